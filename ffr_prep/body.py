@@ -1,0 +1,444 @@
+"""The reduced flexible body: the one object that passes from `ffr_prep` to `ffr_dyn`.
+
+A body is a small, immutable set of arrays: inertia integrals over the mass, modal frequencies, interfaces with
+their mode shapes, and a surface to draw. This module imports numpy and the standard library only, so a simulation
+needs neither a mesher nor a finite-element library.
+
+Notation (SI units): the position of a material point in the body frame is  u_bar = u_0 + Phi q,  with the undeformed
+position u_0 [m], the mass-orthonormal basis Phi (Phi^T M Phi = I, Phi^T K Phi = diag(omega2)) and the elastic
+coordinates q (n,) [m sqrt(kg)]. Integrals over the mass carry the suffix ``_dm``; their integrand is their name.
+The numbered invariants I1...I9 and Shabana's S_bar family are read-only views of these integrals.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import zipfile
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray
+
+MAGIC = "ffr-body"
+FORMAT_VERSION = 1
+
+_ORTHONORMAL_TOLERANCE = 1e-8
+
+
+class BodyError(ValueError):
+    """A body or a body file that cannot be used; the message says what is wrong and what to do."""
+
+
+@dataclass(frozen=True)
+class Interface:
+    """A six-coordinate node to which joints, forces and sensors attach.
+
+    position : (3,) [m], undeformed, in the body frame
+    phi_t    : (3, n) [1/sqrt(kg)], translation of the node per elastic coordinate
+    phi_r    : (3, n) [rad/(m sqrt(kg))], infinitesimal rotation of the node per elastic coordinate
+    kind     : "rigid" (RBE2), "mean" (RBE3) or "node"
+    """
+
+    name: str
+    position: Array
+    phi_t: Array
+    phi_r: Array
+    kind: str = "node"
+
+    def __post_init__(self) -> None:
+        _freeze(self, "position", (3,))
+        n = np.shape(self.phi_t)[-1]
+        _freeze(self, "phi_t", (3, n))
+        _freeze(self, "phi_r", (3, n))
+
+
+@dataclass(frozen=True)
+class Surface:
+    """What is drawn and where fields are recovered: a triangulated boundary with the basis at its points.
+
+    points : (P, 3) [m] undeformed; triangles : (T, 3) indices into points; Phi : (P, 3, n) [1/sqrt(kg)]
+    """
+
+    points: Array
+    triangles: Array
+    Phi: Array
+
+    def __post_init__(self) -> None:
+        count, n = np.shape(self.points)[0], np.shape(self.Phi)[-1]
+        _freeze(self, "points", (count, 3))
+        _freeze(self, "Phi", (count, 3, n))
+        triangles = np.array(self.triangles, dtype=np.int64).reshape(-1, 3)
+        if triangles.size and (triangles.min() < 0 or triangles.max() >= count):
+            raise BodyError(f"surface: a triangle refers to point {triangles.max()}, but there are {count} points")
+        triangles.setflags(write=False)
+        object.__setattr__(self, "triangles", triangles)
+
+
+@dataclass(frozen=True)
+class FlexibleBody:
+    """A linear elastic body in the floating frame of reference; ``n = 0`` is a rigid body.
+
+    mass      : I1, [kg]
+    r_dm      : (3,) integral of u_0 dm [kg m]
+    rr_dm     : (3, 3) integral of u_0k u_0l dm [kg m^2]
+    P_dm      : (3, n) integral of Phi dm [sqrt(kg)]
+    rP_dm     : (3, 3, n) integral of u_0k phi_l,j dm at [k, l, j] [m sqrt(kg)]
+    PP_dm     : (3, 3, n, n) integral of phi_k,i phi_l,j dm at [k, l, i, j] [-]
+    omega2    : (n,) squared circular frequencies of the reduced body under its reference conditions [rad^2/s^2]
+    interfaces, surface : where to attach, what to draw
+    provenance: how the body was made; plain JSON values
+
+    Raises BodyError when the integrals contradict each other (shape, symmetry, orthonormality, negative mass).
+    """
+
+    name: str
+    mass: float
+    r_dm: Array
+    rr_dm: Array
+    P_dm: Array
+    rP_dm: Array
+    PP_dm: Array
+    omega2: Array
+    interfaces: tuple[Interface, ...] = ()
+    surface: Surface | None = None
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        n = np.size(self.omega2)
+        object.__setattr__(self, "mass", float(self.mass))
+        for key, shape in _shapes(n).items():
+            _freeze(self, key, shape)
+        object.__setattr__(self, "interfaces", tuple(self.interfaces))
+        _check(self)
+
+    # ---- sizes and rigid-body quantities -------------------------------------------------------------------------
+
+    @property
+    def n(self) -> int:
+        """Number of elastic coordinates."""
+        return int(self.omega2.size)
+
+    @property
+    def frequencies(self) -> Array:
+        """(n,) frequencies under the reference conditions [Hz]."""
+        return np.sqrt(self.omega2) / (2 * np.pi)
+
+    @property
+    def centre_of_mass(self) -> Array:
+        """(3,) undeformed centre of mass in the body frame [m]."""
+        return self.r_dm / self.mass
+
+    @property
+    def inertia(self) -> Array:
+        """(3, 3) undeformed inertia tensor about the origin of the body frame [kg m^2] (I7)."""
+        return np.trace(self.rr_dm) * np.eye(3) - self.rr_dm
+
+    @property
+    def central_inertia(self) -> Array:
+        """(3, 3) undeformed inertia tensor about the centre of mass, body axes [kg m^2]."""
+        c = self.centre_of_mass
+        return self.inertia - self.mass * (c @ c * np.eye(3) - np.outer(c, c))
+
+    def interface(self, name: str) -> Interface:
+        """The interface of that name; BodyError lists the names there are."""
+        for candidate in self.interfaces:
+            if candidate.name == name:
+                return candidate
+        known = ", ".join(repr(i.name) for i in self.interfaces) or "none"
+        raise BodyError(f"body {self.name!r} has no interface {name!r}; it has: {known}")
+
+    # ---- the nine inertia invariants ------------------------------------------------------------------------------
+    # Signs as in Rantalainen 2007, eqs. 3.50-3.67: J(q) = I7 - sum_j (I8_j + I8_j^T) q_j - sum_ij I9_ij q_i q_j.
+    # Other sources (MBDyn among them) define I8 with the opposite sign.
+
+    @property
+    def I1(self) -> float:
+        """Mass [kg]."""
+        return self.mass
+
+    @property
+    def I2(self) -> Array:
+        """(3,) first moment of the mass, integral of u_0 dm [kg m]."""
+        return self.r_dm
+
+    @property
+    def I3(self) -> Array:
+        """(3, n) integral of Phi dm [sqrt(kg)]."""
+        return self.P_dm
+
+    @property
+    def I4(self) -> Array:
+        """(3, n) integral of u_0 x phi_j dm [m sqrt(kg)]."""
+        return axial(self.rP_dm)
+
+    @property
+    def I5(self) -> Array:
+        """(3, n, n) integral of phi_i x phi_j dm at [:, i, j] [-]."""
+        return axial(self.PP_dm)
+
+    @property
+    def I6(self) -> Array:
+        """(n, n) integral of Phi^T Phi dm [-]; the identity, since the basis is mass-orthonormal."""
+        return np.einsum("kkij->ij", self.PP_dm)
+
+    @property
+    def I7(self) -> Array:
+        """(3, 3) undeformed inertia tensor about the origin, integral of u~^T u~ dm [kg m^2]."""
+        return self.inertia
+
+    @property
+    def I8(self) -> Array:
+        """(n, 3, 3) integral of u_0~ phi_j~ dm [m sqrt(kg)]."""
+        trace = np.einsum("kkj->j", self.rP_dm)
+        return np.einsum("klj->jlk", self.rP_dm) - trace[:, None, None] * np.eye(3)
+
+    @property
+    def I9(self) -> Array:
+        """(n, n, 3, 3) integral of phi_i~ phi_j~ dm at [i, j] [-]."""
+        trace = np.einsum("kkij->ij", self.PP_dm)
+        return np.einsum("klij->ijlk", self.PP_dm) - trace[:, :, None, None] * np.eye(3)
+
+    # ---- Shabana's inertia shape integrals (Dynamics of Multibody Systems, ch. 5 and 6), in modal coordinates -----
+
+    @property
+    def S_bar(self) -> Array:
+        """(3, n) integral of the shape functions dm (= I3) [sqrt(kg)]."""
+        return self.P_dm
+
+    def S_bar_kl(self, k: int, l: int) -> Array:  # noqa: E741 - k, l are the book's indices
+        """(n, n) integral of S_k^T S_l dm, with k, l in 0, 1, 2 for x, y, z [-]."""
+        return self.PP_dm[k, l]
+
+    def N_bar_kl(self, k: int, l: int) -> Array:  # noqa: E741
+        """(n, n) skew part S_bar_kl - S_bar_kl^T [-]."""
+        return self.PP_dm[k, l] - self.PP_dm[k, l].T
+
+    @property
+    def S_bar_ff(self) -> Array:
+        """(n, n) S_bar_xx + S_bar_yy + S_bar_zz (= I6) [-]."""
+        return self.I6
+
+
+def axial(tensor: Array) -> Array:
+    """(3, 3, ...) -> (3, ...): the vector with components T_yz - T_zy, T_zx - T_xz, T_xy - T_yx; a x b for T = a b^T."""
+    return np.stack([tensor[1, 2] - tensor[2, 1], tensor[2, 0] - tensor[0, 2], tensor[0, 1] - tensor[1, 0]])
+
+
+# ---- making bodies ------------------------------------------------------------------------------------------------
+
+
+def rigid_body(
+    name: str,
+    *,
+    mass: float,
+    inertia: Array,
+    centre_of_mass: Array = (0.0, 0.0, 0.0),  # type: ignore[assignment]
+    points: Mapping[str, Array] | None = None,
+    surface: Surface | None = None,
+) -> FlexibleBody:
+    """A body without elastic coordinates.
+
+    mass [kg]; inertia (3, 3) or its diagonal (3,) about the centre of mass, in body axes [kg m^2]; centre_of_mass (3,)
+    [m] in the body frame; points: named points (3,) [m] in the body frame at which joints and forces may attach.
+    Raises BodyError for a mass that is not positive, or an inertia that no mass distribution can have.
+    """
+    tensor = np.asarray(inertia, float)
+    tensor = np.diag(tensor) if tensor.ndim == 1 else tensor
+    if tensor.shape != (3, 3):
+        raise BodyError(f"body {name!r}: inertia must be (3,) or (3, 3), not {np.shape(inertia)}")
+    c = np.asarray(centre_of_mass, float)
+    about_origin = tensor + mass * (c @ c * np.eye(3) - np.outer(c, c))
+    nothing = np.zeros((3, 0))
+    return FlexibleBody(
+        name=name,
+        mass=mass,
+        r_dm=mass * c,
+        rr_dm=0.5 * np.trace(about_origin) * np.eye(3) - about_origin,
+        P_dm=nothing,
+        rP_dm=np.zeros((3, 3, 0)),
+        PP_dm=np.zeros((3, 3, 0, 0)),
+        omega2=np.zeros(0),
+        interfaces=tuple(Interface(key, at, nothing, nothing) for key, at in (points or {}).items()),
+        surface=surface,
+        provenance={"kind": "rigid"},
+    )
+
+
+def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
+    """The body with only its first ``modes`` elastic coordinates, or those whose indices are listed."""
+    keep = np.arange(modes) if np.isscalar(modes) else np.asarray(modes, int)
+    if keep.size and (keep.min() < 0 or keep.max() >= body.n):
+        raise BodyError(f"body {body.name!r} has {body.n} modes; asked to keep mode {int(keep.max()) + 1}")
+    return replace(
+        body,
+        P_dm=body.P_dm[:, keep],
+        rP_dm=body.rP_dm[:, :, keep],
+        PP_dm=body.PP_dm[:, :, keep][:, :, :, keep],
+        omega2=body.omega2[keep],
+        interfaces=tuple(replace(i, phi_t=i.phi_t[:, keep], phi_r=i.phi_r[:, keep]) for i in body.interfaces),
+        surface=body.surface and replace(body.surface, Phi=body.surface.Phi[:, :, keep]),
+    )
+
+
+# ---- the body file ------------------------------------------------------------------------------------------------
+# A zip of .npy members (numpy's .npz, readable without this package) and one JSON member "meta". No pickle.
+
+
+def save_body(body: FlexibleBody, path: str | Path) -> Path:
+    """Write the body to one file, atomically: an existing file is replaced only by a complete new one."""
+    path = Path(path)
+    arrays = {key: getattr(body, key) for key in _shapes(body.n)}
+    for k, interface in enumerate(body.interfaces):
+        for key in ("position", "phi_t", "phi_r"):
+            arrays[f"interface/{k}/{key}"] = getattr(interface, key)
+    if body.surface is not None:
+        for key in ("points", "triangles", "Phi"):
+            arrays[f"surface/{key}"] = getattr(body.surface, key)
+    meta = {
+        "magic": MAGIC,
+        "format_version": FORMAT_VERSION,
+        "name": body.name,
+        "mass": body.mass,
+        "interfaces": [{"name": i.name, "kind": i.kind} for i in body.interfaces],
+        "provenance": dict(body.provenance),
+    }
+    arrays["meta"] = np.frombuffer(json.dumps(meta, sort_keys=True).encode(), dtype=np.uint8)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(path.name + ".part")
+    with open(temporary, "wb") as stream:
+        np.savez_compressed(stream, **arrays)
+    os.replace(temporary, path)
+    return path
+
+
+def load_body(path: str | Path) -> FlexibleBody:
+    """Read a body file. Raises BodyError for a missing, damaged, truncated, foreign or newer file."""
+    path = Path(path)
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            if not isinstance(stored, np.lib.npyio.NpzFile):
+                raise BodyError(f"{path} is not a body file (a bare array); write one with ffr-prep reduce")
+            meta = _meta(path, stored)
+            arrays = {key: stored[key] for key in stored.files if key != "meta"}
+    except FileNotFoundError:
+        raise BodyError(f"body file {path} does not exist") from None
+    except (zipfile.BadZipFile, OSError, EOFError, ValueError, zlib.error) as error:
+        if isinstance(error, BodyError):
+            raise
+        raise BodyError(
+            f"{path} is damaged, truncated or not a body file ({error}); make it again with ffr-prep"
+        ) from None
+    try:
+        return _from_arrays(meta, arrays)
+    except KeyError as error:
+        raise BodyError(f"{path} is damaged: {error} is missing; make it again with ffr-prep") from None
+    except BodyError as error:
+        raise BodyError(f"{path}: {error}") from None
+
+
+def content_hash(*arrays: Array) -> str:
+    """Short SHA-256 of array contents, for provenance."""
+    digest = hashlib.sha256()
+    for array in arrays:
+        digest.update(str((array.shape, array.dtype.str)).encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _meta(path: Path, stored: Any) -> dict[str, Any]:
+    if "meta" not in stored.files:
+        raise BodyError(f"{path} is not a body file (it has no header); write one with ffr-prep reduce")
+    try:
+        meta = json.loads(stored["meta"].tobytes())
+    except (ValueError, UnicodeDecodeError):
+        raise BodyError(f"{path} is not a body file (unreadable header)") from None
+    if not isinstance(meta, dict) or meta.get("magic") != MAGIC:
+        raise BodyError(f"{path} is not a body file (foreign header); write one with ffr-prep reduce")
+    if meta.get("format_version", 0) > FORMAT_VERSION:
+        raise BodyError(
+            f"{path} has body format {meta['format_version']}, this program reads up to {FORMAT_VERSION}: update it"
+        )
+    return meta
+
+
+def _from_arrays(meta: Mapping[str, Any], arrays: Mapping[str, Array]) -> FlexibleBody:
+    interfaces = tuple(
+        Interface(
+            entry["name"],
+            arrays[f"interface/{k}/position"],
+            arrays[f"interface/{k}/phi_t"],
+            arrays[f"interface/{k}/phi_r"],
+            entry["kind"],
+        )
+        for k, entry in enumerate(meta["interfaces"])
+    )
+    surface = None
+    if "surface/points" in arrays:
+        surface = Surface(arrays["surface/points"], arrays["surface/triangles"], arrays["surface/Phi"])
+    core = {key: arrays[key] for key in _shapes(arrays["omega2"].size)}
+    return FlexibleBody(
+        name=meta["name"],
+        mass=meta["mass"],
+        interfaces=interfaces,
+        surface=surface,
+        provenance=meta["provenance"],
+        **core,
+    )
+
+
+# ---- guards -------------------------------------------------------------------------------------------------------
+
+
+def _shapes(n: int) -> dict[str, tuple[int, ...]]:
+    return {
+        "r_dm": (3,),
+        "rr_dm": (3, 3),
+        "P_dm": (3, n),
+        "rP_dm": (3, 3, n),
+        "PP_dm": (3, 3, n, n),
+        "omega2": (n,),
+    }
+
+
+def _freeze(owner: Any, key: str, shape: tuple[int, ...]) -> None:
+    value = np.array(getattr(owner, key), dtype=np.float64)
+    if value.shape != shape:
+        raise BodyError(f"{type(owner).__name__}: {key} has shape {value.shape}, not {shape}")
+    if not np.isfinite(value).all():
+        raise BodyError(f"{type(owner).__name__}: {key} holds values that are not finite")
+    value.setflags(write=False)
+    object.__setattr__(owner, key, value)
+
+
+def _check(body: FlexibleBody) -> None:
+    if not (np.isfinite(body.mass) and body.mass > 0):
+        raise BodyError(f"body {body.name!r}: mass is {body.mass} kg; it must be positive")
+    names = [i.name for i in body.interfaces]
+    if len(set(names)) < len(names):
+        raise BodyError(f"body {body.name!r}: interface names repeat: {names}")
+    if body.omega2.size and body.omega2.min() < 0:
+        raise BodyError(f"body {body.name!r}: omega2 has the negative value {body.omega2.min():g}")
+    parts = [i.phi_t for i in body.interfaces] + ([body.surface.Phi] if body.surface else [])
+    if any(part.shape[-1] != body.n for part in parts):
+        raise BodyError(f"body {body.name!r}: interfaces or surface do not have {body.n} modes")
+    off = np.abs(body.I6 - np.eye(body.n)).max(initial=0.0)
+    if off > _ORTHONORMAL_TOLERANCE:
+        raise BodyError(f"body {body.name!r}: the basis is not mass-orthonormal (off by {off:.1e})")
+    off = np.abs(body.PP_dm - body.PP_dm.transpose(1, 0, 3, 2)).max(initial=0.0)
+    if off > _ORTHONORMAL_TOLERANCE:
+        raise BodyError(f"body {body.name!r}: PP_dm[l, k] is not PP_dm[k, l]^T (off by {off:.1e})")
+    second = body.rr_dm - np.outer(body.r_dm, body.r_dm) / body.mass
+    scale = np.abs(body.rr_dm).max()
+    if np.abs(second - second.T).max() > 1e-10 * scale or np.linalg.eigvalsh(second).min() < -1e-10 * scale:
+        moments = np.linalg.eigvalsh(body.central_inertia)
+        raise BodyError(
+            f"body {body.name!r}: no mass distribution has the principal moments of inertia {moments} kg m^2 "
+            "(each must be at most the sum of the other two)"
+        )
