@@ -227,7 +227,7 @@ class FlexibleBody:
 
 
 def axial(tensor: Array) -> Array:
-    """(3, 3, ...) -> (3, ...): the vector with components T_yz - T_zy, T_zx - T_xz, T_xy - T_yx; a x b for T = a b^T."""
+    """(3, 3, ...) -> (3, ...): T_yz - T_zy, T_zx - T_xz, T_xy - T_yx, which is a x b for T = a b^T."""
     return np.stack([tensor[1, 2] - tensor[2, 1], tensor[2, 0] - tensor[0, 2], tensor[0, 1] - tensor[1, 0]])
 
 
@@ -273,7 +273,7 @@ def rigid_body(
 
 def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
     """The body with only its first ``modes`` elastic coordinates, or those whose indices are listed."""
-    keep = np.arange(modes) if np.isscalar(modes) else np.asarray(modes, int)
+    keep = np.arange(modes) if isinstance(modes, int) else np.asarray(modes, int)
     if keep.size and (keep.min() < 0 or keep.max() >= body.n):
         raise BodyError(f"body {body.name!r} has {body.n} modes; asked to keep mode {int(keep.max()) + 1}")
     return replace(
@@ -312,9 +312,12 @@ def save_body(body: FlexibleBody, path: str | Path) -> Path:
     arrays["meta"] = np.frombuffer(json.dumps(meta, sort_keys=True).encode(), dtype=np.uint8)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(path.name + ".part")
-    with open(temporary, "wb") as stream:
-        np.savez_compressed(stream, **arrays)
-    os.replace(temporary, path)
+    try:
+        with open(temporary, "wb") as stream:
+            np.savez_compressed(stream, **arrays)
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
     return path
 
 

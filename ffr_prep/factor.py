@@ -1,0 +1,147 @@
+"""The one door to sparse factorisations, and the constrained static problem that everything else is made of.
+
+The stiffness K of a free body is singular: its null space is the six rigid motions T. Six coordinates that hold the
+body without redundancy are clamped, and the remaining matrix is factorised once. Every other support follows from it
+with a small dense system: the displacement u that minimises  1/2 u^T K u - f^T u  subject to  C u = c  is
+
+    u = S (f - C^T mu) + T alpha,    T^T (f - C^T mu) = 0,    C u = c,
+
+with S the inverse of the clamped stiffness and mu the multipliers (constraint forces). The loads that S sees are in
+equilibrium, so the clamped coordinates carry no reaction and their choice does not matter.
+
+Source: C. Farhat, F.-X. Roux, Int. J. Numer. Meth. Eng. 32 (1991) 1205-1227 (generalised inverse of a floating body).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+import scipy.sparse.linalg
+
+from ffr_prep.errors import ComputationError
+
+Array = np.ndarray
+
+_SINGULAR = 1e15
+_SCALING_SWEEPS = 10
+
+
+def factorise(A: sp.sparray) -> Callable[[Array], Array]:
+    """The solver of a sparse symmetric positive definite matrix A (n, n): b (n,) or (n, r) -> A^-1 b.
+
+    Raises ComputationError when A is singular to working precision.
+    """
+    try:
+        factor = scipy.sparse.linalg.splu(
+            sp.csc_array(A), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+    except RuntimeError as error:
+        raise ComputationError(f"the stiffness matrix cannot be factorised ({error}); {_REMEDY}") from None
+    probe = np.random.default_rng(0).standard_normal(A.shape[0])
+    growth = scipy.sparse.linalg.norm(A, 1) * np.abs(factor.solve(probe)).max() / np.abs(probe).max()
+    if not growth < _SINGULAR:
+        raise ComputationError(f"the stiffness matrix is singular (condition above {growth:.1e}); {_REMEDY}")
+    return factor.solve
+
+
+_REMEDY = "look for parts joined by a single node or edge, or materials of extremely different stiffness"
+
+
+@dataclass(frozen=True)
+class FreeBody:
+    """A free body, ready to be solved under any support.
+
+    K : (Z, Z) stiffness; T : (Z, 6) orthonormal rigid motions; solve : clamped inverse S, (Z, r) -> (Z, r)
+    """
+
+    K: sp.csr_array
+    T: Array
+    solve: Callable[[Array], Array]
+
+
+def free_body(K: sp.csr_array, T: Array) -> FreeBody:
+    """Clamp six coordinates, chosen so that the rigid motions T (Z, 6) are best held, and factorise once."""
+    rigid, _ = np.linalg.qr(T)
+    _, order = scipy.linalg.qr(rigid.T, mode="r", pivoting=True)
+    free = np.delete(np.arange(K.shape[0]), order[:6])
+    solve_free = factorise(K[free][:, free])
+
+    def solve(load: Array) -> Array:
+        displacement = np.zeros_like(load)
+        displacement[free] = solve_free(load[free])
+        return displacement
+
+    return FreeBody(K, rigid, solve)
+
+
+@dataclass(frozen=True)
+class SupportedBody:
+    """A free body under the supports C u = c; C : (r, Z) independent functionals that hold all rigid motions."""
+
+    body: FreeBody
+    C: Array
+    flexibility: Array
+    scale: Array
+    bordered: tuple[Array, Array]
+
+
+def supported(body: FreeBody, C: Array) -> SupportedBody:
+    """Prepare the small system of the supports C (r, Z), r >= 6.
+
+    Raises ComputationError when the supports depend on one another or leave a rigid motion.
+    """
+    flexibility = body.solve(np.ascontiguousarray(C.T))
+    held = C @ body.T
+    bordered = np.block([[-C @ flexibility, held], [held.T, np.zeros((6, 6))]])
+    scale = _equilibration(bordered)
+    scaled = scale[:, None] * bordered * scale
+    condition = np.linalg.cond(scaled)
+    if not condition < 1e13:
+        raise ComputationError(
+            f"the {len(C)} supports depend on one another or leave a rigid motion free (condition {condition:.1e})"
+        )
+    return SupportedBody(body, C, flexibility, scale, scipy.linalg.lu_factor(scaled))
+
+
+def solve_supported(problem: SupportedBody, f: Array, c: Array) -> tuple[Array, Array]:
+    """Displacement u (Z, r) and multipliers mu of the loads f (Z, r) and the prescribed values c (supports, r)."""
+    particular = problem.body.solve(f)
+    right = np.vstack([c - problem.C @ particular, problem.body.T.T @ f])
+    solution = scipy.linalg.lu_solve(problem.bordered, problem.scale[:, None] * right) * problem.scale[:, None]
+    mu, alpha = solution[: len(c)], solution[len(c) :]
+    return particular - problem.flexibility @ mu + problem.body.T @ alpha, mu
+
+
+def solve_refined(problem: SupportedBody, f: Array, c: Array) -> tuple[Array, Array]:
+    """As `solve_supported`, with one step of iterative refinement; ComputationError when the residual stays large."""
+    u, mu = solve_supported(problem, f, c)
+    residual = f - problem.body.K @ u - problem.C.T @ mu
+    du, dmu = solve_supported(problem, residual, c - problem.C @ u)
+    u, mu = u + du, mu + dmu
+    _check_residual(problem, f, u, mu)
+    return u, mu
+
+
+def _check_residual(problem: SupportedBody, f: Array, u: Array, mu: Array) -> None:
+    reaction = problem.C.T @ mu
+    residual = np.linalg.norm(f - problem.body.K @ u - reaction)
+    noise = np.linalg.norm(abs(problem.body.K) @ np.abs(u))
+    allowed = 1e-6 * (np.linalg.norm(f) + np.linalg.norm(reaction)) + 1e-11 * noise
+    if not residual <= allowed:
+        raise ComputationError(
+            f"a static solution misses equilibrium by {residual:.1e} N (allowed {allowed:.1e} N): the stiffness is "
+            f"nearly singular; {_REMEDY}"
+        )
+
+
+def _equilibration(A: Array) -> Array:
+    """(n,) factors d for which the rows of d A d have largest entries near one (D. Ruiz, RAL-TR-2001-034)."""
+    d = np.ones(len(A))
+    for _ in range(_SCALING_SWEEPS):
+        largest = np.abs(d[:, None] * A * d).max(axis=1)
+        d /= np.sqrt(np.where(largest > 0, largest, 1.0))
+    return d

@@ -1,0 +1,313 @@
+"""Interfaces: regions of the mesh tied to six-coordinate nodes to which joints and forces attach.
+
+A *rigid* interface (RBE2) moves its region as one piece: the nodes of the region follow three translations and three
+rotations of the interface. A *mean* interface (RBE3) leaves the region free and moves with it in the mean: its six
+coordinates are the rigid motion closest to the region's displacement in the least-squares sense over the area.
+Either way the field is  u = B z  in independent coordinates z, and the interface coordinates are  C z.
+
+Source: R. H. MacNeal, The NASTRAN Theoretical Manual (1972), section 5 (rigid elements); the weights of the mean are
+the consistent surface mass of the faces, so a rigid motion is recovered exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from ffr_prep.errors import InputError
+from ffr_prep.mesh import Mesh, face_group, region_nodes
+from ffr_prep.solids import SolidMatrices, face_mass, vector_mass
+
+Array = np.ndarray
+
+_COLLINEAR = 1e-10
+_DEPENDENT = 1e-10
+
+
+@dataclass(frozen=True)
+class InterfaceRegion:
+    """A region of the mesh that becomes an interface.
+
+    name   : of the interface
+    region : face or node group of the mesh; the name of the interface when not given
+    kind   : "rigid" (RBE2) or "mean" (RBE3)
+    point  : (3,) position of the six-coordinate node [m]; the area centroid of a face group (the mean of a node
+             group) when not given
+
+    Raises InputError for another kind.
+    """
+
+    name: str
+    region: str | None = None
+    kind: str = "rigid"
+    point: tuple[float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("rigid", "mean"):
+            raise InputError(f"interface {self.name!r}: kind is {self.kind!r}; it must be 'rigid' or 'mean'")
+        if self.point is not None and (np.shape(self.point) != (3,) or not np.isfinite(self.point).all()):
+            raise InputError(f"interface {self.name!r}: point is {self.point}; it must be three finite numbers")
+
+
+@dataclass(frozen=True)
+class CoupledModel:
+    """The finite-element model in the independent coordinates z that the rigid interfaces leave.
+
+    points  : (N, 3) nodes [m]
+    B       : (3N, Z) field of the independent coordinates, u = B z
+    K, M    : (Z, Z) stiffness and consistent mass
+    T       : (Z, 6) rigid motions: three translations, three rotations about `centre`
+    centre  : (3,) mean of the nodes [m]
+    names, kinds, positions (I, 3) [m] : of the I interfaces
+    C       : (6I, Z) interface coordinates C z: three translations [m] and three rotations [rad] of each interface
+    """
+
+    points: Array
+    B: sp.csr_array
+    K: sp.csr_array
+    M: sp.csr_array
+    T: Array
+    centre: Array
+    names: tuple[str, ...]
+    kinds: tuple[str, ...]
+    positions: Array
+    C: sp.csr_array
+
+
+def couple(mesh: Mesh, matrices: SolidMatrices, interfaces: Sequence[InterfaceRegion]) -> CoupledModel:
+    """Tie the interfaces to the mesh.
+
+    Raises InputError for repeated names, an unknown region, a region of fewer than three or of collinear nodes,
+    rigid regions that share nodes, interfaces whose coordinates depend on one another, and a mesh in several parts.
+    """
+    _check_names(interfaces)
+    regions = [_region(mesh, interface) for interface in interfaces]
+    _check_overlaps(regions)
+    B = _transformation(mesh.points, regions)
+    C = _coordinates(len(mesh.points), regions, B)
+    _check_independent(regions, C)
+    K = sp.csr_array(B.T @ matrices.K @ B)
+    _check_connected(K)
+    centre = mesh.points.mean(axis=0)
+    return CoupledModel(
+        points=mesh.points,
+        B=B,
+        K=K,
+        M=sp.csr_array(B.T @ vector_mass(matrices.m) @ B),
+        T=_rigid_motions(mesh.points, centre, regions),
+        centre=centre,
+        names=tuple(interface.name for interface in interfaces),
+        kinds=tuple(interface.kind for interface in interfaces),
+        positions=np.array([region.point for region in regions]).reshape(-1, 3),
+        C=C,
+    )
+
+
+def interface_index(model: CoupledModel, name: str) -> int:
+    """Position of the interface in the model; InputError lists the names there are."""
+    if name not in model.names:
+        known = ", ".join(repr(n) for n in model.names) or "none"
+        raise InputError(f"there is no interface {name!r}; the interfaces are: {known}")
+    return model.names.index(name)
+
+
+# ---- regions ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Region:
+    """The nodes (r,) of an interface with their weights (r, r) of sum `total`, the centroid and the second moment.
+
+    second_moment : (3, 3) sum of weights (|d|^2 I - d d^T), d from the centroid
+    """
+
+    interface: InterfaceRegion
+    nodes: Array
+    weights: sp.csr_array
+    total: float
+    offsets: Array
+    centroid: Array
+    point: Array
+    second_moment: Array
+
+
+def _region(mesh: Mesh, interface: InterfaceRegion) -> _Region:
+    name = interface.region or interface.name
+    nodes = region_nodes(mesh, name)
+    if len(nodes) < 3:
+        raise InputError(
+            f"interface {interface.name!r}: region {name!r} has {len(nodes)} nodes; a six-coordinate node needs at "
+            "least three that are not on one line"
+        )
+    weights = _weights(mesh, name, nodes)
+    row_sums = np.asarray(weights.sum(axis=1)).ravel()
+    total = float(row_sums.sum())
+    centroid = row_sums @ mesh.points[nodes] / total
+    offsets = mesh.points[nodes] - centroid
+    moment = offsets.T @ (weights @ offsets)
+    second_moment = np.trace(moment) * np.eye(3) - moment
+    _check_not_collinear(interface, second_moment, centroid)
+    point = centroid if interface.point is None else np.asarray(interface.point, float)
+    return _Region(interface, nodes, weights, total, offsets, centroid, point, second_moment)
+
+
+def _weights(mesh: Mesh, name: str, nodes: Array) -> sp.csr_array:
+    """(r, r) consistent surface mass of a face group [m^2]; equal weights for a node group."""
+    count = len(nodes)
+    if name not in mesh.face_groups:
+        return sp.csr_array(sp.eye_array(count, format="csr"))
+    weights = sp.csr_array((count, count))
+    for faces in face_group(mesh, name):
+        local = np.searchsorted(nodes, faces)
+        rows = np.repeat(local, faces.shape[1], axis=1).ravel()
+        columns = np.tile(local, (1, faces.shape[1])).ravel()
+        of_faces = sp.coo_array((face_mass(mesh.points, faces).ravel(), (rows, columns)), shape=(count, count))
+        weights = weights + of_faces.tocsr()
+    return sp.csr_array(weights)
+
+
+def _mean_motion(region: _Region) -> Array:
+    """(6, r, 3) translation of the point and rotation, of the nodal displacements of the region.
+
+    The rigid motion that minimises the weighted square of the difference to the displacement.
+    """
+    row_sums = np.asarray(region.weights.sum(axis=1)).ravel()
+    translation = row_sums[None, :, None] / region.total * np.eye(3)[:, None, :]
+    rotation = np.tensordot(np.linalg.inv(region.second_moment), _tilde(region.weights @ region.offsets), (1, 1))
+    arm = _tilde(region.point - region.centroid)
+    return np.concatenate([translation - np.tensordot(arm, rotation, 1), rotation])
+
+
+def _tilde(v: Array) -> Array:
+    """(..., 3) -> (..., 3, 3): a~ b = a x b."""
+    return np.cross(np.eye(3), np.asarray(v)[..., None, :])
+
+
+# ---- transformation and coordinates -------------------------------------------------------------------------------
+
+
+def _rigid(regions: Sequence[_Region]) -> list[_Region]:
+    return [region for region in regions if region.interface.kind == "rigid"]
+
+
+def _free_nodes(points: Array, regions: Sequence[_Region]) -> Array:
+    """(N,) which nodes follow no rigid interface."""
+    free = np.ones(len(points), bool)
+    for region in _rigid(regions):
+        free[region.nodes] = False
+    return free
+
+
+def _transformation(points: Array, regions: Sequence[_Region]) -> sp.csr_array:
+    """B (3N, Z): the free nodes' displacements first, then six coordinates for each rigid interface."""
+    rigid = _rigid(regions)
+    free_dofs = np.flatnonzero(np.repeat(_free_nodes(points, regions), 3))
+    rows, columns, values = [free_dofs], [np.arange(free_dofs.size)], [np.ones(free_dofs.size)]
+    for k, region in enumerate(rigid):
+        following = rigid_field(points[region.nodes] - region.point)
+        node_rows = 3 * region.nodes[:, None, None] + np.arange(3)[None, :, None]
+        coordinate_columns = free_dofs.size + 6 * k + np.arange(6)[None, None, :]
+        rows.append(np.broadcast_to(node_rows, following.shape).ravel())
+        columns.append(np.broadcast_to(coordinate_columns, following.shape).ravel())
+        values.append(following.ravel())
+    shape = (3 * len(points), free_dofs.size + 6 * len(rigid))
+    triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    return sp.csr_array(sp.coo_array(triplets, shape=shape))
+
+
+def _coordinates(count: int, regions: Sequence[_Region], B: sp.csr_array) -> sp.csr_array:
+    """C (6I, Z) of all interfaces in their order."""
+    first = B.shape[1] - 6 * len(_rigid(regions))
+    parts = [sp.csr_array((0, B.shape[1]))]
+    for region in regions:
+        if region.interface.kind == "rigid":
+            parts.append(sp.eye_array(6, B.shape[1], k=first, format="csr"))
+            first += 6
+        else:
+            parts.append(_on_nodes(count, region) @ B)
+    return sp.csr_array(sp.vstack(parts, format="csr"))
+
+
+def _on_nodes(count: int, region: _Region) -> sp.csr_array:
+    """(6, 3N) the mean motion as rows on the nodal displacements."""
+    motion = _mean_motion(region).reshape(6, -1)
+    dofs = (3 * region.nodes[:, None] + np.arange(3)).ravel()
+    ends = np.arange(7) * dofs.size
+    return sp.csr_array((motion.ravel(), np.tile(dofs, 6), ends), shape=(6, 3 * count))
+
+
+def _rigid_motions(points: Array, centre: Array, regions: Sequence[_Region]) -> Array:
+    """T (Z, 6): the rigid motions in the independent coordinates."""
+    of_nodes = rigid_field(points[_free_nodes(points, regions)] - centre).reshape(-1, 6)
+    turning = np.hstack([np.zeros((3, 3)), np.eye(3)])
+    of_interfaces = [np.vstack([rigid_field(region.point - centre), turning]) for region in _rigid(regions)]
+    return np.vstack([of_nodes, *of_interfaces])
+
+
+def rigid_field(offsets: Array) -> Array:
+    """(..., 3) -> (..., 3, 6): displacement of a point by three translations and three rotations."""
+    identity = np.broadcast_to(np.eye(3), (*np.shape(offsets), 3))
+    return np.concatenate([identity, -_tilde(offsets)], axis=-1)
+
+
+# ---- guards -------------------------------------------------------------------------------------------------------
+
+
+def _check_names(interfaces: Sequence[InterfaceRegion]) -> None:
+    names = [interface.name for interface in interfaces]
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    if repeated:
+        raise InputError(f"interface name {repeated[0]!r} is given more than once: every interface needs its own name")
+
+
+def _check_not_collinear(interface: InterfaceRegion, second_moment: Array, centroid: Array) -> None:
+    moments, axes = np.linalg.eigh(second_moment)
+    if moments[0] <= _COLLINEAR * moments[-1]:
+        raise InputError(
+            f"interface {interface.name!r}: the nodes of region {interface.region or interface.name!r} lie on one "
+            f"line through {_words(centroid)} m along {_words(axes[:, 0])}; the rotation about it is undetermined: "
+            "choose a region with width"
+        )
+
+
+def _check_overlaps(regions: Sequence[_Region]) -> None:
+    rigid = _rigid(regions)
+    for k, one in enumerate(rigid):
+        for other in rigid[k + 1 :]:
+            shared = np.intersect1d(one.nodes, other.nodes)
+            if shared.size:
+                raise InputError(
+                    f"rigid interfaces {one.interface.name!r} and {other.interface.name!r} share {shared.size} nodes "
+                    f"(node {shared[0]} is the first): a node cannot follow two of them; make one 'mean' or separate "
+                    "the regions"
+                )
+
+
+def _check_independent(regions: Sequence[_Region], C: sp.csr_array) -> None:
+    length = np.sqrt(np.asarray((C * C).sum(axis=1))).ravel()
+    gram = (C @ C.T).toarray() / np.outer(length, length)
+    for k, region in enumerate(regions):
+        if np.linalg.eigvalsh(gram[: 6 * k + 6, : 6 * k + 6])[0] < _DEPENDENT:
+            raise InputError(
+                f"interface {region.interface.name!r} moves only with interfaces already given "
+                f"({', '.join(repr(r.interface.name) for r in regions[:k])}): its region must have nodes of its own"
+            )
+
+
+def _check_connected(K: sp.csr_array) -> None:
+    parts, labels = connected_components(K, directed=False)
+    if parts > 1:
+        sizes = np.sort(np.bincount(labels))[::-1]
+        listed = ", ".join(str(size) for size in sizes[:5])
+        raise InputError(
+            f"the mesh falls into {parts} parts that nothing connects ({listed}{', ...' if parts > 5 else ''} degrees "
+            "of freedom): merge the coincident nodes, join the parts with a rigid interface, or reduce them one by one"
+        )
+
+
+def _words(vector: Array) -> str:
+    return "(" + ", ".join(f"{value:.4g}" for value in vector) + ")"

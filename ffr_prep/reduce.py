@@ -1,0 +1,174 @@
+"""From a mesh to a reduced flexible body: the method from end to end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from ffr_prep.body import FlexibleBody, Interface, Surface, content_hash
+from ffr_prep.interface import CoupledModel, InterfaceRegion, couple
+from ffr_prep.invariants import inertia_integrals
+from ffr_prep.mesh import Mesh, check_mesh, mesh_hash, surface_triangles
+from ffr_prep.reduction import Basis, Reduction, check_basis
+from ffr_prep.reference import ReferenceConditions, functionals
+from ffr_prep.solids import Materials, assemble
+
+Array = np.ndarray
+
+
+_VERSIONED = ("ffr", "numpy", "scipy", "scikit-fem")
+
+
+def reduce_mesh(
+    mesh: Mesh,
+    *,
+    name: str,
+    material: Materials,
+    interfaces: Sequence[InterfaceRegion],
+    reference: ReferenceConditions,
+    reduction: Reduction,
+    progress: Callable[[str], None] | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> FlexibleBody:
+    """The reduced flexible body of a meshed solid, in the coordinates of the mesh.
+
+    material   : one, or one for each volume group
+    progress   : called with the name of each stage as it begins
+    provenance : JSON values kept with the body, beside what is recorded anyway
+
+    Raises InputError for input that cannot be used and ComputationError for a computation that failed.
+    """
+    tell = progress or _silent
+    tell("check the mesh")
+    check_mesh(mesh)
+    tell("assemble stiffness and mass")
+    matrices = assemble(mesh, material)
+    tell("tie the interfaces")
+    model = couple(mesh, matrices, interfaces)
+    L = functionals(reference, model)
+    tell("reduce")
+    basis = reduction.basis(model, L)
+    check_basis(model, L, basis)
+    tell("integrate the inertia")
+    Phi = nodal_basis(model, basis)
+    return FlexibleBody(
+        name=name,
+        omega2=basis.omega2,
+        interfaces=interface_shapes(model, basis),
+        surface=boundary(mesh, Phi),
+        provenance=record(mesh, material, interfaces, reference, reduction, model) | dict(provenance or {}),
+        **vars(inertia_integrals(mesh.points, matrices.m, Phi)),
+    )
+
+
+# ---- parts of the body --------------------------------------------------------------------------------------------
+
+
+def nodal_basis(model: CoupledModel, basis: Basis) -> Array:
+    """Phi (N, 3, n) [1/sqrt(kg)] at the nodes of the mesh."""
+    return (model.B @ basis.Z).reshape(*model.points.shape, basis.omega2.size)
+
+
+def interface_shapes(model: CoupledModel, basis: Basis) -> tuple[Interface, ...]:
+    """The interfaces with translation and rotation per elastic coordinate."""
+    shapes = (model.C @ basis.Z).reshape(len(model.names), 6, basis.omega2.size)
+    attached = zip(model.names, model.positions, shapes, model.kinds, strict=True)
+    return tuple(Interface(name, at, six[:3], six[3:], kind) for name, at, six, kind in attached)
+
+
+def boundary(mesh: Mesh, Phi: Array) -> Surface:
+    """The triangulated boundary of the mesh with the basis at its points."""
+    points, triangles = surface_triangles(mesh)
+    return Surface(mesh.points[points], triangles, Phi[points])
+
+
+def _silent(stage: str) -> None:
+    pass
+
+
+# ---- what is known about the body ---------------------------------------------------------------------------------
+
+
+def record(
+    mesh: Mesh,
+    material: Materials,
+    interfaces: Sequence[InterfaceRegion],
+    reference: ReferenceConditions,
+    reduction: Reduction,
+    model: CoupledModel,
+) -> dict[str, Any]:
+    """Provenance as JSON values: mesh, settings, versions, warnings. No time and no path, so it is reproducible."""
+    return {
+        "mesh": {
+            "hash": mesh_hash(mesh),
+            "nodes": len(mesh.points),
+            "elements": _element_counts(mesh),
+            "degrees_of_freedom": model.K.shape[0],
+        },
+        "material": _described(material),
+        "interfaces": [_described(interface) for interface in interfaces],
+        "reference": _described(reference),
+        "reduction": _described(reduction),
+        "versions": {package: version(package) for package in _VERSIONED},
+        "warnings": mesh_warnings(mesh),
+    }
+
+
+def mesh_warnings(mesh: Mesh) -> list[str]:
+    """What makes the results of this mesh doubtful, in words."""
+    counts = _element_counts(mesh)
+    if "tet4" not in counts:
+        return []
+    return [
+        f"{counts['tet4']} first-order tetrahedra (tet4): they are far too stiff in bending (locking); "
+        "use second-order elements (tet10)"
+    ]
+
+
+def summary(body: FlexibleBody) -> dict[str, Any]:
+    """The numbers that describe a body, as JSON values (SI units).
+
+    effective_mass    : per mode, the mass [kg] that translations along x, y, z excite, I3**2
+    effective_inertia : per mode, the moment of inertia [kg m^2] that rotations about the axes of the body frame
+                        excite, I4**2
+    """
+    return {
+        "name": body.name,
+        "mass": body.mass,
+        "centre_of_mass": body.centre_of_mass.tolist(),
+        "inertia": body.inertia.tolist(),
+        "central_inertia": body.central_inertia.tolist(),
+        "modes": body.n,
+        "frequencies": body.frequencies.tolist(),
+        "effective_mass": (body.I3.T**2).tolist(),
+        "effective_inertia": (body.I4.T**2).tolist(),
+        "interfaces": [{"name": i.name, "kind": i.kind, "position": i.position.tolist()} for i in body.interfaces],
+        "surface_points": 0 if body.surface is None else len(body.surface.points),
+        "warnings": list(body.provenance.get("warnings", [])),
+    }
+
+
+def _element_counts(mesh: Mesh) -> dict[str, int]:
+    counts: dict[str, int] = {}
+    for block in mesh.blocks:
+        counts[block.kind] = counts.get(block.kind, 0) + len(block.nodes)
+    return counts
+
+
+def _described(value: Any) -> Any:
+    """Settings as JSON values: a dataclass by its type and fields, an array by its hash, a function by its name."""
+    if is_dataclass(value):
+        return {"type": type(value).__name__} | {f.name: _described(getattr(value, f.name)) for f in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): _described(entry) for key, entry in value.items()}
+    if isinstance(value, (tuple, list)):
+        return [_described(entry) for entry in value]
+    if isinstance(value, np.ndarray):
+        return {"shape": list(value.shape), "hash": content_hash(value)}
+    if isinstance(value, np.generic):
+        return value.item()
+    return value.__qualname__ if callable(value) else value
