@@ -9,7 +9,7 @@ Source: K. J. Bathe, Finite Element Procedures (1996), sections 4.2 and 5.3.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -85,8 +85,8 @@ class ElementKind:
     """
 
     shapes: Callable[[], skfem.Element]
-    corners: list[tuple[int, ...]]
-    means: list[tuple[int, ...]]
+    corners: Sequence[tuple[int, ...]]
+    means: Sequence[tuple[int, ...]]
     stiffness_order: int
     mass_order: int
 
@@ -96,14 +96,14 @@ VOLUMES = {
     "tet10": ElementKind(skfem.ElementTetP2, _CORNERS_TET, _EDGES_TET, 2, 7),
     "hex8": ElementKind(skfem.ElementHex1, _CORNERS_HEX, [], 3, 5),
     "hex20": ElementKind(skfem.ElementHexS2, _CORNERS_HEX, _EDGES_HEX, 5, 9),
-    "hex27": ElementKind(skfem.ElementHex2, _CORNERS_HEX, _EDGES_HEX + _FACES_HEX + _ALL_HEX, 5, 9),
+    "hex27": ElementKind(skfem.ElementHex2, _CORNERS_HEX, [*_EDGES_HEX, *_FACES_HEX, *_ALL_HEX], 5, 9),
 }
 FACES = {
     3: ElementKind(skfem.ElementTriP1, _CORNERS_TRI, [], 1, 2),
     6: ElementKind(skfem.ElementTriP2, _CORNERS_TRI, _EDGES_TRI, 2, 7),
     4: ElementKind(skfem.ElementQuad1, _CORNERS_QUAD, [], 3, 5),
     8: ElementKind(skfem.ElementQuadS2, _CORNERS_QUAD, _EDGES_QUAD, 5, 9),
-    9: ElementKind(skfem.ElementQuad2, _CORNERS_QUAD, _EDGES_QUAD + _ALL_QUAD, 5, 9),
+    9: ElementKind(skfem.ElementQuad2, _CORNERS_QUAD, [*_EDGES_QUAD, *_ALL_QUAD], 5, 9),
 }
 
 
