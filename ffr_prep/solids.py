@@ -53,7 +53,9 @@ def assemble(mesh: Mesh, material: Materials) -> SolidMatrices:
         stiffness = _stiffness(mesh.points, chunk, lam, mu)
         for i, j in np.ndindex(3, 3):
             np.add.at(K[i, j], slots, stiffness[:, :, i, :, j].ravel())
-    return SolidMatrices(_from_blocks(pattern, K), sp.csr_array((m, pattern.indices, pattern.indptr)))
+    return SolidMatrices(
+        _from_blocks(pattern, K), sp.csr_array((m, pattern.indices, pattern.indptr), shape=pattern.shape)
+    )
 
 
 def vector_mass(m: sp.sparray) -> sp.csr_array:
@@ -271,4 +273,5 @@ def _slots(keys: Array, count: int, nodes: Array) -> Array:
 
 def _from_blocks(pattern: sp.csr_array, K: Array) -> sp.csr_array:
     blocks = np.ascontiguousarray(K.transpose(2, 0, 1))
-    return sp.csr_array(sp.bsr_array((blocks, pattern.indices, pattern.indptr)).tocsr())
+    shape = (3 * pattern.shape[0], 3 * pattern.shape[1])
+    return sp.csr_array(sp.bsr_array((blocks, pattern.indices, pattern.indptr), shape=shape).tocsr())

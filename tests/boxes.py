@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import permutations, product
 
 import numpy as np
@@ -33,6 +34,14 @@ _HEX_FACES = (
     (0, 1, 2, 3, 8, 9, 10, 11, 24),
     (4, 5, 6, 7, 12, 13, 14, 15, 25),
 )
+_HEX_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+_MEANS = {
+    "tet4": (),
+    "tet10": _TET_EDGES,
+    "hex8": (),
+    "hex20": _HEX_EDGES,
+    "hex27": (*_HEX_EDGES, *(face[:4] for face in _HEX_FACES), tuple(range(8))),
+}
 _NODES = {"tet4": 4, "tet10": 10, "hex8": 8, "hex20": 20, "hex27": 27}
 _FACE_NODES = {"tet4": 3, "tet10": 6, "hex8": 4, "hex20": 8, "hex27": 9}
 
@@ -82,3 +91,41 @@ def rotation(seed: int) -> np.ndarray:
     Q, R = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     Q = Q * np.sign(np.diag(R))
     return Q if np.linalg.det(Q) > 0 else -Q
+
+
+def straightened(mesh: Mesh) -> Mesh:
+    """The mesh with every further node at the mean of the corners of its edge, face or cell."""
+    points = mesh.points.copy()
+    for block in mesh.blocks:
+        corners = block.nodes[:, : 4 if block.kind.startswith("tet") else 8]
+        for k, of in enumerate(_MEANS[block.kind]):
+            points[block.nodes[:, corners.shape[1] + k]] = points[corners[:, list(of)]].mean(axis=1)
+    return replace(mesh, points=points)
+
+
+def shaken(mesh: Mesh, amplitude: float, seed: int = 0) -> Mesh:
+    """The box mesh with its inner corner nodes moved at random by up to `amplitude` [m], straight elements."""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    inner = ((mesh.points > low + 1e-9) & (mesh.points < high - 1e-9)).astype(float)
+    step = np.random.default_rng(seed).uniform(-amplitude, amplitude, mesh.points.shape)
+    return straightened(replace(mesh, points=mesh.points + inner * step))
+
+
+def moved(mesh: Mesh, R: np.ndarray, by: np.ndarray) -> Mesh:
+    """The mesh turned by R and then shifted."""
+    return replace(mesh, points=mesh.points @ R.T + by)
+
+
+def rigid_motions(points: np.ndarray) -> np.ndarray:
+    """(N, 3, 6) the six rigid motions about the origin."""
+    motions = np.zeros((len(points), 3, 6))
+    motions[:, :, :3] = np.eye(3)
+    for k, axis in enumerate(np.eye(3)):
+        motions[:, :, 3 + k] = np.cross(axis, points)
+    return motions
+
+
+def box_inertia(mass: float, size: np.ndarray) -> np.ndarray:
+    """(3, 3) central inertia of a homogeneous box [kg m^2]."""
+    a, b, c = size
+    return mass / 12 * np.diag([b**2 + c**2, a**2 + c**2, a**2 + b**2])
