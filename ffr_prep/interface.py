@@ -267,9 +267,10 @@ def _check_names(interfaces: Sequence[InterfaceRegion]) -> None:
 def _check_not_collinear(interface: InterfaceRegion, second_moment: Array, centroid: Array) -> None:
     moments, axes = np.linalg.eigh(second_moment)
     if moments[0] <= _COLLINEAR * moments[-1]:
+        size = float(np.sqrt(moments[-1]) + np.abs(centroid).max())
         raise InputError(
             f"interface {interface.name!r}: the nodes of region {interface.region or interface.name!r} lie on one "
-            f"line through {_words(centroid)} m along {_words(axes[:, 0])}; the rotation about it is undetermined: "
+            f"line through {in_words(centroid, size)} m along {in_words(axes[:, 0], 1.0)}; the rotation about it is undetermined: "
             "choose a region with width"
         )
 
@@ -309,5 +310,7 @@ def _check_connected(K: sp.csr_array) -> None:
         )
 
 
-def _words(vector: Array) -> str:
-    return "(" + ", ".join(f"{value:.4g}" for value in vector) + ")"
+def in_words(vector: Array, scale: float) -> str:
+    """The vector to four digits; parts below 1e-9 of the scale are zero."""
+    rounded = np.where(np.abs(vector) < 1e-9 * scale, 0.0, vector)
+    return "(" + ", ".join(f"{value:.4g}" for value in rounded) + ")"

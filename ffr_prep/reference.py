@@ -18,7 +18,7 @@ import numpy as np
 import scipy.linalg
 
 from ffr_prep.errors import InputError
-from ffr_prep.interface import CoupledModel, interface_index
+from ffr_prep.interface import CoupledModel, in_words, interface_index
 
 Array = np.ndarray
 Vector = tuple[float, float, float]
@@ -201,20 +201,14 @@ def motion_in_words(motion: Array, centre: Array, length: float) -> str:
     translation, turn = motion[:3], motion[3:]
     rate = np.linalg.norm(turn)
     if rate * length <= 1e-8 * np.linalg.norm(translation):
-        return f"translation along {_words(translation / np.linalg.norm(translation))}"
+        return f"translation along {in_words(translation / np.linalg.norm(translation), 1.0)}"
     axis = turn / rate
     point = centre + np.cross(axis, translation) / rate
     pitch = axis @ translation / rate
-    through = f"about the axis through {_words(point)} m along {_words(axis)}"
+    through = f"about the axis through {in_words(point, length)} m along {in_words(axis, 1.0)}"
     if abs(pitch) <= 1e-8 * length:
         return f"rotation {through}"
     return f"screw motion {through} with pitch {pitch:.4g} m/rad"
-
-
-def _words(vector: Array) -> str:
-    """The vector to four digits, without noise and negative zeros."""
-    rounded = np.where(np.abs(vector) < 1e-9 * np.abs(vector).max(), 0.0, vector) + 0.0
-    return "(" + ", ".join(f"{value:.4g}" for value in rounded) + ")"
 
 
 def _length(model: CoupledModel) -> float:
