@@ -26,7 +26,7 @@ from ffr_prep.errors import ComputationError
 
 Array = np.ndarray
 
-_SINGULAR = 1e15
+_SINGULAR = 1e13
 _SCALING_SWEEPS = 10
 
 
@@ -41,8 +41,10 @@ def factorise(A: sp.sparray) -> Callable[[Array], Array]:
         )
     except RuntimeError as error:
         raise ComputationError(f"the stiffness matrix cannot be factorised ({error}); {_REMEDY}") from None
+    # Scaled to a unit diagonal, so that neither units nor the size of the body matter.
+    scale = np.sqrt(np.abs(A.diagonal()))
     probe = np.random.default_rng(0).standard_normal(A.shape[0])
-    growth = scipy.sparse.linalg.norm(A, 1) * np.abs(factor.solve(probe)).max() / np.abs(probe).max()
+    growth = np.abs(scale * factor.solve(scale * probe)).max() / np.abs(probe).max()
     if not growth < _SINGULAR:
         raise ComputationError(f"the stiffness matrix is singular (condition above {growth:.1e}); {_REMEDY}")
     return factor.solve

@@ -270,8 +270,8 @@ def _check_not_collinear(interface: InterfaceRegion, second_moment: Array, centr
         size = float(np.sqrt(moments[-1]) + np.abs(centroid).max())
         raise InputError(
             f"interface {interface.name!r}: the nodes of region {interface.region or interface.name!r} lie on one "
-            f"line through {in_words(centroid, size)} m along {in_words(axes[:, 0], 1.0)}; the rotation about it is undetermined: "
-            "choose a region with width"
+            f"line through {in_words(centroid, size)} m along {in_words(axes[:, 0], 1.0)}; the rotation about it is "
+            "undetermined: choose a region with width"
         )
 
 

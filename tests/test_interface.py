@@ -127,7 +127,7 @@ def with_nodes(*nodes):
 
 @pytest.mark.parametrize("kind", ["rigid", "mean"])
 def test_a_region_of_two_nodes_is_refused(kind):
-    with pytest.raises(InputError, match="region 'few' has 2 nodes; .* at least three"):
+    with pytest.raises(InputError, match=r"region 'few' has 2 nodes; .* at least three"):
         coupled(with_nodes(0, 1), InterfaceRegion("pin", region="few", kind=kind))
 
 

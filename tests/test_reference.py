@@ -151,9 +151,8 @@ def test_a_screw_motion_is_named():
     held = np.delete(np.eye(6), 3, axis=0)
     held[0, 3] = -0.1
     (motion,) = free_rigid_motions(held, 1.0).T
-    assert "screw motion about the axis through (0, 0, 0) m along (1, 0, 0) with pitch 0.1 m/rad" == motion_in_words(
-        motion, np.zeros(3), 1.0
-    )
+    words = motion_in_words(motion, np.zeros(3), 1.0)
+    assert words == "screw motion about the axis through (0, 0, 0) m along (1, 0, 0) with pitch 0.1 m/rad"
 
 
 @pytest.mark.parametrize("length", [1e-4, 1.0, 1e4])
