@@ -15,8 +15,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -272,10 +270,17 @@ def rigid_body(
 
 
 def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
-    """The body with only its first ``modes`` elastic coordinates, or those whose indices are listed."""
-    keep = np.arange(modes) if isinstance(modes, int) else np.asarray(modes, int)
-    if keep.size and (keep.min() < 0 or keep.max() >= body.n):
-        raise BodyError(f"body {body.name!r} has {body.n} modes; asked to keep mode {int(keep.max()) + 1}")
+    """The body with only its first ``modes`` elastic coordinates, or those whose indices are listed.
+
+    Raises BodyError for a mode that does not exist or is listed twice.
+    """
+    keep = np.arange(int(modes)) if np.ndim(modes) == 0 else np.asarray(modes, int)
+    unknown = keep[(keep < 0) | (keep >= body.n)]
+    if unknown.size or np.unique(keep).size < keep.size:
+        raise BodyError(
+            f"body {body.name!r} has {body.n} modes, counted from 0; asked to keep {keep.tolist()}: each must exist "
+            "and be named once"
+        )
     return replace(
         body,
         P_dm=body.P_dm[:, keep],
@@ -292,7 +297,10 @@ def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
 
 
 def save_body(body: FlexibleBody, path: str | Path) -> Path:
-    """Write the body to one file, atomically: an existing file is replaced only by a complete new one."""
+    """Write the body to one file, atomically: an existing file is replaced only by a complete new one.
+
+    Raises BodyError when the provenance is not JSON, OSError when the file cannot be written.
+    """
     path = Path(path)
     arrays = {key: getattr(body, key) for key in _shapes(body.n)}
     for k, interface in enumerate(body.interfaces):
@@ -309,7 +317,7 @@ def save_body(body: FlexibleBody, path: str | Path) -> Path:
         "interfaces": [{"name": i.name, "kind": i.kind} for i in body.interfaces],
         "provenance": dict(body.provenance),
     }
-    arrays["meta"] = np.frombuffer(json.dumps(meta, sort_keys=True).encode(), dtype=np.uint8)
+    arrays["meta"] = np.frombuffer(_header(body, meta).encode(), dtype=np.uint8)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(path.name + ".part")
     try:
@@ -325,25 +333,18 @@ def load_body(path: str | Path) -> FlexibleBody:
     """Read a body file. Raises BodyError for a missing, damaged, truncated, foreign or newer file."""
     path = Path(path)
     try:
-        with np.load(path, allow_pickle=False) as stored:
-            if not isinstance(stored, np.lib.npyio.NpzFile):
-                raise BodyError(f"{path} is not a body file (a bare array); write one with ffr-prep reduce")
-            meta = _meta(path, stored)
-            arrays = {key: stored[key] for key in stored.files if key != "meta"}
+        return _from_arrays(*_read(path))
     except FileNotFoundError:
         raise BodyError(f"body file {path} does not exist") from None
-    except (zipfile.BadZipFile, OSError, EOFError, ValueError, zlib.error) as error:
-        if isinstance(error, BodyError):
-            raise
-        raise BodyError(
-            f"{path} is damaged, truncated or not a body file ({error}); make it again with ffr-prep"
-        ) from None
-    try:
-        return _from_arrays(meta, arrays)
-    except KeyError as error:
-        raise BodyError(f"{path} is damaged: {error} is missing; make it again with ffr-prep") from None
+    except (PermissionError, IsADirectoryError) as error:
+        raise BodyError(f"body file {path} cannot be read ({error.strerror})") from None
     except BodyError as error:
         raise BodyError(f"{path}: {error}") from None
+    except Exception as error:  # a damaged zip, array header or field can fail in any way the readers know
+        what = str(error) or type(error).__name__
+        raise BodyError(
+            f"{path} is damaged, truncated or not a body file ({what}); make it again with ffr-prep reduce"
+        ) from None
 
 
 def content_hash(*arrays: Array) -> str:
@@ -355,18 +356,31 @@ def content_hash(*arrays: Array) -> str:
     return digest.hexdigest()[:16]
 
 
-def _meta(path: Path, stored: Any) -> dict[str, Any]:
-    if "meta" not in stored.files:
-        raise BodyError(f"{path} is not a body file (it has no header); write one with ffr-prep reduce")
+def _header(body: FlexibleBody, meta: Mapping[str, Any]) -> str:
     try:
-        meta = json.loads(stored["meta"].tobytes())
-    except (ValueError, UnicodeDecodeError):
-        raise BodyError(f"{path} is not a body file (unreadable header)") from None
+        return json.dumps(meta, sort_keys=True)
+    except (TypeError, ValueError) as error:
+        raise BodyError(f"body {body.name!r}: the provenance must be plain JSON values ({error})") from None
+
+
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:
+    stored = np.load(path, allow_pickle=False)
+    if not isinstance(stored, np.lib.npyio.NpzFile):
+        raise BodyError("not a body file (a bare array); write one with ffr-prep reduce")
+    with stored:
+        meta = _meta(stored)
+        return meta, {key: stored[key] for key in stored.files if key != "meta"}
+
+
+def _meta(stored: Any) -> dict[str, Any]:
+    if "meta" not in stored.files:
+        raise BodyError("not a body file (it has no header); write one with ffr-prep reduce")
+    meta = json.loads(stored["meta"].tobytes())
     if not isinstance(meta, dict) or meta.get("magic") != MAGIC:
-        raise BodyError(f"{path} is not a body file (foreign header); write one with ffr-prep reduce")
-    if meta.get("format_version", 0) > FORMAT_VERSION:
+        raise BodyError("not a body file (foreign header); write one with ffr-prep reduce")
+    if meta["format_version"] > FORMAT_VERSION:
         raise BodyError(
-            f"{path} has body format {meta['format_version']}, this program reads up to {FORMAT_VERSION}: update it"
+            f"body format {meta['format_version']}; this program reads up to {FORMAT_VERSION}: update the program"
         )
     return meta
 
