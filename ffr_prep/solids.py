@@ -9,7 +9,7 @@ Source: K. J. Bathe, Finite Element Procedures (1996), sections 4.2 and 5.3.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 
@@ -18,6 +18,7 @@ import scipy.sparse as sp
 import skfem
 from skfem.quadrature import get_quadrature
 
+from ffr_prep.elements import KINDS
 from ffr_prep.errors import InputError
 from ffr_prep.material import Material
 from ffr_prep.mesh import Block, Mesh
@@ -65,53 +66,26 @@ def vector_mass(m: sp.sparray) -> sp.csr_array:
 
 # ---- reference elements -------------------------------------------------------------------------------------------
 
-_EDGES_HEX = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
-_EDGES_TET = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]
-_FACES_HEX = [(0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (3, 2, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7)]
-_CORNERS_TET = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
-_CORNERS_HEX = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
-_CORNERS_TRI = [(0, 0), (1, 0), (0, 1)]
-_CORNERS_QUAD = [(0, 0), (1, 0), (1, 1), (0, 1)]
-_EDGES_TRI = [(0, 1), (1, 2), (2, 0)]
-_EDGES_QUAD = [(0, 1), (1, 2), (2, 3), (3, 0)]
-_ALL_HEX = [tuple(range(8))]
-_ALL_QUAD = [tuple(range(4))]
+# Orders of the quadrature rules. The stiffness is integrated in full (exactly on straight tetrahedra); the mass exactly
+# for every shape the element can take: its integrand is N_a N_b det J.
+STIFFNESS_ORDER = {"tet4": 1, "tet10": 2, "hex8": 3, "hex20": 5, "hex27": 5}
+MASS_ORDER = {"tet4": 2, "tet10": 7, "hex8": 5, "hex20": 9, "hex27": 9}
 
-
-@dataclass(frozen=True)
-class ElementKind:
-    """A reference element: scikit-fem's shape functions, the corners, and the corners whose mean each further node is.
-
-    The nodes are in meshio's (VTK's) order. The order of the stiffness rule is that of full integration; the mass
-    rule is exact for every shape the element can take (integrand N_a N_b det J).
-    """
-
-    shapes: Callable[[], skfem.Element]
-    corners: Sequence[tuple[int, ...]]
-    means: Sequence[tuple[int, ...]]
-    stiffness_order: int
-    mass_order: int
-
-
-VOLUMES = {
-    "tet4": ElementKind(skfem.ElementTetP1, _CORNERS_TET, [], 1, 2),
-    "tet10": ElementKind(skfem.ElementTetP2, _CORNERS_TET, _EDGES_TET, 2, 7),
-    "hex8": ElementKind(skfem.ElementHex1, _CORNERS_HEX, [], 3, 5),
-    "hex20": ElementKind(skfem.ElementHexS2, _CORNERS_HEX, _EDGES_HEX, 5, 9),
-    "hex27": ElementKind(skfem.ElementHex2, _CORNERS_HEX, [*_EDGES_HEX, *_FACES_HEX, *_ALL_HEX], 5, 9),
-}
-FACES = {
-    3: ElementKind(skfem.ElementTriP1, _CORNERS_TRI, [], 1, 2),
-    6: ElementKind(skfem.ElementTriP2, _CORNERS_TRI, _EDGES_TRI, 2, 7),
-    4: ElementKind(skfem.ElementQuad1, _CORNERS_QUAD, [], 3, 5),
-    8: ElementKind(skfem.ElementQuadS2, _CORNERS_QUAD, _EDGES_QUAD, 5, 9),
-    9: ElementKind(skfem.ElementQuad2, _CORNERS_QUAD, [*_EDGES_QUAD, *_ALL_QUAD], 5, 9),
+_TRIANGLE = np.array([(0, 0), (1, 0), (0, 1), (0.5, 0), (0.5, 0.5), (0, 0.5)])
+_SQUARE = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5), (0.5, 0.5)])
+# Faces by their number of nodes: shape functions, nodes of the reference face in VTK's order, order of the mass rule.
+_FACES = {
+    3: (skfem.ElementTriP1, _TRIANGLE[:3], 2),
+    6: (skfem.ElementTriP2, _TRIANGLE, 7),
+    4: (skfem.ElementQuad1, _SQUARE[:4], 5),
+    8: (skfem.ElementQuadS2, _SQUARE[:8], 9),
+    9: (skfem.ElementQuad2, _SQUARE, 9),
 }
 
 
 @dataclass(frozen=True)
 class Rule:
-    """Shape functions at quadrature points: weights (Q,), N (Q, k), dN (Q, k, d), nodes in meshio's order."""
+    """Shape functions at quadrature points: weights (Q,), N (Q, k), dN (Q, k, d), nodes in VTK's order."""
 
     weights: Array
     N: Array
@@ -119,22 +93,24 @@ class Rule:
 
 
 @cache
-def _rule(kind: str | int, order: int) -> Rule:
-    element_kind = VOLUMES[kind] if isinstance(kind, str) else FACES[kind]
-    element = element_kind.shapes()
+def _volume_rule(kind: str, order: int) -> Rule:
+    return _rule(getattr(skfem, KINDS[kind].shapes)(), KINDS[kind].nodes, order)
+
+
+@cache
+def _face_rule(k: int) -> Rule:
+    element, nodes, order = _FACES[k]
+    return _rule(element(), nodes, order)
+
+
+def _rule(element: skfem.Element, nodes: Array, order: int) -> Rule:
+    """The rule of that order, with scikit-fem's shape functions sorted to the nodes (k, d) of the reference element."""
     X, weights = get_quadrature(element.refdom, order)
-    evaluated = [element.lbasis(X, i) for i in _scikit_fem_order(element_kind, element.doflocs)]
+    theirs = np.linalg.norm(nodes[:, None] - element.doflocs[None], axis=-1).argmin(axis=1)
+    evaluated = [element.lbasis(X, i) for i in theirs]
     N = np.stack([np.broadcast_to(value, X.shape[1]) for value, _ in evaluated], axis=-1)
     dN = np.stack([np.broadcast_to(gradient, X.shape) for _, gradient in evaluated], axis=-1)
     return Rule(weights, N, np.ascontiguousarray(dN.transpose(1, 2, 0)))
-
-
-def _scikit_fem_order(kind: ElementKind, doflocs: Array) -> Array:
-    """For each node in meshio's order, the index of scikit-fem's shape function at the same reference point."""
-    corners = np.array(kind.corners, float)
-    nodes = np.vstack([corners] + [corners[list(of)].mean(axis=0)[None] for of in kind.means])
-    distance = np.linalg.norm(nodes[:, None] - doflocs[None], axis=-1)
-    return np.argmin(distance, axis=1)
 
 
 # ---- element integrals --------------------------------------------------------------------------------------------
@@ -174,7 +150,7 @@ def _jacobian(points: Array, chunk: _Chunk, rule: Rule) -> tuple[Array, Array]:
 
 def _mass(points: Array, chunk: _Chunk) -> Array:
     """(e, k, k) integral of N_a N_b dV [m^3]."""
-    rule = _rule(chunk.kind, VOLUMES[chunk.kind].mass_order)
+    rule = _volume_rule(chunk.kind, MASS_ORDER[chunk.kind])
     _, volume = _jacobian(points, chunk, rule)
     products = np.einsum("qa,qb->qab", rule.N, rule.N)
     return np.tensordot(volume, products, axes=1)
@@ -185,7 +161,7 @@ def _stiffness(points: Array, chunk: _Chunk, lam: Array, mu: Array) -> Array:
 
     K_aibj = integral of lam N_a,i N_b,j + mu N_a,j N_b,i + mu delta_ij N_a,k N_b,k dV
     """
-    rule = _rule(chunk.kind, VOLUMES[chunk.kind].stiffness_order)
+    rule = _volume_rule(chunk.kind, STIFFNESS_ORDER[chunk.kind])
     J, volume = _jacobian(points, chunk, rule)
     gradient = np.matmul(rule.dN, np.linalg.inv(J)) * np.sqrt(volume)[..., None, None]
     count, points_per_element, k, _ = gradient.shape
@@ -200,8 +176,7 @@ def _stiffness(points: Array, chunk: _Chunk, lam: Array, mu: Array) -> Array:
 
 def face_mass(points: Array, faces: Array) -> Array:
     """(F, k, k) integral of N_a N_b dA [m^2] over faces (F, k) of 3, 6, 4, 8 or 9 nodes."""
-    k = faces.shape[1]
-    rule = _rule(k, FACES[k].mass_order)
+    rule = _face_rule(faces.shape[1])
     J = np.einsum("fkc,qkd->fqcd", points[faces], rule.dN, optimize=True)
     area = np.linalg.norm(np.cross(J[..., 0], J[..., 1]), axis=-1) * rule.weights
     return np.einsum("fq,qa,qb->fab", area, rule.N, rule.N, optimize=True)
