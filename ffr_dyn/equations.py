@@ -1,0 +1,410 @@
+"""Scene -> compiled tables. Declarations end here; the kernels read numbers only."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ffr_dyn.drivers import driver_word
+from ffr_dyn.elimination import Elimination, eliminate
+from ffr_dyn.errors import InputError
+from ffr_dyn.forces import Load
+from ffr_dyn.joints import Word, words
+from ffr_dyn.kernels.tables import (
+    Bodies,
+    BodyWork,
+    Functions,
+    Loads,
+    Markers,
+    MarkerWork,
+    Model,
+    Pattern,
+    Record,
+    Rows,
+    RowWork,
+    Stages,
+    Work,
+)
+from ffr_dyn.layout import Layout, layout
+from ffr_dyn.scene import Scene, joint_of, marker_number, markers
+from ffr_dyn.state import StateView
+from ffr_dyn.timefunction import USER, TimeFunction, as_time_function
+from ffr_prep.body import FlexibleBody, axial
+
+Array = np.ndarray
+
+SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+@dataclass(frozen=True)
+class Block:
+    """The rows of one joint or driver: a name, two marker numbers, the words."""
+
+    name: str
+    i: int
+    j: int
+    words: tuple[Word, ...]
+    function: TimeFunction | None = None
+
+
+@dataclass(frozen=True)
+class System:
+    """A compiled scene: the tables, and what connects their numbers to the scene's names.
+
+    blocks : in elimination order, as the rows in the tables;  user : keeps the callback of the user's functions alive
+    """
+
+    scene: Scene
+    layout: Layout
+    blocks: tuple[Block, ...]
+    elimination: Elimination
+    model: Model
+    user: UserFunctions
+
+
+def blocks_of(scene: Scene) -> list[Block]:
+    """Joints, then drivers, as blocks of words."""
+    listed = [
+        Block(j.name, marker_number(scene, j.i), marker_number(scene, j.j), tuple(words(j))) for j in scene.joints
+    ]
+    for driver in scene.drivers:
+        joint = joint_of(scene, driver)
+        ends = marker_number(scene, joint.i), marker_number(scene, joint.j)
+        listed.append(Block(driver.name, *ends, (driver_word(driver, joint),), driver.function))
+    return listed
+
+
+def compile_scene(scene: Scene, blocks: list[Block] | None = None) -> System:
+    """Tables of a scene. `blocks`: the constraint rows to use (those that assembly found independent); default all."""
+    chosen = blocks_of(scene) if blocks is None else blocks
+    place = layout(scene)
+    table = markers(scene)
+    ground = len(scene.bodies)
+    moving = [tuple(b for b in (table[k.i][0], table[k.j][0]) if b != ground) for k in chosen]
+    elimination = eliminate([len(k.words) for k in chosen], moving)
+    ordered = tuple(chosen[k] for k in elimination.order)
+    functions = FunctionTable()
+    model = {
+        "gravity": np.array(scene.gravity),
+        "bodies": _bodies(scene, place),
+        "markers": _markers(scene, ordered),
+        "rows": _rows(ordered, functions),
+        "pattern": _pattern(ordered, [moving[k] for k in elimination.order], elimination, table),
+        "loads": _loads(scene, functions),
+        "functions": functions.tables(),
+    }
+    user = UserFunctions(functions.callbacks, place, scene)
+    compiled = Model(**model, user_address=user.address, user_count=user.count)  # type: ignore[arg-type]
+    return System(scene, place, ordered, elimination, compiled, user)
+
+
+# ---- bodies -------------------------------------------------------------------------------------------------------
+
+
+def _six(tensor: Array) -> Array:
+    """(3, 3, ...) -> (6, ...) symmetric part."""
+    return np.stack([0.5 * (tensor[k, l] + tensor[l, k]) for k, l in SYMMETRIC])
+
+
+def _nine(tensor: Array) -> Array:
+    """(3, 3, ...) -> (9, ...) symmetric part and axial vector."""
+    return np.concatenate([_six(tensor), axial(tensor)])
+
+
+def _pp_rows(body: FlexibleBody) -> Array:
+    return np.moveaxis(_nine(body.PP_dm), 1, 0).ravel()  # (n over i, 9, n over j)
+
+
+def _pool(parts: list[Array]) -> Array:
+    return np.concatenate([np.ravel(p) for p in parts]) if parts else np.zeros(0)
+
+
+def _starts(sizes: list[int]) -> Array:
+    return np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)]).astype(np.int64)
+
+
+def _bodies(scene: Scene, place: Layout) -> Bodies:
+    models = [body.model for body in scene.bodies]
+    n = [m.n for m in models]
+    where = np.zeros((len(n) + 1, 5), dtype=np.int64)
+    where[:-1] = np.column_stack([n, place.ix, place.iv, _starts(n)[:-1], _starts([9 * k * k for k in n])[:-1]])
+    where[-1, 3] = sum(n)
+    return Bodies(
+        where=where,
+        mass=np.array([m.mass for m in models]),
+        moments=np.array([np.concatenate([m.r_dm, _six(m.rr_dm)]) for m in models]),
+        P_dm=_pool([m.P_dm for m in models]),
+        rP_dm=_pool([_nine(m.rP_dm) for m in models]),
+        PP_dm=_pool([_pp_rows(m) for m in models]),
+        omega2=_pool([m.omega2 for m in models]),
+        two_zeta_omega=_pool([2 * b.damping * np.sqrt(b.model.omega2) for b in scene.bodies]),
+    )
+
+
+# ---- markers ------------------------------------------------------------------------------------------------------
+
+
+def _markers(scene: Scene, blocks: tuple[Block, ...]) -> Markers:
+    table = markers(scene)
+    ground = len(scene.bodies)
+    interfaces = [i for body in scene.bodies for i in body.model.interfaces]
+    phi = [np.concatenate([i.phi_t, i.phi_r]) for i in interfaces] + [np.zeros((6, 0))] * len(scene.ground)
+    joint = sorted({k for block in blocks for k in (block.i, block.j)})
+    loaded = [marker_number(scene, load.marker) for load in scene.loads]
+    sprung = [marker_number(scene, m) for spring in scene.springs for m in (spring.i, spring.j)]
+    return Markers(
+        body=np.array([entry[0] for entry in table], dtype=np.int64),
+        u=np.array([i.position for i in interfaces] + list(scene.ground.values())).reshape(-1, 3),
+        phi=_pool(phi),
+        start=_starts([p.size for p in phi])[:-1],
+        active=np.array(sorted({*joint, *loaded, *sprung}), dtype=np.int64),
+        joint=np.array([k for k in joint if table[k][0] != ground], dtype=np.int64),
+    )
+
+
+# ---- constraints --------------------------------------------------------------------------------------------------
+
+
+def _rows(blocks: tuple[Block, ...], functions: FunctionTable) -> Rows:
+    function = []
+    for block in blocks:
+        number = -1 if block.function is None else functions.add(block.function, f"driver {block.name!r}")
+        function += [number] * len(block.words)
+    listed = [word for block in blocks for word in block.words]
+    axes = [np.array([word.axis_i, word.axis_i2, word.axis_j]) for word in listed]
+    return Rows(
+        kind=np.array([word.kind for word in listed], dtype=np.int64),
+        axes=np.array(axes, dtype=float).reshape(-1, 3, 3),
+        function=np.array(function, dtype=np.int64),
+        start=_starts([len(b.words) for b in blocks]),
+        marker=np.array([(b.i, b.j) for b in blocks], dtype=np.int64).reshape(-1, 2),
+    )
+
+
+def _pattern(
+    blocks: tuple[Block, ...], moving: list[tuple[int, ...]], elimination: Elimination, table: list[tuple[int, str, str]]
+) -> Pattern:
+    size = [len(b.words) for b in blocks]
+    offsets: dict[tuple[int, int], int] = {}
+    total = 0
+    for k, column in enumerate(elimination.columns):
+        for later in (k, *column):
+            offsets[later, k] = total
+            total += size[later] * size[k]
+    sides = [[table[block.i][0], table[block.j][0]] for block in blocks]
+    pairs = [
+        (b, later, sides[later].index(b), earlier, sides[earlier].index(b), offsets[later, earlier])
+        for earlier in range(len(blocks))
+        for later in (earlier, *elimination.columns[earlier])
+        for b in moving[earlier]
+        if b in moving[later]
+    ]
+    listed = np.array(pairs, dtype=np.int64).reshape(-1, 6)
+    updates = [
+        [offsets[a, b] for at, a in enumerate(column) for b in column[: at + 1]] for column in elimination.columns
+    ]
+    column = [(later, offsets[later, k]) for k, column in enumerate(elimination.columns) for later in column]
+    return Pattern(
+        pair_body=listed[:, 0].copy(),
+        pair=listed[:, 1:].copy(),
+        diagonal=np.array([offsets[k, k] for k in range(len(blocks))], dtype=np.int64),
+        column_start=_starts([len(column) for column in elimination.columns]),
+        column=np.array(column, dtype=np.int64).reshape(-1, 2),
+        update_start=_starts([len(column) for column in updates]),
+        update=np.array([offset for column in updates for offset in column], dtype=np.int64),
+    )
+
+
+# ---- loads and functions ------------------------------------------------------------------------------------------
+
+
+class FunctionTable:
+    """Collects time functions while a scene is compiled, and the callbacks of the user with their slots."""
+
+    def __init__(self) -> None:
+        self.functions: list[TimeFunction] = []
+        self.callbacks: list[Callback] = []
+        self.slots = 0
+
+    def add(self, function: TimeFunction, what: str = "function") -> int:
+        if function.callback is not None:
+            slot = self.callback(function.callback, 3, what, with_state=False)
+            function = TimeFunction(USER, (float(slot),))
+        self.functions.append(function)
+        return len(self.functions) - 1
+
+    def callback(self, function: Callable[..., Any], size: int, what: str, *, with_state: bool) -> int:
+        slot = self.slots
+        self.callbacks.append(Callback(function, slot, size, what, with_state))
+        self.slots += size
+        return slot
+
+    def tables(self) -> Functions:
+        return Functions(
+            kind=np.array([f.kind for f in self.functions], dtype=np.int64),
+            start=_starts([len(f.data) for f in self.functions]),
+            data=_pool([np.array(f.data) for f in self.functions]),
+        )
+
+
+@dataclass(frozen=True)
+class Callback:
+    """A Python function of the user and where its numbers go."""
+
+    function: Callable[..., Any]
+    slot: int
+    size: int
+    what: str
+    with_state: bool
+
+
+def _loads(scene: Scene, functions: FunctionTable) -> Loads:
+    value, number, wrench = [], [], []
+    for load in scene.loads:
+        constants, indices = _components(load, functions)
+        value.append(constants)
+        number.append(indices)
+        slot = -1
+        if load.function is not None:
+            slot = functions.callback(load.function, 6, f"load {load.name!r}", with_state=True)
+        wrench.append((marker_number(scene, load.marker), int(load.axes == "body"), slot))
+    springs = [(s.stiffness, s.damping, s.free_length, s.preload) for s in scene.springs]
+    ends = [(marker_number(scene, s.i), marker_number(scene, s.j)) for s in scene.springs]
+    return Loads(
+        wrench=np.array(wrench, dtype=np.int64).reshape(-1, 3),
+        value=np.array(value, dtype=float).reshape(-1, 6),
+        function=np.array(number, dtype=np.int64).reshape(-1, 6),
+        spring=np.array(ends, dtype=np.int64).reshape(-1, 2),
+        spring_data=np.array(springs, dtype=float).reshape(-1, 4),
+    )
+
+
+def _components(load: Load, functions: FunctionTable) -> tuple[list[float], list[int]]:
+    constants, indices = [], []
+    for component in (*load.force, *load.moment):
+        if isinstance(component, (int, float, np.floating, np.integer)):
+            if not np.isfinite(component):
+                raise InputError(f"load {load.name!r}: a component is {component}; all must be finite")
+            constants.append(float(component))
+            indices.append(-1)
+        else:
+            what = f"load {load.name!r}"
+            constants.append(1.0)
+            indices.append(functions.add(as_time_function(component, what), what))
+    return constants, indices
+
+
+# ---- the user's Python functions ----------------------------------------------------------------------------------
+
+_SIGNATURE = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
+
+
+class UserFunctions:
+    """One C callback through which the kernels reach all Python functions of a scene.
+
+    Python cannot raise through compiled code: the callback reports failure, and `failure` keeps what to tell the user.
+    """
+
+    def __init__(self, callbacks: list[Callback], place: Layout, scene: Scene) -> None:
+        self.callbacks = callbacks
+        self.place = place
+        self.scene = scene
+        self.count = sum(c.size for c in callbacks)
+        self.failure: str | None = None
+        self.cause: BaseException | None = None
+        self._c_function = _SIGNATURE(self._call)
+        self.address = ctypes.cast(self._c_function, ctypes.c_void_p).value or 0
+
+    def _call(self, t: float, x_address: int, v_address: int, out_address: int) -> int:
+        x = _at(x_address, self.place.x_size)
+        v = _at(v_address, self.place.v_size)
+        out = _at(out_address, self.count)
+        for callback in self.callbacks:
+            try:
+                out[callback.slot : callback.slot + callback.size] = self._values(callback, t, x, v)
+            except BaseException as error:  # noqa: BLE001 - nothing may pass through compiled code
+                self.failure = f"{callback.what} at t = {t:.6g} s: {error or type(error).__name__}"
+                self.cause = error
+                return 1
+        return 0
+
+    def _values(self, callback: Callback, t: float, x: Array, v: Array) -> Array:
+        arguments = (t, StateView(self.scene, self.place, x, v)) if callback.with_state else (t,)
+        given = np.atleast_1d(np.asarray(callback.function(*arguments), dtype=float))
+        values = np.zeros(callback.size)
+        if given.ndim != 1 or given.size > callback.size or (callback.with_state and given.size not in (3, 6)):
+            raise InputError(f"the function returned {given!r}, not numbers of the right count")
+        if not np.isfinite(given).all():
+            raise InputError(f"the function returned {given}; it must be finite")
+        values[: given.size] = given
+        return values
+
+
+def _at(address: int, size: int) -> Array:
+    return np.ctypeslib.as_array(ctypes.cast(address, ctypes.POINTER(ctypes.c_double)), (size,))
+
+
+# ---- memory -------------------------------------------------------------------------------------------------------
+
+
+def new_work(m: Model) -> Work:
+    """Scratch for one evaluation, with the elastic diagonal of an explicit method."""
+    B, E, M, C = m.bodies.mass.size, int(m.bodies.where[-1, 3]), m.markers.body.size, m.rows.kind.size
+    n, V, pairs = m.bodies.where[:, 0], 6 * B + E, m.pattern.pair_body.size
+    size = np.diff(m.rows.start)
+    column = np.repeat(np.arange(size.size), np.diff(m.pattern.column_start))
+    stored = int((size**2).sum() + (size[m.pattern.column[:, 0]] * size[column]).sum())
+
+    def zeros(**shapes: Any) -> dict[str, Array]:
+        return {key: np.zeros(shape) for key, shape in shapes.items()}
+
+    bodies = BodyWork(
+        A=_identities(B + 1),
+        dinv=np.ones(E),
+        **zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), g=9 * E, l=3 * E, Cd=6 * E, L=(B, 6, 6), f=V, acc=V),
+        **zeros(rigid=(B, 6), elastic=E),
+    )
+    vectors = zeros(omega=(M, 3), r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3))
+    rows = RowWork(
+        **zeros(Phi=C, nu=C, gamma=C, lam=C, jac=(C, 2, 9), rr=(C, 2, 6), ww=(C, 2, 6)),
+        **zeros(P=(M, 6, 6), phiphi=(pairs, 6, 6), S=stored),
+    )
+    return Work(
+        bodies=bodies,
+        markers=MarkerWork(A=_identities(M), **vectors),
+        rows=rows,
+        info=np.zeros(4, dtype=np.int64),
+        **zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=2),
+    )
+
+
+def _identities(count: int) -> Array:
+    return np.repeat(np.eye(3)[None], count, axis=0)
+
+
+def new_stages(system: System, count: int) -> Stages:
+    """Scratch of an integrator with `count` stages."""
+    place, rows = system.layout, system.model.rows.kind.size
+    return Stages(np.zeros((count, place.x_size)), np.zeros((count, place.v_size)), np.zeros(rows))
+
+
+def new_record(system: System, rows: int) -> Record:
+    """Room for `rows` output times."""
+    m, place = system.model, system.layout
+    M, K, Z = m.markers.body.size, m.rows.marker.shape[0], m.loads.spring.shape[0]
+    return Record(
+        np.zeros(rows),
+        np.zeros((rows, place.x_size)),
+        np.zeros((rows, place.v_size)),
+        np.zeros((rows, place.v_size)),
+        np.zeros((rows, M, 3)),
+        np.zeros((rows, M, 3)),
+        np.zeros((rows, K, 6)),
+        np.zeros((rows, Z)),
+        np.zeros((rows, 3)),
+        np.zeros((rows, 2)),
+    )

@@ -1,0 +1,28 @@
+"""Time integration: one file per method, one protocol.
+
+A method is a frozen dataclass with its settings and three class attributes: `order`, `stage_count` (rows of scratch it
+needs) and `run`, its compiled loop
+
+    run(model, work, stages, t0, h, first, substeps, x, v, alpha, beta, tolerance, out) -> (rows filled, status).
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Protocol
+
+from ffr_dyn.integrators.rk4 import RK4
+from ffr_dyn.integrators.ros2 import ROS2
+
+__all__ = ["METHODS", "RK4", "ROS2", "Integrator"]
+
+
+class Integrator(Protocol):
+    """What `forward` needs of a method."""
+
+    step: float
+    order: ClassVar[int]
+    stage_count: ClassVar[int]
+    run: ClassVar[Any]
+
+
+METHODS = {"rk4": RK4, "ros2": ROS2}

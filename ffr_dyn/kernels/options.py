@@ -1,0 +1,62 @@
+"""How every kernel is compiled, and the care that compiled kernels on disk are never stale.
+
+NaN must survive (it is how a bad force is noticed), so the floating-point liberties are limited to contraction and
+re-association. Results are reproducible bit by bit on one machine.
+"""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+from typing import Any
+
+from numba import njit
+
+kernel: Any = functools.partial(
+    njit, cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"}
+)
+
+# For a kernel that is called from one place: numba optimises everything below a compiled function again at each level.
+inlined: Any = functools.partial(
+    njit, cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"}, inline="always"
+)
+
+_PACKAGE = Path(__file__).resolve().parent.parent
+
+
+def _sources() -> list[Path]:
+    return sorted([*_PACKAGE.glob("kernels/*.py"), *_PACKAGE.glob("integrators/*.py")])
+
+
+def _stamp() -> str:
+    return "\n".join(f"{path.name} {path.stat().st_mtime_ns} {path.stat().st_size}" for path in _sources())
+
+
+def _compiled() -> list[Path]:
+    return [path for folder in ("kernels", "integrators") for path in (_PACKAGE / folder).glob("__pycache__/*.nb[ic]")]
+
+
+def discard_stale_kernels() -> None:
+    """Delete compiled kernels when any kernel source has changed.
+
+    numba notices a change in a function's own file only; an integrator compiled with an older `bodies.py` would run on.
+    Where the package folder cannot be written numba caches elsewhere, by the installed version: nothing to do.
+    """
+    record = _PACKAGE / "kernels" / "__pycache__" / "sources.stamp"
+    try:
+        if record.exists() and record.read_text() == _stamp():
+            return
+        for path in _compiled():
+            path.unlink(missing_ok=True)
+        record.parent.mkdir(exist_ok=True)
+        record.write_text(_stamp())
+    except OSError:
+        return
+
+
+def is_compiled(function_name: str) -> bool:
+    """Whether a compiled form of the kernel is on disk."""
+    return any(f".{function_name}-" in path.name for path in _compiled())
+
+
+discard_stale_kernels()

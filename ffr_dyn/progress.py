@@ -1,0 +1,27 @@
+"""How far a long run has come: simulated time, percentage and remaining time on a terminal; silent in a pipe."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TextIO
+
+from tqdm import tqdm
+
+_FORMAT = "{desc}: {percentage:3.0f} % |{bar}| t = {n:.4g} of {total:.4g} s, {remaining} left"
+
+
+@contextmanager
+def progress(
+    label: str, end: float, *, start: float = 0.0, stream: TextIO | None = None
+) -> Iterator[Callable[[float], None]]:
+    """Yields ``update(t)``, to be called with the simulated time t [s], from start to end, as often as one likes.
+
+    Written to stream (standard error by default), a few times a second, and only when that is a terminal.
+    """
+    with tqdm(desc=label, total=end, initial=start, file=stream, disable=None, bar_format=_FORMAT) as bar:
+        yield lambda t: _advance(bar, t)
+
+
+def _advance(bar: tqdm, t: float) -> None:
+    bar.update(min(t, bar.total) - bar.n)

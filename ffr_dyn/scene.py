@@ -1,0 +1,168 @@
+"""Scenes: bodies, ground points, joints, drivers and loads, declared by name; names are resolved once, here.
+
+A marker is named "body.interface" or "ground.point".
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ffr_dyn.drivers import Driver, driver_word
+from ffr_dyn.errors import InputError
+from ffr_dyn.forces import Load, SpringDamper
+from ffr_dyn.joints import Joint
+from ffr_dyn.rotation import euler_parameters
+from ffr_prep.body import FlexibleBody
+
+Array = np.ndarray
+
+GROUND = "ground"
+
+
+@dataclass(frozen=True)
+class Body:
+    """A reduced (or rigid) body in the scene, with its pose and motion at the start.
+
+    position : (3,) [m] of the body frame's origin, global
+    rotation : rotation vector (3,) [rad], Euler parameters (4,) or matrix (3, 3), body -> global
+    velocity : (3,) [m/s] of the origin, global;  omega_bar : (3,) [rad/s] in body axes
+    q, q_dot : (n,) elastic coordinates and rates; default zero
+    damping  : modal damping ratio, one for all modes or (n,)
+
+    Pose and motion are a first guess: assembly makes them meet the joints.
+    """
+
+    name: str
+    model: FlexibleBody
+    position: Any = (0.0, 0.0, 0.0)
+    rotation: Any = (0.0, 0.0, 0.0)
+    velocity: Any = (0.0, 0.0, 0.0)
+    omega_bar: Any = (0.0, 0.0, 0.0)
+    q: Any = None
+    q_dot: Any = None
+    damping: Any = 0.0
+
+    def __post_init__(self) -> None:
+        n, who = self.model.n, f"body {self.name!r}"
+        for key in ("position", "velocity", "omega_bar"):
+            object.__setattr__(self, key, _vector(getattr(self, key), 3, f"{who}: {key}"))
+        object.__setattr__(self, "rotation", euler_parameters(self.rotation, f"{who}: rotation"))
+        for key in ("q", "q_dot"):
+            value = np.zeros(n) if getattr(self, key) is None else getattr(self, key)
+            object.__setattr__(self, key, _vector(value, n, f"{who}: {key}"))
+        object.__setattr__(self, "damping", _vector(np.broadcast_to(self.damping, n), n, f"{who}: damping"))
+        if (self.damping < 0).any():
+            raise InputError(f"{who}: a modal damping ratio is negative: {self.damping.min():g}")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything an analysis needs. Raises InputError for names that do not exist, repeat or contradict each other.
+
+    ground  : name -> (3,) [m], points fixed in the global frame
+    gravity : (3,) [m/s^2], global
+    """
+
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...] = ()
+    drivers: tuple[Driver, ...] = ()
+    loads: tuple[Load, ...] = ()
+    springs: tuple[SpringDamper, ...] = ()
+    ground: Mapping[str, Any] = field(default_factory=dict)
+    gravity: Any = (0.0, 0.0, 0.0)
+    name: str = "scene"
+
+    def __post_init__(self) -> None:
+        for key in ("bodies", "joints", "drivers", "loads", "springs"):
+            object.__setattr__(self, key, tuple(getattr(self, key)))
+        points = {key: _vector(at, 3, f"ground point {key!r}") for key, at in self.ground.items()}
+        object.__setattr__(self, "ground", points)
+        object.__setattr__(self, "gravity", _vector(self.gravity, 3, "gravity"))
+        if not self.bodies:
+            raise InputError("a scene needs at least one body")
+        _check_names(self)
+        _check_joints(self)
+        for driver in self.drivers:
+            driver_word(driver, joint_of(self, driver))
+        for marker in [m for load in self.loads for m in (load.marker,)] + [
+            m for spring in self.springs for m in (spring.i, spring.j)
+        ]:
+            marker_number(self, marker)
+
+
+def markers(scene: Scene) -> list[tuple[int, str, str]]:
+    """All markers as (body number, body name, point name): every interface of every body, then the ground's points."""
+    listed = [(b, body.name, i.name) for b, body in enumerate(scene.bodies) for i in body.model.interfaces]
+    return listed + [(len(scene.bodies), GROUND, point) for point in scene.ground]
+
+
+def marker_names(scene: Scene) -> list[str]:
+    """Names "body.interface" in the order of `markers`."""
+    return [f"{body}.{point}" for _, body, point in markers(scene)]
+
+
+def marker_number(scene: Scene, name: str) -> int:
+    """Index of a marker; InputError says which body or interface does not exist and what there is."""
+    names = marker_names(scene)
+    if name in names:
+        return names.index(name)
+    body, _, point = name.partition(".")
+    bodies = [GROUND, *(b.name for b in scene.bodies)]
+    if body not in bodies:
+        raise InputError(f"marker {name!r}: there is no body {body!r}; {_offer(body, bodies)}")
+    there = [n.partition(".")[2] for n in names if n.partition(".")[0] == body]
+    raise InputError(f"marker {name!r}: body {body!r} has no interface {point!r}; {_offer(point, there)}")
+
+
+def joint_of(scene: Scene, driver: Driver) -> Joint:
+    """The joint a driver acts on."""
+    for joint in scene.joints:
+        if joint.name == driver.joint:
+            return joint
+    raise InputError(
+        f"driver {driver.name!r}: there is no joint {driver.joint!r}; {_offer(driver.joint, [j.name for j in scene.joints])}"
+    )
+
+
+def _offer(name: str, known: Iterable[str]) -> str:
+    known = list(known)
+    close = difflib.get_close_matches(name, known, 1)
+    hint = f"did you mean {close[0]!r}? " if close else ""
+    return f"{hint}there are: {', '.join(map(repr, known)) or 'none'}"
+
+
+def _check_names(scene: Scene) -> None:
+    for what in ("bodies", "joints", "drivers", "loads", "springs"):
+        names = [item.name for item in getattr(scene, what)]
+        repeated = sorted({name for name in names if names.count(name) > 1})
+        if repeated:
+            raise InputError(f"{what}: the name {repeated[0]!r} is used more than once")
+    for body in scene.bodies:
+        if body.name == GROUND or "." in body.name or not body.name:
+            raise InputError(f"a body cannot be named {body.name!r}: {GROUND!r} and dots are reserved")
+
+
+def _check_joints(scene: Scene) -> None:
+    table = markers(scene)
+    for joint in scene.joints:
+        i, j = (marker_number(scene, name) for name in (joint.i, joint.j))
+        if table[i][0] == table[j][0]:
+            raise InputError(f"joint {joint.name!r} ties {table[i][1]!r} to itself; a joint needs two different bodies")
+
+
+def _vector(value: Any, size: int, what: str) -> Array:
+    try:
+        vector = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{what} must be {size} numbers, not {value!r}") from None
+    if vector.shape != (size,):
+        raise InputError(f"{what} must be {size} numbers, not {value!r}")
+    if not np.isfinite(vector).all():
+        raise InputError(f"{what} holds values that are not finite: {value!r}")
+    vector.setflags(write=False)
+    return vector

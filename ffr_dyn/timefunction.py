@@ -1,0 +1,84 @@
+"""Functions of time for drivers and loads: each with two derivatives, compiled to numbers for the kernels.
+
+    constant(5.0)   polynomial(0, 150)   harmonic(amplitude=.1, frequency=2)   table(times, values)   user(f)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_dyn.errors import InputError
+
+Array = np.ndarray
+
+# Kinds, as in ffr_dyn.kernels.loads (which must not be imported before it is needed: it loads the compiler).
+POLYNOMIAL, HARMONIC, PIECEWISE, USER = 0, 1, 2, 3
+
+
+@dataclass(frozen=True)
+class TimeFunction:
+    """A function of time as the kernels read it: its kind and its numbers; `callback` for a Python function."""
+
+    kind: int
+    data: tuple[float, ...]
+    callback: Callable[[float], object] | None = None
+
+
+def constant(value: float) -> TimeFunction:
+    """The same value at all times."""
+    return polynomial(value)
+
+
+def polynomial(*coefficients: float) -> TimeFunction:
+    """c0 + c1 t + c2 t^2 + ...; `polynomial(0, 150)` is a crank that turns at 150 rad/s."""
+    return TimeFunction(POLYNOMIAL, _numbers("polynomial", coefficients))
+
+
+def harmonic(*, amplitude: float, frequency: float, phase: float = 0.0, mean: float = 0.0) -> TimeFunction:
+    """mean + amplitude sin(2 pi frequency t + phase); frequency [Hz], phase [rad]."""
+    return TimeFunction(HARMONIC, _numbers("harmonic", (mean, amplitude, 2 * np.pi * frequency, phase)))
+
+
+def table(times: Array, values: Array) -> TimeFunction:
+    """Not-a-knot cubic spline through (times, values), twice differentiable; holds its end values outside.
+
+    Raises InputError unless there are two or more times, increasing, with as many values.
+    """
+    from scipy.interpolate import CubicSpline
+
+    t, y = np.asarray(times, float), np.asarray(values, float)
+    if t.ndim != 1 or t.shape != y.shape or t.size < 2 or not (np.diff(t) > 0).all():
+        raise InputError("a table needs two or more increasing times and as many values")
+    _numbers("table", (*t, *y))
+    return piecewise(t, CubicSpline(t, y).c[::-1].T)
+
+
+def piecewise(breaks: Array, coefficients: Array) -> TimeFunction:
+    """Piecewise polynomial: coefficients (pieces, k), ascending powers of (t - start of the piece)."""
+    pieces, count = np.shape(coefficients)
+    return TimeFunction(PIECEWISE, (float(pieces), float(count), *map(float, breaks), *map(float, np.ravel(coefficients))))
+
+
+def user(function: Callable[[float], object]) -> TimeFunction:
+    """A Python function t -> value, or t -> (value, rate, second derivative) where it drives a joint coordinate."""
+    return TimeFunction(USER, (0.0,), function)
+
+
+def as_time_function(value: object, what: str) -> TimeFunction:
+    """A number, a Python function or a TimeFunction as a TimeFunction; InputError names `what` otherwise."""
+    if isinstance(value, TimeFunction):
+        return value
+    if callable(value):
+        return user(value)
+    if isinstance(value, (int, float, np.floating, np.integer)):
+        return constant(float(value))
+    raise InputError(f"{what} must be a number, a time function or a Python function of time, not {value!r}")
+
+
+def _numbers(what: str, values: tuple[float, ...]) -> tuple[float, ...]:
+    if not values or not np.isfinite(values).all():
+        raise InputError(f"{what}: all numbers must be finite: {values}")
+    return tuple(float(v) for v in values)

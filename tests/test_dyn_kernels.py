@@ -1,0 +1,267 @@
+"""The compiled kernels against their readable twins, and the twins against a Lagrangian differentiated numerically."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from synthetic import cloud
+
+from ffr_dyn.constraints import evaluate_word
+from ffr_dyn.equations import System, compile_scene, new_work
+from ffr_dyn.inertia import elastic_force, gravity_force, mass_matrix, quadratic_velocity
+from ffr_dyn.joints import KINDS, Joint
+from ffr_dyn.kernels.record import evaluate_truly
+from ffr_dyn.kernels.tables import OK
+from ffr_dyn.layout import layout
+from ffr_dyn.rotation import G_bar, rotation_matrix, skew
+from ffr_dyn.scene import Body, Scene
+from ffr_dyn.drivers import Driver
+from ffr_dyn.timefunction import harmonic
+
+RNG = np.random.default_rng(7)
+
+
+def random_state(scene: Scene, seed: int = 3) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    place = layout(scene)
+    x, v = rng.normal(size=place.x_size), rng.normal(size=place.v_size)
+    for b in range(len(scene.bodies)):
+        x[place.p(b)] /= np.linalg.norm(x[place.p(b)])
+        x[place.q(b)] *= 0.05
+    return x, v
+
+
+def moved(scene: Scene, x: np.ndarray, v: np.ndarray, h: float) -> np.ndarray:
+    """x after the small time h at the constant velocity v: exact rotation about the body axes."""
+    place = layout(scene)
+    y = x.copy()
+    for b in range(len(scene.bodies)):
+        y[place.R(b)] += h * v[place.R_dot(b)]
+        y[place.q(b)] += h * v[place.q_dot(b)]
+        half = 0.5 * h * v[place.omega(b)]
+        angle = np.linalg.norm(half)
+        p = x[place.p(b)]
+        y[place.p(b)] = np.cos(angle) * p + np.sinc(angle / np.pi) * (G_bar(p).T @ half)
+    return y
+
+
+# ---- one body: mass matrix and forces from the Lagrangian ------------------------------------------------------------
+
+
+def kinetic_energy(body, R_dot, A, omega, q, q_dot) -> float:
+    """Sum over the mass points: no integral of the body is used."""
+    mass = np.array(body.provenance["masses"])
+    u = body.surface.points + body.surface.Phi @ q
+    velocity = R_dot + (np.cross(omega, u) + body.surface.Phi @ q_dot) @ A.T
+    return 0.5 * float(mass @ (velocity**2).sum(1))
+
+
+def test_mass_matrix_is_the_hessian_of_the_kinetic_energy():
+    body = cloud(4)
+    q, A = RNG.normal(size=4) * 0.1, np.eye(3)
+    M = mass_matrix(body, q)
+    for _ in range(5):
+        y = RNG.normal(size=10)
+        energy = kinetic_energy(body, y[:3], A, y[3:6], q, y[6:])
+        assert 0.5 * y @ M @ y == pytest.approx(energy, rel=1e-13)
+
+
+def lagrange_residual(body, R, p, q, v, acc, gravity) -> np.ndarray:
+    """d/dt (dL/d(velocity)) - dL/d(position) in the quasi-velocities (A^T R_dot, omega_bar, q_dot), by differences of L.
+
+    For quasi-velocities y the equations are Boltzmann-Hamel's; with the kinetic energy T(q, y) of a free body they are
+    d/dt T_v + omega x T_v, d/dt T_omega + omega x T_omega + v x T_v, d/dt T_qdot - T_q.
+    """
+    h = 1e-6
+
+    def momentum(qq, y):
+        return mass_matrix_by_differences(body, qq) @ y
+
+    y, rate = v, acc
+    A = rotation_matrix(p)
+    P = momentum(q, y)
+    dP = (momentum(q + h * y[6:], y + h * rate) - momentum(q - h * y[6:], y - h * rate)) / (2 * h)
+    dT = np.array([
+        (energy_of(body, q + h * e, y) - energy_of(body, q - h * e, y)) / (2 * h) for e in np.eye(q.size)
+    ])  # fmt: skip
+    field = A.T @ gravity
+    mass = np.array(body.provenance["masses"])
+    u = body.surface.points + body.surface.Phi @ q
+    weight = np.concatenate([
+        mass.sum() * field, np.cross(mass @ u, field), np.einsum("p,pkj,k->j", mass, body.surface.Phi, field)
+    ])  # fmt: skip
+    return np.concatenate([
+        dP[:3] + np.cross(y[3:6], P[:3]),
+        dP[3:6] + np.cross(y[3:6], P[3:6]) + np.cross(y[:3], P[:3]),
+        dP[6:] - dT + body.omega2 * q,
+    ]) - weight  # fmt: skip
+
+
+def energy_of(body, q, y) -> float:
+    return kinetic_energy(body, y[:3], np.eye(3), y[3:6], q, y[6:])
+
+
+def mass_matrix_by_differences(body, q) -> np.ndarray:
+    size = 6 + body.n
+    unit = np.eye(size)
+    T = [[energy_of(body, q, unit[i] + unit[j]) for j in range(size)] for i in range(size)]
+    own = np.array([energy_of(body, q, unit[i]) for i in range(size)])
+    return np.array(T) - own[:, None] - own[None, :]
+
+
+def test_accelerations_satisfy_the_lagrangian_differentiated_numerically():
+    body = cloud(5, stiffness=3.0)
+    gravity = np.array([0.3, -9.81, 1.0])
+    q, q_dot, omega, V = (RNG.normal(size=k) * 0.3 for k in (5, 5, 3, 3))
+    p = RNG.normal(size=4)
+    p /= np.linalg.norm(p)
+    A = rotation_matrix(p)
+    forces = (
+        quadratic_velocity(body, q, omega, q_dot)
+        + elastic_force(body, np.zeros(5), q, q_dot)
+        + gravity_force(body, q, A, gravity)
+    )
+    solution = np.linalg.solve(mass_matrix(body, q), forces)  # a = A^T R_ddot, omega_dot, q_ddot
+    y = np.concatenate([A.T @ V, omega, q_dot])
+    rate = solution.copy()
+    rate[:3] -= np.cross(omega, y[:3])  # d/dt (A^T R_dot) = a - omega x (A^T R_dot)
+    residual = lagrange_residual(body, np.zeros(3), p, q, y, rate, gravity)
+    assert np.abs(residual).max() < 1e-6 * np.abs(forces).max()
+
+
+# ---- kernels against twins ----------------------------------------------------------------------------------------
+
+
+def chain(n_first: int = 4, n_second: int = 3, kind: str = "revolute", **joint) -> Scene:
+    first, second = cloud(n_first, seed=1), cloud(n_second, seed=2)
+    return Scene(
+        bodies=(Body("one", first, damping=0.02), Body("two", second, damping=0.01)),
+        joints=(
+            Joint("root", "spherical", "ground.O", "one.a"),
+            Joint("tie", kind, "one.b", "two.c", **joint),
+        ),
+        ground={"O": (0.1, 0.2, 0.3)},
+        gravity=(0.5, -9.81, 0.2),
+    )
+
+
+def dense(system: System, x, v):
+    """Twin: block-diagonal mass matrix, forces, constraint rows of the compiled blocks, all as dense arrays."""
+    scene, place = system.scene, system.layout
+    M, f = np.zeros((place.v_size, place.v_size)), np.zeros(place.v_size)
+    for b, body in enumerate(scene.bodies):
+        at = slice(place.iv[b], place.iv[b] + 6 + place.n[b])
+        q, q_dot, omega = x[place.q(b)], v[place.q_dot(b)], v[place.omega(b)]
+        M[at, at] = mass_matrix(body.model, q)
+        f[at] = (
+            quadratic_velocity(body.model, q, omega, q_dot)
+            + elastic_force(body.model, body.damping, q, q_dot)
+            + gravity_force(body.model, q, rotation_matrix(x[place.p(b)]), scene.gravity)
+        )
+    rows = [
+        evaluate_word(scene, place, x, v, word, block.i, block.j, (0.0, 0.0, 0.0))
+        for block in system.blocks
+        for word in block.words
+    ]
+    return M, f, rows
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("sizes", [(4, 3), (0, 5), (3, 0), (0, 0), (1, 2)])
+def test_compiled_accelerations_and_multipliers_equal_the_dense_solution(kind, sizes):
+    scene = chain(*sizes, kind=kind, axis=(0.2, 1.0, 0.3), axis_j=(1.0, -0.5, 0.4))
+    system = compile_scene(scene)
+    x, v = random_state(scene)
+    work = new_work(system.model)
+    assert evaluate_truly(system.model, work, 0.0, x, v) == OK
+    M, f, rows = dense(system, x, v)
+    J = np.array([row.jacobian for row in rows])
+    gamma = np.array([row.gamma for row in rows])
+    size = gamma.size
+    K = np.block([[M, J.T], [J, np.zeros((size, size))]])
+    solution = np.linalg.solve(K, np.concatenate([f, gamma]))
+    np.testing.assert_allclose(work.rows.Phi, [row.Phi for row in rows], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(work.rows.nu, [row.nu for row in rows], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(work.rows.gamma, gamma, rtol=0, atol=1e-11)
+    scale = np.abs(solution).max()
+    np.testing.assert_allclose(work.bodies.acc, solution[: f.size], rtol=0, atol=1e-10 * scale)
+    np.testing.assert_allclose(work.rows.lam, solution[f.size :], rtol=0, atol=1e-9 * scale)
+
+
+# ---- constraints: finite differences ----------------------------------------------------------------------------------
+
+
+DRIVE = harmonic(amplitude=0.7, frequency=0.8, phase=0.3, mean=0.2)
+
+
+def drive_at(t: float) -> tuple[float, float, float]:
+    mean, amplitude, speed, phase = DRIVE.data
+    angle = speed * t + phase
+    return (
+        mean + amplitude * np.sin(angle),
+        amplitude * speed * np.cos(angle),
+        -amplitude * speed**2 * np.sin(angle),
+    )
+
+
+def constraint_cases():
+    cases = [(kind, sizes, None) for kind in KINDS for sizes in ((4, 3), (0, 0))]
+    return cases + [("revolute", (4, 3), "angle"), ("cylindrical", (4, 3), "stroke"), ("translational", (0, 2), "stroke")]
+
+
+@pytest.mark.parametrize(("kind", "sizes", "coordinate"), constraint_cases())
+def test_jacobian_rate_and_right_hand_side_equal_finite_differences(kind, sizes, coordinate):
+    from dataclasses import replace
+
+    scene = chain(*sizes, kind=kind, axis=(0.2, 1.0, 0.3), axis_j=(1.0, -0.5, 0.4))
+    if coordinate:
+        scene = replace(scene, drivers=(Driver("drive", "tie", DRIVE, coordinate),))
+    system = compile_scene(scene)
+    x, v = random_state(scene)
+    place, h, t = system.layout, 1e-5, 0.37
+    acc = np.random.default_rng(5).normal(size=place.v_size)
+
+    def rows_at(s: float):
+        """Rows at time t + s along a motion with velocity v and body-axes acceleration acc at s = 0."""
+        xs = moved(scene, x, v + 0.5 * s * global_rates(acc), s)
+        vs = v + s * global_rates(acc)
+        return [
+            evaluate_word(scene, place, xs, vs, w, b.i, b.j, drive_at(t + s)) for b in system.blocks for w in b.words
+        ]
+
+    def global_rates(a):
+        out = a.copy()
+        for b in range(len(scene.bodies)):
+            out[place.R_dot(b)] = rotation_matrix(x[place.p(b)]) @ a[place.R_dot(b)]
+        return out
+
+    here, ahead, behind = rows_at(0.0), rows_at(h), rows_at(-h)
+    for row, plus, minus in zip(here, ahead, behind, strict=True):
+        assert row.nu == pytest.approx((plus.Phi - minus.Phi) / (2 * h), abs=2e-8)
+        nu_dot = (plus.nu - minus.nu) / (2 * h)
+        assert row.jacobian @ acc - row.gamma == pytest.approx(nu_dot, abs=2e-7)
+    # the Jacobian column by column, time held
+    for k in range(place.v_size):
+        unit = np.zeros(place.v_size)
+        unit[k] = 1.0
+        direction = global_rates(unit)
+
+        def value(s, direction=direction):
+            xs = moved(scene, x, direction, s)
+            return np.array([
+                evaluate_word(scene, place, xs, v, w, b.i, b.j, drive_at(t)).Phi for b in system.blocks for w in b.words
+            ])  # fmt: skip
+
+        slope = (value(h) - value(-h)) / (2 * h)
+        np.testing.assert_allclose([row.jacobian[k] for row in here], slope, rtol=0, atol=2e-9)
+
+
+def test_skew_and_G_bar_conventions():
+    p = RNG.normal(size=4)
+    p /= np.linalg.norm(p)
+    omega = RNG.normal(size=3)
+    h = 1e-6
+    rate = 0.5 * G_bar(p).T @ omega
+    A_dot = (rotation_matrix(p + h * rate) - rotation_matrix(p - h * rate)) / (2 * h)
+    np.testing.assert_allclose(A_dot, rotation_matrix(p) @ skew(omega), atol=1e-8)
+    np.testing.assert_allclose(2 * G_bar(p) @ rate, omega, atol=1e-14)
