@@ -82,3 +82,29 @@ def _numbers(what: str, values: tuple[float, ...]) -> tuple[float, ...]:
     if not values or not np.isfinite(values).all():
         raise InputError(f"{what}: all numbers must be finite: {values}")
     return tuple(float(v) for v in values)
+
+
+def evaluate(function: TimeFunction, t: float) -> tuple[float, float, float]:
+    """(value, rate, second derivative) at t; the readable twin of `ffr_dyn.kernels.loads.evaluate_functions`."""
+    if function.callback is not None:
+        given = np.atleast_1d(np.asarray(function.callback(t), float))
+        return tuple(np.concatenate([given, np.zeros(3)])[:3])  # type: ignore[return-value]
+    data = np.array(function.data)
+    if function.kind == HARMONIC:
+        mean, amplitude, speed, phase = data
+        angle = speed * t + phase
+        wave = amplitude * np.sin(angle)
+        return mean + wave, amplitude * speed * np.cos(angle), -(speed**2) * wave
+    if function.kind == POLYNOMIAL:
+        return _derivatives(np.polynomial.Polynomial(data), t)
+    pieces, count = int(data[0]), int(data[1])
+    breaks = data[2 : pieces + 3]
+    inside = min(max(t, breaks[0]), breaks[-1])
+    piece = min(int(np.searchsorted(breaks, inside, side="right")) - 1, pieces - 1)
+    coefficients = data[pieces + 3 :].reshape(pieces, count)[piece]
+    value, rate, second = _derivatives(np.polynomial.Polynomial(coefficients), inside - breaks[piece])
+    return (value, rate, second) if inside == t else (value, 0.0, 0.0)
+
+
+def _derivatives(polynomial: np.polynomial.Polynomial, t: float) -> tuple[float, float, float]:
+    return float(polynomial(t)), float(polynomial.deriv()(t)), float(polynomial.deriv(2)(t))

@@ -1,7 +1,7 @@
 """Time integration: one file per method, one protocol.
 
-A method is a frozen dataclass with its settings and three class attributes: `order`, `stage_count` (rows of scratch it
-needs) and `run`, its compiled loop
+A method is a frozen dataclass with its settings and class attributes: `order`, `implicit` (whether it treats the elastic
+forces implicitly), `stage_count` (rows of scratch it needs) and `run`, its compiled loop
 
     run(model, work, stages, t0, h, first, substeps, x, v, alpha, beta, tolerance, out) -> (rows filled, status).
 """
@@ -21,6 +21,7 @@ class Integrator(Protocol):
 
     step: float
     order: ClassVar[int]
+    implicit: ClassVar[bool]
     stage_count: ClassVar[int]
     run: ClassVar[Any]
 

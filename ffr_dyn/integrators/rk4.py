@@ -79,5 +79,6 @@ class RK4:
 
     step: float
     order: ClassVar[int] = 4
+    implicit: ClassVar[bool] = False
     stage_count: ClassVar[int] = 5
     run: ClassVar[Any] = staticmethod(rk4_run)

@@ -143,5 +143,6 @@ class ROS2:
 
     step: float
     order: ClassVar[int] = 2
+    implicit: ClassVar[bool] = True
     stage_count: ClassVar[int] = 4
     run: ClassVar[Any] = staticmethod(ros2_run)

@@ -1,0 +1,1 @@
+"""Analyses: each a function of a scene."""

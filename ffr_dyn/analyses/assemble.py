@@ -1,0 +1,229 @@
+"""Assembly: positions and velocities that meet the joints, from a rough guess; and which constraint rows are independent.
+
+Corrections are the smallest in the norm of the mass matrix, so heavy bodies move least. Elastic coordinates are left
+alone wherever rigid motion suffices. (Haug 1989, ch. 4; Nikravesh 1988, ch. 5 for redundant rows by factorisation.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import qr
+
+from ffr_dyn.constraints import Row, evaluate_word
+from ffr_dyn.equations import Block, System, blocks_of, compile_scene
+from ffr_dyn.errors import InputError
+from ffr_dyn.inertia import mass_matrix
+from ffr_dyn.layout import Layout, initial_state, layout
+from ffr_dyn.rotation import G_bar, rotation_matrix
+from ffr_dyn.scene import Scene
+from ffr_dyn.timefunction import evaluate
+
+Array = np.ndarray
+
+TOLERANCE = 1e-11  # of Phi [m, -] and of its rate
+RANK_TOLERANCE = 1e-8  # of a row's independent part, relative to the row
+ITERATIONS = 100
+LARGEST_TURN = 0.5  # rad per iteration
+
+
+@dataclass(frozen=True)
+class Assembled:
+    """A consistent state and the system of independent constraint rows.
+
+    x, v : positions and velocities (see `Layout`);  notes : what was changed and what is redundant, in words
+    degrees_of_freedom : velocities left free by the constraints, elastic ones included
+    """
+
+    system: System
+    x: Array
+    v: Array
+    degrees_of_freedom: int
+    notes: tuple[str, ...]
+
+
+def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
+    """Consistent positions and velocities at `time` [s].
+
+    Raises InputError when the joints cannot be closed, naming the joint that stays open furthest, or when a driver
+    contradicts the joints.
+    """
+    blocks, place = blocks_of(scene), layout(scene)
+    guess, v = initial_state(scene, place)
+    x = close_positions(scene, place, blocks, guess, v, time)
+    kept, redundant = independent_blocks(scene, place, blocks, x, v, time)
+    v = close_velocities(scene, place, kept, x, v, time)
+    _check_left_out(scene, place, blocks, x, v, time)
+    rows = sum(len(block.words) for block in kept)
+    notes = [f"{block}: the row '{text}' is redundant; its reaction is taken as zero" for block, text in redundant]
+    shift = max(np.linalg.norm(x[place.R(b)] - guess[place.R(b)]) for b in range(len(scene.bodies)))
+    if shift > 1e-6:
+        notes.insert(0, f"assembly moved a body by {shift:.3g} m from where the scene puts it")
+    return Assembled(compile_scene(scene, kept), x, v, place.v_size - rows, tuple(notes))
+
+
+def rows_at(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> list[Row]:
+    """All rows of the blocks, readable form."""
+    drives = [evaluate(b.function, time) if b.function is not None else (0.0, 0.0, 0.0) for b in blocks]
+    return [
+        evaluate_word(scene, place, x, v, word, block.i, block.j, drive)
+        for block, drive in zip(blocks, drives, strict=True)
+        for word in block.words
+    ]
+
+
+def close_positions(
+    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float
+) -> Array:
+    """Newton's method on Phi(x) = 0 with least-mass-norm steps; rigid motion first, elastic coordinates if they must."""
+    worst = 0.0
+    for elastic in (False, True):
+        moved = x.copy()
+        for _ in range(ITERATIONS):
+            rows = rows_at(scene, place, blocks, moved, v, time)
+            Phi = np.array([row.Phi for row in rows])
+            worst = np.abs(Phi).max(initial=0.0)
+            if worst < TOLERANCE:
+                return moved
+            moved = _moved(place, moved, _limited(place, _step(scene, place, moved, rows, -Phi, elastic)))
+    names = [block.name for block in blocks for _ in block.words]
+    at = int(np.argmax(np.abs(Phi)))
+    raise InputError(
+        f"the mechanism cannot be assembled: joint {names[at]!r} stays open by {worst:.3g} after {ITERATIONS} iterations; "
+        "check the positions of the interfaces, the lengths of the bodies and the axes of the joints, or start closer"
+    )
+
+
+def close_velocities(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> Array:
+    """Velocities with Phi_q v + Phi_t = 0, nearest to v; rigid motion first."""
+    for elastic in (False, True):
+        rows = rows_at(scene, place, blocks, x, v, time)
+        nu = np.array([row.nu for row in rows])
+        step = _step(scene, place, x, rows, -nu, elastic)
+        moved = v + _to_global(place, x, step)
+        left = np.abs([row.nu for row in rows_at(scene, place, blocks, x, moved, time)])
+        if left.size == 0 or left.max() < 1e-9 * max(1.0, float(np.abs(nu).max())):
+            return moved
+    names = [block.name for block in blocks for _ in block.words]
+    raise InputError(
+        f"no velocities meet the joints and drivers: {names[int(np.argmax(left))]!r} is left at a rate of "
+        f"{left.max():.3g}; the mechanism may be locked or in a singular position at the start"
+    )
+
+
+def independent_blocks(
+    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float
+) -> tuple[list[Block], list[tuple[str, str]]]:
+    """Blocks without their redundant words, and the (block, word) pairs that were dropped.
+
+    Rows are redundant when they depend on others here *and* at a neighbouring position, so that a mechanism that
+    starts in a singular position keeps its rows. Raises InputError when a driver's row is dependent.
+    """
+    rows = rows_at(scene, place, blocks, x, v, time)
+    if not rows:
+        return blocks, []
+    keep = _independent(scene, place, x, rows)
+    if keep.size < len(rows):
+        nearby = _neighbour(scene, place, blocks, x, v, time, rows)
+        others = _independent(scene, place, nearby, rows_at(scene, place, blocks, nearby, v, time))
+        keep = others if others.size > keep.size else keep
+    chosen, dropped, number = [], [], 0
+    for block in blocks:
+        words = []
+        for word in block.words:
+            if number in keep:
+                words.append(word)
+            else:
+                dropped.append((block.name, word.text))
+            number += 1
+        chosen.append(replace(block, words=tuple(words)))
+    for block, left in zip(blocks, chosen, strict=True):
+        if block.function is not None and len(left.words) < len(block.words):
+            raise InputError(f"driver {block.name!r} prescribes a motion that the joints and other drivers already fix")
+    return chosen, dropped
+
+
+# ---- linear algebra -----------------------------------------------------------------------------------------------
+
+
+def _weights(scene: Scene, place: Layout, x: Array, elastic: bool) -> Array:
+    """W^(1/2) (V, V) with W the inverse mass matrix; zero for elastic coordinates that may not move."""
+    W = np.zeros((place.v_size, place.v_size))
+    for b, body in enumerate(scene.bodies):
+        M = mass_matrix(body.model, x[place.q(b)])
+        size = 6 + place.n[b] if elastic else 6
+        values, vectors = np.linalg.eigh(M[:size, :size])
+        limit = 1e-12 * values.max()
+        at = slice(place.iv[b], place.iv[b] + size)
+        W[at, at] = vectors / np.sqrt(np.maximum(values, limit))
+    return W
+
+
+def _step(scene: Scene, place: Layout, x: Array, rows: list[Row], target: Array, elastic: bool) -> Array:
+    """Smallest step (body axes) with J step = target, in the norm of the mass matrix."""
+    if not rows:
+        return np.zeros(place.v_size)
+    W = _weights(scene, place, x, elastic)
+    J = np.array([row.jacobian for row in rows])
+    return W @ np.linalg.lstsq(J @ W, target, rcond=1e-10)[0]
+
+
+def _independent(scene: Scene, place: Layout, x: Array, rows: list[Row]) -> Array:
+    """Numbers of a largest set of independent rows: pivoted QR of the weighted Jacobian, rows scaled to length one."""
+    J = np.array([row.jacobian for row in rows]) @ _weights(scene, place, x, elastic=True)
+    length = np.linalg.norm(J, axis=1)
+    J = J / np.where(length > 0, length, 1.0)[:, None]
+    _, R, pivots = qr(J.T, mode="economic", pivoting=True)
+    rank = int((np.abs(np.diag(R)) > RANK_TOLERANCE).sum())
+    return np.sort(pivots[:rank])
+
+
+def _neighbour(
+    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float, rows: list[Row]
+) -> Array:
+    """An assembled position a small free motion away from x (x itself where nothing can move)."""
+    W = _weights(scene, place, x, elastic=False)
+    J = np.array([row.jacobian for row in rows]) @ W
+    _, values, basis = np.linalg.svd(J)
+    rank = int((values > 1e-9 * values.max(initial=1.0)).sum())
+    if rank == basis.shape[0]:
+        return x
+    direction = W @ basis[rank:].T @ np.random.default_rng(0).normal(size=basis.shape[0] - rank)
+    try:
+        return close_positions(scene, place, blocks, _moved(place, x, 1e-3 * direction / np.abs(direction).max()), v, time)
+    except InputError:
+        return x
+
+
+def _check_left_out(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> None:
+    """The rows that were dropped must hold too; otherwise they contradict the rest."""
+    for block in blocks:
+        for row in rows_at(scene, place, [block], x, v, time):
+            if abs(row.nu) > 1e-6 * max(1.0, float(np.abs(v).max())):
+                raise InputError(f"{block.name!r} contradicts the other constraints: its rate is left at {row.nu:.3g}")
+
+
+# ---- small motions ------------------------------------------------------------------------------------------------
+
+
+def _limited(place: Layout, step: Array) -> Array:
+    turn = max(np.linalg.norm(step[place.omega(b)]) for b in range(len(place.n)))
+    return step * min(1.0, LARGEST_TURN / turn) if turn > 0 else step
+
+
+def _to_global(place: Layout, x: Array, step: Array) -> Array:
+    out = step.copy()
+    for b in range(len(place.n)):
+        out[place.R_dot(b)] = rotation_matrix(x[place.p(b)]) @ step[place.R_dot(b)]
+    return out
+
+
+def _moved(place: Layout, x: Array, step: Array) -> Array:
+    out, shift = x.copy(), _to_global(place, x, step)
+    for b in range(len(place.n)):
+        p = x[place.p(b)] + 0.5 * G_bar(x[place.p(b)]).T @ step[place.omega(b)]
+        out[place.R(b)] += shift[place.R_dot(b)]
+        out[place.p(b)] = p / np.linalg.norm(p)
+        out[place.q(b)] += step[place.q_dot(b)]
+    return out

@@ -1,0 +1,250 @@
+"""Forward dynamics: all forces known, the motion wanted."""
+
+from __future__ import annotations
+
+import sys
+import time as clock
+from collections.abc import Callable, Iterator
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ffr_dyn.analyses.assemble import Assembled, assemble
+from ffr_dyn.equations import System, new_record, new_stages, new_work
+from ffr_dyn.errors import InputError, SimulationError
+from ffr_dyn.integrators import ROS2, Integrator
+from ffr_dyn.kernels.options import is_compiled
+from ffr_dyn.kernels.record import record as record_kernel
+from ffr_dyn.kernels.tables import NOT_FINITE, OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, Record, Work
+from ffr_dyn.measure import Unwound, measure
+from ffr_dyn.result import Quantity, Result
+from ffr_dyn.result_file import ResultWriter
+from ffr_dyn.scene import Scene
+from ffr_dyn.stabilisation import Projection, Stabilisation, gains
+from ffr_prep.body import Surface
+
+Array = np.ndarray
+
+RK4_LIMIT = 2.83  # imaginary stability limit of RK4, Hairer & Wanner 1996, IV.2
+SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, file and keyboard
+STRAINED = 0.1  # elastic rotation [rad] beyond which linear elasticity in the moving frame is doubtful
+
+
+@dataclass
+class _Run:
+    """What changes while a run goes on."""
+
+    x: Array
+    v: Array
+    work: Work
+    stages: Any
+    unwound: dict[str, Unwound]
+    parts: list[dict[str, Quantity]]
+    times: list[Array]
+    turned: Array
+
+
+def forward(
+    scene: Scene,
+    *,
+    end: float,
+    output_step: float,
+    method: Integrator | None = None,
+    start: float = 0.0,
+    stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
+    path: str | Path | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Result:
+    """Integrate the equations of motion of a scene from `start` to `end` [s], keeping a row every `output_step` [s].
+
+    method      : RK4(step), ROS2(step), ...; by default ROS2 with a tenth of the output step
+    path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
+    progress    : called with the time reached, a few times a second
+
+    Raises InputError for a scene or settings that cannot be used, SimulationError when the run fails: the message gives
+    the time, the body or joint, the likely cause and what to change.
+    """
+    method = method or ROS2(step=output_step / 10)
+    substeps, rows = _counts(end - start, output_step, method.step)
+    _check_step(scene, method)
+    assembled = assemble(scene, time=start)
+    _announce_compilation(method)
+    run = _started(assembled, method, start)
+    header = _header(scene, assembled, method, stabilisation, (start, end, output_step))
+    first = Result(run.times[0], run.parts[0], _geometry(scene), header | {"status": "running"})
+    with nullcontext() if path is None else ResultWriter(path, first) as writer:
+        for times, part in _advance(assembled.system, run, method, stabilisation, start, substeps, rows):
+            if writer is not None:
+                writer.append(times, {name: quantity.values for name, quantity in part.items()})
+            if progress is not None:
+                progress(float(times[-1]))
+    return _result(scene, run, header | {"status": "complete"})
+
+
+def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
+    """(steps per output row, output rows)."""
+    if not (np.isfinite([span, output_step, step]).all() and span > 0 and output_step > 0 and step > 0):
+        raise InputError(f"duration, output step and step must be positive; they are {span}, {output_step}, {step} s")
+    substeps, rows = round(output_step / step), round(span / output_step)
+    if substeps < 1 or abs(substeps * step - output_step) > 1e-9 * output_step:
+        better = output_step / max(1, round(output_step / step))
+        raise InputError(f"the output step {output_step} s is not a multiple of the step {step} s; try a step of {better:.6g}")
+    if rows < 1 or abs(rows * output_step - span) > 1e-9 * span:
+        raise InputError(f"the duration {span} s is not a multiple of the output step {output_step} s")
+    return substeps, rows
+
+
+def _check_step(scene: Scene, method: Integrator) -> None:
+    """Refuse an explicit step that cannot be stable for any state."""
+    fastest = max(scene.bodies, key=lambda body: body.model.omega2.max(initial=0.0))
+    omega = float(np.sqrt(fastest.model.omega2.max(initial=0.0)))
+    if not method.implicit and method.step * omega > RK4_LIMIT:
+        raise InputError(
+            f"{type(method).__name__} with a step of {method.step:g} s is unstable: body {fastest.name!r} has a mode of "
+            f"{omega / 2 / np.pi:.4g} Hz, which needs a step below {RK4_LIMIT / omega:.2g} s (joints lower this further); "
+            "use ROS2, fewer modes or a smaller step"
+        )
+
+
+def _announce_compilation(method: Integrator) -> None:
+    if not is_compiled(method.run.__name__):
+        print("ffr-dyn: compiling the kernels, once (about half a minute) ...", file=sys.stderr, flush=True)
+
+
+def _started(assembled: Assembled, method: Integrator, start: float) -> _Run:
+    """The run with its first row."""
+    system, x, v = assembled.system, assembled.x.copy(), assembled.v.copy()
+    work, first = new_work(system.model), new_record(system, 1)
+    status = record_kernel(system.model, work, start, x, v, first, 0)
+    if status != OK:
+        raise _failure(system, work, status, start)
+    parts, unwound = measure(system, first, {})
+    run = _Run(x, v, work, new_stages(system, method.stage_count), unwound, [parts], [first.time], np.zeros(1))
+    run.turned = _elastic_turns(system, first)
+    return run
+
+
+def _advance(
+    system: System, run: _Run, method: Integrator, stabilisation: Stabilisation, start: float, substeps: int, rows: int
+) -> Iterator[tuple[Array, dict[str, Quantity]]]:
+    """Yields (times, quantities) chunk after chunk, each about SECONDS_PER_CALL long."""
+    alpha, beta, tolerance = gains(stabilisation)
+    done, count = 0, 1
+    while done < rows:
+        chunk = new_record(system, min(count, rows - done))
+        began = clock.monotonic()
+        filled, status = method.run(
+            system.model, run.work, run.stages, start, method.step, done * substeps, substeps,
+            run.x, run.v, alpha, beta, tolerance, chunk,
+        )  # fmt: skip
+        took = clock.monotonic() - began
+        if filled:
+            kept = Record(*(column[:filled] for column in chunk))
+            part, run.unwound = measure(system, kept, run.unwound)
+            run.parts.append(part)
+            run.times.append(kept.time)
+            run.turned = np.maximum(run.turned, _elastic_turns(system, kept))
+            yield kept.time, part
+        if status != OK:
+            raise _failure(system, run.work, status, start + int(run.work.info[3]) * method.step)
+        done += filled
+        count = int(np.clip(count * SECONDS_PER_CALL / max(took, 1e-6), 1, 10 * count))
+
+
+def _failure(system: System, work: Work, status: int, time: float) -> BaseException:
+    """What to tell about a status of the kernels."""
+    at, where = f"at t = {time:.6g} s", int(work.info[0])
+    if system.user.cause is not None:
+        if isinstance(system.user.cause, KeyboardInterrupt):
+            return system.user.cause
+        return SimulationError(f"the run stopped in a Python function of the scene: {system.user.failure}")
+    if status == SINGULAR_BODY:
+        name = system.scene.bodies[where].name
+        return SimulationError(
+            f"{at} the mass matrix of body {name!r} is not positive: it has no inertia left for rigid motion; "
+            "give it mass and inertia about all axes, or keep fewer modes"
+        )
+    if status == SINGULAR_CONSTRAINT:
+        row = np.searchsorted(system.model.rows.start, where, side="right") - 1
+        block = system.blocks[row]
+        text = block.words[where - system.model.rows.start[row]].text
+        return SimulationError(
+            f"{at} the constraints become dependent: row '{text}' of {block.name!r} (a singular position, or joints "
+            "that are redundant here only); start elsewhere or replace a joint by one that constrains less"
+        )
+    if status == NOT_FINITE:
+        return SimulationError(
+            f"{at} the state of {_worst(system, work)} is no longer finite: the step is too large for an explicit method "
+            "(use ROS2 or a smaller step), or a force is not finite"
+        )
+    return SimulationError(f"{at} the run stopped: {system.user.failure or 'unknown cause'}")
+
+
+def _worst(system: System, work: Work) -> str:
+    """The first body whose right-hand side is not finite."""
+    for b, body in enumerate(system.scene.bodies):
+        at = slice(system.layout.iv[b], system.layout.iv[b] + 6 + system.layout.n[b])
+        if not np.isfinite(work.bodies.f[at]).all():
+            return f"body {body.name!r}"
+    return "the scene"
+
+
+def _elastic_turns(system: System, record: Record) -> Array:
+    """(B,) largest elastic rotation [rad] at an interface of each body."""
+    turns = []
+    for b, body in enumerate(system.scene.bodies):
+        q = record.x[:, system.layout.q(b)]
+        turns.append(max((np.abs(q @ i.phi_r.T).max(initial=0.0) for i in body.model.interfaces), default=0.0))
+    return np.array(turns)
+
+
+# ---- the result -----------------------------------------------------------------------------------------------------
+
+
+def _header(
+    scene: Scene, assembled: Assembled, method: Integrator, stabilisation: Stabilisation, span: tuple[float, float, float]
+) -> dict[str, Any]:
+    start, end, output_step = span
+    return {
+        "title": scene.name,
+        "analysis": "forward dynamics",
+        "method": f"{method!r}",
+        "stabilisation": f"{stabilisation!r}",
+        "start": start,
+        "end": end,
+        "output_step": output_step,
+        "degrees_of_freedom": assembled.degrees_of_freedom,
+        "notes": list(assembled.notes),
+    }
+
+
+def _geometry(scene: Scene) -> dict[str, Surface]:
+    return {body.name: body.model.surface for body in scene.bodies if body.model.surface is not None}
+
+
+def _result(scene: Scene, run: _Run, attributes: dict[str, Any]) -> Result:
+    names = run.parts[0]
+    quantities = {
+        name: Quantity(np.concatenate([part[name].values for part in run.parts]), q.unit, q.axes, q.description)
+        for name, q in names.items()
+    }
+    info, drift = run.work.info, run.work.drift
+    account = {
+        "evaluations": int(info[1]),
+        "projections": int(info[2]),
+        "largest_drift": [float(drift[0]), float(drift[1])],
+        "notes": [*attributes["notes"], *_strained(scene, run.turned)],
+    }
+    return Result(np.concatenate(run.times), quantities, _geometry(scene), attributes | account)
+
+
+def _strained(scene: Scene, turned: Array) -> list[str]:
+    return [
+        f"body {body.name!r} turns within itself by up to {turn:.2g} rad: linear elasticity in its moving frame is "
+        "strained beyond about 0.1 rad; split the body into several or expect errors of that order squared"
+        for body, turn in zip(scene.bodies, turned, strict=True)
+        if turn > STRAINED
+    ]

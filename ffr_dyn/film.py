@@ -1,0 +1,221 @@
+"""What an animation shows, as arrays: poses and elastic coordinates of the bodies at the times of the pictures.
+
+A point with the undeformed position u_0 in the body frame is drawn at R + A(p) (u_0 + scale Phi q). The scale
+exaggerates the deformation only. Everything here comes from the result alone and is independent of how it is rendered.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_dyn.errors import InputError
+from ffr_dyn.result import Array, Result
+from ffr_dyn.rotation import rotation_matrix
+from ffr_prep.body import Surface
+
+# The share of its own size by which the automatic scale deflects the most flexible body.
+_AUTOMATIC_SHARE = 0.05
+_PLANAR_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A body with a surface. R (F, 3) [m], A (F, 3, 3), q (F, n) [m sqrt(kg)] at the F times; n = 0 if it is rigid."""
+
+    name: str
+    surface: Surface
+    R: Array
+    A: Array
+    q: Array
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the undeformed body's box [m]."""
+        return float(np.linalg.norm(np.ptp(self.surface.points, axis=0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A body without a surface: the points (F, M, 3) [m] of its markers, and the pairs (E, 2) of them to be joined."""
+
+    name: str
+    points: Array
+    pairs: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """Bodies at the times (F,) [s] of the pictures.
+
+    scale      : factor of the drawn deformation
+    deflection : largest elastic displacement |Phi q| over bodies and times, not scaled [m]
+    traces     : by marker, its path over all rows of the result (T, 3) [m]
+    low, high  : (3,) corners of a box that holds the whole motion [m]
+    """
+
+    times: Array
+    solids: tuple[Solid, ...]
+    links: tuple[Link, ...]
+    traces: dict[str, Array]
+    scale: float
+    deflection: float
+    low: Array
+    high: Array
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the box of the whole motion [m]."""
+        return float(np.linalg.norm(self.high - self.low))
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A view: the direction (3,) from the scene towards the eye, and the direction (3,) that is up in the picture."""
+
+    direction: tuple[float, float, float]
+    up: tuple[float, float, float]
+
+
+def film(result: Result, frames: int, *, scale: float | str = 1.0, traces: Iterable[str] = ()) -> Film:
+    """The bodies of a result at ``frames`` equally spaced times; between rows, poses and coordinates are interpolated.
+
+    scale  : factor of the drawn deformation, not negative; "auto": a round one for deflections of about 5 % of a body
+    traces : markers ("rod.small_eye") whose paths are drawn
+    Raises InputError for no rows, no body, an unknown marker, a scale that cannot be used, or infinite values.
+    """
+    if result.time.size == 0:
+        raise InputError("nothing to animate: the result has no rows")
+    if not (scale == "auto" or (isinstance(scale, int | float) and 0 <= scale < math.inf)):
+        raise InputError(f"scale is {scale!r}; it must be a number that is not negative, or 'auto'")
+    times = np.linspace(result.time[0], result.time[-1], frames)
+    solids = tuple(_solid(result, name, times) for name in result.geometry if f"{name}.R" in result.quantities)
+    links = tuple(_link(result, name, times) for name in _bodies(result) if name not in result.geometry)
+    if not solids and not links:
+        raise InputError("nothing to animate: the result has no body (quantities <body>.R and <body>.p)")
+    deflections = [float(max(displacements(solid, k).max() for k in range(frames))) for solid in solids]
+    factor = _automatic_scale(solids, deflections) if scale == "auto" else float(scale)
+    paths = {name: result[f"{name}.position"] for name in traces}
+    low, high = _box(solids, links, paths, [factor * deflection for deflection in deflections])
+    return Film(times, solids, links, paths, factor, max(deflections, default=0.0), low, high)
+
+
+def body_points(solid: Solid, frame: int, scale: float) -> Array:
+    """(P, 3) deformed points in the body frame, u_0 + scale Phi q [m]."""
+    return solid.surface.points + scale * (solid.surface.Phi @ solid.q[frame])
+
+
+def drawn_points(solid: Solid, frame: int, scale: float) -> Array:
+    """(P, 3) points in the global frame, R + A (u_0 + scale Phi q) [m]."""
+    return solid.R[frame] + body_points(solid, frame, scale) @ solid.A[frame].T
+
+
+def displacements(solid: Solid, frame: int) -> Array:
+    """(P,) elastic displacements |Phi q|, not scaled [m]."""
+    return np.linalg.norm(solid.surface.Phi @ solid.q[frame], axis=1)
+
+
+def camera_for(shown: Film) -> Camera:
+    """Planar motion is seen nearly from its front, slightly from above and the right (x to the right in the planes xy
+    and xz, y or z up); spatial motion from a corner, z up."""
+    front = {
+        "z": Camera((0.20, 0.28, 1.0), (0.0, 1.0, 0.0)),
+        "y": Camera((0.20, -1.0, 0.28), (0.0, 0.0, 1.0)),
+        "x": Camera((1.0, 0.20, 0.28), (0.0, 0.0, 1.0)),
+    }
+    for axis, camera in front.items():
+        if _is_planar(shown, "xyz".index(axis)):
+            return camera
+    return Camera((0.75, -1.0, 0.6), (0.0, 0.0, 1.0))
+
+
+# ---- from the result to the times of the pictures -----------------------------------------------------------------
+
+
+def _bodies(result: Result) -> list[str]:
+    names = [name.removesuffix(".R") for name in result.quantities if name.endswith(".R")]
+    return [name for name in names if f"{name}.p" in result.quantities]
+
+
+def _solid(result: Result, name: str, times: Array) -> Solid:
+    surface = result.geometry[name]
+    n = surface.Phi.shape[2]
+    q = result[f"{name}.q"] if n else np.zeros((result.time.size, 0))
+    if q.shape[1] != n:
+        raise InputError(f"body {name!r} has {q.shape[1]} elastic coordinates, but its surface has {n} mode shapes")
+    R = _at(times, result.time, result[f"{name}.R"], name)
+    return Solid(name, surface, R, _rotations(times, result, name), _at(times, result.time, q, name))
+
+
+def _rotations(times: Array, result: Result, name: str) -> Array:
+    p = result[f"{name}.p"]
+    # p and -p are the same rotation: stay on one sheet, or the interpolation would pass through a wrong one.
+    flips = np.where(np.einsum("ti,ti->t", p[1:], p[:-1]) < 0, -1.0, 1.0)
+    p = _at(times, result.time, p * np.cumprod([1.0, *flips])[:, None], name)
+    return rotation_matrix(p / np.linalg.norm(p, axis=1, keepdims=True))
+
+
+def _at(times: Array, rows: Array, values: Array, name: str) -> Array:
+    if not np.isfinite(values).all():
+        raise InputError(f"body {name!r} has poses or elastic coordinates that are not finite; it cannot be drawn")
+    columns = values.reshape(len(values), -1).T
+    return np.array([np.interp(times, rows, column) for column in columns]).T.reshape(len(times), *values.shape[1:])
+
+
+def _link(result: Result, name: str, times: Array) -> Link:
+    ending = ".position"
+    markers = [key for key in result.quantities if key.startswith(f"{name}.") and key.endswith(ending)]
+    histories = [result[key] for key in markers]
+    if len(markers) < 2:
+        histories.insert(0, result[f"{name}.R"])
+    points = np.stack([_at(times, result.time, history, name) for history in histories], axis=1)
+    return Link(name, points, _spanning_tree(points[0]))
+
+
+def _spanning_tree(points: Array) -> Array:
+    """(M - 1, 2) the pairs that join all points with the least length (Prim 1957)."""
+    distance = np.linalg.norm(points[:, None] - points[None], axis=-1)
+    joined, left, pairs = [0], set(range(1, len(points))), []
+    while left:
+        _, a, b = min((distance[a, b], a, b) for a in joined for b in left)
+        pairs.append((a, b))
+        joined.append(b)
+        left.remove(b)
+    return np.array(pairs, dtype=int).reshape(-1, 2)
+
+
+# ---- scale, extent, plane -----------------------------------------------------------------------------------------
+
+
+def _automatic_scale(solids: Iterable[Solid], deflections: list[float]) -> float:
+    """The number 1, 2 or 5 times a power of ten nearest to the wanted factor, but never a reduction."""
+    shares = [deflection / solid.size for solid, deflection in zip(solids, deflections, strict=True) if solid.size > 0]
+    if max(shares, default=0.0) == 0.0:
+        return 1.0
+    wanted = _AUTOMATIC_SHARE / max(shares)
+    decade = 10.0 ** math.floor(math.log10(wanted))
+    nearest = min((1, 2, 5, 10), key=lambda digit: abs(math.log(digit * decade / wanted)))
+    return max(1.0, nearest * decade)
+
+
+def _box(
+    solids: Iterable[Solid], links: Iterable[Link], paths: dict[str, Array], margins: list[float]
+) -> tuple[Array, Array]:
+    clouds = [link.points.reshape(-1, 3) for link in links] + list(paths.values())
+    for solid, margin in zip(solids, margins, strict=True):
+        low, high = solid.surface.points.min(axis=0) - margin, solid.surface.points.max(axis=0) + margin
+        corners = np.stack(np.meshgrid(*np.stack([low, high], axis=1)), axis=-1).reshape(-1, 3)
+        clouds.append((solid.R[:, None] + np.einsum("fij,cj->fci", solid.A, corners)).reshape(-1, 3))
+    points = np.concatenate(clouds)
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _is_planar(shown: Film, axis: int) -> bool:
+    """Whether all bodies move in planes normal to that axis of the global frame."""
+    heights = [solid.R[:, axis] for solid in shown.solids] + [link.points[..., axis] for link in shown.links]
+    turns = [np.einsum("fj,j->f", solid.A[:, axis], solid.A[0, axis]) for solid in shown.solids]
+    flat = all(np.ptp(height, axis=0).max() <= _PLANAR_TOLERANCE * shown.size for height in heights)
+    return flat and all((turn > 1.0 - _PLANAR_TOLERANCE).all() for turn in turns)
