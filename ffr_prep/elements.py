@@ -1,0 +1,116 @@
+"""Volume elements: node order, edges, faces, shape functions.
+
+Nodes are ordered as in VTK and meshio: corners, then mid-edge nodes, then face centres, then the centre. Faces are
+listed with their corners first, counter-clockwise seen from outside, then their mid-edge nodes, then their centre.
+
+Source: W. Schroeder, K. Martin, B. Lorensen, The Visualization Toolkit, 4th ed. (2006), section 5.4 (cell types).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+Array = np.ndarray
+Corners = tuple[tuple[int, ...], ...]
+
+_TET_CORNERS = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
+_TET_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
+_TET_FACES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
+_HEX_CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
+_HEX_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+_HEX_FACES = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (2, 3, 7, 6), (0, 3, 2, 1), (4, 5, 6, 7))
+
+
+@dataclass(frozen=True)
+class ElementKind:
+    """A volume element.
+
+    corners : number of corner nodes
+    means   : for every further node, the corners whose mean it is
+    faces   : (f, k) nodes of the faces
+    shapes  : name of the element in scikit-fem
+    """
+
+    corners: int
+    means: Corners
+    faces: Array
+    shapes: str
+
+    @property
+    def size(self) -> int:
+        """Number of nodes."""
+        return self.corners + len(self.means)
+
+    @property
+    def nodes(self) -> Array:
+        """(k, 3) positions of the nodes in the reference element, the unit simplex or the unit cube."""
+        corners = np.array(_TET_CORNERS if self.corners == 4 else _HEX_CORNERS, float)
+        return np.vstack([corners, *(corners[list(of)].mean(axis=0) for of in self.means)])
+
+
+def _kind(
+    corners: int, means: tuple[tuple[int, ...], ...], faces: tuple[tuple[int, ...], ...], shapes: str
+) -> ElementKind:
+    node_of = {frozenset(of): corners + k for k, of in enumerate(means)}
+    return ElementKind(corners, means, np.array([_whole_face(face, node_of) for face in faces]), shapes)
+
+
+def _whole_face(face: tuple[int, ...], node_of: Mapping[frozenset[int], int]) -> list[int]:
+    """The corners of a face followed by the further nodes that lie on it."""
+    edges = [frozenset(edge) for edge in zip(face, (*face[1:], face[0]), strict=True)]
+    return [*face, *(node_of[part] for part in (*edges, frozenset(face)) if part in node_of)]
+
+
+KINDS: Mapping[str, ElementKind] = {
+    "tet4": _kind(4, (), _TET_FACES, "ElementTetP1"),
+    "tet10": _kind(4, _TET_EDGES, _TET_FACES, "ElementTetP2"),
+    "hex8": _kind(8, (), _HEX_FACES, "ElementHex1"),
+    "hex20": _kind(8, _HEX_EDGES, _HEX_FACES, "ElementHexS2"),
+    "hex27": _kind(8, (*_HEX_EDGES, *_HEX_FACES, tuple(range(8))), _HEX_FACES, "ElementHex2"),
+}
+
+# How a face of k nodes is drawn: triangles between its nodes, counter-clockwise like the face.
+FACE_TRIANGLES: Mapping[int, Array] = {
+    3: np.array([(0, 1, 2)]),
+    6: np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)]),
+    4: np.array([(0, 1, 2), (0, 2, 3)]),
+    8: np.array([(0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7), (4, 5, 7), (5, 6, 7)]),
+    9: np.array([(0, 4, 8), (4, 1, 8), (1, 5, 8), (5, 2, 8), (2, 6, 8), (6, 3, 8), (3, 7, 8), (7, 0, 8)]),
+}
+
+
+def face_corners(size: int) -> int:
+    """Number of corners of a face of `size` nodes."""
+    return 3 if size in (3, 6) else 4
+
+
+def node_order(kind: str, positions: Array) -> Array:
+    """(k,) for each node in the order used here, the index of the same node among `positions` (k, 3).
+
+    positions : where another program has the nodes, in the unit simplex or the unit cube
+    """
+    distance = np.linalg.norm(KINDS[kind].nodes[:, None] - positions[None], axis=-1)
+    return np.argmin(distance, axis=1)
+
+
+@cache
+def sampled_gradients(kind: str) -> Array:
+    """(Q, k, 3) gradients of the shape functions at the nodes of the reference element and at quadrature points."""
+    import skfem  # here, because it is slow to load and most commands do without it
+    from skfem.quadrature import get_quadrature
+
+    element = getattr(skfem, KINDS[kind].shapes)()
+    quadrature, _ = get_quadrature(element.refdom, 5)
+    X = np.hstack([KINDS[kind].nodes.T, quadrature])
+    gradients = [np.broadcast_to(element.lbasis(X, i)[1], X.shape) for i in node_order(kind, element.doflocs)]
+    return np.ascontiguousarray(np.stack(gradients, axis=-1).transpose(1, 2, 0))
+
+
+def jacobian_determinants(kind: str, points: Array) -> Array:
+    """(E, Q) volume ratio [m^3] of elements with nodes at `points` (E, k, 3), at the nodes and inside."""
+    J = np.einsum("ekc,qkd->eqcd", points, sampled_gradients(kind), optimize=True)
+    return np.linalg.det(J)

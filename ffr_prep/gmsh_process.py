@@ -1,0 +1,184 @@
+"""Gmsh in a process of its own: open a geometry or mesh file, mesh it, write plain arrays.
+
+Run as  python gmsh_process.py JOB.json RESULT.npz.  Gmsh is a large native library that may crash or exit; here that
+ends only this process. It runs on one thread, so the same file gives the same mesh bit for bit.
+
+Exit codes: 0 done, 2 the file cannot be read, 3 gmsh cannot be loaded, 4 meshing failed. Messages are on stderr.
+
+Source: C. Geuzaine, J.-F. Remacle, Int. J. Numer. Meth. Engng 79 (2009) 1309-1331; gmsh reference manual.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+UNREADABLE, UNLOADABLE, UNMESHED = 2, 3, 4
+
+_HXT = 10
+_ELEMENTS_PER_TURN = 12
+_DIGITS = 12
+_BY_CURVATURE = (".step", ".stp", ".iges", ".igs", ".brep")
+
+
+def main() -> int:
+    """Run the job described by the file named first and write the arrays to the file named second."""
+    job = json.loads(Path(sys.argv[1]).read_text())
+    try:
+        import gmsh
+    except (OSError, ImportError) as error:
+        return _failed(error, UNLOADABLE)
+    numbers = [word for name, value in job["numbers"].items() for word in ("-setnumber", name, repr(value))]
+    gmsh.initialize(["gmsh", *numbers], readConfigFiles=False)
+    try:
+        _open(gmsh, job)
+    except Exception as error:  # gmsh raises nothing more specific
+        return _failed(error, UNREADABLE)
+    try:
+        if job["generate"]:
+            _generate(gmsh, job)
+        arrays, names = _result(gmsh)
+        if job["generate"]:
+            arrays["points"] = _rounded(arrays["points"])
+    except Exception as error:
+        return _failed(error, UNMESHED)
+    arrays["names"] = np.frombuffer(json.dumps(names).encode(), np.uint8)
+    np.savez(sys.argv[2], allow_pickle=False, **arrays)
+    gmsh.finalize()
+    return 0
+
+
+def _failed(error: BaseException, code: int) -> int:
+    print(error, file=sys.stderr)
+    return code
+
+
+# ---- meshing ------------------------------------------------------------------------------------------------------
+
+
+def _open(gmsh: Any, job: dict[str, Any]) -> None:
+    for option in ("General.NumThreads", "Mesh.MaxNumThreads1D", "Mesh.MaxNumThreads2D", "Mesh.MaxNumThreads3D"):
+        gmsh.option.setNumber(option, 1)
+    gmsh.option.setNumber("Mesh.Algorithm3D", _HXT)
+    gmsh.option.setNumber("Mesh.Optimize", 1)
+    gmsh.option.setString("Geometry.OCCTargetUnit", job["unit"])
+    if job["path"].lower().endswith(_BY_CURVATURE):
+        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _ELEMENTS_PER_TURN)
+    gmsh.open(job["path"])
+
+
+def _generate(gmsh: Any, job: dict[str, Any]) -> None:
+    """Mesh the volumes; the options set here win over those of a script."""
+    if job["size"] is not None:
+        gmsh.option.setNumber("Mesh.MeshSizeMax", job["size"])
+    gmsh.option.setNumber("Mesh.ElementOrder", job["order"])
+    if not gmsh.model.getEntities(3):
+        raise ValueError("the geometry has no volume, only surfaces or curves: make it a solid")
+    if not gmsh.model.mesh.getElementTypes(3).size:
+        gmsh.model.mesh.generate(3)
+    gmsh.model.mesh.setOrder(job["order"])
+    if job["order"] == 2 and _smallest_jacobian(gmsh) <= 0:
+        gmsh.model.mesh.optimize("HighOrder")
+
+
+def _rounded(points: np.ndarray) -> np.ndarray:
+    """Twelve digits: OpenCASCADE projects onto curved faces with rounding errors that differ from run to run."""
+    size = np.ptp(points, axis=0).max()
+    return np.round(points, _DIGITS - int(np.ceil(np.log10(size)))) + 0.0
+
+
+def _smallest_jacobian(gmsh: Any) -> float:
+    types = gmsh.model.mesh.getElementTypes(3)
+    tags = [gmsh.model.mesh.getElementsByType(kind)[0] for kind in types]
+    return min(gmsh.model.mesh.getElementQualities(of_kind, "minDetJac").min() for of_kind in tags)
+
+
+# ---- result -------------------------------------------------------------------------------------------------------
+
+
+def _result(gmsh: Any) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """The mesh as arrays, and the names and notes that belong to them as JSON values."""
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    index_of = np.full(int(tags.max(initial=0)) + 1, -1, np.int64)
+    index_of[tags] = np.arange(tags.size)
+    arrays = {"points": coordinates.reshape(-1, 3)}
+    names: dict[str, Any] = {"kinds": [], "volumes": [], "faces": [], "nodes": [], "notes": []}
+    _add_volumes(gmsh, index_of, arrays, names)
+    _add_faces(gmsh, index_of, arrays, names)
+    _add_nodes(gmsh, index_of, arrays, names)
+    return arrays, names
+
+
+def _add_volumes(gmsh: Any, index_of: np.ndarray, arrays: dict[str, np.ndarray], names: dict[str, Any]) -> None:
+    """Elements by kind, and the members of each volume group as (kind, numbers within the kind)."""
+    groups = _groups(gmsh, 3)
+    entities = sorted({tag for members in groups.values() for tag in members})
+    if len(entities) < len(gmsh.model.getEntities(3)):
+        names["notes"].append("volumes in no physical group are left out, as gmsh does")
+    numbers: dict[tuple[int, int], np.ndarray] = {}
+    for k, kind in enumerate(int(kind) for kind in gmsh.model.mesh.getElementTypes(3)):
+        blocks = [gmsh.model.mesh.getElementsByType(kind, tag)[1] for tag in entities]
+        name, _, _, size, local, _ = gmsh.model.mesh.getElementProperties(kind)
+        ends = np.cumsum([0, *(block.size // size for block in blocks)])
+        numbers |= {(k, tag): np.arange(*ends[i : i + 2]) for i, tag in enumerate(entities)}
+        arrays[f"cells_{k}"] = index_of[np.concatenate(blocks)].reshape(-1, size)
+        arrays[f"local_{k}"] = np.reshape(local, (size, 3))
+        names["kinds"].append(name)
+    for g, (group, members) in enumerate(groups.items()):
+        names["volumes"].append(group)
+        for k in range(len(names["kinds"])):
+            arrays[f"volume_{g}_{k}"] = np.concatenate([numbers[k, tag] for tag in members])
+
+
+def _add_faces(gmsh: Any, index_of: np.ndarray, arrays: dict[str, np.ndarray], names: dict[str, Any]) -> None:
+    """The corners of the faces of each surface group, triangles and quadrilaterals apart."""
+    types = [int(kind) for kind in gmsh.model.mesh.getElementTypes(2)]
+    for g, (group, members) in enumerate(_groups(gmsh, 2).items()):
+        names["faces"].append(group)
+        for corners in (3, 4):
+            found = [np.zeros((0, corners), np.int64)]
+            for kind in types:
+                _, _, _, size, _, primary = gmsh.model.mesh.getElementProperties(kind)
+                if primary == corners:
+                    blocks = [gmsh.model.mesh.getElementsByType(kind, tag)[1] for tag in members]
+                    found.append(index_of[np.concatenate(blocks)].reshape(-1, size)[:, :corners])
+            arrays[f"face_{g}_{corners}"] = np.concatenate(found)
+
+
+def _add_nodes(gmsh: Any, index_of: np.ndarray, arrays: dict[str, np.ndarray], names: dict[str, Any]) -> None:
+    """The nodes of the physical groups of points and curves."""
+    for dimension, tag in [pair for d in (0, 1) for pair in gmsh.model.getPhysicalGroups(d)]:
+        nodes, _ = gmsh.model.mesh.getNodesForPhysicalGroup(dimension, tag)
+        names["nodes"].append(gmsh.model.getPhysicalName(dimension, tag) or f"physical_{tag}")
+        arrays[f"node_{len(names['nodes']) - 1}"] = index_of[nodes]
+
+
+def _groups(gmsh: Any, dimension: int) -> dict[str, list[int]]:
+    """Name -> entities: the physical groups; where there are none, every entity by its name in the file and its tag."""
+    groups: dict[str, list[int]] = {}
+    for _, tag in gmsh.model.getPhysicalGroups(dimension):
+        name = gmsh.model.getPhysicalName(dimension, tag) or f"physical_{tag}"
+        groups.setdefault(name, []).extend(int(e) for e in gmsh.model.getEntitiesForPhysicalGroup(dimension, tag))
+    if groups:
+        return groups
+    for _, tag in gmsh.model.getEntities(dimension):
+        groups[f"{'volume' if dimension == 3 else 'surface'}_{tag}"] = [tag]
+        name = _given_name(gmsh.model.getEntityName(dimension, tag))
+        if name:
+            groups.setdefault(name, []).append(tag)
+    return groups
+
+
+def _given_name(path: str) -> str:
+    """The last part of a CAD label such as "Shapes/rod/bore", unless the exporting program made it up."""
+    name = path.rpartition("/")[2].strip()
+    return "" if re.match(r"Open CASCADE STEP translator", name) else name
+
+
+if __name__ == "__main__":
+    sys.exit(main())
