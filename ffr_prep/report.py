@@ -1,0 +1,185 @@
+"""What a mesh or a reduced body is, in words and numbers for a reader at the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ffr_prep.body import FlexibleBody, Interface
+
+if TYPE_CHECKING:
+    from ffr_prep.mesh import Mesh
+
+Array = np.ndarray
+
+_MOST_MODES = 40
+_MOST_NAMES = 20
+_INDEPENDENT = 1e-8
+_NOISE = 1e-9
+
+
+def mesh_lines(mesh: Mesh) -> Iterator[str]:
+    """Size, elements and groups of a mesh."""
+    counts: dict[str, int] = {}
+    for block in mesh.blocks:
+        counts[block.kind] = counts.get(block.kind, 0) + len(block.nodes)
+    elements = ", ".join(f"{count} {kind}" for kind, count in counts.items())
+    yield f"mesh        {elements}; {len(mesh.points)} nodes, {3 * len(mesh.points)} degrees of freedom"
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    yield f"extent      {_vector(high - low)} m, from {_vector(low)} to {_vector(high)}"
+    yield f"surfaces    {_names(mesh.face_groups)}"
+    if mesh.node_groups:
+        yield f"node sets   {_names(mesh.node_groups)}"
+    yield f"volumes     {_names(mesh.volume_groups)}"
+    for note in mesh.notes:
+        yield f"note        {note}"
+
+
+def body_lines(body: FlexibleBody) -> Iterator[str]:
+    """Everything worth knowing of a body before it is used."""
+    yield f"body        {body.name}, {body.n} elastic coordinates"
+    yield from _mass_lines(body)
+    yield from _interface_lines(body)
+    yield from _choice_lines(body.provenance)
+    yield from mode_lines(body)
+    yield from ability_lines(body)
+    yield from _origin_lines(body.provenance)
+
+
+def short_lines(body: FlexibleBody) -> Iterator[str]:
+    """A body in a few lines."""
+    yield f"mass        {body.mass:.6g} kg, centre of mass {_vector(body.centre_of_mass)} m"
+    yield from _interface_lines(body)
+    if body.n:
+        shown = ", ".join(f"{f:.4g}" for f in body.frequencies[:6])
+        yield f"modes       {body.n}: {shown}{', ...' if body.n > 6 else ''} Hz"
+    for warning in body.provenance.get("warnings", []):
+        yield f"warning     {warning}"
+
+
+# ---- parts --------------------------------------------------------------------------------------------------------
+
+
+def _mass_lines(body: FlexibleBody) -> Iterator[str]:
+    principal, axes = np.linalg.eigh(body.central_inertia)
+    axes = axes * np.sign(axes[np.argmax(np.abs(axes), axis=0), range(3)])
+    yield f"mass        {body.mass:.6g} kg"
+    yield f"centre      {_vector(body.centre_of_mass)} m"
+    yield from _tensor_lines("inertia     about origin  ", body.inertia)
+    yield from _tensor_lines(f"{'':12}about centre  ", body.central_inertia)
+    for moment, axis in zip(principal, axes.T, strict=True):
+        yield f"{'':12}principal     {moment:12.5g} kg m^2 about {_vector(axis)}"
+
+
+def _tensor_lines(label: str, tensor: Array) -> Iterator[str]:
+    shown = np.where(np.abs(tensor) < _NOISE * np.abs(tensor).max(), 0.0, tensor) + 0.0
+    for k, row in enumerate(shown):
+        yield f"{label if k == 0 else '':26}" + " ".join(f"{x:12.5g}" for x in row) + (" kg m^2" if k == 0 else "")
+
+
+def _interface_lines(body: FlexibleBody) -> Iterator[str]:
+    width = max((len(i.name) for i in body.interfaces), default=0)
+    for k, interface in enumerate(body.interfaces):
+        label = "interfaces" if k == 0 else ""
+        yield f"{label:12}{interface.name:{width}}  {interface.kind:5}  at {_vector(interface.position)} m"
+
+
+def mode_lines(body: FlexibleBody) -> Iterator[str]:
+    """A table of frequencies and effective masses, P_dm^2."""
+    if not body.n:
+        return
+    yield "modes       frequency   effective mass along x, y, z, in % of the mass"
+    shares = 100 * body.P_dm.T**2 / body.mass
+    for k in range(min(body.n, _MOST_MODES)):
+        yield f"{k + 1:7d}  {body.frequencies[k]:12.6g} Hz  " + " ".join(f"{share:7.2f}" for share in shares[k])
+    if body.n > _MOST_MODES:
+        yield f"{'':9}{body.n - _MOST_MODES} more up to {body.frequencies[-1]:.6g} Hz"
+    yield f"{'sum':>7}  {'':15}  " + " ".join(f"{total:7.2f}" for total in shares.sum(axis=0))
+
+
+def ability_lines(body: FlexibleBody) -> Iterator[str]:
+    """What the elastic coordinates can represent and what they cannot."""
+    if not body.n:
+        yield "ability     a rigid body: it does not deform"
+        return
+    yield f"ability     {_range_in_words(body)}"
+    if body.interfaces:
+        yield f"{'':12}{_interfaces_in_words(body)}"
+    yield f"{'':12}small strains and small elastic rotations; the motion of the body itself may be large"
+
+
+def _range_in_words(body: FlexibleBody) -> str:
+    """Modal truncation leaves little error up to about half the highest normal mode kept.
+
+    Source: R. R. Craig, A. J. Kurdila, Fundamentals of Structural Dynamics, 2nd ed. (2006), section 17.8 (cut-off
+    frequencies of 1.5 to 2 times the range of interest).
+    """
+    kept = body.provenance.get("reduction", {}).get("modes", body.n)
+    if not 0 < kept <= body.n:
+        return "slow deformation only: no normal mode was kept"
+    return f"vibration up to about {body.frequencies[kept - 1] / 2:.3g} Hz, half the frequency of mode {kept}"
+
+
+def _interfaces_in_words(body: FlexibleBody) -> str:
+    possible, wanted = interface_freedom(body)
+    if possible == wanted:
+        return f"every motion of the interfaces: all {wanted} coordinates can move independently"
+    return (
+        f"only {possible} independent motions of the {wanted} interface coordinates: where joints or forces act, keep "
+        "more modes or use craig-bampton"
+    )
+
+
+def interface_freedom(body: FlexibleBody) -> tuple[int, int]:
+    """How many independent motions of all interface coordinates the body has, rigid ones included, and their number."""
+    arms = [np.linalg.norm(i.position - body.centre_of_mass) for i in body.interfaces]
+    length = float(max(arms)) or 1.0
+    motions = np.vstack([_motions(i, length) for i in body.interfaces])
+    norms = np.linalg.norm(motions, axis=0)
+    unit = motions[:, norms > 0] / norms[norms > 0]
+    return int(np.linalg.matrix_rank(unit, tol=_INDEPENDENT)), len(motions)
+
+
+def _motions(interface: Interface, length: float) -> Array:
+    """(6, 6 + n) translation and rotation (times a length) of an interface in six rigid motions and the elastic ones."""
+    turning = np.cross(np.eye(3), interface.position).T
+    translation = np.hstack([np.eye(3), turning, interface.phi_t])
+    rotation = np.hstack([np.zeros((3, 3)), np.eye(3), interface.phi_r])
+    return np.vstack([translation, length * rotation])
+
+
+def _choice_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
+    for key in ("reduction", "reference", "material"):
+        if key in provenance:
+            yield f"{key:12}{_settings(provenance[key])}"
+
+
+def _origin_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
+    for key, value in provenance.items():
+        if value and key not in ("reduction", "reference", "material", "interfaces", "warnings"):
+            yield f"{key:12}{_settings(value)}"
+    for warning in provenance.get("warnings", []):
+        yield f"warning     {warning}"
+
+
+def _settings(value: Any) -> str:
+    """Nested settings in one line."""
+    if isinstance(value, Mapping):
+        words = [f"{k} {_settings(v)}" for k, v in value.items() if k != "type" and v not in (None, {}, [])]
+        return " ".join([*([value["type"]] if "type" in value else []), ", ".join(words)]).strip()
+    if isinstance(value, list):
+        return "(" + ", ".join(map(_settings, value)) + ")"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _vector(vector: Array) -> str:
+    shown = np.where(np.abs(vector) < _NOISE * np.abs(vector).max(), 0.0, vector) + 0.0
+    return "(" + ", ".join(f"{x:.5g}" for x in shown) + ")"
+
+
+def _names(groups: Mapping[str, object]) -> str:
+    names = list(groups)
+    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+    return ", ".join(names[:_MOST_NAMES]) + more if names else "none named"
