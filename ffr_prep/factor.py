@@ -16,12 +16,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
-import scipy.sparse.linalg
 
+from ffr_prep.cholesky import cholesky, solve_cholesky
 from ffr_prep.errors import ComputationError
 
 Array = np.ndarray
@@ -30,24 +31,24 @@ _SINGULAR = 1e13
 _SCALING_SWEEPS = 10
 
 
-def factorise(A: sp.sparray) -> Callable[[Array], Array]:
-    """The solver of a sparse symmetric positive definite matrix A (n, n): b (n,) or (n, r) -> A^-1 b.
+def factorise(A: sp.csr_array, positions: Array) -> Callable[[Array], Array]:
+    """The solver of a sparse symmetric positive definite matrix A (n, n): b (n, r) -> A^-1 b.
+
+    positions : (n, 3) where each unknown is; rows of NaN for unknowns that touch many others
 
     Raises ComputationError when A is singular to working precision.
     """
     try:
-        factor = scipy.sparse.linalg.splu(
-            sp.csc_array(A), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
-    except RuntimeError as error:
-        raise ComputationError(f"the stiffness matrix cannot be factorised ({error}); {_REMEDY}") from None
+        factor = cholesky(A, positions)
+    except np.linalg.LinAlgError as error:
+        raise ComputationError(f"the stiffness matrix is not positive definite ({error}); {_REMEDY}") from None
     # Scaled to a unit diagonal, so that neither units nor the size of the body matter.
-    scale = np.sqrt(np.abs(A.diagonal()))
-    probe = np.random.default_rng(0).standard_normal(A.shape[0])
-    growth = np.abs(scale * factor.solve(scale * probe)).max() / np.abs(probe).max()
+    scale = np.sqrt(A.diagonal())[:, None]
+    probe = np.random.default_rng(0).standard_normal((A.shape[0], 1))
+    growth = np.abs(scale * solve_cholesky(factor, scale * probe)).max() / np.abs(probe).max()
     if not growth < _SINGULAR:
         raise ComputationError(f"the stiffness matrix is singular (condition above {growth:.1e}); {_REMEDY}")
-    return factor.solve
+    return partial(solve_cholesky, factor)
 
 
 _REMEDY = "look for parts joined by a single node or edge, or materials of extremely different stiffness"
@@ -65,12 +66,15 @@ class FreeBody:
     solve: Callable[[Array], Array]
 
 
-def free_body(K: sp.csr_array, T: Array) -> FreeBody:
-    """Clamp six coordinates, chosen so that the rigid motions T (Z, 6) are best held, and factorise once."""
+def free_body(K: sp.csr_array, T: Array, positions: Array) -> FreeBody:
+    """Clamp six coordinates, chosen so that the rigid motions T (Z, 6) are best held, and factorise once.
+
+    positions : (Z, 3) where each coordinate is; rows of NaN for those of rigid interfaces
+    """
     rigid, _ = np.linalg.qr(T)
     _, order = scipy.linalg.qr(rigid.T, mode="r", pivoting=True)
     free = np.delete(np.arange(K.shape[0]), order[:6])
-    solve_free = factorise(K[free][:, free])
+    solve_free = factorise(K[free][:, free], positions[free])
 
     def solve(load: Array) -> Array:
         displacement = np.zeros_like(load)

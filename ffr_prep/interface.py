@@ -62,6 +62,7 @@ class CoupledModel:
     K, M    : (Z, Z) stiffness and consistent mass
     T       : (Z, 6) rigid motions: three translations, three rotations about `centre`
     centre  : (3,) mean of the nodes [m]
+    places  : (Z, 3) where each coordinate is [m]; NaN for those of rigid interfaces, which are in many places
     names, kinds, positions (I, 3) [m] : of the I interfaces
     C       : (6I, Z) interface coordinates C z: three translations [m] and three rotations [rad] of each interface
     """
@@ -72,6 +73,7 @@ class CoupledModel:
     M: sp.csr_array
     T: Array
     centre: Array
+    places: Array
     names: tuple[str, ...]
     kinds: tuple[str, ...]
     positions: Array
@@ -100,6 +102,7 @@ def couple(mesh: Mesh, matrices: SolidMatrices, interfaces: Sequence[InterfaceRe
         M=sp.csr_array(B.T @ vector_mass(matrices.m) @ B),
         T=_rigid_motions(mesh.points, centre, regions),
         centre=centre,
+        places=_places(mesh.points, regions),
         names=tuple(interface.name for interface in interfaces),
         kinds=tuple(interface.kind for interface in interfaces),
         positions=np.array([region.point for region in regions]).reshape(-1, 3),
@@ -246,6 +249,11 @@ def _rigid_motions(points: Array, centre: Array, regions: Sequence[_Region]) -> 
     turning = np.hstack([np.zeros((3, 3)), np.eye(3)])
     of_interfaces = [np.vstack([rigid_field(region.point - centre), turning]) for region in _rigid(regions)]
     return np.vstack([of_nodes, *of_interfaces])
+
+
+def _places(points: Array, regions: Sequence[_Region]) -> Array:
+    of_nodes = np.repeat(points[_free_nodes(points, regions)], 3, axis=0)
+    return np.vstack([of_nodes, np.full((6 * len(_rigid(regions)), 3), np.nan)])
 
 
 def rigid_field(offsets: Array) -> Array:

@@ -55,7 +55,7 @@ class CraigBampton:
         """Raises InputError without interfaces and for more modes than the model has."""
         if not model.names:
             raise InputError("Craig-Bampton needs at least one interface; without any, reduce by Eigenmodes")
-        fixed = supported(free_body(model.K, model.T), model.C.toarray())
+        fixed = supported(free_body(model.K, model.T, model.places), model.C.toarray())
         omega2, modes = normal_modes(model, fixed, self.modes)
         shapes, stiffness = constraint_modes(model, fixed)
         vectors = np.hstack([modes, shapes])
@@ -71,7 +71,7 @@ class Eigenmodes:
 
     def basis(self, model: CoupledModel, L: Array) -> Basis:
         """Raises InputError for more modes than the model has."""
-        held = supported(free_body(model.K, model.T), L)
+        held = supported(free_body(model.K, model.T, model.places), L)
         omega2, modes = normal_modes(model, held, self.modes)
         return diagonalised(model, modes, np.diag(omega2))
 

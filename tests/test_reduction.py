@@ -53,7 +53,7 @@ def test_static_solutions_satisfy_the_optimality_conditions(model):
     rng = np.random.default_rng(0)
     C = np.vstack([model.C.toarray(), rng.normal(size=(2, model.K.shape[0])) / 40])
     f, c = rng.normal(size=(model.K.shape[0], 3)), rng.normal(size=(len(C), 3))
-    u, mu = solve_refined(supported(free_body(model.K, model.T), C), f, c)
+    u, mu = solve_refined(supported(free_body(model.K, model.T, model.places), C), f, c)
     np.testing.assert_allclose(C @ u, c, atol=1e-9 * np.abs(u).max())
     residual = model.K @ u + C.T @ mu - f
     assert np.abs(residual).max() < 1e-12 * np.abs(abs(model.K) @ np.abs(u)).max()
@@ -63,7 +63,7 @@ def test_static_solution_equals_the_clamped_one(model):
     """Six coordinates of a rigid interface set to zero are the same as leaving them out of the matrix."""
     held = model.K.shape[0] - 6
     f = np.random.default_rng(1).normal(size=(model.K.shape[0], 1))
-    problem = supported(free_body(model.K, model.T), model.C[:6].toarray())
+    problem = supported(free_body(model.K, model.T, model.places), model.C[:6].toarray())
     u, mu = solve_refined(problem, f, np.zeros((6, 1)))
     clamped = scipy.linalg.solve(model.K[:held][:, :held].toarray(), f[:held], assume_a="pos")
     np.testing.assert_allclose(u[:held], clamped, atol=1e-9 * np.abs(clamped).max())
@@ -72,11 +72,11 @@ def test_static_solution_equals_the_clamped_one(model):
 
 
 def test_singular_matrices_and_dependent_supports_are_refused(model):
-    with pytest.raises(ComputationError, match="cannot be factorised"):
-        factorise(sp.csr_array(np.diag([1.0, 0.0, 2.0])))
+    with pytest.raises(ComputationError, match="not positive definite"):
+        factorise(sp.csr_array(np.diag([1.0, 0.0, 2.0])), np.zeros((3, 3)))
     with pytest.raises(ComputationError, match="is singular"):
-        factorise(sp.csr_array(np.array([[1.0, 1.0], [1.0, 1.0 + 2.3e-16]])))
-    body = free_body(model.K, model.T)
+        factorise(sp.csr_array(np.array([[1.0, 1.0], [1.0, 1.0 + 1e-15]])), np.eye(3)[:2])
+    body = free_body(model.K, model.T, model.places)
     C = model.C.toarray()
     with pytest.raises(ComputationError, match="depend on one another"):
         supported(body, np.vstack([C, C[:1]]))
@@ -92,8 +92,8 @@ def test_a_body_with_a_hinge_inside_is_refused():
     block = replace(diagonal.blocks[0], nodes=nodes.reshape(-1, 8))
     hinged = replace(diagonal, points=mesh.points[used], blocks=(block,), face_groups={})
     model = coupled(hinged, ())
-    with pytest.raises(ComputationError, match="joined by a single node or edge"):
-        free_body(model.K, model.T)
+    with pytest.raises(ComputationError, match=r"(not positive definite|is singular).* joined by a single node or edge"):
+        free_body(model.K, model.T, model.places)
 
 
 # ---- laws of every basis ------------------------------------------------------------------------------------------
@@ -276,7 +276,7 @@ def test_static_response_at_the_interfaces_is_exact_without_any_mode():
     model = coupled(mesh)
     force = np.zeros((12, 1))
     force[6 + 2] = 1.0
-    problem = supported(free_body(model.K, model.T), functionals(FixedTo("left"), model))
+    problem = supported(free_body(model.K, model.T, model.places), functionals(FixedTo("left"), model))
     u, _ = solve_refined(problem, model.C.T @ force, np.zeros((6, 1)))
     body = reduced(mesh, FixedTo("left"), CraigBampton(0))
     tip = body.interface("right")
