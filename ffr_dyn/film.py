@@ -15,7 +15,13 @@ import numpy as np
 from ffr_dyn.errors import InputError
 from ffr_dyn.result import Array, Result
 from ffr_dyn.rotation import rotation_matrix
+from ffr_dyn.units import readable
 from ffr_prep.body import Surface
+
+# Muted Okabe-Ito colours for bodies, so that the deformation stays the loudest; full ones for paths.
+BODY_COLOURS = ("#8FB4D0", "#E0B48A", "#93C4B0", "#D9B3C8", "#C9BE86", "#A9CFE6", "#B0B0B0")
+TRACE_COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7")
+COLOUR_MAP = "viridis"
 
 # The share of its own size by which the automatic scale deflects the most flexible body.
 _AUTOMATIC_SHARE = 0.05
@@ -31,6 +37,11 @@ class Solid:
     R: Array
     A: Array
     q: Array
+
+    @property
+    def is_flexible(self) -> bool:
+        """Whether the body has elastic coordinates."""
+        return self.q.shape[1] > 0
 
     @property
     def size(self) -> float:
@@ -71,6 +82,23 @@ class Film:
         """Diagonal of the box of the whole motion [m]."""
         return float(np.linalg.norm(self.high - self.low))
 
+    @property
+    def centre(self) -> Array:
+        """(3,) middle of the box of the whole motion [m]."""
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def corners(self) -> Array:
+        """(8, 3) corners of the box of the whole motion [m]."""
+        return _corners(self.low, self.high)
+
+    def caption(self, frame: int) -> str:
+        """Time and scale of the deformation, as they are written in the picture: "t = 0.0250 s   deformation x 20"."""
+        factor, unit = readable("s", float(np.abs(self.times).max()))
+        digits = max(0, 2 - math.floor(math.log10(factor * (float(np.ptp(self.times)) or 1.0))))
+        clock = f"t = {self.times[frame] * factor:.{digits}f} {unit}"
+        return f"{clock}     deformation × {self.scale:g}" if self.deflection > 0 and self.scale != 1.0 else clock
+
 
 @dataclass(frozen=True)
 class Camera:
@@ -78,6 +106,14 @@ class Camera:
 
     direction: tuple[float, float, float]
     up: tuple[float, float, float]
+
+    def axes(self) -> tuple[Array, Array, Array]:
+        """Unit vectors (3,): towards the eye, to the right, up. InputError if direction and up are parallel or zero."""
+        direction, right = np.asarray(self.direction, float), np.cross(self.up, self.direction)
+        if not np.linalg.norm(right) > 1e-9 * np.linalg.norm(direction) * np.linalg.norm(self.up):
+            raise InputError(f"camera: up {self.up} must not be parallel to the direction {self.direction}, nor zero")
+        direction, right = direction / np.linalg.norm(direction), right / np.linalg.norm(right)
+        return direction, right, np.cross(direction, right)
 
 
 def film(result: Result, frames: int, *, scale: float | str = 1.0, traces: Iterable[str] = ()) -> Film:
@@ -207,10 +243,14 @@ def _box(
     clouds = [link.points.reshape(-1, 3) for link in links] + list(paths.values())
     for solid, margin in zip(solids, margins, strict=True):
         low, high = solid.surface.points.min(axis=0) - margin, solid.surface.points.max(axis=0) + margin
-        corners = np.stack(np.meshgrid(*np.stack([low, high], axis=1)), axis=-1).reshape(-1, 3)
+        corners = _corners(low, high)
         clouds.append((solid.R[:, None] + np.einsum("fij,cj->fci", solid.A, corners)).reshape(-1, 3))
     points = np.concatenate(clouds)
     return points.min(axis=0), points.max(axis=0)
+
+
+def _corners(low: Array, high: Array) -> Array:
+    return np.stack(np.meshgrid(*np.stack([low, high], axis=1)), axis=-1).reshape(8, 3)
 
 
 def _is_planar(shown: Film, axis: int) -> bool:
