@@ -186,7 +186,10 @@ def _rows(blocks: tuple[Block, ...], functions: FunctionTable) -> Rows:
 
 
 def _pattern(
-    blocks: tuple[Block, ...], moving: list[tuple[int, ...]], elimination: Elimination, table: list[tuple[int, str, str]]
+    blocks: tuple[Block, ...],
+    moving: list[tuple[int, ...]],
+    elimination: Elimination,
+    table: list[tuple[int, str, str]],
 ) -> Pattern:
     size = [len(b.words) for b in blocks]
     offsets: dict[tuple[int, int], int] = {}

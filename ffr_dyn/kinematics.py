@@ -48,7 +48,12 @@ class Motion:
 def body_state(place: Layout, x: Array, v: Array, b: int) -> BodyState:
     """The state of body b."""
     return BodyState(
-        rotation_matrix(x[place.p(b)]), x[place.R(b)], v[place.R_dot(b)], v[place.omega(b)], x[place.q(b)], v[place.q_dot(b)]
+        rotation_matrix(x[place.p(b)]),
+        x[place.R(b)],
+        v[place.R_dot(b)],
+        v[place.omega(b)],
+        x[place.q(b)],
+        v[place.q_dot(b)],
     )
 
 

@@ -25,9 +25,7 @@ class Unwound:
     time: float
 
 
-def measure(
-    system: System, record: Record, last: dict[str, Unwound]
-) -> tuple[dict[str, Quantity], dict[str, Unwound]]:
+def measure(system: System, record: Record, last: dict[str, Unwound]) -> tuple[dict[str, Quantity], dict[str, Unwound]]:
     """All quantities of the recorded rows; `last` (by joint) continues angles from an earlier part of the run."""
     found: dict[str, Quantity] = {}
     found |= _bodies(system, record)
@@ -36,7 +34,9 @@ def measure(
     coordinates, unwound = _joint_coordinates(system, record, last)
     found |= coordinates
     for k, spring in enumerate(system.scene.springs):
-        found[f"{spring.name}.tension"] = Quantity(record.spring[:, k], "N", (), "spring-damper force, tension positive")
+        found[f"{spring.name}.tension"] = Quantity(
+            record.spring[:, k], "N", (), "spring-damper force, tension positive"
+        )
     return found | _totals(record), unwound
 
 
@@ -63,11 +63,16 @@ def _bodies(system: System, record: Record) -> dict[str, Quantity]:
 def _markers(system: System, record: Record) -> dict[str, Quantity]:
     found = {}
     ground = len(system.scene.bodies)
-    for k, (name, (b, _, _)) in enumerate(zip(marker_names(system.scene), markers(system.scene), strict=True)):
+    for k, (name, (b, _, point)) in enumerate(zip(marker_names(system.scene), markers(system.scene), strict=True)):
         if b == ground:
             continue
         found[f"{name}.position"] = Quantity(record.r[:, k], "m", (XYZ,), "position of the marker, global axes")
         found[f"{name}.velocity"] = Quantity(record.rd[:, k], "m/s", (XYZ,), "velocity of the marker, global axes")
+        if system.layout.n[b]:
+            moved = record.x[:, system.layout.q(b)] @ system.scene.bodies[b].model.interface(point).phi_t.T
+            found[f"{name}.displacement"] = Quantity(
+                moved, "m", (XYZ,), "elastic displacement of the marker, body axes"
+            )
     return found
 
 

@@ -1,6 +1,6 @@
 """Functions of time for drivers and loads: each with two derivatives, compiled to numbers for the kernels.
 
-    constant(5.0)   polynomial(0, 150)   harmonic(amplitude=.1, frequency=2)   table(times, values)   user(f)
+constant(5.0)   polynomial(0, 150)   harmonic(amplitude=.1, frequency=2)   table(times, values)   user(f)
 """
 
 from __future__ import annotations
@@ -59,7 +59,9 @@ def table(times: Array, values: Array) -> TimeFunction:
 def piecewise(breaks: Array, coefficients: Array) -> TimeFunction:
     """Piecewise polynomial: coefficients (pieces, k), ascending powers of (t - start of the piece)."""
     pieces, count = np.shape(coefficients)
-    return TimeFunction(PIECEWISE, (float(pieces), float(count), *map(float, breaks), *map(float, np.ravel(coefficients))))
+    return TimeFunction(
+        PIECEWISE, (float(pieces), float(count), *map(float, breaks), *map(float, np.ravel(coefficients)))
+    )
 
 
 def user(function: Callable[[float], object]) -> TimeFunction:

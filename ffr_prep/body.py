@@ -292,6 +292,26 @@ def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
     )
 
 
+def with_point(body: FlexibleBody, name: str, position: Array) -> FlexibleBody:
+    """The body with one more interface, at the surface node nearest to `position` (3,) [m], body frame.
+
+    Joints, forces and sensors can then attach there. Its rotation is the least-squares rotation of the node's
+    neighbours on the surface. Nothing is added to the basis: what the node does under load is what the basis can show.
+    Raises BodyError when the body has no surface.
+    """
+    if body.surface is None:
+        raise BodyError(f"body {body.name!r} has no surface to put the point {name!r} on")
+    points, Phi = body.surface.points, body.surface.Phi
+    node = int(np.argmin(((points - np.asarray(position, float)) ** 2).sum(1)))
+    around = body.surface.triangles[(body.surface.triangles == node).any(1)]
+    ring = np.setdiff1d(around, [node])
+    arms, moved = points[ring] - points[node], Phi[ring] - Phi[node]
+    # omega minimises sum |omega x arm - moved|^2, so (sum arm^2 I - arm arm^T) omega = sum arm x moved
+    normal = (arms**2).sum() * np.eye(3) - arms.T @ arms
+    phi_r = np.linalg.lstsq(normal, axial(np.einsum("pk,plj->klj", arms, moved)), rcond=None)[0]
+    return replace(body, interfaces=(*body.interfaces, Interface(name, points[node], Phi[node], phi_r)))
+
+
 # ---- the body file ------------------------------------------------------------------------------------------------
 # A zip of .npy members (numpy's .npz, readable without this package) and one JSON member "meta". No pickle.
 

@@ -206,7 +206,11 @@ def drive_at(t: float) -> tuple[float, float, float]:
 
 def constraint_cases():
     cases = [(kind, sizes, None) for kind in KINDS for sizes in ((4, 3), (0, 0))]
-    return cases + [("revolute", (4, 3), "angle"), ("cylindrical", (4, 3), "stroke"), ("translational", (0, 2), "stroke")]
+    return cases + [
+        ("revolute", (4, 3), "angle"),
+        ("cylindrical", (4, 3), "stroke"),
+        ("translational", (0, 2), "stroke"),
+    ]
 
 
 @pytest.mark.parametrize(("kind", "sizes", "coordinate"), constraint_cases())

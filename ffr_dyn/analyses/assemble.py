@@ -73,9 +73,7 @@ def rows_at(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array
     ]
 
 
-def close_positions(
-    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float
-) -> Array:
+def close_positions(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> Array:
     """Newton's method on Phi(x) = 0 with least-mass-norm steps; rigid motion first, elastic coordinates if they must."""
     worst = 0.0
     for elastic in (False, True):
@@ -191,7 +189,9 @@ def _neighbour(
         return x
     direction = W @ basis[rank:].T @ np.random.default_rng(0).normal(size=basis.shape[0] - rank)
     try:
-        return close_positions(scene, place, blocks, _moved(place, x, 1e-3 * direction / np.abs(direction).max()), v, time)
+        return close_positions(
+            scene, place, blocks, _moved(place, x, 1e-3 * direction / np.abs(direction).max()), v, time
+        )
     except InputError:
         return x
 

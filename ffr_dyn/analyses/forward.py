@@ -91,7 +91,9 @@ def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
     substeps, rows = round(output_step / step), round(span / output_step)
     if substeps < 1 or abs(substeps * step - output_step) > 1e-9 * output_step:
         better = output_step / max(1, round(output_step / step))
-        raise InputError(f"the output step {output_step} s is not a multiple of the step {step} s; try a step of {better:.6g}")
+        raise InputError(
+            f"the output step {output_step} s is not a multiple of the step {step} s; try a step of {better:.6g}"
+        )
     if rows < 1 or abs(rows * output_step - span) > 1e-9 * span:
         raise InputError(f"the duration {span} s is not a multiple of the output step {output_step} s")
     return substeps, rows
@@ -205,7 +207,11 @@ def _elastic_turns(system: System, record: Record) -> Array:
 
 
 def _header(
-    scene: Scene, assembled: Assembled, method: Integrator, stabilisation: Stabilisation, span: tuple[float, float, float]
+    scene: Scene,
+    assembled: Assembled,
+    method: Integrator,
+    stabilisation: Stabilisation,
+    span: tuple[float, float, float],
 ) -> dict[str, Any]:
     start, end, output_step = span
     return {

@@ -12,9 +12,7 @@ from typing import Any
 
 from numba import njit
 
-kernel: Any = functools.partial(
-    njit, cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"}
-)
+kernel: Any = functools.partial(njit, cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 
 # For a kernel that is called from one place: numba optimises everything below a compiled function again at each level.
 inlined: Any = functools.partial(

@@ -1,0 +1,178 @@
+"""The command `ffr-dyn`. Heavy modules are imported inside the commands, so that help is immediate."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from ffr_dyn.errors import InputError, SimulationError
+
+EXAMPLE = """\b
+Example:
+  ffr-prep reduce rod.geo --unit mm --material steel --interface big_eye --interface small_eye \\
+           --reference simply-supported:big_eye,small_eye -o rod.ffr
+  ffr-dyn run slider_crank.toml -o out/result.nc
+  ffr-dyn plot out/result.nc rod.small_eye.position.x -o out/slider.png
+  ffr-dyn animate out/result.nc -o out/motion.gif --scale auto
+"""
+
+
+@click.group(epilog=EXAMPLE, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(package_name="ffr")
+def cli() -> None:
+    """Flexible multibody dynamics in the floating frame of reference: from reduced bodies to a moving machine.
+
+    A scene file (TOML) names the bodies (files from ffr-prep, or rigid ones), their joints, drivers and loads. `run`
+    computes the motion and writes one result file; `info`, `plot` and `animate` show what is in it.
+    """
+
+
+@cli.command()
+@click.argument("scene", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Result file (netCDF); default: <scene>.nc.")
+@click.option("--end", type=float, help="End of the run [s], instead of the scene's.")
+@click.option("--step", type=float, help="Time step [s], instead of the scene's.")
+@click.option("--method", type=click.Choice(["ros2", "rk4"]), help="Integrator, instead of the scene's.")
+def run(scene: Path, output: Path | None, end: float | None, step: float | None, method: str | None) -> None:
+    """Forward dynamics of SCENE: integrate the motion and write the result file.
+
+    ros2 treats the elastic modes implicitly: no elastic frequency limits its step. rk4 is explicit, of fourth order:
+    exact for soft bodies at small steps, unstable when step times the highest circular frequency exceeds about 2.8.
+    Drift off the constraints is held by projection and reported.
+    """
+    from ffr_dyn.analyses.forward import forward
+    from ffr_dyn.integrators import METHODS
+    from ffr_dyn.progress import progress
+    from ffr_dyn.scene_file import load_scene
+
+    loaded, settings = load_scene(scene)
+    output = output or scene.with_suffix(".nc")
+    chosen = METHODS[method] if method else type(settings.method)
+    finish = settings.end if end is None else end
+    with progress(loaded.name, finish, start=settings.start) as update:
+        result = forward(
+            loaded,
+            start=settings.start,
+            end=finish,
+            output_step=settings.output_step,
+            method=chosen(settings.method.step if step is None else step),
+            stabilisation=settings.stabilisation,
+            path=output,
+            progress=update,
+        )
+    for line in summary(result.attributes):
+        click.echo(line)
+    click.echo(f"result       {output}")
+
+
+def summary(attributes: object) -> list[str]:
+    """What a run reports, a line each."""
+    a = dict(attributes)  # type: ignore[call-overload]
+    lines = [
+        f"scene        {a['title']}: {a['analysis']}, {a['degrees_of_freedom']} degrees of freedom",
+        f"method       {a['method']}, {a.get('evaluations', 0)} evaluations of the equations of motion",
+    ]
+    if "largest_drift" in a:
+        position, velocity = a["largest_drift"]
+        lines.append(
+            f"constraints  left by at most {position:.1e} (rate {velocity:.1e}); {a['projections']} projections"
+        )
+    return lines + [f"note         {note}" for note in a["notes"]]
+
+
+@cli.command()
+@click.argument("result", type=click.Path(path_type=Path))
+def info(result: Path) -> None:
+    """What RESULT holds: how it was made, notes, and every quantity with its unit."""
+    from ffr_dyn.result_file import load_result
+
+    loaded = load_result(result)
+    for key, value in sorted(loaded.attributes.items()):
+        for line in value if isinstance(value, list) else [value]:
+            click.echo(f"{key:20} {line}")
+    click.echo(f"{'rows':20} {loaded.time.size}, from {loaded.time[0]:g} to {loaded.time[-1]:g} s\n")
+    for name, quantity in loaded.quantities.items():
+        axes = "".join(f".{{{','.join(axis.labels)}}}" for axis in quantity.axes)
+        click.echo(f"{name + axes:45} [{quantity.unit}] {quantity.description}")
+
+
+@cli.command()
+@click.argument("result", type=click.Path(path_type=Path))
+@click.argument("names", nargs=-1, required=True)
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="Picture, .png or .svg.")
+@click.option("--title", help="Title of the picture.")
+def plot(result: Path, names: tuple[str, ...], output: Path, title: str | None) -> None:
+    """Draw the histories NAMES of RESULT, a panel per unit. `ffr-dyn info` lists the names."""
+    from ffr_dyn import plots
+    from ffr_dyn.result_file import load_result
+
+    plots.plot(load_result(result), names, output, title=title)
+    click.echo(f"picture  {output}")
+
+
+@cli.command()
+@click.argument("result", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help=".gif, .mp4 or .html.")
+@click.option("--scale", default="auto", help="Factor on the deformation: a number, or auto.", show_default=True)
+@click.option("--duration", type=float, help="Length of the film [s]; default: chosen from the run.")
+def animate(result: Path, output: Path, scale: str, duration: float | None) -> None:
+    """A film of RESULT: deformed bodies, coloured by elastic displacement, with the undeformed ghost.
+
+    .html is one page that works offline and can be turned with the mouse.
+    """
+    from ffr_dyn import animate as animation
+    from ffr_dyn.result_file import load_result
+
+    factor: float | str = scale if scale == "auto" else _number(scale)
+    animation.animate(load_result(result), output, scale=factor, duration=duration)
+    click.echo(f"film     {output}")
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"--scale must be a number or auto, not {text!r}") from None
+
+
+@cli.command()
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), default=Path("out/slider_crank"), show_default=True,
+    help="Folder for everything that is made.",
+)  # fmt: skip
+def demo(output: Path) -> None:
+    """The main job: mesh a connecting rod, reduce it, run it in a slider-crank, plot and animate."""
+    from ffr_dyn.examples.slider_crank import make
+
+    for line in make(output):
+        click.echo(line)
+
+
+def main() -> None:
+    """Entry point: exit code 2 for bad input, 1 for a failed computation, no traceback for either."""
+    from ffr_prep.body import BodyError
+
+    try:
+        cli(standalone_mode=False)
+    except (InputError, BodyError) as error:
+        _leave(str(error), 2)
+    except SimulationError as error:
+        _leave(str(error), 1)
+    except click.UsageError as error:
+        error.show()
+        sys.exit(2)
+    except click.ClickException as error:
+        _leave(error.format_message(), error.exit_code)
+    except (click.Abort, KeyboardInterrupt):
+        _leave("interrupted; the result file holds what was computed", 1)
+
+
+def _leave(message: str, code: int) -> None:
+    click.echo(f"ffr-dyn: {message}", err=True)
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()

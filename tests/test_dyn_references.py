@@ -1,0 +1,159 @@
+"""Published and independently computed cases."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.drivers import Driver
+from ffr_dyn.forces import SpringDamper
+from ffr_dyn.integrators import RK4, ROS2
+from ffr_dyn.joints import Joint
+from ffr_dyn.scene import Body, Scene
+from ffr_dyn.stabilisation import Projection
+from ffr_dyn.timefunction import polynomial
+from ffr_prep.body import FlexibleBody, rigid_body
+from ffr_prep.interface import InterfaceRegion
+from ffr_prep.material import Material
+from ffr_prep.mesh import read_mesh
+from ffr_prep.reduce import reduce_mesh
+from ffr_prep.reduction import CraigBampton
+from ffr_prep.reference import FixedTo, MeanAxis, SimplySupported
+
+HERE = Path(__file__).parent
+MESHES = HERE.parent / "meshes"
+GRAVITY = (0.0, -9.81, 0.0)
+FINE = Projection(1e-13)
+
+
+def mass_point(name: str, mass: float = 1.0, **points):
+    """A unit mass with a negligible, round inertia and named points."""
+    return rigid_body(name, mass=mass, inertia=(1e-9, 1e-9, 1e-9), points=points)
+
+
+# ---- rigid bodies -----------------------------------------------------------------------------------------------------
+
+
+def test_dzhanibekov():
+    """Torque-free top, I = (1, 2, 3), omega(0) = (0.001, 1, 0.001): closed form in elliptic functions, at t = 10 s."""
+    body = rigid_body("top", mass=1.0, inertia=(1, 2, 3))
+    result = forward(Scene((Body("top", body, omega_bar=(0.001, 1, 0.001)),)), end=10, output_step=10, method=RK4(2e-3))
+    expected = (-0.117326383719773, 0.993093912821562, 0.0677433399352767)
+    np.testing.assert_allclose(result["top.omega_bar"][-1], expected, atol=1e-9)
+
+
+def test_simple_pendulum():
+    """IFToMM benchmark A01: point mass 1 kg on 1 m, from (-1, 0) at rest; position at t = 10 s."""
+    bob = mass_point("bob", c=(0, 0, 0), pivot=(1, 0, 0))
+    scene = Scene(
+        (Body("bob", bob, position=(-1, 0, 0)),),
+        (Joint("hinge", "revolute", "ground.O", "bob.pivot"),),
+        ground={"O": (0, 0, 0)},
+        gravity=GRAVITY,
+    )
+    result = forward(scene, end=10, output_step=10, method=RK4(1e-3), stabilisation=FINE)
+    expected = (-0.275087462576117, -0.961419205099125)
+    np.testing.assert_allclose(result["bob.c.position"][-1, :2], expected, atol=2e-8)  # 1e-9 kg m^2 of inertia is in it
+
+
+def test_double_pendulum():
+    """Two point masses of 1 kg on massless links of 1 m, both released horizontally; angles from the downward vertical."""
+    first = mass_point("first", c=(0, 0, 0), pivot=(-1, 0, 0))
+    second = mass_point("second", c=(0, 0, 0), pivot=(-1, 0, 0))
+    scene = Scene(
+        (Body("first", first, position=(1, 0, 0)), Body("second", second, position=(2, 0, 0))),
+        (
+            Joint("A", "revolute", "ground.O", "first.pivot"),
+            Joint("B", "revolute", "first.c", "second.pivot"),
+        ),
+        ground={"O": (0, 0, 0)},
+        gravity=GRAVITY,
+    )
+    result = forward(scene, end=1, output_step=1, method=RK4(2.5e-4), stabilisation=FINE)
+    one, two = result["first.c.position"][-1], result["second.c.position"][-1]
+    angles = np.arctan2([one[0], two[0] - one[0]], [-one[1], one[1] - two[1]])
+    np.testing.assert_allclose(angles, (-0.62508769980639, -1.03458508568), atol=1e-7)
+
+
+def test_stiff_spring_pendulum():
+    """Point mass 1 kg on a spring of 1e6 N/m and 1 m, from (1, 0) at rest, at t = 1 s."""
+    ball = mass_point("ball", c=(0, 0, 0))
+    scene = Scene(
+        (Body("ball", ball, position=(1, 0, 0)),),
+        springs=(SpringDamper("spring", "ground.O", "ball.c", 1e6, free_length=1.0),),
+        ground={"O": (0, 0, 0)},
+        gravity=GRAVITY,
+    )
+    result = forward(scene, end=1, output_step=1, method=RK4(5e-5))
+    np.testing.assert_allclose(result["ball.c.position"][-1, :2], (-0.98629074, -0.16504631), atol=2e-7)
+
+
+# ---- flexible bodies from solid meshes --------------------------------------------------------------------------------
+
+
+def solid(mesh: str, material: Material, ends: tuple[str, str], kind: str, reference, modes: int = 8) -> FlexibleBody:
+    return reduce_mesh(
+        read_mesh(MESHES / mesh),
+        name="rod",
+        material=material,
+        interfaces=[InterfaceRegion(end, kind=kind) for end in ends],
+        reference=reference,
+        reduction=CraigBampton(modes),
+    )
+
+
+@pytest.mark.parametrize("kind", ["rigid", "mean"])
+@pytest.mark.parametrize(
+    "reference", [SimplySupported("hinge", "tip"), FixedTo("hinge"), MeanAxis()], ids=["simple", "fixed", "mean-axis"]
+)
+def test_flexible_pendulum(kind, reference):
+    """Against the linear floating-frame beam (see the data file): tip within 3e-4 m over the first half second."""
+    body = solid("pendulum.geo", Material("metal", 7e10, 0.3, 5540.0), ("hinge", "tip"), kind, reference)
+    scene = Scene(
+        (Body("rod", body),),
+        (Joint("hinge", "revolute", "ground.O", "rod.hinge"),),
+        ground={"O": (0, 0, 0)},
+        gravity=GRAVITY,
+    )
+    result = forward(scene, end=0.5, output_step=0.01, method=ROS2(2.5e-5))
+    expected = np.loadtxt(HERE / "reference" / "pendulum_linear.csv", delimiter=",")
+    np.testing.assert_allclose(result.time, expected[:, 0], atol=1e-12)
+    assert np.abs(result["rod.tip.position"][:, :2] - expected[:, 1:3]).max() < 3e-4
+    assert np.ptp(result["energy.total"]) < 1e-5 * np.ptp(result["energy.gravity"])
+    assert result.attributes["notes"] == []
+
+
+def slider_crank(rod: FlexibleBody) -> Scene:
+    crank = rigid_body(
+        "crank", mass=0.1, inertia=(1e-4, 1e-4, 1e-4), points={"hub": np.zeros(3), "pin": np.array([0.15, 0, 0])}
+    )
+    slider = rigid_body("slider", mass=rod.mass / 2, inertia=(1e-5, 1e-5, 1e-5), points={"pin": np.zeros(3)})
+    return Scene(
+        (Body("crank", crank), Body("rod", rod, position=(0.15, 0, 0)), Body("slider", slider, position=(0.45, 0, 0))),
+        (
+            Joint("bearing", "revolute", "ground.O", "crank.hub"),
+            Joint("crank_pin", "revolute", "crank.pin", "rod.crankpin"),
+            Joint("wrist_pin", "revolute", "rod.slider", "slider.pin"),
+            Joint("guide", "translational", "ground.O", "slider.pin", axis=(1, 0, 0)),
+        ),
+        (Driver("motor", "bearing", polynomial(0, 150.0)),),
+        ground={"O": (0, 0, 0)},
+    )
+
+
+@pytest.mark.parametrize("kind", ["rigid", "mean"])
+def test_flexible_slider_crank(kind):
+    """Against the linear floating-frame beam in the chord frame: mid-rod deflection within 5 % of its peak."""
+    steel = Material("steel", 2e11, 0.3, 7870.0)
+    rod = solid("slidercrank_rod.geo", steel, ("crankpin", "slider"), kind, SimplySupported("crankpin", "slider"))
+    result = forward(slider_crank(rod), end=0.084, output_step=4e-4, method=ROS2(1e-5))
+    middle = np.abs(rod.surface.points[:, 0] - 0.15) < 1e-6
+    deflection = result["rod.q"] @ rod.surface.Phi[middle].mean(axis=0)[1]
+    expected = np.loadtxt(HERE / "reference" / "slider_crank_linear.csv", delimiter=",")
+    np.testing.assert_allclose(result.time, expected[:, 0], atol=1e-9)
+    peak = np.abs(expected[:, 1]).max()
+    assert np.abs(deflection - expected[:, 1]).max() < 0.05 * peak
+    assert abs(deflection.max() - expected[:, 1].max()) < 0.01 * peak
