@@ -3,8 +3,7 @@
 Every reduction ends in the same form: a mass-orthonormal basis Z of the independent coordinates with a diagonal
 stiffness, Z^T M Z = I, Z^T K Z = diag(omega2), which satisfies the reference conditions L Z = 0.
 
-Sources: R. R. Craig, M. C. C. Bampton, AIAA Journal 6 (1968) 1313-1319; R. B. Lehoucq, D. C. Sorensen, C. Yang,
-ARPACK Users' Guide (1998), section 3.2 (shift-invert mode).
+Source: R. R. Craig, M. C. C. Bampton, AIAA Journal 6 (1968) 1313-1319.
 """
 
 from __future__ import annotations
@@ -14,15 +13,16 @@ from typing import Protocol
 
 import numpy as np
 import scipy.linalg
-import scipy.sparse.linalg
 
 from ffr_prep.errors import ComputationError, InputError
 from ffr_prep.factor import SupportedBody, free_body, solve_refined, solve_supported, supported
 from ffr_prep.interface import CoupledModel
+from ffr_prep.lanczos import lowest_modes
 
 Array = np.ndarray
 
 _DENSE = 600
+_BLOCK = 8
 _TIE = 1e-6
 _RIGID = 1e-9
 
@@ -107,23 +107,11 @@ def _dense_modes(model: CoupledModel, C: Array, count: int) -> tuple[Array, Arra
 
 
 def _lanczos_modes(model: CoupledModel, held: SupportedBody, count: int) -> tuple[Array, Array]:
-    none = np.zeros((len(held.C), 1))
+    def flexibility(loads: Array) -> Array:
+        return solve_supported(held, loads, np.zeros((len(held.C), loads.shape[1])))[0]
 
-    def flexibility(load: Array) -> Array:
-        return solve_supported(held, np.reshape(load, (-1, 1)), none)[0][:, 0]
-
-    operator = scipy.sparse.linalg.LinearOperator(model.K.shape, matvec=flexibility, dtype=float)
-    start = flexibility(np.random.default_rng(0).standard_normal(model.K.shape[0]))
-    try:
-        omega2, vectors = scipy.sparse.linalg.eigsh(
-            model.K, count, model.M, sigma=0.0, OPinv=operator, v0=start / np.linalg.norm(start)
-        )
-    except scipy.sparse.linalg.ArpackNoConvergence as error:
-        raise ComputationError(
-            f"only {len(error.eigenvalues)} of {count} normal modes converged: ask for fewer modes"
-        ) from None
-    order = np.argsort(omega2)
-    return omega2[order], vectors[:, order]
+    start = np.random.default_rng(0).standard_normal((model.K.shape[0], _BLOCK))
+    return lowest_modes(flexibility, model.M, start, count, most=20 * count + 300)
 
 
 def constraint_modes(model: CoupledModel, fixed: SupportedBody) -> tuple[Array, Array]:
