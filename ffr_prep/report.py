@@ -17,7 +17,7 @@ Array = np.ndarray
 _MOST_MODES = 40
 _MOST_NAMES = 20
 _INDEPENDENT = 1e-8
-_NOISE = 1e-9
+_NOISE = 1e-6
 
 
 def mesh_lines(mesh: Mesh) -> Iterator[str]:
@@ -143,7 +143,7 @@ def interface_freedom(body: FlexibleBody) -> tuple[int, int]:
 
 
 def _motions(interface: Interface, length: float) -> Array:
-    """(6, 6 + n) translation and rotation (times a length) of an interface in six rigid motions and the elastic ones."""
+    """(6, 6 + n) translation and rotation (times a length) of an interface in rigid and elastic motions."""
     turning = np.cross(np.eye(3), interface.position).T
     translation = np.hstack([np.eye(3), turning, interface.phi_t])
     rotation = np.hstack([np.zeros((3, 3)), np.eye(3), interface.phi_r])
