@@ -92,12 +92,15 @@ class Film:
         """(8, 3) corners of the box of the whole motion [m]."""
         return _corners(self.low, self.high)
 
-    def caption(self, frame: int) -> str:
-        """Time and scale of the deformation, as they are written in the picture: "t = 0.0250 s   deformation x 20"."""
+    def clock(self, frame: int) -> str:
+        """The time of a picture as it is written in it, with a fitting unit and number of digits: "25.0 ms"."""
         factor, unit = readable("s", float(np.abs(self.times).max()))
-        digits = max(0, 2 - math.floor(math.log10(factor * (float(np.ptp(self.times)) or 1.0))))
-        clock = f"t = {self.times[frame] * factor:.{digits}f} {unit}"
-        return f"{clock}     deformation × {self.scale:g}" if self.deflection > 0 and self.scale != 1.0 else clock
+        span = factor * float(np.ptp(self.times)) or 1.0
+        return f"{self.times[frame] * factor:.{max(0, 2 - math.floor(math.log10(span)))}f} {unit}"
+
+    def scale_note(self) -> str:
+        """The scale as it is written in the picture, "deformation × 20"; nothing when it is one or all is rigid."""
+        return f"deformation × {self.scale:g}" if self.deflection > 0 and self.scale != 1.0 else ""
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -19,9 +20,11 @@ if not os.environ.get("DISPLAY"):
     # Without a display VTK tries X first and complains; EGL needs none. VTK reads the variable when it is imported.
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
-import pyvista as pv
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
+
+# As Any: the annotations of pyvista refuse calls that its documentation shows.
+pv: Any = importlib.import_module("pyvista")
 
 _FEATURE_ANGLE = 30.0
 _INK = "#222222"
@@ -50,7 +53,7 @@ def pictures(shown: Film, camera: Camera, size: tuple[int, int], *, coloured: bo
         plotter.close()
 
 
-def _plotter(size: tuple[int, int]) -> pv.Plotter:
+def _plotter(size: tuple[int, int]) -> Any:
     try:
         plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="none")
         plotter.set_background("white")
@@ -75,7 +78,7 @@ def _cannot_render(reason: object) -> SimulationError:
     )
 
 
-def _grab(plotter: pv.Plotter, size: tuple[int, int]) -> Array:
+def _grab(plotter: Any, size: tuple[int, int]) -> Array:
     width, height = size
     pixels = vtkUnsignedCharArray()
     plotter.render_window.Render()
@@ -83,7 +86,7 @@ def _grab(plotter: pv.Plotter, size: tuple[int, int]) -> Array:
     return np.ascontiguousarray(vtk_to_numpy(pixels).reshape(height, width, 3)[::-1])
 
 
-def _aim(plotter: pv.Plotter, shown: Film, camera: Camera, size: tuple[int, int]) -> None:
+def _aim(plotter: Any, shown: Film, camera: Camera, size: tuple[int, int]) -> None:
     """Parallel projection that just shows the box of the whole motion."""
     direction, right, up = camera.axes()
     corners = shown.corners - shown.centre
@@ -101,7 +104,7 @@ def _aim(plotter: pv.Plotter, shown: Film, camera: Camera, size: tuple[int, int]
 # ---- what is in the picture ---------------------------------------------------------------------------------------
 
 
-def _build(plotter: pv.Plotter, shown: Film, coloured: bool) -> list[Update]:
+def _build(plotter: Any, shown: Film, coloured: bool) -> list[Update]:
     updates: list[Update] = []
     plain = iter(BODY_COLOURS * (1 + len(shown.solids) + len(shown.links)))
     for solid in shown.solids:
@@ -124,7 +127,7 @@ def _build(plotter: pv.Plotter, shown: Film, coloured: bool) -> list[Update]:
 class _Mesh:
     """A VTK mesh whose k-th point is the point index[k] of the surface."""
 
-    data: pv.PolyData
+    data: Any
     index: Array
 
     def move(self, points: Array) -> None:
@@ -146,19 +149,19 @@ def _edges(surface: Surface) -> _Mesh:
     return _Mesh(mesh, np.array(mesh.point_data.pop("index")))
 
 
-def _indexed(surface: Surface) -> pv.PolyData:
+def _indexed(surface: Surface) -> Any:
     mesh = pv.PolyData.from_regular_faces(np.array(surface.points), np.array(surface.triangles))
     mesh.point_data["index"] = np.arange(mesh.n_points)
     return mesh
 
 
-def _plain_solid(plotter: pv.Plotter, shown: Film, solid: Solid, colour: str) -> Update:
+def _plain_solid(plotter: Any, shown: Film, solid: Solid, colour: str) -> Update:
     skin, edges = _skin(solid.surface), _edges(solid.surface)
     actors = [plotter.add_mesh(skin.data, color=colour, **_MATTE), *_edge_actors(plotter, edges)]
     return lambda frame: _place(solid, frame, shown.scale, (skin, edges), actors)
 
 
-def _coloured_solid(plotter: pv.Plotter, shown: Film, solid: Solid) -> Update:
+def _coloured_solid(plotter: Any, shown: Film, solid: Solid) -> Update:
     skin, edges = _skin(solid.surface), _edges(solid.surface)
     factor, unit = readable("m", shown.deflection)
     skin.data.point_data["displacement"] = np.zeros(skin.data.n_points)
@@ -193,13 +196,13 @@ def _bar(title: str) -> dict[str, Any]:
     }
 
 
-def _edge_actors(plotter: pv.Plotter, edges: _Mesh) -> list[Any]:
+def _edge_actors(plotter: Any, edges: _Mesh) -> list[Any]:
     if edges.data.n_points == 0:
         return []
     return [plotter.add_mesh(edges.data, color=_INK, line_width=1.3, lighting=False)]
 
 
-def _ghost(plotter: pv.Plotter, solid: Solid) -> Update:
+def _ghost(plotter: Any, solid: Solid) -> Update:
     actor = plotter.add_mesh(_skin(solid.surface).data, color="#808080", opacity=0.18, **_MATTE)
     # In planar bending its sides lie in those of the body: put it a little behind them, or the two would flicker.
     actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
@@ -224,7 +227,7 @@ def _pose(actor: Any, solid: Solid, frame: int) -> None:
     actor.user_matrix = matrix
 
 
-def _tubes(plotter: pv.Plotter, link: Link, colour: str) -> Update:
+def _tubes(plotter: Any, link: Link, colour: str) -> Update:
     cells = np.insert(link.pairs, 0, 2, axis=1).ravel()
     meshes = [pv.PolyData(np.array(link.points[0]))]
     plotter.add_mesh(meshes[0], color=_INK, point_size=12, render_points_as_spheres=True)
@@ -240,12 +243,10 @@ def _tubes(plotter: pv.Plotter, link: Link, colour: str) -> Update:
     return update
 
 
-def _caption(plotter: pv.Plotter, shown: Film) -> Update:
-    text: Any = plotter.add_text(
-        shown.caption(0), position=(0.02, 0.93), viewport=True, font_size=11, color=_INK, font="arial"
-    )
+def _caption(plotter: Any, shown: Film) -> Update:
+    text: Any = plotter.add_text("t", position=(0.02, 0.93), viewport=True, font_size=11, color=_INK)
 
     def update(frame: int) -> None:
-        text.input = shown.caption(frame)
+        text.input = f"t = {shown.clock(frame)}     {shown.scale_note()}"
 
     return update
