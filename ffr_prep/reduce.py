@@ -129,29 +129,6 @@ def mesh_warnings(mesh: Mesh) -> list[str]:
     ]
 
 
-def summary(body: FlexibleBody) -> dict[str, Any]:
-    """The numbers that describe a body, as JSON values (SI units).
-
-    effective_mass    : per mode, the mass [kg] that translations along x, y, z excite, I3**2
-    effective_inertia : per mode, the moment of inertia [kg m^2] that rotations about the axes of the body frame
-                        excite, I4**2
-    """
-    return {
-        "name": body.name,
-        "mass": body.mass,
-        "centre_of_mass": body.centre_of_mass.tolist(),
-        "inertia": body.inertia.tolist(),
-        "central_inertia": body.central_inertia.tolist(),
-        "modes": body.n,
-        "frequencies": body.frequencies.tolist(),
-        "effective_mass": (body.I3.T**2).tolist(),
-        "effective_inertia": (body.I4.T**2).tolist(),
-        "interfaces": [{"name": i.name, "kind": i.kind, "position": i.position.tolist()} for i in body.interfaces],
-        "surface_points": 0 if body.surface is None else len(body.surface.points),
-        "warnings": list(body.provenance.get("warnings", [])),
-    }
-
-
 def _element_counts(mesh: Mesh) -> dict[str, int]:
     counts: dict[str, int] = {}
     for block in mesh.blocks:
