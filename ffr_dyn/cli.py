@@ -49,7 +49,7 @@ def run(scene: Path, output: Path | None, end: float | None, step: float | None,
 
     loaded, settings = load_scene(scene)
     output = output or scene.with_suffix(".nc")
-    chosen = METHODS[method] if method else type(settings.method)
+    chosen = METHODS[method or type(settings.method).__name__.lower()]
     finish = settings.end if end is None else end
     with progress(loaded.name, finish, start=settings.start) as update:
         result = forward(

@@ -107,7 +107,7 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None) -> System:
 
 def _six(tensor: Array) -> Array:
     """(3, 3, ...) -> (6, ...) symmetric part."""
-    return np.stack([0.5 * (tensor[k, l] + tensor[l, k]) for k, l in SYMMETRIC])
+    return np.stack([0.5 * (tensor[k, l] + tensor[l, k]) for k, l in SYMMETRIC])  # noqa: E741
 
 
 def _nine(tensor: Array) -> Array:
@@ -210,13 +210,13 @@ def _pattern(
     updates = [
         [offsets[a, b] for at, a in enumerate(column) for b in column[: at + 1]] for column in elimination.columns
     ]
-    column = [(later, offsets[later, k]) for k, column in enumerate(elimination.columns) for later in column]
+    stored = [(later, offsets[later, k]) for k, column in enumerate(elimination.columns) for later in column]
     return Pattern(
         pair_body=listed[:, 0].copy(),
         pair=listed[:, 1:].copy(),
         diagonal=np.array([offsets[k, k] for k in range(len(blocks))], dtype=np.int64),
         column_start=_starts([len(column) for column in elimination.columns]),
-        column=np.array(column, dtype=np.int64).reshape(-1, 2),
+        column=np.array(stored, dtype=np.int64).reshape(-1, 2),
         update_start=_starts([len(column) for column in updates]),
         update=np.array([offset for column in updates for offset in column], dtype=np.int64),
     )
@@ -329,7 +329,7 @@ class UserFunctions:
         for callback in self.callbacks:
             try:
                 out[callback.slot : callback.slot + callback.size] = self._values(callback, t, x, v)
-            except BaseException as error:  # noqa: BLE001 - nothing may pass through compiled code
+            except BaseException as error:
                 self.failure = f"{callback.what} at t = {t:.6g} s: {error or type(error).__name__}"
                 self.cause = error
                 return 1

@@ -142,12 +142,14 @@ class ResultWriter:
         self._published_at = time.monotonic()
         self._publishing_took = self._published_at - started
 
-    def close(self, status: str = "complete") -> None:
-        """Publish the finished file at ``path``. Closing again does nothing."""
+    def close(self, status: str = "complete", attributes: Mapping[str, Any] | None = None) -> None:
+        """Publish the finished file at ``path``; attributes, when given, replace the header's. Again does nothing."""
         if not self._file:
             return
         with self._explained():
             self._drain()
+            if attributes is not None:
+                _write_attributes(self._file, attributes)
             self._file.attrs["status"] = status
             self._file.close()
             _sync(self._part)

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from synthetic import cloud
 
+from ffr_dyn.analyses.assemble import rows_at
 from ffr_dyn.constraints import evaluate_word
+from ffr_dyn.drivers import Driver
 from ffr_dyn.equations import System, compile_scene, new_work
 from ffr_dyn.inertia import elastic_force, gravity_force, mass_matrix, quadratic_velocity
 from ffr_dyn.joints import KINDS, Joint
+from ffr_dyn.kernels.loads import evaluate_functions
 from ffr_dyn.kernels.record import evaluate_truly
-from ffr_dyn.kernels.tables import OK
+from ffr_dyn.kernels.tables import OK, Functions
 from ffr_dyn.layout import layout
 from ffr_dyn.rotation import G_bar, rotation_matrix, skew
 from ffr_dyn.scene import Body, Scene
-from ffr_dyn.drivers import Driver
-from ffr_dyn.timefunction import harmonic
+from ffr_dyn.timefunction import evaluate, harmonic, polynomial, table
 
 RNG = np.random.default_rng(7)
 
@@ -205,8 +209,8 @@ def drive_at(t: float) -> tuple[float, float, float]:
 
 
 def constraint_cases():
-    cases = [(kind, sizes, None) for kind in KINDS for sizes in ((4, 3), (0, 0))]
-    return cases + [
+    return [
+        *((kind, sizes, None) for kind in KINDS for sizes in ((4, 3), (0, 0))),
         ("revolute", (4, 3), "angle"),
         ("cylindrical", (4, 3), "stroke"),
         ("translational", (0, 2), "stroke"),
@@ -215,8 +219,6 @@ def constraint_cases():
 
 @pytest.mark.parametrize(("kind", "sizes", "coordinate"), constraint_cases())
 def test_jacobian_rate_and_right_hand_side_equal_finite_differences(kind, sizes, coordinate):
-    from dataclasses import replace
-
     scene = chain(*sizes, kind=kind, axis=(0.2, 1.0, 0.3), axis_j=(1.0, -0.5, 0.4))
     if coordinate:
         scene = replace(scene, drivers=(Driver("drive", "tie", DRIVE, coordinate),))
@@ -269,3 +271,50 @@ def test_skew_and_G_bar_conventions():
     A_dot = (rotation_matrix(p + h * rate) - rotation_matrix(p - h * rate)) / (2 * h)
     np.testing.assert_allclose(A_dot, rotation_matrix(p) @ skew(omega), atol=1e-8)
     np.testing.assert_allclose(2 * G_bar(p) @ rate, omega, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("kind", "coordinate"), [("revolute", "angle"), ("cylindrical", "angle"), ("cylindrical", "stroke")]
+)
+def test_compiled_drivers_equal_the_readable_ones(kind, coordinate):
+    scene = replace(chain(kind=kind), drivers=(Driver("drive", "tie", DRIVE, coordinate),))
+    system = compile_scene(scene)
+    (x, v), work, t = random_state(scene), new_work(system.model), 0.37
+    assert evaluate_truly(system.model, work, t, x, v) == OK
+    rows = rows_at(scene, system.layout, list(system.blocks), x, v, t)
+    for name in ("Phi", "nu", "gamma"):
+        np.testing.assert_allclose(getattr(work.rows, name), [getattr(r, name) for r in rows], rtol=0, atol=1e-11)
+
+
+TIMES = np.array([0.0, 0.3, 0.7, 1.5, 2.0])
+FUNCTIONS = {
+    "polynomial": polynomial(1.0, -2.0, 0.5, 3.0),
+    "harmonic": DRIVE,
+    "table": table(TIMES, np.cos(3 * TIMES)),
+    "one piece": table(TIMES[:2], TIMES[:2] ** 2),
+}
+
+
+@pytest.mark.parametrize("function", FUNCTIONS.values(), ids=list(FUNCTIONS))
+@pytest.mark.parametrize("t", [-0.5, 0.0, 0.1, 0.3, 0.69, 1.9999, 2.0, 2.5])
+def test_compiled_time_functions_equal_the_readable_ones(function, t):
+    tables = Functions(
+        np.array([function.kind]), np.array([0, len(function.data)]), np.array(function.data, dtype=float)
+    )
+    out = np.zeros((1, 3))
+    evaluate_functions(tables, np.zeros(0), t, out)
+    np.testing.assert_allclose(out[0], evaluate(function, t), rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("function", FUNCTIONS.values(), ids=list(FUNCTIONS))
+def test_derivatives_of_time_functions_equal_finite_differences(function):
+    t, h = 0.11, 1e-5
+    _, rate, second = evaluate(function, t)
+    ahead, behind = evaluate(function, t + h), evaluate(function, t - h)
+    assert rate == pytest.approx((ahead[0] - behind[0]) / (2 * h), abs=1e-7)
+    assert second == pytest.approx((ahead[1] - behind[1]) / (2 * h), abs=1e-6)
+
+
+def test_a_table_passes_through_its_points():
+    for t, y in zip(TIMES, np.cos(3 * TIMES), strict=True):
+        assert evaluate(FUNCTIONS["table"], t)[0] == pytest.approx(y, abs=1e-12)

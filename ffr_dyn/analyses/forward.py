@@ -67,7 +67,7 @@ def forward(
     Raises InputError for a scene or settings that cannot be used, SimulationError when the run fails: the message gives
     the time, the body or joint, the likely cause and what to change.
     """
-    method = method or ROS2(step=output_step / 10)
+    method = method if method is not None else ROS2(step=output_step / 10)
     substeps, rows = _counts(end - start, output_step, method.step)
     _check_step(scene, method)
     assembled = assemble(scene, time=start)
@@ -81,7 +81,10 @@ def forward(
                 writer.append(times, {name: quantity.values for name, quantity in part.items()})
             if progress is not None:
                 progress(float(times[-1]))
-    return _result(scene, run, header | {"status": "complete"})
+        account = _account(scene, run, header["notes"])
+        if writer is not None:
+            writer.close("complete", header | account)
+    return _result(scene, run, header | account | {"status": "complete"})
 
 
 def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
@@ -237,14 +240,18 @@ def _result(scene: Scene, run: _Run, attributes: dict[str, Any]) -> Result:
         name: Quantity(np.concatenate([part[name].values for part in run.parts]), q.unit, q.axes, q.description)
         for name, q in names.items()
     }
+    return Result(np.concatenate(run.times), quantities, _geometry(scene), attributes)
+
+
+def _account(scene: Scene, run: _Run, notes: list[str]) -> dict[str, Any]:
+    """What only the end of a run can tell."""
     info, drift = run.work.info, run.work.drift
-    account = {
+    return {
         "evaluations": int(info[1]),
         "projections": int(info[2]),
         "largest_drift": [float(drift[0]), float(drift[1])],
-        "notes": [*attributes["notes"], *_strained(scene, run.turned)],
+        "notes": [*notes, *_strained(scene, run.turned)],
     }
-    return Result(np.concatenate(run.times), quantities, _geometry(scene), attributes | account)
 
 
 def _strained(scene: Scene, turned: Array) -> list[str]:

@@ -8,6 +8,7 @@ forces implicitly), `stage_count` (rows of scratch it needs) and `run`, its comp
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, ClassVar, Protocol
 
 from ffr_dyn.integrators.rk4 import RK4
@@ -19,11 +20,14 @@ __all__ = ["METHODS", "RK4", "ROS2", "Integrator"]
 class Integrator(Protocol):
     """What `forward` needs of a method."""
 
-    step: float
+    @property
+    def step(self) -> float:
+        """Time step [s]."""
+
     order: ClassVar[int]
     implicit: ClassVar[bool]
     stage_count: ClassVar[int]
     run: ClassVar[Any]
 
 
-METHODS = {"rk4": RK4, "ros2": ROS2}
+METHODS: dict[str, Callable[[float], Integrator]] = {"rk4": RK4, "ros2": ROS2}

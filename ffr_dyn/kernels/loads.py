@@ -90,7 +90,7 @@ def call_user(address, t, x, v, user):
     """Let the user's Python functions fill `user`. Returns True when they did."""
     if user.size == 0:
         return True
-    return _call_address(address, t, x.ctypes.data, v.ctypes.data, user.ctypes.data) == 0
+    return _call_address(address, t, x.ctypes.data, v.ctypes.data, user.ctypes.data) == 0  # type: ignore[call-arg]
 
 
 @kernel
