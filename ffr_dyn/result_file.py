@@ -240,7 +240,8 @@ def _history(file: h5py.File, name: str, values: Array, unit: str, description: 
         name, data=values, maxshape=(None, *values.shape[1:]), chunks=chunk, fletcher32=True, track_order=True
     )
     variable.attrs["units"] = unit
-    variable.attrs["long_name"] = description
+    if description:
+        variable.attrs["long_name"] = description
     return variable
 
 
@@ -313,7 +314,7 @@ def _read(file: h5py.File) -> Result:
 def _read_quantity(variable: h5py.Dataset) -> Quantity:
     scales = [dimension[0] for dimension in variable.dims][1:]
     axes = tuple(Axis(scale.name[1:], tuple(scale.asstr()[:])) for scale in scales)
-    return Quantity(variable[...], variable.attrs["units"], axes, variable.attrs["long_name"])
+    return Quantity(variable[...], variable.attrs.get("units", "1"), axes, variable.attrs.get("long_name", ""))
 
 
 def _read_surface(group: h5py.Group) -> Surface:
