@@ -8,6 +8,7 @@ from importlib.metadata import version
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from ffr_prep.body import FlexibleBody, Interface, Surface, content_hash
 from ffr_prep.interface import CoupledModel, InterfaceRegion, couple
@@ -42,7 +43,20 @@ def reduce_mesh(
 
     Raises InputError for input that cannot be used and ComputationError for a computation that failed.
     """
-    tell = progress or _silent
+    with threadpool_limits(1):  # small dense blocks: waiting threads are slower than one, and one is reproducible
+        return _reduced(mesh, name, material, interfaces, reference, reduction, progress or _silent, provenance or {})
+
+
+def _reduced(
+    mesh: Mesh,
+    name: str,
+    material: Materials,
+    interfaces: Sequence[InterfaceRegion],
+    reference: ReferenceConditions,
+    reduction: Reduction,
+    tell: Callable[[str], None],
+    provenance: Mapping[str, Any],
+) -> FlexibleBody:
     tell("check the mesh")
     check_mesh(mesh)
     tell("assemble stiffness and mass")
@@ -60,7 +74,7 @@ def reduce_mesh(
         omega2=basis.omega2,
         interfaces=interface_shapes(model, basis),
         surface=boundary(mesh, Phi),
-        provenance=record(mesh, material, interfaces, reference, reduction, model) | dict(provenance or {}),
+        provenance=record(mesh, material, interfaces, reference, reduction, model) | dict(provenance),
         **vars(inertia_integrals(mesh.points, matrices.m, Phi)),
     )
 
