@@ -15,8 +15,8 @@ from ffr_dyn.result import Array
 from ffr_dyn.units import bracketed, readable
 from ffr_prep.body import Surface
 
-# More moving points than this make pages of some ten megabytes; larger surfaces are simplified.
-_MOST_POINTS = 6000
+# Larger surfaces are simplified until all pictures together need no more numbers than this: some eight megabytes.
+_MOST_NUMBERS = 1_400_000
 _TITLE = "Motion of a multibody system"
 _INK = "#222222"
 # The default epsilons are for sides of about one: facets of some millimetres would have no normal.
@@ -229,10 +229,11 @@ def _vector(values: Array) -> dict[str, float]:
 
 
 def _simplified(shown: Film) -> Film:
-    total = sum(len(solid.surface.points) for solid in shown.solids)
-    if total <= _MOST_POINTS:
+    # Three coordinates of each point, seven numbers with a ghost and a colour.
+    per_frame = sum(len(solid.surface.points) * (7 if solid.is_flexible else 3) for solid in shown.solids)
+    if per_frame * shown.times.size <= _MOST_NUMBERS:
         return shown
-    share = _MOST_POINTS / total
+    share = _MOST_NUMBERS / (per_frame * shown.times.size)
     return replace(
         shown, solids=tuple(replace(solid, surface=decimated(solid.surface, share)) for solid in shown.solids)
     )

@@ -385,7 +385,7 @@ def test_a_large_surface_is_simplified_for_a_page_to_some_of_its_points():
 
 
 def test_a_page_of_a_large_surface_stays_small(tmp_path, monkeypatch):
-    monkeypatch.setattr(page, "_MOST_POINTS", 100)
+    monkeypatch.setattr(page, "_MOST_NUMBERS", 100_000)
     result = replace(rotating_box(), geometry={"rod": box_surface(stations=400)})
     assert animate(result, tmp_path / "a.html").stat().st_size < 5.5e6
 
