@@ -23,7 +23,7 @@ UNREADABLE, UNLOADABLE, UNMESHED = 2, 3, 4
 _HXT = 10
 _ELEMENTS_PER_TURN = 12
 _DIGITS = 12
-_BY_CURVATURE = (".step", ".stp", ".iges", ".igs", ".brep")
+_CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 
 
 def main() -> int:
@@ -67,7 +67,7 @@ def _open(gmsh: Any, job: dict[str, Any]) -> None:
     gmsh.option.setNumber("Mesh.Algorithm3D", _HXT)
     gmsh.option.setNumber("Mesh.Optimize", 1)
     gmsh.option.setString("Geometry.OCCTargetUnit", job["unit"])
-    if job["path"].lower().endswith(_BY_CURVATURE):
+    if job["path"].lower().endswith(_CAD):
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _ELEMENTS_PER_TURN)
     gmsh.open(job["path"])
 
@@ -76,6 +76,8 @@ def _generate(gmsh: Any, job: dict[str, Any]) -> None:
     """Mesh the volumes; the options set here win over those of a script."""
     if job["size"] is not None:
         gmsh.option.setNumber("Mesh.MeshSizeMax", job["size"])
+        if job["path"].lower().endswith(_CAD):  # without sizes at points, gmsh takes a tenth of the diagonal
+            gmsh.model.mesh.setSize(gmsh.model.getEntities(0), job["size"])
     gmsh.option.setNumber("Mesh.ElementOrder", job["order"])
     if not gmsh.model.getEntities(3):
         raise ValueError("the geometry has no volume, only surfaces or curves: make it a solid")
@@ -154,7 +156,7 @@ def _add_nodes(gmsh: Any, index_of: np.ndarray, arrays: dict[str, np.ndarray], n
     """The nodes of the physical groups of points and curves."""
     for dimension, tag in [pair for d in (0, 1) for pair in gmsh.model.getPhysicalGroups(d)]:
         nodes, _ = gmsh.model.mesh.getNodesForPhysicalGroup(dimension, tag)
-        names["nodes"].append(gmsh.model.getPhysicalName(dimension, tag) or f"physical_{tag}")
+        names["nodes"].append(_physical_name(gmsh, dimension, tag))
         arrays[f"node_{len(names['nodes']) - 1}"] = index_of[nodes]
 
 
@@ -162,7 +164,7 @@ def _groups(gmsh: Any, dimension: int) -> dict[str, list[int]]:
     """Name -> entities: the physical groups; where there are none, every entity by its name in the file and its tag."""
     groups: dict[str, list[int]] = {}
     for _, tag in gmsh.model.getPhysicalGroups(dimension):
-        name = gmsh.model.getPhysicalName(dimension, tag) or f"physical_{tag}"
+        name = _physical_name(gmsh, dimension, tag)
         groups.setdefault(name, []).extend(int(e) for e in gmsh.model.getEntitiesForPhysicalGroup(dimension, tag))
     if groups:
         return groups
@@ -172,6 +174,11 @@ def _groups(gmsh: Any, dimension: int) -> dict[str, list[int]]:
         if name:
             groups.setdefault(name, []).append(tag)
     return groups
+
+
+def _physical_name(gmsh: Any, dimension: int, tag: int) -> str:
+    """Without the blanks that some formats fill names with."""
+    return gmsh.model.getPhysicalName(dimension, tag).strip() or f"physical_{tag}"
 
 
 def _given_name(path: str) -> str:

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ffr_prep.abaqus_source import from_abaqus
 from ffr_prep.body import content_hash
 from ffr_prep.elements import FACE_TRIANGLES, KINDS, jacobian_determinants
 from ffr_prep.errors import InputError
@@ -112,6 +113,8 @@ def _check_request(path: Path, unit: str | None, size: float | None, numbers: Ma
         raise InputError(f"mesh file {path} does not exist")
     if size is not None and path.suffix.lower() not in GEOMETRY:
         raise InputError(f"{path} is meshed already, so an element size has no effect; leave it out")
+    if path.suffix.lower() == ".geo" and not path.read_bytes().endswith(b"\n"):
+        raise InputError(f"the last line of {path} does not end with a line break, so gmsh would ignore it: add one")
     if numbers:
         _check_parameters(path, numbers)
 
@@ -133,6 +136,8 @@ def _read(
 ) -> tuple[Source, str]:
     """The mesh as in the file, and the unit of its numbers."""
     suffix = path.suffix.lower()
+    if suffix == ".inp":
+        return from_abaqus(path), unit or "m"
     if suffix not in BY_GMSH:
         from ffr_prep.meshio_source import from_meshio  # here, because meshio is slow to load
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -17,6 +19,7 @@ Array = np.ndarray
 
 _VOLUMES = {"tetra": "tet4", "tetra10": "tet10", "hexahedron": "hex8", "hexahedron20": "hex20", "hexahedron27": "hex27"}
 _FACES = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4, "quad9": 4}
+_NASTRAN = (".bdf", ".nas", ".fem")
 _MOST_TAGS = 100
 _NO_NODE_TAGS = ("nastran:ref", "gmsh:dim_tags")
 
@@ -31,7 +34,7 @@ def from_meshio(path: Path) -> Source:
     faces = [k for k, block in enumerate(read.cells) if block.type in _FACES]
     groups = dict(_cell_sets(path, read)) | dict(_tagged_cells(read))
     return Source(
-        points=_in_space(read.points),
+        points=_in_space(path, read.points),
         blocks=tuple((_kind(read.cells[k].type), np.asarray(read.cells[k].data, np.int64)) for k in volumes),
         volumes=_volume_groups(read, volumes, groups),
         faces=_face_groups(read, faces, groups),
@@ -44,10 +47,20 @@ def _read(path: Path) -> meshio.Mesh:
     """meshio's readers raise whatever comes, exit, and write to the terminal."""
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as said:
         try:
-            return meshio.read(path)
+            return _read_bulk_data(path) if path.suffix.lower() in _NASTRAN else meshio.read(path)
         except (Exception, SystemExit) as error:
             words = " ".join([f"{type(error).__name__}: {error}", *said.getvalue().split()])
     raise InputError(f"cannot read {path} as a mesh ({words}); is it complete, and does its ending name its format?")
+
+
+def _read_bulk_data(path: Path) -> meshio.Mesh:
+    """A Nastran file; the lines around the bulk data that meshio wants are ones that many programs leave out."""
+    text = path.read_text()
+    before = "" if re.search(r"^\s*BEGIN\s+BULK", text, re.MULTILINE) else "BEGIN BULK\n"
+    with tempfile.TemporaryDirectory(prefix="ffr-nastran-") as folder:
+        complete = Path(folder, "complete.bdf")
+        complete.write_text(before + text + "\nENDDATA\n")
+        return meshio.read(complete)
 
 
 def _check_coordinate_systems(path: Path, read: meshio.Mesh) -> None:
@@ -59,9 +72,9 @@ def _check_coordinate_systems(path: Path, read: meshio.Mesh) -> None:
         )
 
 
-def _in_space(points: Array) -> Array:
-    if points.shape[1] != 3:
-        raise InputError(f"the mesh is {points.shape[1]}-dimensional; a solid needs points with x, y and z")
+def _in_space(path: Path, points: Array) -> Array:
+    if np.ndim(points) != 2 or np.shape(points)[1] != 3:
+        raise InputError(f"{path} has no points with x, y and z (their shape is {np.shape(points)}); is it complete?")
     return np.asarray(points, np.float64)
 
 
@@ -106,14 +119,14 @@ def _node_groups(read: meshio.Mesh) -> dict[str, Array]:
 
 
 def _tag_values(tags: Sequence[Array]) -> list[int]:
-    if any(tag.ndim != 1 or not np.issubdtype(tag.dtype, np.integer) for tag in tags):
+    if not tags or any(tag.ndim != 1 or not np.issubdtype(tag.dtype, np.integer) for tag in tags):
         return []
     values = np.unique(np.concatenate(tags))
     return values.tolist() if values.size <= _MOST_TAGS else []
 
 
 def _short(key: str) -> str:
-    return key.rpartition(":")[2]
+    return "property" if key == "nastran:ref" else key.rpartition(":")[2]
 
 
 def _volume_groups(read: meshio.Mesh, volumes: Sequence[int], groups: Groups) -> dict[str, Array]:
