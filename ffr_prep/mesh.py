@@ -113,7 +113,7 @@ def _check_request(path: Path, unit: str | None, size: float | None, numbers: Ma
         raise InputError(f"mesh file {path} does not exist")
     if size is not None and path.suffix.lower() not in GEOMETRY:
         raise InputError(f"{path} is meshed already, so an element size has no effect; leave it out")
-    if path.suffix.lower() == ".geo" and not path.read_bytes().endswith(b"\n"):
+    if path.suffix.lower() == ".geo" and path.read_bytes().rpartition(b"\n")[2].strip():
         raise InputError(f"the last line of {path} does not end with a line break, so gmsh would ignore it: add one")
     if numbers:
         _check_parameters(path, numbers)

@@ -701,7 +701,7 @@ def test_syntax_errors_are_quoted_from_gmsh(tmp_path):
 
 def test_last_line_that_gmsh_would_ignore(tmp_path):
     (tmp_path / "a.geo").write_text('SetFactory("OpenCASCADE");\nBox(1) = {0, 0, 0, 1, 1, 1};')
-    with pytest.raises(InputError, match="last line of .*does not end with a line break"):
+    with pytest.raises(InputError, match=r"last line of .*does not end with a line break"):
         read_mesh(tmp_path / "a.geo")
 
 
