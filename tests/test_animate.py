@@ -111,8 +111,9 @@ def test_between_rows_the_body_turns_without_growing():
         np.testing.assert_allclose(solid.A[k], exact, atol=1e-5)
 
 
-def test_the_whole_motion_fits_in_the_box_of_the_film():
-    shown = film(rotating_box((0.6, 0, 0.8), amplitude=0.05), 40, scale=3.0)
+@pytest.mark.parametrize("axis", [(0.6, 0, 0.8), (0, 0, 0)])
+def test_the_whole_motion_fits_in_the_box_of_the_film(axis):
+    shown = film(rotating_box(axis, amplitude=0.05), 40, scale=3.0)
     (solid,) = shown.solids
     drawn = np.concatenate([drawn_points(solid, k, 3.0) for k in range(40)])
     assert (drawn >= shown.low).all()
@@ -290,6 +291,36 @@ def test_deformation_is_coloured_and_the_undeformed_body_is_a_ghost(tmp_path):
     grey = (np.ptp(plain, axis=-1) < 6) & (plain.max(axis=-1) > 150) & (plain.max(axis=-1) < 240)
     grey_alone = (np.ptp(alone, axis=-1) < 6) & (alone.max(axis=-1) > 150) & (alone.max(axis=-1) < 240)
     assert grey.sum() > 5 * grey_alone.sum() + 100
+
+
+def outlines(images):
+    """Left, right, top and bottom edge [pixels] of what is not white in each picture."""
+    edges = []
+    for image in images:
+        rows, columns = np.nonzero((image < 200).any(axis=-1))
+        edges.append([columns.min(), columns.max() + 1, rows.min(), rows.max() + 1])
+    return np.array(edges, dtype=float)
+
+
+@pytest.mark.parametrize("amplitude", [0.0, 0.1])
+def test_bodies_are_pictured_at_the_pose_and_with_the_deformation_of_the_formula(amplitude, monkeypatch):
+    from ffr_dyn import render
+
+    monkeypatch.setattr(render, "_caption", lambda *_: lambda _: None)
+    monkeypatch.setattr(render.pv.Plotter, "add_axes", lambda *_, **__: None)
+    shown = film(rotating_box(amplitude=amplitude), 9)
+    camera = camera_for(shown)
+    seen = outlines(render.pictures(shown, camera, (240, 160), coloured=False))
+    _, right, up = camera.axes()
+    points = [drawn_points(shown.solids[0], k, 1.0) for k in range(9)]
+    across, down = (np.array([[(p @ a).min(), (p @ a).max()] for p in points]) for a in (right, -up))
+    # A parallel projection: pixels = offset + pixels per metre * metres, with one factor for both directions.
+    metres = np.concatenate([across, down], axis=1)
+    unknowns = np.stack([metres.ravel(), np.tile([1, 1, 0, 0], 9), np.tile([0, 0, 1, 1], 9)], axis=1)
+    fitted = np.linalg.lstsq(unknowns, seen.ravel(), rcond=None)[0]
+    assert fitted[0] > 60
+    np.testing.assert_allclose(unknowns @ fitted, seen.ravel(), atol=2.0)
+    assert np.ptp(seen, axis=0).max() > 40
 
 
 def test_markers_and_traces_are_drawn(tmp_path):
