@@ -20,6 +20,7 @@ from ffr_prep.errors import ComputationError, InputError
 if TYPE_CHECKING:
     from ffr_prep.interface import InterfaceRegion
     from ffr_prep.material import Material
+    from ffr_prep.mesh import Mesh
     from ffr_prep.reduction import Reduction
     from ffr_prep.reference import ReferenceConditions
 
@@ -61,6 +62,7 @@ Reductions:
 Materials: a name (steel, aluminium, titanium, ...), or E=7e10,nu=0.3,rho=5540 in SI units; for several volumes
   --material web=steel --material rim=E=7e10,nu=0.3,rho=2700, each with the name of a volume of the mesh.
 """
+_FAR = 10.0
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 120}
 
 
@@ -152,7 +154,9 @@ def reduce(
     _check_writable(output)
     steps = Steps(visible=sys.stderr.isatty())
     loaded = read_mesh(mesh, unit=unit, size=size, numbers=parameters, order=order, progress=steps)
+    steps.end()
     _print(mesh_lines(loaded))
+    _check_points(regions, loaded)
     body = reduce_mesh(
         loaded,
         name=name or output.stem,
@@ -316,6 +320,18 @@ def _mode_numbers(text: str, count: int) -> list[int]:
     return list(dict.fromkeys(numbers))
 
 
+def _check_points(interfaces: Sequence[InterfaceRegion], mesh: Mesh) -> None:
+    """A point far away is most likely given in millimetres."""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    reach = _FAR * max(high - low)
+    for interface in interfaces:
+        if interface.point is not None and any((interface.point < low - reach) | (interface.point > high + reach)):
+            raise InputError(
+                f"interface {interface.name!r}: its point {interface.point} is far from the body, which lies between "
+                f"({', '.join(f'{x:.4g}' for x in low)}) and ({', '.join(f'{x:.4g}' for x in high)}) m; give it in metres"
+            )
+
+
 def _check_writable(output: Path) -> None:
     """Before the work, not after it."""
     if output.is_dir():
@@ -343,17 +359,17 @@ class Steps:
             click.echo(f"{step} ... ", err=True, nl=False)
 
     def end(self) -> None:
-        """The last step ends."""
+        """The step ends and no other begins."""
         self._tell_end()
         self.begun.append(("", time.perf_counter()))
 
     def in_words(self) -> str:
         """The steps with the seconds each took."""
         spans = [(name, later - since) for (name, since), (_, later) in pairwise(self.begun)]
-        return ", ".join(f"{name} {span:.1f} s" for name, span in spans)
+        return ", ".join(f"{name} {span:.1f} s" for name, span in spans if name)
 
     def _tell_end(self) -> None:
-        if self.visible and self.begun:
+        if self.visible and self.begun and self.begun[-1][0]:
             click.echo(f"{time.perf_counter() - self.begun[-1][1]:.1f} s", err=True)
 
 

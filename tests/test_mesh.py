@@ -347,15 +347,17 @@ def written_by_gmsh(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("suffix", [".msh", "_binary.msh", ".inp", ".unv", ".med"])
-def test_named_surfaces_in_formats_written_by_gmsh(written_by_gmsh, kind, suffix):
-    path = written_by_gmsh / f"{kind}{suffix}"
-    if kind == "hex27" and "msh" not in suffix:
-        assert not path.exists()
-        return
-    mesh = read_mesh(path)
-    assert_is_the_box(mesh, kind, "left", "right")
+@pytest.mark.parametrize(
+    "name",
+    [
+        *(f"{kind}.msh" for kind in KINDS),
+        *(f"{kind}.inp" for kind in KINDS if kind != "hex27"),
+        *("tet10_binary.msh", "hex20_binary.msh", "tet10.unv", "hex20.unv", "tet10.med", "hex20.med"),
+    ],
+)
+def test_named_surfaces_in_formats_written_by_gmsh(written_by_gmsh, name):
+    mesh = read_mesh(written_by_gmsh / name)
+    assert_is_the_box(mesh, name.partition("_")[0].partition(".")[0], "left", "right")
     np.testing.assert_array_equal(mesh.volume_groups["box"], np.arange(len(mesh.blocks[0].nodes)))
 
 
@@ -590,7 +592,7 @@ def test_connecting_rod(connecting_rod):
 
 def test_second_order_follows_the_bores(connecting_rod):
     """The volume converges faster than that of straight elements, which fill the bores and cut the outside."""
-    fine = volume(read_mesh(MESHES / "connecting_rod.geo", unit="mm", size=3))
+    fine = volume(read_mesh(MESHES / "connecting_rod.geo", unit="mm", size=4))
     straight = volume(read_mesh(MESHES / "connecting_rod.geo", unit="mm", order=1))
     assert abs(volume(connecting_rod) / fine - 1) < 1e-4
     assert abs(volume(connecting_rod) - fine) < 0.3 * abs(straight - fine)
@@ -631,8 +633,6 @@ def cad(tmp_path_factory):
         ("metres.step", None, 1.0),
         ("centimetres.stp", None, 1e-2),
         ("box.step", "m", 1.0),
-        ("metres.step", "mm", 1e-3),
-        ("box.brep", None, 1.0),
         ("box.brep", "in", 0.0254),
     ],
 )

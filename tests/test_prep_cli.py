@@ -245,6 +245,7 @@ FAILURES = {
     "no mesh": (lambda folder: folder / "none.msh", [], "none.msh does not exist"),
     "parameter": (bar, ["--set", "nx=many"], "'many' is not a number"),
     "interface": (bar, ["--interface", "left@1,2"], "three coordinates"),
+    "interface in millimetres": (bar, ["--interface", "left@500,50,50"], "(0, 0, 0) and (1, 0.1, 0.1) m; give it in"),
     "interface kind": (bar, ["--interface", "left:soft"], "kind is 'soft'"),
     "interface text": (bar, ["--interface", ":rigid"], "write NAME"),
     "reference": (bar, ["--reference", "clamped"], "write fixed:NAME"),
