@@ -89,9 +89,8 @@ def main() -> None:
                 tip, median, least, most = run(start, method(step), 5)
                 error = float(np.linalg.norm(tip - truth, axis=1).max())
                 points.append((1e3 * median, error))
-                print(
-                    f"{method.__name__:8}{n:6d}{step:12.3g}{error:12.2e}{1e3 * median:12.2f}{1e3 * least:9.2f}{1e3 * most:9.2f}"
-                )
+                times = "".join(f"{1e3 * t:{width}.2f}" for t, width in ((median, 12), (least, 9), (most, 9)))
+                print(f"{method.__name__:8}{n:6d}{step:12.3g}{error:12.2e}{times}")
             axes.loglog(
                 *zip(*points, strict=True),
                 marker=marker,
