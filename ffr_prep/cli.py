@@ -82,7 +82,7 @@ _PATH = click.Path(path_type=Path)
 _UNIT = click.option(
     "--unit",
     type=click.Choice(["m", "cm", "mm", "in"]),
-    help="Unit of the numbers in MESH; default: what a STEP or IGES file declares, m for others.",
+    help="Unit of the numbers in MESH; default: what a STEP file declares, mm for IGES, m for others.",
 )
 _SIZE = click.option("--size", type=float, help="Largest element edge, in that unit, when geometry is meshed.")
 _SET = click.option(

@@ -23,7 +23,8 @@ UNREADABLE, UNLOADABLE, UNMESHED = 2, 3, 4
 _HXT = 10
 _ELEMENTS_PER_TURN = 12
 _DIGITS = 12
-_CAD = (".step", ".stp", ".iges", ".igs", ".brep")
+_IGES = (".iges", ".igs")
+_CAD = (".step", ".stp", ".brep", *_IGES)
 
 
 def main() -> int:
@@ -66,7 +67,11 @@ def _open(gmsh: Any, job: dict[str, Any]) -> None:
         gmsh.option.setNumber(option, 1)
     gmsh.option.setNumber("Mesh.Algorithm3D", _HXT)
     gmsh.option.setNumber("Mesh.Optimize", 1)
-    gmsh.option.setString("Geometry.OCCTargetUnit", job["unit"])
+    if job["path"].lower().endswith(_IGES):  # surfaces without solids, for which OpenCASCADE takes no target unit
+        gmsh.option.setNumber("Geometry.OCCSewFaces", 1)
+        gmsh.option.setNumber("Geometry.OCCMakeSolids", 1)
+    else:
+        gmsh.option.setString("Geometry.OCCTargetUnit", job["unit"])
     if job["path"].lower().endswith(_CAD):
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _ELEMENTS_PER_TURN)
     gmsh.open(job["path"])
@@ -184,7 +189,7 @@ def _physical_name(gmsh: Any, dimension: int, tag: int) -> str:
 def _given_name(path: str) -> str:
     """The last part of a CAD label such as "Shapes/rod/bore", unless the exporting program made it up."""
     name = path.rpartition("/")[2].strip()
-    return "" if re.match(r"Open CASCADE STEP translator", name) else name
+    return "" if re.match(r"Open CASCADE STEP translator|COMPOUND$|SOLID$", name) else name
 
 
 if __name__ == "__main__":

@@ -26,7 +26,8 @@ Array = np.ndarray
 CAD_UNITS = {"m": "M", "cm": "CM", "mm": "MM", "in": "INCH"}
 GEOMETRY = (".geo", ".step", ".stp", ".iges", ".igs", ".brep")
 BY_GMSH = (*GEOMETRY, ".msh", ".med", ".unv")
-WITH_UNIT = (".step", ".stp", ".iges", ".igs")
+IGES = (".iges", ".igs")
+WITH_UNIT = (".step", ".stp", *IGES)
 
 _TIMEOUT = 3600.0
 _LIBRARIES = "libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1"
@@ -119,12 +120,13 @@ def _gmsh_block(kind: str, stored: dict[str, Array], k: int) -> tuple[str, Array
 
 
 def declared_unit(path: Path) -> str:
-    """The length unit of a STEP or IGES file: "m", "cm", "mm" or "in"; "mm" where it declares another or none."""
+    """The length unit of a STEP file: "m", "cm", "mm" or "in"; "mm" where it declares another, and for IGES files.
+
+    OpenCASCADE converts to the unit it is asked for, except that it gives IGES in millimetres whatever they declare.
+    """
+    if path.suffix.lower() in IGES:
+        return "mm"
     text = path.read_text(errors="replace")
-    return _step_unit(text) if path.suffix.lower() in (".step", ".stp") else _iges_unit(text)
-
-
-def _step_unit(text: str) -> str:
     context = re.search(r"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\s*\(([^)]*)\)", text)
     for reference in re.findall(r"#\d+", context[1]) if context else []:
         entity = re.search(rf"{reference}\s*=\s*\(([^;]*)\)\s*;", text)
@@ -134,10 +136,3 @@ def _step_unit(text: str) -> str:
             prefix = re.search(r"SI_UNIT\s*\(\s*(\$|\.\w+\.)\s*,\s*\.METRE\.", entity[1])
             return {"$": "m", ".CENTI.": "cm"}.get(prefix[1], "mm") if prefix else "mm"
     return "mm"
-
-
-def _iges_unit(text: str) -> str:
-    header = "".join(line[:72] for line in text.splitlines() if line[72:73] == "G")
-    names = {"1HM": "m", "2HCM": "cm", "2HMM": "mm", "2HIN": "in", "4HINCH": "in"}
-    found = [names[part.strip()] for part in re.split(r"[,;]", header) if part.strip() in names]
-    return found[0] if found else "mm"

@@ -18,7 +18,7 @@ from ffr_prep.abaqus_source import from_abaqus
 from ffr_prep.body import content_hash
 from ffr_prep.elements import FACE_TRIANGLES, KINDS, jacobian_determinants
 from ffr_prep.errors import InputError
-from ffr_prep.gmsh_source import BY_GMSH, GEOMETRY, WITH_UNIT, declared_unit, from_gmsh
+from ffr_prep.gmsh_source import BY_GMSH, GEOMETRY, IGES, WITH_UNIT, declared_unit, from_gmsh
 from ffr_prep.mesh_source import Source
 from ffr_prep.sides import joined_by_faces, joined_by_nodes, outer_faces, whole_faces
 
@@ -79,8 +79,8 @@ def read_mesh(
 ) -> Mesh:
     """A mesh from a file, in metres; geometry (.geo, .step, .iges, .brep) is meshed by gmsh first.
 
-    unit     : of the numbers in the file, "m", "cm", "mm" or "in"; without it the unit that a STEP or IGES file
-               declares, and metres for every other file
+    unit     : of the numbers in the file, "m", "cm", "mm" or "in"; without it the unit that a STEP file declares,
+               millimetres for IGES, which is converted to them, and metres for every other file
     size     : largest element edge when geometry is meshed, in the unit of the file
     numbers  : parameters of a .geo script to change, by name
     order    : 1 or 2, of the elements when geometry is meshed; second-order elements follow curved surfaces
@@ -113,6 +113,8 @@ def _check_request(path: Path, unit: str | None, size: float | None, numbers: Ma
         raise InputError(f"mesh file {path} does not exist")
     if size is not None and path.suffix.lower() not in GEOMETRY:
         raise InputError(f"{path} is meshed already, so an element size has no effect; leave it out")
+    if path.suffix.lower() in IGES and unit not in (None, "mm"):
+        raise InputError(f"{path} declares its unit and is converted to millimetres; leave out the unit {unit!r}")
     if path.suffix.lower() == ".geo" and path.read_bytes().rpartition(b"\n")[2].strip():
         raise InputError(f"the last line of {path} does not end with a line break, so gmsh would ignore it: add one")
     if numbers:

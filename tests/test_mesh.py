@@ -609,14 +609,14 @@ def test_element_size(connecting_rod):
 
 @pytest.fixture(scope="module")
 def cad(tmp_path_factory):
-    """A box of 10 x 20 x 30 in the file's unit: STEP and IGES declare millimetres, BREP nothing."""
+    """A box of 10 x 20 x 30 in the file's unit: STEP and IGES declare one, BREP does not."""
     folder = tmp_path_factory.mktemp("cad")
     gmsh.initialize(["gmsh"])
     gmsh.option.setNumber("General.Terminal", 0)
     gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
     gmsh.model.occ.addBox(0, 0, 0, 10, 20, 30)
     gmsh.model.occ.synchronize()
-    for suffix in ("step", "brep"):
+    for suffix in ("step", "brep", "igs"):
         gmsh.write(str(folder / f"box.{suffix}"))
     gmsh.finalize()
     step = (folder / "box.step").read_text()
@@ -634,6 +634,7 @@ def cad(tmp_path_factory):
         ("centimetres.stp", None, 1e-2),
         ("box.step", "m", 1.0),
         ("box.brep", "in", 0.0254),
+        ("box.igs", None, 1e-3),
     ],
 )
 def test_units_of_cad_files(cad, name, unit, metre):
@@ -641,6 +642,27 @@ def test_units_of_cad_files(cad, name, unit, metre):
     mesh = read_mesh(cad / name, unit=unit, size=30.0, order=1)
     np.testing.assert_allclose(np.ptp(mesh.points, axis=0), np.array([10, 20, 30]) * metre, rtol=1e-9)
     assert len(mesh.points) < 100
+
+
+def test_iges_has_its_unit(cad):
+    with pytest.raises(InputError, match="converted to millimetres; leave out the unit 'm'"):
+        read_mesh(cad / "box.igs", unit="m")
+
+
+INCHES = """
+#9 = ( GEOMETRIC_REPRESENTATION_CONTEXT(3) GLOBAL_UNIT_ASSIGNED_CONTEXT((#12, #14, #15)) REPRESENTATION_CONTEXT('','') );
+#10 = ( LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT(.MILLI.,.METRE.) );
+#11 = LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(25.4), #10);
+#12 = ( CONVERSION_BASED_UNIT('INCH', #11)
+  LENGTH_UNIT() NAMED_UNIT(#13) );
+"""
+
+
+def test_inches_are_defined_by_millimetres_in_step_files(tmp_path):
+    (tmp_path / "i.step").write_text(INCHES)
+    assert gmsh_source.declared_unit(tmp_path / "i.step") == "in"
+    (tmp_path / "i.step").write_text(INCHES.replace("(#12,", "(#10,"))
+    assert gmsh_source.declared_unit(tmp_path / "i.step") == "mm"
 
 
 def test_entities_of_cad_files_have_names(cad):
