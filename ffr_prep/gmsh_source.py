@@ -62,7 +62,15 @@ def _run_gmsh(path: Path, job_file: Path, result: Path) -> None:
     # By its path, so that it also runs where the package is not installed; -P keeps its folder off sys.path.
     command = [sys.executable, "-P", gmsh_process.__file__, str(job_file), str(result)]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=_TIMEOUT, check=False)
+        done = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=_TIMEOUT,
+            check=False,
+        )
     except subprocess.TimeoutExpired:
         raise ComputationError(
             f"gmsh did not finish {path} within {_TIMEOUT:g} s: choose a larger element size, or simplify the geometry"

@@ -126,6 +126,8 @@ def _check_parameters(path: Path, numbers: Mapping[str, float]) -> None:
     if path.suffix.lower() != ".geo":
         raise InputError(f"{path} has no parameters to set ({', '.join(numbers)}); only .geo scripts have")
     script = re.sub(r"//.*", "", path.read_text(errors="replace"))
+    if re.search(r"^\s*Include\b", script, re.MULTILINE):
+        return  # the parameter may be in the other file
     declared = re.findall(r"DefineConstant\s*\[(.*?)\]\s*;", script, re.DOTALL)
     known = dict.fromkeys(re.findall(r"(\w+)\s*=", "".join(declared)))
     for name in numbers:

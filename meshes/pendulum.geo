@@ -12,7 +12,7 @@ DefineConstant[
   length = 1.2,     // along x
   thickness = 0.009,  // along y
   width = 0.2,      // along z
-  along = 24,       // number of elements
+  along = 32,       // number of elements
   across = 4,
   layers = 1
 ];

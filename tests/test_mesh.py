@@ -703,6 +703,12 @@ def test_arguments_that_cannot_be_used(arguments, message):
         read_mesh(MESHES / "box.geo", **arguments)
 
 
+def test_parameters_of_an_included_script(tmp_path):
+    (tmp_path / "outer.geo").write_text(f'Include "{MESHES / "box.geo"}";\n')
+    mesh = read_mesh(tmp_path / "outer.geo", numbers={"x": 3.0, "nx": 1}, order=1)
+    assert mesh.points[:, 0].max() == 3.0
+
+
 def test_arguments_that_would_be_ignored(written_by_gmsh):
     with pytest.raises(InputError, match="meshed already"):
         read_mesh(written_by_gmsh / "tet4.msh", size=0.1)
