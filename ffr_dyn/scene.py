@@ -22,6 +22,7 @@ from ffr_prep.body import FlexibleBody
 Array = np.ndarray
 
 GROUND = "ground"
+RESERVED = (GROUND, "energy", "constraint", "time", "geometry")
 
 
 @dataclass(frozen=True)
@@ -137,14 +138,17 @@ def _offer(name: str, known: Iterable[str]) -> str:
 
 
 def _check_names(scene: Scene) -> None:
-    for what in ("bodies", "joints", "drivers", "loads", "springs"):
-        names = [item.name for item in getattr(scene, what)]
-        repeated = sorted({name for name in names if names.count(name) > 1})
-        if repeated:
-            raise InputError(f"{what}: the name {repeated[0]!r} is used more than once")
-    for body in scene.bodies:
-        if body.name == GROUND or "." in body.name or not body.name:
-            raise InputError(f"a body cannot be named {body.name!r}: {GROUND!r} and dots are reserved")
+    """One name, one thing: results are named by them."""
+    things = (*scene.bodies, *scene.joints, *scene.drivers, *scene.loads, *scene.springs)
+    names = [thing.name for thing in things]
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    if repeated:
+        raise InputError(f"the name {repeated[0]!r} is used more than once in the scene; every name must be its own")
+    for name in names:
+        if name in RESERVED or not name.replace("_", "a").replace("-", "a").isalnum():
+            raise InputError(
+                f"{name!r} cannot be a name: use letters, digits, '_' and '-'; {', '.join(map(repr, RESERVED))} are taken"
+            )
 
 
 def _check_joints(scene: Scene) -> None:
