@@ -4,7 +4,8 @@ Nodes, elements, and all ways to name a part of them: *NSET, *ELSET, *SURFACE, t
 sets, GENERATE. meshio reads .inp too, but neither surfaces nor face elements of second order, and of a set that comes
 in pieces it keeps the last.
 
-Source: Abaqus 2016 Keywords Reference Guide; Abaqus 2016 Elements Guide, section 28.1.4 (node order and face numbers).
+Source: Abaqus Keywords Reference Guide; Abaqus Analysis User's Guide, Three-dimensional solid element library (node
+order and face numbers).
 """
 
 from __future__ import annotations

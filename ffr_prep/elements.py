@@ -3,7 +3,7 @@
 Nodes are ordered as in VTK and meshio: corners, then mid-edge nodes, then face centres, then the centre. Faces are
 listed with their corners first, counter-clockwise seen from outside, then their mid-edge nodes, then their centre.
 
-Source: W. Schroeder, K. Martin, B. Lorensen, The Visualization Toolkit, 4th ed. (2006), section 5.4 (cell types).
+Source: W. Schroeder, K. Martin, B. Lorensen, The Visualization Toolkit, 4th ed. (2006), chapter 5 (cell types).
 """
 
 from __future__ import annotations

@@ -39,10 +39,9 @@ class Material:
             )
 
 
-# Room-temperature values, rounded. Metals: W. D. Callister, D. G. Rethwisch, Materials Science and Engineering, 9th ed.
-# (2014), appendix B (tables B.1 density, B.2 modulus, B.3 Poisson's ratio); cast iron EN-GJL-250: EN 1561 annex A;
-# EN-GJS-400: EN 1563 annex; plastics: M. F. Ashby, Materials Selection in Mechanical Design, 4th ed. (2011),
-# appendix A. Alloys and heats differ by several per cent, plastics by more: give measured values where it matters.
+# Typical values at room temperature, rounded, as tabulated in W. D. Callister, D. G. Rethwisch, Materials Science and
+# Engineering (2014), appendix B (metals), and M. F. Ashby, Materials Selection in Mechanical Design (2011), appendix A
+# (plastics). Alloys and heats differ by several per cent, plastics by more: give measured values where it matters.
 _LIBRARY = {
     "steel": (2.1e11, 0.30, 7850.0),
     "stainless steel": (1.93e11, 0.30, 8000.0),

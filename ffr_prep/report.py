@@ -113,8 +113,8 @@ def ability_lines(body: FlexibleBody) -> Iterator[str]:
 def _range_in_words(body: FlexibleBody) -> str:
     """Modal truncation leaves little error up to about half the highest normal mode kept.
 
-    Source: R. R. Craig, A. J. Kurdila, Fundamentals of Structural Dynamics, 2nd ed. (2006), section 17.8 (cut-off
-    frequencies of 1.5 to 2 times the range of interest).
+    The rule of practice for component modes is to keep those up to 1.5 to 2 times the range of interest: R. R. Craig,
+    A. J. Kurdila, Fundamentals of Structural Dynamics, 2nd ed. (2006), chapter 17.
     """
     kept = body.provenance.get("reduction", {}).get("modes", body.n)
     if not 0 < kept <= body.n:

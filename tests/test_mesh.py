@@ -503,7 +503,7 @@ FACE_PLANES_HEX = {1: (2, 0), 2: (2, 1), 3: (1, 0), 4: (0, 1), 5: (1, 1), 6: (0,
 
 @pytest.mark.parametrize("side", FACE_PLANES_HEX)
 def test_abaqus_face_numbers_of_a_hexahedron(deck, side):
-    """Abaqus Elements Guide 28.1.4: faces 1-2-3-4, 5-8-7-6, 1-5-6-2, 2-6-7-3, 3-7-8-4, 4-8-5-1."""
+    """Abaqus, Three-dimensional solid element library: faces 1-2-3-4, 5-8-7-6, 1-5-6-2, 2-6-7-3, 3-7-8-4, 4-8-5-1."""
     axis, value = FACE_PLANES_HEX[side]
     mesh = read_mesh(deck(DECK.replace("Upper, S2", f"Lower, S{side}")))
     np.testing.assert_array_equal(mesh.points[region_nodes(mesh, "Top")][:, axis], value)
@@ -511,7 +511,7 @@ def test_abaqus_face_numbers_of_a_hexahedron(deck, side):
 
 @pytest.mark.parametrize(("side", "without"), [(1, 4), (2, 3), (3, 1), (4, 2)])
 def test_abaqus_face_numbers_of_a_tetrahedron(deck, side, without):
-    """Abaqus Elements Guide 28.1.4: faces 1-2-3, 1-4-2, 2-4-3, 3-4-1."""
+    """Abaqus, Three-dimensional solid element library: faces 1-2-3, 1-4-2, 2-4-3, 3-4-1."""
     mesh = read_mesh(
         deck(f"*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4\n5,1,2,3,4\n*SURFACE,NAME=f\n5,S{side}\n")
     )
