@@ -1,0 +1,412 @@
+"""Standard input data of flexible bodies (SID): write and read `.SID_FEM` files.
+
+Source: O. Wallrapp, "Standardization of flexible body modeling in multibody system codes, Part I: Definition of
+standard input data", Mechanics of Structures and Machines 22 (1994) 283-304. The equations of motion there are
+Me q'' + Ct a + Cr alpha + Ge(omega) q' + Oe Omega + Ke q = ..., with Omega the six products of the angular velocity.
+
+How the blocks follow from the integrals of FlexibleBody, and back (r: position, phi_j: mode j):
+
+    mdCM  r_dm; m1 = P_dm                               Ct      P_dm
+    J     tr(rr) I - rr; m1 = the same of rP + rP^T     Cr      axial(rP); m1(k, l) = axial(PP)[:, l, k]
+    Gr_l  -2 (rP_l^T - tr(rP_l) I)                      Ge_l    2 Cr.m1(:, l)
+    Oe    xx: rP_xx - tr(rP), xy: rP_xy + rP_yx; m1 the same of PP
+
+J.m1 holds the symmetric part of rP_dm, Cr the other; Oe.m1 holds the symmetric part of PP_dm, Cr.m1 the other.
+Everything else repeats them and is checked on reading.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal, get_args
+from urllib.parse import quote, unquote
+
+import numpy as np
+
+from ffr_prep.body import FlexibleBody, Interface, axial
+from ffr_prep.errors import InputError
+from ffr_prep.interchange import (
+    IDENTITY_TOLERANCE,
+    LUMPING_LIMIT,
+    MISFIT_LIMIT,
+    Bounds,
+    Content,
+    body_from,
+    bounds,
+    from_inertia,
+    from_parts,
+    mended_trace,
+    moments,
+    nodal_masses,
+    nodes,
+    read_lines,
+    real,
+    skew,
+    write_lines,
+)
+from ffr_prep.sid_blocks import Section, Taylor, integer, only, part, sections, taylor, value
+from ffr_prep.sid_nodes import read_nodes
+
+Array = np.ndarray
+Layout = Literal["mode-major", "axis-major"]
+
+J_ORDER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+OE_ORDER = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+BLOCKS = ("mdCM", "J", "Ct", "Cr", "Me", "Gr", "Ge", "Oe", "ksigma", "Ke", "De")
+NAMES = "interfaces="
+
+
+def write_sid(body: FlexibleBody, path: str | Path, *, layout: Layout = "mode-major", surface: bool = False) -> Path:
+    """Write the body as standard input data, SI units, 17 significant digits.
+
+    layout  : of the matrices Gr (3, 3n) and Ge (n, 3n), which programs do not agree on: column 3(l-1)+a for mode l and
+              axis a ("mode-major") or (a-1)n+l ("axis-major"); line 1 of the file says which
+    surface : also write the points of the surface as nodes, after the interfaces. The format has no triangles, no
+              kinds of interfaces and no provenance; geometric stiffness, which a body does not hold, is left out.
+
+    Source: Wallrapp 1994. Raises InputError for an unknown layout, a body without nodes, or a missing surface.
+    """
+    if layout not in get_args(Layout):
+        raise InputError(f"layout {layout!r} is not known; take mode-major or axis-major")
+    return write_lines(Path(path), list(_lines(body, layout, nodes(body, surface=surface))))
+
+
+def blocks(body: FlexibleBody, layout: Layout) -> dict[str, tuple[Array, Array | None]]:
+    """The Taylor blocks by name: m0 (rows, columns) and, of order 1, m1 (rows, n, columns)."""
+    n = body.n
+    first = np.einsum("klj->jkl", body.rP_dm + body.rP_dm.transpose(1, 0, 2))
+    J1 = np.trace(first, axis1=1, axis2=2)[:, None, None] * np.eye(3) - first
+    Cr1 = axial(body.PP_dm).transpose(2, 1, 0)
+    return {
+        "mdCM": (body.r_dm[:, None], body.P_dm[:, :, None]),
+        "J": (_six(body.inertia)[:, None], _six(J1).T[:, :, None]),
+        "Ct": (body.P_dm.T, None),
+        "Cr": (axial(body.rP_dm).T, Cr1),
+        "Me": (np.eye(n), None),
+        "Gr": (_laid_out(-2 * body.I8.transpose(1, 0, 2), layout), None),
+        "Ge": (_laid_out(2 * Cr1, layout), None),
+        "Oe": (_centrifugal(body.rP_dm).T, _centrifugal(body.PP_dm).transpose(1, 2, 0)),
+        "ksigma": (np.zeros((n, 1)), None),
+        "Ke": (np.diag(body.omega2), None),
+        "De": (np.zeros((n, n)), None),
+    }
+
+
+def _six(tensor: Array) -> Array:
+    """(..., 3, 3) -> (..., 6) in the order of J."""
+    return np.stack([tensor[..., k, l] for k, l in J_ORDER], axis=-1)  # noqa: E741
+
+
+def _centrifugal(moment: Array) -> Array:
+    """(3, 3, ...) integral of a b^T dm -> (6, ...) integral of b . omega~ omega~ a dm per product of omega."""
+    trace = np.einsum("kk...->...", moment)
+    return np.stack([moment[k, l] - trace if k == l else moment[k, l] + moment[l, k] for k, l in OE_ORDER])  # noqa: E741
+
+
+def _laid_out(matrices: Array, layout: Layout) -> Array:
+    """(rows, n, 3) -> (rows, 3n)."""
+    ordered = matrices if layout == "mode-major" else matrices.transpose(0, 2, 1)
+    return ordered.reshape(len(matrices), 3 * matrices.shape[1])
+
+
+# ---- text ---------------------------------------------------------------------------------------------------------
+
+
+def label(name: str) -> str:
+    """A name without blanks and without the words at which simple readers of the format would stop."""
+    plain = quote(name, safe="+-")
+    for word in ("frame", "refmod"):
+        plain = plain.replace(word, f"%{ord(word[0]):02X}{word[1:]}")
+    return plain
+
+
+def _lines(body: FlexibleBody, layout: Layout, at: tuple[Interface, ...]) -> Iterator[str]:
+    named = ",".join(label(i.name) for i in body.interfaces)
+    yield f"{len(at):5d}{body.n:5d}   :No. nodes, No. modes: ffr-prep, SI, Gr,Ge={layout}, {NAMES}{named}"
+    yield "part "
+    yield f"  new modal = {label(body.name)}"
+    yield "    refmod "
+    yield _pair(6, "mass ", _number(body.mass))
+    yield _pair(6, "nelastq ", f"{body.n}")
+    for k, frequency in enumerate(body.frequencies, start=1):
+        yield _pair(6, f"ielastq ({k:4d}) ", f"Eigen Mode {k:5d} : {frequency:.9g} Hz")
+    yield "    end refmod "
+    yield "    frame "
+    for k, node in enumerate(at, start=1):
+        yield from _node(k, node, body.n)
+    yield "    end frame "
+    for name, (m0, m1) in blocks(body, layout).items():
+        yield from _block(4, name, m0, m1, body.n)
+    yield "  end modal "
+    yield "end part "
+
+
+def _node(number: int, node: Interface, n: int) -> Iterator[str]:
+    yield f"      new node = {number}"
+    yield _pair(8, "rframe ", "body ref")
+    yield from _block(8, "origin", node.position[:, None], node.phi_t[:, :, None], n)
+    yield from _block(8, "phi", node.phi_t, None, n)
+    yield from _block(8, "psi", node.phi_r, None, n)
+    yield from _block(8, "AP", np.eye(3), skew(node.phi_r).transpose(0, 2, 1), n)
+    yield "      end node "
+
+
+def _block(indent: int, name: str, m0: Array, m1: Array | None, n: int) -> Iterator[str]:
+    """A Taylor block. Structure 3 (general) or 0 (zero) only: simple readers know no other."""
+    anything = m0.any() or (m1 is not None and m1.any())
+    head = {
+        "order": int(m1 is not None),
+        "nrow": m0.shape[0],
+        "ncol": m0.shape[1],
+        "nq": n,
+        "nqn": 0,
+        "structure": 3 if anything else 0,
+    }
+    yield f"{'':{indent}}{name} "
+    for key, number in head.items():
+        yield _pair(indent + 2, f"{key} ", f"{number}")
+    for i, j in np.argwhere(m0):
+        yield _pair(indent + 2, f"m0({i + 1:4d},{j + 1:4d}) ", _number(m0[i, j]))
+    if m1 is not None:
+        for i, q, j in np.argwhere(m1):
+            yield _pair(indent + 2, f"m1({i + 1:4d},{q + 1:4d},{j + 1:4d}) ", _number(m1[i, q, j]))
+    yield f"{'':{indent}}end {name} "
+
+
+def _pair(indent: int, key: str, value: str) -> str:
+    return f"{'':{indent}}{key:<{44 - indent}}= {value}"
+
+
+def _number(value: float) -> str:
+    return f"{value:23.16E}".replace("E", "D")
+
+
+# ---- reading ------------------------------------------------------------------------------------------------------
+
+
+def read_sid(path: str | Path) -> FlexibleBody:
+    """The body of a standard input data file; every node becomes an interface of the kind "node".
+
+    The numbers are taken to be in SI units. The layouts of Gr and Ge are those that satisfy Gr_l + Gr_l^T =
+    2 dJ/dq_l and Ge = 2 Cr.m1. Where Me is not the unit matrix or Ke not diagonal, the modes are combined. Geometric
+    stiffness and damping are left out. provenance: "layout", "notes" (what was changed), "warnings" (what was lost or
+    does not agree).
+
+    Source: Wallrapp 1994. Raises InputError for a file that does not exist, is damaged, truncated or foreign, or
+    whose blocks contradict each other, naming line, block or identity, and by how much.
+    """
+    path = Path(path)
+    lines = read_lines(path)
+    try:
+        return body_from(_content(lines, path))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _content(lines: list[str], path: Path) -> Content:
+    count, n, names = _first_line(lines)
+    modal = part(part(sections(lines, 1), "part"), "modal")
+    only(modal, ("refmod", "frame", *BLOCKS))
+    mass = _mass(part(modal, "refmod"), n)
+    found = {name: taylor(part(modal, name), *size, n) for name, size in _sizes(n).items()}
+    at = read_nodes(part(modal, "frame"), count, n, names)
+    r_dm, P_dm = found["mdCM"].m0[:, 0], found["mdCM"].m1[:, :, 0]
+    rr_dm = from_inertia(_tensor(found["J"].m0[:, 0]))
+    limit = bounds(mass, rr_dm, found["Me"].m0)
+    rP_dm = from_parts(from_inertia(_tensor(found["J"].m1[:, :, 0])), found["Cr"].m0.T)
+    layout = _check_repeated(P_dm, rP_dm, found, limit)
+    stiffened = [*at.stiffened, *_stiffened(found, limit)]
+    content = Content(
+        name=unquote(modal.label) or path.stem,
+        mass=mass,
+        r_dm=r_dm,
+        rr_dm=rr_dm,
+        P_dm=P_dm,
+        rP_dm=rP_dm,
+        PP_dm=_second_moments(found, limit),
+        M=found["Me"].m0,
+        K=found["Ke"].m0,
+        interfaces=at.interfaces,
+        facts={
+            "source": {"file": path.name, "format": "SID"},
+            "layout": layout,
+            "notes": ["every node became an interface of the kind 'node'", "the format has no surface to draw"],
+            "warnings": [*at.lost, *_lost(found, stiffened), *_lumped(rP_dm, found, layout, limit)],
+        },
+    )
+    return _trace_of_mass(content, bool(stiffened))
+
+
+def _sizes(n: int) -> dict[str, tuple[int, int]]:
+    square, axes, wide = (n, n), (n, 3), 3 * n
+    sizes = ((3, 1), (6, 1), axes, axes, square, (3, wide), (n, wide), (n, 6), (n, 1), square, square)
+    return dict(zip(BLOCKS, sizes, strict=True))
+
+
+def _first_line(lines: list[str]) -> tuple[int, int, list[str]]:
+    """Numbers of nodes and modes, and the names of the nodes where this program wrote them."""
+    numbers = re.match(r"\s*([0-9]{1,7})\s+([0-9]{1,5})(?![0-9])(.*)", lines[0] if lines else "")
+    if numbers is None:
+        raise InputError("line 1 must begin with the numbers of nodes and modes: this is not a SID file, or damaged")
+    count, n, comment = int(numbers[1]), int(numbers[2]), numbers[3]
+    named = comment.partition(NAMES)[2].split(",") if NAMES in comment else []
+    return count, n, [unquote(name.strip()) for name in named if name.strip()]
+
+
+def _mass(refmod: Section, n: int) -> float:
+    if integer(refmod, "nelastq") != n:
+        raise InputError(f"{refmod} has nelastq = {integer(refmod, 'nelastq')}, but line 1 announces {n} modes")
+    return real(value(refmod, "mass"), f"{refmod}: mass")
+
+
+# ---- what repeats, what contradicts, what is lost -----------------------------------------------------------------
+
+
+def _tensor(six: Array) -> Array:
+    """(6, ...) in the order of J -> (3, 3, ...)."""
+    tensor = np.zeros((3, 3, *six.shape[1:]))
+    for value_of, (k, l) in zip(six, J_ORDER, strict=True):
+        tensor[k, l] = tensor[l, k] = value_of
+    return tensor
+
+
+def _second_moments(found: Mapping[str, Taylor], limit: Bounds) -> Array:
+    """(3, 3, n, n) PP_dm from Oe.m1, Me and Cr.m1. Raises InputError where Oe.m1 is not symmetric in the modes."""
+    Oe1, M = found["Oe"].m1, found["Me"].m0
+    _hold("Oe.m1(k,l,c) = Oe.m1(l,k,c)", Oe1 - Oe1.transpose(1, 0, 2), limit.third[:, :, None])
+    both = np.zeros((3, 3, *M.shape))
+    for column, (k, l) in enumerate(OE_ORDER):  # noqa: E741
+        both[k, l] = both[l, k] = 2 * (Oe1[:, :, column] + M) if k == l else Oe1[:, :, column]
+    return from_parts(both, _of_mass(found["Cr"].m1).transpose(2, 1, 0))
+
+
+def _of_mass(Cr1: Array) -> Array:
+    """The part of Cr.m1 that is an integral over the mass: antisymmetric in the modes."""
+    return 0.5 * (Cr1 - Cr1.transpose(1, 0, 2))
+
+
+def _check_repeated(P_dm: Array, rP_dm: Array, found: Mapping[str, Taylor], limit: Bounds) -> dict[str, str]:
+    """The layouts of Gr and Ge. Raises InputError where blocks that repeat each other differ."""
+    _hold("Ct = transpose of mdCM.m1", found["Ct"].m0 - P_dm.T, limit.first[:, None])
+    _hold("Oe.m0 = centrifugal forces from J.m1", found["Oe"].m0 - _centrifugal(rP_dm).T, limit.second[:, None])
+    J1 = _tensor(found["J"].m1[:, :, 0])
+    twice = 2 * _of_mass(found["Cr"].m1)
+
+    def of_Gr(Gr: Array) -> float:
+        return _relative(Gr + Gr.transpose(2, 1, 0) - 2 * J1.transpose(0, 2, 1), limit.second[:, None])
+
+    def of_Ge(Ge: Array) -> float:
+        return _relative(Ge - twice, limit.third[:, :, None])
+
+    Gr = {layout: of_Gr(_taken_apart(found["Gr"].m0, layout)) for layout in get_args(Layout)}
+    Ge = {layout: of_Ge(_taken_apart(found["Ge"].m0, layout)) for layout in get_args(Layout)}
+    return {"Gr": _fitting("Gr_l + transpose = 2 dJ/dq_l", Gr), "Ge": _fitting("Ge = 2 Cr.m1", Ge)}
+
+
+def _taken_apart(matrix: Array, layout: str) -> Array:
+    """(rows, 3n) -> (rows, n, 3)."""
+    rows, n = matrix.shape[0], matrix.shape[1] // 3
+    return matrix.reshape(rows, n, 3) if layout == "mode-major" else matrix.reshape(rows, 3, n).transpose(0, 2, 1)
+
+
+def _fitting(identity: str, residuals: Mapping[str, float]) -> str:
+    best = min(residuals, key=lambda layout: residuals[layout])
+    if residuals[best] > IDENTITY_TOLERANCE:
+        off = ", ".join(f"{layout} by {residual:.1e}" for layout, residual in residuals.items())
+        raise InputError(f"the identity {identity} fails in both layouts ({off}, relative): a block is damaged")
+    return best
+
+
+def _relative(residual: Array, bound: Array) -> float:
+    return float(np.abs(residual / bound).max(initial=0.0))
+
+
+def _hold(identity: str, residual: Array, bound: Array) -> None:
+    off = _relative(residual, bound)
+    if off > IDENTITY_TOLERANCE:
+        raise InputError(f"the identity {identity} fails by {off:.1e} (relative): a block is damaged")
+
+
+def _stiffened(found: Mapping[str, Taylor], limit: Bounds) -> list[str]:
+    """The blocks that hold geometric stiffness."""
+    Cr1 = found["Cr"].m1
+    uneven = _relative(Cr1 - _of_mass(Cr1), limit.third[:, :, None]) > IDENTITY_TOLERANCE
+    return ["Ct.m1"] * bool(found["Ct"].m1.any()) + ["Cr.m1"] * uneven
+
+
+def _lost(found: Mapping[str, Taylor], stiffened: list[str]) -> list[str]:
+    lost = []
+    if stiffened:
+        lost.append(f"dropped: the geometric stiffness in {', '.join(stiffened)}")
+    for name, what in (("ksigma", "the prestress forces"), ("De", "the modal damping")):
+        if found[name].m0.any():
+            lost.append(f"dropped: {what} {name}")
+    higher = [name for name in ("Me", "Gr", "Ge", "ksigma", "Ke", "De") if found[name].m1.any()]
+    return [*lost, f"dropped: the terms of order 1 of {', '.join(higher)}"] if higher else lost
+
+
+def _lumped(rP_dm: Array, found: Mapping[str, Taylor], layout: Mapping[str, str], limit: Bounds) -> list[str]:
+    """A consistent mass has Gr_l - transpose = -2 skew(Cr_l); rotary inertia of nodes is in Cr only."""
+    Gr = _taken_apart(found["Gr"].m0, layout["Gr"])
+    off = _relative(Gr - Gr.transpose(2, 1, 0) + 2 * skew(axial(rP_dm)).transpose(0, 2, 1), limit.second[:, None])
+    if off <= IDENTITY_TOLERANCE:
+        return []
+    return [f"lumped mass: the identity antisym(Gr_l) = -skew(Cr_l) fails by {off:.1e} (relative); Cr was taken"]
+
+
+def _trace_of_mass(content: Content, stiffened: bool) -> Content:
+    """The content with a PP_dm whose trace is Me, as the sum of Oe.m1 over xx, yy, zz = -2 Me demands.
+
+    Geometric stiffness in Oe.m1 cannot be told from mass; PP_dm is then that of masses at the nodes.
+    Raises InputError where the sum is neither explained by lumping nor replaced by masses at the nodes.
+    """
+    PP_dm, off = mended_trace(content.PP_dm, content.M)
+    if off <= IDENTITY_TOLERANCE:
+        return replace(content, PP_dm=PP_dm)
+    identity = f"the identity sum of Oe.m1 over xx, yy, zz = -2 Me fails by {off:.1e} (relative)"
+    if stiffened:
+        PP_dm, misfit = _at_nodes(content)
+        warning = (
+            f"dropped: geometric stiffness in Oe.m1; {identity}; PP_dm is that of nodal masses, off by {misfit:.1e}"
+        )
+    elif off > LUMPING_LIMIT:
+        raise InputError(f"{identity}: too much for a lumped mass; a block is damaged or of order 0")
+    else:
+        warning = f"lumped mass: {identity}; each axis of PP_dm took a third"
+    warnings = [*content.facts["warnings"], warning]
+    return replace(content, PP_dm=PP_dm, facts={**content.facts, "warnings": warnings})
+
+
+def _at_nodes(content: Content) -> tuple[Array, float]:
+    """PP_dm of the masses at the nodes that come closest to all other integrals, and their relative misfit."""
+    at = content.interfaces
+    positions = np.array([i.position for i in at]).reshape(-1, 3)
+    shapes = np.array([i.phi_t for i in at]).reshape(-1, 3, len(content.M))
+    P, rP, PP = moments(positions, shapes)
+    rr = np.einsum("pk,pl->klp", positions, positions)
+    limit = bounds(content.mass, content.rr_dm, content.M)
+    arm = np.sqrt(np.trace(content.rr_dm) / content.mass)
+    known = (
+        (np.ones((1, len(at))), np.array([content.mass]), content.mass),
+        (positions.T, content.r_dm, content.mass * arm),
+        (rr, content.rr_dm, content.mass * arm**2),
+        (P, content.P_dm, limit.first[:, None]),
+        (rP, content.rP_dm, limit.second[:, None]),
+        (np.einsum("kkijp->ijp", PP), content.M, limit.third[:, :, None]),
+        (axial(PP), axial(content.PP_dm), limit.third[:, :, None]),
+    )
+    rows = np.vstack([(integrand / scale).reshape(-1, len(at)) for integrand, _, scale in known])
+    target = np.concatenate([(sum_ / np.reshape(scale, np.shape(scale)[:-1])).ravel() for _, sum_, scale in known])
+    masses, misfit = nodal_masses(rows, target)
+    if misfit > MISFIT_LIMIT:
+        raise InputError(
+            f"Oe.m1 holds geometric stiffness, which cannot be told from its mass part, and masses at the {len(at)} "
+            f"nodes miss the other integrals by {misfit:.1e} (at most {MISFIT_LIMIT}): write the file without geometric "
+            "stiffness, or with more nodes"
+        )
+    lumped = PP @ masses
+    mixed = from_parts(lumped + lumped.swapaxes(0, 1), axial(content.PP_dm))
+    return mended_trace(mixed, content.M)[0], misfit
