@@ -186,6 +186,18 @@ def bounds(mass: float, rr_dm: Array, M: Array) -> Bounds:
     return Bounds(weight * np.sqrt(mass), weight * np.sqrt(spread), np.outer(weight, weight))
 
 
+def relative(residual: Array, bound: Array) -> float:
+    """Largest residual as a fraction of its bound."""
+    return float(np.abs(residual / bound).max(initial=0.0))
+
+
+def hold(identity: str, residual: Array, bound: Array) -> None:
+    """Raises InputError where an identity fails by more than IDENTITY_TOLERANCE of the bound."""
+    off = relative(residual, bound)
+    if off > IDENTITY_TOLERANCE:
+        raise InputError(f"the identity {identity} fails by {off:.1e} (relative): the file is damaged")
+
+
 # ---- nodes and their masses ---------------------------------------------------------------------------------------
 
 
@@ -233,6 +245,8 @@ def nodal_masses(rows: Array, target: Array) -> tuple[Array, float]:
     Non-negative least squares (Lawson and Hanson 1974, Solving Least Squares Problems, ch. 23). Raises
     ComputationError when it does not converge.
     """
+    if not target.size:
+        return np.zeros(rows.shape[1]), 0.0
     try:
         masses, distance = scipy.optimize.nnls(rows, target)
     except RuntimeError as error:

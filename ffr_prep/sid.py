@@ -38,12 +38,14 @@ from ffr_prep.interchange import (
     bounds,
     from_inertia,
     from_parts,
+    hold,
     mended_trace,
     moments,
     nodal_masses,
     nodes,
     read_lines,
     real,
+    relative,
     skew,
     write_lines,
 )
@@ -268,7 +270,7 @@ def _mass(refmod: Section, n: int) -> float:
 def _tensor(six: Array) -> Array:
     """(6, ...) in the order of J -> (3, 3, ...)."""
     tensor = np.zeros((3, 3, *six.shape[1:]))
-    for value_of, (k, l) in zip(six, J_ORDER, strict=True):
+    for value_of, (k, l) in zip(six, J_ORDER, strict=True):  # noqa: E741
         tensor[k, l] = tensor[l, k] = value_of
     return tensor
 
@@ -276,7 +278,7 @@ def _tensor(six: Array) -> Array:
 def _second_moments(found: Mapping[str, Taylor], limit: Bounds) -> Array:
     """(3, 3, n, n) PP_dm from Oe.m1, Me and Cr.m1. Raises InputError where Oe.m1 is not symmetric in the modes."""
     Oe1, M = found["Oe"].m1, found["Me"].m0
-    _hold("Oe.m1(k,l,c) = Oe.m1(l,k,c)", Oe1 - Oe1.transpose(1, 0, 2), limit.third[:, :, None])
+    hold("Oe.m1(k,l,c) = Oe.m1(l,k,c)", Oe1 - Oe1.transpose(1, 0, 2), limit.third[:, :, None])
     both = np.zeros((3, 3, *M.shape))
     for column, (k, l) in enumerate(OE_ORDER):  # noqa: E741
         both[k, l] = both[l, k] = 2 * (Oe1[:, :, column] + M) if k == l else Oe1[:, :, column]
@@ -290,16 +292,16 @@ def _of_mass(Cr1: Array) -> Array:
 
 def _check_repeated(P_dm: Array, rP_dm: Array, found: Mapping[str, Taylor], limit: Bounds) -> dict[str, str]:
     """The layouts of Gr and Ge. Raises InputError where blocks that repeat each other differ."""
-    _hold("Ct = transpose of mdCM.m1", found["Ct"].m0 - P_dm.T, limit.first[:, None])
-    _hold("Oe.m0 = centrifugal forces from J.m1", found["Oe"].m0 - _centrifugal(rP_dm).T, limit.second[:, None])
+    hold("Ct = transpose of mdCM.m1", found["Ct"].m0 - P_dm.T, limit.first[:, None])
+    hold("Oe.m0 = centrifugal forces from J.m1", found["Oe"].m0 - _centrifugal(rP_dm).T, limit.second[:, None])
     J1 = _tensor(found["J"].m1[:, :, 0])
     twice = 2 * _of_mass(found["Cr"].m1)
 
     def of_Gr(Gr: Array) -> float:
-        return _relative(Gr + Gr.transpose(2, 1, 0) - 2 * J1.transpose(0, 2, 1), limit.second[:, None])
+        return relative(Gr + Gr.transpose(2, 1, 0) - 2 * J1.transpose(0, 2, 1), limit.second[:, None])
 
     def of_Ge(Ge: Array) -> float:
-        return _relative(Ge - twice, limit.third[:, :, None])
+        return relative(Ge - twice, limit.third[:, :, None])
 
     Gr = {layout: of_Gr(_taken_apart(found["Gr"].m0, layout)) for layout in get_args(Layout)}
     Ge = {layout: of_Ge(_taken_apart(found["Ge"].m0, layout)) for layout in get_args(Layout)}
@@ -320,20 +322,10 @@ def _fitting(identity: str, residuals: Mapping[str, float]) -> str:
     return best
 
 
-def _relative(residual: Array, bound: Array) -> float:
-    return float(np.abs(residual / bound).max(initial=0.0))
-
-
-def _hold(identity: str, residual: Array, bound: Array) -> None:
-    off = _relative(residual, bound)
-    if off > IDENTITY_TOLERANCE:
-        raise InputError(f"the identity {identity} fails by {off:.1e} (relative): a block is damaged")
-
-
 def _stiffened(found: Mapping[str, Taylor], limit: Bounds) -> list[str]:
     """The blocks that hold geometric stiffness."""
     Cr1 = found["Cr"].m1
-    uneven = _relative(Cr1 - _of_mass(Cr1), limit.third[:, :, None]) > IDENTITY_TOLERANCE
+    uneven = relative(Cr1 - _of_mass(Cr1), limit.third[:, :, None]) > IDENTITY_TOLERANCE
     return ["Ct.m1"] * bool(found["Ct"].m1.any()) + ["Cr.m1"] * uneven
 
 
@@ -351,7 +343,7 @@ def _lost(found: Mapping[str, Taylor], stiffened: list[str]) -> list[str]:
 def _lumped(rP_dm: Array, found: Mapping[str, Taylor], layout: Mapping[str, str], limit: Bounds) -> list[str]:
     """A consistent mass has Gr_l - transpose = -2 skew(Cr_l); rotary inertia of nodes is in Cr only."""
     Gr = _taken_apart(found["Gr"].m0, layout["Gr"])
-    off = _relative(Gr - Gr.transpose(2, 1, 0) + 2 * skew(axial(rP_dm)).transpose(0, 2, 1), limit.second[:, None])
+    off = relative(Gr - Gr.transpose(2, 1, 0) + 2 * skew(axial(rP_dm)).transpose(0, 2, 1), limit.second[:, None])
     if off <= IDENTITY_TOLERANCE:
         return []
     return [f"lumped mass: the identity antisym(Gr_l) = -skew(Cr_l) fails by {off:.1e} (relative); Cr was taken"]
