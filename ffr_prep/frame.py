@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
@@ -74,7 +75,7 @@ def polyline(corners: Sequence[Vector] | Array, member: Member, *, elements: int
     if elements < 1:
         raise InputError(f"a polyline of {elements} elements a leg cannot be built; ask for one or more")
     part = np.arange(elements)[:, None] / elements
-    points = np.vstack([*((1 - part) * a + part * b for a, b in zip(at[:-1], at[1:], strict=True)), at[-1:]])
+    points = np.vstack([*((1 - part) * a + part * b for a, b in pairwise(at)), at[-1:]])
     pairs = np.stack([np.arange(len(points) - 1), np.arange(1, len(points))], axis=1)
     if np.array_equal(at[0], at[-1]) and len(at) > 2:
         points, pairs = points[:-1], pairs % (len(points) - 1)

@@ -178,7 +178,8 @@ def _check_constants(section: Section) -> None:
                 f"section {section.name!r}: shear factor {symbol} is {getattr(section, symbol):g}; it must be positive, "
                 "math.inf for no shear deformation"
             )
-    if section.J > (1 + 1e-9) * (section.Iy + section.Iz):
+    most = (1 + 1e-9) * (section.Iy + section.Iz)
+    if most < section.J:
         raise InputError(
             f"section {section.name!r}: J is {section.J:g} m^4, but no section has more than Iy + Iz = "
             f"{section.Iy + section.Iz:g} m^4; check the units of all three"

@@ -12,7 +12,7 @@ Sources: A. A. Shabana, Dynamics of Multibody Systems (2013), sections 6.1-6.7.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
 
@@ -27,7 +27,7 @@ from ffr_prep.frame import Frame, check_frame, ends, frame_hash, group_nodes, or
 from ffr_prep.interface import CoupledModel, InterfaceRegion, rigid_field
 from ffr_prep.invariants import inertia_integrals
 from ffr_prep.reduce import _described, interface_shapes
-from ffr_prep.reduction import Basis, Reduction, check_basis
+from ffr_prep.reduction import Reduction, check_basis
 from ffr_prep.reference import ReferenceConditions, functionals
 from ffr_prep.sweep import swept_surface
 
