@@ -30,7 +30,7 @@ from ffr_dyn.kernels.tables import (
     Work,
 )
 from ffr_dyn.layout import Layout, layout
-from ffr_dyn.scene import Scene, joint_of, marker_number, markers
+from ffr_dyn.scene import Body, Scene, joint_of, marker_number, markers
 from ffr_dyn.state import StateView
 from ffr_dyn.timefunction import USER, TimeFunction, as_time_function
 from ffr_prep.body import FlexibleBody, axial
@@ -130,8 +130,10 @@ def _starts(sizes: list[int]) -> Array:
 def _bodies(scene: Scene, place: Layout) -> Bodies:
     models = [body.model for body in scene.bodies]
     n = [m.n for m in models]
-    where = np.zeros((len(n) + 1, 5), dtype=np.int64)
-    where[:-1] = np.column_stack([n, place.ix, place.iv, _starts(n)[:-1], _starts([9 * k * k for k in n])[:-1]])
+    stiffening = [_stiffening(body) for body in scene.bodies]
+    where = np.zeros((len(n) + 1, 7), dtype=np.int64)
+    starts = [_starts(n)[:-1], _starts([9 * k * k for k in n])[:-1], _starts([s.size for s in stiffening])[:-1]]
+    where[:-1] = np.column_stack([n, place.ix, place.iv, *starts, [len(s) for s in stiffening]])
     where[-1, 3] = sum(n)
     return Bodies(
         where=where,
@@ -142,7 +144,16 @@ def _bodies(scene: Scene, place: Layout) -> Bodies:
         PP_dm=_pool([_pp_rows(m) for m in models]),
         omega2=_pool([m.omega2 for m in models]),
         two_zeta_omega=_pool([2 * b.damping * np.sqrt(b.model.omega2) for b in scene.bodies]),
+        stiffening=_pool(stiffening),
     )
+
+
+def _stiffening(body: Body) -> Array:
+    """(loads, n, n) geometric stiffness of a body, none where it has none or the scene does without."""
+    n = body.model.n
+    if body.model.stiffening is None or not body.stiffening:
+        return np.zeros((0, n, n))
+    return body.model.stiffening
 
 
 # ---- markers ------------------------------------------------------------------------------------------------------
@@ -161,9 +172,19 @@ def _markers(scene: Scene, blocks: tuple[Block, ...]) -> Markers:
         u=np.array([i.position for i in interfaces] + list(scene.ground.values())).reshape(-1, 3),
         phi=_pool(phi),
         start=_starts([p.size for p in phi])[:-1],
+        load=np.array(_load_numbers(scene), dtype=np.int64),
         active=np.array(sorted({*joint, *loaded, *sprung}), dtype=np.int64),
         joint=np.array([k for k in joint if table[k][0] != ground], dtype=np.int64),
     )
+
+
+def _load_numbers(scene: Scene) -> list[int]:
+    """Per marker, the number of its force in the stiffening loads of its body: twelve inertial ones come first."""
+    numbers: list[int] = []
+    for body in scene.bodies:
+        has = len(_stiffening(body)) > 0
+        numbers += [12 + 6 * k if has else -1 for k in range(len(body.model.interfaces))]
+    return numbers + [-1] * len(scene.ground)
 
 
 # ---- constraints --------------------------------------------------------------------------------------------------
@@ -369,9 +390,10 @@ def new_work(m: Model) -> Work:
         A=_identities(B + 1),
         dinv=np.ones(E),
         **zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), g=9 * E, l=3 * E, Cd=6 * E, L=(B, 6, 6), f=V, acc=V),
-        **zeros(rigid=(B, 6), elastic=E),
+        **zeros(rigid=(B, 6), elastic=E, unstiffened=E, shift=V, load=int(m.bodies.where[:, 6].max())),
+        **zeros(stiff=int((m.bodies.where[:, 6] * n).sum())),
     )
-    vectors = zeros(omega=(M, 3), r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3))
+    vectors = zeros(omega=(M, 3), r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3), load=(M, 6))
     rows = RowWork(
         **zeros(Phi=C, nu=C, gamma=C, lam=C, jac=(C, 2, 9), rr=(C, 2, 6), ww=(C, 2, 6)),
         **zeros(P=(M, 6, 6), phiphi=(pairs, 6, 6), S=stored),

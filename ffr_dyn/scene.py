@@ -34,6 +34,7 @@ class Body:
     velocity : (3,) [m/s] of the origin, global;  omega_bar : (3,) [rad/s] in body axes
     q, q_dot : (n,) elastic coordinates and rates; default zero
     damping  : modal damping ratio, one for all modes or (n,)
+    stiffening : use the geometric stiffening that the model has, if any
 
     Pose and motion are a first guess: assembly makes them meet the joints.
     """
@@ -47,6 +48,7 @@ class Body:
     q: Any = None
     q_dot: Any = None
     damping: Any = 0.0
+    stiffening: bool = True
 
     def __post_init__(self) -> None:
         n, who = self.model.n, f"body {self.name!r}"
@@ -139,7 +141,7 @@ def _offer(name: str, known: Iterable[str]) -> str:
 
 def _check_names(scene: Scene) -> None:
     """One name, one thing: results are named by them."""
-    things = (*scene.bodies, *scene.joints, *scene.drivers, *scene.loads, *scene.springs)
+    things: tuple[Any, ...] = (*scene.bodies, *scene.joints, *scene.drivers, *scene.loads, *scene.springs)
     names = [thing.name for thing in things]
     repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:

@@ -86,6 +86,7 @@ class BodyEntry(_Strict):
     velocity: Vector = [0.0, 0.0, 0.0]
     omega_bar: Vector = [0.0, 0.0, 0.0]
     damping: float | list[float] = 0.0
+    stiffening: bool = True
 
     @model_validator(mode="after")
     def _kind(self) -> BodyEntry:
@@ -228,6 +229,7 @@ def _body(name: str, entry: BodyEntry, folder: Path) -> Body:
         velocity=entry.velocity,
         omega_bar=entry.omega_bar,
         damping=entry.damping,
+        stiffening=entry.stiffening,
     )
 
 

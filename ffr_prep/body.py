@@ -91,6 +91,10 @@ class FlexibleBody:
     PP_dm     : (3, 3, n, n) integral of phi_k,i phi_l,j dm at [k, l, i, j] [-]
     omega2    : (n,) squared circular frequencies of the reduced body under its reference conditions [rad^2/s^2]
     interfaces, surface : where to attach, what to draw
+    stiffening: (12 + 6 I, n, n) geometric stiffness [1/s^2] per unit of: the acceleration of the body frame less gravity
+        (3) [m/s^2], its angular acceleration (3) [rad/s^2], the products xx, yy, zz, xy, xz, yz of its angular velocity
+        (6) [rad^2/s^2], and for each of the I interfaces force (3) [N] and moment (3) [N m]; all in body axes. None where
+        it was not computed
     provenance: how the body was made; plain JSON values
 
     Raises BodyError when the integrals contradict each other (shape, symmetry, orthonormality, negative mass).
@@ -106,6 +110,7 @@ class FlexibleBody:
     omega2: Array
     interfaces: tuple[Interface, ...] = ()
     surface: Surface | None = None
+    stiffening: Array | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -114,6 +119,8 @@ class FlexibleBody:
         for key, shape in _shapes(n).items():
             _freeze(self, key, shape)
         object.__setattr__(self, "interfaces", tuple(self.interfaces))
+        if self.stiffening is not None:
+            _freeze(self, "stiffening", (12 + 6 * len(self.interfaces), n, n))
         _check(self)
 
     # ---- sizes and rigid-body quantities -------------------------------------------------------------------------
@@ -289,6 +296,7 @@ def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
         omega2=body.omega2[keep],
         interfaces=tuple(replace(i, phi_t=i.phi_t[:, keep], phi_r=i.phi_r[:, keep]) for i in body.interfaces),
         surface=body.surface and replace(body.surface, Phi=body.surface.Phi[:, :, keep]),
+        stiffening=None if body.stiffening is None else body.stiffening[:, keep][:, :, keep],
     )
 
 
@@ -296,7 +304,9 @@ def with_point(body: FlexibleBody, name: str, position: Array) -> FlexibleBody:
     """The body with one more interface, at the surface node nearest to `position` (3,) [m], body frame.
 
     Joints, forces and sensors can then attach there. Its rotation is the least-squares rotation of the node's
-    neighbours on the surface. Nothing is added to the basis: what the node does under load is what the basis can show.
+    neighbours on the surface. Nothing is added to the basis: what the node does under load is what the basis can show;
+    loads there do not stiffen the body.
+
     Raises BodyError when the body has no surface.
     """
     if body.surface is None:
@@ -309,7 +319,11 @@ def with_point(body: FlexibleBody, name: str, position: Array) -> FlexibleBody:
     # omega minimises sum |omega x arm - moved|^2, so (sum arm^2 I - arm arm^T) omega = sum arm x moved
     normal = (arms**2).sum() * np.eye(3) - arms.T @ arms
     phi_r = np.linalg.lstsq(normal, axial(np.einsum("pk,plj->klj", arms, moved)), rcond=None)[0]
-    return replace(body, interfaces=(*body.interfaces, Interface(name, points[node], Phi[node], phi_r)))
+    stiffening = body.stiffening
+    if stiffening is not None:
+        stiffening = np.concatenate([stiffening, np.zeros((6, body.n, body.n))])
+    point = Interface(name, points[node], Phi[node], phi_r)
+    return replace(body, interfaces=(*body.interfaces, point), stiffening=stiffening)
 
 
 # ---- the body file ------------------------------------------------------------------------------------------------
@@ -329,6 +343,8 @@ def save_body(body: FlexibleBody, path: str | Path) -> Path:
     if body.surface is not None:
         for key in ("points", "triangles", "Phi"):
             arrays[f"surface/{key}"] = getattr(body.surface, key)
+    if body.stiffening is not None:
+        arrays["stiffening"] = body.stiffening
     meta = {
         "magic": MAGIC,
         "format_version": FORMAT_VERSION,
@@ -425,6 +441,7 @@ def _from_arrays(meta: Mapping[str, Any], arrays: Mapping[str, Array]) -> Flexib
         mass=meta["mass"],
         interfaces=interfaces,
         surface=surface,
+        stiffening=arrays.get("stiffening"),
         provenance=meta["provenance"],
         **core,
     )

@@ -17,6 +17,7 @@ from ffr_prep.mesh import Mesh, check_mesh, mesh_hash, surface_triangles
 from ffr_prep.reduction import Basis, Reduction, check_basis
 from ffr_prep.reference import ReferenceConditions, functionals
 from ffr_prep.solids import Materials, assemble
+from ffr_prep.stiffening import stiffening_matrices
 
 Array = np.ndarray
 
@@ -32,19 +33,23 @@ def reduce_mesh(
     interfaces: Sequence[InterfaceRegion],
     reference: ReferenceConditions,
     reduction: Reduction,
+    stiffening: bool = False,
     progress: Callable[[str], None] | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> FlexibleBody:
     """The reduced flexible body of a meshed solid, in the coordinates of the mesh.
 
     material   : one, or one for each volume group
+    stiffening : also compute the geometric stiffness by load, which a simulation then uses
     progress   : called with the name of each stage as it begins
     provenance : JSON values kept with the body, beside what is recorded anyway
 
     Raises InputError for input that cannot be used and ComputationError for a computation that failed.
     """
     with threadpool_limits(1):  # small dense blocks: waiting threads are slower than one, and one is reproducible
-        return _reduced(mesh, name, material, interfaces, reference, reduction, progress or _silent, provenance or {})
+        return _reduced(
+            mesh, name, material, interfaces, reference, reduction, stiffening, progress or _silent, provenance or {}
+        )
 
 
 def _reduced(
@@ -54,6 +59,7 @@ def _reduced(
     interfaces: Sequence[InterfaceRegion],
     reference: ReferenceConditions,
     reduction: Reduction,
+    stiffening: bool,
     tell: Callable[[str], None],
     provenance: Mapping[str, Any],
 ) -> FlexibleBody:
@@ -69,11 +75,14 @@ def _reduced(
     check_basis(model, L, basis)
     tell("integrate the inertia")
     Phi = nodal_basis(model, basis)
+    if stiffening:
+        tell("compute the geometric stiffness")
     return FlexibleBody(
         name=name,
         omega2=basis.omega2,
         interfaces=interface_shapes(model, basis),
         surface=boundary(mesh, Phi),
+        stiffening=stiffening_matrices(mesh, material, matrices, model, L, Phi) if stiffening else None,
         provenance=record(mesh, material, interfaces, reference, reduction, model) | dict(provenance),
         **vars(inertia_integrals(mesh.points, matrices.m, Phi)),
     )

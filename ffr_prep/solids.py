@@ -174,6 +174,42 @@ def _stiffness(points: Array, chunk: _Chunk, lam: Array, mu: Array) -> Array:
     return K
 
 
+@dataclass(frozen=True)
+class GradientChunk:
+    """Some elements at their stiffness quadrature points (q in all): volume (q,) [m^3], shape gradients, constants."""
+
+    volume: Array
+    nodes: Array
+    shapes: Array
+    lam: Array
+    mu: Array
+
+    def gradient(self, field: Array) -> Array:
+        """(q, 3, 3, r) d u_m / dx_k at [q, m, k] of nodal fields (N, 3, r)."""
+        at_points = np.einsum("eqak,eamr->eqmkr", self.shapes, field[self.nodes], optimize=True)
+        return at_points.reshape(-1, 3, 3, field.shape[2])
+
+    def stress(self, field: Array) -> Array:
+        """(q, 3, 3, r) Cauchy stress [Pa] of nodal displacements (N, 3, r) [m]."""
+        gradient = self.gradient(field)
+        strain = 0.5 * (gradient + gradient.transpose(0, 2, 1, 3))
+        trace = np.einsum("qkkr->qr", strain)
+        return self.lam[:, None, None, None] * trace[:, None, None] * np.eye(3)[:, :, None] + (
+            2 * self.mu[:, None, None, None] * strain
+        )
+
+
+def displacement_gradients(mesh: Mesh, material: Materials) -> Iterator[GradientChunk]:
+    """The mesh in pieces, ready to differentiate displacement fields."""
+    constants = _element_constants(mesh, material)
+    for chunk in _chunks(mesh):
+        rule = _volume_rule(chunk.kind, STIFFNESS_ORDER[chunk.kind])
+        J, volume = _jacobian(mesh.points, chunk, rule)
+        shapes = np.matmul(rule.dN, np.linalg.inv(J))
+        lam, mu, _ = np.repeat(constants[chunk.elements], volume.shape[1], axis=0).T
+        yield GradientChunk(volume.ravel(), chunk.nodes, shapes, lam, mu)
+
+
 def face_mass(points: Array, faces: Array) -> Array:
     """(F, k, k) integral of N_a N_b dA [m^2] over faces (F, k) of 3, 6, 4, 8 or 9 nodes."""
     rule = _face_rule(faces.shape[1])

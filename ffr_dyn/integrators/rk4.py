@@ -8,13 +8,13 @@ from typing import Any, ClassVar
 from ffr_dyn.kernels.bodies import normalise, position_rates
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.record import record
+from ffr_dyn.kernels.stiffening import solve_stiffened
 from ffr_dyn.kernels.system import (
     acceleration_target,
     evaluate,
     evaluate_on_constraints,
     finite,
     prepare,
-    solve_motion,
     to_velocity_rates,
 )
 from ffr_dyn.kernels.tables import OK
@@ -38,7 +38,7 @@ def step(m, w, stages, t, h, x, v, alpha, beta, tolerance):
         if status != OK:
             return status
         acceleration_target(w.rows, alpha, beta, stages.target)
-        solve_motion(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, stages.target)
+        solve_stiffened(m, w, xs, stages.target)
         position_rates(m.bodies, xs, vs, stages.x[k])
         to_velocity_rates(m.bodies.where, w.bodies.A, w.bodies.acc, stages.v[k])
     for k in range(4):

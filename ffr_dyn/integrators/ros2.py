@@ -21,6 +21,7 @@ from typing import Any, ClassVar
 from ffr_dyn.kernels.bodies import mass_times, normalise, position_rates
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.record import record
+from ffr_dyn.kernels.stiffening import solve_stiffened
 from ffr_dyn.kernels.system import (
     acceleration_target,
     constraint_rates,
@@ -28,7 +29,6 @@ from ffr_dyn.kernels.system import (
     evaluate_on_constraints,
     finite,
     prepare,
-    solve_motion,
     to_body_axes,
     to_velocity_rates,
 )
@@ -59,6 +59,7 @@ def add_correction(m, w, r_v, target):
     bodies, bw, rw = m.bodies, w.bodies, w.rows
     copy(bw.acc, r_v)
     to_body_axes(bodies.where, bw.A, bw.acc)
+    copy(bw.shift, bw.acc)
     constraint_rates(bodies.where, m.markers, m.rows, rw.jac, bw.acc, rw.lam)
     add_scaled(target, target, 1.0, rw.lam)
     for b in range(bodies.mass.size):
@@ -97,9 +98,10 @@ def step(m, w, stages, t, h, x, v, alpha, beta, tolerance):
             return status
         acceleration_target(w.rows, alpha, beta, stages.target)
         add_elastic_part(m.bodies, w.bodies.f, vs, r_x, gh)
+        fill(w.bodies.shift, 0.0)
         if k == 1:
             add_correction(m, w, r_v, stages.target)
-        solve_motion(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, stages.target)
+        solve_stiffened(m, w, xs, stages.target)
         position_rates(m.bodies, xs, vs, stages.x[k])
         to_velocity_rates(m.bodies.where, w.bodies.A, w.bodies.acc, stages.v[k])
         add_scaled(stages.x[k], stages.x[k], 1.0, r_x)

@@ -7,7 +7,7 @@ from numba.extending import intrinsic
 
 from ffr_dyn.kernels.markers import apply_wrench
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.vectors import dot, get, scale, subtract, to_body
+from ffr_dyn.kernels.vectors import dot, fill, get, scale, subtract, to_body
 
 POLYNOMIAL, HARMONIC, PIECEWISE, USER = 0, 1, 2, 3
 
@@ -139,14 +139,16 @@ def spring_force(loads, markers, k):
 
 @inlined
 def apply_loads(where, markers, loads, w, functions, user, f):
-    """Add all wrenches and springs to the right-hand sides f; w: MarkerWork."""
+    """Add all wrenches and springs to the right-hand sides f, and to w.load; w: MarkerWork."""
+    for k in range(w.load.shape[0]):
+        fill(w.load[k], 0.0)
     for k in range(loads.wrench.shape[0]):
         marker = loads.wrench[k, 0]
         force, moment = given_wrench(loads, functions, user, w.A[marker], k)
-        apply_wrench(where, markers, get(w.u, marker), f, marker, force, moment)
+        apply_wrench(where, markers, get(w.u, marker), f, w.load[marker], marker, force, moment)
     for k in range(loads.spring.shape[0]):
         force, direction = spring_force(loads, w, k)
         for side in range(2):
             marker = loads.spring[k, side]
             pull = to_body(w.A[marker], scale(force if side == 0 else -force, direction))
-            apply_wrench(where, markers, get(w.u, marker), f, marker, pull, (0.0, 0.0, 0.0))
+            apply_wrench(where, markers, get(w.u, marker), f, w.load[marker], marker, pull, (0.0, 0.0, 0.0))

@@ -87,8 +87,8 @@ def project(phi, force, moment, out, n):
 
 
 @kernel
-def apply_wrench(where, markers, u, f, k, force, moment):
-    """Add a force and moment (body axes) on marker k, at u, to the right-hand sides f."""
+def apply_wrench(where, markers, u, f, load, k, force, moment):
+    """Add a force and moment (body axes) on marker k, at u, to the right-hand sides f and to the marker's load (6,)."""
     b = markers.body[k]
     if b == where.shape[0] - 1:
         return
@@ -97,5 +97,7 @@ def apply_wrench(where, markers, u, f, k, force, moment):
     for c in range(3):
         f[j + c] += force[c]
         f[j + 3 + c] += lever[c] + moment[c]
+        load[c] += force[c]
+        load[3 + c] += moment[c]
     if n > 0:
         project(shapes(markers, k, n), force, moment, f[j + 6 : j + 6 + n], n)

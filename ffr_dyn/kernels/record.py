@@ -4,7 +4,8 @@ from ffr_dyn.kernels.bodies import energies
 from ffr_dyn.kernels.loads import spring_force
 from ffr_dyn.kernels.markers import update_marker
 from ffr_dyn.kernels.options import inlined
-from ffr_dyn.kernels.system import evaluate, largest, prepare, reactions, solve_motion, to_velocity_rates
+from ffr_dyn.kernels.stiffening import solve_stiffened
+from ffr_dyn.kernels.system import evaluate, largest, prepare, reactions, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.kernels.vectors import copy, fill, get, put
 
@@ -16,7 +17,8 @@ def evaluate_truly(m, w, t, x, v):
     prepare(m.bodies.where, m.markers, m.rows, m.pattern, w.bodies.dinv, w.rows.phiphi)
     status = evaluate(m, w, t, x, v)
     if status == OK:
-        solve_motion(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, w.rows.gamma)
+        fill(w.bodies.shift, 0.0)
+        solve_stiffened(m, w, x, w.rows.gamma)
         to_velocity_rates(m.bodies.where, w.bodies.A, w.bodies.acc, w.vd)
     return status
 

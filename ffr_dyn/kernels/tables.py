@@ -24,7 +24,9 @@ OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED = 0, 1, 2, 3, 4
 class Bodies(NamedTuple):
     """B bodies, E elastic coordinates in all."""
 
-    where: Array  # (B + 1, 5) n, first position in x, first velocity in v, first elastic coordinate, start in PP_dm
+    where: (
+        Array  # (B + 1, 7) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening; its number of loads
+    )
     mass: Array  # (B,)
     moments: Array  # (B, 9) first moment r_dm (3), second moment rr_dm (6)
     P_dm: Array  # (3 E,) per body 3 rows of n
@@ -32,6 +34,7 @@ class Bodies(NamedTuple):
     PP_dm: Array  # pooled; per body n rows of 9 n: for q_i the same nine rows over j (last three: I5)
     omega2: Array  # (E,)
     two_zeta_omega: Array  # (E,)
+    stiffening: Array  # pooled; per body loads x n x n, empty without geometric stiffening
 
 
 class Markers(NamedTuple):
@@ -41,6 +44,7 @@ class Markers(NamedTuple):
     u: Array  # (M, 3) undeformed position in the body frame (ground: global)
     phi: Array  # pooled; per marker 6 rows of n: phi_t, phi_r
     start: Array  # (M,) in phi
+    load: Array  # (M,) number of the marker's first load in its body's stiffening, or -1
     active: Array  # markers that joints or loads use, updated at every evaluation
     joint: Array  # markers of bodies that joints use
 
@@ -115,6 +119,10 @@ class BodyWork(NamedTuple):
     dinv: Array  # (E,) 1 / (1 + implicit terms); ones for explicit methods
     rigid: Array  # (B, 6) scratch
     elastic: Array  # (E,) scratch
+    unstiffened: Array  # (E,) elastic right-hand side without geometric stiffening
+    shift: Array  # (V,) part of acc that is no acceleration (corrections of an integrator's stage), body axes
+    stiff: Array  # pooled like stiffening, n per load: K_load q
+    load: Array  # (longest,) loads of one body
 
 
 class MarkerWork(NamedTuple):
@@ -128,6 +136,7 @@ class MarkerWork(NamedTuple):
     u: Array  # (M, 3) position in body axes
     theta: Array  # (M, 3) elastic rotation phi_r q
     thetad: Array  # (M, 3)
+    load: Array  # (M, 6) applied force and moment, body axes
 
 
 class RowWork(NamedTuple):
