@@ -319,7 +319,7 @@ def test_euler_bernoulli_elements_are_of_fourth_order():
         )
         return np.sqrt(body.omega2) / exact - 1
 
-    np.testing.assert_allclose(errors(8) / errors(16), 16, rtol=0.05)
+    np.testing.assert_allclose(errors(6) / errors(12), 16, rtol=0.05)
 
 
 def thin(section):
