@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ffr_prep.cli_interchange import export_body, import_body
 from ffr_prep.errors import ComputationError, InputError
 
 if TYPE_CHECKING:
@@ -212,6 +213,10 @@ def modes(body: Path, output: Path, chosen: str, scale: str) -> None:
     factor = "auto" if scale == "auto" else _number("--scale", scale)
     for path in mode_pictures(loaded, output, numbers, factor):
         click.echo(f"picture     {path}")
+
+
+cli.add_command(export_body)
+cli.add_command(import_body)
 
 
 # ---- arguments ----------------------------------------------------------------------------------------------------
