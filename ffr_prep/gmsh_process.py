@@ -43,7 +43,7 @@ def main() -> int:
     try:
         if job["generate"]:
             _generate(gmsh, job)
-        arrays, names = _result(gmsh)
+        arrays, names = _lines(gmsh) if job["dimension"] == 1 else _result(gmsh)
         if job["generate"]:
             arrays["points"] = _rounded(arrays["points"])
     except Exception as error:
@@ -78,12 +78,15 @@ def _open(gmsh: Any, job: dict[str, Any]) -> None:
 
 
 def _generate(gmsh: Any, job: dict[str, Any]) -> None:
-    """Mesh the volumes; the options set here win over those of a script."""
+    """Mesh the volumes, or the curves only; the options set here win over those of a script."""
     if job["size"] is not None:
         gmsh.option.setNumber("Mesh.MeshSizeMax", job["size"])
         if job["path"].lower().endswith(_CAD):  # without sizes at points, gmsh takes a tenth of the diagonal
             gmsh.model.mesh.setSize(gmsh.model.getEntities(0), job["size"])
     gmsh.option.setNumber("Mesh.ElementOrder", job["order"])
+    if job["dimension"] == 1:
+        gmsh.model.mesh.generate(1)
+        return
     if not gmsh.model.getEntities(3):
         raise ValueError("the geometry has no volume, only surfaces or curves: make it a solid")
     if not gmsh.model.mesh.getElementTypes(3).size:
@@ -110,13 +113,34 @@ def _smallest_jacobian(gmsh: Any) -> float:
 
 def _result(gmsh: Any) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """The mesh as arrays, and the names and notes that belong to them as JSON values."""
-    tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    index_of = np.full(int(tags.max(initial=0)) + 1, -1, np.int64)
-    index_of[tags] = np.arange(tags.size)
-    arrays = {"points": coordinates.reshape(-1, 3)}
+    arrays, index_of = _points(gmsh)
     names: dict[str, Any] = {"kinds": [], "volumes": [], "faces": [], "nodes": [], "notes": []}
     _add_volumes(gmsh, index_of, arrays, names)
     _add_faces(gmsh, index_of, arrays, names)
+    _add_nodes(gmsh, index_of, arrays, names)
+    return arrays, names
+
+
+def _points(gmsh: Any) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """The nodes, and the place of each node by its tag."""
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    index_of = np.full(int(tags.max(initial=0)) + 1, -1, np.int64)
+    index_of[tags] = np.arange(tags.size)
+    return {"points": coordinates.reshape(-1, 3)}, index_of
+
+
+def _lines(gmsh: Any) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """The line elements of each curve group, by their ends, and the nodes of the groups of points and curves."""
+    arrays, index_of = _points(gmsh)
+    names: dict[str, Any] = {"lines": [], "nodes": []}
+    for g, (group, members) in enumerate(_groups(gmsh, 1).items()):
+        found = [np.zeros((0, 2), np.int64)]
+        for kind in (int(kind) for kind in gmsh.model.mesh.getElementTypes(1)):
+            size = gmsh.model.mesh.getElementProperties(kind)[3]
+            blocks = [gmsh.model.mesh.getElementsByType(kind, tag)[1] for tag in members]
+            found.append(index_of[np.concatenate(blocks)].reshape(-1, size)[:, :2])
+        names["lines"].append(group)
+        arrays[f"line_{g}"] = np.concatenate(found)
     _add_nodes(gmsh, index_of, arrays, names)
     return arrays, names
 
@@ -174,7 +198,7 @@ def _groups(gmsh: Any, dimension: int) -> dict[str, list[int]]:
     if groups:
         return groups
     for _, tag in gmsh.model.getEntities(dimension):
-        groups[f"{'volume' if dimension == 3 else 'surface'}_{tag}"] = [tag]
+        groups[f"{('point', 'curve', 'surface', 'volume')[dimension]}_{tag}"] = [tag]
         name = _given_name(gmsh.model.getEntityName(dimension, tag))
         if name:
             groups.setdefault(name, []).append(tag)

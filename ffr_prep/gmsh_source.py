@@ -42,8 +42,29 @@ def from_gmsh(path: Path, *, unit: str, size: float | None, numbers: Mapping[str
     unit : for CAD files that declare a unit, the unit to convert to; size : largest element edge
     Raises InputError for a file that gmsh cannot read, ComputationError when meshing fails.
     """
+    return _source(_arrays(path, dimension=3, unit=unit, size=size, numbers=numbers, order=order))
+
+
+def lines_from_gmsh(
+    path: Path, *, unit: str, size: float | None, numbers: Mapping[str, float]
+) -> tuple[Array, dict[str, Array], dict[str, Array]]:
+    """The curves of a file as straight lines: points (N, 3), the lines (L, 2) of each group and the nodes of each group.
+
+    Arguments and errors as in `from_gmsh`.
+    """
+    stored = _arrays(path, dimension=1, unit=unit, size=size, numbers=numbers, order=1)
+    names = json.loads(stored["names"].tobytes())
+    lines = {name: stored[f"line_{g}"] for g, name in enumerate(names["lines"])}
+    return stored["points"], lines, {name: stored[f"node_{g}"] for g, name in enumerate(names["nodes"])}
+
+
+def _arrays(
+    path: Path, *, dimension: int, unit: str, size: float | None, numbers: Mapping[str, float], order: int
+) -> dict[str, Array]:
+    """The arrays that the process writes."""
     job = {
         "path": str(path.resolve()),
+        "dimension": dimension,
         "generate": path.suffix.lower() in GEOMETRY,
         "unit": CAD_UNITS[unit],
         "size": size,
@@ -55,7 +76,7 @@ def from_gmsh(path: Path, *, unit: str, size: float | None, numbers: Mapping[str
         job_file.write_text(json.dumps(job))
         _run_gmsh(path, job_file, result)
         with np.load(result) as stored:
-            return _source(dict(stored))
+            return dict(stored)
 
 
 def _run_gmsh(path: Path, job_file: Path, result: Path) -> None:
