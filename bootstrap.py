@@ -49,6 +49,16 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stab
 
 CHECKS = {"ruff check": ("ruff", "check"), "ruff format": ("ruff", "format", "--check"), "mypy": ("mypy",)}
 LINES_OF_AN_ERROR = 15
+SIGNS_OF_NO_NETWORK = (
+    "Temporary failure",
+    "Failed to establish a new connection",
+    "Name or service not known",
+    "Could not resolve",
+    "Could not connect",
+    "Cannot connect to proxy",
+    "Network is unreachable",
+    "timed out",
+)
 
 
 class SetUpError(Exception):
@@ -323,9 +333,16 @@ def timed(title: str) -> Iterator[None]:
 
 
 def _failure(what: str, output: str) -> str:
-    lines = output.strip().splitlines()[-LINES_OF_AN_ERROR:]
-    shown = "\n".join(f"  {line}" for line in lines)
-    return f"{what}. It said:\n\n{shown}\n\nIf the network was not reachable, run this again when it is."
+    """The message of a command that failed: the end of what it said, without its warnings."""
+    lines = [line for line in output.splitlines() if line.strip() and "WARNING: " not in line]
+    shown = "\n".join(f"  {line}" for line in lines[-LINES_OF_AN_ERROR:])
+    offline = any(sign in output for sign in SIGNS_OF_NO_NETWORK)
+    advice = (
+        "The network was not reachable: run this again when it is."
+        if offline
+        else "Put that right, then run this again."
+    )
+    return f"{what}. It said:\n\n{shown}\n\n{advice}"
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ class Machine:
     def __init__(self, bad=()):
         self.bad = set(bad)
         self.commands = []
+        self.complaint = "no route\n"
 
     def __call__(self, command, **_):
         command = [str(word) for word in command]
@@ -32,7 +33,7 @@ class Machine:
             python = Path(command[-1]) / "bin" / "python"
             python.parent.mkdir(parents=True, exist_ok=True)
             python.touch()
-        return subprocess.CompletedProcess(command, int(failed), stdout="3 11" if not failed else "no route\n")
+        return subprocess.CompletedProcess(command, int(failed), stdout=self.complaint if failed else "3 11")
 
     def ran(self, word):
         return [command for command in self.commands if word in command]
@@ -182,8 +183,20 @@ def test_another_system_is_told_what_it_lacks(machine, monkeypatch):
 
 def test_a_failed_installation_says_what_apt_said(machine):
     machine.bad = {"install"}
-    with pytest.raises(SetUpError, match=r"apt-get could not install(.|\n)*no route(.|\n)*network"):
+    with pytest.raises(SetUpError, match=r"apt-get could not install(.|\n)*no route(.|\n)*Put that right"):
         bootstrap.install_packages(["libgl1"])
+
+
+@pytest.mark.parametrize(
+    "step", [lambda: bootstrap.install_packages(["libgl1"]), lambda: bootstrap.make_environment(())]
+)
+def test_a_missing_network_is_named(machine, step):
+    machine.bad = {"install"}
+    machine.complaint = "WARNING: Retrying\nE: Temporary failure resolving 'a.b'\n"
+    with pytest.raises(SetUpError, match="The network was not reachable: run this again") as caught:
+        step()
+    assert "Temporary failure resolving" in str(caught.value)
+    assert "Retrying" not in str(caught.value)
 
 
 def test_packages_that_change_nothing_are_reported(machine, monkeypatch):
@@ -229,7 +242,7 @@ def test_a_changed_project_is_installed_again(machine, tmp_path):
 
 def test_an_interrupted_installation_is_made_anew(machine, tmp_path):
     machine.bad = {"pip"}
-    with pytest.raises(SetUpError, match=r"pip could not install(.|\n)*no route(.|\n)*network"):
+    with pytest.raises(SetUpError, match=r"pip could not install(.|\n)*no route(.|\n)*Put that right"):
         bootstrap.make_environment(())
     assert not (tmp_path / ".venv" / "stamp.json").exists()
     machine.bad = set()
