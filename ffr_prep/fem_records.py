@@ -110,14 +110,16 @@ def shapes(record: Record, header: Header) -> Array:
 
 
 def _of_modes(record: Record, header: Header) -> Iterable[tuple[int, str]]:
-    """The lines of record 8 that hold numbers: all but the one before each mode, and comments."""
-    per_mode, left = 6 * len(header.labels), 0
+    """The lines of record 8 that hold numbers. A comment inside a mode tells that its numbers are too many or too few."""
+    per_mode = 6 * len(header.labels)
+    left, modes, opened_by = 0, 0, ""
     for line, text in record.lines:
-        if text.lstrip().startswith("**"):
-            left = left or per_mode
-        elif left <= 0:
-            left = per_mode
-        else:
+        comment = text.lstrip().startswith("**")
+        if left <= 0 and modes < header.n:
+            left, modes, opened_by = per_mode, modes + 1, text.lstrip()
+        elif comment and left > 0 and (left < per_mode or not opened_by.startswith("**")):
+            raise InputError(f"line {line}: record 8: a comment inside mode {modes}, which lacks {left} numbers")
+        elif not comment:
             left -= len(text.split())
             yield line, text
 

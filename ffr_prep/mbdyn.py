@@ -151,7 +151,7 @@ def _head(body: FlexibleBody, at: tuple[Interface, ...]) -> Iterator[str]:
 
 
 def _texts(content: Mapping[int, Array]) -> Iterator[str]:
-    for record, values in content.items():
+    for record, values in sorted(content.items()):
         yield "**"
         yield _title(record)
         if record != 8:
