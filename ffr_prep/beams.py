@@ -169,6 +169,11 @@ def centroid_shift(elements: Beams) -> Array:
     return W
 
 
+def element_coordinates(elements: Beams) -> Array:
+    """W C_bar (E, 12, 12): nodal coordinates in body axes -> of the centroid line in element axes."""
+    return centroid_shift(elements) @ nodal_rotation(elements)
+
+
 def undeformed_coordinates(elements: Beams) -> Array:
     """e_0 (E, 12): the ends of the undeformed centroid line in the intermediate element frame [m], no rotations."""
     in_element_axes = np.einsum("ecd,enc->end", elements.C, elements.ends) + elements.offset[:, None]
@@ -227,6 +232,23 @@ def bending_functions(length: Array, shear: Array, xi: Array) -> tuple[Array, Ar
     return scale * np.stack(deflection, axis=-1), scale * np.stack(rotation, axis=-1)
 
 
+def axis_gradients(elements: Beams, xi: Array) -> tuple[Array, Array]:
+    """(E, Q, 2, 12) dv/dx and dw/dx of the axis, and (E, Q, 1, 12) the twist, in element axes [1/m]."""
+    _, rotation = axis_functions(elements, xi)
+    slopes = np.stack([rotation[:, :, 2], -rotation[:, :, 1]], axis=2)
+    slopes[:, :, 0, _XY] += shear_strain(elements.length, elements.shear_y)[:, None]
+    slopes[:, :, 1, _XZ] += _SIGN * shear_strain(elements.length, elements.shear_z)[:, None]
+    twist = np.zeros((*slopes.shape[:2], 1, 12))
+    twist[..., 3], twist[..., 9] = -1 / elements.length[:, None, None], 1 / elements.length[:, None, None]
+    return slopes, twist
+
+
+def shear_strain(length: Array, shear: Array) -> Array:
+    """(E, 4) the constant shear strain, slope less rotation, of (v_1, theta_1, v_2, theta_2) in one plane."""
+    half = np.full_like(length, 0.5)
+    return (shear / (1 + shear))[:, None] * np.stack([-1 / length, -half, 1 / length, -half], axis=-1)
+
+
 # ---- field, mass and stiffness ------------------------------------------------------------------------------------
 
 
@@ -267,7 +289,7 @@ def stiffness(elements: Beams) -> Array:
     K[np.ix_(range(len(K)), _XY, _XY)] = in_plane
     in_plane = _bending_stiffness(elements.EIy, elements.length, elements.shear_z)
     K[np.ix_(range(len(K)), _XZ, _XZ)] = in_plane * np.outer(_SIGN, _SIGN)
-    to_element = centroid_shift(elements) @ nodal_rotation(elements)
+    to_element = element_coordinates(elements)
     return to_element.transpose(0, 2, 1) @ K @ to_element
 
 

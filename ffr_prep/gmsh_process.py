@@ -85,6 +85,8 @@ def _generate(gmsh: Any, job: dict[str, Any]) -> None:
             gmsh.model.mesh.setSize(gmsh.model.getEntities(0), job["size"])
     gmsh.option.setNumber("Mesh.ElementOrder", job["order"])
     if job["dimension"] == 1:
+        if not gmsh.model.getEntities(1):
+            raise ValueError("the geometry has no curves: draw the axes of the beams")
         gmsh.model.mesh.generate(1)
         return
     if not gmsh.model.getEntities(3):

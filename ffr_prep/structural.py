@@ -20,6 +20,7 @@ import numpy as np
 import scipy.sparse as sp
 from threadpoolctl import threadpool_limits
 
+from ffr_prep.beam_stiffening import beam_stiffening, unit_accelerations
 from ffr_prep.beams import Beams, beams, field, mass_points, stiffness, undeformed
 from ffr_prep.body import FlexibleBody
 from ffr_prep.errors import InputError
@@ -27,7 +28,7 @@ from ffr_prep.frame import Frame, check_frame, ends, frame_hash, group_nodes, or
 from ffr_prep.interface import CoupledModel, InterfaceRegion, rigid_field
 from ffr_prep.invariants import inertia_integrals
 from ffr_prep.reduce import _described, interface_shapes
-from ffr_prep.reduction import Reduction, check_basis
+from ffr_prep.reduction import Basis, Reduction, check_basis
 from ffr_prep.reference import ReferenceConditions, functionals
 from ffr_prep.sweep import swept_surface
 
@@ -61,19 +62,23 @@ def reduce_frame(
     interfaces: Sequence[InterfaceRegion],
     reference: ReferenceConditions,
     reduction: Reduction,
+    stiffening: bool = False,
     progress: Callable[[str], None] | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> FlexibleBody:
     """The reduced flexible body of a frame of beams, in the coordinates of its nodes.
 
     interfaces : rigid ones at groups of nodes: one node gives its six coordinates, several follow the interface rigidly
+    stiffening : also compute the geometric stiffness by load, which a simulation then uses
     progress   : called with the name of each stage as it begins
     provenance : JSON values kept with the body, beside what is recorded anyway
 
     Raises InputError for input that cannot be used and ComputationError for a computation that failed.
     """
     with threadpool_limits(1):  # as for solids: small dense blocks, and reproducible
-        return _reduced(frame, name, interfaces, reference, reduction, progress or _silent, provenance or {})
+        return _reduced(
+            frame, name, interfaces, reference, reduction, stiffening, progress or _silent, provenance or {}
+        )
 
 
 def _reduced(
@@ -82,6 +87,7 @@ def _reduced(
     interfaces: Sequence[InterfaceRegion],
     reference: ReferenceConditions,
     reduction: Reduction,
+    stiffening: bool,
     tell: Callable[[str], None],
     provenance: Mapping[str, Any],
 ) -> FlexibleBody:
@@ -105,6 +111,7 @@ def _reduced(
         omega2=basis.omega2,
         interfaces=interface_shapes(model, basis),
         surface=swept_surface(frame, elements, (matrices.B_1 @ q_n).reshape(-1, 12, basis.omega2.size)),
+        stiffening=_stiffening(elements, matrices, ties, model, L, basis) if stiffening else None,
         provenance=record(frame, interfaces, reference, reduction, model) | dict(provenance),
         **vars(inertia_integrals(matrices.positions, sp.diags_array(matrices.mass), Phi)),
     )
@@ -139,6 +146,19 @@ def connectivity(frame: Frame) -> sp.csr_array:
     columns = (6 * frame.elements[:, :, None] + np.arange(6)).ravel()
     rows = np.arange(columns.size)
     return sp.csr_array((np.ones(columns.size), (rows, columns)), shape=(columns.size, 6 * len(frame.points)))
+
+
+def inertial_loads(matrices: StructuralMatrices) -> Array:
+    """(6N, 12) nodal loads of unit accelerations: translation, rotation, products of the angular velocity."""
+    forces = matrices.mass[:, None] * unit_accelerations(matrices.positions)
+    return -(matrices.N.T @ forces.reshape(len(forces), -1).T)
+
+
+def _stiffening(
+    elements: Beams, matrices: StructuralMatrices, ties: sp.csr_array, model: CoupledModel, L: Array, basis: Basis
+) -> Array:
+    inertial = ties.T @ inertial_loads(matrices)
+    return beam_stiffening(elements, matrices.B_1, ties, model, L, inertial, basis.Z)
 
 
 # ---- interfaces ---------------------------------------------------------------------------------------------------
