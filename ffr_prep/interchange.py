@@ -26,7 +26,7 @@ IDENTITY_TOLERANCE = 1e-6
 LUMPING_LIMIT = 0.5
 MISFIT_LIMIT = 0.05
 _ORTHONORMAL = 1e-9
-_MANY_MOMENTS = 30_000_000
+MANY_MOMENTS = 30_000_000
 _REAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([DEde][+-]?[0-9]+)?")
 
 
@@ -228,7 +228,7 @@ def moments(positions: Array, shapes: Array) -> tuple[Array, Array, Array]:
     positions (N, 3) [m], shapes (N, 3, n). Raises InputError where these do not fit in memory.
     """
     count, _, n = shapes.shape
-    if 9 * n * n * count > _MANY_MOMENTS:
+    if 9 * n * n * count > MANY_MOMENTS:
         raise InputError(
             f"{count} nodes with {n} modes are too many to lump the mass at; keep fewer modes or leave the surface out"
         )
@@ -245,8 +245,8 @@ def nodal_masses(rows: Array, target: Array) -> tuple[Array, float]:
     Non-negative least squares (Lawson and Hanson 1974, Solving Least Squares Problems, ch. 23). Raises
     ComputationError when it does not converge.
     """
-    if not target.size:
-        return np.zeros(rows.shape[1]), 0.0
+    if not rows.size:
+        return np.zeros(rows.shape[1]), float(target.any())
     try:
         masses, distance = scipy.optimize.nnls(rows, target)
     except RuntimeError as error:

@@ -498,7 +498,7 @@ def test_the_writer_refuses_and_leaves_files_alone(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="neither interfaces nor surface points"):
         write_fem(replace(body, interfaces=()), path)
     with monkeypatch.context() as patch:
-        patch.setattr(ffr_prep.interchange, "_MANY_MOMENTS", 100)
+        patch.setattr(ffr_prep.interchange, "MANY_MOMENTS", 100)
         with pytest.raises(InputError, match="15 nodes with 4 modes are too many to lump the mass at"):
             write_fem(body, path, surface=True)
 
