@@ -78,7 +78,7 @@ def write_fem(body: FlexibleBody, path: str | Path, *, kind: Kind = "legacy", su
               of them; "legacy" writes masses lumped at the nodes (records 11, 12), which come as close to the
               integrals as masses at these nodes can
     surface : also write the points of the surface as nodes, after the interfaces. The format has no triangles, no
-              kinds of interfaces and no provenance.
+              kinds of interfaces and no provenance. The geometric stiffness of a body (record 19) is left out.
 
     Source: MBDyn Input File Format, modal joint. Raises InputError for an unknown kind, a body without nodes, a missing
     surface, and where lumped masses miss the integrals by more than MISFIT_LIMIT.

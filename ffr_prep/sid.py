@@ -21,7 +21,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, get_args
+from typing import get_args
 from urllib.parse import quote, unquote
 
 import numpy as np
@@ -45,18 +45,26 @@ from ffr_prep.interchange import (
     nodes,
     read_lines,
     real,
-    relative,
     skew,
     write_lines,
 )
 from ffr_prep.sid_blocks import Section, Taylor, integer, only, part, sections, taylor, value
+from ffr_prep.sid_identities import (
+    OE_ORDER,
+    Layout,
+    centrifugal,
+    check_repeated,
+    laid_out,
+    lost_blocks,
+    lumped_mass,
+    of_mass,
+    six,
+    stiffened_blocks,
+    tensor,
+)
 from ffr_prep.sid_nodes import read_nodes
 
 Array = np.ndarray
-Layout = Literal["mode-major", "axis-major"]
-
-J_ORDER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-OE_ORDER = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 BLOCKS = ("mdCM", "J", "Ct", "Cr", "Me", "Gr", "Ge", "Oe", "ksigma", "Ke", "De")
 NAMES = "interfaces="
 _ENOUGH_NODES = 400
@@ -68,7 +76,8 @@ def write_sid(body: FlexibleBody, path: str | Path, *, layout: Layout = "mode-ma
     layout  : of the matrices Gr (3, 3n) and Ge (n, 3n), which programs do not agree on: column 3(l-1)+a for mode l and
               axis a ("mode-major") or (a-1)n+l ("axis-major"); line 1 of the file says which
     surface : also write the points of the surface as nodes, after the interfaces. The format has no triangles, no
-              kinds of interfaces and no provenance; geometric stiffness, which a body does not hold, is left out.
+              kinds of interfaces and no provenance. The geometric stiffness of a body is left out: in Oe.m1 it could
+              not be told from mass.
 
     Source: Wallrapp 1994. Raises InputError for an unknown layout, a body without nodes, or a missing surface.
     """
@@ -85,34 +94,17 @@ def blocks(body: FlexibleBody, layout: Layout) -> dict[str, tuple[Array, Array |
     Cr1 = axial(body.PP_dm).transpose(2, 1, 0)
     return {
         "mdCM": (body.r_dm[:, None], body.P_dm[:, :, None]),
-        "J": (_six(body.inertia)[:, None], _six(J1).T[:, :, None]),
+        "J": (six(body.inertia)[:, None], six(J1).T[:, :, None]),
         "Ct": (body.P_dm.T, None),
         "Cr": (axial(body.rP_dm).T, Cr1),
         "Me": (np.eye(n), None),
-        "Gr": (_laid_out(-2 * body.I8.transpose(1, 0, 2), layout), None),
-        "Ge": (_laid_out(2 * Cr1, layout), None),
-        "Oe": (_centrifugal(body.rP_dm).T, _centrifugal(body.PP_dm).transpose(1, 2, 0)),
+        "Gr": (laid_out(-2 * body.I8.transpose(1, 0, 2), layout), None),
+        "Ge": (laid_out(2 * Cr1, layout), None),
+        "Oe": (centrifugal(body.rP_dm).T, centrifugal(body.PP_dm).transpose(1, 2, 0)),
         "ksigma": (np.zeros((n, 1)), None),
         "Ke": (np.diag(body.omega2), None),
         "De": (np.zeros((n, n)), None),
     }
-
-
-def _six(tensor: Array) -> Array:
-    """(..., 3, 3) -> (..., 6) in the order of J."""
-    return np.stack([tensor[..., k, l] for k, l in J_ORDER], axis=-1)  # noqa: E741
-
-
-def _centrifugal(moment: Array) -> Array:
-    """(3, 3, ...) integral of a b^T dm -> (6, ...) integral of b . omega~ omega~ a dm per product of omega."""
-    trace = np.einsum("kk...->...", moment)
-    return np.stack([moment[k, l] - trace if k == l else moment[k, l] + moment[l, k] for k, l in OE_ORDER])  # noqa: E741
-
-
-def _laid_out(matrices: Array, layout: Layout) -> Array:
-    """(rows, n, 3) -> (rows, 3n)."""
-    ordered = matrices if layout == "mode-major" else matrices.transpose(0, 2, 1)
-    return ordered.reshape(len(matrices), 3 * matrices.shape[1])
 
 
 # ---- text ---------------------------------------------------------------------------------------------------------
@@ -217,11 +209,11 @@ def _content(lines: list[str], path: Path) -> Content:
     found = {name: taylor(part(modal, name), *size, n) for name, size in _sizes(n).items()}
     at = read_nodes(part(modal, "frame"), count, n, names)
     r_dm, P_dm = found["mdCM"].m0[:, 0], found["mdCM"].m1[:, :, 0]
-    rr_dm = from_inertia(_tensor(found["J"].m0[:, 0]))
+    rr_dm = from_inertia(tensor(found["J"].m0[:, 0]))
     limit = bounds(mass, rr_dm, found["Me"].m0)
-    rP_dm = from_parts(from_inertia(_tensor(found["J"].m1[:, :, 0])), found["Cr"].m0.T)
-    layout = _check_repeated(P_dm, rP_dm, found, limit)
-    stiffened = [*at.stiffened, *_stiffened(found, limit)]
+    rP_dm = from_parts(from_inertia(tensor(found["J"].m1[:, :, 0])), found["Cr"].m0.T)
+    layout = check_repeated(P_dm, rP_dm, found, limit)
+    stiffened = [*at.stiffened, *stiffened_blocks(found, limit)]
     content = Content(
         name=unquote(modal.label) or path.stem,
         mass=mass,
@@ -237,7 +229,7 @@ def _content(lines: list[str], path: Path) -> Content:
             "source": {"file": path.name, "format": "SID"},
             "layout": layout,
             "notes": ["every node became an interface of the kind 'node'", "the format has no surface to draw"],
-            "warnings": [*at.lost, *_lost(found, stiffened), *_lumped(rP_dm, found, layout, limit)],
+            "warnings": [*at.lost, *lost_blocks(found, stiffened), *lumped_mass(rP_dm, found, layout, limit)],
         },
     )
     return _trace_of_mass(content, bool(stiffened))
@@ -268,14 +260,6 @@ def _mass(refmod: Section, n: int) -> float:
 # ---- what repeats, what contradicts, what is lost -----------------------------------------------------------------
 
 
-def _tensor(six: Array) -> Array:
-    """(6, ...) in the order of J -> (3, 3, ...)."""
-    tensor = np.zeros((3, 3, *six.shape[1:]))
-    for value_of, (k, l) in zip(six, J_ORDER, strict=True):  # noqa: E741
-        tensor[k, l] = tensor[l, k] = value_of
-    return tensor
-
-
 def _second_moments(found: Mapping[str, Taylor], limit: Bounds) -> Array:
     """(3, 3, n, n) PP_dm from Oe.m1, Me and Cr.m1. Raises InputError where Oe.m1 is not symmetric in the modes."""
     Oe1, M = found["Oe"].m1, found["Me"].m0
@@ -283,71 +267,7 @@ def _second_moments(found: Mapping[str, Taylor], limit: Bounds) -> Array:
     both = np.zeros((3, 3, *M.shape))
     for column, (k, l) in enumerate(OE_ORDER):  # noqa: E741
         both[k, l] = both[l, k] = 2 * (Oe1[:, :, column] + M) if k == l else Oe1[:, :, column]
-    return from_parts(both, _of_mass(found["Cr"].m1).transpose(2, 1, 0))
-
-
-def _of_mass(Cr1: Array) -> Array:
-    """The part of Cr.m1 that is an integral over the mass: antisymmetric in the modes."""
-    return 0.5 * (Cr1 - Cr1.transpose(1, 0, 2))
-
-
-def _check_repeated(P_dm: Array, rP_dm: Array, found: Mapping[str, Taylor], limit: Bounds) -> dict[str, str]:
-    """The layouts of Gr and Ge. Raises InputError where blocks that repeat each other differ."""
-    hold("Ct = transpose of mdCM.m1", found["Ct"].m0 - P_dm.T, limit.first[:, None])
-    hold("Oe.m0 = centrifugal forces from J.m1", found["Oe"].m0 - _centrifugal(rP_dm).T, limit.second[:, None])
-    J1 = _tensor(found["J"].m1[:, :, 0])
-    twice = 2 * _of_mass(found["Cr"].m1)
-
-    def of_Gr(Gr: Array) -> float:
-        return relative(Gr + Gr.transpose(2, 1, 0) - 2 * J1.transpose(0, 2, 1), limit.second[:, None])
-
-    def of_Ge(Ge: Array) -> float:
-        return relative(Ge - twice, limit.third[:, :, None])
-
-    Gr = {layout: of_Gr(_taken_apart(found["Gr"].m0, layout)) for layout in get_args(Layout)}
-    Ge = {layout: of_Ge(_taken_apart(found["Ge"].m0, layout)) for layout in get_args(Layout)}
-    return {"Gr": _fitting("Gr_l + transpose = 2 dJ/dq_l", Gr), "Ge": _fitting("Ge = 2 Cr.m1", Ge)}
-
-
-def _taken_apart(matrix: Array, layout: str) -> Array:
-    """(rows, 3n) -> (rows, n, 3)."""
-    rows, n = matrix.shape[0], matrix.shape[1] // 3
-    return matrix.reshape(rows, n, 3) if layout == "mode-major" else matrix.reshape(rows, 3, n).transpose(0, 2, 1)
-
-
-def _fitting(identity: str, residuals: Mapping[str, float]) -> str:
-    best = min(residuals, key=lambda layout: residuals[layout])
-    if residuals[best] > IDENTITY_TOLERANCE:
-        off = ", ".join(f"{layout} by {residual:.1e}" for layout, residual in residuals.items())
-        raise InputError(f"the identity {identity} fails in both layouts ({off}, relative): a block is damaged")
-    return best
-
-
-def _stiffened(found: Mapping[str, Taylor], limit: Bounds) -> list[str]:
-    """The blocks that hold geometric stiffness."""
-    Cr1 = found["Cr"].m1
-    uneven = relative(Cr1 - _of_mass(Cr1), limit.third[:, :, None]) > IDENTITY_TOLERANCE
-    return ["Ct.m1"] * bool(found["Ct"].m1.any()) + ["Cr.m1"] * uneven
-
-
-def _lost(found: Mapping[str, Taylor], stiffened: list[str]) -> list[str]:
-    lost = []
-    if stiffened:
-        lost.append(f"dropped: the geometric stiffness in {', '.join(stiffened)}")
-    for name, what in (("ksigma", "the prestress forces"), ("De", "the modal damping")):
-        if found[name].m0.any():
-            lost.append(f"dropped: {what} {name}")
-    higher = [name for name in ("Me", "Gr", "Ge", "ksigma", "Ke", "De") if found[name].m1.any()]
-    return [*lost, f"dropped: the terms of order 1 of {', '.join(higher)}"] if higher else lost
-
-
-def _lumped(rP_dm: Array, found: Mapping[str, Taylor], layout: Mapping[str, str], limit: Bounds) -> list[str]:
-    """A consistent mass has Gr_l - transpose = -2 skew(Cr_l); rotary inertia of nodes is in Cr only."""
-    Gr = _taken_apart(found["Gr"].m0, layout["Gr"])
-    off = relative(Gr - Gr.transpose(2, 1, 0) + 2 * skew(axial(rP_dm)).transpose(0, 2, 1), limit.second[:, None])
-    if off <= IDENTITY_TOLERANCE:
-        return []
-    return [f"lumped mass: the identity antisym(Gr_l) = -skew(Cr_l) fails by {off:.1e} (relative); Cr was taken"]
+    return from_parts(both, of_mass(found["Cr"].m1).transpose(2, 1, 0))
 
 
 def _trace_of_mass(content: Content, stiffened: bool) -> Content:
@@ -366,7 +286,9 @@ def _trace_of_mass(content: Content, stiffened: bool) -> Content:
             f"dropped: geometric stiffness in Oe.m1 ({identity}); PP_dm is that of nodal masses, off by {misfit:.1e}"
         )
     elif off > LUMPING_LIMIT:
-        raise InputError(f"{identity}: too much for a lumped mass; a block is damaged or of order 0")
+        raise InputError(
+            f"{identity}: too much for a lumped mass; Oe is damaged, of order 0, or holds geometric stiffness alone"
+        )
     else:
         warning = f"lumped mass: {identity}; each axis of PP_dm took a third"
     warnings = [*content.facts["warnings"], warning]

@@ -1,5 +1,6 @@
 """Standard input data: every block against sums over mass points, files of others, round trips, guards, damage."""
 
+import os
 import re
 from dataclasses import replace
 from itertools import pairwise
@@ -671,8 +672,21 @@ def test_the_writer_refuses_and_leaves_files_alone(tmp_path):
         write_sid(replace(body, surface=None), path, surface=True)
     with pytest.raises(InputError, match="neither interfaces nor surface points"):
         write_sid(replace(body, interfaces=()), path)
+    taken = replace(body, interfaces=(replace(body.interfaces[0], name="surface-2"),))
+    with pytest.raises(InputError, match="rename the interface 'surface-2'; surface points need it"):
+        write_sid(taken, path, surface=True)
     assert path.read_text() == "precious"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_failed_write_leaves_no_trace(tmp_path, monkeypatch):
+    def failing(source, target):
+        raise OSError("disk full")
+
+    monkeypatch.setattr(os, "replace", failing)
+    with pytest.raises(OSError, match="disk full"):
+        write_sid(cloud(1), tmp_path / "b.SID_FEM")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_rigid_body_is_a_file_without_modes(tmp_path):
@@ -683,6 +697,15 @@ def test_a_rigid_body_is_a_file_without_modes(tmp_path):
 
 
 # ---- the command line ---------------------------------------------------------------------------------------------
+
+
+def test_export_says_what_it_leaves_out(tmp_path, capsys):
+    body = replace(cloud(2), stiffening=np.ones((12 + 18, 2, 2)))
+    source = save_body(body, tmp_path / "b.ffr")
+    for name in ("b.SID_FEM", "b.fem"):
+        main(["export", str(source), "-o", str(tmp_path / name), "--kind", "full", "--surface"])
+        assert "geometric stiffness of the body was left out" in capsys.readouterr().out
+    assert_same(read_sid(tmp_path / "b.SID_FEM"), cloud(2), 1e-14)
 
 
 def test_export_and_import_commands(tmp_path, capsys):
