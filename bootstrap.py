@@ -233,7 +233,7 @@ def install_packages(packages: Sequence[str]) -> None:
         captured([*apt, "update"])  # where this fails, so does the next
         done = captured([*apt, "install", "-y", "--fix-broken", "--no-install-recommends", *packages])
     if done.returncode:
-        raise SetUpError(_failure("apt-get could not install the packages", done.stdout))
+        raise SetUpError(_failure(f"apt-get could not install {names}", done.stdout))
 
 
 def administrator() -> list[str] | None:
