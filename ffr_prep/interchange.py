@@ -26,6 +26,8 @@ IDENTITY_TOLERANCE = 1e-6
 LUMPING_LIMIT = 0.5
 MISFIT_LIMIT = 0.05
 _ORTHONORMAL = 1e-9
+_DEPENDENT = 1e-12
+_TINY, _HUGE = 1e-60, 1e60  # beyond these, products overflow
 MANY_MOMENTS = 30_000_000
 _REAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([DEde][+-]?[0-9]+)?")
 
@@ -84,19 +86,21 @@ def body_from(content: Content) -> FlexibleBody:
 def normal_coordinates(M: Array, K: Array) -> tuple[Array, Array, list[str]]:
     """(n, n) V with V^T M V = I and V^T K V = diag(omega2), (n,) omega2, and a note where V is not the identity.
 
-    Raises InputError where M or K is not symmetric, M not positive definite or K has a negative eigenvalue.
+    The diagonal of M is positive. Raises InputError where M or K is not symmetric, M not positive definite or K has a
+    negative eigenvalue.
     """
     n = len(M)
     if n == 0:
         return np.eye(0), np.zeros(0), []
     M, K = _symmetric("modal mass", M), _symmetric("modal stiffness", K)
-    lowest = float(np.linalg.eigvalsh(M).min())
-    if lowest <= 0:
-        raise InputError(f"the modal mass is not positive definite (lowest eigenvalue {lowest:.3e}): modes depend")
+    weight = np.sqrt(np.diag(M))
+    cosines = M / np.outer(weight, weight)
+    lowest = float(np.linalg.eigvalsh(cosines).min())
+    if lowest <= _DEPENDENT:
+        raise InputError(f"the modal mass is not positive definite: modes depend on each other (to {lowest:.1e})")
     unit = np.abs(M - np.eye(n)).max() <= _ORTHONORMAL
     stiffness = np.diag(K)
-    weight = np.sqrt(np.diag(M))
-    mixed = max(_off_diagonal(M / np.outer(weight, weight)), _off_diagonal(K) / max(np.abs(stiffness).max(), 1e-300))
+    mixed = max(_off_diagonal(cosines), _off_diagonal(K) / max(np.abs(stiffness).max(), 1e-300))
     if mixed <= _ORTHONORMAL and unit:
         return np.eye(n), _not_negative(stiffness), []
     if mixed <= _ORTHONORMAL:
@@ -175,10 +179,10 @@ class Bounds:
 
 def bounds(mass: float, rr_dm: Array, M: Array) -> Bounds:
     """The bounds of the integrals of a body. Raises InputError where mass or modal mass is not positive."""
-    if not mass > 0:
+    if not mass > _TINY:
         raise InputError(f"the mass is {mass:g} kg; it must be positive")
     own = np.diag(M)
-    if own.size and own.min() <= 0:
+    if own.size and own.min() <= _TINY:
         k = int(own.argmin())
         raise InputError(f"the modal mass of mode {k + 1} is {own[k]:g}; it must be positive")
     weight = np.sqrt(own)
@@ -284,7 +288,7 @@ def real(text: str, what: str) -> float:
     if not _REAL.fullmatch(text):
         raise InputError(f"{what}: {text[:40]!r} is not a number")
     value = float(text.upper().replace("D", "E"))
-    if not np.isfinite(value):
+    if abs(value) > _HUGE:
         raise InputError(f"{what}: {text[:40]} is too large")
     return value
 

@@ -659,6 +659,18 @@ def test_random_damage_never_crashes(tmp_path, lines):
     assert refused > 75
 
 
+def test_absurd_magnitudes_never_crash(tmp_path, lines):
+    rng, text, outcomes = np.random.default_rng(2), "\n".join(lines), []
+    spots = list(re.finditer(r"-?\d\.\d+[DE][+-]\d+", text))
+    for value in ("0.0", "-1.0", "1.0E-308", "1.0E-30", "1.0E+30", "1.0E+200", "-1.0E+308"):
+        for spot in rng.choice(len(spots), 12, replace=False):
+            broken = text[: spots[spot].start()] + value + text[spots[spot].end() :]
+            outcomes.append(damaged(with_lines(tmp_path, [broken])))
+            if value.endswith(("200", "308")) and "-308" not in value:
+                assert "is too large" in str(outcomes[-1])
+    assert any(isinstance(outcome, FlexibleBody) for outcome in outcomes)
+
+
 # ---- guards of the writer -----------------------------------------------------------------------------------------
 
 
