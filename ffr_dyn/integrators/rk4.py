@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.options import inlined, kernel
+from ffr_dyn.kernels.options import entry, inlined
 from ffr_dyn.kernels.record import record
 from ffr_dyn.kernels.stiffening import solve_stiffened
 from ffr_dyn.kernels.system import (
@@ -49,7 +49,7 @@ def step(m, w, stages, t, h, x, v, alpha, beta, tolerance):
     return finite(x, v)
 
 
-@kernel
+@entry
 def rk4_run(m, w, stages, t0, h, first, substeps, x, v, alpha, beta, tolerance, out):
     """Fill the rows of `out`, `substeps` steps apart, from step number `first`. Returns (rows filled, status)."""
     number = first

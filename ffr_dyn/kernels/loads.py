@@ -6,7 +6,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from ffr_dyn.kernels.markers import apply_wrench
-from ffr_dyn.kernels.options import inlined, kernel
+from ffr_dyn.kernels.options import entry, inlined, kernel
 from ffr_dyn.kernels.vectors import dot, fill, get, scale, subtract, to_body
 
 POLYNOMIAL, HARMONIC, PIECEWISE, USER = 0, 1, 2, 3
@@ -46,7 +46,7 @@ def piecewise(data, start, t):
     return value, rate, second
 
 
-@inlined
+@entry
 def evaluate_functions(functions, user, t, out):
     """out (F, 3) = value and two time derivatives of every time function at t; `user` holds what Python gave."""
     data = functions.data
