@@ -45,7 +45,7 @@ LIBRARIES = {
     "libXinerama.so.1": "libxinerama1",
     "libgomp.so.1": "libgomp1",
 }
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+BROWSERS = ("chromium", "google-chrome", "chrome")
 
 CHECKS = {"ruff check": ("ruff", "check"), "ruff format": ("ruff", "format", "--check"), "mypy": ("mypy",)}
 LINES_OF_AN_ERROR = 15
@@ -81,7 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.command == "demo":
             set_up(extras=(), browser=False)
             return demo()
-        set_up(extras=("test",), browser=options.slow)
+        set_up(extras=("bench", "test") if options.slow else ("test",), browser=options.slow)
         return test(slow=options.slow)
     except SetUpError as error:
         print(f"\n{error}", file=sys.stderr)

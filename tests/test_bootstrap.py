@@ -300,6 +300,16 @@ def test_slow_selects_every_test(machine):
     assert machine.commands[-1][1:] == ["-m", "pytest", "-m", ""]
 
 
+@pytest.mark.parametrize(
+    ("options", "extras", "browser"), [([], ("test",), False), (["--slow"], ("bench", "test"), True)]
+)
+def test_the_longer_tests_need_a_browser_and_the_benchmarks(machine, monkeypatch, options, extras, browser):
+    asked = []
+    monkeypatch.setattr(bootstrap, "set_up", lambda **wanted: asked.append(wanted))
+    assert bootstrap.main(["test", *options]) == 0
+    assert asked == [{"extras": extras, "browser": browser}]
+
+
 @pytest.mark.parametrize("word", ["check", "format", "pytest"])
 def test_any_failed_check_fails(machine, word):
     machine.bad = {word}
