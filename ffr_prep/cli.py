@@ -125,6 +125,7 @@ def mesh(mesh: Path, unit: str | None, size: float | None, numbers: tuple[str, .
     "--method", type=click.Choice(["craig-bampton", "eigenmodes"]), default="craig-bampton", show_default=True
 )
 @click.option("--modes", type=click.IntRange(min=0), default=10, show_default=True, help="Normal modes to keep.")
+@click.option("--stiffening", is_flag=True, help="Also compute geometric stiffening: slender rods under load, fast blades.")
 def reduce(
     mesh: Path,
     output: Path,
@@ -138,6 +139,7 @@ def reduce(
     reference: str,
     method: str,
     modes: int,
+    stiffening: bool,
 ) -> None:
     """Reduce MESH to a flexible body and write it to a file.
 
@@ -165,6 +167,7 @@ def reduce(
         interfaces=regions,
         reference=conditions,
         reduction=reduction,
+        stiffening=stiffening,
         progress=steps,
         provenance={
             "source": {"file": mesh.name, "unit": unit, "size": size, "numbers": parameters, "order": order},
