@@ -52,6 +52,8 @@ class Frame:
     members     : what the elements are made of
     member_of   : (E,) index into members
     node_groups : name -> (m,) nodes, where interfaces attach
+
+    Raises InputError for arrays of other shapes and coordinates that are not finite.
     """
 
     points: Array
@@ -60,6 +62,25 @@ class Frame:
     member_of: Array
     node_groups: Mapping[str, Array] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        _freeze(self, "points", np.array(self.points, float), (-1, 3))
+        _freeze(self, "elements", np.array(self.elements, np.int64), (-1, 2))
+        _freeze(self, "member_of", np.array(self.member_of, np.int64), (len(self.elements),))
+        groups = {name: np.array(nodes, np.int64) for name, nodes in self.node_groups.items()}
+        object.__setattr__(self, "node_groups", groups)
+        wrong = np.flatnonzero(~np.isfinite(self.points).all(axis=1))
+        if wrong.size:
+            raise InputError(
+                f"node {wrong[0]} has the coordinates {self.points[wrong[0]]}; they must be finite numbers"
+            )
+
+
+def _freeze(frame: Frame, key: str, value: Array, shape: tuple[int, ...]) -> None:
+    if value.ndim != len(shape) or any(size not in (-1, given) for size, given in zip(shape, value.shape, strict=True)):
+        raise InputError(f"frame: {key} has the shape {value.shape}; it must be {str(shape).replace('-1', 'any')}")
+    value.setflags(write=False)
+    object.__setattr__(frame, key, value)
+
 
 # ---- building -----------------------------------------------------------------------------------------------------
 
@@ -67,11 +88,14 @@ class Frame:
 def polyline(corners: Sequence[Vector] | Array, member: Member, *, elements: int = 1) -> Frame:
     """Straight beams from corner to corner (P, 3) [m], each of `elements` elements of equal length.
 
-    Raises InputError for fewer than two corners or no elements.
+    Raises InputError for fewer than two corners, one that is not finite, or no elements.
     """
     at = np.asarray(corners, float)
     if at.ndim != 2 or at.shape[1] != 3 or len(at) < 2:
         raise InputError(f"a polyline needs two or more corners (x, y, z); it has the shape {at.shape}")
+    if not np.isfinite(at).all():
+        wrong = at[~np.isfinite(at).all(axis=1)][0]
+        raise InputError(f"a polyline has the corner {wrong.tolist()}; it must be three finite numbers")
     if elements < 1:
         raise InputError(f"a polyline of {elements} elements a leg cannot be built; ask for one or more")
     part = np.arange(elements)[:, None] / elements
@@ -175,7 +199,7 @@ def frame_hash(frame: Frame) -> str:
 def check_frame(frame: Frame) -> None:
     """Raises InputError for a frame that no computation should start from.
 
-    Guarded: no elements, numbers that do not fit or are not finite, nodes of no element, empty groups, elements that
+    Guarded: no elements, numbers of nodes and members that do not exist, nodes of no element, empty groups, elements that
     are repeated, nodes at the same place and parts that nothing connects. The elements guard their own length and
     orientation.
     """
@@ -190,17 +214,11 @@ def _check_numbers(frame: Frame) -> None:
     count = len(frame.points)
     if not len(frame.elements):
         raise InputError("the frame has no elements; build one with polyline(...)")
-    wrong = np.flatnonzero(~np.isfinite(frame.points).all(axis=1))
-    if wrong.size:
-        raise InputError(f"node {wrong[0]} has the coordinates {frame.points[wrong[0]]}; they must be finite numbers")
     if frame.elements.min() < 0 or frame.elements.max() >= count:
         raise InputError(
             f"elements refer to nodes {frame.elements.min()} to {frame.elements.max()}, but there are {count} nodes"
         )
-    if (
-        frame.member_of.shape != frame.elements.shape[:1]
-        or not np.isin(frame.member_of, range(len(frame.members))).all()
-    ):
+    if not np.isin(frame.member_of, range(len(frame.members))).all():
         raise InputError(f"every element must have one of the {len(frame.members)} members of the frame")
     unused = np.setdiff1d(np.arange(count), frame.elements)
     if unused.size:

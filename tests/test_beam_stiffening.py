@@ -83,7 +83,7 @@ def test_rotating_cantilever(eta, mu):
     49 (1982) 197-202.
     """
     section = with_mass_moments(general("rod", A=1.0, Iy=1.00002e-6, Iz=1e-6, J=1e-6), 1e-9, 0.0)
-    body = rod(section, 1.0, 90, 16, FixedTo("root"))
+    body = rod(section, 1.0, 90, 30, FixedTo("root"))
     unit = STEEL.E * 1e-6 / STEEL.rho
     stiffened = np.diag(body.omega2) + eta**2 * unit * (body.stiffening[ACROSS] - body.PP_dm[0, 0] - body.PP_dm[2, 2])
     values, vectors = scipy.linalg.eigh(stiffened)

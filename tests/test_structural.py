@@ -571,8 +571,15 @@ def line(*corners) -> Frame:
             lambda: beam_elements(polyline([(0, 0, 0), (1, 0, 0)], Member(BAR, STEEL, (2.0, 0, 0)))),
             "its orientation .* points the same way",
         ),
-        (lambda: check_frame(replace(line((0, 0, 0), (1, 0, 0)), elements=np.zeros((0, 2), int))), "has no elements"),
-        (lambda: check_frame(line((0, 0, 0), (np.nan, 0, 0))), "must be finite"),
+        (lambda: check_frame(Frame([(0, 0, 0)], np.zeros((0, 2)), (ROD,), [])), "has no elements"),
+        (lambda: line((0, 0, 0), (np.nan, 0, 0)), "has the corner .* three finite numbers"),
+        (
+            lambda: Frame([(0, 0, 0), (np.inf, 0, 0)], [(0, 1)], (ROD,), [0]),
+            "node 1 has the coordinates .* must be finite",
+        ),
+        (lambda: Frame([(0, 0), (1, 0)], [(0, 1)], (ROD,), [0]), r"points has the shape \(2, 2\)"),
+        (lambda: Frame([(0, 0, 0), (1, 0, 0)], [0, 1], (ROD,), [0]), r"elements has the shape \(2,\)"),
+        (lambda: Frame([(0, 0, 0), (1, 0, 0)], [(0, 1)], (ROD,), [0, 0]), r"member_of has the shape \(2,\)"),
         (
             lambda: check_frame(replace(line((0, 0, 0), (1, 0, 0)), elements=np.array([[0, 2]]))),
             "but there are 2 nodes",
