@@ -16,14 +16,14 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from ffr_prep.beams import Beams, axis_gradients, element_coordinates
+from ffr_prep.beams import Beams, axis_gradients, element_coordinates, mass_points, undeformed
 from ffr_prep.factor import free_body, solve_refined, supported
 from ffr_prep.interface import CoupledModel
 from ffr_prep.stiffening import PRODUCTS
 
 Array = np.ndarray
 
-_GAUSS = 3  # points; products of the quadratic slopes are of degree four
+_GAUSS = 4  # points; products of the quadratic slopes with the quadratic tension are of degree six
 
 
 def beam_stiffening(
@@ -42,27 +42,46 @@ def beam_stiffening(
     def nodal(z: Array) -> Array:
         return to_element @ (B_1 @ (ties @ z)).reshape(-1, 12, z.shape[1])
 
-    forces = axial_forces(elements, nodal(displacement))
-    stiffness = [stiffness_of_tension(elements, force, nodal(Z)) for force in forces.T]
+    of_elements = np.zeros((len(elements.length), 2, loads.shape[1]))
+    of_elements[:, :, : inertial.shape[1]] = axial_loads(elements)
+    forces = tensions(elements, nodal(displacement), of_elements)
+    stiffness = [stiffness_of_tension(elements, forces[:, :, k], nodal(Z)) for k in range(forces.shape[2])]
     return np.array(stiffness).reshape(-1, Z.shape[1], Z.shape[1])
 
 
-def axial_forces(elements: Beams, e: Array) -> Array:
-    """(E, r) tension [N] of the elements with coordinates e (E, 12, r) in element axes; constant in each element."""
-    return (elements.EA / elements.length)[:, None] * (e[:, 6] - e[:, 0])
+def axial_loads(elements: Beams) -> Array:
+    """(E, 2, 12) nodal forces along x' of the elements under unit accelerations [N]."""
+    xi, across, mass = mass_points(elements)
+    accelerations = unit_accelerations(undeformed(elements, xi, across).reshape(-1, 3)).reshape(12, *mass.shape, 3)
+    along = np.einsum("aeqc,ec,eq->aeq", accelerations, elements.C[:, :, 0], mass)
+    return -np.stack([along @ (1 - xi), along @ xi], axis=-1).transpose(1, 2, 0)
 
 
-def stiffness_of_tension(elements: Beams, force: Array, e: Array) -> Array:
-    """(n, n) geometric stiffness of the shapes e (E, 12, n), in element axes, under the tensions `force` (E,) [N]."""
+def tensions(elements: Beams, e: Array, loads: Array) -> Array:
+    """(E, 3, r) tension [N] at both ends and its mean, of coordinates e (E, 12, r) and loads along x' (E, 2, r).
+
+    The ends follow from the equilibrium of the element; all three are exact where the loads vary linearly along it.
+    """
+    mean = (elements.EA / elements.length)[:, None] * (e[:, 6] - e[:, 0])
+    return np.stack([mean + loads[:, 0], mean - loads[:, 1], mean], axis=1)
+
+
+def stiffness_of_tension(elements: Beams, tension: Array, e: Array) -> Array:
+    """(n, n) geometric stiffness of the shapes e (E, 12, n), in element axes.
+
+    tension : (E, 3) [N], quadratic along the element with these values at its ends and this mean
+    """
     at, weight = np.polynomial.legendre.leggauss(_GAUSS)
-    deflection, twist = axis_gradients(elements, (1 + at) / 2)
+    xi = (1 + at) / 2
+    deflection, twist = axis_gradients(elements, xi)
     radius = np.sqrt((elements.EIy + elements.EIz) / elements.EA)
     slopes = np.concatenate([deflection, radius[:, None, None, None] * twist], axis=2) @ e[:, None]
-    weights = np.sqrt(np.outer(np.abs(force) * elements.length, weight / 2))[..., None, None]
-    weighted = weights * slopes
+    first, last, mean = tension.T[..., None]
+    force = first * (1 - xi) + last * xi + 6 * xi * (1 - xi) * (mean - (first + last) / 2)
+    weighted = (force * weight / 2 * elements.length[:, None])[..., None, None] * slopes
     n = e.shape[2]
-    signed = np.sign(force)[:, None, None, None] * weighted
-    return weighted.reshape(-1, n).T @ signed.reshape(-1, n)
+    K = slopes.reshape(-1, n).T @ weighted.reshape(-1, n)
+    return (K + K.T) / 2
 
 
 def unit_accelerations(points: Array) -> Array:
