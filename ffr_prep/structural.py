@@ -278,13 +278,20 @@ def record(
             "elements": {"beam": len(frame.elements)},
             "degrees_of_freedom": model.K.shape[0],
         },
-        "members": [_described(member) for member in frame.members],
+        "members": [_strict(_described(member)) for member in frame.members],
         "interfaces": [_described(interface) for interface in interfaces],
         "reference": _described(reference),
         "reduction": _described(reduction),
         "versions": {package: version(package) for package in _VERSIONED},
         "warnings": [],
     }
+
+
+def _strict(value: Any) -> Any:
+    """Without infinite numbers, which JSON does not have: a section rigid in shear has the factor "inf"."""
+    if isinstance(value, dict):
+        return {key: _strict(entry) for key, entry in value.items()}
+    return "inf" if value == np.inf else value
 
 
 def _silent(stage: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from ffr_dyn.integrators import ROS2
 from ffr_dyn.joints import Joint
 from ffr_dyn.scene import Body, Scene
 from ffr_prep.beams import axis_functions, beams, field, mass_points, stiffness, undeformed
+from ffr_prep.body import load_body, save_body
 from ffr_prep.errors import InputError
 from ffr_prep.frame import Frame, Member, check_frame, group_nodes, joined, named, polyline
 from ffr_prep.interface import InterfaceRegion
@@ -546,6 +548,31 @@ def test_a_frame_is_reduced_to_the_same_bits_twice():
     assert one.provenance == two.provenance
     assert one.provenance["frame"]["elements"] == {"beam": 9}
     assert one.provenance["members"][0]["section"]["name"] == "rectangle 0.02 x 0.05 m"
+
+
+def test_the_body_file_holds_a_frame(tmp_path):
+    frame = straight(thin(circle(0.01)), 0.3, 2)
+    make = {"interfaces": regions("root"), "reference": FixedTo("root"), "reduction": CraigBampton(2)}
+    body = reduce_frame(frame, name="rod", stiffening=True, provenance={"drawing": 7}, **make)
+    again = load_body(save_body(body, tmp_path / "rod.ffr"))
+    assert again.provenance == body.provenance
+    assert json.loads(json.dumps(again.provenance, allow_nan=False))["members"][0]["section"]["ky"] == "inf"
+    assert again.provenance["drawing"] == 7
+    np.testing.assert_array_equal(again.stiffening, body.stiffening)
+
+
+def test_stages_are_told():
+    stages: list[str] = []
+    reduce_frame(
+        straight(BAR, 1.0, 2),
+        name="b",
+        interfaces=regions("root"),
+        reference=FixedTo("root"),
+        reduction=CraigBampton(2),
+        progress=stages.append,
+    )
+    assert stages[0] == "check the frame"
+    assert stages[-1] == "integrate the inertia"
 
 
 # ---- guards -----------------------------------------------------------------------------------------------------------
