@@ -137,19 +137,6 @@ def _number(text: str) -> float:
         raise InputError(f"--scale must be a number or auto, not {text!r}") from None
 
 
-@cli.command()
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), default=Path("out/slider_crank"), show_default=True,
-    help="Folder for everything that is made.",
-)  # fmt: skip
-def demo(output: Path) -> None:
-    """The main job: mesh a connecting rod, reduce it, run it in a slider-crank, plot and animate."""
-    from ffr_dyn.examples.slider_crank import make
-
-    for line in make(output):
-        click.echo(line)
-
-
 def main() -> None:
     """Entry point: exit code 2 for bad input, 1 for a failed computation, no traceback for either."""
     from ffr_prep.body import BodyError

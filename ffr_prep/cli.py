@@ -125,7 +125,9 @@ def mesh(mesh: Path, unit: str | None, size: float | None, numbers: tuple[str, .
     "--method", type=click.Choice(["craig-bampton", "eigenmodes"]), default="craig-bampton", show_default=True
 )
 @click.option("--modes", type=click.IntRange(min=0), default=10, show_default=True, help="Normal modes to keep.")
-@click.option("--stiffening", is_flag=True, help="Also compute geometric stiffening: slender rods under load, fast blades.")
+@click.option(
+    "--stiffening", is_flag=True, help="Also compute geometric stiffening: slender rods under load, fast blades."
+)
 def reduce(
     mesh: Path,
     output: Path,

@@ -10,7 +10,7 @@ import numpy as np
 from ffr_prep.errors import InputError
 from ffr_prep.frame import Frame, Member
 from ffr_prep.gmsh_source import WITH_UNIT, declared_unit, lines_from_gmsh
-from ffr_prep.mesh import UNITS, _check_request, _choice
+from ffr_prep.mesh import UNITS, check_request, choice
 
 Array = np.ndarray
 
@@ -37,7 +37,7 @@ def read_frame(
     curves; ComputationError when meshing fails.
     """
     path, numbers = Path(path), dict(numbers or {})
-    _check_request(path, unit, size, numbers, 1)
+    check_request(path, unit, size, numbers, 1)
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"{path}: frames are read from {', '.join(SUFFIXES)}; convert it with gmsh -save to .msh")
     if progress:
@@ -72,7 +72,7 @@ def _check_members(path: Path, lines: Mapping[str, Array], members: Mapping[str,
         raise InputError(f"{path} has no curves with line elements; draw the axes of the beams as curves")
     unknown = [name for name in members if name not in filled]
     if unknown:
-        raise InputError(f"{path} has no group of curves {unknown[0]!r}; {_choice(unknown[0], dict.fromkeys(filled))}")
+        raise InputError(f"{path} has no group of curves {unknown[0]!r}; {choice(unknown[0], dict.fromkeys(filled))}")
     bare = [name for name in filled if name not in members]
     if bare:
         raise InputError(

@@ -92,7 +92,7 @@ def read_mesh(
     Raises InputError for a file or an argument that cannot be used, ComputationError when meshing fails.
     """
     path, numbers = Path(path), dict(numbers or {})
-    _check_request(path, unit, size, numbers, order)
+    check_request(path, unit, size, numbers, order)
     if progress:
         progress("read the mesh")
     source, file_unit = _read(path, unit, size, numbers, order)
@@ -102,7 +102,7 @@ def read_mesh(
     return replace(mesh, notes=(*mesh.notes, *_doubtful_unit(mesh, path, unit)))
 
 
-def _check_request(path: Path, unit: str | None, size: float | None, numbers: Mapping[str, float], order: int) -> None:
+def check_request(path: Path, unit: str | None, size: float | None, numbers: Mapping[str, float], order: int) -> None:
     if unit is not None and unit not in UNITS:
         raise InputError(f"unit {unit!r} is not known; the units are {', '.join(UNITS)}")
     if size is not None and not 0 < size < np.inf:
@@ -132,7 +132,7 @@ def _check_parameters(path: Path, numbers: Mapping[str, float]) -> None:
     known = dict.fromkeys(re.findall(r"(\w+)\s*=", "".join(declared)))
     for name in numbers:
         if not re.search(rf"\b{re.escape(name)}\b", script):
-            raise InputError(f"{path} has no parameter {name!r}; {_choice(name, known)}")
+            raise InputError(f"{path} has no parameter {name!r}; {choice(name, known)}")
 
 
 def _read(
@@ -187,7 +187,7 @@ def _doubtful_unit(mesh: Mesh, path: Path, unit: str | None) -> list[str]:
 def face_group(mesh: Mesh, name: str) -> tuple[Array, ...]:
     """The faces of a group, arrays (F, k); InputError lists the face groups there are."""
     if name not in mesh.face_groups:
-        raise InputError(f"the mesh has no face group {name!r}; {_choice(name, mesh.face_groups)}")
+        raise InputError(f"the mesh has no face group {name!r}; {choice(name, mesh.face_groups)}")
     return mesh.face_groups[name]
 
 
@@ -198,10 +198,10 @@ def region_nodes(mesh: Mesh, name: str) -> Array:
     if name in mesh.node_groups:
         return np.unique(mesh.node_groups[name])
     known = dict.fromkeys([*mesh.face_groups, *mesh.node_groups])
-    raise InputError(f"the mesh has no group of faces or nodes {name!r}; {_choice(name, known)}")
+    raise InputError(f"the mesh has no group of faces or nodes {name!r}; {choice(name, known)}")
 
 
-def _choice(name: str, known: Mapping[str, object]) -> str:
+def choice(name: str, known: Mapping[str, object]) -> str:
     """Names to choose from, the near ones first."""
     near = get_close_matches(name, known, n=3, cutoff=0.5)
     shown = [*near, *(other for other in known if other not in near)]

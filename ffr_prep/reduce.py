@@ -132,10 +132,10 @@ def record(
             "elements": _element_counts(mesh),
             "degrees_of_freedom": model.K.shape[0],
         },
-        "material": _described(material),
-        "interfaces": [_described(interface) for interface in interfaces],
-        "reference": _described(reference),
-        "reduction": _described(reduction),
+        "material": described(material),
+        "interfaces": [described(interface) for interface in interfaces],
+        "reference": described(reference),
+        "reduction": described(reduction),
         "versions": {package: version(package) for package in _VERSIONED},
         "warnings": mesh_warnings(mesh),
     }
@@ -159,14 +159,14 @@ def _element_counts(mesh: Mesh) -> dict[str, int]:
     return counts
 
 
-def _described(value: Any) -> Any:
+def described(value: Any) -> Any:
     """Settings as JSON values: a dataclass by its type and fields, an array by its hash, a function by its name."""
     if is_dataclass(value):
-        return {"type": type(value).__name__} | {f.name: _described(getattr(value, f.name)) for f in fields(value)}
+        return {"type": type(value).__name__} | {f.name: described(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, Mapping):
-        return {str(key): _described(entry) for key, entry in value.items()}
+        return {str(key): described(entry) for key, entry in value.items()}
     if isinstance(value, (tuple, list)):
-        return [_described(entry) for entry in value]
+        return [described(entry) for entry in value]
     if isinstance(value, np.ndarray):
         return {"shape": list(value.shape), "hash": content_hash(value)}
     if isinstance(value, np.generic):

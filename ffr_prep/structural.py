@@ -27,7 +27,7 @@ from ffr_prep.errors import InputError
 from ffr_prep.frame import Frame, check_frame, ends, frame_hash, group_nodes, orientations
 from ffr_prep.interface import CoupledModel, InterfaceRegion, rigid_field
 from ffr_prep.invariants import inertia_integrals
-from ffr_prep.reduce import _described, interface_shapes
+from ffr_prep.reduce import described, interface_shapes
 from ffr_prep.reduction import Basis, Reduction, check_basis
 from ffr_prep.reference import ReferenceConditions, functionals
 from ffr_prep.sweep import swept_surface
@@ -278,10 +278,10 @@ def record(
             "elements": {"beam": len(frame.elements)},
             "degrees_of_freedom": model.K.shape[0],
         },
-        "members": [_strict(_described(member)) for member in frame.members],
-        "interfaces": [_described(interface) for interface in interfaces],
-        "reference": _described(reference),
-        "reduction": _described(reduction),
+        "members": [_strict(described(member)) for member in frame.members],
+        "interfaces": [described(interface) for interface in interfaces],
+        "reference": described(reference),
+        "reduction": described(reduction),
         "versions": {package: version(package) for package in _VERSIONED},
         "warnings": [],
     }
