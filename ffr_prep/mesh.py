@@ -103,6 +103,7 @@ def read_mesh(
 
 
 def check_request(path: Path, unit: str | None, size: float | None, numbers: Mapping[str, float], order: int) -> None:
+    """Raises InputError for a unit, size, parameter, order or file that cannot be used."""
     if unit is not None and unit not in UNITS:
         raise InputError(f"unit {unit!r} is not known; the units are {', '.join(UNITS)}")
     if size is not None and not 0 < size < np.inf:
