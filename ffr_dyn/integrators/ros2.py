@@ -1,7 +1,8 @@
 """A linearly implicit W-method of order two: elastic stiffness and damping implicit, everything else explicit.
 
 Rosenbrock-type method with the elastic part  A = d(q_ddot)/d(q, q_dot) of  M v_dot = ... - Omega^2 q - 2 zeta Omega q_dot
-as its Jacobian; its order does not depend on what A leaves out (Verwer, Spee, Blom, Hundsdorfer 1999, ROS2):
+and the kinematics x_dot = T(x) v as its Jacobian; its order does not depend on what A leaves out (Verwer, Spee, Blom,
+Hundsdorfer 1999, ROS2):
 
     (I - gamma h A) k1 = f(t, y)
     (I - gamma h A) k2 = f(t + h, y + h k1) - 2 k1,     y+ = y + 3/2 h k1 + 1/2 h k2,     gamma = 1 - 1/sqrt(2)
@@ -10,7 +11,10 @@ L-stable in the elastic part. Since Omega^2 and 2 zeta Omega are diagonal, a sta
 1 + gamma^2 h^2 Omega^2 + 2 gamma h zeta Omega in place of the unit elastic mass:
 
     (M + diag_ff(gamma^2 h^2 Omega^2 + 2 gamma h zeta Omega)) k_v + Phi_q^T mu = Q + M r_v - gamma h Omega^2 (q_dot + r_q)
-    Phi_q k_v = gamma_rhs + Phi_q r_v,      k_q = q_dot + r_q + gamma h k_v     (r = 0, then -2 k1)
+    Phi_q k_v = gamma_rhs + Phi_q r_v,      k_x = T(x) (v + gamma h k_v) + r_x     (r = 0, then -2 k1)
+
+All positions move with v + gamma h k_v, not the elastic ones alone: otherwise a joint that stiff modes move would be left by
+its two sides at different rates, and drift.
 """
 
 from __future__ import annotations
@@ -68,15 +72,6 @@ def add_correction(m, w, r_v, target):
 
 
 @inlined
-def add_implicit_rates(bodies, xd, vd, gh):
-    """Elastic rows of the position stage: k_q += gamma h k_v."""
-    for b in range(bodies.mass.size):
-        n, i, j = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 2]
-        for c in range(n):
-            xd[i + 7 + c] += gh * vd[j + 6 + c]
-
-
-@inlined
 def step(m, w, stages, t, h, x, v, alpha, beta, tolerance):
     """One step in place. Returns a status."""
     gh = GAMMA * h
@@ -102,10 +97,10 @@ def step(m, w, stages, t, h, x, v, alpha, beta, tolerance):
         if k == 1:
             add_correction(m, w, r_v, stages.target)
         solve_stiffened(m, w, xs, stages.target)
-        position_rates(m.bodies, xs, vs, stages.x[k])
         to_velocity_rates(m.bodies.where, w.bodies.A, w.bodies.acc, stages.v[k])
+        add_scaled(vs, vs, gh, stages.v[k])
+        position_rates(m.bodies, xs, vs, stages.x[k])
         add_scaled(stages.x[k], stages.x[k], 1.0, r_x)
-        add_implicit_rates(m.bodies, stages.x[k], stages.v[k], gh)
     for k in range(2):
         weight = 1.5 * h if k == 0 else 0.5 * h
         add_scaled(x, x, weight, stages.x[k])

@@ -52,7 +52,7 @@ def add_pair(starts, pair, flexible, phiphi, w):
             w.S[offset + a * rows_b + c] += value
 
 
-@kernel
+@inlined
 def block(S, offset, rows, columns):
     return S[offset : offset + rows * columns].reshape(rows, columns)
 

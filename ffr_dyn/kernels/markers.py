@@ -1,11 +1,11 @@
 """Markers: points and small elastic rotations that move with the deformation; their velocities and bias accelerations."""
 
 from ffr_dyn.kernels.bodies import row_dot, row_product
-from ffr_dyn.kernels.options import kernel
+from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.vectors import add, cross, get, put, scale, to_global
 
 
-@kernel
+@inlined
 def shapes(markers, k, n):
     """Six pooled rows of n: phi_t, phi_r of marker k."""
     start = markers.start[k]
