@@ -63,9 +63,10 @@ def meshed_body(
 
 
 @cache
-def pendulum_rod(kind: str, modes: int) -> MeshedBody:
+def pendulum_rod(kind: str, modes: int, reference: ReferenceConditions | None = None) -> MeshedBody:
     """Plate strip of 1.2 m, E = 7e10 Pa, interfaces "hinge" and "tip"."""
-    return meshed_body("pendulum.geo", "rod", Material("metal", 7e10, 0.3, 5540.0), ("hinge", "tip"), kind, modes)
+    metal = Material("metal", 7e10, 0.3, 5540.0)
+    return meshed_body("pendulum.geo", "rod", metal, ("hinge", "tip"), kind, modes, reference)
 
 
 @cache
