@@ -126,6 +126,8 @@ def test(*, slow: bool) -> int:
     selection = ["-m", ""] if slow else []
     print("pytest", flush=True)
     tests = subprocess.run([str(_program("python")), "-m", "pytest", *selection], cwd=HOME)
+    if tests.returncode < 0:
+        print(f"\npytest was ended by signal {-tests.returncode}: its tests are not complete.", flush=True)
     return 0 if all(passed) and tests.returncode == 0 else 1
 
 

@@ -317,6 +317,13 @@ def test_any_failed_check_fails(machine, word):
     assert machine.ran("pytest")
 
 
+def test_tests_that_were_killed_say_so(machine, monkeypatch, capsys):
+    killed = subprocess.CompletedProcess([], -9)
+    monkeypatch.setattr(bootstrap.subprocess, "run", lambda command, **_: killed)
+    assert bootstrap.test(slow=False) == 1
+    assert "ended by signal 9" in capsys.readouterr().out
+
+
 def test_a_failed_check_shows_what_it_found(machine, capsys):
     machine.bad = {"check"}
     bootstrap.check("ruff check", ("ruff", "check"))
