@@ -89,7 +89,7 @@ def pictures(result: Result, folder: Path) -> None:
     forces = ["crank_pin.force.x", "crank_pin.force.y", "piston_pin.force.x", "piston_pin.force.y", "motor.moment.z"]
     plot(result, forces, folder / "reactions.png", title="Joint reactions and motor torque")
     for name in ("motion.gif", "motion.html"):
-        animate(result, folder / name, scale="auto")
+        animate(result, folder / name, scale="auto", fps=20)
 
 
 def main() -> None:

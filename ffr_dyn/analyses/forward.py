@@ -17,7 +17,6 @@ from ffr_dyn.equations import System, new_record, new_stages, new_work
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import ROS2, Integrator
 from ffr_dyn.kernels.options import is_compiled
-from ffr_dyn.kernels.record import record as record_kernel
 from ffr_dyn.kernels.tables import NOT_FINITE, OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, Record, Work
 from ffr_dyn.measure import Unwound, measure
 from ffr_dyn.result import Quantity, Result
@@ -122,12 +121,13 @@ def _announce_compilation(method: Integrator) -> None:
 def _started(assembled: Assembled, method: Integrator, start: float) -> _Run:
     """The run with its first row."""
     system, x, v = assembled.system, assembled.x.copy(), assembled.v.copy()
-    work, first = new_work(system.model), new_record(system, 1)
-    status = record_kernel(system.model, work, start, x, v, first, 0)
+    work, stages, first = new_work(system.model), new_stages(system, method.stage_count), new_record(system, 1)
+    # A run of no steps records the start.
+    _, status = method.run(system.model, work, stages, start, method.step, 0, 0, x, v, 0.0, 0.0, 0.0, first)
     if status != OK:
         raise _failure(system, work, status, start)
     parts, unwound = measure(system, first, {})
-    run = _Run(x, v, work, new_stages(system, method.stage_count), unwound, [parts], [first.time], np.zeros(1))
+    run = _Run(x, v, work, stages, unwound, [parts], [first.time], np.zeros(1))
     run.turned = _elastic_turns(system, first)
     return run
 

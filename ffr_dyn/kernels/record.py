@@ -3,7 +3,7 @@
 from ffr_dyn.kernels.bodies import energies
 from ffr_dyn.kernels.loads import spring_force
 from ffr_dyn.kernels.markers import update_marker
-from ffr_dyn.kernels.options import entry, inlined
+from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.stiffening import solve_stiffened
 from ffr_dyn.kernels.system import evaluate, largest, prepare, reactions, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
@@ -43,7 +43,7 @@ def keep(m, w, t, x, v, out, k):
     out.violation[k, 0], out.violation[k, 1] = largest(w.rows.Phi), largest(w.rows.nu)
 
 
-@entry
+@inlined
 def record(m, w, t, x, v, out, k):
     """Evaluate the scene at (t, x, v) and keep it as row k of `out`. Returns a status."""
     status = evaluate_truly(m, w, t, x, v)
