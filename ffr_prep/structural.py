@@ -130,14 +130,14 @@ def assemble_frame(frame: Frame, elements: Beams) -> StructuralMatrices:
     """Stiffness, mass points and their displacements in the coordinates of all nodes."""
     B_1 = connectivity(frame)
     xi, across, mass = mass_points(elements)
-    K = sp.block_diag(list(stiffness(elements)), format="csr")
+    K = sp.block_diag([sp.coo_array(k) for k in stiffness(elements)], format="csr")
     C_S_W_C_bar = field(elements, xi, across).reshape(len(elements.length), -1, 12)
     return StructuralMatrices(
         B_1=B_1,
         K=sp.csr_array(B_1.T @ K @ B_1),
         positions=undeformed(elements, xi, across).reshape(-1, 3),
         mass=mass.ravel(),
-        N=sp.csr_array(sp.block_diag(list(C_S_W_C_bar), format="csr") @ B_1),
+        N=sp.csr_array(sp.block_diag([sp.coo_array(w) for w in C_S_W_C_bar], format="csr") @ B_1),
     )
 
 
