@@ -174,7 +174,7 @@ def main() -> None:
         end, steps = (0.02, (5e-6, 2.5e-6)) if quick else (0.084, (1e-5, 5e-6, 2.5e-6, 1.25e-6))
         print_case(slider_crank_case(kind, end, steps), BOTH)
     if not quick:
-        print_case(slider_crank_case("rigid", 0.5, (5e-6, 2.5e-6, 1.25e-6)), {"Exudyn gen. alpha": ALPHA})
+        print_case(slider_crank_case("rigid", 0.5, (2.5e-6, 1.25e-6, 6.25e-7)), {"Exudyn gen. alpha": ALPHA})
     print_gravity(pendulum_case("rigid", (4e-5, 2e-5)))
 
 

@@ -65,7 +65,7 @@ Array = np.ndarray
 
 SECONDS = 0.2  # processor time of one timed run
 CHECKED, APART = 500, 1e-3  # steps after which the motions are compared, and how far apart they may be
-EXPLICIT_STEP, IMPLICIT_STEP = 5e-6, 2e-5  # s
+EXPLICIT_STEP, IMPLICIT_STEP = 5e-6, 1e-4  # s
 LINKS, LENGTHS = 8, (8, 16, 32, 64)
 FIXED_INTERFACE_MODES = (2, 26)  # with six static shapes: 8 and 32 elastic coordinates
 TARGETS = {8: 4.0, 32: 8.0}  # us per body and evaluation
