@@ -23,7 +23,7 @@ from ffr_prep.interface import InterfaceRegion, couple
 from ffr_prep.material import Material
 from ffr_prep.mesh import read_mesh
 from ffr_prep.reduce import nodal_basis, reduce_mesh
-from ffr_prep.reduction import CraigBampton
+from ffr_prep.reduction import CraigBampton, factorised
 from ffr_prep.reference import ReferenceConditions, SimplySupported, functionals
 from ffr_prep.solids import assemble, vector_mass
 
@@ -58,7 +58,7 @@ def meshed_body(
     with threadpool_limits(1):  # as reduce_mesh: bit for bit the same modes, also where frequencies are double
         matrices = assemble(mesh, material)
         model = couple(mesh, matrices, regions)
-        Phi = nodal_basis(model, method.basis(model, functionals(conditions, model)))
+        Phi = nodal_basis(model, method.basis(model, factorised(model), functionals(conditions, model)))
     return MeshedBody(body, mesh.points, matrices.K, vector_mass(matrices.m), Phi)
 
 

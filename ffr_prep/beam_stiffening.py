@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ffr_prep.beams import Beams, axis_gradients, element_coordinates, mass_points, undeformed
-from ffr_prep.factor import free_body, solve_refined, supported
+from ffr_prep.factor import SupportedBody, solve_refined
 from ffr_prep.interface import CoupledModel
 from ffr_prep.stiffening import PRODUCTS
 
@@ -27,16 +27,21 @@ _GAUSS = 4  # points; products of the quadratic slopes with the quadratic tensio
 
 
 def beam_stiffening(
-    elements: Beams, B_1: sp.csr_array, ties: sp.csr_array, model: CoupledModel, L: Array, inertial: Array, Z: Array
+    elements: Beams,
+    B_1: sp.csr_array,
+    ties: sp.csr_array,
+    model: CoupledModel,
+    held: SupportedBody,
+    inertial: Array,
+    Z: Array,
 ) -> Array:
     """(12 + 6 I, n, n) reduced geometric stiffness per unit load, in the order of `FlexibleBody.stiffening`.
 
-    B_1 connectivity; ties (6N, Z) nodal coordinates of the independent ones; L (r, Z) reference conditions; inertial
-    (Z, 12) loads of unit accelerations; Z (Z, n) basis. Raises ComputationError when a static problem fails.
+    B_1 connectivity; ties (6N, Z) nodal coordinates of the independent ones; held : the body under its reference conditions;
+    inertial (Z, 12) loads of unit accelerations; Z (Z, n) basis. Raises ComputationError when a static problem fails.
     """
     loads = np.hstack([inertial, model.C.toarray().T])
-    held = supported(free_body(model.K, model.T, model.places), L)
-    displacement, _ = solve_refined(held, loads, np.zeros((len(L), loads.shape[1])))
+    displacement, _ = solve_refined(held, loads, np.zeros((len(held.C), loads.shape[1])))
     to_element = element_coordinates(elements)
 
     def nodal(z: Array) -> Array:

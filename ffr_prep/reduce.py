@@ -11,10 +11,11 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ffr_prep.body import FlexibleBody, Interface, Surface, content_hash
+from ffr_prep.factor import supported
 from ffr_prep.interface import CoupledModel, InterfaceRegion, couple
 from ffr_prep.invariants import inertia_integrals
 from ffr_prep.mesh import Mesh, check_mesh, mesh_hash, surface_triangles
-from ffr_prep.reduction import Basis, Reduction, check_basis
+from ffr_prep.reduction import Basis, Reduction, check_basis, factorised
 from ffr_prep.reference import ReferenceConditions, functionals
 from ffr_prep.solids import Materials, assemble
 from ffr_prep.stiffening import stiffening_matrices
@@ -70,8 +71,10 @@ def _reduced(
     tell("tie the interfaces")
     model = couple(mesh, matrices, interfaces)
     L = functionals(reference, model)
+    tell("factorise the stiffness")
+    body = factorised(model)
     tell("reduce")
-    basis = reduction.basis(model, L)
+    basis = reduction.basis(model, body, L)
     check_basis(model, L, basis)
     tell("integrate the inertia")
     Phi = nodal_basis(model, basis)
@@ -82,7 +85,9 @@ def _reduced(
         omega2=basis.omega2,
         interfaces=interface_shapes(model, basis),
         surface=boundary(mesh, Phi),
-        stiffening=stiffening_matrices(mesh, material, matrices, model, L, Phi) if stiffening else None,
+        stiffening=stiffening_matrices(mesh, material, matrices, model, supported(body, L), Phi)
+        if stiffening
+        else None,
         provenance=record(mesh, material, interfaces, reference, reduction, model) | dict(provenance),
         **vars(inertia_integrals(mesh.points, matrices.m, Phi)),
     )

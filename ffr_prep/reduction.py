@@ -15,7 +15,7 @@ import numpy as np
 import scipy.linalg
 
 from ffr_prep.errors import ComputationError, InputError
-from ffr_prep.factor import SupportedBody, free_body, solve_refined, solve_supported, supported
+from ffr_prep.factor import FreeBody, SupportedBody, free_body, solve_refined, solve_supported, supported
 from ffr_prep.interface import CoupledModel
 from ffr_prep.lanczos import lowest_modes
 
@@ -38,8 +38,8 @@ class Basis:
 class Reduction(Protocol):
     """What every reduction offers."""
 
-    def basis(self, model: CoupledModel, L: Array) -> Basis:
-        """The basis under the reference conditions L (r, Z)."""
+    def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
+        """The basis under the reference conditions L (r, Z), with the factorised stiffness of the model."""
 
 
 @dataclass(frozen=True)
@@ -51,11 +51,11 @@ class CraigBampton:
 
     modes: int
 
-    def basis(self, model: CoupledModel, L: Array) -> Basis:
+    def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
         """Raises InputError without interfaces and for more modes than the model has."""
         if not model.names:
             raise InputError("Craig-Bampton needs at least one interface; without any, reduce by Eigenmodes")
-        fixed = supported(free_body(model.K, model.T, model.places), model.C.toarray())
+        fixed = supported(body, model.C.toarray())
         omega2, modes = normal_modes(model, fixed, self.modes)
         shapes, stiffness = constraint_modes(model, fixed)
         vectors = np.hstack([modes, shapes])
@@ -69,11 +69,16 @@ class Eigenmodes:
 
     modes: int
 
-    def basis(self, model: CoupledModel, L: Array) -> Basis:
+    def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
         """Raises InputError for more modes than the model has."""
-        held = supported(free_body(model.K, model.T, model.places), L)
+        held = supported(body, L)
         omega2, modes = normal_modes(model, held, self.modes)
         return diagonalised(model, modes, np.diag(omega2))
+
+
+def factorised(model: CoupledModel) -> FreeBody:
+    """The one factorisation that serves modes, static shapes, stiffening loads and error reports of a model."""
+    return free_body(model.K, model.T, model.places)
 
 
 # ---- building blocks ----------------------------------------------------------------------------------------------

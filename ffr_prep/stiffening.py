@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ffr_prep.factor import free_body, solve_refined, supported
+from ffr_prep.factor import SupportedBody, solve_refined
 from ffr_prep.interface import CoupledModel
 from ffr_prep.mesh import Mesh
 from ffr_prep.solids import Materials, SolidMatrices, displacement_gradients, vector_mass
@@ -29,15 +29,16 @@ PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 def stiffening_matrices(
-    mesh: Mesh, material: Materials, matrices: SolidMatrices, model: CoupledModel, L: Array, Phi: Array
+    mesh: Mesh, material: Materials, matrices: SolidMatrices, model: CoupledModel, held: SupportedBody, Phi: Array
 ) -> Array:
     """(12 + 6 I, n, n) reduced geometric stiffness per unit load, in the order of `FlexibleBody.stiffening`.
 
-    L (r, Z) reference conditions; Phi (N, 3, n) nodal basis. Raises ComputationError when a static problem fails.
+    held : the body under its reference conditions; Phi (N, 3, n) nodal basis
+
+    Raises ComputationError when a static problem fails.
     """
     loads = np.hstack([model.B.T @ inertial_loads(mesh.points, matrices), model.C.toarray().T])
-    held = supported(free_body(model.K, model.T, model.places), L)
-    displacement, _ = solve_refined(held, loads, np.zeros((len(L), loads.shape[1])))
+    displacement, _ = solve_refined(held, loads, np.zeros((len(held.C), loads.shape[1])))
     fields = np.moveaxis((model.B @ displacement).reshape(*mesh.points.shape, -1), -1, 0)
     n = Phi.shape[2]
     K = np.zeros((len(fields), n, n))

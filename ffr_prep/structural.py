@@ -24,11 +24,12 @@ from ffr_prep.beam_stiffening import beam_stiffening, unit_accelerations
 from ffr_prep.beams import Beams, beams, field, mass_points, stiffness, undeformed
 from ffr_prep.body import FlexibleBody
 from ffr_prep.errors import InputError
+from ffr_prep.factor import SupportedBody, supported
 from ffr_prep.frame import Frame, check_frame, ends, frame_hash, group_nodes, orientations
 from ffr_prep.interface import CoupledModel, InterfaceRegion, rigid_field
 from ffr_prep.invariants import inertia_integrals
 from ffr_prep.reduce import described, interface_shapes
-from ffr_prep.reduction import Basis, Reduction, check_basis
+from ffr_prep.reduction import Basis, Reduction, check_basis, factorised
 from ffr_prep.reference import ReferenceConditions, functionals
 from ffr_prep.sweep import swept_surface
 
@@ -100,8 +101,10 @@ def _reduced(
     ties = tie(frame, interfaces)
     model = couple_frame(frame, matrices, interfaces, ties)
     L = functionals(reference, model)
+    tell("factorise the stiffness")
+    body = factorised(model)
     tell("reduce")
-    basis = reduction.basis(model, L)
+    basis = reduction.basis(model, body, L)
     check_basis(model, L, basis)
     tell("integrate the inertia")
     q_n = ties @ basis.Z
@@ -111,7 +114,7 @@ def _reduced(
         omega2=basis.omega2,
         interfaces=interface_shapes(model, basis),
         surface=swept_surface(frame, elements, (matrices.B_1 @ q_n).reshape(-1, 12, basis.omega2.size)),
-        stiffening=_stiffening(elements, matrices, ties, model, L, basis) if stiffening else None,
+        stiffening=_stiffening(elements, matrices, ties, model, supported(body, L), basis) if stiffening else None,
         provenance=record(frame, interfaces, reference, reduction, model) | dict(provenance),
         **vars(inertia_integrals(matrices.positions, sp.diags_array(matrices.mass), Phi)),
     )
@@ -155,10 +158,15 @@ def inertial_loads(matrices: StructuralMatrices) -> Array:
 
 
 def _stiffening(
-    elements: Beams, matrices: StructuralMatrices, ties: sp.csr_array, model: CoupledModel, L: Array, basis: Basis
+    elements: Beams,
+    matrices: StructuralMatrices,
+    ties: sp.csr_array,
+    model: CoupledModel,
+    held: SupportedBody,
+    basis: Basis,
 ) -> Array:
     inertial = ties.T @ inertial_loads(matrices)
-    return beam_stiffening(elements, matrices.B_1, ties, model, L, inertial, basis.Z)
+    return beam_stiffening(elements, matrices.B_1, ties, model, held, inertial, basis.Z)
 
 
 # ---- interfaces ---------------------------------------------------------------------------------------------------

@@ -11,11 +11,11 @@ from boxes import STEEL, box_mesh, moved, rotation, shaken
 
 import ffr_prep.reduction as reduction_module
 from ffr_prep.errors import ComputationError, InputError
-from ffr_prep.factor import factorise, free_body, solve_refined, supported
+from ffr_prep.factor import factorise, solve_refined, supported
 from ffr_prep.interface import InterfaceRegion, couple
 from ffr_prep.material import Material
 from ffr_prep.reduce import reduce_mesh
-from ffr_prep.reduction import Basis, CraigBampton, Eigenmodes, check_basis
+from ffr_prep.reduction import Basis, CraigBampton, Eigenmodes, check_basis, factorised
 from ffr_prep.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports, functionals
 from ffr_prep.solids import assemble
 
@@ -53,7 +53,7 @@ def test_static_solutions_satisfy_the_optimality_conditions(model):
     rng = np.random.default_rng(0)
     C = np.vstack([model.C.toarray(), rng.normal(size=(2, model.K.shape[0])) / 40])
     f, c = rng.normal(size=(model.K.shape[0], 3)), rng.normal(size=(len(C), 3))
-    u, mu = solve_refined(supported(free_body(model.K, model.T, model.places), C), f, c)
+    u, mu = solve_refined(supported(factorised(model), C), f, c)
     np.testing.assert_allclose(C @ u, c, atol=1e-9 * np.abs(u).max())
     residual = model.K @ u + C.T @ mu - f
     assert np.abs(residual).max() < 1e-12 * np.abs(abs(model.K) @ np.abs(u)).max()
@@ -63,7 +63,7 @@ def test_static_solution_equals_the_clamped_one(model):
     """Six coordinates of a rigid interface set to zero are the same as leaving them out of the matrix."""
     held = model.K.shape[0] - 6
     f = np.random.default_rng(1).normal(size=(model.K.shape[0], 1))
-    problem = supported(free_body(model.K, model.T, model.places), model.C[:6].toarray())
+    problem = supported(factorised(model), model.C[:6].toarray())
     u, mu = solve_refined(problem, f, np.zeros((6, 1)))
     clamped = scipy.linalg.solve(model.K[:held][:, :held].toarray(), f[:held], assume_a="pos")
     np.testing.assert_allclose(u[:held], clamped, atol=1e-9 * np.abs(clamped).max())
@@ -76,7 +76,7 @@ def test_singular_matrices_and_dependent_supports_are_refused(model):
         factorise(sp.csr_array(np.diag([1.0, 0.0, 2.0])), np.zeros((3, 3)))
     with pytest.raises(ComputationError, match="is singular"):
         factorise(sp.csr_array(np.array([[1.0, 1.0], [1.0, 1.0 + 1e-15]])), np.eye(3)[:2])
-    body = free_body(model.K, model.T, model.places)
+    body = factorised(model)
     C = model.C.toarray()
     with pytest.raises(ComputationError, match="depend on one another"):
         supported(body, np.vstack([C, C[:1]]))
@@ -86,7 +86,7 @@ def test_singular_matrices_and_dependent_supports_are_refused(model):
 
 def test_a_solution_out_of_equilibrium_is_refused(model):
     """A factorisation that does not belong to the stiffness leaves a residual."""
-    problem = supported(free_body(model.K, model.T, model.places), model.C.toarray())
+    problem = supported(factorised(model), model.C.toarray())
     other = sp.csr_array(model.K + sp.diags_array(np.linspace(0, 1, model.K.shape[0]) * model.K.diagonal()))
     wrong = replace(problem, body=replace(problem.body, K=other))
     with pytest.raises(ComputationError, match="misses equilibrium by"):
@@ -104,7 +104,7 @@ def test_a_body_with_a_hinge_inside_is_refused():
     with pytest.raises(
         ComputationError, match=r"(not positive definite|is singular).* joined by a single node or edge"
     ):
-        free_body(model.K, model.T, model.places)
+        factorised(model)
 
 
 # ---- laws of every basis ------------------------------------------------------------------------------------------
@@ -121,7 +121,7 @@ OVERDETERMINED = Supports(
 @pytest.mark.parametrize("reduction", [CraigBampton(5), Eigenmodes(5)], ids=lambda r: type(r).__name__)
 def test_bases_are_orthonormal_diagonal_and_within_the_reference_conditions(model, reference, reduction):
     L = functionals(reference, model)
-    basis = reduction.basis(model, L)
+    basis = reduction.basis(model, factorised(model), L)
     Z, omega2 = basis.Z, basis.omega2
     np.testing.assert_allclose(Z.T @ (model.M @ Z), np.eye(len(omega2)), atol=1e-11)
     stiffness = Z.T @ (model.K @ Z)
@@ -133,7 +133,7 @@ def test_bases_are_orthonormal_diagonal_and_within_the_reference_conditions(mode
 
 
 def test_signs_make_the_largest_component_positive(model):
-    Z = Eigenmodes(6).basis(model, functionals(FixedTo("left"), model)).Z
+    Z = Eigenmodes(6).basis(model, factorised(model), functionals(FixedTo("left"), model)).Z
     size = np.abs(Z)
     for mode, magnitude in zip(Z.T, size.T, strict=True):
         assert mode[np.argmax(magnitude >= (1 - 1e-6) * magnitude.max())] > 0
@@ -149,9 +149,9 @@ def test_the_same_input_gives_the_same_bits(beam):
 @pytest.mark.parametrize("reference", REFERENCES, ids=lambda r: type(r).__name__)
 def test_lanczos_and_dense_eigenvalues_agree(model, reference, monkeypatch):
     L = functionals(reference, model)
-    lanczos = Eigenmodes(20).basis(model, L)
+    lanczos = Eigenmodes(20).basis(model, factorised(model), L)
     monkeypatch.setattr(reduction_module, "_DENSE", model.K.shape[0])
-    dense = Eigenmodes(20).basis(model, L)
+    dense = Eigenmodes(20).basis(model, factorised(model), L)
     assert model.K.shape[0] > 600
     np.testing.assert_allclose(lanczos.omega2, dense.omega2, rtol=1e-7)
     angles = scipy.linalg.subspace_angles(lanczos.Z[:, :18], dense.Z[:, :18])
@@ -163,7 +163,7 @@ def test_craig_bampton_with_all_modes_is_the_whole_model():
     model = coupled(mesh)
     L = functionals(FixedTo("left"), model)
     size = model.K.shape[0]
-    complete = CraigBampton(size - 12).basis(model, L)
+    complete = CraigBampton(size - 12).basis(model, factorised(model), L)
     assert complete.omega2.size == size - 6
     direct = scipy.linalg.eigvalsh(
         model.K[: size - 6][:, : size - 6].toarray(), model.M[: size - 6][:, : size - 6].toarray()
@@ -191,7 +191,7 @@ def test_determinate_conditions_span_the_same_total_motion(model):
     rigid = np.linalg.qr(model.T)[0]
     spaces = []
     for reference in REFERENCES:
-        Z = CraigBampton(6).basis(model, functionals(reference, model)).Z
+        Z = CraigBampton(6).basis(model, factorised(model), functionals(reference, model)).Z
         assert Z.shape[1] == 12
         spaces.append(np.hstack([rigid, Z / np.linalg.norm(Z, axis=0)]))
     for other in spaces[1:]:
@@ -286,7 +286,7 @@ def test_static_response_at_the_interfaces_is_exact_without_any_mode():
     model = coupled(mesh)
     force = np.zeros((12, 1))
     force[6 + 2] = 1.0
-    problem = supported(free_body(model.K, model.T, model.places), functionals(FixedTo("left"), model))
+    problem = supported(factorised(model), functionals(FixedTo("left"), model))
     u, _ = solve_refined(problem, model.C.T @ force, np.zeros((6, 1)))
     body = reduced(mesh, FixedTo("left"), CraigBampton(0))
     tip = body.interface("right")
@@ -319,7 +319,7 @@ def test_interface_shapes_and_surface_are_those_of_the_field(beam):
     assert np.abs(body.interface("left").phi_r).max() < 1e-8
     right = beam.face_groups["right"][0]
     model = coupled(beam)
-    basis = CraigBampton(3).basis(model, functionals(FixedTo("left"), model))
+    basis = CraigBampton(3).basis(model, factorised(model), functionals(FixedTo("left"), model))
     Phi = (model.B @ basis.Z).reshape(-1, 3, body.n)
     np.testing.assert_array_equal(Phi[np.isin(beam.points, body.surface.points).all(axis=1)].shape[1:], (3, body.n))
     by_position = {tuple(point): k for k, point in enumerate(beam.points)}
@@ -389,7 +389,7 @@ def damaged(basis, **changes):
 
 def test_a_basis_that_is_not_what_it_claims_is_refused(model):
     L = functionals(FixedTo("left"), model)
-    basis = Eigenmodes(3).basis(model, L)
+    basis = Eigenmodes(3).basis(model, factorised(model), L)
     check_basis(model, L, basis)
     with pytest.raises(ComputationError, match=r"Z\^T M Z - I reaches"):
         check_basis(model, L, damaged(basis, Z=lambda Z: 1.01 * Z))
