@@ -362,9 +362,10 @@ def with_point(body: FlexibleBody, name: str, position: Array) -> FlexibleBody:
         raise BodyError(f"body {body.name!r} has no surface to put the point {name!r} on")
     points, Phi = body.surface.points, body.surface.Phi
     node = int(np.argmin(((points - np.asarray(position, float)) ** 2).sum(1)))
-    here = np.flatnonzero((points == points[node]).all(1))  # several where materials meet
+    here = np.flatnonzero((points == points[node]).all(1))  # points are there twice where materials meet
     around = body.surface.triangles[np.isin(body.surface.triangles, here).any(1)]
     ring = np.setdiff1d(around, here)
+    ring = ring[np.sort(np.unique(points[ring], axis=0, return_index=True)[1])]
     arms, moved = points[ring] - points[node], Phi[ring] - Phi[node]
     # omega minimises sum |omega x arm - moved|^2, so (sum arm^2 I - arm arm^T) omega = sum arm x moved
     normal = (arms**2).sum() * np.eye(3) - arms.T @ arms

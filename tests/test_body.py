@@ -167,6 +167,18 @@ def test_a_file_that_is_newer_or_inconsistent_is_refused(tmp_path, change, words
         load_body(path)
 
 
+def test_a_file_of_the_first_version_is_read(tmp_path):
+    """It differs from the present one in nothing but what it cannot hold."""
+    with np.load(save_body(some_body(), tmp_path / "b.ffr")) as stored:
+        arrays = dict(stored)
+    meta = json.loads(arrays["meta"].tobytes())
+    assert meta["format_version"] == 2
+    arrays["meta"] = np.frombuffer(json.dumps(meta | {"format_version": 1}).encode(), np.uint8)
+    with open(tmp_path / "old.ffr", "wb") as stream:
+        np.savez(stream, **arrays)
+    assert_same(some_body(), load_body(tmp_path / "old.ffr"))
+
+
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(BodyError, match=r"nowhere\.ffr does not exist"):
         load_body(tmp_path / "nowhere.ffr")
