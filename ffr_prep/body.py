@@ -69,8 +69,8 @@ class BeamForces:
 
     positions : (E, 3, 3) undeformed places on the centroid line, in the body frame [m]
     axes      : (E, 3, 3) rotation from element to body axes
-    modes     : (E, 3, 6, n) N, Qy, Qz, Mx, My, Mz at [element, place, force, :], on the side of the section that faces
-                the last end, in element axes [N/(m sqrt(kg)), N/sqrt(kg)]
+    modes     : (E, 3, 6, n) N, Qy, Qz, Mx, My, Mz at [element, place, force, :], which the part of the beam towards the
+                last end exerts on the other, in element axes [N/(m sqrt(kg)), N/sqrt(kg)]
     """
 
     positions: Array
