@@ -16,7 +16,7 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ import numpy as np
 Array = np.ndarray
 
 MAGIC = "ffr-body"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2  # 2 adds stress modes and section forces; files of version 1 are read as bodies without them
 
 _ORTHONORMAL_TOLERANCE = 1e-8
 
@@ -57,21 +57,64 @@ class Interface:
         _freeze(self, "phi_r", (3, n))
 
 
+# The components of a symmetric tensor, in the order in which they are stored; shear strains are those of the tensor.
+TENSOR = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+# Section forces of beams, in element axes: tension, shear forces [N], torque and bending moments [N m].
+SECTION_FORCES = ("N", "Qy", "Qz", "Mx", "My", "Mz")
+
+
+@dataclass(frozen=True)
+class BeamForces:
+    """Section forces of E beam elements per elastic coordinate, at the first end, the middle and the last end of each.
+
+    positions : (E, 3, 3) undeformed places on the centroid line, in the body frame [m]
+    axes      : (E, 3, 3) rotation from element to body axes
+    modes     : (E, 3, 6, n) N, Qy, Qz, Mx, My, Mz at [element, place, force, :], which the part of the beam towards the
+                last end exerts on the other, in element axes [N/(m sqrt(kg)), N/sqrt(kg)]
+    """
+
+    positions: Array
+    axes: Array
+    modes: Array
+
+    def __post_init__(self) -> None:
+        count, n = np.shape(self.positions)[0], np.shape(self.modes)[-1]
+        _freeze(self, "positions", (count, 3, 3))
+        _freeze(self, "axes", (count, 3, 3))
+        _freeze(self, "modes", (count, 3, 6, n))
+
+
 @dataclass(frozen=True)
 class Surface:
     """What is drawn and where fields are recovered: a triangulated boundary with the basis at its points.
 
     points : (P, 3) [m] undeformed; triangles : (T, 3) indices into points; Phi : (P, 3, n) [1/sqrt(kg)]
+    stress : (P, 6, n) components xx, yy, zz, xy, xz, yz of the stress per elastic coordinate, in body axes
+             [Pa/(m sqrt(kg))]; None where it was not recovered
+    moduli : (P, 2) Young's modulus [Pa] and Poisson's ratio at the points, which give the strain; with the stress
+    beams  : section forces of beam elements; None where there are none
     """
 
     points: Array
     triangles: Array
     Phi: Array
+    stress: Array | None = None
+    moduli: Array | None = None
+    beams: BeamForces | None = None
 
     def __post_init__(self) -> None:
         count, n = np.shape(self.points)[0], np.shape(self.Phi)[-1]
         _freeze(self, "points", (count, 3))
         _freeze(self, "Phi", (count, 3, n))
+        if (self.stress is None) != (self.moduli is None):
+            raise BodyError(
+                "surface: stress modes and the moduli at the same points belong together; give both or none"
+            )
+        if self.stress is not None:
+            _freeze(self, "stress", (count, 6, n))
+            _freeze(self, "moduli", (count, 2))
+        if self.beams is not None and self.beams.modes.shape[-1] != n:
+            raise BodyError(f"surface: the section forces have {self.beams.modes.shape[-1]} modes, the surface {n}")
         triangles = np.array(self.triangles, dtype=np.int64).reshape(-1, 3)
         if triangles.size and (triangles.min() < 0 or triangles.max() >= count):
             raise BodyError(f"surface: a triangle refers to point {triangles.max()}, but there are {count} points")
@@ -295,9 +338,15 @@ def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
         PP_dm=body.PP_dm[:, :, keep][:, :, :, keep],
         omega2=body.omega2[keep],
         interfaces=tuple(replace(i, phi_t=i.phi_t[:, keep], phi_r=i.phi_r[:, keep]) for i in body.interfaces),
-        surface=body.surface and replace(body.surface, Phi=body.surface.Phi[:, :, keep]),
+        surface=body.surface and _truncated_surface(body.surface, keep),
         stiffening=None if body.stiffening is None else body.stiffening[:, keep][:, :, keep],
     )
+
+
+def _truncated_surface(surface: Surface, keep: Array) -> Surface:
+    beams = surface.beams and replace(surface.beams, modes=surface.beams.modes[..., keep])
+    stress = None if surface.stress is None else surface.stress[..., keep]
+    return replace(surface, Phi=surface.Phi[..., keep], stress=stress, beams=beams)
 
 
 def with_point(body: FlexibleBody, name: str, position: Array) -> FlexibleBody:
@@ -313,8 +362,10 @@ def with_point(body: FlexibleBody, name: str, position: Array) -> FlexibleBody:
         raise BodyError(f"body {body.name!r} has no surface to put the point {name!r} on")
     points, Phi = body.surface.points, body.surface.Phi
     node = int(np.argmin(((points - np.asarray(position, float)) ** 2).sum(1)))
-    around = body.surface.triangles[(body.surface.triangles == node).any(1)]
-    ring = np.setdiff1d(around, [node])
+    here = np.flatnonzero((points == points[node]).all(1))  # points are there twice where materials meet
+    around = body.surface.triangles[np.isin(body.surface.triangles, here).any(1)]
+    ring = np.setdiff1d(around, here)
+    ring = ring[np.sort(np.unique(points[ring], axis=0, return_index=True)[1])]
     arms, moved = points[ring] - points[node], Phi[ring] - Phi[node]
     # omega minimises sum |omega x arm - moved|^2, so (sum arm^2 I - arm arm^T) omega = sum arm x moved
     normal = (arms**2).sum() * np.eye(3) - arms.T @ arms
@@ -341,8 +392,7 @@ def save_body(body: FlexibleBody, path: str | Path) -> Path:
         for key in ("position", "phi_t", "phi_r"):
             arrays[f"interface/{k}/{key}"] = getattr(interface, key)
     if body.surface is not None:
-        for key in ("points", "triangles", "Phi"):
-            arrays[f"surface/{key}"] = getattr(body.surface, key)
+        arrays |= {f"surface/{key}": value for key, value in surface_arrays(body.surface).items()}
     if body.stiffening is not None:
         arrays["stiffening"] = body.stiffening
     meta = {
@@ -363,6 +413,23 @@ def save_body(body: FlexibleBody, path: str | Path) -> Path:
     finally:
         temporary.unlink(missing_ok=True)
     return path
+
+
+def surface_arrays(surface: Surface) -> dict[str, Array]:
+    """The arrays of a surface by name, without those it does not have: how files keep it."""
+    arrays = {"points": surface.points, "triangles": surface.triangles, "Phi": surface.Phi}
+    if surface.stress is not None and surface.moduli is not None:
+        arrays |= {"stress": surface.stress, "moduli": surface.moduli}
+    if surface.beams is not None:
+        arrays |= {f"beams/{f.name}": getattr(surface.beams, f.name) for f in fields(BeamForces)}
+    return arrays
+
+
+def surface_of(arrays: Mapping[str, Array]) -> Surface:
+    """The surface of these arrays; the inverse of `surface_arrays`."""
+    own = {key: value for key, value in arrays.items() if "/" not in key}
+    beams = {key.removeprefix("beams/"): value for key, value in arrays.items() if key.startswith("beams/")}
+    return Surface(**own, beams=BeamForces(**beams) if beams else None)
 
 
 def load_body(path: str | Path) -> FlexibleBody:
@@ -432,9 +499,8 @@ def _from_arrays(meta: Mapping[str, Any], arrays: Mapping[str, Array]) -> Flexib
         )
         for k, entry in enumerate(meta["interfaces"])
     )
-    surface = None
-    if "surface/points" in arrays:
-        surface = Surface(arrays["surface/points"], arrays["surface/triangles"], arrays["surface/Phi"])
+    of_surface = {key.removeprefix("surface/"): value for key, value in arrays.items() if key.startswith("surface/")}
+    surface = surface_of(of_surface) if of_surface else None
     core = {key: arrays[key] for key in _shapes(arrays["omega2"].size)}
     return FlexibleBody(
         name=meta["name"],

@@ -128,6 +128,9 @@ def mesh(mesh: Path, unit: str | None, size: float | None, numbers: tuple[str, .
 @click.option(
     "--stiffening", is_flag=True, help="Also compute geometric stiffening: slender rods under load, fast blades."
 )
+@click.option(
+    "--stress", is_flag=True, help="Also keep the stress at the surface, which ffr-dyn stress and animate show."
+)
 def reduce(
     mesh: Path,
     output: Path,
@@ -142,6 +145,7 @@ def reduce(
     method: str,
     modes: int,
     stiffening: bool,
+    stress: bool,
 ) -> None:
     """Reduce MESH to a flexible body and write it to a file.
 
@@ -170,6 +174,7 @@ def reduce(
         reference=conditions,
         reduction=reduction,
         stiffening=stiffening,
+        stress=stress,
         progress=steps,
         provenance={
             "source": {"file": mesh.name, "unit": unit, "size": size, "numbers": parameters, "order": order},

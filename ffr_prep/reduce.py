@@ -19,6 +19,7 @@ from ffr_prep.reduction import Basis, Reduction, check_basis, factorised
 from ffr_prep.reference import ReferenceConditions, functionals
 from ffr_prep.solids import Materials, assemble
 from ffr_prep.stiffening import stiffening_matrices
+from ffr_prep.stress import AVERAGING, stressed_boundary
 
 Array = np.ndarray
 
@@ -35,6 +36,7 @@ def reduce_mesh(
     reference: ReferenceConditions,
     reduction: Reduction,
     stiffening: bool = False,
+    stress: bool = False,
     progress: Callable[[str], None] | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> FlexibleBody:
@@ -42,6 +44,7 @@ def reduce_mesh(
 
     material   : one, or one for each volume group
     stiffening : also compute the geometric stiffness by load, which a simulation then uses
+    stress     : also keep the stress at the nodes of the surface per elastic coordinate
     progress   : called with the name of each stage as it begins
     provenance : JSON values kept with the body, beside what is recorded anyway
 
@@ -49,7 +52,16 @@ def reduce_mesh(
     """
     with threadpool_limits(1):  # small dense blocks: waiting threads are slower than one, and one is reproducible
         return _reduced(
-            mesh, name, material, interfaces, reference, reduction, stiffening, progress or _silent, provenance or {}
+            mesh,
+            name,
+            material,
+            interfaces,
+            reference,
+            reduction,
+            stiffening,
+            stress,
+            progress or _silent,
+            provenance or {},
         )
 
 
@@ -61,6 +73,7 @@ def _reduced(
     reference: ReferenceConditions,
     reduction: Reduction,
     stiffening: bool,
+    stress: bool,
     tell: Callable[[str], None],
     provenance: Mapping[str, Any],
 ) -> FlexibleBody:
@@ -78,17 +91,22 @@ def _reduced(
     check_basis(model, L, basis)
     tell("integrate the inertia")
     Phi = nodal_basis(model, basis)
+    if stress:
+        tell("recover the stress")
+    surface = stressed_boundary(mesh, material, Phi) if stress else boundary(mesh, Phi)
     if stiffening:
         tell("compute the geometric stiffness")
     return FlexibleBody(
         name=name,
         omega2=basis.omega2,
         interfaces=interface_shapes(model, basis),
-        surface=boundary(mesh, Phi),
+        surface=surface,
         stiffening=stiffening_matrices(mesh, material, matrices, model, supported(body, L), Phi)
         if stiffening
         else None,
-        provenance=record(mesh, material, interfaces, reference, reduction, model) | dict(provenance),
+        provenance=record(mesh, material, interfaces, reference, reduction, model)
+        | ({"stress": AVERAGING} if stress else {})
+        | dict(provenance),
         **vars(inertia_integrals(mesh.points, matrices.m, Phi)),
     )
 

@@ -21,6 +21,7 @@ import scipy.sparse as sp
 from threadpoolctl import threadpool_limits
 
 from ffr_prep.beam_stiffening import beam_stiffening, unit_accelerations
+from ffr_prep.beam_stress import SECTION_STRESS, stressed_sweep
 from ffr_prep.beams import Beams, beams, field, mass_points, stiffness, undeformed
 from ffr_prep.body import FlexibleBody
 from ffr_prep.errors import InputError
@@ -64,6 +65,7 @@ def reduce_frame(
     reference: ReferenceConditions,
     reduction: Reduction,
     stiffening: bool = False,
+    stress: bool = False,
     progress: Callable[[str], None] | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> FlexibleBody:
@@ -71,6 +73,7 @@ def reduce_frame(
 
     interfaces : rigid ones at groups of nodes: one node gives its six coordinates, several follow the interface rigidly
     stiffening : also compute the geometric stiffness by load, which a simulation then uses
+    stress     : also keep section forces and the stress at the outlines of the sections per elastic coordinate
     progress   : called with the name of each stage as it begins
     provenance : JSON values kept with the body, beside what is recorded anyway
 
@@ -78,7 +81,7 @@ def reduce_frame(
     """
     with threadpool_limits(1):  # as for solids: small dense blocks, and reproducible
         return _reduced(
-            frame, name, interfaces, reference, reduction, stiffening, progress or _silent, provenance or {}
+            frame, name, interfaces, reference, reduction, stiffening, stress, progress or _silent, provenance or {}
         )
 
 
@@ -89,6 +92,7 @@ def _reduced(
     reference: ReferenceConditions,
     reduction: Reduction,
     stiffening: bool,
+    stress: bool,
     tell: Callable[[str], None],
     provenance: Mapping[str, Any],
 ) -> FlexibleBody:
@@ -109,13 +113,16 @@ def _reduced(
     tell("integrate the inertia")
     q_n = ties @ basis.Z
     Phi = (matrices.N @ q_n).reshape(-1, 3, basis.omega2.size)
+    nodal = (matrices.B_1 @ q_n).reshape(-1, 12, basis.omega2.size)
     return FlexibleBody(
         name=name,
         omega2=basis.omega2,
         interfaces=interface_shapes(model, basis),
-        surface=swept_surface(frame, elements, (matrices.B_1 @ q_n).reshape(-1, 12, basis.omega2.size)),
+        surface=(stressed_sweep if stress else swept_surface)(frame, elements, nodal),
         stiffening=_stiffening(elements, matrices, ties, model, supported(body, L), basis) if stiffening else None,
-        provenance=record(frame, interfaces, reference, reduction, model) | dict(provenance),
+        provenance=record(frame, interfaces, reference, reduction, model)
+        | ({"stress": SECTION_STRESS} if stress else {})
+        | dict(provenance),
         **vars(inertia_integrals(matrices.positions, sp.diags_array(matrices.mass), Phi)),
     )
 

@@ -19,8 +19,8 @@ def swept_surface(frame: Frame, elements: Beams, nodal: Array) -> Surface:
     nodal : (E, 12, n) coordinates of every element, in body axes, per elastic coordinate
     """
     points, triangles, shapes, count = [], [], [], 0
-    for own, outline in _prisms(frame):
-        xi, across = _stations(outline, len(own))
+    for own, outline in prisms(frame):
+        xi, across = stations(outline, len(own))
         part = picked(elements, own)
         first = count + len(xi) * np.arange(len(own))
         points.append(undeformed(part, xi, across).reshape(-1, 3))
@@ -30,7 +30,7 @@ def swept_surface(frame: Frame, elements: Beams, nodal: Array) -> Surface:
     return Surface(np.vstack(points), np.vstack(triangles), np.vstack(shapes))
 
 
-def _prisms(frame: Frame) -> list[tuple[Array, Array]]:
+def prisms(frame: Frame) -> list[tuple[Array, Array]]:
     """The elements of each member with each polygon (P, 2) of its section."""
     of_members = [np.flatnonzero(frame.member_of == k) for k in range(len(frame.members))]
     return [
@@ -41,7 +41,7 @@ def _prisms(frame: Frame) -> list[tuple[Array, Array]]:
     ]
 
 
-def _stations(outline: Array, elements: int) -> tuple[Array, Array]:
+def stations(outline: Array, elements: int) -> tuple[Array, Array]:
     """xi (Q,) and the corners (E, Q, 2) of the outline (P, 2) at each of the stations, Q = stations P."""
     xi = np.repeat(np.linspace(0.0, 1.0, _STATIONS), len(outline))
     return xi, np.broadcast_to(np.tile(outline, (_STATIONS, 1)), (elements, len(xi), 2))

@@ -151,7 +151,7 @@ def rewritten(path, change):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda meta, arrays: meta.update(format_version=99), "format 99; this program reads up to 1: update"),
+        (lambda meta, arrays: meta.update(format_version=99), "format 99; this program reads up to 2: update"),
         (lambda meta, arrays: arrays.pop("PP_dm"), "damaged.*'PP_dm'"),
         (lambda meta, arrays: meta.pop("name"), "damaged.*'name'"),
         (lambda meta, arrays: arrays.update(r_dm=np.zeros(4)), r"r_dm has shape \(4,\), not \(3,\)"),
@@ -165,6 +165,18 @@ def test_a_file_that_is_newer_or_inconsistent_is_refused(tmp_path, change, words
     rewritten(path, change)
     with pytest.raises(BodyError, match=words):
         load_body(path)
+
+
+def test_a_file_of_the_first_version_is_read(tmp_path):
+    """It differs from the present one in nothing but what it cannot hold."""
+    with np.load(save_body(some_body(), tmp_path / "b.ffr")) as stored:
+        arrays = dict(stored)
+    meta = json.loads(arrays["meta"].tobytes())
+    assert meta["format_version"] == 2
+    arrays["meta"] = np.frombuffer(json.dumps(meta | {"format_version": 1}).encode(), np.uint8)
+    with open(tmp_path / "old.ffr", "wb") as stream:
+        np.savez(stream, **arrays)
+    assert_same(some_body(), load_body(tmp_path / "old.ffr"))
 
 
 def test_a_missing_file_is_named(tmp_path):
