@@ -445,7 +445,7 @@ def new_work(m: Model) -> Work:
         markers=MarkerWork(A=_identities(M), **vectors),
         rows=rows,
         info=np.zeros(4, dtype=np.int64),
-        independence=np.ones(3),
+        independence=np.array([1.0, 1.0, 0.0, 0.0]),
         **zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=2),
     )
 

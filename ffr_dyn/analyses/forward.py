@@ -280,7 +280,7 @@ def _account(scene: Scene, run: _Run, notes: list[str]) -> dict[str, Any]:
 
 
 def _singular(work: Work) -> list[str]:
-    least, time = work.independence[1:]
+    least, time = work.independence[1:3]
     if least >= AT:
         return []
     return [

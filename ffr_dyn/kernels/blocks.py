@@ -9,7 +9,7 @@ from ffr_dyn.kernels.vectors import solve_lower, solve_upper
 
 # The least share of a row that other rows do not contain (the square of a sine). In a singular position it is zero; with
 # this floor the motion there misses one acceleration for the moment, and goes on.
-FLOOR = 1e-11
+FLOOR = 1e-13
 
 
 @kernel

@@ -67,10 +67,10 @@ def couple_joints(where, markers, rows, pattern, bw, rw):
         add_pair(rows.start, pattern.pair[p], where[pattern.pair_body[p], 0] > 0, rw.phiphi[p], rw)
 
 
-# Near a singular position the rows become dependent and a violation eta of the constraints throws the motion from its
-# branch when it comes closer than about eta^(1/3). So on the approach (share of a row that others do not contain below
-# NEAR) the violation is held far lower, and at the position itself (below AT) it is left alone: along the direction that
-# is about to be free a correction would be the violation divided by the distance.
+# Near a singular position the rows become dependent, and a violation eta of the constraints throws the motion from its
+# branch when it comes closer than about eta^(1/3). So on the approach (`nearness` below NEAR) the violation is held far
+# lower, and at the position itself (below AT) it is left alone: along the direction that is about to be free a correction
+# would be the violation divided by the distance.
 NEAR, AT = 1e-2, 1e-6
 TIGHTER = 1e-4
 
@@ -98,9 +98,19 @@ def evaluate(m, w, t, x, v):
     if failed >= 0:
         w.info[0] = failed
         return SINGULAR_CONSTRAINT
-    if w.independence[0] < w.independence[1]:
-        w.independence[1], w.independence[2] = w.independence[0], t
+    w.independence[3] = max(w.independence[3], w.independence[0])
+    if nearness(w) < w.independence[1]:
+        w.independence[1], w.independence[2] = nearness(w), t
     return OK
+
+
+@kernel
+def nearness(w):
+    """Share of a row that others do not contain, over the largest met: small near a singular position.
+
+    The share alone is small for light bodies at any position, since it is measured by the mass matrix.
+    """
+    return w.independence[0] / w.independence[3]
 
 
 @kernel
@@ -295,10 +305,10 @@ def evaluate_on_constraints(m, w, t, x, v, tolerance):
         position, velocity = largest(w.rows.Phi), largest(w.rows.nu)
         if attempt == 0:
             w.drift[0], w.drift[1] = max(w.drift[0], position), max(w.drift[1], velocity)
-        allowed = tolerance * (TIGHTER if w.independence[0] < NEAR else 1.0)
+        allowed = tolerance * (TIGHTER if nearness(w) < NEAR else 1.0)
         if tolerance == 0.0 or attempt == 4 or (position <= allowed and velocity <= 100.0 * allowed):
             break
-        if w.independence[0] < AT:
+        if nearness(w) < AT:
             break
         w.info[2] += 1
         move_back(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, w.vd, x, v)

@@ -171,7 +171,9 @@ class Work(NamedTuple):
     user: Array  # (user_count,)
     info: Array  # (4,) integers: body or row that failed, evaluations, projections, step that failed
     drift: Array  # (2,) largest |Phi| and |Phi_dot| met
-    independence: Array  # (3,) least share of a row that others do not contain: now, least so far, and when
+    independence: (
+        Array  # (4,) least share of a row that others do not contain; smallest nearness and when; largest share
+    )
 
 
 class Stages(NamedTuple):
