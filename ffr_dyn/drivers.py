@@ -1,14 +1,15 @@
-"""Drivers: a joint coordinate prescribed over time."""
+"""Drivers: motion prescribed over time, of a joint coordinate or of a point."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ffr_dyn.errors import InputError
-from ffr_dyn.joints import COORDINATES, DOT_2, DRIVEN_ANGLE, Joint, Word, frames
-from ffr_dyn.timefunction import TimeFunction
+from ffr_dyn.joints import COINCIDENCE, COORDINATES, DOT_2, DRIVEN_ANGLE, Joint, Word, frames, word
+from ffr_dyn.timefunction import TimeFunction, as_time_function
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,28 @@ class Driver:
     coordinate: str = "angle"
 
 
+@dataclass(frozen=True)
+class PointDriver:
+    """Prescribes where marker `j` is, seen from marker `i`: components of r_j - r_i in global axes [m] over time.
+
+    x, y, z : numbers, time functions or Python functions that give (value, rate, second derivative); None leaves a
+              component free
+
+    Raises InputError when all are free.
+    """
+
+    name: str
+    i: str
+    j: str
+    x: Any = None
+    y: Any = None
+    z: Any = None
+
+    def __post_init__(self) -> None:
+        if self.x is None and self.y is None and self.z is None:
+            raise InputError(f"driver {self.name!r} prescribes nothing: give x, y or z as a function of time")
+
+
 def driver_word(driver: Driver, joint: Joint) -> Word:
     """The constraint row of a driver. Raises InputError when the joint has no such coordinate."""
     if driver.coordinate not in COORDINATES[joint.kind]:
@@ -34,7 +57,21 @@ def driver_word(driver: Driver, joint: Joint) -> Word:
             f"{driver.coordinate!r}; it has: {has}"
         )
     on_i, on_j = frames(joint)
-    nothing = np.zeros(3)
     if driver.coordinate == "stroke":
-        return Word(DOT_2, on_i[:, 2], nothing, nothing, "stroke")
-    return Word(DRIVEN_ANGLE, on_i[:, 0], on_j[:, 0], on_i[:, 1], "angle")
+        return word(DOT_2, "stroke", on_i[:, 2], function=driver.function)
+    return word(DRIVEN_ANGLE, "angle", on_i[:, 0], on_j[:, 0], on_i[:, 1], function=driver.function)
+
+
+def path_words(driver: PointDriver) -> list[Word]:
+    """The constraint rows of a driven point: one for each prescribed component."""
+    given = zip("xyz", (driver.x, driver.y, driver.z), strict=True)
+    return [
+        word(
+            COINCIDENCE,
+            f"{axis} of the point",
+            np.array([float("xyz".index(axis)), 0.0, 0.0]),
+            function=as_time_function(value, f"driver {driver.name!r}: {axis}"),
+        )
+        for axis, value in given
+        if value is not None
+    ]

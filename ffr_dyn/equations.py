@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.drivers import driver_word
+from ffr_dyn.couplings import Coupling, coupling_word
+from ffr_dyn.drivers import Driver, PointDriver, driver_word, path_words
 from ffr_dyn.elimination import Elimination, eliminate
 from ffr_dyn.errors import InputError
 from ffr_dyn.forces import Load
-from ffr_dyn.joints import Word, words
+from ffr_dyn.joints import RELATION, Joint, Word, words
 from ffr_dyn.kernels.tables import (
     Bodies,
     BodyWork,
@@ -30,7 +31,7 @@ from ffr_dyn.kernels.tables import (
     Work,
 )
 from ffr_dyn.layout import Layout, layout
-from ffr_dyn.scene import Body, Scene, joint_of, marker_number, markers
+from ffr_dyn.scene import Body, Scene, joint_of, joints_of, marker_number, markers
 from ffr_dyn.state import StateView
 from ffr_dyn.timefunction import USER, TimeFunction, as_time_function
 from ffr_prep.body import FlexibleBody, axial
@@ -42,13 +43,16 @@ SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 @dataclass(frozen=True)
 class Block:
-    """The rows of one joint or driver: a name, two marker numbers, the words."""
+    """The rows of one joint, driver or coupling.
+
+    markers : numbers of markers i, j, or i, j of both joints of a relation
+    driver  : whether it prescribes a motion
+    """
 
     name: str
-    i: int
-    j: int
+    markers: tuple[int, ...]
     words: tuple[Word, ...]
-    function: TimeFunction | None = None
+    driver: bool = False
 
 
 @dataclass(frozen=True)
@@ -67,29 +71,52 @@ class System:
 
 
 def blocks_of(scene: Scene) -> list[Block]:
-    """Joints, then drivers, as blocks of words."""
-    listed = [
-        Block(j.name, marker_number(scene, j.i), marker_number(scene, j.j), tuple(words(j))) for j in scene.joints
-    ]
-    for driver in scene.drivers:
-        joint = joint_of(scene, driver)
-        ends = marker_number(scene, joint.i), marker_number(scene, joint.j)
-        listed.append(Block(driver.name, *ends, (driver_word(driver, joint),), driver.function))
-    return listed
+    """Joints, then couplings, then drivers, as blocks of words."""
+    joints = [_joint_block(scene, joint) for joint in scene.joints]
+    couplings = [_coupling_block(scene, coupling) for coupling in scene.couplings]
+    return joints + couplings + [_driver_block(scene, driver) for driver in scene.drivers]
 
 
-def compile_scene(scene: Scene, blocks: list[Block] | None = None) -> System:
-    """Tables of a scene. `blocks`: the constraint rows to use (those that assembly found independent); default all."""
+def _ends(scene: Scene, joint: Joint | PointDriver) -> tuple[int, int]:
+    return marker_number(scene, joint.i), marker_number(scene, joint.j)
+
+
+def _joint_block(scene: Scene, joint: Joint) -> Block:
+    ends, said = _ends(scene, joint), tuple(words(joint))
+    related = any(word.kind == RELATION for word in said)
+    return Block(joint.name, ends + ends if related else ends, said)
+
+
+def _coupling_block(scene: Scene, coupling: Coupling) -> Block:
+    first, second = joints_of(scene, coupling)
+    word = coupling_word(coupling, first, second)
+    return Block(coupling.name, _ends(scene, first) + _ends(scene, second), (word,))
+
+
+def _driver_block(scene: Scene, driver: Driver | PointDriver) -> Block:
+    if isinstance(driver, PointDriver):
+        return Block(driver.name, _ends(scene, driver), tuple(path_words(driver)), driver=True)
+    joint = joint_of(scene, driver)
+    return Block(driver.name, _ends(scene, joint), (driver_word(driver, joint),), driver=True)
+
+
+def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: float = 0.0) -> System:
+    """Tables of a scene.
+
+    blocks     : the constraint rows to use; default all
+    relaxation : above zero where rows depend on one another (see `kernels.system.solve_motion`)
+    """
     chosen = blocks_of(scene) if blocks is None else blocks
     place = layout(scene)
     table = markers(scene)
     ground = len(scene.bodies)
-    moving = [tuple(b for b in (table[k.i][0], table[k.j][0]) if b != ground) for k in chosen]
+    moving = [_moving(block, table, ground) for block in chosen]
     elimination = eliminate([len(k.words) for k in chosen], moving)
     ordered = tuple(chosen[k] for k in elimination.order)
     functions = FunctionTable()
     model = {
         "gravity": np.array(scene.gravity),
+        "relaxation": relaxation,
         "bodies": _bodies(scene, place),
         "markers": _markers(scene, ordered),
         "rows": _rows(ordered, functions),
@@ -100,6 +127,11 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None) -> System:
     user = UserFunctions(functions.callbacks, place, scene)
     compiled = Model(**model, user_address=user.address, user_count=user.count)  # type: ignore[arg-type]
     return System(scene, place, ordered, elimination, compiled, user)
+
+
+def _moving(block: Block, table: list[tuple[int, str, str]], ground: int) -> tuple[int, ...]:
+    """The bodies that a block ties, each once."""
+    return tuple(dict.fromkeys(table[k][0] for k in block.markers if table[k][0] != ground))
 
 
 # ---- bodies -------------------------------------------------------------------------------------------------------
@@ -164,7 +196,7 @@ def _markers(scene: Scene, blocks: tuple[Block, ...]) -> Markers:
     ground = len(scene.bodies)
     interfaces = [i for body in scene.bodies for i in body.model.interfaces]
     phi = [np.concatenate([i.phi_t, i.phi_r]) for i in interfaces] + [np.zeros((6, 0))] * len(scene.ground)
-    joint = sorted({k for block in blocks for k in (block.i, block.j)})
+    joint = sorted({k for block in blocks for k in block.markers})
     loaded = [marker_number(scene, load.marker) for load in scene.loads]
     sprung = [marker_number(scene, m) for spring in scene.springs for m in (spring.i, spring.j)]
     return Markers(
@@ -191,18 +223,22 @@ def _load_numbers(scene: Scene) -> list[int]:
 
 
 def _rows(blocks: tuple[Block, ...], functions: FunctionTable) -> Rows:
-    function = []
-    for block in blocks:
-        number = -1 if block.function is None else functions.add(block.function, f"driver {block.name!r}")
-        function += [number] * len(block.words)
-    listed = [word for block in blocks for word in block.words]
-    axes = [np.array([word.axis_i, word.axis_i2, word.axis_j]) for word in listed]
+    said = [(block, word) for block in blocks for word in block.words]
+    function = [-1 if w.function is None else functions.add(w.function, f"{b.name!r}") for b, w in said]
+    listed = [word for _, word in said]
+    axes = np.zeros((len(listed), 6, 3))
+    for row, word in enumerate(listed):
+        axes[row, : len(word.axes)] = word.axes
+    sides = max((len(block.markers) for block in blocks), default=2)
     return Rows(
         kind=np.array([word.kind for word in listed], dtype=np.int64),
-        axes=np.array(axes, dtype=float).reshape(-1, 3, 3),
+        axes=axes,
+        relation=np.array([word.relation for word in listed], dtype=float).reshape(-1, 5),
         function=np.array(function, dtype=np.int64),
         start=_starts([len(b.words) for b in blocks]),
-        marker=np.array([(b.i, b.j) for b in blocks], dtype=np.int64).reshape(-1, 2),
+        marker=np.array([b.markers + (-1,) * (sides - len(b.markers)) for b in blocks], dtype=np.int64).reshape(
+            -1, sides
+        ),
     )
 
 
@@ -219,13 +255,14 @@ def _pattern(
         for later in (k, *column):
             offsets[later, k] = total
             total += size[later] * size[k]
-    sides = [[table[block.i][0], table[block.j][0]] for block in blocks]
+    sides = [[table[marker][0] for marker in block.markers] for block in blocks]
     pairs = [
-        (b, later, sides[later].index(b), earlier, sides[earlier].index(b), offsets[later, earlier])
+        (b, later, side, earlier, other, offsets[later, earlier])
         for earlier in range(len(blocks))
         for later in (earlier, *elimination.columns[earlier])
         for b in moving[earlier]
-        if b in moving[later]
+        for side in _where(sides[later], b)
+        for other in _where(sides[earlier], b)
     ]
     listed = np.array(pairs, dtype=np.int64).reshape(-1, 6)
     updates = [
@@ -241,6 +278,10 @@ def _pattern(
         update_start=_starts([len(column) for column in updates]),
         update=np.array([offset for column in updates for offset in column], dtype=np.int64),
     )
+
+
+def _where(sides: list[int], body: int) -> list[int]:
+    return [k for k, b in enumerate(sides) if b == body]
 
 
 # ---- loads and functions ------------------------------------------------------------------------------------------
@@ -378,6 +419,7 @@ def _at(address: int, size: int) -> Array:
 def new_work(m: Model) -> Work:
     """Scratch for one evaluation, with the elastic diagonal of an explicit method."""
     B, E, M, C = m.bodies.mass.size, int(m.bodies.where[-1, 3]), m.markers.body.size, m.rows.kind.size
+    D = m.rows.marker.shape[1]
     n, V, pairs = m.bodies.where[:, 0], 6 * B + E, m.pattern.pair_body.size
     size = np.diff(m.rows.start)
     column = np.repeat(np.arange(size.size), np.diff(m.pattern.column_start))
@@ -395,7 +437,7 @@ def new_work(m: Model) -> Work:
     )
     vectors = zeros(omega=(M, 3), r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3), load=(M, 6))
     rows = RowWork(
-        **zeros(Phi=C, nu=C, gamma=C, lam=C, jac=(C, 2, 9), rr=(C, 2, 6), ww=(C, 2, 6)),
+        **zeros(Phi=C, nu=C, gamma=C, lam=C, step=C, jac=(C, D, 9), rr=(C, D, 6), ww=(C, D, 6)),
         **zeros(P=(M, 6, 6), phiphi=(pairs, 6, 6), S=stored),
     )
     return Work(
@@ -403,6 +445,7 @@ def new_work(m: Model) -> Work:
         markers=MarkerWork(A=_identities(M), **vectors),
         rows=rows,
         info=np.zeros(4, dtype=np.int64),
+        independence=np.array([1.0, 1.0, 0.0, 0.0]),
         **zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=2),
     )
 

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.drivers import Driver, driver_word
+from ffr_dyn.couplings import Coupling, coupled, coupling_word
+from ffr_dyn.drivers import Driver, PointDriver, driver_word
 from ffr_dyn.errors import InputError
 from ffr_dyn.forces import Load, SpringDamper
 from ffr_dyn.joints import Joint
@@ -73,7 +74,8 @@ class Scene:
 
     bodies: tuple[Body, ...]
     joints: tuple[Joint, ...] = ()
-    drivers: tuple[Driver, ...] = ()
+    drivers: tuple[Driver | PointDriver, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
     loads: tuple[Load, ...] = ()
     springs: tuple[SpringDamper, ...] = ()
     ground: Mapping[str, Any] = field(default_factory=dict)
@@ -81,7 +83,7 @@ class Scene:
     name: str = "scene"
 
     def __post_init__(self) -> None:
-        for key in ("bodies", "joints", "drivers", "loads", "springs"):
+        for key in ("bodies", "joints", "drivers", "couplings", "loads", "springs"):
             object.__setattr__(self, key, tuple(getattr(self, key)))
         points = {key: _vector(at, 3, f"ground point {key!r}") for key, at in self.ground.items()}
         object.__setattr__(self, "ground", points)
@@ -91,7 +93,12 @@ class Scene:
         _check_names(self)
         _check_joints(self)
         for driver in self.drivers:
-            driver_word(driver, joint_of(self, driver))
+            if isinstance(driver, Driver):
+                driver_word(driver, joint_of(self, driver))
+            else:
+                _check_point_driver(self, driver)
+        for coupling in self.couplings:
+            coupling_word(coupling, *joints_of(self, coupling))
         for marker in [m for load in self.loads for m in (load.marker,)] + [
             m for spring in self.springs for m in (spring.i, spring.j)
         ]:
@@ -124,12 +131,27 @@ def marker_number(scene: Scene, name: str) -> int:
 
 def joint_of(scene: Scene, driver: Driver) -> Joint:
     """The joint a driver acts on."""
+    return _joint(scene, driver.joint, f"driver {driver.name!r}")
+
+
+def joints_of(scene: Scene, coupling: Coupling) -> tuple[Joint, Joint]:
+    """Both joints of a coupling."""
+    (first, _), (second, _) = coupled(coupling)
+    who = f"coupling {coupling.name!r}"
+    return _joint(scene, first, who), _joint(scene, second, who)
+
+
+def _joint(scene: Scene, name: str, who: str) -> Joint:
     for joint in scene.joints:
-        if joint.name == driver.joint:
+        if joint.name == name:
             return joint
-    raise InputError(
-        f"driver {driver.name!r}: there is no joint {driver.joint!r}; {_offer(driver.joint, [j.name for j in scene.joints])}"
-    )
+    raise InputError(f"{who}: there is no joint {name!r}; {_offer(name, [j.name for j in scene.joints])}")
+
+
+def _check_point_driver(scene: Scene, driver: PointDriver) -> None:
+    i, j = (markers(scene)[marker_number(scene, name)] for name in (driver.i, driver.j))
+    if i[0] == j[0]:
+        raise InputError(f"driver {driver.name!r} drives {i[1]!r} against itself; it needs markers of two bodies")
 
 
 def _offer(name: str, known: Iterable[str]) -> str:
@@ -141,7 +163,14 @@ def _offer(name: str, known: Iterable[str]) -> str:
 
 def _check_names(scene: Scene) -> None:
     """One name, one thing: results are named by them."""
-    things: tuple[Any, ...] = (*scene.bodies, *scene.joints, *scene.drivers, *scene.loads, *scene.springs)
+    things: tuple[Any, ...] = (
+        *scene.bodies,
+        *scene.joints,
+        *scene.drivers,
+        *scene.couplings,
+        *scene.loads,
+        *scene.springs,
+    )
     names = [thing.name for thing in things]
     repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:

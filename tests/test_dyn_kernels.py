@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from synthetic import cloud
 
-from ffr_dyn.analyses.assemble import rows_at
+from ffr_dyn.analyses.assemble import drive_of, rows_at
 from ffr_dyn.constraints import evaluate_word
-from ffr_dyn.drivers import Driver
+from ffr_dyn.drivers import Driver, PointDriver
 from ffr_dyn.equations import System, compile_scene, new_work
 from ffr_dyn.inertia import elastic_force, gravity_force, mass_matrix, quadratic_velocity
 from ffr_dyn.joints import KINDS, Joint
@@ -136,7 +136,11 @@ def test_accelerations_satisfy_the_lagrangian_differentiated_numerically():
 # ---- kernels against twins ----------------------------------------------------------------------------------------
 
 
+SPECIAL = {"distance": {"length": harmonic(amplitude=0.3, frequency=0.8, phase=0.3, mean=2.0)}, "screw": {"pitch": 0.7}}
+
+
 def chain(n_first: int = 4, n_second: int = 3, kind: str = "revolute", **joint) -> Scene:
+    joint |= SPECIAL.get(kind, {})
     first, second = cloud(n_first, seed=1), cloud(n_second, seed=2)
     return Scene(
         bodies=(Body("one", first, damping=0.02), Body("two", second, damping=0.01)),
@@ -163,7 +167,7 @@ def dense(system: System, x, v):
             + gravity_force(body.model, q, rotation_matrix(x[place.p(b)]), scene.gravity)
         )
     rows = [
-        evaluate_word(scene, place, x, v, word, block.i, block.j, (0.0, 0.0, 0.0))
+        evaluate_word(scene, place, x, v, word, block.markers, drive_of(word, 0.0))
         for block in system.blocks
         for word in block.words
     ]
@@ -198,29 +202,22 @@ def test_compiled_accelerations_and_multipliers_equal_the_dense_solution(kind, s
 DRIVE = harmonic(amplitude=0.7, frequency=0.8, phase=0.3, mean=0.2)
 
 
-def drive_at(t: float) -> tuple[float, float, float]:
-    mean, amplitude, speed, phase = DRIVE.data
-    angle = speed * t + phase
-    return (
-        mean + amplitude * np.sin(angle),
-        amplitude * speed * np.cos(angle),
-        -amplitude * speed**2 * np.sin(angle),
-    )
-
-
 def constraint_cases():
     return [
         *((kind, sizes, None) for kind in KINDS for sizes in ((4, 3), (0, 0))),
         ("revolute", (4, 3), "angle"),
         ("cylindrical", (4, 3), "stroke"),
         ("translational", (0, 2), "stroke"),
+        ("spherical", (3, 2), "path"),
     ]
 
 
 @pytest.mark.parametrize(("kind", "sizes", "coordinate"), constraint_cases())
 def test_jacobian_rate_and_right_hand_side_equal_finite_differences(kind, sizes, coordinate):
     scene = chain(*sizes, kind=kind, axis=(0.2, 1.0, 0.3), axis_j=(1.0, -0.5, 0.4))
-    if coordinate:
+    if coordinate == "path":
+        scene = replace(scene, drivers=(PointDriver("drive", "one.a", "two.a", DRIVE, None, 0.3),))
+    elif coordinate:
         scene = replace(scene, drivers=(Driver("drive", "tie", DRIVE, coordinate),))
     system = compile_scene(scene)
     x, v = random_state(scene)
@@ -232,7 +229,9 @@ def test_jacobian_rate_and_right_hand_side_equal_finite_differences(kind, sizes,
         xs = moved(scene, x, v + 0.5 * s * global_rates(acc), s)
         vs = v + s * global_rates(acc)
         return [
-            evaluate_word(scene, place, xs, vs, w, b.i, b.j, drive_at(t + s)) for b in system.blocks for w in b.words
+            evaluate_word(scene, place, xs, vs, w, b.markers, drive_of(w, t + s))
+            for b in system.blocks
+            for w in b.words
         ]
 
     def global_rates(a):
@@ -255,7 +254,7 @@ def test_jacobian_rate_and_right_hand_side_equal_finite_differences(kind, sizes,
         def value(s, direction=direction):
             xs = moved(scene, x, direction, s)
             return np.array([
-                evaluate_word(scene, place, xs, v, w, b.i, b.j, drive_at(t)).Phi for b in system.blocks for w in b.words
+                evaluate_word(scene, place, xs, v, w, b.markers, drive_of(w, t)).Phi for b in system.blocks for w in b.words
             ])  # fmt: skip
 
         slope = (value(h) - value(-h)) / (2 * h)

@@ -1,4 +1,4 @@
-"""Assembly: positions and velocities that meet the joints, from a rough guess; and which constraint rows are independent.
+"""Assembly: positions and velocities that meet the joints, from a rough guess; and which constraint rows are redundant.
 
 Corrections are the smallest in the norm of the mass matrix, so heavy bodies move least. Elastic coordinates are left
 alone wherever rigid motion suffices. (Haug 1989, ch. 4; Nikravesh 1988, ch. 5 for redundant rows by factorisation.)
@@ -15,6 +15,7 @@ from ffr_dyn.constraints import Row, evaluate_word
 from ffr_dyn.equations import Block, System, blocks_of, compile_scene
 from ffr_dyn.errors import InputError
 from ffr_dyn.inertia import mass_matrix
+from ffr_dyn.joints import Word
 from ffr_dyn.layout import Layout, initial_state, layout
 from ffr_dyn.rotation import G_bar, rotation_matrix
 from ffr_dyn.scene import Scene
@@ -25,18 +26,23 @@ Array = np.ndarray
 TOLERANCE = 1e-11  # of Phi [m, -] and of its rate
 RANK_TOLERANCE = 1e-8  # of a row's independent part, relative to the row
 ITERATIONS = 100
+RELAXATION = 1e-8  # of dependent rows, relative
 LARGEST_TURN = 0.5  # rad per iteration
 
 
 @dataclass(frozen=True)
 class Assembled:
-    """A consistent state and the system of independent constraint rows.
+    """A consistent state and the compiled scene.
+
+    system   : with independent constraint rows, for the motion
+    all_rows : with all of them and a relaxed multiplier matrix, for the reactions; None where no row is redundant
 
     x, v : positions and velocities (see `Layout`);  notes : what was changed and what is redundant, in words
     degrees_of_freedom : velocities left free by the constraints, elastic ones included
     """
 
     system: System
+    all_rows: System | None
     x: Array
     v: Array
     degrees_of_freedom: int
@@ -53,24 +59,31 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     guess, v = initial_state(scene, place)
     x = close_positions(scene, place, blocks, guess, v, time)
     kept, redundant = independent_blocks(scene, place, blocks, x, v, time)
-    v = close_velocities(scene, place, kept, x, v, time)
-    _check_left_out(scene, place, blocks, x, v, time)
+    v = close_velocities(scene, place, blocks, x, v, time)
     rows = sum(len(block.words) for block in kept)
-    notes = [f"{block}: the row '{text}' is redundant; its reaction is taken as zero" for block, text in redundant]
+    notes = [
+        f"{block}: the row '{text}' is redundant; of the reactions that are possible the smallest are given"
+        for block, text in redundant
+    ]
     shift = max(np.linalg.norm(x[place.R(b)] - guess[place.R(b)]) for b in range(len(scene.bodies)))
     if shift > 1e-6:
         notes.insert(0, f"assembly moved a body by {shift:.3g} m from where the scene puts it")
-    return Assembled(compile_scene(scene, kept), x, v, place.v_size - rows, tuple(notes))
+    all_rows = compile_scene(scene, blocks, RELAXATION) if redundant else None
+    return Assembled(compile_scene(scene, kept), all_rows, x, v, place.v_size - rows, tuple(notes))
 
 
 def rows_at(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> list[Row]:
     """All rows of the blocks, readable form."""
-    drives = [evaluate(b.function, time) if b.function is not None else (0.0, 0.0, 0.0) for b in blocks]
     return [
-        evaluate_word(scene, place, x, v, word, block.i, block.j, drive)
-        for block, drive in zip(blocks, drives, strict=True)
+        evaluate_word(scene, place, x, v, word, block.markers, drive_of(word, time))
+        for block in blocks
         for word in block.words
     ]
+
+
+def drive_of(word: Word, time: float) -> tuple[float, float, float]:
+    """Value, rate and second derivative of what a word prescribes; zeros where it prescribes nothing."""
+    return (0.0, 0.0, 0.0) if word.function is None else evaluate(word.function, time)
 
 
 def close_positions(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> Array:
@@ -116,7 +129,7 @@ def independent_blocks(
     """Blocks without their redundant words, and the (block, word) pairs that were dropped.
 
     Rows are redundant when they depend on others here *and* at a neighbouring position, so that a mechanism that
-    starts in a singular position keeps its rows. Raises InputError when a driver's row is dependent.
+    starts in a singular position keeps its rows. Raises InputError when a driver's row is redundant.
     """
     rows = rows_at(scene, place, blocks, x, v, time)
     if not rows:
@@ -126,20 +139,14 @@ def independent_blocks(
         nearby = _neighbour(scene, place, blocks, x, v, time, rows)
         others = _independent(scene, place, nearby, rows_at(scene, place, blocks, nearby, v, time))
         keep = others if others.size > keep.size else keep
-    chosen, dropped, number = [], [], 0
-    for block in blocks:
-        words = []
-        for word in block.words:
-            if number in keep:
-                words.append(word)
-            else:
-                dropped.append((block.name, word.text))
-            number += 1
-        chosen.append(replace(block, words=tuple(words)))
-    for block, left in zip(blocks, chosen, strict=True):
-        if block.function is not None and len(left.words) < len(block.words):
+    said = [(block, word) for block in blocks for word in block.words]
+    dropped = [said[k] for k in range(len(said)) if k not in keep]
+    for block, _ in dropped:
+        if block.driver:
             raise InputError(f"driver {block.name!r} prescribes a motion that the joints and other drivers already fix")
-    return chosen, dropped
+    kept = iter(range(len(said)))
+    left = [replace(block, words=tuple(word for word in block.words if next(kept) in keep)) for block in blocks]
+    return left, [(block.name, word.text) for block, word in dropped]
 
 
 # ---- linear algebra -----------------------------------------------------------------------------------------------
@@ -194,14 +201,6 @@ def _neighbour(
         )
     except InputError:
         return x
-
-
-def _check_left_out(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> None:
-    """The rows that were dropped must hold too; otherwise they contradict the rest."""
-    for block in blocks:
-        for row in rows_at(scene, place, [block], x, v, time):
-            if abs(row.nu) > 1e-6 * max(1.0, float(np.abs(v).max())):
-                raise InputError(f"{block.name!r} contradicts the other constraints: its rate is left at {row.nu:.3g}")
 
 
 # ---- small motions ------------------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ from ffr_dyn.equations import System, new_record, new_stages, new_work
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import ROS2, Integrator
 from ffr_dyn.kernels.options import is_compiled
+from ffr_dyn.kernels.system import AT
 from ffr_dyn.kernels.tables import NOT_FINITE, OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, Record, Work
 from ffr_dyn.measure import Unwound, measure
 from ffr_dyn.result import Quantity, Result
@@ -75,7 +76,7 @@ def forward(
     header = _header(scene, assembled, method, stabilisation, (start, end, output_step))
     first = Result(run.times[0], run.parts[0], _geometry(scene), header | {"status": "running"})
     with nullcontext() if path is None else ResultWriter(path, first) as writer:
-        for times, part in _advance(assembled.system, run, method, stabilisation, start, substeps, rows):
+        for times, part in _advance(assembled, run, method, stabilisation, start, substeps, rows):
             if writer is not None:
                 writer.append(times, {name: quantity.values for name, quantity in part.items()})
             if progress is not None:
@@ -126,6 +127,7 @@ def _started(assembled: Assembled, method: Integrator, start: float) -> _Run:
     _, status = method.run(system.model, work, stages, start, method.step, 0, 0, x, v, 0.0, 0.0, 0.0, first)
     if status != OK:
         raise _failure(system, work, status, start)
+    first = _with_all_reactions(assembled, method, first)
     parts, unwound = measure(system, first, {})
     run = _Run(x, v, work, stages, unwound, [parts], [first.time], np.zeros(1))
     run.turned = _elastic_turns(system, first)
@@ -133,9 +135,16 @@ def _started(assembled: Assembled, method: Integrator, start: float) -> _Run:
 
 
 def _advance(
-    system: System, run: _Run, method: Integrator, stabilisation: Stabilisation, start: float, substeps: int, rows: int
+    assembled: Assembled,
+    run: _Run,
+    method: Integrator,
+    stabilisation: Stabilisation,
+    start: float,
+    substeps: int,
+    rows: int,
 ) -> Iterator[tuple[Array, dict[str, Quantity]]]:
     """Yields (times, quantities) chunk after chunk, each about SECONDS_PER_CALL long."""
+    system = assembled.system
     alpha, beta, tolerance = gains(stabilisation)
     done, count = 0, 1
     while done < rows:
@@ -147,7 +156,7 @@ def _advance(
         )  # fmt: skip
         took = clock.monotonic() - began
         if filled:
-            kept = Record(*(column[:filled] for column in chunk))
+            kept = _with_all_reactions(assembled, method, Record(*(column[:filled] for column in chunk)))
             part, run.unwound = measure(system, kept, run.unwound)
             run.parts.append(part)
             run.times.append(kept.time)
@@ -157,6 +166,22 @@ def _advance(
             raise _failure(system, run.work, status, start + int(run.work.info[3]) * method.step)
         done += filled
         count = int(np.clip(count * SECONDS_PER_CALL / max(took, 1e-6), 1, 10 * count))
+
+
+def _with_all_reactions(assembled: Assembled, method: Integrator, record: Record) -> Record:
+    """The record with reactions of the redundant rows too: at every state, the smallest that give its accelerations."""
+    if assembled.all_rows is None:
+        return record
+    system = assembled.all_rows
+    work, stages, one = new_work(system.model), new_stages(system, method.stage_count), new_record(system, 1)
+    names = [block.name for block in system.blocks]
+    numbers = [names.index(block.name) for block in assembled.system.blocks]
+    reaction = np.empty_like(record.reaction)
+    for row, time in enumerate(record.time):
+        x, v = record.x[row].copy(), record.v[row].copy()
+        method.run(system.model, work, stages, time, method.step, 0, 0, x, v, 0.0, 0.0, 0.0, one)
+        reaction[row] = one.reaction[0, numbers]
+    return record._replace(reaction=reaction)
 
 
 def _failure(system: System, work: Work, status: int, time: float) -> BaseException:
@@ -173,12 +198,12 @@ def _failure(system: System, work: Work, status: int, time: float) -> BaseExcept
             "give it mass and inertia about all axes, or keep fewer modes"
         )
     if status == SINGULAR_CONSTRAINT:
-        row = np.searchsorted(system.model.rows.start, where, side="right") - 1
+        row = int(np.searchsorted(system.model.rows.start, where, side="right")) - 1
         block = system.blocks[row]
         text = block.words[where - system.model.rows.start[row]].text
         return SimulationError(
-            f"{at} the constraints become dependent: row '{text}' of {block.name!r} (a singular position, or joints "
-            "that are redundant here only); start elsewhere or replace a joint by one that constrains less"
+            f"{at} the row '{text}' of {block.name!r} cannot be met by any motion: it ties bodies that cannot move there, "
+            "or the state is no longer finite"
         )
     if status == NOT_FINITE:
         return SimulationError(
@@ -250,8 +275,18 @@ def _account(scene: Scene, run: _Run, notes: list[str]) -> dict[str, Any]:
         "evaluations": int(info[1]),
         "projections": int(info[2]),
         "largest_drift": [float(drift[0]), float(drift[1])],
-        "notes": [*notes, *_strained(scene, run.turned)],
+        "notes": [*notes, *_singular(run.work), *_strained(scene, run.turned)],
     }
+
+
+def _singular(work: Work) -> list[str]:
+    least, time = work.independence[1:3]
+    if least >= AT:
+        return []
+    return [
+        f"the motion passes a singular position near t = {time:.6g} s, where constraints become dependent; it goes on along "
+        "its branch, and reactions there are large or not unique"
+    ]
 
 
 def _strained(scene: Scene, turned: Array) -> list[str]:

@@ -5,7 +5,11 @@ linear in the number of bodies (Baraff 1996), for a few loops there is little fi
 """
 
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.vectors import cholesky, solve_lower, solve_upper
+from ffr_dyn.kernels.vectors import solve_lower, solve_upper
+
+# The least share of a row that other rows do not contain (the square of a sine). In a singular position it is zero; with
+# this floor the motion there misses one acceleration for the moment, and goes on.
+FLOOR = 1e-13
 
 
 @kernel
@@ -58,15 +62,46 @@ def block(S, offset, rows, columns):
 
 
 @inlined
-def factorise_blocks(starts, pattern, S):
-    """Factorise in place (right-looking block Cholesky). Returns the row without a pivot, or -1."""
+def factorise_blocks(starts, pattern, S, relaxation, diagonals, independence):
+    """Factorise in place (right-looking block Cholesky). Returns the row without a pivot, or -1.
+
+    diagonals (C,) : scratch;  independence (1,) : the least share of a row that the rows before it do not contain
+    """
+    independence[0] = 1.0
     for k in range(starts.size - 1):
         size = starts[k + 1] - starts[k]
         diagonal = block(S, pattern.diagonal[k], size, size)
-        failed = cholesky(diagonal, size)
+        for row in range(size):
+            diagonal[row, row] *= 1.0 + relaxation
+            diagonals[starts[k] + row] = diagonal[row, row]
+    for k in range(starts.size - 1):
+        size = starts[k + 1] - starts[k]
+        diagonal = block(S, pattern.diagonal[k], size, size)
+        failed = pivots(diagonal, size, diagonals[starts[k] : starts[k + 1]], independence)
         if failed >= 0:
             return starts[k] + failed
         eliminate_block(starts, pattern, S, k, size, diagonal)
+    return -1
+
+
+@kernel
+def pivots(matrix, size, diagonals, independence):
+    """In-place lower Cholesky factor with reciprocal diagonal, pivots at least FLOOR of the original diagonal."""
+    for j in range(size):
+        pivot = matrix[j, j]
+        for k in range(j):
+            pivot -= matrix[j, k] * matrix[j, k]
+        share = pivot / diagonals[j]
+        if not diagonals[j] > 0.0 or share != share:
+            return j
+        independence[0] = min(independence[0], share)
+        inverse = 1.0 / (max(share, FLOOR) * diagonals[j]) ** 0.5
+        matrix[j, j] = inverse
+        for i in range(j + 1, size):
+            value = matrix[i, j]
+            for k in range(j):
+                value -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = value * inverse
     return -1
 
 

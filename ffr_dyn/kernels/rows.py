@@ -1,4 +1,5 @@
-"""Constraint rows on two markers i, j: coincidence of points, dot-1, dot-2, driven angle.
+"""Constraint rows on two markers i, j: coincidence of points, dot-1, dot-2, driven angle, distance; and relations between
+two joint coordinates, on the markers of both joints.
 
 Each returns Phi, nu = dPhi/dt, gamma (Phi_q v_dot = gamma) and, per side, the coefficients of the point's velocity, of
 omega_bar and of the elastic rotation rate (all in body axes). Readable twin: `ffr_dyn.constraints`.
@@ -8,19 +9,20 @@ import math
 
 from ffr_dyn.kernels.markers import axis_motion
 from ffr_dyn.kernels.options import kernel
-from ffr_dyn.kernels.tables import COINCIDENCE, DOT_1, DOT_2
+from ffr_dyn.kernels.tables import COINCIDENCE, DISTANCE, DOT_1, DOT_2, RELATION, STROKE
 from ffr_dyn.kernels.vectors import add, cross, dot, get, scale, subtract, to_body
 
 ZERO = (0.0, 0.0, 0.0)
 
 
 @kernel
-def coincidence(w, i, j, c):
-    """(r_j - r_i)_c = 0."""
+def coincidence(w, i, j, c, drive):
+    """(r_j - r_i)_c = s(t)."""
     ei, ej = get(w.A[i], c), get(w.A[j], c)
     side_i = (scale(-1.0, ei), cross(ei, get(w.u, i)), ZERO)
     side_j = (ej, cross(get(w.u, j), ej), ZERO)
-    return w.r[j, c] - w.r[i, c], w.rd[j, c] - w.rd[i, c], w.rb[i, c] - w.rb[j, c], side_i, side_j
+    Phi, nu = w.r[j, c] - w.r[i, c] - drive[0], w.rd[j, c] - w.rd[i, c] - drive[1]
+    return Phi, nu, w.rb[i, c] - w.rb[j, c] + drive[2], side_i, side_j
 
 
 @kernel
@@ -73,14 +75,83 @@ def driven_angle(w, i, j, f, g, fj0, drive):
 
 
 @kernel
+def distance(w, i, j, drive):
+    """(|r_j - r_i|^2 - s(t)^2) / (2 s(t)) = 0, which near zero is the distance less s."""
+    d, dd = subtract(get(w.r, j), get(w.r, i)), subtract(get(w.rd, j), get(w.rd, i))
+    db = subtract(get(w.rb, j), get(w.rb, i))
+    s, speed, second = drive
+    # with Phi = (d.d / s - s) / 2; Phi_ddot = Phi_q v_dot - gamma
+    square, rate = dot(d, d), dot(d, dd)
+    nu = rate / s - 0.5 * speed * (square / (s * s) + 1.0)
+    quadratic = dot(dd, dd) + dot(d, db) - 2.0 * rate * speed / s + square * speed * speed / (s * s)
+    gamma = -quadratic / s + 0.5 * second * (square / (s * s) + 1.0)
+    bi, bj = to_body(w.A[i], scale(-1.0 / s, d)), to_body(w.A[j], scale(1.0 / s, d))
+    side_i, side_j = (bi, cross(get(w.u, i), bi), ZERO), (bj, cross(get(w.u, j), bj), ZERO)
+    return 0.5 * (square / s - s), nu, gamma, side_i, side_j
+
+
+@kernel
+def combined(a, side_a, b, side_b):
+    """a side_a + b side_b of the coefficients of a side."""
+    return (
+        add(scale(a, side_a[0]), scale(b, side_b[0])),
+        add(scale(a, side_a[1]), scale(b, side_b[1])),
+        add(scale(a, side_a[2]), scale(b, side_b[2])),
+    )
+
+
+@kernel
+def coordinate(kind, first, second, third, w, i, j):
+    """Value, rate, right-hand side and sides of a joint coordinate; axes f_i, g_i, f_j of an angle, or h_i of a stroke."""
+    if kind == STROKE:
+        return dot_2(w, i, j, first, ZERO)
+    c, c_rate, c_gamma, ci, cj = dot_1(w, i, j, first, third)
+    s, s_rate, s_gamma, si, sj = dot_1(w, i, j, second, third)
+    square = c * c + s * s
+    rate = (c * s_rate - s * c_rate) / square
+    gamma = (c * s_gamma - s * c_gamma + 2.0 * rate * (c * c_rate + s * s_rate)) / square
+    side_i, side_j = combined(c / square, si, -s / square, ci), combined(c / square, sj, -s / square, cj)
+    return math.atan2(s, c), rate, gamma, side_i, side_j
+
+
+@kernel
+def fill_relation(axes, relation, drive, markers, at, w, row):
+    """a_1 coordinate_1 + a_2 coordinate_2 = s(t), up to the spacing of values that whole turns make equivalent."""
+    Phi, nu, gamma = -drive[0], -drive[1], drive[2]
+    for k in range(2):
+        factor, first = relation[2 * k], 3 * k
+        value, rate, bias, side_i, side_j = coordinate(
+            int(relation[2 * k + 1]), get(axes, first), get(axes, first + 1), get(axes, first + 2),
+            markers, at[2 * k], at[2 * k + 1],
+        )  # fmt: skip
+        Phi += factor * value
+        nu += factor * rate
+        gamma += factor * bias
+        fill_side(w.jac[row, 2 * k], factor, side_i)
+        fill_side(w.jac[row, 2 * k + 1], factor, side_j)
+    if relation[4] > 0.0:
+        Phi -= relation[4] * round(Phi / relation[4])
+    w.Phi[row], w.nu[row], w.gamma[row] = Phi, nu, gamma
+
+
+@kernel
+def fill_side(jac, factor, side):
+    for part in range(3):
+        for c in range(3):
+            jac[3 * part + c] = factor * side[part][c]
+
+
+@kernel
 def row_of(kind, axes, drive, w, i, j):
     """The row of one word."""
     if kind == COINCIDENCE:
-        return coincidence(w, i, j, int(axes[0, 0]))
+        return coincidence(w, i, j, int(axes[0, 0]), drive)
     if kind == DOT_1:
         return dot_1(w, i, j, get(axes, 0), get(axes, 2))
     if kind == DOT_2:
         return dot_2(w, i, j, get(axes, 0), drive)
+    if kind == DISTANCE:
+        return distance(w, i, j, drive)
     return driven_angle(w, i, j, get(axes, 0), get(axes, 1), get(axes, 2), drive)
 
 
@@ -92,9 +163,10 @@ def evaluate_block(rows, functions, markers, w, k):
         drive = ZERO
         if rows.function[row] >= 0:
             drive = get(functions, rows.function[row])
+        if rows.kind[row] == RELATION:
+            fill_relation(rows.axes[row], rows.relation[row], drive, markers, rows.marker[k], w, row)
+            continue
         Phi, nu, gamma, side_i, side_j = row_of(rows.kind[row], rows.axes[row], drive, markers, i, j)
         w.Phi[row], w.nu[row], w.gamma[row] = Phi, nu, gamma
-        for part in range(3):
-            for c in range(3):
-                w.jac[row, 0, 3 * part + c] = side_i[part][c]
-                w.jac[row, 1, 3 * part + c] = side_j[part][c]
+        fill_side(w.jac[row, 0], 1.0, side_i)
+        fill_side(w.jac[row, 1], 1.0, side_j)

@@ -10,6 +10,7 @@ from ffr_dyn.kernels.system import solve_motion
 from ffr_dyn.kernels.vectors import copy, cross, get, subtract, to_body
 
 SWEEPS = 3
+PASSES = 10
 INERTIAL = 12
 
 
@@ -64,9 +65,9 @@ def marker_loads(markers, rows, mw, rw, b, known, load):
     if not known:
         return
     for block in range(rows.marker.shape[0]):
-        for side in range(2):
+        for side in range(rows.marker.shape[1]):
             k = rows.marker[block, side]
-            if markers.body[k] == b and markers.load[k] >= 0:
+            if k >= 0 and markers.body[k] == b and markers.load[k] >= 0:
                 add_reaction(rw, rows.start[block], rows.start[block + 1], side, get(mw.u, k), load, markers.load[k])
 
 
@@ -100,6 +101,7 @@ def stiffen(bodies, w, b):
 def solve_stiffened(m, w, x, target):
     """`solve_motion` with the geometric stiffening of the bodies that have it."""
     stiffened = m.bodies.stiffening.size > 0
+    passes = PASSES if m.relaxation > 0.0 else 1
     if stiffened:
         multiply_stiffness(m.bodies, w.bodies, x)
     for sweep in range(SWEEPS if stiffened else 1):
@@ -109,4 +111,4 @@ def solve_stiffened(m, w, x, target):
                     frame_loads(m.bodies, w.bodies, m.gravity, b, sweep > 0)
                     marker_loads(m.markers, m.rows, w.markers, w.rows, b, sweep > 0, w.bodies.load)
                     stiffen(m.bodies, w.bodies, b)
-        solve_motion(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, target)
+        solve_motion(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, target, passes)

@@ -10,7 +10,7 @@ from ffr_dyn.kernels.loads import apply_loads, call_user, evaluate_functions
 from ffr_dyn.kernels.markers import couple_marker, couple_pair, project, shapes, update_marker
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.rows import evaluate_block
-from ffr_dyn.kernels.tables import NOT_FINITE, OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, USER_FAILED
+from ffr_dyn.kernels.tables import NOT_FINITE, OK, RELATION, SINGULAR_BODY, SINGULAR_CONSTRAINT, USER_FAILED
 from ffr_dyn.kernels.vectors import (
     add_scaled,
     copy,
@@ -57,14 +57,22 @@ def couple_joints(where, markers, rows, pattern, bw, rw):
         if n > 0:
             couple_marker(shapes(markers, k, n), bw.Cd[6 * e : 6 * (e + n)], n, rw.P[k])
     for k in range(rows.marker.shape[0]):
-        for side in range(2):
+        for side in range(rows.marker.shape[1]):
             marker = rows.marker[k, side]
-            b = markers.body[marker]
+            b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
                 eliminate_side(rows.start[k], rows.start[k + 1], side, where[b, 0] > 0, rw.P[marker], bw.L[b], rw)
     fill(rw.S, 0.0)
     for p in range(pattern.pair_body.size):
         add_pair(rows.start, pattern.pair[p], where[pattern.pair_body[p], 0] > 0, rw.phiphi[p], rw)
+
+
+# Near a singular position the rows become dependent, and a violation eta of the constraints throws the motion from its
+# branch when it comes closer than about eta^(1/3). So on the approach (`nearness` below NEAR) the violation is held far
+# lower, and at the position itself (below AT) it is left alone: along the direction that is about to be free a correction
+# would be the violation divided by the distance.
+NEAR, AT = 1e-2, 1e-6
+TIGHTER = 1e-4
 
 
 @kernel
@@ -86,31 +94,65 @@ def evaluate(m, w, t, x, v):
     for k in range(rows.marker.shape[0]):
         evaluate_block(rows, w.functions, mw, rw, k)
     couple_joints(bodies.where, markers, rows, m.pattern, bw, rw)
-    failed = factorise_blocks(rows.start, m.pattern, rw.S)
+    failed = factorise_blocks(rows.start, m.pattern, rw.S, m.relaxation, rw.step, w.independence)
     if failed >= 0:
         w.info[0] = failed
         return SINGULAR_CONSTRAINT
+    w.independence[3] = max(w.independence[3], w.independence[0])
+    if nearness(w) < w.independence[1]:
+        w.independence[1], w.independence[2] = nearness(w), t
     return OK
 
 
 @kernel
-def solve_motion(bodies, markers, rows, pattern, bw, rw, target):
-    """acc, lam from  M acc + Phi_q^T lam = f,  Phi_q acc = target (C,)."""
+def nearness(w):
+    """Share of a row that others do not contain, over the largest met: small near a singular position.
+
+    The share alone is small for light bodies at any position, since it is measured by the mass matrix.
+    """
+    return w.independence[0] / w.independence[3]
+
+
+@kernel
+def largest(values):
+    result = 0.0
+    for k in range(values.size):
+        if not abs(values[k]) <= result:  # NaN is largest
+            result = abs(values[k])
+    return result
+
+
+@kernel
+def solve_motion(bodies, markers, rows, pattern, bw, rw, target, passes):
+    """acc, lam from  M acc + Phi_q^T lam = f,  Phi_q acc = target (C,).
+
+    One pass is exact where the rows are independent. With a relaxed multiplier matrix further passes remove the effect
+    of the relaxation from the motion; of the multipliers that dependent rows leave open, the smallest are found (method
+    of multipliers; Bayo & Ledesma, Nonlinear Dynamics 9 (1996) 113-130).
+    """
     for b in range(bodies.mass.size):
         solve_body(bodies, bw, b)
-    constraint_rates(bodies.where, markers, rows, rw.jac, bw.acc, rw.lam)
-    for row in range(target.size):
-        rw.lam[row] -= target[row]
-    solve_blocks(rows.start, pattern, rw.S, rw.lam)
-    react(bodies, markers, rows, bw, rw)
+    fill(rw.lam, 0.0)
+    before = 0.0
+    for number in range(passes):
+        constraint_rates(bodies.where, markers, rows, rw.jac, bw.acc, rw.step)
+        for row in range(target.size):
+            rw.step[row] -= target[row]
+        left = largest(rw.step)
+        if number > 0 and not left < 0.5 * before:
+            break
+        before = left
+        solve_blocks(rows.start, pattern, rw.S, rw.step)
+        react(bodies, markers, rows, bw, rw)
+        add_scaled(rw.lam, rw.lam, 1.0, rw.step)
 
 
 @kernel
 def solve_correction(bodies, markers, rows, pattern, bw, rw, value):
-    """acc, lam from  M acc + Phi_q^T lam = 0,  Phi_q acc = -value: the mass-orthogonal projection."""
+    """acc, step from  M acc + Phi_q^T step = 0,  Phi_q acc = -value: the mass-orthogonal projection."""
     fill(bw.acc, 0.0)
-    copy(rw.lam, value)
-    solve_blocks(rows.start, pattern, rw.S, rw.lam)
+    copy(rw.step, value)
+    solve_blocks(rows.start, pattern, rw.S, rw.step)
     react(bodies, markers, rows, bw, rw)
 
 
@@ -120,9 +162,9 @@ def constraint_rates(where, markers, rows, jac, acc, out):
     fill(out, 0.0)
     ground = where.shape[0] - 1
     for k in range(rows.marker.shape[0]):
-        for side in range(2):
+        for side in range(rows.marker.shape[1]):
             marker = rows.marker[k, side]
-            b = markers.body[marker]
+            b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
                 n, j = where[b, 0], where[b, 2]
                 phi = shapes(markers, marker, n)
@@ -147,16 +189,16 @@ def add_side_rates(phi, jac, acc, first, last, side, n, out):
 
 @inlined
 def react(bodies, markers, rows, bw, rw):
-    """acc -= M^-1 Phi_q^T lam, by the eliminated rows: six numbers per body, then back-substitution."""
+    """acc -= M^-1 Phi_q^T step, by the eliminated rows: six numbers per body, then back-substitution."""
     where = bodies.where
     ground = where.shape[0] - 1
     fill(bw.elastic, 0.0)
     for b in range(bw.rigid.shape[0]):
         fill(bw.rigid[b], 0.0)
     for k in range(rows.marker.shape[0]):
-        for side in range(2):
+        for side in range(rows.marker.shape[1]):
             marker = rows.marker[k, side]
-            b = markers.body[marker]
+            b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
                 n, e = where[b, 0], where[b, 3]
                 elastic = bw.elastic[e : e + n]
@@ -178,10 +220,10 @@ def react(bodies, markers, rows, bw, rw):
 
 @kernel
 def gather(phi, w, first, last, side, n, rigid, elastic):
-    """Add -Phi_q^T lam of some rows' side to the rigid (eliminated) and elastic parts of a body."""
+    """Add -Phi_q^T step of some rows' side to the rigid (eliminated) and elastic parts of a body."""
     force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for row in range(first, last):
-        jac, rr, lam = w.jac[row, side], w.rr[row, side], w.lam[row]
+        jac, rr, lam = w.jac[row, side], w.rr[row, side], w.step[row]
         for c in range(6):
             rigid[c] -= rr[c] * lam
         force = (force[0] - jac[0] * lam, force[1] - jac[1] * lam, force[2] - jac[2] * lam)
@@ -237,15 +279,6 @@ def acceleration_target(w, alpha, beta, target):
         target[row] = w.gamma[row] - 2.0 * alpha * w.nu[row] - beta * beta * w.Phi[row]
 
 
-@kernel
-def largest(values):
-    result = 0.0
-    for k in range(values.size):
-        if not abs(values[k]) <= result:  # NaN is largest
-            result = abs(values[k])
-    return result
-
-
 @inlined
 def move_back(bodies, markers, rows, pattern, bw, rw, vd, x, v):
     """One projection of (x, v) onto the constraints, smallest in the norm of the mass matrix."""
@@ -272,7 +305,10 @@ def evaluate_on_constraints(m, w, t, x, v, tolerance):
         position, velocity = largest(w.rows.Phi), largest(w.rows.nu)
         if attempt == 0:
             w.drift[0], w.drift[1] = max(w.drift[0], position), max(w.drift[1], velocity)
-        if tolerance == 0.0 or attempt == 4 or (position <= tolerance and velocity <= 100.0 * tolerance):
+        allowed = tolerance * (TIGHTER if nearness(w) < NEAR else 1.0)
+        if tolerance == 0.0 or attempt == 4 or (position <= allowed and velocity <= 100.0 * allowed):
+            break
+        if nearness(w) < AT:
             break
         w.info[2] += 1
         move_back(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, w.vd, x, v)
@@ -292,14 +328,23 @@ def finite(x, v):
 
 @inlined
 def reactions(rows, mw, rw, out):
-    """out (K, 6): force and moment (global axes) that marker i's body exerts on marker j's body at marker j."""
+    """out (K, 6): force and moment (global axes) that marker i's body exerts on marker j's body at marker j.
+
+    A relation between joint coordinates has one number: the force or torque along its first coordinate, per factor.
+    """
     for k in range(rows.marker.shape[0]):
+        if rows.start[k] < rows.start[k + 1] and rows.kind[rows.start[k]] == RELATION:
+            fill(out[k], 0.0)
+            out[k, 0] = -rw.lam[rows.start[k]]
+            continue
         marker = rows.marker[k, 1]
         force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for row in range(rows.start[k], rows.start[k + 1]):
-            jac, lam = rw.jac[row, 1], rw.lam[row]
-            force = subtract(force, (jac[0] * lam, jac[1] * lam, jac[2] * lam))
-            moment = subtract(moment, (jac[3] * lam, jac[4] * lam, jac[5] * lam))
+            for side in range(1, rows.marker.shape[1], 2):  # a screw has the same markers twice
+                if rows.marker[k, side] == marker:
+                    jac, lam = rw.jac[row, side], rw.lam[row]
+                    force = subtract(force, (jac[0] * lam, jac[1] * lam, jac[2] * lam))
+                    moment = subtract(moment, (jac[3] * lam, jac[4] * lam, jac[5] * lam))
         moment = subtract(moment, cross(get(mw.u, marker), force))
         force, moment = to_global(mw.A[marker], force), to_global(mw.A[marker], moment)
         for c in range(3):

@@ -16,7 +16,8 @@ import numpy as np
 
 Array = np.ndarray
 
-COINCIDENCE, DOT_1, DOT_2, DRIVEN_ANGLE = 0, 1, 2, 3
+COINCIDENCE, DOT_1, DOT_2, DRIVEN_ANGLE, DISTANCE, RELATION = 0, 1, 2, 3, 4, 5
+ANGLE, STROKE = 0, 1
 
 OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED = 0, 1, 2, 3, 4
 
@@ -53,10 +54,12 @@ class Rows(NamedTuple):
     """C constraint rows in K blocks (joints, drivers), blocks in elimination order."""
 
     kind: Array  # (C,)
-    axes: Array  # (C, 3, 3) axis on i, second axis on i of a driven angle, axis on j; coincidence: component in [0, 0]
+    axes: Array  # (C, 6, 3) axis on i, second axis on i of an angle, axis on j; coincidence: component in [0, 0];
+    # a relation has three such axes for each of its two joint coordinates
+    relation: Array  # (C, 5) of a relation: factor and kind of both coordinates, spacing of equivalent values or 0
     function: Array  # (C,) time function or -1
     start: Array  # (K + 1,) first row of each block
-    marker: Array  # (K, 2) marker i, marker j
+    marker: Array  # (K, 2 or 4) markers i, j of a joint, or of both joints of a relation; -1 where there is none
 
 
 class Pattern(NamedTuple):
@@ -93,6 +96,7 @@ class Model(NamedTuple):
     """Constant tables of a scene."""
 
     gravity: Array  # (3,) [m/s^2]
+    relaxation: float  # relative, added to the diagonal of the multiplier matrix where rows depend on others; or 0
     bodies: Bodies
     markers: Markers
     rows: Rows
@@ -140,15 +144,16 @@ class MarkerWork(NamedTuple):
 
 
 class RowWork(NamedTuple):
-    """Per constraint row; sides 0 (marker i) and 1 (marker j)."""
+    """Per constraint row; D = 2 sides (marker i, marker j), or 4 where there are relations."""
 
     Phi: Array  # (C,)
     nu: Array  # (C,) time derivative of Phi
     gamma: Array  # (C,)
     lam: Array  # (C,)
-    jac: Array  # (C, 2, 9) coefficients of point velocity, omega_bar, elastic rotation rate
-    rr: Array  # (C, 2, 6) rigid part after elimination of the elastic coordinates
-    ww: Array  # (C, 2, 6) L^-1 rr
+    step: Array  # (C,) change of lam
+    jac: Array  # (C, D, 9) coefficients of point velocity, omega_bar, elastic rotation rate
+    rr: Array  # (C, D, 6) rigid part after elimination of the elastic coordinates
+    ww: Array  # (C, D, 6) L^-1 rr
     P: Array  # (M, 6, 6) [P_dm; H] dinv phi^T
     phiphi: Array  # (pairs, 6, 6) phi dinv phi'^T
     S: Array  # pooled blocks
@@ -166,6 +171,9 @@ class Work(NamedTuple):
     user: Array  # (user_count,)
     info: Array  # (4,) integers: body or row that failed, evaluations, projections, step that failed
     drift: Array  # (2,) largest |Phi| and |Phi_dot| met
+    independence: (
+        Array  # (4,) least share of a row that others do not contain; smallest nearness and when; largest share
+    )
 
 
 class Stages(NamedTuple):
