@@ -55,7 +55,7 @@ def of_one(op, parameter, u):
     if op == ATAN:
         slope = 1.0 / (1.0 + u * u)
         return math.atan(u), slope, -2.0 * u * slope * slope
-    if op == ASIN or op == ACOS:
+    if op in (ASIN, ACOS):
         slope = 1.0 / math.sqrt(1.0 - u * u)
         if op == ASIN:
             return math.asin(u), slope, u * slope**3
