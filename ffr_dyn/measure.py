@@ -21,7 +21,7 @@ from ffr_dyn.measurement import Measurement
 from ffr_dyn.power import Worked, damping_power, power, reaction, transmitted, work
 from ffr_dyn.result import EULER_PARAMETERS, XYZ, Axis, Quantity, mode_axis
 from ffr_dyn.scene import marker_names, markers
-from ffr_dyn.view import View, cross, dot, times, to_axes
+from ffr_dyn.view import View, dot, times, to_axes
 
 Array = np.ndarray
 
@@ -309,16 +309,17 @@ def unwind(time: Array, angle: Array, rate: Array, last: Unwound | None) -> tupl
 
 def angles(view: View, joint: Joint) -> tuple[Array, Array]:
     """Joint angle [rad] within half a turn and its rate [rad/s], each (T,)."""
-    frame_i, frame_j = view.joint_frames(joint)
-    f_j = frame_j[:, :, 0]
-    angle = np.arctan2(dot(frame_i[:, :, 1], f_j), dot(frame_i[:, :, 0], f_j))
-    spin = view.spin(view.number(joint.j)) - view.spin(view.number(joint.i))
-    return angle, dot(spin, frame_i[:, :, 2])
+    (frame_i, frame_j), (rate_i, rate_j) = view.joint_frames(joint), view.joint_frame_rates(joint)
+    f_j, f_j_dot = frame_j[:, :, 0], rate_j[:, :, 0]
+    cosine, sine = (dot(frame_i[:, :, k], f_j) for k in (0, 1))
+    cosine_dot, sine_dot = (dot(rate_i[:, :, k], f_j) + dot(frame_i[:, :, k], f_j_dot) for k in (0, 1))
+    rate = (cosine * sine_dot - sine * cosine_dot) / (cosine**2 + sine**2)
+    return np.arctan2(sine, cosine), rate
 
 
 def strokes(view: View, joint: Joint) -> tuple[Array, Array]:
     """Joint stroke [m] and its rate [m/s], each (T,)."""
     i, j = view.number(joint.i), view.number(joint.j)
-    h = view.joint_frames(joint)[0][:, :, 2]
+    h, h_dot = view.joint_frames(joint)[0][:, :, 2], view.joint_frame_rates(joint)[0][:, :, 2]
     apart, rate = (values[:, j] - values[:, i] for values in (view.record.r, view.record.rd))
-    return dot(h, apart), dot(h, rate) + dot(cross(view.spin(i), h), apart)
+    return dot(h, apart), dot(h, rate) + dot(h_dot, apart)

@@ -33,7 +33,7 @@ class Worked:
 
 
 def work(time: Array, power: Array, last: Worked | None) -> tuple[Array, Worked]:
-    """Work (T,) of a power (T,) at equally spaced times: Adams-Moulton, of order four but for its first two steps.
+    """Work (T,) of a power (T,) at equally spaced times: Adams-Moulton, of order four but for the first row after the start.
 
     last : what the rows before these left; without, the first row is the start, where the work is zero
     """
@@ -51,7 +51,7 @@ def _means(values: Array) -> Array:
     if values.size > 1:
         means[1] = (values[1] + values[0]) / 2
     if values.size > 2:
-        means[2] = (5 * values[2] + 8 * values[1] - values[0]) / 12
+        means[2] = (2 * values[2] + 5 * values[1] - values[0]) / 6  # Simpson's rule less the first step
     means[3:] = (9 * values[3:] + 19 * values[2:-1] - 5 * values[1:-2] + values[:-3]) / 24
     return means
 

@@ -148,7 +148,24 @@ class View:
         columns = [np.broadcast_to(frame[:, k], (self.rows, 3)) for k in range(3)]
         return np.stack([to_global(A, a + cross(theta, a)) for a in columns], axis=2)
 
+    def frame_rate(self, marker: int, frame: Array) -> Array:
+        """(T, 3, 3) time derivative of `frame`."""
+        owner = self._owner(marker)
+        if owner is None:
+            return np.zeros((self.rows, 3, 3))
+        b, _, phi_r = owner
+        omega, theta = self.record.v[:, self.system.layout.omega(b)], shaped(phi_r, self.q(b))
+        twist, A = shaped(phi_r, self.q_dot(b)), self.axes(b)
+        columns = [np.broadcast_to(frame[:, k], (self.rows, 3)) for k in range(3)]
+        rates = [cross(omega, a + cross(theta, a)) + cross(twist, a) for a in columns]
+        return np.stack([to_global(A, rate) for rate in rates], axis=2)
+
     def joint_frames(self, joint: Joint) -> tuple[Array, Array]:
         """Frames (T, 3, 3) of a joint on its markers i and j, global axes."""
         on_i, on_j = frames(joint)
         return self.frame(self.number(joint.i), on_i), self.frame(self.number(joint.j), on_j)
+
+    def joint_frame_rates(self, joint: Joint) -> tuple[Array, Array]:
+        """Time derivatives of `joint_frames`."""
+        on_i, on_j = frames(joint)
+        return self.frame_rate(self.number(joint.i), on_i), self.frame_rate(self.number(joint.j), on_j)

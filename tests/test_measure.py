@@ -175,8 +175,8 @@ def test_a_driver_does_the_work_that_the_energy_tells(drivers):
     def left(step: float) -> float:
         return unbalanced(forward(scene, end=0.1, output_step=0.01, method=RK4(step), outputs=("*",)), scene)
 
-    assert left(1e-3) < 1e-5
-    assert left(2.5e-4) < 2e-8
+    assert left(1e-3) < 1e-6
+    assert left(2.5e-4) < 4e-9
 
 
 def test_power_goes_through_the_joints():
