@@ -89,7 +89,9 @@ def _reduced(
     tell("factorise the stiffness")
     body = _factorised(model, coupled, ties)
     tell("reduce")
-    basis = _basis(reduction, coupled, body, L) if not mass_is_singular(model) else _shifted(reduction, coupled, body, L)
+    basis = (
+        _basis(reduction, coupled, body, L) if not mass_is_singular(model) else _shifted(reduction, coupled, body, L)
+    )
     check_basis(coupled, L, basis)
     tell("integrate the inertia")
     Phi = ties @ basis.Z

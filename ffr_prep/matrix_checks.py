@@ -15,7 +15,7 @@ from ffr_prep.nodal_inertia import rigid_motions
 Array = np.ndarray
 
 _SYMMETRIC = 1e-8
-_FREE = 1e-8
+_FREE = 1e-6
 _FEW_DIGITS = 1e-11
 _ONE_MASS = 1e-6
 _DEFINITE = 1e-10
@@ -42,7 +42,7 @@ def _check_translations(model: MatrixModel) -> None:
     rows = model.dofs.translations()
     short = np.flatnonzero((rows < 0).any(axis=1))
     if short.size:
-        missing = [component_in_words(k) for k in np.flatnonzero(rows[short[0]] < 0)]
+        missing = [component_in_words(int(k)) for k in np.flatnonzero(rows[short[0]] < 0)]
         raise InputError(
             f"{node_in_words(model, short[0])} has no row for {', '.join(missing)} ({short.size} such nodes): it is "
             "supported, or the model is planar; give the matrices of the free body in space, without boundary conditions"
@@ -98,7 +98,9 @@ def _is_positive(model: MatrixModel, shift: float) -> bool:
     M = model.M[massive][:, massive]
     scale = sp.diags_array(1 / np.sqrt(M.diagonal()))
     try:
-        cholesky(sp.csr_array(scale @ M @ scale + shift * sp.eye_array(massive.size)), model.points[model.nodes[massive]])
+        cholesky(
+            sp.csr_array(scale @ M @ scale + shift * sp.eye_array(massive.size)), model.points[model.nodes[massive]]
+        )
     except np.linalg.LinAlgError:
         return False
     return True
@@ -157,7 +159,7 @@ def _check_free(model: MatrixModel) -> None:
     raise InputError(
         f"K resists the rigid {component_in_words(int(motion))} ({residual.max():.1e} of its own size, most at "
         f"{row_in_words(model, int(row))}): the model is supported, so give the free body without boundary conditions, and "
-        "the reference conditions here; or the file has fewer than nine digits; or its nodes, their order, unit or axes are "
+        "the reference conditions here; or the file has fewer than seven digits; or its nodes, their order, unit or axes are "
         "not those of the matrices"
     )
 
