@@ -17,6 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 from threadpoolctl import threadpool_limits
 
+from ffr_prep.basis import Basis, check_basis, factorised
 from ffr_prep.body import FlexibleBody, Surface
 from ffr_prep.errors import ComputationError, InputError
 from ffr_prep.factor import FreeBody
@@ -33,7 +34,7 @@ from ffr_prep.matrix_coupling import couple_matrices, tie_matrices
 from ffr_prep.matrix_model import MatrixModel, model_hash, without_empty_rows
 from ffr_prep.nodal_inertia import nodal_integrals, scalar_integrals, scalar_mass
 from ffr_prep.reduce import described, interface_shapes
-from ffr_prep.reduction import Basis, Reduction, check_basis, factorised
+from ffr_prep.reduction import Reduction
 from ffr_prep.reference import ReferenceConditions, functionals
 
 Array = np.ndarray

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from ffr_prep.basis import check_basis, factorised
 from ffr_prep.body import BeamForces, FlexibleBody, Surface
 from ffr_prep.factor import solve_refined, supported
 from ffr_prep.interface import CoupledModel
 from ffr_prep.invariants import InertiaIntegrals
 from ffr_prep.reduce import described, interface_shapes
-from ffr_prep.reduction import Reduction, check_basis, factorised
+from ffr_prep.reduction import Reduction
 from ffr_prep.reference import ReferenceConditions, functionals
 
 Array = np.ndarray

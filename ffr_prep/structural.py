@@ -10,7 +10,7 @@ Sources: A. A. Shabana, Dynamics of Multibody Systems (2013), sections 6.1-6.7.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -95,7 +95,9 @@ def frame_model(
     matrices = assemble_frame(frame, parts)
     tell("tie the interfaces")
     ties = tie(frame, interfaces)
-    coupled = couple_frame(frame, matrices.K, matrices.M, interfaces, ties)
+    coupled = replace(
+        couple_frame(frame, matrices.K, matrices.M, interfaces, ties), inertial_loads=ties.T @ matrices.loads
+    )
 
     def nodal(part: Family, z: Array) -> Array:
         return element_values(part, ties @ z)
