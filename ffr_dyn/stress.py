@@ -107,7 +107,8 @@ def measure(name: str) -> Measure:
 
 def stressed_bodies(result: Result) -> tuple[str, ...]:
     """The bodies of the result that have stress modes; InputError when none has."""
-    names = tuple(name for name, surface in result.geometry.items() if surface.stress is not None)
+    modes = {name: surface.stress for name, surface in result.geometry.items()}
+    names = tuple(name for name, stress in modes.items() if stress is not None and stress.shape[2] > 0)
     if not names:
         raise InputError(
             "no body of the result has stress modes; reduce it again with them (ffr-prep reduce --stress, "
