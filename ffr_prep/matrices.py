@@ -154,7 +154,7 @@ def _shifted(reduction: Reduction, coupled: CoupledModel, body: FreeBody, L: Arr
             f"{massless} of the {len(share)} shapes move no mass: M is zero for rotations or nodes that they consist of; ask "
             "for fewer modes, or give the interface nodes a mass"
         )
-    return Basis(found.Z / np.sqrt(share), found.omega2 / share)
+    return replace(found, Z=found.Z / np.sqrt(share), omega2=found.omega2 / share)
 
 
 def _epsilon(coupled: CoupledModel) -> float:

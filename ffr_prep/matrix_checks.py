@@ -169,7 +169,9 @@ def check_connected(model: MatrixModel, coupled: CoupledModel, ties: sp.csr_arra
 
     ties : (D, Z) the rows from the independent coordinates
     """
-    parts, labels = connected_components(coupled.K, directed=False)
+    shape = (len(model.points), len(model.nodes))
+    of_nodes = sp.csr_array((np.ones(shape[1]), (model.nodes, np.arange(shape[1]))), shape=shape) @ abs(ties)
+    parts, labels = connected_components(abs(coupled.K) + of_nodes.T @ of_nodes, directed=False)
     if parts > 1:
         smallest = int(np.argmin(np.bincount(labels)))
         raise InputError(

@@ -86,6 +86,8 @@ class MatrixModel:
         for key in ("K", "M"):
             object.__setattr__(self, key, sp.csr_array(getattr(self, key), dtype=float))
         object.__setattr__(self, "groups", {name: np.array(of, np.int64) for name, of in self.groups.items()})
+        if self.triangles is not None:
+            object.__setattr__(self, "triangles", np.array(self.triangles, np.int64).reshape(-1, 3))
         _check_shapes(self)
         _check_rows(self)
 
