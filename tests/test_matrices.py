@@ -534,6 +534,14 @@ def test_a_rotation_without_stiffness_is_named(frame_model):
     rejected(replace(frame_model, K=K), "K resists the rigid rotation|nothing connects")
 
 
+def test_an_indefinite_stiffness_is_refused(solid_model):
+    """A spring of negative stiffness between two nodes, along their line: no force under rigid motion."""
+    i, j = (3 * int(group_nodes(solid_model, name)[0]) for name in ("left", "right"))
+    k = solid_model.K.diagonal()[[i, j]].min() / 2
+    K = added(solid_model.K, (i, i, -k), (j, j, -k), (i, j, k), (j, i, k))
+    rejected(replace(solid_model, K=K), "K is not positive: some motions have a negative energy")
+
+
 def test_a_failed_factorisation_without_a_mechanism_stays_what_it_is(solid_model, monkeypatch):
     def fails(coupled):
         raise ComputationError("the factorisation failed")

@@ -593,3 +593,16 @@ def test_groups_that_cannot_be(model, tmp_path, capsys, group, message):
 def test_rows_in_words():
     model = with_group(of_frame(rod(rectangle(0.02, 0.05), 1.0, 1)), "both", [1, 2])
     assert row_in_words(model, 10) == "rotation about y of node 2 at (1, 0, 0) m"
+
+
+def test_the_example_of_the_documentation(tmp_path, monkeypatch):
+    """A cantilever of one beam: the lowest frequency of a tip mass m/2 is sqrt(3 EI/(m/2 L^3)) but for its rotary inertia."""
+    monkeypatch.chdir(tmp_path)
+    page = (Path(__file__).parent.parent / "docs" / "matrices.md").read_text(encoding="utf-8")
+    space: dict = {}
+    exec(compile(page.split("```python\n")[1].split("```")[0], "matrices.md", "exec"), space)
+    body = space["body"]
+    assert body.n == 6
+    np.testing.assert_allclose(body.frequencies[:2], np.sqrt(3 * 80.0 / 0.4) / (2 * np.pi), rtol=5e-3)
+    axial_frequency = np.sqrt(2e7 / 0.4) / (2 * np.pi)
+    assert np.abs(body.frequencies / axial_frequency - 1).min() < 1e-12
