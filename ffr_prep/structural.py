@@ -113,7 +113,6 @@ def frame_model(
 
     return Model(
         coupled=coupled,
-        inertial_loads=ties.T @ matrices.loads,
         inertia=lambda basis: summed([inertia(part, nodal(part, basis)) for part in parts]),
         surface=surface,
         stressed=stressed,
