@@ -15,9 +15,10 @@ from matrix_models import bar, of_frame, rod, space_frame
 from ffr_prep.abaqus_source import nodes_from_abaqus
 from ffr_prep.body import load_body
 from ffr_prep.cli import main
+from ffr_prep.cli_matrices import reduce_matrices_command
 from ffr_prep.errors import InputError
 from ffr_prep.matrices import reduce_matrices
-from ffr_prep.matrix_model import MatrixModel, row_in_words, with_group
+from ffr_prep.matrix_model import UNIT_SYSTEMS, MatrixModel, row_in_words, with_group
 from ffr_prep.matrix_source import read_matrices
 from ffr_prep.nastran_source import GridTable, grids_of_deck, grids_of_op2, model_of_nastran
 from ffr_prep.npz_source import save_matrices
@@ -615,3 +616,8 @@ def test_the_example_of_the_documentation(tmp_path, monkeypatch):
     np.testing.assert_allclose(body.frequencies[:2], np.sqrt(3 * 80.0 / 0.4) / (2 * np.pi), rtol=5e-3)
     axial_frequency = np.sqrt(2e7 / 0.4) / (2 * np.pi)
     assert np.abs(body.frequencies / axial_frequency - 1).min() < 1e-12
+
+
+def test_the_command_offers_all_units():
+    offered = next(option for option in reduce_matrices_command.params if option.name == "units")
+    assert tuple(offered.type.choices) == tuple(UNIT_SYSTEMS)
