@@ -8,8 +8,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import plotly.colors
 import plotly.io
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
 
 from ffr_dyn.film import BODY_COLOURS, TRACE_COLOURS, Camera, Colouring, Film, Link, Solid, drawn_points, is_coloured
 from ffr_dyn.result import Array
@@ -28,6 +29,7 @@ _MATTE: Any = {
     "facenormalsepsilon": 1e-30,
     "vertexnormalsepsilon": 1e-30,
 }
+_STOPS = 33  # of a colour map
 _FIELD_OF_VIEW = np.tan(np.pi / 8)
 
 Item = dict[str, Any]
@@ -149,7 +151,10 @@ def _layout(shown: Film, camera: Camera, seconds: float) -> Item:
 def _colour_axis(colours: Colouring) -> Item:
     factor, _ = colours.readable()
     bar = {"title": {"text": colours.title("<br>")}, "len": 0.6, "thickness": 18}
-    shades = [list(stop) for stop in plotly.colors.get_colorscale(colours.colour_map)]
+    stops = np.linspace(0.0, 1.0, _STOPS)
+    shades = [
+        [at, to_hex(shade)] for at, shade in zip(stops.tolist(), colormaps[colours.colour_map](stops), strict=True)
+    ]
     return {"cmin": colours.low * factor, "cmax": colours.high * factor, "colorscale": shades, "colorbar": bar}
 
 

@@ -227,7 +227,14 @@ def test_section_forces_are_sums_over_the_modes():
         assert abs(peak.value) == pytest.approx(whole[k].max(), rel=1e-12)
         place = ("first", "middle", "last").index(peak.place)
         assert whole[k, peak.element, place, peak.row] == pytest.approx(abs(peak.value), rel=1e-12)
-    assert nearest_element(beams, beams.positions[3, 1]) == 3
+
+
+def test_the_nearest_element_is_the_one_whose_line_is_nearest():
+    ends = np.array([[[0.0, 0, 0], [4.0, 0, 0]], [[4.0, 0, 0], [5.0, 0, 0]], [[5.0, 0, 0], [5.0, 3.0, 0]]])
+    positions = np.stack([ends[:, 0], ends.mean(axis=1), ends[:, 1]], axis=1)
+    beams = BeamForces(positions, np.tile(np.eye(3), (3, 1, 1)), np.zeros((3, 3, 6, 1)))
+    for point, element in (((3.7, 0.1, 0.2), 0), ((4.4, 0, 0), 1), ((5.5, 2.0, 0), 2), ((-1.0, 0, 0), 0)):
+        assert nearest_element(beams, np.array(point)) == element
 
 
 # ---- references: stress by inertia --------------------------------------------------------------------------------
