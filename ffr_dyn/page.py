@@ -29,6 +29,7 @@ _MATTE: Any = {
     "facenormalsepsilon": 1e-30,
     "vertexnormalsepsilon": 1e-30,
 }
+_SINK = 0.002  # of the body's size
 _STOPS = 33  # of a colour map
 _FIELD_OF_VIEW = np.tan(np.pi / 8)
 
@@ -92,7 +93,8 @@ def _body(shown: Film, solid: Solid, frame: int, colour: str, light: Item) -> It
 
 
 def _ghost(solid: Solid, frame: int) -> Item:
-    item = _mesh(solid, drawn_points(solid, frame, 0.0))
+    # In planar bending its sides lie in those of the body: let them sink a little, or the two would flicker.
+    item = _mesh(solid, solid.R[frame] + sunk(solid.surface, _SINK * solid.size) @ solid.A[frame].T)
     return {**item, "name": f"{solid.name}, undeformed", "color": "#808080", "opacity": 0.18, "hoverinfo": "skip"}
 
 
@@ -214,6 +216,16 @@ def _slider(shown: Film) -> Item:
 
 _AT_ONCE: Any = {"transition": {"duration": 0}}
 _JUMP: Any = {"mode": "immediate", "frame": {"duration": 0, "redraw": True}, **_AT_ONCE}
+
+
+def sunk(surface: Surface, depth: float) -> Array:
+    """(P, 3) undeformed points, moved inwards by `depth` [m] along the mean normal of the triangles around each."""
+    a, b, c = (surface.points[corner] for corner in surface.triangles.T)
+    normals = np.zeros_like(surface.points)
+    for corner in surface.triangles.T:
+        np.add.at(normals, corner, np.cross(b - a, c - a))
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return surface.points - depth * normals / np.where(length > 0, length, 1.0)
 
 
 # ---- numbers ------------------------------------------------------------------------------------------------------
