@@ -15,12 +15,13 @@ from ffr_prep.nodal_inertia import rigid_motions
 Array = np.ndarray
 
 _SYMMETRIC = 1e-8
-_FREE = 1e-8
+_FREE = 1e-6
 _FEW_DIGITS = 1e-11
 _ONE_MASS = 1e-6
 _DEFINITE = 1e-10
-_ZERO_ENERGY = 1e-11
+_ZERO_ENERGY = 1e-13
 _NO_STIFFNESS = 1e-14
+_SHIFT = 1e-9
 _BLOCK = 14
 
 
@@ -42,7 +43,7 @@ def _check_translations(model: MatrixModel) -> None:
     rows = model.dofs.translations()
     short = np.flatnonzero((rows < 0).any(axis=1))
     if short.size:
-        missing = [component_in_words(k) for k in np.flatnonzero(rows[short[0]] < 0)]
+        missing = [component_in_words(int(k)) for k in np.flatnonzero(rows[short[0]] < 0)]
         raise InputError(
             f"{node_in_words(model, short[0])} has no row for {', '.join(missing)} ({short.size} such nodes): it is "
             "supported, or the model is planar; give the matrices of the free body in space, without boundary conditions"
@@ -98,7 +99,9 @@ def _is_positive(model: MatrixModel, shift: float) -> bool:
     M = model.M[massive][:, massive]
     scale = sp.diags_array(1 / np.sqrt(M.diagonal()))
     try:
-        cholesky(sp.csr_array(scale @ M @ scale + shift * sp.eye_array(massive.size)), model.points[model.nodes[massive]])
+        cholesky(
+            sp.csr_array(scale @ M @ scale + shift * sp.eye_array(massive.size)), model.points[model.nodes[massive]]
+        )
     except np.linalg.LinAlgError:
         return False
     return True
@@ -157,7 +160,7 @@ def _check_free(model: MatrixModel) -> None:
     raise InputError(
         f"K resists the rigid {component_in_words(int(motion))} ({residual.max():.1e} of its own size, most at "
         f"{row_in_words(model, int(row))}): the model is supported, so give the free body without boundary conditions, and "
-        "the reference conditions here; or the file has fewer than nine digits; or its nodes, their order, unit or axes are "
+        "the reference conditions here; or the file has fewer than seven digits; or its nodes, their order, unit or axes are "
         "not those of the matrices"
     )
 
@@ -167,7 +170,9 @@ def check_connected(model: MatrixModel, coupled: CoupledModel, ties: sp.csr_arra
 
     ties : (D, Z) the rows from the independent coordinates
     """
-    parts, labels = connected_components(coupled.K, directed=False)
+    shape = (len(model.points), len(model.nodes))
+    of_nodes = sp.csr_array((np.ones(shape[1]), (model.nodes, np.arange(shape[1]))), shape=shape) @ abs(ties)
+    parts, labels = connected_components(abs(coupled.K) + of_nodes.T @ of_nodes, directed=False)
     if parts > 1:
         smallest = int(np.argmin(np.bincount(labels)))
         raise InputError(
@@ -215,7 +220,13 @@ def _lowest(coupled: CoupledModel) -> tuple[Array, Array]:
     S = sp.diags_array(scale)
     K = sp.csr_array(S @ coupled.K @ S)
     rigid, _ = np.linalg.qr(coupled.T / scale[:, None])
-    factor = cholesky(sp.csr_array(K + 1e-9 * sp.eye_array(K.shape[0])), coupled.places)
+    try:
+        factor = cholesky(sp.csr_array(K + _SHIFT * sp.eye_array(K.shape[0])), coupled.places)
+    except np.linalg.LinAlgError:
+        raise InputError(
+            "K is not positive: some motions have a negative energy, as with Lagrange multipliers, loads that soften the "
+            "structure beyond buckling, or too few digits in the file; give the stiffness of the unloaded structure alone"
+        ) from None
     block = np.random.default_rng(0).standard_normal((K.shape[0], min(_BLOCK, K.shape[0] - 6)))
     for _ in range(4):
         block = solve_cholesky(factor, block - rigid @ (rigid.T @ block))

@@ -308,9 +308,9 @@ def test_bodies_are_pictured_at_the_pose_and_with_the_deformation_of_the_formula
 
     monkeypatch.setattr(render, "_caption", lambda *_: lambda _: None)
     monkeypatch.setattr(render.pv.Plotter, "add_axes", lambda *_, **__: None)
-    shown = film(rotating_box(amplitude=amplitude), 9)
+    shown = film(rotating_box(amplitude=amplitude), 9, colour="body")
     camera = camera_for(shown)
-    seen = outlines(render.pictures(shown, camera, (240, 160), coloured=False))
+    seen = outlines(render.pictures(shown, camera, (240, 160)))
     _, right, up = camera.axes()
     points = [drawn_points(shown.solids[0], k, 1.0) for k in range(9)]
     across, down = (np.array([[(p @ a).min(), (p @ a).max()] for p in points]) for a in (right, -up))
@@ -394,6 +394,14 @@ def test_a_page_holds_everything_and_fetches_nothing(tmp_path):
     assert "deformation \\u00d7 20" in text
     assert '"name":"49"' in text
     assert '"name":"50"' not in text
+
+
+def test_the_ghost_of_a_page_sinks_below_the_skin_of_the_body():
+    surface = box_surface()
+    points = page.sunk(surface, 0.01)
+    np.testing.assert_allclose(np.linalg.norm(points - surface.points, axis=1), 0.01, rtol=1e-12)
+    middle = (surface.points[:, 0] > 0.1) & (surface.points[:, 0] < 0.9)
+    assert (np.abs(points[middle, 1:]) < np.abs(surface.points[middle, 1:]) - 0.004).all()
 
 
 def test_a_page_has_at_most_eighty_pictures_and_little_more_than_plotly(tmp_path):
