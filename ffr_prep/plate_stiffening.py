@@ -18,15 +18,8 @@ from dataclasses import fields
 
 import numpy as np
 
-from ffr_prep.plates import (
-    Plates,
-    displacement_gradient,
-    element_coordinates,
-    jacobian,
-    membrane_strain,
-    reference,
-    rule,
-)
+from ffr_prep.plate_functions import reference, rule
+from ffr_prep.plates import Plates, displacement_gradient, element_coordinates, jacobian, membrane_strain
 
 Array = np.ndarray
 
