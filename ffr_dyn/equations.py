@@ -163,9 +163,11 @@ def _bodies(scene: Scene, place: Layout) -> Bodies:
     models = [body.model for body in scene.bodies]
     n = [m.n for m in models]
     stiffening = [_stiffening(body) for body in scene.bodies]
-    where = np.zeros((len(n) + 1, 7), dtype=np.int64)
+    where = np.full((len(n) + 1, 8), -1, dtype=np.int64)
+    where[-1, :7] = 0
     starts = [_starts(n)[:-1], _starts([9 * k * k for k in n])[:-1], _starts([s.size for s in stiffening])[:-1]]
-    where[:-1] = np.column_stack([n, place.ix, place.iv, *starts, [len(s) for s in stiffening]])
+    where[:-1, :7] = np.column_stack([n, place.ix, place.iv, *starts, [len(s) for s in stiffening]])
+    where[:-1, 7] = place.normals
     where[-1, 3] = sum(n)
     return Bodies(
         where=where,

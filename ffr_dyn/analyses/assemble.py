@@ -17,6 +17,7 @@ from ffr_dyn.errors import InputError
 from ffr_dyn.inertia import mass_matrix
 from ffr_dyn.joints import Word
 from ffr_dyn.layout import Layout, initial_state, layout
+from ffr_dyn.plane import flattened
 from ffr_dyn.rotation import G_bar, rotation_matrix
 from ffr_dyn.scene import Scene
 from ffr_dyn.timefunction import evaluate
@@ -55,8 +56,10 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     Raises InputError when the joints cannot be closed, naming the joint that stays open furthest, or when a driver
     contradicts the joints.
     """
-    blocks, place = blocks_of(scene), layout(scene)
+    scene = flattened(scene)
+    place = layout(scene)
     guess, v = initial_state(scene, place)
+    blocks = in_plane_blocks(scene, place, blocks_of(scene), guess, v, time)
     x = close_positions(scene, place, blocks, guess, v, time)
     kept, redundant = independent_blocks(scene, place, blocks, x, v, time)
     v = close_velocities(scene, place, blocks, x, v, time)
@@ -68,8 +71,15 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     shift = max(np.linalg.norm(x[place.R(b)] - guess[place.R(b)]) for b in range(len(scene.bodies)))
     if shift > 1e-6:
         notes.insert(0, f"assembly moved a body by {shift:.3g} m from where the scene puts it")
+    if scene.plane != "none":
+        notes.append(f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes")
     all_rows = compile_scene(scene, blocks, RELAXATION) if redundant else None
-    return Assembled(compile_scene(scene, kept), all_rows, x, v, place.v_size - rows, tuple(notes))
+    return Assembled(compile_scene(scene, kept), all_rows, x, v, _movable(place) - rows, tuple(notes))
+
+
+def _movable(place: Layout) -> int:
+    """How many velocities the scene has without its constraints."""
+    return sum(len(place.active(b)) + n for b, n in enumerate(place.n))
 
 
 def rows_at(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> list[Row]:
@@ -79,6 +89,20 @@ def rows_at(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array
         for block in blocks
         for word in block.words
     ]
+
+
+def in_plane_blocks(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> list[Block]:
+    """The blocks of a planar scene without the rows that no motion in the plane can change."""
+    if scene.plane == "none":
+        return blocks
+    active = [place.iv[b] + c for b in range(len(place.n)) for c in (*place.active(b), *range(6, 6 + place.n[b]))]
+    rows = iter(rows_at(scene, place, blocks, x, v, time))
+
+    def moves(word: Word) -> bool:
+        jacobian = next(rows).jacobian
+        return bool(np.abs(jacobian[active]).max(initial=0.0) > RANK_TOLERANCE * np.abs(jacobian).max(initial=0.0))
+
+    return [replace(block, words=tuple(word for word in block.words if moves(word))) for block in blocks]
 
 
 def drive_of(word: Word, time: float) -> tuple[float, float, float]:
@@ -153,15 +177,14 @@ def independent_blocks(
 
 
 def _weights(scene: Scene, place: Layout, x: Array, elastic: bool) -> Array:
-    """W^(1/2) (V, V) with W the inverse mass matrix; zero for elastic coordinates that may not move."""
+    """W^(1/2) (V, V) with W the inverse mass matrix; zero for coordinates that may not move."""
     W = np.zeros((place.v_size, place.v_size))
     for b, body in enumerate(scene.bodies):
         M = mass_matrix(body.model, x[place.q(b)])
-        size = 6 + place.n[b] if elastic else 6
-        values, vectors = np.linalg.eigh(M[:size, :size])
-        limit = 1e-12 * values.max()
-        at = slice(place.iv[b], place.iv[b] + size)
-        W[at, at] = vectors / np.sqrt(np.maximum(values, limit))
+        active = np.array([*place.active(b), *range(6, 6 + place.n[b] if elastic else 6)])
+        values, vectors = np.linalg.eigh(M[np.ix_(active, active)])
+        at = place.iv[b] + active
+        W[np.ix_(at, at)] = vectors / np.sqrt(np.maximum(values, 1e-12 * values.max()))
     return W
 
 

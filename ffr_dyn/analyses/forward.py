@@ -71,6 +71,7 @@ def forward(
     substeps, rows = _counts(end - start, output_step, method.step)
     _check_step(scene, method)
     assembled = assemble(scene, time=start)
+    scene = assembled.system.scene  # of a planar scene, what moves in the plane
     _announce_compilation(method)
     run = _started(assembled, method, start)
     header = _header(scene, assembled, method, stabilisation, (start, end, output_step))

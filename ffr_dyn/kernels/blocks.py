@@ -5,7 +5,7 @@ linear in the number of bodies (Baraff 1996), for a few loops there is little fi
 """
 
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.vectors import solve_lower, solve_upper
+from ffr_dyn.kernels.vectors import rigid_lower, solve_lower, solve_upper
 
 # The least share of a row that other rows do not contain (the square of a sine). In a singular position it is zero; with
 # this floor the motion there misses one acceleration for the moment, and goes on.
@@ -13,16 +13,16 @@ FLOOR = 1e-13
 
 
 @kernel
-def eliminate_side(first, last, side, flexible, P, L, w):
+def eliminate_side(first, last, side, flexible, normal, P, L, w):
     """Rows first ... last of one side: w.rr = rigid part after elimination of the elastic coordinates, w.ww = L^-1 w.rr."""
     for row in range(first, last):
         jac, rr, ww = w.jac[row, side], w.rr[row, side], w.ww[row, side]
         for c in range(6):
             rr[c] = jac[c]
-            if flexible:
+            if flexible and (normal < 0 or (c != normal if c < 3 else c == 3 + normal)):
                 rr[c] -= six(P, c, jac)
             ww[c] = rr[c]
-        solve_lower(L, ww, 6)
+        rigid_lower(L, ww, normal)
 
 
 @kernel

@@ -5,7 +5,19 @@ ch. 5, written for body-frame velocities); see `ffr_dyn.inertia` for the readabl
 """
 
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.vectors import cholesky, copy, cross, dot, fill, get, put, solve_lower, solve_upper, to_body
+from ffr_dyn.kernels.vectors import (
+    cholesky,
+    copy,
+    cross,
+    dot,
+    fill,
+    get,
+    in_plane,
+    put,
+    rigid_lower,
+    rigid_upper,
+    to_body,
+)
 
 
 @kernel
@@ -188,17 +200,17 @@ def rigid_mass(mass, s, J, M):
 @kernel
 def factorise(bodies, w, b):
     """Cholesky factor of the Schur complement of body b on its elastic block. Returns True when it is positive."""
-    n, e = bodies.where[b, 0], bodies.where[b, 3]
+    n, e, normal = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 7]
     L = w.L[b]
     rigid_mass(bodies.mass[b], w.s[b], w.J[b], L)
+    P, H = bodies.P_dm[3 * e : 3 * (e + n)], w.g[9 * e + 6 * n : 9 * (e + n)]
+    dinv, Cd = w.dinv[e : e + n], w.Cd[6 * e : 6 * (e + n)]
+    if normal >= 0:
+        return factorise_in_plane(P, H, dinv, Cd, L, n, normal)
+    for r in range(3):
+        scale_row(P, r, dinv, n, Cd, r)
+        scale_row(H, r, dinv, n, Cd, 3 + r)
     if n > 0:
-        dinv = w.dinv[e : e + n]
-        Cd = w.Cd[6 * e : 6 * (e + n)]
-        P, H = bodies.P_dm[3 * e : 3 * (e + n)], w.g[9 * e + 6 * n : 9 * (e + n)]
-        for r in range(3):
-            for j in range(n):
-                Cd[r * n + j] = P[r * n + j] * dinv[j]
-                Cd[(3 + r) * n + j] = H[r * n + j] * dinv[j]
         for r in range(3):
             for c in range(r + 1):
                 L[r, c] -= row_product(Cd, r, P, c, n)
@@ -206,6 +218,35 @@ def factorise(bodies, w, b):
             for c in range(3):
                 L[3 + r, c] -= row_product(Cd, 3 + r, P, c, n)
     return cholesky(L, 6) < 0
+
+
+@kernel
+def scale_row(rows, r, dinv, n, out, target):
+    """out[target] = rows[r] dinv, for pooled arrays of rows of n."""
+    row, scaled = rows[r * n : (r + 1) * n], out[target * n : (target + 1) * n]
+    for j in range(n):
+        scaled[j] = row[j] * dinv[j]
+
+
+@kernel
+def factorise_in_plane(P, H, dinv, Cd, L, n, normal):
+    """`factorise` for the three rigid coordinates i, j, k of a planar body."""
+    i, j, k = in_plane(normal)
+    scale_row(P, i, dinv, n, Cd, i)
+    scale_row(P, j, dinv, n, Cd, j)
+    scale_row(H, normal, dinv, n, Cd, k)
+    ii, ji, jj = row_product(Cd, i, P, i, n), row_product(Cd, j, P, i, n), row_product(Cd, j, P, j, n)
+    ki, kj, kk = row_product(Cd, k, P, i, n), row_product(Cd, k, P, j, n), row_product(Cd, k, H, normal, n)
+    inertia = L[k, k]
+    ii, jj, kk = L[i, i] - ii, L[j, j] - jj, inertia - kk
+    L[i, i] = 1.0 / ii**0.5
+    L[j, i], L[k, i] = -ji * L[i, i], (L[k, i] - ki) * L[i, i]
+    jj -= L[j, i] ** 2
+    L[j, j] = 1.0 / jj**0.5
+    L[k, j] = (L[k, j] - kj - L[k, i] * L[j, i]) * L[j, j]
+    kk -= L[k, i] ** 2 + L[k, j] ** 2
+    L[k, k] = 1.0 / kk**0.5
+    return ii > 0.0 and jj > 0.0 and kk > 1e-14 * inertia
 
 
 @kernel
@@ -227,8 +268,8 @@ def solve_body(bodies, w, b):
         acc[k] = f[k]
         if n > 0:
             acc[k] -= row_dot(w.Cd[6 * e : 6 * (e + n)], k, f[6:], n)
-    solve_lower(w.L[b], acc, 6)
-    solve_upper(w.L[b], acc, 6)
+    rigid_lower(w.L[b], acc, bodies.where[b, 7])
+    rigid_upper(w.L[b], acc, bodies.where[b, 7])
     if n > 0:
         back_substitute(w.Cd[6 * e : 6 * (e + n)], w.dinv[e : e + n], f[6:], acc, n, acc[6:])
 

@@ -17,8 +17,8 @@ from ffr_dyn.kernels.vectors import (
     cross,
     fill,
     get,
-    solve_lower,
-    solve_upper,
+    rigid_lower,
+    rigid_upper,
     subtract,
     to_body,
     to_global,
@@ -55,13 +55,15 @@ def couple_joints(where, markers, rows, pattern, bw, rw):
         b = markers.body[k]
         n, e = where[b, 0], where[b, 3]
         if n > 0:
-            couple_marker(shapes(markers, k, n), bw.Cd[6 * e : 6 * (e + n)], n, rw.P[k])
+            couple_marker(shapes(markers, k, n), bw.Cd[6 * e : 6 * (e + n)], n, where[b, 7], rw.P[k])
     for k in range(rows.marker.shape[0]):
         for side in range(rows.marker.shape[1]):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
-                eliminate_side(rows.start[k], rows.start[k + 1], side, where[b, 0] > 0, rw.P[marker], bw.L[b], rw)
+                eliminate_side(
+                    rows.start[k], rows.start[k + 1], side, where[b, 0] > 0, where[b, 7], rw.P[marker], bw.L[b], rw
+                )
     fill(rw.S, 0.0)
     for p in range(pattern.pair_body.size):
         add_pair(rows.start, pattern.pair[p], where[pattern.pair_body[p], 0] > 0, rw.phiphi[p], rw)
@@ -206,8 +208,8 @@ def react(bodies, markers, rows, bw, rw):
     for b in range(ground):
         n, j, e = where[b, 0], where[b, 2], where[b, 3]
         z = bw.rigid[b]
-        solve_lower(bw.L[b], z, 6)
-        solve_upper(bw.L[b], z, 6)
+        rigid_lower(bw.L[b], z, where[b, 7])
+        rigid_upper(bw.L[b], z, where[b, 7])
         acc = bw.acc[j : j + 6 + n]
         for c in range(6):
             acc[c] += z[c]

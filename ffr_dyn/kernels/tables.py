@@ -26,7 +26,8 @@ class Bodies(NamedTuple):
     """B bodies, E elastic coordinates in all."""
 
     where: (
-        Array  # (B + 1, 7) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening; its number of loads
+        Array  # (B + 1, 8) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening; its number of loads;
+        # the body axis along the normal of a planar scene, or -1
     )
     mass: Array  # (B,)
     moments: Array  # (B, 9) first moment r_dm (3), second moment rr_dm (6)
