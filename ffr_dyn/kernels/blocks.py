@@ -13,10 +13,10 @@ FLOOR = 1e-13
 
 
 @kernel
-def eliminate_side(first, last, side, flexible, normal, P, L, w):
-    """Rows first ... last of one side: w.rr = rigid part after elimination of the elastic coordinates, w.ww = L^-1 w.rr."""
+def eliminate_side(first, last, side, flexible, normal, P, L, all_jac, all_rr, all_ww):
+    """Rows first ... last of one side: rr = rigid part after elimination of the elastic coordinates, ww = L^-1 rr."""
     for row in range(first, last):
-        jac, rr, ww = w.jac[row, side], w.rr[row, side], w.ww[row, side]
+        jac, rr, ww = all_jac[row, side], all_rr[row, side], all_ww[row, side]
         for c in range(6):
             rr[c] = jac[c]
             if flexible and (normal < 0 or (c != normal if c < 3 else c == 3 + normal)):
@@ -35,13 +35,13 @@ def six(matrix, r, jac):
 
 
 @kernel
-def add_pair(starts, pair, flexible, phiphi, w):
-    """Add the coupling of two block sides on one body to its block of w.S."""
+def add_pair(starts, pair, flexible, phiphi, ww, jac, S):
+    """Add the coupling of two block sides on one body to its block of S."""
     later, side_a, earlier, side_b, offset = pair[0], pair[1], pair[2], pair[3], pair[4]
     start_a, start_b = starts[later], starts[earlier]
     rows_a, rows_b = starts[later + 1] - start_a, starts[earlier + 1] - start_b
     for c in range(rows_b):
-        wc, jc = w.ww[start_b + c, side_b], w.jac[start_b + c, side_b]
+        wc, jc = ww[start_b + c, side_b], jac[start_b + c, side_b]
         w0, w1, w2, w3, w4, w5 = wc[0], wc[1], wc[2], wc[3], wc[4], wc[5]
         first = c if later == earlier else 0
         t0, t1, t2, t3, t4, t5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -49,11 +49,11 @@ def add_pair(starts, pair, flexible, phiphi, w):
             t0, t1, t2 = six(phiphi, 0, jc), six(phiphi, 1, jc), six(phiphi, 2, jc)
             t3, t4, t5 = six(phiphi, 3, jc), six(phiphi, 4, jc), six(phiphi, 5, jc)
         for a in range(first, rows_a):
-            wa, ja = w.ww[start_a + a, side_a], w.jac[start_a + a, side_a]
+            wa, ja = ww[start_a + a, side_a], jac[start_a + a, side_a]
             value = wa[0] * w0 + wa[1] * w1 + wa[2] * w2 + wa[3] * w3 + wa[4] * w4 + wa[5] * w5
             if flexible:
                 value += ja[0] * t0 + ja[1] * t1 + ja[2] * t2 + ja[6] * t3 + ja[7] * t4 + ja[8] * t5
-            w.S[offset + a * rows_b + c] += value
+            S[offset + a * rows_b + c] += value
 
 
 @inlined

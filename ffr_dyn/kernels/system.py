@@ -61,12 +61,13 @@ def couple_joints(where, markers, rows, pattern, bw, rw):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
-                eliminate_side(
-                    rows.start[k], rows.start[k + 1], side, where[b, 0] > 0, where[b, 7], rw.P[marker], bw.L[b], rw
-                )
+                first, last = rows.start[k], rows.start[k + 1]
+                flexible, normal = where[b, 0] > 0, where[b, 7]
+                eliminate_side(first, last, side, flexible, normal, rw.P[marker], bw.L[b], rw.jac, rw.rr, rw.ww)
     fill(rw.S, 0.0)
     for p in range(pattern.pair_body.size):
-        add_pair(rows.start, pattern.pair[p], where[pattern.pair_body[p], 0] > 0, rw.phiphi[p], rw)
+        flexible = where[pattern.pair_body[p], 0] > 0
+        add_pair(rows.start, pattern.pair[p], flexible, rw.phiphi[p], rw.ww, rw.jac, rw.S)
 
 
 # Near a singular position the rows become dependent, and a violation eta of the constraints throws the motion from its
@@ -204,7 +205,8 @@ def react(bodies, markers, rows, bw, rw):
             if b != ground:
                 n, e = where[b, 0], where[b, 3]
                 elastic = bw.elastic[e : e + n]
-                gather(shapes(markers, marker, n), rw, rows.start[k], rows.start[k + 1], side, n, bw.rigid[b], elastic)
+                phi, first, last = shapes(markers, marker, n), rows.start[k], rows.start[k + 1]
+                gather(phi, rw.jac, rw.rr, rw.step, first, last, side, n, bw.rigid[b], elastic)
     for b in range(ground):
         n, j, e = where[b, 0], where[b, 2], where[b, 3]
         z = bw.rigid[b]
@@ -221,11 +223,11 @@ def react(bodies, markers, rows, bw, rw):
 
 
 @kernel
-def gather(phi, w, first, last, side, n, rigid, elastic):
+def gather(phi, all_jac, all_rr, step, first, last, side, n, rigid, elastic):
     """Add -Phi_q^T step of some rows' side to the rigid (eliminated) and elastic parts of a body."""
     force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for row in range(first, last):
-        jac, rr, lam = w.jac[row, side], w.rr[row, side], w.step[row]
+        jac, rr, lam = all_jac[row, side], all_rr[row, side], step[row]
         for c in range(6):
             rigid[c] -= rr[c] * lam
         force = (force[0] - jac[0] * lam, force[1] - jac[1] * lam, force[2] - jac[2] * lam)
