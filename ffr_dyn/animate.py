@@ -22,18 +22,16 @@ from ffr_dyn.result import Array, Result
 
 _SHORTEST, _LONGEST = 3.0, 6.0
 _PAGE_FRAMES = 80
-COLOURS = ("deformation", "body")
 
 
 @dataclass(frozen=True)
 class _Show:
-    """A film and how it is shown: seconds per picture, camera, (width, height), flexible bodies coloured or plain."""
+    """A film and how it is shown: seconds per picture, camera, (width, height)."""
 
     film: Film
     seconds: float
     camera: Camera
     size: tuple[int, int]
-    coloured: bool
 
 
 def animate(
@@ -46,6 +44,7 @@ def animate(
     camera: Camera | None = None,
     size: tuple[int, int] = (960, 640),
     colour: str = "deformation",
+    limit: float | None = None,
     traces: Iterable[str] = (),
 ) -> Path:
     """Animate the bodies of a result; the suffix of path decides: .gif, .mp4 (needs imageio-ffmpeg) or .html.
@@ -55,7 +54,9 @@ def animate(
     duration : playing time [s]; by default the simulated time, but at least 3 s and at most 6 s
     camera   : by default chosen from the motion (`ffr_dyn.film.camera_for`); it does not move
     size     : width and height of the picture [pixels], even numbers for .mp4; a page fills its window
-    colour   : "deformation": flexible bodies by elastic displacement; "body": every body in a colour of its own
+    colour   : "deformation": flexible bodies by elastic displacement; a measure of stress or strain such as "von-mises"
+               (`ffr_dyn.stress.MEASURES`): bodies with stress modes by it; "body": every body in a colour of its own
+    limit    : end of the colour bar [m, Pa or 1]; the largest value of the film when not given
     traces   : markers ("rod.small_eye") whose paths are drawn
 
     An existing file is replaced only by a complete new one. Raises InputError for settings or a result that cannot be
@@ -63,12 +64,12 @@ def animate(
     """
     path = Path(path)
     write = _writer(path)
-    _check_settings(fps, duration, size, colour)
+    _check_settings(fps, duration, size)
     playing, frames = _pace(result, fps, duration)
     if write is _write_page:
         frames = min(frames, _PAGE_FRAMES)
-    shown = film(result, frames, scale=scale, traces=traces)
-    show = _Show(shown, playing / frames, camera or camera_for(shown), size, colour == "deformation")
+    shown = film(result, frames, scale=scale, traces=traces, colour=colour, limit=limit)
+    show = _Show(shown, playing / frames, camera or camera_for(shown), size)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(path.name + ".part")
     try:
@@ -91,9 +92,7 @@ def _writer(path: Path) -> Callable[[_Show, Path], None]:
     return writers[kind]
 
 
-def _check_settings(fps: int, duration: float | None, size: tuple[int, int], colour: str) -> None:
-    if colour not in COLOURS:
-        raise InputError(f"colour is {colour!r}; it must be one of: {', '.join(COLOURS)}")
+def _check_settings(fps: int, duration: float | None, size: tuple[int, int]) -> None:
     if not 1 <= fps <= 50:
         raise InputError(f"fps is {fps}; it must lie between 1 and 50, the most that players of GIF files show")
     if duration is not None and not 0 < duration <= 3600:
@@ -115,7 +114,7 @@ def _pace(result: Result, fps: int, duration: float | None) -> tuple[float, int]
 def _pictures(show: _Show) -> Iterator[Array]:
     from ffr_dyn.render import pictures
 
-    return pictures(show.film, show.camera, show.size, coloured=show.coloured)
+    return pictures(show.film, show.camera, show.size)
 
 
 def _write_gif(show: _Show, path: Path) -> None:
@@ -157,4 +156,4 @@ def _write_mp4(show: _Show, path: Path) -> None:
 def _write_page(show: _Show, path: Path) -> None:
     from ffr_dyn.page import page
 
-    path.write_text(page(show.film, show.camera, show.seconds, coloured=show.coloured), encoding="utf-8")
+    path.write_text(page(show.film, show.camera, show.seconds), encoding="utf-8")

@@ -1,31 +1,38 @@
 """What an animation shows, as arrays: poses and elastic coordinates of the bodies at the times of the pictures.
 
 A point with the undeformed position u_0 in the body frame is drawn at R + A(p) (u_0 + scale Phi q). The scale
-exaggerates the deformation only. Everything here comes from the result alone and is independent of how it is rendered.
+exaggerates the deformation only. Flexible bodies may be coloured by a field on their surface: the elastic displacement
+or a measure of stress or strain. Everything here comes from the result alone and is independent of how it is rendered.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from textwrap import wrap
 
 import numpy as np
 
 from ffr_dyn.errors import InputError
 from ffr_dyn.result import Array, Result
 from ffr_dyn.rotation import rotation_matrix
+from ffr_dyn.stress import MEASURES, Measure, values_at
 from ffr_dyn.units import readable
 from ffr_prep.body import Surface
 
 # Muted Okabe-Ito colours for bodies, so that the deformation stays the loudest; full ones for paths.
 BODY_COLOURS = ("#8FB4D0", "#E0B48A", "#93C4B0", "#D9B3C8", "#C9BE86", "#A9CFE6", "#B0B0B0")
 TRACE_COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7")
-COLOUR_MAP = "viridis"
+# What flexible bodies may be coloured by; "body" leaves every body plain, in a colour of its own.
+COLOURS = ("deformation", "body", *MEASURES)
+# For sizes, for stress and for values with a sign: names that matplotlib and plotly share.
+_SEQUENTIAL, _STRESS, _DIVERGING = "viridis", "turbo", "RdBu_r"
 
 # The share of its own size by which the automatic scale deflects the most flexible body.
 _AUTOMATIC_SHARE = 0.05
 _PLANAR_TOLERANCE = 1e-6
+_TITLE_WIDTH = 13
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,12 +66,44 @@ class Link:
 
 
 @dataclass(frozen=True, eq=False)
+class Colouring:
+    """A field on the surfaces of some bodies, shown as colours.
+
+    words, unit : of the field, in SI symbols
+    low, high   : the range of the colour bar, in that unit
+    colour_map  : by its name in matplotlib
+    bodies      : the names of the bodies that have the field
+    values      : (solid, frame) -> (P,) the field at the surface points of a solid, in that unit
+    """
+
+    words: str
+    unit: str
+    low: float
+    high: float
+    colour_map: str
+    bodies: frozenset[str]
+    values: Callable[[Solid, int], Array]
+
+    def readable(self) -> tuple[float, str]:
+        """Factor and unit in which the range is read easily."""
+        return readable(self.unit, max(abs(self.low), abs(self.high)))
+
+    def title(self, line_break: str) -> str:
+        """The title of the colour bar in short lines: "elastic", "displacement", "[mm]"."""
+        _, unit = self.readable()
+        return line_break.join([*wrap(self.words, _TITLE_WIDTH), *([f"[{unit}]"] if unit else [])])
+
+
+@dataclass(frozen=True, eq=False)
 class Film:
     """Bodies at the times (F,) [s] of the pictures.
 
     scale      : factor of the drawn deformation
     deflection : largest elastic displacement |Phi q| over bodies and times, not scaled [m]
     traces     : by marker, its path over all rows of the result (T, 3) [m]
+    colouring  : what the colours of flexible bodies show; None leaves them plain
+    marks      : words at points (3,) [m] that do not move
+    heading    : words in the corner of the picture, instead of time and scale
     low, high  : (3,) corners of a box that holds the whole motion [m]
     """
 
@@ -76,6 +115,9 @@ class Film:
     deflection: float
     low: Array
     high: Array
+    colouring: Colouring | None = None
+    marks: dict[str, Array] = field(default_factory=dict)
+    heading: str = ""
 
     @property
     def size(self) -> float:
@@ -98,6 +140,10 @@ class Film:
         span = factor * float(np.ptp(self.times)) or 1.0
         return f"{self.times[frame] * factor:.{max(0, 2 - math.floor(math.log10(span)))}f} {unit}"
 
+    def caption(self, frame: int) -> str:
+        """What is written in the corner of a picture."""
+        return self.heading or f"t = {self.clock(frame)}     {self.scale_note()}"
+
     def scale_note(self) -> str:
         """The scale as it is written in the picture, "deformation × 20"; nothing when it is one or all is rigid."""
         return f"deformation × {self.scale:g}" if self.deflection > 0 and self.scale != 1.0 else ""
@@ -119,27 +165,116 @@ class Camera:
         return direction, right, np.cross(direction, right)
 
 
-def film(result: Result, frames: int, *, scale: float | str = 1.0, traces: Iterable[str] = ()) -> Film:
+def film(
+    result: Result,
+    frames: int,
+    *,
+    scale: float | str = 1.0,
+    traces: Iterable[str] = (),
+    colour: str = "deformation",
+    limit: float | None = None,
+) -> Film:
     """The bodies of a result at ``frames`` equally spaced times; between rows, poses and coordinates are interpolated.
 
     scale  : factor of the drawn deformation, not negative; "auto": a round one for deflections of about 5 % of a body
     traces : markers ("rod.small_eye") whose paths are drawn
-    Raises InputError for no rows, no body, an unknown marker, a scale that cannot be used, or infinite values.
+    colour : one of COLOURS: what flexible bodies are coloured by
+    limit  : end of the colour bar [m, Pa or 1]; the largest value over bodies and pictures when not given
+
+    Raises InputError for no rows, no body, an unknown marker, a scale, colour or limit that cannot be used, infinite
+    values, and a colour by stress when no body has stress modes.
     """
     if result.time.size == 0:
         raise InputError("nothing to animate: the result has no rows")
+    return film_at(
+        result,
+        np.linspace(result.time[0], result.time[-1], frames),
+        scale=scale,
+        traces=traces,
+        colour=colour,
+        limit=limit,
+    )
+
+
+def film_at(
+    result: Result,
+    times: Array,
+    *,
+    scale: float | str = 1.0,
+    traces: Iterable[str] = (),
+    colour: str = "deformation",
+    limit: float | None = None,
+) -> Film:
+    """As `film`, at the given times (F,) [s]."""
     if not (scale == "auto" or (isinstance(scale, int | float) and 0 <= scale < math.inf)):
         raise InputError(f"scale is {scale!r}; it must be a number that is not negative, or 'auto'")
-    times = np.linspace(result.time[0], result.time[-1], frames)
+    if limit is not None and not 0 < limit < math.inf:
+        raise InputError(f"the end of the colour bar is {limit}; it must be a positive number")
     solids = tuple(_solid(result, name, times) for name in result.geometry if f"{name}.R" in result.quantities)
     links = tuple(_link(result, name, times) for name in _bodies(result) if name not in result.geometry)
     if not solids and not links:
         raise InputError("nothing to animate: the result has no body (quantities <body>.R and <body>.p)")
-    deflections = [float(max(displacements(solid, k).max() for k in range(frames))) for solid in solids]
+    deflections = [float(max(displacements(solid, k).max() for k in range(len(times)))) for solid in solids]
     factor = _automatic_scale(solids, deflections) if scale == "auto" else float(scale)
     paths = {name: result[f"{name}.position"] for name in traces}
     low, high = _box(solids, links, paths, [factor * deflection for deflection in deflections])
-    return Film(times, solids, links, paths, factor, max(deflections, default=0.0), low, high)
+    deflection = max(deflections, default=0.0)
+    shades = colouring(solids, len(times), colour, deflection, limit)
+    return Film(times, solids, links, paths, factor, deflection, low, high, shades)
+
+
+# ---- colours ------------------------------------------------------------------------------------------------------
+
+
+def colouring(
+    solids: Iterable[Solid], frames: int, colour: str, deflection: float, limit: float | None
+) -> Colouring | None:
+    """What the name of a colour means for these bodies; None where there is nothing to show.
+
+    Raises InputError for an unknown name, and for stress when no body has stress modes.
+    """
+    if colour not in COLOURS:
+        raise InputError(f"colour is {colour!r}; it must be one of: {', '.join(COLOURS)}")
+    flexible = [solid for solid in solids if solid.is_flexible]
+    if colour == "body" or not flexible:
+        return None
+    if colour == "deformation":
+        names = frozenset(solid.name for solid in flexible)
+        high = limit or deflection
+        return Colouring("elastic displacement", "m", 0.0, high, _SEQUENTIAL, names, displacements) if high else None
+    return _stress_colouring(flexible, frames, MEASURES[colour], limit)
+
+
+def _stress_colouring(flexible: list[Solid], frames: int, of: Measure, limit: float | None) -> Colouring | None:
+    stressed = [solid for solid in flexible if solid.surface.stress is not None]
+    if not stressed:
+        raise InputError(
+            f"no body can be coloured by {of.words}: none has stress modes; reduce one with them "
+            "(ffr-prep reduce --stress) and run again"
+        )
+
+    def values(solid: Solid, frame: int) -> Array:
+        return values_at(solid.surface, solid.q[frame : frame + 1], of)[:, 0]
+
+    largest = max(float(np.abs(values(solid, k)).max()) for solid in stressed for k in range(frames))
+    high = limit or largest
+    return measure_colours(of, high, frozenset(solid.name for solid in stressed), values) if high else None
+
+
+def measure_colours(
+    of: Measure, high: float, bodies: frozenset[str], values: Callable[[Solid, int], Array]
+) -> Colouring:
+    """A measure as colours from none to `high`, or for one with a sign from -high (blue) to high (red)."""
+    low, shades = (-high, _DIVERGING) if of.signed else (0.0, _STRESS)
+    return Colouring(of.words, of.unit, low, high, shades, bodies, values)
+
+
+def is_coloured(shown: Film, solid: Solid) -> bool:
+    """Whether the body is coloured by a field."""
+    return shown.colouring is not None and solid.name in shown.colouring.bodies
+
+
+# ---- points -------------------------------------------------------------------------------------------------------
 
 
 def body_points(solid: Solid, frame: int, scale: float) -> Array:

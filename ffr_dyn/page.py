@@ -8,11 +8,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import plotly.colors
 import plotly.io
 
-from ffr_dyn.film import BODY_COLOURS, COLOUR_MAP, TRACE_COLOURS, Camera, Film, Link, Solid, displacements, drawn_points
+from ffr_dyn.film import BODY_COLOURS, TRACE_COLOURS, Camera, Colouring, Film, Link, Solid, drawn_points, is_coloured
 from ffr_dyn.result import Array
-from ffr_dyn.units import bracketed, readable
 from ffr_prep.body import Surface
 
 # Larger surfaces are simplified until all pictures together need no more numbers than this: some eight megabytes.
@@ -33,15 +33,14 @@ _FIELD_OF_VIEW = np.tan(np.pi / 8)
 Item = dict[str, Any]
 
 
-def page(shown: Film, camera: Camera, seconds: float, *, coloured: bool) -> str:
+def page(shown: Film, camera: Camera, seconds: float) -> str:
     """The HTML text of a page with play, pause and a slider over the pictures of the film.
 
-    seconds  : playing time of one picture [s]
-    coloured : whether flexible bodies are coloured by elastic displacement, or plain
+    seconds : playing time of one picture [s]
     """
     shown = _simplified(shown)
     light = _light(shown, camera)
-    moving = [_moving(shown, frame, coloured, light) for frame in range(shown.times.size)]
+    moving = [_moving(shown, frame, light) for frame in range(shown.times.size)]
     still = [*_paths(shown), _triad(shown)]
     figure = {
         "data": [*moving[0], *still],
@@ -70,23 +69,23 @@ def page(shown: Film, camera: Camera, seconds: float, *, coloured: bool) -> str:
 # ---- bodies -------------------------------------------------------------------------------------------------------
 
 
-def _moving(shown: Film, frame: int, coloured: bool, light: Item) -> list[Item]:
+def _moving(shown: Film, frame: int, light: Item) -> list[Item]:
     plain = iter(BODY_COLOURS * (1 + len(shown.solids) + len(shown.links)))
     items = []
     for solid in shown.solids:
         colour = next(plain)
-        items.append(_body(shown, solid, frame, coloured, colour, light))
+        items.append(_body(shown, solid, frame, colour, light))
         if solid.is_flexible and shown.scale > 0:
             items.append(_ghost(solid, frame))
     return items + [_rods(link, frame, next(plain)) for link in shown.links]
 
 
-def _body(shown: Film, solid: Solid, frame: int, coloured: bool, colour: str, light: Item) -> Item:
+def _body(shown: Film, solid: Solid, frame: int, colour: str, light: Item) -> Item:
     item = {**_mesh(solid, drawn_points(solid, frame, shown.scale)), "name": solid.name, **light}
-    if not (coloured and solid.is_flexible and shown.deflection > 0):
+    if shown.colouring is None or not is_coloured(shown, solid):
         return {**item, "color": colour, "showlegend": True}
-    factor, _ = readable("m", shown.deflection)
-    intensity = _numbers(displacements(solid, frame) * factor)
+    factor, _ = shown.colouring.readable()
+    intensity = _numbers(shown.colouring.values(solid, frame) * factor)
     return {**item, "intensity": intensity, "coloraxis": "coloraxis", "showlegend": True}
 
 
@@ -135,16 +134,9 @@ def _triad(shown: Film) -> Item:
 
 
 def _layout(shown: Film, camera: Camera, seconds: float) -> Item:
-    factor, unit = readable("m", shown.deflection)
-    bar = {"title": {"text": f"elastic<br>{bracketed('displacement', unit)}"}, "len": 0.6, "thickness": 18}
     return {
         "scene": _scene(shown, camera),
-        "coloraxis": {
-            "cmin": 0.0,
-            "cmax": shown.deflection * factor,
-            "colorscale": COLOUR_MAP.title(),
-            "colorbar": bar,
-        },
+        **({"coloraxis": _colour_axis(shown.colouring)} if shown.colouring else {}),
         "font": {"family": "sans-serif", "size": 14, "color": _INK},
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
         "legend": {"x": 0.01, "y": 0.90, "bgcolor": "rgba(255,255,255,0.6)"},
@@ -152,6 +144,13 @@ def _layout(shown: Film, camera: Camera, seconds: float) -> Item:
         "updatemenus": [_buttons(seconds)],
         "sliders": [_slider(shown)],
     }
+
+
+def _colour_axis(colours: Colouring) -> Item:
+    factor, _ = colours.readable()
+    bar = {"title": {"text": colours.title("<br>")}, "len": 0.6, "thickness": 18}
+    shades = [list(stop) for stop in plotly.colors.get_colorscale(colours.colour_map)]
+    return {"cmin": colours.low * factor, "cmax": colours.high * factor, "colorscale": shades, "colorbar": bar}
 
 
 def _scene(shown: Film, camera: Camera) -> Item:
@@ -246,4 +245,5 @@ def decimated(surface: Surface, share: float) -> Surface:
 
     coarse = pv.PolyData.from_regular_faces(np.array(surface.points), np.array(surface.triangles)).decimate(1.0 - share)
     nearest = cKDTree(surface.points).query(coarse.points)[1]
-    return Surface(surface.points[nearest], coarse.regular_faces, surface.Phi[nearest])
+    stress, moduli = (None if of is None else of[nearest] for of in (surface.stress, surface.moduli))
+    return Surface(surface.points[nearest], coarse.regular_faces, surface.Phi[nearest], stress, moduli)

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.errors import SimulationError
-from ffr_dyn.film import BODY_COLOURS, COLOUR_MAP, TRACE_COLOURS, Camera, Film, Link, Solid, body_points, displacements
+from ffr_dyn.film import BODY_COLOURS, TRACE_COLOURS, Camera, Colouring, Film, Link, Solid, body_points, is_coloured
 from ffr_dyn.result import Array
-from ffr_dyn.units import bracketed, readable
 from ffr_prep.body import Surface
 
 if not os.environ.get("DISPLAY"):
@@ -36,14 +35,14 @@ _SHIFT = (-0.04, -0.03)
 Update = Callable[[int], None]
 
 
-def pictures(shown: Film, camera: Camera, size: tuple[int, int], *, coloured: bool) -> Iterator[Array]:
-    """Yields for each time of the film a picture (height, width, 3) uint8; flexible bodies coloured or plain.
+def pictures(shown: Film, camera: Camera, size: tuple[int, int]) -> Iterator[Array]:
+    """Yields for each time of the film a picture (height, width, 3) uint8.
 
     Raises SimulationError, naming the packages that are missing, when this machine cannot render.
     """
     plotter = _plotter(size)
     try:
-        updates = _build(plotter, shown, coloured)
+        updates = _build(plotter, shown)
         _aim(plotter, shown, camera, size)
         for frame in range(shown.times.size):
             for update in updates:
@@ -104,13 +103,13 @@ def _aim(plotter: Any, shown: Film, camera: Camera, size: tuple[int, int]) -> No
 # ---- what is in the picture ---------------------------------------------------------------------------------------
 
 
-def _build(plotter: Any, shown: Film, coloured: bool) -> list[Update]:
+def _build(plotter: Any, shown: Film) -> list[Update]:
     updates: list[Update] = []
     plain = iter(BODY_COLOURS * (1 + len(shown.solids) + len(shown.links)))
     for solid in shown.solids:
         colour = next(plain)
-        if coloured and solid.is_flexible and shown.deflection > 0:
-            updates.append(_coloured_solid(plotter, shown, solid))
+        if shown.colouring is not None and is_coloured(shown, solid):
+            updates.append(_coloured_solid(plotter, shown, solid, shown.colouring))
         else:
             updates.append(_plain_solid(plotter, shown, solid, colour))
         if solid.is_flexible and shown.scale > 0:
@@ -118,6 +117,8 @@ def _build(plotter: Any, shown: Film, coloured: bool) -> list[Update]:
     updates += [_tubes(plotter, link, next(plain)) for link in shown.links]
     for path, colour in zip(shown.traces.values(), TRACE_COLOURS * len(shown.traces), strict=False):
         plotter.add_mesh(pv.lines_from_points(path), color=colour, line_width=2.5, lighting=False)
+    if shown.marks:
+        _mark(plotter, shown)
     plotter.add_axes(line_width=2, color=_INK, viewport=(0.0, 0.0, 0.16, 0.2))
     updates.append(_caption(plotter, shown))
     return updates
@@ -161,23 +162,23 @@ def _plain_solid(plotter: Any, shown: Film, solid: Solid, colour: str) -> Update
     return lambda frame: _place(solid, frame, shown.scale, (skin, edges), actors)
 
 
-def _coloured_solid(plotter: Any, shown: Film, solid: Solid) -> Update:
+def _coloured_solid(plotter: Any, shown: Film, solid: Solid, colours: Colouring) -> Update:
     skin, edges = _skin(solid.surface), _edges(solid.surface)
-    factor, unit = readable("m", shown.deflection)
-    skin.data.point_data["displacement"] = np.zeros(skin.data.n_points)
+    factor, _ = colours.readable()
+    skin.data.point_data["field"] = np.zeros(skin.data.n_points)
     actor = plotter.add_mesh(
         skin.data,
-        scalars="displacement",
-        clim=(0.0, shown.deflection * factor),
-        cmap=COLOUR_MAP,
-        scalar_bar_args=_bar(bracketed("elastic\ndisplacement\n", unit)),
+        scalars="field",
+        clim=(colours.low * factor, colours.high * factor),
+        cmap=colours.colour_map,
+        scalar_bar_args=_bar(colours.title("\n")),
         **_MATTE,
     )
     actors = [actor, *_edge_actors(plotter, edges)]
 
     def update(frame: int) -> None:
         _place(solid, frame, shown.scale, (skin, edges), actors)
-        skin.data.point_data["displacement"][:] = displacements(solid, frame)[skin.index] * factor
+        skin.data.point_data["field"][:] = colours.values(solid, frame)[skin.index] * factor
         skin.data.Modified()
 
     return update
@@ -243,10 +244,16 @@ def _tubes(plotter: Any, link: Link, colour: str) -> Update:
     return update
 
 
+def _mark(plotter: Any, shown: Film) -> None:
+    points, words = np.array(list(shown.marks.values())), list(shown.marks)
+    look = {"font_size": 17, "text_color": _INK, "shape_color": "white", "shape_opacity": 0.75, "point_color": _INK}
+    plotter.add_point_labels(points, words, always_visible=True, point_size=11, render_points_as_spheres=True, **look)
+
+
 def _caption(plotter: Any, shown: Film) -> Update:
     text: Any = plotter.add_text("t", position=(0.02, 0.93), viewport=True, font_size=11, color=_INK)
 
     def update(frame: int) -> None:
-        text.input = f"t = {shown.clock(frame)}     {shown.scale_note()}"
+        text.input = shown.caption(frame)
 
     return update

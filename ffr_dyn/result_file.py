@@ -5,7 +5,9 @@ every variable whenever one is made or resized: seconds for some hundred quantit
 
 * dimension ``time`` [s], unlimited; each quantity is a variable of its dotted name with ``units`` and ``long_name``;
 * every other axis is a dimension with a coordinate variable of labels: xyz, euler_parameter, <body>.mode;
-* group ``geometry/<body>``: points (point, xyz) [m], triangles (triangle, corner), Phi (point, xyz, mode) [kg^-0.5];
+* group ``geometry/<body>``: points (point, xyz) [m], triangles (triangle, corner), Phi (point, xyz, mode) [kg^-0.5]; where
+  the body has them, stress (point, component, mode) [Pa/(m sqrt(kg))] with the components xx, yy, zz, xy, xz, yz, moduli
+  (point, modulus) and the group beams of section forces (element, place, force, mode);
 * attributes: Conventions, title, source, status, and those of the result; text and numbers as they are, any other
   JSON value in the attribute ``json_attributes``. No pickle.
 
@@ -30,11 +32,12 @@ import numpy as np
 
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.result import XYZ, Array, Axis, Quantity, Result, check_times
-from ffr_prep.body import Surface
+from ffr_prep.body import Surface, surface_of
 
 FORMAT = "ffr-result"
 FORMAT_VERSION = 1
 
+_SURFACE = ("points", "triangles", "Phi", "stress", "moduli", "beams/positions", "beams/axes", "beams/modes")
 _CHUNK_BYTES, _CHUNK_ROWS = 32768, 512
 _BUFFER_BYTES = 4 << 20
 _MARKS = ("Conventions", "ffr_format", "ffr_format_version", "json_attributes")
@@ -254,7 +257,30 @@ def _write_surface(group: h5py.Group, xyz: h5py.Dataset, surface: Surface) -> No
         _attach(triangles, [_index(group, "triangle", len(surface.triangles)), _index(group, "corner", 3)])
     if n:
         shapes = _array(group, "Phi", surface.Phi, "kg-0.5", "mode shapes")
-        _attach(shapes, [points, xyz, _index(group, "mode", n)])
+        mode = _index(group, "mode", n)
+        _attach(shapes, [points, xyz, mode])
+        _write_stress(group, points, mode, surface)
+
+
+def _write_stress(group: h5py.Group, point: h5py.Dataset, mode: h5py.Dataset, surface: Surface) -> None:
+    if surface.stress is not None and surface.moduli is not None:
+        stress = _array(
+            group, "stress", surface.stress, "Pa m-1 kg-0.5", "stress modes xx, yy, zz, xy, xz, yz, body axes"
+        )
+        _attach(stress, [point, _index(group, "component", 6), mode])
+        moduli = _array(group, "moduli", surface.moduli, "1", "Young's modulus [Pa] and Poisson's ratio")
+        _attach(moduli, [point, _index(group, "modulus", 2)])
+    if surface.beams is not None:
+        beams = group.create_group("beams", track_order=True)
+        element, place = _index(beams, "element", len(surface.beams.positions)), _index(beams, "place", 3)
+        xyz, axis = _index(beams, "xyz", 3), _index(beams, "axis", 3)
+        positions = _array(beams, "positions", surface.beams.positions, "m", "first end, middle and last end")
+        _attach(positions, [element, place, xyz])
+        _attach(_array(beams, "axes", surface.beams.axes, "1", "element to body axes"), [element, xyz, axis])
+        forces = _array(
+            beams, "modes", surface.beams.modes, "N m-1 kg-0.5", "N, Qy, Qz, Mx, My, Mz (moments: N kg-0.5)"
+        )
+        _attach(forces, [element, place, _index(beams, "force", 6), mode])
 
 
 def _array(group: h5py.Group, name: str, values: Array, unit: str, description: str) -> h5py.Dataset:
@@ -319,8 +345,8 @@ def _read_quantity(variable: h5py.Dataset) -> Quantity:
 
 def _read_surface(group: h5py.Group) -> Surface:
     points = group["points"][:]
-    triangles = group["triangles"][:] if "triangles" in group else np.zeros((0, 3), int)
-    return Surface(points, triangles, group["Phi"][:] if "Phi" in group else np.zeros((len(points), 3, 0)))
+    empty = {"triangles": np.zeros((0, 3), int), "Phi": np.zeros((len(points), 3, 0))}
+    return surface_of(empty | {key: group[key][:] for key in _SURFACE if key in group})
 
 
 def _read_attributes(file: h5py.File) -> dict[str, Any]:

@@ -49,19 +49,44 @@ class _Deck:
 
 def from_abaqus(path: Path) -> Source:
     """The mesh of an Abaqus input file. Raises InputError for a file that cannot be read and for several parts."""
-    deck = _Deck()
-    try:
-        for keyword, parameters, rows in _sections(path):
-            if keyword in _READERS:
-                _READERS[keyword](deck, parameters, rows)
-    except (ValueError, KeyError, IndexError, UnicodeDecodeError) as error:
-        if isinstance(error, InputError):
-            raise InputError(f"{path}: {error}") from None
-        raise InputError(f"cannot read {path} as an Abaqus input file ({type(error).__name__}: {error})") from None
+    deck = _deck(path, _READERS)
     try:
         return _source(deck)
     except KeyError as error:
         raise InputError(f"{path} refers to {error.args[0]}, which it does not define; is it complete?") from None
+
+
+def nodes_from_abaqus(path: Path) -> tuple[Array, Array, dict[str, Array]]:
+    """Numbers (N,) and coordinates (N, 3) of the nodes of an Abaqus input file, and the numbers in its node sets.
+
+    Raises InputError for a file that cannot be read and for nodes with coordinate systems of their own.
+    """
+    deck = _deck(path, {key: _READERS[key] for key in ("NODE", "NSET", "INSTANCE")} | {"TRANSFORM": _read_transform})
+    if not deck.nodes:
+        raise InputError(f"{path} defines no nodes")
+    try:
+        sets = {deck.spelling[name]: np.unique(_resolved(name, deck.node_sets)) for name in deck.node_sets}
+    except KeyError as error:
+        raise InputError(f"{path} refers to {error.args[0]}, which it does not define; is it complete?") from None
+    points = np.array(list(deck.nodes.values()), float).reshape(-1, 3)
+    return (
+        np.array(list(deck.nodes), np.int64),
+        points,
+        {name: of.astype(np.int64) for name, of in sets.items() if of.size},
+    )
+
+
+def _deck(path: Path, readers: Mapping[str, Callable[[_Deck, Mapping[str, str], list[Row]], None]]) -> _Deck:
+    deck = _Deck()
+    try:
+        for keyword, parameters, rows in _sections(path):
+            if keyword in readers:
+                readers[keyword](deck, parameters, rows)
+    except (ValueError, KeyError, IndexError, UnicodeDecodeError) as error:
+        if isinstance(error, InputError):
+            raise InputError(f"{path}: {error}") from None
+        raise InputError(f"cannot read {path} as an Abaqus input file ({type(error).__name__}: {error})") from None
+    return deck
 
 
 # ---- reading ------------------------------------------------------------------------------------------------------
@@ -142,6 +167,13 @@ def _read_instance(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) 
     deck.instances += 1
     if deck.instances > 1 or rows:
         raise InputError("it places parts in an assembly; write the one part to reduce to a file of its own")
+
+
+def _read_transform(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) -> None:
+    raise InputError(
+        f"it gives node set {parameters.get('NSET', '')!r} a coordinate system of its own (*TRANSFORM): matrices are needed "
+        "in global axes"
+    )
 
 
 _READERS: Mapping[str, Callable[[_Deck, Mapping[str, str], list[Row]], None]] = {

@@ -14,11 +14,8 @@ Representation of geometric stiffening in multibody system simulation (1991).
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 
 from ffr_prep.beams import Beams, axis_gradients, element_coordinates, mass_points, undeformed
-from ffr_prep.factor import SupportedBody, solve_refined
-from ffr_prep.interface import CoupledModel
 from ffr_prep.stiffening import PRODUCTS
 
 Array = np.ndarray
@@ -26,32 +23,17 @@ Array = np.ndarray
 _GAUSS = 4  # points; products of the quadratic slopes with the quadratic tension are of degree six
 
 
-def beam_stiffening(
-    elements: Beams,
-    B_1: sp.csr_array,
-    ties: sp.csr_array,
-    model: CoupledModel,
-    held: SupportedBody,
-    inertial: Array,
-    Z: Array,
-) -> Array:
-    """(12 + 6 I, n, n) reduced geometric stiffness per unit load, in the order of `FlexibleBody.stiffening`.
+def beam_stiffening(elements: Beams, static: Array, basis: Array) -> Array:
+    """(r, n, n) geometric stiffness of the shapes `basis` (E, 12, n) under r loads with displacements `static` (E, 12, r).
 
-    B_1 connectivity; ties (6N, Z) nodal coordinates of the independent ones; held : the body under its reference conditions;
-    inertial (Z, 12) loads of unit accelerations; Z (Z, n) basis. Raises ComputationError when a static problem fails.
+    Both are nodal coordinates in body axes; the first twelve loads are those of unit accelerations, which act inside the
+    elements, the others act at nodes.
     """
-    loads = np.hstack([inertial, model.C.toarray().T])
-    displacement, _ = solve_refined(held, loads, np.zeros((len(held.C), loads.shape[1])))
     to_element = element_coordinates(elements)
-
-    def nodal(z: Array) -> Array:
-        return to_element @ (B_1 @ (ties @ z)).reshape(-1, 12, z.shape[1])
-
-    of_elements = np.zeros((len(elements.length), 2, loads.shape[1]))
-    of_elements[:, :, : inertial.shape[1]] = axial_loads(elements)
-    forces = tensions(elements, nodal(displacement), of_elements)
-    stiffness = [stiffness_of_tension(elements, forces[:, :, k], nodal(Z)) for k in range(forces.shape[2])]
-    return np.array(stiffness).reshape(-1, Z.shape[1], Z.shape[1])
+    of_elements = np.zeros((len(elements.length), 2, static.shape[2]))
+    of_elements[:, :, :12] = axial_loads(elements)
+    forces, shapes = tensions(elements, to_element @ static, of_elements), to_element @ basis
+    return np.array([stiffness_of_tension(elements, forces[:, :, k], shapes) for k in range(static.shape[2])])
 
 
 def axial_loads(elements: Beams) -> Array:

@@ -1,7 +1,8 @@
-"""Frames of beams: nodes and the members between them, built from a few lines of Python, joined, named and checked."""
+"""Frames of beams and plates: nodes and what is between them, built from a few lines of Python, joined, named, checked."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
@@ -44,14 +45,42 @@ class Member:
 
 
 @dataclass(frozen=True)
-class Frame:
-    """Nodes with six coordinates each and straight beam elements between them; frozen, SI units.
+class Shell:
+    """What a plate is made of.
 
-    points      : (N, 3) [m]
-    elements    : (E, 2) nodes of each element, x' runs from the first to the second
-    members     : what the elements are made of
-    member_of   : (E,) index into members
-    node_groups : name -> (m,) nodes, where interfaces attach
+    thickness : [m], half of it on either side of the nodes
+    gyration  : root mean square of the distance of the mass from the middle plane [m]; thickness/sqrt(12) when not given,
+                0 leaves the rotary inertia of the thickness out
+
+    Raises InputError for a thickness that is not positive and a negative gyration.
+    """
+
+    thickness: float
+    material: Material
+    gyration: float | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 < self.thickness < math.inf:
+            raise InputError(f"shell of {self.material.name}: the thickness is {self.thickness} m; it must be positive")
+        if self.gyration is None:
+            object.__setattr__(self, "gyration", self.thickness / math.sqrt(12))
+        if not 0 <= (self.gyration or 0.0) < math.inf:
+            raise InputError(f"shell of {self.material.name}: gyration is {self.gyration} m; it must not be negative")
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Nodes with six coordinates each, and straight beams and flat plates between them; frozen, SI units.
+
+    points         : (N, 3) [m]
+    elements       : (E, 2) nodes of each beam element, x' runs from the first to the second
+    members        : what the beams are made of
+    member_of      : (E,) index into members
+    node_groups    : name -> (m,) nodes, where interfaces attach
+    triangles      : (T, 3) nodes of the plate elements of three nodes, counter-clockwise about z'
+    quadrilaterals : (Q, 4) of those of four
+    shells         : what the plates are made of
+    shell_of       : (T + Q,) index into shells, triangles first
 
     Raises InputError for arrays of other shapes and coordinates that are not finite.
     """
@@ -61,11 +90,19 @@ class Frame:
     members: tuple[Member, ...]
     member_of: Array
     node_groups: Mapping[str, Array] = field(default_factory=dict)
+    triangles: Array = field(default_factory=lambda: np.zeros((0, 3), np.int64))
+    quadrilaterals: Array = field(default_factory=lambda: np.zeros((0, 4), np.int64))
+    shells: tuple[Shell, ...] = ()
+    shell_of: Array = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def __post_init__(self) -> None:
         _freeze(self, "points", np.array(self.points, float), (-1, 3))
         _freeze(self, "elements", np.array(self.elements, np.int64), (-1, 2))
         _freeze(self, "member_of", np.array(self.member_of, np.int64), (len(self.elements),))
+        _freeze(self, "triangles", np.array(self.triangles, np.int64), (-1, 3))
+        _freeze(self, "quadrilaterals", np.array(self.quadrilaterals, np.int64), (-1, 4))
+        plates = len(self.triangles) + len(self.quadrilaterals)
+        _freeze(self, "shell_of", np.array(self.shell_of, np.int64), (plates,))
         groups = {name: np.array(nodes, np.int64) for name, nodes in self.node_groups.items()}
         object.__setattr__(self, "node_groups", groups)
         wrong = np.flatnonzero(~np.isfinite(self.points).all(axis=1))
@@ -106,24 +143,80 @@ def polyline(corners: Sequence[Vector] | Array, member: Member, *, elements: int
     return Frame(points, pairs, (member,), np.zeros(len(pairs), np.int64))
 
 
+def panel(corners: Sequence[Vector] | Array, shell: Shell, *, elements: tuple[int, int]) -> Frame:
+    """A flat plate between four corners (4, 3) [m] of n x m quadrilaterals: n along the first side, m along the second.
+
+    `triangulated` makes triangles of them. Raises InputError for other than four finite corners, or no elements.
+    """
+    at = np.asarray(corners, float)
+    if at.shape != (4, 3) or not np.isfinite(at).all():
+        raise InputError(f"a panel needs four finite corners (x, y, z); it has {at.tolist()}")
+    if len(elements) != 2 or min(elements) < 1:
+        raise InputError(f"a panel of {elements} elements cannot be built; ask for one or more along both sides")
+    x, y = (np.linspace(0.0, 1.0, count + 1) for count in elements)
+    weights = np.stack([np.outer(1 - x, 1 - y), np.outer(x, 1 - y), np.outer(x, y), np.outer(1 - x, y)], axis=-1)
+    number = np.arange(weights[..., 0].size).reshape(len(x), len(y))
+    sides = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
+    quadrilaterals = np.stack(sides, axis=-1).reshape(-1, 4)
+    return _of_plates((weights @ at).reshape(-1, 3), np.zeros((0, 3)), quadrilaterals, shell)
+
+
+def _of_plates(points: Array, triangles: Array, quadrilaterals: Array, shell: Shell) -> Frame:
+    return Frame(
+        points,
+        np.zeros((0, 2), np.int64),
+        (),
+        np.zeros(0, np.int64),
+        triangles=triangles,
+        quadrilaterals=quadrilaterals,
+        shells=(shell,),
+        shell_of=np.zeros(len(triangles) + len(quadrilaterals), np.int64),
+    )
+
+
+def triangulated(frame: Frame) -> Frame:
+    """The frame with every quadrilateral cut into two triangles along its shorter diagonal."""
+    a, b, c, d = frame.points[frame.quadrilaterals].transpose(1, 0, 2)
+    other = np.linalg.norm(b - d, axis=1) < (1 - _SAME_PLACE) * np.linalg.norm(a - c, axis=1)
+    cuts = np.where(other[:, None, None], [[(0, 1, 3), (1, 2, 3)]], [[(0, 1, 2), (0, 2, 3)]])
+    halves = np.take_along_axis(frame.quadrilaterals[:, None], cuts.reshape(len(cuts), 2, 3), axis=2)
+    of_triangles, of_quadrilaterals = np.split(frame.shell_of, [len(frame.triangles)])
+    return replace(
+        frame,
+        triangles=np.vstack([frame.triangles, halves.reshape(-1, 3)]),
+        quadrilaterals=np.zeros((0, 4), np.int64),
+        shell_of=np.concatenate([of_triangles, np.repeat(of_quadrilaterals, 2)]),
+    )
+
+
 def joined(*frames: Frame) -> Frame:
-    """One frame of several: nodes at the same place become one, and members meet there rigidly."""
+    """One frame of several: nodes at the same place become one, and beams and plates meet there rigidly."""
     points = np.vstack([frame.points for frame in frames])
     first = np.cumsum([0, *(len(frame.points) for frame in frames)])
     kept, new = _merged(points)
     members = tuple(dict.fromkeys(member for frame in frames for member in frame.members))
+    shells = tuple(dict.fromkeys(shell for frame in frames for shell in frame.shells))
     groups: dict[str, Array] = {}
     for frame, start in zip(frames, first[:-1], strict=True):
         for name, nodes in frame.node_groups.items():
             groups[name] = np.union1d(groups.get(name, np.zeros(0, np.int64)), new[nodes + start])
-    renumbered = [np.array([members.index(m) for m in frame.members])[frame.member_of] for frame in frames]
+    starts = list(zip(frames, first[:-1], strict=True))
+    of_shells = [np.split(_renumbered(f.shells, shells, f.shell_of), [len(f.triangles)]) for f in frames]
     return Frame(
         points=points[kept],
-        elements=np.vstack([new[f.elements + start] for f, start in zip(frames, first[:-1], strict=True)]),
+        elements=np.vstack([new[f.elements + start] for f, start in starts]),
         members=members,
-        member_of=np.concatenate(renumbered),
+        member_of=np.concatenate([_renumbered(f.members, members, f.member_of) for f in frames]),
         node_groups=groups,
+        triangles=np.vstack([new[f.triangles + start] for f, start in starts]),
+        quadrilaterals=np.vstack([new[f.quadrilaterals + start] for f, start in starts]),
+        shells=shells,
+        shell_of=np.concatenate([*(own[0] for own in of_shells), *(own[1] for own in of_shells)]),
     )
+
+
+def _renumbered(own: Sequence[object], known: Sequence[object], index: Array) -> Array:
+    return np.array([known.index(one) for one in own], np.int64)[index]
 
 
 def _merged(points: Array) -> tuple[Array, Array]:
@@ -187,7 +280,9 @@ def orientations(frame: Frame) -> Array:
 
 def frame_hash(frame: Frame) -> str:
     """A short hash of nodes, elements and groups."""
-    parts = [frame.points, np.asarray(frame.elements, np.int64), np.asarray(frame.member_of, np.int64)]
+    parts = [frame.points, frame.elements, frame.member_of]
+    if frame.shell_of.size:
+        parts += [frame.triangles, frame.quadrilaterals, frame.shell_of]
     for name in sorted(frame.node_groups):
         parts += [np.frombuffer(name.encode(), np.uint8), np.asarray(frame.node_groups[name], np.int64)]
     return content_hash(*parts)
@@ -199,28 +294,42 @@ def frame_hash(frame: Frame) -> str:
 def check_frame(frame: Frame) -> None:
     """Raises InputError for a frame that no computation should start from.
 
-    Guarded: no elements, numbers of nodes and members that do not exist, nodes of no element, empty groups, elements that
-    are repeated, nodes at the same place and parts that nothing connects. The elements guard their own length and
-    orientation.
+    Guarded: no elements, numbers of nodes, members and shells that do not exist, nodes of no element, empty groups,
+    elements that are repeated, nodes at the same place and parts that nothing connects. The elements guard their own
+    shape and orientation.
     """
     _check_numbers(frame)
     _check_groups(frame)
-    _check_repeated(frame)
+    for nodes in (frame.elements, frame.triangles, frame.quadrilaterals):
+        _check_repeated(nodes)
     _check_coincident(frame)
     _check_connected(frame)
 
 
+def _pairs(frame: Frame) -> Array:
+    """(L, 2) nodes that an element connects, each with the first of it."""
+    of_plates = [
+        np.stack([np.broadcast_to(n[:, :1], n[:, 1:].shape), n[:, 1:]], -1).reshape(-1, 2) for n in _plates(frame)
+    ]
+    return np.vstack([frame.elements, *of_plates])
+
+
+def _plates(frame: Frame) -> tuple[Array, Array]:
+    return frame.triangles, frame.quadrilaterals
+
+
 def _check_numbers(frame: Frame) -> None:
     count = len(frame.points)
-    if not len(frame.elements):
-        raise InputError("the frame has no elements; build one with polyline(...)")
-    if frame.elements.min() < 0 or frame.elements.max() >= count:
-        raise InputError(
-            f"elements refer to nodes {frame.elements.min()} to {frame.elements.max()}, but there are {count} nodes"
-        )
+    used = np.concatenate([frame.elements.ravel(), *(nodes.ravel() for nodes in _plates(frame))])
+    if not used.size:
+        raise InputError("the frame has no elements; build one with polyline(...) or panel(...)")
+    if used.min() < 0 or used.max() >= count:
+        raise InputError(f"elements refer to nodes {used.min()} to {used.max()}, but there are {count} nodes")
     if not np.isin(frame.member_of, range(len(frame.members))).all():
         raise InputError(f"every element must have one of the {len(frame.members)} members of the frame")
-    unused = np.setdiff1d(np.arange(count), frame.elements)
+    if not np.isin(frame.shell_of, range(len(frame.shells))).all():
+        raise InputError(f"every plate must have one of the {len(frame.shells)} shells of the frame")
+    unused = np.setdiff1d(np.arange(count), used)
     if unused.size:
         raise InputError(f"{unused.size} nodes belong to no element, the first being node {unused[0]}; remove them")
 
@@ -231,17 +340,18 @@ def _check_groups(frame: Frame) -> None:
             raise InputError(f"node group {name!r} is empty or names nodes that the frame does not have")
 
 
-def _check_repeated(frame: Frame) -> None:
-    _, index, counts = np.unique(np.sort(frame.elements, axis=1), axis=0, return_index=True, return_counts=True)
+def _check_repeated(nodes: Array) -> None:
+    _, index, counts = np.unique(np.sort(nodes, axis=1), axis=0, return_index=True, return_counts=True)
     if (counts > 1).any():
         element = int(index[counts > 1].min())
         raise InputError(
             f"{np.sum(counts > 1)} elements are there more than once, the first being element {element} between nodes "
-            f"{frame.elements[element].tolist()}: remove the copies"
+            f"{nodes[element].tolist()}: remove the copies"
         )
 
 
 def _check_coincident(frame: Frame) -> None:
+    """The nodes of one beam element at the same place are left to the element, which says more."""
     pairs = cKDTree(frame.points).query_pairs(_SAME_PLACE * _size(frame.points), output_type="ndarray")
     linked = {tuple(pair) for pair in np.sort(frame.elements, axis=1).tolist()}
     apart = sorted(tuple(pair) for pair in pairs.tolist() if tuple(pair) not in linked)
@@ -254,8 +364,8 @@ def _check_coincident(frame: Frame) -> None:
 
 
 def _check_connected(frame: Frame) -> None:
-    count = len(frame.points)
-    graph = sp.coo_array((np.ones(len(frame.elements)), tuple(frame.elements.T)), shape=(count, count))
+    count, pairs = len(frame.points), _pairs(frame)
+    graph = sp.coo_array((np.ones(len(pairs)), tuple(pairs.T)), shape=(count, count))
     parts, labels = connected_components(graph, directed=False)
     if parts > 1:
         places = ", ".join(str(frame.points[np.argmax(labels == part)].tolist()) for part in range(min(parts, 5)))

@@ -65,6 +65,8 @@ class CoupledModel:
     places  : (Z, 3) where each coordinate is [m]; NaN for those of rigid interfaces, which are in many places
     names, kinds, positions (I, 3) [m] : of the I interfaces
     C       : (6I, Z) interface coordinates C z: three translations [m] and three rotations [rad] of each interface
+    inertial_loads : (Z, 12) loads of unit accelerations: translation, rotation, products of the angular velocity; None where
+              the model does not know them
     """
 
     points: Array
@@ -78,6 +80,7 @@ class CoupledModel:
     kinds: tuple[str, ...]
     positions: Array
     C: sp.csr_array
+    inertial_loads: Array | None = None
 
 
 def couple(mesh: Mesh, matrices: SolidMatrices, interfaces: Sequence[InterfaceRegion]) -> CoupledModel:

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from ffr_prep.basis import Basis, check_basis, factorised
 from ffr_prep.body import FlexibleBody, Interface, Surface, content_hash
 from ffr_prep.factor import supported
 from ffr_prep.interface import CoupledModel, InterfaceRegion, couple
 from ffr_prep.invariants import inertia_integrals
 from ffr_prep.mesh import Mesh, check_mesh, mesh_hash, surface_triangles
-from ffr_prep.reduction import Basis, Reduction, check_basis, factorised
+from ffr_prep.reduction import Reduction
 from ffr_prep.reference import ReferenceConditions, functionals
 from ffr_prep.solids import Materials, assemble
-from ffr_prep.stiffening import stiffening_matrices
+from ffr_prep.stiffening import inertial_loads, stiffening_matrices
 from ffr_prep.stress import AVERAGING, stressed_boundary
 
 Array = np.ndarray
@@ -83,6 +84,7 @@ def _reduced(
     matrices = assemble(mesh, material)
     tell("tie the interfaces")
     model = couple(mesh, matrices, interfaces)
+    model = replace(model, inertial_loads=model.B.T @ inertial_loads(mesh.points, matrices))
     L = functionals(reference, model)
     tell("factorise the stiffness")
     body = factorised(model)

@@ -1,10 +1,8 @@
-"""From a frame of structural elements to a reduced flexible body.
+"""From a frame of beams and plates to a reduced flexible body.
 
-An element family delivers, for its elements, the stiffness of their nodal coordinates and *mass points*: points inside
-the elements that integrate every product of two displacement fields exactly, with the undeformed position, the mass and
-the shape functions C S W C_bar there. Assembly is u = C S W C_bar B_1 q_n with the Boolean B_1. All inertia integrals
-are then sums over the mass points, as exact as the shape functions; the body that results is of the same kind as that
-of a meshed solid. Beams are such a family; plates and shells can join with the same three arrays.
+The families of elements (`ffr_prep.families`) deliver stiffness and mass points. Assembly is u = C S W C_bar B_1 q_n with
+the Boolean B_1, and all inertia integrals are sums over the mass points, as exact as the shape functions; the body that
+results is of the same kind as that of a meshed solid.
 
 Sources: A. A. Shabana, Dynamics of Multibody Systems (2013), sections 6.1-6.7.
 """
@@ -12,49 +10,41 @@ Sources: A. A. Shabana, Dynamics of Multibody Systems (2013), sections 6.1-6.7.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from importlib.metadata import version
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from threadpoolctl import threadpool_limits
 
-from ffr_prep.beam_stiffening import beam_stiffening, unit_accelerations
-from ffr_prep.beam_stress import SECTION_STRESS, stressed_sweep
-from ffr_prep.beams import Beams, beams, field, mass_points, stiffness, undeformed
-from ffr_prep.body import FlexibleBody
-from ffr_prep.errors import InputError
-from ffr_prep.factor import SupportedBody, supported
-from ffr_prep.frame import Frame, check_frame, ends, frame_hash, group_nodes, orientations
-from ffr_prep.interface import CoupledModel, InterfaceRegion, rigid_field
-from ffr_prep.invariants import inertia_integrals
-from ffr_prep.reduce import described, interface_shapes
-from ffr_prep.reduction import Basis, Reduction, check_basis, factorised
-from ffr_prep.reference import ReferenceConditions, functionals
-from ffr_prep.sweep import swept_surface
+from ffr_prep.beam_stiffening import unit_accelerations
+from ffr_prep.body import FlexibleBody, Surface
+from ffr_prep.families import Family, families
+from ffr_prep.frame import Frame, check_frame, frame_hash
+from ffr_prep.interface import CoupledModel, InterfaceRegion
+from ffr_prep.invariants import InertiaIntegrals, inertia_integrals
+from ffr_prep.model import Model, merged, reduce_model, summed
+from ffr_prep.reduce import described
+from ffr_prep.reduction import Reduction
+from ffr_prep.reference import ReferenceConditions
+from ffr_prep.structural_interface import couple_frame, tie
 
 Array = np.ndarray
 
-_VERSIONED = ("ffr", "numpy", "scipy")
+_CHUNK = 512
 
 
 @dataclass(frozen=True)
 class StructuralMatrices:
     """The assembled model in the nodal coordinates q_n (6N,): three translations and three rotations of every node.
 
-    B_1       : (12E, 6N) Boolean connectivity, the coordinates of each element among those of all nodes
-    K         : (6N, 6N) stiffness
-    positions : (P, 3) mass points of the undeformed body [m]
-    mass      : (P,) their masses [kg]
-    N         : (3P, 6N) displacement of the mass points, u = N q_n
+    K, M  : (6N, 6N) stiffness and consistent mass
+    loads : (6N, 12) loads of unit accelerations: translation, rotation, products of the angular velocity
     """
 
-    B_1: sp.csr_array
     K: sp.csr_array
-    positions: Array
-    mass: Array
-    N: sp.csr_array
+    M: sp.csr_array
+    loads: Array
 
 
 def reduce_frame(
@@ -69,236 +59,146 @@ def reduce_frame(
     progress: Callable[[str], None] | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> FlexibleBody:
-    """The reduced flexible body of a frame of beams, in the coordinates of its nodes.
+    """The reduced flexible body of a frame of beams and plates, in the coordinates of its nodes.
 
-    interfaces : rigid ones at groups of nodes: one node gives its six coordinates, several follow the interface rigidly
+    interfaces : at groups of nodes. Rigid ones: one node gives its six coordinates, several follow the interface. Mean
+                 ones leave their nodes free and move with them in the mean
     stiffening : also compute the geometric stiffness by load, which a simulation then uses
-    stress     : also keep section forces and the stress at the outlines of the sections per elastic coordinate
+    stress     : also keep section forces of beams and the stress on outlines and faces per elastic coordinate
     progress   : called with the name of each stage as it begins
     provenance : JSON values kept with the body, beside what is recorded anyway
 
     Raises InputError for input that cannot be used and ComputationError for a computation that failed.
     """
     with threadpool_limits(1):  # as for solids: small dense blocks, and reproducible
-        return _reduced(
-            frame, name, interfaces, reference, reduction, stiffening, stress, progress or _silent, provenance or {}
+        return reduce_model(
+            frame_model(frame, interfaces, progress),
+            name=name,
+            reference=reference,
+            reduction=reduction,
+            stiffening=stiffening,
+            stress=stress,
+            progress=progress,
+            provenance=provenance,
         )
 
 
-def _reduced(
-    frame: Frame,
-    name: str,
-    interfaces: Sequence[InterfaceRegion],
-    reference: ReferenceConditions,
-    reduction: Reduction,
-    stiffening: bool,
-    stress: bool,
-    tell: Callable[[str], None],
-    provenance: Mapping[str, Any],
-) -> FlexibleBody:
+def frame_model(
+    frame: Frame, interfaces: Sequence[InterfaceRegion], progress: Callable[[str], None] | None = None
+) -> Model:
+    """The frame, ready to be reduced or to be tied to other models. Errors and arguments as in `reduce_frame`."""
+    tell = progress or _silent
     tell("check the frame")
     check_frame(frame)
     tell("assemble stiffness and mass")
-    elements = beam_elements(frame)
-    matrices = assemble_frame(frame, elements)
+    parts = families(frame)
+    matrices = assemble_frame(frame, parts)
     tell("tie the interfaces")
     ties = tie(frame, interfaces)
-    model = couple_frame(frame, matrices, interfaces, ties)
-    L = functionals(reference, model)
-    tell("factorise the stiffness")
-    body = factorised(model)
-    tell("reduce")
-    basis = reduction.basis(model, body, L)
-    check_basis(model, L, basis)
-    tell("integrate the inertia")
-    q_n = ties @ basis.Z
-    Phi = (matrices.N @ q_n).reshape(-1, 3, basis.omega2.size)
-    nodal = (matrices.B_1 @ q_n).reshape(-1, 12, basis.omega2.size)
-    return FlexibleBody(
-        name=name,
-        omega2=basis.omega2,
-        interfaces=interface_shapes(model, basis),
-        surface=(stressed_sweep if stress else swept_surface)(frame, elements, nodal),
-        stiffening=_stiffening(elements, matrices, ties, model, supported(body, L), basis) if stiffening else None,
-        provenance=record(frame, interfaces, reference, reduction, model)
-        | ({"stress": SECTION_STRESS} if stress else {})
-        | dict(provenance),
-        **vars(inertia_integrals(matrices.positions, sp.diags_array(matrices.mass), Phi)),
+    coupled = replace(
+        couple_frame(frame, matrices.K, matrices.M, interfaces, ties), inertial_loads=ties.T @ matrices.loads
+    )
+
+    def nodal(part: Family, z: Array) -> Array:
+        return element_values(part, ties @ z)
+
+    def stiffening(static: Array, basis: Array) -> Array:
+        return np.sum([part.stiffening(nodal(part, static), nodal(part, basis)) for part in parts], axis=0)
+
+    def surface(basis: Array) -> Surface:
+        return merged([part.surface(nodal(part, basis)) for part in parts])
+
+    def stressed(basis: Array) -> Surface:
+        return merged([part.stressed(nodal(part, basis)) for part in parts])
+
+    return Model(
+        coupled=coupled,
+        inertia=lambda basis: summed([inertia(part, nodal(part, basis)) for part in parts]),
+        surface=surface,
+        stressed=stressed,
+        stiffening=stiffening,
+        recovery="; ".join(dict.fromkeys(part.recovery for part in parts)),
+        record=_record(frame, interfaces, coupled, parts),
     )
 
 
 # ---- assembly -----------------------------------------------------------------------------------------------------
 
 
-def beam_elements(frame: Frame) -> Beams:
-    """The beam elements of the frame; InputError for one without length or a needed orientation."""
-    members = [frame.members[k] for k in frame.member_of]
-    return beams(ends(frame), [m.section for m in members], [m.material for m in members], orientations(frame))
+def assemble_frame(frame: Frame, parts: Sequence[Family]) -> StructuralMatrices:
+    """Stiffness, mass and inertial loads in the coordinates of all nodes."""
+    size = 6 * len(frame.points)
+    K, M, loads = sp.csr_array((size, size)), sp.csr_array((size, size)), np.zeros((size, 12))
+    for part in parts:
+        B_1 = connectivity(part.nodes, len(frame.points))
+        K = K + B_1.T @ _blocks(part.stiffness) @ B_1
+        M = M + B_1.T @ _blocks(element_mass(part)) @ B_1
+        loads -= B_1.T @ _element_loads(part).reshape(-1, 12)
+    return StructuralMatrices(sp.csr_array((K + K.T) / 2), sp.csr_array((M + M.T) / 2), loads)
 
 
-def assemble_frame(frame: Frame, elements: Beams) -> StructuralMatrices:
-    """Stiffness, mass points and their displacements in the coordinates of all nodes."""
-    B_1 = connectivity(frame)
-    xi, across, mass = mass_points(elements)
-    K = sp.block_diag([sp.coo_array(k) for k in stiffness(elements)], format="csr")
-    C_S_W_C_bar = field(elements, xi, across).reshape(len(elements.length), -1, 12)
-    return StructuralMatrices(
-        B_1=B_1,
-        K=sp.csr_array(B_1.T @ K @ B_1),
-        positions=undeformed(elements, xi, across).reshape(-1, 3),
-        mass=mass.ravel(),
-        N=sp.csr_array(sp.block_diag([sp.coo_array(w) for w in C_S_W_C_bar], format="csr") @ B_1),
-    )
+def connectivity(nodes: Array, count: int) -> sp.csr_array:
+    """B_1 (6kE, 6N) Boolean: the coordinates of elements with the nodes (E, k) among those of all `count` nodes."""
+    columns = (6 * nodes[:, :, None] + np.arange(6)).ravel()
+    return sp.csr_array((np.ones(columns.size), columns, np.arange(columns.size + 1)), shape=(columns.size, 6 * count))
 
 
-def connectivity(frame: Frame) -> sp.csr_array:
-    """B_1 (12E, 6N)."""
-    columns = (6 * frame.elements[:, :, None] + np.arange(6)).ravel()
-    rows = np.arange(columns.size)
-    return sp.csr_array((np.ones(columns.size), (rows, columns)), shape=(columns.size, 6 * len(frame.points)))
+def element_values(part: Family, q_n: Array) -> Array:
+    """(E, 6k, n) the coordinates of each element, B_1 q_n, of the nodal coordinates (6N, n)."""
+    by_node = q_n.reshape(-1, 6, q_n.shape[1])
+    return by_node[part.nodes].reshape(len(part.nodes), -1, q_n.shape[1])
 
 
-def inertial_loads(matrices: StructuralMatrices) -> Array:
-    """(6N, 12) nodal loads of unit accelerations: translation, rotation, products of the angular velocity."""
-    forces = matrices.mass[:, None] * unit_accelerations(matrices.positions)
-    return -(matrices.N.T @ forces.reshape(len(forces), -1).T)
+def element_mass(part: Family) -> Array:
+    """(E, 6k, 6k) consistent mass."""
+    count, points, _, n = part.field.shape
+    weighted = part.field * np.sqrt(part.mass)[..., None, None]
+    flat = weighted.reshape(count, 3 * points, n)
+    return flat.transpose(0, 2, 1) @ flat
 
 
-def _stiffening(
-    elements: Beams,
-    matrices: StructuralMatrices,
-    ties: sp.csr_array,
-    model: CoupledModel,
-    held: SupportedBody,
-    basis: Basis,
-) -> Array:
-    inertial = ties.T @ inertial_loads(matrices)
-    return beam_stiffening(elements, matrices.B_1, ties, model, held, inertial, basis.Z)
+def _element_loads(part: Family) -> Array:
+    """(E, 6k, 12) integrals of shape functions times unit accelerations over the mass."""
+    count, points, _, n = part.field.shape
+    accelerations = unit_accelerations(part.positions.reshape(-1, 3)).reshape(12, count, points, 3)
+    forces = (part.mass[..., None] * accelerations).reshape(12, count, 3 * points).transpose(1, 2, 0)
+    return part.field.reshape(count, 3 * points, n).transpose(0, 2, 1) @ forces
 
 
-# ---- interfaces ---------------------------------------------------------------------------------------------------
+def _blocks(matrices: Array) -> sp.csr_array:
+    """The block-diagonal matrix of (E, n, n)."""
+    count, n, _ = matrices.shape
+    blocks = sp.bsr_array((matrices, np.arange(count), np.arange(count + 1)), shape=(count * n, count * n))
+    return sp.csr_array(blocks)
 
 
-def couple_frame(
-    frame: Frame, matrices: StructuralMatrices, interfaces: Sequence[InterfaceRegion], ties: sp.csr_array
-) -> CoupledModel:
-    """The model in the independent coordinates z: those of the free nodes, then six for each interface."""
-    positions = _interface_points(frame, interfaces)
-    free = _free_nodes(frame, interfaces)
-    centre = frame.points.mean(axis=0)
-    displacements = matrices.N @ ties
-    Z = ties.shape[1]
-    translations = (6 * np.arange(len(frame.points))[:, None] + np.arange(3)).ravel()
-    return CoupledModel(
-        points=frame.points,
-        B=sp.csr_array(ties[translations]),
-        K=sp.csr_array(ties.T @ matrices.K @ ties),
-        M=sp.csr_array(displacements.T @ sp.diags_array(np.repeat(matrices.mass, 3)) @ displacements),
-        T=_rigid_coordinates(np.vstack([frame.points[free], positions]) - centre).reshape(-1, 6),
-        centre=centre,
-        places=np.repeat(np.vstack([frame.points[free], _places(frame, interfaces, positions)]), 6, axis=0),
-        names=tuple(interface.name for interface in interfaces),
-        kinds=tuple("node" if len(_nodes(frame, i)) == 1 else "rigid" for i in interfaces),
-        positions=positions,
-        C=sp.csr_array(sp.eye_array(6 * len(interfaces), Z, k=Z - 6 * len(interfaces), format="csr")),
-    )
+def inertia(part: Family, nodal: Array) -> InertiaIntegrals:
+    """The inertia integrals of a family for the element coordinates (E, 6k, n) per elastic coordinate."""
+    return summed([_inertia(part, nodal, slice(k, k + _CHUNK)) for k in range(0, len(nodal), _CHUNK)])
 
 
-def tie(frame: Frame, interfaces: Sequence[InterfaceRegion]) -> sp.csr_array:
-    """(6N, Z) coordinates of all nodes from the independent ones, q_n = tie z.
-
-    Raises InputError for repeated names, a kind other than "rigid", an unknown group, or interfaces that share nodes.
-    """
-    _check_interfaces(frame, interfaces)
-    positions = _interface_points(frame, interfaces)
-    free = (6 * _free_nodes(frame, interfaces)[:, None] + np.arange(6)).ravel()
-    rows, columns, values = [free], [np.arange(free.size)], [np.ones(free.size)]
-    for k, interface in enumerate(interfaces):
-        nodes = _nodes(frame, interface)
-        following = _rigid_coordinates(frame.points[nodes] - positions[k])
-        own_rows = 6 * nodes[:, None, None] + np.arange(6)[:, None]
-        own_columns = free.size + 6 * k + np.arange(6)
-        rows.append(np.broadcast_to(own_rows, following.shape).ravel())
-        columns.append(np.broadcast_to(own_columns, following.shape).ravel())
-        values.append(following.ravel())
-    shape = (6 * len(frame.points), free.size + 6 * len(interfaces))
-    triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    return sp.csr_array(sp.coo_array(triplets, shape=shape))
-
-
-def _rigid_coordinates(offsets: Array) -> Array:
-    """(..., 3) -> (..., 6, 6): the six coordinates of a node by three translations and three rotations."""
-    turning = np.broadcast_to(np.hstack([np.zeros((3, 3)), np.eye(3)]), (*offsets.shape, 6))
-    return np.concatenate([rigid_field(offsets), turning], axis=-2)
-
-
-def _nodes(frame: Frame, interface: InterfaceRegion) -> Array:
-    return group_nodes(frame, interface.region or interface.name)
-
-
-def _free_nodes(frame: Frame, interfaces: Sequence[InterfaceRegion]) -> Array:
-    """The nodes that follow no interface."""
-    taken = [_nodes(frame, interface) for interface in interfaces]
-    return np.setdiff1d(np.arange(len(frame.points)), np.concatenate([np.zeros(0, np.int64), *taken]))
-
-
-def _interface_points(frame: Frame, interfaces: Sequence[InterfaceRegion]) -> Array:
-    """(I, 3) the given point, or the mean of the nodes [m]."""
-    given = [frame.points[_nodes(frame, i)].mean(axis=0) if i.point is None else i.point for i in interfaces]
-    return np.array(given, float).reshape(-1, 3)
-
-
-def _places(frame: Frame, interfaces: Sequence[InterfaceRegion], positions: Array) -> Array:
-    """(I, 3) where each interface is; NaN for those that hold several nodes."""
-    single = [len(_nodes(frame, interface)) == 1 for interface in interfaces]
-    return np.where(np.array(single, bool).reshape(-1, 1), positions, np.nan)
-
-
-def _check_interfaces(frame: Frame, interfaces: Sequence[InterfaceRegion]) -> None:
-    names = [interface.name for interface in interfaces]
-    repeated = sorted({name for name in names if names.count(name) > 1})
-    if repeated:
-        raise InputError(f"interface name {repeated[0]!r} is given more than once: every interface needs its own name")
-    owner: dict[int, str] = {}
-    for interface in interfaces:
-        if interface.kind != "rigid":
-            raise InputError(
-                f"interface {interface.name!r}: kind is {interface.kind!r}; the nodes of a frame are tied rigidly, so "
-                "leave the kind out"
-            )
-        for node in _nodes(frame, interface).tolist():
-            if node in owner:
-                raise InputError(
-                    f"interfaces {owner[node]!r} and {interface.name!r} share node {node}: a node cannot follow two of "
-                    "them; separate the groups or merge the interfaces"
-                )
-            owner[node] = interface.name
+def _inertia(part: Family, nodal: Array, own: slice) -> InertiaIntegrals:
+    Phi = part.field[own] @ nodal[own, None]
+    mass = sp.diags_array(part.mass[own].ravel())
+    return inertia_integrals(part.positions[own].reshape(-1, 3), mass, Phi.reshape(-1, 3, nodal.shape[2]))
 
 
 # ---- what is known about the body ---------------------------------------------------------------------------------
 
 
-def record(
-    frame: Frame,
-    interfaces: Sequence[InterfaceRegion],
-    reference: ReferenceConditions,
-    reduction: Reduction,
-    model: CoupledModel,
+def _record(
+    frame: Frame, interfaces: Sequence[InterfaceRegion], coupled: CoupledModel, parts: Sequence[Family]
 ) -> dict[str, Any]:
-    """Provenance as JSON values: frame, settings, versions. No time and no path, so it is reproducible."""
     return {
         "frame": {
             "hash": frame_hash(frame),
             "nodes": len(frame.points),
-            "elements": {"beam": len(frame.elements)},
-            "degrees_of_freedom": model.K.shape[0],
+            "elements": {part.name: len(part.nodes) for part in parts},
+            "degrees_of_freedom": coupled.K.shape[0],
         },
         "members": [_strict(described(member)) for member in frame.members],
+        "shells": [described(shell) for shell in frame.shells],
         "interfaces": [described(interface) for interface in interfaces],
-        "reference": described(reference),
-        "reduction": described(reduction),
-        "versions": {package: version(package) for package in _VERSIONED},
-        "warnings": [],
     }
 
 

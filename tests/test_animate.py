@@ -308,9 +308,9 @@ def test_bodies_are_pictured_at_the_pose_and_with_the_deformation_of_the_formula
 
     monkeypatch.setattr(render, "_caption", lambda *_: lambda _: None)
     monkeypatch.setattr(render.pv.Plotter, "add_axes", lambda *_, **__: None)
-    shown = film(rotating_box(amplitude=amplitude), 9)
+    shown = film(rotating_box(amplitude=amplitude), 9, colour="body")
     camera = camera_for(shown)
-    seen = outlines(render.pictures(shown, camera, (240, 160), coloured=False))
+    seen = outlines(render.pictures(shown, camera, (240, 160)))
     _, right, up = camera.axes()
     points = [drawn_points(shown.solids[0], k, 1.0) for k in range(9)]
     across, down = (np.array([[(p @ a).min(), (p @ a).max()] for p in points]) for a in (right, -up))

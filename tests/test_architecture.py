@@ -29,6 +29,7 @@ MESHERS_AND_PLOTTERS = {
     "matplotlib",
     "meshio",
     "plotly",
+    "pyNastran",
     "pyvista",
     "skfem",
     "vtk",
@@ -221,7 +222,7 @@ def distribution_name(requirement: str) -> str:
 
 def declared() -> set[str]:
     project = PROJECT["project"]
-    optional = project["optional-dependencies"]["video"]
+    optional = [requirement for extra in ("video", "nastran") for requirement in project["optional-dependencies"][extra]]
     return {distribution_name(requirement) for requirement in [*project["dependencies"], *optional]}
 
 
@@ -232,7 +233,8 @@ def third_party() -> set[str]:
 
 
 def test_every_library_is_declared_and_every_declared_one_is_used():
-    owners = importlib.metadata.packages_distributions() | {"imageio_ffmpeg": ["imageio-ffmpeg"]}
+    extras = {"imageio_ffmpeg": ["imageio-ffmpeg"], "pyNastran": ["pyNastran"]}
+    owners = importlib.metadata.packages_distributions() | extras
     needed = {distribution_name(owners[name][0]) for name in third_party()}
     assert needed == declared()
 
