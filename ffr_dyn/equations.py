@@ -439,7 +439,7 @@ def new_work(m: Model) -> Work:
     )
     vectors = zeros(omega=(M, 3), r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3), load=(M, 6))
     rows = RowWork(
-        **zeros(Phi=C, nu=C, gamma=C, lam=C, step=C, jac=(C, D, 9), rr=(C, D, 6), ww=(C, D, 6)),
+        **zeros(Phi=C, nu=C, gamma=C, lam=C, step=C, scale=C, jac=(C, D, 9), rr=(C, D, 6), ww=(C, D, 6)),
         **zeros(P=(M, 6, 6), phiphi=(pairs, 6, 6), S=stored),
     )
     return Work(
@@ -447,7 +447,7 @@ def new_work(m: Model) -> Work:
         markers=MarkerWork(A=_identities(M), **vectors),
         rows=rows,
         info=np.zeros(4, dtype=np.int64),
-        independence=np.array([1.0, 1.0, 0.0, 0.0]),
+        independence=np.ones(3),
         **zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=2),
     )
 

@@ -16,7 +16,7 @@ import numpy as np
 from ffr_dyn.drivers import PointDriver
 from ffr_dyn.errors import InputError
 from ffr_dyn.forces import SpringDamper
-from ffr_dyn.joints import Joint, frames
+from ffr_dyn.joints import Joint
 from ffr_dyn.rotation import rotation_matrix
 from ffr_dyn.scene import Body, Scene, marker_names, markers
 from ffr_prep.body import FlexibleBody, axial, truncated
@@ -29,22 +29,21 @@ _ZERO = 1e-9
 _KNOWN = {"bodies", "joints", "drivers", "couplings", "loads", "springs", "ground", "gravity", "name", "plane"}
 
 
-def flattened(scene: Scene) -> Scene:
-    """The scene with its plane decided: `plane` is "x", "y", "z" with in-plane modes only, or "none".
+def planar_forms(scene: Scene) -> Iterator[Scene]:
+    """The scene with in-plane modes only, for every plane that its declarations allow; `plane` is the normal.
 
-    Raises InputError for a scene that is declared planar and has something across the plane.
+    Whether the joints too keep to the plane is for their rows to tell. Raises InputError for a scene that is declared
+    planar and has something across the plane.
     """
-    if scene.plane == "none":
-        return scene
     if scene.plane in AXES:
         normal = AXES.index(scene.plane)
         for obstacle in _across(scene, normal):
             raise InputError(f"the scene is declared planar with the normal {scene.plane}, but {obstacle}")
-        return _in_plane(scene, normal, strict=False)
-    for normal in range(3):
-        if not any(True for _ in _obstacles(scene, normal)):
-            return _in_plane(scene, normal, strict=True)
-    return replace(scene, plane="none")
+        yield _in_plane(scene, normal, strict=False)
+    if scene.plane == "auto":
+        for normal in range(3):
+            if not any(True for _ in _obstacles(scene, normal)):
+                yield _in_plane(scene, normal, strict=True)
 
 
 def body_normal(body: Body, normal: int) -> int:
@@ -100,10 +99,6 @@ def _obstacles(scene: Scene, normal: int) -> Iterator[str]:
         k = body_normal(body, normal)
         if not _symmetric(body.model, k, _used(scene, body)):
             yield f"body {body.name!r} is not symmetric"
-    for joint in scene.joints:
-        for end, frame in zip((joint.i, joint.j), frames(joint), strict=True):
-            if not _aligned(frame, _normal_of(scene, end, normal)):
-                yield f"joint {joint.name!r} has axes aslant"
     for load in scene.loads:
         k = normal if load.axes == "global" else _normal_of(scene, load.marker, normal)
         if load.function is not None or not _vanishes(load.force[k]) or not _none_but(load.moment, k):
@@ -147,12 +142,6 @@ def _normal_of(scene: Scene, marker: str, normal: int) -> int:
     """The axis of the marker's body along the normal."""
     body = marker.partition(".")[0]
     return next((body_normal(b, normal) for b in scene.bodies if b.name == body), normal)
-
-
-def _aligned(frame: Array, k: int) -> bool:
-    """Whether every axis of a joint frame is in the plane across axis k or along it."""
-    along = np.abs(frame[k])
-    return bool(((along < _ZERO) | (along > 1 - _ZERO)).all())
 
 
 def _used(scene: Scene, body: Body) -> list[str]:

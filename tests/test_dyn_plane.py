@@ -7,14 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ffr_dyn.analyses.assemble import assemble
+from ffr_dyn.analyses.assemble import assemble, flattened
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.drivers import Driver
 from ffr_dyn.errors import InputError
 from ffr_dyn.forces import Load, SpringDamper
 from ffr_dyn.integrators import RK4, ROS2
 from ffr_dyn.joints import Joint, frames
-from ffr_dyn.plane import flattened
 from ffr_dyn.rotation import euler_parameters, rotation_matrix
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.timefunction import harmonic, polynomial
@@ -140,16 +139,16 @@ SPATIAL = {
 
 @pytest.mark.parametrize("make", SPATIAL.values(), ids=list(SPATIAL))
 def test_what_reaches_across_the_plane_is_computed_in_space(make):
-    assert flattened(make()).plane == "none"
+    assert flattened(make(), 0.0)[0].plane == "none"
 
 
 def test_a_declared_plane_leaves_out_what_is_across_and_refuses_what_cannot_be():
-    assert flattened(heavy_below(plane="z")).plane == "z"
+    assert flattened(heavy_below(plane="z"), 0.0)[0].plane == "z"
     with pytest.raises(InputError, match="gravity has the component 1"):
-        flattened(slider_crank(gravity=(0, -9.81, 1.0), plane="z"))
+        flattened(slider_crank(gravity=(0, -9.81, 1.0), plane="z"), 0.0)
     scene = slider_crank(plane="z")
     leaning = [replace(body, rotation=(0.1, 0, 0)) if body.name == "rod" else body for body in scene.bodies]
     with pytest.raises(InputError, match=r"no axis of body 'rod' is along it"):
-        flattened(replace(scene, bodies=tuple(leaning)))
+        flattened(replace(scene, bodies=tuple(leaning)), 0.0)
     with pytest.raises(InputError, match="plane is 'w'"):
         slider_crank(plane="w")

@@ -13,8 +13,12 @@ FLOOR = 1e-13
 
 
 @kernel
-def eliminate_side(first, last, side, flexible, normal, P, L, all_jac, all_rr, all_ww):
-    """Rows first ... last of one side: rr = rigid part after elimination of the elastic coordinates, ww = L^-1 rr."""
+def eliminate_side(first, last, side, flexible, normal, P, L, mass, turning, all_jac, all_rr, all_ww, scale):
+    """Rows first ... last of one side: rr = rigid part after elimination of the elastic coordinates, ww = L^-1 rr.
+
+    scale : gathers what the row's own part of the multiplier matrix is at least, by the mass or the trace of the inertia
+            `turning` of the body
+    """
     for row in range(first, last):
         jac, rr, ww = all_jac[row, side], all_rr[row, side], all_ww[row, side]
         for c in range(6):
@@ -23,6 +27,11 @@ def eliminate_side(first, last, side, flexible, normal, P, L, all_jac, all_rr, a
                 rr[c] -= six(P, c, jac)
             ww[c] = rr[c]
         rigid_lower(L, ww, normal)
+        point = jac[0] * jac[0] + jac[1] * jac[1] + jac[2] * jac[2]
+        if point > 0.0:
+            scale[row] += point / mass
+        else:
+            scale[row] += (jac[3] * jac[3] + jac[4] * jac[4] + jac[5] * jac[5]) / turning
 
 
 @kernel
@@ -62,10 +71,11 @@ def block(S, offset, rows, columns):
 
 
 @inlined
-def factorise_blocks(starts, pattern, S, relaxation, diagonals, independence):
+def factorise_blocks(starts, pattern, S, relaxation, scale, independence):
     """Factorise in place (right-looking block Cholesky). Returns the row without a pivot, or -1.
 
-    diagonals (C,) : scratch;  independence (1,) : the least share of a row that the rows before it do not contain
+    scale (C,)        : what the entry of a row on the diagonal is at least
+    independence (1,) : the least share of a row that the rows before it do not contain
     """
     independence[0] = 1.0
     for k in range(starts.size - 1):
@@ -73,11 +83,10 @@ def factorise_blocks(starts, pattern, S, relaxation, diagonals, independence):
         diagonal = block(S, pattern.diagonal[k], size, size)
         for row in range(size):
             diagonal[row, row] *= 1.0 + relaxation
-            diagonals[starts[k] + row] = diagonal[row, row]
     for k in range(starts.size - 1):
         size = starts[k + 1] - starts[k]
         diagonal = block(S, pattern.diagonal[k], size, size)
-        failed = pivots(diagonal, size, diagonals[starts[k] : starts[k + 1]], independence)
+        failed = pivots(diagonal, size, scale[starts[k] : starts[k + 1]], independence)
         if failed >= 0:
             return starts[k] + failed
         eliminate_block(starts, pattern, S, k, size, diagonal)
@@ -85,17 +94,17 @@ def factorise_blocks(starts, pattern, S, relaxation, diagonals, independence):
 
 
 @kernel
-def pivots(matrix, size, diagonals, independence):
-    """In-place lower Cholesky factor with reciprocal diagonal, pivots at least FLOOR of the original diagonal."""
+def pivots(matrix, size, scale, independence):
+    """In-place lower Cholesky factor with reciprocal diagonal, pivots at least FLOOR of `scale`."""
     for j in range(size):
         pivot = matrix[j, j]
         for k in range(j):
             pivot -= matrix[j, k] * matrix[j, k]
-        share = pivot / diagonals[j]
-        if not diagonals[j] > 0.0 or share != share:
+        share = pivot / scale[j]
+        if not scale[j] > 0.0 or share != share:
             return j
         independence[0] = min(independence[0], share)
-        inverse = 1.0 / (max(share, FLOOR) * diagonals[j]) ** 0.5
+        inverse = 1.0 / (max(share, FLOOR) * scale[j]) ** 0.5
         matrix[j, j] = inverse
         for i in range(j + 1, size):
             value = matrix[i, j]

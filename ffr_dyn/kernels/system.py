@@ -48,8 +48,10 @@ def evaluate_bodies(gravity, bodies, w, x, v):
 
 
 @inlined
-def couple_joints(where, markers, rows, pattern, bw, rw):
+def couple_joints(bodies, markers, rows, pattern, bw, rw):
     """Rigid parts of all rows after elimination of the elastic coordinates, and the multiplier matrix."""
+    where = bodies.where
+    fill(rw.scale, 0.0)
     ground = where.shape[0] - 1
     for k in markers.joint:
         b = markers.body[k]
@@ -63,7 +65,22 @@ def couple_joints(where, markers, rows, pattern, bw, rw):
             if b != ground:
                 first, last = rows.start[k], rows.start[k + 1]
                 flexible, normal = where[b, 0] > 0, where[b, 7]
-                eliminate_side(first, last, side, flexible, normal, rw.P[marker], bw.L[b], rw.jac, rw.rr, rw.ww)
+                mass, turning = bodies.mass[b], bw.J[b, 0, 0] + bw.J[b, 1, 1] + bw.J[b, 2, 2]
+                eliminate_side(
+                    first,
+                    last,
+                    side,
+                    flexible,
+                    normal,
+                    rw.P[marker],
+                    bw.L[b],
+                    mass,
+                    turning,
+                    rw.jac,
+                    rw.rr,
+                    rw.ww,
+                    rw.scale,
+                )
     fill(rw.S, 0.0)
     for p in range(pattern.pair_body.size):
         flexible = where[pattern.pair_body[p], 0] > 0
@@ -71,7 +88,7 @@ def couple_joints(where, markers, rows, pattern, bw, rw):
 
 
 # Near a singular position the rows become dependent, and a violation eta of the constraints throws the motion from its
-# branch when it comes closer than about eta^(1/3). So on the approach (`nearness` below NEAR) the violation is held far
+# branch when it comes closer than about eta^(1/3). So on the approach (`independence` below NEAR) the violation is held far
 # lower, and at the position itself (below AT) it is left alone: along the direction that is about to be free a correction
 # would be the violation divided by the distance.
 NEAR, AT = 1e-2, 1e-6
@@ -96,24 +113,14 @@ def evaluate(m, w, t, x, v):
     apply_loads(bodies.where, markers, m.loads, mw, w.functions, w.user, bw.f)
     for k in range(rows.marker.shape[0]):
         evaluate_block(rows, w.functions, mw, rw, k)
-    couple_joints(bodies.where, markers, rows, m.pattern, bw, rw)
-    failed = factorise_blocks(rows.start, m.pattern, rw.S, m.relaxation, rw.step, w.independence)
+    couple_joints(bodies, markers, rows, m.pattern, bw, rw)
+    failed = factorise_blocks(rows.start, m.pattern, rw.S, m.relaxation, rw.scale, w.independence)
     if failed >= 0:
         w.info[0] = failed
         return SINGULAR_CONSTRAINT
-    w.independence[3] = max(w.independence[3], w.independence[0])
-    if nearness(w) < w.independence[1]:
-        w.independence[1], w.independence[2] = nearness(w), t
+    if w.independence[0] < w.independence[1]:
+        w.independence[1], w.independence[2] = w.independence[0], t
     return OK
-
-
-@kernel
-def nearness(w):
-    """Share of a row that others do not contain, over the largest met: small near a singular position.
-
-    The share alone is small for light bodies at any position, since it is measured by the mass matrix.
-    """
-    return w.independence[0] / w.independence[3]
 
 
 @kernel
@@ -309,10 +316,10 @@ def evaluate_on_constraints(m, w, t, x, v, tolerance):
         position, velocity = largest(w.rows.Phi), largest(w.rows.nu)
         if attempt == 0:
             w.drift[0], w.drift[1] = max(w.drift[0], position), max(w.drift[1], velocity)
-        allowed = tolerance * (TIGHTER if nearness(w) < NEAR else 1.0)
+        allowed = tolerance * (TIGHTER if w.independence[0] < NEAR else 1.0)
         if tolerance == 0.0 or attempt == 4 or (position <= allowed and velocity <= 100.0 * allowed):
             break
-        if nearness(w) < AT:
+        if w.independence[0] < AT:
             break
         w.info[2] += 1
         move_back(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, w.vd, x, v)
