@@ -33,7 +33,7 @@ from ffr_dyn.kernels.tables import (
 from ffr_dyn.layout import Layout, layout
 from ffr_dyn.scene import Body, Scene, joint_of, joints_of, marker_number, markers
 from ffr_dyn.state import StateView
-from ffr_dyn.timefunction import USER, TimeFunction, as_time_function
+from ffr_dyn.timefunction import OPERATION, USER, TimeFunction, as_time_function
 from ffr_prep.body import FlexibleBody, axial
 
 Array = np.ndarray
@@ -301,6 +301,9 @@ class FunctionTable:
         if function.callback is not None:
             slot = self.callback(function.callback, 3, what, with_state=False)
             function = TimeFunction(USER, (float(slot),))
+        elif function.kind == OPERATION:
+            rows = [float(self.add(operand, what)) for operand in function.operands]
+            function = TimeFunction(OPERATION, (*function.data, rows[0], rows[-1]))
         self.functions.append(function)
         return len(self.functions) - 1
 

@@ -34,12 +34,14 @@ _DEPENDENT = 1e-7  # the same among the additions, whose products square it
 class Basis:
     """Z (z, n) [1/sqrt(kg)], mass-orthonormal with diagonal stiffness; omega2 (n,) [rad^2/s^2], ascending.
 
-    dropped : number of proposed vectors that depended on the others
+    dropped  : number of proposed vectors that depended on the others
+    warnings : what makes the basis doubtful, in words
     """
 
     Z: Array
     omega2: Array
     dropped: int = 0
+    warnings: tuple[str, ...] = ()
 
 
 def factorised(model: CoupledModel) -> FreeBody:

@@ -15,6 +15,7 @@ from itertools import combinations
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.beam_stiffening import unit_accelerations
 from ffr_prep.errors import InputError
 from ffr_prep.interface import CoupledModel, InterfaceRegion
 from ffr_prep.matrix_model import MatrixModel, group_nodes, node_in_words
@@ -50,7 +51,16 @@ def couple_matrices(model: MatrixModel, interfaces: Sequence[InterfaceRegion], t
         kinds=tuple("node" if len(_nodes(model, i)) == 1 else i.kind for i in interfaces),
         positions=positions,
         C=C,
+        inertial_loads=-(ties.T @ (model.M @ _accelerations(model))),
     )
+
+
+def _accelerations(model: MatrixModel) -> Array:
+    """(D, 12) of the nodes: three translations, three rotations, six products of the angular velocity; as rigid nodes."""
+    fields = np.zeros((len(model.points), 6, 12))
+    fields[..., :6] = rigid_coordinates(model.points)
+    fields[:, :3, 6:] = unit_accelerations(model.points)[6:].transpose(1, 2, 0)
+    return model.dofs.of_nodes(fields)
 
 
 def tie_matrices(model: MatrixModel, interfaces: Sequence[InterfaceRegion]) -> sp.csr_array:

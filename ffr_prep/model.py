@@ -15,9 +15,11 @@ from ffr_prep.errors import ComputationError
 from ffr_prep.factor import SupportedBody, solve_refined, supported
 from ffr_prep.interface import CoupledModel
 from ffr_prep.invariants import InertiaIntegrals
+from ffr_prep.quality import assess, completed
 from ffr_prep.reduce import described, interface_shapes
 from ffr_prep.reduction import Reduction
 from ffr_prep.reference import ReferenceConditions, functionals
+from ffr_prep.selection import Band
 
 Array = np.ndarray
 
@@ -55,6 +57,7 @@ def reduce_model(
     reduction: Reduction,
     stiffening: bool = False,
     stress: bool = False,
+    quality: Band | None = None,
     progress: Callable[[str], None] | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> FlexibleBody:
@@ -62,6 +65,7 @@ def reduce_model(
 
     stiffening : also compute the geometric stiffness by load, which a simulation then uses
     stress     : also keep section forces of beams and the stress at the surface per elastic coordinate
+    quality    : compare the body with the full model over this band of frequencies, and keep what was found
     progress   : called with the name of each stage as it begins
     provenance : JSON values kept with the body, beside what is recorded anyway
 
@@ -75,6 +79,9 @@ def reduce_model(
     tell("reduce")
     basis = reduction.basis(coupled, body, L)
     check_basis(coupled, L, basis)
+    if quality:
+        tell("compare with the full model")
+    assessed = assess(coupled, body, L, basis, quality) if quality else None
     if stiffening:
         tell("compute the geometric stiffness")
         static = static_displacements(coupled, supported(body, L))
@@ -85,9 +92,13 @@ def reduce_model(
         interfaces=interface_shapes(coupled, basis),
         surface=(model.stressed if stress else model.surface)(basis.Z),
         stiffening=model.stiffening(static, basis.Z) if stiffening else None,
-        provenance=record(model, reference, reduction)
-        | ({"stress": model.recovery} if stress else {})
-        | dict(provenance or {}),
+        provenance=completed(
+            record(model, reference, reduction)
+            | ({"stress": model.recovery} if stress else {})
+            | dict(provenance or {}),
+            basis,
+            assessed,
+        ),
         **vars(model.inertia(basis.Z)),
     )
 

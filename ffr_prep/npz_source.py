@@ -30,7 +30,7 @@ _GROUP = "group/"
 
 def from_npz(path: Path) -> MatrixModel:
     """The model of a .npz file, in the unit of the file. Raises InputError for one that cannot be used."""
-    arrays = _arrays(path)
+    arrays = arrays_of(path)
     missing = [key for key in ("points", "dofs") if key not in arrays]
     if missing:
         raise InputError(f"{path} has no array {missing[0]!r}; it holds {', '.join(map(repr, sorted(arrays)))}")
@@ -72,7 +72,8 @@ def save_matrices(model: MatrixModel, path: str | Path) -> Path:
     return path
 
 
-def _arrays(path: Path) -> dict[str, Array]:
+def arrays_of(path: Path) -> dict[str, Array]:
+    """The arrays of a .npz file by name; InputError for a file that is none."""
     try:
         with np.load(path, allow_pickle=False) as stored:
             return {key: stored[key] for key in stored.files}
@@ -86,7 +87,7 @@ def _matrix(path: Path, arrays: Mapping[str, Array], name: str) -> sp.csr_array:
         dense = arrays[name]
         if dense.ndim != 2:
             raise InputError(f"{path}: {name} has the shape {dense.shape}; it must be (D, D)")
-        return sp.csr_array(np.array(dense, float))
+        return sp.csr_array(dense)
     parts = {key.removeprefix(f"{name}/"): value for key, value in arrays.items() if key.startswith(f"{name}/")}
     return sparse_of(f"{path}: {name}", parts)
 

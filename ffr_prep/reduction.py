@@ -12,7 +12,7 @@ C. Pierre, ibid. 39 (2001) 1182-1187 (characteristic constraint modes).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -27,6 +27,7 @@ from ffr_prep.modes import constraint_modes, modes_up_to, normal_modes
 from ffr_prep.receptance import free_modes, receptance_error, reference_modes
 from ffr_prep.selection import Accuracy, Selection, UpTo
 from ffr_prep.static_shapes import attachment_modes
+from ffr_prep.waves import resolution_warnings
 
 Array = np.ndarray
 
@@ -161,7 +162,8 @@ class Union:
         """Raises what its parts raise."""
         bases = [part.basis(model, body, L) for part in self.parts]
         whole = basis_of(model, L, *(basis.Z for basis in bases))
-        return Basis(whole.Z, whole.omega2, whole.dropped + sum(basis.dropped for basis in bases))
+        warnings = tuple(dict.fromkeys(warning for basis in bases for warning in basis.warnings))
+        return Basis(whole.Z, whole.omega2, whole.dropped + sum(basis.dropped for basis in bases), warnings)
 
 
 # ---- selection ----------------------------------------------------------------------------------------------------
@@ -179,7 +181,9 @@ def selected(
     Raises InputError for more modes than the model has, ComputationError when no number of modes is accurate enough.
     """
     if isinstance(selection, UpTo):
-        return with_modes(*modes_up_to(model, held, selection.frequency))
+        omega2, modes = modes_up_to(model, held, selection.frequency)
+        warnings = resolution_warnings(model, omega2, modes, selection.frequency)
+        return replace(with_modes(omega2, modes), warnings=warnings)
     if isinstance(selection, Accuracy):
         return _accurate(model, body, held, selection, with_modes)
     return with_modes(*normal_modes(model, held, selection))
@@ -219,7 +223,7 @@ def _accurate(
             enough, best = count, basis
         else:
             few = count
-    return best
+    return replace(best, warnings=resolution_warnings(model, omega2, modes, wanted.band.high))
 
 
 def _condensed_modes(K: Array, M: Array, selection: int | UpTo) -> Array:

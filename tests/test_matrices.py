@@ -378,6 +378,7 @@ def small(**changes) -> MatrixModel:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
+        ({"K": np.eye(6) * (1 + 0.02j)}, "K is complex; give its real part"),
         ({"points": np.zeros((2, 2))}, r"nodes have the shape \(2, 2\)"),
         ({"K": np.eye(5)}, "K is 5 x 5, but the table of nodal coordinates has 6 rows"),
         ({"M": np.eye(7)}, "M is 7 x 7"),

@@ -15,9 +15,10 @@ from matrix_models import bar, of_frame, rod, space_frame
 from ffr_prep.abaqus_source import nodes_from_abaqus
 from ffr_prep.body import load_body
 from ffr_prep.cli import main
+from ffr_prep.cli_matrices import reduce_matrices_command
 from ffr_prep.errors import InputError
 from ffr_prep.matrices import reduce_matrices
-from ffr_prep.matrix_model import MatrixModel, row_in_words, with_group
+from ffr_prep.matrix_model import UNIT_SYSTEMS, MatrixModel, row_in_words, with_group
 from ffr_prep.matrix_source import read_matrices
 from ffr_prep.nastran_source import GridTable, grids_of_deck, grids_of_op2, model_of_nastran
 from ffr_prep.npz_source import save_matrices
@@ -208,11 +209,14 @@ def test_tables_that_cannot_be_used(tmp_path, line, message):
         read_matrices([tmp_path / "K.mtx", tmp_path / "K.mtx", tmp_path / "rows.csv"])
 
 
-def test_a_file_that_is_not_matrix_market(tmp_path):
+def test_files_that_are_not_matrices(tmp_path):
     (tmp_path / "K.mtx").write_text("1,1,1,1,5.0\n")
     (tmp_path / "rows.csv").write_text("1,1,0,0,0\n")
+    (tmp_path / "K.npz").write_text("1,1,1,1,5.0\n")
     with pytest.raises(InputError, match="is not a Matrix Market file"):
         read_matrices([tmp_path / "K.mtx", tmp_path / "K.mtx", tmp_path / "rows.csv"])
+    with pytest.raises(InputError, match=r"K\.npz is damaged or not a \.npz file"):
+        read_matrices([tmp_path / "K.npz", tmp_path / "K.npz", tmp_path / "rows.csv"])
 
 
 # ---- Abaqus -------------------------------------------------------------------------------------------------------
@@ -288,6 +292,7 @@ def test_abaqus_coordinate_format(tmp_path):
         ({"STIF_mtx": "1 1 5.0\n", "MASS_mtx": "1 1 5.0\n"}, "9 nodes, which do not make 1 rows"),
         ({"STIF_mtx": "-1 1 5.0\n", "MASS_mtx": "1 1 5.0\n"}, "has row or column -1: Lagrange multipliers"),
         ({"STIF_mtx": "1 2\n"}, "its lines have 2 numbers"),
+        ({"STIF_mtx": "** nothing\n"}, "its lines have 0 numbers"),
         ({"STIF_mtx": "one two\n"}, "is not a matrix that Abaqus writes as text"),
         ({"model_inp": "*Heading\n"}, r"model\.inp defines no nodes"),
         ({"model_inp": "*Node\n13, 0, 0, 0\n*Nset, nset=A\nB,\n"}, r"model\.inp refers to the set 'B'"),
@@ -361,6 +366,11 @@ def test_scalar_points_without_stiffness_are_left_out(model):
     assert_same(of_nastran(*with_scalar_point(model, 0.0)), model)
     with pytest.raises(InputError, match="scalar point 25 has stiffness or mass"):
         of_nastran(*with_scalar_point(model, 2.0))
+
+
+def test_a_matrix_that_is_there_twice(model):
+    with pytest.raises(InputError, match=r"run\.op4 holds KGG 2 times"):
+        of_nastran({"KGG": [model.K, model.K], "MGG": model.M}, grids(model))
 
 
 @pytest.mark.parametrize(
@@ -606,3 +616,8 @@ def test_the_example_of_the_documentation(tmp_path, monkeypatch):
     np.testing.assert_allclose(body.frequencies[:2], np.sqrt(3 * 80.0 / 0.4) / (2 * np.pi), rtol=5e-3)
     axial_frequency = np.sqrt(2e7 / 0.4) / (2 * np.pi)
     assert np.abs(body.frequencies / axial_frequency - 1).min() < 1e-12
+
+
+def test_the_command_offers_all_units():
+    offered = next(option for option in reduce_matrices_command.params if option.name == "units")
+    assert tuple(offered.type.choices) == tuple(UNIT_SYSTEMS)
