@@ -155,7 +155,8 @@ def interface_freedom(body: FlexibleBody) -> tuple[int, int]:
     length = float(max(arms)) or 1.0
     motions = np.vstack([_motions(i, length) for i in body.interfaces])
     norms = np.linalg.norm(motions, axis=0)
-    unit = motions[:, norms > 0] / norms[norms > 0]
+    moves = norms > _INDEPENDENT * np.concatenate([np.ones(6), np.full(body.n, 1 / np.sqrt(body.mass))])
+    unit = motions[:, moves] / norms[moves]
     return int(np.linalg.matrix_rank(unit, tol=_INDEPENDENT)), len(motions)
 
 
