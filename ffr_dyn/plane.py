@@ -65,6 +65,7 @@ def _in_plane(scene: Scene, normal: int, *, strict: bool) -> Scene:
                 q=body.q[keep],
                 q_dot=body.q_dot[keep],
                 damping=body.damping[keep],
+                kept=(tuple(keep.tolist()), body.model.n),
             )
         )
     return replace(scene, bodies=tuple(bodies), plane=AXES[normal])
