@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.equations import System
+from ffr_dyn.force_tables import Action, actions_of, bushings_of, spread_of
+from ffr_dyn.forces import SpringDamper
 from ffr_dyn.joints import COORDINATES, Joint, frames
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.result import EULER_PARAMETERS, XYZ, Axis, Quantity, mode_axis
@@ -33,10 +35,7 @@ def measure(system: System, record: Record, last: dict[str, Unwound]) -> tuple[d
     found |= _reactions(system, record)
     coordinates, unwound = _joint_coordinates(system, record, last)
     found |= coordinates
-    for k, spring in enumerate(system.scene.springs):
-        found[f"{spring.name}.tension"] = Quantity(
-            record.spring[:, k], "N", (), "spring-damper force, tension positive"
-        )
+    found |= _forces(system, record)
     return found | _totals(record), unwound
 
 
@@ -83,6 +82,48 @@ def _reactions(system: System, record: Record) -> dict[str, Quantity]:
         found[f"{block.name}.force"] = Quantity(record.reaction[:, k, :3], "N", (XYZ,), f"force {text}")
         found[f"{block.name}.moment"] = Quantity(record.reaction[:, k, 3:], "N m", (XYZ,), f"moment {text}")
     return found
+
+
+def _forces(system: System, record: Record) -> dict[str, Quantity]:
+    """Coordinates, forces and powers of the applied loads."""
+    scene = system.scene
+    found: dict[str, Quantity] = {}
+    for k, action in enumerate(actions_of(scene)):
+        found |= _action(action, record.action[:, k])
+    for k, bushing in enumerate(bushings_of(scene)):
+        found |= _bushing(bushing.name, record.bushing[:, k])
+    loads = [*scene.loads, *actions_of(scene), *bushings_of(scene), *spread_of(scene)]
+    for k, load in enumerate(loads):
+        found[f"{load.name}.power"] = Quantity(record.power[:, k], "W", (), "power that the force gives to the bodies")
+    return found
+
+
+def _action(action: Action, values: Array) -> dict[str, Quantity]:
+    name = action.name
+    if isinstance(action, SpringDamper):
+        return {
+            f"{name}.tension": Quantity(-values[:, 2], "N", (), "spring-damper force, tension positive"),
+            f"{name}.length": Quantity(values[:, 0], "m", (), "distance of the ends"),
+        }
+    if action.coordinate == "angle":
+        angle = "joint angle as the force counts it, with whole turns"
+        return {
+            f"{name}.torque": Quantity(values[:, 2], "N m", (), "torque that increases the joint angle"),
+            f"{name}.angle": Quantity(values[:, 0], "rad", (), angle),
+        }
+    return {
+        f"{name}.force": Quantity(values[:, 2], "N", (), "force that increases the joint stroke"),
+        f"{name}.stroke": Quantity(values[:, 0], "m", (), "joint stroke along its axis"),
+    }
+
+
+def _bushing(name: str, values: Array) -> dict[str, Quantity]:
+    return {
+        f"{name}.displacement": Quantity(values[:, :3], "m", (XYZ,), "of j from i, axes of the bushing on i"),
+        f"{name}.rotation": Quantity(values[:, 3:6], "rad", (XYZ,), "rotation vector from the axes of i to those of j"),
+        f"{name}.force": Quantity(values[:, 12:15], "N", (XYZ,), "force on j, axes of the bushing on i"),
+        f"{name}.moment": Quantity(values[:, 15:], "N m", (XYZ,), "conjugate to the rotation vector, on j"),
+    }
 
 
 def _totals(record: Record) -> dict[str, Quantity]:

@@ -14,7 +14,7 @@ from ffr_dyn.errors import InputError
 
 Array = np.ndarray
 
-# Kinds, as in ffr_dyn.kernels.loads (which must not be imported before it is needed: it loads the compiler).
+# Kinds, as in ffr_dyn.kernels.functions (which must not be imported before it is needed: it loads the compiler).
 POLYNOMIAL, HARMONIC, PIECEWISE, USER = 0, 1, 2, 3
 
 
@@ -87,7 +87,7 @@ def _numbers(what: str, values: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def evaluate(function: TimeFunction, t: float) -> tuple[float, float, float]:
-    """(value, rate, second derivative) at t; the readable twin of `ffr_dyn.kernels.loads.evaluate_functions`."""
+    """(value, rate, second derivative) at t; the readable twin of `ffr_dyn.kernels.functions.evaluate_functions`."""
     if function.callback is not None:
         given = np.atleast_1d(np.asarray(function.callback(t), float))
         return tuple(np.concatenate([given, np.zeros(3)])[:3])  # type: ignore[return-value]
