@@ -14,6 +14,7 @@ import numpy as np
 from ffr_dyn.curve import Curve
 from ffr_dyn.errors import InputError
 from ffr_dyn.rotation import triad
+from ffr_dyn.timefunction import as_time_function
 
 Array = np.ndarray
 
@@ -160,6 +161,14 @@ def check_positive(value: Any, what: str) -> None:
     check_number(value, what)
     if value <= 0:
         raise InputError(f"{what} is {value:g}; it must be positive")
+
+
+def check_function(value: Any, what: str, least: float = -np.inf) -> None:
+    """InputError unless the value is a function of time or a finite number, not below `least`."""
+    if isinstance(value, (int, float, np.floating, np.integer)):
+        check_number(value, what, least)
+    else:
+        as_time_function(value, what)
 
 
 def check_number_or_curve(value: Any, what: str) -> None:

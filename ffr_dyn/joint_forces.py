@@ -19,8 +19,7 @@ import numpy as np
 
 from ffr_dyn.curve import Curve
 from ffr_dyn.errors import InputError
-from ffr_dyn.forces import check_damping, check_number, check_number_or_curve, check_positive
-from ffr_dyn.timefunction import as_time_function
+from ffr_dyn.forces import check_damping, check_function, check_number, check_number_or_curve, check_positive
 
 
 @dataclass(frozen=True)
@@ -78,9 +77,7 @@ class JointFriction:
         check_number(self.coulomb, f"{who}: coulomb", least=0.0)
         check_positive(self.creep, f"{who}: creep")
         check_number(self.viscous, f"{who}: viscous", least=0.0)
-        as_time_function(self.normal, f"{who}: normal")
-        if isinstance(self.normal, (int, float)):
-            check_number(self.normal, f"{who}: normal", least=0.0)
+        check_function(self.normal, f"{who}: normal", least=0.0)
         if (self.static is None) != (self.stribeck is None):
             raise InputError(f"{who}: static and stribeck belong together; give both or neither")
         if self.static is not None:
@@ -138,9 +135,7 @@ class Actuator:
 
     def __post_init__(self) -> None:
         who = _checked(self)
-        as_time_function(self.force, f"{who}: force")
-        if isinstance(self.force, (int, float)):
-            check_number(self.force, f"{who}: force")
+        check_function(self.force, f"{who}: force")
 
 
 @dataclass(frozen=True)
@@ -162,7 +157,7 @@ class Servo:
 
     def __post_init__(self) -> None:
         who = _checked(self)
-        as_time_function(self.target, f"{who}: target")
+        check_function(self.target, f"{who}: target")
         check_number(self.kp, f"{who}: kp", least=0.0)
         check_number(self.kd, f"{who}: kd", least=0.0)
         if not self.limit > 0:

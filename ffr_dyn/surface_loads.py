@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.errors import InputError
-from ffr_dyn.forces import check_array
-from ffr_dyn.timefunction import as_time_function
+from ffr_dyn.forces import check_array, check_function
 from ffr_prep.body import FlexibleBody, Surface, axial
 
 Array = np.ndarray
@@ -43,7 +42,7 @@ class NodalForces:
         who = f"force {self.name!r}"
         if self.axes not in ("global", "body"):
             raise InputError(f"{who}: axes must be 'global' or 'body', not {self.axes!r}")
-        as_time_function(self.function, f"{who}: function")
+        check_function(self.function, f"{who}: function")
         points = _indices(self.points, f"{who}: points")
         forces = check_array(self.forces, (points.size, 3), f"{who}: forces")
         object.__setattr__(self, "points", points)
@@ -71,7 +70,7 @@ class Pressure:
 
     def __post_init__(self) -> None:
         who = f"pressure {self.name!r}"
-        as_time_function(self.function, f"{who}: function")
+        check_function(self.function, f"{who}: function")
         shape = np.shape(self.pressure)
         object.__setattr__(self, "pressure", check_array(self.pressure, shape[:1], f"{who}: pressure"))
         if self.triangles is not None and not callable(self.triangles):
@@ -92,7 +91,7 @@ class ModalForce:
 
     def __post_init__(self) -> None:
         who = f"force {self.name!r}"
-        as_time_function(self.function, f"{who}: function")
+        check_function(self.function, f"{who}: function")
         shape = np.shape(self.values)
         object.__setattr__(self, "values", check_array(self.values, shape[:1], f"{who}: values"))
 
@@ -177,8 +176,8 @@ def _pressure(load: Pressure, body: FlexibleBody, surface: Surface) -> Affine:
     share = -(p + p.sum(1, keepdims=True)) / 12  # (T, 3)
     f = share[:, :, None] * area[:, None]
     slope = share[:, :, None, None] * area_q[:, None] * (1.0 if load.follower else 0.0)
-    n = body.n
-    return _affine(u.reshape(-1, 3), Phi.reshape(-1, 3, n), f.reshape(-1, 3), slope.reshape(-1, 3, n))
+    count, n = 3 * len(corners), body.n
+    return _affine(u.reshape(count, 3), Phi.reshape(count, 3, n), f.reshape(count, 3), slope.reshape(count, 3, n))
 
 
 def _chosen(load: Pressure, body: FlexibleBody, surface: Surface) -> Array:
