@@ -18,12 +18,13 @@ from ffr_dyn.drivers import Driver
 from ffr_dyn.joints import Joint
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.timefunction import polynomial
+from ffr_prep.basis import factorised
 from ffr_prep.body import FlexibleBody, rigid_body
 from ffr_prep.interface import InterfaceRegion, couple
 from ffr_prep.material import Material
 from ffr_prep.mesh import read_mesh
 from ffr_prep.reduce import nodal_basis, reduce_mesh
-from ffr_prep.reduction import CraigBampton, factorised
+from ffr_prep.reduction import CraigBampton
 from ffr_prep.reference import ReferenceConditions, SimplySupported, functionals
 from ffr_prep.solids import assemble, vector_mass
 

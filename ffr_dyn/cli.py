@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from ffr_dyn.cli_stress import stress
 from ffr_dyn.errors import InputError, SimulationError
 
 EXAMPLE = """\b
@@ -16,6 +17,7 @@ Example:
   ffr-dyn run slider_crank.toml -o out/result.nc
   ffr-dyn plot out/result.nc rod.small_eye.position.x -o out/slider.png
   ffr-dyn animate out/result.nc -o out/motion.gif --scale auto
+  ffr-dyn stress out/result.nc -o out/stress
 """
 
 
@@ -117,8 +119,15 @@ def plot(result: Path, names: tuple[str, ...], output: Path, title: str | None) 
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help=".gif, .mp4 or .html.")
 @click.option("--scale", default="auto", help="Factor on the deformation: a number, or auto.", show_default=True)
 @click.option("--duration", type=float, help="Length of the film [s]; default: chosen from the run.")
-def animate(result: Path, output: Path, scale: str, duration: float | None) -> None:
-    """A film of RESULT: deformed bodies, coloured by elastic displacement, with the undeformed ghost.
+@click.option(
+    "--colour", default="deformation", show_default=True, help="Of flexible bodies: deformation, body, von-mises, ..."
+)
+@click.option("--limit", type=float, help="End of the colour bar [m, Pa]; default: the largest value of the film.")
+def animate(result: Path, output: Path, scale: str, duration: float | None, colour: str, limit: float | None) -> None:
+    """A film of RESULT: deformed bodies, coloured by elastic displacement or stress, with the undeformed ghost.
+
+    Colours by stress need bodies with stress modes (`ffr-prep reduce --stress`); `ffr-dyn stress --help` lists the
+    quantities.
 
     .html is one page that works offline and can be turned with the mouse.
     """
@@ -126,8 +135,12 @@ def animate(result: Path, output: Path, scale: str, duration: float | None) -> N
     from ffr_dyn.result_file import load_result
 
     factor: float | str = scale if scale == "auto" else _number(scale)
-    animation.animate(load_result(result), output, scale=factor, duration=duration)
+    loaded = load_result(result)
+    animation.animate(loaded, output, scale=factor, duration=duration, colour=colour, limit=limit)
     click.echo(f"film     {output}")
+
+
+cli.add_command(stress)
 
 
 def _number(text: str) -> float:

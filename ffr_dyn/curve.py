@@ -52,3 +52,17 @@ def curve_value(curve: Curve, x: float) -> float:
     through = PchipInterpolator(curve.at, curve.values)
     inside = float(np.clip(x, curve.at[0], curve.at[-1]))
     return float(through(inside) + through(inside, 1) * (x - inside))
+
+
+def curve_integral(curve: Curve, x: Array) -> Array:
+    """Integral of the curve from 0 to x, of the shape of x: the energy that a spring of this curve stores."""
+    return _primitive(curve, np.asarray(x, float)) - _primitive(curve, np.zeros(()))
+
+
+def _primitive(curve: Curve, x: Array) -> Array:
+    from scipy.interpolate import PchipInterpolator
+
+    through = PchipInterpolator(curve.at, curve.values)
+    inside = np.clip(x, curve.at[0], curve.at[-1])
+    beyond = x - inside
+    return through.antiderivative()(inside) + beyond * (through(inside) + 0.5 * beyond * through(inside, 1))

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from textwrap import wrap
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from ffr_dyn.errors import InputError
 from ffr_dyn.result import Array, Result
 from ffr_dyn.rotation import rotation_matrix
 from ffr_dyn.stress import MEASURES, Measure, values_at
-from ffr_dyn.units import bracketed, readable
+from ffr_dyn.units import readable
 from ffr_prep.body import Surface
 
 # Muted Okabe-Ito colours for bodies, so that the deformation stays the loudest; full ones for paths.
@@ -25,12 +26,13 @@ BODY_COLOURS = ("#8FB4D0", "#E0B48A", "#93C4B0", "#D9B3C8", "#C9BE86", "#A9CFE6"
 TRACE_COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7")
 # What flexible bodies may be coloured by; "body" leaves every body plain, in a colour of its own.
 COLOURS = ("deformation", "body", *MEASURES)
-# For sizes, for stress and for values with a sign: names that matplotlib and plotly share.
-_SEQUENTIAL, _STRESS, _DIVERGING = "viridis", "turbo", "RdBu_r"
+# For sizes, for stress and for values with a sign, by their names in matplotlib.
+_SEQUENTIAL, _STRESS, _DIVERGING = "viridis", "turbo", "coolwarm"
 
 # The share of its own size by which the automatic scale deflects the most flexible body.
 _AUTOMATIC_SHARE = 0.05
 _PLANAR_TOLERANCE = 1e-6
+_TITLE_WIDTH = 13
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,9 +89,9 @@ class Colouring:
         return readable(self.unit, max(abs(self.low), abs(self.high)))
 
     def title(self, line_break: str) -> str:
-        """The title of the colour bar, a word a line: "elastic, displacement [mm]"."""
+        """The title of the colour bar in short lines: "elastic", "displacement", "[mm]"."""
         _, unit = self.readable()
-        return bracketed(self.words.replace(" ", line_break) + line_break * bool(unit), unit)
+        return line_break.join([*wrap(self.words, _TITLE_WIDTH), *([f"[{unit}]"] if unit else [])])
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +102,8 @@ class Film:
     deflection : largest elastic displacement |Phi q| over bodies and times, not scaled [m]
     traces     : by marker, its path over all rows of the result (T, 3) [m]
     colouring  : what the colours of flexible bodies show; None leaves them plain
+    marks      : words at points (3,) [m] that do not move
+    heading    : words in the corner of the picture, instead of time and scale
     low, high  : (3,) corners of a box that holds the whole motion [m]
     """
 
@@ -112,6 +116,8 @@ class Film:
     low: Array
     high: Array
     colouring: Colouring | None = None
+    marks: dict[str, Array] = field(default_factory=dict)
+    heading: str = ""
 
     @property
     def size(self) -> float:
@@ -133,6 +139,10 @@ class Film:
         factor, unit = readable("s", float(np.abs(self.times).max()))
         span = factor * float(np.ptp(self.times)) or 1.0
         return f"{self.times[frame] * factor:.{max(0, 2 - math.floor(math.log10(span)))}f} {unit}"
+
+    def caption(self, frame: int) -> str:
+        """What is written in the corner of a picture."""
+        return self.heading or f"t = {self.clock(frame)}     {self.scale_note()}"
 
     def scale_note(self) -> str:
         """The scale as it is written in the picture, "deformation × 20"; nothing when it is one or all is rigid."""
@@ -248,9 +258,15 @@ def _stress_colouring(flexible: list[Solid], frames: int, of: Measure, limit: fl
 
     largest = max(float(np.abs(values(solid, k)).max()) for solid in stressed for k in range(frames))
     high = limit or largest
-    names = frozenset(solid.name for solid in stressed)
+    return measure_colours(of, high, frozenset(solid.name for solid in stressed), values) if high else None
+
+
+def measure_colours(
+    of: Measure, high: float, bodies: frozenset[str], values: Callable[[Solid, int], Array]
+) -> Colouring:
+    """A measure as colours from none to `high`, or for one with a sign from -high (blue) to high (red)."""
     low, shades = (-high, _DIVERGING) if of.signed else (0.0, _STRESS)
-    return Colouring(of.words, of.unit, low, high, shades, names, values) if high else None
+    return Colouring(of.words, of.unit, low, high, shades, bodies, values)
 
 
 def is_coloured(shown: Film, solid: Solid) -> bool:

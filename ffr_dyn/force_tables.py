@@ -37,11 +37,12 @@ from ffr_dyn.kernels.tables import (
 )
 from ffr_dyn.scene import Scene, body_number, joint_under, marker_number
 from ffr_dyn.surface_loads import Affine, SurfaceLoad, distributed
-from ffr_dyn.timefunction import USER, TimeFunction, as_time_function
+from ffr_dyn.timefunction import OPERATION, POLYNOMIAL, USER, TimeFunction, as_time_function
 
 Array = np.ndarray
 
 Action = SpringDamper | JointForce
+AppliedLoad = Load | Action | Bushing | SurfaceLoad
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,9 @@ class FunctionTable:
         if function.callback is not None:
             slot = self.callback(function.callback, (1, 2, 3), what, with_state=False)
             function = TimeFunction(USER, (float(slot),))
+        elif function.kind == OPERATION:
+            rows = [float(self.add(operand, what)) for operand in function.operands]
+            function = TimeFunction(OPERATION, (*function.data, rows[0], rows[-1]))
         self.functions.append(function)
         return len(self.functions) - 1
 
@@ -118,7 +122,7 @@ def base_functions(scene: Scene, functions: FunctionTable) -> Array:
 
 
 def _is_zero(function: TimeFunction) -> bool:
-    return function.callback is None and not any(function.data)
+    return function.kind == POLYNOMIAL and not any(function.data)
 
 
 def marker_numbers(scene: Scene) -> list[int]:
@@ -147,6 +151,11 @@ def bushings_of(scene: Scene) -> list[Bushing]:
 def spread_of(scene: Scene) -> list[SurfaceLoad]:
     """All surface loads in the order of the tables."""
     return [force for force in scene.forces if isinstance(force, SurfaceLoad)]
+
+
+def loads_of(scene: Scene) -> list[AppliedLoad]:
+    """All applied loads in the order in which their powers are recorded."""
+    return [*scene.loads, *actions_of(scene), *bushings_of(scene), *spread_of(scene)]
 
 
 def load_tables(scene: Scene, functions: FunctionTable) -> Loads:

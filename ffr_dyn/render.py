@@ -117,6 +117,8 @@ def _build(plotter: Any, shown: Film) -> list[Update]:
     updates += [_tubes(plotter, link, next(plain)) for link in shown.links]
     for path, colour in zip(shown.traces.values(), TRACE_COLOURS * len(shown.traces), strict=False):
         plotter.add_mesh(pv.lines_from_points(path), color=colour, line_width=2.5, lighting=False)
+    if shown.marks:
+        _mark(plotter, shown)
     plotter.add_axes(line_width=2, color=_INK, viewport=(0.0, 0.0, 0.16, 0.2))
     updates.append(_caption(plotter, shown))
     return updates
@@ -242,10 +244,16 @@ def _tubes(plotter: Any, link: Link, colour: str) -> Update:
     return update
 
 
+def _mark(plotter: Any, shown: Film) -> None:
+    points, words = np.array(list(shown.marks.values())), list(shown.marks)
+    look = {"font_size": 17, "text_color": _INK, "shape_color": "white", "shape_opacity": 0.75, "point_color": _INK}
+    plotter.add_point_labels(points, words, always_visible=True, point_size=11, render_points_as_spheres=True, **look)
+
+
 def _caption(plotter: Any, shown: Film) -> Update:
     text: Any = plotter.add_text("t", position=(0.02, 0.93), viewport=True, font_size=11, color=_INK)
 
     def update(frame: int) -> None:
-        text.input = f"t = {shown.clock(frame)}     {shown.scale_note()}"
+        text.input = shown.caption(frame)
 
     return update

@@ -18,6 +18,7 @@ from ffr_dyn.errors import InputError
 from ffr_dyn.forces import Bushing, Load, SpringDamper
 from ffr_dyn.joint_forces import JointForce
 from ffr_dyn.joints import COORDINATES, Joint
+from ffr_dyn.measurement import Measurement
 from ffr_dyn.rotation import euler_parameters
 from ffr_dyn.surface_loads import SurfaceLoad, distributed
 from ffr_dyn.timefunction import TimeFunction, as_time_function
@@ -28,7 +29,7 @@ Array = np.ndarray
 Force = Bushing | JointForce | SurfaceLoad
 
 GROUND = "ground"
-RESERVED = (GROUND, "energy", "constraint", "time", "geometry")
+RESERVED = (GROUND, "energy", "constraint", "measured", "time", "geometry")
 
 
 @dataclass(frozen=True)
@@ -88,13 +89,14 @@ class Scene:
     loads: tuple[Load, ...] = ()
     springs: tuple[SpringDamper, ...] = ()
     forces: tuple[Force, ...] = ()
+    measurements: tuple[Measurement, ...] = ()
     ground: Mapping[str, Any] = field(default_factory=dict)
     gravity: Any = (0.0, 0.0, 0.0)
     base_acceleration: Any = (0.0, 0.0, 0.0)
     name: str = "scene"
 
     def __post_init__(self) -> None:
-        for key in ("bodies", "joints", "drivers", "couplings", "loads", "springs", "forces"):
+        for key in ("bodies", "joints", "drivers", "couplings", "loads", "springs", "forces", "measurements"):
             object.__setattr__(self, key, tuple(getattr(self, key)))
         points = {key: _vector(at, 3, f"ground point {key!r}") for key, at in self.ground.items()}
         object.__setattr__(self, "ground", points)
@@ -117,6 +119,8 @@ class Scene:
             marker_number(self, marker)
         for force in self.forces:
             _check_force(self, force)
+        for measurement in self.measurements:
+            _check_measurement(self, measurement)
 
 
 def markers(scene: Scene) -> list[tuple[int, str, str]]:
@@ -200,6 +204,15 @@ def _check_point_driver(scene: Scene, driver: PointDriver) -> None:
         raise InputError(f"driver {driver.name!r} drives {i[1]!r} against itself; it needs markers of two bodies")
 
 
+def _check_measurement(scene: Scene, measurement: Measurement) -> None:
+    marker_number(scene, measurement.i), marker_number(scene, measurement.j)
+    known = ["global", *(body.name for body in scene.bodies)]
+    if measurement.axes not in known:
+        raise InputError(
+            f"measurement {measurement.name!r}: there are no axes {measurement.axes!r}; {_offer(measurement.axes, known)}"
+        )
+
+
 def _offer(name: str, known: Iterable[str]) -> str:
     known = list(known)
     close = difflib.get_close_matches(name, known, 1)
@@ -217,6 +230,7 @@ def _check_names(scene: Scene) -> None:
         *scene.loads,
         *scene.springs,
         *scene.forces,
+        *scene.measurements,
     )
     names = [thing.name for thing in things]
     repeated = sorted({name for name in names if names.count(name) > 1})

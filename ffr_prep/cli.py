@@ -17,6 +17,7 @@ import click
 
 from ffr_prep.cli_interchange import export_body, import_body
 from ffr_prep.cli_matrices import reduce_matrices_command
+from ffr_prep.cli_structure import reduce_structure
 from ffr_prep.errors import ComputationError, InputError
 
 if TYPE_CHECKING:
@@ -229,6 +230,7 @@ def modes(body: Path, output: Path, chosen: str, scale: str) -> None:
 cli.add_command(export_body)
 cli.add_command(import_body)
 cli.add_command(reduce_matrices_command)
+cli.add_command(reduce_structure)
 
 
 # ---- arguments ----------------------------------------------------------------------------------------------------

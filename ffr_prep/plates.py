@@ -20,8 +20,9 @@ of the centre, a the slope along a side of length l with normal n, and d = (w_j 
   Zienkiewicz's cubic, on rectangles the field of Adini, Clough and Melosh; it is continuous between elements;
 * displacement in the plane: u = sum N_i u_i + sum P_m n_m l/8 (psi_j - psi_i) + B phi z' x (r - r_c), psi the rotation
   about the normal (drilling). The second part is Allman's; in the third the inside of the element follows the mean of psi
-  where that is not the mean rotation of its contour, phi = mean psi - mean rotation. So no motion is without energy but the
-  six rigid ones and none without mass; both parts vanish where the strain is constant.
+  where that is not the mean rotation of its contour, phi = (mean psi - mean rotation)/10. So no motion is without energy
+  but the six rigid ones and none without mass; both parts vanish where the strain is constant. The tenth costs less
+  stiffness in bending than the whole, and any factor tells the two rotations apart.
 
 The in-plane displacement at the height z is u + z theta x (0, 0, 1); rotary inertia of the thickness is part of S. All
 fields hold rigid motions and constant strains and curvatures exactly; deflection and displacement in the plane
@@ -55,6 +56,7 @@ _SIDE = {3: skfem.ElementTriP2, 4: skfem.ElementQuadS2}
 _CORNER = {3: skfem.ElementTriP1, 4: skfem.ElementQuad1}
 _CENTRE = {3: (skfem.ElementTriMini, 3), 4: (skfem.ElementQuad2, 8)}
 
+_FOLLOWING = 0.1
 _FLAT = 0.01
 _DEGENERATE = 1e-6
 
@@ -251,8 +253,8 @@ def _in_element_axes(elements: Plates, of: Reference) -> Reference:
 class _Sides:
     """Quantities of the k sides, linear in the element coordinates: (E, k, 6k), and of the contour (E, 6k).
 
-    normal (E, k, 2) ; kirchhoff : theta at the middle beyond the mean of the ends ; even, odd : the two parts of the
-    deflection ; bulge : in-plane displacement of the middle ; phi : mean drilling less mean rotation of the contour
+    normal (E, k, 2); kirchhoff: theta at the middle beyond the mean of the ends; even, odd: the two parts of the
+    deflection; bulge: in-plane displacement of the middle; phi: turn of the inside beyond the contour
     """
 
     normal: Array
@@ -281,7 +283,7 @@ def _sides(elements: Plates) -> _Sides:
         even=length / 8 * (first - last),
         odd=length / 8 * (first + last - 2 * rise),
         bulge=length / 8 * turn,
-        phi=_mean_drilling(elements) - _mean_rotation(elements, along),
+        phi=_FOLLOWING * (_mean_drilling(elements) - _mean_rotation(elements, along)),
     )
 
 

@@ -1,38 +1,37 @@
-"""Reduction: a few deformation shapes that carry the motion of the whole model.
+"""Reductions by component modes: a few deformation shapes that carry the motion of the whole model.
 
-Every reduction ends in the same form: a mass-orthonormal basis Z of the independent coordinates with a diagonal
-stiffness, Z^T M Z = I, Z^T K Z = diag(omega2), which satisfies the reference conditions L Z = 0.
+Every reduction ends in the same form, a mass-orthonormal basis with diagonal stiffness under the reference conditions
+(see `ffr_prep.basis`). Those of this module are made of normal modes and static shapes; `ffr_prep.static_shapes` and
+`ffr_prep.krylov` hold others, and `Union` joins any of them.
 
-Source: R. R. Craig, M. C. C. Bampton, AIAA Journal 6 (1968) 1313-1319.
+Sources: R. J. Guyan, AIAA Journal 3 (1965) 380; R. R. Craig, M. C. C. Bampton, ibid. 6 (1968) 1313-1319; R. H. MacNeal,
+Computers & Structures 1 (1971) 581-601; S. Rubin, AIAA Journal 13 (1975) 995-1006; M. P. Castanier, Y.-C. Tan,
+C. Pierre, ibid. 39 (2001) 1182-1187 (characteristic constraint modes).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 import scipy.linalg
 
+from ffr_prep.basis import Basis, basis_of, diagonalised, restricted
 from ffr_prep.errors import ComputationError, InputError
-from ffr_prep.factor import FreeBody, SupportedBody, free_body, solve_refined, solve_supported, supported
+from ffr_prep.factor import FreeBody, SupportedBody, supported
 from ffr_prep.interface import CoupledModel
-from ffr_prep.lanczos import lowest_modes
+from ffr_prep.krylov import mean_motion
+from ffr_prep.modes import constraint_modes, modes_up_to, normal_modes
+from ffr_prep.receptance import free_modes, receptance_error, reference_modes
+from ffr_prep.selection import Accuracy, Selection, UpTo
+from ffr_prep.static_shapes import attachment_modes
+from ffr_prep.waves import resolution_warnings
 
 Array = np.ndarray
 
-_DENSE = 600
-_BLOCK = 8
-_TIE = 1e-6
-_RIGID = 1e-9
-
-
-@dataclass(frozen=True)
-class Basis:
-    """Z (z, n) [1/sqrt(kg)], mass-orthonormal with diagonal stiffness; omega2 (n,) [rad^2/s^2], ascending."""
-
-    Z: Array
-    omega2: Array
+_RICHER = (2.0, 4.0, 8.0, 16.0)  # times the band: where modes are looked for
 
 
 class Reduction(Protocol):
@@ -46,143 +45,201 @@ class Reduction(Protocol):
 class CraigBampton:
     """Normal modes with all interfaces fixed, and the static shapes of every interface coordinate.
 
+    modes : a number, `UpTo` a frequency or to an `Accuracy`
+
     The reference conditions are imposed on the sum, so with six of them n = modes + 6 interfaces - 6.
     """
 
-    modes: int
+    modes: Selection
 
     def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
         """Raises InputError without interfaces and for more modes than the model has."""
-        if not model.names:
-            raise InputError("Craig-Bampton needs at least one interface; without any, reduce by Eigenmodes")
+        _check_interfaces(model, "Craig-Bampton")
         fixed = supported(body, model.C.toarray())
-        omega2, modes = normal_modes(model, fixed, self.modes)
         shapes, stiffness = constraint_modes(model, fixed)
-        vectors = np.hstack([modes, shapes])
-        K = scipy.linalg.block_diag(np.diag(omega2), stiffness)
-        return diagonalised(model, *restricted(vectors, K, L))
+
+        def with_modes(omega2: Array, modes: Array) -> Basis:
+            K = scipy.linalg.block_diag(np.diag(omega2), stiffness)
+            return diagonalised(model, *restricted(np.hstack([modes, shapes]), K, L))
+
+        return selected(model, body, fixed, self.modes, with_modes)
+
+
+@dataclass(frozen=True)
+class Guyan:
+    """The static shapes of every interface coordinate alone: stiffness exact at the interfaces, inertia approximate.
+
+    The same as `CraigBampton` without modes; good far below the first frequency with the interfaces fixed.
+    """
+
+    def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
+        """Raises InputError without interfaces."""
+        return CraigBampton(0).basis(model, body, L)
 
 
 @dataclass(frozen=True)
 class Eigenmodes:
-    """Normal modes of the body under its reference conditions; free-free modes for the mean axis."""
+    """Normal modes of the body under its reference conditions; free-free modes for the mean axis.
 
-    modes: int
+    modes : a number, `UpTo` a frequency or to an `Accuracy`
+    """
+
+    modes: Selection
 
     def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
         """Raises InputError for more modes than the model has."""
-        held = supported(body, L)
-        omega2, modes = normal_modes(model, held, self.modes)
-        return diagonalised(model, modes, np.diag(omega2))
+
+        def with_modes(omega2: Array, modes: Array) -> Basis:
+            return diagonalised(model, modes, np.diag(omega2))
+
+        return selected(model, body, supported(body, L), self.modes, with_modes)
 
 
-def factorised(model: CoupledModel) -> FreeBody:
-    """The one factorisation that serves modes, static shapes, stiffening loads and error reports of a model."""
-    return free_body(model.K, model.T, model.places)
+@dataclass(frozen=True)
+class Rubin:
+    """Normal modes of the free body, and the static response to unit loads at the interfaces that its inertia balances.
 
+    modes : a number, `UpTo` a frequency or to an `Accuracy`
 
-# ---- building blocks ----------------------------------------------------------------------------------------------
-
-
-def normal_modes(model: CoupledModel, held: SupportedBody, count: int) -> tuple[Array, Array]:
-    """The lowest `count` modes under the supports: omega2 (count,) and mass-orthonormal vectors (Z, count).
-
-    Raises InputError when the model has fewer, ComputationError when the iteration does not converge.
+    What the static response adds to the modes is the residual flexibility of all modes above. Its inertia is kept, as
+    Rubin does; MacNeal neglects it, which would leave shapes without mass. As the interfaces are free, fewer modes than
+    with `CraigBampton` are needed where joints leave them nearly free.
     """
-    size = model.K.shape[0]
-    most = size - len(held.C)
-    if not 0 <= count <= most:
-        raise InputError(
-            f"asked for {count} normal modes of a model with {most} free degrees of freedom: ask for 0 to {most}, or "
-            "refine the mesh or raise its order"
+
+    modes: Selection
+
+    def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
+        """Raises InputError without interfaces and for more modes than the model has."""
+        _check_interfaces(model, "Rubin's reduction")
+        shapes = attachment_modes(model, body, L)
+
+        def with_modes(_: Array, modes: Array) -> Basis:
+            return basis_of(model, L, modes, shapes)
+
+        held = supported(body, L if len(L) > 6 else mean_motion(model))
+        return selected(model, body, held, self.modes, with_modes)
+
+
+@dataclass(frozen=True)
+class CharacteristicModes:
+    """Craig-Bampton with fewer static shapes: only the lowest vibration modes of the body as condensed to its interfaces.
+
+    modes           : with the interfaces fixed: a number, `UpTo` a frequency or to an `Accuracy`
+    interface_modes : elastic modes of the condensed stiffness and mass: a number, or `UpTo` a frequency
+
+    For many interfaces. Forces at the interfaces then bend the body less than they should, the more the fewer are kept.
+    """
+
+    modes: Selection
+    interface_modes: int | UpTo
+
+    def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
+        """Raises InputError without interfaces and for more modes than there are."""
+        _check_interfaces(model, "a reduction of the interfaces")
+        fixed = supported(body, model.C.toarray())
+        shapes, stiffness = constraint_modes(model, fixed)
+        kept = _condensed_modes(stiffness, shapes.T @ (model.M @ shapes), self.interface_modes)
+        shapes, stiffness = shapes @ kept, kept.T @ stiffness @ kept
+
+        def with_modes(omega2: Array, modes: Array) -> Basis:
+            K = scipy.linalg.block_diag(np.diag(omega2), stiffness)
+            return diagonalised(model, *restricted(np.hstack([modes, shapes]), K, L))
+
+        return selected(model, body, fixed, self.modes, with_modes)
+
+
+@dataclass(frozen=True)
+class Union:
+    """The space of several reductions together; vectors that depend on those of earlier ones are dropped and counted."""
+
+    parts: tuple[Reduction, ...]
+
+    def __post_init__(self) -> None:
+        if not self.parts:
+            raise InputError("a union needs at least one reduction")
+
+    def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
+        """Raises what its parts raise."""
+        bases = [part.basis(model, body, L) for part in self.parts]
+        whole = basis_of(model, L, *(basis.Z for basis in bases))
+        warnings = tuple(dict.fromkeys(warning for basis in bases for warning in basis.warnings))
+        return Basis(whole.Z, whole.omega2, whole.dropped + sum(basis.dropped for basis in bases), warnings)
+
+
+# ---- selection ----------------------------------------------------------------------------------------------------
+
+
+def selected(
+    model: CoupledModel,
+    body: FreeBody,
+    held: SupportedBody,
+    selection: Selection,
+    with_modes: Callable[[Array, Array], Basis],
+) -> Basis:
+    """The basis that `with_modes` makes of omega2 (p,) and the p normal modes (Z, p) under the supports.
+
+    Raises InputError for more modes than the model has, ComputationError when no number of modes is accurate enough.
+    """
+    if isinstance(selection, UpTo):
+        omega2, modes = modes_up_to(model, held, selection.frequency)
+        warnings = resolution_warnings(model, omega2, modes, selection.frequency)
+        return replace(with_modes(omega2, modes), warnings=warnings)
+    if isinstance(selection, Accuracy):
+        return _accurate(model, body, held, selection, with_modes)
+    return with_modes(*normal_modes(model, held, selection))
+
+
+def _accurate(
+    model: CoupledModel,
+    body: FreeBody,
+    held: SupportedBody,
+    wanted: Accuracy,
+    with_modes: Callable[[Array, Array], Basis],
+) -> Basis:
+    reference, _ = reference_modes(model, body, wanted.band)
+    frequencies = wanted.band.frequencies()
+
+    def error(basis: Basis) -> float:
+        return float(receptance_error(free_modes(model, basis), reference, frequencies).max())
+
+    few = -1
+    for richer in _RICHER:
+        omega2, modes = modes_up_to(model, held, richer * wanted.band.high)
+        best = with_modes(omega2, modes)
+        if best.omega2.size and error(best) <= wanted.tolerance:
+            break
+        few = omega2.size
+    else:
+        raise ComputationError(
+            f"with all {omega2.size} modes up to {_RICHER[-1] * wanted.band.high:.4g} Hz the receptances at the interfaces "
+            f"are still more than {wanted.tolerance:g} off: use craig-bampton or rubin, which also carry static shapes, or "
+            "allow a larger error"
         )
-    if count == 0:
-        return np.zeros(0), np.zeros((size, 0))
-    if size <= _DENSE or 3 * count > size:
-        return _dense_modes(model, held.C, count)
-    return _lanczos_modes(model, held, count)
+    enough = omega2.size
+    while enough - few > 1:
+        count = (few + enough) // 2
+        basis = with_modes(omega2[:count], modes[:, :count])
+        if basis.omega2.size and error(basis) <= wanted.tolerance:
+            enough, best = count, basis
+        else:
+            few = count
+    return replace(best, warnings=resolution_warnings(model, omega2, modes, wanted.band.high))
 
 
-def _dense_modes(model: CoupledModel, C: Array, count: int) -> tuple[Array, Array]:
-    null = scipy.linalg.null_space(C)
-    omega2, vectors = scipy.linalg.eigh(
-        null.T @ (model.K @ null), null.T @ (model.M @ null), subset_by_index=(0, count - 1)
-    )
-    return omega2, null @ vectors
-
-
-def _lanczos_modes(model: CoupledModel, held: SupportedBody, count: int) -> tuple[Array, Array]:
-    def flexibility(loads: Array) -> Array:
-        return solve_supported(held, loads, np.zeros((len(held.C), loads.shape[1])))[0]
-
-    start = np.random.default_rng(0).standard_normal((model.K.shape[0], _BLOCK))
-    return lowest_modes(flexibility, model.M, start, count, most=20 * count + 300)
-
-
-def constraint_modes(model: CoupledModel, fixed: SupportedBody) -> tuple[Array, Array]:
-    """Static shapes (Z, r) of unit values of each support coordinate, and their stiffness (r, r).
-
-    The stiffness is the reaction to the shapes; it is more accurate than a product with K, whose rounding errors
-    scale with the stiffest motion of the mesh.
-    """
-    count = len(fixed.C)
-    shapes, mu = solve_refined(fixed, np.zeros((model.K.shape[0], count)), np.eye(count))
-    return shapes, -(mu + mu.T) / 2
-
-
-def restricted(vectors: Array, K: Array, L: Array) -> tuple[Array, Array]:
-    """The combinations of the vectors (Z, p), with stiffness K (p, p), that satisfy L u = 0: vectors and stiffness."""
-    scale = 1 / np.linalg.norm(vectors, axis=0)
-    V = scale[:, None] * scipy.linalg.null_space(L @ (vectors * scale), rcond=1e-10)
-    return vectors @ V, V.T @ K @ V
-
-
-def diagonalised(model: CoupledModel, vectors: Array, K: Array) -> Basis:
-    """The mass-orthonormal basis of the same space in which the stiffness K (p, p) is diagonal."""
-    M = vectors.T @ (model.M @ vectors)
+def _condensed_modes(K: Array, M: Array, selection: int | UpTo) -> Array:
+    """(6I, 6 + count) the six rigid motions and the lowest elastic modes of the condensed body."""
     scale = 1 / np.sqrt(np.diag(M))
-    omega2, combination = scipy.linalg.eigh(K * np.outer(scale, scale), M * np.outer(scale, scale))
-    Z = vectors @ (scale[:, None] * combination)
-    return Basis(Z * _signs(Z), omega2)
+    omega2, V = scipy.linalg.eigh(K * np.outer(scale, scale), M * np.outer(scale, scale))
+    elastic = len(omega2) - 6
+    if isinstance(selection, UpTo):
+        count = int(np.searchsorted(omega2[6:], (2 * np.pi * selection.frequency) ** 2, side="right"))
+    else:
+        count = selection
+    if not 0 <= count <= elastic:
+        raise InputError(f"asked for {count} interface modes; the interfaces have {elastic}: ask for 0 to {elastic}")
+    return scale[:, None] * V[:, : 6 + count]
 
 
-def _signs(Z: Array) -> Array:
-    """(n,) the factor +1 or -1 that makes the largest component of each mode positive (the first among equals)."""
-    if not Z.size:
-        return np.ones(Z.shape[1])
-    size = np.abs(Z)
-    first = np.argmax(size >= (1 - _TIE) * size.max(axis=0), axis=0)
-    return np.sign(Z[first, np.arange(Z.shape[1])])
-
-
-# ---- guards -------------------------------------------------------------------------------------------------------
-
-
-def check_basis(model: CoupledModel, L: Array, basis: Basis) -> None:
-    """Raises ComputationError when the basis is not what every later step relies on.
-
-    That is: mass-orthonormal, diagonal in the stiffness, within the reference conditions, without a rigid motion.
-    """
-    Z, omega2 = basis.Z, basis.omega2
-    _check_small("Z^T M Z - I", Z.T @ (model.M @ Z) - np.eye(len(omega2)), 1e-9)
-    noise = 1e-12 * np.einsum("zi,zi->i", np.abs(Z), abs(model.K) @ np.abs(Z)).max(initial=0.0)
-    allowed = noise + 1e-7 * omega2.max(initial=0.0)
-    _check_small("Z^T K Z - diag(omega2)", Z.T @ (model.K @ Z) - np.diag(omega2), allowed)
-    _check_small("L Z", L @ Z, 1e-8 * np.abs(Z).max(initial=0.0))
-    if omega2.size and not omega2[0] > 0:
-        raise ComputationError(f"the lowest squared frequency is {omega2[0]:.3g} rad^2/s^2: a rigid motion is left")
-    if _rigid_content(model, Z).max(initial=0.0) > 1 - _RIGID:
-        raise ComputationError("a mode of the basis is a rigid motion: the reference conditions do not hold the body")
-
-
-def _check_small(name: str, value: Array, allowed: float) -> None:
-    worst = np.abs(value).max(initial=0.0)
-    if not worst <= allowed:
-        raise ComputationError(f"the basis is inaccurate: {name} reaches {worst:.1e}, allowed {allowed:.1e}")
-
-
-def _rigid_content(model: CoupledModel, Z: Array) -> Array:
-    """(n,) the part of each mode's unit mass norm that a rigid motion can take away."""
-    momenta = model.M @ model.T
-    coupling = momenta.T @ Z
-    return np.einsum("in,in->n", coupling, np.linalg.solve(model.T.T @ momenta, coupling))
+def _check_interfaces(model: CoupledModel, name: str) -> None:
+    if not model.names:
+        raise InputError(f"{name} needs at least one interface; without any, reduce by Eigenmodes")

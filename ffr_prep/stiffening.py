@@ -39,7 +39,12 @@ def stiffening_matrices(
     """
     loads = np.hstack([model.B.T @ inertial_loads(mesh.points, matrices), model.C.toarray().T])
     displacement, _ = solve_refined(held, loads, np.zeros((len(held.C), loads.shape[1])))
-    fields = np.moveaxis((model.B @ displacement).reshape(*mesh.points.shape, -1), -1, 0)
+    return stiffening_of(mesh, material, (model.B @ displacement).reshape(*mesh.points.shape, -1), Phi)
+
+
+def stiffening_of(mesh: Mesh, material: Materials, static: Array, Phi: Array) -> Array:
+    """(r, n, n) geometric stiffness of the basis Phi (N, 3, n) under r loads with the displacements static (N, 3, r)."""
+    fields = np.moveaxis(static, -1, 0)
     n = Phi.shape[2]
     K = np.zeros((len(fields), n, n))
     for chunk in displacement_gradients(mesh, material):

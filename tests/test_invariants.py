@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from boxes import STEEL, box_mesh, moved, rotation, shaken
 
+from ffr_prep.basis import factorised
 from ffr_prep.body import axial
 from ffr_prep.interface import InterfaceRegion, couple
 from ffr_prep.invariants import inertia_integrals
 from ffr_prep.material import Material
 from ffr_prep.reduce import reduce_mesh
-from ffr_prep.reduction import CraigBampton, factorised
+from ffr_prep.reduction import CraigBampton
 from ffr_prep.reference import FixedTo, MeanAxis, functionals
 from ffr_prep.solids import assemble
 

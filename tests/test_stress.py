@@ -9,6 +9,7 @@ import skfem
 from boxes import KINDS, STEEL, box_mesh, moved, rotation, shaken
 from skfem.quadrature import get_quadrature
 
+from ffr_prep.basis import factorised
 from ffr_prep.body import TENSOR, BodyError, load_body, save_body, truncated, with_point
 from ffr_prep.elements import KINDS as ELEMENTS
 from ffr_prep.factor import solve_refined, supported
@@ -16,7 +17,7 @@ from ffr_prep.interface import InterfaceRegion, couple
 from ffr_prep.material import Material
 from ffr_prep.mesh import surface_triangles
 from ffr_prep.reduce import boundary, reduce_mesh
-from ffr_prep.reduction import CraigBampton, factorised
+from ffr_prep.reduction import CraigBampton
 from ffr_prep.reference import FixedTo, functionals
 from ffr_prep.solids import STIFFNESS_ORDER, assemble
 from ffr_prep.stress import extrapolation, stressed_boundary

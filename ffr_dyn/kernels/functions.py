@@ -2,9 +2,10 @@
 
 import math
 
+from ffr_dyn.kernels.operations import operate
 from ffr_dyn.kernels.options import entry, kernel
 
-POLYNOMIAL, HARMONIC, PIECEWISE, USER = 0, 1, 2, 3
+POLYNOMIAL, HARMONIC, PIECEWISE, USER, OPERATION = 0, 1, 2, 3, 4
 
 
 @kernel
@@ -58,6 +59,8 @@ def evaluate_functions(functions, user, t, out):
             second = -amplitude * speed * speed * math.sin(angle)
         elif kind == PIECEWISE:
             value, rate, second = piecewise(data, start, t)
+        elif kind == OPERATION:
+            value, rate, second = operate(data, start, out)
         else:
             slot = int(data[start])
             value, rate, second = user[slot], user[slot + 1], user[slot + 2]
