@@ -37,7 +37,7 @@ from ffr_dyn.kernels.tables import (
 )
 from ffr_dyn.scene import Scene, body_number, joint_under, marker_number
 from ffr_dyn.surface_loads import Affine, SurfaceLoad, distributed
-from ffr_dyn.timefunction import OPERATION, POLYNOMIAL, USER, TimeFunction, as_time_function
+from ffr_dyn.timefunction import OPERATION, USER, TimeFunction, as_time_function, is_zero
 
 Array = np.ndarray
 
@@ -117,12 +117,8 @@ class NumberPool:
 def base_functions(scene: Scene, functions: FunctionTable) -> Array:
     """(3,) time functions of the base's acceleration, -1 for a component that is zero."""
     return np.array(
-        [-1 if _is_zero(f) else functions.add(f, "base_acceleration") for f in scene.base_acceleration], dtype=np.int64
+        [-1 if is_zero(f) else functions.add(f, "base_acceleration") for f in scene.base_acceleration], dtype=np.int64
     )
-
-
-def _is_zero(function: TimeFunction) -> bool:
-    return function.kind == POLYNOMIAL and not any(function.data)
 
 
 def marker_numbers(scene: Scene) -> list[int]:

@@ -80,6 +80,9 @@ class Scene:
     base_acceleration : three components [m/s^2], global, each a number, a time function or a Python function of time: the
               translational acceleration of the ground, whose frame all results refer to. It acts as gravity less this
               acceleration; a gravity that varies is its negative
+    plane   : "auto" finds out whether the scene is planar and then computes in the plane alone (see `ffr_dyn.plane`);
+              "x", "y" or "z", its normal, declares it, so that modes mostly in the plane are kept and the rest is left
+              out even where it is small only; "none" computes in space
     """
 
     bodies: tuple[Body, ...]
@@ -94,6 +97,7 @@ class Scene:
     gravity: Any = (0.0, 0.0, 0.0)
     base_acceleration: Any = (0.0, 0.0, 0.0)
     name: str = "scene"
+    plane: str = "auto"
 
     def __post_init__(self) -> None:
         for key in ("bodies", "joints", "drivers", "couplings", "loads", "springs", "forces", "measurements"):
@@ -102,6 +106,8 @@ class Scene:
         object.__setattr__(self, "ground", points)
         object.__setattr__(self, "gravity", _vector(self.gravity, 3, "gravity"))
         object.__setattr__(self, "base_acceleration", _acceleration(self.base_acceleration))
+        if self.plane not in ("auto", "x", "y", "z", "none"):
+            raise InputError(f"plane is {self.plane!r}; it must be 'auto', 'none', or the normal 'x', 'y' or 'z'")
         if not self.bodies:
             raise InputError("a scene needs at least one body")
         _check_names(self)

@@ -91,6 +91,11 @@ def as_time_function(value: object, what: str) -> TimeFunction:
     raise InputError(f"{what} must be a number, a time function or a Python function of time, not {value!r}")
 
 
+def is_zero(function: TimeFunction) -> bool:
+    """Whether a function is the constant zero by its declaration."""
+    return function.kind == POLYNOMIAL and function.callback is None and not any(function.data)
+
+
 def _numbers(what: str, values: tuple[float, ...]) -> tuple[float, ...]:
     if not values or not np.isfinite(values).all():
         raise InputError(f"{what}: all numbers must be finite: {values}")

@@ -11,12 +11,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ffr_prep.cli_interchange import export_body, import_body
 from ffr_prep.cli_matrices import reduce_matrices_command
+from ffr_prep.cli_reduction import NOTES as REDUCTION_NOTES
+from ffr_prep.cli_reduction import band_of, draw_quality, reduction_of, reduction_options
 from ffr_prep.cli_structure import reduce_structure
 from ffr_prep.errors import ComputationError, InputError
 
@@ -24,7 +26,6 @@ if TYPE_CHECKING:
     from ffr_prep.interface import InterfaceRegion
     from ffr_prep.material import Material
     from ffr_prep.mesh import Mesh
-    from ffr_prep.reduction import Reduction
     from ffr_prep.reference import ReferenceConditions
 
 EXAMPLE = """\b
@@ -55,13 +56,8 @@ Reference conditions: how the body frame is attached to the deforming body.
 With craig-bampton, choices that only remove the six rigid motions give the same answer up to second order in the
 strain. With eigenmodes the choice matters: take the one that looks like the joints.
 
-\b
-Reductions:
-  craig-bampton                  static shapes of every interface coordinate and N modes with all interfaces fixed:
-                                 for bodies that joints load, the safe choice
-  eigenmodes                     N modes under the reference conditions: for bodies without interface loads
-
-\b
+"""
+MATERIAL_NOTES = """\b
 Materials: a name (steel, aluminium, titanium, ...), or E=7e10,nu=0.3,rho=5540 in SI units; for several volumes
   --material web=steel --material rim=E=7e10,nu=0.3,rho=2700, each with the name of a volume of the mesh.
 """
@@ -112,7 +108,7 @@ def mesh(mesh: Path, unit: str | None, size: float | None, numbers: tuple[str, .
     check_mesh(loaded)
 
 
-@cli.command(epilog=REDUCE_NOTES)
+@cli.command(epilog=f"{REDUCE_NOTES}{REDUCTION_NOTES}\n{MATERIAL_NOTES}")
 @click.argument("mesh", type=_PATH)
 @click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
 @click.option("--name", help="Name of the body; default: the name of the file.")
@@ -123,10 +119,7 @@ def mesh(mesh: Path, unit: str | None, size: float | None, numbers: tuple[str, .
 @click.option("--material", "materials", multiple=True, required=True, metavar="MATERIAL", help="See below.")
 @click.option("--interface", "interfaces", multiple=True, metavar="INTERFACE", help="See below; may be repeated.")
 @click.option("--reference", default="mean-axis", show_default=True, metavar="CONDITIONS", help="See below.")
-@click.option(
-    "--method", type=click.Choice(["craig-bampton", "eigenmodes"]), default="craig-bampton", show_default=True
-)
-@click.option("--modes", type=click.IntRange(min=0), default=10, show_default=True, help="Normal modes to keep.")
+@reduction_options
 @click.option(
     "--stiffening", is_flag=True, help="Also compute geometric stiffening: slender rods under load, fast blades."
 )
@@ -144,10 +137,9 @@ def reduce(
     materials: tuple[str, ...],
     interfaces: tuple[str, ...],
     reference: str,
-    method: str,
-    modes: int,
     stiffening: bool,
     stress: bool,
+    **options: Any,
 ) -> None:
     """Reduce MESH to a flexible body and write it to a file.
 
@@ -160,7 +152,7 @@ def reduce(
     from ffr_prep.report import mesh_lines, short_lines
 
     material, regions = _material(materials), [_interface(text) for text in interfaces]
-    conditions, reduction = _reference(reference), _reduction(method, modes)
+    conditions, reduction, band = _reference(reference), reduction_of(options), band_of(options)
     parameters = _numbers(numbers)
     _check_writable(output)
     steps = Steps(visible=sys.stderr.isatty())
@@ -177,6 +169,7 @@ def reduce(
         reduction=reduction,
         stiffening=stiffening,
         stress=stress,
+        quality=band,
         progress=steps,
         provenance={
             "source": {"file": mesh.name, "unit": unit, "size": size, "numbers": parameters, "order": order},
@@ -187,6 +180,7 @@ def reduce(
     save_body(body, output)
     steps.end()
     _print(short_lines(body))
+    draw_quality(body, options)
     click.echo(f"time        {steps.in_words()}")
     click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")
 
@@ -318,12 +312,6 @@ def _supports(path: Path) -> ReferenceConditions:
     if unknown:
         raise InputError(f"{path}: {unknown[0]!r} is not known; a support has interface, motion and direction")
     return Supports(supports)
-
-
-def _reduction(method: str, modes: int) -> Reduction:
-    from ffr_prep.reduction import CraigBampton, Eigenmodes
-
-    return CraigBampton(modes) if method == "craig-bampton" else Eigenmodes(modes)
 
 
 def _mode_numbers(text: str, count: int) -> list[int]:

@@ -222,7 +222,9 @@ def distribution_name(requirement: str) -> str:
 
 def declared() -> set[str]:
     project = PROJECT["project"]
-    optional = [requirement for extra in ("video", "nastran") for requirement in project["optional-dependencies"][extra]]
+    optional = [
+        requirement for extra in ("video", "nastran") for requirement in project["optional-dependencies"][extra]
+    ]
     return {distribution_name(requirement) for requirement in [*project["dependencies"], *optional]}
 
 

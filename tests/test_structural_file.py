@@ -14,9 +14,11 @@ from ffr_prep.cli import cli, main
 from ffr_prep.errors import InputError
 from ffr_prep.frame import Member, Shell, check_frame
 from ffr_prep.material import Material, material
-from ffr_prep.reduction import CraigBampton, Eigenmodes
+from ffr_prep.reduction import CraigBampton, Eigenmodes, Guyan, Rubin, Union
 from ffr_prep.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports
 from ffr_prep.section import circle, general, i_section, rectangle, shear_rigid, shifted, tube
+from ffr_prep.selection import Accuracy, Band, UpTo
+from ffr_prep.static_shapes import AttachmentModes, InertiaRelief
 from ffr_prep.structural import reduce_frame
 from ffr_prep.structural_file import load_structure
 
@@ -130,6 +132,27 @@ materials.own = {E = 1e9, nu = 0.25, rho = 1200}
     assert load_structure(written(tmp_path, LINE)).reduction == CraigBampton(10)
 
 
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ('{method = "rubin", modes = 3}', Rubin(3)),
+        ('{method = "guyan"}', Guyan()),
+        ('{method = "attachment"}', AttachmentModes()),
+        ("{frequency = 500}", CraigBampton(UpTo(500.0))),
+        ("{accuracy = [10, 500, 0.05]}", CraigBampton(Accuracy(Band(10.0, 500.0), 0.05))),
+        ('[{modes = 2}, {method = "inertia-relief"}]', Union((CraigBampton(2), InertiaRelief()))),
+    ],
+)
+def test_reductions(tmp_path, text, expected):
+    assert load_structure(written(tmp_path, f"reduction = {text}" + LINE)).reduction == expected
+
+
+def test_the_quality_of_a_structure_is_reported(tmp_path):
+    text = "reduction = {modes = 2}\nquality = [5, 200]\n" + LINE.replace("elements = 2", "elements = 8")
+    body = reduce_frame(**vars(load_structure(written(tmp_path, text))))
+    assert body.provenance["quality"]["band"] == [5, 200]
+
+
 # ---- guards -----------------------------------------------------------------------------------------------------------
 
 
@@ -147,7 +170,8 @@ materials.own = {E = 1e9, nu = 0.25, rho = 1200}
         (LINE.replace('"steel"', '"stel"'), "no material 'stel' in the library; did you mean steel"),
         (LINE.replace("b = [1, 0, 0]", "b = [1, 0, 1]"), "no node at .* to be called 'b'"),
         (LINE + 'kind = "soft"', "interfaces.b.kind: Input should be 'rigid' or 'mean'"),
-        ("reduction = {modes = -1}\n" + LINE, "reduction.modes: Input should be greater than or equal to 0"),
+        ("reduction = {modes = -1}\n" + LINE, "reduction.0.modes: Input should be greater than or equal to 0"),
+        ("reduction = {modes = 2, frequency = 5}\n" + LINE, "reduction.*modes, frequency and accuracy all say"),
         ("geometry = {file = 'none.geo'}\n" + LINE, "none.geo does not exist"),
     ],
 )
