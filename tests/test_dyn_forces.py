@@ -9,6 +9,7 @@ import pytest
 from synthetic import cloud
 from test_dyn_kernels import chain, moved, random_state
 
+from ffr_dyn.analyses.assemble import assemble
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.applied import applied, gravity_forces, stretch
 from ffr_dyn.curve import Curve, curve_value
@@ -811,3 +812,64 @@ def test_a_failing_python_function_stops_the_run_and_is_named(force, message):
     if "finite" in message:
         with pytest.raises(SimulationError, match=message):
             applied_forces(system, 0.0, *random_state(scene))
+
+
+# ---- planar scenes --------------------------------------------------------------------------------------------------
+
+
+HINGE = Joint("hinge", "revolute", "carriage.pin", "link.pin")
+
+
+def arm(hinge: Joint = HINGE, **changes) -> Scene:
+    """A driven pendulum on a carriage that slides along x; everything moves in the plane z = 0."""
+    carriage = rigid_body("carriage", mass=2.0, inertia=[1, 1, 1], points={"pin": (0, 0, 0)})
+    link = rigid_body("link", mass=1.0, inertia=[0.1, 0.1, 0.1], points={"pin": (0, 0.5, 0), "end": (0, -0.5, 0)})
+    parts = {
+        "forces": (
+            JointSpring("coil", "hinge", 3.0, 0.1, 0.2),
+            JointFriction("rub", "guide", 0.5, 0.1, coordinate="stroke"),
+            Actuator("motor", "hinge", harmonic(amplitude=2.0, frequency=1.0)),
+        ),
+        "base_acceleration": (harmonic(amplitude=3.0, frequency=0.8), 0, 0),
+    }
+    return Scene(
+        (Body("carriage", carriage), Body("link", link, position=(0, -0.5, 0))),
+        (
+            Joint("guide", "translational", "ground.o", "carriage.pin", axis=(1, 0, 0)),
+            hinge,
+        ),
+        ground={"o": (0, 0, 0)},
+        gravity=(0, -9.81, 0),
+        **parts | changes,
+    )
+
+
+def test_forces_on_joints_in_the_plane_keep_a_scene_planar():
+    scene = arm()
+    assert assemble(scene).system.scene.plane == "z"
+    planar, spatial = (
+        forward(replace(scene, plane=plane), end=1.0, output_step=0.1, method=RK4(1e-3)) for plane in ("auto", "none")
+    )
+    for name in ("guide.stroke", "hinge.angle", "coil.torque", "rub.force", "motor.torque"):
+        np.testing.assert_allclose(planar[name], spatial[name], rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"base_acceleration": (0, 0, lambda t: 1.0)},
+        {"forces": (Bushing("b", "ground.o", "link.end", (1,) * 6),)},
+        {
+            "hinge": replace(HINGE, kind="cylindrical"),
+            "forces": (Actuator("push", "hinge", 1.0, coordinate="stroke"),),
+        },
+    ],
+    ids=["base", "bushing", "stroke along the normal"],
+)
+def test_what_may_act_across_the_plane_is_computed_in_space(changes):
+    assert assemble(arm(**changes)).system.scene.plane not in ("x", "y", "z")
+
+
+def test_a_scene_declared_planar_refuses_a_base_that_leaves_the_plane():
+    with pytest.raises(InputError, match="base_acceleration has a component"):
+        assemble(arm(base_acceleration=(0, 0, 1.0), plane="z"))
