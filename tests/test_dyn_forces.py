@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -622,6 +624,18 @@ def test_a_shaken_oscillator_answers_as_the_closed_form_says():
     t = result.time
     exact = -a / (w0**2 - w**2) * (np.sin(w * t) - w / w0 * np.sin(w0 * t))
     np.testing.assert_allclose(result["guide.stroke"], exact, atol=1e-9)
+
+
+def test_the_turntable_of_the_documentation_swings_more_slowly_than_at_rest():
+    """Seen from the turntable, the centrifugal force takes w^2 from k / m."""
+    page = (Path(__file__).resolve().parent.parent / "docs" / "forces.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"```python\n(.*?)```", page, re.S)
+    space: dict = {}
+    exec(compile(text, "docs/forces.md", "exec"), space)
+    result = space["result"]
+    exact = 0.4 * np.cos(np.sqrt(50.0 / 1.5 - 3.0**2) * result.time)
+    np.testing.assert_allclose(result["spoke.stroke"], exact, atol=1e-4)
+    assert result["turntable.angle"][-1] == pytest.approx(6.0)
 
 
 # ---- the Jacobian -------------------------------------------------------------------------------------------------
