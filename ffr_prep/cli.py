@@ -15,10 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ffr_prep.cli_conversion import convert
 from ffr_prep.cli_interchange import export_body, import_body
 from ffr_prep.cli_matrices import reduce_matrices_command
 from ffr_prep.cli_reduction import NOTES as REDUCTION_NOTES
 from ffr_prep.cli_reduction import band_of, draw_quality, reduction_of, reduction_options
+from ffr_prep.cli_solver import solver_of, solver_options
 from ffr_prep.cli_structure import reduce_structure
 from ffr_prep.errors import ComputationError, InputError
 
@@ -120,6 +122,7 @@ def mesh(mesh: Path, unit: str | None, size: float | None, numbers: tuple[str, .
 @click.option("--interface", "interfaces", multiple=True, metavar="INTERFACE", help="See below; may be repeated.")
 @click.option("--reference", default="mean-axis", show_default=True, metavar="CONDITIONS", help="See below.")
 @reduction_options
+@solver_options
 @click.option(
     "--stiffening", is_flag=True, help="Also compute geometric stiffening: slender rods under load, fast blades."
 )
@@ -153,6 +156,7 @@ def reduce(
 
     material, regions = _material(materials), [_interface(text) for text in interfaces]
     conditions, reduction, band = _reference(reference), reduction_of(options), band_of(options)
+    solver = solver_of(options)
     parameters = _numbers(numbers)
     _check_writable(output)
     steps = Steps(visible=sys.stderr.isatty())
@@ -170,6 +174,7 @@ def reduce(
         stiffening=stiffening,
         stress=stress,
         quality=band,
+        solver=solver,
         progress=steps,
         provenance={
             "source": {"file": mesh.name, "unit": unit, "size": size, "numbers": parameters, "order": order},
@@ -182,6 +187,7 @@ def reduce(
     _print(short_lines(body))
     draw_quality(body, options)
     click.echo(f"time        {steps.in_words()}")
+    click.echo(f"memory      {peak_memory()}")
     click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")
 
 
@@ -221,6 +227,7 @@ def modes(body: Path, output: Path, chosen: str, scale: str) -> None:
         click.echo(f"picture     {path}")
 
 
+cli.add_command(convert)
 cli.add_command(export_body)
 cli.add_command(import_body)
 cli.add_command(reduce_matrices_command)
@@ -378,6 +385,16 @@ class Steps:
     def _tell_end(self) -> None:
         if self.visible and self.begun and self.begun[-1][0]:
             click.echo(f"{time.perf_counter() - self.begun[-1][1]:.1f} s", err=True)
+
+
+def peak_memory() -> str:
+    """The most that this process ever had in memory, in words."""
+    if sys.platform == "win32":
+        return "not known on Windows"
+    import resource
+
+    unit = 1 if sys.platform == "darwin" else 1024
+    return f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 2**30:.2f} GiB at most"
 
 
 def _print(lines: Iterable[str]) -> None:

@@ -155,7 +155,8 @@ def interface_freedom(body: FlexibleBody) -> tuple[int, int]:
     length = float(max(arms)) or 1.0
     motions = np.vstack([_motions(i, length) for i in body.interfaces])
     norms = np.linalg.norm(motions, axis=0)
-    unit = motions[:, norms > 0] / norms[norms > 0]
+    moves = norms > _INDEPENDENT * np.concatenate([np.ones(6), np.full(body.n, 1 / np.sqrt(body.mass))])
+    unit = motions[:, moves] / norms[moves]
     return int(np.linalg.matrix_rank(unit, tol=_INDEPENDENT)), len(motions)
 
 
@@ -218,7 +219,10 @@ def _largest(errors: Array) -> str:
 
 
 def _percent(error: float) -> str:
-    return f"{100 * abs(error):.2g} %" if abs(error) >= 1e-6 else "less than 0.0001 %"
+    percent = 100 * abs(error)
+    if percent < 1e-4:
+        return "less than 0.0001 %"
+    return f"{percent:.0f} %" if percent >= 10 else f"{percent:.2g} %"
 
 
 def _choice_lines(provenance: Mapping[str, Any]) -> Iterator[str]:

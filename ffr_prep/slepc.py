@@ -33,6 +33,7 @@ _PYTHON = "/usr/bin/python3"
 _HOMES = {"SLEPC_DIR": "/usr/lib/slepcdir", "PETSC_DIR": "/usr/lib/petscdir"}
 _INSTALL = "apt-get install python3-slepc4py-real libopenblas0-pthread openmpi-bin"
 _PATIENCE = 60.0
+_GRACE = 3.0
 _LOCAL = 20_000  # unknowns that supports may touch: eliminating one of them couples all others
 
 
@@ -54,7 +55,7 @@ def started(A: sp.csr_array, ranks: int) -> SlepcProcess:
     folder = Path(owner.name)
     with open(folder / "errors.txt", "w") as errors:
         child = subprocess.Popen(
-            _command(ranks),
+            [*_command(ranks), str(folder / "command.json")],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=errors,
@@ -129,10 +130,18 @@ def _command(ranks: int) -> list[str]:
 
 def _environment() -> dict[str, str]:
     """More ranks than cores are allowed, and root, as in containers; every rank computes on one thread."""
-    allowed = ("OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "OMPI_MCA_rmaps_base_oversubscribe")
+    on = (
+        "OMPI_ALLOW_RUN_AS_ROOT",
+        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM",
+        "OMPI_MCA_rmaps_base_oversubscribe",
+        "OMPI_MCA_mpi_yield_when_idle",
+        "OPENBLAS_NUM_THREADS",
+        "OMP_NUM_THREADS",
+    )
     own = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "OMPI_"))}
     homes = {name: _home(name) for name in _HOMES}
-    return own | homes | dict.fromkeys((*allowed, "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "1")
+    modules = os.pathsep.join(f"{home}/lib/python3/dist-packages" for home in homes.values())
+    return own | homes | {"PYTHONPATH": modules} | dict.fromkeys(on, "1")
 
 
 def _home(name: str) -> str:
@@ -164,8 +173,10 @@ def _ask(process: SlepcProcess, **command: Any) -> None:
 
 
 def _said(process: SlepcProcess) -> str:
-    lines = [line.strip() for line in (process.folder / "errors.txt").read_text(errors="replace").splitlines()]
-    return " | ".join([line for line in lines if line.strip("-")][-3:]) or "none"
+    """The last words of the processes, without what mpirun adds between rules."""
+    text = (process.folder / "errors.txt").read_text(errors="replace")
+    lines = [line.strip() for line in text.partition("\n-----")[0].splitlines() if line.strip("- ")]
+    return " | ".join(lines[-3:]) or "none"
 
 
 def _end(child: subprocess.Popen[str]) -> None:
@@ -173,10 +184,12 @@ def _end(child: subprocess.Popen[str]) -> None:
     for pipe in (child.stdin, child.stdout):
         if pipe:
             pipe.close()
-    try:
-        child.wait(_PATIENCE)
-    except subprocess.TimeoutExpired:
-        child.kill()
+    for insist in (child.terminate, child.kill):  # mpirun ends its processes when it is told to
+        try:
+            child.wait(_GRACE)
+            return
+        except subprocess.TimeoutExpired:
+            insist()
 
 
 def _write_matrix(stem: Path, A: sp.csr_array) -> None:

@@ -1,8 +1,8 @@
 """PETSc and SLEPc in MPI processes of their own: factorise a matrix, solve with it, find modes.
 
-Run as  mpirun -n RANKS python3 slepc_process.py  with a line of JSON per command on the standard input of the first
-rank. Each is answered by a line on its standard output: "done", or what went wrong. The end of the input is the end.
-This file is run by the system's Python and imports nothing of the package.
+Run as  mpirun -n RANKS python3 slepc_process.py FILE  with a line of JSON per command on the standard input of the first
+rank, which passes it on to the others in the file. Each is answered by a line on its standard output: "done", or what
+went wrong. The end of the input is the end. The system's Python runs this file, which imports nothing of the package.
 """
 
 from __future__ import annotations
@@ -10,9 +10,12 @@ from __future__ import annotations
 import json
 import os
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+_NEGATIVE_PIVOTS = 12  # INFOG(12) of MUMPS
 
 
 def main() -> int:
@@ -22,19 +25,15 @@ def main() -> int:
     try:
         import slepc4py
 
-        slepc4py.init(["ffr", "-malloc_dump", "0"])
+        slepc4py.init(["ffr"])
         from petsc4py import PETSc
         from slepc4py import SLEPc
     except Exception as error:  # a library that is broken raises anything
         print(error, file=sys.stderr)
         _answer(answers, "missing")
         return 1
-    comm = PETSc.COMM_WORLD.tompi4py()
     solver = None
-    while True:
-        line = comm.bcast(sys.stdin.readline() if comm.rank == 0 else None)
-        if not line:
-            return 0
+    while line := _next_line(PETSc.COMM_WORLD, Path(sys.argv[1])):
         command = json.loads(line)
         said = "done"
         try:
@@ -46,8 +45,18 @@ def main() -> int:
                 _modes(PETSc, SLEPc, command)
         except (PETSc.Error, ArithmeticError) as error:
             said = " ".join(str(error).split())
-        if comm.rank == 0:
+        if PETSc.COMM_WORLD.rank == 0:
             _answer(answers, said)
+    return 0
+
+
+def _next_line(comm: Any, file: Path) -> str:
+    """The next command, which the first rank reads and the others find in a file."""
+    comm.barrier()
+    if comm.rank == 0:
+        file.write_text(sys.stdin.readline())
+    comm.barrier()
+    return file.read_text()
 
 
 def _answer(answers: Any, text: str) -> None:
@@ -81,7 +90,10 @@ def _factorised(PETSc: Any, A: Any) -> Any:
     solver.setOperators(A)
     _directly(solver)
     solver.setUp()
-    if solver.getPC().getFailedReason():
+    x, b = A.createVecs()
+    b.set(1.0)
+    solver.solve(b, x)
+    if solver.getConvergedReason() < 0 or solver.getPC().getFactorMatrix().getMumpsInfog(_NEGATIVE_PIVOTS):
         raise ArithmeticError("the stiffness matrix is not positive definite: a pivot is not positive")
     return solver
 
