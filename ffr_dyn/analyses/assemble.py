@@ -39,6 +39,7 @@ class Assembled:
 
     x, v : positions and velocities (see `Layout`);  notes : what was changed and what is redundant, in words
     degrees_of_freedom : velocities left free by the constraints, elastic ones included
+    redundant : (joint, row) pairs that follow from the other rows
     """
 
     system: System
@@ -47,6 +48,7 @@ class Assembled:
     v: Array
     degrees_of_freedom: int
     notes: tuple[str, ...]
+    redundant: tuple[tuple[str, str], ...] = ()
 
 
 def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
@@ -69,7 +71,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     if shift > 1e-6:
         notes.insert(0, f"assembly moved a body by {shift:.3g} m from where the scene puts it")
     all_rows = compile_scene(scene, blocks, RELAXATION) if redundant else None
-    return Assembled(compile_scene(scene, kept), all_rows, x, v, place.v_size - rows, tuple(notes))
+    return Assembled(compile_scene(scene, kept), all_rows, x, v, place.v_size - rows, tuple(notes), tuple(redundant))
 
 
 def rows_at(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> list[Row]:

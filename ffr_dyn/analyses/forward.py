@@ -74,7 +74,7 @@ def forward(
     _announce_compilation(method)
     run = _started(assembled, method, start)
     header = _header(scene, assembled, method, stabilisation, (start, end, output_step))
-    first = Result(run.times[0], run.parts[0], _geometry(scene), header | {"status": "running"})
+    first = Result(run.times[0], run.parts[0], geometry(scene), header | {"status": "running"})
     with nullcontext() if path is None else ResultWriter(path, first) as writer:
         for times, part in _advance(assembled, run, method, stabilisation, start, substeps, rows):
             if writer is not None:
@@ -126,8 +126,8 @@ def _started(assembled: Assembled, method: Integrator, start: float) -> _Run:
     # A run of no steps records the start.
     _, status = method.run(system.model, work, stages, start, method.step, 0, 0, x, v, 0.0, 0.0, 0.0, first)
     if status != OK:
-        raise _failure(system, work, status, start)
-    first = _with_all_reactions(assembled, method, first)
+        raise failure(system, work, status, start)
+    first = with_all_reactions(assembled, method, first)
     parts, unwound = measure(system, first, {})
     run = _Run(x, v, work, stages, unwound, [parts], [first.time], np.zeros(1))
     run.turned = _elastic_turns(system, first)
@@ -156,19 +156,19 @@ def _advance(
         )  # fmt: skip
         took = clock.monotonic() - began
         if filled:
-            kept = _with_all_reactions(assembled, method, Record(*(column[:filled] for column in chunk)))
+            kept = with_all_reactions(assembled, method, Record(*(column[:filled] for column in chunk)))
             part, run.unwound = measure(system, kept, run.unwound)
             run.parts.append(part)
             run.times.append(kept.time)
             run.turned = np.maximum(run.turned, _elastic_turns(system, kept))
             yield kept.time, part
         if status != OK:
-            raise _failure(system, run.work, status, start + int(run.work.info[3]) * method.step)
+            raise failure(system, run.work, status, start + int(run.work.info[3]) * method.step)
         done += filled
         count = int(np.clip(count * SECONDS_PER_CALL / max(took, 1e-6), 1, 10 * count))
 
 
-def _with_all_reactions(assembled: Assembled, method: Integrator, record: Record) -> Record:
+def with_all_reactions(assembled: Assembled, method: Integrator, record: Record) -> Record:
     """The record with reactions of the redundant rows too: at every state, the smallest that give its accelerations."""
     if assembled.all_rows is None:
         return record
@@ -184,7 +184,7 @@ def _with_all_reactions(assembled: Assembled, method: Integrator, record: Record
     return record._replace(reaction=reaction)
 
 
-def _failure(system: System, work: Work, status: int, time: float) -> BaseException:
+def failure(system: System, work: Work, status: int, time: float) -> BaseException:
     """What to tell about a status of the kernels."""
     at, where = f"at t = {time:.6g} s", int(work.info[0])
     if system.user.cause is not None:
@@ -255,7 +255,7 @@ def _header(
     }
 
 
-def _geometry(scene: Scene) -> dict[str, Surface]:
+def geometry(scene: Scene) -> dict[str, Surface]:
     return {body.name: body.model.surface for body in scene.bodies if body.model.surface is not None}
 
 
@@ -265,7 +265,7 @@ def _result(scene: Scene, run: _Run, attributes: dict[str, Any]) -> Result:
         name: Quantity(np.concatenate([part[name].values for part in run.parts]), q.unit, q.axes, q.description)
         for name, q in names.items()
     }
-    return Result(np.concatenate(run.times), quantities, _geometry(scene), attributes)
+    return Result(np.concatenate(run.times), quantities, geometry(scene), attributes)
 
 
 def _account(scene: Scene, run: _Run, notes: list[str]) -> dict[str, Any]:
@@ -275,7 +275,7 @@ def _account(scene: Scene, run: _Run, notes: list[str]) -> dict[str, Any]:
         "evaluations": int(info[1]),
         "projections": int(info[2]),
         "largest_drift": [float(drift[0]), float(drift[1])],
-        "notes": [*notes, *_singular(run.work), *_strained(scene, run.turned)],
+        "notes": [*notes, *_singular(run.work), *strained(scene, run.turned)],
     }
 
 
@@ -289,7 +289,7 @@ def _singular(work: Work) -> list[str]:
     ]
 
 
-def _strained(scene: Scene, turned: Array) -> list[str]:
+def strained(scene: Scene, turned: Array) -> list[str]:
     return [
         f"body {body.name!r} turns within itself by up to {turn:.2g} rad: linear elasticity in its moving frame is "
         "strained beyond about 0.1 rad; split the body into several or expect errors of that order squared"

@@ -1,0 +1,106 @@
+"""From recorded states to the labelled result that every analysis returns, with the efforts and powers of the drivers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ffr_dyn.analyses.actuators import joint_named
+from ffr_dyn.analyses.forward import geometry
+from ffr_dyn.drivers import Driver
+from ffr_dyn.equations import System
+from ffr_dyn.errors import InputError
+from ffr_dyn.joints import frames
+from ffr_dyn.kernels.tables import Record
+from ffr_dyn.measure import measure
+from ffr_dyn.result import Quantity, Result
+from ffr_dyn.result_file import save_result
+from ffr_dyn.rotation import rotation_matrix
+from ffr_dyn.scene import GROUND, Scene
+
+Array = np.ndarray
+
+
+def output_times(start: float, end: float, output_step: float) -> Array:
+    """(T,) from start to end [s]. Raises InputError unless the span is a multiple of the output step."""
+    rows = round((end - start) / output_step) if output_step > 0 and np.isfinite([start, end]).all() else 0
+    if rows < 1 or abs(rows * output_step - (end - start)) > 1e-9 * (end - start):
+        raise InputError(f"from {start} to {end} s is not a positive multiple of the output step {output_step} s")
+    return start + output_step * np.arange(rows + 1)
+
+
+def result_of(system: System, record: Record, attributes: dict[str, Any], path: str | Path | None = None) -> Result:
+    """All quantities of recorded states, efforts of the drivers included; written to `path` when it is complete."""
+    quantities, _ = measure(system, record, {})
+    plain = Result(record.time, quantities, geometry(system.scene), attributes)
+    return with_quantities(plain, efforts(system.scene, plain), path)
+
+
+def with_quantities(result: Result, more: dict[str, Quantity], path: str | Path | None = None) -> Result:
+    """The result with more quantities, written to `path` if there is one."""
+    whole = Result(result.time, {**result.quantities, **more}, result.geometry, result.attributes)
+    if path is not None:
+        save_result(whole, path)
+    return whole
+
+
+def efforts(scene: Scene, result: Result) -> dict[str, Quantity]:
+    """Effort and power of every driver; the power is that which the driver brings into the scene.
+
+    A joint's driver has a scalar "driver.effort" [N m or N] with power = effort x rate of the coordinate; a driven point
+    has its force already, with power = force . relative velocity.
+    """
+    found: dict[str, Quantity] = {}
+    for driver in scene.drivers:
+        force, moment = result[f"{driver.name}.force"], result[f"{driver.name}.moment"]
+        if isinstance(driver, Driver):
+            joint = joint_named(scene, driver.joint, f"driver {driver.name!r}")
+            axis = axis_history(scene, result, joint.i, frames(joint)[0][:, 2])
+            angular = driver.coordinate == "angle"
+            effort = ((moment if angular else force) * axis).sum(1)
+            rate = (relative(scene, result, joint.i, joint.j, angular) * axis).sum(1)
+            text = f"effort along {driver.joint}.{driver.coordinate}, on the second body"
+            found[f"{driver.name}.effort"] = Quantity(effort, "N m" if angular else "N", (), text)
+            power = effort * rate
+        else:
+            power = (force * relative(scene, result, driver.i, driver.j, angular=False)).sum(1)
+        found[f"{driver.name}.power"] = Quantity(power, "W", (), "power of the driver into the scene")
+    return found
+
+
+def axis_history(scene: Scene, result: Result, marker: str, axis: Array) -> Array:
+    """(T, 3) global axis that stands on a marker, `axis` (3,) in body axes."""
+    name, _, point = marker.partition(".")
+    if name == GROUND:
+        return np.broadcast_to(axis, (result.time.size, 3))
+    A, theta = rotation_matrix(result[f"{name}.p"]), _elastic(scene, result, name, point, "q")
+    return np.einsum("tkl,tl->tk", A, axis + np.cross(theta, axis))
+
+
+def relative(scene: Scene, result: Result, i: str, j: str, angular: bool) -> Array:
+    """(T, 3) global velocity (or angular velocity) of marker j less that of marker i."""
+    motion = _spin if angular else _velocity
+    return motion(scene, result, j) - motion(scene, result, i)
+
+
+def _velocity(scene: Scene, result: Result, marker: str) -> Array:
+    still = marker.partition(".")[0] == GROUND
+    return np.zeros((result.time.size, 3)) if still else result[f"{marker}.velocity"]
+
+
+def _spin(scene: Scene, result: Result, marker: str) -> Array:
+    name, _, point = marker.partition(".")
+    if name == GROUND:
+        return np.zeros((result.time.size, 3))
+    spin = result[f"{name}.omega_bar"] + _elastic(scene, result, name, point, "q_dot")
+    return np.einsum("tkl,tl->tk", rotation_matrix(result[f"{name}.p"]), spin)
+
+
+def _elastic(scene: Scene, result: Result, name: str, point: str, coordinates: str) -> Array:
+    """(T, 3) elastic rotation of a marker or its rate, body axes."""
+    model = next(body.model for body in scene.bodies if body.name == name)
+    if model.n == 0:
+        return np.zeros((result.time.size, 3))
+    return result[f"{name}.{coordinates}"] @ model.interface(point).phi_r.T
