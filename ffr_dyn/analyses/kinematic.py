@@ -27,7 +27,7 @@ from ffr_dyn.analyses.evaluation import (
     total_mass_matrix,
 )
 from ffr_dyn.analyses.forward import with_all_reactions
-from ffr_dyn.analyses.mobility import coordinate_gradients, require_driven
+from ffr_dyn.analyses.mobility import named_motion, require_driven
 from ffr_dyn.analyses.outcome import output_times, result_of
 from ffr_dyn.errors import SimulationError
 from ffr_dyn.integrators import RK4
@@ -159,7 +159,7 @@ def _pose(at: Evaluator, time: float, x: Array, v: Array) -> _Pose:
     still = evaluate(at, time, x, np.zeros_like(v))
     values, sign, motion = _conditioning(at, still, x)
     v = np.linalg.lstsq(still.jacobian, -still.nu, rcond=1e-12)[0]
-    return _Pose(time, x, v, values, sign, _named(at, x, motion))
+    return _Pose(time, x, v, values, sign, named_motion(at.system.scene, at.system.layout, x, motion))
 
 
 def _conditioning(at: Evaluator, now: Evaluation, x: Array) -> tuple[float, float, Array]:
@@ -172,13 +172,6 @@ def _conditioning(at: Evaluator, now: Evaluation, x: Array) -> tuple[float, floa
     square = weighted.shape[0] == weighted.shape[1]
     sign = float(np.linalg.slogdet(weighted)[0]) if square else 0.0
     return float(values[place.v_size - 1]), sign, np.linalg.solve(lower.T, basis[place.v_size - 1])
-
-
-def _named(at: Evaluator, x: Array, motion: Array) -> str:
-    """The joint whose coordinate moves most in a motion, relative to the rest of the bodies."""
-    scene, place = at.system.scene, at.system.layout
-    names, gradients = coordinate_gradients(scene, place, x, np.zeros(place.v_size))
-    return names[int(np.argmax(np.abs(gradients @ motion)))] if names else scene.bodies[0].name
 
 
 def _locked(at: Evaluator, pose: _Pose) -> SimulationError:

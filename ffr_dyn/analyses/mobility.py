@@ -141,6 +141,17 @@ def coordinate_gradients(scene: Scene, place: Layout, x: Array, v: Array) -> tup
     return names, np.array(rows).reshape(-1, place.v_size)
 
 
+def named_motion(scene: Scene, place: Layout, x: Array, direction: Array) -> str:
+    """The coordinate that leads a motion (V,): of a joint if one takes part, else of the body that moves most."""
+    names, gradients = coordinate_gradients(scene, place, x, np.zeros(place.v_size))
+    bodies = np.concatenate([np.roll(direction[place.rigid(b)], 3) for b in range(len(place.n))])
+    joints = gradients @ direction
+    if np.abs(joints).max(initial=0.0) > 0.1 * np.abs(bodies).max():
+        return names[int(np.argmax(np.abs(joints)))]
+    leading = int(np.argmax(np.abs(bodies)))
+    return f"{scene.bodies[leading // 6].name} {ALONG[leading % 6]}"
+
+
 def _motions(scene: Scene, place: Layout, x: Array, v: Array, rigid: Array, Z: Array) -> list[FreeMotion]:
     """The free motions Z (6 B, d) in the coordinates that lead them: joint coordinates first, then shifts and turns."""
     names, gradients = coordinate_gradients(scene, place, x, v)

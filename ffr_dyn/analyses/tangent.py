@@ -55,7 +55,7 @@ def chart(at: Evaluator, time: float, x: Array, v: Array) -> Chart:
     now = evaluate(at, time, x, v)
     M = total_mass_matrix(scene, place, x)
     Z = free_motions(now.jacobian, M)
-    movement = np.abs(Z / _sizes(at)[:, None]).max(axis=0, initial=0.0)
+    movement = np.abs(Z / sizes(at)[:, None]).max(axis=0, initial=0.0)
     return Chart(at, time, x, to_body_axes(place, x, v), M, Z, M @ Z, STEP / np.maximum(movement, 1e-300))
 
 
@@ -133,12 +133,17 @@ def stiffness(near: Chart) -> tuple[Array, float]:
 def _period(near: Chart) -> float:
     """A time [s] to compare rates with: of the largest acceleration or spin at the state."""
     now = evaluate(near.at, near.time, near.x, to_global_axes(near.at.system.layout, near.x, near.V))
-    size = _sizes(near.at)
+    size = sizes(near.at)
     rate = max(np.abs(near.V / size).max(initial=0.0), np.sqrt(np.abs(now.acceleration / size).max(initial=0.0)))
     return 1.0 / max(rate, 1.0)
 
 
-def _sizes(at: Evaluator) -> Array:
+def movement(near: Chart, y: Array) -> float:
+    """How far a deviation moves anything: largest turn [rad] or shift, relative to the size of the scene."""
+    return float(np.abs(near.Z @ y / sizes(near.at)).max(initial=0.0))
+
+
+def sizes(at: Evaluator) -> Array:
     """(V,) what counts as a movement of one: a radian, the size of the scene; of an elastic coordinate, that over sqrt(m)."""
     place, scene = at.system.layout, at.system.scene
     points = [i.position for body in scene.bodies for i in body.model.interfaces]
