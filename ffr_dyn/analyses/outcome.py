@@ -19,6 +19,7 @@ from ffr_dyn.result import Quantity, Result
 from ffr_dyn.result_file import save_result
 from ffr_dyn.rotation import rotation_matrix
 from ffr_dyn.scene import GROUND, Scene
+from ffr_dyn.timefunction import evaluate
 
 Array = np.ndarray
 
@@ -60,12 +61,12 @@ def efforts(scene: Scene, result: Result) -> dict[str, Quantity]:
             axis = axis_history(scene, result, joint.i, frames(joint)[0][:, 2])
             angular = driver.coordinate == "angle"
             effort = ((moment if angular else force) * axis).sum(1)
-            rate = (relative(scene, result, joint.i, joint.j, angular) * axis).sum(1)
+            rate = np.array([evaluate(driver.function, float(t))[1] for t in result.time])
             text = f"effort along {driver.joint}.{driver.coordinate}, on the second body"
             found[f"{driver.name}.effort"] = Quantity(effort, "N m" if angular else "N", (), text)
             power = effort * rate
         else:
-            power = (force * relative(scene, result, driver.i, driver.j, angular=False)).sum(1)
+            power = (force * (_velocity(result, driver.j) - _velocity(result, driver.i))).sum(1)
         found[f"{driver.name}.power"] = Quantity(power, "W", (), "power of the driver into the scene")
     return found
 
@@ -75,32 +76,18 @@ def axis_history(scene: Scene, result: Result, marker: str, axis: Array) -> Arra
     name, _, point = marker.partition(".")
     if name == GROUND:
         return np.broadcast_to(axis, (result.time.size, 3))
-    A, theta = rotation_matrix(result[f"{name}.p"]), _elastic(scene, result, name, point, "q")
+    A, theta = rotation_matrix(result[f"{name}.p"]), _elastic_turn(scene, result, name, point)
     return np.einsum("tkl,tl->tk", A, axis + np.cross(theta, axis))
 
 
-def relative(scene: Scene, result: Result, i: str, j: str, angular: bool) -> Array:
-    """(T, 3) global velocity (or angular velocity) of marker j less that of marker i."""
-    motion = _spin if angular else _velocity
-    return motion(scene, result, j) - motion(scene, result, i)
-
-
-def _velocity(scene: Scene, result: Result, marker: str) -> Array:
+def _velocity(result: Result, marker: str) -> Array:
     still = marker.partition(".")[0] == GROUND
     return np.zeros((result.time.size, 3)) if still else result[f"{marker}.velocity"]
 
 
-def _spin(scene: Scene, result: Result, marker: str) -> Array:
-    name, _, point = marker.partition(".")
-    if name == GROUND:
-        return np.zeros((result.time.size, 3))
-    spin = result[f"{name}.omega_bar"] + _elastic(scene, result, name, point, "q_dot")
-    return np.einsum("tkl,tl->tk", rotation_matrix(result[f"{name}.p"]), spin)
-
-
-def _elastic(scene: Scene, result: Result, name: str, point: str, coordinates: str) -> Array:
-    """(T, 3) elastic rotation of a marker or its rate, body axes."""
+def _elastic_turn(scene: Scene, result: Result, name: str, point: str) -> Array:
+    """(T, 3) elastic rotation of a marker, body axes."""
     model = next(body.model for body in scene.bodies if body.name == name)
     if model.n == 0:
         return np.zeros((result.time.size, 3))
-    return result[f"{name}.{coordinates}"] @ model.interface(point).phi_r.T
+    return result[f"{name}.q"] @ model.interface(point).phi_r.T
