@@ -84,7 +84,7 @@ def _balanced(at: Evaluator, time: float, x: Array) -> _Balance:
             radius = 0.5 * movement(near, step)
             step = _step(near, K, residual, radius)
         x, radius = there, min(2 * radius, LARGEST_STEP)
-    values, vectors = np.linalg.eigh(0.5 * (K + K.T))
+    _, vectors = np.linalg.eigh(0.5 * (K + K.T))
     raise _not_held(near, vectors[:, 0], f"no equilibrium was found in {ITERATIONS} steps")
 
 
