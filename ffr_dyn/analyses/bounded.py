@@ -19,7 +19,7 @@ from scipy.linalg import schur
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
-from ffr_dyn.analyses.servo import Servo, at_moment, slope, slope_matrix
+from ffr_dyn.analyses.servo import Servo, at_moment, at_rest, slope, slope_matrix
 from ffr_dyn.errors import InputError, SimulationError
 
 Array = np.ndarray
@@ -65,9 +65,8 @@ def bounded_solution(
 
     Raises InputError when the known motion does not start and end at rest; SimulationError when nothing converges.
     """
-    first = _equilibrium(own, own.span[0], w, x)
-    path = _carried(own, first, output_step)
-    last = _equilibrium(own, own.span[1], *path)
+    route = _equilibria(own, output_step, w, x)
+    first, last = (_end(own, *route[k]) for k in (0, -1))
     if first.growing.shape[0] + last.other.shape[0] != w.size or first.growing.shape != last.growing.shape:
         raise SimulationError(
             f"the internal dynamics have {first.growing.shape[0]} growing motions at the start and {last.growing.shape[0]} at "
@@ -78,7 +77,7 @@ def bounded_solution(
     h = output_step / settings.parts
     rows = round((own.span[1] - own.span[0]) / output_step) * settings.parts
     times = own.span[0] + h * np.arange(-before * settings.parts, rows + after * settings.parts + 1)
-    ws, xs = _collocated(own, times, first, last)
+    ws, xs = _collocated(own, times, first, last, route)
     keep = slice(None, None, settings.parts)
     note = f"bounded solution over {times[0]:.4g} to {times[-1]:.4g} s with {first.growing.shape[0]} growing internal motions"
     return times[keep], ws[keep], xs[keep], [note]
@@ -91,19 +90,34 @@ def _whole(span: float, output_step: float) -> int:
 # ---- ends ------------------------------------------------------------------------------------------------------------
 
 
-def _equilibrium(own: Servo, time: float, w: Array, x: Array) -> _End:
-    """Where the internal dynamics rest while the known motion does (Newton's method on y_ddot at y_dot = 0)."""
-    d = own.size
-    w = np.concatenate([w[:d], np.zeros(d)])
-    _require_rest(own, time, w, x)
+def _equilibria(own: Servo, output_step: float, w: Array, x: Array) -> list[tuple[float, Array, Array]]:
+    """(time, y, x) of the equilibria along the known motion, as if it stood still at every output time."""
+    y, route = w[: own.size], []
+    for time in np.linspace(*own.span, round((own.span[1] - own.span[0]) / output_step) + 1):
+        y, x = _equilibrium(own, float(time), y, x)
+        route.append((float(time), y, x))
+    return route
+
+
+def _equilibrium(own: Servo, time: float, y: Array, x: Array) -> tuple[Array, Array]:
+    """Where the internal dynamics rest (Newton's method on y_ddot)."""
     for _ in range(ITERATIONS):
-        value, x = slope(own, time, w, x)
-        A = slope_matrix(own, time, w, x)
-        step = np.linalg.lstsq(A[d:, :d], -value[d:], rcond=1e-12)[0]
-        w = w + np.concatenate([step, np.zeros(d)])
-        if np.abs(step).max() < 1e-12 * max(1.0, float(np.abs(w).max())):
-            return _split(w, x, A)
-    raise SimulationError(f"at t = {time:.6g} s the internal dynamics have no equilibrium to start from or to end at")
+        now = at_rest(own, time, y, x)
+        x = now.x
+        h = 1e-6 * max(1.0, float(np.abs(y).max()))
+        sides = [[at_rest(own, time, y + sign * h * one, x).y_ddot for sign in (1, -1)] for one in np.eye(y.size)]
+        stiffness = np.array([(plus - minus) / (2 * h) for plus, minus in sides]).T
+        step = np.linalg.lstsq(stiffness, -now.y_ddot, rcond=1e-12)[0]
+        y = y + step
+        if np.abs(step).max() < 1e-11 * max(1.0, float(np.abs(y).max())):
+            return y, x
+    raise SimulationError(f"at t = {time:.6g} s the internal dynamics have no equilibrium near the known motion")
+
+
+def _end(own: Servo, time: float, y: Array, x: Array) -> _End:
+    w = np.concatenate([y, np.zeros_like(y)])
+    _require_rest(own, time, w, x)
+    return _split(w, x, slope_matrix(own, time, w, x))
 
 
 def _require_rest(own: Servo, time: float, w: Array, x: Array) -> None:
@@ -127,23 +141,19 @@ def _split(w: Array, x: Array, A: Array) -> _End:
     return _End(w, x, A, vectors[:, :count].T, others[:, :rest].T, slowest)
 
 
-def _carried(own: Servo, first: _End, output_step: float) -> tuple[Array, Array]:
-    """The rest position of the start carried along the known motion, with the internal coordinates as they are."""
-    x = first.x
-    for time in np.arange(own.span[0], own.span[1] + 0.5 * output_step, output_step):
-        x = at_moment(own, float(time), first.w, x).x
-    return first.w, x
-
-
 # ---- all times at once -----------------------------------------------------------------------------------------------
 
 
-def _collocated(own: Servo, times: Array, first: _End, last: _End) -> tuple[Array, list[Array]]:
-    """Newton's method from the straight line between the equilibria."""
-    share = np.clip((times - own.span[0]) / (own.span[1] - own.span[0]), 0.0, 1.0)[:, None]
-    ws = (1 - share) * first.w + share * last.w
-    matrices = (1 - share[:, :, None]) * first.A + share[:, :, None] * last.A
-    xs = _states(own, times, ws, first.x)
+def _collocated(
+    own: Servo, times: Array, first: _End, last: _End, route: list[tuple[float, Array, Array]]
+) -> tuple[Array, list[Array]]:
+    """Newton's method from the equilibria along the known motion."""
+    clock, values = np.array([t for t, _, _ in route]), np.array([y for _, y, _ in route])
+    rest = np.array([np.interp(times, clock, column) for column in values.T]).T
+    ws = np.concatenate([rest, np.zeros_like(rest)], axis=1)
+    xs = [route[int(np.argmin(np.abs(clock - time)))][2] for time in times]
+    share = np.clip((times - own.span[0]) / (own.span[1] - own.span[0]), 0.0, 1.0)[:, None, None]
+    matrices = (1 - share) * first.A + share * last.A
     solve, before, renewed = _linear(times, matrices, first, last), np.inf, False
     for _ in range(ITERATIONS):
         residual, xs = _residual(own, times, ws, xs, first, last)
@@ -159,14 +169,6 @@ def _collocated(own: Servo, times: Array, first: _End, last: _End) -> tuple[Arra
     raise SimulationError(
         f"the bounded solution did not converge: the last correction was {size:.3g}; use a smaller output step or more parts"
     )
-
-
-def _states(own: Servo, times: Array, ws: Array, x: Array) -> list[Array]:
-    xs = []
-    for time, w in zip(times, ws, strict=True):
-        x = at_moment(own, float(time), w, x).x
-        xs.append(x)
-    return xs
 
 
 def _residual(

@@ -271,24 +271,40 @@ def at_moment(own: Servo, time: float, w: Array, near: Array) -> Moment:
     Raises SimulationError when the internal coordinates no longer describe the motion or the efforts are not determined.
     """
     clock = float(np.clip(time, *own.span))
-    at, place = _guided(own, clock, w), own.at.system.layout
-    d, still, slots = own.size, np.zeros(place.v_size), _positions(own)
-    x = near
+    at = _guided(own, clock, w)
+    x, now = _placed(own, at, clock, w, near)
+    V = np.linalg.solve(_square(own, now), np.concatenate([-now.nu, w[own.size + own.inner.size :]]))
+    v = to_global_axes(own.at.system.layout, x, V)
+    now = evaluate(at, clock, x, v)
+    return _accelerated(own, at, now, x, v, now.gamma)
+
+
+def at_rest(own: Servo, time: float, y: Array, near: Array) -> Moment:
+    """The same with the known motions held still where they are at that time, and y at rest."""
+    clock = float(np.clip(time, *own.span))
+    w = np.concatenate([y, np.zeros(own.size)])
+    at = _guided(own, clock, w)
+    x, now = _placed(own, at, clock, w, near)
+    return _accelerated(own, at, now, x, np.zeros(own.at.system.layout.v_size), np.zeros_like(now.gamma))
+
+
+def _placed(own: Servo, at: Evaluator, time: float, w: Array, x: Array) -> tuple[Array, Evaluation]:
+    """The position by Newton's method from x, and the equations there at rest."""
+    place, slots = own.at.system.layout, _positions(own)
+    still, d = np.zeros(place.v_size), own.size
     for _ in range(ITERATIONS):
-        now = evaluate(at, clock, x, still)
+        now = evaluate(at, time, x, still)
         left = np.concatenate([-now.Phi, w[own.inner.size : d] - x[slots]])
+        if np.abs(left).max() < TOLERANCE:
+            return x, now
         step = np.linalg.solve(_square(own, now), left)
         x = moved(place, x, step)
         if np.abs(step).max() < TOLERANCE:
-            break
-    else:
-        raise SimulationError(
-            f"at t = {time:.6g} s no position belongs to the known motions: they are out of reach, or "
-            f"{', '.join(own.names)} no longer describe what is free"
-        )
-    V = np.linalg.solve(_square(own, now), np.concatenate([-now.nu, w[d + own.inner.size :]]))
-    v = to_global_axes(place, x, V)
-    return _accelerated(own, at, clock, x, v)
+            return x, evaluate(at, time, x, still)
+    raise SimulationError(
+        f"at t = {time:.6g} s no position belongs to the known motions: they are out of reach, or "
+        f"{', '.join(own.names)} no longer describe what is free"
+    )
 
 
 def _square(own: Servo, now: Evaluation) -> Array:
@@ -297,21 +313,20 @@ def _square(own: Servo, now: Evaluation) -> Array:
     return np.concatenate([now.jacobian, rows])
 
 
-def _accelerated(own: Servo, at: Evaluator, time: float, x: Array, v: Array) -> Moment:
-    now = evaluate(at, time, x, v)
+def _accelerated(own: Servo, at: Evaluator, now: Evaluation, x: Array, v: Array, gamma: Array) -> Moment:
+    """Accelerations and efforts at an evaluated state."""
     V, C = now.jacobian.shape[1], own.plant.size
     B, J, S = effort_columns(at, own.unknown, x), now.jacobian[own.plant], now.jacobian[own.known]
-    U = B.shape[1]
-    matrix = np.zeros((V + C + U, V + C + U))
+    matrix = np.zeros((V + C + B.shape[1], V + C + B.shape[1]))
     matrix[:V, :V] = total_mass_matrix(at.system.scene, at.system.layout, x)
     matrix[:V, V : V + C], matrix[V : V + C, :V] = J.T, J
     matrix[:V, V + C :], matrix[V + C :, :V] = -B, S
     try:
-        found = np.linalg.solve(matrix, np.concatenate([now.force, now.gamma[own.plant], now.gamma[own.known]]))
+        found = np.linalg.solve(matrix, np.concatenate([now.force, gamma[own.plant], gamma[own.known]]))
     except np.linalg.LinAlgError:
-        raise SimulationError(f"at t = {time:.6g} s the unknown forces no longer determine the known motions") from None
+        raise SimulationError("the unknown forces no longer determine the known motions at a position on the way") from None
     acceleration = found[:V]
-    joints = now.jacobian[own.inner] @ acceleration - now.gamma[own.inner]
+    joints = now.jacobian[own.inner] @ acceleration - gamma[own.inner]
     y_ddot = np.concatenate([joints, acceleration[own.elastic]])
     return Moment(x, v, acceleration, found[V + C :], y_ddot, now.gamma[own.known])
 
