@@ -11,7 +11,7 @@ from test_analyses_kinematic import bar, slider_crank
 from test_analyses_static import flexible, hanging
 
 from ffr_dyn.analyses.actuators import JointForce, MarkerForce, as_loads, recorded
-from ffr_dyn.analyses.evaluation import evaluate, evaluator, total_mass_matrix
+from ffr_dyn.analyses.evaluation import evaluate, evaluated_mass_matrix, evaluator, total_mass_matrix
 from ffr_dyn.analyses.assemble import assemble
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.linearise import as_result, linearise, table_of_modes
@@ -171,3 +171,11 @@ def test_bad_input():
         MarkerForce("f", "rod.b", (0, 0, 0))
     with pytest.raises(InputError, match="more than 5"):
         recorded(np.arange(3.0), np.arange(3.0))
+
+
+def test_the_mass_matrix_that_the_kernels_keep_is_the_readable_one():
+    assembled = assemble(flexible())
+    at = evaluator(assembled.system)
+    evaluate(at, 0.0, assembled.x, assembled.v)
+    readable = total_mass_matrix(flexible(), assembled.system.layout, assembled.x)
+    np.testing.assert_allclose(evaluated_mass_matrix(at), readable, atol=1e-13)

@@ -94,14 +94,14 @@ def test_kinematics_and_inverse_close_the_circle(antonya):
         Driver("motor", "A", recorded(antonya.time, antonya["A.angle"], degree=7)),
         PointDriver("path", "ground.O", "b5.c", x=recorded(antonya.time, antonya["b5.R.x"], degree=7)),
     )
-    inside = slice(5, -5)
+    inside = slice(1, None)
     for run in (kinematic, lambda s, **k: inverse(s, elastic=QuasiStatic(), **k)):
-        back = run(chain(TORQUE_3, drivers=drivers), end=2.0, output_step=0.004)
+        back = run(chain(TORQUE_3, drivers=drivers), end=1.6, output_step=0.04)
         np.testing.assert_allclose(back["motor.effort"][inside], -250.0, atol=1e-5)
         np.testing.assert_allclose(back["path.force"][inside, 0], 10 * np.sin(0.5 * np.pi * back.time)[inside], atol=1e-6)
         for name in ("B.force", "D.force"):
-            np.testing.assert_allclose(back[name][inside], antonya[name][inside], atol=1e-5)
-        np.testing.assert_allclose(back["b3.R"], antonya["b3.R"], atol=1e-8)
+            np.testing.assert_allclose(back[name][inside], antonya[name][:401:10][inside], atol=1e-5)
+        np.testing.assert_allclose(back["b3.R"], antonya["b3.R"][:401:10], atol=1e-8)
 
 
 def test_the_chain_with_a_flexible_body():
@@ -204,15 +204,15 @@ TIP = PointDriver("path", "ground.O", "arm.tip", y=rest_to_rest(0.4, 0.6))
 
 def test_tip_path_known_needs_the_moment_before_the_motion():
     """Stable inversion of the non-minimum-phase arm; the moment found reproduces the path to 1e-6 of its range."""
-    found = mixed(one_link(TIP), unknown=(MOTOR,), end=0.6, output_step=4e-3)
+    found = mixed(one_link(TIP), unknown=(MOTOR,), end=0.6, output_step=5e-3)
     assert "bounded" in found.attributes["analysis"]
     moment, before = found["motor.effort"], found.time < -1e-9
     assert np.abs(moment[before]).max() > 0.02 * np.abs(moment).max()
     assert np.abs(found["arm.tip.position.y"][before]).max() < 1e-9
     start = scene_at(one_link(), found, 0)
     fed = replace(start, loads=as_loads(start, MOTOR, found.time, moment))
-    rows = int(round((found.time[-1] - found.time[0]) / 4e-3))
-    run = forward(fed, start=found.time[0], end=found.time[0] + rows * 4e-3, output_step=4e-3, method=RK4(2.5e-4), stabilisation=FINE)
+    rows = int(round((found.time[-1] - found.time[0]) / 5e-3))
+    run = forward(fed, start=found.time[0], end=found.time[0] + rows * 5e-3, output_step=5e-3, method=RK4(2.5e-4), stabilisation=FINE)
     np.testing.assert_allclose(run["arm.tip.position.y"], found["arm.tip.position.y"], atol=4e-7)
 
 

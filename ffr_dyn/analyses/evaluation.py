@@ -17,7 +17,7 @@ from ffr_dyn.inertia import mass_matrix
 from ffr_dyn.integrators import RK4
 from ffr_dyn.kernels.tables import OK, SINGULAR_CONSTRAINT, Record, Work
 from ffr_dyn.layout import Layout
-from ffr_dyn.rotation import from_vector, rotation_matrix
+from ffr_dyn.rotation import from_vector, rotation_matrix, skew
 from ffr_dyn.scene import Scene
 
 Array = np.ndarray
@@ -118,9 +118,10 @@ def _jacobian(system: System, work: Work) -> Array:
             if b == len(place.n):
                 continue
             part = work.rows.jac[lines, side]
-            phi = shapes(system, marker)
             jacobian[lines, place.rigid(b)] += part[:, :6]
-            jacobian[lines, place.q_dot(b)] += part[:, :3] @ phi[:3] + part[:, 6:] @ phi[3:]
+            if place.n[b]:
+                phi = shapes(system, marker)
+                jacobian[lines, place.q_dot(b)] += part[:, :3] @ phi[:3] + part[:, 6:] @ phi[3:]
     return jacobian
 
 
@@ -139,7 +140,7 @@ def moved(place: Layout, x: Array, step: Array) -> Array:
     out = x.copy()
     for b in range(len(place.n)):
         p = x[place.p(b)]
-        out[place.R(b)] += rotation_matrix(p) @ step[place.rigid(b)][:3]
+        out[place.R(b)] += rotation_matrix(p) @ step[place.R_dot(b)]
         out[place.p(b)] = product(p, from_vector(step[place.omega(b)]))
         out[place.q(b)] += step[place.q_dot(b)]
     return out
@@ -147,8 +148,12 @@ def moved(place: Layout, x: Array, step: Array) -> Array:
 
 def product(p: Array, r: Array) -> Array:
     """Euler parameters of the rotation p after r, of length one."""
-    out = np.concatenate([[p[0] * r[0] - p[1:] @ r[1:]], p[0] * r[1:] + r[0] * p[1:] + np.cross(p[1:], r[1:])])
-    return out / np.linalg.norm(out)
+    a, b, c, d = p.tolist()
+    e, f, g, h = r.tolist()
+    out = np.array([
+        a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g, a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e
+    ])  # fmt: skip
+    return out / np.sqrt(out @ out)
 
 
 def to_body_axes(place: Layout, x: Array, v: Array) -> Array:
@@ -176,6 +181,23 @@ def total_mass_matrix(scene: Scene, place: Layout, x: Array) -> Array:
     for b, body in enumerate(scene.bodies):
         at = slice(place.iv[b], place.iv[b] + 6 + place.n[b])
         M[at, at] = mass_matrix(body.model, x[place.q(b)])
+    return M
+
+
+def evaluated_mass_matrix(at: Evaluator) -> Array:
+    """(V, V) mass matrix at the state evaluated last, from what the kernels keep of it."""
+    place, bodies, work = at.system.layout, at.system.model.bodies, at.work.bodies
+    M = np.zeros((place.v_size, place.v_size))
+    for b, n in enumerate(place.n):
+        rigid, elastic, e = place.rigid(b), place.q_dot(b), int(bodies.where[b, 3])
+        block, s = M[rigid, rigid], skew(work.s[b])
+        block[[0, 1, 2], [0, 1, 2]] = bodies.mass[b]
+        block[3:, :3], block[:3, 3:], block[3:, 3:] = s, -s, work.J[b]
+        if n:
+            P, H = bodies.P_dm[3 * e : 3 * (e + n)], work.g[9 * e + 6 * n : 9 * (e + n)]
+            coupling = np.concatenate([P, H]).reshape(6, n)
+            M[rigid, elastic], M[elastic, rigid] = coupling, coupling.T
+            M[elastic, elastic] = np.eye(n)
     return M
 
 

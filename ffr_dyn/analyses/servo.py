@@ -22,6 +22,7 @@ from ffr_dyn.analyses.evaluation import (
     Evaluation,
     Evaluator,
     evaluate,
+    evaluated_mass_matrix,
     evaluator,
     free_motions,
     moved,
@@ -318,7 +319,7 @@ def _accelerated(own: Servo, at: Evaluator, now: Evaluation, x: Array, v: Array,
     V, C = now.jacobian.shape[1], own.plant.size
     B, J, S = effort_columns(at, own.unknown, x), now.jacobian[own.plant], now.jacobian[own.known]
     matrix = np.zeros((V + C + B.shape[1], V + C + B.shape[1]))
-    matrix[:V, :V] = total_mass_matrix(at.system.scene, at.system.layout, x)
+    matrix[:V, :V] = evaluated_mass_matrix(at)
     matrix[:V, V : V + C], matrix[V : V + C, :V] = J.T, J
     matrix[:V, V + C :], matrix[V + C :, :V] = -B, S
     try:
