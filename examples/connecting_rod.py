@@ -3,7 +3,8 @@
     python examples/connecting_rod.py [folder]
 
 Meshes meshes/connecting_rod.geo, reduces it under simply supported reference conditions, runs it between a rigid crank at
-4000 rev/min and a rigid piston, and leaves body file, result, plots and animations in the folder (out/connecting_rod).
+4000 rev/min and a rigid piston, finds where the rod is stressed most, and leaves body file, result, plots and animations
+in the folder (out/connecting_rod).
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from ffr_dyn.plots import plot
 from ffr_dyn.progress import progress
 from ffr_dyn.result import Result
 from ffr_dyn.scene import Body, Scene
+from ffr_dyn.stress_report import report_lines, stress_report
 from ffr_dyn.timefunction import polynomial
 from ffr_prep.body import FlexibleBody, rigid_body, save_body, with_point
 from ffr_prep.interface import InterfaceRegion
@@ -35,6 +37,7 @@ from ffr_prep.reference import SimplySupported
 GEOMETRY = Path(__file__).resolve().parent.parent / "meshes" / "connecting_rod.geo"
 THROW, ROD = 0.045, 0.150  # crank radius and distance of the eyes [m]
 SPEED = 4000 * 2 * np.pi / 60  # [rad/s]
+STRESS = 60e6  # [Pa], end of the colour bar: above what is left when the vibration of the start has decayed
 
 
 def reduced_rod() -> FlexibleBody:
@@ -47,6 +50,7 @@ def reduced_rod() -> FlexibleBody:
         interfaces=[InterfaceRegion("big_eye"), InterfaceRegion("small_eye")],
         reference=SimplySupported("big_eye", "small_eye"),
         reduction=CraigBampton(8),
+        stress=True,
     )
     return with_point(rod, "middle", np.array([ROD / 2, 0.013, 0.0]))
 
@@ -76,7 +80,7 @@ def slider_crank(rod: FlexibleBody) -> Scene:
 
 
 def pictures(result: Result, folder: Path) -> None:
-    """Slider motion, mid-rod deflection and reactions, and two films."""
+    """Slider motion, mid-rod deflection and reactions, and two films: coloured by deflection and by stress."""
     plot(
         result, ["piston.pin.position.x", "piston.pin.velocity.x"], folder / "slider_motion.png", title="Piston motion"
     )
@@ -88,8 +92,14 @@ def pictures(result: Result, folder: Path) -> None:
     )
     forces = ["crank_pin.force.x", "crank_pin.force.y", "piston_pin.force.x", "piston_pin.force.y", "motor.moment.z"]
     plot(result, forces, folder / "reactions.png", title="Joint reactions and motor torque")
-    for name in ("motion.gif", "motion.html"):
-        animate(result, folder / name, scale="auto", fps=20)
+    animate(result, folder / "motion.gif", scale="auto", fps=20)
+    animate(result, folder / "motion.html", scale="auto", fps=20, colour="von-mises", limit=STRESS)
+
+
+def stresses(result: Result, folder: Path) -> None:
+    """Hot spots of the last turn, when the vibration of the start has decayed."""
+    for line in report_lines(stress_report(result, folder, since=2 / 3 * result.time[-1], count=3)):
+        print(line)
 
 
 def main() -> None:
@@ -115,6 +125,7 @@ def main() -> None:
     )
     for note in result.attributes["notes"]:
         print(f"note      {note}")
+    stresses(result, folder / "stress")
     pictures(result, folder)
     print(f"results   {folder} ({time.monotonic() - began:.1f} s)")
 

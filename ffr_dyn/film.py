@@ -26,8 +26,8 @@ BODY_COLOURS = ("#8FB4D0", "#E0B48A", "#93C4B0", "#D9B3C8", "#C9BE86", "#A9CFE6"
 TRACE_COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7")
 # What flexible bodies may be coloured by; "body" leaves every body plain, in a colour of its own.
 COLOURS = ("deformation", "body", *MEASURES)
-# For sizes, for stress and for values with a sign: names that matplotlib and plotly share.
-_SEQUENTIAL, _STRESS, _DIVERGING = "viridis", "turbo", "RdBu_r"
+# For sizes, for stress and for values with a sign, by their names in matplotlib.
+_SEQUENTIAL, _STRESS, _DIVERGING = "viridis", "turbo", "coolwarm"
 
 # The share of its own size by which the automatic scale deflects the most flexible body.
 _AUTOMATIC_SHARE = 0.05

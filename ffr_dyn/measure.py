@@ -1,19 +1,35 @@
-"""From recorded states to named quantities with units."""
+"""From recorded states to named quantities with units.
+
+Every quantity has a name, a unit and a way to compute it from the recorded rows (`catalogue`); only those that are wanted are
+computed and kept. `docs/scene_file.md` lists them.
+"""
 
 from __future__ import annotations
 
+import fnmatch
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 
 import numpy as np
 
 from ffr_dyn.equations import System
-from ffr_dyn.joints import COORDINATES, Joint, frames
+from ffr_dyn.errors import InputError
+from ffr_dyn.joints import COORDINATES, Joint
 from ffr_dyn.kernels.tables import Record
+from ffr_dyn.measurement import Measurement
+from ffr_dyn.power import Worked, damping_power, power, reaction, transmitted, work
 from ffr_dyn.result import EULER_PARAMETERS, XYZ, Axis, Quantity, mode_axis
-from ffr_dyn.rotation import rotation_matrix
-from ffr_dyn.scene import Scene, marker_names, marker_number, markers
+from ffr_dyn.scene import marker_names, markers
+from ffr_dyn.view import View, dot, times, to_axes
 
 Array = np.ndarray
+
+# What a result keeps unless told otherwise: enough to draw, to animate and to recover stress, and what joints carry.
+DEFAULT_OUTPUTS = (
+    *("*.R", "*.p", "*.v", "*.omega_bar", "*.q", "*.q_dot", "*.position", "*.velocity", "*.displacement"),
+    *("*.force", "*.moment", "*.angle", "*.stroke", "*.tension", "energy.*", "constraint.*", "measured.*"),
+)
 
 
 @dataclass(frozen=True)
@@ -25,92 +41,259 @@ class Unwound:
     time: float
 
 
-def measure(system: System, record: Record, last: dict[str, Unwound]) -> tuple[dict[str, Quantity], dict[str, Unwound]]:
-    """All quantities of the recorded rows; `last` (by joint) continues angles from an earlier part of the run."""
-    found: dict[str, Quantity] = {}
-    found |= _bodies(system, record)
-    found |= _markers(system, record)
-    found |= _reactions(system, record)
-    coordinates, unwound = _joint_coordinates(system, record, last)
-    found |= coordinates
-    for k, spring in enumerate(system.scene.springs):
-        found[f"{spring.name}.tension"] = Quantity(
-            record.spring[:, k], "N", (), "spring-damper force, tension positive"
-        )
-    return found | _totals(record), unwound
+Memory = Mapping[str, Unwound | Worked]
 
 
-def _bodies(system: System, record: Record) -> dict[str, Quantity]:
-    found: dict[str, Quantity] = {}
+@dataclass(frozen=True)
+class Entry:
+    """A quantity that can be had: unit, axes, description, and how to compute its values.
+
+    compute : (view, what the earlier rows left) -> (values (T, ...), what these rows leave)
+    """
+
+    unit: str
+    axes: tuple[Axis, ...]
+    text: str
+    compute: Callable[[View, Unwound | Worked | None], tuple[Array, Unwound | Worked | None]]
+
+
+def measure(
+    system: System, record: Record, last: Memory, wanted: Mapping[str, Entry] | None = None
+) -> tuple[dict[str, Quantity], Memory]:
+    """The wanted quantities of the recorded rows; by default those of `DEFAULT_OUTPUTS`.
+
+    wanted : entries of the catalogue by name; see `selected`
+    last   : what `measure` returned for the rows before these, {} at the start: angles and work go on from it
+    """
+    view, found, left = View(system, record), {}, dict(last)
+    for name, entry in (selected(system) if wanted is None else wanted).items():
+        values, memory = entry.compute(view, last.get(name))
+        found[name] = Quantity(values, entry.unit, entry.axes, entry.text)
+        if memory is not None:
+            left[name] = memory
+    return found, left
+
+
+def selected(system: System, outputs: Sequence[str] = ("default",)) -> dict[str, Entry]:
+    """The entries of the catalogue that names or patterns such as "rod.*.position" ask for, in its order.
+
+    "default" stands for `DEFAULT_OUTPUTS`. Raises InputError for a name or pattern that fits nothing.
+    """
+    everything = catalogue(system)
+    wanted: set[str] = set()
+    for pattern in outputs:
+        patterns = DEFAULT_OUTPUTS if pattern == "default" else (pattern,)
+        fitting = {name for name in everything for one in patterns if fnmatch.fnmatchcase(name, one)}
+        if not fitting:
+            close = get_close_matches(pattern, everything, 3)
+            known = f"did you mean {', '.join(close)}?" if close else f"there are: {', '.join(everything)}"
+            raise InputError(f"outputs: {pattern!r} is none of the scene's quantities; {known}")
+        wanted |= fitting
+    return {name: entry for name, entry in everything.items() if name in wanted}
+
+
+def needs_every_step(wanted: Iterable[str]) -> bool:
+    """Whether a wanted quantity adds up over the integrator's steps (work) rather than over output rows."""
+    return any(name.endswith(".work") for name in wanted)
+
+
+def catalogue(system: System) -> dict[str, Entry]:
+    """Every quantity that can be had of a scene, by name."""
+    parts = (_bodies, _markers, _reactions, _joint_coordinates, _springs, _powers, _totals, _measurements)
+    return {name: entry for part in parts for name, entry in part(system)}
+
+
+Named = Iterator[tuple[str, Entry]]
+
+
+def _entry(unit: str, axes: tuple[Axis, ...], text: str, values: Callable[[View], Array]) -> Entry:
+    """A quantity that needs nothing of earlier rows."""
+    return Entry(unit, axes, text, lambda view, _: (values(view), None))
+
+
+def _bodies(system: System) -> Named:
     place = system.layout
-
-    def add(name: str, values: Array, unit: str, axis: Axis, text: str) -> None:
-        found[name] = Quantity(values, unit, (axis,), text)
-
     for b, body in enumerate(system.scene.bodies):
-        n = body.name
-        add(f"{n}.R", record.x[:, place.R(b)], "m", XYZ, "origin of the body frame, global axes")
-        add(f"{n}.p", record.x[:, place.p(b)], "1", EULER_PARAMETERS, "Euler parameters, body to global")
-        add(f"{n}.v", record.v[:, place.R_dot(b)], "m/s", XYZ, "velocity of the origin, global axes")
-        add(f"{n}.omega_bar", record.v[:, place.omega(b)], "rad/s", XYZ, "angular velocity, body axes")
+        n, R, omega = body.name, place.R_dot(b), place.omega(b)
+        yield f"{n}.R", _column("m", XYZ, "origin of the body frame, global axes", "x", place.R(b))
+        yield f"{n}.p", _column("1", EULER_PARAMETERS, "Euler parameters, body to global", "x", place.p(b))
+        yield f"{n}.v", _column("m/s", XYZ, "velocity of the origin, global axes", "v", R)
+        yield f"{n}.omega_bar", _column("rad/s", XYZ, "angular velocity, body axes", "v", omega)
+        yield f"{n}.a", _column("m/s^2", XYZ, "acceleration of the origin, global axes", "vd", R)
+        yield f"{n}.alpha_bar", _column("rad/s^2", XYZ, "angular acceleration, body axes", "vd", omega)
         if place.n[b]:
-            modes = mode_axis(n, place.n[b])
-            add(f"{n}.q", record.x[:, place.q(b)], "m sqrt(kg)", modes, "elastic coordinates (mass-normalised)")
-            add(f"{n}.q_dot", record.v[:, place.q_dot(b)], "m sqrt(kg)/s", modes, "rates of the elastic coordinates")
-    return found
+            yield from _elastic(system, b)
 
 
-def _markers(system: System, record: Record) -> dict[str, Quantity]:
-    found = {}
+def _elastic(system: System, b: int) -> Named:
+    place, n = system.layout, system.scene.bodies[b].name
+    modes, unit = mode_axis(n, place.n[b]), "m sqrt(kg)"
+    yield f"{n}.q", _column(unit, modes, "elastic coordinates (mass-normalised)", "x", place.q(b))
+    yield f"{n}.q_dot", _column(f"{unit}/s", modes, "rates of the elastic coordinates", "v", place.q_dot(b))
+    yield f"{n}.q_ddot", _column(f"{unit}/s^2", modes, "accelerations of the elastic coordinates", "vd", place.q_dot(b))
+
+
+def _column(unit: str, axis: Axis, text: str, of: str, at: slice) -> Entry:
+    return _entry(unit, (axis,), text, lambda view: getattr(view.record, of)[:, at])
+
+
+def _markers(system: System) -> Named:
     ground = len(system.scene.bodies)
-    for k, (name, (b, _, point)) in enumerate(zip(marker_names(system.scene), markers(system.scene), strict=True)):
+    for k, (name, (b, _, _)) in enumerate(zip(marker_names(system.scene), markers(system.scene), strict=True)):
         if b == ground:
             continue
-        found[f"{name}.position"] = Quantity(record.r[:, k], "m", (XYZ,), "position of the marker, global axes")
-        found[f"{name}.velocity"] = Quantity(record.rd[:, k], "m/s", (XYZ,), "velocity of the marker, global axes")
+        for what, entry in _marker(k).items():
+            if what != "displacement" or system.layout.n[b]:
+                yield f"{name}.{what}", entry
+
+
+def _marker(k: int) -> dict[str, Entry]:
+    def vector(unit: str, text: str, values: Callable[[View], Array]) -> Entry:
+        return _entry(unit, (XYZ,), text, values)
+
+    parameters = "Euler parameters of the marker's axes to global: its body's rotation and the elastic one"
+    return {
+        "position": vector("m", "position of the marker, global axes", lambda view: view.record.r[:, k]),
+        "velocity": vector("m/s", "velocity of the marker, global axes", lambda view: view.record.rd[:, k]),
+        "displacement": vector("m", "elastic displacement of the marker, body axes", lambda v: v.displacement(k)),
+        "acceleration": vector("m/s^2", "acceleration of the marker, global axes", lambda v: v.acceleration(k)),
+        "orientation": _entry("1", (EULER_PARAMETERS,), parameters, lambda view: view.orientation(k)),
+        "angular_velocity": vector("rad/s", "angular velocity of the marker, global axes", lambda view: view.spin(k)),
+    }
+
+
+def _reactions(system: System) -> Named:
+    joints = {joint.name: joint for joint in system.scene.joints}
+    for block in system.blocks:
+        for k, (what, unit) in enumerate((("force", "N"), ("moment", "N m"))):
+            text = f"{what} that the first body exerts on the second at its marker"
+            for suffix, axes in (
+                ("", "global axes"),
+                ("_i", "axes of the first body"),
+                ("_joint", "joint axes f, g, h"),
+            ):
+                if suffix != "_joint" or block.name in joints:
+                    entry = _reaction(block.name, block.markers[0], joints.get(block.name), k, suffix)
+                    yield f"{block.name}.{what}{suffix}", _entry(unit, (XYZ,), f"{text}, {axes}", entry)
+
+
+def _reaction(name: str, marker: int, joint: Joint | None, k: int, suffix: str) -> Callable[[View], Array]:
+    def values(view: View) -> Array:
+        vector = reaction(view, name)[k]
+        if suffix == "_i":
+            return to_axes(view.axes(markers(view.system.scene)[marker][0]), vector)
+        if suffix == "_joint" and joint is not None:
+            return to_axes(view.joint_frames(joint)[0], vector)
+        return vector
+
+    return values
+
+
+def _springs(system: System) -> Named:
+    for k, spring in enumerate(system.scene.springs):
+        text = "spring-damper force, tension positive"
+        yield f"{spring.name}.tension", _entry("N", (), text, lambda view, k=k: view.record.spring[:, k])  # type: ignore[misc]
+
+
+def _powers(system: System) -> Named:
+    scene = system.scene
+    distances = [joint for joint in scene.joints if joint.kind == "distance"]
+    for thing in (*scene.loads, *scene.springs, *scene.drivers, *distances):
+        yield from _worked(thing.name, "put into the scene", lambda view, thing=thing: power(view, thing))  # type: ignore[misc]
+    for b, body in enumerate(scene.bodies):
         if system.layout.n[b]:
-            moved = record.x[:, system.layout.q(b)] @ system.scene.bodies[b].model.interface(point).phi_t.T
-            found[f"{name}.displacement"] = Quantity(
-                moved, "m", (XYZ,), "elastic displacement of the marker, body axes"
-            )
-    return found
+            yield from _worked(f"{body.name}.damping", "of modal damping", lambda view, b=b: damping_power(view, b))  # type: ignore[misc]
+    for joint in scene.joints:
+        text = "power that the first body gives to the second through the joint"
+        yield f"{joint.name}.transmitted", _entry("W", (), text, lambda view, joint=joint: transmitted(view, joint))  # type: ignore[misc]
 
 
-def _reactions(system: System, record: Record) -> dict[str, Quantity]:
-    found = {}
-    for k, block in enumerate(system.blocks):
-        text = "that the first body exerts on the second at its marker, global axes"
-        found[f"{block.name}.force"] = Quantity(record.reaction[:, k, :3], "N", (XYZ,), f"force {text}")
-        found[f"{block.name}.moment"] = Quantity(record.reaction[:, k, 3:], "N m", (XYZ,), f"moment {text}")
-    return found
+def _worked(name: str, text: str, values: Callable[[View], Array]) -> Named:
+    def done(view: View, last: Unwound | Worked | None) -> tuple[Array, Worked]:
+        before = last if isinstance(last, Worked) else None
+        return work(view.record.time, values(view), before)
+
+    yield f"{name}.power", _entry("W", (), f"power {text}", values)
+    yield f"{name}.work", Entry("J", (), f"work {text} since the start", done)
 
 
-def _totals(record: Record) -> dict[str, Quantity]:
-    names = ("kinetic", "strain", "gravity")
-    found = {f"energy.{name}": Quantity(record.energy[:, k], "J", (), f"{name} energy") for k, name in enumerate(names)}
-    found["energy.total"] = Quantity(record.energy.sum(axis=1), "J", (), "kinetic, strain and gravity energy")
-    found["constraint.position"] = Quantity(record.violation[:, 0], "m", (), "largest violation of a constraint row")
-    found["constraint.velocity"] = Quantity(record.violation[:, 1], "m/s", (), "largest rate of a constraint row")
-    return found
+def _totals(system: System) -> Named:
+    for k, name in enumerate(("kinetic", "strain", "gravity")):
+        yield f"energy.{name}", _entry("J", (), f"{name} energy", lambda view, k=k: view.record.energy[:, k])  # type: ignore[misc]
+    total = "kinetic, strain and gravity energy"
+    yield "energy.total", _entry("J", (), total, lambda view: _sum(view.record.energy))
+    if system.scene.springs:
+        yield "energy.springs", _entry("J", (), "energy stored in spring-dampers, preload included", _spring_energy)
+    texts = (("position", "m", "largest violation of a constraint row"), ("velocity", "m/s", "largest rate of a row"))
+    for k, (name, unit, text) in enumerate(texts):
+        yield f"constraint.{name}", _entry(unit, (), text, lambda view, k=k: view.record.violation[:, k])  # type: ignore[misc]
+
+
+def _sum(energy: Array) -> Array:
+    return energy[:, 0] + energy[:, 1] + energy[:, 2]
+
+
+def _spring_energy(view: View) -> Array:
+    total = np.zeros(view.rows)
+    for spring in view.system.scene.springs:
+        apart = view.record.r[:, view.number(spring.j)] - view.record.r[:, view.number(spring.i)]
+        stretch = np.sqrt(dot(apart, apart)) - spring.free_length
+        total += (0.5 * spring.stiffness * stretch + spring.preload) * stretch
+    return total
+
+
+# ---- measurements of the scene ------------------------------------------------------------------------------------
+
+
+def _measurements(system: System) -> Named:
+    units = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2", "distance": "m", "orientation": "1"}
+    axes = {"distance": (), "orientation": (EULER_PARAMETERS,)}
+    for m in system.scene.measurements:
+        text = f"{m.what} of {m.j} from {m.i}" + ("" if m.what in axes else f", {m.axes} axes")
+        entry = _entry(units[m.what], axes.get(m.what, (XYZ,)), text, lambda view, m=m: _measured(view, m))  # type: ignore[misc]
+        yield f"measured.{m.name}", entry
+
+
+def _measured(view: View, m: Measurement) -> Array:
+    i, j = view.number(m.i), view.number(m.j)
+    if m.what == "orientation":
+        return times(view.orientation(i) * [1.0, -1.0, -1.0, -1.0], view.orientation(j))
+    if m.what == "velocity":
+        difference = view.record.rd[:, j] - view.record.rd[:, i]
+    elif m.what == "acceleration":
+        difference = view.acceleration(j) - view.acceleration(i)
+    else:
+        difference = view.record.r[:, j] - view.record.r[:, i]
+    if m.what == "distance":
+        return np.sqrt(dot(difference, difference))
+    if m.axes == "global":
+        return difference
+    return to_axes(view.axes([body.name for body in view.system.scene.bodies].index(m.axes)), difference)
 
 
 # ---- joint coordinates --------------------------------------------------------------------------------------------
 
 
-def _joint_coordinates(
-    system: System, record: Record, last: dict[str, Unwound]
-) -> tuple[dict[str, Quantity], dict[str, Unwound]]:
-    found: dict[str, Quantity] = {}
-    unwound: dict[str, Unwound] = {}
+def _joint_coordinates(system: System) -> Named:
     for joint in system.scene.joints:
         if "angle" in COORDINATES[joint.kind]:
-            angle, rate = _angles(system, record, joint)
-            values, unwound[joint.name] = unwind(record.time, angle, rate, last.get(joint.name))
-            found[f"{joint.name}.angle"] = Quantity(values, "rad", (), "joint angle, unwound")
+            yield f"{joint.name}.angle", _unwound(joint)
+            rate = _entry("rad/s", (), "rate of the joint angle", lambda view, j=joint: angles(view, j)[1])  # type: ignore[misc]
+            yield f"{joint.name}.angle_rate", rate
         if "stroke" in COORDINATES[joint.kind]:
-            values = _stroke(system, record, joint)
-            found[f"{joint.name}.stroke"] = Quantity(values, "m", (), "joint stroke along its axis")
-    return found, unwound
+            for k, (name, unit) in enumerate((("stroke", "m"), ("stroke_rate", "m/s"))):
+                text = ("joint stroke along its axis", "rate of the joint stroke")[k]
+                yield (
+                    f"{joint.name}.{name}",
+                    _entry(unit, (), text, lambda view, j=joint, k=k: strokes(view, j)[k]),  # type: ignore[misc]
+                )
+
+
+def _unwound(joint: Joint) -> Entry:
+    def compute(view: View, last: Unwound | Worked | None) -> tuple[Array, Unwound]:
+        return unwind(view.record.time, *angles(view, joint), last if isinstance(last, Unwound) else None)
+
+    return Entry("rad", (), "joint angle, unwound", compute)
 
 
 def unwind(time: Array, angle: Array, rate: Array, last: Unwound | None) -> tuple[Array, Unwound]:
@@ -124,36 +307,19 @@ def unwind(time: Array, angle: Array, rate: Array, last: Unwound | None) -> tupl
     return out, before
 
 
-def _frame(system: System, record: Record, marker: int, frame: Array) -> tuple[Array, Array]:
-    """Joint frame (T, 3, 3) of a marker in global axes, columns f, g, h, and its angular velocity (T, 3)."""
-    scene, place = system.scene, system.layout
-    b, _, point = markers(scene)[marker]
-    rows = record.time.size
-    if b == len(scene.bodies):
-        return np.broadcast_to(frame, (rows, 3, 3)), np.zeros((rows, 3))
-    A = rotation_matrix(record.x[:, place.p(b)])
-    phi_r = scene.bodies[b].model.interface(point).phi_r
-    theta = record.x[:, place.q(b)] @ phi_r.T
-    turned = frame + np.cross(theta[:, None, :], frame.T[None]).transpose(0, 2, 1)
-    spin = record.v[:, place.omega(b)] + record.v[:, place.q_dot(b)] @ phi_r.T
-    return A @ turned, np.einsum("tkl,tl->tk", A, spin)
+def angles(view: View, joint: Joint) -> tuple[Array, Array]:
+    """Joint angle [rad] within half a turn and its rate [rad/s], each (T,)."""
+    (frame_i, frame_j), (rate_i, rate_j) = view.joint_frames(joint), view.joint_frame_rates(joint)
+    f_j, f_j_dot = frame_j[:, :, 0], rate_j[:, :, 0]
+    cosine, sine = (dot(frame_i[:, :, k], f_j) for k in (0, 1))
+    cosine_dot, sine_dot = (dot(rate_i[:, :, k], f_j) + dot(frame_i[:, :, k], f_j_dot) for k in (0, 1))
+    rate = (cosine * sine_dot - sine * cosine_dot) / (cosine**2 + sine**2)
+    return np.arctan2(sine, cosine), rate
 
 
-def _ends(scene: Scene, joint: Joint) -> tuple[int, int]:
-    return marker_number(scene, joint.i), marker_number(scene, joint.j)
-
-
-def _angles(system: System, record: Record, joint: Joint) -> tuple[Array, Array]:
-    on_i, on_j = frames(joint)
-    i, j = _ends(system.scene, joint)
-    frame_i, spin_i = _frame(system, record, i, on_i)
-    frame_j, spin_j = _frame(system, record, j, on_j)
-    f_j = frame_j[:, :, 0]
-    angle = np.arctan2((frame_i[:, :, 1] * f_j).sum(1), (frame_i[:, :, 0] * f_j).sum(1))
-    return angle, ((spin_j - spin_i) * frame_i[:, :, 2]).sum(1)
-
-
-def _stroke(system: System, record: Record, joint: Joint) -> Array:
-    i, j = _ends(system.scene, joint)
-    frame_i, _ = _frame(system, record, i, frames(joint)[0])
-    return (frame_i[:, :, 2] * (record.r[:, j] - record.r[:, i])).sum(1)
+def strokes(view: View, joint: Joint) -> tuple[Array, Array]:
+    """Joint stroke [m] and its rate [m/s], each (T,)."""
+    i, j = view.number(joint.i), view.number(joint.j)
+    h, h_dot = view.joint_frames(joint)[0][:, :, 2], view.joint_frame_rates(joint)[0][:, :, 2]
+    apart, rate = (values[:, j] - values[:, i] for values in (view.record.r, view.record.rd))
+    return dot(h, apart), dot(h, rate) + dot(h_dot, apart)

@@ -8,8 +8,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import plotly.colors
 import plotly.io
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
 
 from ffr_dyn.film import BODY_COLOURS, TRACE_COLOURS, Camera, Colouring, Film, Link, Solid, drawn_points, is_coloured
 from ffr_dyn.result import Array
@@ -28,6 +29,8 @@ _MATTE: Any = {
     "facenormalsepsilon": 1e-30,
     "vertexnormalsepsilon": 1e-30,
 }
+_SINK = 0.002  # of the body's size
+_STOPS = 33  # of a colour map
 _FIELD_OF_VIEW = np.tan(np.pi / 8)
 
 Item = dict[str, Any]
@@ -90,7 +93,8 @@ def _body(shown: Film, solid: Solid, frame: int, colour: str, light: Item) -> It
 
 
 def _ghost(solid: Solid, frame: int) -> Item:
-    item = _mesh(solid, drawn_points(solid, frame, 0.0))
+    # In planar bending its sides lie in those of the body: let them sink a little, or the two would flicker.
+    item = _mesh(solid, solid.R[frame] + sunk(solid.surface, _SINK * solid.size) @ solid.A[frame].T)
     return {**item, "name": f"{solid.name}, undeformed", "color": "#808080", "opacity": 0.18, "hoverinfo": "skip"}
 
 
@@ -149,7 +153,10 @@ def _layout(shown: Film, camera: Camera, seconds: float) -> Item:
 def _colour_axis(colours: Colouring) -> Item:
     factor, _ = colours.readable()
     bar = {"title": {"text": colours.title("<br>")}, "len": 0.6, "thickness": 18}
-    shades = [list(stop) for stop in plotly.colors.get_colorscale(colours.colour_map)]
+    stops = np.linspace(0.0, 1.0, _STOPS)
+    shades = [
+        [at, to_hex(shade)] for at, shade in zip(stops.tolist(), colormaps[colours.colour_map](stops), strict=True)
+    ]
     return {"cmin": colours.low * factor, "cmax": colours.high * factor, "colorscale": shades, "colorbar": bar}
 
 
@@ -209,6 +216,16 @@ def _slider(shown: Film) -> Item:
 
 _AT_ONCE: Any = {"transition": {"duration": 0}}
 _JUMP: Any = {"mode": "immediate", "frame": {"duration": 0, "redraw": True}, **_AT_ONCE}
+
+
+def sunk(surface: Surface, depth: float) -> Array:
+    """(P, 3) undeformed points, moved inwards by `depth` [m] along the mean normal of the triangles around each."""
+    a, b, c = (surface.points[corner] for corner in surface.triangles.T)
+    normals = np.zeros_like(surface.points)
+    for corner in surface.triangles.T:
+        np.add.at(normals, corner, np.cross(b - a, c - a))
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return surface.points - depth * normals / np.where(length > 0, length, 1.0)
 
 
 # ---- numbers ------------------------------------------------------------------------------------------------------

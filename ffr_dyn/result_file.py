@@ -8,6 +8,7 @@ every variable whenever one is made or resized: seconds for some hundred quantit
 * group ``geometry/<body>``: points (point, xyz) [m], triangles (triangle, corner), Phi (point, xyz, mode) [kg^-0.5]; where
   the body has them, stress (point, component, mode) [Pa/(m sqrt(kg))] with the components xx, yy, zz, xy, xz, yz, moduli
   (point, modulus) and the group beams of section forces (element, place, force, mode);
+* where a run can be continued, group ``checkpoint`` with the bytes of `ffr_dyn.checkpoint`, those of the last row;
 * attributes: Conventions, title, source, status, and those of the result; text and numbers as they are, any other
   JSON value in the attribute ``json_attributes``. No pickle.
 
@@ -53,18 +54,35 @@ def save_result(result: Result, path: str | Path) -> Path:
 def load_result(path: str | Path) -> Result:
     """Read a result file. Raises InputError for a missing, damaged, truncated, foreign or newer file."""
     path = Path(path)
+    with _reading(path) as file:
+        return _read(file)
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[h5py.File]:
+    """A result file, open; whatever is wrong with it becomes an InputError."""
     if not path.is_file():
         raise InputError(f"result file {path} does not exist")
     try:
         with h5py.File(path, "r") as file:
             _check_format(path, file)
-            return _read(file)
+            yield file
     except (OSError, KeyError, IndexError, RuntimeError, ValueError, TypeError, OverflowError, MemoryError) as error:
         if isinstance(error, InputError) and str(path) in str(error):
             raise
         raise InputError(
             f"{path} is damaged, truncated or not a result file ({error}); run the analysis again"
         ) from None
+
+
+def load_checkpoint(path: str | Path) -> Array | None:
+    """The bytes from which the run of a result file can be continued; None where the file has none.
+
+    Raises InputError for a missing or damaged file.
+    """
+    path = Path(path)
+    with _reading(path) as file:
+        return file["checkpoint/state"][:] if "checkpoint/state" in file else None
 
 
 class ResultWriter:
@@ -81,13 +99,22 @@ class ResultWriter:
 
     path   : the file to write; its directory is made if necessary
     header : quantities, geometry and attributes, and the first rows (none, or those of a run to be continued)
+    checkpoint : bytes (uint8) from which the run can go on after the rows of the header
 
     As a context manager it closes with the status "complete", or "stopped: ..." when an exception passes through; a run
     that stopped before its first row leaves ``path`` as it was.
     Raises InputError when path cannot be written, SimulationError when writing fails later (such as a full disk).
     """
 
-    def __init__(self, path: str | Path, header: Result, *, interval: float = 5.0, share: float = 0.03) -> None:
+    def __init__(
+        self,
+        path: str | Path,
+        header: Result,
+        *,
+        checkpoint: Array | None = None,
+        interval: float = 5.0,
+        share: float = 0.03,
+    ) -> None:
         self.path = Path(path)
         self._part = self.path.with_name(self.path.name + ".part")
         self._interval, self._share = interval, share
@@ -97,12 +124,14 @@ class ResultWriter:
         self._pending_bytes = 0
         self._rows = header.time.size
         self._last_time = header.time[-1:]
+        self._checkpoint = checkpoint
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             if self.path.is_dir():
                 raise InputError(f"{self.path} is a directory; give the name of a result file")
             self._file = h5py.File(self._part, "w", libver=("v108", "v108"), track_order=True)
             _write_structure(self._file, header)
+            self._keep_checkpoint()
         except OSError as error:
             raise InputError(
                 f"{self.path} cannot be written ({error}); choose another place or end the other run"
@@ -110,8 +139,11 @@ class ResultWriter:
         self._published_at = time.monotonic()
         self._publishing_took = 0.0
 
-    def append(self, times: Array, values: Mapping[str, Array]) -> None:
-        """Add k rows: times (k,) [s] and, for every quantity of the header, values (k, ...). Flushes when it is due."""
+    def append(self, times: Array, values: Mapping[str, Array], checkpoint: Array | None = None) -> None:
+        """Add k rows: times (k,) [s] and, for every quantity of the header, values (k, ...). Flushes when it is due.
+
+        checkpoint : bytes (uint8) from which the run can go on after these rows; kept with them, in place of the last
+        """
         times = np.array(times, dtype=np.float64)
         check_times(np.concatenate([self._last_time, times]))
         if values.keys() != set(self._names):
@@ -125,6 +157,7 @@ class ResultWriter:
         self._pending.append([times, *rows])
         self._pending_bytes += sum(row.nbytes for row in self._pending[-1])
         self._last_time = np.append(self._last_time, times)[-1:]
+        self._checkpoint = checkpoint
         if time.monotonic() - self._published_at >= max(self._interval, self._publishing_took / self._share):
             self.flush()
         elif self._pending_bytes > _BUFFER_BYTES:
@@ -186,6 +219,11 @@ class ResultWriter:
             variable.resize(end, axis=0)
             variable[self._rows : end] = rows
         self._rows, self._pending, self._pending_bytes = end, [], 0
+        self._keep_checkpoint()
+
+    def _keep_checkpoint(self) -> None:
+        if self._checkpoint is not None:
+            _write_checkpoint(self._file, self._checkpoint)
 
     @contextmanager
     def _explained(self) -> Iterator[None]:
@@ -281,6 +319,21 @@ def _write_stress(group: h5py.Group, point: h5py.Dataset, mode: h5py.Dataset, su
             beams, "modes", surface.beams.modes, "N m-1 kg-0.5", "N, Qy, Qz, Mx, My, Mz (moments: N kg-0.5)"
         )
         _attach(forces, [element, place, _index(beams, "force", 6), mode])
+
+
+def _write_checkpoint(file: h5py.File, content: Array) -> None:
+    """In place where the length allows it: a deleted one would leave a hole in the file."""
+    group = file.require_group("checkpoint")
+    if "state" in group and group["state"].size == content.size:
+        group["state"][:] = content
+        return
+    for name in list(group):
+        del group[name]
+    scale = group.create_dataset("byte", shape=content.shape, dtype=np.uint8, track_order=True)
+    scale.make_scale("This is a netCDF dimension but not a netCDF variable." + f"{content.size:10}")
+    state = group.create_dataset("state", data=content, chunks=content.shape, fletcher32=True, track_order=True)
+    state.attrs["long_name"] = "state at the last row, from which the run can be continued"
+    _attach(state, [scale])
 
 
 def _array(group: h5py.Group, name: str, values: Array, unit: str, description: str) -> h5py.Dataset:

@@ -17,13 +17,14 @@ from ffr_dyn.drivers import Driver, PointDriver, driver_word
 from ffr_dyn.errors import InputError
 from ffr_dyn.forces import Load, SpringDamper
 from ffr_dyn.joints import Joint
+from ffr_dyn.measurement import Measurement
 from ffr_dyn.rotation import euler_parameters
 from ffr_prep.body import FlexibleBody
 
 Array = np.ndarray
 
 GROUND = "ground"
-RESERVED = (GROUND, "energy", "constraint", "time", "geometry")
+RESERVED = (GROUND, "energy", "constraint", "measured", "time", "geometry")
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,9 @@ class Scene:
 
     ground  : name -> (3,) [m], points fixed in the global frame
     gravity : (3,) [m/s^2], global
+    plane   : "auto" finds out whether the scene is planar and then computes in the plane alone (see `ffr_dyn.plane`);
+              "x", "y" or "z", its normal, declares it, so that modes mostly in the plane are kept and the rest is left
+              out even where it is small only; "none" computes in space
     """
 
     bodies: tuple[Body, ...]
@@ -78,16 +82,20 @@ class Scene:
     couplings: tuple[Coupling, ...] = ()
     loads: tuple[Load, ...] = ()
     springs: tuple[SpringDamper, ...] = ()
+    measurements: tuple[Measurement, ...] = ()
     ground: Mapping[str, Any] = field(default_factory=dict)
     gravity: Any = (0.0, 0.0, 0.0)
     name: str = "scene"
+    plane: str = "auto"
 
     def __post_init__(self) -> None:
-        for key in ("bodies", "joints", "drivers", "couplings", "loads", "springs"):
+        for key in ("bodies", "joints", "drivers", "couplings", "loads", "springs", "measurements"):
             object.__setattr__(self, key, tuple(getattr(self, key)))
         points = {key: _vector(at, 3, f"ground point {key!r}") for key, at in self.ground.items()}
         object.__setattr__(self, "ground", points)
         object.__setattr__(self, "gravity", _vector(self.gravity, 3, "gravity"))
+        if self.plane not in ("auto", "x", "y", "z", "none"):
+            raise InputError(f"plane is {self.plane!r}; it must be 'auto', 'none', or the normal 'x', 'y' or 'z'")
         if not self.bodies:
             raise InputError("a scene needs at least one body")
         _check_names(self)
@@ -103,6 +111,8 @@ class Scene:
             m for spring in self.springs for m in (spring.i, spring.j)
         ]:
             marker_number(self, marker)
+        for measurement in self.measurements:
+            _check_measurement(self, measurement)
 
 
 def markers(scene: Scene) -> list[tuple[int, str, str]]:
@@ -154,6 +164,15 @@ def _check_point_driver(scene: Scene, driver: PointDriver) -> None:
         raise InputError(f"driver {driver.name!r} drives {i[1]!r} against itself; it needs markers of two bodies")
 
 
+def _check_measurement(scene: Scene, measurement: Measurement) -> None:
+    marker_number(scene, measurement.i), marker_number(scene, measurement.j)
+    known = ["global", *(body.name for body in scene.bodies)]
+    if measurement.axes not in known:
+        raise InputError(
+            f"measurement {measurement.name!r}: there are no axes {measurement.axes!r}; {_offer(measurement.axes, known)}"
+        )
+
+
 def _offer(name: str, known: Iterable[str]) -> str:
     known = list(known)
     close = difflib.get_close_matches(name, known, 1)
@@ -170,6 +189,7 @@ def _check_names(scene: Scene) -> None:
         *scene.couplings,
         *scene.loads,
         *scene.springs,
+        *scene.measurements,
     )
     names = [thing.name for thing in things]
     repeated = sorted({name for name in names if names.count(name) > 1})

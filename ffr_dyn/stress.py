@@ -322,5 +322,8 @@ def section_peaks(result: Result, body: str) -> tuple[SectionPeak, ...]:
 
 
 def nearest_element(beams: BeamForces, position: Array) -> int:
-    """The beam element whose middle is nearest to a position (3,) [m] in the body frame."""
-    return int(np.argmin(np.linalg.norm(beams.positions[:, 1] - np.asarray(position, float), axis=1)))
+    """The beam element whose centroid line is nearest to a position (3,) [m] in the body frame."""
+    start, along = beams.positions[:, 0], beams.positions[:, 2] - beams.positions[:, 0]
+    from_start = np.asarray(position, float) - start
+    xi = np.clip(np.einsum("ec,ec->e", from_start, along) / np.einsum("ec,ec->e", along, along), 0.0, 1.0)
+    return int(np.argmin(np.linalg.norm(from_start - xi[:, None] * along, axis=1)))

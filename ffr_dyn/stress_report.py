@@ -70,7 +70,8 @@ def stress_report(
     since    : leave out what was before this time [s], such as the transient at the start
 
     Written: hot_spots.csv, history.csv and history.png of the quantity, <body>.png with the largest values over the run
-    in colour, and of beams <body>_section_forces.csv and .png of the element at the place that is hottest.
+    in colour, and of beams <body>_section_forces.csv and .png of the element nearest to the first point, or else of the
+    one with the largest bending moment.
     Raises InputError for names and points that do not exist, SimulationError when this machine cannot render.
     """
     folder, result = Path(folder), result if since is None else _later(result, since)
@@ -81,7 +82,7 @@ def stress_report(
     places = {bodies[0]: _named("point", points)} if len(points) else _places(spots)
     files = [_spot_table(spots, quantity, folder / "hot_spots.csv"), *_histories(result, places, quantity, folder)]
     beams = [name for name in bodies if result.geometry[name].beams is not None]
-    files += [file for name in beams for file in _section_files(result, name, places, folder)]
+    files += [file for name in beams for file in _section_files(result, name, points, folder)]
     files += [_peak_picture(result, name, spots, quantity, folder / f"{name}.png") for name in bodies]
     return StressReport(quantity, spots, {name: section_peaks(result, name) for name in beams}, tuple(files))
 
@@ -155,11 +156,10 @@ def _histories(result: Result, places: dict[str, Places], quantity: str, folder:
     ]
 
 
-def _section_files(result: Result, body: str, places: dict[str, Places], folder: Path) -> list[Path]:
-    """Section forces of the element nearest to the first place on the body."""
-    beams = beams_of(result, body)
-    first = next(iter(places.get(body, {}).values()), beams.positions[0, 0])
-    element = nearest_element(beams, first)
+def _section_files(result: Result, body: str, points: Sequence[Sequence[float]], folder: Path) -> list[Path]:
+    """Section forces of the element nearest to the first point, or else of the one with the largest bending moment."""
+    bending = max(section_peaks(result, body)[4:], key=lambda peak: abs(peak.value))
+    element = nearest_element(beams_of(result, body), np.array(points[0], float)) if len(points) else bending.element
     histories = section_histories(result, body, element)
     middle = [name for name in histories.quantities if ".middle." in name]
     return [
@@ -181,14 +181,19 @@ def _peak_picture(result: Result, body: str, spots: Sequence[HotSpot], quantity:
     shades = measure_colours(of, largest, frozenset([body]), lambda solid, frame: values) if largest else None
     numbered = {str(k + 1): np.array(s.position) for k, s in enumerate(spots) if s.body == body}
     shown = film_at(_at_rest(result, body), np.zeros(1), scale=0.0, colour="body")
-    heading = f"{body}: largest {of.words} of the run"  # in size, wherever it has a sign
-    shown = replace(shown, colouring=shades, marks=numbered, heading=heading)
+    shown = replace(shown, colouring=shades, marks=numbered, heading=_heading(result, body, of.words))
     camera = _view(shown.high - shown.low, next(iter(numbered.values()), shown.centre) - shown.centre)
     (picture,) = pictures(shown, camera, _SIZE)
     temporary = path.with_name(path.name + ".part")
     Image.fromarray(picture).save(temporary, "PNG")
     os.replace(temporary, path)
     return path
+
+
+def _heading(result: Result, body: str, words: str) -> str:
+    factor, unit = readable("s", float(result.time[-1]))
+    first, last = factor * result.time[[0, -1]]
+    return f"{body}: largest {words} from {first:.4g} to {last:.4g} {unit}"
 
 
 def _at_rest(result: Result, body: str) -> Result:

@@ -1,6 +1,7 @@
 """Functions of time for drivers and loads: each with two derivatives, compiled to numbers for the kernels.
 
 constant(5.0)   polynomial(0, 150)   harmonic(amplitude=.1, frequency=2)   table(times, values)   user(f)
+and, by `ffr_dyn.formula`, formula("0.1 * sin(2 * pi * t)")
 """
 
 from __future__ import annotations
@@ -11,20 +12,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.errors import InputError
+from ffr_dyn.operations import operate
 
 Array = np.ndarray
 
 # Kinds, as in ffr_dyn.kernels.loads (which must not be imported before it is needed: it loads the compiler).
-POLYNOMIAL, HARMONIC, PIECEWISE, USER = 0, 1, 2, 3
+POLYNOMIAL, HARMONIC, PIECEWISE, USER, OPERATION = 0, 1, 2, 3, 4
 
 
 @dataclass(frozen=True)
 class TimeFunction:
-    """A function of time as the kernels read it: its kind and its numbers; `callback` for a Python function."""
+    """A function of time as the kernels read it: its kind and its numbers; `callback` for a Python function.
+
+    operands : what an operation of a formula (data: its number, its parameter) works on
+    """
 
     kind: int
     data: tuple[float, ...]
     callback: Callable[[float], object] | None = None
+    operands: tuple[TimeFunction, ...] = ()
 
 
 def constant(value: float) -> TimeFunction:
@@ -69,6 +75,11 @@ def user(function: Callable[[float], object]) -> TimeFunction:
     return TimeFunction(USER, (0.0,), function)
 
 
+def operation(op: int, *operands: TimeFunction, parameter: float = 0.0) -> TimeFunction:
+    """An operation of `ffr_dyn.operations` on one or two functions of time."""
+    return TimeFunction(OPERATION, (float(op), parameter), None, operands)
+
+
 def as_time_function(value: object, what: str) -> TimeFunction:
     """A number, a Python function or a TimeFunction as a TimeFunction; InputError names `what` otherwise."""
     if isinstance(value, TimeFunction):
@@ -89,8 +100,11 @@ def _numbers(what: str, values: tuple[float, ...]) -> tuple[float, ...]:
 def evaluate(function: TimeFunction, t: float) -> tuple[float, float, float]:
     """(value, rate, second derivative) at t; the readable twin of `ffr_dyn.kernels.loads.evaluate_functions`."""
     if function.callback is not None:
-        given = np.atleast_1d(np.asarray(function.callback(t), float))
-        return tuple(np.concatenate([given, np.zeros(3)])[:3])  # type: ignore[return-value]
+        returned = np.atleast_1d(np.asarray(function.callback(t), float))
+        return tuple(np.concatenate([returned, np.zeros(3)])[:3])  # type: ignore[return-value]
+    if function.kind == OPERATION:
+        given = [evaluate(operand, t) for operand in function.operands]
+        return operate(int(function.data[0]), function.data[1], given[0], given[-1])
     data = np.array(function.data)
     if function.kind == HARMONIC:
         mean, amplitude, speed, phase = data

@@ -11,6 +11,7 @@ Source: Abaqus Analysis User's Guide, "Generating structural matrices" and "Defi
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -54,13 +55,15 @@ def from_abaqus_matrices(stiffness: Path, mass: Path, deck: Path) -> MatrixModel
 def _entries(path: Path) -> Array:
     """(E, 3 or 5) the lines as numbers."""
     try:
-        with open(path, encoding="utf-8") as stream:
-            entries = np.loadtxt(_lines(stream), ndmin=2)
+        with open(path, encoding="latin-1") as stream:
+            lines = _lines(stream)
+            first = next(lines, "")
+            entries = np.loadtxt(chain([first], lines), ndmin=2) if first else np.zeros((0, 0))
     except ValueError as error:
         raise InputError(f"{path} is not a matrix that Abaqus writes as text ({error})") from None
-    if not entries.size or entries.shape[1] not in (3, 5):
+    if entries.shape[1] not in (3, 5):
         raise InputError(
-            f"{path} is not a matrix that Abaqus writes as text: its lines have {entries.shape[1] if entries.size else 0} "
+            f"{path} is not a matrix that Abaqus writes as text: its lines have {entries.shape[1]} "
             "numbers; use *MATRIX OUTPUT, STIFFNESS, MASS, FORMAT=MATRIX INPUT"
         )
     return entries

@@ -19,7 +19,7 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from ffr_prep.errors import ComputationError
-from ffr_prep.factor import FreeBody, free_body
+from ffr_prep.factor import CHOLESKY, FreeBody, Solver, free_body
 from ffr_prep.interface import CoupledModel
 
 Array = np.ndarray
@@ -34,17 +34,19 @@ _DEPENDENT = 1e-7  # the same among the additions, whose products square it
 class Basis:
     """Z (z, n) [1/sqrt(kg)], mass-orthonormal with diagonal stiffness; omega2 (n,) [rad^2/s^2], ascending.
 
-    dropped : number of proposed vectors that depended on the others
+    dropped  : number of proposed vectors that depended on the others
+    warnings : what makes the basis doubtful, in words
     """
 
     Z: Array
     omega2: Array
     dropped: int = 0
+    warnings: tuple[str, ...] = ()
 
 
-def factorised(model: CoupledModel) -> FreeBody:
+def factorised(model: CoupledModel, solver: Solver = CHOLESKY) -> FreeBody:
     """The one factorisation that serves modes, static shapes, stiffening loads and error reports of a model."""
-    return free_body(model.K, model.T, model.places)
+    return free_body(model.K, model.T, model.places, solver)
 
 
 # ---- from vectors to a basis --------------------------------------------------------------------------------------

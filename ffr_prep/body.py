@@ -338,15 +338,19 @@ def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
         PP_dm=body.PP_dm[:, :, keep][:, :, :, keep],
         omega2=body.omega2[keep],
         interfaces=tuple(replace(i, phi_t=i.phi_t[:, keep], phi_r=i.phi_r[:, keep]) for i in body.interfaces),
-        surface=body.surface and _truncated_surface(body.surface, keep),
+        surface=body.surface and recombined(body.surface, np.eye(body.n)[:, keep], body.surface.Phi[:, :, keep]),
         stiffening=None if body.stiffening is None else body.stiffening[:, keep][:, :, keep],
     )
 
 
-def _truncated_surface(surface: Surface, keep: Array) -> Surface:
-    beams = surface.beams and replace(surface.beams, modes=surface.beams.modes[..., keep])
-    stress = None if surface.stress is None else surface.stress[..., keep]
-    return replace(surface, Phi=surface.Phi[..., keep], stress=stress, beams=beams)
+def recombined(surface: Surface, V: Array, Phi: Array) -> Surface:
+    """The surface for other elastic coordinates p, with q = V p for V (n, m) and the basis Phi (P, 3, m).
+
+    Phi may differ from the old basis times V by rigid motions, which cause no stress.
+    """
+    stress = None if surface.stress is None else surface.stress @ V
+    beams = surface.beams and replace(surface.beams, modes=surface.beams.modes @ V)
+    return replace(surface, Phi=Phi, stress=stress, beams=beams)
 
 
 def with_point(body: FlexibleBody, name: str, position: Array) -> FlexibleBody:

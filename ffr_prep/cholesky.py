@@ -1,9 +1,7 @@
 """Sparse Cholesky factorisation of finite-element matrices: nested dissection and dense fronts.
 
-The unknowns are cut in two halves by a plane across their longest extent, again and again; what lies on a cut is
-eliminated after both its halves. Each piece then becomes a dense front that LAPACK factorises, so that nearly all work
-is in matrix products. On second-order tetrahedra this takes a fifth of the time and half the memory of a general
-sparse LU factorisation with a minimum-degree ordering.
+Independent branches of the elimination tree run on the threads there are; how the work is divided does not depend on
+their number, and every front is computed on one thread, so the result is the same to the bit with any number.
 
 Sources: A. George, SIAM J. Numer. Anal. 10 (1973) 345-363 (nested dissection); J. W. H. Liu, SIAM Review 34 (1992)
 82-109 (the multifrontal method).
@@ -11,41 +9,72 @@ Sources: A. George, SIAM J. Numer. Anal. 10 (1973) 345-363 (nested dissection); 
 
 from __future__ import annotations
 
+import heapq
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
-import numba
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg.blas import dsyrk, dtrsm
-from scipy.linalg.lapack import dpotrf, dtrtri
+from threadpoolctl import ThreadpoolController
+
+from ffr_prep.dissection import elimination_tree
+from ffr_prep.fronts import (
+    DONE,
+    Fronts,
+    Sorted,
+    add,
+    backward,
+    begin,
+    boundaries,
+    diagonal_tile,
+    eliminate_branch,
+    forward,
+    row_tile,
+    shape,
+    update_tile,
+)
 
 Array = np.ndarray
+Map = Callable[[Callable[..., Any], Iterable[Any]], Iterable[Any]]
 
-_LEAF = 80
+_BRANCHES = 24  # a branch has at most this part of the work
+_TILE = 384
+_BLAS = ThreadpoolController()
 
 
 @dataclass(frozen=True)
-class Front:
-    """Unknowns start...stop of the elimination order, and what their elimination leaves behind.
+class Division:
+    """How the fronts are divided among threads.
 
-    boundary : (b,) later unknowns that they touch
-    inverse  : (m, m) inverse of their Cholesky factor, which makes a solution a product of matrices
-    below    : (b, m) the rows of the factor at the boundary
+    branches : (t, 2) first and last front of the subtrees that are independent of each other, ascending
+    trunk    : the other fronts, in the order of elimination
+    below    : for each front those directly below it
     """
 
-    start: int
-    stop: int
-    boundary: Array
-    inverse: Array
-    below: Array
+    branches: Array
+    trunk: list[int]
+    below: list[list[int]]
 
 
 @dataclass(frozen=True)
 class Factor:
-    """P A P^T = L L^T; order : (n,) the unknown at each place of the elimination."""
+    """P A P^T = L L^T.
+
+    order   : (n,) the unknown at each place of the elimination
+    fronts  : the columns of L
+    targets : rows of the boundaries in a solution: a branch has copies of the rows outside it, after the n unknowns
+    copied  : (c,) the rows that these copy
+    """
 
     order: Array
-    fronts: tuple[Front, ...]
+    fronts: Fronts
+    division: Division
+    targets: Array
+    copied: Array
 
 
 def cholesky(A: sp.csr_array, positions: Array) -> Factor:
@@ -56,146 +85,139 @@ def cholesky(A: sp.csr_array, positions: Array) -> Factor:
 
     Raises numpy.linalg.LinAlgError when A is not positive definite.
     """
-    pieces, children = _elimination_tree(A, positions)
+    pieces, below = elimination_tree(A, positions)
     order = np.concatenate(pieces)
-    sorted_A = sp.csr_array(A[order][:, order])
-    ends = np.cumsum([len(piece) for piece in pieces])
-    local = np.empty(len(order), dtype=np.int64)
-    fronts: list[Front] = []
-    updates: dict[int, Array] = {}
-    for k, (piece, below) in enumerate(zip(pieces, children, strict=True)):
-        start, stop = int(ends[k] - len(piece)), int(ends[k])
-        rows = sorted_A[start:stop]
-        boundary = _boundary(rows, [fronts[child] for child in below], stop)
-        members = np.concatenate([np.arange(start, stop), boundary])
-        local[members] = np.arange(len(members))
-        F = _assembled(rows, start, local, len(members))
-        for child in below:
-            _extend_add(F, updates.pop(child), local[fronts[child].boundary])
-        front, updates[k] = _eliminated(F, start, stop, boundary)
-        fronts.append(front)
-    return Factor(order, tuple(fronts))
+    place = np.empty(len(order), np.int32)
+    place[order] = np.arange(len(order))
+    matrix = Sorted(A.indptr, A.indices, A.data, order, place)
+    fronts = _empty_fronts(matrix, np.cumsum([0, *map(len, pieces)]), np.array([len(of) for of in below]))
+    division = _division(fronts, below)
+    with _threads() as each:
+        _eliminate_all(fronts, division, matrix, each)
+    return Factor(order, fronts, division, *_private_rows(fronts, division.branches))
 
 
 def solve_cholesky(factor: Factor, b: Array) -> Array:
     """A^-1 b for b (n, r)."""
-    y = np.array(b[factor.order], dtype=float)
-    for front in factor.fronts:
-        own = slice(front.start, front.stop)
-        y[own] = front.inverse @ y[own]
-        y[front.boundary] -= front.below @ y[own]
-    for front in reversed(factor.fronts):
-        own = slice(front.start, front.stop)
-        y[own] = front.inverse.T @ (y[own] - front.below.T @ y[front.boundary])
-    x = np.empty_like(y)
-    x[factor.order] = y
+    n = len(factor.order)
+    fronts, targets, trunk, branches = factor.fronts, factor.targets, factor.division.trunk, factor.division.branches
+    y = np.zeros((n + len(factor.copied), b.shape[1]))
+    y[:n] = b[factor.order]
+    with _threads() as each:
+        _finish(each(lambda branch: forward(fronts, targets, branch[0], branch[1], y), branches))
+        np.add.at(y, factor.copied, y[n:])
+        for k in trunk:
+            forward(fronts, targets, k, k, y)
+        for k in reversed(trunk):
+            backward(fronts, targets, k, k, y)
+        y[n:] = y[factor.copied]
+        _finish(each(lambda branch: backward(fronts, targets, branch[0], branch[1], y), branches))
+    x = np.empty((n, b.shape[1]))
+    x[factor.order] = y[:n]
     return x
 
 
-# ---- order of elimination -----------------------------------------------------------------------------------------
+# ---- division of the work -----------------------------------------------------------------------------------------
 
 
-def _elimination_tree(A: sp.csr_array, positions: Array) -> tuple[list[Array], list[list[int]]]:
-    """Pieces of unknowns in the order of their elimination, and for each the earlier pieces that touch it directly."""
-    placed = np.flatnonzero(np.isfinite(positions[:, 0]))
-    points, point_of = np.unique(positions[placed], axis=0, return_inverse=True)
-    shape = (len(positions), len(points))
-    incidence = sp.csr_array((np.ones(placed.size), (placed, point_of.ravel())), shape=shape)
-    pattern = sp.csr_array((np.ones(A.nnz), A.indices, A.indptr), shape=A.shape)
-    graph = sp.csr_array(incidence.T @ (pattern @ incidence))
-    cuts, children = _dissection(points, graph)
-    unknowns_of = sp.csr_array(incidence.T)
-    pieces = [unknowns_of[cut].indices.astype(np.int64) for cut in cuts]
-    last = np.setdiff1d(np.arange(len(positions)), placed)
-    if last.size:
-        children.append(_tops(children))
-        pieces.append(last)
-    return pieces, children
+@contextmanager
+def _threads() -> Iterator[Map]:
+    """A map that runs on all threads there are; each calls BLAS on its own."""
+    with _BLAS.limit(limits=1), ThreadPoolExecutor(os.cpu_count()) as pool:
+        yield pool.map
 
 
-def _dissection(points: Array, graph: sp.csr_array) -> tuple[list[Array], list[list[int]]]:
-    """Nested dissection of the points (N, 3): pieces in the order of elimination, with the pieces below each."""
-    pieces: list[Array] = []
-    children: list[list[int]] = []
-    marked = np.zeros(len(points), bool)
-
-    def add(piece: Array, below: list[int]) -> list[int]:
-        if not piece.size:
-            return below
-        pieces.append(piece)
-        children.append(below)
-        return [len(pieces) - 1]
-
-    def dissect(part: Array) -> list[int]:
-        if len(part) <= _LEAF:
-            return add(part, [])
-        one, two, cut = _cut(points, graph, part, marked)
-        return add(cut, dissect(one) + dissect(two))
-
-    dissect(np.arange(len(points)))
-    return pieces, children
+def _empty_fronts(matrix: Sorted, starts: Array, children: Array) -> Fronts:
+    ends, boundary = boundaries(starts, children, matrix)
+    own, rest = np.diff(starts), np.diff(ends)
+    offsets = np.concatenate([[0], np.cumsum(own * (own + rest))])
+    return Fronts(starts, ends, boundary, offsets, np.zeros(offsets[-1]), children)
 
 
-def _cut(points: Array, graph: sp.csr_array, part: Array, marked: Array) -> tuple[Array, Array, Array]:
-    """Two halves of a part that do not touch each other, and the points between them."""
-    offsets = points[part] - points[part].mean(axis=0)
-    _, axes = np.linalg.eigh(offsets.T @ offsets)
-    along = np.argsort(offsets @ axes[:, -1], kind="stable")
-    one, two = np.sort(part[along[: len(part) // 2]]), np.sort(part[along[len(part) // 2 :]])
-    at_one, at_two = _touching(graph, one, two, marked), _touching(graph, two, one, marked)
-    if at_one.sum() <= at_two.sum():
-        return one[~at_one], two, one[at_one]
-    return one, two[~at_two], two[at_two]
+def _division(fronts: Fronts, below: list[list[int]]) -> Division:
+    """The tree is cut at its heaviest front until all branches are light."""
+    own, rest = np.diff(fronts.starts), np.diff(fronts.ends)
+    first, work = np.arange(len(below)), own * (own + rest) ** 2.0
+    light = work.sum() / _BRANCHES
+    for k, of in enumerate(below):
+        first[k] = min([k, *first[of]])
+        work[k] += work[of].sum()
+    branches, trunk = [(-work[k], k) for k in set(range(len(below))).difference(*below)], []
+    heapq.heapify(branches)
+    while -branches[0][0] > light and below[branches[0][1]]:
+        _, heaviest = heapq.heappop(branches)
+        trunk.append(heaviest)
+        for k in below[heaviest]:
+            heapq.heappush(branches, (-work[k], k))
+    return Division(np.array(sorted((first[k], k) for _, k in branches)), sorted(trunk), below)
 
 
-def _touching(graph: sp.csr_array, part: Array, other: Array, marked: Array) -> Array:
-    """(p,) which points of the part have a neighbour in the other; `marked` (N,) is all False and stays so."""
-    marked[other] = True
-    touching = (graph[part] @ marked) > 0
-    marked[other] = False
-    return touching
+def _private_rows(fronts: Fronts, branches: Array) -> tuple[Array, Array]:
+    """The targets of all boundaries, and the rows that the branches have copies of."""
+    targets = fronts.boundary.astype(np.int64)
+    copied, count = [np.zeros(0, np.int64)], int(fronts.starts[-1])
+    for first, last in branches:
+        outside = fronts.boundary[fronts.ends[last] : fronts.ends[last + 1]].astype(np.int64)
+        of_branch = targets[fronts.ends[first] : fronts.ends[last + 1]]
+        leaving = of_branch >= fronts.starts[last + 1]
+        of_branch[leaving] = count + np.searchsorted(outside, of_branch[leaving])
+        copied.append(outside)
+        count += len(outside)
+    return targets, np.concatenate(copied)
 
 
-def _tops(children: list[list[int]]) -> list[int]:
-    """The pieces that are below no other."""
-    below = {child for of in children for child in of}
-    return [k for k in range(len(children)) if k not in below]
+# ---- elimination --------------------------------------------------------------------------------------------------
 
 
-# ---- fronts -------------------------------------------------------------------------------------------------------
+def _eliminate_all(fronts: Fronts, division: Division, matrix: Sorted, each: Map) -> None:
+    results = each(lambda branch: eliminate_branch(fronts, branch[0], branch[1], matrix), division.branches)
+    updates: dict[int, Array] = {}
+    for (_, last), (update, bad) in zip(division.branches, results, strict=True):
+        _check_pivot(bad)
+        rest = shape(fronts, last)[1]
+        updates[int(last)] = update.reshape(rest, rest)
+    local = np.empty(len(matrix.order), np.int32)
+    for k in division.trunk:
+        rest = shape(fronts, k)[1]
+        update = np.zeros((rest, rest))
+        begin(fronts, k, matrix, update, local)
+        for child in division.below[k]:
+            _add_tiled(fronts, k, child, updates.pop(child), update, local, each)
+        _eliminate_tiled(fronts, k, update, each)
+        updates[k] = update
 
 
-def _boundary(rows: sp.csr_array, earlier: list[Front], stop: int) -> Array:
-    """Later unknowns that a front touches, by the matrix or by the fronts below it."""
-    touched = np.unique(np.concatenate([rows.indices, *(front.boundary for front in earlier)]))
-    return touched[touched >= stop]
+def _add_tiled(fronts: Fronts, k: int, child: int, of_child: Array, update: Array, local: Array, each: Map) -> None:
+    _finish(
+        each(
+            lambda columns: add(fronts, k, child, of_child, update, local, columns[0], columns[1]),
+            _tiles(0, len(of_child)),
+        )
+    )
 
 
-def _assembled(rows: sp.csr_array, start: int, local: Array, size: int) -> Array:
-    """(size, size) the columns of the matrix that the front eliminates, lower triangle."""
-    F = np.zeros((size, size), order="F")
-    columns = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
-    later = rows.indices >= start
-    F[local[rows.indices[later]], columns[later]] = rows.data[later]
-    return F
+def _eliminate_tiled(fronts: Fronts, k: int, update: Array, each: Map) -> None:
+    """As `eliminate`, by tiles that do not depend on the number of threads."""
+    own, rest = shape(fronts, k)
+    size, panel = own + rest, fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]]
+    for first, last in _tiles(0, own):
+        bad = diagonal_tile(panel, size, first, last)
+        _check_pivot(fronts.starts[k] + first + bad - 1 if bad else DONE)
+        _finish(each(lambda rows, of=(first, last): row_tile(panel, size, *of, *rows), _tiles(last, size)))
+    pairs = [(columns, rows) for columns in _tiles(0, rest) for rows in _tiles(0, rest) if rows >= columns]
+    _finish(each(lambda pair: update_tile(panel, own, update, *pair[0], *pair[1]), pairs))
 
 
-@numba.njit(cache=True)
-def _extend_add(F, update, places):  # type: ignore[no-untyped-def]
-    """Add the lower triangle of the update (b, b) of a front below to F, at ascending places (b,)."""
-    for j in range(places.size):
-        for i in range(j, places.size):
-            F[places[i], places[j]] += update[i, j]
+def _tiles(start: int, stop: int) -> list[tuple[int, int]]:
+    return [(first, min(first + _TILE, stop)) for first in range(start, stop, _TILE)]
 
 
-def _eliminated(F: Array, start: int, stop: int, boundary: Array) -> tuple[Front, Array]:
-    """The factor of the front, and the update (b, b, lower triangle) that it leaves to later ones."""
-    own = stop - start
-    L, info = dpotrf(F[:own, :own], lower=1, clean=1)
-    if info:
-        raise np.linalg.LinAlgError(f"pivot {start + info} is not positive")
-    inverse, _ = dtrtri(L, lower=1)
-    if not boundary.size:
-        return Front(start, stop, boundary, inverse, np.zeros((0, own))), np.zeros((0, 0))
-    below = dtrsm(1.0, L, F[own:, :own], side=1, lower=1, trans_a=1)
-    return Front(start, stop, boundary, inverse, below), dsyrk(-1.0, below, beta=1.0, c=F[own:, own:], lower=1)
+def _finish(results: Iterable[None]) -> None:
+    """Wait for all, and raise what one of them raised."""
+    for _ in results:
+        pass
+
+
+def _check_pivot(bad: int) -> None:
+    if bad != DONE:
+        raise np.linalg.LinAlgError(f"pivot {bad + 1} is not positive")

@@ -43,7 +43,7 @@ def main() -> int:
     try:
         if job["generate"]:
             _generate(gmsh, job)
-        arrays, names = _lines(gmsh) if job["dimension"] == 1 else _result(gmsh)
+        arrays, names = {1: _lines, 2: _surfaces, 3: _result}[job["dimension"]](gmsh)
         if job["generate"]:
             arrays["points"] = _rounded(arrays["points"])
     except Exception as error:
@@ -78,7 +78,7 @@ def _open(gmsh: Any, job: dict[str, Any]) -> None:
 
 
 def _generate(gmsh: Any, job: dict[str, Any]) -> None:
-    """Mesh the volumes, or the curves only; the options set here win over those of a script."""
+    """Mesh the volumes, the surfaces or the curves; the options set here win over those of a script."""
     if job["size"] is not None:
         gmsh.option.setNumber("Mesh.MeshSizeMax", job["size"])
         if job["path"].lower().endswith(_CAD):  # without sizes at points, gmsh takes a tenth of the diagonal
@@ -88,6 +88,11 @@ def _generate(gmsh: Any, job: dict[str, Any]) -> None:
         if not gmsh.model.getEntities(1):
             raise ValueError("the geometry has no curves: draw the axes of the beams")
         gmsh.model.mesh.generate(1)
+        return
+    if job["dimension"] == 2:
+        if not gmsh.model.getEntities(2):
+            raise ValueError("the geometry has no surfaces: draw the plates as surfaces")
+        gmsh.model.mesh.generate(2)
         return
     if not gmsh.model.getEntities(3):
         raise ValueError("the geometry has no volume, only surfaces or curves: make it a solid")
@@ -147,6 +152,16 @@ def _lines(gmsh: Any) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     return arrays, names
 
 
+def _surfaces(gmsh: Any) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """As `_lines`, and the corners of the faces of each surface group with the nodes of these groups."""
+    arrays, names = _lines(gmsh)
+    _, index_of = _points(gmsh)
+    names["faces"] = []
+    _add_faces(gmsh, index_of, arrays, names)
+    _add_nodes(gmsh, index_of, arrays, names, dimensions=(2,))
+    return arrays, names
+
+
 def _add_volumes(gmsh: Any, index_of: np.ndarray, arrays: dict[str, np.ndarray], names: dict[str, Any]) -> None:
     """Elements by kind, and the members of each volume group as (kind, numbers within the kind)."""
     groups = _groups(gmsh, 3)
@@ -183,9 +198,15 @@ def _add_faces(gmsh: Any, index_of: np.ndarray, arrays: dict[str, np.ndarray], n
             arrays[f"face_{g}_{corners}"] = np.concatenate(found)
 
 
-def _add_nodes(gmsh: Any, index_of: np.ndarray, arrays: dict[str, np.ndarray], names: dict[str, Any]) -> None:
-    """The nodes of the physical groups of points and curves."""
-    for dimension, tag in [pair for d in (0, 1) for pair in gmsh.model.getPhysicalGroups(d)]:
+def _add_nodes(
+    gmsh: Any,
+    index_of: np.ndarray,
+    arrays: dict[str, np.ndarray],
+    names: dict[str, Any],
+    dimensions: tuple[int, ...] = (0, 1),
+) -> None:
+    """The nodes of the physical groups of points and curves, or of other dimensions."""
+    for dimension, tag in [pair for d in dimensions for pair in gmsh.model.getPhysicalGroups(d)]:
         nodes, _ = gmsh.model.mesh.getNodesForPhysicalGroup(dimension, tag)
         names["nodes"].append(_physical_name(gmsh, dimension, tag))
         arrays[f"node_{len(names['nodes']) - 1}"] = index_of[nodes]

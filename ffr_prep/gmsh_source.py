@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +57,31 @@ def lines_from_gmsh(
     names = json.loads(stored["names"].tobytes())
     lines = {name: stored[f"line_{g}"] for g, name in enumerate(names["lines"])}
     return stored["points"], lines, {name: stored[f"node_{g}"] for g, name in enumerate(names["nodes"])}
+
+
+@dataclass(frozen=True)
+class LinesAndFaces:
+    """points (N, 3); by group: lines (L, 2), the corners of faces (T, 3) and (Q, 4), and nodes."""
+
+    points: Array
+    lines: Mapping[str, Array]
+    faces: Mapping[str, tuple[Array, Array]]
+    nodes: Mapping[str, Array]
+
+
+def faces_from_gmsh(path: Path, *, unit: str, size: float | None, numbers: Mapping[str, float]) -> LinesAndFaces:
+    """The surfaces of a file as flat triangles and quadrilaterals, and its curves as straight lines.
+
+    Arguments and errors as in `from_gmsh`.
+    """
+    stored = _arrays(path, dimension=2, unit=unit, size=size, numbers=numbers, order=1)
+    names = json.loads(stored["names"].tobytes())
+    return LinesAndFaces(
+        points=stored["points"],
+        lines={name: stored[f"line_{g}"] for g, name in enumerate(names["lines"])},
+        faces={name: (stored[f"face_{g}_3"], stored[f"face_{g}_4"]) for g, name in enumerate(names["faces"])},
+        nodes={name: stored[f"node_{g}"] for g, name in enumerate(names["nodes"])},
+    )
 
 
 def _arrays(

@@ -67,6 +67,8 @@ class CoupledModel:
     C       : (6I, Z) interface coordinates C z: three translations [m] and three rotations [rad] of each interface
     inertial_loads : (Z, 12) loads of unit accelerations: translation, rotation, products of the angular velocity; None where
               the model does not know them
+    edges     : (E, 2) nodes at the ends of each edge of each element; None where the model does not know its elements
+    dimension : of the elements: 3 of solids, 2 of plates, 1 of beams
     """
 
     points: Array
@@ -81,6 +83,8 @@ class CoupledModel:
     positions: Array
     C: sp.csr_array
     inertial_loads: Array | None = None
+    edges: Array | None = None
+    dimension: int = 3
 
 
 def couple(mesh: Mesh, matrices: SolidMatrices, interfaces: Sequence[InterfaceRegion]) -> CoupledModel:

@@ -33,9 +33,11 @@ from ffr_prep.matrix_checks import (
 from ffr_prep.matrix_coupling import couple_matrices, tie_matrices
 from ffr_prep.matrix_model import MatrixModel, model_hash, without_empty_rows
 from ffr_prep.nodal_inertia import nodal_integrals, scalar_integrals, scalar_mass
+from ffr_prep.quality import Quality, assess, completed
 from ffr_prep.reduce import described, interface_shapes
 from ffr_prep.reduction import Reduction
 from ffr_prep.reference import ReferenceConditions, functionals
+from ffr_prep.selection import Band
 
 Array = np.ndarray
 
@@ -51,12 +53,14 @@ def reduce_matrices(
     interfaces: Sequence[InterfaceRegion],
     reference: ReferenceConditions,
     reduction: Reduction,
+    quality: Band | None = None,
     progress: Callable[[str], None] | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> FlexibleBody:
     """The reduced flexible body of outside matrices, in the coordinates of their nodes.
 
     interfaces : at groups of nodes; one node gives its six coordinates, several follow rigidly or in the mean
+    quality    : compare the body with the full model over this band of frequencies, and keep what was found
     progress   : called with the name of each stage as it begins
     provenance : JSON values kept with the body, beside what is recorded anyway
 
@@ -67,7 +71,7 @@ def reduce_matrices(
     ComputationError for a computation that failed.
     """
     with threadpool_limits(1):  # as for solids: small dense blocks, and reproducible
-        return _reduced(model, name, interfaces, reference, reduction, progress or _silent, provenance or {})
+        return _reduced(model, name, interfaces, reference, reduction, quality, progress or _silent, provenance or {})
 
 
 def _reduced(
@@ -76,6 +80,7 @@ def _reduced(
     interfaces: Sequence[InterfaceRegion],
     reference: ReferenceConditions,
     reduction: Reduction,
+    quality: Band | None,
     tell: Callable[[str], None],
     provenance: Mapping[str, Any],
 ) -> FlexibleBody:
@@ -94,6 +99,9 @@ def _reduced(
         _basis(reduction, coupled, body, L) if not mass_is_singular(model) else _shifted(reduction, coupled, body, L)
     )
     check_basis(coupled, L, basis)
+    if quality:
+        tell("compare with the full model")
+    assessed = _assessed(model, coupled, body, L, basis, quality) if quality else None
     tell("integrate the inertia")
     Phi = ties @ basis.Z
     integrals, mass, doubts = _integrals(model, Phi)
@@ -103,7 +111,9 @@ def _reduced(
         omega2=basis.omega2,
         interfaces=interface_shapes(coupled, basis),
         surface=_surface(model, Phi),
-        provenance=record(model, mass, interfaces, reference, reduction, coupled, warnings) | dict(provenance),
+        provenance=completed(
+            record(model, mass, interfaces, reference, reduction, coupled, warnings) | dict(provenance), basis, assessed
+        ),
         **vars(integrals),
     )
 
@@ -115,6 +125,14 @@ def _factorised(model: MatrixModel, coupled: CoupledModel, ties: sp.csr_array) -
     except ComputationError:
         check_mechanisms(model, coupled, ties)
         raise
+
+
+def _assessed(model: MatrixModel, coupled: CoupledModel, body: FreeBody, L: Array, basis: Basis, band: Band) -> Quality:
+    if mass_is_singular(model):
+        raise InputError(
+            "the quality of a reduction needs a mass for every coordinate, and some have none: leave out the quality report"
+        )
+    return assess(coupled, body, L, basis, band)
 
 
 def _surface(model: MatrixModel, Phi: Array) -> Surface | None:
@@ -154,7 +172,7 @@ def _shifted(reduction: Reduction, coupled: CoupledModel, body: FreeBody, L: Arr
             f"{massless} of the {len(share)} shapes move no mass: M is zero for rotations or nodes that they consist of; ask "
             "for fewer modes, or give the interface nodes a mass"
         )
-    return Basis(found.Z / np.sqrt(share), found.omega2 / share)
+    return replace(found, Z=found.Z / np.sqrt(share), omega2=found.omega2 / share)
 
 
 def _epsilon(coupled: CoupledModel) -> float:

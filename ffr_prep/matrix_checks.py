@@ -19,8 +19,9 @@ _FREE = 1e-6
 _FEW_DIGITS = 1e-11
 _ONE_MASS = 1e-6
 _DEFINITE = 1e-10
-_ZERO_ENERGY = 1e-11
+_ZERO_ENERGY = 1e-13
 _NO_STIFFNESS = 1e-14
+_SHIFT = 1e-9
 _BLOCK = 14
 
 
@@ -169,7 +170,9 @@ def check_connected(model: MatrixModel, coupled: CoupledModel, ties: sp.csr_arra
 
     ties : (D, Z) the rows from the independent coordinates
     """
-    parts, labels = connected_components(coupled.K, directed=False)
+    shape = (len(model.points), len(model.nodes))
+    of_nodes = sp.csr_array((np.ones(shape[1]), (model.nodes, np.arange(shape[1]))), shape=shape) @ abs(ties)
+    parts, labels = connected_components(abs(coupled.K) + of_nodes.T @ of_nodes, directed=False)
     if parts > 1:
         smallest = int(np.argmin(np.bincount(labels)))
         raise InputError(
@@ -217,7 +220,13 @@ def _lowest(coupled: CoupledModel) -> tuple[Array, Array]:
     S = sp.diags_array(scale)
     K = sp.csr_array(S @ coupled.K @ S)
     rigid, _ = np.linalg.qr(coupled.T / scale[:, None])
-    factor = cholesky(sp.csr_array(K + 1e-9 * sp.eye_array(K.shape[0])), coupled.places)
+    try:
+        factor = cholesky(sp.csr_array(K + _SHIFT * sp.eye_array(K.shape[0])), coupled.places)
+    except np.linalg.LinAlgError:
+        raise InputError(
+            "K is not positive: some motions have a negative energy, as with Lagrange multipliers, loads that soften the "
+            "structure beyond buckling, or too few digits in the file; give the stiffness of the unloaded structure alone"
+        ) from None
     block = np.random.default_rng(0).standard_normal((K.shape[0], min(_BLOCK, K.shape[0] - 6)))
     for _ in range(4):
         block = solve_cholesky(factor, block - rigid @ (rigid.T @ block))

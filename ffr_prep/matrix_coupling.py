@@ -1,7 +1,8 @@
 """Interfaces on outside matrices: groups of nodes with any of the six coordinates, tied to six-coordinate nodes.
 
 One node with six coordinates is an interface as it is. Several nodes follow rigidly (RBE2), or move the interface in the
-mean (RBE3): the rigid motion closest to their translations in the least-squares sense, all nodes counting alike.
+mean (RBE3): the rigid motion closest to theirs in the least-squares sense, all nodes counting alike, and rotations, where
+nodes have them, by the square of the radius of gyration of the nodes (as in `ffr_prep.structural_interface`).
 
 Source: R. H. MacNeal, The NASTRAN Theoretical Manual (1972), section 5 (rigid elements).
 """
@@ -14,10 +15,11 @@ from itertools import combinations
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.beam_stiffening import unit_accelerations
 from ffr_prep.errors import InputError
-from ffr_prep.interface import CoupledModel, InterfaceRegion, rigid_field
+from ffr_prep.interface import CoupledModel, InterfaceRegion
 from ffr_prep.matrix_model import MatrixModel, group_nodes, node_in_words
-from ffr_prep.nodal_inertia import rigid_coordinates
+from ffr_prep.structural_interface import rigid_coordinates
 
 Array = np.ndarray
 
@@ -49,7 +51,16 @@ def couple_matrices(model: MatrixModel, interfaces: Sequence[InterfaceRegion], t
         kinds=tuple("node" if len(_nodes(model, i)) == 1 else i.kind for i in interfaces),
         positions=positions,
         C=C,
+        inertial_loads=-(ties.T @ (model.M @ _accelerations(model))),
     )
+
+
+def _accelerations(model: MatrixModel) -> Array:
+    """(D, 12) of the nodes: three translations, three rotations, six products of the angular velocity; as rigid nodes."""
+    fields = np.zeros((len(model.points), 6, 12))
+    fields[..., :6] = rigid_coordinates(model.points)
+    fields[:, :3, 6:] = unit_accelerations(model.points)[6:].transpose(1, 2, 0)
+    return model.dofs.of_nodes(fields)
 
 
 def tie_matrices(model: MatrixModel, interfaces: Sequence[InterfaceRegion]) -> sp.csr_array:
@@ -98,12 +109,19 @@ def _coordinates(
 
 
 def _mean_motion(model: MatrixModel, interface: InterfaceRegion, at: Array) -> sp.csr_array:
-    """(6, D) the rigid motion about the point that is closest to the translations of the nodes."""
-    nodes = _nodes(model, interface)
-    columns = model.dofs.translations()[nodes].ravel()
-    motion = np.linalg.pinv(rigid_field(model.points[nodes] - at).reshape(-1, 6))
-    ends = np.arange(7) * columns.size
-    return sp.csr_array((motion.ravel(), np.tile(columns, 6), ends), shape=(6, len(model.nodes)))
+    """(6, D) the rigid motion about the point that is closest to the motions of the nodes."""
+    rows, following = _following(model, interface, at)
+    root = np.sqrt(_weights(model, rows))[:, None]
+    motion = np.linalg.pinv(root * following) * root.T
+    ends = np.arange(7) * rows.size
+    return sp.csr_array((motion.ravel(), np.tile(rows, 6), ends), shape=(6, len(model.nodes)))
+
+
+def _weights(model: MatrixModel, rows: Array) -> Array:
+    """(r,) 1 for translations, the squared radius of gyration of the nodes [m^2] for rotations; 1 for one node."""
+    at = model.points[np.unique(model.nodes[rows])]
+    square = float(((at - at.mean(axis=0)) ** 2).sum() / len(at)) or 1.0
+    return np.where(model.components[rows] < 3, 1.0, square)
 
 
 def _nodes(model: MatrixModel, interface: InterfaceRegion) -> Array:
@@ -151,20 +169,15 @@ def _check_interfaces(model: MatrixModel, interfaces: Sequence[InterfaceRegion])
 def _check_determined(model: MatrixModel, interface: InterfaceRegion) -> None:
     """Six coordinates need a node with six, or nodes that are not on one line."""
     nodes = _nodes(model, interface)
-    points = model.points[nodes]
-    size = np.linalg.norm(np.ptp(points, axis=0)) or 1.0
-    at = points.mean(axis=0)
-    if interface.kind == "rigid":
-        rows, motion = _following(model, interface, at)
-        lengths = np.where(model.components[rows] < 3, size, 1.0)
-        motion = motion / lengths[:, None] * np.array([size, size, size, 1.0, 1.0, 1.0])
-    else:
-        motion = rigid_field((points - at) / size).reshape(-1, 6)
-    if np.linalg.matrix_rank(motion, tol=_DETERMINED * np.sqrt(len(nodes))) < 6:
+    rows, motion = _following(model, interface, model.points[nodes].mean(axis=0))
+    weights = _weights(model, rows)
+    size = np.sqrt(weights.max())
+    scaled = np.sqrt(weights)[:, None] * motion / np.array([1.0, 1.0, 1.0, size, size, size])
+    if np.linalg.matrix_rank(scaled, tol=_DETERMINED * np.linalg.norm(scaled)) < 6:
         raise InputError(
             f"interface {interface.name!r}: the {len(nodes)} nodes of group {interface.region or interface.name!r} do not "
             f"determine its six coordinates (the first is {node_in_words(model, nodes[0])}): take a node with three "
-            "rotations and tie it rigidly, or three or more nodes that are not on one line"
+            "rotations, or three or more nodes that are not on one line"
         )
 
 

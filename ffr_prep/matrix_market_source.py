@@ -22,7 +22,7 @@ import scipy.sparse as sp
 from ffr_prep.errors import InputError
 from ffr_prep.matrix_model import MatrixModel
 from ffr_prep.matrix_source import NodeTable, model_of
-from ffr_prep.npz_source import sparse_of
+from ffr_prep.npz_source import arrays_of, sparse_of
 
 Array = np.ndarray
 
@@ -35,7 +35,7 @@ def from_matrix_market(stiffness: Path, mass: Path, rows: Path) -> MatrixModel:
 
 def read_rows(path: Path) -> tuple[NodeTable, Array]:
     """The nodes, and number and component (D, 2) of each row."""
-    lines = list(csv.reader(path.read_text(encoding="utf-8").splitlines()))
+    lines = list(csv.reader(path.read_text(encoding="utf-8-sig", errors="replace").splitlines()))
     first = 1 if lines and lines[0] and not _is_integer(lines[0][0]) else 0
     points: dict[int, list[float]] = {}
     groups: dict[str, dict[int, None]] = {}
@@ -75,8 +75,7 @@ def _is_integer(word: str) -> bool:
 
 def _matrix(path: Path) -> sp.csr_array:
     if path.suffix.lower() == ".npz":
-        with np.load(path, allow_pickle=False) as stored:
-            return sparse_of(str(path), {key: stored[key] for key in stored.files})
+        return sparse_of(str(path), arrays_of(path))
     try:
         return sp.csr_array(scipy.io.mmread(path))
     except Exception as error:  # the reader raises whatever its parser meets

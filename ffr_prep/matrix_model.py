@@ -84,8 +84,10 @@ class MatrixModel:
         labels = labels if labels.size else np.arange(1, len(self.points) + 1)
         object.__setattr__(self, "labels", labels)
         for key in ("K", "M"):
-            object.__setattr__(self, key, sp.csr_array(getattr(self, key), dtype=float))
+            object.__setattr__(self, key, _real(key, sp.csr_array(getattr(self, key))))
         object.__setattr__(self, "groups", {name: np.array(of, np.int64) for name, of in self.groups.items()})
+        if self.triangles is not None:
+            object.__setattr__(self, "triangles", np.array(self.triangles, np.int64).reshape(-1, 3))
         _check_shapes(self)
         _check_rows(self)
 
@@ -220,6 +222,12 @@ def group_nodes(model: MatrixModel, name: str) -> Array:
             f"there is no group of nodes {name!r}; {f'did you mean {near[0]!r}? ' if near else ''}There are: {known}"
         )
     return np.unique(model.groups[name])
+
+
+def _real(name: str, A: sp.csr_array) -> sp.csr_array:
+    if np.iscomplexobj(A.data):
+        raise InputError(f"{name} is complex; give its real part: damping belongs to the simulation, not to the body")
+    return sp.csr_array(A, dtype=float)
 
 
 # ---- guards -------------------------------------------------------------------------------------------------------

@@ -67,7 +67,7 @@ def _read(paths: Sequence[Path]) -> MatrixModel:
         from ffr_prep.npz_source import from_npz
 
         return from_npz(paths[0])
-    if len(kinds) == 3 and set(kinds[:2]) <= {".mtx", ".npz", ".gz"} and kinds[2] == ".csv":
+    if len(kinds) == 3 and set(kinds[:2]) <= {".mtx", ".npz"} and kinds[2] == ".csv":
         from ffr_prep.matrix_market_source import from_matrix_market
 
         return from_matrix_market(*paths)

@@ -11,12 +11,15 @@ import numpy as np
 
 from ffr_prep.basis import check_basis, factorised
 from ffr_prep.body import BeamForces, FlexibleBody, Surface
-from ffr_prep.factor import solve_refined, supported
+from ffr_prep.errors import ComputationError
+from ffr_prep.factor import SupportedBody, solve_refined, supported
 from ffr_prep.interface import CoupledModel
 from ffr_prep.invariants import InertiaIntegrals
+from ffr_prep.quality import assess, completed
 from ffr_prep.reduce import described, interface_shapes
 from ffr_prep.reduction import Reduction
 from ffr_prep.reference import ReferenceConditions, functionals
+from ffr_prep.selection import Band
 
 Array = np.ndarray
 
@@ -25,20 +28,18 @@ Array = np.ndarray
 class Model:
     """What a reduction needs of a model, whatever its elements are; z are the independent coordinates of `coupled`.
 
-    coupled        : stiffness, mass and interfaces
-    inertial_loads : (Z, 12) loads of unit accelerations: translation, rotation, products of the angular velocity
-    inertia        : inertia integrals of a basis (Z, n)
-    surface        : what is drawn, with the basis (Z, n) at its points
-    stressed       : the same with stress modes, and section forces where there are beams
-    stiffening     : (r, n, n) geometric stiffness of a basis (Z, n) under loads with the static displacements (Z, r), the
-                     first twelve of them the inertial loads
-    recovery       : how the stress is recovered, in words
-    record         : what the model is; JSON values
-    packages       : whose versions are recorded
+    coupled    : stiffness, mass, interfaces and inertial loads
+    inertia    : inertia integrals of a basis (Z, n)
+    surface    : what is drawn, with the basis (Z, n) at its points
+    stressed   : the same with stress modes, and section forces where there are beams
+    stiffening : (r, n, n) geometric stiffness of a basis (Z, n) under loads with the static displacements (Z, r), the
+                 first twelve of them the inertial loads
+    recovery   : how the stress is recovered, in words
+    record     : what the model is; JSON values
+    packages   : whose versions are recorded
     """
 
     coupled: CoupledModel
-    inertial_loads: Array
     inertia: Callable[[Array], InertiaIntegrals]
     surface: Callable[[Array], Surface]
     stressed: Callable[[Array], Surface]
@@ -56,6 +57,7 @@ def reduce_model(
     reduction: Reduction,
     stiffening: bool = False,
     stress: bool = False,
+    quality: Band | None = None,
     progress: Callable[[str], None] | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> FlexibleBody:
@@ -63,6 +65,7 @@ def reduce_model(
 
     stiffening : also compute the geometric stiffness by load, which a simulation then uses
     stress     : also keep section forces of beams and the stress at the surface per elastic coordinate
+    quality    : compare the body with the full model over this band of frequencies, and keep what was found
     progress   : called with the name of each stage as it begins
     provenance : JSON values kept with the body, beside what is recorded anyway
 
@@ -76,33 +79,58 @@ def reduce_model(
     tell("reduce")
     basis = reduction.basis(coupled, body, L)
     check_basis(coupled, L, basis)
+    if quality:
+        tell("compare with the full model")
+    assessed = assess(coupled, body, L, basis, quality) if quality else None
+    stiffness = None
     if stiffening:
         tell("compute the geometric stiffness")
-        loads = np.hstack([model.inertial_loads, coupled.C.toarray().T])
-        held = supported(body, L)
-        static, _ = solve_refined(held, loads, np.zeros((len(held.C), loads.shape[1])))
+        stiffness = model.stiffening(static_displacements(coupled, supported(body, L)), basis.Z)
     tell("integrate the inertia")
     return FlexibleBody(
         name=name,
         omega2=basis.omega2,
         interfaces=interface_shapes(coupled, basis),
         surface=(model.stressed if stress else model.surface)(basis.Z),
-        stiffening=model.stiffening(static, basis.Z) if stiffening else None,
-        provenance=record(model, reference, reduction)
-        | ({"stress": model.recovery} if stress else {})
-        | dict(provenance or {}),
+        stiffening=stiffness,
+        provenance=completed(
+            record(model, reference, reduction)
+            | ({"stress": model.recovery} if stress else {})
+            | dict(provenance or {}),
+            basis,
+            assessed,
+        ),
         **vars(model.inertia(basis.Z)),
     )
 
 
+def static_displacements(coupled: CoupledModel, held: SupportedBody) -> Array:
+    """(Z, 12 + 6 I) of the inertial loads and of unit forces and moments at each interface.
+
+    Raises ComputationError when a static problem fails.
+    """
+    loads = np.hstack([known_loads(coupled), coupled.C.toarray().T])
+    return solve_refined(held, loads, np.zeros((len(held.C), loads.shape[1])))[0]
+
+
+def known_loads(coupled: CoupledModel) -> Array:
+    """(Z, 12) the inertial loads; ComputationError for a model without them."""
+    if coupled.inertial_loads is None:
+        raise ComputationError("the model does not know its inertial loads: it cannot be stiffened or tied")
+    return coupled.inertial_loads
+
+
 def record(model: Model, reference: ReferenceConditions, reduction: Reduction) -> dict[str, Any]:
     """Provenance as JSON values: model, settings, versions. No time and no path, so it is reproducible."""
-    return dict(model.record) | {
-        "reference": described(reference),
-        "reduction": described(reduction),
-        "versions": {package: version(package) for package in model.packages},
-        "warnings": [],
-    }
+    return (
+        {"warnings": []}
+        | dict(model.record)
+        | {
+            "reference": described(reference),
+            "reduction": described(reduction),
+            "versions": {package: version(package) for package in model.packages},
+        }
+    )
 
 
 def summed(parts: Sequence[InertiaIntegrals]) -> InertiaIntegrals:

@@ -75,9 +75,12 @@ def from_op2(path: Path) -> MatrixModel:
 
 
 def model_of_nastran(path: Path, found: Mapping[str, Any], grids: GridTable, source: Mapping[str, Any]) -> MatrixModel:
-    """The model of matrices by name (arrays, or objects with an array `data`) and the points of the g-set."""
+    """The model of matrices by name, as pyNastran holds them in `data`, and the points of the g-set."""
     stiffness, mass = _pair(path, found)
-    K, M = (sp.csr_array(getattr(found[name], "data", found[name]), dtype=float) for name in (stiffness, mass))
+    for name in (stiffness, mass):
+        if isinstance(found[name].data, list):
+            raise InputError(f"{path} holds {name} {len(found[name].data)} times; write one model to a file")
+    K, M = (sp.csr_array(found[name].data) for name in (stiffness, mass))
     widths = np.where(grids.kinds == _GRID, 6, 1)
     if not K.shape[0] == M.shape[0] == widths.sum():
         raise InputError(

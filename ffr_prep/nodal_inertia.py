@@ -33,8 +33,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from ffr_prep.body import axial
-from ffr_prep.interface import rigid_field
 from ffr_prep.invariants import InertiaIntegrals, inertia_integrals
+from ffr_prep.structural_interface import rigid_coordinates
 
 Array = np.ndarray
 
@@ -74,12 +74,6 @@ class DofMap:
 def rigid_motions(points: Array, dofs: DofMap) -> Array:
     """T (D, 6): three translations and three rotations about the origin of the nodes at points (N, 3) [m]."""
     return dofs.of_nodes(rigid_coordinates(points))
-
-
-def rigid_coordinates(offsets: Array) -> Array:
-    """(..., 3) -> (..., 6, 6): the six coordinates of a node by three translations and three rotations."""
-    turning = np.broadcast_to(np.hstack([np.zeros((3, 3)), np.eye(3)]), (*np.shape(offsets)[:-1], 3, 6))
-    return np.concatenate([rigid_field(offsets), turning], axis=-2)
 
 
 # ---- route 1 ------------------------------------------------------------------------------------------------------

@@ -30,7 +30,7 @@ _GROUP = "group/"
 
 def from_npz(path: Path) -> MatrixModel:
     """The model of a .npz file, in the unit of the file. Raises InputError for one that cannot be used."""
-    arrays = _arrays(path)
+    arrays = arrays_of(path)
     missing = [key for key in ("points", "dofs") if key not in arrays]
     if missing:
         raise InputError(f"{path} has no array {missing[0]!r}; it holds {', '.join(map(repr, sorted(arrays)))}")
@@ -58,14 +58,8 @@ def save_matrices(model: MatrixModel, path: str | Path) -> Path:
         **{_GROUP + name: model.labels[of] for name, of in model.groups.items()},
     }
     for name, A in (("K", model.K), ("M", model.M)):
-        parts = {
-            "data": A.data,
-            "indices": A.indices,
-            "indptr": A.indptr,
-            "shape": np.array(A.shape),
-            "format": np.array("csr"),
-        }
-        arrays |= {f"{name}/{key}": part for key, part in parts.items()}
+        parts = {"data": A.data, "indices": A.indices, "indptr": A.indptr, "shape": A.shape, "format": "csr"}
+        arrays |= {f"{name}/{key}": np.array(part) for key, part in parts.items()}
     if model.triangles is not None:
         arrays["triangles"] = model.labels[model.triangles]
     temporary = path.with_name(path.name + ".part")
@@ -78,7 +72,8 @@ def save_matrices(model: MatrixModel, path: str | Path) -> Path:
     return path
 
 
-def _arrays(path: Path) -> dict[str, Array]:
+def arrays_of(path: Path) -> dict[str, Array]:
+    """The arrays of a .npz file by name; InputError for a file that is none."""
     try:
         with np.load(path, allow_pickle=False) as stored:
             return {key: stored[key] for key in stored.files}
@@ -92,7 +87,7 @@ def _matrix(path: Path, arrays: Mapping[str, Array], name: str) -> sp.csr_array:
         dense = arrays[name]
         if dense.ndim != 2:
             raise InputError(f"{path}: {name} has the shape {dense.shape}; it must be (D, D)")
-        return sp.csr_array(np.array(dense, float))
+        return sp.csr_array(dense)
     parts = {key.removeprefix(f"{name}/"): value for key, value in arrays.items() if key.startswith(f"{name}/")}
     return sparse_of(f"{path}: {name}", parts)
 
@@ -105,10 +100,12 @@ def sparse_of(what: str, parts: Mapping[str, Array]) -> sp.csr_array:
             return sp.csr_array(sp.coo_array((parts["data"], (parts["row"], parts["col"])), shape=shape))
         text = parts["format"].item() if "format" in parts else "csr"
         kind = {"csr": sp.csr_array, "csc": sp.csc_array}[text.decode() if isinstance(text, bytes) else str(text)]
-        return sp.csr_array(kind((parts["data"], parts["indices"], parts["indptr"]), shape=shape))
+        A = kind((parts["data"], parts["indices"], parts["indptr"]), shape=shape)
+        A.check_format(full_check=True)
+        return sp.csr_array(A)
     except KeyError as error:
         raise InputError(
-            f"{what} has no member {error.args[0]!r}; see scipy.sparse.save_npz (formats csr, csc, coo)"
+            f"{what} has no {error.args[0]!r}; store csr, csc or coo as scipy.sparse.save_npz does"
         ) from None
     except (ValueError, TypeError) as error:
         raise InputError(f"{what} cannot be put together ({error})") from None

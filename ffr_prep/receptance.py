@@ -21,8 +21,9 @@ import scipy.linalg
 
 from ffr_prep.basis import Basis, basis_of
 from ffr_prep.errors import ComputationError, InputError
-from ffr_prep.factor import FreeBody, SupportedBody, solve_refined, supported
+from ffr_prep.factor import FreeBody, supported
 from ffr_prep.interface import CoupledModel
+from ffr_prep.krylov import krylov_blocks, mean_motion, static_solver
 from ffr_prep.modes import modes_up_to
 from ffr_prep.selection import Band
 
@@ -87,11 +88,6 @@ def static_flexibility(modes: FreeModes) -> Array:
 # ---- the reference ------------------------------------------------------------------------------------------------
 
 
-def free_support(model: CoupledModel, body: FreeBody) -> SupportedBody:
-    """The body without mean motion: loads are balanced by the inertia of the rigid motion that they cause."""
-    return supported(body, _mean(model))
-
-
 def reference_modes(model: CoupledModel, body: FreeBody, band: Band) -> tuple[FreeModes, float]:
     """Modes of a basis far richer than the band needs, and the error of the next poorer one, which bounds its own.
 
@@ -99,10 +95,9 @@ def reference_modes(model: CoupledModel, body: FreeBody, band: Band) -> tuple[Fr
     """
     if not model.names:
         raise InputError("receptances need interfaces: give the body at least one, or choose a number of modes")
-    held = free_support(model, body)
-    _, modes = modes_up_to(model, held, _RICHER * band.high)
-    blocks = krylov_blocks(model, held, _BLOCKS)
-    L = _mean(model)
+    L = mean_motion(model)
+    _, modes = modes_up_to(model, supported(body, L), _RICHER * band.high)
+    blocks = krylov_blocks(model, static_solver(model, body, L), _BLOCKS)
     rich = free_modes(model, basis_of(model, L, modes, *blocks))
     poorer = free_modes(model, basis_of(model, L, modes, *blocks[:-1]))
     error = float(receptance_error(poorer, rich, band.frequencies()).max())
@@ -111,21 +106,3 @@ def reference_modes(model: CoupledModel, body: FreeBody, band: Band) -> tuple[Fr
             f"the receptances up to {band.high:g} Hz are known to {error:.1e} only: lower the upper end of the band"
         )
     return rich, error
-
-
-def krylov_blocks(model: CoupledModel, held: SupportedBody, count: int) -> list[Array]:
-    """Static response (Z, 6I) to the interface loads, static response to the inertia of that response, and so on."""
-    blocks: list[Array] = []
-    loads = model.C.toarray().T
-    for _ in range(count):
-        response, _ = solve_refined(held, loads, np.zeros((len(held.C), loads.shape[1])))
-        response = response / np.sqrt(np.einsum("zi,zi->i", response, model.M @ response))
-        blocks.append(response)
-        loads = model.M @ response
-    return blocks
-
-
-def _mean(model: CoupledModel) -> Array:
-    """(6, Z) mean motion over the mass, rows of unit length."""
-    rows = (model.M @ model.T).T
-    return rows / np.linalg.norm(rows, axis=1, keepdims=True)

@@ -12,15 +12,18 @@ from threadpoolctl import threadpool_limits
 
 from ffr_prep.basis import Basis, check_basis, factorised
 from ffr_prep.body import FlexibleBody, Interface, Surface, content_hash
-from ffr_prep.factor import supported
+from ffr_prep.factor import CHOLESKY, Solver, supported
 from ffr_prep.interface import CoupledModel, InterfaceRegion, couple
 from ffr_prep.invariants import inertia_integrals
 from ffr_prep.mesh import Mesh, check_mesh, mesh_hash, surface_triangles
+from ffr_prep.quality import assess, completed
 from ffr_prep.reduction import Reduction
 from ffr_prep.reference import ReferenceConditions, functionals
+from ffr_prep.selection import Band
 from ffr_prep.solids import Materials, assemble
 from ffr_prep.stiffening import inertial_loads, stiffening_matrices
 from ffr_prep.stress import AVERAGING, stressed_boundary
+from ffr_prep.waves import element_edges
 
 Array = np.ndarray
 
@@ -38,6 +41,8 @@ def reduce_mesh(
     reduction: Reduction,
     stiffening: bool = False,
     stress: bool = False,
+    quality: Band | None = None,
+    solver: Solver = CHOLESKY,
     progress: Callable[[str], None] | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> FlexibleBody:
@@ -46,6 +51,8 @@ def reduce_mesh(
     material   : one, or one for each volume group
     stiffening : also compute the geometric stiffness by load, which a simulation then uses
     stress     : also keep the stress at the nodes of the surface per elastic coordinate
+    quality    : compare the body with the full model over this band of frequencies, and keep what was found
+    solver     : what factorises the stiffness and finds the modes
     progress   : called with the name of each stage as it begins
     provenance : JSON values kept with the body, beside what is recorded anyway
 
@@ -61,6 +68,8 @@ def reduce_mesh(
             reduction,
             stiffening,
             stress,
+            quality,
+            solver,
             progress or _silent,
             provenance or {},
         )
@@ -75,6 +84,8 @@ def _reduced(
     reduction: Reduction,
     stiffening: bool,
     stress: bool,
+    quality: Band | None,
+    solver: Solver,
     tell: Callable[[str], None],
     provenance: Mapping[str, Any],
 ) -> FlexibleBody:
@@ -84,13 +95,18 @@ def _reduced(
     matrices = assemble(mesh, material)
     tell("tie the interfaces")
     model = couple(mesh, matrices, interfaces)
-    model = replace(model, inertial_loads=model.B.T @ inertial_loads(mesh.points, matrices))
+    model = replace(model, inertial_loads=model.B.T @ inertial_loads(mesh.points, matrices), edges=element_edges(mesh))
+    m = matrices.m
+    del matrices  # its stiffness takes as much memory as that of the model
     L = functionals(reference, model)
     tell("factorise the stiffness")
-    body = factorised(model)
+    body = factorised(model, solver)
     tell("reduce")
     basis = reduction.basis(model, body, L)
     check_basis(model, L, basis)
+    if quality:
+        tell("compare with the full model")
+    assessed = assess(model, body, L, basis, quality) if quality else None
     tell("integrate the inertia")
     Phi = nodal_basis(model, basis)
     if stress:
@@ -103,13 +119,16 @@ def _reduced(
         omega2=basis.omega2,
         interfaces=interface_shapes(model, basis),
         surface=surface,
-        stiffening=stiffening_matrices(mesh, material, matrices, model, supported(body, L), Phi)
-        if stiffening
-        else None,
-        provenance=record(mesh, material, interfaces, reference, reduction, model)
-        | ({"stress": AVERAGING} if stress else {})
-        | dict(provenance),
-        **vars(inertia_integrals(mesh.points, matrices.m, Phi)),
+        stiffening=stiffening_matrices(mesh, material, model, supported(body, L), Phi) if stiffening else None,
+        provenance=completed(
+            record(mesh, material, interfaces, reference, reduction, model)
+            | {"solver": described(solver)}
+            | ({"stress": AVERAGING} if stress else {})
+            | dict(provenance),
+            basis,
+            assessed,
+        ),
+        **vars(inertia_integrals(mesh.points, m, Phi)),
     )
 
 
@@ -154,7 +173,7 @@ def record(
         "mesh": {
             "hash": mesh_hash(mesh),
             "nodes": len(mesh.points),
-            "elements": _element_counts(mesh),
+            "elements": element_counts(mesh),
             "degrees_of_freedom": model.K.shape[0],
         },
         "material": described(material),
@@ -168,7 +187,7 @@ def record(
 
 def mesh_warnings(mesh: Mesh) -> list[str]:
     """What makes the results of this mesh doubtful, in words."""
-    counts = _element_counts(mesh)
+    counts = element_counts(mesh)
     if "tet4" not in counts:
         return []
     return [
@@ -177,7 +196,8 @@ def mesh_warnings(mesh: Mesh) -> list[str]:
     ]
 
 
-def _element_counts(mesh: Mesh) -> dict[str, int]:
+def element_counts(mesh: Mesh) -> dict[str, int]:
+    """Elements by kind."""
     counts: dict[str, int] = {}
     for block in mesh.blocks:
         counts[block.kind] = counts.get(block.kind, 0) + len(block.nodes)

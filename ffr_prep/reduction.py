@@ -12,7 +12,7 @@ C. Pierre, ibid. 39 (2001) 1182-1187 (characteristic constraint modes).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -22,14 +22,16 @@ from ffr_prep.basis import Basis, basis_of, diagonalised, restricted
 from ffr_prep.errors import ComputationError, InputError
 from ffr_prep.factor import FreeBody, SupportedBody, supported
 from ffr_prep.interface import CoupledModel
+from ffr_prep.krylov import mean_motion
 from ffr_prep.modes import constraint_modes, modes_up_to, normal_modes
-from ffr_prep.receptance import free_modes, free_support, receptance_error, reference_modes
+from ffr_prep.receptance import free_modes, receptance_error, reference_modes
 from ffr_prep.selection import Accuracy, Selection, UpTo
 from ffr_prep.static_shapes import attachment_modes
+from ffr_prep.waves import resolution_warnings
 
 Array = np.ndarray
 
-_RICHEST = 4.0
+_RICHER = (2.0, 4.0, 8.0, 16.0)  # times the band: where modes are looked for
 
 
 class Reduction(Protocol):
@@ -114,7 +116,7 @@ class Rubin:
         def with_modes(_: Array, modes: Array) -> Basis:
             return basis_of(model, L, modes, shapes)
 
-        held = supported(body, L) if len(L) > 6 else free_support(model, body)
+        held = supported(body, L if len(L) > 6 else mean_motion(model))
         return selected(model, body, held, self.modes, with_modes)
 
 
@@ -160,7 +162,8 @@ class Union:
         """Raises what its parts raise."""
         bases = [part.basis(model, body, L) for part in self.parts]
         whole = basis_of(model, L, *(basis.Z for basis in bases))
-        return Basis(whole.Z, whole.omega2, whole.dropped + sum(basis.dropped for basis in bases))
+        warnings = tuple(dict.fromkeys(warning for basis in bases for warning in basis.warnings))
+        return Basis(whole.Z, whole.omega2, whole.dropped + sum(basis.dropped for basis in bases), warnings)
 
 
 # ---- selection ----------------------------------------------------------------------------------------------------
@@ -178,7 +181,9 @@ def selected(
     Raises InputError for more modes than the model has, ComputationError when no number of modes is accurate enough.
     """
     if isinstance(selection, UpTo):
-        return with_modes(*modes_up_to(model, held, selection.frequency))
+        omega2, modes = modes_up_to(model, held, selection.frequency)
+        warnings = resolution_warnings(model, omega2, modes, selection.frequency)
+        return replace(with_modes(omega2, modes), warnings=warnings)
     if isinstance(selection, Accuracy):
         return _accurate(model, body, held, selection, with_modes)
     return with_modes(*normal_modes(model, held, selection))
@@ -197,15 +202,20 @@ def _accurate(
     def error(basis: Basis) -> float:
         return float(receptance_error(free_modes(model, basis), reference, frequencies).max())
 
-    omega2, modes = modes_up_to(model, held, _RICHEST * wanted.band.high)
-    best = with_modes(omega2, modes)
-    if error(best) > wanted.tolerance:
+    few = -1
+    for richer in _RICHER:
+        omega2, modes = modes_up_to(model, held, richer * wanted.band.high)
+        best = with_modes(omega2, modes)
+        if best.omega2.size and error(best) <= wanted.tolerance:
+            break
+        few = omega2.size
+    else:
         raise ComputationError(
-            f"with all {omega2.size} modes up to {_RICHEST * wanted.band.high:.4g} Hz the receptances at the interfaces are "
-            f"still {error(best):.1e} off, more than {wanted.tolerance:g}: use craig-bampton or rubin, which also carry "
-            "static shapes, or allow a larger error"
+            f"with all {omega2.size} modes up to {_RICHER[-1] * wanted.band.high:.4g} Hz the receptances at the interfaces "
+            f"are still more than {wanted.tolerance:g} off: use craig-bampton or rubin, which also carry static shapes, or "
+            "allow a larger error"
         )
-    few, enough = -1, omega2.size
+    enough = omega2.size
     while enough - few > 1:
         count = (few + enough) // 2
         basis = with_modes(omega2[:count], modes[:, :count])
@@ -213,7 +223,7 @@ def _accurate(
             enough, best = count, basis
         else:
             few = count
-    return best
+    return replace(best, warnings=resolution_warnings(model, omega2, modes, wanted.band.high))
 
 
 def _condensed_modes(K: Array, M: Array, selection: int | UpTo) -> Array:

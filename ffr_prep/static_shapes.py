@@ -18,8 +18,9 @@ import scipy.sparse as sp
 
 from ffr_prep.basis import Basis, basis_of
 from ffr_prep.errors import InputError
-from ffr_prep.factor import FreeBody, factorise, solve_refined, supported
+from ffr_prep.factor import FreeBody, factorise
 from ffr_prep.interface import CoupledModel
+from ffr_prep.krylov import mean_motion, static_solver
 
 Array = np.ndarray
 
@@ -72,13 +73,15 @@ class UserVectors:
             raise InputError("user vectors hold values that are not finite")
         basis = basis_of(model, L, elastic_part(model, coordinates_of(model, given.reshape(-1, given.shape[2]))))
         if given.shape[2] and not basis.omega2.size:
-            raise InputError("the user vectors are rigid motions: they do not deform the body")
+            raise InputError(
+                "the user vectors do not deform the body: they are rigid motions, or the reference conditions prevent them"
+            )
         return basis
 
 
 def attachment_modes(model: CoupledModel, body: FreeBody, L: Array) -> Array:
     """(Z, 6I) static response to unit interface loads."""
-    return _response(model, body, L if len(L) > 6 else (model.M @ model.T).T, model.C.toarray().T)
+    return _response(model, body, L if len(L) > 6 else mean_motion(model), model.C.toarray().T)
 
 
 def inertia_relief_modes(model: CoupledModel, body: FreeBody, L: Array) -> Array:
@@ -97,8 +100,7 @@ def inertial_loads(model: CoupledModel) -> Array:
 
 def _response(model: CoupledModel, body: FreeBody, supports: Array, loads: Array) -> Array:
     """(Z, r) static response; without the columns whose loads the supports carry without any deformation."""
-    held = supported(body, supports)
-    response, _ = solve_refined(held, loads, np.zeros((len(held.C), loads.shape[1])))
+    response = static_solver(model, body, supports)(loads)
     energy = np.einsum("zi,zi->i", response, loads)
     scale = np.einsum("zi,zi->i", np.abs(response), np.abs(loads))
     return response[:, np.abs(energy) > _NOTHING * scale]

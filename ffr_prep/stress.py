@@ -49,9 +49,10 @@ def stressed_boundary(mesh: Mesh, material: Materials, Phi: Array) -> Surface:
     Nodes where several materials meet are there once for each. Raises InputError for elements without a material or with
     two.
     """
-    near = _near_surface(mesh)
+    outside = surface_triangles(mesh)
+    near = _near_surface(mesh, outside[0])
     elastic, of_element = _materials(near, material)
-    parts = [_material_boundary(near, mesh, of_element == k) for k in range(len(elastic))]
+    parts = [_material_boundary(near, outside, of_element == k) for k in range(len(elastic))]
     points = np.concatenate([nodes for nodes, _ in parts])
     owner = np.repeat(np.arange(len(parts)), [len(nodes) for nodes, _ in parts])
     first = np.cumsum([0, *(len(nodes) for nodes, _ in parts)])
@@ -120,10 +121,10 @@ def _corner_functions(kind: str, X: Array) -> Array:
 # ---- which elements, which materials ------------------------------------------------------------------------------
 
 
-def _near_surface(mesh: Mesh) -> Mesh:
-    """The elements that have a node on the boundary; the nodes keep their numbers."""
+def _near_surface(mesh: Mesh, nodes: Array) -> Mesh:
+    """The elements that have one of the nodes; the nodes keep their numbers."""
     outside = np.zeros(len(mesh.points), bool)
-    outside[surface_triangles(mesh)[0]] = True
+    outside[nodes] = True
     return _picked(mesh, np.concatenate([outside[block.nodes].any(axis=1) for block in mesh.blocks]))
 
 
@@ -147,15 +148,15 @@ def _materials(mesh: Mesh, material: Materials) -> tuple[Array, Array]:
     return np.stack([mu * (3 * lam + 2 * mu) / (lam + mu), lam / (2 * (lam + mu))], axis=1), of_element.ravel()
 
 
-def _material_boundary(near: Mesh, mesh: Mesh, own: Array) -> tuple[Array, Array]:
-    """(P,) nodes and (T, 3) triangles of the outer boundary that belong to some of the elements."""
+def _material_boundary(near: Mesh, outside: tuple[Array, Array], own: Array) -> tuple[Array, Array]:
+    """(P,) nodes and (T, 3) triangles, those of the boundary `outside` that belong to some of the elements."""
     if own.all():
-        return surface_triangles(mesh)
+        return outside
     pairs = [(block.kind, block.nodes) for block in _picked(near, own).blocks if len(block.nodes)]
     theirs = np.concatenate([faces[:, FACE_TRIANGLES[faces.shape[1]]].reshape(-1, 3) for faces in outer_faces(pairs)])
-    nodes, triangles = surface_triangles(mesh)
-    outside = _in(np.sort(theirs, axis=1), np.sort(nodes[triangles], axis=1))
-    points, corners = np.unique(theirs[outside], return_inverse=True)
+    nodes, triangles = outside
+    shared = _in(np.sort(theirs, axis=1), np.sort(nodes[triangles], axis=1))
+    points, corners = np.unique(theirs[shared], return_inverse=True)
     return points, corners.reshape(-1, 3)
 
 

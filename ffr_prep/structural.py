@@ -27,6 +27,7 @@ from ffr_prep.model import Model, merged, reduce_model, summed
 from ffr_prep.reduce import described
 from ffr_prep.reduction import Reduction
 from ffr_prep.reference import ReferenceConditions
+from ffr_prep.selection import Band
 from ffr_prep.structural_interface import couple_frame, tie
 
 Array = np.ndarray
@@ -56,6 +57,7 @@ def reduce_frame(
     reduction: Reduction,
     stiffening: bool = False,
     stress: bool = False,
+    quality: Band | None = None,
     progress: Callable[[str], None] | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> FlexibleBody:
@@ -65,6 +67,7 @@ def reduce_frame(
                  ones leave their nodes free and move with them in the mean
     stiffening : also compute the geometric stiffness by load, which a simulation then uses
     stress     : also keep section forces of beams and the stress on outlines and faces per elastic coordinate
+    quality    : compare the body with the full model over this band of frequencies, and keep what was found
     progress   : called with the name of each stage as it begins
     provenance : JSON values kept with the body, beside what is recorded anyway
 
@@ -78,6 +81,7 @@ def reduce_frame(
             reduction=reduction,
             stiffening=stiffening,
             stress=stress,
+            quality=quality,
             progress=progress,
             provenance=provenance,
         )
@@ -96,7 +100,10 @@ def frame_model(
     tell("tie the interfaces")
     ties = tie(frame, interfaces)
     coupled = replace(
-        couple_frame(frame, matrices.K, matrices.M, interfaces, ties), inertial_loads=ties.T @ matrices.loads
+        couple_frame(frame, matrices.K, matrices.M, interfaces, ties),
+        inertial_loads=ties.T @ matrices.loads,
+        edges=np.concatenate([_edges(part.nodes) for part in parts]),
+        dimension=max(min(part.nodes.shape[1], 3) for part in parts) - 1,
     )
 
     def nodal(part: Family, z: Array) -> Array:
@@ -113,7 +120,6 @@ def frame_model(
 
     return Model(
         coupled=coupled,
-        inertial_loads=ties.T @ matrices.loads,
         inertia=lambda basis: summed([inertia(part, nodal(part, basis)) for part in parts]),
         surface=surface,
         stressed=stressed,
@@ -136,6 +142,11 @@ def assemble_frame(frame: Frame, parts: Sequence[Family]) -> StructuralMatrices:
         M = M + B_1.T @ _blocks(element_mass(part)) @ B_1
         loads -= B_1.T @ _element_loads(part).reshape(-1, 12)
     return StructuralMatrices(sp.csr_array((K + K.T) / 2), sp.csr_array((M + M.T) / 2), loads)
+
+
+def _edges(nodes: Array) -> Array:
+    """(E k, 2) the edges of elements (E, k); those of beams twice."""
+    return np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=-1).reshape(-1, 2)
 
 
 def connectivity(nodes: Array, count: int) -> sp.csr_array:

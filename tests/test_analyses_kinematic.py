@@ -16,7 +16,7 @@ from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import RK4
 from ffr_dyn.joints import Joint
 from ffr_dyn.scene import Body, Scene
-from ffr_dyn.timefunction import polynomial
+from ffr_dyn.timefunction import polynomial, table
 from ffr_prep.body import rigid_body
 
 G = (0.0, -9.81, 0.0)
@@ -165,3 +165,16 @@ def test_driven_point():
     gap = replace(scene, drivers=(replace(path, y=None),))
     with pytest.raises(InputError, match="needs every rigid motion"):
         kinematic(gap, end=3.0, output_step=0.25)
+
+
+def test_a_driver_that_starts_at_rest_does_turn_a_scene_that_lies_in_two_planes():
+    """A rod along x lies in the x-y and in the x-z plane; its driver asks for a motion later only."""
+    start = table(np.linspace(0, 1, 21), np.linspace(0, 1, 21) ** 4)
+    rod = Scene(
+        (Body("rod", bar("rod", 1.0)),),
+        (Joint("A", "revolute", "ground.O", "rod.a"),),
+        (Driver("motor", "A", start),),
+        ground={"O": (0, 0, 0)},
+    )
+    for result in (kinematic(rod, end=1.0, output_step=0.5), forward(rod, end=1.0, output_step=0.5, method=RK4(1e-2))):
+        np.testing.assert_allclose(result["A.angle"], [0, 0.5**4, 1], atol=1e-6)

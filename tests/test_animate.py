@@ -396,6 +396,14 @@ def test_a_page_holds_everything_and_fetches_nothing(tmp_path):
     assert '"name":"50"' not in text
 
 
+def test_the_ghost_of_a_page_sinks_below_the_skin_of_the_body():
+    surface = box_surface()
+    points = page.sunk(surface, 0.01)
+    np.testing.assert_allclose(np.linalg.norm(points - surface.points, axis=1), 0.01, rtol=1e-12)
+    middle = (surface.points[:, 0] > 0.1) & (surface.points[:, 0] < 0.9)
+    assert (np.abs(points[middle, 1:]) < np.abs(surface.points[middle, 1:]) - 0.004).all()
+
+
 def test_a_page_has_at_most_eighty_pictures_and_little_more_than_plotly(tmp_path):
     path = animate(rotating_box(), tmp_path / "a.html", duration=60.0)
     text = path.read_text("utf-8")

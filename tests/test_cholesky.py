@@ -1,11 +1,14 @@
 """The sparse factorisation against dense ones, whatever the shape of the graph."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from boxes import STEEL, box_mesh, shaken
 
 from ffr_prep.cholesky import cholesky, solve_cholesky
+from ffr_prep.dissection import _cut, elimination_tree
 from ffr_prep.solids import assemble
 
 
@@ -59,10 +62,52 @@ def test_points_that_coincide_or_lie_on_a_line():
     assert_solves(A, np.full_like(positions, np.nan))
 
 
-def test_the_same_matrix_gives_the_same_bits():
-    A, positions = clamped("tet10", (6, 3, 2))
-    one, two = cholesky(A, positions), cholesky(A, positions)
-    assert all(a.below.tobytes() == b.below.tobytes() for a, b in zip(one.fronts, two.fronts, strict=True))
+def test_the_same_matrix_gives_the_same_bits_with_any_number_of_threads(monkeypatch):
+    A, positions = clamped("tet10", (12, 5, 4))
+    b = np.random.default_rng(0).normal(size=(A.shape[0], 5))
+    factor = cholesky(A, positions)
+    assert len(factor.division.branches) > 8
+    x = solve_cholesky(factor, b)
+    for threads in (1, 3):
+        monkeypatch.setattr("os.cpu_count", lambda threads=threads: threads)
+        again = cholesky(A, positions)
+        assert again.fronts.panels.tobytes() == factor.fronts.panels.tobytes()
+        assert solve_cholesky(again, b).tobytes() == x.tobytes()
+
+
+def test_large_fronts_are_eliminated_by_tiles(monkeypatch):
+    """The same numbers as in one piece, up to rounding."""
+    A, positions = clamped("tet10", (8, 4, 4))
+    monkeypatch.setattr("ffr_prep.cholesky._TILE", 50)
+    monkeypatch.setattr("ffr_prep.cholesky._BRANCHES", 200)
+    factor = cholesky(A, positions)
+    own = np.diff(factor.fronts.starts)[factor.division.trunk]
+    assert own.max() > 100
+    assert_solves(A, positions)
+
+
+def test_pieces_below_a_piece_precede_it_and_separate_its_halves():
+    A, positions = clamped("tet10", (8, 4, 3))
+    pieces, children = elimination_tree(A, positions)
+    np.testing.assert_array_equal(np.sort(np.concatenate(pieces)), np.arange(A.shape[0]))
+    first = list(range(len(pieces)))
+    for k, below in enumerate(children):
+        ends = [first[child] for child in below] + [k]
+        assert all(child + 1 == end for child, end in zip(below, ends[1:], strict=True))
+        first[k] = ends[0]
+        for one, other in combinations(below, 2):
+            rows, columns = (np.concatenate(pieces[first[side] : side + 1]) for side in (one, other))
+            assert A[rows][:, columns].nnz == 0
+
+
+def test_the_separator_is_a_smallest_one():
+    """A comb of 20 points on a line, each touching the ten on the other side of the cut: the spine alone separates."""
+    points = np.column_stack([np.arange(20.0), np.zeros((20, 2))])
+    edges = sp.lil_array((20, 20))
+    for spine, tooth in [(9, k) for k in range(10, 20)] + [(10, k) for k in range(9)]:
+        edges[spine, tooth] = edges[tooth, spine] = 1
+    _, _, separator = _cut(points, sp.csr_array(edges), np.arange(20), np.full(20, -1))
+    np.testing.assert_array_equal(separator, [9, 10])
 
 
 def test_a_matrix_that_is_not_positive_definite_is_refused():

@@ -8,17 +8,22 @@ from dataclasses import replace
 import h5netcdf
 import numpy as np
 import pytest
-from boxes import STEEL
+from boxes import STEEL, box_mesh
 from click.testing import CliRunner
 from PIL import Image
 from test_animate import rotating_box
 
+from ffr_dyn.analyses.forward import forward
 from ffr_dyn.animate import animate
 from ffr_dyn.cli import cli
+from ffr_dyn.drivers import Driver
 from ffr_dyn.errors import InputError
 from ffr_dyn.film import film
+from ffr_dyn.integrators import ROS2
+from ffr_dyn.joints import Joint
 from ffr_dyn.result import Quantity, Result, mode_axis
 from ffr_dyn.result_file import load_result, save_result
+from ffr_dyn.scene import Body, Scene
 from ffr_dyn.stress import (
     MEASURES,
     hot_spots,
@@ -36,7 +41,17 @@ from ffr_dyn.stress import (
     von_mises,
 )
 from ffr_dyn.stress_report import report_lines, stress_report
+from ffr_dyn.timefunction import polynomial
 from ffr_prep.body import SECTION_FORCES, BeamForces, Surface
+from ffr_prep.frame import Member, named, polyline
+from ffr_prep.interface import InterfaceRegion
+from ffr_prep.mesh import Block
+from ffr_prep.reduce import reduce_mesh
+from ffr_prep.reduction import CraigBampton, Eigenmodes, Union
+from ffr_prep.reference import FixedTo, MeanAxis
+from ffr_prep.section import rectangle
+from ffr_prep.static_shapes import InertiaRelief
+from ffr_prep.structural import reduce_frame
 
 PAIRS = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])
 
@@ -215,7 +230,112 @@ def test_section_forces_are_sums_over_the_modes():
         assert abs(peak.value) == pytest.approx(whole[k].max(), rel=1e-12)
         place = ("first", "middle", "last").index(peak.place)
         assert whole[k, peak.element, place, peak.row] == pytest.approx(abs(peak.value), rel=1e-12)
-    assert nearest_element(beams, beams.positions[3, 1]) == 3
+
+
+def test_the_nearest_element_is_the_one_whose_line_is_nearest():
+    ends = np.array([[[0.0, 0, 0], [4.0, 0, 0]], [[4.0, 0, 0], [5.0, 0, 0]], [[5.0, 0, 0], [5.0, 3.0, 0]]])
+    positions = np.stack([ends[:, 0], ends.mean(axis=1), ends[:, 1]], axis=1)
+    beams = BeamForces(positions, np.tile(np.eye(3), (3, 1, 1)), np.zeros((3, 3, 6, 1)))
+    for point, element in (((3.7, 0.1, 0.2), 0), ((4.4, 0, 0), 1), ((5.5, 2.0, 0), 2), ((-1.0, 0, 0), 0)):
+        assert nearest_element(beams, np.array(point)) == element
+
+
+# ---- references: stress by inertia --------------------------------------------------------------------------------
+
+
+SPIN = 30.0  # [rad/s], well below the first bending frequency of both bodies
+
+
+def settled(body, *parts):
+    """The result of a body that has turned about the z axis until its vibration was damped out."""
+    scene = Scene((Body("body", body, omega_bar=(0, 0, SPIN), damping=1.0),), *parts, ground={"O": (0, 0, 0)})
+    return forward(scene, end=0.2, output_step=0.2, method=ROS2(1e-4))
+
+
+@pytest.mark.parametrize(("relief", "smallest", "largest"), [(True, 0.0, 0.003), (False, 0.5, 1.1)])
+def test_a_rotating_bar_has_the_tension_of_the_mass_beyond(relief, smallest, largest):
+    """sigma = E (cos kx / cos kL - 1), k^2 = rho Omega^2 / E, or nearly rho Omega^2 (L^2 - x^2) / 2.
+
+    Fixed-interface modes alone, the first ones being bending, carry none of it: inertia needs shapes of its own.
+    """
+    material = replace(STEEL, nu=0.0)
+    bar = reduce_mesh(
+        box_mesh("hex20", (1.0, 0.02, 0.02), (10, 1, 1), origin=(0, -0.01, -0.01)),
+        name="bar",
+        material=material,
+        interfaces=[InterfaceRegion("left")],
+        reference=FixedTo("left"),
+        reduction=Union((CraigBampton(2), InertiaRelief())) if relief else CraigBampton(2),
+        stress=True,
+    )
+    hinge = (Joint("hinge", "revolute", "ground.O", "body.left"),)
+    result = settled(bar, hinge, (Driver("motor", "hinge", polynomial(0, SPIN)),))
+    found = tensors(bar.surface, result["body.q"][-1:])[:, 0]
+    k = np.sqrt(material.rho / material.E) * SPIN
+    exact = np.zeros_like(found)
+    exact[:, 0] = material.E * (np.cos(k * bar.surface.points[:, 0]) / np.cos(k) - 1)
+    assert exact.max() == pytest.approx(material.rho * SPIN**2 / 2, rel=1e-4)
+    assert smallest <= np.abs(found - exact).max() / exact.max() < largest
+
+
+def ring(elements, radius, thickness):
+    """A closed ring of hex20 about the z axis: a box bent round, its two ends made one."""
+    box = box_mesh("hex20", (1.0, 1.0, 1.0), (elements, 1, 1))
+    lattice = np.round(box.points * [4 * elements, 4, 4]).astype(int) % [4 * elements, 8, 8]
+    _, kept, new = np.unique(lattice, axis=0, return_index=True, return_inverse=True)
+    turn, outward, across = box.points[kept].T
+    r = radius + thickness * (0.5 - outward)
+    points = np.stack([r * np.cos(2 * np.pi * turn), r * np.sin(2 * np.pi * turn), thickness * (across - 0.5)], axis=1)
+    return replace(box, points=points, blocks=(Block("hex20", new.ravel()[box.blocks[0].nodes]),), face_groups={})
+
+
+def test_a_spinning_ring_has_its_hoop_stress():
+    """sigma = rho Omega^2 R^2 of a thin ring, within 1 % at every node; free, with inertia relief."""
+    radius = 0.5
+    body = reduce_mesh(
+        ring(60, radius, 0.005),
+        name="ring",
+        material=STEEL,
+        interfaces=[],
+        reference=MeanAxis(),
+        reduction=Union((Eigenmodes(2), InertiaRelief())),
+        stress=True,
+    )
+    result = settled(body)
+    stress = tensors(body.surface, result["body.q"][-1:])[:, 0]
+    x, y, _ = body.surface.points.T
+    along = np.stack([-y, x, 0 * x], axis=1) / np.hypot(x, y)[:, None]
+    hoop = np.einsum("pk,pkl,pl->p", along, matrices(stress), along)
+    np.testing.assert_allclose(hoop, STEEL.rho * SPIN**2 * radius**2, rtol=0.01)
+
+
+def test_section_forces_of_a_sagging_cantilever_and_the_reaction_of_its_joint(tmp_path):
+    """Weight p per length on n elements of length l: root shear p (L - l / 2), root moment p (L^2 / 2 - l^2 / 12)."""
+    section, length, elements = rectangle(0.02, 0.04), 2.0, 5
+    frame = polyline([(0, 0, 0), (length, 0, 0)], Member(section, STEEL, (0, 1, 0)), elements=elements)
+    beam = reduce_frame(
+        named(frame, root=(0, 0, 0)),
+        name="beam",
+        interfaces=[InterfaceRegion("root")],
+        reference=FixedTo("root"),
+        reduction=Union((CraigBampton(0), InertiaRelief())),
+        stress=True,
+    )
+    clamp = (Joint("clamp", "fixed", "ground.O", "beam.root"),)
+    scene = Scene((Body("beam", beam, damping=1.0),), clamp, ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0))
+    path = tmp_path / "run.nc"
+    result = forward(scene, end=2.0, output_step=0.5, method=ROS2(1e-3), path=path)
+    p, l = STEEL.rho * section.A * 9.81, length / elements  # noqa: E741
+    at_root = section_forces(result, "beam", 0)[-1, 0]
+    expected = [0, -p * (length - l / 2), 0, 0, 0, -p * (length**2 / 2 - l**2 / 12)]
+    np.testing.assert_allclose(at_root, expected, atol=1e-5 * p)
+    assert np.abs(result["clamp.force.y"][-1]) == pytest.approx(p * length, rel=1e-6)
+    middle = section_forces(result, "beam", 2)[-1, 1]
+    np.testing.assert_allclose(middle[[1, 5]], [-p * length / 2, -p * (length**2 / 8 + l**2 / 24)], rtol=1e-5)
+    hottest = hot_spots(result, count=1)[0]
+    assert hottest.position[0] == pytest.approx(0.0, abs=1e-12)
+    assert hot_spots(load_result(path), count=1)[0] == hottest
+    np.testing.assert_array_equal(section_forces(load_result(path), "beam", 0)[-1, 0], at_root)
 
 
 # ---- what is refused ------------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ffr_prep.errors import ComputationError, InputError
-from ffr_prep.frame import Member, check_frame, joined, polyline
+from ffr_prep.frame import Member, Shell, check_frame, joined, polyline
 from ffr_prep.frame_source import read_frame
 from ffr_prep.interface import InterfaceRegion
 from ffr_prep.material import material
@@ -114,3 +114,64 @@ def test_files_that_hold_no_frame(tmp_path):
 def test_a_missing_orientation_is_found():
     with pytest.raises(InputError, match="not round, and no orientation"):
         reduced(read_frame(PORTAL, {**MEMBERS, "brace": Member(rectangle(0.01, 0.02), STEEL)}))
+
+
+# ---- surfaces -----------------------------------------------------------------------------------------------------------
+
+TRAY = PORTAL.with_name("tray.geo")
+SHELLS = {"floor": Shell(0.002, STEEL), "walls": Shell(0.003, STEEL)}
+RIMS = {"rims": Member(tube(0.02, 0.002), STEEL)}
+
+
+def test_tray_of_sheet_with_beams_along_its_rims():
+    """Triangles, quadrilaterals and lines of one mesh share their nodes; mass and centre in closed form."""
+    frame = read_frame(TRAY, RIMS, shells=SHELLS)
+    check_frame(frame)
+    assert len(frame.triangles) > 100
+    assert len(frame.quadrilaterals) == 2 * 12 * 2
+    assert len(frame.elements) == 2 * 12
+    body = reduce_frame(
+        frame,
+        name="tray",
+        interfaces=[InterfaceRegion("front"), InterfaceRegion("rear", kind="mean")],
+        reference=FixedTo("front"),
+        reduction=CraigBampton(4),
+    )
+    floor, walls = 7850 * 0.6 * 0.3 * 0.002, 7850 * 2 * 0.6 * 0.1 * 0.003
+    rims = 7850 * 2 * 0.6 * RIMS["rims"].section.A
+    assert body.mass == pytest.approx(floor + walls + rims, rel=1e-12)
+    height = (0.05 * walls + 0.1 * rims) / body.mass
+    np.testing.assert_allclose(body.centre_of_mass, (0.3, 0.15, height), rtol=1e-12)
+    assert [i.kind for i in body.interfaces] == ["rigid", "mean"]
+    assert np.ptp(frame.points[frame.node_groups["floor"], 2]) == 0
+
+
+def test_surfaces_alone_and_their_parameters():
+    frame = read_frame(TRAY, shells=SHELLS, size=0.1, numbers={"h": 1.0}, unit="cm")
+    assert not len(frame.elements)
+    assert np.ptp(frame.points[:, 0]) == pytest.approx(0.006)
+
+
+@pytest.mark.parametrize(
+    ("members", "shells", "says"),
+    [
+        ({}, {"floor": SHELLS["floor"]}, "group of surfaces 'walls' has no shell"),
+        ({}, {**SHELLS, "wall": SHELLS["walls"]}, "no group of surfaces 'wall'; did you mean 'walls'"),
+        ({"rim": RIMS["rims"]}, SHELLS, "no group of curves 'rim'; did you mean 'rims'"),
+    ],
+)
+def test_shells_that_do_not_fit(members, shells, says):
+    with pytest.raises(InputError, match=says):
+        read_frame(TRAY, members, shells=shells)
+
+
+def test_curves_alone_hold_no_shells(tmp_path):
+    with pytest.raises(ComputationError, match="no surfaces: draw the plates"):
+        read_frame(PORTAL, shells=SHELLS)
+    meshed = tmp_path / "line.msh"
+    meshed.write_text(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n2\n1 0 0 0\n2 1 0 0\n$EndNodes\n"
+        "$Elements\n1\n1 1 2 1 1 1 2\n$EndElements\n"
+    )
+    with pytest.raises(InputError, match="no surfaces with elements"):
+        read_frame(meshed, shells=SHELLS)

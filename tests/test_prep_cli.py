@@ -53,6 +53,15 @@ def body_file(tmp_path_factory):
 # ---- the whole way ------------------------------------------------------------------------------------------------
 
 
+def test_stress_modes_are_kept_when_asked_for(tmp_path, body_file, capsys):
+    run("reduce", *BAR, "--material", "steel", *INTERFACES, "--modes", 1, "--stress", "-o", tmp_path / "bar.ffr")
+    surface = load_body(tmp_path / "bar.ffr").surface
+    assert surface.stress.shape == (len(surface.points), 6, surface.Phi.shape[2])
+    assert load_body(body_file).surface.stress is None
+    run("info", tmp_path / "bar.ffr")
+    assert "mean over the elements of one material" in capsys.readouterr().out
+
+
 def test_reduced_cantilever(body_file):
     """f_1 = 1.8751^2/(2 pi) sqrt(EI/(rho A L^4)) of a slender clamped beam; a square section has it twice."""
     body = load_body(body_file)
@@ -251,7 +260,7 @@ FAILURES = {
     "reference": (bar, ["--reference", "clamped"], "write fixed:NAME"),
     "reference interface": (bar, ["--interface", "left", "--reference", "fixed:right"], "'right'"),
     "reference file": (bar, ["--reference", "none.toml"], "none.toml do not exist"),
-    "method": (bar, ["--method", "magic"], "'magic'"),
+    "method": (bar, ["--method", "magic"], "magic is not known"),
     "option": (bar, ["--colour", "red"], "--colour"),
     "unit": (bar, ["--unit", "yd"], "'yd'"),
 }  # fmt: skip

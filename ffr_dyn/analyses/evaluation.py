@@ -37,7 +37,8 @@ class Evaluator:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """The equations at one state, rows in the order of the system's blocks.
+    """The equations at one state: rows in the order of the system's blocks, then one for each coordinate across the plane
+    of a planar scene (`locked`).
 
     Phi, nu, gamma : (C,) constraint rows, their rates and right-hand sides;  jacobian : (C, V)
     force          : (V,) all forces but those of the constraints, body axes
@@ -66,17 +67,30 @@ def evaluate(at: Evaluator, time: float, x: Array, v: Array) -> Evaluation:
     _, status = RK4.run(system.model, work, at.stages, time, 1.0, 0, 0, x.copy(), v.copy(), 0.0, 0.0, 0.0, at.record)
     if status not in (OK, SINGULAR_CONSTRAINT):
         raise failure(system, work, status, time)
-    rows, bodies = work.rows, work.bodies
+    rows, bodies, across = work.rows, work.bodies, locked(system.layout)
+    still = np.zeros(across.size)
     return Evaluation(
-        rows.Phi.copy(),
-        rows.nu.copy(),
-        rows.gamma.copy(),
-        _jacobian(system, work),
+        np.concatenate([rows.Phi, still]),
+        np.concatenate([rows.nu, still]),
+        np.concatenate([rows.gamma, still]),
+        np.concatenate([_jacobian(system, work), unit_rows(across, system.layout.v_size)]),
         bodies.f.copy(),
         bodies.acc.copy(),
         rows.lam.copy(),
         status == SINGULAR_CONSTRAINT,
     )
+
+
+def locked(place: Layout) -> Array:
+    """Numbers of the velocities that a planar scene does not have."""
+    return np.array([place.iv[b] + c for b in range(len(place.n)) for c in range(6) if c not in place.active(b)], int)
+
+
+def unit_rows(numbers: Array, size: int) -> Array:
+    """(K, size) rows with a one at the numbers (K,)."""
+    rows = np.zeros((numbers.size, size))
+    rows[np.arange(numbers.size), numbers] = 1.0
+    return rows
 
 
 def with_efforts(at: Evaluator, first: int, wrenches: Array) -> Evaluator:

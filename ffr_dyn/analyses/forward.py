@@ -4,26 +4,28 @@ from __future__ import annotations
 
 import sys
 import time as clock
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ffr_dyn.analyses.assemble import Assembled, assemble
+from ffr_dyn.checkpoint import Checkpoint, decode, encode, fingerprint, leaves, restore
 from ffr_dyn.equations import System, new_record, new_stages, new_work
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import ROS2, Integrator
 from ffr_dyn.kernels.options import is_compiled
 from ffr_dyn.kernels.system import AT
 from ffr_dyn.kernels.tables import NOT_FINITE, OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, Record, Work
-from ffr_dyn.measure import Unwound, measure
+from ffr_dyn.measure import Entry, Memory, measure, needs_every_step, selected
 from ffr_dyn.result import Quantity, Result
-from ffr_dyn.result_file import ResultWriter
+from ffr_dyn.result_file import ResultWriter, load_checkpoint, load_result
 from ffr_dyn.scene import Scene
 from ffr_dyn.stabilisation import Projection, Stabilisation, gains
+from ffr_dyn.view import shaped
 from ffr_prep.body import Surface
 
 Array = np.ndarray
@@ -35,16 +37,17 @@ STRAINED = 0.1  # elastic rotation [rad] beyond which linear elasticity in the m
 
 @dataclass
 class _Run:
-    """What changes while a run goes on."""
+    """What changes while a run goes on; `done` counts the steps."""
 
     x: Array
     v: Array
     work: Work
     stages: Any
-    unwound: dict[str, Unwound]
+    memory: Memory
     parts: list[dict[str, Quantity]]
     times: list[Array]
     turned: Array
+    done: int
 
 
 def forward(
@@ -55,13 +58,19 @@ def forward(
     method: Integrator | None = None,
     start: float = 0.0,
     stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
+    outputs: Sequence[str] = ("default",),
     path: str | Path | None = None,
+    resume: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Result:
     """Integrate the equations of motion of a scene from `start` to `end` [s], keeping a row every `output_step` [s].
 
     method      : RK4(step), ROS2(step), ...; by default ROS2 with a tenth of the output step
+    outputs     : names or patterns of the quantities to keep (see `ffr_dyn.measure.selected`), such as "default",
+                  "rod.*.acceleration", "*.power"
     path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
+    resume      : a result file (its `path` of before) whose run goes on from its last rows as if it had never stopped, to
+                  the bit; `end` may be later than it was. A file that does not exist yet is a run from the start
     progress    : called with the time reached, a few times a second
 
     Raises InputError for a scene or settings that cannot be used, SimulationError when the run fails: the message gives
@@ -71,14 +80,23 @@ def forward(
     substeps, rows = _counts(end - start, output_step, method.step)
     _check_step(scene, method)
     assembled = assemble(scene, time=start)
+    scene = assembled.system.scene  # of a planar scene, what moves in the plane
+    wanted = selected(assembled.system, outputs)
     _announce_compilation(method)
-    run = _started(assembled, method, start)
-    header = _header(scene, assembled, method, stabilisation, (start, end, output_step))
+    span = (start, end, output_step)
+    mark = _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
+    header = _header(scene, assembled, method, stabilisation, span)
+    if resume is not None and Path(resume).exists():
+        run = _resumed(assembled, method, Path(resume), mark)
+    else:
+        run = _started(assembled, method, start, wanted)
+    _check_resumed(run, substeps * rows, output_step / substeps)
+    path = resume if path is None else path
     first = Result(run.times[0], run.parts[0], geometry(scene), header | {"status": "running"})
-    with nullcontext() if path is None else ResultWriter(path, first) as writer:
-        for times, part in _advance(assembled, run, method, stabilisation, start, substeps, rows):
+    with nullcontext() if path is None else ResultWriter(path, first, checkpoint=_checkpoint(run, mark)) as writer:
+        for times, part in _advance(assembled, run, method, stabilisation, start, substeps, rows, wanted):
             if writer is not None:
-                writer.append(times, {name: quantity.values for name, quantity in part.items()})
+                writer.append(times, {name: quantity.values for name, quantity in part.items()}, _checkpoint(run, mark))
             if progress is not None:
                 progress(float(times[-1]))
         account = _account(scene, run, header["notes"])
@@ -119,7 +137,7 @@ def _announce_compilation(method: Integrator) -> None:
         print("ffr-dyn: compiling the kernels, once (about half a minute) ...", file=sys.stderr, flush=True)
 
 
-def _started(assembled: Assembled, method: Integrator, start: float) -> _Run:
+def _started(assembled: Assembled, method: Integrator, start: float, wanted: Mapping[str, Entry]) -> _Run:
     """The run with its first row."""
     system, x, v = assembled.system, assembled.x.copy(), assembled.v.copy()
     work, stages, first = new_work(system.model), new_stages(system, method.stage_count), new_record(system, 1)
@@ -128,10 +146,8 @@ def _started(assembled: Assembled, method: Integrator, start: float) -> _Run:
     if status != OK:
         raise failure(system, work, status, start)
     first = with_all_reactions(assembled, method, first)
-    parts, unwound = measure(system, first, {})
-    run = _Run(x, v, work, stages, unwound, [parts], [first.time], np.zeros(1))
-    run.turned = _elastic_turns(system, first)
-    return run
+    parts, memory = measure(system, first, {}, wanted)
+    return _Run(x, v, work, stages, memory, [parts], [first.time], _elastic_turns(system, first), 0)
 
 
 def _advance(
@@ -142,29 +158,39 @@ def _advance(
     start: float,
     substeps: int,
     rows: int,
+    wanted: Mapping[str, Entry],
 ) -> Iterator[tuple[Array, dict[str, Quantity]]]:
-    """Yields (times, quantities) chunk after chunk, each about SECONDS_PER_CALL long."""
+    """Yields (times, quantities) of output rows chunk after chunk, each about SECONDS_PER_CALL long.
+
+    Where a quantity adds up over the steps, every step is looked at and only the output rows are kept.
+    """
     system = assembled.system
     alpha, beta, tolerance = gains(stabilisation)
-    done, count = 0, 1
-    while done < rows:
-        chunk = new_record(system, min(count, rows - done))
+    looks = substeps if needs_every_step(wanted) else 1
+    count = 1
+    while run.done < rows * substeps:
+        chunk = new_record(system, looks * min(count, rows - run.done // substeps))
         began = clock.monotonic()
         filled, status = method.run(
-            system.model, run.work, run.stages, start, method.step, done * substeps, substeps,
+            system.model, run.work, run.stages, start, method.step, run.done, substeps // looks,
             run.x, run.v, alpha, beta, tolerance, chunk,
         )  # fmt: skip
         took = clock.monotonic() - began
+        filled -= filled % looks
         if filled:
             kept = with_all_reactions(assembled, method, Record(*(column[:filled] for column in chunk)))
-            part, run.unwound = measure(system, kept, run.unwound)
+            every, run.memory = measure(system, kept, run.memory, wanted)
+            part = {
+                name: replace(quantity, values=quantity.values[looks - 1 :: looks]) for name, quantity in every.items()
+            }
+            times = kept.time[looks - 1 :: looks]
             run.parts.append(part)
-            run.times.append(kept.time)
+            run.times.append(times)
             run.turned = np.maximum(run.turned, _elastic_turns(system, kept))
-            yield kept.time, part
+            run.done += filled // looks * substeps
+            yield times, part
         if status != OK:
             raise failure(system, run.work, status, start + int(run.work.info[3]) * method.step)
-        done += filled
         count = int(np.clip(count * SECONDS_PER_CALL / max(took, 1e-6), 1, 10 * count))
 
 
@@ -227,8 +253,51 @@ def _elastic_turns(system: System, record: Record) -> Array:
     turns = []
     for b, body in enumerate(system.scene.bodies):
         q = record.x[:, system.layout.q(b)]
-        turns.append(max((np.abs(q @ i.phi_r.T).max(initial=0.0) for i in body.model.interfaces), default=0.0))
+        turns.append(max((np.abs(shaped(i.phi_r, q)).max(initial=0.0) for i in body.model.interfaces), default=0.0))
     return np.array(turns)
+
+
+# ---- stopping and going on -------------------------------------------------------------------------------------------
+
+
+def _fingerprint(
+    assembled: Assembled,
+    method: Integrator,
+    stabilisation: Stabilisation,
+    start: float,
+    output_step: float,
+    wanted: Mapping[str, Entry],
+) -> str:
+    state = (assembled.x.tobytes(), assembled.v.tobytes())
+    return fingerprint(assembled.system.model, *state, method, stabilisation, start, output_step, list(wanted))
+
+
+def _checkpoint(run: _Run, mark: str) -> Array:
+    arrays = {"x": run.x, "v": run.v, "turned": run.turned, **{f"work.{key}": array for key, array in leaves(run.work)}}
+    return encode(Checkpoint(mark, run.done, arrays, run.memory))
+
+
+def _resumed(assembled: Assembled, method: Integrator, path: Path, mark: str) -> _Run:
+    """The run that a result file holds, ready to go on."""
+    content = load_checkpoint(path)
+    if content is None:
+        raise InputError(f"{path} has no checkpoint: it is not the result of a forward run; run from the start")
+    saved, earlier = decode(content), load_result(path)
+    if saved.fingerprint != mark:
+        raise InputError(
+            f"{path} is the result of another scene or of other settings (step, method, start, output step, outputs): its "
+            "run cannot be continued with these; run from the start, to another file if that one is still wanted"
+        )
+    work = new_work(assembled.system.model)
+    restore(work, saved.arrays, "work.")
+    x, v, turned = (saved.arrays[key].copy() for key in ("x", "v", "turned"))
+    stages = new_stages(assembled.system, method.stage_count)
+    return _Run(x, v, work, stages, saved.memory, [dict(earlier.quantities)], [earlier.time], turned, saved.steps)
+
+
+def _check_resumed(run: _Run, steps: int, step: float) -> None:
+    if run.done > steps:
+        raise InputError(f"the run to be continued has gone {(run.done - steps) * step:g} s beyond this end already")
 
 
 # ---- the result -----------------------------------------------------------------------------------------------------

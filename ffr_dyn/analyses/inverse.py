@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ffr_dyn.analyses.assemble import Assembled, assemble
-from ffr_dyn.analyses.evaluation import Evaluator, copied, evaluate, evaluator, joined, moved, to_global_axes
+from ffr_dyn.analyses.assemble import Assembled, assemble, flattened
+from ffr_dyn.analyses.evaluation import Evaluator, copied, evaluate, evaluator, joined, locked, moved, to_global_axes
 from ffr_dyn.analyses.forward import forward, strained
 from ffr_dyn.analyses.kinematic import kinematic, undeformed
 from ffr_dyn.analyses.mobility import require_driven
-from ffr_dyn.analyses.outcome import efforts, result_of, with_quantities
+from ffr_dyn.analyses.outcome import efforts, outputs, result_of, with_quantities
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.result import Result
@@ -66,10 +66,10 @@ def inverse(
         return _quasi_static(scene, end, output_step, start, path, progress)
     result = forward(
         scene, end=end, output_step=output_step, method=elastic.method, start=start,
-        stabilisation=elastic.stabilisation, path=path, progress=progress,
+        stabilisation=elastic.stabilisation, outputs=outputs(scene), path=path, progress=progress,
     )  # fmt: skip
     named = Result(result.time, result.quantities, result.geometry, result.attributes | {"analysis": "inverse dynamics"})
-    return with_quantities(named, efforts(scene, named), path)
+    return with_quantities(named, efforts(flattened(scene, start)[0], named), path)
 
 
 # ---- quasi-static deformation ---------------------------------------------------------------------------------------
@@ -115,7 +115,7 @@ def _coordinates(assembled: Assembled) -> tuple[Array, Array]:
     place = assembled.system.layout
     rigid = np.concatenate([np.arange(place.iv[b], place.iv[b] + 6) for b in range(len(place.n))])
     elastic = np.setdiff1d(np.arange(place.v_size), rigid)
-    rows = assembled.system.model.rows.kind.size
+    rows = assembled.system.model.rows.kind.size + locked(place).size
     if rows != rigid.size:
         raise InputError(
             f"{rows - rigid.size} rows of the joints are redundant for rigid bodies and are met by deformation only; use "

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffr_dyn.analyses.actuators import Actuator, unit_loads
-from ffr_dyn.analyses.assemble import assemble
+from ffr_dyn.analyses.assemble import assemble, in_space
 from ffr_dyn.analyses.evaluation import Evaluator, evaluate, evaluator, to_global_axes, with_efforts
 from ffr_dyn.analyses.mobility import named_motion
 from ffr_dyn.analyses.outcome import result_of
@@ -82,7 +82,7 @@ def linearise(
     Raises InputError when nothing is free to move, or for a name that does not exist.
     """
     loads = tuple(load for item in inputs if not isinstance(item, str) for load in unit_loads(scene, item))
-    fed = replace(scene, loads=(*scene.loads, *loads))
+    fed = replace(in_space(scene), loads=(*scene.loads, *loads))
     assembled = assemble(fed, time=time)
     at = _with_inputs(evaluator(assembled.system), scene, inputs, np.zeros(len(inputs)))
     near = chart(at, time, assembled.x, assembled.v)

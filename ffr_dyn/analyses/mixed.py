@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.actuators import Actuator, JointForce, MarkerForce, unit, unit_loads
-from ffr_dyn.analyses.assemble import assemble
+from ffr_dyn.analyses.assemble import assemble, flattened
 from ffr_dyn.analyses.bounded import Bounded, bounded_solution
 from ffr_dyn.analyses.evaluation import evaluator, joined, record_states, with_efforts
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.analyses.outcome import efforts, output_times, result_of, with_quantities
-from ffr_dyn.analyses.servo import Servo, at_moment, internal_values, servo, slope, slope_matrix
+from ffr_dyn.analyses.outcome import efforts, output_times, outputs, result_of, with_quantities
+from ffr_dyn.analyses.servo import Moment, Servo, at_moment, internal_values, servo, slope, slope_matrix
 from ffr_dyn.drivers import Driver, PointDriver
+from ffr_dyn.equations import blocks_of, compile_scene
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.result import Quantity, Result
@@ -77,9 +78,9 @@ def mixed(
     if partners is not None and solution is None:
         result = forward(
             scene, end=end, output_step=output_step, method=method, start=start,
-            stabilisation=Projection(1e-12), path=path, progress=progress,
+            stabilisation=Projection(1e-12), outputs=outputs(scene), path=path, progress=progress,
         )  # fmt: skip
-        return _named(scene, result, partners, path)
+        return _named(flattened(scene, start)[0], result, partners, path)
     return _not_collocated(scene, names, unknown, (start, end, output_step), solution, path, progress)
 
 
@@ -134,7 +135,7 @@ def _named(
         else:
             effort = replace(found[f"{driver}.effort"], description=f"effort that realises {driver}")
         found[f"{force}.effort"] = effort
-        found[f"{force}.power"] = found[f"{driver}.power"]
+        found[f"{force}.power"] = result.quantity(f"{driver}.power")
     attributes = result.attributes | {"analysis": "mixed dynamics, collocated"}
     return with_quantities(Result(result.time, result.quantities, result.geometry, attributes), found, path)
 
@@ -156,7 +157,7 @@ def _not_collocated(
     if stiffened:
         raise InputError(f"servo constraints need bodies without geometric stiffening: set stiffening=False of {stiffened}")
     assembled = assemble(scene, time=start)
-    own = servo(scene, assembled, names, unknown, (start, end))
+    own = servo(assembled, names, unknown, (start, end))
     w = internal_values(own, assembled.x, assembled.v)
     chosen = _solution(own, start, end, w, assembled.x, solution)
     if isinstance(chosen, Bounded):
@@ -176,7 +177,7 @@ def _not_collocated(
         "notes": [*assembled.notes, *notes],
         "status": "complete",
     }
-    return _recorded(scene, names, own, times, moments, attributes, path)
+    return _recorded(names, own, times, moments, attributes, path)
 
 
 def _solution(
@@ -228,12 +229,11 @@ def _integrated(
 
 
 def _recorded(
-    scene: Scene, names: tuple[str, ...], own: Servo, times: Array, moments: list, attributes: dict[str, Any],
+    names: tuple[str, ...], own: Servo, times: Array, moments: list[Moment], attributes: dict[str, Any],
     path: str | Path | None,
 ) -> Result:  # fmt: skip
     """The states, in the scene without the known drivers and with the efforts as loads."""
-    from ffr_dyn.equations import blocks_of, compile_scene
-
+    scene = own.at.system.scene
     loads = [load for actuator in own.unknown for load in unit_loads(scene, actuator)]
     kept = tuple(driver for driver in scene.drivers if driver.name not in names)
     fed = replace(scene, drivers=kept, loads=(*scene.loads, *loads))

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffr_dyn.analyses.assemble import assemble, rows_at
-from ffr_dyn.analyses.evaluation import free_motions, total_mass_matrix
+from ffr_dyn.analyses.assemble import assemble, flattened, in_space, rows_at
+from ffr_dyn.analyses.evaluation import free_motions, locked, total_mass_matrix, unit_rows
 from ffr_dyn.constraints import evaluate_word
-from ffr_dyn.equations import Block, blocks_of
+from ffr_dyn.equations import Block
 from ffr_dyn.errors import InputError
 from ffr_dyn.joints import COORDINATES, F, G, H, RELATION, Joint, Word, frames
 from ffr_dyn.layout import Layout, layout
@@ -40,6 +40,7 @@ class Mobility:
     """What the joints and drivers of a scene leave free at its assembled start.
 
     degrees_of_freedom : rigid and elastic;  elastic : number of elastic coordinates
+    plane      : normal of a planar scene, "x", "y" or "z"; otherwise "none"
     free       : rigid motions with all bodies undeformed; at a singular position more than the mechanism has elsewhere
     redundant  : (joint, row) pairs that follow from the other rows
     overdriven : drivers whose motion the joints and the other drivers fix already
@@ -47,6 +48,7 @@ class Mobility:
 
     degrees_of_freedom: int
     elastic: int
+    plane: str
     free: tuple[FreeMotion, ...]
     redundant: tuple[tuple[str, str], ...]
     overdriven: tuple[str, ...]
@@ -56,6 +58,8 @@ class Mobility:
         rigid = self.degrees_of_freedom - self.elastic
         about = f"{self.degrees_of_freedom} degrees of freedom" + (f", {self.elastic} of them elastic coordinates" * bool(self.elastic))
         said = [about if rigid >= 0 else f"{about}; joints and drivers deform bodies in {-rigid} ways"]
+        if self.plane != "none":
+            said.append(f"planar       normal {self.plane}")
         said += [f"free         {motion.name}: moves {', '.join(motion.bodies)}" for motion in self.free]
         said += [f"redundant    {joint}: {row}" for joint, row in self.redundant]
         return said + [f"overdriven   {driver}" for driver in self.overdriven]
@@ -66,36 +70,36 @@ def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobili
 
     Raises InputError when the scene cannot be assembled.
     """
+    scene = in_space(scene)
     over = overdriven(scene, time) if drivers else ()
     bare = scene if drivers and not over else replace(scene, drivers=())
     assembled = assemble(bare, time=time)
-    place = layout(bare)
-    rows = rows_at(bare, place, blocks_of(bare), assembled.x, assembled.v, time)
+    flat, blocks = flattened(bare, time)
+    place = assembled.system.layout
+    jacobian = _jacobian(flat, place, blocks, assembled.x, assembled.v, time)
     rigid = np.concatenate([np.arange(place.iv[b], place.iv[b] + 6) for b in range(len(place.n))])
-    jacobian = np.array([row.jacobian for row in rows]).reshape(-1, place.v_size)
-    M = total_mass_matrix(bare, place, assembled.x)
+    M = total_mass_matrix(flat, place, assembled.x)
     Z = free_motions(jacobian[:, rigid], M[np.ix_(rigid, rigid)])
-    motions = tuple(_motions(bare, place, assembled.x, assembled.v, rigid, Z))
-    return Mobility(assembled.degrees_of_freedom, sum(place.n), motions, assembled.redundant, over)
+    motions = tuple(_motions(flat, place, assembled.x, assembled.v, rigid, Z))
+    return Mobility(assembled.degrees_of_freedom, sum(place.n), flat.plane, motions, assembled.redundant, over)
 
 
 def overdriven(scene: Scene, time: float = 0.0) -> tuple[str, ...]:
     """Drivers that add nothing to the joints and the other drivers at the assembled start of the scene without them."""
-    bare = replace(scene, drivers=())
-    assembled, place, blocks = assemble(bare, time=time), layout(scene), blocks_of(scene)
-    M = total_mass_matrix(scene, place, assembled.x)
-    jacobians = [_jacobian(scene, place, [block], assembled.x, assembled.v, time) for block in blocks]
+    flat, blocks = flattened(in_space(scene), time)
+    place = layout(flat)
+    assembled = assemble(replace(flat, drivers=()), time=time)
+    M = total_mass_matrix(flat, place, assembled.x)
 
-    def rank(chosen: list[int]) -> int:
-        jacobian = np.concatenate([jacobians[k] for k in chosen] or [np.zeros((0, place.v_size))])
+    def rank(chosen: list[Block]) -> int:
+        jacobian = _jacobian(flat, place, chosen, assembled.x, assembled.v, time)
         return place.v_size - free_motions(jacobian, M).shape[1]
 
-    every = list(range(len(blocks)))
-    total = rank(every)
+    total = rank(blocks)
     return tuple(
         block.name
-        for k, block in enumerate(blocks)
-        if block.driver and total - rank([n for n in every if n != k]) < len(block.words)
+        for block in blocks
+        if block.driver and total - rank([other for other in blocks if other is not block]) < len(block.words)
     )
 
 
@@ -114,8 +118,9 @@ def require_driven(scene: Scene, time: float, analysis: str) -> None:
 
 
 def _jacobian(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> Array:
-    rows = rows_at(scene, place, blocks, x, v, time)
-    return np.array([row.jacobian for row in rows]).reshape(-1, place.v_size)
+    """Rows of the blocks, and of what a planar scene does not have."""
+    rows = [row.jacobian for row in rows_at(scene, place, blocks, x, v, time)]
+    return np.concatenate([np.array(rows).reshape(-1, place.v_size), unit_rows(locked(place), place.v_size)])
 
 
 # ---- free motions in words ------------------------------------------------------------------------------------------

@@ -14,12 +14,11 @@ from ffr_dyn.equations import System
 from ffr_dyn.errors import InputError
 from ffr_dyn.joints import frames
 from ffr_dyn.kernels.tables import Record
-from ffr_dyn.measure import measure
+from ffr_dyn.measure import measure, selected
 from ffr_dyn.result import Quantity, Result
 from ffr_dyn.result_file import save_result
 from ffr_dyn.rotation import rotation_matrix
 from ffr_dyn.scene import GROUND, Scene
-from ffr_dyn.timefunction import evaluate
 
 Array = np.ndarray
 
@@ -34,9 +33,14 @@ def output_times(start: float, end: float, output_step: float) -> Array:
 
 def result_of(system: System, record: Record, attributes: dict[str, Any], path: str | Path | None = None) -> Result:
     """All quantities of recorded states, efforts of the drivers included; written to `path` when it is complete."""
-    quantities, _ = measure(system, record, {})
+    quantities, _ = measure(system, record, {}, selected(system, outputs(system.scene)))
     plain = Result(record.time, quantities, geometry(system.scene), attributes)
     return with_quantities(plain, efforts(system.scene, plain), path)
+
+
+def outputs(scene: Scene) -> tuple[str, ...]:
+    """What the results of these analyses keep: the default, and the power of every driver."""
+    return ("default", *(f"{driver.name}.power" for driver in scene.drivers))
 
 
 def with_quantities(result: Result, more: dict[str, Quantity], path: str | Path | None = None) -> Result:
@@ -48,26 +52,19 @@ def with_quantities(result: Result, more: dict[str, Quantity], path: str | Path 
 
 
 def efforts(scene: Scene, result: Result) -> dict[str, Quantity]:
-    """Effort and power of every driver; the power is that which the driver brings into the scene.
+    """"driver.effort" [N m or N] of every driven joint coordinate: what acts along it on the second body.
 
-    A joint's driver has a scalar "driver.effort" [N m or N] with power = effort x rate of the coordinate; a driven point
-    has its force already, with power = force . relative velocity.
+    scene : as it was computed, a planar one with its in-plane modes
     """
     found: dict[str, Quantity] = {}
     for driver in scene.drivers:
-        force, moment = result[f"{driver.name}.force"], result[f"{driver.name}.moment"]
         if isinstance(driver, Driver):
             joint = joint_named(scene, driver.joint, f"driver {driver.name!r}")
             axis = axis_history(scene, result, joint.i, frames(joint)[0][:, 2])
             angular = driver.coordinate == "angle"
-            effort = ((moment if angular else force) * axis).sum(1)
-            rate = np.array([evaluate(driver.function, float(t))[1] for t in result.time])
+            effort = (result[f"{driver.name}.{'moment' if angular else 'force'}"] * axis).sum(1)
             text = f"effort along {driver.joint}.{driver.coordinate}, on the second body"
             found[f"{driver.name}.effort"] = Quantity(effort, "N m" if angular else "N", (), text)
-            power = effort * rate
-        else:
-            power = (force * (_velocity(result, driver.j) - _velocity(result, driver.i))).sum(1)
-        found[f"{driver.name}.power"] = Quantity(power, "W", (), "power of the driver into the scene")
     return found
 
 
@@ -78,11 +75,6 @@ def axis_history(scene: Scene, result: Result, marker: str, axis: Array) -> Arra
         return np.broadcast_to(axis, (result.time.size, 3))
     A, theta = rotation_matrix(result[f"{name}.p"]), _elastic_turn(scene, result, name, point)
     return np.einsum("tkl,tl->tk", A, axis + np.cross(theta, axis))
-
-
-def _velocity(result: Result, marker: str) -> Array:
-    still = marker.partition(".")[0] == GROUND
-    return np.zeros((result.time.size, 3)) if still else result[f"{marker}.velocity"]
 
 
 def _elastic_turn(scene: Scene, result: Result, name: str, point: str) -> Array:

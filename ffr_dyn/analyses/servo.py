@@ -25,11 +25,13 @@ from ffr_dyn.analyses.evaluation import (
     evaluated_mass_matrix,
     evaluator,
     free_motions,
+    locked,
     moved,
     shapes,
     to_body_axes,
     to_global_axes,
     total_mass_matrix,
+    unit_rows,
 )
 from ffr_dyn.analyses.mobility import coordinate_gradients, coordinate_word
 from ffr_dyn.constraints import evaluate_word
@@ -88,13 +90,13 @@ class Moment:
 
 
 def servo(
-    scene: Scene, assembled: Assembled, known: tuple[str, ...], unknown: tuple[Actuator, ...], span: tuple[float, float]
+    assembled: Assembled, known: tuple[str, ...], unknown: tuple[Actuator, ...], span: tuple[float, float]
 ) -> Servo:
     """Choose internal coordinates at the assembled state, by rank, and of the unknown efforts as many as motions are known.
 
     Raises InputError when motions and efforts do not fit, with the combination that is not determined.
     """
-    blocks = list(assembled.system.blocks)
+    scene, blocks = assembled.system.scene, list(assembled.system.blocks)
     bare = evaluator(assembled.system)
     now = evaluate(bare, span[0], assembled.x, assembled.v)
     known_rows = _rows_of(blocks, known)
@@ -108,7 +110,7 @@ def servo(
     ordered, rows = list(system.blocks), system.model.rows
     inner_rows = _rows_of(ordered, tuple(block.name for block in inner))
     known_rows = _rows_of(ordered, known)
-    plant_rows = np.setdiff1d(np.arange(rows.kind.size), np.concatenate([inner_rows, known_rows]))
+    plant_rows = np.setdiff1d(np.arange(rows.kind.size + locked(system.layout).size), np.concatenate([inner_rows, known_rows]))
     data = system.model.functions.start[rows.function[inner_rows]]
     return Servo(
         evaluator(system), chosen, plant_rows, known_rows, inner_rows, np.array(elastic, dtype=int), data, span, names
@@ -203,9 +205,7 @@ def _internal(scene: Scene, assembled: Assembled, now: Evaluation, M: Array):  #
     joints = [(joint, c) for joint in scene.joints for c in COORDINATES[joint.kind]]
     elastic = [int(k) for b in range(len(place.n)) for k in np.arange(place.v_size)[place.q_dot(b)]]
     labels = [f"{scene.bodies[b].name}.q.{k + 1}" for b in range(len(place.n)) for k in range(place.n[b])]
-    unit = np.zeros((len(elastic), place.v_size))
-    unit[np.arange(len(elastic)), elastic] = 1.0
-    candidates = np.concatenate([gradients, unit])
+    candidates = np.concatenate([gradients, unit_rows(np.array(elastic, int), place.v_size)])
     length = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(M), candidates.T), axis=0)
     _, R, order = qr((candidates @ Z / length[:, None]).T, pivoting=True, mode="economic")
     d = Z.shape[1]
@@ -309,9 +309,7 @@ def _placed(own: Servo, at: Evaluator, time: float, w: Array, x: Array) -> tuple
 
 
 def _square(own: Servo, now: Evaluation) -> Array:
-    rows = np.zeros((own.elastic.size, now.jacobian.shape[1]))
-    rows[np.arange(own.elastic.size), own.elastic] = 1.0
-    return np.concatenate([now.jacobian, rows])
+    return np.concatenate([now.jacobian, unit_rows(own.elastic, now.jacobian.shape[1])])
 
 
 def _accelerated(own: Servo, at: Evaluator, now: Evaluation, x: Array, v: Array, gamma: Array) -> Moment:

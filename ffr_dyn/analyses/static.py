@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ffr_dyn.analyses.assemble import Assembled, assemble
+from ffr_dyn.analyses.assemble import Assembled, assemble, in_space
 from ffr_dyn.analyses.evaluation import Evaluator, evaluate, evaluator, record_states
 from ffr_dyn.analyses.forward import with_all_reactions
 from ffr_dyn.analyses.mobility import named_motion
@@ -53,7 +53,7 @@ def static(scene: Scene, *, time: float = 0.0, path: str | Path | None = None) -
 
     Raises InputError for a motion that nothing holds, with its name; SimulationError when no equilibrium is found.
     """
-    assembled = assemble(held(scene, time), time=time)
+    assembled = assemble(in_space(held(scene, time)), time=time)
     at = evaluator(assembled.system)
     found = _balanced(at, time, assembled.x)
     lowest = float("inf")

@@ -6,10 +6,11 @@ from numba import types
 from numba.extending import intrinsic
 
 from ffr_dyn.kernels.markers import apply_wrench
+from ffr_dyn.kernels.operations import operate
 from ffr_dyn.kernels.options import entry, inlined, kernel
 from ffr_dyn.kernels.vectors import dot, fill, get, scale, subtract, to_body
 
-POLYNOMIAL, HARMONIC, PIECEWISE, USER = 0, 1, 2, 3
+POLYNOMIAL, HARMONIC, PIECEWISE, USER, OPERATION = 0, 1, 2, 3, 4
 
 
 @kernel
@@ -63,6 +64,8 @@ def evaluate_functions(functions, user, t, out):
             second = -amplitude * speed * speed * math.sin(angle)
         elif kind == PIECEWISE:
             value, rate, second = piecewise(data, start, t)
+        elif kind == OPERATION:
+            value, rate, second = operate(data, start, out)
         else:
             slot = int(data[start])
             value, rate, second = user[slot], user[slot + 1], user[slot + 2]

@@ -1,0 +1,70 @@
+"""The sub-command `reduce-structure` of ffr-prep: bodies from frames of beams and plates."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from ffr_prep.frame import Frame
+
+_PATH = click.Path(path_type=Path)
+NOTES = """\b
+Example of a STRUCTURE:
+  reference = {kind = "fixed", interface = "left_foot"}
+  reduction = {method = "craig-bampton", modes = 10}
+  [geometry]
+  file = "portal.geo"               # curves are beams, surfaces are plates
+  [members.columns]                 # a group of curves
+  section = {shape = "i", h = 0.2, b = 0.1, web = 0.006, flange = 0.009}
+  material = "steel"
+  orientation = [1, 0, 0]           # in the plane of the web
+  [shells.roof]                     # a group of surfaces
+  thickness = 0.003
+  material = "steel"
+  [interfaces.left_foot]            # a group of points, curves or surfaces
+
+\b
+Without a file: [[polylines]] with member, corners and elements, [[panels]] with shell, four corners and elements = [n, m];
+[nodes] gives names to places, such as tip = [1, 0, 0]. Sections: rectangle (b, h), circle (d), tube (d, t), i (h, b, web,
+flange), general (A, Iy, Iz, J, ky, kz). References: fixed, simply-supported (pin, roller), mean-axis, supports.
+"""
+
+
+@click.command("reduce-structure", epilog=NOTES)
+@click.argument("structure", type=_PATH)
+@click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
+def reduce_structure(structure: Path, output: Path) -> None:
+    """Reduce the beams and plates that STRUCTURE describes, a TOML file, to a flexible body and write it to a file."""
+    from ffr_prep import cli
+    from ffr_prep.body import save_body
+    from ffr_prep.report import short_lines
+    from ffr_prep.structural import reduce_frame
+    from ffr_prep.structural_file import load_structure
+
+    cli._check_writable(output)
+    steps = cli.Steps(visible=sys.stderr.isatty())
+    loaded = load_structure(structure, steps)
+    steps.end()
+    cli._print(_lines(loaded.frame))
+    body = reduce_frame(**vars(loaded), progress=steps, provenance={"source": {"file": structure.name}})
+    steps("write the body file")
+    save_body(body, output)
+    steps.end()
+    cli._print(short_lines(body))
+    click.echo(f"time        {steps.in_words()}")
+    click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")
+
+
+def _lines(frame: Frame) -> Iterator[str]:
+    """Size, extent and groups of a frame."""
+    kinds = {"beams": frame.elements, "triangles": frame.triangles, "quadrilaterals": frame.quadrilaterals}
+    elements = ", ".join(f"{len(nodes)} {kind}" for kind, nodes in kinds.items() if len(nodes))
+    yield f"frame       {elements}; {len(frame.points)} nodes, {6 * len(frame.points)} degrees of freedom"
+    extent = frame.points.max(axis=0) - frame.points.min(axis=0)
+    yield f"extent      ({', '.join(f'{x:.5g}' for x in extent)}) m"
+    yield f"groups      {', '.join(frame.node_groups) or 'none named'}"

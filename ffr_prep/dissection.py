@@ -1,0 +1,165 @@
+"""Nested dissection: an order of elimination that keeps a sparse factor small.
+
+The unknowns are cut in two halves by a plane across their longest extent, again and again; what separates two halves is
+eliminated after both. The separator is the smallest set of points that covers all edges across the cut, which by
+Konig's theorem follows from a maximum matching of these edges. On second-order tetrahedra it has a quarter fewer points
+than the layer of points along the plane, and the factorisation half the work.
+
+Sources: A. George, SIAM J. Numer. Anal. 10 (1973) 345-363 (nested dissection); A. Pothen, C.-J. Fan, ACM Trans. Math.
+Softw. 16 (1990) 303-324 (separators from matchings).
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import maximum_bipartite_matching
+
+Array = np.ndarray
+Tree = tuple[list[Array], list[list[int]]]
+
+_LEAF = 40
+
+
+def elimination_tree(A: sp.csr_array, positions: Array) -> Tree:
+    """Pieces of unknowns in the order of their elimination, and for each the earlier pieces directly below it.
+
+    All pieces below a piece precede it without a gap. positions : (n, 3) where each unknown is; rows of NaN for
+    unknowns that touch many others, which are eliminated last.
+    """
+    placed = np.flatnonzero(np.isfinite(positions[:, 0]))
+    points, index = np.unique(positions[placed], axis=0, return_inverse=True)
+    point_of = np.full(len(positions), -1)
+    point_of[placed] = index.ravel()
+    by_point = np.argsort(point_of, kind="stable")[len(positions) - placed.size :]
+    ends = np.searchsorted(point_of[by_point], np.arange(len(points) + 1))
+    pieces, children = _dissection(points, _graph(A, point_of, by_point, ends))
+    unknowns = [_joined(by_point, ends, piece) for piece in pieces]
+    last = np.setdiff1d(np.arange(len(positions)), placed)
+    if last.size:
+        children.append(_tops(children))
+        unknowns.append(last)
+    return unknowns, children
+
+
+def _graph(A: sp.csr_array, point_of: Array, by_point: Array, ends: Array) -> sp.csr_array:
+    """(N, N) which points have unknowns that touch each other."""
+    counts = _neighbours(A.indptr, A.indices, point_of, by_point, ends, np.zeros(0, np.int32), np.zeros(0, np.int64))
+    indptr = np.concatenate([[0], np.cumsum(counts)])
+    indices = np.empty(indptr[-1], np.int32)
+    _neighbours(A.indptr, A.indices, point_of, by_point, ends, indices, indptr)
+    size = len(ends) - 1
+    return sp.csr_array((np.ones(indices.size, np.int8), indices, indptr), shape=(size, size))
+
+
+@numba.njit(cache=True)
+def _neighbours(indptr, rows, point_of, by_point, ends, indices, starts):  # type: ignore[no-untyped-def]
+    """(N,) number of neighbours of every point; they are written to the indices, unless these are empty."""
+    size = ends.size - 1
+    counts = np.zeros(size, np.int64)
+    seen = np.full(size, -1)
+    for p in range(size):
+        for a in by_point[ends[p] : ends[p + 1]]:
+            for b in rows[indptr[a] : indptr[a + 1]]:
+                q = point_of[b]
+                if q >= 0 and seen[q] != p:
+                    seen[q] = p
+                    if indices.size:
+                        indices[starts[p] + counts[p]] = q
+                    counts[p] += 1
+    return counts
+
+
+def _joined(by_point: Array, ends: Array, piece: Array) -> Array:
+    """The unknowns of the points of a piece."""
+    counts = ends[piece + 1] - ends[piece]
+    first = np.repeat(ends[piece] - np.cumsum(counts) + counts, counts)
+    return by_point[first + np.arange(counts.sum())]
+
+
+def _dissection(points: Array, graph: sp.csr_array) -> Tree:
+    """Pieces of the points (N, 3) in the order of elimination, with the pieces below each."""
+    pieces: list[Array] = []
+    children: list[list[int]] = []
+    place = np.full(len(points), -1)
+
+    def add(piece: Array, below: list[int]) -> list[int]:
+        if not piece.size:
+            return below
+        pieces.append(piece)
+        children.append(below)
+        return [len(pieces) - 1]
+
+    def dissect(part: Array) -> list[int]:
+        if len(part) <= _LEAF:
+            return add(part, [])
+        one, two, separator = _cut(points, graph, part, place)
+        return add(separator, dissect(one) + dissect(two))
+
+    dissect(np.arange(len(points)))
+    return pieces, children
+
+
+def _cut(points: Array, graph: sp.csr_array, part: Array, place: Array) -> tuple[Array, Array, Array]:
+    """Two halves of a part that do not touch each other, and the points between them; `place` (N,) is all -1 and stays."""
+    offsets = points[part] - points[part].mean(axis=0)
+    _, axes = np.linalg.eigh(offsets.T @ offsets)
+    along = np.argsort(offsets @ axes[:, -1], kind="stable")
+    one, two = np.sort(part[along[: len(part) // 2]]), np.sort(part[along[len(part) // 2 :]])
+    place[two] = np.arange(two.size)
+    across = _edges(graph, one, place, two.size)
+    place[two] = -1
+    of_one, of_two = _cover(across)
+    return one[~of_one], two[~of_two], np.sort(np.concatenate([one[of_one], two[of_two]]))
+
+
+def _edges(graph: sp.csr_array, one: Array, place: Array, count: int) -> sp.csr_array:
+    """(one, two) edges between the halves; place (N,) is the number of a point in the second half, -1 elsewhere."""
+    rows = graph[one]
+    found = place[rows.indices]
+    inside = np.concatenate([[0], np.cumsum(found >= 0)])
+    indices = found[found >= 0].astype(np.int32)
+    return sp.csr_array((np.ones(indices.size, np.int8), indices, inside[rows.indptr]), shape=(one.size, count))
+
+
+def _cover(edges: sp.csr_array) -> tuple[Array, Array]:
+    """The rows (p,) and columns (q,) of a smallest vertex cover (Konig).
+
+    Of what alternating paths from the unmatched rows reach: the columns, and the rows that they do not reach.
+    """
+    match = maximum_bipartite_matching(edges, perm_type="column")
+    row_of = np.full(edges.shape[1], -1)
+    row_of[match[match >= 0]] = np.flatnonzero(match >= 0)
+    return _reached(edges.indptr, edges.indices, match, row_of)
+
+
+@numba.njit(cache=True)
+def _reached(indptr, indices, match, row_of):  # type: ignore[no-untyped-def]
+    rows = np.diff(indptr) > 0
+    columns = np.zeros(row_of.size, np.bool_)
+    stack = np.empty(match.size, np.int64)
+    height = 0
+    for row in range(match.size):
+        if rows[row] and match[row] < 0:
+            rows[row] = False
+            stack[height] = row
+            height += 1
+    while height:
+        height -= 1
+        row = stack[height]
+        for column in indices[indptr[row] : indptr[row + 1]]:
+            if not columns[column]:
+                columns[column] = True
+                following = row_of[column]
+                if following >= 0 and rows[following]:
+                    rows[following] = False
+                    stack[height] = following
+                    height += 1
+    return rows, columns
+
+
+def _tops(children: list[list[int]]) -> list[int]:
+    """The pieces that are below no other."""
+    below = {child for of in children for child in of}
+    return [k for k in range(len(children)) if k not in below]

@@ -1,0 +1,373 @@
+"""Dense fronts of a multifrontal factorisation: compiled, without the interpreter's lock, on one thread each.
+
+A front belongs to one piece of unknowns. Its panel holds their columns of the matrix, own unknowns first, then the later
+unknowns that they touch (the boundary); elimination turns it into the columns of the Cholesky factor, and leaves an
+update of the boundary by the boundary, of which only the lower triangle counts. Arrays are [column, row]: a column is
+contiguous, as BLAS and LAPACK want it.
+
+Source: J. W. H. Liu, SIAM Review 34 (1992) 82-109 (the multifrontal method).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import llvmlite.binding
+import numba
+import numpy as np
+from numba import types
+from numba.extending import get_cython_function_address
+
+Array = np.ndarray
+
+DONE = -1
+
+_REALS = types.CPointer(types.float64)
+_INTEGERS = types.CPointer(types.int32)
+_LETTERS = types.CPointer(types.uint8)
+
+
+class Fronts(NamedTuple):
+    """All fronts of a matrix, one after the other in the order of elimination.
+
+    starts   : (F + 1,) first unknown of each, in that order
+    ends     : (F + 1,) where the boundary of each is in `boundary`, ascending
+    offsets  : (F + 1,) where the panel of each is in `panels`
+    children : (F,) how many fronts are directly below each; in that order they are the last ones without a parent
+    """
+
+    starts: Array
+    ends: Array
+    boundary: Array
+    offsets: Array
+    panels: Array
+    children: Array
+
+
+class Sorted(NamedTuple):
+    """A symmetric matrix by rows, with the unknown at each place of the elimination and the place of each unknown."""
+
+    indptr: Array
+    indices: Array
+    data: Array
+    order: Array
+    place: Array
+
+
+# ---- BLAS and LAPACK ----------------------------------------------------------------------------------------------
+
+
+def _external(library: str, name: str, *arguments: types.Type) -> Any:
+    """SciPy's copy of a BLAS or LAPACK function under a name that compiled and cached code finds again."""
+    llvmlite.binding.add_symbol(f"ffr_{name}", get_cython_function_address(f"scipy.linalg.cython_{library}", name))
+    return types.ExternalFunction(f"ffr_{name}", types.void(*arguments))
+
+
+_dgemm = _external(
+    "blas", "dgemm", *[_LETTERS] * 2, *[_INTEGERS] * 3, *[_REALS] * 2, _INTEGERS, _REALS, _INTEGERS, *[_REALS] * 2, _INTEGERS
+)  # fmt: skip
+_dsyrk = _external(
+    "blas", "dsyrk", *[_LETTERS] * 2, *[_INTEGERS] * 2, *[_REALS] * 2, _INTEGERS, *[_REALS] * 2, _INTEGERS
+)
+_dtrsm = _external("blas", "dtrsm", *[_LETTERS] * 4, *[_INTEGERS] * 2, *[_REALS] * 2, _INTEGERS, _REALS, _INTEGERS)
+_dpotrf = _external("lapack", "dpotrf", _LETTERS, _INTEGERS, _REALS, _INTEGERS, _INTEGERS)
+
+_LOWER, _PLAIN, _TRANSPOSED, _LEFT, _RIGHT = (ord(letter) for letter in "LNTLR")
+
+
+@numba.njit(cache=True, nogil=True)
+def product(of_A, of_B, A, B, C, rows, columns, inner, ld, factor):  # type: ignore[no-untyped-def]
+    """C (rows, columns) = factor A B, added to C if the factor is negative.
+
+    of_A, of_B : _PLAIN or _TRANSPOSED, how A (rows, inner) and B (inner, columns) are stored; ld : leading dimensions
+    """
+    letters = np.array([of_A, of_B], np.uint8)
+    sizes = np.array([rows, columns, inner, ld[0], ld[1], ld[2]], np.int32)
+    factors = np.array([factor, 1.0 if factor < 0 else 0.0])
+    _dgemm(
+        letters.ctypes, letters[1:].ctypes, sizes.ctypes, sizes[1:].ctypes, sizes[2:].ctypes, factors.ctypes,
+        A.ctypes, sizes[3:].ctypes, B.ctypes, sizes[4:].ctypes, factors[1:].ctypes, C.ctypes, sizes[5:].ctypes,
+    )  # fmt: skip
+
+
+@numba.njit(cache=True, nogil=True)
+def minus_square(A, C, size, inner, ld_A, ld_C):  # type: ignore[no-untyped-def]
+    """C - A A^T, lower triangle; A (size, inner)."""
+    letters = np.array([_LOWER, _PLAIN], np.uint8)
+    sizes = np.array([size, inner, ld_A, ld_C], np.int32)
+    factors = np.array([-1.0, 1.0])
+    _dsyrk(
+        letters.ctypes, letters[1:].ctypes, sizes.ctypes, sizes[1:].ctypes, factors.ctypes,
+        A.ctypes, sizes[2:].ctypes, factors[1:].ctypes, C.ctypes, sizes[3:].ctypes,
+    )  # fmt: skip
+
+
+@numba.njit(cache=True, nogil=True)
+def divide(side, transposed, L, B, rows, columns, ld_L, ld_B):  # type: ignore[no-untyped-def]
+    """B (rows, columns) becomes L^-1 B or L^-T B with side _LEFT, B L^-1 or B L^-T with side _RIGHT."""
+    letters = np.array([side, _LOWER, _TRANSPOSED if transposed else _PLAIN, _PLAIN], np.uint8)
+    sizes = np.array([rows, columns, ld_L, ld_B], np.int32)
+    one = np.ones(1)
+    _dtrsm(
+        letters.ctypes, letters[1:].ctypes, letters[2:].ctypes, letters[3:].ctypes, sizes.ctypes, sizes[1:].ctypes,
+        one.ctypes, L.ctypes, sizes[2:].ctypes, B.ctypes, sizes[3:].ctypes,
+    )  # fmt: skip
+
+
+@numba.njit(cache=True, nogil=True)
+def triangular(A, size, ld):  # type: ignore[no-untyped-def]
+    """A becomes its Cholesky factor; the number (from 1) of the pivot that is not positive, or 0."""
+    letters = np.array([_LOWER], np.uint8)
+    sizes = np.array([size, ld, 0], np.int32)
+    _dpotrf(letters.ctypes, sizes.ctypes, A.ctypes, sizes[1:].ctypes, sizes[2:].ctypes)
+    return sizes[2]
+
+
+# ---- symbolic -----------------------------------------------------------------------------------------------------
+
+
+@numba.njit(cache=True)
+def boundaries(starts, children, A):  # type: ignore[no-untyped-def]
+    """Ends (F + 1,) and the boundaries of all fronts: later unknowns touched by the matrix or by the fronts below."""
+    count = children.size
+    ends = np.zeros(count + 1, np.int64)
+    found = np.empty(A.place.size, np.int32)
+    boundary = np.empty(max(1024, 8 * A.place.size), np.int32)
+    seen = np.full(A.place.size, -1, np.int32)
+    pending = np.empty(count, np.int64)
+    height = 0
+    for k in range(count):
+        size = 0
+        for p in range(starts[k], starts[k + 1]):
+            row = A.order[p]
+            for unknown in A.indices[A.indptr[row] : A.indptr[row + 1]]:
+                size = _noted(A.place[unknown], k, starts[k + 1], seen, found, size)
+        for child in pending[height - children[k] : height]:
+            for place in boundary[ends[child] : ends[child + 1]]:
+                size = _noted(place, k, starts[k + 1], seen, found, size)
+        height -= children[k]
+        pending[height] = k
+        height += 1
+        ends[k + 1] = ends[k] + size
+        if ends[k + 1] > boundary.size:
+            boundary = np.concatenate((boundary, np.empty(boundary.size + size, np.int32)))
+        boundary[ends[k] : ends[k + 1]] = np.sort(found[:size])
+    return ends, boundary[: ends[count]].copy()
+
+
+@numba.njit(cache=True)
+def _noted(place, front, stop, seen, found, size):  # type: ignore[no-untyped-def]
+    """Note a later place once per front; the number noted so far."""
+    if place >= stop and seen[place] != front:
+        seen[place] = front
+        found[size] = place
+        return size + 1
+    return size
+
+
+# ---- numeric ------------------------------------------------------------------------------------------------------
+
+
+@numba.njit(cache=True, nogil=True)
+def shape(fronts, k):  # type: ignore[no-untyped-def]
+    """Number of own and of boundary unknowns."""
+    return fronts.starts[k + 1] - fronts.starts[k], fronts.ends[k + 1] - fronts.ends[k]
+
+
+@numba.njit(cache=True, nogil=True)
+def panel_of(fronts, k):  # type: ignore[no-untyped-def]
+    """(own, own + boundary) the panel of a front."""
+    own, rest = shape(fronts, k)
+    return fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]].reshape((own, own + rest))
+
+
+@numba.njit(cache=True, nogil=True)
+def begin(fronts, k, A, update, local):  # type: ignore[no-untyped-def]
+    """The matrix into the panel of a front, zeros into its update (rest, rest); local (n,) is where its unknowns are."""
+    own, rest = shape(fronts, k)
+    start, stop = fronts.starts[k], fronts.starts[k + 1]
+    local[start:stop] = np.arange(own)
+    local[fronts.boundary[fronts.ends[k] : fronts.ends[k + 1]]] = np.arange(own, own + rest)
+    panel = panel_of(fronts, k)
+    for p in range(start, stop):
+        row = A.order[p]
+        for e in range(A.indptr[row], A.indptr[row + 1]):
+            place = A.place[A.indices[e]]
+            if place >= p:
+                panel[p - start, local[place]] = A.data[e]
+    for j in range(rest):
+        update[j, j:] = 0.0
+
+
+@numba.njit(cache=True, nogil=True)
+def add(fronts, k, child, of_child, update, local, first, last):  # type: ignore[no-untyped-def]
+    """Add columns first...last of the update of a front below to a front that has begun."""
+    places = local[fronts.boundary[fronts.ends[child] : fronts.ends[child + 1]]]
+    panel = panel_of(fronts, k)
+    own = panel.shape[0]
+    for j in range(first, min(last, places.size)):
+        if places[j] < own:
+            for i in range(j, places.size):
+                panel[places[j], places[i]] += of_child[j, i]
+        else:
+            for i in range(j, places.size):
+                update[places[j] - own, places[i] - own] += of_child[j, i]
+
+
+@numba.njit(cache=True, nogil=True)
+def eliminate(fronts, k, update):  # type: ignore[no-untyped-def]
+    """The panel becomes columns of the factor, the update is completed; the first bad pivot or DONE."""
+    own, rest = shape(fronts, k)
+    size = own + rest
+    panel = fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]]
+    bad = triangular(panel, own, size)
+    if bad:
+        return fronts.starts[k] + bad - 1
+    if rest:
+        divide(_RIGHT, True, panel, panel[own:], rest, own, size, size)
+        minus_square(panel[own:], update, rest, own, size, rest)
+    return DONE
+
+
+@numba.njit(cache=True, nogil=True)
+def eliminate_branch(fronts, first, last, A):  # type: ignore[no-untyped-def]
+    """Eliminate the fronts first...last, a front and all below it: the update of the last, and a bad pivot or DONE.
+
+    The updates that wait for their front are in one array, as asking for memory takes longer than filling it.
+    """
+    local = np.empty(A.place.size, np.int32)
+    pending = np.empty(last - first + 1, np.int64)
+    places = np.zeros(last - first + 2, np.int64)
+    waiting = np.empty(_most_waiting(fronts, first, last, pending, places))
+    height = 0
+    for k in range(first, last + 1):
+        rest = shape(fronts, k)[1]
+        update = waiting[places[height] : places[height] + rest**2]
+        begin(fronts, k, A, update.reshape((rest, rest)), local)
+        for h in range(height - fronts.children[k], height):
+            size = shape(fronts, pending[h])[1]
+            of_child = waiting[places[h] : places[h + 1]].reshape((size, size))
+            add(fronts, k, pending[h], of_child, update.reshape((rest, rest)), local, 0, size)
+        bad = eliminate(fronts, k, update)
+        if bad != DONE:
+            break
+        height = _pushed(fronts, k, pending, places, height)
+        _move(update, waiting[places[height - 1] : places[height]])
+    return waiting[: places[height]].copy(), bad
+
+
+@numba.njit(cache=True, nogil=True)
+def _move(source, target):  # type: ignore[no-untyped-def]
+    """Copy to an array that begins at or before the source in the same memory."""
+    for i in range(source.size):
+        target[i] = source[i]
+
+
+@numba.njit(cache=True, nogil=True)
+def _pushed(fronts, k, pending, places, height):  # type: ignore[no-untyped-def]
+    """The update of a front takes the place of those below it: how many wait then."""
+    height -= fronts.children[k]
+    pending[height] = k
+    places[height + 1] = places[height] + shape(fronts, k)[1] ** 2
+    return height + 1
+
+
+@numba.njit(cache=True, nogil=True)
+def _most_waiting(fronts, first, last, pending, places):  # type: ignore[no-untyped-def]
+    """How large the updates of the fronts first...last become together; the arrays are for work."""
+    height, most = 0, 0
+    for k in range(first, last + 1):
+        most = max(most, places[height] + shape(fronts, k)[1] ** 2)
+        height = _pushed(fronts, k, pending, places, height)
+    return most
+
+
+# ---- tiles of large fronts ----------------------------------------------------------------------------------------
+
+
+@numba.njit(cache=True, nogil=True)
+def diagonal_tile(panel, size, first, last):  # type: ignore[no-untyped-def]
+    """Factorise the diagonal tile of the columns first...last of a panel, the columns before being done: as LAPACK."""
+    corner = panel[first * size + first :]
+    product(
+        _PLAIN,
+        _TRANSPOSED,
+        panel[first:],
+        panel[first:],
+        corner,
+        last - first,
+        last - first,
+        first,
+        (size, size, size),
+        -1.0,
+    )
+    return triangular(corner, last - first, size)
+
+
+@numba.njit(cache=True, nogil=True)
+def row_tile(panel, size, first, last, top, bottom):  # type: ignore[no-untyped-def]
+    """Rows top...bottom of the same columns, the diagonal tile being done."""
+    tile, tall = panel[first * size + top :], bottom - top
+    product(_PLAIN, _TRANSPOSED, panel[top:], panel[first:], tile, tall, last - first, first, (size, size, size), -1.0)
+    divide(_RIGHT, True, panel[first * size + first :], tile, tall, last - first, size, size)
+
+
+@numba.njit(cache=True, nogil=True)
+def update_tile(panel, own, update, first, last, top, bottom):  # type: ignore[no-untyped-def]
+    """Columns first...last and rows top...bottom of an update, the panel being done."""
+    rest = update.shape[0]
+    size = own + rest
+    target = update.reshape(update.size)[first * rest + top :]
+    left, right = panel[own + top :], panel[own + first :]
+    product(_PLAIN, _TRANSPOSED, left, right, target, bottom - top, last - first, own, (size, size, rest), -1.0)
+
+
+# ---- solution -----------------------------------------------------------------------------------------------------
+
+
+@numba.njit(cache=True, nogil=True)
+def forward(fronts, targets, first, last, y):  # type: ignore[no-untyped-def]
+    """L^-1 for the fronts first...last; y (rows, r), `targets` the rows of the boundaries."""
+    r = y.shape[1]
+    for k in range(first, last + 1):
+        own, rest = shape(fronts, k)
+        start, size = fronts.starts[k], own + rest
+        panel = fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]]
+        x = y[start : start + own].T.copy()
+        divide(_LEFT, False, panel, x, own, r, size, own)
+        y[start : start + own] = x.T
+        if rest:
+            change = np.empty((r, rest))
+            product(_PLAIN, _PLAIN, panel[own:], x, change, rest, r, own, (size, own, rest), 1.0)
+            _scatter(change, targets[fronts.ends[k] : fronts.ends[k + 1]], y)
+
+
+@numba.njit(cache=True, nogil=True)
+def _scatter(change, rows, y):  # type: ignore[no-untyped-def]
+    for i in range(rows.size):
+        for c in range(y.shape[1]):
+            y[rows[i], c] -= change[c, i]
+
+
+@numba.njit(cache=True, nogil=True)
+def backward(fronts, targets, first, last, y):  # type: ignore[no-untyped-def]
+    """L^-T for the fronts first...last, the last first."""
+    r = y.shape[1]
+    for k in range(last, first - 1, -1):
+        own, rest = shape(fronts, k)
+        start, size = fronts.starts[k], own + rest
+        panel = fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]]
+        x = y[start : start + own].T.copy()
+        if rest:
+            known = np.empty((r, rest))
+            _gather(y, targets[fronts.ends[k] : fronts.ends[k + 1]], known)
+            product(_TRANSPOSED, _PLAIN, panel[own:], known, x, own, r, rest, (size, rest, own), -1.0)
+        divide(_LEFT, True, panel, x, own, r, size, own)
+        y[start : start + own] = x.T
+
+
+@numba.njit(cache=True, nogil=True)
+def _gather(y, rows, known):  # type: ignore[no-untyped-def]
+    for i in range(rows.size):
+        for c in range(y.shape[1]):
+            known[c, i] = y[rows[i], c]

@@ -1,0 +1,224 @@
+"""A run that was stopped, killed or cut goes on as if it had never stopped: to the bit."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic import cloud
+
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.checkpoint import Checkpoint, decode, encode
+from ffr_dyn.errors import InputError, SimulationError
+from ffr_dyn.forces import Load, SpringDamper
+from ffr_dyn.integrators import RK4, ROS2
+from ffr_dyn.joints import Joint
+from ffr_dyn.measure import Unwound, measure, selected
+from ffr_dyn.power import Worked
+from ffr_dyn.result_file import load_checkpoint, load_result, save_result
+from ffr_dyn.scene import Body, Scene
+from ffr_dyn.stabilisation import Baumgarte
+from ffr_dyn.timefunction import harmonic
+
+GROUND = {"O": (0, 0, 0), "P": (0, 2, 0)}
+SCENE = Scene(
+    (
+        Body("one", cloud(5, seed=1), omega_bar=(0.0, 0.0, 9.0), damping=0.01),
+        Body("two", cloud(3, seed=2), position=(1.0, 0.0, 0.0), omega_bar=(0.0, 0.0, -20.0)),
+    ),
+    (Joint("hinge", "revolute", "ground.O", "one.a"), Joint("elbow", "spherical", "one.b", "two.a")),
+    loads=(Load("push", "two.c", force=(harmonic(amplitude=5.0, frequency=2.0), 0.0, 0.0)),),
+    springs=(SpringDamper("rope", "ground.P", "two.b", 50.0, 1.0, 1.0),),
+    ground=GROUND,
+    gravity=(0.0, -9.81, 0.0),
+)
+SETTINGS = {"end": 1.0, "output_step": 0.01, "method": ROS2(1e-3), "outputs": ("default", "*.work", "*.power")}
+
+
+def assert_same_bits(a, b):
+    assert a.time.tobytes() == b.time.tobytes()
+    assert list(a.quantities) == list(b.quantities)
+    for name, quantity in a.quantities.items():
+        assert quantity.values.tobytes() == b[name].tobytes(), name
+    assert {**b.attributes, **a.attributes} == b.attributes  # a file also says what wrote it
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The run that nothing stopped."""
+    path = tmp_path_factory.mktemp("whole") / "run.nc"
+    forward(SCENE, **SETTINGS, path=path)
+    return load_result(path)
+
+
+class StoppedError(Exception):
+    pass
+
+
+def stop_after(t: float):
+    def progress(reached: float) -> None:
+        if reached >= t:
+            raise StoppedError
+
+    return progress
+
+
+@pytest.mark.parametrize("at", [0.0, 0.3, 0.995])
+def test_a_stopped_run_goes_on_to_the_same_bits(tmp_path, whole, at):
+    path = tmp_path / "run.nc"
+    with pytest.raises(StoppedError):
+        forward(SCENE, **SETTINGS, path=path, progress=stop_after(at))
+    assert load_result(path).time[-1] >= at
+    result = forward(SCENE, **SETTINGS, resume=path)
+    assert_same_bits(result, whole)
+    assert_same_bits(load_result(path), whole)
+
+
+def test_a_run_to_a_later_end_is_the_long_run(tmp_path, whole):
+    path = tmp_path / "run.nc"
+    forward(SCENE, **SETTINGS | {"end": 0.37}, path=path)
+    assert_same_bits(forward(SCENE, **SETTINGS, resume=path), whole)
+    with pytest.raises(InputError, match=r"0\.5 s beyond this end"):
+        forward(SCENE, **SETTINGS | {"end": 0.5}, resume=path)
+    assert_same_bits(forward(SCENE, **SETTINGS, resume=path), whole)  # nothing is left to do
+    assert_same_bits(load_result(path), whole)
+    assert load_checkpoint(path) is not None
+
+
+def test_a_resumed_run_can_go_to_another_file(tmp_path, whole):
+    forward(SCENE, **SETTINGS | {"end": 0.2}, path=tmp_path / "a.nc")
+    before = (tmp_path / "a.nc").read_bytes()
+    forward(SCENE, **SETTINGS, resume=tmp_path / "a.nc", path=tmp_path / "b.nc")
+    assert (tmp_path / "a.nc").read_bytes() == before
+    assert_same_bits(load_result(tmp_path / "b.nc"), whole)
+
+
+def test_a_file_that_is_not_there_yet_is_a_run_from_the_start(tmp_path, whole):
+    assert_same_bits(forward(SCENE, **SETTINGS, resume=tmp_path / "none.nc"), whole)
+    assert_same_bits(load_result(tmp_path / "none.nc"), whole)
+
+
+def test_counters_of_drift_and_projections_go_on(tmp_path, whole):
+    assert whole.attributes["projections"] > 0
+    assert whole.attributes["largest_drift"][0] > 0
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"method": ROS2(5e-4)},
+        {"method": RK4(1e-3)},
+        {"start": 0.01, "end": 1.01},
+        {"output_step": 0.02},
+        {"stabilisation": Baumgarte(10.0, 10.0)},
+        {"outputs": ("default",)},
+        {"scene": replace(SCENE, gravity=(0.0, -9.82, 0.0))},
+        {"scene": replace(SCENE, bodies=(replace(SCENE.bodies[0], omega_bar=(0.0, 0.0, 9.5)), SCENE.bodies[1]))},
+        {"scene": replace(SCENE, bodies=(replace(SCENE.bodies[0], damping=0.02), SCENE.bodies[1]))},
+        {"scene": replace(SCENE, springs=(replace(SCENE.springs[0], preload=1e-12),))},
+    ],
+)
+def test_another_scene_or_other_settings_are_refused(tmp_path, change):
+    path = tmp_path / "run.nc"
+    forward(SCENE, **SETTINGS | {"end": 0.02}, path=path)
+    before = path.read_bytes()
+    with pytest.raises(InputError, match="another scene or of other settings"):
+        forward(**{"scene": SCENE} | SETTINGS | change, resume=path)
+    assert path.read_bytes() == before
+
+
+def test_files_that_cannot_be_continued_are_named(tmp_path, whole):
+    with pytest.raises(InputError, match=r"plain\.nc has no checkpoint"):
+        forward(SCENE, **SETTINGS, resume=save_result(whole, tmp_path / "plain.nc"))
+    (tmp_path / "text.nc").write_text("hello")
+    with pytest.raises(InputError, match="damaged"):
+        forward(SCENE, **SETTINGS, resume=tmp_path / "text.nc")
+
+
+def test_measuring_in_parts_gives_the_same_bits():
+    """Angles, elastic displacements, work: however many rows are looked at together."""
+    from ffr_dyn.analyses.assemble import assemble
+    from ffr_dyn.equations import new_record, new_stages, new_work
+    from ffr_dyn.kernels.tables import Record
+
+    system = assemble(SCENE).system
+    state = assemble(SCENE)
+    record, x, v = new_record(system, 40), state.x.copy(), state.v.copy()
+    ROS2.run(system.model, new_work(system.model), new_stages(system, 4), 0.0, 1e-3, 0, 1, x, v, 0.0, 0.0, 1e-9, record)
+    wanted = selected(system, ("*",))
+    once, _ = measure(system, record, {}, wanted)
+    for sizes in ([1] * 40, [3, 1, 13, 7, 16], [39, 1]):
+        memory, parts, at = {}, [], 0
+        for size in sizes:
+            part = Record(*(column[at : at + size] for column in record))
+            quantities, memory = measure(system, part, memory, wanted)
+            parts.append(quantities)
+            at += size
+        for name, quantity in once.items():
+            joined = np.concatenate([part[name].values for part in parts])
+            assert joined.tobytes() == quantity.values.tobytes(), (name, sizes)
+
+
+def test_a_checkpoint_survives_its_bytes():
+    given = Checkpoint(
+        "abc",
+        12,
+        {"x": np.array([1.0, np.nan, -0.0]), "work.info": np.arange(4)},
+        {"hinge.angle": Unwound(1e-300, np.inf, 3.0), "push.work": Worked(1.0, 2.0, (0.1, 0.2))},
+    )
+    back = decode(encode(given))
+    assert (back.fingerprint, back.steps, back.memory) == (given.fingerprint, given.steps, given.memory)
+    assert all(back.arrays[name].tobytes() == array.tobytes() for name, array in given.arrays.items())
+    with pytest.raises(InputError, match="checkpoint is damaged"):
+        decode(encode(given)[:-30])
+
+
+# ---- kill -9 --------------------------------------------------------------------------------------------------------
+
+RUN = """
+import sys, time
+import test_resume as t
+from ffr_dyn import result_file
+from ffr_dyn.analyses import forward as f
+start = result_file.ResultWriter.__init__
+result_file.ResultWriter.__init__ = lambda *a, **k: start(*a, **(k | {"interval": 0.0, "share": 1e9}))
+f.SECONDS_PER_CALL = 0.003
+f.forward(t.SCENE, **t.SETTINGS, resume=sys.argv[1], progress=lambda reached: time.sleep(0.02))
+"""
+
+
+@pytest.mark.parametrize("delays", [(0.1,), pytest.param((0.05, 0.2, 0.13, 0.3), marks=pytest.mark.slow)])
+def test_a_killed_run_goes_on_to_the_same_bits(tmp_path, whole, delays):
+    """Killed wherever it stands, again and again, until it is through."""
+    path, lengths = tmp_path / "run.nc", []
+    here = Path(__file__).parent
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(here.parent), str(here)])}
+    for delay in delays:
+        run = subprocess.Popen([sys.executable, "-c", RUN, path], env=environment)
+        rows = lengths[-1] if lengths else 0
+        while run.poll() is None and (not path.exists() or load_result(path).time.size <= rows):
+            time.sleep(0.01)
+        time.sleep(delay)
+        run.send_signal(signal.SIGKILL)
+        assert run.wait() == -signal.SIGKILL
+        lengths.append(load_result(path).time.size)
+    assert lengths == sorted(set(lengths))
+    assert lengths[-1] < whole.time.size
+    forward(SCENE, **SETTINGS, resume=path)
+    assert_same_bits(load_result(path), whole)
+
+
+def test_a_run_that_failed_tells_the_same_when_it_is_resumed(tmp_path):
+    scene = replace(SCENE, loads=(Load("bad", "two.c", function=lambda t, state: (np.nan if t > 0.5 else 0.0, 0, 0)),))
+    settings = SETTINGS | {"outputs": ("default",)}
+    for _ in range(2):
+        with pytest.raises(SimulationError, match=r"'bad' at t = 0\.50"):
+            forward(scene, **settings, resume=tmp_path / "run.nc")
+        assert load_result(tmp_path / "run.nc").time[-1] == pytest.approx(0.5)
