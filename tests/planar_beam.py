@@ -9,7 +9,15 @@ from ffr_prep.body import FlexibleBody, Interface, Surface
 
 
 def planar_beam(
-    name: str, length: float, mass: float, bending: float, modes: int, *, start: float = 0.0, points: int = 40, out_of_plane: bool = False
+    name: str,
+    length: float,
+    mass: float,
+    bending: float,
+    modes: int,
+    *,
+    start: float = 0.0,
+    points: int = 40,
+    out_of_plane: bool = False,
 ) -> FlexibleBody:
     """Clamped to its frame at "root" (x = start), free at "tip"; bending = EI; modes of x^2, x^3, ... by Rayleigh and Ritz.
 

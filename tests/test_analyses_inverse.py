@@ -1,4 +1,4 @@
-"""Inverse dynamics: reactions of every joint against independent free-body balances, round trips, quasi-static deformation."""
+"""Inverse dynamics: reactions of every joint against free-body balances, round trips, quasi-static deformation."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ffr_dyn.drivers import Driver
 from ffr_dyn.errors import InputError
 from ffr_dyn.forces import Load
 from ffr_dyn.integrators import RK4
-from ffr_dyn.joints import Joint
+from ffr_dyn.joints import COORDINATES, Joint
 from ffr_dyn.rotation import rotation_matrix
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.stabilisation import Projection
@@ -24,10 +24,11 @@ from ffr_dyn.timefunction import harmonic, polynomial
 from ffr_prep.body import rigid_body
 
 FINE = Projection(1e-13)
+MOTION = harmonic(amplitude=0.7, frequency=0.8)
 G = (0.3, -9.81, 0.5)
 
 
-def arm(*kinds: str, motion=harmonic(amplitude=0.7, frequency=0.8)) -> Scene:
+def arm(*kinds: str) -> Scene:
     """A chain of one driven body per joint kind, in space; a second revolute's driver is added where it is needed."""
     J = np.array([[0.2, 0.02, 0.01], [0.02, 0.3, -0.03], [0.01, -0.03, 0.25]])
     link = rigid_body(
@@ -38,8 +39,7 @@ def arm(*kinds: str, motion=harmonic(amplitude=0.7, frequency=0.8)) -> Scene:
         bodies.append(Body(f"body{k}", link, position=k * np.array([0.8, 0.2, 0.1])))
         before = "ground.O" if k == 0 else f"body{k - 1}.b"
         joints.append(Joint(f"joint{k}", kind, before, f"body{k}.a", axis=(0.2, 0.5, 1.0)))
-        for c in {"revolute": ("angle",), "translational": ("stroke",), "cylindrical": ("angle", "stroke")}.get(kind, ()):
-            drivers.append(Driver(f"{c}{k}", f"joint{k}", motion, c))
+        drivers += [Driver(f"{c}{k}", f"joint{k}", MOTION, c) for c in COORDINATES[kind]]
     return Scene(tuple(bodies), tuple(joints), tuple(drivers), ground={"O": (0, 0, 0)}, gravity=G)
 
 
@@ -73,7 +73,9 @@ def test_reactions_are_those_of_the_free_body(kind):
     np.testing.assert_allclose(given, wrench_of_motion(scene, result, 1, h), atol=2e-8)
 
 
-@pytest.mark.parametrize("kind", ["spherical", "universal", "planar", "point-on-line", "point-on-plane", "distance", "orientation"])
+@pytest.mark.parametrize(
+    "kind", ["spherical", "universal", "planar", "point-on-line", "point-on-plane", "distance", "orientation"]
+)
 def test_reactions_of_a_loose_joint_balance_the_free_body(kind):
     """A body that a joint does not fix moves freely: in a forward run its reaction still carries inertia and weight."""
     scene, h = arm("revolute"), 1e-3
@@ -127,7 +129,9 @@ def flexible_arm() -> Scene:
 
 def test_slow_dynamic_deformation_settles_to_the_quasi_static_one():
     """In steady rotation, no gravity: after the damped vibration has died out both agree."""
-    scene = replace(flexible_arm(), drivers=(Driver("one", "A", polynomial(0.0, 2.0)), Driver("two", "B", polynomial(0.3))))
+    scene = replace(
+        flexible_arm(), drivers=(Driver("one", "A", polynomial(0.0, 2.0)), Driver("two", "B", polynomial(0.3)))
+    )
     dynamic = inverse(scene, end=4.0, output_step=0.5, elastic=Dynamic(RK4(2e-3), FINE))
     still = inverse(scene, end=4.0, output_step=0.5, elastic=QuasiStatic())
     for name in ("b.q", "b.c.position", "one.effort", "B.moment"):

@@ -59,7 +59,7 @@ def test_slider_crank_in_closed_form():
     r, length = 0.2, 0.7
     result = kinematic(slider_crank(r, length, MOTOR), end=2.0, output_step=0.05)
     t = result.time
-    angle, rate, second = 0.3 + 4 * t + 1.5 * t**2, 4 + 3 * t, 3.0
+    angle, rate = 0.3 + 4 * t + 1.5 * t**2, 4 + 3 * t
     root = np.sqrt(length**2 - (r * np.sin(angle)) ** 2)
     x = r * np.cos(angle) + root
     slope = -r * np.sin(angle) - r**2 * np.sin(angle) * np.cos(angle) / root
@@ -92,7 +92,7 @@ def test_mobility_in_words():
     assert free.free[0].bodies == ("crank", "rod", "slider")
     assert any("main.angle" in line for line in free.lines())
     driven = mobility(slider_crank(0.2, 0.7, MOTOR))
-    assert driven.degrees_of_freedom == 0 and driven.free == () and driven.overdriven == ()
+    assert (driven.degrees_of_freedom, driven.free, driven.overdriven) == (0, (), ())
 
 
 def test_mobility_of_a_free_flexible_body():
@@ -156,9 +156,18 @@ def test_a_singular_position_on_the_way_is_told():
 
 def test_driven_point():
     """Two links whose end is led along a circle: two prescribed components fix both angles."""
-    links = (Body("one", bar("one", 1.0), rotation=(0, 0, 0.5)), Body("two", bar("two", 0.8), (np.cos(0.5), np.sin(0.5), 0), (0, 0, -0.6)))
+    links = (
+        Body("one", bar("one", 1.0), rotation=(0, 0, 0.5)),
+        Body("two", bar("two", 0.8), (np.cos(0.5), np.sin(0.5), 0), (0, 0, -0.6)),
+    )
     joints = (Joint("A", "revolute", "ground.O", "one.a"), Joint("B", "revolute", "one.b", "two.a"))
-    path = PointDriver("path", "ground.O", "two.b", x=lambda t: (1.2 + 0.2 * np.cos(t), -0.2 * np.sin(t), -0.2 * np.cos(t)), y=polynomial(0.1))
+    path = PointDriver(
+        "path",
+        "ground.O",
+        "two.b",
+        x=lambda t: (1.2 + 0.2 * np.cos(t), -0.2 * np.sin(t), -0.2 * np.cos(t)),
+        y=polynomial(0.1),
+    )
     scene = Scene(links, joints, (path,), ground={"O": (0, 0, 0)}, gravity=G)
     result = kinematic(scene, end=3.0, output_step=0.25)
     np.testing.assert_allclose(result["two.b.position"][:, 0], 1.2 + 0.2 * np.cos(result.time), atol=1e-10)

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import eigh
-from test_analyses_kinematic import bar, slider_crank
+from test_analyses_kinematic import slider_crank
 from test_analyses_static import flexible, hanging
 
 from ffr_dyn.analyses.actuators import JointForce, MarkerForce, as_loads, recorded
-from ffr_dyn.analyses.evaluation import evaluate, evaluated_mass_matrix, evaluator, total_mass_matrix
 from ffr_dyn.analyses.assemble import assemble
+from ffr_dyn.analyses.evaluation import evaluate, evaluated_mass_matrix, evaluator, total_mass_matrix
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.linearise import as_result, linearise, table_of_modes
 from ffr_dyn.analyses.states import scene_at
@@ -50,7 +50,9 @@ def test_oscillator_with_damper_and_its_state_space():
     found = linearise(
         scene, inputs=(JointForce("push", "rail", "stroke"),), outputs=("m.R.x", "m.v.x", "spring.tension")
     )
-    np.testing.assert_allclose(sorted(found.eigenvalues, key=lambda z: z.imag), [-1 - 1j * 24**0.5, -1 + 1j * 24**0.5], atol=1e-7)
+    np.testing.assert_allclose(
+        sorted(found.eigenvalues, key=lambda z: z.imag), [-1 - 1j * 24**0.5, -1 + 1j * 24**0.5], atol=1e-7
+    )
     np.testing.assert_allclose(found.damping_ratios, 0.2, atol=1e-8)
     s = 2.0 + 3.0j
     transfer = found.C @ np.linalg.solve(s * np.eye(2) - found.A, found.B) + found.D
@@ -59,7 +61,7 @@ def test_oscillator_with_damper_and_its_state_space():
 
 
 def test_free_vibration_has_the_assembled_eigenfrequencies():
-    """Without gravity, K is the diagonal of omega^2 on all elastic coordinates: compared on the free motions of the joints."""
+    """Without gravity, K is diag(omega^2) on all elastic coordinates: compared on the free motions of the joints."""
     scene = replace(flexible(), springs=(), gravity=(0, 0, 0))
     scene = replace(scene, bodies=tuple(replace(body, damping=0.0) for body in scene.bodies))
     assembled = assemble(scene)
@@ -119,7 +121,7 @@ def test_steady_rotation_softens_the_vibration():
 
 
 def test_a_small_forward_run_is_what_the_matrices_say():
-    """Response of the flexible scene to a small moment on its hinge, from A, B and C by small steps of the matrix exponential."""
+    """Response of the flexible scene to a small moment on its hinge: from A, B and C by the matrix exponential."""
     from scipy.linalg import expm
 
     scene = flexible()

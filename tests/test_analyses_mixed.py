@@ -12,7 +12,7 @@ from test_analyses_kinematic import bar
 from ffr_dyn.analyses.actuators import JointForce, MarkerForce, as_loads, recorded
 from ffr_dyn.analyses.bounded import Bounded
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.analyses.inverse import Dynamic, QuasiStatic, inverse
+from ffr_dyn.analyses.inverse import QuasiStatic, inverse
 from ffr_dyn.analyses.kinematic import kinematic
 from ffr_dyn.analyses.mixed import Causal, mixed
 from ffr_dyn.analyses.states import scene_at
@@ -44,10 +44,12 @@ def chain(*loads: Load, drivers=(), third=None) -> Scene:
     """After Antonya's mixed dynamic example; kg, mm, s. Ground - 2 - 3 - 4 - 5, body 5 slides along x."""
     slide = 50 * (1 - np.sqrt(3) / 2)
     B = 50 * np.array([0.5, -np.sqrt(3) / 2, 0])
-    C = B + [0, 50, 0]
+    C = B + np.array([0, 50, 0])
     bodies = (
         Body("b2", link("b2", 0.1233, 25.786, a=(-25, 0, 0), b=(25, 0, 0)), B / 2, (0, 0, -np.pi / 3)),
-        Body("b3", third or link("b3", 0.1233, 25.786, root=(-25, 0, 0), tip=(25, 0, 0)), (B + C) / 2, (0, 0, np.pi / 2)),
+        Body(
+            "b3", third or link("b3", 0.1233, 25.786, root=(-25, 0, 0), tip=(25, 0, 0)), (B + C) / 2, (0, 0, np.pi / 2)
+        ),
         Body("b4", link("b4", 0.1233, 25.786, c1=(-12.5, 1.656, 0), d=(12.5, 1.656, 0)), C - [-12.5, 1.656, 0]),
         Body("b5", link("b5", 0.63, 212.0, d=(-25, 0, 0)), (75, slide, 0)),
     )
@@ -98,7 +100,9 @@ def test_kinematics_and_inverse_close_the_circle(antonya):
     for run in (kinematic, lambda s, **k: inverse(s, elastic=QuasiStatic(), **k)):
         back = run(chain(TORQUE_3, drivers=drivers), end=1.6, output_step=0.04)
         np.testing.assert_allclose(back["motor.effort"][inside], -250.0, atol=1e-5)
-        np.testing.assert_allclose(back["path.force"][inside, 0], 10 * np.sin(0.5 * np.pi * back.time)[inside], atol=1e-6)
+        np.testing.assert_allclose(
+            back["path.force"][inside, 0], 10 * np.sin(0.5 * np.pi * back.time)[inside], atol=1e-6
+        )
         for name in ("B.force", "D.force"):
             np.testing.assert_allclose(back[name][inside], antonya[name][:401:10][inside], atol=1e-5)
         np.testing.assert_allclose(back["b3.R"], antonya["b3.R"][:401:10], atol=1e-8)
@@ -120,8 +124,12 @@ def test_the_chain_with_a_flexible_body():
 
 def test_forces_away_from_the_known_motion(antonya):
     """The angle at A known, the force on body 5 unknown: a servo constraint with one internal coordinate."""
-    scene = chain(TORQUE_2, TORQUE_3, drivers=(Driver("angle", "A", recorded(antonya.time, antonya["A.angle"], degree=7)),))
-    back = mixed(scene, unknown=(MarkerForce("F", "b5.c", (1, 0, 0)),), end=1.0, output_step=0.02, solution=Causal(growth=1e9))
+    scene = chain(
+        TORQUE_2, TORQUE_3, drivers=(Driver("angle", "A", recorded(antonya.time, antonya["A.angle"], degree=7)),)
+    )
+    back = mixed(
+        scene, unknown=(MarkerForce("F", "b5.c", (1, 0, 0)),), end=1.0, output_step=0.02, solution=Causal(growth=1e9)
+    )
     inside = slice(1, None)
     np.testing.assert_allclose(back["F.effort"][inside], 10 * np.sin(0.5 * np.pi * back.time)[inside], atol=2e-4)
     np.testing.assert_allclose(back["b4.R"], antonya["b4.R"][:251:5], atol=1e-5)
@@ -156,7 +164,9 @@ def test_round_trip_of_a_spatial_flexible_arm():
     times = np.linspace(0, 0.3, 61)
     push = 1 - np.cos(20 * times)
     given = [start["d1.effort"][0] + 0.8 * push, start["d2.effort"][0] - 0.5 * push]
-    pushed = replace(scene, loads=(*as_loads(scene, shoulder, times, given[0]), *as_loads(scene, elbow, times, given[1])))
+    pushed = replace(
+        scene, loads=(*as_loads(scene, shoulder, times, given[0]), *as_loads(scene, elbow, times, given[1]))
+    )
     run = forward(pushed, end=0.3, output_step=5e-4, method=RK4(1.25e-4), stabilisation=FINE)
     drivers = tuple(Driver(f"d_{n}", n, recorded(run.time, run[f"{n}.angle"], degree=7)) for n in ("shoulder", "elbow"))
     known = replace(scene, drivers=drivers)
@@ -193,7 +203,9 @@ MOTOR = JointForce("motor", "bearing")
 def test_hub_angle_known_is_causal():
     """The moment found at the hub, fed to a forward run, turns the hub as prescribed."""
     angle = rest_to_rest(1.0, 0.6)
-    found = mixed(one_link(Driver("turn", "bearing", angle)), unknown=(MOTOR,), end=0.8, output_step=1e-3, method=RK4(2.5e-4))
+    found = mixed(
+        one_link(Driver("turn", "bearing", angle)), unknown=(MOTOR,), end=0.8, output_step=1e-3, method=RK4(2.5e-4)
+    )
     scene = replace(one_link(), loads=as_loads(one_link(), MOTOR, found.time, found["motor.effort"]))
     run = forward(scene, end=0.8, output_step=0.05, method=RK4(2.5e-4))
     np.testing.assert_allclose(run["bearing.angle"], found["bearing.angle"][::50], atol=1e-6)
@@ -211,8 +223,15 @@ def test_tip_path_known_needs_the_moment_before_the_motion():
     assert np.abs(found["arm.tip.position.y"][before]).max() < 1e-9
     start = scene_at(one_link(), found, 0)
     fed = replace(start, loads=as_loads(start, MOTOR, found.time, moment))
-    rows = int(round((found.time[-1] - found.time[0]) / 5e-3))
-    run = forward(fed, start=found.time[0], end=found.time[0] + rows * 5e-3, output_step=5e-3, method=RK4(2.5e-4), stabilisation=FINE)
+    rows = round((found.time[-1] - found.time[0]) / 5e-3)
+    run = forward(
+        fed,
+        start=found.time[0],
+        end=found.time[0] + rows * 5e-3,
+        output_step=5e-3,
+        method=RK4(2.5e-4),
+        stabilisation=FINE,
+    )
     np.testing.assert_allclose(run["arm.tip.position.y"], found["arm.tip.position.y"], atol=4e-7)
 
 
@@ -245,7 +264,9 @@ def two_carts(*drivers) -> Scene:
 
 def test_a_force_without_influence_is_named():
     scene = two_carts(Driver("go", "rail1", polynomial(0, 0, 1.0), "stroke"))
-    with pytest.raises(InputError, match=r"no force changes the acceleration .*go: stroke.*, and .*\(push2\) changes none"):
+    with pytest.raises(
+        InputError, match=r"no force changes the acceleration .*go: stroke.*, and .*\(push2\) changes none"
+    ):
         mixed(scene, unknown=(JointForce("push2", "rail2", "stroke"),), end=1.0, output_step=0.1)
 
 

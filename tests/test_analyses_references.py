@@ -1,7 +1,7 @@
 """Andrews' squeezing mechanism: seven bodies, ten revolute joints, one spring, driven by a constant moment.
 
 IVP Test Set (F. Mazzia, C. Magherini, University of Bari), problem "Andrews' squeezing mechanism"; IFToMM benchmark A03. The
-seven angles at t = 0.03 s come from two independent integrations that agree to 1e-12; the published digits are right to 1e-10.
+seven angles at t = 0.03 s come from two independent integrations that agree to 1e-12; published digits are right to 1e-10.
 """
 
 from __future__ import annotations
@@ -19,7 +19,19 @@ from ffr_dyn.stabilisation import Projection
 from ffr_prep.body import rigid_body
 
 A, B, C = (-0.06934, -0.00227), (-0.03635, 0.03273), (0.014, 0.072)
-D, DA, E, EA, RR, RA, SS, SA, SB, SC, SD = 0.028, 0.0115, 0.02, 0.01421, 0.007, 0.00092, 0.035, 0.01874, 0.01043, 0.018, 0.02
+D, DA, E, EA, RR, RA, SS, SA, SB, SC, SD = (
+    0.028,
+    0.0115,
+    0.02,
+    0.01421,
+    0.007,
+    0.00092,
+    0.035,
+    0.01874,
+    0.01043,
+    0.018,
+    0.02,
+)
 TA, TB, U, UA, UB, ZF, ZT, FA = 0.02308, 0.00916, 0.04, 0.01228, 0.00449, 0.02, 0.04, 0.01421
 MASS = (0.04325, 0.00365, 0.02373, 0.00706, 0.0705, 0.00706, 0.05498)
 INERTIA = (2.194e-6, 4.41e-7, 5.255e-6, 5.667e-7, 1.169e-5, 5.667e-7, 1.912e-5)
@@ -36,7 +48,15 @@ END = {
 def andrews() -> Scene:
     """Joints carry the names of the angles; P is where the second, third, fourth and sixth body meet."""
     q = START
-    total = (q["beta"], q["beta"] + q["theta"], q["gamma"], q["phi"] + q["delta"], q["delta"], q["omega"] + q["epsilon"], q["epsilon"])
+    total = (
+        q["beta"],
+        q["beta"] + q["theta"],
+        q["gamma"],
+        q["phi"] + q["delta"],
+        q["delta"],
+        q["omega"] + q["epsilon"],
+        q["epsilon"],
+    )
     local = (
         ((RA, 0), {"o": (0, 0), "b": (RR, 0)}),
         ((-DA, 0), {"b": (0, 0), "p": (-D, 0)}),

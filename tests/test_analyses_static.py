@@ -92,7 +92,10 @@ def test_a_driven_scene_is_held_by_its_driver():
     """The crank held at an angle: the motor's moment is what the weights give by virtual work."""
     scene = slider_crank(0.2, 0.7, Driver("motor", "main", polynomial(0.7, 3.0)))
     result = static(scene, time=0.0)
-    energy = [static(replace(scene, drivers=(Driver("motor", "main", polynomial(a)),)))["energy.total"][0] for a in (0.6999, 0.7001)]
+    energy = [
+        static(replace(scene, drivers=(Driver("motor", "main", polynomial(a)),)))["energy.total"][0]
+        for a in (0.6999, 0.7001)
+    ]
     assert result["motor.effort"][0] == pytest.approx((energy[1] - energy[0]) / 2e-4, rel=1e-6)
 
 

@@ -32,7 +32,9 @@ class JointForce:
 
     def __post_init__(self) -> None:
         if self.coordinate not in ("angle", "stroke"):
-            raise InputError(f"joint force {self.name!r}: coordinate must be 'angle' or 'stroke', not {self.coordinate!r}")
+            raise InputError(
+                f"joint force {self.name!r}: coordinate must be 'angle' or 'stroke', not {self.coordinate!r}"
+            )
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,9 @@ def joint_named(scene: Scene, name: str, who: str) -> Joint:
     for joint in scene.joints:
         if joint.name == name:
             return joint
-    raise InputError(f"{who}: there is no joint {name!r}; there are {', '.join(j.name for j in scene.joints) or 'none'}")
+    raise InputError(
+        f"{who}: there is no joint {name!r}; there are {', '.join(j.name for j in scene.joints) or 'none'}"
+    )
 
 
 def unit(actuator: Actuator) -> str:

@@ -12,6 +12,7 @@ converges slowly. (Devasia, Chen & Paden, IEEE Transactions on Automatic Control
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,8 +37,7 @@ SLOW = 0.3  # contraction, beyond which the matrices along the path are renewed
 class Bounded:
     """Settings of the bounded solution.
 
-    before, after : times [s] added to the known motion; default: 25 e-folds of the slowest unstable (before) or stable (after)
-                    internal motion
+    before, after : times [s] added to the known motion; default: 25 e-folds of the slowest motion that grows or decays
     parts         : of an output step, for collocation
     """
 
@@ -48,7 +48,7 @@ class Bounded:
 
 @dataclass(frozen=True)
 class _End:
-    """An equilibrium w of the internal dynamics with its state x, matrix A, and left bases of growing and other directions."""
+    """An equilibrium w of the internal dynamics with its state x, matrix A, left bases of growing and other directions."""
 
     w: Array
     x: Array
@@ -69,8 +69,8 @@ def bounded_solution(
     first, last = (_end(own, *route[k]) for k in (0, -1))
     if first.growing.shape[0] + last.other.shape[0] != w.size or first.growing.shape != last.growing.shape:
         raise SimulationError(
-            f"the internal dynamics have {first.growing.shape[0]} growing motions at the start and {last.growing.shape[0]} at "
-            "the end: there is no bounded solution that belongs to both"
+            f"the internal dynamics have {first.growing.shape[0]} growing motions at the start and "
+            f"{last.growing.shape[0]} at the end: there is no bounded solution that belongs to both"
         )
     before = _whole(FOLDS / first.slowest if settings.before is None else settings.before, output_step)
     after = _whole(FOLDS / last.slowest if settings.after is None else settings.after, output_step)
@@ -186,7 +186,7 @@ def _residual(
     return np.concatenate([ends, defects.ravel()]), xs
 
 
-def _linear(times: Array, A: Array, first: _End, last: _End):  # type: ignore[no-untyped-def]
+def _linear(times: Array, A: Array, first: _End, last: _End) -> Callable[[Array], Array]:
     """Solver for the linearised residual with matrices A (T, 2 d, 2 d) at the times."""
     size, count, one = A.shape[1], times.size, np.eye(A.shape[1])
     rows, columns, values = [], [], []

@@ -165,7 +165,8 @@ def product(p: Array, r: Array) -> Array:
     a, b, c, d = p.tolist()
     e, f, g, h = r.tolist()
     out = np.array([
-        a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g, a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e
+        a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g,
+        a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e,
     ])  # fmt: skip
     return out / np.sqrt(out @ out)
 

@@ -50,7 +50,7 @@ def inverse(
     end: float,
     output_step: float,
     start: float = 0.0,
-    elastic: Dynamic | QuasiStatic = Dynamic(),  # noqa: B008 - frozen
+    elastic: Dynamic | QuasiStatic = Dynamic(),
     path: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Result:
@@ -68,7 +68,9 @@ def inverse(
         scene, end=end, output_step=output_step, method=elastic.method, start=start,
         stabilisation=elastic.stabilisation, outputs=outputs(scene), path=path, progress=progress,
     )  # fmt: skip
-    named = Result(result.time, result.quantities, result.geometry, result.attributes | {"analysis": "inverse dynamics"})
+    named = Result(
+        result.time, result.quantities, result.geometry, {**result.attributes, "analysis": "inverse dynamics"}
+    )
     return with_quantities(named, efforts(flattened(scene, start)[0], named), path)
 
 

@@ -191,8 +191,8 @@ def _recorded(assembled: Assembled, poses: list[_Pose]) -> Record:
         now = evaluate(at, pose.time, pose.x, v)
         if now.singular or pose.conditioning < SINGULAR * best:
             raise SimulationError(
-                f"at t = {pose.time:.6g} s the position is singular: the drivers do not determine the motion of {pose.joint}; "
-                "choose output times that miss it, or drive another joint"
+                f"at t = {pose.time:.6g} s the position is singular: the drivers do not determine the motion of "
+                f"{pose.joint}; choose output times that miss it, or drive another joint"
             )
         rows.append(copied(at.record))
     return with_all_reactions(assembled, RK4(1.0), joined(rows))

@@ -187,7 +187,9 @@ def _output_matrices(
 def _scalar(result: Result, name: str) -> float:
     values = result[name]
     if values.ndim != 1:
-        raise InputError(f"output {name!r} has several components; name one, such as {next(result.components([name]))!r}")
+        raise InputError(
+            f"output {name!r} has several components; name one, such as {next(result.components([name]))!r}"
+        )
     return float(values[0])
 
 
@@ -208,7 +210,11 @@ def as_result(scene: Scene, found: Linearisation, time: float = 0.0) -> Result:
         "frequencies": Quantity(found.frequencies[None], "Hz", (modes,), "of the damped vibration"),
         "damping_ratios": Quantity(found.damping_ratios[None], "1", (modes,), "-Re / modulus of the eigenvalues"),
     }
-    matrices = (("B", found.B, (states, found.inputs)), ("C", found.C, (found.outputs, columns)), ("D", found.D, (found.outputs, found.inputs)))
+    matrices = (
+        ("B", found.B, (states, found.inputs)),
+        ("C", found.C, (found.outputs, columns)),
+        ("D", found.D, (found.outputs, found.inputs)),
+    )
     for name, matrix, axes in matrices:
         if matrix.size:
             labelled = tuple(a if isinstance(a, Axis) else Axis(_AXES[a is found.inputs], _labels(a)) for a in axes)

@@ -1,7 +1,7 @@
 """Mixed dynamics: some motions known, equally many forces unknown; both the rest of the motion and the forces are wanted.
 
-*Collocated*: each unknown force acts along a known motion. It is the multiplier of that motion's row, and the run is a forward
-run with drivers (Antonya's partitioning, in multiplier form).
+*Collocated*: each unknown force acts along a known motion. It is the multiplier of that motion's row, and the run is a
+forward run with drivers (Antonya's partitioning, in multiplier form).
 *Not collocated*: servo constraints (`servo`). Their internal dynamics may be unstable - a flexible arm whose tip is known and
 whose hub is driven - and then no integration from the start can be trusted. The bounded solution is found instead, over all
 times at once: it starts at rest before the known motion does, and ends at rest after it (`bounded`).
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -96,7 +97,9 @@ def _known(scene: Scene, known: tuple[str, ...] | None) -> tuple[str, ...]:
 # ---- collocated ------------------------------------------------------------------------------------------------------
 
 
-def _collocated(scene: Scene, names: tuple[str, ...], unknown: tuple[Actuator, ...]) -> dict[str, tuple[str, float]] | None:
+def _collocated(
+    scene: Scene, names: tuple[str, ...], unknown: tuple[Actuator, ...]
+) -> dict[str, tuple[str, float]] | None:
     """For each unknown force the driver along which it acts and its sign; None unless every known motion has its force."""
     drivers = {driver.name: driver for driver in scene.drivers if driver.name in names}
     pairs: dict[str, tuple[str, float]] = {}
@@ -112,7 +115,10 @@ def _collocated(scene: Scene, names: tuple[str, ...], unknown: tuple[Actuator, .
 def _along(driver: Driver | PointDriver, actuator: Actuator) -> float:
     """1 or -1 where the force acts along the driven coordinate, else 0."""
     if isinstance(driver, Driver):
-        same = isinstance(actuator, JointForce) and (actuator.joint, actuator.coordinate) == (driver.joint, driver.coordinate)
+        same = isinstance(actuator, JointForce) and (actuator.joint, actuator.coordinate) == (
+            driver.joint,
+            driver.coordinate,
+        )
         return float(same)
     components = [c for c in "xyz" if getattr(driver, c) is not None]
     alone = len(components) == 1 and driver.i.partition(".")[0] == GROUND
@@ -122,9 +128,7 @@ def _along(driver: Driver | PointDriver, actuator: Actuator) -> float:
     return float(along) if actuator.axes == "global" and abs(abs(along) - 1) < 1e-15 else 0.0
 
 
-def _named(
-    scene: Scene, result: Result, partners: dict[str, tuple[str, float]], path: str | Path | None
-) -> Result:
+def _named(scene: Scene, result: Result, partners: dict[str, tuple[str, float]], path: str | Path | None) -> Result:
     """The drivers' efforts under the names of the unknown forces."""
     found = efforts(scene, result)
     for force, (driver, sign) in partners.items():
@@ -136,7 +140,7 @@ def _named(
             effort = replace(found[f"{driver}.effort"], description=f"effort that realises {driver}")
         found[f"{force}.effort"] = effort
         found[f"{force}.power"] = result.quantity(f"{driver}.power")
-    attributes = result.attributes | {"analysis": "mixed dynamics, collocated"}
+    attributes = {**result.attributes, "analysis": "mixed dynamics, collocated"}
     return with_quantities(Result(result.time, result.quantities, result.geometry, attributes), found, path)
 
 
@@ -155,7 +159,9 @@ def _not_collocated(
     start, end, output_step = span
     stiffened = [b.name for b in scene.bodies if b.stiffening and b.model.stiffening is not None]
     if stiffened:
-        raise InputError(f"servo constraints need bodies without geometric stiffening: set stiffening=False of {stiffened}")
+        raise InputError(
+            f"servo constraints need bodies without geometric stiffening: set stiffening=False of {stiffened}"
+        )
     assembled = assemble(scene, time=start)
     own = servo(assembled, names, unknown, (start, end))
     w = internal_values(own, assembled.x, assembled.v)
@@ -183,7 +189,7 @@ def _not_collocated(
 def _solution(
     own: Servo, start: float, end: float, w: Array, x: Array, wanted: Causal | Bounded | None
 ) -> Causal | Bounded:
-    """What was asked for, or what the internal dynamics at the start allow. SimulationError for a causal run into instability."""
+    """What was asked for, or what the internal dynamics allow at the start; SimulationError for a causal run they do not."""
     if isinstance(wanted, Bounded) or own.size == 0:
         return wanted or Causal()
     causal = wanted or Causal()
@@ -215,7 +221,7 @@ def _integrated(
         for time in times[1:]:
             xs.append(at_moment(own, float(time), w, xs[-1]).x)
         return np.zeros((times.size, 0)), xs
-    for before, time in zip(times[:-1], times[1:], strict=True):
+    for before, time in pairwise(times):
         solver = DOP853(right, float(before), ws[-1], float(time), rtol=causal.tolerance, atol=causal.tolerance * 1e-2)
         while solver.status == "running":
             message = solver.step()
@@ -252,5 +258,7 @@ def _recorded(
     u = np.array([moment.u for moment in moments])
     found = {}
     for k, actuator in enumerate(own.unknown):
-        found[f"{actuator.name}.effort"] = Quantity(u[:, k], unit(actuator), (), "effort that realises the known motions")
+        found[f"{actuator.name}.effort"] = Quantity(
+            u[:, k], unit(actuator), (), "effort that realises the known motions"
+        )
     return with_quantities(result, found, path)

@@ -11,7 +11,7 @@ from ffr_dyn.analyses.evaluation import free_motions, locked, total_mass_matrix,
 from ffr_dyn.constraints import evaluate_word
 from ffr_dyn.equations import Block
 from ffr_dyn.errors import InputError
-from ffr_dyn.joints import COORDINATES, F, G, H, RELATION, Joint, Word, frames
+from ffr_dyn.joints import COORDINATES, RELATION, F, G, H, Joint, Word, frames
 from ffr_dyn.layout import Layout, layout
 from ffr_dyn.scene import Scene, marker_number
 
@@ -56,7 +56,9 @@ class Mobility:
     def lines(self) -> list[str]:
         """The report, a line each."""
         rigid = self.degrees_of_freedom - self.elastic
-        about = f"{self.degrees_of_freedom} degrees of freedom" + (f", {self.elastic} of them elastic coordinates" * bool(self.elastic))
+        about = f"{self.degrees_of_freedom} degrees of freedom" + (
+            f", {self.elastic} of them elastic coordinates" * bool(self.elastic)
+        )
         said = [about if rigid >= 0 else f"{about}; joints and drivers deform bodies in {-rigid} ways"]
         if self.plane != "none":
             said.append(f"planar       normal {self.plane}")

@@ -52,7 +52,7 @@ def with_quantities(result: Result, more: dict[str, Quantity], path: str | Path 
 
 
 def efforts(scene: Scene, result: Result) -> dict[str, Quantity]:
-    """"driver.effort" [N m or N] of every driven joint coordinate: what acts along it on the second body.
+    """ "driver.effort" [N m or N] of every driven joint coordinate: what acts along it on the second body.
 
     scene : as it was computed, a planar one with its in-plane modes
     """

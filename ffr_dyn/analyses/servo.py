@@ -39,7 +39,7 @@ from ffr_dyn.drivers import Driver, driver_word
 from ffr_dyn.equations import Block, compile_scene
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.forces import Load
-from ffr_dyn.joints import COORDINATES
+from ffr_dyn.joints import COORDINATES, Word
 from ffr_dyn.scene import Scene, marker_number
 from ffr_dyn.timefunction import polynomial
 
@@ -79,7 +79,7 @@ class Servo:
 
 @dataclass(frozen=True)
 class Moment:
-    """The scene at one time: x, v (global), accelerations (V,) in body axes, efforts u, y_ddot; sigma of the known motions."""
+    """The scene at one time: x, v (global), accelerations (V,) in body axes, efforts u, y_ddot, sigma of known motions."""
 
     x: Array
     v: Array
@@ -110,7 +110,9 @@ def servo(
     ordered, rows = list(system.blocks), system.model.rows
     inner_rows = _rows_of(ordered, tuple(block.name for block in inner))
     known_rows = _rows_of(ordered, known)
-    plant_rows = np.setdiff1d(np.arange(rows.kind.size + locked(system.layout).size), np.concatenate([inner_rows, known_rows]))
+    plant_rows = np.setdiff1d(
+        np.arange(rows.kind.size + locked(system.layout).size), np.concatenate([inner_rows, known_rows])
+    )
     data = system.model.functions.start[rows.function[inner_rows]]
     return Servo(
         evaluator(system), chosen, plant_rows, known_rows, inner_rows, np.array(elastic, dtype=int), data, span, names
@@ -197,7 +199,9 @@ def _combination(weights: Array, names: list[str]) -> str:
 # ---- internal coordinates --------------------------------------------------------------------------------------------
 
 
-def _internal(scene: Scene, assembled: Assembled, now: Evaluation, M: Array):  # type: ignore[no-untyped-def]
+def _internal(
+    scene: Scene, assembled: Assembled, now: Evaluation, M: Array
+) -> tuple[list[tuple[tuple[int, int], Word]], list[int], tuple[str, ...]]:
     """Words (with markers) of internal joint coordinates, numbers of internal elastic ones, and the names of all."""
     place = assembled.system.layout
     Z = free_motions(now.jacobian, M)
@@ -323,7 +327,9 @@ def _accelerated(own: Servo, at: Evaluator, now: Evaluation, x: Array, v: Array,
     try:
         found = np.linalg.solve(matrix, np.concatenate([now.force, gamma[own.plant], gamma[own.known]]))
     except np.linalg.LinAlgError:
-        raise SimulationError("the unknown forces no longer determine the known motions at a position on the way") from None
+        raise SimulationError(
+            "the unknown forces no longer determine the known motions at a position on the way"
+        ) from None
     acceleration = found[:V]
     joints = now.jacobian[own.inner] @ acceleration - gamma[own.inner]
     y_ddot = np.concatenate([joints, acceleration[own.elastic]])

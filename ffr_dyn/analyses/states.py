@@ -47,7 +47,8 @@ def _held_joint(joint: Joint, time: float) -> Joint:
 def _held_driver(driver: Driver | PointDriver, time: float) -> Driver | PointDriver:
     if isinstance(driver, Driver):
         return replace(driver, function=constant(_value(driver.function, time)))
-    return replace(driver, **{c: _value(f, time) for c in "xyz" if (f := getattr(driver, c)) is not None})
+    still: dict[str, Any] = {c: _value(f, time) for c in "xyz" if (f := getattr(driver, c)) is not None}
+    return replace(driver, **still)
 
 
 def _value(function: Any, time: float) -> float:
