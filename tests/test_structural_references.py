@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +13,11 @@ from boxes import box_mesh, rotation
 from numpy.polynomial import Polynomial
 from test_plates import rigid_coordinates, solved
 
-from ffr_prep.body import FlexibleBody
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.integrators import ROS2
+from ffr_dyn.joints import Joint
+from ffr_dyn.scene import Body, Scene
+from ffr_prep.body import FlexibleBody, with_point
 from ffr_prep.errors import InputError
 from ffr_prep.families import families
 from ffr_prep.frame import Frame, Member, Shell, named, panel, polyline, triangulated
@@ -214,6 +219,36 @@ def test_a_cantilever_is_one_body_in_three_theories(kind):
     spun = other.stiffening[8][np.ix_(b, b)] * np.outer(sign, sign)  # the product of the angular velocity about z
     expected = one.stiffening[8][np.ix_(a, a)]
     np.testing.assert_allclose(spun, expected, atol=0.01 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("cut", [triangulated, lambda frame: frame], ids=["triangles", "quadrilaterals"])
+def test_flexible_pendulum_of_plates(cut):
+    """A plate 0.2 m wide and 9 mm thick on a hinge, against the linear floating-frame beam (see the data file)."""
+    corners = [(0, 0, -0.1), (1.2, 0, -0.1), (1.2, 0, 0.1), (0, 0, 0.1)]
+    frame = cut(panel(corners, Shell(0.009, Material("metal", 7e10, 0.0, 5540.0), gyration=0.0), elements=(30, 2)))
+    x = frame.points[:, 0]
+    frame = replace(frame, node_groups={"root": np.flatnonzero(x < 1e-9), "tip": np.flatnonzero(x > 1.2 - 1e-9)})
+    rod = reduce_frame(
+        frame,
+        name="rod",
+        interfaces=[InterfaceRegion("root"), InterfaceRegion("tip")],
+        reference=SimplySupported("root", "tip"),
+        reduction=CraigBampton(6),
+    )
+    scene = Scene(
+        (Body("rod", with_point(rod, "middle", np.array((0.6, 0.0045, 0)))),),
+        (Joint("hinge", "revolute", "ground.O", "rod.root"),),
+        ground={"O": (0, 0, 0)},
+        gravity=(0.0, -9.81, 0.0),
+    )
+    result = forward(scene, end=0.5, output_step=0.01, method=ROS2(1e-4))
+    expected = np.loadtxt(Path(__file__).parent / "reference" / "pendulum_linear.csv", delimiter=",")
+    root, middle, tip = (result[f"rod.{name}.position"][:, :2] for name in ("root", "middle", "tip"))
+    along = (tip - root) / np.linalg.norm(tip - root, axis=1)[:, None]
+    deflection = along[:, 0] * (middle - root)[:, 1] - along[:, 1] * (middle - root)[:, 0] - 0.0045
+    assert np.abs(deflection).max() > 1e-3
+    np.testing.assert_allclose(result["rod.tip.position"][:, :2], expected[:, 1:3], atol=2e-5)
+    np.testing.assert_allclose(deflection, expected[:, 3], atol=2e-5)
 
 
 # ---- mean interfaces --------------------------------------------------------------------------------------------------
