@@ -25,6 +25,7 @@ from ffr_dyn.timefunction import POLYNOMIAL, TimeFunction, evaluate
 Array = np.ndarray
 
 TOLERANCE = 1e-11  # of Phi [m, -] and of its rate
+ASKED = 1e-6  # of a row across the plane at random speeds of about one; modes carry rounding of 1e-9
 RANK_TOLERANCE = 1e-8  # of a row's independent part, relative to the row
 ITERATIONS = 100
 RELAXATION = 1e-8  # of dependent rows, relative
@@ -127,7 +128,7 @@ def _across(scene: Scene, blocks: list[Block], time: float) -> tuple[list[bool],
     across = most_inside <= RANK_TOLERANCE * most_outside
     mixed = ~across & (most_outside > RANK_TOLERANCE * most_inside)
     moving = np.array([_changes(word.function) for block in blocks for word in block.words], bool)
-    asked = (most_left[across] >= RANK_TOLERANCE).any() or moving[across].any()
+    asked = (most_left[across] >= ASKED).any() or moving[across].any()
     return across.tolist(), not (mixed.any() or asked)
 
 

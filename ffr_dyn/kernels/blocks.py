@@ -12,7 +12,7 @@ from ffr_dyn.kernels.vectors import rigid_lower, solve_lower, solve_upper
 FLOOR = 1e-13
 
 
-@kernel
+@inlined
 def eliminate_side(first, last, side, flexible, normal, P, L, mass, turning, all_jac, all_rr, all_ww, scale):
     """Rows first ... last of one side: rr = rigid part after elimination of the elastic coordinates, ww = L^-1 rr.
 
@@ -43,7 +43,7 @@ def six(matrix, r, jac):
     )  # fmt: skip
 
 
-@kernel
+@inlined
 def add_pair(starts, pair, flexible, phiphi, ww, jac, S):
     """Add the coupling of two block sides on one body to its block of S."""
     later, side_a, earlier, side_b, offset = pair[0], pair[1], pair[2], pair[3], pair[4]

@@ -12,7 +12,7 @@ def shapes(markers, k, n):
     return markers.phi[start : start + 6 * n]
 
 
-@kernel
+@inlined
 def update_marker(where, markers, w, A, omega, x, v, k):
     """Position, velocity, bias acceleration and elastic rotation of marker k; A, omega those of its body."""
     b = markers.body[k]

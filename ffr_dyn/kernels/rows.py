@@ -15,7 +15,7 @@ from ffr_dyn.kernels.vectors import add, cross, dot, get, scale, subtract, to_bo
 ZERO = (0.0, 0.0, 0.0)
 
 
-@kernel
+@inlined
 def coincidence(w, i, j, c, drive):
     """(r_j - r_i)_c = s(t)."""
     ei, ej = get(w.A[i], c), get(w.A[j], c)
@@ -144,8 +144,6 @@ def fill_side(jac, factor, side):
 @kernel
 def row_of(kind, axes, drive, w, i, j):
     """The row of one word."""
-    if kind == COINCIDENCE:
-        return coincidence(w, i, j, int(axes[0, 0]), drive)
     if kind == DOT_1:
         return dot_1(w, i, j, get(axes, 0), get(axes, 2))
     if kind == DOT_2:
@@ -165,6 +163,12 @@ def evaluate_block(rows, functions, markers, w, k):
             drive = get(functions, rows.function[row])
         if rows.kind[row] == RELATION:
             fill_relation(rows.axes[row], rows.relation[row], drive, markers, rows.marker[k], w, row)
+            continue
+        if rows.kind[row] == COINCIDENCE:
+            Phi, nu, gamma, side_i, side_j = coincidence(markers, i, j, int(rows.axes[row, 0, 0]), drive)
+            w.Phi[row], w.nu[row], w.gamma[row] = Phi, nu, gamma
+            fill_side(w.jac[row, 0], 1.0, side_i)
+            fill_side(w.jac[row, 1], 1.0, side_j)
             continue
         Phi, nu, gamma, side_i, side_j = row_of(rows.kind[row], rows.axes[row], drive, markers, i, j)
         w.Phi[row], w.nu[row], w.gamma[row] = Phi, nu, gamma
