@@ -1,4 +1,4 @@
-"""A scene as the text of a scene file, which reads back as the same scene to the bit."""
+"""A scene as the text of a scene file, which reads back as the same scene to the bit (a constant function as its number)."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ from ffr_dyn.scene_file import Settings, load_scene
 from ffr_dyn.scene_schema import TABLES, schema
 from ffr_dyn.scene_text import save_scene, to_toml
 from ffr_dyn.stabilisation import Baumgarte, Drifting, Projection
-from ffr_dyn.timefunction import constant, evaluate, harmonic, polynomial, table
+from ffr_dyn.timefunction import evaluate, harmonic, polynomial, table
 from ffr_prep.body import rigid_body, save_body
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -289,7 +289,7 @@ def rich() -> Scene:
         ),
         couplings=(Coupling("gear", "j1.angle", "j2.angle", -1 / 3, 1e-300),),
         loads=(
-            Load("push", "two.a", force=(1.0, formula("smooth(t)"), 0.0), moment=(0, 0, constant(3.0)), axes="body"),
+            Load("push", "two.a", force=(1.0, formula("smooth(t)"), 0.0), moment=(0, 0, 3.0), axes="body"),
             Load("pull", "one.a"),
         ),
         springs=(SpringDamper("rope", "ground.O", "two.a", 1 / 3, preload=2.0),),
