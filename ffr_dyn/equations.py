@@ -163,9 +163,11 @@ def _bodies(scene: Scene, place: Layout) -> Bodies:
     models = [body.model for body in scene.bodies]
     n = [m.n for m in models]
     stiffening = [_stiffening(body) for body in scene.bodies]
-    where = np.zeros((len(n) + 1, 7), dtype=np.int64)
+    where = np.full((len(n) + 1, 8), -1, dtype=np.int64)
+    where[-1, :7] = 0
     starts = [_starts(n)[:-1], _starts([9 * k * k for k in n])[:-1], _starts([s.size for s in stiffening])[:-1]]
-    where[:-1] = np.column_stack([n, place.ix, place.iv, *starts, [len(s) for s in stiffening]])
+    where[:-1, :7] = np.column_stack([n, place.ix, place.iv, *starts, [len(s) for s in stiffening]])
+    where[:-1, 7] = place.normals
     where[-1, 3] = sum(n)
     return Bodies(
         where=where,
@@ -440,7 +442,7 @@ def new_work(m: Model) -> Work:
     )
     vectors = zeros(omega=(M, 3), r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3), load=(M, 6))
     rows = RowWork(
-        **zeros(Phi=C, nu=C, gamma=C, lam=C, step=C, jac=(C, D, 9), rr=(C, D, 6), ww=(C, D, 6)),
+        **zeros(Phi=C, nu=C, gamma=C, lam=C, step=C, scale=C, jac=(C, D, 9), rr=(C, D, 6), ww=(C, D, 6)),
         **zeros(P=(M, 6, 6), phiphi=(pairs, 6, 6), S=stored),
     )
     return Work(
@@ -448,7 +450,7 @@ def new_work(m: Model) -> Work:
         markers=MarkerWork(A=_identities(M), **vectors),
         rows=rows,
         info=np.zeros(4, dtype=np.int64),
-        independence=np.array([1.0, 1.0, 0.0, 0.0]),
+        independence=np.ones(3),
         **zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=2),
     )
 

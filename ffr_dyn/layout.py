@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ffr_dyn.plane import AXES, body_normal
 from ffr_dyn.scene import Scene
 
 Array = np.ndarray
@@ -13,13 +14,17 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Layout:
-    """Where each body's coordinates begin in x and v, and how many elastic coordinates it has."""
+    """Where each body's coordinates begin in x and v, how many elastic coordinates it has, and what may move.
+
+    normals : per body, the body axis along the normal of a planar scene, or -1
+    """
 
     n: tuple[int, ...]
     ix: tuple[int, ...]
     iv: tuple[int, ...]
     x_size: int
     v_size: int
+    normals: tuple[int, ...]
 
     def R(self, b: int) -> slice:
         return slice(self.ix[b], self.ix[b] + 3)
@@ -43,13 +48,19 @@ class Layout:
         """R_dot and omega_bar together."""
         return slice(self.iv[b], self.iv[b] + 6)
 
+    def active(self, b: int) -> list[int]:
+        """The rigid coordinates of body b that may move (body axes, among its velocities): all six, or three in a plane."""
+        k = self.normals[b]
+        return list(range(6)) if k < 0 else [c for c in range(3) if c != k] + [3 + k]
+
 
 def layout(scene: Scene) -> Layout:
     """The slices of a scene."""
     n = tuple(body.model.n for body in scene.bodies)
     ix = tuple(int(k) for k in np.cumsum([0, *(7 + k for k in n)]))
     iv = tuple(int(k) for k in np.cumsum([0, *(6 + k for k in n)]))
-    return Layout(n, ix[:-1], iv[:-1], ix[-1], iv[-1])
+    normals = [body_normal(b, AXES.index(scene.plane)) if scene.plane in AXES else -1 for b in scene.bodies]
+    return Layout(n, ix[:-1], iv[:-1], ix[-1], iv[-1], tuple(normals))
 
 
 def initial_state(scene: Scene, place: Layout) -> tuple[Array, Array]:

@@ -71,6 +71,9 @@ class Scene:
 
     ground  : name -> (3,) [m], points fixed in the global frame
     gravity : (3,) [m/s^2], global
+    plane   : "auto" finds out whether the scene is planar and then computes in the plane alone (see `ffr_dyn.plane`);
+              "x", "y" or "z", its normal, declares it, so that modes mostly in the plane are kept and the rest is left
+              out even where it is small only; "none" computes in space
     """
 
     bodies: tuple[Body, ...]
@@ -83,6 +86,7 @@ class Scene:
     ground: Mapping[str, Any] = field(default_factory=dict)
     gravity: Any = (0.0, 0.0, 0.0)
     name: str = "scene"
+    plane: str = "auto"
 
     def __post_init__(self) -> None:
         for key in ("bodies", "joints", "drivers", "couplings", "loads", "springs", "measurements"):
@@ -90,6 +94,8 @@ class Scene:
         points = {key: _vector(at, 3, f"ground point {key!r}") for key, at in self.ground.items()}
         object.__setattr__(self, "ground", points)
         object.__setattr__(self, "gravity", _vector(self.gravity, 3, "gravity"))
+        if self.plane not in ("auto", "x", "y", "z", "none"):
+            raise InputError(f"plane is {self.plane!r}; it must be 'auto', 'none', or the normal 'x', 'y' or 'z'")
         if not self.bodies:
             raise InputError("a scene needs at least one body")
         _check_names(self)

@@ -181,14 +181,19 @@ def _peak_picture(result: Result, body: str, spots: Sequence[HotSpot], quantity:
     shades = measure_colours(of, largest, frozenset([body]), lambda solid, frame: values) if largest else None
     numbered = {str(k + 1): np.array(s.position) for k, s in enumerate(spots) if s.body == body}
     shown = film_at(_at_rest(result, body), np.zeros(1), scale=0.0, colour="body")
-    heading = f"{body}: largest {of.words} of the run"  # in size, wherever it has a sign
-    shown = replace(shown, colouring=shades, marks=numbered, heading=heading)
+    shown = replace(shown, colouring=shades, marks=numbered, heading=_heading(result, body, of.words))
     camera = _view(shown.high - shown.low, next(iter(numbered.values()), shown.centre) - shown.centre)
     (picture,) = pictures(shown, camera, _SIZE)
     temporary = path.with_name(path.name + ".part")
     Image.fromarray(picture).save(temporary, "PNG")
     os.replace(temporary, path)
     return path
+
+
+def _heading(result: Result, body: str, words: str) -> str:
+    factor, unit = readable("s", float(result.time[-1]))
+    first, last = factor * result.time[[0, -1]]
+    return f"{body}: largest {words} from {first:.4g} to {last:.4g} {unit}"
 
 
 def _at_rest(result: Result, body: str) -> Result:

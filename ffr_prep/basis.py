@@ -19,7 +19,7 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from ffr_prep.errors import ComputationError
-from ffr_prep.factor import FreeBody, free_body
+from ffr_prep.factor import CHOLESKY, FreeBody, Solver, free_body
 from ffr_prep.interface import CoupledModel
 
 Array = np.ndarray
@@ -44,9 +44,9 @@ class Basis:
     warnings: tuple[str, ...] = ()
 
 
-def factorised(model: CoupledModel) -> FreeBody:
+def factorised(model: CoupledModel, solver: Solver = CHOLESKY) -> FreeBody:
     """The one factorisation that serves modes, static shapes, stiffening loads and error reports of a model."""
-    return free_body(model.K, model.T, model.places)
+    return free_body(model.K, model.T, model.places, solver)
 
 
 # ---- from vectors to a basis --------------------------------------------------------------------------------------

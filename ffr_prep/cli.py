@@ -11,12 +11,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from ffr_prep.cli_conversion import convert
 from ffr_prep.cli_interchange import export_body, import_body
 from ffr_prep.cli_matrices import reduce_matrices_command
+from ffr_prep.cli_reduction import NOTES as REDUCTION_NOTES
+from ffr_prep.cli_reduction import band_of, draw_quality, reduction_of, reduction_options
+from ffr_prep.cli_solver import solver_of, solver_options
 from ffr_prep.cli_structure import reduce_structure
 from ffr_prep.errors import ComputationError, InputError
 
@@ -24,7 +28,6 @@ if TYPE_CHECKING:
     from ffr_prep.interface import InterfaceRegion
     from ffr_prep.material import Material
     from ffr_prep.mesh import Mesh
-    from ffr_prep.reduction import Reduction
     from ffr_prep.reference import ReferenceConditions
 
 EXAMPLE = """\b
@@ -55,13 +58,8 @@ Reference conditions: how the body frame is attached to the deforming body.
 With craig-bampton, choices that only remove the six rigid motions give the same answer up to second order in the
 strain. With eigenmodes the choice matters: take the one that looks like the joints.
 
-\b
-Reductions:
-  craig-bampton                  static shapes of every interface coordinate and N modes with all interfaces fixed:
-                                 for bodies that joints load, the safe choice
-  eigenmodes                     N modes under the reference conditions: for bodies without interface loads
-
-\b
+"""
+MATERIAL_NOTES = """\b
 Materials: a name (steel, aluminium, titanium, ...), or E=7e10,nu=0.3,rho=5540 in SI units; for several volumes
   --material web=steel --material rim=E=7e10,nu=0.3,rho=2700, each with the name of a volume of the mesh.
 """
@@ -112,7 +110,7 @@ def mesh(mesh: Path, unit: str | None, size: float | None, numbers: tuple[str, .
     check_mesh(loaded)
 
 
-@cli.command(epilog=REDUCE_NOTES)
+@cli.command(epilog=f"{REDUCE_NOTES}{REDUCTION_NOTES}\n{MATERIAL_NOTES}")
 @click.argument("mesh", type=_PATH)
 @click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
 @click.option("--name", help="Name of the body; default: the name of the file.")
@@ -123,10 +121,8 @@ def mesh(mesh: Path, unit: str | None, size: float | None, numbers: tuple[str, .
 @click.option("--material", "materials", multiple=True, required=True, metavar="MATERIAL", help="See below.")
 @click.option("--interface", "interfaces", multiple=True, metavar="INTERFACE", help="See below; may be repeated.")
 @click.option("--reference", default="mean-axis", show_default=True, metavar="CONDITIONS", help="See below.")
-@click.option(
-    "--method", type=click.Choice(["craig-bampton", "eigenmodes"]), default="craig-bampton", show_default=True
-)
-@click.option("--modes", type=click.IntRange(min=0), default=10, show_default=True, help="Normal modes to keep.")
+@reduction_options
+@solver_options
 @click.option(
     "--stiffening", is_flag=True, help="Also compute geometric stiffening: slender rods under load, fast blades."
 )
@@ -144,10 +140,9 @@ def reduce(
     materials: tuple[str, ...],
     interfaces: tuple[str, ...],
     reference: str,
-    method: str,
-    modes: int,
     stiffening: bool,
     stress: bool,
+    **options: Any,
 ) -> None:
     """Reduce MESH to a flexible body and write it to a file.
 
@@ -160,7 +155,8 @@ def reduce(
     from ffr_prep.report import mesh_lines, short_lines
 
     material, regions = _material(materials), [_interface(text) for text in interfaces]
-    conditions, reduction = _reference(reference), _reduction(method, modes)
+    conditions, reduction, band = _reference(reference), reduction_of(options), band_of(options)
+    solver = solver_of(options)
     parameters = _numbers(numbers)
     _check_writable(output)
     steps = Steps(visible=sys.stderr.isatty())
@@ -177,6 +173,8 @@ def reduce(
         reduction=reduction,
         stiffening=stiffening,
         stress=stress,
+        quality=band,
+        solver=solver,
         progress=steps,
         provenance={
             "source": {"file": mesh.name, "unit": unit, "size": size, "numbers": parameters, "order": order},
@@ -187,7 +185,9 @@ def reduce(
     save_body(body, output)
     steps.end()
     _print(short_lines(body))
+    draw_quality(body, options)
     click.echo(f"time        {steps.in_words()}")
+    click.echo(f"memory      {peak_memory()}")
     click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")
 
 
@@ -227,6 +227,7 @@ def modes(body: Path, output: Path, chosen: str, scale: str) -> None:
         click.echo(f"picture     {path}")
 
 
+cli.add_command(convert)
 cli.add_command(export_body)
 cli.add_command(import_body)
 cli.add_command(reduce_matrices_command)
@@ -320,12 +321,6 @@ def _supports(path: Path) -> ReferenceConditions:
     return Supports(supports)
 
 
-def _reduction(method: str, modes: int) -> Reduction:
-    from ffr_prep.reduction import CraigBampton, Eigenmodes
-
-    return CraigBampton(modes) if method == "craig-bampton" else Eigenmodes(modes)
-
-
 def _mode_numbers(text: str, count: int) -> list[int]:
     """Mode numbers from 1 of "1-4,7" or "all"; ranges may end beyond the last mode."""
     if not re.fullmatch(r"all|\d+(-\d+)?(,\d+(-\d+)?)*", text):
@@ -390,6 +385,16 @@ class Steps:
     def _tell_end(self) -> None:
         if self.visible and self.begun and self.begun[-1][0]:
             click.echo(f"{time.perf_counter() - self.begun[-1][1]:.1f} s", err=True)
+
+
+def peak_memory() -> str:
+    """The most that this process ever had in memory, in words."""
+    if sys.platform == "win32":
+        return "not known on Windows"
+    import resource
+
+    unit = 1 if sys.platform == "darwin" else 1024
+    return f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 2**30:.2f} GiB at most"
 
 
 def _print(lines: Iterable[str]) -> None:

@@ -6,10 +6,11 @@ import re
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from ffr_prep.cli_reduction import band_of, draw_quality, reduction_of, reduction_options
 from ffr_prep.errors import InputError
 
 if TYPE_CHECKING:
@@ -49,10 +50,7 @@ Reference conditions and methods are those of `ffr-prep reduce`. Geometric stiff
 @click.option("--group", "groups", multiple=True, metavar="GROUP", help="See below; may be repeated.")
 @click.option("--interface", "interfaces", multiple=True, metavar="INTERFACE", help="See below; may be repeated.")
 @click.option("--reference", default="mean-axis", show_default=True, metavar="CONDITIONS", help="As in reduce.")
-@click.option(
-    "--method", type=click.Choice(["craig-bampton", "eigenmodes"]), default="craig-bampton", show_default=True
-)
-@click.option("--modes", type=click.IntRange(min=0), default=10, show_default=True, help="Normal modes to keep.")
+@reduction_options
 @click.option("--surface", type=_PATH, help="Mesh of the same solid, for drawing; in the length unit of FILES.")
 def reduce_matrices_command(
     files: tuple[Path, ...],
@@ -62,9 +60,8 @@ def reduce_matrices_command(
     groups: tuple[str, ...],
     interfaces: tuple[str, ...],
     reference: str,
-    method: str,
-    modes: int,
     surface: Path | None,
+    **options: Any,
 ) -> None:
     """Reduce stiffness and mass matrices in FILES to a flexible body and write it to a file.
 
@@ -77,7 +74,7 @@ def reduce_matrices_command(
     from ffr_prep.report import short_lines
 
     regions = [cli._interface(text) for text in interfaces]
-    conditions, reduction = cli._reference(reference), cli._reduction(method, modes)
+    conditions, reduction, band = cli._reference(reference), reduction_of(options), band_of(options)
     cli._check_writable(output)
     steps = cli.Steps(visible=sys.stderr.isatty())
     steps("read the matrices")
@@ -91,12 +88,14 @@ def reduce_matrices_command(
         interfaces=regions,
         reference=conditions,
         reduction=reduction,
+        quality=band,
         progress=steps,
     )
     steps("write the body file")
     save_body(body, output)
     steps.end()
     cli._print(short_lines(body))
+    draw_quality(body, options)
     click.echo(f"time        {steps.in_words()}")
     click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")
 

@@ -21,37 +21,113 @@ from functools import partial
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
+from scipy.sparse.linalg import splu
 
 from ffr_prep.cholesky import cholesky, solve_cholesky
-from ffr_prep.errors import ComputationError
+from ffr_prep.errors import ComputationError, InputError
+from ffr_prep.lanczos import lowest_modes
+from ffr_prep.slepc import SlepcProcess, mpi_modes, mpi_solve, started
 
 Array = np.ndarray
+Solve = Callable[[Array], Array]
 
 _SINGULAR = 1e13
 _SCALING_SWEEPS = 10
+_BLOCK = 8
+_REMEDY = "look for parts joined by a single node or edge, or materials of extremely different stiffness"
 
 
-def factorise(A: sp.csr_array, positions: Array) -> Callable[[Array], Array]:
+# ---- the choice of a solver ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Solver:
+    """What factorises the stiffness and finds the modes.
+
+    name  : "cholesky" (this package's own), "superlu" (SciPy's, slow but with no compiled code of ours), "pardiso" (Intel
+            MKL, if pypardiso is installed) or "slepc" (SLEPc and MUMPS in processes of their own, under MPI)
+    ranks : processes of "slepc"
+
+    Raises InputError for another name or number of processes.
+    """
+
+    name: str = "cholesky"
+    ranks: int = 1
+
+    def __post_init__(self) -> None:
+        if self.name not in (*_FACTORISATIONS, "slepc"):
+            known = ", ".join((*_FACTORISATIONS, "slepc"))
+            raise InputError(f"there is no solver {self.name!r}; the solvers are {known}")
+        if self.ranks < 1 or (self.ranks > 1 and self.name != "slepc"):
+            raise InputError(
+                f"solver {self.name!r} with {self.ranks} ranks cannot be run: the ranks are a positive number, and only "
+                "'slepc' runs on more than one"
+            )
+
+
+def _cholesky(A: sp.csr_array, positions: Array) -> Solve:
+    return partial(solve_cholesky, cholesky(A, positions))
+
+
+def _superlu(A: sp.csr_array, positions: Array) -> Solve:
+    """Without pivoting, so that the signs of the pivots show whether A is positive definite."""
+    try:
+        lu = splu(A.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    except RuntimeError as error:
+        raise np.linalg.LinAlgError(str(error)) from None
+    if (lu.perm_r != lu.perm_c).any() or not (lu.U.diagonal() > 0).all():
+        raise np.linalg.LinAlgError("a pivot is not positive")
+    return lu.solve
+
+
+def _pardiso(A: sp.csr_array, positions: Array) -> Solve:
+    """Matrix type 2, positive definite: with it Pardiso fails at a pivot that is not."""
+    try:
+        import pypardiso
+    except ImportError:
+        raise InputError("solver 'pardiso' needs pypardiso: pip install ffr[pardiso]") from None
+    upper = sp.csr_matrix(sp.triu(A, format="csr"))
+    pardiso = pypardiso.PyPardisoSolver(mtype=2)
+    try:
+        pardiso.factorize(upper)
+    except pypardiso.pardiso_wrapper.PyPardisoError as error:
+        raise np.linalg.LinAlgError(str(error)) from None
+    return lambda b: pardiso.solve(upper, np.asfortranarray(b))
+
+
+_FACTORISATIONS: dict[str, Callable[[sp.csr_array, Array], Solve]] = {
+    "cholesky": _cholesky,
+    "superlu": _superlu,
+    "pardiso": _pardiso,
+}
+CHOLESKY = Solver()
+
+
+# ---- factorisation ------------------------------------------------------------------------------------------------
+
+
+def factorise(A: sp.csr_array, positions: Array, solver: Solver = CHOLESKY) -> Solve:
     """The solver of a sparse symmetric positive definite matrix A (n, n): b (n, r) -> A^-1 b.
 
     positions : (n, 3) where each unknown is; rows of NaN for unknowns that touch many others
 
-    Raises ComputationError when A is singular to working precision.
+    Raises ComputationError when A is singular to working precision, InputError when the solver is not installed.
     """
     try:
-        factor = cholesky(A, positions)
+        solve = _FACTORISATIONS[solver.name](A, positions)
     except np.linalg.LinAlgError as error:
         raise ComputationError(f"the stiffness matrix is not positive definite ({error}); {_REMEDY}") from None
+    _check_regular(A, solve)
+    return solve
+
+
+def _check_regular(A: sp.csr_array, solve: Solve) -> None:
     # Scaled to a unit diagonal, so that neither units nor the size of the body matter.
     scale = np.sqrt(A.diagonal())[:, None]
     probe = np.random.default_rng(0).standard_normal((A.shape[0], 1))
-    growth = np.abs(scale * solve_cholesky(factor, scale * probe)).max() / np.abs(probe).max()
+    growth = np.abs(scale * solve(scale * probe)).max() / np.abs(probe).max()
     if not growth < _SINGULAR:
         raise ComputationError(f"the stiffness matrix is singular (condition above {growth:.1e}); {_REMEDY}")
-    return partial(solve_cholesky, factor)
-
-
-_REMEDY = "look for parts joined by a single node or edge, or materials of extremely different stiffness"
 
 
 @dataclass(frozen=True)
@@ -59,29 +135,54 @@ class FreeBody:
     """A free body, ready to be solved under any support.
 
     K : (Z, Z) stiffness; T : (Z, 6) orthonormal rigid motions; solve : clamped inverse S, (Z, r) -> (Z, r)
+    lowest : (supports, mass, count) -> omega2 (count,) and mass-orthonormal modes (Z, count)
     """
 
     K: sp.csr_array
     T: Array
-    solve: Callable[[Array], Array]
+    solve: Solve
+    lowest: Callable[[SupportedBody, sp.csr_array, int], tuple[Array, Array]]
 
 
-def free_body(K: sp.csr_array, T: Array, positions: Array) -> FreeBody:
+def free_body(K: sp.csr_array, T: Array, positions: Array, solver: Solver = CHOLESKY) -> FreeBody:
     """Clamp six coordinates, chosen so that the rigid motions T (Z, 6) are best held, and factorise once.
 
     positions : (Z, 3) where each coordinate is; rows of NaN for those of rigid interfaces
+
+    Raises as `factorise`.
     """
     rigid, _ = np.linalg.qr(T)
     _, order = scipy.linalg.qr(rigid.T, mode="r", pivoting=True)
     free = np.delete(np.arange(K.shape[0]), order[:6])
-    solve_free = factorise(K[free][:, free], positions[free])
+    clamped = K[free][:, free]
+    if solver.name != "slepc":
+        return FreeBody(K, rigid, partial(_extended, factorise(clamped, positions[free], solver), free), _by_lanczos)
+    process = started(clamped, solver.ranks)
+    solve = partial(mpi_solve, process)
+    _check_regular(clamped, solve)
+    return FreeBody(K, rigid, partial(_extended, solve, free), partial(_by_slepc, process))
 
-    def solve(load: Array) -> Array:
-        displacement = np.zeros_like(load)
-        displacement[free] = solve_free(load[free])
-        return displacement
 
-    return FreeBody(K, rigid, solve)
+def _extended(solve_free: Solve, free: Array, load: Array) -> Array:
+    """The displacement (Z, r) of loads (Z, r) with all but the free coordinates clamped."""
+    displacement = np.zeros_like(load)
+    displacement[free] = solve_free(load[free])
+    return displacement
+
+
+def _by_lanczos(held: SupportedBody, M: sp.csr_array, count: int) -> tuple[Array, Array]:
+    def flexibility(loads: Array) -> Array:
+        return solve_supported(held, loads, np.zeros((len(held.C), loads.shape[1])))[0]
+
+    start = np.random.default_rng(0).standard_normal((M.shape[0], _BLOCK))
+    return lowest_modes(flexibility, M, start, count, most=20 * count + 300)
+
+
+def _by_slepc(process: SlepcProcess, held: SupportedBody, M: sp.csr_array, count: int) -> tuple[Array, Array]:
+    return mpi_modes(process, held.body.K, M, held.C, count)
+
+
+# ---- supports -----------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

@@ -158,19 +158,14 @@ def panel(corners: Sequence[Vector] | Array, shell: Shell, *, elements: tuple[in
     number = np.arange(weights[..., 0].size).reshape(len(x), len(y))
     sides = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
     quadrilaterals = np.stack(sides, axis=-1).reshape(-1, 4)
-    return _of_plates((weights @ at).reshape(-1, 3), np.zeros((0, 3)), quadrilaterals, shell)
-
-
-def _of_plates(points: Array, triangles: Array, quadrilaterals: Array, shell: Shell) -> Frame:
     return Frame(
-        points,
-        np.zeros((0, 2), np.int64),
-        (),
-        np.zeros(0, np.int64),
-        triangles=triangles,
+        points=(weights @ at).reshape(-1, 3),
+        elements=np.zeros((0, 2), np.int64),
+        members=(),
+        member_of=np.zeros(0, np.int64),
         quadrilaterals=quadrilaterals,
         shells=(shell,),
-        shell_of=np.zeros(len(triangles) + len(quadrilaterals), np.int64),
+        shell_of=np.zeros(len(quadrilaterals), np.int64),
     )
 
 

@@ -23,6 +23,7 @@ Array = np.ndarray
 
 _RESIDUAL = 1e-9
 _DEPENDENT = 1e-10
+_PANEL = 64
 
 
 def lowest_modes(
@@ -38,21 +39,19 @@ def lowest_modes(
     1e-9 / omega2 by then. The error of omega2 is of second order in it.
     """
     Q: list[Array] = []
-    MQ: list[Array] = []
     T = np.zeros((0, 0))
-    block = _orthonormal(flexibility(M @ start), Q, MQ, M)
+    block, momenta, _ = _orthonormal(flexibility(M @ start), Q, M)
     while True:
-        Q.append(block)
-        MQ.append(M @ block)
-        following = flexibility(MQ[-1])
-        T = _bordered(T, np.vstack([mq.T @ following for mq in MQ]))
-        block = _orthonormal(following, Q, MQ, M)
+        _append(Q, block)
+        following = flexibility(momenta)
+        block, momenta, columns = _orthonormal(following, Q, M)
+        T = _bordered(T, columns)
         values, vectors = scipy.linalg.eigh(T)
         values, vectors = values[::-1][:count], vectors[:, ::-1][:, :count]
-        coupling = (M @ block).T @ following
+        coupling = momenta.T @ following
         residuals = np.linalg.norm(coupling @ vectors[-following.shape[1] :], axis=0)
         if len(values) == count and (residuals <= _RESIDUAL * values).all():
-            return 1 / values, np.hstack(Q) @ vectors
+            return 1 / values, _combined(Q, vectors)
         if len(T) + block.shape[1] > most or not block.size:
             converged = int(np.sum(residuals <= _RESIDUAL * values))
             raise ComputationError(
@@ -67,14 +66,44 @@ def _bordered(T: Array, columns: Array) -> Array:
     return np.block([[T, columns[:old]], [columns[:old].T, (corner + corner.T) / 2]])
 
 
-def _orthonormal(vectors: Array, Q: list[Array], MQ: list[Array], M: sp.csr_array) -> Array:
-    """M-orthonormal basis of what the vectors add to the blocks Q; a second pass removes the rounding of the first."""
-    smallest = _DEPENDENT**2 * np.einsum("zi,zi->i", vectors, M @ vectors).max(initial=0.0)
-    for _ in range(2):
-        for q, mq in zip(Q, MQ, strict=True):
-            vectors = vectors - q @ (mq.T @ vectors)
-        squares, axes = scipy.linalg.eigh(vectors.T @ (M @ vectors))
-        added = squares > smallest
-        vectors = vectors @ (axes[:, added] / np.sqrt(squares[added]))
-        smallest = 0.5
-    return vectors
+def _orthonormal(vectors: Array, Q: list[Array], M: sp.csr_array) -> tuple[Array, Array, Array]:
+    """What the vectors (Z, b) add to Q: an M-orthonormal basis, M times it, and the coordinates Q^T M of the vectors.
+
+    A second pass removes the rounding of the first.
+    """
+    momenta = M @ vectors
+    coordinates = _coordinates(Q, momenta)
+    smallest = _DEPENDENT**2 * np.einsum("zi,zi->i", vectors, momenta).max(initial=0.0)
+    vectors, momenta = _normalised(vectors - _combined(Q, coordinates), M, smallest)
+    vectors, momenta = _normalised(vectors - _combined(Q, _coordinates(Q, momenta)), M, 0.5)
+    return vectors, momenta, coordinates
+
+
+def _normalised(vectors: Array, M: sp.csr_array, smallest: float) -> tuple[Array, Array]:
+    """M-orthonormal basis of the vectors without directions of a smaller squared norm, and M times it."""
+    momenta = M @ vectors
+    squares, axes = scipy.linalg.eigh(vectors.T @ momenta)
+    kept = squares > smallest
+    combination = axes[:, kept] / np.sqrt(squares[kept])
+    return vectors @ combination, momenta @ combination
+
+
+# ---- the search space, in panels of some blocks, which make large products of matrices ----------------------------
+
+
+def _append(Q: list[Array], block: Array) -> None:
+    if Q and Q[-1].shape[1] + block.shape[1] <= _PANEL:
+        block = np.hstack([Q.pop(), block])
+    Q.append(block)
+
+
+def _coordinates(Q: list[Array], momenta: Array) -> Array:
+    """(p, b) Q^T momenta."""
+    return np.vstack([np.zeros((0, momenta.shape[1])), *(panel.T @ momenta for panel in Q)])
+
+
+def _combined(Q: list[Array], coordinates: Array) -> Array:
+    """(Z, b) Q coordinates (p, b); zero without Q."""
+    ends = np.cumsum([0, *(panel.shape[1] for panel in Q)])
+    parts = [panel @ coordinates[first:last] for panel, first, last in zip(Q, ends, ends[1:], strict=False)]
+    return np.sum(parts, axis=0)

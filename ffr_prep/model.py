@@ -82,16 +82,17 @@ def reduce_model(
     if quality:
         tell("compare with the full model")
     assessed = assess(coupled, body, L, basis, quality) if quality else None
+    stiffness = None
     if stiffening:
         tell("compute the geometric stiffness")
-        static = static_displacements(coupled, supported(body, L))
+        stiffness = model.stiffening(static_displacements(coupled, supported(body, L)), basis.Z)
     tell("integrate the inertia")
     return FlexibleBody(
         name=name,
         omega2=basis.omega2,
         interfaces=interface_shapes(coupled, basis),
         surface=(model.stressed if stress else model.surface)(basis.Z),
-        stiffening=model.stiffening(static, basis.Z) if stiffening else None,
+        stiffening=stiffness,
         provenance=completed(
             record(model, reference, reduction)
             | ({"stress": model.recovery} if stress else {})

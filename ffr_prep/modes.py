@@ -6,14 +6,12 @@ import numpy as np
 import scipy.linalg
 
 from ffr_prep.errors import InputError
-from ffr_prep.factor import SupportedBody, solve_refined, solve_supported
+from ffr_prep.factor import SupportedBody, solve_refined
 from ffr_prep.interface import CoupledModel
-from ffr_prep.lanczos import lowest_modes
 
 Array = np.ndarray
 
 _DENSE = 600
-_BLOCK = 8
 _FIRST = 12
 
 
@@ -33,7 +31,7 @@ def normal_modes(model: CoupledModel, held: SupportedBody, count: int) -> tuple[
         return np.zeros(0), np.zeros((size, 0))
     if size <= _DENSE or 3 * count > size:
         return _dense_modes(model, held.C, count)
-    return _lanczos_modes(model, held, count)
+    return held.body.lowest(held, model.M, count)
 
 
 def modes_up_to(model: CoupledModel, held: SupportedBody, frequency: float) -> tuple[Array, Array]:
@@ -63,14 +61,6 @@ def _dense_modes(model: CoupledModel, C: Array, count: int) -> tuple[Array, Arra
         null.T @ (model.K @ null), null.T @ (model.M @ null), subset_by_index=(0, count - 1)
     )
     return omega2, null @ vectors
-
-
-def _lanczos_modes(model: CoupledModel, held: SupportedBody, count: int) -> tuple[Array, Array]:
-    def flexibility(loads: Array) -> Array:
-        return solve_supported(held, loads, np.zeros((len(held.C), loads.shape[1])))[0]
-
-    start = np.random.default_rng(0).standard_normal((model.K.shape[0], _BLOCK))
-    return lowest_modes(flexibility, model.M, start, count, most=20 * count + 300)
 
 
 def constraint_modes(model: CoupledModel, fixed: SupportedBody) -> tuple[Array, Array]:

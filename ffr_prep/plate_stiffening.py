@@ -18,15 +18,8 @@ from dataclasses import fields
 
 import numpy as np
 
-from ffr_prep.plates import (
-    Plates,
-    displacement_gradient,
-    element_coordinates,
-    jacobian,
-    membrane_strain,
-    reference,
-    rule,
-)
+from ffr_prep.plate_functions import reference, rule
+from ffr_prep.plates import Plates, displacement_gradient, element_coordinates, jacobian, membrane_strain
 
 Array = np.ndarray
 
@@ -47,8 +40,9 @@ def plate_stiffening(elements: Plates, static: Array, basis: Array) -> Array:
         to_element = element_coordinates(part)
         strain = membrane_strain(part, at) @ (to_element @ static[own])[:, None]
         forces = part.membrane[:, None] @ strain
+        gradient, area = _gradient(part, to_element @ basis[own])
         for load, stiffness in enumerate(K):
-            stiffness += stiffness_of_forces(part, forces[..., load], to_element @ basis[own])
+            stiffness += _of_forces(gradient, area, forces[..., load])
     return K
 
 
@@ -57,13 +51,24 @@ def stiffness_of_forces(elements: Plates, forces: Array, e: Array) -> Array:
 
     forces : (E, Q, 3) xx, yy, xy per length [N/m] at the Q points of the stiffness rule, or (E, 1, 3) where constant
     """
+    return _of_forces(*_gradient(elements, e), forces)
+
+
+def _gradient(elements: Plates, e: Array) -> tuple[Array, Array]:
+    """(2, 3, E, Q, n) d u_m / d x_a at [a, m] of the shapes e (E, 6k, n), and the area (E, Q) of the points."""
     k = elements.lift.shape[1]
     at, weights = rule(k, _ORDER[k])
     area = jacobian(elements, reference(k, at))[1] * weights
-    gradient = displacement_gradient(elements, at) @ e[:, None, None]
-    tensor = forces[..., [[0, 2], [2, 1]]] * area[..., None, None]
-    weighted = np.einsum("eqab,eqbmj->eqamj", tensor, gradient, optimize=True)
-    n = e.shape[2]
+    gradient = displacement_gradient(elements, at)
+    count, points, _, _, size = gradient.shape
+    fields = gradient.reshape(count, 6 * points, size) @ e
+    return np.ascontiguousarray(fields.reshape(count, points, 2, 3, -1).transpose(2, 3, 0, 1, 4)), area
+
+
+def _of_forces(gradient: Array, area: Array, forces: Array) -> Array:
+    n = gradient.shape[-1]
+    xx, yy, xy = np.moveaxis(forces * area[..., None], -1, 0)[..., None]
+    weighted = np.stack([xx * gradient[0] + xy * gradient[1], xy * gradient[0] + yy * gradient[1]])
     K = gradient.reshape(-1, n).T @ weighted.reshape(-1, n)
     return (K + K.T) / 2
 

@@ -38,23 +38,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
-import skfem
-from skfem.quadrature import get_quadrature
 
 from ffr_prep.errors import InputError
 from ffr_prep.frame import Shell
+from ffr_prep.plate_functions import Reference, reference, rule
 
 Array = np.ndarray
 
 # Exact for products of two fields, and of two strains, of triangles and parallelograms.
 _MASS_ORDER = {3: 8, 4: 7}
 _STIFFNESS_ORDER = {3: 6, 4: 7}
-_SIDE = {3: skfem.ElementTriP2, 4: skfem.ElementQuadS2}
-_CORNER = {3: skfem.ElementTriP1, 4: skfem.ElementQuad1}
-_CENTRE = {3: (skfem.ElementTriMini, 3), 4: (skfem.ElementQuad2, 8)}
 
 _FOLLOWING = 0.1
 _FLAT = 0.01
@@ -187,48 +182,7 @@ def undeformed_coordinates(elements: Plates) -> Array:
     return e_0.reshape(count, 6 * k)
 
 
-# ---- functions of the reference element ---------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Reference:
-    """Functions at points (Q, 2) of the unit triangle or square: N, P, g P (Q, k) and B (Q,), and their gradients."""
-
-    N: Array
-    P: Array
-    gP: Array
-    B: Array
-    dN: Array
-    dP: Array
-    dgP: Array
-    dB: Array
-
-
-def reference(k: int, at: Array) -> Reference:
-    """Scikit-fem's functions of corners, sides and centre at `at` (Q, 2)."""
-    N, dN = _functions(_CORNER[k](), range(k), at)
-    P, dP = _functions(_SIDE[k](), range(k, 2 * k), at)
-    (B, dB) = _functions(_CENTRE[k][0](), [_CENTRE[k][1]], at)
-    g = N - np.roll(N, -1, axis=1)  # from 1 to -1 along a side of a triangle
-    dg = dN - np.roll(dN, -1, axis=1)
-    if k == 4:  # along a side of a square; the opposite side runs back
-        g, dg = g - np.roll(g, 2, axis=1), dg - np.roll(dg, 2, axis=1)
-    return Reference(N, P, g * P, B[:, 0], dN, dP, dg * P[..., None] + g[..., None] * dP, dB[:, 0])
-
-
-def _functions(element: skfem.Element, which: Sequence[int] | range, at: Array) -> tuple[Array, Array]:
-    """(Q, m) values and (Q, m, 2) gradients."""
-    evaluated = [element.lbasis(at.T, i) for i in which]
-    values = np.stack([np.broadcast_to(value, len(at)) for value, _ in evaluated], axis=-1)
-    gradients = np.stack([np.broadcast_to(gradient, (2, len(at))) for _, gradient in evaluated], axis=-1)
-    return values, gradients.transpose(1, 2, 0)
-
-
-@cache
-def rule(k: int, order: int) -> tuple[Array, Array]:
-    """Points (Q, 2) and weights (Q,) of a quadrature rule on the unit triangle or square."""
-    at, weights = get_quadrature(_CORNER[k]().refdom, order)
-    return at.T, weights
+# ---- gradients in element axes ------------------------------------------------------------------------------------
 
 
 def jacobian(elements: Plates, of: Reference) -> tuple[Array, Array]:

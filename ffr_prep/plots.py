@@ -71,9 +71,9 @@ def mode_pictures(
     paths = []
     for k, shape, factor, image in zip(numbers, shapes, factors, images, strict=True):
         paths.append(folder / f"mode_{k:02d}.png")
-        _save(_picture(body, k, shape, factor, image, camera), paths[-1])
+        save_figure(_picture(body, k, shape, factor, image, camera), paths[-1])
     paths.append(folder / "modes.png")
-    _save(_sheet(body, numbers, images, camera), paths[-1])
+    save_figure(_sheet(body, numbers, images, camera), paths[-1])
     return paths
 
 
@@ -269,7 +269,8 @@ def _triad(axes: Any, camera: Camera) -> None:
     axes.set_axis_off()
 
 
-def _save(figure: Figure, path: Path) -> None:
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write the figure as a PNG; an existing file is replaced only by a complete new one."""
     with mpl.rc_context({"font.family": "DejaVu Sans"}):
         FigureCanvasAgg(figure)
         temporary = path.with_name(path.name + ".part")

@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from ffr_prep.basis import Basis, check_basis, factorised
 from ffr_prep.body import FlexibleBody, Interface, Surface, content_hash
-from ffr_prep.factor import supported
+from ffr_prep.factor import CHOLESKY, Solver, supported
 from ffr_prep.interface import CoupledModel, InterfaceRegion, couple
 from ffr_prep.invariants import inertia_integrals
 from ffr_prep.mesh import Mesh, check_mesh, mesh_hash, surface_triangles
@@ -42,6 +42,7 @@ def reduce_mesh(
     stiffening: bool = False,
     stress: bool = False,
     quality: Band | None = None,
+    solver: Solver = CHOLESKY,
     progress: Callable[[str], None] | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> FlexibleBody:
@@ -51,6 +52,7 @@ def reduce_mesh(
     stiffening : also compute the geometric stiffness by load, which a simulation then uses
     stress     : also keep the stress at the nodes of the surface per elastic coordinate
     quality    : compare the body with the full model over this band of frequencies, and keep what was found
+    solver     : what factorises the stiffness and finds the modes
     progress   : called with the name of each stage as it begins
     provenance : JSON values kept with the body, beside what is recorded anyway
 
@@ -67,6 +69,7 @@ def reduce_mesh(
             stiffening,
             stress,
             quality,
+            solver,
             progress or _silent,
             provenance or {},
         )
@@ -82,6 +85,7 @@ def _reduced(
     stiffening: bool,
     stress: bool,
     quality: Band | None,
+    solver: Solver,
     tell: Callable[[str], None],
     provenance: Mapping[str, Any],
 ) -> FlexibleBody:
@@ -92,9 +96,11 @@ def _reduced(
     tell("tie the interfaces")
     model = couple(mesh, matrices, interfaces)
     model = replace(model, inertial_loads=model.B.T @ inertial_loads(mesh.points, matrices), edges=element_edges(mesh))
+    m = matrices.m
+    del matrices  # its stiffness takes as much memory as that of the model
     L = functionals(reference, model)
     tell("factorise the stiffness")
-    body = factorised(model)
+    body = factorised(model, solver)
     tell("reduce")
     basis = reduction.basis(model, body, L)
     check_basis(model, L, basis)
@@ -113,17 +119,16 @@ def _reduced(
         omega2=basis.omega2,
         interfaces=interface_shapes(model, basis),
         surface=surface,
-        stiffening=stiffening_matrices(mesh, material, matrices, model, supported(body, L), Phi)
-        if stiffening
-        else None,
+        stiffening=stiffening_matrices(mesh, material, model, supported(body, L), Phi) if stiffening else None,
         provenance=completed(
             record(mesh, material, interfaces, reference, reduction, model)
+            | {"solver": described(solver)}
             | ({"stress": AVERAGING} if stress else {})
             | dict(provenance),
             basis,
             assessed,
         ),
-        **vars(inertia_integrals(mesh.points, matrices.m, Phi)),
+        **vars(inertia_integrals(mesh.points, m, Phi)),
     )
 
 

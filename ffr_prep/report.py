@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ffr_prep.body import FlexibleBody, Interface
+from ffr_prep.quality import Quality, quality_of
 
 if TYPE_CHECKING:
     from ffr_prep.mesh import Mesh
@@ -16,6 +17,8 @@ Array = np.ndarray
 
 _MOST_MODES = 40
 _MOST_NAMES = 20
+_MOST_INTERFACES = 24
+_CLOSE = 0.01
 _INDEPENDENT = 1e-8
 _NOISE = 1e-6
 
@@ -45,6 +48,7 @@ def body_lines(body: FlexibleBody) -> Iterator[str]:
     yield from _choice_lines(body.provenance)
     yield from mode_lines(body)
     yield from ability_lines(body)
+    yield from quality_lines(body)
     yield from _origin_lines(body.provenance)
 
 
@@ -55,6 +59,7 @@ def short_lines(body: FlexibleBody) -> Iterator[str]:
     if body.n:
         shown = ", ".join(f"{f:.4g}" for f in body.frequencies[:6])
         yield f"modes       {body.n}: {shown}{', ...' if body.n > 6 else ''} Hz"
+    yield from quality_lines(body)
     for warning in body.provenance.get("warnings", []):
         yield f"warning     {warning}"
 
@@ -80,18 +85,21 @@ def _tensor_lines(label: str, tensor: Array) -> Iterator[str]:
 
 
 def _interface_lines(body: FlexibleBody) -> Iterator[str]:
-    width = max((len(i.name) for i in body.interfaces), default=0)
-    for k, interface in enumerate(body.interfaces):
+    width = max((len(i.name) for i in body.interfaces[:_MOST_INTERFACES]), default=0)
+    for k, interface in enumerate(body.interfaces[:_MOST_INTERFACES]):
         label = "interfaces" if k == 0 else ""
         yield f"{label:12}{interface.name:{width}}  {interface.kind:5}  at {_vector(interface.position)} m"
+    if len(body.interfaces) > _MOST_INTERFACES:
+        yield f"{'':12}{len(body.interfaces) - _MOST_INTERFACES} more"
 
 
 def mode_lines(body: FlexibleBody) -> Iterator[str]:
-    """A table of frequencies and effective masses, P_dm^2."""
+    """A table of frequencies, effective masses P_dm^2 and effective inertias I4^2 about the origin."""
     if not body.n:
         return
-    yield "modes       frequency   effective mass along x, y, z, in % of the mass"
-    shares = 100 * body.P_dm.T**2 / body.mass
+    yield "modes       frequency   effective mass along x, y, z, in % of the mass; effective inertia about them, in %"
+    whole = np.array([body.mass] * 3 + list(np.diag(body.inertia)))
+    shares = 100 * np.vstack([body.P_dm, body.I4]).T ** 2 / whole
     for k in range(min(body.n, _MOST_MODES)):
         yield f"{k + 1:7d}  {body.frequencies[k]:12.6g} Hz  " + " ".join(f"{share:7.2f}" for share in shares[k])
     if body.n > _MOST_MODES:
@@ -116,10 +124,19 @@ def _range_in_words(body: FlexibleBody) -> str:
     The rule of practice for component modes is to keep those up to 1.5 to 2 times the range of interest: R. R. Craig,
     A. J. Kurdila, Fundamentals of Structural Dynamics, 2nd ed. (2006), chapter 17.
     """
-    kept = body.provenance.get("reduction", {}).get("modes", body.n)
+    kept = _kept(body.provenance.get("reduction", {}), body.n)
+    if isinstance(kept, Mapping):
+        top = kept["frequency"] / 2 if kept["type"] == "UpTo" else kept["band"]["high"]
+        return f"vibration up to about {top:.3g} Hz, as its modes were chosen"
     if not 0 < kept <= body.n:
         return "slow deformation only: no normal mode was kept"
     return f"vibration up to about {body.frequencies[kept - 1] / 2:.3g} Hz, half the frequency of mode {kept}"
+
+
+def _kept(reduction: Mapping[str, Any], n: int) -> Any:
+    """What was asked of the number of normal modes: by a reduction, or by the first part of a union that has any."""
+    parts = [part for part in reduction.get("parts", [reduction]) if "modes" in part]
+    return parts[0]["modes"] if parts else 0 if "type" in reduction else n
 
 
 def _interfaces_in_words(body: FlexibleBody) -> str:
@@ -138,7 +155,8 @@ def interface_freedom(body: FlexibleBody) -> tuple[int, int]:
     length = float(max(arms)) or 1.0
     motions = np.vstack([_motions(i, length) for i in body.interfaces])
     norms = np.linalg.norm(motions, axis=0)
-    unit = motions[:, norms > 0] / norms[norms > 0]
+    moves = norms > _INDEPENDENT * np.concatenate([np.ones(6), np.full(body.n, 1 / np.sqrt(body.mass))])
+    unit = motions[:, moves] / norms[moves]
     return int(np.linalg.matrix_rank(unit, tol=_INDEPENDENT)), len(motions)
 
 
@@ -150,6 +168,60 @@ def _motions(interface: Interface, length: float) -> Array:
     return np.vstack([translation, length * rotation])
 
 
+def quality_lines(body: FlexibleBody) -> Iterator[str]:
+    """How far the body is from the full model, where that was found out."""
+    quality = quality_of(body.provenance)
+    if quality is None:
+        return
+    low, high = quality.band
+    yield f"quality     against the full model, {low:.4g} to {high:.4g} Hz"
+    yield f"{'':12}frequencies under the reference conditions: {_frequencies_in_words(quality)}"
+    if quality.points:
+        yield f"{'':12}static flexibility of the free body at the interfaces: {_percent(quality.flexibility_error)} off"
+        yield f"{'':12}receptances there: {_receptances_in_words(quality)}"
+    yield from _steady_lines(quality)
+
+
+def _frequencies_in_words(quality: Quality) -> str:
+    inside = quality.mode_frequencies[: quality.frequency_errors.size] <= quality.band[1]
+    missing = int(np.sum(quality.mode_frequencies <= quality.band[1])) - int(inside.sum())
+    lost = f"; {missing} of the full model are missing" if missing else ""
+    errors = quality.frequency_errors[inside]
+    if not errors.size:
+        return f"none within the band{lost}"
+    worst = int(np.argmax(errors))
+    return (
+        f"{errors.size} within the band, off by up to {_percent(errors[worst])} "
+        f"(at {quality.mode_frequencies[worst]:.4g} Hz){lost}"
+    )
+
+
+def _receptances_in_words(quality: Quality) -> str:
+    wrong = quality.receptance_errors > _CLOSE
+    worst = int(np.argmax(quality.receptance_errors))
+    off = f"off by up to {_percent(quality.receptance_errors[worst])} (at {quality.frequencies[worst]:.4g} Hz)"
+    if not wrong.any():
+        return off
+    first = int(np.argmax(wrong))
+    return f"within {_CLOSE:.0%} up to {quality.frequencies[first - 1]:.4g} Hz, {off}" if first else off
+
+
+def _steady_lines(quality: Quality) -> Iterator[str]:
+    yield f"{'':12}steady deformation by      displacement         stress, largest error"
+    parts = zip(("gravity", "angular acceleration", "spin"), (slice(0, 3), slice(3, 6), slice(6, 12)), strict=True)
+    for name, part in parts:
+        both = [_largest(errors[part]) for errors in (quality.displacement_errors, quality.stress_errors)]
+        yield f"{'':14}{name:22}{both[0]:>15}{both[1]:>15}"
+
+
+def _largest(errors: Array) -> str:
+    return "no deformation" if np.isnan(errors).all() else _percent(float(np.nanmax(errors)))
+
+
+def _percent(error: float) -> str:
+    return f"{100 * abs(error):.2g} %" if abs(error) >= 1e-6 else "less than 0.0001 %"
+
+
 def _choice_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
     for key in ("reduction", "reference", "material"):
         if key in provenance:
@@ -158,7 +230,7 @@ def _choice_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
 
 def _origin_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
     for key, value in provenance.items():
-        if value and key not in ("reduction", "reference", "material", "interfaces", "warnings"):
+        if value and key not in ("reduction", "reference", "material", "interfaces", "warnings", "quality"):
             yield f"{key:12}{_settings(value)}"
     for warning in provenance.get("warnings", []):
         yield f"warning     {warning}"

@@ -10,7 +10,7 @@ from ffr_prep.errors import InputError
 
 Array = np.ndarray
 
-_POINTS = 100
+_POINTS = 200
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Band:
             raise InputError(f"the band from {self.low:g} to {self.high:g} Hz: it must be 0 < low < high")
 
     def frequencies(self) -> Array:
-        """(100,) logarithmically spaced frequencies [Hz]."""
+        """(200,) logarithmically spaced frequencies [Hz]."""
         return np.geomspace(self.low, self.high, _POINTS)
 
 

@@ -15,6 +15,7 @@ from ffr_prep.reduce import boundary, described, element_counts, mesh_warnings
 from ffr_prep.solids import Materials, assemble
 from ffr_prep.stiffening import inertial_loads, stiffening_of
 from ffr_prep.stress import AVERAGING, stressed_boundary
+from ffr_prep.waves import element_edges
 
 Array = np.ndarray
 
@@ -41,7 +42,9 @@ def solid_model(
         return (coupled.B @ z).reshape(*mesh.points.shape, z.shape[1])
 
     return Model(
-        coupled=replace(coupled, inertial_loads=coupled.B.T @ inertial_loads(mesh.points, matrices)),
+        coupled=replace(
+            coupled, inertial_loads=coupled.B.T @ inertial_loads(mesh.points, matrices), edges=element_edges(mesh)
+        ),
         inertia=lambda basis: inertia_integrals(mesh.points, matrices.m, field(basis)),
         surface=lambda basis: boundary(mesh, field(basis)),
         stressed=lambda basis: stressed_boundary(mesh, material, field(basis)),

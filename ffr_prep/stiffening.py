@@ -16,44 +16,48 @@ Bathe, Finite Element Procedures (1996), section 6.2 (the linearised stress term
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 
 from ffr_prep.factor import SupportedBody, solve_refined
 from ffr_prep.interface import CoupledModel
 from ffr_prep.mesh import Mesh
-from ffr_prep.solids import Materials, SolidMatrices, displacement_gradients, vector_mass
+from ffr_prep.solids import GradientChunk, Materials, SolidMatrices, displacement_gradients, vector_mass
+from ffr_prep.static_shapes import inertial_loads as loads_of
 
 Array = np.ndarray
 
 PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
-def stiffening_matrices(
-    mesh: Mesh, material: Materials, matrices: SolidMatrices, model: CoupledModel, held: SupportedBody, Phi: Array
-) -> Array:
+def stiffening_matrices(mesh: Mesh, material: Materials, model: CoupledModel, held: SupportedBody, Phi: Array) -> Array:
     """(12 + 6 I, n, n) reduced geometric stiffness per unit load, in the order of `FlexibleBody.stiffening`.
 
-    held : the body under its reference conditions; Phi (N, 3, n) nodal basis
+    model : with its inertial loads; held : the body under its reference conditions; Phi (N, 3, n) nodal basis
 
     Raises ComputationError when a static problem fails.
     """
-    loads = np.hstack([model.B.T @ inertial_loads(mesh.points, matrices), model.C.toarray().T])
+    loads = np.hstack([loads_of(model), model.C.toarray().T])
     displacement, _ = solve_refined(held, loads, np.zeros((len(held.C), loads.shape[1])))
     return stiffening_of(mesh, material, (model.B @ displacement).reshape(*mesh.points.shape, -1), Phi)
 
 
 def stiffening_of(mesh: Mesh, material: Materials, static: Array, Phi: Array) -> Array:
     """(r, n, n) geometric stiffness of the basis Phi (N, 3, n) under r loads with the displacements static (N, 3, r)."""
-    fields = np.moveaxis(static, -1, 0)
-    n = Phi.shape[2]
-    K = np.zeros((len(fields), n, n))
-    for chunk in displacement_gradients(mesh, material):
-        modes = chunk.gradient(Phi)  # (q, 3, 3, n) d phi_m / dx_k
-        for load, field in enumerate(fields):
-            stress = chunk.stress(field[..., None])[..., 0]
-            weighted = np.einsum("q,qkl,qmlj->qmkj", chunk.volume, stress, modes, optimize=True)
-            K[load] += modes.reshape(-1, n).T @ weighted.reshape(-1, n)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # summed in the order of the elements, whoever is first
+        parts = pool.map(lambda chunk: _of_chunk(chunk, static, Phi), displacement_gradients(mesh, material))
+        K = sum(parts, np.zeros((static.shape[2], Phi.shape[2], Phi.shape[2])))
     return (K + K.transpose(0, 2, 1)) / 2
+
+
+def _of_chunk(chunk: GradientChunk, static: Array, Phi: Array) -> Array:
+    """The part of some elements: sums over their points q, over m and over k."""
+    n = Phi.shape[2]
+    modes = np.ascontiguousarray(chunk.gradient(Phi).transpose(0, 2, 1, 3)).reshape(-1, 3, 3 * n)  # [q, k, m n]
+    stress = np.ascontiguousarray(np.moveaxis(chunk.stress(static) * chunk.volume[:, None, None, None], 3, 0))
+    return np.stack([modes.reshape(-1, n).T @ np.matmul(of_load, modes).reshape(-1, n) for of_load in stress])
 
 
 def inertial_loads(points: Array, matrices: SolidMatrices) -> Array:

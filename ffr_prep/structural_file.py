@@ -18,21 +18,23 @@ models below.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from ffr_prep.errors import InputError
 from ffr_prep.frame import Frame, Member, Shell, joined, named, panel, polyline, triangulated
 from ffr_prep.frame_source import read_frame
 from ffr_prep.interface import InterfaceRegion
 from ffr_prep.material import Material, material
-from ffr_prep.reduction import CraigBampton, Eigenmodes, Reduction
+from ffr_prep.reduction import CraigBampton, Eigenmodes, Guyan, Reduction, Rubin, Union
 from ffr_prep.reference import FixedTo, MeanAxis, ReferenceConditions, SimplySupported, Support, Supports
 from ffr_prep.section import Section, circle, general, i_section, rectangle, shear_rigid, shifted, tube
+from ffr_prep.selection import Accuracy, Band, Selection, UpTo
+from ffr_prep.static_shapes import AttachmentModes, InertiaRelief
 
 Vector = tuple[float, float, float]
 Progress = Callable[[str], None]
@@ -194,10 +196,20 @@ ReferenceEntry = Annotated[
 
 
 class ReductionEntry(_Strict):
-    """Craig-Bampton or plain eigenmodes, with so many normal modes."""
+    """A reduction (see `ffr_prep.reduction`) with a number of normal modes, 10 when nothing is said, or all up to a
+    frequency [Hz], or as many as a relative accuracy of the receptances in a band [low, high, error] needs.
+    """
 
-    method: Literal["craig-bampton", "eigenmodes"] = "craig-bampton"
-    modes: int = Field(default=10, ge=0)
+    method: Literal["craig-bampton", "eigenmodes", "rubin", "guyan", "attachment", "inertia-relief"] = "craig-bampton"
+    modes: int | None = Field(default=None, ge=0)
+    frequency: float | None = None
+    accuracy: tuple[float, float, float] | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> ReductionEntry:
+        if sum(value is not None for value in (self.modes, self.frequency, self.accuracy)) > 1:
+            raise ValueError("modes, frequency and accuracy all say how many modes to keep: give one of them")
+        return self
 
 
 class StructureEntry(_Strict):
@@ -213,9 +225,15 @@ class StructureEntry(_Strict):
     nodes: dict[str, Vector] = {}
     interfaces: dict[str, InterfaceEntry] = {}
     reference: ReferenceEntry = MeanAxisEntry(kind="mean-axis")
-    reduction: ReductionEntry = ReductionEntry()
+    reduction: list[ReductionEntry] = Field(default=[ReductionEntry()], min_length=1)
     stiffening: bool = False
     stress: bool = False
+    quality: tuple[float, float] | None = None
+
+    @field_validator("reduction", mode="before")
+    @classmethod
+    def _one_or_several(cls, value: Any) -> Any:
+        return [value] if isinstance(value, dict) else value
 
     @model_validator(mode="after")
     def _something(self) -> StructureEntry:
@@ -235,6 +253,7 @@ class Structure:
     reduction: Reduction
     stiffening: bool
     stress: bool
+    quality: Band | None
 
 
 def load_structure(path: str | Path, progress: Progress | None = None) -> Structure:
@@ -256,6 +275,7 @@ def load_structure(path: str | Path, progress: Progress | None = None) -> Struct
             reduction=_reduction(entry.reduction),
             stiffening=entry.stiffening,
             stress=entry.stress,
+            quality=None if entry.quality is None else Band(*entry.quality),
         )
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
@@ -370,5 +390,29 @@ def _reference(entry: ReferenceEntry) -> ReferenceConditions:
     return MeanAxis()
 
 
-def _reduction(entry: ReductionEntry) -> Reduction:
-    return CraigBampton(entry.modes) if entry.method == "craig-bampton" else Eigenmodes(entry.modes)
+def _reduction(entries: Sequence[ReductionEntry]) -> Reduction:
+    """One, or the space of several."""
+    parts = tuple(_part(entry) for entry in entries)
+    return parts[0] if len(parts) == 1 else Union(parts)
+
+
+def _part(entry: ReductionEntry) -> Reduction:
+    selection = _selection(entry)
+    made: dict[str, Reduction] = {
+        "craig-bampton": CraigBampton(selection),
+        "eigenmodes": Eigenmodes(selection),
+        "rubin": Rubin(selection),
+        "guyan": Guyan(),
+        "attachment": AttachmentModes(),
+        "inertia-relief": InertiaRelief(),
+    }
+    return made[entry.method]
+
+
+def _selection(entry: ReductionEntry) -> Selection:
+    if entry.accuracy is not None:
+        low, high, tolerance = entry.accuracy
+        return Accuracy(Band(low, high), tolerance)
+    if entry.frequency is not None:
+        return UpTo(entry.frequency)
+    return 10 if entry.modes is None else entry.modes

@@ -147,7 +147,16 @@ def _coupled(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]], X: sp.
         positions=np.vstack([m.positions for m in models])[np.concatenate(stay).astype(bool)],
         C=sp.csr_array((_diagonal([m.C for m in models]) @ X)[np.repeat(np.concatenate(stay).astype(bool), 6)]),
         inertial_loads=X.T @ np.vstack([known_loads(m) for m in models]),
+        edges=_edges(models),
+        dimension=max(m.dimension for m in models),
     )
+
+
+def _edges(models: Sequence[CoupledModel]) -> Array | None:
+    """The edges of all models among all their points; None where one does not know its elements."""
+    first = np.cumsum([0, *(len(m.points) for m in models)])
+    known = [m.edges + start for m, start in zip(models, first, strict=False) if m.edges is not None]
+    return np.concatenate(known) if len(known) == len(models) else None
 
 
 def _independent_rows(X: sp.csr_array) -> Array:

@@ -1,8 +1,8 @@
 """How finely the elements of a model resolve the waves of its modes.
 
-A wave of wave number k changes by |k h u| over an element of size h. The mean of that over the edges of all elements
-gives the elements per wavelength 2 pi / (k h) of a mode, without knowing what kind of wave it is; bending counts shorter,
-by up to sqrt 2, for the rotation of its sections.
+In a wave of wave number k the displacement gradient g changes by |k h g| over an element of size h, whether the wave
+bends, twists or stretches; the displacement itself would also count the rotation of sections. The mean of that over the
+edges of all elements gives the elements per wavelength 2 pi / (k h) of a mode.
 
 Source: K. J. Bathe, Finite Element Procedures (1996), section 9.4 (elements for the shortest wave of interest).
 """
@@ -10,6 +10,7 @@ Source: K. J. Bathe, Finite Element Procedures (1996), section 9.4 (elements for
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
 
 from ffr_prep.elements import KINDS
 from ffr_prep.interface import CoupledModel
@@ -36,12 +37,30 @@ def elements_per_wavelength(model: CoupledModel, Z: Array) -> Array:
     """(n,) elements per wavelength of the shapes Z (Z, n); infinite where the model does not know its elements."""
     if model.edges is None or not Z.size:
         return np.full(Z.shape[1], np.inf)
-    first, last = (model.B @ Z).reshape(*model.points.shape, -1)[model.edges.T]
-    size = np.einsum("ecj,ecj->j", first, first) + np.einsum("ecj,ecj->j", last, last)
-    change = first - last
+    u = (model.B @ Z).reshape(len(model.points), -1)
+    change, size = np.zeros(Z.shape[1]), np.zeros(Z.shape[1])
+    for along in _derivatives(model.points, model.edges):
+        first, last = (along @ u).reshape(*model.points.shape, -1)[model.edges.T]
+        change += np.einsum("ecj,ecj->j", last - first, last - first)
+        size += (np.einsum("ecj,ecj->j", first, first) + np.einsum("ecj,ecj->j", last, last)) / 2
     # of the edges of an element, one in `dimension` lies along the wave
-    phase = np.sqrt(2 * model.dimension * np.einsum("ecj,ecj->j", change, change) / size)
-    return 2 * np.pi / phase
+    phase = np.sqrt(model.dimension * change / np.where(size > 0, size, np.inf))
+    return 2 * np.pi / np.maximum(phase, np.finfo(float).tiny)
+
+
+def _derivatives(points: Array, edges: Array) -> list[sp.csr_array]:
+    """Three (N, N) matrices: d/dx, d/dy, d/dz at the nodes, least squares over the edges that meet there."""
+    count = len(points)
+    ends = np.concatenate([edges, edges[:, ::-1]])
+    arms = points[ends[:, 1]] - points[ends[:, 0]]
+    normal = np.zeros((count, 3, 3))
+    np.add.at(normal, ends[:, 0], arms[:, :, None] * arms[:, None, :])
+    weights = np.einsum("ekl,el->ek", np.linalg.pinv(normal, rcond=1e-6, hermitian=True)[ends[:, 0]], arms)
+    made = []
+    for k in range(3):
+        neighbours = sp.csr_array((weights[:, k], (ends[:, 0], ends[:, 1])), shape=(count, count))
+        made.append(sp.csr_array(neighbours - sp.diags_array(np.bincount(ends[:, 0], weights[:, k], count))))
+    return made
 
 
 def resolution_warnings(model: CoupledModel, omega2: Array, Z: Array, frequency: float) -> tuple[str, ...]:

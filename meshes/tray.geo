@@ -14,4 +14,4 @@ Curve Loop(3) = {8, 9, 10, 3};     Plane Surface(3) = {3};
 Transfinite Surface {2, 3};        Recombine Surface {2, 3};
 Physical Surface("floor") = {1};   Physical Surface("walls") = {2, 3};
 Physical Curve("rims") = {6, 9};
-Physical Curve("front") = {4};     Physical Curve("rear") = {2};
+Physical Curve("front") = {4, 5, 8};  Physical Curve("rear") = {2, 7, 10};

@@ -39,6 +39,8 @@ HEAVY = {*MESHERS_AND_PLOTTERS, "PIL", "h5py", "numba", "pydantic", "scipy"}
 
 # Modules of a distribution that another one, which is declared, cannot be without.
 BROUGHT_BY = {"llvmlite": "numba", "vtkmodules": "pyvista"}
+# What only the system's Python has, in processes of its own.
+OF_THE_SYSTEM = {"petsc4py", "slepc4py"}
 
 
 @dataclass(frozen=True)
@@ -222,18 +224,22 @@ def distribution_name(requirement: str) -> str:
 
 def declared() -> set[str]:
     project = PROJECT["project"]
-    optional = [requirement for extra in ("video", "nastran") for requirement in project["optional-dependencies"][extra]]
+    optional = [
+        requirement
+        for extra in ("video", "nastran", "pardiso")
+        for requirement in project["optional-dependencies"][extra]
+    ]
     return {distribution_name(requirement) for requirement in [*project["dependencies"], *optional]}
 
 
 def third_party() -> set[str]:
     """Top-level names of the libraries that the packages import."""
     names = {top(i.name) for module in MODULES for i in imports_of(module)}
-    return {BROUGHT_BY.get(name, name) for name in names - set(sys.stdlib_module_names) - set(PACKAGES)}
+    return {BROUGHT_BY.get(name, name) for name in names - set(sys.stdlib_module_names) - set(PACKAGES) - OF_THE_SYSTEM}
 
 
 def test_every_library_is_declared_and_every_declared_one_is_used():
-    extras = {"imageio_ffmpeg": ["imageio-ffmpeg"], "pyNastran": ["pyNastran"]}
+    extras = {"imageio_ffmpeg": ["imageio-ffmpeg"], "pyNastran": ["pyNastran"], "pypardiso": ["pypardiso"]}
     owners = importlib.metadata.packages_distributions() | extras
     needed = {distribution_name(owners[name][0]) for name in third_party()}
     assert needed == declared()

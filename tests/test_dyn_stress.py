@@ -43,12 +43,15 @@ from ffr_dyn.stress import (
 from ffr_dyn.stress_report import report_lines, stress_report
 from ffr_dyn.timefunction import polynomial
 from ffr_prep.body import SECTION_FORCES, BeamForces, Surface
+from ffr_prep.frame import Member, named, polyline
 from ffr_prep.interface import InterfaceRegion
 from ffr_prep.mesh import Block
 from ffr_prep.reduce import reduce_mesh
 from ffr_prep.reduction import CraigBampton, Eigenmodes, Union
 from ffr_prep.reference import FixedTo, MeanAxis
+from ffr_prep.section import rectangle
 from ffr_prep.static_shapes import InertiaRelief
+from ffr_prep.structural import reduce_frame
 
 PAIRS = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])
 
@@ -304,6 +307,35 @@ def test_a_spinning_ring_has_its_hoop_stress():
     along = np.stack([-y, x, 0 * x], axis=1) / np.hypot(x, y)[:, None]
     hoop = np.einsum("pk,pkl,pl->p", along, matrices(stress), along)
     np.testing.assert_allclose(hoop, STEEL.rho * SPIN**2 * radius**2, rtol=0.01)
+
+
+def test_section_forces_of_a_sagging_cantilever_and_the_reaction_of_its_joint(tmp_path):
+    """Weight p per length on n elements of length l: root shear p (L - l / 2), root moment p (L^2 / 2 - l^2 / 12)."""
+    section, length, elements = rectangle(0.02, 0.04), 2.0, 5
+    frame = polyline([(0, 0, 0), (length, 0, 0)], Member(section, STEEL, (0, 1, 0)), elements=elements)
+    beam = reduce_frame(
+        named(frame, root=(0, 0, 0)),
+        name="beam",
+        interfaces=[InterfaceRegion("root")],
+        reference=FixedTo("root"),
+        reduction=Union((CraigBampton(0), InertiaRelief())),
+        stress=True,
+    )
+    clamp = (Joint("clamp", "fixed", "ground.O", "beam.root"),)
+    scene = Scene((Body("beam", beam, damping=1.0),), clamp, ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0))
+    path = tmp_path / "run.nc"
+    result = forward(scene, end=2.0, output_step=0.5, method=ROS2(1e-3), path=path)
+    p, l = STEEL.rho * section.A * 9.81, length / elements  # noqa: E741
+    at_root = section_forces(result, "beam", 0)[-1, 0]
+    expected = [0, -p * (length - l / 2), 0, 0, 0, -p * (length**2 / 2 - l**2 / 12)]
+    np.testing.assert_allclose(at_root, expected, atol=1e-5 * p)
+    assert np.abs(result["clamp.force.y"][-1]) == pytest.approx(p * length, rel=1e-6)
+    middle = section_forces(result, "beam", 2)[-1, 1]
+    np.testing.assert_allclose(middle[[1, 5]], [-p * length / 2, -p * (length**2 / 8 + l**2 / 24)], rtol=1e-5)
+    hottest = hot_spots(result, count=1)[0]
+    assert hottest.position[0] == pytest.approx(0.0, abs=1e-12)
+    assert hot_spots(load_result(path), count=1)[0] == hottest
+    np.testing.assert_array_equal(section_forces(load_result(path), "beam", 0)[-1, 0], at_root)
 
 
 # ---- what is refused ------------------------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ from ffr_prep.families import families
 from ffr_prep.frame import Frame, Member, Shell, check_frame, joined, named, panel, polyline, triangulated
 from ffr_prep.interface import InterfaceRegion
 from ffr_prep.material import Material
+from ffr_prep.plate_functions import reference, rule
 from ffr_prep.plates import (
     bending_strain,
     element_coordinates,
@@ -24,8 +25,6 @@ from ffr_prep.plates import (
     mass_points,
     membrane_strain,
     plates,
-    reference,
-    rule,
     shape_functions,
     stiffness,
     undeformed,

@@ -260,7 +260,7 @@ FAILURES = {
     "reference": (bar, ["--reference", "clamped"], "write fixed:NAME"),
     "reference interface": (bar, ["--interface", "left", "--reference", "fixed:right"], "'right'"),
     "reference file": (bar, ["--reference", "none.toml"], "none.toml do not exist"),
-    "method": (bar, ["--method", "magic"], "'magic'"),
+    "method": (bar, ["--method", "magic"], "magic is not known"),
     "option": (bar, ["--colour", "red"], "--colour"),
     "unit": (bar, ["--unit", "yd"], "'yd'"),
 }  # fmt: skip

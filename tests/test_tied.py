@@ -213,15 +213,12 @@ def test_interface_names_are_of_one_part():
         tied(parts, [("one.b", "two.c")])
 
 
-def test_an_interface_cannot_be_tied_to_one_that_follows_it():
-    """A mean interface over the nodes of a rigid one of the same part."""
-    frame = named(
-        polyline([(0, 0, 0), (1, 0, 0)], Member(rectangle(B, H), STEEL, (0, 0, 1.0)), elements=4), a=(0, 0, 0)
-    )
-    part = frame_model(frame, [InterfaceRegion("a")])
-    parts = {"one": part}
-    with pytest.raises(InputError, match=r"'one\.a' is in 2 ties"):
-        tied(parts, [("one.a", "one.a")])
+def test_an_interface_cannot_be_tied_to_one_that_it_moves():
+    """A mean interface over a face that has nodes of the rigid one."""
+    mesh = box_mesh("hex8", (0.3, B, H), (3, 1, 1))
+    part = solid_model(mesh, STEEL, [InterfaceRegion("end", "right"), InterfaceRegion("top", kind="mean")])
+    with pytest.raises(InputError, match=r"'one\.end' and 'one\.top' move one another"):
+        tied({"one": part}, [("one.end", "one.top")])
 
 
 def test_reduced_frames_and_models_are_the_same_body():

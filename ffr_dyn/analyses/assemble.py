@@ -17,6 +17,7 @@ from ffr_dyn.errors import InputError
 from ffr_dyn.inertia import mass_matrix
 from ffr_dyn.joints import Word
 from ffr_dyn.layout import Layout, initial_state, layout
+from ffr_dyn.plane import planar_forms
 from ffr_dyn.rotation import G_bar, rotation_matrix
 from ffr_dyn.scene import Scene
 from ffr_dyn.timefunction import evaluate
@@ -55,7 +56,8 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     Raises InputError when the joints cannot be closed, naming the joint that stays open furthest, or when a driver
     contradicts the joints.
     """
-    blocks, place = blocks_of(scene), layout(scene)
+    scene, blocks = flattened(scene, time)
+    place = layout(scene)
     guess, v = initial_state(scene, place)
     x = close_positions(scene, place, blocks, guess, v, time)
     kept, redundant = independent_blocks(scene, place, blocks, x, v, time)
@@ -68,8 +70,15 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     shift = max(np.linalg.norm(x[place.R(b)] - guess[place.R(b)]) for b in range(len(scene.bodies)))
     if shift > 1e-6:
         notes.insert(0, f"assembly moved a body by {shift:.3g} m from where the scene puts it")
+    if scene.plane != "none":
+        notes.append(f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes")
     all_rows = compile_scene(scene, blocks, RELAXATION) if redundant else None
-    return Assembled(compile_scene(scene, kept), all_rows, x, v, place.v_size - rows, tuple(notes))
+    return Assembled(compile_scene(scene, kept), all_rows, x, v, _movable(place) - rows, tuple(notes))
+
+
+def _movable(place: Layout) -> int:
+    """How many velocities the scene has without its constraints."""
+    return sum(len(place.active(b)) + n for b, n in enumerate(place.n))
 
 
 def rows_at(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> list[Row]:
@@ -79,6 +88,43 @@ def rows_at(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array
         for block in blocks
         for word in block.words
     ]
+
+
+def flattened(scene: Scene, time: float) -> tuple[Scene, list[Block]]:
+    """The scene with its plane decided, `plane` "x", "y", "z" or "none", and its rows; those of a planar scene without
+    the ones that no motion in the plane can change."""
+    for flat in planar_forms(scene):
+        blocks = blocks_of(flat)
+        across, pure = _across(flat, blocks, time)
+        if pure or scene.plane == flat.plane:
+            numbers = iter(across)
+            return flat, [replace(b, words=tuple(word for word in b.words if not next(numbers))) for b in blocks]
+    return replace(scene, plane="none"), blocks_of(scene)
+
+
+def _across(scene: Scene, blocks: list[Block], time: float) -> tuple[list[bool], bool]:
+    """Which rows of a planar scene act across the plane only; and whether all others act in it only, and none of the
+    former asks for a motion.
+
+    Looked at in the position and with the motion that the scene declares, and at random in the plane around it.
+    """
+    place, rng = layout(scene), np.random.default_rng(0)
+    start, v = initial_state(scene, place)
+    active = np.zeros(place.v_size, bool)
+    for b, n in enumerate(place.n):
+        active[[place.iv[b] + c for c in (*place.active(b), *range(6, 6 + n))]] = True
+    inside, outside, left = [], [], []
+    for scale in (0.0, 1e-2, 1e-2):
+        step = np.where(active, scale * rng.normal(size=place.v_size), 0.0)
+        x, speeds = _moved(place, start, step), v + _to_global(place, start, 100 * step)
+        rows = rows_at(scene, place, blocks, x, speeds, time)
+        inside.append([np.abs(row.jacobian[active]).max(initial=0.0) for row in rows])
+        outside.append([np.abs(row.jacobian[~active]).max(initial=0.0) for row in rows])
+        left.append([max(abs(row.Phi), abs(row.nu), abs(row.gamma)) for row in rows])
+    most_inside, most_outside, most_left = (np.array(part).max(axis=0) for part in (inside, outside, left))
+    across = most_inside <= RANK_TOLERANCE * most_outside
+    mixed = ~across & (most_outside > RANK_TOLERANCE * most_inside)
+    return across.tolist(), not mixed.any() and bool((most_left[across] < RANK_TOLERANCE).all())
 
 
 def drive_of(word: Word, time: float) -> tuple[float, float, float]:
@@ -153,15 +199,14 @@ def independent_blocks(
 
 
 def _weights(scene: Scene, place: Layout, x: Array, elastic: bool) -> Array:
-    """W^(1/2) (V, V) with W the inverse mass matrix; zero for elastic coordinates that may not move."""
+    """W^(1/2) (V, V) with W the inverse mass matrix; zero for coordinates that may not move."""
     W = np.zeros((place.v_size, place.v_size))
     for b, body in enumerate(scene.bodies):
         M = mass_matrix(body.model, x[place.q(b)])
-        size = 6 + place.n[b] if elastic else 6
-        values, vectors = np.linalg.eigh(M[:size, :size])
-        limit = 1e-12 * values.max()
-        at = slice(place.iv[b], place.iv[b] + size)
-        W[at, at] = vectors / np.sqrt(np.maximum(values, limit))
+        active = np.array([*place.active(b), *range(6, 6 + place.n[b] if elastic else 6)])
+        values, vectors = np.linalg.eigh(M[np.ix_(active, active)])
+        at = place.iv[b] + active
+        W[np.ix_(at, at)] = vectors / np.sqrt(np.maximum(values, 1e-12 * values.max()))
     return W
 
 
@@ -192,9 +237,9 @@ def _neighbour(
     J = np.array([row.jacobian for row in rows]) @ W
     _, values, basis = np.linalg.svd(J)
     rank = int((values > 1e-9 * values.max(initial=1.0)).sum())
-    if rank == basis.shape[0]:
-        return x
     direction = W @ basis[rank:].T @ np.random.default_rng(0).normal(size=basis.shape[0] - rank)
+    if not direction.any():
+        return x
     try:
         return close_positions(
             scene, place, blocks, _moved(place, x, 1e-3 * direction / np.abs(direction).max()), v, time

@@ -80,6 +80,7 @@ def forward(
     substeps, rows = _counts(end - start, output_step, method.step)
     _check_step(scene, method)
     assembled = assemble(scene, time=start)
+    scene = assembled.system.scene  # of a planar scene, what moves in the plane
     wanted = selected(assembled.system, outputs)
     _announce_compilation(method)
     span = (start, end, output_step)

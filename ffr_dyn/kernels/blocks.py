@@ -5,7 +5,7 @@ linear in the number of bodies (Baraff 1996), for a few loops there is little fi
 """
 
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.vectors import solve_lower, solve_upper
+from ffr_dyn.kernels.vectors import rigid_lower, solve_lower, solve_upper
 
 # The least share of a row that other rows do not contain (the square of a sine). In a singular position it is zero; with
 # this floor the motion there misses one acceleration for the moment, and goes on.
@@ -13,16 +13,25 @@ FLOOR = 1e-13
 
 
 @kernel
-def eliminate_side(first, last, side, flexible, P, L, w):
-    """Rows first ... last of one side: w.rr = rigid part after elimination of the elastic coordinates, w.ww = L^-1 w.rr."""
+def eliminate_side(first, last, side, flexible, normal, P, L, mass, turning, all_jac, all_rr, all_ww, scale):
+    """Rows first ... last of one side: rr = rigid part after elimination of the elastic coordinates, ww = L^-1 rr.
+
+    scale : gathers what the row's own part of the multiplier matrix is at least, by the mass or the trace of the inertia
+            `turning` of the body
+    """
     for row in range(first, last):
-        jac, rr, ww = w.jac[row, side], w.rr[row, side], w.ww[row, side]
+        jac, rr, ww = all_jac[row, side], all_rr[row, side], all_ww[row, side]
         for c in range(6):
             rr[c] = jac[c]
-            if flexible:
+            if flexible and (normal < 0 or (c != normal if c < 3 else c == 3 + normal)):
                 rr[c] -= six(P, c, jac)
             ww[c] = rr[c]
-        solve_lower(L, ww, 6)
+        rigid_lower(L, ww, normal)
+        point = jac[0] * jac[0] + jac[1] * jac[1] + jac[2] * jac[2]
+        if point > 0.0:
+            scale[row] += point / mass
+        else:
+            scale[row] += (jac[3] * jac[3] + jac[4] * jac[4] + jac[5] * jac[5]) / turning
 
 
 @kernel
@@ -35,13 +44,13 @@ def six(matrix, r, jac):
 
 
 @kernel
-def add_pair(starts, pair, flexible, phiphi, w):
-    """Add the coupling of two block sides on one body to its block of w.S."""
+def add_pair(starts, pair, flexible, phiphi, ww, jac, S):
+    """Add the coupling of two block sides on one body to its block of S."""
     later, side_a, earlier, side_b, offset = pair[0], pair[1], pair[2], pair[3], pair[4]
     start_a, start_b = starts[later], starts[earlier]
     rows_a, rows_b = starts[later + 1] - start_a, starts[earlier + 1] - start_b
     for c in range(rows_b):
-        wc, jc = w.ww[start_b + c, side_b], w.jac[start_b + c, side_b]
+        wc, jc = ww[start_b + c, side_b], jac[start_b + c, side_b]
         w0, w1, w2, w3, w4, w5 = wc[0], wc[1], wc[2], wc[3], wc[4], wc[5]
         first = c if later == earlier else 0
         t0, t1, t2, t3, t4, t5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -49,11 +58,11 @@ def add_pair(starts, pair, flexible, phiphi, w):
             t0, t1, t2 = six(phiphi, 0, jc), six(phiphi, 1, jc), six(phiphi, 2, jc)
             t3, t4, t5 = six(phiphi, 3, jc), six(phiphi, 4, jc), six(phiphi, 5, jc)
         for a in range(first, rows_a):
-            wa, ja = w.ww[start_a + a, side_a], w.jac[start_a + a, side_a]
+            wa, ja = ww[start_a + a, side_a], jac[start_a + a, side_a]
             value = wa[0] * w0 + wa[1] * w1 + wa[2] * w2 + wa[3] * w3 + wa[4] * w4 + wa[5] * w5
             if flexible:
                 value += ja[0] * t0 + ja[1] * t1 + ja[2] * t2 + ja[6] * t3 + ja[7] * t4 + ja[8] * t5
-            w.S[offset + a * rows_b + c] += value
+            S[offset + a * rows_b + c] += value
 
 
 @inlined
@@ -62,10 +71,11 @@ def block(S, offset, rows, columns):
 
 
 @inlined
-def factorise_blocks(starts, pattern, S, relaxation, diagonals, independence):
+def factorise_blocks(starts, pattern, S, relaxation, scale, independence):
     """Factorise in place (right-looking block Cholesky). Returns the row without a pivot, or -1.
 
-    diagonals (C,) : scratch;  independence (1,) : the least share of a row that the rows before it do not contain
+    scale (C,)        : what the entry of a row on the diagonal is at least
+    independence (1,) : the least share of a row that the rows before it do not contain
     """
     independence[0] = 1.0
     for k in range(starts.size - 1):
@@ -73,11 +83,10 @@ def factorise_blocks(starts, pattern, S, relaxation, diagonals, independence):
         diagonal = block(S, pattern.diagonal[k], size, size)
         for row in range(size):
             diagonal[row, row] *= 1.0 + relaxation
-            diagonals[starts[k] + row] = diagonal[row, row]
     for k in range(starts.size - 1):
         size = starts[k + 1] - starts[k]
         diagonal = block(S, pattern.diagonal[k], size, size)
-        failed = pivots(diagonal, size, diagonals[starts[k] : starts[k + 1]], independence)
+        failed = pivots(diagonal, size, scale[starts[k] : starts[k + 1]], independence)
         if failed >= 0:
             return starts[k] + failed
         eliminate_block(starts, pattern, S, k, size, diagonal)
@@ -85,17 +94,17 @@ def factorise_blocks(starts, pattern, S, relaxation, diagonals, independence):
 
 
 @kernel
-def pivots(matrix, size, diagonals, independence):
-    """In-place lower Cholesky factor with reciprocal diagonal, pivots at least FLOOR of the original diagonal."""
+def pivots(matrix, size, scale, independence):
+    """In-place lower Cholesky factor with reciprocal diagonal, pivots at least FLOOR of `scale`."""
     for j in range(size):
         pivot = matrix[j, j]
         for k in range(j):
             pivot -= matrix[j, k] * matrix[j, k]
-        share = pivot / diagonals[j]
-        if not diagonals[j] > 0.0 or share != share:
+        share = pivot / scale[j]
+        if not scale[j] > 0.0 or share != share:
             return j
         independence[0] = min(independence[0], share)
-        inverse = 1.0 / (max(share, FLOOR) * diagonals[j]) ** 0.5
+        inverse = 1.0 / (max(share, FLOOR) * scale[j]) ** 0.5
         matrix[j, j] = inverse
         for i in range(j + 1, size):
             value = matrix[i, j]

@@ -5,7 +5,19 @@ ch. 5, written for body-frame velocities); see `ffr_dyn.inertia` for the readabl
 """
 
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.vectors import cholesky, copy, cross, dot, fill, get, put, solve_lower, solve_upper, to_body
+from ffr_dyn.kernels.vectors import (
+    cholesky,
+    copy,
+    cross,
+    dot,
+    fill,
+    get,
+    in_plane,
+    put,
+    rigid_lower,
+    rigid_upper,
+    to_body,
+)
 
 
 @kernel
@@ -131,6 +143,53 @@ def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s):
 
 
 @inlined
+def contract_in_plane(PP, q, qd, n, g0, g1, h, l, first, second, turning):  # noqa: E741
+    """g0, g1, h += the rows `first`, `second`, `turning` of sum_i q_i PP_i; l += row `turning` of sum_i qd_i PP_i."""
+    for i in range(n):
+        qi, di, start = q[i], qd[i], 9 * n * i
+        a, b = PP[start + first * n : start + (first + 1) * n], PP[start + second * n : start + (second + 1) * n]
+        c = PP[start + turning * n : start + (turning + 1) * n]
+        for j in range(n):
+            g0[j] += qi * a[j]
+            g1[j] += qi * b[j]
+            h[j] += qi * c[j]
+            l[j] += di * c[j]
+
+
+@inlined
+def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, normal):
+    """`flexible_terms` of a planar body that turns at the rate `omega`; without what acts across the plane."""
+    n, e, start = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4]
+    g, l = w.g[9 * e : 9 * (e + n)], w.l[3 * e : 3 * e + n]  # noqa: E741
+    rP, P = bodies.rP_dm[9 * e : 9 * (e + n)], bodies.P_dm[3 * e : 3 * (e + n)]
+    c0, c1, _ = in_plane(normal)
+    turning = 6 + normal
+    g0, g1, h = g[c0 * n : (c0 + 1) * n], g[c1 * n : (c1 + 1) * n], g[turning * n : (turning + 1) * n]
+    copy(g, rP)
+    fill(l, 0.0)
+    contract_in_plane(bodies.PP_dm[start : start + 9 * n * n], q, qd, n, g0, g1, h, l, c0, c1, turning)
+    s = (s[0] + row_dot(P, 0, q, n), s[1] + row_dot(P, 1, q, n), s[2] + row_dot(P, 2, q, n))
+    pd = (row_dot(P, 0, qd, n), row_dot(P, 1, qd, n), row_dot(P, 2, qd, n))
+    grown = row_dot(rP, c0, q, n) + row_dot(g0, 0, q, n) + row_dot(rP, c1, q, n) + row_dot(g1, 0, q, n)
+    growing = row_dot(g0, 0, qd, n) + row_dot(g1, 0, qd, n)
+    # Only the sums of both components in the plane enter; they are kept in one component.
+    W = (
+        second[0] + (grown if c0 == 0 else 0.0), second[1] + (grown if c0 == 1 else 0.0),
+        second[2], second[3], second[4], second[5],
+    )  # fmt: skip
+    D = (growing if c0 == 0 else 0.0, growing if c0 == 1 else 0.0, 0.0, 0.0, 0.0, 0.0)
+    f = w.f[bodies.where[b, 2] + 6 : bodies.where[b, 2] + 6 + n]
+    omega2, damping = bodies.omega2[e : e + n], bodies.two_zeta_omega[e : e + n]
+    P0, P1, square = P[c0 * n : (c0 + 1) * n], P[c1 * n : (c1 + 1) * n], omega * omega
+    for j in range(n):
+        f[j] = (
+            square * (g0[j] + g1[j]) - 2.0 * omega * l[j] + gravity[c0] * P0[j] + gravity[c1] * P1[j]
+            - omega2[j] * q[j] - damping[j] * qd[j]
+        )  # fmt: skip
+    return s, pd, W, D
+
+
+@inlined
 def inertia(gravity_field, bodies, w, x, v, b):
     """Rotation, first and second moments, right-hand side w.f (body axes) of body b, without markers' loads."""
     n, i, j = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 2]
@@ -147,7 +206,11 @@ def inertia(gravity_field, bodies, w, x, v, b):
     D_axial = (0.0, 0.0, 0.0)
     if n > 0:
         q, qd = x[i + 7 : i + 7 + n], v[j + 6 : j + 6 + n]
-        s, pd, W, D, D_axial = flexible_terms(bodies, w, b, q, qd, omega, gravity, W, s)
+        normal = bodies.where[b, 7]
+        if normal >= 0:
+            s, pd, W, D = flexible_terms_in_plane(bodies, w, b, q, qd, omega[normal], gravity, W, s, normal)
+        else:
+            s, pd, W, D, D_axial = flexible_terms(bodies, w, b, q, qd, omega, gravity, W, s)
     put(w.s, b, s)
     J = w.J[b]
     J[0, 0], J[1, 1], J[2, 2] = W[1] + W[2], W[0] + W[2], W[0] + W[1]
@@ -185,20 +248,20 @@ def rigid_mass(mass, s, J, M):
     M[5, 0], M[5, 1] = -s[1], s[0]
 
 
-@kernel
+@inlined
 def factorise(bodies, w, b):
     """Cholesky factor of the Schur complement of body b on its elastic block. Returns True when it is positive."""
-    n, e = bodies.where[b, 0], bodies.where[b, 3]
+    n, e, normal = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 7]
     L = w.L[b]
     rigid_mass(bodies.mass[b], w.s[b], w.J[b], L)
+    P, H = bodies.P_dm[3 * e : 3 * (e + n)], w.g[9 * e + 6 * n : 9 * (e + n)]
+    dinv, Cd = w.dinv[e : e + n], w.Cd[6 * e : 6 * (e + n)]
+    if normal >= 0:
+        return factorise_in_plane(P, H, dinv, Cd, L, n, normal)
+    for r in range(3):
+        scale_row(P, r, dinv, n, Cd, r)
+        scale_row(H, r, dinv, n, Cd, 3 + r)
     if n > 0:
-        dinv = w.dinv[e : e + n]
-        Cd = w.Cd[6 * e : 6 * (e + n)]
-        P, H = bodies.P_dm[3 * e : 3 * (e + n)], w.g[9 * e + 6 * n : 9 * (e + n)]
-        for r in range(3):
-            for j in range(n):
-                Cd[r * n + j] = P[r * n + j] * dinv[j]
-                Cd[(3 + r) * n + j] = H[r * n + j] * dinv[j]
         for r in range(3):
             for c in range(r + 1):
                 L[r, c] -= row_product(Cd, r, P, c, n)
@@ -206,6 +269,35 @@ def factorise(bodies, w, b):
             for c in range(3):
                 L[3 + r, c] -= row_product(Cd, 3 + r, P, c, n)
     return cholesky(L, 6) < 0
+
+
+@kernel
+def scale_row(rows, r, dinv, n, out, target):
+    """out[target] = rows[r] dinv, for pooled arrays of rows of n."""
+    row, scaled = rows[r * n : (r + 1) * n], out[target * n : (target + 1) * n]
+    for j in range(n):
+        scaled[j] = row[j] * dinv[j]
+
+
+@kernel
+def factorise_in_plane(P, H, dinv, Cd, L, n, normal):
+    """`factorise` for the three rigid coordinates i, j, k of a planar body."""
+    i, j, k = in_plane(normal)
+    scale_row(P, i, dinv, n, Cd, i)
+    scale_row(P, j, dinv, n, Cd, j)
+    scale_row(H, normal, dinv, n, Cd, k)
+    ii, ji, jj = row_product(Cd, i, P, i, n), row_product(Cd, j, P, i, n), row_product(Cd, j, P, j, n)
+    ki, kj, kk = row_product(Cd, k, P, i, n), row_product(Cd, k, P, j, n), row_product(Cd, k, H, normal, n)
+    inertia = L[k, k]
+    ii, jj, kk = L[i, i] - ii, L[j, j] - jj, inertia - kk
+    L[i, i] = 1.0 / ii**0.5
+    L[j, i], L[k, i] = -ji * L[i, i], (L[k, i] - ki) * L[i, i]
+    jj -= L[j, i] ** 2
+    L[j, j] = 1.0 / jj**0.5
+    L[k, j] = (L[k, j] - kj - L[k, i] * L[j, i]) * L[j, j]
+    kk -= L[k, i] ** 2 + L[k, j] ** 2
+    L[k, k] = 1.0 / kk**0.5
+    return ii > 0.0 and jj > 0.0 and kk > 1e-14 * inertia
 
 
 @kernel
@@ -218,7 +310,7 @@ def row_product(a, i, b, j, n):
     return total
 
 
-@kernel
+@inlined
 def solve_body(bodies, w, b):
     """w.acc = M^-1 w.f for body b, without constraints."""
     n, j, e = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3]
@@ -227,8 +319,8 @@ def solve_body(bodies, w, b):
         acc[k] = f[k]
         if n > 0:
             acc[k] -= row_dot(w.Cd[6 * e : 6 * (e + n)], k, f[6:], n)
-    solve_lower(w.L[b], acc, 6)
-    solve_upper(w.L[b], acc, 6)
+    rigid_lower(w.L[b], acc, bodies.where[b, 7])
+    rigid_upper(w.L[b], acc, bodies.where[b, 7])
     if n > 0:
         back_substitute(w.Cd[6 * e : 6 * (e + n)], w.dinv[e : e + n], f[6:], acc, n, acc[6:])
 

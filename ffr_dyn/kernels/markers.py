@@ -57,9 +57,11 @@ def axis_motion(w, k, a0):
 
 
 @kernel
-def couple_marker(phi, Cd, n, P):
+def couple_marker(phi, Cd, n, normal, P):
     """P (6, 6) = [P_dm; H] dinv phi^T: what a unit wrench on a marker does to the rigid coordinates through the elastic."""
     for r in range(6):
+        if normal >= 0 and (r == normal if r < 3 else r != 3 + normal):
+            continue
         for c in range(6):
             P[r, c] = row_product(Cd, r, phi, c, n)
 

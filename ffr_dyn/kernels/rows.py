@@ -8,7 +8,7 @@ omega_bar and of the elastic rotation rate (all in body axes). Readable twin: `f
 import math
 
 from ffr_dyn.kernels.markers import axis_motion
-from ffr_dyn.kernels.options import kernel
+from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.tables import COINCIDENCE, DISTANCE, DOT_1, DOT_2, RELATION, STROKE
 from ffr_dyn.kernels.vectors import add, cross, dot, get, scale, subtract, to_body
 
@@ -155,7 +155,7 @@ def row_of(kind, axes, drive, w, i, j):
     return driven_angle(w, i, j, get(axes, 0), get(axes, 1), get(axes, 2), drive)
 
 
-@kernel
+@inlined
 def evaluate_block(rows, functions, markers, w, k):
     """Fill the rows of block k of w (a RowWork); markers: MarkerWork; functions (F, 3)."""
     i, j = rows.marker[k, 0], rows.marker[k, 1]

@@ -17,8 +17,8 @@ from ffr_dyn.kernels.vectors import (
     cross,
     fill,
     get,
-    solve_lower,
-    solve_upper,
+    rigid_lower,
+    rigid_upper,
     subtract,
     to_body,
     to_global,
@@ -48,27 +48,47 @@ def evaluate_bodies(gravity, bodies, w, x, v):
 
 
 @inlined
-def couple_joints(where, markers, rows, pattern, bw, rw):
+def couple_joints(bodies, markers, rows, pattern, bw, rw):
     """Rigid parts of all rows after elimination of the elastic coordinates, and the multiplier matrix."""
+    where = bodies.where
+    fill(rw.scale, 0.0)
     ground = where.shape[0] - 1
     for k in markers.joint:
         b = markers.body[k]
         n, e = where[b, 0], where[b, 3]
         if n > 0:
-            couple_marker(shapes(markers, k, n), bw.Cd[6 * e : 6 * (e + n)], n, rw.P[k])
+            couple_marker(shapes(markers, k, n), bw.Cd[6 * e : 6 * (e + n)], n, where[b, 7], rw.P[k])
     for k in range(rows.marker.shape[0]):
         for side in range(rows.marker.shape[1]):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
-                eliminate_side(rows.start[k], rows.start[k + 1], side, where[b, 0] > 0, rw.P[marker], bw.L[b], rw)
+                first, last = rows.start[k], rows.start[k + 1]
+                flexible, normal = where[b, 0] > 0, where[b, 7]
+                mass, turning = bodies.mass[b], bw.J[b, 0, 0] + bw.J[b, 1, 1] + bw.J[b, 2, 2]
+                eliminate_side(
+                    first,
+                    last,
+                    side,
+                    flexible,
+                    normal,
+                    rw.P[marker],
+                    bw.L[b],
+                    mass,
+                    turning,
+                    rw.jac,
+                    rw.rr,
+                    rw.ww,
+                    rw.scale,
+                )
     fill(rw.S, 0.0)
     for p in range(pattern.pair_body.size):
-        add_pair(rows.start, pattern.pair[p], where[pattern.pair_body[p], 0] > 0, rw.phiphi[p], rw)
+        flexible = where[pattern.pair_body[p], 0] > 0
+        add_pair(rows.start, pattern.pair[p], flexible, rw.phiphi[p], rw.ww, rw.jac, rw.S)
 
 
 # Near a singular position the rows become dependent, and a violation eta of the constraints throws the motion from its
-# branch when it comes closer than about eta^(1/3). So on the approach (`nearness` below NEAR) the violation is held far
+# branch when it comes closer than about eta^(1/3). So on the approach (`independence` below NEAR) the violation is held far
 # lower, and at the position itself (below AT) it is left alone: along the direction that is about to be free a correction
 # would be the violation divided by the distance.
 NEAR, AT = 1e-2, 1e-6
@@ -93,24 +113,14 @@ def evaluate(m, w, t, x, v):
     apply_loads(bodies.where, markers, m.loads, mw, w.functions, w.user, bw.f)
     for k in range(rows.marker.shape[0]):
         evaluate_block(rows, w.functions, mw, rw, k)
-    couple_joints(bodies.where, markers, rows, m.pattern, bw, rw)
-    failed = factorise_blocks(rows.start, m.pattern, rw.S, m.relaxation, rw.step, w.independence)
+    couple_joints(bodies, markers, rows, m.pattern, bw, rw)
+    failed = factorise_blocks(rows.start, m.pattern, rw.S, m.relaxation, rw.scale, w.independence)
     if failed >= 0:
         w.info[0] = failed
         return SINGULAR_CONSTRAINT
-    w.independence[3] = max(w.independence[3], w.independence[0])
-    if nearness(w) < w.independence[1]:
-        w.independence[1], w.independence[2] = nearness(w), t
+    if w.independence[0] < w.independence[1]:
+        w.independence[1], w.independence[2] = w.independence[0], t
     return OK
-
-
-@kernel
-def nearness(w):
-    """Share of a row that others do not contain, over the largest met: small near a singular position.
-
-    The share alone is small for light bodies at any position, since it is measured by the mass matrix.
-    """
-    return w.independence[0] / w.independence[3]
 
 
 @kernel
@@ -202,12 +212,13 @@ def react(bodies, markers, rows, bw, rw):
             if b != ground:
                 n, e = where[b, 0], where[b, 3]
                 elastic = bw.elastic[e : e + n]
-                gather(shapes(markers, marker, n), rw, rows.start[k], rows.start[k + 1], side, n, bw.rigid[b], elastic)
+                phi, first, last = shapes(markers, marker, n), rows.start[k], rows.start[k + 1]
+                gather(phi, rw.jac, rw.rr, rw.step, first, last, side, n, bw.rigid[b], elastic)
     for b in range(ground):
         n, j, e = where[b, 0], where[b, 2], where[b, 3]
         z = bw.rigid[b]
-        solve_lower(bw.L[b], z, 6)
-        solve_upper(bw.L[b], z, 6)
+        rigid_lower(bw.L[b], z, where[b, 7])
+        rigid_upper(bw.L[b], z, where[b, 7])
         acc = bw.acc[j : j + 6 + n]
         for c in range(6):
             acc[c] += z[c]
@@ -219,11 +230,11 @@ def react(bodies, markers, rows, bw, rw):
 
 
 @kernel
-def gather(phi, w, first, last, side, n, rigid, elastic):
+def gather(phi, all_jac, all_rr, step, first, last, side, n, rigid, elastic):
     """Add -Phi_q^T step of some rows' side to the rigid (eliminated) and elastic parts of a body."""
     force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for row in range(first, last):
-        jac, rr, lam = w.jac[row, side], w.rr[row, side], w.step[row]
+        jac, rr, lam = all_jac[row, side], all_rr[row, side], step[row]
         for c in range(6):
             rigid[c] -= rr[c] * lam
         force = (force[0] - jac[0] * lam, force[1] - jac[1] * lam, force[2] - jac[2] * lam)
@@ -305,10 +316,10 @@ def evaluate_on_constraints(m, w, t, x, v, tolerance):
         position, velocity = largest(w.rows.Phi), largest(w.rows.nu)
         if attempt == 0:
             w.drift[0], w.drift[1] = max(w.drift[0], position), max(w.drift[1], velocity)
-        allowed = tolerance * (TIGHTER if nearness(w) < NEAR else 1.0)
+        allowed = tolerance * (TIGHTER if w.independence[0] < NEAR else 1.0)
         if tolerance == 0.0 or attempt == 4 or (position <= allowed and velocity <= 100.0 * allowed):
             break
-        if nearness(w) < AT:
+        if w.independence[0] < AT:
             break
         w.info[2] += 1
         move_back(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, w.vd, x, v)

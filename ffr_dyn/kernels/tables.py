@@ -26,7 +26,8 @@ class Bodies(NamedTuple):
     """B bodies, E elastic coordinates in all."""
 
     where: (
-        Array  # (B + 1, 7) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening; its number of loads
+        Array  # (B + 1, 8) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening; its number of loads;
+        # the body axis along the normal of a planar scene, or -1
     )
     mass: Array  # (B,)
     moments: Array  # (B, 9) first moment r_dm (3), second moment rr_dm (6)
@@ -151,6 +152,7 @@ class RowWork(NamedTuple):
     gamma: Array  # (C,)
     lam: Array  # (C,)
     step: Array  # (C,) change of lam
+    scale: Array  # (C,) what the entry of S on the diagonal is at least
     jac: Array  # (C, D, 9) coefficients of point velocity, omega_bar, elastic rotation rate
     rr: Array  # (C, D, 6) rigid part after elimination of the elastic coordinates
     ww: Array  # (C, D, 6) L^-1 rr
@@ -171,9 +173,7 @@ class Work(NamedTuple):
     user: Array  # (user_count,)
     info: Array  # (4,) integers: body or row that failed, evaluations, projections, step that failed
     drift: Array  # (2,) largest |Phi| and |Phi_dot| met
-    independence: (
-        Array  # (4,) least share of a row that others do not contain; smallest nearness and when; largest share
-    )
+    independence: Array  # (3,) least share of a row that others do not contain: now, least so far, and when
 
 
 class Stages(NamedTuple):

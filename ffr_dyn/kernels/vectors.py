@@ -105,6 +105,38 @@ def solve_upper(factor, b, size):
 
 
 @kernel
+def rigid_lower(factor, b, normal):
+    """In place b <- L^-1 b for the rigid coordinates (6,) of a body; of a planar one, three of them and zeros."""
+    if normal < 0:
+        solve_lower(factor, b, 6)
+        return
+    i, j, k = in_plane(normal)
+    first = b[i] * factor[i, i]
+    second = (b[j] - factor[j, i] * first) * factor[j, j]
+    third = (b[k] - factor[k, i] * first - factor[k, j] * second) * factor[k, k]
+    b[normal], b[3 + (normal + 1) % 3], b[3 + (normal + 2) % 3] = 0.0, 0.0, 0.0
+    b[i], b[j], b[k] = first, second, third
+
+
+@kernel
+def rigid_upper(factor, b, normal):
+    """In place b <- L^-T b, as `rigid_lower`."""
+    if normal < 0:
+        solve_upper(factor, b, 6)
+        return
+    i, j, k = in_plane(normal)
+    b[k] = b[k] * factor[k, k]
+    b[j] = (b[j] - factor[k, j] * b[k]) * factor[j, j]
+    b[i] = (b[i] - factor[j, i] * b[j] - factor[k, i] * b[k]) * factor[i, i]
+
+
+@kernel
+def in_plane(normal):
+    """The rigid coordinates, ascending, that move in the plane across body axis `normal`."""
+    return 1 if normal == 0 else 0, 1 if normal == 2 else 2, 3 + normal
+
+
+@kernel
 def fill(target, value):
     for k in range(target.size):
         target[k] = value

@@ -1,0 +1,215 @@
+"""Planar scenes: found or declared, and reduced to what moves in the plane.
+
+A scene is planar about a global axis when nothing in it can leave the plane across that axis: every body has a body axis
+along the normal and is symmetric about the plane through its origin, markers that are used lie in that plane, axes of
+joints are in the plane or along the normal, and so are forces. Then the in-plane motion and all reactions are those of
+the spatial scene, while a body has three rigid coordinates, no out-of-plane modes, and a revolute joint two rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields, replace
+
+import numpy as np
+
+from ffr_dyn.drivers import PointDriver
+from ffr_dyn.errors import InputError
+from ffr_dyn.forces import SpringDamper
+from ffr_dyn.joints import Joint
+from ffr_dyn.rotation import rotation_matrix
+from ffr_dyn.scene import Body, Scene, marker_names, markers
+from ffr_prep.body import FlexibleBody, axial, truncated
+
+Array = np.ndarray
+
+AXES = "xyz"
+_ZERO = 1e-9
+# What the search for a plane understands; a scene with anything else is planar only when it is declared so.
+_KNOWN = {"bodies", "joints", "drivers", "couplings", "loads", "springs", "ground", "gravity", "name", "plane"}
+
+
+def planar_forms(scene: Scene) -> Iterator[Scene]:
+    """The scene with in-plane modes only, for every plane that its declarations allow; `plane` is the normal.
+
+    Whether the joints too keep to the plane is for their rows to tell. Raises InputError for a scene that is declared
+    planar and has something across the plane.
+    """
+    if scene.plane in AXES:
+        normal = AXES.index(scene.plane)
+        for obstacle in _across(scene, normal):
+            raise InputError(f"the scene is declared planar with the normal {scene.plane}, but {obstacle}")
+        yield _in_plane(scene, normal, strict=False)
+    if scene.plane == "auto":
+        for normal in range(3):
+            if not any(True for _ in _obstacles(scene, normal)):
+                yield _in_plane(scene, normal, strict=True)
+
+
+def body_normal(body: Body, normal: int) -> int:
+    """The body axis along the global axis `normal`, or -1."""
+    along = rotation_matrix(body.rotation)[normal]
+    k = int(np.argmax(np.abs(along)))
+    return k if abs(along[k]) > 1 - 1e-12 else -1
+
+
+def _in_plane(scene: Scene, normal: int, *, strict: bool) -> Scene:
+    bodies = []
+    for body in scene.bodies:
+        k = body_normal(body, normal)
+        keep = np.flatnonzero(_stays(body.model, k, _used(scene, body)) if strict else _mostly(body.model, k))
+        bodies.append(
+            replace(
+                body,
+                model=truncated(body.model, keep),
+                q=body.q[keep],
+                q_dot=body.q_dot[keep],
+                damping=body.damping[keep],
+            )
+        )
+    return replace(scene, bodies=tuple(bodies), plane=AXES[normal])
+
+
+# ---- what stands in the way ---------------------------------------------------------------------------------------
+
+
+def _across(scene: Scene, normal: int) -> Iterator[str]:
+    """What makes a planar motion impossible, in words."""
+    if abs(scene.gravity[normal]) > _ZERO * np.linalg.norm(scene.gravity):
+        yield f"gravity has the component {scene.gravity[normal]:g} m/s^2 along it"
+    for body in scene.bodies:
+        k = body_normal(body, normal)
+        if k < 0:
+            yield f"no axis of body {body.name!r} is along it"
+        elif abs(body.velocity[normal]) > _ZERO * np.linalg.norm(body.velocity):
+            yield f"body {body.name!r} starts with a velocity along it"
+        elif np.abs(np.delete(body.omega_bar, k)).max() > _ZERO * np.linalg.norm(body.omega_bar):
+            yield f"body {body.name!r} starts with an angular velocity across it"
+    for driver in scene.drivers:
+        if isinstance(driver, PointDriver) and (driver.x, driver.y, driver.z)[normal] is not None:
+            yield f"driver {driver.name!r} prescribes a motion along it"
+
+
+def _obstacles(scene: Scene, normal: int) -> Iterator[str]:
+    """What may take the motion out of the plane, or makes reactions that a planar scene does not have."""
+    yield from _across(scene, normal)
+    if any(f.name not in _KNOWN and getattr(scene, f.name) for f in fields(scene)):
+        yield "there are forces of other kinds"
+    for body in scene.bodies:
+        k = body_normal(body, normal)
+        if not _symmetric(body.model, k, _used(scene, body)):
+            yield f"body {body.name!r} is not symmetric"
+    for load in scene.loads:
+        k = normal if load.axes == "global" else _normal_of(scene, load.marker, normal)
+        if load.function is not None or not _vanishes(load.force[k]) or not _none_but(load.moment, k):
+            yield f"load {load.name!r} may act across"
+    heights = {round(height, 9) for height in _heights(scene, normal)}
+    if len(heights) > 1:
+        yield "springs or distances run aslant"
+
+
+def _heights(scene: Scene, normal: int) -> Iterator[float]:
+    """Along the normal, the distance between the ends of whatever acts along a line; zero to start with."""
+    at = dict(zip(marker_names(scene), _places(scene), strict=True))
+    yield 0.0
+    for spring in scene.springs:
+        yield abs(at[spring.i][normal] - at[spring.j][normal])
+    for joint in scene.joints:
+        yield abs(at[joint.i][normal] - at[joint.j][normal])
+
+
+def _places(scene: Scene) -> list[Array]:
+    """Undeformed position of every marker as the scene declares it."""
+    found = []
+    for b, _, point in markers(scene):
+        if b == len(scene.bodies):
+            found.append(scene.ground[point])
+        else:
+            body = scene.bodies[b]
+            found.append(body.position + rotation_matrix(body.rotation) @ body.model.interface(point).position)
+    return found
+
+
+def _vanishes(component: object) -> bool:
+    return isinstance(component, (int, float, np.floating, np.integer)) and component == 0
+
+
+def _none_but(moment: tuple[object, ...], k: int) -> bool:
+    return all(_vanishes(moment[c]) for c in range(3) if c != k)
+
+
+def _normal_of(scene: Scene, marker: str, normal: int) -> int:
+    """The axis of the marker's body along the normal."""
+    body = marker.partition(".")[0]
+    return next((body_normal(b, normal) for b in scene.bodies if b.name == body), normal)
+
+
+def _used(scene: Scene, body: Body) -> list[str]:
+    """Interfaces of a body at which joints, loads, springs or point drivers act."""
+    paired: list[Joint | SpringDamper | PointDriver]
+    paired = [*scene.joints, *scene.springs, *(d for d in scene.drivers if isinstance(d, PointDriver))]
+    ends = [load.marker for load in scene.loads] + [end for one in paired for end in (one.i, one.j)]
+    return sorted({end.partition(".")[2] for end in ends if end.partition(".")[0] == body.name})
+
+
+# ---- symmetry of a body -------------------------------------------------------------------------------------------
+
+
+def _symmetric(body: FlexibleBody, k: int, used: list[str]) -> bool:
+    """Whether in-plane motion excites nothing across body axis k, neither rigid nor elastic."""
+    if k < 0:
+        return False
+    a, b = (c for c in range(3) if c != k)
+    length = np.sqrt(np.trace(body.rr_dm) / body.mass)
+    offsets = [body.r_dm[k] / body.mass, *(body.interface(name).position[k] for name in used)]
+    products = [body.rr_dm[a, k], body.rr_dm[b, k]]
+    if np.abs(offsets).max() > _ZERO * length or np.abs(products).max() > _ZERO * body.mass * length**2:
+        return False
+    stays, leaves = _stays(body, k, used), _leaves(body, k, used)
+    if (stays == leaves).any():
+        return False
+    if body.stiffening is not None and not _splits(body.stiffening, stays):
+        return False
+    PP, turning = body.PP_dm, axial(body.PP_dm)
+    mixed = np.array([PP[a, a] + PP[b, b], turning[k]])[:, stays][:, :, leaves]
+    out = np.array([PP[a, k], PP[b, k], turning[a], turning[b]])[:, stays][:, :, stays]
+    return bool(max(np.abs(mixed).max(initial=0.0), np.abs(out).max(initial=0.0)) < _ZERO)
+
+
+def _splits(stiffening: Array, stays: Array) -> bool:
+    """Whether no load couples modes that stay in the plane with modes that leave it."""
+    scale = np.abs(stiffening).max(axis=(1, 2), initial=0.0)
+    mixed = np.abs(stiffening[:, stays][:, :, ~stays]).max(axis=(1, 2), initial=0.0)
+    return bool((mixed <= 1e-6 * scale).all())
+
+
+def _stays(body: FlexibleBody, k: int, used: list[str]) -> Array:
+    """(n,) which modes have no momentum, and move no marker that is used, across the plane."""
+    a, b = (c for c in range(3) if c != k)
+    turning = axial(body.rP_dm)
+    return _quiet(body, [body.P_dm[k]], [turning[a], turning[b]], used, [k], [a, b])
+
+
+def _leaves(body: FlexibleBody, k: int, used: list[str]) -> Array:
+    """(n,) which modes have no momentum, and move no marker that is used, in the plane."""
+    a, b = (c for c in range(3) if c != k)
+    moments = [axial(body.rP_dm)[k], body.rP_dm[a, a] + body.rP_dm[b, b]]
+    return _quiet(body, [body.P_dm[a], body.P_dm[b]], moments, used, [a, b], [k])
+
+
+def _quiet(
+    body: FlexibleBody, momenta: list[Array], moments: list[Array], used: list[str], shifts: list[int], turns: list[int]
+) -> Array:
+    length = np.sqrt(np.trace(body.rr_dm) / body.mass)
+    parts = [part / np.sqrt(body.mass) for part in momenta]
+    parts += [part / (np.sqrt(body.mass) * length) for part in moments]
+    for name in used:
+        interface = body.interface(name)
+        parts += [interface.phi_t[c] * np.sqrt(body.mass) for c in shifts]
+        parts += [interface.phi_r[c] * np.sqrt(body.mass) * length for c in turns]
+    return np.abs(parts).max(axis=0) < _ZERO
+
+
+def _mostly(body: FlexibleBody, k: int) -> Array:
+    """(n,) which modes have more of their motion in the plane than across."""
+    return np.einsum("jj->j", body.PP_dm[k, k]) < 0.5

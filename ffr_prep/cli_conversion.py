@@ -1,0 +1,31 @@
+"""The sub-command `convert` of ffr-prep: other reference conditions for a body."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+_PATH = click.Path(path_type=Path)
+
+
+@click.command("convert")
+@click.argument("body", type=_PATH)
+@click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
+@click.option("--reference", required=True, metavar="CONDITIONS", help="As in reduce, on the interfaces of BODY.")
+def convert(body: Path, output: Path, reference: str) -> None:
+    """Attach the frame of BODY in another way, without its mesh: to an interface, between two, or to the mean axis.
+
+    The motions that the body can make stay the same. What it has lost before is said, and not brought back.
+    """
+    from ffr_prep import cli
+    from ffr_prep.body import load_body, save_body
+    from ffr_prep.conversion import with_reference
+    from ffr_prep.report import short_lines
+
+    conditions = cli._reference(reference)
+    cli._check_writable(output)
+    converted = with_reference(load_body(body), conditions)
+    save_body(converted, output)
+    cli._print(short_lines(converted))
+    click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")
