@@ -95,7 +95,7 @@ def _explained(error: ValidationError, source: Source) -> str:
 
 
 def _scene(entry: Any, source: Source) -> Scene:
-    tables = {
+    tables: dict[str, Any] = {
         table: tuple(_declared(kinds, (table, name), item, source) for name, item in getattr(entry, table).items())
         for table, kinds in TABLES.items()
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -222,3 +223,27 @@ def test_a_run_that_failed_tells_the_same_when_it_is_resumed(tmp_path):
         with pytest.raises(SimulationError, match=r"'bad' at t = 0\.50"):
             forward(scene, **settings, resume=tmp_path / "run.nc")
         assert load_result(tmp_path / "run.nc").time[-1] == pytest.approx(0.5)
+
+
+BITS = """
+import hashlib, test_resume as t
+result = t.forward(t.SCENE, **t.SETTINGS | {"outputs": ("one.R", "two.q"), "end": 0.2})
+print(hashlib.sha256(result["one.R"].tobytes() + result["two.q"].tobytes()).hexdigest())
+"""
+
+
+@pytest.mark.slow
+def test_the_run_that_compiles_gives_the_bits_of_all_later_ones(tmp_path):
+    """A copy of the program without compiled kernels: its first run, and its second."""
+    here = Path(__file__).parent
+    unwanted = shutil.ignore_patterns("__pycache__")
+    for folder in ("ffr_dyn", "ffr_prep", "tests"):
+        shutil.copytree(here.parent / folder, tmp_path / folder, ignore=unwanted)
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(tmp_path / "tests")])}
+    runs = [
+        subprocess.run([sys.executable, "-c", BITS], env=environment, capture_output=True, text=True, check=True)
+        for _ in range(2)
+    ]
+    assert "compiling" in runs[0].stderr
+    assert "compiling" not in runs[1].stderr
+    assert runs[0].stdout == runs[1].stdout
