@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,13 +12,12 @@ from ffr_dyn.couplings import Coupling, coupling_word
 from ffr_dyn.drivers import Driver, PointDriver, driver_word, path_words
 from ffr_dyn.elimination import Elimination, eliminate
 from ffr_dyn.errors import InputError
-from ffr_dyn.forces import Load
+from ffr_dyn.force_tables import Callback, FunctionTable, base_functions, load_tables, marker_numbers
 from ffr_dyn.joints import RELATION, Joint, Word, words
 from ffr_dyn.kernels.tables import (
     Bodies,
     BodyWork,
-    Functions,
-    Loads,
+    LoadWork,
     Markers,
     MarkerWork,
     Model,
@@ -33,7 +31,6 @@ from ffr_dyn.kernels.tables import (
 from ffr_dyn.layout import Layout, layout
 from ffr_dyn.scene import Body, Scene, joint_of, joints_of, marker_number, markers
 from ffr_dyn.state import StateView
-from ffr_dyn.timefunction import OPERATION, USER, TimeFunction, as_time_function
 from ffr_prep.body import FlexibleBody, axial
 
 Array = np.ndarray
@@ -116,12 +113,13 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: f
     functions = FunctionTable()
     model = {
         "gravity": np.array(scene.gravity),
+        "base": base_functions(scene, functions),
         "relaxation": relaxation,
         "bodies": _bodies(scene, place),
         "markers": _markers(scene, ordered),
         "rows": _rows(ordered, functions),
         "pattern": _pattern(ordered, [moving[k] for k in elimination.order], elimination, table),
-        "loads": _loads(scene, functions),
+        "loads": load_tables(scene, functions),
         "functions": functions.tables(),
     }
     user = UserFunctions(functions.callbacks, place, scene)
@@ -199,15 +197,13 @@ def _markers(scene: Scene, blocks: tuple[Block, ...]) -> Markers:
     interfaces = [i for body in scene.bodies for i in body.model.interfaces]
     phi = [np.concatenate([i.phi_t, i.phi_r]) for i in interfaces] + [np.zeros((6, 0))] * len(scene.ground)
     joint = sorted({k for block in blocks for k in block.markers})
-    loaded = [marker_number(scene, load.marker) for load in scene.loads]
-    sprung = [marker_number(scene, m) for spring in scene.springs for m in (spring.i, spring.j)]
     return Markers(
         body=np.array([entry[0] for entry in table], dtype=np.int64),
         u=np.array([i.position for i in interfaces] + list(scene.ground.values())).reshape(-1, 3),
         phi=_pool(phi),
         start=_starts([p.size for p in phi])[:-1],
         load=np.array(_load_numbers(scene), dtype=np.int64),
-        active=np.array(sorted({*joint, *loaded, *sprung}), dtype=np.int64),
+        active=np.array(sorted({*joint, *marker_numbers(scene)}), dtype=np.int64),
         joint=np.array([k for k in joint if table[k][0] != ground], dtype=np.int64),
     )
 
@@ -286,88 +282,6 @@ def _where(sides: list[int], body: int) -> list[int]:
     return [k for k, b in enumerate(sides) if b == body]
 
 
-# ---- loads and functions ------------------------------------------------------------------------------------------
-
-
-class FunctionTable:
-    """Collects time functions while a scene is compiled, and the callbacks of the user with their slots."""
-
-    def __init__(self) -> None:
-        self.functions: list[TimeFunction] = []
-        self.callbacks: list[Callback] = []
-        self.slots = 0
-
-    def add(self, function: TimeFunction, what: str = "function") -> int:
-        if function.callback is not None:
-            slot = self.callback(function.callback, 3, what, with_state=False)
-            function = TimeFunction(USER, (float(slot),))
-        elif function.kind == OPERATION:
-            rows = [float(self.add(operand, what)) for operand in function.operands]
-            function = TimeFunction(OPERATION, (*function.data, rows[0], rows[-1]))
-        self.functions.append(function)
-        return len(self.functions) - 1
-
-    def callback(self, function: Callable[..., Any], size: int, what: str, *, with_state: bool) -> int:
-        slot = self.slots
-        self.callbacks.append(Callback(function, slot, size, what, with_state))
-        self.slots += size
-        return slot
-
-    def tables(self) -> Functions:
-        return Functions(
-            kind=np.array([f.kind for f in self.functions], dtype=np.int64),
-            start=_starts([len(f.data) for f in self.functions]),
-            data=_pool([np.array(f.data) for f in self.functions]),
-        )
-
-
-@dataclass(frozen=True)
-class Callback:
-    """A Python function of the user and where its numbers go."""
-
-    function: Callable[..., Any]
-    slot: int
-    size: int
-    what: str
-    with_state: bool
-
-
-def _loads(scene: Scene, functions: FunctionTable) -> Loads:
-    value, number, wrench = [], [], []
-    for load in scene.loads:
-        constants, indices = _components(load, functions)
-        value.append(constants)
-        number.append(indices)
-        slot = -1
-        if load.function is not None:
-            slot = functions.callback(load.function, 6, f"load {load.name!r}", with_state=True)
-        wrench.append((marker_number(scene, load.marker), int(load.axes == "body"), slot))
-    springs = [(s.stiffness, s.damping, s.free_length, s.preload) for s in scene.springs]
-    ends = [(marker_number(scene, s.i), marker_number(scene, s.j)) for s in scene.springs]
-    return Loads(
-        wrench=np.array(wrench, dtype=np.int64).reshape(-1, 3),
-        value=np.array(value, dtype=float).reshape(-1, 6),
-        function=np.array(number, dtype=np.int64).reshape(-1, 6),
-        spring=np.array(ends, dtype=np.int64).reshape(-1, 2),
-        spring_data=np.array(springs, dtype=float).reshape(-1, 4),
-    )
-
-
-def _components(load: Load, functions: FunctionTable) -> tuple[list[float], list[int]]:
-    constants, indices = [], []
-    for component in (*load.force, *load.moment):
-        if isinstance(component, (int, float, np.floating, np.integer)):
-            if not np.isfinite(component):
-                raise InputError(f"load {load.name!r}: a component is {component}; all must be finite")
-            constants.append(float(component))
-            indices.append(-1)
-        else:
-            what = f"load {load.name!r}"
-            constants.append(1.0)
-            indices.append(functions.add(as_time_function(component, what), what))
-    return constants, indices
-
-
 # ---- the user's Python functions ----------------------------------------------------------------------------------
 
 _SIGNATURE = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
@@ -406,7 +320,7 @@ class UserFunctions:
         arguments = (t, StateView(self.scene, self.place, x, v)) if callback.with_state else (t,)
         given = np.atleast_1d(np.asarray(callback.function(*arguments), dtype=float))
         values = np.zeros(callback.size)
-        if given.ndim != 1 or given.size > callback.size or (callback.with_state and given.size not in (3, 6)):
+        if given.ndim != 1 or given.size not in callback.sizes:
             raise InputError(f"the function returned {given!r}, not numbers of the right count")
         if not np.isfinite(given).all():
             raise InputError(f"the function returned {given}; it must be finite")
@@ -449,9 +363,23 @@ def new_work(m: Model) -> Work:
         bodies=bodies,
         markers=MarkerWork(A=_identities(M), **vectors),
         rows=rows,
+        loads=_load_work(m, V, M),
+        field=np.zeros(3),
         info=np.zeros(4, dtype=np.int64),
         independence=np.ones(3),
         **zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=2),
+    )
+
+
+def _load_work(m: Model, V: int, M: int) -> LoadWork:
+    return LoadWork(
+        reference=m.loads.turn.copy(),
+        action=np.zeros((m.loads.action.shape[0], 3)),
+        bushing=np.zeros((m.loads.bushing.shape[0], 18)),
+        axes=np.zeros((2, 3, 3, 3)),
+        turn=np.zeros((3, 3, 3)),
+        f=np.zeros(V),
+        load=np.zeros((M, 6)),
     )
 
 
@@ -468,7 +396,8 @@ def new_stages(system: System, count: int) -> Stages:
 def new_record(system: System, rows: int) -> Record:
     """Room for `rows` output times."""
     m, place = system.model, system.layout
-    M, K, Z = m.markers.body.size, m.rows.marker.shape[0], m.loads.spring.shape[0]
+    M, K = m.markers.body.size, m.rows.marker.shape[0]
+    W, Z, Y, U = (table.shape[0] for table in (m.loads.wrench, m.loads.action, m.loads.bushing, m.loads.spread))
     return Record(
         np.zeros(rows),
         np.zeros((rows, place.x_size)),
@@ -477,7 +406,9 @@ def new_record(system: System, rows: int) -> Record:
         np.zeros((rows, M, 3)),
         np.zeros((rows, M, 3)),
         np.zeros((rows, K, 6)),
-        np.zeros((rows, Z)),
+        np.zeros((rows, Z, 3)),
+        np.zeros((rows, Y, 18)),
+        np.zeros((rows, W + Z + Y + U)),
         np.zeros((rows, 3)),
         np.zeros((rows, 2)),
     )

@@ -15,10 +15,12 @@ import numpy as np
 
 from ffr_dyn.equations import System
 from ffr_dyn.errors import InputError
+from ffr_dyn.force_tables import Action, actions_of, bushings_of, loads_of
+from ffr_dyn.forces import SpringDamper
 from ffr_dyn.joints import COORDINATES, Joint
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.measurement import Measurement
-from ffr_dyn.power import Worked, damping_power, power, reaction, transmitted, work
+from ffr_dyn.power import Worked, damping_power, power, reaction, spring_energy, springs_of, transmitted, work
 from ffr_dyn.result import EULER_PARAMETERS, XYZ, Axis, Quantity, mode_axis
 from ffr_dyn.scene import marker_names, markers
 from ffr_dyn.view import View, dot, times, to_axes
@@ -27,8 +29,8 @@ Array = np.ndarray
 
 # What a result keeps unless told otherwise: enough to draw, to animate and to recover stress, and what joints carry.
 DEFAULT_OUTPUTS = (
-    *("*.R", "*.p", "*.v", "*.omega_bar", "*.q", "*.q_dot", "*.position", "*.velocity", "*.displacement"),
-    *("*.force", "*.moment", "*.angle", "*.stroke", "*.tension", "energy.*", "constraint.*", "measured.*"),
+    *("*.R", "*.p", "*.v", "*.omega_bar", "*.q", "*.q_dot", "*.position", "*.velocity", "*.displacement", "*.rotation"),
+    *("*.force", "*.moment", "*.torque", "*.tension", "*.angle", "*.stroke", "energy.*", "constraint.*", "measured.*"),
 )
 
 
@@ -99,7 +101,7 @@ def needs_every_step(wanted: Iterable[str]) -> bool:
 
 def catalogue(system: System) -> dict[str, Entry]:
     """Every quantity that can be had of a scene, by name."""
-    parts = (_bodies, _markers, _reactions, _joint_coordinates, _springs, _powers, _totals, _measurements)
+    parts = (_bodies, _markers, _reactions, _joint_coordinates, _forces, _powers, _totals, _measurements)
     return {name: entry for part in parts for name, entry in part(system)}
 
 
@@ -189,16 +191,49 @@ def _reaction(name: str, marker: int, joint: Joint | None, k: int, suffix: str) 
     return values
 
 
-def _springs(system: System) -> Named:
-    for k, spring in enumerate(system.scene.springs):
-        text = "spring-damper force, tension positive"
-        yield f"{spring.name}.tension", _entry("N", (), text, lambda view, k=k: view.record.spring[:, k])  # type: ignore[misc]
+def _forces(system: System) -> Named:
+    """What acts on coordinates and in bushings: where it stands and what it exerts."""
+    for k, action in enumerate(actions_of(system.scene)):
+        for what, unit, column, sign, text in _of_action(action):
+            entry = _entry(unit, (), text, lambda view, k=k, c=column, s=sign: s * view.record.action[:, k, c])  # type: ignore[misc]
+            yield f"{action.name}.{what}", entry
+    for k, bushing in enumerate(bushings_of(system.scene)):
+        for what, unit, first, text in BUSHING:
+            entry = _entry(unit, (XYZ,), text, lambda view, k=k, a=first: view.record.bushing[:, k, a : a + 3])  # type: ignore[misc]
+            yield f"{bushing.name}.{what}", entry
+
+
+# name, unit, first column of the record, text
+BUSHING = (
+    ("displacement", "m", 0, "displacement of j from i, axes of the bushing on i"),
+    ("rotation", "rad", 3, "rotation vector from the axes of i to those of j"),
+    ("force", "N", 12, "force of the bushing on j, axes of the bushing on i"),
+    ("moment", "N m", 15, "moment of the bushing on j, conjugate to the rotation vector"),
+)
+
+
+def _of_action(action: Action) -> tuple[tuple[str, str, int, float, str], ...]:
+    """Name, unit, column of the record, sign and text of force and coordinate."""
+    if isinstance(action, SpringDamper):
+        return (
+            ("tension", "N", 2, -1.0, "spring-damper force, tension positive"),
+            ("length", "m", 0, 1.0, "distance of the ends"),
+        )
+    if action.coordinate == "angle":
+        return (
+            ("torque", "N m", 2, 1.0, "torque that increases the joint angle"),
+            ("angle", "rad", 0, 1.0, "joint angle with whole turns, as the force counts them"),
+        )
+    return (
+        ("force", "N", 2, 1.0, "force that increases the joint stroke"),
+        ("stroke", "m", 0, 1.0, "joint stroke along its axis"),
+    )
 
 
 def _powers(system: System) -> Named:
     scene = system.scene
     distances = [joint for joint in scene.joints if joint.kind == "distance"]
-    for thing in (*scene.loads, *scene.springs, *scene.drivers, *distances):
+    for thing in (*loads_of(scene), *scene.drivers, *distances):
         yield from _worked(thing.name, "put into the scene", lambda view, thing=thing: power(view, thing))  # type: ignore[misc]
     for b, body in enumerate(scene.bodies):
         if system.layout.n[b]:
@@ -222,8 +257,9 @@ def _totals(system: System) -> Named:
         yield f"energy.{name}", _entry("J", (), f"{name} energy", lambda view, k=k: view.record.energy[:, k])  # type: ignore[misc]
     total = "kinetic, strain and gravity energy"
     yield "energy.total", _entry("J", (), total, lambda view: _sum(view.record.energy))
-    if system.scene.springs:
-        yield "energy.springs", _entry("J", (), "energy stored in spring-dampers, preload included", _spring_energy)
+    if springs_of(system.scene):
+        text = "energy stored in springs and bushings, preload included"
+        yield "energy.springs", _entry("J", (), text, spring_energy)
     texts = (("position", "m", "largest violation of a constraint row"), ("velocity", "m/s", "largest rate of a row"))
     for k, (name, unit, text) in enumerate(texts):
         yield f"constraint.{name}", _entry(unit, (), text, lambda view, k=k: view.record.violation[:, k])  # type: ignore[misc]
@@ -231,15 +267,6 @@ def _totals(system: System) -> Named:
 
 def _sum(energy: Array) -> Array:
     return energy[:, 0] + energy[:, 1] + energy[:, 2]
-
-
-def _spring_energy(view: View) -> Array:
-    total = np.zeros(view.rows)
-    for spring in view.system.scene.springs:
-        apart = view.record.r[:, view.number(spring.j)] - view.record.r[:, view.number(spring.i)]
-        stretch = np.sqrt(dot(apart, apart)) - spring.free_length
-        total += (0.5 * spring.stiffness * stretch + spring.preload) * stretch
-    return total
 
 
 # ---- measurements of the scene ------------------------------------------------------------------------------------

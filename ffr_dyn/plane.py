@@ -16,9 +16,12 @@ import numpy as np
 from ffr_dyn.drivers import PointDriver
 from ffr_dyn.errors import InputError
 from ffr_dyn.forces import SpringDamper
-from ffr_dyn.joints import Joint
+from ffr_dyn.joint_forces import JointForce
+from ffr_dyn.joints import Joint, frames
 from ffr_dyn.rotation import rotation_matrix
-from ffr_dyn.scene import Body, Scene, marker_names, markers
+from ffr_dyn.scene import Body, Scene, joint_under, marker_names, marker_number, markers
+from ffr_dyn.surface_loads import ModalForce
+from ffr_dyn.timefunction import is_zero
 from ffr_prep.body import FlexibleBody, axial, truncated
 
 Array = np.ndarray
@@ -26,7 +29,8 @@ Array = np.ndarray
 AXES = "xyz"
 _ZERO = 1e-9
 # What the search for a plane understands; a scene with anything else is planar only when it is declared so.
-_KNOWN = {"bodies", "joints", "drivers", "couplings", "loads", "springs", "ground", "gravity", "name", "plane"}
+_KNOWN = {"bodies", "joints", "drivers", "couplings", "loads", "springs", "forces", "ground"}
+_KNOWN |= {"gravity", "base_acceleration", "name", "plane"}
 
 
 def planar_forms(scene: Scene) -> Iterator[Scene]:
@@ -54,7 +58,7 @@ def body_normal(body: Body, normal: int) -> int:
 
 
 def _in_plane(scene: Scene, normal: int, *, strict: bool) -> Scene:
-    bodies = []
+    bodies, kept = [], {}
     for body in scene.bodies:
         k = body_normal(body, normal)
         keep = np.flatnonzero(_stays(body.model, k, _used(scene, body)) if strict else _mostly(body.model, k))
@@ -67,7 +71,9 @@ def _in_plane(scene: Scene, normal: int, *, strict: bool) -> Scene:
                 damping=body.damping[keep],
             )
         )
-    return replace(scene, bodies=tuple(bodies), plane=AXES[normal])
+        kept[body.name] = keep
+    forces = [replace(f, values=f.values[kept[f.body]]) if isinstance(f, ModalForce) else f for f in scene.forces]
+    return replace(scene, bodies=tuple(bodies), forces=tuple(forces), plane=AXES[normal])
 
 
 # ---- what stands in the way ---------------------------------------------------------------------------------------
@@ -77,6 +83,8 @@ def _across(scene: Scene, normal: int) -> Iterator[str]:
     """What makes a planar motion impossible, in words."""
     if abs(scene.gravity[normal]) > _ZERO * np.linalg.norm(scene.gravity):
         yield f"gravity has the component {scene.gravity[normal]:g} m/s^2 along it"
+    if not is_zero(scene.base_acceleration[normal]):
+        yield "base_acceleration has a component along it"
     for body in scene.bodies:
         k = body_normal(body, normal)
         if k < 0:
@@ -103,9 +111,23 @@ def _obstacles(scene: Scene, normal: int) -> Iterator[str]:
         k = normal if load.axes == "global" else _normal_of(scene, load.marker, normal)
         if load.function is not None or not _vanishes(load.force[k]) or not _none_but(load.moment, k):
             yield f"load {load.name!r} may act across"
+    for force in scene.forces:
+        if not isinstance(force, JointForce) or not _turns_in_plane(scene, force, normal):
+            yield f"force {force.name!r} may act across"
     heights = {round(height, 9) for height in _heights(scene, normal)}
     if len(heights) > 1:
         yield "springs or distances run aslant"
+
+
+def _turns_in_plane(scene: Scene, force: JointForce, normal: int) -> bool:
+    """Whether a force on a joint coordinate moves bodies in the plane: an angle about the normal, a stroke across it."""
+    joint = joint_under(scene, force)
+    b = markers(scene)[marker_number(scene, joint.i)][0]
+    axis = frames(joint)[0][:, 2]
+    if b < len(scene.bodies):
+        axis = rotation_matrix(scene.bodies[b].rotation) @ axis
+    along = abs(axis[normal])
+    return bool(along > 1 - 1e-12 if force.coordinate == "angle" else along < _ZERO)
 
 
 def _heights(scene: Scene, normal: int) -> Iterator[float]:

@@ -12,13 +12,15 @@ from typing import Any
 
 import numpy as np
 
+from ffr_dyn.curve import Curve, curve_integral
 from ffr_dyn.drivers import Driver, PointDriver
-from ffr_dyn.forces import Load, SpringDamper
+from ffr_dyn.force_tables import AppliedLoad, actions_of, bushings_of, loads_of
+from ffr_dyn.forces import Bushing, SpringDamper, bushing_curves, stiffness_matrix
+from ffr_dyn.joint_forces import JointSpring
 from ffr_dyn.joints import Joint
-from ffr_dyn.scene import joint_of, markers
-from ffr_dyn.state import StateView
-from ffr_dyn.timefunction import as_time_function, evaluate
-from ffr_dyn.view import View, cross, dot, to_global
+from ffr_dyn.scene import Scene, joint_of
+from ffr_dyn.timefunction import evaluate
+from ffr_dyn.view import View, cross, dot
 
 Array = np.ndarray
 
@@ -58,7 +60,8 @@ def _means(values: Array) -> Array:
 
 def power(view: View, thing: Any) -> Array:
     """(T,) [W] that a force, a driver or a distance joint puts into the scene."""
-    return next(of for kind, of in POWERS.items() if isinstance(thing, kind))(view, thing)
+    of = next((of for kind, of in POWERS.items() if isinstance(thing, kind)), _of_force)
+    return of(view, thing)
 
 
 def damping_power(view: View, b: int) -> Array:
@@ -83,37 +86,44 @@ def reaction(view: View, name: str) -> tuple[Array, Array]:
     return view.record.reaction[:, k, :3], view.record.reaction[:, k, 3:]
 
 
+def springs_of(scene: Scene) -> list[SpringDamper | JointSpring | Bushing]:
+    """What stores energy."""
+    return [load for load in loads_of(scene) if isinstance(load, (SpringDamper, JointSpring, Bushing))]
+
+
+def spring_energy(view: View) -> Array:
+    """(T,) [J] stored in springs and bushings, preload included; zero where they are neither stretched nor turned."""
+    scene, total = view.system.scene, np.zeros(view.rows)
+    for k, action in enumerate(actions_of(scene)):
+        if isinstance(action, (SpringDamper, JointSpring)):
+            free = action.free_length if isinstance(action, SpringDamper) else action.free
+            stretch = view.record.action[:, k, 0] - free
+            total += _stored(action.stiffness, stretch) + action.preload * stretch
+    for k, bushing in enumerate(bushings_of(scene)):
+        total += _in_bushing(bushing, view.record.bushing[:, k, :6])
+    return total
+
+
+def _in_bushing(bushing: Bushing, x: Array) -> Array:
+    """(T,) energy at displacements and rotations x (T, 6)."""
+    total, K = np.zeros(len(x)), stiffness_matrix(bushing)
+    for r, (curve, preload) in enumerate(zip(bushing_curves(bushing), bushing.preload, strict=True)):
+        for c in range(6):
+            total += 0.5 * K[r, c] * x[:, r] * x[:, c]
+        total += (0.0 if curve is None else _stored(curve, x[:, r])) - preload * x[:, r]
+    return total
+
+
+def _stored(stiffness: float | Curve, stretch: Array) -> Array:
+    return curve_integral(stiffness, stretch) if isinstance(stiffness, Curve) else 0.5 * stiffness * stretch**2
+
+
 # ---- of each kind -------------------------------------------------------------------------------------------------
 
 
-def _of_load(view: View, load: Load) -> Array:
-    force, moment = _wrench(view, load)
-    marker = view.number(load.marker)
-    if load.axes == "body":
-        A = view.axes(markers(view.system.scene)[marker][0])
-        force, moment = to_global(A, force), to_global(A, moment)
-    return dot(force, view.record.rd[:, marker]) + dot(moment, view.spin(marker))
-
-
-def _wrench(view: View, load: Load) -> tuple[Array, Array]:
-    """Force and moment (T, 3) of a load in its axes."""
-    what = f"load {load.name!r}"
-    functions = [as_time_function(component, what) for component in (*load.force, *load.moment)]
-    given = np.array([[evaluate(function, t)[0] for function in functions] for t in view.record.time])
-    if load.function is not None:
-        for row, t in enumerate(view.record.time):
-            state = StateView(view.system.scene, view.system.layout, view.record.x[row], view.record.v[row])
-            values = np.asarray(load.function(t, state), float)
-            given[row, : values.size] += values
-    return given[:, :3], given[:, 3:]
-
-
-def _of_spring(view: View, spring: SpringDamper) -> Array:
-    k = [s.name for s in view.system.scene.springs].index(spring.name)
-    i, j = view.number(spring.i), view.number(spring.j)
-    apart = view.record.r[:, j] - view.record.r[:, i]
-    rate = dot(apart, view.record.rd[:, j] - view.record.rd[:, i]) / np.sqrt(dot(apart, apart))
-    return -view.record.spring[:, k] * rate
+def _of_force(view: View, load: AppliedLoad) -> Array:
+    names = [one.name for one in loads_of(view.system.scene)]
+    return view.record.power[:, names.index(load.name)]
 
 
 def between_points(view: View, block: PointDriver | Joint) -> Array:
@@ -138,10 +148,8 @@ def _of_driver(view: View, driver: Driver) -> Array:
     return dot(moment, about) / dot(about, about) * dot(along, f_j) * drive[:, 1]
 
 
-# A new kind of force: one entry.
+# Of what is no applied load: the power of those is recorded.
 POWERS: dict[type, Callable[[View, Any], Array]] = {
-    Load: _of_load,
-    SpringDamper: _of_spring,
     PointDriver: between_points,
     Driver: _of_driver,
     Joint: between_points,

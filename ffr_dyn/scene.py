@@ -15,13 +15,18 @@ import numpy as np
 from ffr_dyn.couplings import Coupling, coupled, coupling_word
 from ffr_dyn.drivers import Driver, PointDriver, driver_word
 from ffr_dyn.errors import InputError
-from ffr_dyn.forces import Load, SpringDamper
-from ffr_dyn.joints import Joint
+from ffr_dyn.forces import Bushing, Load, SpringDamper
+from ffr_dyn.joint_forces import JointForce
+from ffr_dyn.joints import COORDINATES, Joint
 from ffr_dyn.measurement import Measurement
 from ffr_dyn.rotation import euler_parameters
+from ffr_dyn.surface_loads import SurfaceLoad, distributed
+from ffr_dyn.timefunction import TimeFunction, as_time_function
 from ffr_prep.body import FlexibleBody
 
 Array = np.ndarray
+
+Force = Bushing | JointForce | SurfaceLoad
 
 GROUND = "ground"
 RESERVED = (GROUND, "energy", "constraint", "measured", "time", "geometry")
@@ -70,7 +75,11 @@ class Scene:
     """Everything an analysis needs. Raises InputError for names that do not exist, repeat or contradict each other.
 
     ground  : name -> (3,) [m], points fixed in the global frame
+    forces  : bushings, forces on joint coordinates, loads on surfaces and modes
     gravity : (3,) [m/s^2], global
+    base_acceleration : three components [m/s^2], global, each a number, a time function or a Python function of time: the
+              translational acceleration of the ground, whose frame all results refer to. It acts as gravity less this
+              acceleration; a gravity that varies is its negative
     plane   : "auto" finds out whether the scene is planar and then computes in the plane alone (see `ffr_dyn.plane`);
               "x", "y" or "z", its normal, declares it, so that modes mostly in the plane are kept and the rest is left
               out even where it is small only; "none" computes in space
@@ -82,18 +91,21 @@ class Scene:
     couplings: tuple[Coupling, ...] = ()
     loads: tuple[Load, ...] = ()
     springs: tuple[SpringDamper, ...] = ()
+    forces: tuple[Force, ...] = ()
     measurements: tuple[Measurement, ...] = ()
     ground: Mapping[str, Any] = field(default_factory=dict)
     gravity: Any = (0.0, 0.0, 0.0)
+    base_acceleration: Any = (0.0, 0.0, 0.0)
     name: str = "scene"
     plane: str = "auto"
 
     def __post_init__(self) -> None:
-        for key in ("bodies", "joints", "drivers", "couplings", "loads", "springs", "measurements"):
+        for key in ("bodies", "joints", "drivers", "couplings", "loads", "springs", "forces", "measurements"):
             object.__setattr__(self, key, tuple(getattr(self, key)))
         points = {key: _vector(at, 3, f"ground point {key!r}") for key, at in self.ground.items()}
         object.__setattr__(self, "ground", points)
         object.__setattr__(self, "gravity", _vector(self.gravity, 3, "gravity"))
+        object.__setattr__(self, "base_acceleration", _acceleration(self.base_acceleration))
         if self.plane not in ("auto", "x", "y", "z", "none"):
             raise InputError(f"plane is {self.plane!r}; it must be 'auto', 'none', or the normal 'x', 'y' or 'z'")
         if not self.bodies:
@@ -111,6 +123,8 @@ class Scene:
             m for spring in self.springs for m in (spring.i, spring.j)
         ]:
             marker_number(self, marker)
+        for force in self.forces:
+            _check_force(self, force)
         for measurement in self.measurements:
             _check_measurement(self, measurement)
 
@@ -151,6 +165,38 @@ def joints_of(scene: Scene, coupling: Coupling) -> tuple[Joint, Joint]:
     return _joint(scene, first, who), _joint(scene, second, who)
 
 
+def joint_under(scene: Scene, force: JointForce) -> Joint:
+    """The joint on whose coordinate a force acts. Raises InputError when it has no such coordinate."""
+    who = f"force {force.name!r}"
+    joint = _joint(scene, force.joint, who)
+    if force.coordinate not in COORDINATES[joint.kind]:
+        has = ", ".join(COORDINATES[joint.kind]) or "none"
+        raise InputError(
+            f"{who}: the {joint.kind} joint {joint.name!r} has no coordinate {force.coordinate!r}; it has: {has}"
+        )
+    return joint
+
+
+def body_number(scene: Scene, load: SurfaceLoad) -> int:
+    """The body on which a surface load acts."""
+    names = [body.name for body in scene.bodies]
+    if load.body not in names:
+        raise InputError(f"force {load.name!r}: there is no body {load.body!r}; {_offer(load.body, names)}")
+    return names.index(load.body)
+
+
+def _check_force(scene: Scene, force: Force) -> None:
+    """What a force needs from the scene is there."""
+    if isinstance(force, Bushing):
+        i, j = (markers(scene)[marker_number(scene, name)] for name in (force.i, force.j))
+        if i[0] == j[0]:
+            raise InputError(f"bushing {force.name!r} ties {i[1]!r} to itself; it needs markers of two bodies")
+    elif isinstance(force, JointForce):
+        joint_under(scene, force)
+    else:
+        distributed(force, scene.bodies[body_number(scene, force)].model)
+
+
 def _joint(scene: Scene, name: str, who: str) -> Joint:
     for joint in scene.joints:
         if joint.name == name:
@@ -189,6 +235,7 @@ def _check_names(scene: Scene) -> None:
         *scene.couplings,
         *scene.loads,
         *scene.springs,
+        *scene.forces,
         *scene.measurements,
     )
     names = [thing.name for thing in things]
@@ -208,6 +255,14 @@ def _check_joints(scene: Scene) -> None:
         i, j = (marker_number(scene, name) for name in (joint.i, joint.j))
         if table[i][0] == table[j][0]:
             raise InputError(f"joint {joint.name!r} ties {table[i][1]!r} to itself; a joint needs two different bodies")
+
+
+def _acceleration(value: Any) -> tuple[TimeFunction, TimeFunction, TimeFunction]:
+    what = "base_acceleration"
+    if np.size(value) != 3 or len(value) != 3:
+        raise InputError(f"{what} needs three components, not {value!r}")
+    x, y, z = (as_time_function(component, what) for component in value)
+    return x, y, z
 
 
 def _vector(value: Any, size: int, what: str) -> Array:

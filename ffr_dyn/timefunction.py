@@ -16,7 +16,7 @@ from ffr_dyn.operations import operate
 
 Array = np.ndarray
 
-# Kinds, as in ffr_dyn.kernels.loads (which must not be imported before it is needed: it loads the compiler).
+# Kinds, as in ffr_dyn.kernels.functions (which must not be imported before it is needed: it loads the compiler).
 POLYNOMIAL, HARMONIC, PIECEWISE, USER, OPERATION = 0, 1, 2, 3, 4
 
 
@@ -91,6 +91,11 @@ def as_time_function(value: object, what: str) -> TimeFunction:
     raise InputError(f"{what} must be a number, a time function or a Python function of time, not {value!r}")
 
 
+def is_zero(function: TimeFunction) -> bool:
+    """Whether a function is the constant zero by its declaration."""
+    return function.kind == POLYNOMIAL and function.callback is None and not any(function.data)
+
+
 def _numbers(what: str, values: tuple[float, ...]) -> tuple[float, ...]:
     if not values or not np.isfinite(values).all():
         raise InputError(f"{what}: all numbers must be finite: {values}")
@@ -98,7 +103,7 @@ def _numbers(what: str, values: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def evaluate(function: TimeFunction, t: float) -> tuple[float, float, float]:
-    """(value, rate, second derivative) at t; the readable twin of `ffr_dyn.kernels.loads.evaluate_functions`."""
+    """(value, rate, second derivative) at t; the readable twin of `ffr_dyn.kernels.functions.evaluate_functions`."""
     if function.callback is not None:
         returned = np.atleast_1d(np.asarray(function.callback(t), float))
         return tuple(np.concatenate([returned, np.zeros(3)])[:3])  # type: ignore[return-value]

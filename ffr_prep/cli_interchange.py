@@ -53,7 +53,7 @@ def export_body(
         write_sid(loaded, output, layout=layout, surface=surface)
     else:
         write_fem(loaded, output, kind=kind, surface=surface)
-    if loaded.stiffening is not None:
+    if loaded.stiffening is not None and target != "SID" and kind == "legacy":
         click.echo("note        the geometric stiffness of the body was left out")
     click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")
 

@@ -90,7 +90,7 @@ def _pardiso(A: sp.csr_array, positions: Array) -> Solve:
     pardiso = pypardiso.PyPardisoSolver(mtype=2)
     try:
         pardiso.factorize(upper)
-    except pypardiso.pardiso_wrapper.PyPardisoError as error:
+    except (pypardiso.pardiso_wrapper.PyPardisoError, ValueError) as error:
         raise np.linalg.LinAlgError(str(error)) from None
     return lambda b: pardiso.solve(upper, np.asfortranarray(b))
 

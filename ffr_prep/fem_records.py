@@ -132,6 +132,30 @@ def _words(lines: Iterable[tuple[int, str]]) -> list[tuple[int, str]]:
     return [(line, word) for line, text in lines for word in text.split()]
 
 
+def stiffening_matrices(record: Record, header: Header) -> dict[int, Array]:
+    """The matrices (n, n) of record 19 by their index: their number, then for each its index and its numbers.
+
+    Raises InputError naming record and line, for an index that no load has or that is there twice.
+    """
+    words = _words(_without_comments(record))
+    if not words:
+        raise InputError(f"record 19 (line {record.end}) is empty; it begins with the number of its matrices")
+    count, size, most = whole(words[0][1], f"line {words[0][0]}: record 19"), header.n**2, 12 + 6 * len(header.labels)
+    if len(words) != 1 + count * (1 + size):
+        raise InputError(
+            f"record 19 ends at line {record.end} with {len(words)} numbers; {count} matrices need {1 + count * (1 + size)}"
+        )
+    found: dict[int, Array] = {}
+    for start in range(1, len(words), 1 + size):
+        line, word = words[start]
+        index = whole(word, f"line {line}: record 19")
+        if not 1 <= index <= most or index in found:
+            raise InputError(f"line {line}: record 19: index {index} is there twice or not among 1 to {most}")
+        values = [real(text, f"line {at}: record 19") for at, text in words[start + 1 : start + 1 + size]]
+        found[index] = np.array(values).reshape(header.n, header.n)
+    return found
+
+
 def _exactly(record: Record, words: Sequence[tuple[int, str]], shape: tuple[int, ...]) -> Array:
     count = prod(shape)
     if len(words) != count:

@@ -39,6 +39,7 @@ class Content:
     mass [kg], r_dm (3,) [kg m], rr_dm (3, 3) [kg m^2] as in FlexibleBody; P_dm (3, n), rP_dm (3, 3, n),
     PP_dm (3, 3, n, n) likewise but not yet mass-orthonormal; M, K (n, n) modal mass and stiffness;
     interfaces : the nodes; facts : for the provenance, with the lists "notes" and "warnings"
+    stiffening : (12 + 6 N, n, n) geometric stiffness per load as in FlexibleBody, or None
     """
 
     name: str
@@ -52,6 +53,7 @@ class Content:
     K: Array
     interfaces: tuple[Interface, ...]
     facts: dict[str, Any]
+    stiffening: Array | None = None
 
 
 def body_from(content: Content) -> FlexibleBody:
@@ -74,6 +76,7 @@ def body_from(content: Content) -> FlexibleBody:
             interfaces=tuple(
                 Interface(i.name, i.position, i.phi_t @ V, i.phi_r @ V, i.kind) for i in content.interfaces
             ),
+            stiffening=None if content.stiffening is None else V.T @ content.stiffening @ V,
             provenance=facts,
         )
     except BodyError as error:

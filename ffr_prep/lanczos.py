@@ -12,6 +12,7 @@ orthogonalisation and without shifts.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
@@ -38,7 +39,7 @@ def lowest_modes(
     Raises ComputationError when the residual |G M u - u / omega2| of a mode, in the norm of the mass, is not below
     1e-9 / omega2 by then. The error of omega2 is of second order in it.
     """
-    Q: list[Array] = []
+    Q = SearchSpace([])
     T = np.zeros((0, 0))
     block, momenta, _ = _orthonormal(flexibility(M @ start), Q, M)
     while True:
@@ -66,7 +67,7 @@ def _bordered(T: Array, columns: Array) -> Array:
     return np.block([[T, columns[:old]], [columns[:old].T, (corner + corner.T) / 2]])
 
 
-def _orthonormal(vectors: Array, Q: list[Array], M: sp.csr_array) -> tuple[Array, Array, Array]:
+def _orthonormal(vectors: Array, Q: SearchSpace, M: sp.csr_array) -> tuple[Array, Array, Array]:
     """What the vectors (Z, b) add to Q: an M-orthonormal basis, M times it, and the coordinates Q^T M of the vectors.
 
     A second pass removes the rounding of the first.
@@ -88,22 +89,36 @@ def _normalised(vectors: Array, M: sp.csr_array, smallest: float) -> tuple[Array
     return vectors @ combination, momenta @ combination
 
 
-# ---- the search space, in panels of some blocks, which make large products of matrices ----------------------------
+# ---- the search space: rows of panels, which make large products of matrices --------------------------------------
 
 
-def _append(Q: list[Array], block: Array) -> None:
-    if Q and Q[-1].shape[1] + block.shape[1] <= _PANEL:
-        block = np.hstack([Q.pop(), block])
-    Q.append(block)
+@dataclass
+class SearchSpace:
+    """M-orthonormal vectors, the first `size` rows of panels (_PANEL, Z)."""
+
+    panels: list[Array]
+    size: int = 0
+
+    @property
+    def used(self) -> list[Array]:
+        """The rows of the panels that are filled."""
+        return [panel[: self.size - k * _PANEL] for k, panel in enumerate(self.panels)]
 
 
-def _coordinates(Q: list[Array], momenta: Array) -> Array:
+def _append(Q: SearchSpace, block: Array) -> None:
+    for vector in block.T:
+        if Q.size == _PANEL * len(Q.panels):
+            Q.panels.append(np.empty((_PANEL, len(vector))))
+        Q.panels[-1][Q.size % _PANEL] = vector
+        Q.size += 1
+
+
+def _coordinates(Q: SearchSpace, momenta: Array) -> Array:
     """(p, b) Q^T momenta."""
-    return np.vstack([np.zeros((0, momenta.shape[1])), *(panel.T @ momenta for panel in Q)])
+    return np.vstack([np.zeros((0, momenta.shape[1])), *(panel @ momenta for panel in Q.used)])
 
 
-def _combined(Q: list[Array], coordinates: Array) -> Array:
+def _combined(Q: SearchSpace, coordinates: Array) -> Array:
     """(Z, b) Q coordinates (p, b); zero without Q."""
-    ends = np.cumsum([0, *(panel.shape[1] for panel in Q)])
-    parts = [panel @ coordinates[first:last] for panel, first, last in zip(Q, ends, ends[1:], strict=False)]
+    parts = [panel.T @ coordinates[k * _PANEL : (k + 1) * _PANEL] for k, panel in enumerate(Q.used)]
     return np.sum(parts, axis=0)

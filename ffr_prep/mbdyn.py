@@ -8,6 +8,8 @@ data file. How the records follow from the integrals of FlexibleBody, and back (
     10  K                                          17  I5 = axial(PP_dm)
     14  I3 = P_dm                                  18  I9 = integral of phi_j~ phi_k~ dm
 
+    19  geometric stiffness by load, where the body has it
+
 Record 16 holds all of rP_dm and record 18 all of PP_dm; 15 and 17 repeat their antisymmetric parts and 9 the trace of 18.
 Without records 14 to 18 the integrals are sums over the lumped masses of record 11.
 """
@@ -24,7 +26,7 @@ import numpy as np
 
 from ffr_prep.body import FlexibleBody, Interface, axial
 from ffr_prep.errors import InputError
-from ffr_prep.fem_records import COUNTS, names, numbers, records, shapes
+from ffr_prep.fem_records import COUNTS, Header, Record, names, numbers, records, shapes, stiffening_matrices
 from ffr_prep.interchange import (
     IDENTITY_TOLERANCE,
     LUMPING_LIMIT,
@@ -49,6 +51,10 @@ from ffr_prep.interchange import (
 Array = np.ndarray
 Kind = Literal["legacy", "full"]
 
+# The loads of record 19 (products xx, yy, zz, xy, yz, zx of the angular velocity, angular acceleration, acceleration)
+# among those of `FlexibleBody.stiffening`. Forces and moments at the interfaces follow in both.
+_OURS = [6, 7, 8, 9, 11, 10, 3, 4, 5, 0, 1, 2]
+
 TITLES = {
     1: "HEADER",
     2: "FINITE ELEMENT NODE LIST",
@@ -65,6 +71,7 @@ TITLES = {
     16: "INVARIANT 8",
     17: "INVARIANT 5",
     18: "INVARIANT 9",
+    19: "GEOMETRIC STIFFENING",
 }
 
 
@@ -74,11 +81,11 @@ TITLES = {
 def write_fem(body: FlexibleBody, path: str | Path, *, kind: Kind = "legacy", surface: bool = False) -> Path:
     """Write the body as FEM data of MBDyn's modal joint, SI units, 17 significant digits.
 
-    kind    : "full" writes the inertia integrals (records 12, 14 to 18), which a recent MBDyn reads, and loses nothing
-              of them; "legacy" writes masses lumped at the nodes (records 11, 12), which come as close to the
-              integrals as masses at these nodes can
+    kind    : "full" writes the inertia integrals (records 12, 14 to 18) and the geometric stiffness (19), which a recent
+              MBDyn reads, and loses nothing of them; "legacy" leaves the stiffness out and writes masses lumped at the
+              nodes (records 11, 12), which come as close to the integrals as masses at these nodes can
     surface : also write the points of the surface as nodes, after the interfaces. The format has no triangles, no
-              kinds of interfaces and no provenance. The geometric stiffness of a body (record 19) is left out.
+              kinds of interfaces and no provenance
 
     Source: MBDyn Input File Format, modal joint. Raises InputError for an unknown kind, a body without nodes, a missing
     surface, and where lumped masses miss the integrals by more than MISFIT_LIMIT.
@@ -115,6 +122,7 @@ def _invariants(body: FlexibleBody) -> dict[int, Array]:
         16: -body.I8.transpose(1, 0, 2),
         17: body.I5,
         18: body.I9.transpose(2, 0, 1, 3),
+        **({} if body.stiffening is None else {19: body.stiffening}),
     }
 
 
@@ -154,12 +162,23 @@ def _texts(content: Mapping[int, Array]) -> Iterator[str]:
     for record, values in sorted(content.items()):
         yield "**"
         yield _title(record)
+        if record == 19:
+            yield from _stiffening_lines(values)
+            continue
         if record != 8:
             yield from _six_a_line(values)
             continue
         for k, mode in enumerate(values, start=1):
             yield f"**    MODE SHAPE # {k}"
             yield from _six_a_line(mode)
+
+
+def _stiffening_lines(K: Array) -> Iterator[str]:
+    """The number of matrices, then each with its index."""
+    yield str(len(K))
+    for index, load in enumerate(_OURS[:12] + list(range(12, len(K))), start=1):
+        yield str(index)
+        yield from _six_a_line(K[load])
 
 
 def _title(record: int) -> str:
@@ -189,7 +208,7 @@ def read_fem(path: str | Path) -> FlexibleBody:
 
     The numbers are taken to be in SI units. Integrals come from records 14, 16 and 18 where they are there, else from
     the lumped masses of record 11. Where record 9 is not the unit matrix or record 10 not diagonal, the modes are
-    combined. Geometric stiffness, damping and initial values are left out. provenance: "notes" (what was changed),
+    combined. Damping and initial values are left out. provenance: "notes" (what was changed),
     "warnings" (what was lost or does not agree).
 
     Source: MBDyn Input File Format, modal joint. Raises InputError for a file that does not exist, is damaged,
@@ -233,9 +252,24 @@ def _content(lines: list[str], path: Path) -> Content:
             "source": {"file": path.name, "format": "MBDyn FEM"},
             "inertia": {str(r): "record" if r in given else "lumped masses" for r in (12, 14, 16, 18)},
             "notes": ["every node became an interface of the kind 'node'", "the format has no surface to draw"],
-            "warnings": [*_lost(given, 19 in found), *of_r, *of_phi],
+            "warnings": [*_lost(given), *of_r, *of_phi],
         },
+        stiffening=_stiffening(found[19], header) if 19 in found else None,
     )
+
+
+def _stiffening(record: Record, header: Header) -> Array:
+    """(12 + 6 N, n, n) from record 19; matrices that are not there are zero. InputError for one that is not symmetric."""
+    matrices = stiffening_matrices(record, header)
+    K = np.zeros((12 + 6 * len(header.labels), header.n, header.n))
+    for index, matrix in matrices.items():
+        hold(
+            f"matrix {index} of record 19 is symmetric",
+            matrix - matrix.T,
+            np.maximum(np.abs(matrix).max(keepdims=True), 1e-300),
+        )
+        K[_OURS[index - 1] if index <= 12 else index - 1] = 0.5 * (matrix + matrix.T)
+    return K
 
 
 def _rigid(given: Mapping[int, Array], at: _Nodes) -> tuple[float, Array, Array]:
@@ -311,8 +345,8 @@ def _second_moments(
     return mended, [warning] * (off > IDENTITY_TOLERANCE)
 
 
-def _lost(given: Mapping[int, Array], stiffened: bool) -> list[str]:
-    lost = ["dropped: the geometric stiffness in record 19"] if stiffened else []
+def _lost(given: Mapping[int, Array]) -> list[str]:
+    lost = []
     for record, what in ((3, "initial modal displacements"), (4, "initial modal velocities"), (13, "modal damping")):
         if record in given and given[record].any():
             lost.append(f"dropped: the {what} of record {record}")

@@ -122,8 +122,8 @@ def _draw_steady(axes: Any, quality: Quality) -> None:
     axes.set_xlim(_FLOOR, 1.5)
     axes.set_yticks(rows, ACCELERATIONS, fontsize=8)
     axes.set_xlabel("relative error", fontsize=9)
-    axes.set_title("steady deformation under unit accelerations", fontsize=10, loc="left", color=_INK)
-    axes.legend(frameon=True, edgecolor="none", fontsize=9, loc="lower right")
+    axes.set_title("steady deformation", fontsize=10, loc="left", color=_INK)
+    axes.legend(frameon=False, fontsize=9, ncols=2, loc="lower right", bbox_to_anchor=(1.02, 1.0))
     axes.tick_params(labelsize=8)
     _plain(axes)
 

@@ -219,7 +219,10 @@ def _largest(errors: Array) -> str:
 
 
 def _percent(error: float) -> str:
-    return f"{100 * abs(error):.2g} %" if abs(error) >= 1e-6 else "less than 0.0001 %"
+    percent = 100 * abs(error)
+    if percent < 1e-4:
+        return "less than 0.0001 %"
+    return f"{percent:.0f} %" if percent >= 10 else f"{percent:.2g} %"
 
 
 def _choice_lines(provenance: Mapping[str, Any]) -> Iterator[str]:

@@ -11,6 +11,9 @@ How the blocks follow from the integrals of FlexibleBody, and back (r: position,
     Gr_l  -2 (rP_l^T - tr(rP_l) I)                      Ge_l    2 Cr.m1(:, l)
     Oe    xx: rP_xx - tr(rP), xy: rP_xy + rP_yx; m1 the same of PP
 
+The geometric stiffness K per load stands beside them: in Ct.m1, Cr.m1 (the part symmetric in the modes) and Oe.m1 for
+what multiplies them, and, with the opposite sign, in phi.m1 and psi.m1 of the nodes for the forces and moments there.
+
 J.m1 holds the symmetric part of rP_dm, Cr the other; Oe.m1 holds the symmetric part of PP_dm, Cr.m1 the other.
 Everything else repeats them and is checked on reading.
 """
@@ -45,6 +48,7 @@ from ffr_prep.interchange import (
     nodes,
     read_lines,
     real,
+    relative,
     skew,
     write_lines,
 )
@@ -57,9 +61,9 @@ from ffr_prep.sid_identities import (
     laid_out,
     lost_blocks,
     lumped_mass,
+    of_accelerations,
     of_mass,
     six,
-    stiffened_blocks,
     tensor,
 )
 from ffr_prep.sid_nodes import read_nodes
@@ -68,6 +72,8 @@ Array = np.ndarray
 BLOCKS = ("mdCM", "J", "Ct", "Cr", "Me", "Gr", "Ge", "Oe", "ksigma", "Ke", "De")
 NAMES = "interfaces="
 _ENOUGH_NODES = 400
+# The products of the angular velocity that the columns of Oe belong to, among the loads of `FlexibleBody.stiffening`.
+PRODUCTS = [6, 7, 8, 9, 11, 10]
 
 
 def write_sid(body: FlexibleBody, path: str | Path, *, layout: Layout = "mode-major", surface: bool = False) -> Path:
@@ -76,8 +82,7 @@ def write_sid(body: FlexibleBody, path: str | Path, *, layout: Layout = "mode-ma
     layout  : of the matrices Gr (3, 3n) and Ge (n, 3n), which programs do not agree on: column 3(l-1)+a for mode l and
               axis a ("mode-major") or (a-1)n+l ("axis-major"); line 1 of the file says which
     surface : also write the points of the surface as nodes, after the interfaces. The format has no triangles, no
-              kinds of interfaces and no provenance. The geometric stiffness of a body is left out: in Oe.m1 it could
-              not be told from mass.
+              kinds of interfaces and no provenance
 
     Source: Wallrapp 1994. Raises InputError for an unknown layout, a body without nodes, or a missing surface.
     """
@@ -89,18 +94,19 @@ def write_sid(body: FlexibleBody, path: str | Path, *, layout: Layout = "mode-ma
 def blocks(body: FlexibleBody, layout: Layout) -> dict[str, tuple[Array, Array | None]]:
     """The Taylor blocks by name: m0 (rows, columns) and, of order 1, m1 (rows, n, columns)."""
     n = body.n
+    K = np.zeros((12, n, n)) if body.stiffening is None else body.stiffening[:12]
     first = np.einsum("klj->jkl", body.rP_dm + body.rP_dm.transpose(1, 0, 2))
     J1 = np.trace(first, axis1=1, axis2=2)[:, None, None] * np.eye(3) - first
     Cr1 = axial(body.PP_dm).transpose(2, 1, 0)
     return {
         "mdCM": (body.r_dm[:, None], body.P_dm[:, :, None]),
         "J": (six(body.inertia)[:, None], six(J1).T[:, :, None]),
-        "Ct": (body.P_dm.T, None),
-        "Cr": (axial(body.rP_dm).T, Cr1),
+        "Ct": (body.P_dm.T, None if body.stiffening is None else K[:3].transpose(1, 2, 0)),
+        "Cr": (axial(body.rP_dm).T, Cr1 + K[3:6].transpose(1, 2, 0)),
         "Me": (np.eye(n), None),
         "Gr": (laid_out(-2 * body.I8.transpose(1, 0, 2), layout), None),
         "Ge": (laid_out(2 * Cr1, layout), None),
-        "Oe": (centrifugal(body.rP_dm).T, centrifugal(body.PP_dm).transpose(1, 2, 0)),
+        "Oe": (centrifugal(body.rP_dm).T, (centrifugal(body.PP_dm) + K[PRODUCTS]).transpose(1, 2, 0)),
         "ksigma": (np.zeros((n, 1)), None),
         "Ke": (np.diag(body.omega2), None),
         "De": (np.zeros((n, n)), None),
@@ -130,8 +136,9 @@ def _lines(body: FlexibleBody, layout: Layout, at: tuple[Interface, ...]) -> Ite
         yield _pair(6, f"ielastq ({k:4d}) ", f"Eigen Mode {k:5d} : {frequency:.9g} Hz")
     yield "    end refmod "
     yield "    frame "
-    for k, node in enumerate(at, start=1):
-        yield from _node(k, node, body.n)
+    for k, node in enumerate(at):
+        known = None if body.stiffening is None or k >= len(body.interfaces) else body.stiffening
+        yield from _node(k + 1, node, body.n, None if known is None else known[12 + 6 * k : 18 + 6 * k])
     yield "    end frame "
     for name, (m0, m1) in blocks(body, layout).items():
         yield from _block(4, name, m0, m1, body.n)
@@ -139,12 +146,14 @@ def _lines(body: FlexibleBody, layout: Layout, at: tuple[Interface, ...]) -> Ite
     yield "end part "
 
 
-def _node(number: int, node: Interface, n: int) -> Iterator[str]:
+def _node(number: int, node: Interface, n: int, K: Array | None) -> Iterator[str]:
+    """A node, with the geometric stiffness (6, n, n) of unit forces and moments on it."""
+    by_force, by_moment = (None, None) if K is None else (-K[:3].transpose(0, 2, 1), -K[3:].transpose(0, 2, 1))
     yield f"      new node = {number}"
     yield _pair(8, "rframe ", "body ref")
     yield from _block(8, "origin", node.position[:, None], node.phi_t[:, :, None], n)
-    yield from _block(8, "phi", node.phi_t, None, n)
-    yield from _block(8, "psi", node.phi_r, None, n)
+    yield from _block(8, "phi", node.phi_t, by_force, n)
+    yield from _block(8, "psi", node.phi_r, by_moment, n)
     yield from _block(8, "AP", np.eye(3), skew(node.phi_r).transpose(0, 2, 1), n)
     yield "      end node "
 
@@ -186,9 +195,10 @@ def read_sid(path: str | Path) -> FlexibleBody:
     """The body of a standard input data file; every node becomes an interface of the kind "node".
 
     The numbers are taken to be in SI units. The layouts of Gr and Ge are those that satisfy Gr_l + Gr_l^T =
-    2 dJ/dq_l and Ge = 2 Cr.m1. Where Me is not the unit matrix or Ke not diagonal, the modes are combined. Geometric
-    stiffness and damping are left out. provenance: "layout", "notes" (what was changed), "warnings" (what was lost or
-    does not agree).
+    2 dJ/dq_l and Ge = 2 Cr.m1. Where Me is not the unit matrix or Ke not diagonal, the modes are combined. In Oe.m1
+    geometric stiffness and mass stand as a sum: the part of the mass is that of masses at the nodes which fit all other
+    integrals best, and the sum stays exact. Damping is left out. provenance: "layout", "notes" (what was changed),
+    "warnings" (what was lost or does not agree).
 
     Source: Wallrapp 1994. Raises InputError for a file that does not exist, is damaged, truncated or foreign, or
     whose blocks contradict each other, naming line, block or identity, and by how much.
@@ -213,7 +223,7 @@ def _content(lines: list[str], path: Path) -> Content:
     limit = bounds(mass, rr_dm, found["Me"].m0)
     rP_dm = from_parts(from_inertia(tensor(found["J"].m1[:, :, 0])), found["Cr"].m0.T)
     layout = check_repeated(P_dm, rP_dm, found, limit)
-    stiffened = [*at.stiffened, *stiffened_blocks(found, limit)]
+    K = np.concatenate([of_accelerations(found), np.zeros((6, n, n)), at.stiffening])
     content = Content(
         name=unquote(modal.label) or path.stem,
         mass=mass,
@@ -229,10 +239,10 @@ def _content(lines: list[str], path: Path) -> Content:
             "source": {"file": path.name, "format": "SID"},
             "layout": layout,
             "notes": ["every node became an interface of the kind 'node'", "the format has no surface to draw"],
-            "warnings": [*at.lost, *lost_blocks(found, stiffened), *lumped_mass(rP_dm, found, layout, limit)],
+            "warnings": [*at.lost, *lost_blocks(found), *lumped_mass(rP_dm, found, layout, limit)],
         },
     )
-    return _trace_of_mass(content, bool(stiffened))
+    return _trace_of_mass(content, K, found, limit)
 
 
 def _sizes(n: int) -> dict[str, tuple[int, int]]:
@@ -270,20 +280,23 @@ def _second_moments(found: Mapping[str, Taylor], limit: Bounds) -> Array:
     return from_parts(both, of_mass(found["Cr"].m1).transpose(2, 1, 0))
 
 
-def _trace_of_mass(content: Content, stiffened: bool) -> Content:
-    """The content with a PP_dm whose trace is Me, as the sum of Oe.m1 over xx, yy, zz = -2 Me demands.
+def _trace_of_mass(content: Content, K: Array, found: Mapping[str, Taylor], limit: Bounds) -> Content:
+    """The content with a PP_dm whose trace is Me, as the sum of Oe.m1 over xx, yy, zz = -2 Me demands, and with the
+    geometric stiffness K (12 + 6 N, n, n) where the file has any, the part in Oe.m1 included.
 
-    Geometric stiffness in Oe.m1 cannot be told from mass; PP_dm is then that of masses at the nodes.
     Raises InputError where neither geometric stiffness nor lumping explains what is lacking.
     """
+    stiffened = relative(K, limit.third) > IDENTITY_TOLERANCE
     PP_dm, off = mended_trace(content.PP_dm, content.M)
     if off <= IDENTITY_TOLERANCE:
-        return replace(content, PP_dm=PP_dm)
+        return replace(content, PP_dm=PP_dm, stiffening=K if stiffened else None)
     identity = f"the identity sum of Oe.m1 over xx, yy, zz = -2 Me fails by {off:.1e} (relative)"
     if stiffened:
         PP_dm, misfit = _at_nodes(content)
+        K[PRODUCTS] = found["Oe"].m1.transpose(2, 0, 1) - centrifugal(PP_dm)
         warning = (
-            f"dropped: geometric stiffness in Oe.m1 ({identity}); PP_dm is that of nodal masses, off by {misfit:.1e}"
+            f"geometric stiffness in Oe.m1 ({identity}): its sum with mass is kept, the part of the mass is that of nodal "
+            f"masses, off by {misfit:.1e}"
         )
     elif off > LUMPING_LIMIT:
         raise InputError(
@@ -292,13 +305,14 @@ def _trace_of_mass(content: Content, stiffened: bool) -> Content:
     else:
         warning = f"lumped mass: {identity}; each axis of PP_dm took a third"
     warnings = [*content.facts["warnings"], warning]
-    return replace(content, PP_dm=PP_dm, facts={**content.facts, "warnings": warnings})
+    facts = {**content.facts, "warnings": warnings}
+    return replace(content, PP_dm=PP_dm, facts=facts, stiffening=K if stiffened else None)
 
 
 def _at_nodes(content: Content) -> tuple[Array, float]:
     """PP_dm of the masses at the nodes that come closest to all other integrals, and their relative misfit.
 
-    However large the misfit, what it spoils (spin softening) is no larger than the geometric stiffness that is dropped.
+    However large the misfit, it spoils terms of second order in the elastic coordinates of J alone.
     """
     n, count = len(content.M), len(content.interfaces)
     at = content.interfaces[:: 1 + max(count // _ENOUGH_NODES, 9 * n * n * count // MANY_MOMENTS)]

@@ -90,18 +90,16 @@ def _fitting(identity: str, residuals: Mapping[str, float]) -> str:
     return best
 
 
-def stiffened_blocks(found: Mapping[str, Taylor], limit: Bounds) -> list[str]:
-    """The blocks that hold geometric stiffness."""
+def of_accelerations(found: Mapping[str, Taylor]) -> Array:
+    """(6, n, n) geometric stiffness of the acceleration and the angular acceleration: Ct.m1, and what is symmetric in
+    the modes of Cr.m1."""
     Cr1 = found["Cr"].m1
-    uneven = relative(Cr1 - of_mass(Cr1), limit.third[:, :, None]) > IDENTITY_TOLERANCE
-    return ["Ct.m1"] * bool(found["Ct"].m1.any()) + ["Cr.m1"] * uneven
+    return np.concatenate([found["Ct"].m1.transpose(2, 0, 1), (Cr1 - of_mass(Cr1)).transpose(2, 0, 1)])
 
 
-def lost_blocks(found: Mapping[str, Taylor], stiffened: list[str]) -> list[str]:
-    """Warnings of what a body cannot hold: geometric stiffness, prestress, damping, higher orders."""
+def lost_blocks(found: Mapping[str, Taylor]) -> list[str]:
+    """Warnings of what a body cannot hold: prestress, damping, higher orders."""
     lost = []
-    if stiffened:
-        lost.append(f"dropped: the geometric stiffness in {', '.join(stiffened)}")
     for name, what in (("ksigma", "the prestress forces"), ("De", "the modal damping")):
         if found[name].m0.any():
             lost.append(f"dropped: {what} {name}")

@@ -17,10 +17,11 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Nodes:
-    """The interfaces, which blocks of theirs hold geometric stiffness, and warnings of what else was left out."""
+    """The interfaces, the geometric stiffness (6 N, n, n) of unit forces and moments on them, and warnings of what was
+    left out."""
 
     interfaces: tuple[Interface, ...]
-    stiffened: tuple[str, ...]
+    stiffening: Array
     lost: tuple[str, ...]
 
 
@@ -32,17 +33,18 @@ def read_nodes(frame: Section, count: int, n: int, names: Sequence[str]) -> Node
     only(frame, ("node",))
     if len(frame.parts) != count:
         raise InputError(f"{frame} holds {len(frame.parts)} nodes, but line 1 announces {count}")
-    interfaces, stiffened, lost = [], set(), set()
+    interfaces, lost = [], set()
+    stiffening = np.zeros((count, 6, n, n))
     for k, node in enumerate(frame.parts):
         blocks = _blocks(node, n)
         interfaces.append(_interface(names[k] if k < len(names) else node.label, blocks))
         _check(node, blocks)
-        stiffened |= {f"{name}.m1 of nodes" for name in ("phi", "psi") if blocks[name].m1.any()}
+        stiffening[k] = -np.concatenate([blocks["phi"].m1, blocks["psi"].m1]).transpose(0, 2, 1)
         if not np.allclose(blocks["AP"].m0, np.eye(3), atol=IDENTITY_TOLERANCE):
             lost.add("dropped: the orientation of nodes; interfaces are parallel to the body frame")
         if any(part_.word == "sigma" and part_.entries for part_ in node.parts):
             lost.add("dropped: the stresses sigma of nodes")
-    return Nodes(tuple(interfaces), tuple(sorted(stiffened)), tuple(sorted(lost)))
+    return Nodes(tuple(interfaces), stiffening.reshape(6 * count, n, n), tuple(sorted(lost)))
 
 
 def _blocks(node: Section, n: int) -> dict[str, Taylor]:

@@ -33,6 +33,7 @@ _PYTHON = "/usr/bin/python3"
 _HOMES = {"SLEPC_DIR": "/usr/lib/slepcdir", "PETSC_DIR": "/usr/lib/petscdir"}
 _INSTALL = "apt-get install python3-slepc4py-real libopenblas0-pthread openmpi-bin"
 _PATIENCE = 60.0
+_GRACE = 3.0
 _LOCAL = 20_000  # unknowns that supports may touch: eliminating one of them couples all others
 
 
@@ -183,10 +184,12 @@ def _end(child: subprocess.Popen[str]) -> None:
     for pipe in (child.stdin, child.stdout):
         if pipe:
             pipe.close()
-    try:
-        child.wait(_PATIENCE)
-    except subprocess.TimeoutExpired:
-        child.kill()
+    for insist in (child.terminate, child.kill):  # mpirun ends its processes when it is told to
+        try:
+            child.wait(_GRACE)
+            return
+        except subprocess.TimeoutExpired:
+            insist()
 
 
 def _write_matrix(stem: Path, A: sp.csr_array) -> None:

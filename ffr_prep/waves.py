@@ -23,8 +23,10 @@ ENOUGH = 6.0
 
 def element_edges(mesh: Mesh) -> Array:
     """(E, 2) the corners at the ends of the edges of all elements of a mesh."""
-    ends = [block.nodes[:, _edges(block.kind)].reshape(-1, 2) for block in mesh.blocks]
-    return np.unique(np.sort(np.concatenate(ends), axis=1), axis=0)
+    count = len(mesh.points)
+    ends = np.concatenate([block.nodes[:, _edges(block.kind)].reshape(-1, 2) for block in mesh.blocks])
+    each = np.unique(ends.min(axis=1).astype(np.int64) * count + ends.max(axis=1))
+    return np.stack([each // count, each % count], axis=1)
 
 
 def _edges(kind: str) -> Array:

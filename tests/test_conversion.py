@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from boxes import STEEL, box_mesh, moved, rotation
+from test_docs import ROOT, code
 from test_prep_cli import assert_fails, run
 from test_structural import regions, space_frame
 
@@ -193,6 +194,17 @@ def test_the_command_line_converts(bodies, tmp_path, capsys):
         capsys, "no interface 'x'", "convert", tmp_path / "b.ffr", "--reference", "fixed:x", "-o", tmp_path / "d"
     )
     assert not (tmp_path / "d").exists()
+
+
+def test_the_examples_of_the_documentation_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "meshes").symlink_to(ROOT / "meshes")
+    space: dict = {}
+    for text in code("docs/reduction.md", "python"):
+        exec(compile(text, "reduction", "exec"), space)
+    assert (tmp_path / "quality" / "receptances.png").exists()
+    assert space["floating"].n == space["rod"].n
+    assert np.abs(space["floating"].P_dm).max() < 1e-9
 
 
 # ---- guards -----------------------------------------------------------------------------------------------------------

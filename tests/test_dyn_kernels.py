@@ -14,7 +14,7 @@ from ffr_dyn.drivers import Driver, PointDriver
 from ffr_dyn.equations import System, compile_scene, new_work
 from ffr_dyn.inertia import elastic_force, gravity_force, mass_matrix, quadratic_velocity
 from ffr_dyn.joints import KINDS, Joint
-from ffr_dyn.kernels.loads import evaluate_functions
+from ffr_dyn.kernels.functions import evaluate_functions
 from ffr_dyn.kernels.record import evaluate_truly
 from ffr_dyn.kernels.tables import OK, Functions
 from ffr_dyn.layout import layout

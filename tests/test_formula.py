@@ -47,7 +47,7 @@ def test_value_and_derivatives_of_a_formula(text):
 @pytest.mark.parametrize("text", FORMULAS)
 def test_kernels_evaluate_formulas_as_the_readable_form(text):
     from ffr_dyn.equations import FunctionTable
-    from ffr_dyn.kernels.loads import evaluate_functions
+    from ffr_dyn.kernels.functions import evaluate_functions
 
     numbers = FunctionTable()
     at = numbers.add(formula(text, PARAMETERS))

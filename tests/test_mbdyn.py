@@ -306,10 +306,9 @@ def rotary_inertia(given):
 
 def test_what_is_lost_is_said(tmp_path):
     given = orthonormal(field(2))
-    changes = {3: np.ones(2), 4: np.ones(2), 13: np.eye(2), 19: np.ones(6)}
-    body = read_fem(foreign(tmp_path / "b.fem", given, (*OWN, 3, 4, 11, 13, 19), changes=changes))
+    changes = {3: np.ones(2), 4: np.ones(2), 13: np.eye(2)}
+    body = read_fem(foreign(tmp_path / "b.fem", given, (*OWN, 3, 4, 11, 13), changes=changes))
     assert [re.findall(r"record \d+", warning)[0] for warning in body.provenance["warnings"]] == [
-        "record 19",
         "record 3",
         "record 4",
         "record 13",
@@ -317,6 +316,58 @@ def test_what_is_lost_is_said(tmp_path):
     zeros = {3: np.zeros(2), 4: np.zeros(2), 13: np.zeros((2, 2))}
     quiet = read_fem(foreign(tmp_path / "b.fem", given, (*OWN, 3, 4, 11, 13), changes=zeros))
     assert quiet.provenance["warnings"] == []
+
+
+def stiffened(n: int) -> FlexibleBody:
+    """A body with a different symmetric matrix for every load."""
+    half = np.random.default_rng(4).normal(size=(12 + 18, n, n))
+    return replace(cloud(n), stiffening=half + half.transpose(0, 2, 1))
+
+
+def test_geometric_stiffness_goes_round_exactly(tmp_path):
+    body = stiffened(3)
+    back = read_fem(write_fem(body, tmp_path / "b.fem", kind="full"))
+    np.testing.assert_allclose(back.stiffening, body.stiffening, rtol=1e-15)
+    with_surface = read_fem(write_fem(body, tmp_path / "c.fem", kind="full", surface=True))
+    np.testing.assert_allclose(with_surface.stiffening[:30], body.stiffening, rtol=1e-15)
+    assert not with_surface.stiffening[30:].any()
+
+
+def test_record_19_has_the_loads_in_the_order_of_the_format(tmp_path):
+    """1-6 the products xx, yy, zz, xy, yz, zx, 7-9 angular and 10-12 linear acceleration, then the interfaces."""
+    body = stiffened(1)
+    text = write_fem(body, tmp_path / "b.fem", kind="full").read_text().partition("RECORD GROUP 19")[2]
+    words = text.split("\n", 1)[1].split()
+    assert words[0] == "30"
+    found = dict(zip(map(int, words[1::2]), map(float, words[2::2]), strict=True))
+    ours = body.stiffening[:, 0, 0]
+    expected = [*ours[[6, 7, 8, 9, 11, 10]], *ours[3:6], *ours[:3], *ours[12:]]
+    np.testing.assert_allclose([found[k] for k in range(1, 31)], expected, rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ("\n30\n", "\n31\n", "numbers; 31 matrices need"),
+        ("\n2\n", "\n1\n", "index 1 is there twice"),
+        ("\n30\n1\n", "\n30\n77\n", "index 77 .* not among 1 to 30"),
+    ],
+)
+def test_damaged_records_of_stiffness_are_refused(tmp_path, before, after, said):
+    path = write_fem(stiffened(2), tmp_path / "b.fem", kind="full")
+    head, title, rest = path.read_text().partition("GROUP 19")
+    assert before in rest
+    path.write_text(head + title + rest.replace(before, after, 1))
+    with pytest.raises(InputError, match=said):
+        read_fem(path)
+
+
+def test_stiffness_that_is_not_symmetric_is_refused(tmp_path):
+    K = np.zeros((30, 2, 2))
+    K[0] = [[1.0, 2.0], [3.0, 4.0]]
+    path = write_fem(replace(cloud(2), stiffening=K), tmp_path / "b.fem", kind="full")
+    with pytest.raises(InputError, match="matrix 10 of record 19 is symmetric fails by"):
+        read_fem(path)
 
 
 # ---- guards of the reader -----------------------------------------------------------------------------------------

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 from boxes import STEEL, box_mesh
+from matrix_models import lumped, of_frame
+from matrix_models import space_frame as matrix_frame
 from PIL import Image
 from test_prep_cli import BAR, INTERFACES, assert_fails, run
 from test_structural import regions, straight
@@ -19,6 +21,7 @@ from ffr_prep.errors import InputError
 from ffr_prep.frame import Member, polyline
 from ffr_prep.interface import InterfaceRegion, couple
 from ffr_prep.material import Material
+from ffr_prep.matrices import reduce_matrices
 from ffr_prep.mesh import Block, Mesh
 from ffr_prep.quality import assess, quality_of, steady_errors
 from ffr_prep.quality_plots import quality_pictures
@@ -396,3 +399,17 @@ def test_fields_of_ones_own(tmp_path, capsys):
 )
 def test_options_that_do_not_fit(options, message, tmp_path, capsys):
     assert_fails(capsys, message, *REDUCE, *options, "-o", tmp_path / "b")
+
+
+# ---- own matrices -----------------------------------------------------------------------------------------------------
+
+
+def test_matrices_from_outside_are_assessed_like_the_model_they_come_from():
+    frame = of_frame(matrix_frame())
+    settings = {"name": "b", "interfaces": regions("a", "b"), "reference": FixedTo("a"), "quality": Band(5.0, 100.0)}
+    body = reduce_matrices(frame, **settings, reduction=Union((CraigBampton(2), InertiaRelief())))
+    quality = quality_of(body.provenance)
+    assert np.nanmax(quality.displacement_errors) < 1e-6
+    assert quality.flexibility_error < 1e-8
+    with pytest.raises(InputError, match="needs a mass for every coordinate"):
+        reduce_matrices(replace(frame, M=lumped(frame)), **settings, reduction=Eigenmodes(2))

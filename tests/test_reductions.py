@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 from boxes import STEEL, box_mesh, moved, rotation, shaken
-from test_structural import regions, space_frame
+from test_structural import regions, space_frame, straight
 
 from ffr_prep.basis import check_basis, factorised
 from ffr_prep.errors import ComputationError, InputError
@@ -18,6 +18,7 @@ from ffr_prep.krylov import Krylov, dynamic_solver
 from ffr_prep.receptance import free_modes, receptance_error, receptances, reference_modes, static_flexibility
 from ffr_prep.reduction import CharacteristicModes, CraigBampton, Eigenmodes, Guyan, Rubin, Union
 from ffr_prep.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports, functionals
+from ffr_prep.section import general, with_mass_moments
 from ffr_prep.selection import Accuracy, Band, UpTo
 from ffr_prep.solids import assemble
 from ffr_prep.static_shapes import AttachmentModes, InertiaRelief, UserVectors
@@ -238,6 +239,19 @@ def test_unions_drop_and_count_what_they_have(model, body):
     once = CraigBampton(4).basis(model, body, L)
     assert twice.dropped == 6 + 8
     np.testing.assert_allclose(twice.omega2, once.omega2, rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("modes", "error"), [(0, 0.10265779), (1, 4.4653833e-3), (2, 1.0297938e-3), (4, 1.8232966e-4), (8, 2.7367912e-5)]
+)
+def test_craig_bampton_converges_on_a_fine_bar(modes, error):
+    """Clamped-free bar with its interface at the tip, exact components: relative error of the first frequency."""
+    section = with_mass_moments(general("bar", A=1e-4, Iy=1e-3, Iz=1e-3, J=1e-3), 1e-12, 1e-12)  # axial modes first
+    bar = frame_model(straight(section, 1.0, 200), regions("root", "tip")).coupled
+    body, L = factorised(bar), functionals(FixedTo("root"), bar)
+    full = Eigenmodes(1).basis(bar, body, L).omega2[0]
+    found = CraigBampton(modes).basis(bar, body, L).omega2[0]
+    assert np.sqrt(found / full) - 1 == pytest.approx(error, rel=0.05)
 
 
 # ---- selection --------------------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from ffr_prep.interface import InterfaceRegion
 from ffr_prep.reduce import reduce_mesh
 from ffr_prep.reduction import CraigBampton
 from ffr_prep.reference import FixedTo
-from ffr_prep.sid import read_sid, write_sid
+from ffr_prep.sid import blocks, read_sid, write_sid
 
 LAYOUTS = ("mode-major", "axis-major")
 INTEGRALS = ("mass", "r_dm", "rr_dm", "P_dm", "rP_dm", "PP_dm", "omega2")
@@ -415,19 +415,39 @@ def stiffened(given: Field, parts):
     return {name: (found[name][0], found[name][1] + spans[name]) for name in parts}
 
 
-def test_geometric_stiffness_is_dropped_with_a_warning(tmp_path):
+def test_geometric_stiffness_of_accelerations_is_read(tmp_path):
     given = orthonormal(field(4))
     plain = read_sid(foreign(tmp_path / "1.SID_FEM", given))
     body = read_sid(foreign(tmp_path / "2.SID_FEM", given, changes=stiffened(given, ["Ct", "Cr"])))
-    assert body.provenance["warnings"] == ["dropped: the geometric stiffness in Ct.m1, Cr.m1"]
-    assert_same(body, plain, 1e-10)
+    assert body.provenance["warnings"] == []
+    assert plain.stiffening is None
+    np.testing.assert_allclose(body.stiffening[:6], stiffening(given)[:, :, :6].transpose(2, 0, 1), atol=1e-9)
+    assert not body.stiffening[6:].any()
+    assert_same(replace(body, stiffening=None), plain, 1e-10)
+
+
+def test_a_stiffened_body_goes_round_with_the_sum_in_Oe_exact(tmp_path):
+    """Every node carries mass here, so that mass and stiffness in Oe.m1 are told apart."""
+    half = np.random.default_rng(4).normal(size=(12 + 18, 3, 3))
+    body = replace(cloud(3), stiffening=half + half.transpose(0, 2, 1))
+    path = write_sid(body, tmp_path / "b.SID_FEM", surface=True)
+    back = read_sid(path)
+    np.testing.assert_allclose(back.stiffening[:30], body.stiffening, atol=1e-7)
+    assert not back.stiffening[30:].any()
+    few = read_sid(write_sid(body, tmp_path / "c.SID_FEM"))
+    again = read_sid(write_sid(few, tmp_path / "d.SID_FEM"))
+    loads = [*range(6), *range(12, 30)]
+    np.testing.assert_allclose(few.stiffening[loads], body.stiffening[loads], atol=1e-13)
+    for one in (back, few, again):
+        np.testing.assert_allclose(blocks(one, "mode-major")["Oe"][1], blocks(body, "mode-major")["Oe"][1], atol=1e-12)
+    np.testing.assert_allclose(again.stiffening, few.stiffening, atol=1e-12)
 
 
 def test_mass_and_stiffness_in_Oe_are_told_apart_by_masses_at_the_nodes(tmp_path):
     given = orthonormal(field(4))
     changes = stiffened(given, ["Ct", "Cr", "Oe"])
     body = read_sid(foreign(tmp_path / "1.SID_FEM", given, at=range(9), changes=changes))
-    assert "PP_dm is that of nodal masses, off by" in body.provenance["warnings"][-1]
+    assert "the part of the mass is that of nodal masses, off by" in body.provenance["warnings"][-1]
     for key, value in integrals(given).items():
         np.testing.assert_allclose(getattr(body, key), value, atol=1e-8, err_msg=key)
     assert float(body.provenance["warnings"][-1].split()[-1]) < 1e-8
@@ -464,12 +484,12 @@ def test_what_else_is_lost_is_said(tmp_path):
     assert [w for w in warnings if "sigma" in w]
 
 
-def test_higher_terms_of_nodes_and_matrices_are_said_to_be_lost(tmp_path, lines):
-    for name, said in (("phi", "geometric stiffness in phi.m1 of nodes"), ("Me", "terms of order 1 of Me")):
-        start = within(lines, name)
-        text = changed(lines, name, r"order( +)= 0", r"order\1= 1")
-        text = [*text[: start[-1]], "m1(1, 1, 1) = 0.25D+00", *text[start[-1] :]]
-        assert any(said in warning for warning in read_sid(with_lines(tmp_path, text)).provenance["warnings"])
+def test_higher_terms_of_matrices_are_said_to_be_lost(tmp_path, lines):
+    start = within(lines, "Me")
+    text = changed(lines, "Me", r"order( +)= 0", r"order\1= 1")
+    text = [*text[: start[-1]], "m1(1, 1, 1) = 0.25D+00", *text[start[-1] :]]
+    warnings = read_sid(with_lines(tmp_path, text)).provenance["warnings"]
+    assert any("terms of order 1 of Me" in warning for warning in warnings)
 
 
 # ---- guards of the reader -----------------------------------------------------------------------------------------
@@ -714,10 +734,9 @@ def test_a_rigid_body_is_a_file_without_modes(tmp_path):
 def test_export_says_what_it_leaves_out(tmp_path, capsys):
     body = replace(cloud(2), stiffening=np.ones((12 + 18, 2, 2)))
     source = save_body(body, tmp_path / "b.ffr")
-    for name in ("b.SID_FEM", "b.fem"):
-        main(["export", str(source), "-o", str(tmp_path / name), "--kind", "full", "--surface"])
-        assert "geometric stiffness of the body was left out" in capsys.readouterr().out
-    assert_same(read_sid(tmp_path / "b.SID_FEM"), cloud(2), 1e-14)
+    for name, kind, left_out in (("b.SID_FEM", "full", False), ("b.fem", "full", False), ("c.fem", "legacy", True)):
+        main(["export", str(source), "-o", str(tmp_path / name), "--kind", kind, "--surface"])
+        assert ("geometric stiffness of the body was left out" in capsys.readouterr().out) is left_out
 
 
 def test_export_and_import_commands(tmp_path, capsys):

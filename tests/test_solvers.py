@@ -1,6 +1,8 @@
 """Every solver behind the one door gives the same body, and none solves with a matrix that is singular or indefinite."""
 
+import re
 import shutil
+import signal
 import subprocess
 from pathlib import Path
 
@@ -9,7 +11,8 @@ import pytest
 import scipy.sparse as sp
 from boxes import STEEL, box_mesh
 
-from ffr_prep import slepc
+from ffr_prep import cli, slepc
+from ffr_prep.body import load_body
 from ffr_prep.errors import ComputationError, InputError
 from ffr_prep.factor import Solver, factorise
 from ffr_prep.interface import InterfaceRegion
@@ -18,6 +21,7 @@ from ffr_prep.reduction import CraigBampton, Eigenmodes
 from ffr_prep.reference import FixedTo, MeanAxis
 from ffr_prep.slepc import mpi_solve, started
 
+MESHES = Path(__file__).parent.parent / "meshes"
 MESH = box_mesh("tet10", (1.0, 0.2, 0.13), (8, 2, 2))
 KEPT, CLAMPED = CraigBampton(8), FixedTo("left")
 ENDS = [InterfaceRegion("left"), InterfaceRegion("right", kind="mean")]
@@ -119,6 +123,16 @@ def test_slepc_refuses_supports_that_touch_most_of_a_body(monkeypatch):
         reduced(Solver("slepc"), Eigenmodes(30), MeanAxis())
 
 
+@with_slepc
+def test_processes_that_are_busy_end_when_nothing_waits_for_them(monkeypatch):
+    monkeypatch.setattr(slepc, "_GRACE", 0.2)
+    process = started(sp.csr_array(np.eye(3)), 2)
+    child = process.child
+    child.send_signal(signal.SIGSTOP)  # mpirun hears neither the end of the pipe nor the request to end
+    del process
+    assert child.wait(10) == -signal.SIGKILL
+
+
 def test_slepc_that_is_not_installed_is_an_error_with_a_remedy(monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda name: None)
     with pytest.raises(InputError, match="apt-get install python3-slepc4py-real"):
@@ -150,3 +164,25 @@ def test_ranks_that_cannot_be_are_refused(name, ranks):
 def test_a_solver_that_does_not_exist_is_refused():
     with pytest.raises(InputError, match="no solver 'umfpack'; the solvers are cholesky, superlu, pardiso, slepc"):
         Solver("umfpack")
+
+
+# ---- the command line ---------------------------------------------------------------------------------------------
+
+BAR = [str(MESHES / "box.geo"), "--set", "nx=6", "--set", "ny=1", "--set", "nz=1", "--material", "steel"]
+
+
+def test_the_command_line_chooses_a_solver_and_tells_time_and_memory(tmp_path, capsys):
+    cli.main(
+        ["reduce", *BAR, "--interface", "left", "--modes", "2", "--solver", "superlu", "-o", str(tmp_path / "bar.ffr")]
+    )
+    said = capsys.readouterr().out
+    assert re.search(r"time +read the mesh \d+\.\d s, .*factorise the stiffness \d+\.\d s", said)
+    assert re.search(r"memory +\d\.\d\d GiB at most", said)
+    assert load_body(tmp_path / "bar.ffr").provenance["solver"]["name"] == "superlu"
+
+
+def test_the_command_line_refuses_bad_ranks(tmp_path, capsys):
+    with pytest.raises(SystemExit) as left:
+        cli.main(["reduce", *BAR, "--solver", "slepc", "--ranks", "0", "-o", str(tmp_path / "bar.ffr")])
+    assert left.value.code == 2
+    assert "solver 'slepc' with 0 ranks cannot be run" in capsys.readouterr().err

@@ -199,6 +199,7 @@ def _with_all_reactions(assembled: Assembled, method: Integrator, record: Record
     reaction = np.empty_like(record.reaction)
     for row, time in enumerate(record.time):
         x, v = record.x[row].copy(), record.v[row].copy()
+        work.loads.reference[:] = record.action[row, :, 0]
         method.run(system.model, work, stages, time, method.step, 0, 0, x, v, 0.0, 0.0, 0.0, one)
         reaction[row] = one.reaction[0, numbers]
     return record._replace(reaction=reaction)

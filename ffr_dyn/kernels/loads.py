@@ -1,75 +1,14 @@
-"""Time functions and applied loads: wrenches on markers, spring-dampers, values of the user's Python functions."""
-
-import math
+"""All applied loads: wrenches on markers, forces on coordinates, bushings, spread loads, values of Python functions."""
 
 from numba import types
 from numba.extending import intrinsic
 
+from ffr_dyn.kernels.actions import apply_action
+from ffr_dyn.kernels.bushings import apply_bushing
 from ffr_dyn.kernels.markers import apply_wrench
-from ffr_dyn.kernels.operations import operate
-from ffr_dyn.kernels.options import entry, inlined, kernel
-from ffr_dyn.kernels.vectors import dot, fill, get, scale, subtract, to_body
-
-POLYNOMIAL, HARMONIC, PIECEWISE, USER, OPERATION = 0, 1, 2, 3, 4
-
-
-@kernel
-def horner(data, start, count, t):
-    """(value, first, second derivative) of the polynomial with ascending coefficients data[start : start + count]."""
-    value, rate, second = 0.0, 0.0, 0.0
-    for k in range(count - 1, -1, -1):
-        second = second * t + 2.0 * rate
-        rate = rate * t + value
-        value = value * t + data[start + k]
-    return value, rate, second
-
-
-@kernel
-def piecewise(data, start, t):
-    """Piecewise polynomial: data = [pieces, coefficients per piece, breaks (pieces + 1), coefficients (ascending)].
-
-    Beyond the breaks the value at the nearest break holds, at rest.
-    """
-    pieces, count = int(data[start]), int(data[start + 1])
-    breaks = start + 2
-    first, last = data[breaks], data[breaks + pieces]
-    low, high = 0, pieces
-    while high - low > 1:
-        middle = (low + high) // 2
-        if t >= data[breaks + middle]:
-            low = middle
-        else:
-            high = middle
-    clipped = min(max(t, first), last)
-    value, rate, second = horner(data, breaks + pieces + 1 + low * count, count, clipped - data[breaks + low])
-    if t < first or t > last:
-        return value, 0.0, 0.0
-    return value, rate, second
-
-
-@entry
-def evaluate_functions(functions, user, t, out):
-    """out (F, 3) = value and two time derivatives of every time function at t; `user` holds what Python gave."""
-    data = functions.data
-    for f in range(functions.kind.size):
-        start = functions.start[f]
-        kind = functions.kind[f]
-        if kind == POLYNOMIAL:
-            value, rate, second = horner(data, start, functions.start[f + 1] - start, t)
-        elif kind == HARMONIC:
-            mean, amplitude, speed = data[start], data[start + 1], data[start + 2]
-            angle = speed * t + data[start + 3]
-            value = mean + amplitude * math.sin(angle)
-            rate = amplitude * speed * math.cos(angle)
-            second = -amplitude * speed * speed * math.sin(angle)
-        elif kind == PIECEWISE:
-            value, rate, second = piecewise(data, start, t)
-        elif kind == OPERATION:
-            value, rate, second = operate(data, start, out)
-        else:
-            slot = int(data[start])
-            value, rate, second = user[slot], user[slot + 1], user[slot + 2]
-        out[f, 0], out[f, 1], out[f, 2] = value, rate, second
+from ffr_dyn.kernels.options import inlined, kernel
+from ffr_dyn.kernels.spread import apply_spread
+from ffr_dyn.kernels.vectors import fill, get, to_body, to_global
 
 
 @intrinsic
@@ -127,31 +66,70 @@ def given_wrench(loads, functions, user, A, k):
 
 
 @kernel
-def spring_force(loads, markers, k):
-    """(force, direction i -> j) of spring-damper k; the force is positive in tension. markers: MarkerWork."""
-    i, j = loads.spring[k, 0], loads.spring[k, 1]
-    d = subtract(get(markers.r, j), get(markers.r, i))
-    length = dot(d, d) ** 0.5
-    if length == 0.0:
-        return 0.0, d
-    direction = scale(1.0 / length, d)
-    rate = dot(direction, subtract(get(markers.rd, j), get(markers.rd, i)))
-    data = loads.spring_data[k]
-    return data[0] * (length - data[2]) + data[1] * rate + data[3], direction
+def apply_given(where, markers, loads, w, functions, user, f, load, k):
+    """Add wrench k to f and load (M, 6)."""
+    marker = loads.wrench[k, 0]
+    force, moment = given_wrench(loads, functions, user, w.A[marker], k)
+    apply_wrench(where, markers, get(w.u, marker), f, load[marker], marker, force, moment)
 
 
-@inlined
-def apply_loads(where, markers, loads, w, functions, user, f):
-    """Add all wrenches and springs to the right-hand sides f, and to w.load; w: MarkerWork."""
+@kernel
+def apply_loads(where, markers, loads, A, w, s, functions, user, x, f):
+    """Add all loads to the right-hand sides f, and to w.load; A (B + 1, 3, 3) of the bodies; w, s: Marker-, LoadWork."""
     for k in range(w.load.shape[0]):
         fill(w.load[k], 0.0)
     for k in range(loads.wrench.shape[0]):
-        marker = loads.wrench[k, 0]
-        force, moment = given_wrench(loads, functions, user, w.A[marker], k)
-        apply_wrench(where, markers, get(w.u, marker), f, w.load[marker], marker, force, moment)
-    for k in range(loads.spring.shape[0]):
-        force, direction = spring_force(loads, w, k)
-        for side in range(2):
-            marker = loads.spring[k, side]
-            pull = to_body(w.A[marker], scale(force if side == 0 else -force, direction))
-            apply_wrench(where, markers, get(w.u, marker), f, w.load[marker], marker, pull, (0.0, 0.0, 0.0))
+        apply_given(where, markers, loads, w, functions, user, f, w.load, k)
+    for k in range(loads.action.shape[0]):
+        apply_action(where, markers, loads, w, s, functions, user, f, w.load, k)
+    for k in range(loads.bushing.shape[0]):
+        apply_bushing(where, markers, loads, w, s, f, w.load, k)
+    for k in range(loads.spread.shape[0]):
+        apply_spread(where, loads, A, functions, x, f, k)
+
+
+@kernel
+def take_power(where, A, f, v):
+    """f . v for right-hand sides f in body axes, which are cleared."""
+    power = 0.0
+    for b in range(where.shape[0] - 1):
+        n, j = where[b, 0], where[b, 2]
+        force = to_global(A[b], (f[j], f[j + 1], f[j + 2]))
+        for c in range(3):
+            power += force[c] * v[j + c]
+        for c in range(3, 6 + n):
+            power += f[j + c] * v[j + c]
+    fill(f, 0.0)
+    return power
+
+
+@kernel
+def powers(where, markers, loads, A, w, s, functions, user, x, v, out):
+    """out (W + Z + Y + U,) = power of each load, after an evaluation at (x, v)."""
+    fill(s.f, 0.0)
+    at = 0
+    for k in range(loads.wrench.shape[0]):
+        apply_given(where, markers, loads, w, functions, user, s.f, s.load, k)
+        out[at] = take_power(where, A, s.f, v)
+        at += 1
+    for k in range(loads.action.shape[0]):
+        apply_action(where, markers, loads, w, s, functions, user, s.f, s.load, k)
+        out[at] = take_power(where, A, s.f, v)
+        at += 1
+    for k in range(loads.bushing.shape[0]):
+        apply_bushing(where, markers, loads, w, s, s.f, s.load, k)
+        out[at] = take_power(where, A, s.f, v)
+        at += 1
+    for k in range(loads.spread.shape[0]):
+        apply_spread(where, loads, A, functions, x, s.f, k)
+        out[at] = take_power(where, A, s.f, v)
+        at += 1
+
+
+@kernel
+def gravity_field(gravity, base, functions, out):
+    """out (3,) = gravity less the acceleration of the base; base (3,): its time functions or -1."""
+    for c in range(3):
+        out[c] = gravity[c]
+        if base[c] >= 0:
+            out[c] -= functions[base[c], 0]

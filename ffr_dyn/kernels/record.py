@@ -1,7 +1,8 @@
 """What is kept at an output time."""
 
+from ffr_dyn.kernels.actions import keep_turns
 from ffr_dyn.kernels.bodies import energies
-from ffr_dyn.kernels.loads import spring_force
+from ffr_dyn.kernels.loads import powers
 from ffr_dyn.kernels.markers import update_marker
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.stiffening import solve_stiffened
@@ -36,9 +37,12 @@ def keep(m, w, t, x, v, out, k):
         put(out.r[k], marker, get(w.markers.r, marker))
         put(out.rd[k], marker, get(w.markers.rd, marker))
     reactions(m.rows, w.markers, w.rows, out.reaction[k])
-    for spring in range(m.loads.spring.shape[0]):
-        out.spring[k, spring] = spring_force(m.loads, w.markers, spring)[0]
-    kinetic, strain, gravity = energies(m.gravity, m.bodies, w.bodies, x, v, w.y[0], w.y[1])
+    for action in range(m.loads.action.shape[0]):
+        copy(out.action[k, action], w.loads.action[action])
+    for bushing in range(m.loads.bushing.shape[0]):
+        copy(out.bushing[k, bushing], w.loads.bushing[bushing])
+    powers(m.bodies.where, m.markers, m.loads, w.bodies.A, w.markers, w.loads, w.functions, w.user, x, v, out.power[k])
+    kinetic, strain, gravity = energies(w.field, m.bodies, w.bodies, x, v, w.y[0], w.y[1])
     out.energy[k, 0], out.energy[k, 1], out.energy[k, 2] = kinetic, strain, gravity
     out.violation[k, 0], out.violation[k, 1] = largest(w.rows.Phi), largest(w.rows.nu)
 
@@ -48,5 +52,6 @@ def record(m, w, t, x, v, out, k):
     """Evaluate the scene at (t, x, v) and keep it as row k of `out`. Returns a status."""
     status = evaluate_truly(m, w, t, x, v)
     if status == OK:
+        keep_turns(m.loads, w.loads)
         keep(m, w, t, x, v, out, k)
     return status

@@ -108,7 +108,7 @@ def solve_stiffened(m, w, x, target):
         if stiffened:
             for b in range(m.bodies.mass.size):
                 if m.bodies.where[b, 6] > 0:
-                    frame_loads(m.bodies, w.bodies, m.gravity, b, sweep > 0)
+                    frame_loads(m.bodies, w.bodies, w.field, b, sweep > 0)
                     marker_loads(m.markers, m.rows, w.markers, w.rows, b, sweep > 0, w.bodies.load)
                     stiffen(m.bodies, w.bodies, b)
         solve_motion(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, target, passes)

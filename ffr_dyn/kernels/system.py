@@ -4,9 +4,11 @@ Order of calls: `prepare` once per elastic diagonal; `evaluate` at a state; then
 `solve_correction` with that state's factors.
 """
 
+from ffr_dyn.kernels.actions import keep_turns
 from ffr_dyn.kernels.blocks import add_pair, eliminate_side, factorise_blocks, solve_blocks
 from ffr_dyn.kernels.bodies import back_substitute, factorise, inertia, normalise, row_dot, solve_body
-from ffr_dyn.kernels.loads import apply_loads, call_user, evaluate_functions
+from ffr_dyn.kernels.functions import evaluate_functions
+from ffr_dyn.kernels.loads import apply_loads, call_user, gravity_field
 from ffr_dyn.kernels.markers import couple_marker, couple_pair, project, shapes, update_marker
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.rows import evaluate_block
@@ -103,14 +105,15 @@ def evaluate(m, w, t, x, v):
     if not call_user(m.user_address, t, x, v, w.user):
         return USER_FAILED
     evaluate_functions(m.functions, w.user, t, w.functions)
-    failed = evaluate_bodies(m.gravity, bodies, bw, x, v)
+    gravity_field(m.gravity, m.base, w.functions, w.field)
+    failed = evaluate_bodies(w.field, bodies, bw, x, v)
     if failed >= 0:
         w.info[0] = failed
         return SINGULAR_BODY
     for k in markers.active:
         b = markers.body[k]
         update_marker(bodies.where, markers, mw, bw.A[b], get(bw.omega, b), x, v, k)
-    apply_loads(bodies.where, markers, m.loads, mw, w.functions, w.user, bw.f)
+    apply_loads(bodies.where, markers, m.loads, bw.A, mw, w.loads, w.functions, w.user, x, bw.f)
     for k in range(rows.marker.shape[0]):
         evaluate_block(rows, w.functions, mw, rw, k)
     couple_joints(bodies, markers, rows, m.pattern, bw, rw)
@@ -323,6 +326,7 @@ def evaluate_on_constraints(m, w, t, x, v, tolerance):
             break
         w.info[2] += 1
         move_back(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, w.vd, x, v)
+    keep_turns(m.loads, w.loads)
     return OK
 
 

@@ -17,7 +17,9 @@ import numpy as np
 Array = np.ndarray
 
 COINCIDENCE, DOT_1, DOT_2, DRIVEN_ANGLE, DISTANCE, RELATION = 0, 1, 2, 3, 4, 5
-ANGLE, STROKE = 0, 1
+ANGLE, STROKE, LENGTH = 0, 1, 2
+SPRING, FRICTION, ACTUATOR, SERVO, STOP = 0, 1, 2, 3, 4
+AFFINE, GLOBAL = 0, 1
 
 OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED = 0, 1, 2, 3, 4
 
@@ -76,7 +78,7 @@ class Pattern(NamedTuple):
 
 
 class Functions(NamedTuple):
-    """F time functions: kind and numbers (see `loads`)."""
+    """F time functions: kind and numbers (see `functions`)."""
 
     kind: Array  # (F,)
     start: Array  # (F + 1,)
@@ -84,19 +86,25 @@ class Functions(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """W wrenches on markers and Z spring-dampers."""
+    """W wrenches on markers, Z actions on coordinates, Y bushings, U spread loads."""
 
     wrench: Array  # (W, 3) marker, axes (0 global, 1 body), start in the user's values or -1
     value: Array  # (W, 6) force and moment
     function: Array  # (W, 6) factor by time function or -1
-    spring: Array  # (Z, 2) markers
-    spring_data: Array  # (Z, 4) stiffness, damping, free length, preload
+    action: Array  # (Z, 6) coordinate, marker i, marker j, law, start in data, time function or -1
+    action_axes: Array  # (Z, 3, 3) f_i, g_i, f_j of an angle, or h_i of a stroke
+    turn: Array  # (Z,) whole turns at the start [rad]
+    bushing: Array  # (Y, 3) marker i, marker j, start in data
+    frames: Array  # (Y, 2, 3, 3) axes on i and j, one a row
+    spread: Array  # (U, 4) body, kind, start in data, time function
+    data: Array  # pooled numbers of laws, curves, bushings and spread loads
 
 
 class Model(NamedTuple):
     """Constant tables of a scene."""
 
     gravity: Array  # (3,) [m/s^2]
+    base: Array  # (3,) time function of the base's acceleration or -1
     relaxation: float  # relative, added to the diagonal of the multiplier matrix where rows depend on others; or 0
     bodies: Bodies
     markers: Markers
@@ -144,6 +152,18 @@ class MarkerWork(NamedTuple):
     load: Array  # (M, 6) applied force and moment, body axes
 
 
+class LoadWork(NamedTuple):
+    """Per applied load, filled by `apply_loads`."""
+
+    reference: Array  # (Z,) coordinates at the last accepted state, from which angles count their turns
+    action: Array  # (Z, 3) coordinate, rate, force
+    bushing: Array  # (Y, 18) displacement and rotation, their rates, force and moment
+    axes: Array  # (2, 3, 3, 3) scratch of a bushing
+    turn: Array  # (3, 3, 3) scratch of a bushing
+    f: Array  # (V,) scratch of the powers
+    load: Array  # (M, 6) scratch of the powers
+
+
 class RowWork(NamedTuple):
     """Per constraint row; D = 2 sides (marker i, marker j), or 4 where there are relations."""
 
@@ -167,6 +187,8 @@ class Work(NamedTuple):
     bodies: BodyWork
     markers: MarkerWork
     rows: RowWork
+    loads: LoadWork
+    field: Array  # (3,) gravity as the base feels it
     vd: Array  # (V,)
     y: Array  # (2, longest body)
     functions: Array  # (F, 3) value, first and second time derivative
@@ -194,6 +216,8 @@ class Record(NamedTuple):
     r: Array  # (T, M, 3) marker positions
     rd: Array  # (T, M, 3) marker velocities
     reaction: Array  # (T, K, 6) by block: force, moment
-    spring: Array  # (T, Z) spring-damper forces
+    action: Array  # (T, Z, 3) coordinate, rate, force
+    bushing: Array  # (T, Y, 18) displacement and rotation, their rates, force and moment
+    power: Array  # (T, W + Z + Y + U)
     energy: Array  # (T, 3) kinetic, strain, gravity
     violation: Array  # (T, 2) largest |Phi|, |Phi_dot|

@@ -1,0 +1,216 @@
+"""Size: time and memory from a mesh file to a body file, beside SciPy's eigsh and SuperLU in the same run.
+
+    python -m benchmarks.size [--dof N] [--peer N] [--solver NAME ...] [--ranks N] [--large N]
+
+Body: the steel rod of meshes/connecting_rod.geo in 10-node tetrahedra, both eyes rigid interfaces; 30 fixed-interface modes
+and 12 constraint modes, frame simply supported between the eyes: 36 elastic coordinates. From the .msh file to the body
+file; drawing the mesh and compiling, which happens once, are left out.
+
+Every run is a process of its own. Printed are the time on the clock and the processor time of each step, which a busy
+machine disturbs less, and the most memory that the process ever had. The load of the machine stands beside every run.
+
+The peer shares reading, checking, assembly, coupling, inertia integrals and file with us; the fixed-interface modes are
+those of `scipy.sparse.linalg.eigsh` in its shift-invert mode about zero on SciPy's SuperLU with the setting that was its
+best (MMD_AT_PLUS_A, symmetric mode, no pivoting), and the constraint modes 12 more solves with the same factor. It needs
+minutes at 300,000 unknowns: by default it runs at a third of the size, and the ratio is printed for equal sizes only.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse.linalg as spl
+
+from ffr_prep.basis import Basis, diagonalised, restricted
+from ffr_prep.body import FlexibleBody, save_body
+from ffr_prep.factor import FreeBody, Solver
+from ffr_prep.interface import CoupledModel, InterfaceRegion
+from ffr_prep.material import material
+from ffr_prep.mesh import read_mesh
+from ffr_prep.reduce import reduce_mesh
+from ffr_prep.reduction import CraigBampton
+from ffr_prep.reference import SimplySupported
+
+Array = np.ndarray
+
+GEOMETRY = Path(__file__).resolve().parents[1] / "meshes" / "connecting_rod.geo"
+EYES = ("big_eye", "small_eye")
+MODES = 30
+_SIZES = ((3.1, 93_144), (1.93, 306_426), (1.2, 1_064_166))  # largest edge [mm], unknowns
+
+
+# ---- one run, in a process of its own -----------------------------------------------------------------------------
+
+
+@dataclass
+class Clock:
+    """Notes what each step takes: time on the clock, processor time, most memory so far."""
+
+    steps: list[tuple[str, float, float]] = field(default_factory=list)
+    begun: tuple[str, float, float] | None = None
+
+    def __call__(self, step: str) -> None:
+        """A step begins, and the one before ends."""
+        now = time.perf_counter(), time.process_time()
+        if self.begun:
+            name, wall, cpu = self.begun
+            self.steps.append((name, now[0] - wall, now[1] - cpu))
+        self.begun = (step, *now)
+
+
+@dataclass(frozen=True)
+class ByEigsh:
+    """Craig-Bampton by the peer; the eyes' coordinates are the last twelve of the model."""
+
+    modes: int
+
+    def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
+        """As `CraigBampton.basis`."""
+        inner = model.K.shape[0] - 12
+        K, M = model.K[:inner][:, :inner].tocsc(), model.M[:inner][:, :inner].tocsc()
+        coupling = model.K[:inner][:, inner:].toarray()
+        lu = spl.splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        inverse = spl.LinearOperator(K.shape, lu.solve)
+        omega2, modes = spl.eigsh(K, self.modes, M, sigma=0.0, OPinv=inverse)
+        shapes = np.vstack([-lu.solve(coupling), np.eye(12)])
+        stiffness = model.K[inner:][:, inner:].toarray() + coupling.T @ shapes[:inner]
+        vectors = np.hstack([np.vstack([modes, np.zeros((12, self.modes))]), shapes])
+        small = scipy.linalg.block_diag(np.diag(omega2), (stiffness + stiffness.T) / 2)
+        return diagonalised(model, *restricted(vectors, small, L))
+
+
+def run(mesh_file: Path, body_file: Path, solver: str, ranks: int) -> None:
+    """Mesh file to body file; the figures as a line of JSON."""
+    clock = Clock()
+    mesh = read_mesh(mesh_file, unit="mm", progress=clock)
+    body = _reduced(mesh, solver, ranks, clock)
+    clock("write the body file")
+    save_body(body, body_file)
+    clock("")
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    figures = {"dof": 3 * len(mesh.points), "steps": clock.steps, "peak": peak, "frequencies": _hertz(body)}
+    print(json.dumps(figures))
+
+
+def _reduced(mesh: Any, solver: str, ranks: int, clock: Clock) -> FlexibleBody:
+    own: dict[str, Any] = {"solver": Solver(solver, ranks)} if solver != "eigsh" else {}
+    if solver == "eigsh":
+        import ffr_prep.reduce
+
+        ffr_prep.reduce.factorised = lambda model, solver: None  # type: ignore[assignment]  # its work is the peer's own
+    return reduce_mesh(
+        mesh,
+        name="rod",
+        material=material("steel"),
+        interfaces=[InterfaceRegion(eye) for eye in EYES],
+        reference=SimplySupported(*EYES),
+        reduction=ByEigsh(MODES) if solver == "eigsh" else CraigBampton(MODES),
+        progress=clock,
+        **own,
+    )
+
+
+def _hertz(body: FlexibleBody) -> list[float]:
+    return (np.sqrt(body.omega2) / (2 * np.pi)).tolist()
+
+
+# ---- all runs -----------------------------------------------------------------------------------------------------
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description="Time and memory from a mesh file to a body file.")
+    parser.add_argument("--dof", type=int, default=300_000, help="unknowns of our run")
+    parser.add_argument("--peer", type=int, default=100_000, help="unknowns of the run beside SciPy; 0 for none")
+    parser.add_argument("--solver", nargs="*", default=[], help="further solvers at the size of --dof")
+    parser.add_argument("--ranks", type=int, default=2, help="processes of the solver slepc")
+    parser.add_argument("--large", type=int, default=0, help="unknowns of a last run of ours, such as 1000000")
+    asked = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="ffr-size-") as folder:
+        _measured(Path(folder), 100_000, "cholesky", show=False)  # compiles
+        ours = {dof: _measured(Path(folder), dof, "cholesky") for dof in dict.fromkeys((asked.dof, asked.peer)) if dof}
+        if asked.peer:
+            _compare(ours[asked.peer], _measured(Path(folder), asked.peer, "eigsh"))
+        for solver in asked.solver:
+            _compare(
+                ours[asked.dof], _measured(Path(folder), asked.dof, solver, asked.ranks if solver == "slepc" else 1)
+            )
+        if asked.large:
+            _measured(Path(folder), asked.large, "cholesky")
+
+
+def _measured(folder: Path, dof: int, solver: str, ranks: int = 1, show: bool = True) -> dict[str, Any]:
+    mesh = folder / f"rod_{dof}.msh"
+    if not mesh.exists():
+        _draw(mesh, dof)
+    load = os.getloadavg()[0]
+    command = [sys.executable, "-m", "benchmarks.size", "run", str(mesh), str(folder / "rod.ffr"), solver, str(ranks)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=GEOMETRY.parents[1])
+    if done.returncode:
+        sys.exit(f"{solver} at {dof} unknowns ended with code {done.returncode}: {done.stderr[-2000:]}")
+    figures: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    figures["solver"] = solver
+    figures["wall"], figures["cpu"] = (sum(step[k] for step in figures["steps"]) for k in (1, 2))
+    if show:
+        _show(figures, load)
+    return figures
+
+
+def _draw(mesh: Path, dof: int) -> None:
+    """The rod with about as many unknowns; on curved surfaces there are more than the edge alone would give."""
+    (edge, known) = min(_SIZES, key=lambda size: abs(np.log(size[1] / dof)))
+    size = edge * (known / dof) ** (1 / 3) if abs(known / dof - 1) > 0.1 else edge
+    gmsh = [sys.executable, "-c", _GMSH, str(GEOMETRY), str(mesh), str(size)]
+    subprocess.run(gmsh, check=True, capture_output=True)
+
+
+_GMSH = """
+import sys, gmsh
+gmsh.initialize(["gmsh", "-setnumber", "size", sys.argv[3]], interruptible=False)
+for name, value in {"General.NumThreads": 1, "Mesh.Algorithm3D": 10, "Mesh.Optimize": 1, "Mesh.Binary": 1}.items():
+    gmsh.option.setNumber(name, value)
+gmsh.open(sys.argv[1])
+gmsh.model.mesh.generate(3)
+gmsh.model.mesh.setOrder(2)
+gmsh.write(sys.argv[2])
+"""
+
+
+def _show(figures: dict[str, Any], load: float) -> None:
+    print(
+        f"{figures['solver']}, {figures['dof']} unknowns: {figures['wall']:.1f} s on the clock, {figures['cpu']:.1f} s of "
+        f"processor, {figures['peak']:.2f} GiB at most (load before it {load:.1f} on {os.cpu_count()} cores)"
+    )
+    for name, wall, cpu in figures["steps"]:
+        print(f"    {name:32s} {wall:7.1f} s {cpu:7.1f} s")
+    sys.stdout.flush()
+
+
+def _compare(ours: dict[str, Any], other: dict[str, Any]) -> None:
+    """Ratios at equal size, and how far the frequencies are apart."""
+    apart = max(abs(a / b - 1) for a, b in zip(ours["frequencies"], other["frequencies"], strict=True))
+    wall, cpu, peak = (other[key] / ours[key] for key in ("wall", "cpu", "peak"))
+    print(
+        f"    {other['solver']} against ours: time {wall:.1f}, processor time {cpu:.1f}, memory {peak:.1f} times; "
+        f"frequencies {apart:.0e} apart\n"
+    )
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["run"]:
+        run(Path(sys.argv[2]), Path(sys.argv[3]), sys.argv[4], int(sys.argv[5]))
+    else:
+        main()

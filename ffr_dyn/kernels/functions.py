@@ -1,0 +1,67 @@
+"""Functions of time and piecewise polynomials, compiled; declared in `ffr_dyn.timefunction` and `ffr_dyn.curve`."""
+
+import math
+
+from ffr_dyn.kernels.operations import operate
+from ffr_dyn.kernels.options import entry, kernel
+
+POLYNOMIAL, HARMONIC, PIECEWISE, USER, OPERATION = 0, 1, 2, 3, 4
+
+
+@kernel
+def horner(data, start, count, t):
+    """(value, first, second derivative) of the polynomial with ascending coefficients data[start : start + count]."""
+    value, rate, second = 0.0, 0.0, 0.0
+    for k in range(count - 1, -1, -1):
+        second = second * t + 2.0 * rate
+        rate = rate * t + value
+        value = value * t + data[start + k]
+    return value, rate, second
+
+
+@kernel
+def piecewise(data, start, t):
+    """Piecewise polynomial: data = [pieces, coefficients per piece, breaks (pieces + 1), coefficients (ascending)].
+
+    Beyond the breaks the value at the nearest break holds, at rest.
+    """
+    pieces, count = int(data[start]), int(data[start + 1])
+    breaks = start + 2
+    first, last = data[breaks], data[breaks + pieces]
+    low, high = 0, pieces
+    while high - low > 1:
+        middle = (low + high) // 2
+        if t >= data[breaks + middle]:
+            low = middle
+        else:
+            high = middle
+    clipped = min(max(t, first), last)
+    value, rate, second = horner(data, breaks + pieces + 1 + low * count, count, clipped - data[breaks + low])
+    if t < first or t > last:
+        return value, 0.0, 0.0
+    return value, rate, second
+
+
+@entry
+def evaluate_functions(functions, user, t, out):
+    """out (F, 3) = value and two time derivatives of every time function at t; `user` holds what Python gave."""
+    data = functions.data
+    for f in range(functions.kind.size):
+        start = functions.start[f]
+        kind = functions.kind[f]
+        if kind == POLYNOMIAL:
+            value, rate, second = horner(data, start, functions.start[f + 1] - start, t)
+        elif kind == HARMONIC:
+            mean, amplitude, speed = data[start], data[start + 1], data[start + 2]
+            angle = speed * t + data[start + 3]
+            value = mean + amplitude * math.sin(angle)
+            rate = amplitude * speed * math.cos(angle)
+            second = -amplitude * speed * speed * math.sin(angle)
+        elif kind == PIECEWISE:
+            value, rate, second = piecewise(data, start, t)
+        elif kind == OPERATION:
+            value, rate, second = operate(data, start, out)
+        else:
+            slot = int(data[start])
+            value, rate, second = user[slot], user[slot + 1], user[slot + 2]
+        out[f, 0], out[f, 1], out[f, 2] = value, rate, second
