@@ -21,7 +21,7 @@ Paths are relative to the file. Angles in rad, everything in SI units unless a u
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,7 @@ from ffr_dyn.errors import InputError
 from ffr_dyn.forces import Load
 from ffr_dyn.formula import is_constant
 from ffr_dyn.integrators import METHODS, Integrator
+from ffr_dyn.joint_forces import Actuator
 from ffr_dyn.parameters import Parameters, flattened, overridden, substituted
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.scene_schema import TABLES, BodyEntry, ForwardEntry, Kind, SceneEntry, keys_of
@@ -41,6 +42,8 @@ from ffr_dyn.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
 from ffr_dyn.state_formula import StateFormula, check_names
 from ffr_dyn.timefunction import TimeFunction, constant
 from ffr_prep.body import BodyError, FlexibleBody, load_body, rigid_body, truncated, with_point
+
+WHOLE = ("name", "gravity", "ground", "base_acceleration")  # fields of a scene that are no tables of entries
 
 
 @dataclass(frozen=True)
@@ -86,7 +89,7 @@ def _explained(error: ValidationError, source: Source) -> str:
         plain = isinstance(item["input"], (str, int, float, bool, list))
         value = f" (it is {item['input']!r})" if plain and item["type"] != "missing" else ""
         text = item["msg"].removeprefix("Value error, ").removeprefix("it: ")
-        where = ".".join(key for key in keys if not key.startswith(("list[", "function-")))
+        where = ".".join(key for key in keys if not key.startswith(("[", "list[", "function-")))
         lines[f"{origin(source, keys)}: {where or 'file'}: {text}{value}"] = None
     return "; ".join(lines)
 
@@ -101,10 +104,10 @@ def _scene(entry: Any, source: Source) -> Scene:
     }
     bodies = tuple(_body(name, body, source) for name, body in entry.bodies.items())
     try:
-        scene = Scene(bodies=bodies, name=entry.name, gravity=entry.gravity, ground=entry.ground, **tables)
-        for load in scene.loads:
-            if isinstance(load.function, StateFormula):
-                check_names(scene, load.function, f"load {load.name!r}")
+        scene = Scene(bodies=bodies, **{key: getattr(entry, key) for key in WHOLE}, **tables)
+        for force in (*scene.loads, *scene.forces):
+            if isinstance(force, (Load, Actuator)) and isinstance(force.function, StateFormula):
+                check_names(scene, force.function, f"force {force.name!r}")
     except InputError as error:
         raise InputError(f"{origin(source, ())}: {error}") from None
     return scene
@@ -125,16 +128,32 @@ def _kind(kinds: tuple[Kind, ...], entry: BaseModel) -> Kind:
 def _made(kind: Kind, name: str, entry: BaseModel) -> Any:
     """The declaration that an entry of the file means."""
     given = {f.name: getattr(entry, f.name) for f in keys_of(kind)}
-    return _load(name, **given) if kind.made is Load else kind.made(name=name, **given)
+    for f in keys_of(kind):
+        if given[f.name] is None and f.default is not None:
+            del given[f.name]
+    special: dict[type, Callable[..., Any]] = {Load: _load, Actuator: _actuator}
+    return special.get(kind.made, kind.made)(name=name, **given)
 
 
-def _load(name: str, force: list[Any], moment: list[Any], **given: Any) -> Load:
+def _load(force: list[Any], moment: list[Any], **given: Any) -> Load:
     """Components that depend on the motion go to the load's function, the others stay functions of time."""
-    components = [constant(c) if isinstance(c, float) else c for c in (*force, *moment)]  # a default is a number
+    timed, moving = _separated((*force, *moment))
+    return Load(force=timed[:3], moment=timed[3:], function=moving, **given)
+
+
+def _actuator(force: Any = 0.0, **given: Any) -> Actuator:
+    """As `_load`."""
+    timed, moving = _separated((force,))
+    return Actuator(force=timed[0], function=moving, **given)
+
+
+def _separated(given: tuple[Any, ...]) -> tuple[list[float | TimeFunction], StateFormula | None]:
+    """Functions of time (zero where a component is none), and those that depend on the motion (zero likewise) if any does."""
+    components = [constant(c) if isinstance(c, float) else c for c in given]  # a default is a number
     timed = [_plain(c) if isinstance(c, TimeFunction) else 0.0 for c in components]
     moving = tuple(constant(0.0) if isinstance(c, TimeFunction) else c for c in components)
     follows = any(not isinstance(c, TimeFunction) for c in components)
-    return Load(name, force=timed[:3], moment=timed[3:], function=StateFormula(moving) if follows else None, **given)
+    return timed, StateFormula(moving) if follows else None
 
 
 def _plain(function: TimeFunction) -> float | TimeFunction:

@@ -30,14 +30,17 @@ from pydantic import Field as Key
 from pydantic_core import CoreSchema, core_schema
 
 from ffr_dyn.couplings import Coupling
+from ffr_dyn.curve import Curve
 from ffr_dyn.drivers import Driver, PointDriver
 from ffr_dyn.errors import InputError
-from ffr_dyn.forces import Load, SpringDamper
+from ffr_dyn.forces import Bushing, Load, SpringDamper
 from ffr_dyn.formula import Expression, is_constant, parse
 from ffr_dyn.integrators import METHODS
+from ffr_dyn.joint_forces import Actuator, JointFriction, JointSpring, JointStop, Servo
 from ffr_dyn.joints import Joint
 from ffr_dyn.measurement import Measurement
 from ffr_dyn.parameters import as_number
+from ffr_dyn.surface_loads import ModalForce, NodalForces, Pressure
 from ffr_dyn.timefunction import HARMONIC, TimeFunction, constant, harmonic, piecewise, polynomial, table
 from ffr_dyn.units import split_quantity
 
@@ -136,7 +139,7 @@ class FunctionEntry(_Strict):
 def _form(value: Any) -> str | None:
     if isinstance(value, bool):
         return None
-    kinds = ((str, "text"), ((dict, FunctionEntry), "table"), ((int, float), "number"))
+    kinds = ((str, "[text]"), ((dict, FunctionEntry), "[table]"), ((int, float), "[number]"))
     return next((name for kind, name in kinds if isinstance(value, kind)), None)  # type: ignore[arg-type]
 
 
@@ -195,11 +198,26 @@ def _read_table(file: Path) -> TimeFunction:
 
 
 _Given = Annotated[
-    Annotated[float, Tag("number")] | Annotated[str, Tag("text")] | Annotated[FunctionEntry, Tag("table")],
+    Annotated[float, Tag("[number]")] | Annotated[str, Tag("[text]")] | Annotated[FunctionEntry, Tag("[table]")],
     Discriminator(_form, custom_error_type="function", custom_error_message="give a number, a formula or a table"),
 ]
 OfTime = Annotated[_Given, AfterValidator(_of_time)]
 OfMotion = Annotated[_Given, AfterValidator(_expression)]
+
+
+class CurveEntry(_Strict):
+    """`values` over the increasing places `at`: a smooth curve through the points, straight beyond them."""
+
+    at: list[Number]
+    values: list[Number]
+
+
+def or_curve(unit: str | None = None) -> Any:
+    """The type of a factor, such as a stiffness: a number, or a curve in its place."""
+    plain, curve = Annotated[float, In(unit)], Annotated[CurveEntry, AfterValidator(lambda e: Curve(e.at, e.values))]
+    which = Discriminator(lambda given: "[curve]" if isinstance(given, (dict, CurveEntry, Curve)) else "[number]")
+    return Annotated[Annotated[plain, Tag("[number]")] | Annotated[curve, Tag("[curve]")], which]
+
 
 Direction = Vector | list[Vector]
 
@@ -217,10 +235,26 @@ FIELDS: dict[str, Any] = {
     "PointDriver.z": OfTime,
     "Load.force": Annotated[list[OfMotion], THREE],
     "Load.moment": Annotated[list[OfMotion], THREE],
-    "SpringDamper.stiffness": Annotated[float, In("N/m")],
-    "SpringDamper.damping": Annotated[float, In("N s/m")],
+    "SpringDamper.stiffness": or_curve("N/m"),
+    "SpringDamper.damping": or_curve("N s/m"),
     "SpringDamper.free_length": Annotated[float, In("m")],
     "SpringDamper.preload": Annotated[float, In("N")],
+    "Bushing.stiffness": list[or_curve()] | list[list[Number]],  # type: ignore[misc]
+    "Bushing.damping": list[Number] | list[list[Number]],
+    "Bushing.preload": list[Number],
+    "Bushing.axes": Direction,
+    "Bushing.axes_j": Direction,
+    "JointFriction.normal": OfTime,
+    "Actuator.force": OfMotion,
+    "Servo.target": OfTime,
+    "NodalForces.points": list[int],
+    "NodalForces.forces": list[Vector],
+    "NodalForces.function": OfTime,
+    "Pressure.pressure": Number | list[Number],
+    "Pressure.triangles": list[int],
+    "Pressure.function": OfTime,
+    "ModalForce.values": list[Number],
+    "ModalForce.function": OfTime,
 }
 
 # Fields that a file cannot hold: Python functions, and the name, which is the key of the entry.
@@ -242,6 +276,17 @@ TABLES: dict[str, tuple[Kind, ...]] = {
     "couplings": (Kind("", Coupling),),
     "loads": (Kind("", Load),),
     "springs": (Kind("", SpringDamper),),
+    "forces": (
+        Kind("bushing", Bushing),
+        Kind("joint-spring", JointSpring),
+        Kind("joint-friction", JointFriction),
+        Kind("joint-stop", JointStop),
+        Kind("actuator", Actuator),
+        Kind("servo", Servo),
+        Kind("nodal-forces", NodalForces),
+        Kind("pressure", Pressure),
+        Kind("modal-force", ModalForce),
+    ),
     "measurements": (Kind("", Measurement),),
 }
 
@@ -260,7 +305,14 @@ def _type(kind: Kind, f: Field, hints: Mapping[str, Any]) -> Any:
     found = FIELDS.get(_named(kind, f), FIELDS.get(f.name))
     if found is None:
         found = _numbered(hints[f.name])
-    return found | None if f.default is None else found
+    return found | None if _default(f) is None else found
+
+
+def _default(f: Field) -> Any:
+    """What stands for a key that is not given; None where the dataclass has no limit (JSON has no infinity)."""
+    if isinstance(f.default, tuple):
+        return list(f.default)
+    return None if f.default in (np.inf, -np.inf) else f.default
 
 
 def _numbered(hint: Any) -> Any:
@@ -268,6 +320,8 @@ def _numbered(hint: Any) -> Any:
         return Number
     if typing.get_origin(hint) is None:
         return hint
+    if Curve in typing.get_args(hint):
+        return or_curve()
     inner = tuple(_numbered(part) for part in typing.get_args(hint))
     return typing.Union[inner]  # noqa: UP007 - of types that are known now only
 
@@ -277,8 +331,7 @@ def entry_model(kind: Kind) -> type[BaseModel]:
     hints = typing.get_type_hints(kind.made)
     keys: dict[str, Any] = {"kind": (Literal[kind.word], kind.word)} if kind.word else {}
     for f in keys_of(kind):
-        default = ... if f.default is MISSING else f.default
-        keys[f.name] = (_type(kind, f, hints), list(default) if isinstance(default, tuple) else default)
+        keys[f.name] = (_type(kind, f, hints), ... if f.default is MISSING else _default(f))
     return create_model(f"{kind.made.__name__}Entry", __base__=_Strict, __doc__=kind.made.__doc__, **keys)
 
 
@@ -287,10 +340,10 @@ def _table_model(kinds: tuple[Kind, ...]) -> Any:
     models = [entry_model(kind) for kind in kinds]
     if len(models) == 1:
         return dict[str, models[0]]  # type: ignore[valid-type]
-    tagged = tuple(Annotated[model, Tag(kind.word)] for model, kind in zip(models, kinds, strict=True))
+    tagged = tuple(Annotated[model, Tag(f"[{kind.word}]")] for model, kind in zip(models, kinds, strict=True))
     words = [kind.word for kind in kinds]
     which = Discriminator(
-        lambda given: given.get("kind", words[0]) if isinstance(given, dict) else getattr(given, "kind", None),
+        lambda given: f"[{given.get('kind', words[0]) if isinstance(given, dict) else getattr(given, 'kind', None)}]",
         custom_error_type="kind",
         custom_error_message=f"there is no such kind; there are {', '.join(words)}",
     )
@@ -362,6 +415,7 @@ class _SceneBase(_Strict):
     parameters: dict[str, Any] = {}
     outputs: list[str] = ["default"]
     gravity: Annotated[list[Annotated[float, In("m/s^2")]], THREE] = [0.0, 0.0, 0.0]
+    base_acceleration: Annotated[list[OfTime], THREE] = [0.0, 0.0, 0.0]
     analysis: ForwardEntry
     ground: dict[str, Metres] = {}
     bodies: dict[str, BodyEntry]

@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from ffr_dyn.curve import Curve
 from ffr_dyn.errors import InputError
 from ffr_dyn.forces import Load
 from ffr_dyn.formula import Measured, Operation, text_of
 from ffr_dyn.integrators import METHODS
+from ffr_dyn.joint_forces import Actuator
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.scene_file import Settings
 from ffr_dyn.scene_schema import TABLES, Kind, keys_of
@@ -47,8 +49,8 @@ def to_toml(scene: Scene, settings: Settings, files: Mapping[str, str] = {}) -> 
 
     Raises InputError for what a file cannot hold: Python functions, and flexible bodies without a file.
     """
-    top = {"name": scene.name, "gravity": scene.gravity, "outputs": list(settings.outputs)}
-    tree = {**top, "analysis": _analysis(settings), "ground": dict(scene.ground)}
+    top = {"name": scene.name, "gravity": scene.gravity, "base_acceleration": scene.base_acceleration}
+    tree = {**top, "outputs": list(settings.outputs), "analysis": _analysis(settings), "ground": dict(scene.ground)}
     tree["bodies"] = {body.name: _body(body, files) for body in scene.bodies}
     for table, kinds in TABLES.items():
         tree[table] = {thing.name: _entry(_kind(kinds, thing), thing) for thing in getattr(scene, table)}
@@ -106,7 +108,7 @@ def _is_plain(model: FlexibleBody) -> bool:
 def _entry(kind: Kind, thing: Any) -> dict[str, Any]:
     """The keys of an entry that differ from their defaults."""
     entry: dict[str, Any] = {"kind": kind.word} if kind.word else {}
-    given = _components(thing) if isinstance(thing, Load) else {f.name: getattr(thing, f.name) for f in fields(thing)}
+    given = _with_formulas(thing) if isinstance(thing, (Load, Actuator)) else _given(thing)
     for f in fields(thing):
         if callable(given[f.name]) and f.name not in [key.name for key in keys_of(kind)]:
             raise InputError(
@@ -119,15 +121,19 @@ def _entry(kind: Kind, thing: Any) -> dict[str, Any]:
     return entry
 
 
-def _components(load: Load) -> dict[str, Any]:
-    """The fields of a load, with the formulas of the motion back in its components."""
-    given = {f.name: getattr(load, f.name) for f in fields(load)}
-    if isinstance(load.function, StateFormula):
-        components = [*load.force, *load.moment]
-        moving = load.function.expressions
-        both = [c if e == constant(0.0) else e for c, e in zip(components, moving, strict=True)]
-        given |= {"force": both[:3], "moment": both[3:], "function": None}
-    return given
+def _given(thing: Any) -> dict[str, Any]:
+    return {f.name: getattr(thing, f.name) for f in fields(thing)}
+
+
+def _with_formulas(force: Load | Actuator) -> dict[str, Any]:
+    """The fields of a force, with the formulas of the motion back in its components."""
+    given = _given(force)
+    if not isinstance(force.function, StateFormula):
+        return given
+    components = [force.force] if isinstance(force, Actuator) else [*force.force, *force.moment]
+    both = [c if e == constant(0.0) else e for c, e in zip(components, force.function.expressions, strict=True)]
+    wholes = {"force": both[0]} if isinstance(force, Actuator) else {"force": both[:3], "moment": both[3:]}
+    return given | wholes | {"function": None}
 
 
 # ---- values -------------------------------------------------------------------------------------------------------
@@ -139,6 +145,8 @@ def _data(value: Any, what: str) -> Any:
         return text_of(value)
     if isinstance(value, TimeFunction):
         return _function(value, what)
+    if isinstance(value, Curve):
+        return {"at": value.at.tolist(), "values": value.values.tolist()}
     if isinstance(value, Mapping):
         return {key: _data(item, what) for key, item in value.items() if item is not None}
     if isinstance(value, (np.ndarray, np.generic)):

@@ -29,9 +29,10 @@ class StateFormula:
 
     expressions: tuple[Expression, ...]
 
-    def __call__(self, t: float, state: StateView) -> Array:
+    def __call__(self, t: float, state: StateView) -> Array | float:
         measured = {name: _read(state, name) for expression in self.expressions for name in names_in(expression)}
-        return np.array([value_of(expression, t, measured) for expression in self.expressions])
+        values = np.array([value_of(expression, t, measured) for expression in self.expressions])
+        return values if values.size > 1 else values[0]
 
 
 def check_names(scene: Scene, formula: StateFormula, what: str) -> None:
