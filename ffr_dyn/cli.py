@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from ffr_dyn.cli_analyses import COMMANDS
 from ffr_dyn.cli_stress import stress
 from ffr_dyn.errors import InputError, SimulationError
 
@@ -178,7 +179,8 @@ def animate(result: Path, output: Path, scale: str, duration: float | None, colo
     click.echo(f"film     {output}")
 
 
-cli.add_command(stress)
+for command in (*COMMANDS, stress):
+    cli.add_command(command)
 
 
 def _number(text: str) -> float:

@@ -20,7 +20,7 @@ from ffr_dyn.layout import Layout, initial_state, layout
 from ffr_dyn.plane import planar_forms
 from ffr_dyn.rotation import G_bar, rotation_matrix
 from ffr_dyn.scene import Scene
-from ffr_dyn.timefunction import evaluate
+from ffr_dyn.timefunction import POLYNOMIAL, TimeFunction, evaluate
 
 Array = np.ndarray
 
@@ -40,6 +40,7 @@ class Assembled:
 
     x, v : positions and velocities (see `Layout`);  notes : what was changed and what is redundant, in words
     degrees_of_freedom : velocities left free by the constraints, elastic ones included
+    redundant : (joint, row) pairs that follow from the other rows
     """
 
     system: System
@@ -48,6 +49,7 @@ class Assembled:
     v: Array
     degrees_of_freedom: int
     notes: tuple[str, ...]
+    redundant: tuple[tuple[str, str], ...] = ()
 
 
 def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
@@ -73,7 +75,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     if scene.plane != "none":
         notes.append(f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes")
     all_rows = compile_scene(scene, blocks, RELAXATION) if redundant else None
-    return Assembled(compile_scene(scene, kept), all_rows, x, v, _movable(place) - rows, tuple(notes))
+    return Assembled(compile_scene(scene, kept), all_rows, x, v, _movable(place) - rows, tuple(notes), tuple(redundant))
 
 
 def _movable(place: Layout) -> int:
@@ -104,7 +106,7 @@ def flattened(scene: Scene, time: float) -> tuple[Scene, list[Block]]:
 
 def _across(scene: Scene, blocks: list[Block], time: float) -> tuple[list[bool], bool]:
     """Which rows of a planar scene act across the plane only; and whether all others act in it only, and none of the
-    former asks for a motion.
+    former asks for a motion, now or later.
 
     Looked at in the position and with the motion that the scene declares, and at random in the plane around it.
     """
@@ -124,7 +126,19 @@ def _across(scene: Scene, blocks: list[Block], time: float) -> tuple[list[bool],
     most_inside, most_outside, most_left = (np.array(part).max(axis=0) for part in (inside, outside, left))
     across = most_inside <= RANK_TOLERANCE * most_outside
     mixed = ~across & (most_outside > RANK_TOLERANCE * most_inside)
-    return across.tolist(), not mixed.any() and bool((most_left[across] < RANK_TOLERANCE).all())
+    moving = np.array([_changes(word.function) for block in blocks for word in block.words], bool)
+    asked = (most_left[across] >= RANK_TOLERANCE).any() or moving[across].any()
+    return across.tolist(), not (mixed.any() or asked)
+
+
+def _changes(function: TimeFunction | None) -> bool:
+    """Whether a function of time is more than a constant."""
+    return function is not None and (function.kind != POLYNOMIAL or any(function.data[1:]))
+
+
+def in_space(scene: Scene) -> Scene:
+    """The scene without a search for a plane: what could leave it counts, even where nothing pushes it out."""
+    return replace(scene, plane="none") if scene.plane == "auto" else scene
 
 
 def drive_of(word: Word, time: float) -> tuple[float, float, float]:

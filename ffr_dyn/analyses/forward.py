@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.assemble import Assembled, assemble
-from ffr_dyn.analyses.precompile import precompile
 from ffr_dyn.checkpoint import Checkpoint, decode, encode, fingerprint, leaves, restore
+from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import System, new_record, new_stages, new_work
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import ROS2, Integrator
@@ -79,9 +79,8 @@ def forward(
     substeps, rows = _counts(end - start, output_step, method.step)
     _check_step(scene, method)
     assembled = assemble(scene, time=start)
-    scene = assembled.system.scene  # of a planar scene, what moves in the plane
     wanted = selected(assembled.system, outputs)
-    precompile(method)
+    ensure_compiled(method)
     span = (start, end, output_step)
     mark = _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
     header = _header(scene, assembled, method, stabilisation, span)
@@ -91,7 +90,7 @@ def forward(
         run = _started(assembled, method, start, wanted)
     _check_resumed(run, substeps * rows, output_step / substeps)
     path = resume if path is None else path
-    first = Result(run.times[0], run.parts[0], _geometry(scene), header | {"status": "running"})
+    first = Result(run.times[0], run.parts[0], geometry(scene), header | {"status": "running"})
     with nullcontext() if path is None else ResultWriter(path, first, checkpoint=_checkpoint(run, mark)) as writer:
         for times, part in _advance(assembled, run, method, stabilisation, start, substeps, rows, wanted):
             if writer is not None:
@@ -138,8 +137,8 @@ def _started(assembled: Assembled, method: Integrator, start: float, wanted: Map
     # A run of no steps records the start.
     _, status = method.run(system.model, work, stages, start, method.step, 0, 0, x, v, 0.0, 0.0, 0.0, first)
     if status != OK:
-        raise _failure(system, work, status, start)
-    first = _with_all_reactions(assembled, method, first)
+        raise failure(system, work, status, start)
+    first = with_all_reactions(assembled, method, first)
     parts, memory = measure(system, first, {}, wanted)
     return _Run(x, v, work, stages, memory, [parts], [first.time], _elastic_turns(system, first), 0)
 
@@ -172,7 +171,7 @@ def _advance(
         took = clock.monotonic() - began
         filled -= filled % looks
         if filled:
-            kept = _with_all_reactions(assembled, method, Record(*(column[:filled] for column in chunk)))
+            kept = with_all_reactions(assembled, method, Record(*(column[:filled] for column in chunk)))
             every, run.memory = measure(system, kept, run.memory, wanted)
             part = {
                 name: replace(quantity, values=quantity.values[looks - 1 :: looks]) for name, quantity in every.items()
@@ -184,11 +183,11 @@ def _advance(
             run.done += filled // looks * substeps
             yield times, part
         if status != OK:
-            raise _failure(system, run.work, status, start + int(run.work.info[3]) * method.step)
+            raise failure(system, run.work, status, start + int(run.work.info[3]) * method.step)
         count = int(np.clip(count * SECONDS_PER_CALL / max(took, 1e-6), 1, 10 * count))
 
 
-def _with_all_reactions(assembled: Assembled, method: Integrator, record: Record) -> Record:
+def with_all_reactions(assembled: Assembled, method: Integrator, record: Record) -> Record:
     """The record with reactions of the redundant rows too: at every state, the smallest that give its accelerations."""
     if assembled.all_rows is None:
         return record
@@ -205,7 +204,7 @@ def _with_all_reactions(assembled: Assembled, method: Integrator, record: Record
     return record._replace(reaction=reaction)
 
 
-def _failure(system: System, work: Work, status: int, time: float) -> BaseException:
+def failure(system: System, work: Work, status: int, time: float) -> BaseException:
     """What to tell about a status of the kernels."""
     at, where = f"at t = {time:.6g} s", int(work.info[0])
     if system.user.cause is not None:
@@ -319,7 +318,7 @@ def _header(
     }
 
 
-def _geometry(scene: Scene) -> dict[str, Surface]:
+def geometry(scene: Scene) -> dict[str, Surface]:
     return {body.name: body.model.surface for body in scene.bodies if body.model.surface is not None}
 
 
@@ -329,7 +328,7 @@ def _result(scene: Scene, run: _Run, attributes: dict[str, Any]) -> Result:
         name: Quantity(np.concatenate([part[name].values for part in run.parts]), q.unit, q.axes, q.description)
         for name, q in names.items()
     }
-    return Result(np.concatenate(run.times), quantities, _geometry(scene), attributes)
+    return Result(np.concatenate(run.times), quantities, geometry(scene), attributes)
 
 
 def _account(scene: Scene, run: _Run, notes: list[str]) -> dict[str, Any]:
@@ -339,7 +338,7 @@ def _account(scene: Scene, run: _Run, notes: list[str]) -> dict[str, Any]:
         "evaluations": int(info[1]),
         "projections": int(info[2]),
         "largest_drift": [float(drift[0]), float(drift[1])],
-        "notes": [*notes, *_singular(run.work), *_strained(scene, run.turned)],
+        "notes": [*notes, *_singular(run.work), *strained(scene, run.turned)],
     }
 
 
@@ -353,7 +352,7 @@ def _singular(work: Work) -> list[str]:
     ]
 
 
-def _strained(scene: Scene, turned: Array) -> list[str]:
+def strained(scene: Scene, turned: Array) -> list[str]:
     return [
         f"body {body.name!r} turns within itself by up to {turn:.2g} rad: linear elasticity in its moving frame is "
         "strained beyond about 0.1 rad; split the body into several or expect errors of that order squared"

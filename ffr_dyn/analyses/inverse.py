@@ -1,0 +1,187 @@
+"""Inverse dynamics: every rigid motion prescribed by drivers, the drivers' forces and all reactions wanted.
+
+The elastic coordinates are dynamic - their vibration is integrated, as in a forward run - or quasi-static: at every output
+time they take the values at which they would stay, q_dot = q_ddot = 0, under the inertia of the prescribed motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ffr_dyn.analyses.assemble import Assembled, assemble, flattened
+from ffr_dyn.analyses.evaluation import Evaluator, copied, evaluate, evaluator, joined, locked, moved, to_global_axes
+from ffr_dyn.analyses.forward import forward, strained
+from ffr_dyn.analyses.kinematic import kinematic, undeformed
+from ffr_dyn.analyses.mobility import require_driven
+from ffr_dyn.analyses.outcome import efforts, outputs, result_of, with_quantities
+from ffr_dyn.errors import InputError, SimulationError
+from ffr_dyn.integrators import Integrator
+from ffr_dyn.result import Result
+from ffr_dyn.scene import Scene
+from ffr_dyn.stabilisation import Projection, Stabilisation
+
+Array = np.ndarray
+
+ITERATIONS = 30
+TOLERANCE = 1e-12  # of a change of q, relative to its size or to that which strains the body by 1e-6 of its length
+DIFFERENCE = 1e-6
+
+
+@dataclass(frozen=True)
+class Dynamic:
+    """Elastic coordinates are integrated; by default with ROS2 and a tenth of the output step."""
+
+    method: Integrator | None = None
+    stabilisation: Stabilisation = Projection()  # noqa: RUF009 - frozen
+
+
+@dataclass(frozen=True)
+class QuasiStatic:
+    """Elastic coordinates follow the motion without vibration."""
+
+
+def inverse(
+    scene: Scene,
+    *,
+    end: float,
+    output_step: float,
+    start: float = 0.0,
+    elastic: Dynamic | QuasiStatic = Dynamic(),
+    path: str | Path | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Result:
+    """The forces that drive a scene along its prescribed motion, and all reactions, every `output_step` [s].
+
+    "driver.effort" [N m or N] is the moment or force along the driven coordinate that acts on the joint's second body, its
+    opposite on the first; "driver.power" = effort x rate. A driven point has "driver.force" instead.
+
+    Raises InputError when a rigid motion is left free or prescribed twice; SimulationError when the run fails.
+    """
+    require_driven(undeformed(scene), start, "inverse dynamics")
+    if isinstance(elastic, QuasiStatic):
+        return _quasi_static(scene, end, output_step, start, path, progress)
+    result = forward(
+        scene, end=end, output_step=output_step, method=elastic.method, start=start,
+        stabilisation=elastic.stabilisation, outputs=outputs(scene), path=path, progress=progress,
+    )  # fmt: skip
+    named = Result(
+        result.time, result.quantities, result.geometry, {**result.attributes, "analysis": "inverse dynamics"}
+    )
+    return with_quantities(named, efforts(flattened(scene, start)[0], named), path)
+
+
+# ---- quasi-static deformation ---------------------------------------------------------------------------------------
+
+
+def _quasi_static(
+    scene: Scene,
+    end: float,
+    output_step: float,
+    start: float,
+    path: str | Path | None,
+    progress: Callable[[float], None] | None,
+) -> Result:
+    """At every output time: the undeformed motion, then the deformation at which the elastic accelerations vanish."""
+    rigid = kinematic(scene, end=end, output_step=output_step, start=start)
+    assembled = assemble(scene, time=start)
+    at, places = evaluator(assembled.system), _coordinates(assembled)
+    q, rows, turned = np.zeros(places[1].size), [], np.zeros(len(scene.bodies))
+    tangent = None
+    for row, time in enumerate(rigid.time):
+        x = _undeformed_state(assembled, rigid, row)
+        q, tangent = _deformed(at, places, float(time), x, q, tangent)
+        _pose(at, places, float(time), x, q)
+        rows.append(copied(at.record))
+        if progress is not None:
+            progress(float(time))
+    record = joined(rows)
+    turned = np.array([_turn(scene, record.x, assembled, b) for b in range(len(scene.bodies))])
+    attributes = {
+        "title": scene.name,
+        "analysis": "inverse dynamics, quasi-static deformation",
+        "method": "Newton-Raphson",
+        "evaluations": int(at.work.info[1]),
+        "degrees_of_freedom": assembled.degrees_of_freedom,
+        "notes": [*assembled.notes, *strained(scene, turned)],
+        "status": "complete",
+    }
+    return result_of(assembled.system, record, attributes, path)
+
+
+def _coordinates(assembled: Assembled) -> tuple[Array, Array]:
+    """Numbers of the rigid and of the elastic velocities. InputError where rigid motion alone does not fit the rows."""
+    place = assembled.system.layout
+    rigid = np.concatenate([np.arange(place.iv[b], place.iv[b] + 6) for b in range(len(place.n))])
+    elastic = np.setdiff1d(np.arange(place.v_size), rigid)
+    rows = assembled.system.model.rows.kind.size + locked(place).size
+    if rows != rigid.size:
+        raise InputError(
+            f"{rows - rigid.size} rows of the joints are redundant for rigid bodies and are met by deformation only; use "
+            "elastic=Dynamic(), or joints that constrain less (spherical or universal in place of a revolute)"
+        )
+    return rigid, elastic
+
+
+def _undeformed_state(assembled: Assembled, rigid: Result, row: int) -> Array:
+    place, x = assembled.system.layout, np.zeros(assembled.system.layout.x_size)
+    for b, body in enumerate(assembled.system.scene.bodies):
+        x[place.R(b)], x[place.p(b)] = rigid[f"{body.name}.R"][row], rigid[f"{body.name}.p"][row]
+    return x
+
+
+def _pose(at: Evaluator, places: tuple[Array, Array], time: float, x: Array, q: Array) -> Array:
+    """Elastic accelerations (E,) with the deformation q at rest in the prescribed motion, which x is near to."""
+    place, (rigid, elastic) = at.system.layout, places
+    x, still = x.copy(), np.zeros(place.v_size)
+    x[np.concatenate([np.arange(s.start, s.stop) for s in map(place.q, range(len(place.n)))]).astype(int)] = q
+    for _ in range(ITERATIONS):
+        now = evaluate(at, time, x, still)
+        step = still.copy()
+        step[rigid] = np.linalg.solve(now.jacobian[:, rigid], -now.Phi)
+        x = moved(place, x, step)
+        if np.abs(step).max() < 1e-13:
+            break
+    v = still.copy()
+    v[rigid] = np.linalg.solve(now.jacobian[:, rigid], -now.nu)
+    return evaluate(at, time, x, to_global_axes(place, x, v)).acceleration[elastic]
+
+
+def _deformed(
+    at: Evaluator, places: tuple[Array, Array], time: float, x: Array, q: Array, tangent: Array | None
+) -> tuple[Array, Array]:
+    """Deformation with vanishing elastic accelerations, and the tangent that found it, to be tried again at the next time."""
+    if q.size == 0:
+        return q, np.zeros((0, 0))
+    before = np.inf
+    for _ in range(ITERATIONS):
+        residual = _pose(at, places, time, x, q)
+        if tangent is None:
+            tangent = _tangent(at, places, time, x, q)
+        step = np.linalg.solve(tangent, residual)
+        q = q - step
+        size = float(np.abs(step).max())
+        if size < TOLERANCE * max(float(np.abs(q).max()), 1e-6):
+            return q, tangent
+        if size > 0.1 * before:
+            tangent = None
+        before = size
+    raise SimulationError(
+        f"at t = {time:.6g} s no quasi-static deformation was found: the load is near to buckling a body, or the elastic "
+        "forces are not finite; use elastic=Dynamic()"
+    )
+
+
+def _tangent(at: Evaluator, places: tuple[Array, Array], time: float, x: Array, q: Array) -> Array:
+    """(E, E) central differences of the elastic accelerations."""
+    h = DIFFERENCE * max(float(np.abs(q).max()), 1e-2)
+    sides = [[_pose(at, places, time, x, q + sign * h * one) for sign in (1, -1)] for one in np.eye(q.size)]
+    return np.array([(plus - minus) / (2 * h) for plus, minus in sides]).T
+
+
+def _turn(scene: Scene, x: Array, assembled: Assembled, b: int) -> float:
+    q = x[:, assembled.system.layout.q(b)]
+    return max((float(np.abs(q @ i.phi_r.T).max(initial=0.0)) for i in scene.bodies[b].model.interfaces), default=0.0)

@@ -1,0 +1,218 @@
+"""Kinematics: every rigid motion prescribed by drivers; positions, velocities and accelerations follow from the constraints.
+
+    Phi(q, t) = 0 (Newton-Raphson),   Phi_q q_dot = -Phi_t,   Phi_q q_ddot = gamma      (Haug 1989, ch. 4)
+
+Bodies are taken as undeformed. Between two output times the motion is followed by a predictor and Newton's method, in as many
+parts as that takes; where no part is small enough the mechanism locks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ffr_dyn.analyses.assemble import Assembled, assemble
+from ffr_dyn.analyses.evaluation import (
+    Evaluation,
+    Evaluator,
+    copied,
+    evaluate,
+    evaluator,
+    joined,
+    moved,
+    to_global_axes,
+    total_mass_matrix,
+)
+from ffr_dyn.analyses.forward import with_all_reactions
+from ffr_dyn.analyses.mobility import named_motion, require_driven
+from ffr_dyn.analyses.outcome import output_times, result_of
+from ffr_dyn.errors import SimulationError
+from ffr_dyn.integrators import RK4
+from ffr_dyn.kernels.tables import Record
+from ffr_dyn.result import Result
+from ffr_dyn.scene import Body, Scene
+from ffr_prep.body import truncated
+
+Array = np.ndarray
+
+TOLERANCE = 1e-11  # of Phi [m, -]
+ITERATIONS = 8  # of Newton's method in a part of a step
+LARGEST_TURN = 0.2  # rad, of a body in a part of a step
+SMALLEST_PART = 1e-8  # of an output step
+NEAR = 1e-2  # conditioning, relative to the best met, below which a position is reported as nearly singular
+SINGULAR = 1e-7  # the same, where velocities are no longer determined
+
+
+@dataclass(frozen=True)
+class _Pose:
+    """A position on the path: state, conditioning (smallest singular value) and orientation (sign of the determinant)."""
+
+    time: float
+    x: Array
+    v: Array
+    conditioning: float
+    sign: float
+    joint: str
+
+
+def kinematic(
+    scene: Scene,
+    *,
+    end: float,
+    output_step: float,
+    start: float = 0.0,
+    path: str | Path | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Result:
+    """Positions, velocities and accelerations of a fully driven scene every `output_step` [s], and the reactions they need.
+
+    Raises InputError when a rigid motion is left free or prescribed twice, SimulationError when the mechanism locks: the
+    message gives the time and the joint at its dead point. Positions that are nearly or exactly singular on the way, where
+    the motion could branch, are told in the notes.
+    """
+    rigid = undeformed(scene)
+    require_driven(rigid, start, "a kinematic analysis")
+    assembled = assemble(rigid, time=start)
+    at = evaluator(assembled.all_rows or assembled.system)
+    pose = _pose(at, start, assembled.x, assembled.v)
+    poses, followed = [pose], [pose]
+    for time in output_times(start, end, output_step)[1:]:
+        followed += _follow(at, followed[-1], float(time), output_step)
+        poses.append(followed[-1])
+        if progress is not None:
+            progress(float(time))
+    record = _recorded(assembled, poses)
+    notes = [*assembled.notes, *_undeformed_notes(scene), *_singular_notes(followed)]
+    attributes = {
+        "title": scene.name,
+        "analysis": "kinematic",
+        "method": "Newton-Raphson",
+        "evaluations": int(at.work.info[1]),
+        "degrees_of_freedom": 0,
+        "notes": notes,
+        "status": "complete",
+    }
+    return result_of(assembled.system, record, attributes, path)
+
+
+def undeformed(scene: Scene) -> Scene:
+    """The scene with rigid bodies of the same inertia and interfaces."""
+    return replace(scene, bodies=tuple(_rigid(body) if body.model.n else body for body in scene.bodies))
+
+
+def _rigid(body: Body) -> Body:
+    return replace(body, model=truncated(body.model, 0), q=None, q_dot=None, damping=0.0, stiffening=False)
+
+
+def _undeformed_notes(scene: Scene) -> list[str]:
+    flexible = [body.name for body in scene.bodies if body.model.n]
+    return [f"taken as undeformed: {', '.join(flexible)}"] if flexible else []
+
+
+# ---- along the path ---------------------------------------------------------------------------------------------------
+
+
+def _follow(at: Evaluator, pose: _Pose, end: float, output_step: float) -> list[_Pose]:
+    """Poses from `pose` to the time `end`, in parts that are halved until Newton's method converges from the prediction."""
+    found, part = [pose], end - pose.time
+    while found[-1].time < end:
+        part = min(part, end - found[-1].time)
+        after = _advanced(at, found[-1], end if found[-1].time + 1.01 * part >= end else found[-1].time + part)
+        if after is None:
+            part /= 2
+            if part < SMALLEST_PART * output_step:
+                raise _locked(at, found[-1])
+        else:
+            found.append(after)
+            part *= 2
+    return found[1:]
+
+
+def _advanced(at: Evaluator, pose: _Pose, time: float) -> _Pose | None:
+    """The pose at `time`, or None when the part is too long."""
+    place = at.system.layout
+    step = pose.v * (time - pose.time)
+    if _turn(at, step) > LARGEST_TURN:
+        return None
+    x = moved(place, pose.x, step)
+    for _ in range(ITERATIONS):
+        now = evaluate(at, time, x, np.zeros(place.v_size))
+        if np.abs(now.Phi).max(initial=0.0) < TOLERANCE:
+            return _pose(at, time, x, np.zeros(place.v_size))
+        step = np.linalg.lstsq(now.jacobian, -now.Phi, rcond=1e-12)[0]
+        if _turn(at, step) > LARGEST_TURN:
+            return None
+        x = moved(place, x, step)
+    return None
+
+
+def _turn(at: Evaluator, step: Array) -> float:
+    place = at.system.layout
+    return max(float(np.linalg.norm(step[place.omega(b)])) for b in range(len(place.n)))
+
+
+def _pose(at: Evaluator, time: float, x: Array, v: Array) -> _Pose:
+    """The pose with its velocities (body axes): the rate of the rows at rest is Phi_t."""
+    still = evaluate(at, time, x, np.zeros_like(v))
+    values, sign, motion = _conditioning(at, still, x)
+    v = np.linalg.lstsq(still.jacobian, -still.nu, rcond=1e-12)[0]
+    return _Pose(time, x, v, values, sign, named_motion(at.system.scene, at.system.layout, x, motion))
+
+
+def _conditioning(at: Evaluator, now: Evaluation, x: Array) -> tuple[float, float, Array]:
+    """Smallest singular value of the mass-weighted rows of length one, sign of the determinant, motion that comes free."""
+    scene, place = at.system.scene, at.system.layout
+    lower = np.linalg.cholesky(total_mass_matrix(scene, place, x))
+    weighted = np.linalg.solve(lower, now.jacobian.T).T
+    weighted /= np.linalg.norm(weighted, axis=1)[:, None]
+    _, values, basis = np.linalg.svd(weighted)
+    square = weighted.shape[0] == weighted.shape[1]
+    sign = float(np.linalg.slogdet(weighted)[0]) if square else 0.0
+    return float(values[place.v_size - 1]), sign, np.linalg.solve(lower.T, basis[place.v_size - 1])
+
+
+def _locked(at: Evaluator, pose: _Pose) -> SimulationError:
+    drivers = ", ".join(repr(driver.name) for driver in at.system.scene.drivers)
+    return SimulationError(
+        f"at t = {pose.time:.6g} s the mechanism locks: {pose.joint} is at a dead point beyond which no position meets the "
+        f"joints and drivers ({drivers}); keep the driven motion within reach, or drive another joint"
+    )
+
+
+def _recorded(assembled: Assembled, poses: list[_Pose]) -> Record:
+    """Rows of the result. Raises SimulationError where a pose is singular, since accelerations are not determined there."""
+    at, best = evaluator(assembled.system), max(pose.conditioning for pose in poses)
+    rows = []
+    for pose in poses:
+        v = to_global_axes(assembled.system.layout, pose.x, pose.v)
+        now = evaluate(at, pose.time, pose.x, v)
+        if now.singular or pose.conditioning < SINGULAR * best:
+            raise SimulationError(
+                f"at t = {pose.time:.6g} s the position is singular: the drivers do not determine the motion of "
+                f"{pose.joint}; choose output times that miss it, or drive another joint"
+            )
+        rows.append(copied(at.record))
+    return with_all_reactions(assembled, RK4(1.0), joined(rows))
+
+
+def _singular_notes(poses: list[_Pose]) -> list[str]:
+    """Positions that are nearly singular, and those that were crossed: the determinant changes its sign."""
+    best = max(pose.conditioning for pose in poses)
+    notes = []
+    for k, pose in enumerate(poses):
+        least = all(pose.conditioning <= other.conditioning for other in poses[max(k - 1, 0) : k + 2])
+        if k and pose.sign * poses[k - 1].sign < 0:
+            time = _crossing(poses[k - 1], pose)
+            notes.append(f"a singular position was crossed at about t = {time:.4g} s: {pose.joint} could branch there")
+        elif least and pose.conditioning < NEAR * best:
+            notes.append(f"nearly singular at t = {pose.time:.6g} s: {pose.joint} could branch there")
+    return notes
+
+
+def _crossing(before: _Pose, after: _Pose) -> float:
+    """Where the signed conditioning is zero, by its line."""
+    share = before.conditioning / (before.conditioning + after.conditioning)
+    return before.time + share * (after.time - before.time)

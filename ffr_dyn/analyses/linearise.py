@@ -1,0 +1,253 @@
+"""Linearised equations about a state: matrices A, B, C, D in minimal coordinates, eigenvalues, modes, stability.
+
+    d/dt (y, z) = A (y, z) + B u,     outputs - outputs at the state = C (y, z) + D u
+
+y are small motions along the free motions Z (mass-orthonormal), z their rates, both seen from axes that move with the bodies
+(see `tangent`): at an equilibrium, and in steady rotation, A is constant. Of a state that is neither, A describes the next
+moment only; a note says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ffr_dyn.analyses.actuators import Actuator, unit_loads
+from ffr_dyn.analyses.assemble import assemble, in_space
+from ffr_dyn.analyses.evaluation import Evaluator, evaluate, evaluator, to_global_axes, with_efforts
+from ffr_dyn.analyses.mobility import named_motion
+from ffr_dyn.analyses.outcome import result_of
+from ffr_dyn.analyses.tangent import Chart, chart, derivative, rates, sizes, state, state_matrix
+from ffr_dyn.errors import InputError
+from ffr_dyn.result import Axis, Quantity, Result
+from ffr_dyn.scene import Scene
+
+Array = np.ndarray
+
+STATIONARY = 1e-6  # of the accelerations in moving axes, relative to those of the applied forces
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """A scene near a state, with d degrees of freedom.
+
+    A (2d, 2d), B (2d, inputs), C (outputs, 2d), D (outputs, inputs);  inputs, outputs : names
+    Z           : (V, d) free motions, in body axes [A^T R_dot, omega_bar, q_dot]
+    eigenvalues : (2d,) [1/s] by rising modulus;  modes : (V, 2d) the motions of the bodies that belong to them
+    leading     : what moves most in each mode
+    error       : relative difference of A from step halving
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    Z: Array
+    eigenvalues: Array
+    modes: Array
+    leading: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    error: float
+    notes: tuple[str, ...]
+
+    @property
+    def frequencies(self) -> Array:
+        """(2d,) [Hz] of the damped vibration."""
+        return np.abs(self.eigenvalues.imag) / (2 * np.pi)
+
+    @property
+    def damping_ratios(self) -> Array:
+        """(2d,) -Re / modulus; 1 for a decay without vibration, negative where the motion grows."""
+        modulus = np.abs(self.eigenvalues)
+        return np.where(modulus > 0, -self.eigenvalues.real / np.where(modulus > 0, modulus, 1.0), 0.0)
+
+    @property
+    def stability_margin(self) -> float:
+        """Largest real part of an eigenvalue [1/s]: negative where all small motions decay."""
+        return float(self.eigenvalues.real.max())
+
+
+def linearise(
+    scene: Scene, *, time: float = 0.0, inputs: tuple[Actuator | str, ...] = (), outputs: tuple[str, ...] = ()
+) -> Linearisation:
+    """Linearise a scene about its assembled state at `time` [s], its drivers' positions and rates being those of the time.
+
+    inputs  : actuators, or names of loads of the scene (an input of one doubles the load)
+    outputs : names of components of a result, such as "rod.tip.position.y"
+    For an equilibrium: ``linearise(scene_at(scene, static(scene)))``.
+
+    Raises InputError when nothing is free to move, or for a name that does not exist.
+    """
+    loads = tuple(load for item in inputs if not isinstance(item, str) for load in unit_loads(scene, item))
+    fed = replace(in_space(scene), loads=(*scene.loads, *loads))
+    assembled = assemble(fed, time=time)
+    at = _with_inputs(evaluator(assembled.system), scene, inputs, np.zeros(len(inputs)))
+    near = chart(at, time, assembled.x, assembled.v)
+    if near.steps.size == 0:
+        raise InputError("nothing is free to move: joints and drivers fix every motion; linearise with fewer drivers")
+    A, error = state_matrix(near)
+    B = _columns(lambda u: rates(_fed(near, scene, inputs, u), assembled.x, assembled.v), len(inputs))
+    C, D = _output_matrices(near, scene, inputs, outputs)
+    eigenvalues, vectors = _eigen(A)
+    modes = near.Z @ vectors[: near.steps.size]
+    modes = modes / np.where((size := np.abs(modes).max(axis=0)) > 0, size, 1.0)
+    leading = tuple(_leading(near, mode) for mode in modes.T)
+    names = tuple(item if isinstance(item, str) else item.name for item in inputs)
+    notes = (*assembled.notes, *_stationary_notes(near))
+    return Linearisation(A, B, C, D, near.Z, eigenvalues, modes, leading, names, tuple(outputs), error, notes)
+
+
+def _eigen(A: Array) -> tuple[Array, Array]:
+    values, vectors = np.linalg.eig(A)
+    order = np.lexsort((np.sign(values.imag), np.round(np.abs(values), 9)))
+    return values[order], vectors[:, order]
+
+
+def _leading(near: Chart, mode: Array) -> str:
+    """Named at the phase where the mode is largest."""
+    at = mode[int(np.argmax(np.abs(mode)))]
+    return named_motion(near.at.system.scene, near.at.system.layout, near.x, (mode * np.conj(at)).real)
+
+
+def _stationary_notes(near: Chart) -> list[str]:
+    at, place = near.at, near.at.system.layout
+    v = to_global_axes(place, near.x, near.V)
+    left = near.Z @ rates(near, near.x, v)[near.steps.size :] / sizes(at)
+    applied = np.linalg.solve(near.M, evaluate(at, near.time, near.x, v).force) / sizes(at)
+    if np.abs(left).max() <= STATIONARY * max(1e-9, float(np.abs(applied).max()), float(np.abs(near.V).max()) ** 2):
+        return []
+    return ["the state is no equilibrium and no steady rotation: the eigenvalues describe its next moment only"]
+
+
+# ---- inputs and outputs ----------------------------------------------------------------------------------------------
+
+
+def _columns(function: Callable[[Array], Array], count: int) -> Array:
+    """d function / d u: exact, since the efforts enter linearly."""
+    zero = function(np.zeros(count))
+    return np.array([function(unit) - zero for unit in np.eye(count)]).reshape(count, zero.size).T
+
+
+def _fed(near: Chart, scene: Scene, inputs: tuple[Actuator | str, ...], u: Array) -> Chart:
+    return replace(near, at=_with_inputs(near.at, scene, inputs, u))
+
+
+def _with_inputs(at: Evaluator, scene: Scene, inputs: tuple[Actuator | str, ...], u: Array) -> Evaluator:
+    """The evaluator with loads for the inputs u, on top of the scene's own."""
+    value = _declared(at)
+    number = len(scene.loads)
+    for item, amount in zip(inputs, u, strict=True):
+        if isinstance(item, str):
+            value[_load_number(scene, item)] *= 1.0 + amount
+        else:
+            for load in unit_loads(scene, item):
+                value[number] = amount * np.array([*load.force, *load.moment], float)
+                number += 1
+    return with_efforts(at, 0, value)
+
+
+def _load_number(scene: Scene, name: str) -> int:
+    names = [load.name for load in scene.loads]
+    if name not in names:
+        raise InputError(f"input {name!r}: the scene has no such load; there are {', '.join(names) or 'none'}")
+    if scene.loads[names.index(name)].function is not None:
+        raise InputError(f"input {name!r}: a load by a Python function has no size to vary; use an actuator as input")
+    return names.index(name)
+
+
+def _declared(at: Evaluator) -> Array:
+    """(W, 6) constants of the loads as the scene declares them: factors of one where a component is a function."""
+    listed = [
+        [float(c) if isinstance(c, (int, float, np.floating, np.integer)) else 1.0 for c in (*load.force, *load.moment)]
+        for load in at.system.scene.loads
+    ]
+    return np.array(listed, dtype=float).reshape(-1, 6)
+
+
+def _output_matrices(
+    near: Chart, scene: Scene, inputs: tuple[Actuator | str, ...], outputs: tuple[str, ...]
+) -> tuple[Array, Array]:
+    d = near.steps.size
+    if not outputs:
+        return np.zeros((0, 2 * d)), np.zeros((0, len(inputs)))
+
+    def measured(chart: Chart, deviation: Array) -> Array:
+        x, v = state(chart, deviation[:d], deviation[d:])
+        evaluate(chart.at, chart.time, x, v)
+        result = result_of(chart.at.system, chart.at.record, {})
+        return np.array([_scalar(result, name) for name in outputs])
+
+    C, _ = derivative(lambda deviation: measured(near, deviation), np.concatenate([near.steps, near.steps]))
+    return C, _columns(lambda u: measured(_fed(near, scene, inputs, u), np.zeros(2 * d)), len(inputs))
+
+
+def _scalar(result: Result, name: str) -> float:
+    values = result[name]
+    if values.ndim != 1:
+        raise InputError(
+            f"output {name!r} has several components; name one, such as {next(result.components([name]))!r}"
+        )
+    return float(values[0])
+
+
+# ---- as a result -----------------------------------------------------------------------------------------------------
+
+
+def as_result(scene: Scene, found: Linearisation, time: float = 0.0) -> Result:
+    """The linearisation as a labelled result of one row, which can be kept in a file."""
+    d = found.Z.shape[1]
+    states = Axis("state", (*(f"y{k + 1}" for k in range(d)), *(f"z{k + 1}" for k in range(d))))
+    columns = replace(states, name="of_state")
+    modes = Axis("eigenvalue", tuple(str(k + 1) for k in range(2 * d)))
+    complex_parts = Axis("part", ("re", "im"))
+    parts = np.column_stack([found.eigenvalues.real, found.eigenvalues.imag])
+    quantities = {
+        "A": Quantity(found.A[None], "1", (states, columns), "state matrix"),
+        "eigenvalues": Quantity(parts[None], "1/s", (modes, complex_parts), "eigenvalues of A"),
+        "frequencies": Quantity(found.frequencies[None], "Hz", (modes,), "of the damped vibration"),
+        "damping_ratios": Quantity(found.damping_ratios[None], "1", (modes,), "-Re / modulus of the eigenvalues"),
+    }
+    matrices = (
+        ("B", found.B, (states, found.inputs)),
+        ("C", found.C, (found.outputs, columns)),
+        ("D", found.D, (found.outputs, found.inputs)),
+    )
+    for name, matrix, axes in matrices:
+        if matrix.size:
+            labelled = tuple(a if isinstance(a, Axis) else Axis(_AXES[a is found.inputs], _labels(a)) for a in axes)
+            quantities[name] = Quantity(matrix[None], "1", labelled, f"state space matrix {name}")
+    attributes = {
+        "title": scene.name,
+        "analysis": "linearised",
+        "method": f"central differences, step halving changes A by {found.error:.1e}",
+        "degrees_of_freedom": d,
+        "stability_margin": found.stability_margin,
+        "leading": list(found.leading),
+        "inputs": list(found.inputs),
+        "outputs": list(found.outputs),
+        "notes": list(found.notes),
+        "status": "complete",
+    }
+    return Result(np.array([time]), quantities, {}, attributes)
+
+
+_AXES = {True: "input", False: "output"}
+
+
+def _labels(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Labels of an axis contain no dot."""
+    return tuple(name.replace(".", " ") for name in names)
+
+
+def table_of_modes(found: Linearisation) -> list[str]:
+    """A line for each mode: frequency, damping ratio, real part, and what moves most; one of each conjugate pair."""
+    lines = []
+    for value, frequency, ratio, leading in zip(
+        found.eigenvalues, found.frequencies, found.damping_ratios, found.leading, strict=True
+    ):
+        if value.imag >= 0:
+            lines.append(f"{frequency:12.6g} Hz   damping {ratio:9.3g}   real part {value.real:11.4g} 1/s   {leading}")
+    return lines

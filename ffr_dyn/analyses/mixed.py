@@ -1,0 +1,264 @@
+"""Mixed dynamics: some motions known, equally many forces unknown; both the rest of the motion and the forces are wanted.
+
+*Collocated*: each unknown force acts along a known motion. It is the multiplier of that motion's row, and the run is a
+forward run with drivers (Antonya's partitioning, in multiplier form).
+*Not collocated*: servo constraints (`servo`). Their internal dynamics may be unstable - a flexible arm whose tip is known and
+whose hub is driven - and then no integration from the start can be trusted. The bounded solution is found instead, over all
+times at once: it starts at rest before the known motion does, and ends at rest after it (`bounded`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ffr_dyn.analyses.actuators import Actuator, JointForce, MarkerForce, unit, unit_loads
+from ffr_dyn.analyses.assemble import assemble, flattened
+from ffr_dyn.analyses.bounded import Bounded, bounded_solution
+from ffr_dyn.analyses.evaluation import evaluator, joined, record_states, with_efforts
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.outcome import efforts, output_times, outputs, result_of, with_quantities
+from ffr_dyn.analyses.servo import Moment, Servo, at_moment, internal_values, servo, slope, slope_matrix
+from ffr_dyn.drivers import Driver, PointDriver
+from ffr_dyn.equations import blocks_of, compile_scene
+from ffr_dyn.errors import InputError, SimulationError
+from ffr_dyn.integrators import Integrator
+from ffr_dyn.result import Quantity, Result
+from ffr_dyn.scene import GROUND, Scene
+from ffr_dyn.stabilisation import Projection
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Causal:
+    """Integrate the internal dynamics from the scene's own start (Dormand & Prince, order 8).
+
+    tolerance : relative, of a step
+    growth    : refuse internal dynamics that would magnify an error by more than this over the run
+    """
+
+    tolerance: float = 1e-10
+    growth: float = 1e4
+
+
+def mixed(
+    scene: Scene,
+    *,
+    unknown: tuple[Actuator, ...],
+    end: float,
+    output_step: float,
+    start: float = 0.0,
+    known: tuple[str, ...] | None = None,
+    solution: Causal | Bounded | None = None,
+    method: Integrator | None = None,
+    path: str | Path | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Result:
+    """The motion of a scene of which some motions are known, and the unknown forces that cause them.
+
+    known   : drivers of the scene that are known motions, realised by the unknown forces; default all. Other drivers are true
+              ones, with forces of their own
+    unknown : joint or marker forces; of more than are needed those are chosen that the known motions determine best
+    solution: of forces away from the known motions: `Causal`, or `Bounded` (which adds times before the start and after the
+              end); by default Causal where the internal dynamics allow it
+    method  : integrator of a collocated run
+
+    The result has "name.effort" [N or N m] of every unknown force and its power.
+
+    Raises InputError when motions and forces do not fit (the combination that is undetermined is told), SimulationError when
+    the run fails or a causal one is asked for and cannot be trusted.
+    """
+    names = _known(scene, known)
+    partners = _collocated(scene, names, unknown)
+    if partners is not None and solution is None:
+        result = forward(
+            scene, end=end, output_step=output_step, method=method, start=start,
+            stabilisation=Projection(1e-12), outputs=outputs(scene), path=path, progress=progress,
+        )  # fmt: skip
+        return _named(flattened(scene, start)[0], result, partners, path)
+    return _not_collocated(scene, names, unknown, (start, end, output_step), solution, path, progress)
+
+
+def _known(scene: Scene, known: tuple[str, ...] | None) -> tuple[str, ...]:
+    drivers = [driver.name for driver in scene.drivers]
+    names = tuple(drivers if known is None else known)
+    missing = [name for name in names if name not in drivers]
+    if missing or not names:
+        raise InputError(f"known motions {names}: each must be a driver of the scene; there are {drivers or 'none'}")
+    return names
+
+
+# ---- collocated ------------------------------------------------------------------------------------------------------
+
+
+def _collocated(
+    scene: Scene, names: tuple[str, ...], unknown: tuple[Actuator, ...]
+) -> dict[str, tuple[str, float]] | None:
+    """For each unknown force the driver along which it acts and its sign; None unless every known motion has its force."""
+    drivers = {driver.name: driver for driver in scene.drivers if driver.name in names}
+    pairs: dict[str, tuple[str, float]] = {}
+    for actuator in unknown:
+        for name, driver in drivers.items():
+            sign = _along(driver, actuator)
+            if sign and name not in [taken for taken, _ in pairs.values()]:
+                pairs[actuator.name] = (name, sign)
+                break
+    return pairs if len(pairs) == len(names) == len(unknown) else None
+
+
+def _along(driver: Driver | PointDriver, actuator: Actuator) -> float:
+    """1 or -1 where the force acts along the driven coordinate, else 0."""
+    if isinstance(driver, Driver):
+        same = isinstance(actuator, JointForce) and (actuator.joint, actuator.coordinate) == (
+            driver.joint,
+            driver.coordinate,
+        )
+        return float(same)
+    components = [c for c in "xyz" if getattr(driver, c) is not None]
+    alone = len(components) == 1 and driver.i.partition(".")[0] == GROUND
+    if not (alone and isinstance(actuator, MarkerForce) and actuator.marker == driver.j) or actuator.moment:
+        return 0.0
+    along = np.array(actuator.direction)["xyz".index(components[0])]
+    return float(along) if actuator.axes == "global" and abs(abs(along) - 1) < 1e-15 else 0.0
+
+
+def _named(scene: Scene, result: Result, partners: dict[str, tuple[str, float]], path: str | Path | None) -> Result:
+    """The drivers' efforts under the names of the unknown forces."""
+    found = efforts(scene, result)
+    for force, (driver, sign) in partners.items():
+        row = next(d for d in scene.drivers if d.name == driver)
+        if isinstance(row, PointDriver):
+            axis = next(k for k, c in enumerate("xyz") if getattr(row, c) is not None)
+            effort = Quantity(sign * result[f"{driver}.force"][:, axis], "N", (), f"force that realises {driver}")
+        else:
+            effort = replace(found[f"{driver}.effort"], description=f"effort that realises {driver}")
+        found[f"{force}.effort"] = effort
+        found[f"{force}.power"] = result.quantity(f"{driver}.power")
+    attributes = {**result.attributes, "analysis": "mixed dynamics, collocated"}
+    return with_quantities(Result(result.time, result.quantities, result.geometry, attributes), found, path)
+
+
+# ---- not collocated --------------------------------------------------------------------------------------------------
+
+
+def _not_collocated(
+    scene: Scene,
+    names: tuple[str, ...],
+    unknown: tuple[Actuator, ...],
+    span: tuple[float, float, float],
+    solution: Causal | Bounded | None,
+    path: str | Path | None,
+    progress: Callable[[float], None] | None,
+) -> Result:
+    start, end, output_step = span
+    stiffened = [b.name for b in scene.bodies if b.stiffening and b.model.stiffening is not None]
+    if stiffened:
+        raise InputError(
+            f"servo constraints need bodies without geometric stiffening: set stiffening=False of {stiffened}"
+        )
+    assembled = assemble(scene, time=start)
+    own = servo(assembled, names, unknown, (start, end))
+    w = internal_values(own, assembled.x, assembled.v)
+    chosen = _solution(own, start, end, w, assembled.x, solution)
+    if isinstance(chosen, Bounded):
+        times, ws, xs, notes = bounded_solution(own, chosen, output_step, w, assembled.x)
+    else:
+        times = output_times(start, end, output_step)
+        ws, xs = _integrated(own, chosen, times, w, assembled.x, progress)
+        notes = []
+    moments = [at_moment(own, float(t), w, x) for t, w, x in zip(times, ws, xs, strict=True)]
+    attributes: dict[str, Any] = {
+        "title": scene.name,
+        "analysis": f"mixed dynamics, {'bounded' if isinstance(chosen, Bounded) else 'causal'}",
+        "method": f"{chosen!r}",
+        "evaluations": int(own.at.work.info[1]),
+        "degrees_of_freedom": own.size,
+        "internal_coordinates": list(own.names),
+        "notes": [*assembled.notes, *notes],
+        "status": "complete",
+    }
+    return _recorded(names, own, times, moments, attributes, path)
+
+
+def _solution(
+    own: Servo, start: float, end: float, w: Array, x: Array, wanted: Causal | Bounded | None
+) -> Causal | Bounded:
+    """What was asked for, or what the internal dynamics allow at the start; SimulationError for a causal run they do not."""
+    if isinstance(wanted, Bounded) or own.size == 0:
+        return wanted or Causal()
+    causal = wanted or Causal()
+    rate = float(np.linalg.eigvals(slope_matrix(own, start, w, x)).real.max())
+    if rate * (end - start) <= np.log(causal.growth):
+        return causal
+    if wanted is None:
+        return Bounded()
+    raise SimulationError(
+        f"the internal dynamics are unstable: errors grow e-fold in {1 / rate:.3g} s, over a run of {end - start:g} s; use "
+        "solution=Bounded(), for a known motion that starts and ends at rest"
+    )
+
+
+def _integrated(
+    own: Servo, causal: Causal, times: Array, w: Array, x: Array, progress: Callable[[float], None] | None
+) -> tuple[Array, list[Array]]:
+    """w (T, 2 d) and the states x at the output times."""
+    from scipy.integrate import DOP853
+
+    nearest = [x]
+
+    def right(t: float, y: Array) -> Array:
+        value, nearest[0] = slope(own, t, y, nearest[0])
+        return value
+
+    ws, xs = [w], [x]
+    if own.size == 0:
+        for time in times[1:]:
+            xs.append(at_moment(own, float(time), w, xs[-1]).x)
+        return np.zeros((times.size, 0)), xs
+    for before, time in pairwise(times):
+        solver = DOP853(right, float(before), ws[-1], float(time), rtol=causal.tolerance, atol=causal.tolerance * 1e-2)
+        while solver.status == "running":
+            message = solver.step()
+        if solver.status == "failed":
+            raise SimulationError(f"at t = {solver.t:.6g} s the internal dynamics could not be integrated: {message}")
+        ws.append(solver.y)
+        xs.append(at_moment(own, float(time), solver.y, nearest[0]).x)
+        if progress is not None:
+            progress(float(time))
+    return np.array(ws), xs
+
+
+def _recorded(
+    names: tuple[str, ...], own: Servo, times: Array, moments: list[Moment], attributes: dict[str, Any],
+    path: str | Path | None,
+) -> Result:  # fmt: skip
+    """The states, in the scene without the known drivers and with the efforts as loads."""
+    scene = own.at.system.scene
+    loads = [load for actuator in own.unknown for load in unit_loads(scene, actuator)]
+    kept = tuple(driver for driver in scene.drivers if driver.name not in names)
+    fed = replace(scene, drivers=kept, loads=(*scene.loads, *loads))
+    names_kept = {block.name: block for block in own.at.system.blocks}
+    blocks = [names_kept[block.name] for block in blocks_of(fed)]
+    at = evaluator(compile_scene(fed, blocks))
+    owner = [k for k, actuator in enumerate(own.unknown) for _ in unit_loads(scene, actuator)]
+    units = np.array([[*load.force, *load.moment] for load in loads], float)
+    rows = []
+    for time, moment in zip(times, moments, strict=True):
+        clock = np.clip([time], *own.span)
+        here = with_efforts(at, len(scene.loads), moment.u[owner][:, None] * units)
+        rows.append(record_states(here, clock, moment.x[None], moment.v[None]))
+        rows[-1] = rows[-1]._replace(time=np.array([time]))
+    result = result_of(at.system, joined(rows), attributes)
+    u = np.array([moment.u for moment in moments])
+    found = {}
+    for k, actuator in enumerate(own.unknown):
+        found[f"{actuator.name}.effort"] = Quantity(
+            u[:, k], unit(actuator), (), "effort that realises the known motions"
+        )
+    return with_quantities(result, found, path)

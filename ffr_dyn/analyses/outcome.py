@@ -1,0 +1,85 @@
+"""From recorded states to the labelled result that every analysis returns, with the efforts and powers of the drivers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ffr_dyn.analyses.actuators import joint_named
+from ffr_dyn.analyses.forward import geometry
+from ffr_dyn.drivers import Driver
+from ffr_dyn.equations import System
+from ffr_dyn.errors import InputError
+from ffr_dyn.joints import frames
+from ffr_dyn.kernels.tables import Record
+from ffr_dyn.measure import measure, selected
+from ffr_dyn.result import Quantity, Result
+from ffr_dyn.result_file import save_result
+from ffr_dyn.rotation import rotation_matrix
+from ffr_dyn.scene import GROUND, Scene
+
+Array = np.ndarray
+
+
+def output_times(start: float, end: float, output_step: float) -> Array:
+    """(T,) from start to end [s]. Raises InputError unless the span is a multiple of the output step."""
+    rows = round((end - start) / output_step) if output_step > 0 and np.isfinite([start, end]).all() else 0
+    if rows < 1 or abs(rows * output_step - (end - start)) > 1e-9 * (end - start):
+        raise InputError(f"from {start} to {end} s is not a positive multiple of the output step {output_step} s")
+    return start + output_step * np.arange(rows + 1)
+
+
+def result_of(system: System, record: Record, attributes: dict[str, Any], path: str | Path | None = None) -> Result:
+    """All quantities of recorded states, efforts of the drivers included; written to `path` when it is complete."""
+    quantities, _ = measure(system, record, {}, selected(system, outputs(system.scene)))
+    plain = Result(record.time, quantities, geometry(system.scene), attributes)
+    return with_quantities(plain, efforts(system.scene, plain), path)
+
+
+def outputs(scene: Scene) -> tuple[str, ...]:
+    """What the results of these analyses keep: the default, and the power of every driver."""
+    return ("default", *(f"{driver.name}.power" for driver in scene.drivers))
+
+
+def with_quantities(result: Result, more: dict[str, Quantity], path: str | Path | None = None) -> Result:
+    """The result with more quantities, written to `path` if there is one."""
+    whole = Result(result.time, {**result.quantities, **more}, result.geometry, result.attributes)
+    if path is not None:
+        save_result(whole, path)
+    return whole
+
+
+def efforts(scene: Scene, result: Result) -> dict[str, Quantity]:
+    """ "driver.effort" [N m or N] of every driven joint coordinate: what acts along it on the second body.
+
+    scene : as it was computed, a planar one with its in-plane modes
+    """
+    found: dict[str, Quantity] = {}
+    for driver in scene.drivers:
+        if isinstance(driver, Driver):
+            joint = joint_named(scene, driver.joint, f"driver {driver.name!r}")
+            axis = axis_history(scene, result, joint.i, frames(joint)[0][:, 2])
+            angular = driver.coordinate == "angle"
+            effort = (result[f"{driver.name}.{'moment' if angular else 'force'}"] * axis).sum(1)
+            text = f"effort along {driver.joint}.{driver.coordinate}, on the second body"
+            found[f"{driver.name}.effort"] = Quantity(effort, "N m" if angular else "N", (), text)
+    return found
+
+
+def axis_history(scene: Scene, result: Result, marker: str, axis: Array) -> Array:
+    """(T, 3) global axis that stands on a marker, `axis` (3,) in body axes."""
+    name, _, point = marker.partition(".")
+    if name == GROUND:
+        return np.broadcast_to(axis, (result.time.size, 3))
+    A, theta = rotation_matrix(result[f"{name}.p"]), _elastic_turn(scene, result, name, point)
+    return np.einsum("tkl,tl->tk", A, axis + np.cross(theta, axis))
+
+
+def _elastic_turn(scene: Scene, result: Result, name: str, point: str) -> Array:
+    """(T, 3) elastic rotation of a marker, body axes."""
+    model = next(body.model for body in scene.bodies if body.name == name)
+    if model.n == 0:
+        return np.zeros((result.time.size, 3))
+    return result[f"{name}.q"] @ model.interface(point).phi_r.T

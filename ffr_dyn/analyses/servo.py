@@ -1,0 +1,352 @@
+"""Servo constraints: motions that are known while forces elsewhere realise them, reduced to their internal dynamics.
+
+    M acc + Phi_q^T lam = f + B u,    Phi_q acc = gamma,    S acc = sigma    (S the Jacobian of the known motions)
+
+No constraint force acts along S; the efforts u do. With P = S M_Phi^-1 B regular (M_Phi^-1: the inverse mass projected on the
+joints) the known motions have relative degree two and u follows at every state. What they leave free are the internal
+coordinates y: joint and elastic coordinates that, with the joints and the known motions, fix every position.
+(Blajer & Kolodziejczyk, Multibody System Dynamics 11 (2004) 343-364; Seifried, Dynamics of Underactuated Multibody Systems,
+Springer 2014, ch. 3.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import qr
+
+from ffr_dyn.analyses.actuators import Actuator, unit_loads
+from ffr_dyn.analyses.assemble import Assembled
+from ffr_dyn.analyses.evaluation import (
+    Evaluation,
+    Evaluator,
+    evaluate,
+    evaluated_mass_matrix,
+    evaluator,
+    free_motions,
+    locked,
+    moved,
+    shapes,
+    to_body_axes,
+    to_global_axes,
+    total_mass_matrix,
+    unit_rows,
+)
+from ffr_dyn.analyses.mobility import coordinate_gradients, coordinate_word
+from ffr_dyn.constraints import evaluate_word
+from ffr_dyn.drivers import Driver, driver_word
+from ffr_dyn.equations import Block, compile_scene
+from ffr_dyn.errors import InputError, SimulationError
+from ffr_dyn.forces import Load
+from ffr_dyn.joints import COORDINATES, Word
+from ffr_dyn.scene import Scene, marker_number
+from ffr_dyn.timefunction import polynomial
+
+Array = np.ndarray
+
+ITERATIONS = 20
+TOLERANCE = 1e-12  # of a step of the positions
+UNDETERMINED = 1e-8  # of the smallest singular value of P with rows and columns of length one
+
+
+@dataclass(frozen=True)
+class Servo:
+    """A scene with known motions and the unknown efforts that shall realise them.
+
+    at       : evaluator with all rows: joints, known motions, internal joint coordinates
+    plant, known, inner : row numbers of the joints (and true drivers), of the known motions, of the internal coordinates
+    elastic  : numbers in v of internal elastic coordinates, which come after the joint coordinates in y
+    data     : where the functions of the internal joint coordinates keep their two numbers
+    span     : known motions are held at their values outside of it [s]
+    """
+
+    at: Evaluator
+    unknown: tuple[Actuator, ...]
+    plant: Array
+    known: Array
+    inner: Array
+    elastic: Array
+    data: Array
+    span: tuple[float, float]
+    names: tuple[str, ...]
+
+    @property
+    def size(self) -> int:
+        """Number of internal coordinates y."""
+        return self.inner.size + self.elastic.size
+
+
+@dataclass(frozen=True)
+class Moment:
+    """The scene at one time: x, v (global), accelerations (V,) in body axes, efforts u, y_ddot, sigma of known motions."""
+
+    x: Array
+    v: Array
+    acceleration: Array
+    u: Array
+    y_ddot: Array
+    sigma: Array
+
+
+def servo(
+    assembled: Assembled, known: tuple[str, ...], unknown: tuple[Actuator, ...], span: tuple[float, float]
+) -> Servo:
+    """Choose internal coordinates at the assembled state, by rank, and of the unknown efforts as many as motions are known.
+
+    Raises InputError when motions and efforts do not fit, with the combination that is not determined.
+    """
+    scene, blocks = assembled.system.scene, list(assembled.system.blocks)
+    bare = evaluator(assembled.system)
+    now = evaluate(bare, span[0], assembled.x, assembled.v)
+    known_rows = _rows_of(blocks, known)
+    plant_rows = np.setdiff1d(np.arange(now.Phi.size), known_rows)
+    M = total_mass_matrix(scene, assembled.system.layout, assembled.x)
+    labels = [f"{b.name}: {w.text}" for b in blocks for w in b.words]
+    chosen = _fitting(bare, now, assembled.x, M, plant_rows, known_rows, unknown, [labels[k] for k in known_rows])
+    words, elastic, names = _internal(scene, assembled, now, M)
+    inner = [Block(f"internal {k}", ends, (word,), driver=True) for k, (ends, word) in enumerate(words)]
+    system = compile_scene(scene, blocks + inner)
+    ordered, rows = list(system.blocks), system.model.rows
+    inner_rows = _rows_of(ordered, tuple(block.name for block in inner))
+    known_rows = _rows_of(ordered, known)
+    plant_rows = np.setdiff1d(
+        np.arange(rows.kind.size + locked(system.layout).size), np.concatenate([inner_rows, known_rows])
+    )
+    data = system.model.functions.start[rows.function[inner_rows]]
+    return Servo(
+        evaluator(system), chosen, plant_rows, known_rows, inner_rows, np.array(elastic, dtype=int), data, span, names
+    )
+
+
+def _rows_of(blocks: list[Block], names: tuple[str, ...]) -> Array:
+    """Row numbers of the named blocks, in the order of the names."""
+    starts = np.concatenate([[0], np.cumsum([len(block.words) for block in blocks])])
+    at = {block.name: np.arange(starts[k], starts[k + 1]) for k, block in enumerate(blocks)}
+    return np.concatenate([at[name] for name in names] or [np.zeros(0)]).astype(int)
+
+
+# ---- do the efforts fit the motions? ---------------------------------------------------------------------------------
+
+
+def effort_columns(at: Evaluator, unknown: tuple[Actuator, ...], x: Array) -> Array:
+    """(V, U) generalised forces of unit efforts at the state x, which was evaluated last."""
+    scene = at.system.scene
+    columns = [sum(_force(at, load, x) for load in unit_loads(scene, actuator)) for actuator in unknown]
+    return np.array(columns).reshape(len(unknown), at.system.layout.v_size).T
+
+
+def _force(at: Evaluator, load: Load, x: Array) -> Array:
+    """(V,) generalised force of a constant load, as the kernels apply it."""
+    place, marker = at.system.layout, marker_number(at.system.scene, load.marker)
+    column, b = np.zeros(place.v_size), int(at.system.model.markers.body[marker])
+    if b == len(place.n):
+        return column
+    A = np.eye(3) if load.axes == "body" else at.work.bodies.A[b].T
+    force, moment = A @ np.array(load.force, float), A @ np.array(load.moment, float)
+    phi = shapes(at.system, marker)
+    u = at.system.model.markers.u[marker] + phi[:3] @ x[place.q(b)]
+    column[place.rigid(b)] = np.concatenate([force, moment + np.cross(u, force)])
+    column[place.q_dot(b)] = phi[:3].T @ force + phi[3:].T @ moment
+    return column
+
+
+def _responses(J: Array, M: Array, B: Array) -> Array:
+    """(V, U) accelerations that columns B of force give on the joints' rows J."""
+    Z = free_motions(J, M)
+    return Z @ (Z.T @ B)
+
+
+def _fitting(
+    at: Evaluator,
+    now: Evaluation,
+    x: Array,
+    M: Array,
+    plant: Array,
+    known: Array,
+    unknown: tuple[Actuator, ...],
+    labels: list[str],
+) -> tuple[Actuator, ...]:
+    """As many of the unknown efforts as motions are known, the best determined ones (pivoted QR of P)."""
+    if len(unknown) < known.size:
+        raise InputError(
+            f"{known.size} motions are known ({'; '.join(labels)}) but only {len(unknown)} forces are unknown; name as many"
+        )
+    S = now.jacobian[known]
+    response = _responses(now.jacobian[plant], M, effort_columns(at, unknown, x))
+    free = free_motions(now.jacobian[plant], M)
+    reach = np.linalg.norm(S @ free, axis=1)
+    size = np.sqrt(np.einsum("vu,vw,wu->u", response, M, response))
+    P = S @ response / np.where(reach > 0, reach, 1.0)[:, None] / np.where(size > 0, size, 1.0)
+    _, _, order = qr(P, pivoting=True)
+    chosen = np.sort(order[: known.size])
+    left, values, right = np.linalg.svd(P[:, chosen])
+    if values.min(initial=1.0) < UNDETERMINED:
+        motions = _combination(left[:, -1], labels)
+        forces = _combination(right[-1], [unknown[k].name for k in chosen])
+        raise InputError(
+            f"the unknown forces do not determine the known motions: no force changes the acceleration {motions}, and "
+            f"{forces} changes none of them; know another motion or let another force be unknown"
+        )
+    return tuple(unknown[k] for k in chosen)
+
+
+def _combination(weights: Array, names: list[str]) -> str:
+    said = [(weight, name) for weight, name in zip(weights, names, strict=True) if abs(weight) > 1e-3]
+    return " ".join(f"{weight:+.3g} ({name})" for weight, name in said)
+
+
+# ---- internal coordinates --------------------------------------------------------------------------------------------
+
+
+def _internal(
+    scene: Scene, assembled: Assembled, now: Evaluation, M: Array
+) -> tuple[list[tuple[tuple[int, int], Word]], list[int], tuple[str, ...]]:
+    """Words (with markers) of internal joint coordinates, numbers of internal elastic ones, and the names of all."""
+    place = assembled.system.layout
+    Z = free_motions(now.jacobian, M)
+    names, gradients = coordinate_gradients(scene, place, assembled.x, assembled.v)
+    joints = [(joint, c) for joint in scene.joints for c in COORDINATES[joint.kind]]
+    elastic = [int(k) for b in range(len(place.n)) for k in np.arange(place.v_size)[place.q_dot(b)]]
+    labels = [f"{scene.bodies[b].name}.q.{k + 1}" for b in range(len(place.n)) for k in range(place.n[b])]
+    candidates = np.concatenate([gradients, unit_rows(np.array(elastic, int), place.v_size)])
+    length = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(M), candidates.T), axis=0)
+    _, R, order = qr((candidates @ Z / length[:, None]).T, pivoting=True, mode="economic")
+    d = Z.shape[1]
+    if d and (R.shape[1] < d or np.abs(np.diag(R)).min() < 1e-6):
+        raise InputError(
+            "the motion that the known motions leave free is not described by joint and elastic coordinates: a body moves "
+            "on joints without coordinates; know its motion too, or use joints with an angle or a stroke"
+        )
+    chosen = np.sort(order[:d])
+    words = []
+    for k in chosen[chosen < len(joints)]:
+        joint, coordinate = joints[k]
+        ends = marker_number(scene, joint.i), marker_number(scene, joint.j)
+        words.append((ends, driver_word(Driver("internal", joint.name, polynomial(0.0, 0.0), coordinate), joint)))
+    rest = [int(k) - len(joints) for k in chosen[chosen >= len(joints)]]
+    said = tuple([names[k] for k in chosen[chosen < len(joints)]] + [labels[k] for k in rest])
+    return words, [elastic[k] for k in rest], said
+
+
+def internal_values(own: Servo, x: Array, v: Array) -> Array:
+    """(2 d,) y and y_dot of a state."""
+    scene, place = own.at.system.scene, own.at.system.layout
+    names, gradients = coordinate_gradients(scene, place, x, v)
+    V = to_body_axes(place, x, v)
+    values = _joint_values(scene, own, x, v)
+    numbers = [names.index(name) for name in own.names[: own.inner.size]]
+    position = np.concatenate([[values[k] for k in numbers], x[_positions(own)]])
+    return np.concatenate([position, gradients[numbers] @ V, V[own.elastic]])
+
+
+def _joint_values(scene: Scene, own: Servo, x: Array, v: Array) -> list[float]:
+    place, values = own.at.system.layout, []
+    for joint in scene.joints:
+        ends = (marker_number(scene, joint.i), marker_number(scene, joint.j)) * 2
+        words = [coordinate_word(joint, coordinate) for coordinate in COORDINATES[joint.kind]]
+        values += [evaluate_word(scene, place, x, v, word, ends, (0.0, 0.0, 0.0)).Phi for word in words]
+    return values
+
+
+def _positions(own: Servo) -> Array:
+    """Numbers in x of the internal elastic coordinates: a body has one more position than velocities."""
+    place = own.at.system.layout
+    body = np.searchsorted(np.array(place.iv), own.elastic, side="right") - 1
+    return own.elastic + body + 1
+
+
+# ---- the reduced equations -------------------------------------------------------------------------------------------
+
+
+def _guided(own: Servo, time: float, w: Array) -> Evaluator:
+    """The evaluator whose internal joint coordinates go through y with the rate y_dot."""
+    d, model = own.size, own.at.system.model
+    data = model.functions.data.copy()
+    y, rate = w[: own.inner.size], w[d : d + own.inner.size]
+    data[own.data], data[own.data + 1] = y - rate * time, rate
+    return replace(
+        own.at, system=replace(own.at.system, model=model._replace(functions=model.functions._replace(data=data)))
+    )
+
+
+def at_moment(own: Servo, time: float, w: Array, near: Array) -> Moment:
+    """Everything at a time, from w = (y, y_dot) and a state x nearby.
+
+    Raises SimulationError when the internal coordinates no longer describe the motion or the efforts are not determined.
+    """
+    clock = float(np.clip(time, *own.span))
+    at = _guided(own, clock, w)
+    x, now = _placed(own, at, clock, w, near)
+    V = np.linalg.solve(_square(own, now), np.concatenate([-now.nu, w[own.size + own.inner.size :]]))
+    v = to_global_axes(own.at.system.layout, x, V)
+    now = evaluate(at, clock, x, v)
+    return _accelerated(own, at, now, x, v, now.gamma)
+
+
+def at_rest(own: Servo, time: float, y: Array, near: Array) -> Moment:
+    """The same with the known motions held still where they are at that time, and y at rest."""
+    clock = float(np.clip(time, *own.span))
+    w = np.concatenate([y, np.zeros(own.size)])
+    at = _guided(own, clock, w)
+    x, now = _placed(own, at, clock, w, near)
+    return _accelerated(own, at, now, x, np.zeros(own.at.system.layout.v_size), np.zeros_like(now.gamma))
+
+
+def _placed(own: Servo, at: Evaluator, time: float, w: Array, x: Array) -> tuple[Array, Evaluation]:
+    """The position by Newton's method from x, and the equations there at rest."""
+    place, slots = own.at.system.layout, _positions(own)
+    still, d = np.zeros(place.v_size), own.size
+    for _ in range(ITERATIONS):
+        now = evaluate(at, time, x, still)
+        left = np.concatenate([-now.Phi, w[own.inner.size : d] - x[slots]])
+        if np.abs(left).max() < TOLERANCE:
+            return x, now
+        step = np.linalg.solve(_square(own, now), left)
+        x = moved(place, x, step)
+        if np.abs(step).max() < TOLERANCE:
+            return x, evaluate(at, time, x, still)
+    raise SimulationError(
+        f"at t = {time:.6g} s no position belongs to the known motions: they are out of reach, or "
+        f"{', '.join(own.names)} no longer describe what is free"
+    )
+
+
+def _square(own: Servo, now: Evaluation) -> Array:
+    return np.concatenate([now.jacobian, unit_rows(own.elastic, now.jacobian.shape[1])])
+
+
+def _accelerated(own: Servo, at: Evaluator, now: Evaluation, x: Array, v: Array, gamma: Array) -> Moment:
+    """Accelerations and efforts at an evaluated state."""
+    V, C = now.jacobian.shape[1], own.plant.size
+    B, J, S = effort_columns(at, own.unknown, x), now.jacobian[own.plant], now.jacobian[own.known]
+    matrix = np.zeros((V + C + B.shape[1], V + C + B.shape[1]))
+    matrix[:V, :V] = evaluated_mass_matrix(at)
+    matrix[:V, V : V + C], matrix[V : V + C, :V] = J.T, J
+    matrix[:V, V + C :], matrix[V + C :, :V] = -B, S
+    try:
+        found = np.linalg.solve(matrix, np.concatenate([now.force, gamma[own.plant], gamma[own.known]]))
+    except np.linalg.LinAlgError:
+        raise SimulationError(
+            "the unknown forces no longer determine the known motions at a position on the way"
+        ) from None
+    acceleration = found[:V]
+    joints = now.jacobian[own.inner] @ acceleration - gamma[own.inner]
+    y_ddot = np.concatenate([joints, acceleration[own.elastic]])
+    return Moment(x, v, acceleration, found[V + C :], y_ddot, now.gamma[own.known])
+
+
+def slope(own: Servo, time: float, w: Array, near: Array) -> tuple[Array, Array]:
+    """dw/dt (2 d,) and the state x."""
+    moment = at_moment(own, time, w, near)
+    return np.concatenate([w[own.size :], moment.y_ddot]), moment.x
+
+
+def slope_matrix(own: Servo, time: float, w: Array, near: Array) -> Array:
+    """(2 d, 2 d) central differences of the slope."""
+    scale = 1e-6 * np.maximum(1.0, np.abs(w))
+    sides = [
+        [slope(own, time, w + sign * h * one, near)[0] for sign in (1, -1)]
+        for h, one in zip(scale, np.eye(w.size), strict=True)
+    ]
+    return np.array([(plus - minus) / (2 * h) for (plus, minus), h in zip(sides, scale, strict=True)]).T

@@ -1,0 +1,55 @@
+"""Scenes at another state: where a result has left them, and with their drivers held still."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from ffr_dyn.drivers import Driver, PointDriver
+from ffr_dyn.joints import Joint
+from ffr_dyn.result import Result
+from ffr_dyn.scene import Body, Scene
+from ffr_dyn.timefunction import as_time_function, constant, evaluate
+
+
+def scene_at(scene: Scene, result: Result, row: int = -1) -> Scene:
+    """The scene with its bodies where a row of a result has them, moving as they do there."""
+    return replace(scene, bodies=tuple(_body_at(body, result, row) for body in scene.bodies))
+
+
+def _body_at(body: Body, result: Result, row: int) -> Body:
+    now = {key: result[f"{body.name}.{name}"][row] for key, name in _HISTORIES.items()}
+    elastic = {key: result[f"{body.name}.{key}"][row] for key in ("q", "q_dot") if body.model.n}
+    return replace(body, **now, **elastic)
+
+
+_HISTORIES = {"position": "R", "rotation": "p", "velocity": "v", "omega_bar": "omega_bar"}
+
+
+def held(scene: Scene, time: float) -> Scene:
+    """The scene with every driver and every length that is a function of time held at its value at `time` [s], at rest."""
+    at_rest = replace(
+        scene,
+        joints=tuple(_held_joint(joint, time) for joint in scene.joints),
+        drivers=tuple(_held_driver(driver, time) for driver in scene.drivers),
+    )
+    return replace(at_rest, bodies=tuple(_at_rest(body) for body in scene.bodies))
+
+
+def _at_rest(body: Body) -> Body:
+    return replace(body, velocity=(0.0, 0.0, 0.0), omega_bar=(0.0, 0.0, 0.0), q_dot=None)
+
+
+def _held_joint(joint: Joint, time: float) -> Joint:
+    return joint if joint.length is None else replace(joint, length=_value(joint.length, time))
+
+
+def _held_driver(driver: Driver | PointDriver, time: float) -> Driver | PointDriver:
+    if isinstance(driver, Driver):
+        return replace(driver, function=constant(_value(driver.function, time)))
+    still: dict[str, Any] = {c: _value(f, time) for c in "xyz" if (f := getattr(driver, c)) is not None}
+    return replace(driver, **still)
+
+
+def _value(function: Any, time: float) -> float:
+    return evaluate(as_time_function(function, "function of time"), time)[0]
