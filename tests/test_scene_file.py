@@ -401,6 +401,7 @@ def test_a_flexible_body_needs_a_file():
 
 
 def test_the_published_schema_is_that_of_the_program():
+    """Where it is not: ffr-dyn schema > docs/scene.schema.json."""
     assert json.loads((ROOT / "docs" / "scene.schema.json").read_text(encoding="utf-8")) == json.loads(
         json.dumps(schema())
     )
