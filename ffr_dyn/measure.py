@@ -123,16 +123,28 @@ def _bodies(system: System) -> Named:
         yield f"{n}.omega_bar", _column("rad/s", XYZ, "angular velocity, body axes", "v", omega)
         yield f"{n}.a", _column("m/s^2", XYZ, "acceleration of the origin, global axes", "vd", R)
         yield f"{n}.alpha_bar", _column("rad/s^2", XYZ, "angular acceleration, body axes", "vd", omega)
-        if place.n[b]:
+        if place.n[b] or (body.kept and body.kept[1]):
             yield from _elastic(system, b)
 
 
 def _elastic(system: System, b: int) -> Named:
-    place, n = system.layout, system.scene.bodies[b].name
-    modes, unit = mode_axis(n, place.n[b]), "m sqrt(kg)"
-    yield f"{n}.q", _column(unit, modes, "elastic coordinates (mass-normalised)", "x", place.q(b))
-    yield f"{n}.q_dot", _column(f"{unit}/s", modes, "rates of the elastic coordinates", "v", place.q_dot(b))
-    yield f"{n}.q_ddot", _column(f"{unit}/s^2", modes, "accelerations of the elastic coordinates", "vd", place.q_dot(b))
+    place, body = system.layout, system.scene.bodies[b]
+    numbers, count = body.kept or (tuple(range(place.n[b])), place.n[b])
+    modes, unit, text = mode_axis(body.name, count), "m sqrt(kg)", "elastic coordinates (mass-normalised)"
+
+    def column(unit: str, text: str, of: str, at: slice) -> Entry:
+        return _entry(unit, (modes,), text, lambda view: _spread(getattr(view.record, of)[:, at], numbers, count))
+
+    yield f"{body.name}.q", column(unit, text, "x", place.q(b))
+    yield f"{body.name}.q_dot", column(f"{unit}/s", f"rates of the {text}", "v", place.q_dot(b))
+    yield f"{body.name}.q_ddot", column(f"{unit}/s^2", f"accelerations of the {text}", "vd", place.q_dot(b))
+
+
+def _spread(values: Array, numbers: Sequence[int], count: int) -> Array:
+    """(T, k) values of some coordinates among all `count` of them, zero for those that a planar scene leaves out."""
+    out = np.zeros((len(values), count))
+    out[:, list(numbers)] = values
+    return out
 
 
 def _column(unit: str, axis: Axis, text: str, of: str, at: slice) -> Entry:

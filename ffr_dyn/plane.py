@@ -69,6 +69,7 @@ def _in_plane(scene: Scene, normal: int, *, strict: bool) -> Scene:
                 q=body.q[keep],
                 q_dot=body.q_dot[keep],
                 damping=body.damping[keep],
+                kept=(tuple(keep.tolist()), body.model.n),
             )
         )
         kept[body.name] = keep

@@ -42,6 +42,7 @@ class Body:
     q, q_dot : (n,) elastic coordinates and rates; default zero
     damping  : modal damping ratio, one for all modes or (n,)
     stiffening : use the geometric stiffening that the model has, if any
+    kept     : set where a planar scene leaves modes out: the numbers of those that stay, and how many there were
 
     Pose and motion are a first guess: assembly makes them meet the joints.
     """
@@ -56,6 +57,7 @@ class Body:
     q_dot: Any = None
     damping: Any = 0.0
     stiffening: bool = True
+    kept: tuple[tuple[int, ...], int] | None = None
 
     def __post_init__(self) -> None:
         n, who = self.model.n, f"body {self.name!r}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -222,3 +223,22 @@ def test_a_run_that_failed_tells_the_same_when_it_is_resumed(tmp_path):
         with pytest.raises(SimulationError, match=r"'bad' at t = 0\.50"):
             forward(scene, **settings, resume=tmp_path / "run.nc")
         assert load_result(tmp_path / "run.nc").time[-1] == pytest.approx(0.5)
+
+
+@pytest.mark.slow
+def test_the_first_run_that_compiles_has_the_bits_of_all_later_ones(tmp_path):
+    """A copy of the packages without compiled kernels: a run that has them compiled, then two that find them."""
+    root = Path(__file__).resolve().parent.parent
+    for package in ("ffr_dyn", "ffr_prep"):
+        shutil.copytree(root / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+    script = (
+        "import sys; from test_resume import SCENE, SETTINGS; from ffr_dyn.analyses.forward import forward;"
+        "sys.stdout.buffer.write(forward(SCENE, **SETTINGS)['one.R'].tobytes())"
+    )
+    paths = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(root / "tests")])}
+    run = [sys.executable, "-c", script]
+    first, second = (subprocess.run(run, cwd=tmp_path, env=paths, capture_output=True, check=True) for _ in range(2))
+    assert b"compiling" in first.stderr
+    assert b"compiling" not in second.stderr
+    assert len(first.stdout) == 101 * 24
+    assert first.stdout == second.stdout

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
@@ -14,10 +13,10 @@ import numpy as np
 
 from ffr_dyn.analyses.assemble import Assembled, assemble
 from ffr_dyn.checkpoint import Checkpoint, decode, encode, fingerprint, leaves, restore
+from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import System, new_record, new_stages, new_work
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import ROS2, Integrator
-from ffr_dyn.kernels.options import is_compiled
 from ffr_dyn.kernels.system import AT
 from ffr_dyn.kernels.tables import NOT_FINITE, OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, Record, Work
 from ffr_dyn.measure import Entry, Memory, measure, needs_every_step, selected
@@ -80,9 +79,8 @@ def forward(
     substeps, rows = _counts(end - start, output_step, method.step)
     _check_step(scene, method)
     assembled = assemble(scene, time=start)
-    scene = assembled.system.scene  # of a planar scene, what moves in the plane
     wanted = selected(assembled.system, outputs)
-    _announce_compilation(method)
+    ensure_compiled(method)
     span = (start, end, output_step)
     mark = _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
     header = _header(scene, assembled, method, stabilisation, span)
@@ -130,11 +128,6 @@ def _check_step(scene: Scene, method: Integrator) -> None:
             f"{omega / 2 / np.pi:.4g} Hz, which needs a step below {RK4_LIMIT / omega:.2g} s (joints lower this further); "
             "use ROS2, fewer modes or a smaller step"
         )
-
-
-def _announce_compilation(method: Integrator) -> None:
-    if not is_compiled(method.run.__name__):
-        print("ffr-dyn: compiling the kernels, once (about half a minute) ...", file=sys.stderr, flush=True)
 
 
 def _started(assembled: Assembled, method: Integrator, start: float, wanted: Mapping[str, Entry]) -> _Run:

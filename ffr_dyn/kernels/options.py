@@ -62,9 +62,4 @@ def discard_stale_kernels() -> None:
         return
 
 
-def is_compiled(function_name: str) -> bool:
-    """Whether a compiled form of the kernel is on disk."""
-    return any(f".{function_name}-" in path.name for path in _compiled())
-
-
 discard_stale_kernels()
