@@ -6,7 +6,7 @@ here as plain matrices. Small motions, Jacobians and null spaces are in the velo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -93,14 +93,6 @@ def unit_rows(numbers: Array, size: int) -> Array:
     rows = np.zeros((numbers.size, size))
     rows[np.arange(numbers.size), numbers] = 1.0
     return rows
-
-
-def with_efforts(at: Evaluator, first: int, wrenches: Array) -> Evaluator:
-    """The same memory for the scene with other constants (K, 6) in its loads from number `first` on."""
-    model = at.system.model
-    value = model.loads.value.copy()
-    value[first : first + len(wrenches)] = wrenches
-    return replace(at, system=replace(at.system, model=model._replace(loads=model.loads._replace(value=value))))
 
 
 def record_states(at: Evaluator, times: Array, xs: Array, vs: Array) -> Record:

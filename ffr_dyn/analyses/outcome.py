@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.analyses.actuators import joint_named
+from ffr_dyn.analyses.efforts import joint_named
 from ffr_dyn.analyses.forward import geometry
 from ffr_dyn.drivers import Driver
 from ffr_dyn.equations import System
