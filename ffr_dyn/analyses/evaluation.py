@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.forward import failure
+from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import System, new_record, new_stages, new_work
 from ffr_dyn.inertia import mass_matrix
 from ffr_dyn.integrators import RK4
@@ -58,6 +59,7 @@ class Evaluation:
 
 def evaluator(system: System) -> Evaluator:
     """Memory for evaluations of a compiled scene."""
+    ensure_compiled(RK4(1.0))
     return Evaluator(system, new_work(system.model), new_stages(system, RK4.stage_count), new_record(system, 1))
 
 
