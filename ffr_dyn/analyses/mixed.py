@@ -263,12 +263,10 @@ def _recorded(
 
 
 def _efforts_found(system: System, record: Record, efforts: tuple[Effort, ...], u: Array) -> dict[str, Quantity]:
-    """Efforts (T, U) and their powers: of a joint's as it was recorded, of a marker's at the size of one."""
+    """Efforts (T, U) and their powers."""
     powers, _ = measure(system, record, {}, selected(system, [f"{effort.name}.power" for effort in efforts]))
     found = {}
     for effort, values in zip(efforts, u.T, strict=True):
         text = "effort that realises the known motions"
         found[f"{effort.name}.effort"] = Quantity(values, unit(effort), (), text)
-        power = powers[f"{effort.name}.power"].values * (values if isinstance(effort, MarkerEffort) else 1.0)
-        found[f"{effort.name}.power"] = Quantity(power, "W", (), "power of the effort into the scene")
-    return found
+    return found | powers
