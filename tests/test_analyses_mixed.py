@@ -273,6 +273,7 @@ def test_the_force_that_determines_the_motion_is_chosen():
     forces = JointEffort("push2", "rail2", "stroke"), MarkerEffort("push1", "one.c", (1, 0, 0))
     found = mixed(scene, unknown=forces, end=1.0, output_step=0.1)
     np.testing.assert_allclose(found["push1.effort"], 2.0, atol=1e-9)
+    np.testing.assert_allclose(found["push1.power"], 2.0 * found["one.v.x"], atol=1e-9)
     assert "push2.effort" not in found.quantities
 
 
@@ -304,3 +305,15 @@ def test_a_motion_without_coordinates_is_refused():
     )
     with pytest.raises(InputError, match="not described by joint and elastic coordinates"):
         mixed(hung, unknown=(MarkerEffort("p", "two.c", (1, 0, 0)),), end=1.0, output_step=0.1)
+
+
+def test_work_of_the_unknown_force_is_the_change_of_energy():
+    """The tip path again: what the motor does becomes kinetic and strain energy, but for the modal damping."""
+    scene = one_link(TIP)
+    undamped = replace(scene, bodies=tuple(replace(body, damping=0.0) for body in scene.bodies))
+    found = mixed(undamped, unknown=(MOTOR,), end=0.6, output_step=5e-3)
+    power = found["motor.power"]
+    np.testing.assert_allclose(power, found["motor.effort"] * found["bearing.angle_rate"], atol=1e-12)
+    work = np.concatenate([[0.0], np.cumsum(2.5e-3 * (power[1:] + power[:-1]))])
+    energy = found["energy.total"] - found["energy.total"][0]
+    np.testing.assert_allclose(work, energy, atol=2e-3 * energy.max())

@@ -25,9 +25,11 @@ from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.outcome import efforts, output_times, outputs, result_of, with_quantities
 from ffr_dyn.analyses.servo import Moment, ServoMotion, at_moment, internal_values, servo, slope, slope_matrix
 from ffr_dyn.drivers import Driver, PointDriver
-from ffr_dyn.equations import blocks_of, compile_scene
+from ffr_dyn.equations import System, blocks_of, compile_scene
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import Integrator
+from ffr_dyn.kernels.tables import Record
+from ffr_dyn.measure import measure, selected
 from ffr_dyn.result import Quantity, Result
 from ffr_dyn.scene import GROUND, Scene
 from ffr_dyn.stabilisation import Projection
@@ -255,9 +257,16 @@ def _recorded(
         here = sized(silent, own.unknown, moment.u)
         row = record_states(here, np.clip([time], *own.span), moment.x[None], moment.v[None])
         rows.append(row._replace(time=np.array([time])))
-    result = result_of(at.system, joined(rows), attributes)
-    u = np.array([moment.u for moment in moments])
+    record = joined(rows)
+    found = _efforts_found(at.system, record, own.unknown, np.array([moment.u for moment in moments]))
+    return with_quantities(result_of(at.system, record, attributes), found, path)
+
+
+def _efforts_found(system: System, record: Record, efforts: tuple[Effort, ...], u: Array) -> dict[str, Quantity]:
+    """Efforts (T, U) and their powers."""
+    powers, _ = measure(system, record, {}, selected(system, [f"{effort.name}.power" for effort in efforts]))
     found = {}
-    for k, effort in enumerate(own.unknown):
-        found[f"{effort.name}.effort"] = Quantity(u[:, k], unit(effort), (), "effort that realises the known motions")
-    return with_quantities(result, found, path)
+    for effort, values in zip(efforts, u.T, strict=True):
+        text = "effort that realises the known motions"
+        found[f"{effort.name}.effort"] = Quantity(values, unit(effort), (), text)
+    return found | powers
