@@ -194,6 +194,8 @@ def _of(factor: float | Curve, x: float) -> float:
 
 
 def _friction(law: JointFriction, normal: float, rate: float) -> float:
+    if normal < 0:  # lifted off
+        return -law.viscous * rate
     size = law.coulomb
     if law.static is not None and law.stribeck is not None:
         size += (law.static - law.coulomb) * np.exp(-((rate / law.stribeck) ** 2))

@@ -38,19 +38,36 @@ def cli() -> None:
 @click.option("--end", type=float, help="End of the run [s], instead of the scene's.")
 @click.option("--step", type=float, help="Time step [s], instead of the scene's.")
 @click.option("--method", type=click.Choice(["ros2", "rk4"]), help="Integrator, instead of the scene's.")
-def run(scene: Path, output: Path | None, end: float | None, step: float | None, method: str | None) -> None:
+@click.option(
+    "-p", "--parameter", "parameters", multiple=True, metavar="NAME=VALUE", help="A parameter of the scene file."
+)
+@click.option(
+    "--keep", multiple=True, metavar="NAME", help="Quantities to keep, instead of the scene's; * and ? match."
+)
+@click.option("--resume", is_flag=True, help="Go on where the result file ends, as if the run had never stopped.")
+def run(
+    scene: Path,
+    output: Path | None,
+    end: float | None,
+    step: float | None,
+    method: str | None,
+    parameters: tuple[str, ...],
+    keep: tuple[str, ...],
+    resume: bool,
+) -> None:
     """Forward dynamics of SCENE: integrate the motion and write the result file.
 
     ros2 treats the elastic modes implicitly: no elastic frequency limits its step. rk4 is explicit, of fourth order:
     exact for soft bodies at small steps, unstable when step times the highest circular frequency exceeds about 2.8.
-    Drift off the constraints is held by projection and reported.
+    Drift off the constraints is held by projection and reported. A run that was killed keeps what its last flush wrote,
+    a few seconds old; --resume goes on from there to the same bits. Without a result file it starts at the beginning.
     """
     from ffr_dyn.analyses.forward import forward
     from ffr_dyn.integrators import METHODS
     from ffr_dyn.progress import progress
     from ffr_dyn.scene_file import load_scene
 
-    loaded, settings = load_scene(scene)
+    loaded, settings = load_scene(scene, _assignments(parameters))
     output = output or scene.with_suffix(".nc")
     chosen = METHODS[method or type(settings.method).__name__.lower()]
     finish = settings.end if end is None else end
@@ -62,12 +79,33 @@ def run(scene: Path, output: Path | None, end: float | None, step: float | None,
             output_step=settings.output_step,
             method=chosen(settings.method.step if step is None else step),
             stabilisation=settings.stabilisation,
+            outputs=keep or settings.outputs,
             path=output,
+            resume=output if resume else None,
             progress=update,
         )
     for line in summary(result.attributes):
         click.echo(line)
     click.echo(f"result       {output}")
+
+
+def _assignments(parameters: tuple[str, ...]) -> dict[str, str]:
+    """{"crank.length": "0.15"} of ("crank.length=0.15",)."""
+    for text in parameters:
+        if "=" not in text:
+            raise InputError(f"-p {text}: write it as NAME=VALUE")
+    pairs = (text.partition("=") for text in parameters)
+    return {name.strip(): value.strip() for name, _, value in pairs}
+
+
+@cli.command()
+def schema() -> None:
+    """The JSON schema of scene files, for editors and programs that write them."""
+    import json
+
+    from ffr_dyn.scene_schema import schema as made
+
+    click.echo(json.dumps(made(), indent=2))
 
 
 def summary(attributes: object) -> list[str]:

@@ -11,7 +11,7 @@ import click
 from ffr_dyn.errors import InputError
 
 if TYPE_CHECKING:
-    from ffr_dyn.analyses.actuators import Actuator
+    from ffr_dyn.analyses.efforts import Effort
 
 _FORCES = """\b
 Forces are written as
@@ -146,9 +146,9 @@ def linearise(
 COMMANDS = (check, kinematic, static, inverse, mixed, linearise)
 
 
-def force_of(text: str) -> Actuator:
+def force_of(text: str) -> Effort:
     """A force as the command line writes it. Raises InputError that shows how."""
-    from ffr_dyn.analyses.actuators import JointForce, MarkerForce
+    from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort
 
     name, equals, rest = text.partition("=")
     place, colon, along = rest.partition(":")
@@ -156,12 +156,12 @@ def force_of(text: str) -> Actuator:
         raise InputError(f"{text!r} is not a force: write name=joint.angle or name=body.interface:x,y,z")
     if not colon:
         joint, _, coordinate = place.rpartition(".")
-        return JointForce(name, joint, coordinate)
+        return JointEffort(name, joint, coordinate)
     try:
         direction = tuple(float(number) for number in along.split(","))
     except ValueError:
         raise InputError(f"{text!r}: the direction {along!r} is not three numbers with commas between") from None
-    return MarkerForce(name, place, direction)
+    return MarkerEffort(name, place, direction)
 
 
 def _over_time(scene: Path, output: Path | None, analysis: Callable[..., Any]) -> None:

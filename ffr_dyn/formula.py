@@ -9,8 +9,10 @@ from __future__ import annotations
 import ast
 import difflib
 import math
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ffr_dyn.errors import InputError
 from ffr_dyn.operations import (
@@ -54,7 +56,7 @@ class Operation:
 Expression = TimeFunction | Measured | Operation
 
 
-def formula(text: str, parameters: Mapping[str, float] = {}, what: str = "formula") -> TimeFunction:
+def formula(text: str, parameters: Mapping[str, Any] = {}, what: str = "formula") -> TimeFunction:
     """The function of time that a formula describes, with exact derivatives.
 
     Raises InputError that names `what`, the place in the text and the nearest known name.
@@ -68,7 +70,7 @@ def formula(text: str, parameters: Mapping[str, float] = {}, what: str = "formul
     )
 
 
-def number(text: str, parameters: Mapping[str, float] = {}, what: str = "formula") -> float:
+def number(text: str, parameters: Mapping[str, Any] = {}, what: str = "formula") -> float:
     """The value of a formula without t. Raises InputError when it depends on time or on the motion."""
     function = formula(text, parameters, what)
     if not is_constant(function):
@@ -81,7 +83,7 @@ def is_constant(function: TimeFunction) -> bool:
     return function.kind == POLYNOMIAL and len(function.data) == 1
 
 
-def parse(text: str, parameters: Mapping[str, float], what: str) -> Expression:
+def parse(text: str, parameters: Mapping[str, Any], what: str) -> Expression:
     """A formula as a function of time or, where it names measured quantities, as an expression of those.
 
     Names that are no parameters are taken for measured quantities when they contain a dot.
@@ -121,7 +123,7 @@ class _Reader:
     """Turns the syntax tree of one text into an expression, and refuses whatever is not listed."""
 
     text: str
-    parameters: Mapping[str, float]
+    parameters: Mapping[str, Any]
     what: str
 
     def read(self, node: ast.expr, depth: int) -> Expression:
@@ -152,7 +154,7 @@ class _Reader:
     def _named(self, node: ast.expr) -> Expression:
         name = self._dotted(node)
         if name in self.parameters:
-            return constant(self.parameters[name])
+            return self._parameter(node, self.parameters[name])
         if name in CONSTANTS:
             return constant(CONSTANTS[name])
         if name == "t":
@@ -161,6 +163,11 @@ class _Reader:
             return Measured(name)
         known = [*self.parameters, *CONSTANTS, "t", *FUNCTIONS]
         raise self._refusal(node, f"is not known{_nearest(name, known)}")
+
+    def _parameter(self, node: ast.expr, given: object) -> Expression:
+        if type(given) not in (int, float):
+            raise self._refusal(node, f"is the parameter {given!r}, which is not a number")
+        return constant(float(given))  # type: ignore[arg-type]
 
     def _dotted(self, node: ast.expr) -> str:
         """a.b.c, and a.b[3] for what has a number in its name."""
@@ -206,7 +213,7 @@ class _Reader:
         return InputError(f"{self.what}: in the formula {self.text!r}, {piece[:80]!r} {why}")
 
 
-def _nearest(name: str, known: Mapping[str, object] | list[str]) -> str:
+def _nearest(name: str, known: Mapping[str, Any] | list[str]) -> str:
     close = difflib.get_close_matches(name, list(known), 1)
     return f"; did you mean {close[0]!r}?" if close else f"; known are: {', '.join(known) or 'none'}"
 
@@ -217,7 +224,7 @@ def _nearest(name: str, known: Mapping[str, object] | list[str]) -> str:
 def text_of(expression: Expression) -> str:
     """A formula that `parse` reads back as the same expression. Raises InputError for what has no formula (a table)."""
     if isinstance(expression, Measured):
-        return expression.name
+        return re.sub(r"\.(\d+)", r"[\1]", expression.name)
     if isinstance(expression, Operation) or expression.kind == OPERATION:
         op, parameter = (
             (expression.op, expression.parameter) if isinstance(expression, Operation) else _coded(expression)

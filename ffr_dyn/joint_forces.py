@@ -54,8 +54,8 @@ class JointFriction:
         -normal (coulomb + (static - coulomb) exp(-(c_dot / stribeck)^2)) tanh(c_dot / creep) - viscous c_dot
 
     coulomb : friction force [N] with normal = 1, or coefficient of friction with `normal` [N] (times radius for an angle)
-    normal  : a number not below zero, a time function or a Python function of time. It is given: the joint's reaction does
-              not enter
+    normal  : a number not below zero, a time function or a Python function of time, below zero while the surfaces are
+              apart. It is given: the joint's reaction does not enter
     creep   : [m/s]; a load below friction is not held but creeps, at creep atanh(load / coulomb)
     static, stribeck : friction at rest, not below coulomb, and the velocity [m/s] over which it falls (Stribeck 1902);
               both or neither

@@ -73,7 +73,8 @@ def euler_parameters(rotation: Any, what: str = "rotation") -> Array:
     if value.shape == (4,):
         if abs(np.linalg.norm(value) - 1) > 1e-6:
             raise InputError(f"{what}: Euler parameters must have length 1, not {np.linalg.norm(value):.6g}")
-        return value / np.linalg.norm(value)
+        length = np.linalg.norm(value)
+        return value if abs(length - 1) < 4e-16 else value / length  # normalised once, the bits stay
     if value.shape == (3, 3):
         if np.abs(value @ value.T - np.eye(3)).max() > 1e-6 or np.linalg.det(value) < 0:
             raise InputError(f"{what}: the matrix is not a proper rotation (orthogonal, determinant +1)")

@@ -2,7 +2,7 @@
 
     name = "pendulum"
     gravity = [0, -9.81, 0]
-    [simulation]
+    [analysis]
     end = 2.0
     output_step = 0.01
     [ground]
@@ -15,147 +15,35 @@
     j = "rod.hinge"
     axis = [0, 0, 1]
 
-Paths are relative to the file. Angles in rad, everything in SI units. The whole schema is in the models below.
+Paths are relative to the file. Angles in rad, everything in SI units unless a unit is written. The whole schema is in
+`ffr_dyn.scene_schema`; `ffr_dyn.scene_text` writes a scene as such a file. A scene file is data: nothing in it is run.
 """
 
 from __future__ import annotations
 
-import tomllib
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ValidationError
 
-from ffr_dyn.drivers import Driver
 from ffr_dyn.errors import InputError
-from ffr_dyn.forces import Load, SpringDamper
+from ffr_dyn.forces import Load
+from ffr_dyn.formula import is_constant
 from ffr_dyn.integrators import METHODS, Integrator
-from ffr_dyn.joints import Joint
+from ffr_dyn.joint_forces import Actuator
+from ffr_dyn.parameters import Parameters, flattened, overridden, substituted
 from ffr_dyn.scene import Body, Scene
+from ffr_dyn.scene_schema import TABLES, BodyEntry, ForwardEntry, Kind, SceneEntry, keys_of
+from ffr_dyn.scene_source import Source, origin, read_source
 from ffr_dyn.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
-from ffr_dyn.timefunction import TimeFunction, harmonic, polynomial, table
-from ffr_prep.body import FlexibleBody, load_body, rigid_body, truncated
+from ffr_dyn.state_formula import StateFormula, check_names
+from ffr_dyn.timefunction import TimeFunction, constant
+from ffr_prep.body import BodyError, FlexibleBody, load_body, rigid_body, truncated, with_point
 
-Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
-
-
-class _Strict(BaseModel):
-    """Unknown keys are mistakes; numbers must be finite."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-
-class HarmonicEntry(_Strict):
-    """mean + amplitude sin(2 pi frequency t + phase)."""
-
-    amplitude: float
-    frequency: float
-    phase: float = 0.0
-    mean: float = 0.0
-
-
-class FunctionEntry(_Strict):
-    """A function of time: one of `polynomial`, `harmonic`, `table` (times and values) or `table_file` (two CSV columns)."""
-
-    polynomial: list[float] | None = None
-    harmonic: HarmonicEntry | None = None
-    table: tuple[list[float], list[float]] | None = None
-    table_file: Path | None = None
-
-    @model_validator(mode="after")
-    def _one(self) -> FunctionEntry:
-        given = [key for key in ("polynomial", "harmonic", "table", "table_file") if getattr(self, key) is not None]
-        if len(given) != 1:
-            raise ValueError("give exactly one of polynomial, harmonic, table, table_file")
-        return self
-
-
-class BodyEntry(_Strict):
-    """A flexible body from a file, or a rigid one from mass, inertia (about the centre of mass) and named points."""
-
-    file: Path | None = None
-    modes: int | None = Field(default=None, ge=0)
-    mass: float | None = None
-    inertia: Vector | list[Vector] | None = None
-    centre_of_mass: Vector = [0.0, 0.0, 0.0]
-    points: dict[str, Vector] = {}
-    position: Vector = [0.0, 0.0, 0.0]
-    rotation: list[float] = [0.0, 0.0, 0.0]
-    velocity: Vector = [0.0, 0.0, 0.0]
-    omega_bar: Vector = [0.0, 0.0, 0.0]
-    damping: float | list[float] = 0.0
-    stiffening: bool = True
-
-    @model_validator(mode="after")
-    def _kind(self) -> BodyEntry:
-        if (self.file is None) == (self.mass is None):
-            raise ValueError("give either file (a body from ffr-prep) or mass and inertia (a rigid body)")
-        if self.mass is not None and self.inertia is None:
-            raise ValueError("a rigid body needs inertia, about its centre of mass: three principal values or 3 x 3")
-        return self
-
-
-class JointEntry(_Strict):
-    kind: str
-    i: str
-    j: str
-    axis: Vector | list[Vector] = [0.0, 0.0, 1.0]
-    axis_j: Vector | list[Vector] | None = None
-
-
-class DriverEntry(FunctionEntry):
-    joint: str
-    coordinate: Literal["angle", "stroke"] = "angle"
-
-
-class LoadEntry(_Strict):
-    """Components are numbers or functions of time."""
-
-    marker: str
-    force: list[float | FunctionEntry] = [0.0, 0.0, 0.0]
-    moment: list[float | FunctionEntry] = [0.0, 0.0, 0.0]
-    axes: Literal["global", "body"] = "global"
-
-
-class SpringEntry(_Strict):
-    i: str
-    j: str
-    stiffness: float
-    damping: float = 0.0
-    free_length: float = 0.0
-    preload: float = 0.0
-
-
-class StabilisationEntry(_Strict):
-    kind: Literal["projection", "baumgarte", "none"] = "projection"
-    tolerance: float = Field(default=1e-9, gt=0)
-    alpha: float = 0.0
-    beta: float = 0.0
-
-
-class SimulationEntry(_Strict):
-    """Settings of a forward run; step defaults to a tenth of output_step."""
-
-    end: float
-    output_step: float
-    start: float = 0.0
-    method: Literal["ros2", "rk4"] = "ros2"
-    step: float | None = None
-    stabilisation: StabilisationEntry = StabilisationEntry()
-
-
-class SceneEntry(_Strict):
-    name: str = "scene"
-    gravity: Vector = [0.0, 0.0, 0.0]
-    simulation: SimulationEntry
-    ground: dict[str, Vector] = {}
-    bodies: dict[str, BodyEntry]
-    joints: dict[str, JointEntry] = {}
-    drivers: dict[str, DriverEntry] = {}
-    loads: dict[str, LoadEntry] = {}
-    springs: dict[str, SpringEntry] = {}
+WHOLE = ("name", "gravity", "ground", "base_acceleration")  # fields of a scene that are no tables of entries
 
 
 @dataclass(frozen=True)
@@ -167,110 +55,145 @@ class Settings:
     output_step: float
     method: Integrator
     stabilisation: Stabilisation
+    outputs: tuple[str, ...] = ("default",)
 
 
-def load_scene(path: str | Path) -> tuple[Scene, Settings]:
-    """Read a scene file. Raises InputError that names the entry, its value and what is expected."""
+def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Scene, Settings]:
+    """Read a scene file.
+
+    parameters : values, as text, in place of those in the file, such as {"crank.length": "0.15"}
+
+    Raises InputError that names the file, the entry, its value and what is expected, with the nearest known name.
+    """
     path = Path(path)
+    source = read_source(path)
     try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"scene file {path} does not exist") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path} is not a readable TOML file: {error}") from None
+        values = Parameters(overridden(flattened(source.tree.pop("parameters", {})), parameters))
+        for name in values:
+            values[name]
+        tree = substituted(source.tree, values, "")
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     try:
-        entry = SceneEntry.model_validate(raw)
+        entry = SceneEntry.model_validate(tree, context={"parameters": values})
     except ValidationError as error:
-        raise InputError(f"{path}: {_explained(error)}") from None
-    return _scene(entry, path.parent), _settings(entry.simulation)
+        raise InputError(_explained(error, source)) from None
+    return _scene(entry, source), _settings(entry.analysis, entry.outputs)
 
 
-def _explained(error: ValidationError) -> str:
-    """All complaints, one a line: where, what, and the value."""
-    lines = []
+def _explained(error: ValidationError, source: Source) -> str:
+    """All complaints: where, what, and the value."""
+    lines: dict[str, None] = {}
     for item in error.errors():
-        where = ".".join(str(part) for part in item["loc"])
-        value = (
-            ""
-            if item["type"] in ("missing", "extra_forbidden") or isinstance(item["input"], dict)
-            else f" (it is {item['input']!r})"
-        )
-        text = (
-            "is not a known entry here"
-            if item["type"] == "extra_forbidden"
-            else item["msg"].removeprefix("Value error, ")
-        )
-        lines.append(f"{where or 'file'}: {text}{value}")
+        keys = tuple(str(part) for part in item["loc"])
+        plain = isinstance(item["input"], (str, int, float, bool, list))
+        value = f" (it is {item['input']!r})" if plain and item["type"] != "missing" else ""
+        text = item["msg"].removeprefix("Value error, ").removeprefix("it: ")
+        where = ".".join(key for key in keys if not key.startswith(("[", "list[", "function-")))
+        lines[f"{origin(source, keys)}: {where or 'file'}: {text}{value}"] = None
     return "; ".join(lines)
 
 
-def _scene(entry: SceneEntry, folder: Path) -> Scene:
-    return Scene(
-        name=entry.name,
-        gravity=entry.gravity,
-        ground=entry.ground,
-        bodies=tuple(_body(name, body, folder) for name, body in entry.bodies.items()),
-        joints=tuple(Joint(name, j.kind, j.i, j.j, j.axis, j.axis_j) for name, j in entry.joints.items()),
-        drivers=tuple(
-            Driver(name, d.joint, _function(d, folder, f"driver {name!r}"), d.coordinate)
-            for name, d in entry.drivers.items()
-        ),
-        loads=tuple(_load(name, load, folder) for name, load in entry.loads.items()),
-        springs=tuple(SpringDamper(name, **spring.model_dump()) for name, spring in entry.springs.items()),
-    )
+# ---- from entries to a scene --------------------------------------------------------------------------------------
 
 
-def _body(name: str, entry: BodyEntry, folder: Path) -> Body:
-    return Body(
-        name,
-        _model(name, entry, folder),
-        position=entry.position,
-        rotation=entry.rotation,
-        velocity=entry.velocity,
-        omega_bar=entry.omega_bar,
-        damping=entry.damping,
-        stiffening=entry.stiffening,
-    )
-
-
-def _model(name: str, entry: BodyEntry, folder: Path) -> FlexibleBody:
-    if entry.file is not None:
-        model = load_body(folder / entry.file)
-        return model if entry.modes is None else truncated(model, entry.modes)
-    return rigid_body(
-        name,
-        mass=entry.mass or 0.0,
-        inertia=np.array(entry.inertia),
-        centre_of_mass=np.array(entry.centre_of_mass),
-        points={key: np.array(at) for key, at in entry.points.items()},
-    )
-
-
-def _load(name: str, entry: LoadEntry, folder: Path) -> Load:
-    def components(values: list[float | FunctionEntry]) -> tuple[float | TimeFunction, ...]:
-        return tuple(v if isinstance(v, float) else _function(v, folder, f"load {name!r}") for v in values)
-
-    return Load(name, entry.marker, components(entry.force), components(entry.moment), axes=entry.axes)
-
-
-def _function(entry: FunctionEntry, folder: Path, what: str) -> TimeFunction:
-    if entry.polynomial is not None:
-        return polynomial(*entry.polynomial)
-    if entry.harmonic is not None:
-        return harmonic(**entry.harmonic.model_dump())
-    if entry.table is not None:
-        return table(np.array(entry.table[0]), np.array(entry.table[1]))
-    file = folder / (entry.table_file or "")
+def _scene(entry: Any, source: Source) -> Scene:
+    tables: dict[str, Any] = {
+        table: tuple(_declared(kinds, (table, name), item, source) for name, item in getattr(entry, table).items())
+        for table, kinds in TABLES.items()
+    }
+    bodies = tuple(_body(name, body, source) for name, body in entry.bodies.items())
     try:
-        columns = np.loadtxt(file, delimiter=",", ndmin=2, comments="#")
-    except (OSError, ValueError) as error:
-        raise InputError(f"{what}: {file} is not a file of two columns of numbers, time and value ({error})") from None
-    if columns.shape[1] != 2:
-        raise InputError(f"{what}: {file} has {columns.shape[1]} columns; it needs two, time and value")
-    return table(columns[:, 0], columns[:, 1])
+        scene = Scene(bodies=bodies, **{key: getattr(entry, key) for key in WHOLE}, **tables)
+        for force in (*scene.loads, *scene.forces):
+            if isinstance(force, (Load, Actuator)) and isinstance(force.function, StateFormula):
+                check_names(scene, force.function, f"force {force.name!r}")
+    except InputError as error:
+        raise InputError(f"{origin(source, ())}: {error}") from None
+    return scene
 
 
-def _settings(entry: SimulationEntry) -> Settings:
+def _declared(kinds: tuple[Kind, ...], keys: tuple[str, str], entry: BaseModel, source: Source) -> Any:
+    try:
+        return _made(_kind(kinds, entry), keys[1], entry)
+    except InputError as error:
+        raise InputError(f"{origin(source, keys)}: {error}") from None
+
+
+def _kind(kinds: tuple[Kind, ...], entry: BaseModel) -> Kind:
+    word = getattr(entry, "kind", "") if len(kinds) > 1 else kinds[0].word
+    return next(kind for kind in kinds if kind.word == word)
+
+
+def _made(kind: Kind, name: str, entry: BaseModel) -> Any:
+    """The declaration that an entry of the file means."""
+    given = {f.name: getattr(entry, f.name) for f in keys_of(kind)}
+    for f in keys_of(kind):
+        if given[f.name] is None and f.default is not None:
+            del given[f.name]
+    special: dict[type, Callable[..., Any]] = {Load: _load, Actuator: _actuator}
+    return special.get(kind.made, kind.made)(name=name, **given)
+
+
+def _load(force: list[Any], moment: list[Any], **given: Any) -> Load:
+    """Components that depend on the motion go to the load's function, the others stay functions of time."""
+    timed, moving = _separated((*force, *moment))
+    return Load(force=timed[:3], moment=timed[3:], function=moving, **given)
+
+
+def _actuator(force: Any = 0.0, **given: Any) -> Actuator:
+    """As `_load`."""
+    timed, moving = _separated((force,))
+    return Actuator(force=timed[0], function=moving, **given)
+
+
+def _separated(given: tuple[Any, ...]) -> tuple[list[float | TimeFunction], StateFormula | None]:
+    """Functions of time (zero where a component is none), and those that depend on the motion (zero likewise) if any does."""
+    components = [constant(c) if isinstance(c, float) else c for c in given]  # a default is a number
+    timed = [_plain(c) if isinstance(c, TimeFunction) else 0.0 for c in components]
+    moving = tuple(constant(0.0) if isinstance(c, TimeFunction) else c for c in components)
+    follows = any(not isinstance(c, TimeFunction) for c in components)
+    return timed, StateFormula(moving) if follows else None
+
+
+def _plain(function: TimeFunction) -> float | TimeFunction:
+    return function.data[0] if is_constant(function) else function
+
+
+def _body(name: str, entry: BodyEntry, source: Source) -> Body:
+    try:
+        return Body(
+            name,
+            _model(name, entry),
+            position=entry.position,
+            rotation=entry.rotation,
+            velocity=entry.velocity,
+            omega_bar=entry.omega_bar,
+            q=entry.q,
+            q_dot=entry.q_dot,
+            damping=entry.damping,
+            stiffening=entry.stiffening,
+        )
+    except (InputError, BodyError) as error:
+        raise InputError(f"{origin(source, ('bodies', name))}: bodies.{name}: {error}") from None
+
+
+def _model(name: str, entry: BodyEntry) -> FlexibleBody:
+    points = {key: np.array(at) for key, at in entry.points.items()}
+    if entry.file is not None:
+        model = load_body(entry.file)
+        model = model if entry.modes is None else truncated(model, entry.modes)
+        for point, at in points.items():
+            model = with_point(model, point, at)
+        return model
+    rigid: dict[str, Any] = {"mass": entry.mass, "points": points}
+    if entry.inertia is not None:
+        return rigid_body(name, inertia=np.array(entry.inertia), centre_of_mass=np.array(entry.centre_of_mass), **rigid)
+    model = rigid_body(name, inertia=np.eye(3), **rigid)
+    return replace(model, r_dm=np.array(entry.r_dm), rr_dm=np.array(entry.rr_dm))
+
+
+def _settings(entry: ForwardEntry, outputs: list[str]) -> Settings:
     step = entry.output_step / 10 if entry.step is None else entry.step
     keep = entry.stabilisation
     choice: dict[str, Any] = {
@@ -278,4 +201,5 @@ def _settings(entry: SimulationEntry) -> Settings:
         "baumgarte": Baumgarte(keep.alpha, keep.beta),
         "none": Drifting(),
     }
-    return Settings(entry.start, entry.end, entry.output_step, METHODS[entry.method](step), choice[keep.kind])
+    method = METHODS[entry.method](step)
+    return Settings(entry.start, entry.end, entry.output_step, method, choice[keep.kind], tuple(outputs))

@@ -2,8 +2,8 @@
 
 The unknowns are cut in two halves by a plane across their longest extent, again and again; what separates two halves is
 eliminated after both. The separator is the smallest set of points that covers all edges across the cut, which by
-Konig's theorem follows from a maximum matching of these edges. On second-order tetrahedra it has a quarter fewer points
-than the layer of points along the plane, and the factorisation half the work.
+Konig's theorem follows from a maximum matching of these edges. On second-order tetrahedra this
+halves the work of the factorisation, compared with the layer of points along the plane.
 
 Sources: A. George, SIAM J. Numer. Anal. 10 (1973) 345-363 (nested dissection); A. Pothen, C.-J. Fan, ACM Trans. Math.
 Softw. 16 (1990) 303-324 (separators from matchings).

@@ -14,7 +14,7 @@ from ffr_dyn.result_file import load_result
 SCENE = """
 name = "rod"
 gravity = [0, -9.81, 0]
-[simulation]
+[analysis]
 end = 0.5
 output_step = 0.05
 step = 0.005
@@ -35,7 +35,7 @@ j = "rod.hinge"
 DRIVER = """
 [drivers.motor]
 joint = "hinge"
-polynomial = [0.3, 2.0]
+function = "0.3 + 2 * t"
 """
 
 

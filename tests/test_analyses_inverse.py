@@ -102,7 +102,7 @@ def test_inverse_and_kinematics_agree_for_rigid_bodies():
 
 def test_the_efforts_found_drive_the_freed_mechanism():
     """Forward under a known moment, inverse along the motion recorded: the moment comes back."""
-    from ffr_dyn.analyses.actuators import recorded
+    from ffr_dyn.analyses.efforts import recorded
 
     free = slider_crank(0.2, 0.7)
     moment = harmonic(amplitude=2.0, frequency=1.0)
@@ -152,3 +152,19 @@ def test_work_of_the_drivers_is_the_change_of_energy():
 def test_bad_input():
     with pytest.raises(InputError, match=r"inverse dynamics needs.*joint0\.angle"):
         inverse(replace(arm("revolute"), drivers=()), end=1.0, output_step=0.1)
+
+
+def test_quasi_static_deformation_needs_joints_that_rigid_bodies_can_meet():
+    """A body on two bearings of one axle: met by deformation only."""
+    body = replace(flexible_arm().bodies[1], position=(0, 0, 0))
+    points = {key: body.model.interface(key).position for key in "ab"}
+    scene = Scene(
+        (body,),
+        (Joint("A", "revolute", "ground.a", "b.a"), Joint("C", "revolute", "ground.b", "b.b")),
+        ground=points,
+    )
+    line = points["b"] - points["a"]
+    joints = tuple(replace(joint, axis=line, axis_j=line) for joint in scene.joints)
+    scene = replace(scene, joints=joints, drivers=(Driver("d", "A", polynomial(0.0, 1.0)),))
+    with pytest.raises(InputError, match="met by deformation only"):
+        inverse(scene, end=0.1, output_step=0.05, elastic=QuasiStatic())

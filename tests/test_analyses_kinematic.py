@@ -187,3 +187,10 @@ def test_a_driver_that_starts_at_rest_does_turn_a_scene_that_lies_in_two_planes(
     )
     for result in (kinematic(rod, end=1.0, output_step=0.5), forward(rod, end=1.0, output_step=0.5, method=RK4(1e-2))):
         np.testing.assert_allclose(result["A.angle"], [0, 0.5**4, 1], atol=1e-6)
+
+
+def test_a_singular_output_time_is_refused():
+    """Slider-crank with r = l exactly at 90 degrees: the slider's velocity is not determined there."""
+    scene = slider_crank(0.5, 0.5, Driver("motor", "main", polynomial(1.0, np.pi / 2 - 1.0)), offset=1.0)
+    with pytest.raises(SimulationError, match=r"at t = 1 s the position is singular|locks"):
+        kinematic(scene, end=2.0, output_step=0.5)

@@ -10,8 +10,8 @@ from scipy.linalg import eigh
 from test_analyses_kinematic import slider_crank
 from test_analyses_static import flexible, hanging
 
-from ffr_dyn.analyses.actuators import JointForce, MarkerForce, as_loads, recorded
 from ffr_dyn.analyses.assemble import assemble
+from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort, recorded, with_effort
 from ffr_dyn.analyses.evaluation import evaluate, evaluated_mass_matrix, evaluator, total_mass_matrix
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.linearise import as_result, linearise, table_of_modes
@@ -48,7 +48,7 @@ def test_oscillator_with_damper_and_its_state_space():
         ground={"O": (0, 0, 0)},
     )
     found = linearise(
-        scene, inputs=(JointForce("push", "rail", "stroke"),), outputs=("m.R.x", "m.v.x", "spring.tension")
+        scene, inputs=(JointEffort("push", "rail", "stroke"),), outputs=("m.R.x", "m.v.x", "spring.tension")
     )
     np.testing.assert_allclose(
         sorted(found.eigenvalues, key=lambda z: z.imag), [-1 - 1j * 24**0.5, -1 + 1j * 24**0.5], atol=1e-7
@@ -126,7 +126,7 @@ def test_a_small_forward_run_is_what_the_matrices_say():
 
     scene = flexible()
     start = scene_at(scene, static(scene))
-    hinge = JointForce("motor", "A")
+    hinge = JointEffort("motor", "A")
     outputs = ("two.a.position.x", "A.force.y")
     found = linearise(start, inputs=(hinge,), outputs=outputs)
     size, end = 1e-3, 0.2
@@ -134,7 +134,7 @@ def test_a_small_forward_run_is_what_the_matrices_say():
     final = (expm(whole * end) @ np.eye(whole.shape[0])[-1])[:-1]
     expected = found.C @ final + found.D[:, 0] * size
     times = np.linspace(0, end, 11)
-    pushed = replace(start, loads=as_loads(start, hinge, times, np.full(11, size)))
+    pushed = with_effort(start, hinge, times, np.full(11, size))
     run, rest = (forward(s, end=end, output_step=end, method=RK4(5e-4)) for s in (pushed, start))
     np.testing.assert_allclose([run[n][-1] - rest[n][-1] for n in outputs], expected, rtol=2e-4)
 
@@ -144,12 +144,12 @@ def test_a_load_as_input_is_its_own_force():
 
     scene = hanging(-np.pi / 2, Load("wind", "rod.b", (3.0, 0, 0)))
     one = linearise(scene, inputs=("wind",)).B
-    other = linearise(scene, inputs=(MarkerForce("wind2", "rod.b", (1, 0, 0)),)).B
+    other = linearise(scene, inputs=(MarkerEffort("wind2", "rod.b", (1, 0, 0)),)).B
     np.testing.assert_allclose(one, 3 * other, rtol=1e-9)
 
 
 def test_the_result_can_be_kept(tmp_path):
-    found = linearise(hanging(-np.pi / 2), inputs=(JointForce("motor", "A"),), outputs=("rod.b.position.x",))
+    found = linearise(hanging(-np.pi / 2), inputs=(JointEffort("motor", "A"),), outputs=("rod.b.position.x",))
     kept = load_result(save_result(as_result(hanging(-np.pi / 2), found), tmp_path / "l.nc"))
     np.testing.assert_array_equal(kept["A"][0], found.A)
     np.testing.assert_array_equal(kept["D"][0], found.D)
@@ -167,10 +167,10 @@ def test_bad_input():
         linearise(hanging(0.0), inputs=("wind",))
     with pytest.raises(InputError, match="several components"):
         linearise(hanging(0.0), outputs=("rod.R",))
-    with pytest.raises(InputError, match="no 'stroke'"):
-        linearise(hanging(0.0), inputs=(JointForce("f", "A", "stroke"),))
+    with pytest.raises(InputError, match="no coordinate 'stroke'"):
+        linearise(hanging(0.0), inputs=(JointEffort("f", "A", "stroke"),))
     with pytest.raises(InputError, match="three numbers"):
-        MarkerForce("f", "rod.b", (0, 0, 0))
+        MarkerEffort("f", "rod.b", (0, 0, 0))
     with pytest.raises(InputError, match="more than 5"):
         recorded(np.arange(3.0), np.arange(3.0))
 

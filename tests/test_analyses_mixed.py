@@ -9,8 +9,8 @@ import pytest
 from planar_beam import planar_beam
 from test_analyses_kinematic import bar
 
-from ffr_dyn.analyses.actuators import JointForce, MarkerForce, as_loads, recorded
 from ffr_dyn.analyses.bounded import Bounded
+from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort, recorded, with_effort
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.inverse import QuasiStatic, inverse
 from ffr_dyn.analyses.kinematic import kinematic
@@ -82,7 +82,7 @@ def test_the_unknown_force_is_recovered(antonya):
     """x5(t) known, the force on body 5 unknown."""
     known = PointDriver("path", "ground.O", "b5.c", x=recorded(antonya.time, antonya["b5.R.x"], degree=7))
     scene = chain(TORQUE_2, TORQUE_3, drivers=(known,))
-    force = MarkerForce("F", "b5.c", (1, 0, 0))
+    force = MarkerEffort("F", "b5.c", (1, 0, 0))
     back = mixed(scene, unknown=(force,), end=2.0, output_step=0.004, method=RK4(1e-3))
     inside = slice(5, -5)
     np.testing.assert_allclose(back["F.effort"][inside], 10 * np.sin(0.5 * np.pi * back.time)[inside], atol=1e-6)
@@ -115,7 +115,7 @@ def test_the_chain_with_a_flexible_body():
     run = forward(free, end=0.2, output_step=5e-4, method=RK4(1.25e-4), stabilisation=FINE)
     known = PointDriver("path", "ground.O", "b5.c", x=recorded(run.time, run["b5.R.x"], degree=7))
     scene = replace(free, loads=free.loads[:2], drivers=(known,))
-    back = mixed(scene, unknown=(MarkerForce("F", "b5.c", (1, 0, 0)),), end=0.2, output_step=5e-4, method=RK4(1.25e-4))
+    back = mixed(scene, unknown=(MarkerEffort("F", "b5.c", (1, 0, 0)),), end=0.2, output_step=5e-4, method=RK4(1.25e-4))
     inside = slice(8, -8)
     np.testing.assert_allclose(back["F.effort"][inside], 10 * np.sin(0.5 * np.pi * run.time)[inside], atol=1e-4)
     np.testing.assert_allclose(back["b3.q"], run["b3.q"], atol=1e-6 * np.abs(run["b3.q"]).max())
@@ -128,7 +128,7 @@ def test_forces_away_from_the_known_motion(antonya):
         TORQUE_2, TORQUE_3, drivers=(Driver("angle", "A", recorded(antonya.time, antonya["A.angle"], degree=7)),)
     )
     back = mixed(
-        scene, unknown=(MarkerForce("F", "b5.c", (1, 0, 0)),), end=1.0, output_step=0.02, solution=Causal(growth=1e9)
+        scene, unknown=(MarkerEffort("F", "b5.c", (1, 0, 0)),), end=1.0, output_step=0.02, solution=Causal(growth=1e9)
     )
     inside = slice(1, None)
     np.testing.assert_allclose(back["F.effort"][inside], 10 * np.sin(0.5 * np.pi * back.time)[inside], atol=2e-4)
@@ -157,16 +157,14 @@ def spatial_arm(*loads: Load, drivers=()) -> Scene:
 
 def test_round_trip_of_a_spatial_flexible_arm():
     """Forward under known moments in both joints, then both angles known and both moments unknown."""
-    shoulder, elbow = JointForce("tau1", "shoulder"), JointForce("tau2", "elbow")
+    shoulder, elbow = JointEffort("tau1", "shoulder"), JointEffort("tau2", "elbow")
     posed = (Driver("d1", "shoulder", polynomial(0.0)), Driver("d2", "elbow", polynomial(0.0)))
     start = static(spatial_arm(drivers=posed))
     scene = scene_at(spatial_arm(), start)
     times = np.linspace(0, 0.3, 61)
     push = 1 - np.cos(20 * times)
     given = [start["d1.effort"][0] + 0.8 * push, start["d2.effort"][0] - 0.5 * push]
-    pushed = replace(
-        scene, loads=(*as_loads(scene, shoulder, times, given[0]), *as_loads(scene, elbow, times, given[1]))
-    )
+    pushed = with_effort(with_effort(scene, shoulder, times, given[0]), elbow, times, given[1])
     run = forward(pushed, end=0.3, output_step=5e-4, method=RK4(1.25e-4), stabilisation=FINE)
     drivers = tuple(Driver(f"d_{n}", n, recorded(run.time, run[f"{n}.angle"], degree=7)) for n in ("shoulder", "elbow"))
     known = replace(scene, drivers=drivers)
@@ -197,7 +195,7 @@ def one_link(*drivers) -> Scene:
     )
 
 
-MOTOR = JointForce("motor", "bearing")
+MOTOR = JointEffort("motor", "bearing")
 
 
 def test_hub_angle_known_is_causal():
@@ -206,7 +204,7 @@ def test_hub_angle_known_is_causal():
     found = mixed(
         one_link(Driver("turn", "bearing", angle)), unknown=(MOTOR,), end=0.8, output_step=1e-3, method=RK4(2.5e-4)
     )
-    scene = replace(one_link(), loads=as_loads(one_link(), MOTOR, found.time, found["motor.effort"]))
+    scene = with_effort(one_link(), MOTOR, found.time, found["motor.effort"])
     run = forward(scene, end=0.8, output_step=0.05, method=RK4(2.5e-4))
     np.testing.assert_allclose(run["bearing.angle"], found["bearing.angle"][::50], atol=1e-6)
 
@@ -222,7 +220,7 @@ def test_tip_path_known_needs_the_moment_before_the_motion():
     assert np.abs(moment[before]).max() > 0.02 * np.abs(moment).max()
     assert np.abs(found["arm.tip.position.y"][before]).max() < 1e-9
     start = scene_at(one_link(), found, 0)
-    fed = replace(start, loads=as_loads(start, MOTOR, found.time, moment))
+    fed = with_effort(start, MOTOR, found.time, moment)
     rows = round((found.time[-1] - found.time[0]) / 5e-3)
     run = forward(
         fed,
@@ -267,14 +265,15 @@ def test_a_force_without_influence_is_named():
     with pytest.raises(
         InputError, match=r"no force changes the acceleration .*go: stroke.*, and .*\(push2\) changes none"
     ):
-        mixed(scene, unknown=(JointForce("push2", "rail2", "stroke"),), end=1.0, output_step=0.1)
+        mixed(scene, unknown=(JointEffort("push2", "rail2", "stroke"),), end=1.0, output_step=0.1)
 
 
 def test_the_force_that_determines_the_motion_is_chosen():
     scene = two_carts(Driver("go", "rail1", polynomial(0, 0, 1.0), "stroke"))
-    forces = JointForce("push2", "rail2", "stroke"), MarkerForce("push1", "one.c", (1, 0, 0))
+    forces = JointEffort("push2", "rail2", "stroke"), MarkerEffort("push1", "one.c", (1, 0, 0))
     found = mixed(scene, unknown=forces, end=1.0, output_step=0.1)
     np.testing.assert_allclose(found["push1.effort"], 2.0, atol=1e-9)
+    np.testing.assert_allclose(found["push1.power"], 2.0 * found["one.v.x"], atol=1e-9)
     assert "push2.effort" not in found.quantities
 
 
@@ -285,4 +284,36 @@ def test_bad_input():
     with pytest.raises(InputError, match="must be a driver"):
         mixed(scene, unknown=(), known=("stop",), end=1.0, output_step=0.1)
     with pytest.raises(InputError, match="positive multiple"):
-        mixed(scene, unknown=(MarkerForce("p", "one.c", (1, 0, 0)),), end=1.0, output_step=0.3, solution=Causal())
+        mixed(scene, unknown=(MarkerEffort("p", "one.c", (1, 0, 0)),), end=1.0, output_step=0.3, solution=Causal())
+
+
+def test_servo_constraints_refuse_geometric_stiffening():
+    scene = one_link(TIP)
+    beam = scene.bodies[1].model
+    stiffened = replace(beam, stiffening=np.zeros((24, beam.n, beam.n)))
+    scene = replace(scene, bodies=(scene.bodies[0], replace(scene.bodies[1], model=stiffened)))
+    with pytest.raises(InputError, match=r"stiffening=False of \['arm'\]"):
+        mixed(scene, unknown=(MOTOR,), end=0.6, output_step=0.01)
+
+
+def test_a_motion_without_coordinates_is_refused():
+    """Known: the cart; what its load on a ball joint does is described by no joint coordinate."""
+    base = two_carts(Driver("go", "rail1", polynomial(0, 0, 1.0), "stroke"))
+    ball = Joint("ball", "spherical", "one.c", "two.c")
+    hung = replace(
+        base, bodies=(base.bodies[0], replace(base.bodies[1], position=(0, 0, 0))), joints=(base.joints[0], ball)
+    )
+    with pytest.raises(InputError, match="not described by joint and elastic coordinates"):
+        mixed(hung, unknown=(MarkerEffort("p", "two.c", (1, 0, 0)),), end=1.0, output_step=0.1)
+
+
+def test_work_of_the_unknown_force_is_the_change_of_energy():
+    """The tip path again: what the motor does becomes kinetic and strain energy, but for the modal damping."""
+    scene = one_link(TIP)
+    undamped = replace(scene, bodies=tuple(replace(body, damping=0.0) for body in scene.bodies))
+    found = mixed(undamped, unknown=(MOTOR,), end=0.6, output_step=5e-3)
+    power = found["motor.power"]
+    np.testing.assert_allclose(power, found["motor.effort"] * found["bearing.angle_rate"], atol=1e-12)
+    work = np.concatenate([[0.0], np.cumsum(2.5e-3 * (power[1:] + power[:-1]))])
+    energy = found["energy.total"] - found["energy.total"][0]
+    np.testing.assert_allclose(work, energy, atol=2e-3 * energy.max())

@@ -112,3 +112,39 @@ def test_its_mobility():
     assert {name for name, _ in found.redundant} <= {joint.name for joint in andrews().joints}
     assert len(found.redundant) == 50 - 41
     assert linearise(andrews()).A.shape == (2, 2)
+
+
+def point(name: str, **points) -> object:
+    """A unit mass with hardly any inertia."""
+    return rigid_body(name, mass=1.0, inertia=(1e-12,) * 3, points={"c": (0, 0, 0), **points})
+
+
+def test_double_pendulum_for_five_seconds():
+    """Point masses of 1 kg on massless links of 1 m, both horizontal at first: angles at 1 s and 5 s."""
+    scene = Scene(
+        (
+            Body("one", point("one", pivot=(-1, 0, 0)), position=(1, 0, 0)),
+            Body("two", point("two", pivot=(-1, 0, 0)), position=(2, 0, 0)),
+        ),
+        (Joint("A", "revolute", "ground.O", "one.pivot"), Joint("B", "revolute", "one.c", "two.pivot")),
+        ground={"O": (0, 0, 0)},
+        gravity=(0, -9.81, 0),
+    )
+    result = forward(scene, end=5.0, output_step=1.0, method=RK4(2e-4), stabilisation=Projection(1e-13))
+    first, second = result["one.c.position"], result["two.c.position"] - result["one.c.position"]
+    angles = np.arctan2([first[:, 0], second[:, 0]], [-first[:, 1], -second[:, 1]])
+    np.testing.assert_allclose(angles[:, 1], (-0.62508769980639, -1.03458508568), atol=1e-9)
+    np.testing.assert_allclose(angles[:, 5], (-0.62718670506653, -1.3013155502098), atol=1e-8)
+
+
+def test_stiff_spring_pendulum_for_two_seconds():
+    """1 kg on a spring of 1e6 N/m and 1 m, from the horizontal at rest: position at 1 s and 2 s."""
+    scene = Scene(
+        (Body("ball", point("ball"), position=(1, 0, 0)),),
+        springs=(SpringDamper("spring", "ground.O", "ball.c", 1e6, free_length=1.0),),
+        ground={"O": (0, 0, 0)},
+        gravity=(0, -9.81, 0),
+    )
+    result = forward(scene, end=2.0, output_step=1.0, method=RK4(5e-5))
+    expected = [(-0.98629074, -0.16504631), (0.79350278, -0.60859605)]
+    np.testing.assert_allclose(result["ball.c.position"][1:, :2], expected, atol=2e-7)

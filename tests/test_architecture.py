@@ -38,7 +38,7 @@ MESHERS_AND_PLOTTERS = {
 HEAVY = {*MESHERS_AND_PLOTTERS, "PIL", "h5py", "numba", "pydantic", "scipy"}
 
 # Modules of a distribution that another one, which is declared, cannot be without.
-BROUGHT_BY = {"llvmlite": "numba", "vtkmodules": "pyvista"}
+BROUGHT_BY = {"llvmlite": "numba", "pydantic_core": "pydantic", "vtkmodules": "pyvista"}
 # What only the system's Python has, in processes of its own.
 OF_THE_SYSTEM = {"petsc4py", "slepc4py"}
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from synthetic import cloud
 
+from ffr_dyn.measure import DEFAULT_OUTPUTS
 from ffr_dyn.result_file import load_result
 from ffr_dyn.scene_file import load_scene
 from ffr_prep.body import load_body, save_body
@@ -27,9 +28,18 @@ def test_the_scene_file_of_the_documentation_is_valid(tmp_path):
     save_body(cloud(7), tmp_path / "rod.ffr")
     (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
     scene, settings = load_scene(tmp_path / "scene.toml")
+    assert [i.name for i in scene.bodies[1].model.interfaces][-1] == "middle"
     assert [j.name for j in scene.joints] == ["main_bearing", "crank_pin", "slider_pin", "guide"]
     assert scene.bodies[1].model.n == 6
     assert settings.method.step == 1e-4
+
+
+def test_the_default_outputs_of_the_documentation_are_those_of_the_program():
+    marked = re.findall(r"^\| • (.*?) \|", (ROOT / "docs/scene_file.md").read_text(encoding="utf-8"), re.M)
+    names = [name for line in marked for name in re.findall(r"`\w*(\.?\w*(?:\.\w+)?)`", line)]
+    kept = {pattern.rpartition(".")[2] for pattern in DEFAULT_OUTPUTS}
+    listed = {name.rpartition(".")[2] for name in names}
+    assert kept - {"*"} <= listed
 
 
 def test_the_python_example_of_the_readme_runs(tmp_path, monkeypatch):

@@ -200,7 +200,7 @@ def test_a_body_without_inertia_about_an_axis_is_named():
 SCENE = """
 name = "bar"
 gravity = [0, -9.81, 0]
-[simulation]
+[analysis]
 end = 0.1
 output_step = 0.01
 [ground]
@@ -236,9 +236,9 @@ def run_cli(monkeypatch, capsys, *arguments: object) -> tuple[int, str]:
         ('kind = "revolute"', 'kind = "hinge"', ["no kind 'hinge'"]),
         ("mass = 1.0", "mass = 0.0", ["mass", "positive"]),
         ("mass = 1.0", "", ["bodies.bar", "give either file"]),
-        ("mass = 1.0", "mas = 1.0", ["bodies.bar.mas", "not a known entry"]),
-        ("end = 0.1", "end = inf", ["simulation.end", "finite"]),
-        ("end = 0.1", "", ["simulation.end", "required"]),
+        ("mass = 1.0", "mas = 1.0", ["bodies.bar", "'mas' is not a known entry", "did you mean 'mass'"]),
+        ("end = 0.1", "end = inf", ["analysis.end", "finite"]),
+        ("end = 0.1", "", ["analysis.end", "required"]),
         ("mass = 1.0", 'file = "missing.ffr"', ["missing.ffr", "does not exist"]),
         ("[ground]", "[ground", ["not a readable TOML file"]),
     ],
@@ -284,7 +284,7 @@ def test_flexible_scene_file_runs_from_the_command_line(monkeypatch, capsys, tmp
     text = SCENE.replace("mass = 1.0\n", 'file = "cloud.ffr"\nmodes = 2\ndamping = 0.01\n')
     text = text.replace("inertia = [0.1, 0.1, 0.1]\n", "").replace("points = {a = [0, 0, 0], b = [1, 0, 0]}\n", "")
     text += '[loads.push]\nmarker = "bar.b"\nforce = [{harmonic = {amplitude = 2, frequency = 3}}, 1, 0]\n'
-    text += '[drivers.motor]\njoint = "hinge"\npolynomial = [0, 2.0]\n'
+    text += '[drivers.motor]\njoint = "hinge"\nfunction = "2 * t"\n'
     (tmp_path / "scene.toml").write_text(text)
     code, said = run_cli(monkeypatch, capsys, "run", tmp_path / "scene.toml", "--method", "rk4", "--step", "1e-3")
     assert code == 0, said

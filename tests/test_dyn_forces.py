@@ -55,6 +55,7 @@ PAIRS = {
     "guided spring": JointSpring("s", "tie", BENT, Curve([-3.0, 3.0], [-1.0, 2.0]), -0.3, coordinate="stroke"),
     "friction": JointFriction("s", "tie", 2.0, 0.1, static=3.0, stribeck=0.5, viscous=0.2),
     "pressed friction": JointFriction("s", "tie", 0.3, 0.4, harmonic(amplitude=1, frequency=1, mean=2)),
+    "lifted friction": JointFriction("s", "tie", 0.3, 0.4, lambda t: -2.0, viscous=0.7),
     "stop": JointStop("s", "tie", 20.0, 0.05, lower=0.3, upper=0.4, damping=3.0, coordinate="stroke"),
     "actuator": Actuator("s", "tie", harmonic(amplitude=3.0, frequency=0.4), coordinate="stroke"),
     "python actuator": Actuator("s", "tie", function=lambda t, state: t + state.q("one").sum() + 2.0),
@@ -427,6 +428,13 @@ def test_stribecks_friction_falls_from_static_to_coulomb(rate):
     size = 6 + 3 * np.exp(-((rate / 0.1) ** 2))
     force = alone(scene, np.array([0, 0, 0, 1.0, 0, 0, 0]), v).force
     assert force == pytest.approx(-np.sign(rate) * size - 0.5 * rate)
+
+
+def test_friction_ends_where_the_surfaces_part():
+    law = JointFriction("f", "guide", 0.3, 1e-3, polynomial(20.0, -40.0), coordinate="stroke")
+    result = forward(slider(law, speed=2.0), end=1.0, output_step=0.05, method=RK4(1e-3))
+    t = np.minimum(result.time, 0.5)
+    np.testing.assert_allclose(result["block.v"][:, 2], 2.0 - 0.3 / MASS * (20 * t - 20 * t**2), atol=1e-5)
 
 
 def test_an_elastic_stop_sends_a_block_back_as_fast_and_a_damped_one_slower():

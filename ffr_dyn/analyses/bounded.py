@@ -20,7 +20,7 @@ from scipy.linalg import schur
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
-from ffr_dyn.analyses.servo import Servo, at_moment, at_rest, slope, slope_matrix
+from ffr_dyn.analyses.servo import ServoMotion, at_moment, at_rest, slope, slope_matrix
 from ffr_dyn.errors import InputError, SimulationError
 
 Array = np.ndarray
@@ -59,7 +59,7 @@ class _End:
 
 
 def bounded_solution(
-    own: Servo, settings: Bounded, output_step: float, w: Array, x: Array
+    own: ServoMotion, settings: Bounded, output_step: float, w: Array, x: Array
 ) -> tuple[Array, Array, list[Array], list[str]]:
     """Times (T,), w (T, 2 d), states x, and notes.
 
@@ -90,7 +90,7 @@ def _whole(span: float, output_step: float) -> int:
 # ---- ends ------------------------------------------------------------------------------------------------------------
 
 
-def _equilibria(own: Servo, output_step: float, w: Array, x: Array) -> list[tuple[float, Array, Array]]:
+def _equilibria(own: ServoMotion, output_step: float, w: Array, x: Array) -> list[tuple[float, Array, Array]]:
     """(time, y, x) of the equilibria along the known motion, as if it stood still at every output time."""
     y, route = w[: own.size], []
     for time in np.linspace(*own.span, round((own.span[1] - own.span[0]) / output_step) + 1):
@@ -99,7 +99,7 @@ def _equilibria(own: Servo, output_step: float, w: Array, x: Array) -> list[tupl
     return route
 
 
-def _equilibrium(own: Servo, time: float, y: Array, x: Array) -> tuple[Array, Array]:
+def _equilibrium(own: ServoMotion, time: float, y: Array, x: Array) -> tuple[Array, Array]:
     """Where the internal dynamics rest (Newton's method on y_ddot)."""
     for _ in range(ITERATIONS):
         now = at_rest(own, time, y, x)
@@ -114,13 +114,13 @@ def _equilibrium(own: Servo, time: float, y: Array, x: Array) -> tuple[Array, Ar
     raise SimulationError(f"at t = {time:.6g} s the internal dynamics have no equilibrium near the known motion")
 
 
-def _end(own: Servo, time: float, y: Array, x: Array) -> _End:
+def _end(own: ServoMotion, time: float, y: Array, x: Array) -> _End:
     w = np.concatenate([y, np.zeros_like(y)])
     _require_rest(own, time, w, x)
     return _split(w, x, slope_matrix(own, time, w, x))
 
 
-def _require_rest(own: Servo, time: float, w: Array, x: Array) -> None:
+def _require_rest(own: ServoMotion, time: float, w: Array, x: Array) -> None:
     moment = at_moment(own, time, w, x)
     speed, change = float(np.abs(moment.v).max()), float(np.abs(moment.sigma).max())
     if max(speed, change) > REST:
@@ -145,7 +145,7 @@ def _split(w: Array, x: Array, A: Array) -> _End:
 
 
 def _collocated(
-    own: Servo, times: Array, first: _End, last: _End, route: list[tuple[float, Array, Array]]
+    own: ServoMotion, times: Array, first: _End, last: _End, route: list[tuple[float, Array, Array]]
 ) -> tuple[Array, list[Array]]:
     """Newton's method from the equilibria along the known motion."""
     clock, values = np.array([t for t, _, _ in route]), np.array([y for _, y, _ in route])
@@ -172,7 +172,7 @@ def _collocated(
 
 
 def _residual(
-    own: Servo, times: Array, ws: Array, xs: list[Array], first: _End, last: _End
+    own: ServoMotion, times: Array, ws: Array, xs: list[Array], first: _End, last: _End
 ) -> tuple[Array, list[Array]]:
     """Boundary conditions and the defects of Simpson's rule, and the states."""
     found = [slope(own, float(t), w, x) for t, w, x in zip(times, ws, xs, strict=True)]

@@ -6,12 +6,13 @@ here as plain matrices. Small motions, Jacobians and null spaces are in the velo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ffr_dyn.analyses.forward import failure
+from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import System, new_record, new_stages, new_work
 from ffr_dyn.inertia import mass_matrix
 from ffr_dyn.integrators import RK4
@@ -58,6 +59,7 @@ class Evaluation:
 
 def evaluator(system: System) -> Evaluator:
     """Memory for evaluations of a compiled scene."""
+    ensure_compiled(RK4(1.0))
     return Evaluator(system, new_work(system.model), new_stages(system, RK4.stage_count), new_record(system, 1))
 
 
@@ -91,14 +93,6 @@ def unit_rows(numbers: Array, size: int) -> Array:
     rows = np.zeros((numbers.size, size))
     rows[np.arange(numbers.size), numbers] = 1.0
     return rows
-
-
-def with_efforts(at: Evaluator, first: int, wrenches: Array) -> Evaluator:
-    """The same memory for the scene with other constants (K, 6) in its loads from number `first` on."""
-    model = at.system.model
-    value = model.loads.value.copy()
-    value[first : first + len(wrenches)] = wrenches
-    return replace(at, system=replace(at.system, model=model._replace(loads=model.loads._replace(value=value))))
 
 
 def record_states(at: Evaluator, times: Array, xs: Array, vs: Array) -> Record:

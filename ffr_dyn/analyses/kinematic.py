@@ -43,7 +43,7 @@ ITERATIONS = 8  # of Newton's method in a part of a step
 LARGEST_TURN = 0.2  # rad, of a body in a part of a step
 SMALLEST_PART = 1e-8  # of an output step
 NEAR = 1e-2  # conditioning, relative to the best met, below which a position is reported as nearly singular
-SINGULAR = 1e-7  # the same, where velocities are no longer determined
+SINGULAR = 1e-4  # the same, where Phi within the tolerance no longer determines the motion
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffr_dyn.analyses.actuators import Actuator, unit_loads
 from ffr_dyn.analyses.assemble import assemble, in_space
-from ffr_dyn.analyses.evaluation import Evaluator, evaluate, evaluator, to_global_axes, with_efforts
+from ffr_dyn.analyses.efforts import Effort, sized, with_units
+from ffr_dyn.analyses.evaluation import Evaluator, evaluate, evaluator, to_global_axes
 from ffr_dyn.analyses.mobility import named_motion
 from ffr_dyn.analyses.outcome import result_of
 from ffr_dyn.analyses.tangent import Chart, chart, derivative, rates, sizes, state, state_matrix
@@ -71,18 +71,17 @@ class Linearisation:
 
 
 def linearise(
-    scene: Scene, *, time: float = 0.0, inputs: tuple[Actuator | str, ...] = (), outputs: tuple[str, ...] = ()
+    scene: Scene, *, time: float = 0.0, inputs: tuple[Effort | str, ...] = (), outputs: tuple[str, ...] = ()
 ) -> Linearisation:
     """Linearise a scene about its assembled state at `time` [s], its drivers' positions and rates being those of the time.
 
-    inputs  : actuators, or names of loads of the scene (an input of one doubles the load)
+    inputs  : efforts, or names of loads of the scene (an input of one doubles the load)
     outputs : names of components of a result, such as "rod.tip.position.y"
     For an equilibrium: ``linearise(scene_at(scene, static(scene)))``.
 
     Raises InputError when nothing is free to move, or for a name that does not exist.
     """
-    loads = tuple(load for item in inputs if not isinstance(item, str) for load in unit_loads(scene, item))
-    fed = replace(in_space(scene), loads=(*scene.loads, *loads))
+    fed = with_units(in_space(scene), _efforts(inputs))
     assembled = assemble(fed, time=time)
     at = _with_inputs(evaluator(assembled.system), scene, inputs, np.zeros(len(inputs)))
     near = chart(at, time, assembled.x, assembled.v)
@@ -131,22 +130,23 @@ def _columns(function: Callable[[Array], Array], count: int) -> Array:
     return np.array([function(unit) - zero for unit in np.eye(count)]).reshape(count, zero.size).T
 
 
-def _fed(near: Chart, scene: Scene, inputs: tuple[Actuator | str, ...], u: Array) -> Chart:
+def _fed(near: Chart, scene: Scene, inputs: tuple[Effort | str, ...], u: Array) -> Chart:
     return replace(near, at=_with_inputs(near.at, scene, inputs, u))
 
 
-def _with_inputs(at: Evaluator, scene: Scene, inputs: tuple[Actuator | str, ...], u: Array) -> Evaluator:
-    """The evaluator with loads for the inputs u, on top of the scene's own."""
-    value = _declared(at)
-    number = len(scene.loads)
+def _efforts(inputs: tuple[Effort | str, ...]) -> tuple[Effort, ...]:
+    return tuple(item for item in inputs if not isinstance(item, str))
+
+
+def _with_inputs(at: Evaluator, scene: Scene, inputs: tuple[Effort | str, ...], u: Array) -> Evaluator:
+    """The evaluator with the inputs u, on top of the scene's own loads."""
+    model, value = at.system.model, _declared(at)
     for item, amount in zip(inputs, u, strict=True):
         if isinstance(item, str):
             value[_load_number(scene, item)] *= 1.0 + amount
-        else:
-            for load in unit_loads(scene, item):
-                value[number] = amount * np.array([*load.force, *load.moment], float)
-                number += 1
-    return with_efforts(at, 0, value)
+    fed = replace(at, system=replace(at.system, model=model._replace(loads=model.loads._replace(value=value))))
+    sizes = [amount for item, amount in zip(inputs, u, strict=True) if not isinstance(item, str)]
+    return sized(fed, _efforts(inputs), np.array(sizes))
 
 
 def _load_number(scene: Scene, name: str) -> int:
@@ -154,7 +154,7 @@ def _load_number(scene: Scene, name: str) -> int:
     if name not in names:
         raise InputError(f"input {name!r}: the scene has no such load; there are {', '.join(names) or 'none'}")
     if scene.loads[names.index(name)].function is not None:
-        raise InputError(f"input {name!r}: a load by a Python function has no size to vary; use an actuator as input")
+        raise InputError(f"input {name!r}: a load by a Python function has no size to vary; use an effort as input")
     return names.index(name)
 
 
@@ -168,7 +168,7 @@ def _declared(at: Evaluator) -> Array:
 
 
 def _output_matrices(
-    near: Chart, scene: Scene, inputs: tuple[Actuator | str, ...], outputs: tuple[str, ...]
+    near: Chart, scene: Scene, inputs: tuple[Effort | str, ...], outputs: tuple[str, ...]
 ) -> tuple[Array, Array]:
     d = near.steps.size
     if not outputs:

@@ -17,17 +17,19 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.analyses.actuators import Actuator, JointForce, MarkerForce, unit, unit_loads
 from ffr_dyn.analyses.assemble import assemble, flattened
 from ffr_dyn.analyses.bounded import Bounded, bounded_solution
-from ffr_dyn.analyses.evaluation import evaluator, joined, record_states, with_efforts
+from ffr_dyn.analyses.efforts import Effort, JointEffort, MarkerEffort, sized, unit, with_units
+from ffr_dyn.analyses.evaluation import evaluator, joined, record_states
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.outcome import efforts, output_times, outputs, result_of, with_quantities
-from ffr_dyn.analyses.servo import Moment, Servo, at_moment, internal_values, servo, slope, slope_matrix
+from ffr_dyn.analyses.servo import Moment, ServoMotion, at_moment, internal_values, servo, slope, slope_matrix
 from ffr_dyn.drivers import Driver, PointDriver
-from ffr_dyn.equations import blocks_of, compile_scene
+from ffr_dyn.equations import System, blocks_of, compile_scene
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import Integrator
+from ffr_dyn.kernels.tables import Record
+from ffr_dyn.measure import measure, selected
 from ffr_dyn.result import Quantity, Result
 from ffr_dyn.scene import GROUND, Scene
 from ffr_dyn.stabilisation import Projection
@@ -50,7 +52,7 @@ class Causal:
 def mixed(
     scene: Scene,
     *,
-    unknown: tuple[Actuator, ...],
+    unknown: tuple[Effort, ...],
     end: float,
     output_step: float,
     start: float = 0.0,
@@ -98,34 +100,34 @@ def _known(scene: Scene, known: tuple[str, ...] | None) -> tuple[str, ...]:
 
 
 def _collocated(
-    scene: Scene, names: tuple[str, ...], unknown: tuple[Actuator, ...]
+    scene: Scene, names: tuple[str, ...], unknown: tuple[Effort, ...]
 ) -> dict[str, tuple[str, float]] | None:
     """For each unknown force the driver along which it acts and its sign; None unless every known motion has its force."""
     drivers = {driver.name: driver for driver in scene.drivers if driver.name in names}
     pairs: dict[str, tuple[str, float]] = {}
-    for actuator in unknown:
+    for effort in unknown:
         for name, driver in drivers.items():
-            sign = _along(driver, actuator)
+            sign = _along(driver, effort)
             if sign and name not in [taken for taken, _ in pairs.values()]:
-                pairs[actuator.name] = (name, sign)
+                pairs[effort.name] = (name, sign)
                 break
     return pairs if len(pairs) == len(names) == len(unknown) else None
 
 
-def _along(driver: Driver | PointDriver, actuator: Actuator) -> float:
+def _along(driver: Driver | PointDriver, effort: Effort) -> float:
     """1 or -1 where the force acts along the driven coordinate, else 0."""
     if isinstance(driver, Driver):
-        same = isinstance(actuator, JointForce) and (actuator.joint, actuator.coordinate) == (
+        same = isinstance(effort, JointEffort) and (effort.joint, effort.coordinate) == (
             driver.joint,
             driver.coordinate,
         )
         return float(same)
     components = [c for c in "xyz" if getattr(driver, c) is not None]
     alone = len(components) == 1 and driver.i.partition(".")[0] == GROUND
-    if not (alone and isinstance(actuator, MarkerForce) and actuator.marker == driver.j) or actuator.moment:
+    if not (alone and isinstance(effort, MarkerEffort) and effort.marker == driver.j) or effort.moment:
         return 0.0
-    along = np.array(actuator.direction)["xyz".index(components[0])]
-    return float(along) if actuator.axes == "global" and abs(abs(along) - 1) < 1e-15 else 0.0
+    along = np.array(effort.direction)["xyz".index(components[0])]
+    return float(along) if effort.axes == "global" and abs(abs(along) - 1) < 1e-15 else 0.0
 
 
 def _named(scene: Scene, result: Result, partners: dict[str, tuple[str, float]], path: str | Path | None) -> Result:
@@ -150,7 +152,7 @@ def _named(scene: Scene, result: Result, partners: dict[str, tuple[str, float]],
 def _not_collocated(
     scene: Scene,
     names: tuple[str, ...],
-    unknown: tuple[Actuator, ...],
+    unknown: tuple[Effort, ...],
     span: tuple[float, float, float],
     solution: Causal | Bounded | None,
     path: str | Path | None,
@@ -162,7 +164,7 @@ def _not_collocated(
         raise InputError(
             f"servo constraints need bodies without geometric stiffening: set stiffening=False of {stiffened}"
         )
-    assembled = assemble(scene, time=start)
+    assembled = assemble(with_units(scene, unknown), time=start)
     own = servo(assembled, names, unknown, (start, end))
     w = internal_values(own, assembled.x, assembled.v)
     chosen = _solution(own, start, end, w, assembled.x, solution)
@@ -183,11 +185,11 @@ def _not_collocated(
         "notes": [*assembled.notes, *notes],
         "status": "complete",
     }
-    return _recorded(names, own, times, moments, attributes, path)
+    return _recorded(names, unknown, own, times, moments, attributes, path)
 
 
 def _solution(
-    own: Servo, start: float, end: float, w: Array, x: Array, wanted: Causal | Bounded | None
+    own: ServoMotion, start: float, end: float, w: Array, x: Array, wanted: Causal | Bounded | None
 ) -> Causal | Bounded:
     """What was asked for, or what the internal dynamics allow at the start; SimulationError for a causal run they do not."""
     if isinstance(wanted, Bounded) or own.size == 0:
@@ -205,7 +207,7 @@ def _solution(
 
 
 def _integrated(
-    own: Servo, causal: Causal, times: Array, w: Array, x: Array, progress: Callable[[float], None] | None
+    own: ServoMotion, causal: Causal, times: Array, w: Array, x: Array, progress: Callable[[float], None] | None
 ) -> tuple[Array, list[Array]]:
     """w (T, 2 d) and the states x at the output times."""
     from scipy.integrate import DOP853
@@ -235,30 +237,36 @@ def _integrated(
 
 
 def _recorded(
-    names: tuple[str, ...], own: Servo, times: Array, moments: list[Moment], attributes: dict[str, Any],
+    names: tuple[str, ...],
+    unknown: tuple[Effort, ...],
+    own: ServoMotion,
+    times: Array,
+    moments: list[Moment],
+    attributes: dict[str, Any],
     path: str | Path | None,
-) -> Result:  # fmt: skip
-    """The states, in the scene without the known drivers and with the efforts as loads."""
+) -> Result:
+    """The states, in the scene without the known drivers and with the efforts found."""
     scene = own.at.system.scene
-    loads = [load for actuator in own.unknown for load in unit_loads(scene, actuator)]
     kept = tuple(driver for driver in scene.drivers if driver.name not in names)
-    fed = replace(scene, drivers=kept, loads=(*scene.loads, *loads))
-    names_kept = {block.name: block for block in own.at.system.blocks}
-    blocks = [names_kept[block.name] for block in blocks_of(fed)]
-    at = evaluator(compile_scene(fed, blocks))
-    owner = [k for k, actuator in enumerate(own.unknown) for _ in unit_loads(scene, actuator)]
-    units = np.array([[*load.force, *load.moment] for load in loads], float)
+    free = replace(scene, drivers=kept)
+    rows_of = {block.name: block for block in own.at.system.blocks}
+    at = evaluator(compile_scene(free, [rows_of[block.name] for block in blocks_of(free)]))
+    silent = sized(at, unknown, np.zeros(len(unknown)))
     rows = []
     for time, moment in zip(times, moments, strict=True):
-        clock = np.clip([time], *own.span)
-        here = with_efforts(at, len(scene.loads), moment.u[owner][:, None] * units)
-        rows.append(record_states(here, clock, moment.x[None], moment.v[None]))
-        rows[-1] = rows[-1]._replace(time=np.array([time]))
-    result = result_of(at.system, joined(rows), attributes)
-    u = np.array([moment.u for moment in moments])
+        here = sized(silent, own.unknown, moment.u)
+        row = record_states(here, np.clip([time], *own.span), moment.x[None], moment.v[None])
+        rows.append(row._replace(time=np.array([time])))
+    record = joined(rows)
+    found = _efforts_found(at.system, record, own.unknown, np.array([moment.u for moment in moments]))
+    return with_quantities(result_of(at.system, record, attributes), found, path)
+
+
+def _efforts_found(system: System, record: Record, efforts: tuple[Effort, ...], u: Array) -> dict[str, Quantity]:
+    """Efforts (T, U) and their powers."""
+    powers, _ = measure(system, record, {}, selected(system, [f"{effort.name}.power" for effort in efforts]))
     found = {}
-    for k, actuator in enumerate(own.unknown):
-        found[f"{actuator.name}.effort"] = Quantity(
-            u[:, k], unit(actuator), (), "effort that realises the known motions"
-        )
-    return with_quantities(result, found, path)
+    for effort, values in zip(efforts, u.T, strict=True):
+        text = "effort that realises the known motions"
+        found[f"{effort.name}.effort"] = Quantity(values, unit(effort), (), text)
+    return found | powers

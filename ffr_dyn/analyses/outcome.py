@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.analyses.actuators import joint_named
+from ffr_dyn.analyses.efforts import joint_named
 from ffr_dyn.analyses.forward import geometry
 from ffr_dyn.drivers import Driver
 from ffr_dyn.equations import System
 from ffr_dyn.errors import InputError
-from ffr_dyn.joints import frames
+from ffr_dyn.joints import COORDINATES, frames
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.measure import measure, selected
 from ffr_dyn.result import Quantity, Result
@@ -39,8 +39,9 @@ def result_of(system: System, record: Record, attributes: dict[str, Any], path: 
 
 
 def outputs(scene: Scene) -> tuple[str, ...]:
-    """What the results of these analyses keep: the default, and the power of every driver."""
-    return ("default", *(f"{driver.name}.power" for driver in scene.drivers))
+    """What the results of these analyses keep: the default, the power of every driver, the rates of joint coordinates."""
+    rates = [f"{joint.name}.{coordinate}_rate" for joint in scene.joints for coordinate in COORDINATES[joint.kind]]
+    return ("default", *(f"{driver.name}.power" for driver in scene.drivers), *rates)
 
 
 def with_quantities(result: Result, more: dict[str, Quantity], path: str | Path | None = None) -> Result:

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import qr
 
-from ffr_dyn.analyses.actuators import Actuator, unit_loads
 from ffr_dyn.analyses.assemble import Assembled
+from ffr_dyn.analyses.efforts import Effort, sized
 from ffr_dyn.analyses.evaluation import (
     Evaluation,
     Evaluator,
@@ -27,7 +27,6 @@ from ffr_dyn.analyses.evaluation import (
     free_motions,
     locked,
     moved,
-    shapes,
     to_body_axes,
     to_global_axes,
     total_mass_matrix,
@@ -38,7 +37,6 @@ from ffr_dyn.constraints import evaluate_word
 from ffr_dyn.drivers import Driver, driver_word
 from ffr_dyn.equations import Block, compile_scene
 from ffr_dyn.errors import InputError, SimulationError
-from ffr_dyn.forces import Load
 from ffr_dyn.joints import COORDINATES, Word
 from ffr_dyn.scene import Scene, marker_number
 from ffr_dyn.timefunction import polynomial
@@ -51,7 +49,7 @@ UNDETERMINED = 1e-8  # of the smallest singular value of P with rows and columns
 
 
 @dataclass(frozen=True)
-class Servo:
+class ServoMotion:
     """A scene with known motions and the unknown efforts that shall realise them.
 
     at       : evaluator with all rows: joints, known motions, internal joint coordinates
@@ -62,7 +60,7 @@ class Servo:
     """
 
     at: Evaluator
-    unknown: tuple[Actuator, ...]
+    unknown: tuple[Effort, ...]
     plant: Array
     known: Array
     inner: Array
@@ -90,20 +88,21 @@ class Moment:
 
 
 def servo(
-    assembled: Assembled, known: tuple[str, ...], unknown: tuple[Actuator, ...], span: tuple[float, float]
-) -> Servo:
+    assembled: Assembled, known: tuple[str, ...], unknown: tuple[Effort, ...], span: tuple[float, float]
+) -> ServoMotion:
     """Choose internal coordinates at the assembled state, by rank, and of the unknown efforts as many as motions are known.
 
     Raises InputError when motions and efforts do not fit, with the combination that is not determined.
     """
     scene, blocks = assembled.system.scene, list(assembled.system.blocks)
-    bare = evaluator(assembled.system)
+    bare = sized(evaluator(assembled.system), unknown, np.zeros(len(unknown)))
     now = evaluate(bare, span[0], assembled.x, assembled.v)
     known_rows = _rows_of(blocks, known)
     plant_rows = np.setdiff1d(np.arange(now.Phi.size), known_rows)
     M = total_mass_matrix(scene, assembled.system.layout, assembled.x)
     labels = [f"{b.name}: {w.text}" for b in blocks for w in b.words]
-    chosen = _fitting(bare, now, assembled.x, M, plant_rows, known_rows, unknown, [labels[k] for k in known_rows])
+    B = effort_columns(bare, unknown, (span[0], assembled.x, assembled.v), now.force)
+    chosen = _fitting(now, B, M, plant_rows, known_rows, unknown, [labels[k] for k in known_rows])
     words, elastic, names = _internal(scene, assembled, now, M)
     inner = [Block(f"internal {k}", ends, (word,), driver=True) for k, (ends, word) in enumerate(words)]
     system = compile_scene(scene, blocks + inner)
@@ -114,9 +113,8 @@ def servo(
         np.arange(rows.kind.size + locked(system.layout).size), np.concatenate([inner_rows, known_rows])
     )
     data = system.model.functions.start[rows.function[inner_rows]]
-    return Servo(
-        evaluator(system), chosen, plant_rows, known_rows, inner_rows, np.array(elastic, dtype=int), data, span, names
-    )
+    at = sized(evaluator(system), unknown, np.zeros(len(unknown)))
+    return ServoMotion(at, chosen, plant_rows, known_rows, inner_rows, np.array(elastic, int), data, span, names)
 
 
 def _rows_of(blocks: list[Block], names: tuple[str, ...]) -> Array:
@@ -129,26 +127,13 @@ def _rows_of(blocks: list[Block], names: tuple[str, ...]) -> Array:
 # ---- do the efforts fit the motions? ---------------------------------------------------------------------------------
 
 
-def effort_columns(at: Evaluator, unknown: tuple[Actuator, ...], x: Array) -> Array:
-    """(V, U) generalised forces of unit efforts at the state x, which was evaluated last."""
-    scene = at.system.scene
-    columns = [sum(_force(at, load, x) for load in unit_loads(scene, actuator)) for actuator in unknown]
-    return np.array(columns).reshape(len(unknown), at.system.layout.v_size).T
-
-
-def _force(at: Evaluator, load: Load, x: Array) -> Array:
-    """(V,) generalised force of a constant load, as the kernels apply it."""
-    place, marker = at.system.layout, marker_number(at.system.scene, load.marker)
-    column, b = np.zeros(place.v_size), int(at.system.model.markers.body[marker])
-    if b == len(place.n):
-        return column
-    A = np.eye(3) if load.axes == "body" else at.work.bodies.A[b].T
-    force, moment = A @ np.array(load.force, float), A @ np.array(load.moment, float)
-    phi = shapes(at.system, marker)
-    u = at.system.model.markers.u[marker] + phi[:3] @ x[place.q(b)]
-    column[place.rigid(b)] = np.concatenate([force, moment + np.cross(u, force)])
-    column[place.q_dot(b)] = phi[:3].T @ force + phi[3:].T @ moment
-    return column
+def effort_columns(
+    at: Evaluator, unknown: tuple[Effort, ...], state: tuple[float, Array, Array], without: Array
+) -> Array:
+    """(V, U) generalised forces of unit efforts at a state (time, x, v), by the forces (V,) without them: exact, since
+    efforts enter linearly."""
+    forces = [evaluate(sized(at, unknown, one), *state).force - without for one in np.eye(len(unknown))]
+    return np.array(forces).reshape(len(unknown), without.size).T
 
 
 def _responses(J: Array, M: Array, B: Array) -> Array:
@@ -158,22 +143,21 @@ def _responses(J: Array, M: Array, B: Array) -> Array:
 
 
 def _fitting(
-    at: Evaluator,
     now: Evaluation,
-    x: Array,
+    B: Array,
     M: Array,
     plant: Array,
     known: Array,
-    unknown: tuple[Actuator, ...],
+    unknown: tuple[Effort, ...],
     labels: list[str],
-) -> tuple[Actuator, ...]:
+) -> tuple[Effort, ...]:
     """As many of the unknown efforts as motions are known, the best determined ones (pivoted QR of P)."""
     if len(unknown) < known.size:
         raise InputError(
             f"{known.size} motions are known ({'; '.join(labels)}) but only {len(unknown)} forces are unknown; name as many"
         )
     S = now.jacobian[known]
-    response = _responses(now.jacobian[plant], M, effort_columns(at, unknown, x))
+    response = _responses(now.jacobian[plant], M, B)
     free = free_motions(now.jacobian[plant], M)
     reach = np.linalg.norm(S @ free, axis=1)
     size = np.sqrt(np.einsum("vu,vw,wu->u", response, M, response))
@@ -229,7 +213,7 @@ def _internal(
     return words, [elastic[k] for k in rest], said
 
 
-def internal_values(own: Servo, x: Array, v: Array) -> Array:
+def internal_values(own: ServoMotion, x: Array, v: Array) -> Array:
     """(2 d,) y and y_dot of a state."""
     scene, place = own.at.system.scene, own.at.system.layout
     names, gradients = coordinate_gradients(scene, place, x, v)
@@ -240,7 +224,7 @@ def internal_values(own: Servo, x: Array, v: Array) -> Array:
     return np.concatenate([position, gradients[numbers] @ V, V[own.elastic]])
 
 
-def _joint_values(scene: Scene, own: Servo, x: Array, v: Array) -> list[float]:
+def _joint_values(scene: Scene, own: ServoMotion, x: Array, v: Array) -> list[float]:
     place, values = own.at.system.layout, []
     for joint in scene.joints:
         ends = (marker_number(scene, joint.i), marker_number(scene, joint.j)) * 2
@@ -249,7 +233,7 @@ def _joint_values(scene: Scene, own: Servo, x: Array, v: Array) -> list[float]:
     return values
 
 
-def _positions(own: Servo) -> Array:
+def _positions(own: ServoMotion) -> Array:
     """Numbers in x of the internal elastic coordinates: a body has one more position than velocities."""
     place = own.at.system.layout
     body = np.searchsorted(np.array(place.iv), own.elastic, side="right") - 1
@@ -259,18 +243,17 @@ def _positions(own: Servo) -> Array:
 # ---- the reduced equations -------------------------------------------------------------------------------------------
 
 
-def _guided(own: Servo, time: float, w: Array) -> Evaluator:
+def _guided(own: ServoMotion, time: float, w: Array) -> Evaluator:
     """The evaluator whose internal joint coordinates go through y with the rate y_dot."""
     d, model = own.size, own.at.system.model
     data = model.functions.data.copy()
     y, rate = w[: own.inner.size], w[d : d + own.inner.size]
     data[own.data], data[own.data + 1] = y - rate * time, rate
-    return replace(
-        own.at, system=replace(own.at.system, model=model._replace(functions=model.functions._replace(data=data)))
-    )
+    system = replace(own.at.system, model=model._replace(functions=model.functions._replace(data=data)))
+    return replace(own.at, system=system)
 
 
-def at_moment(own: Servo, time: float, w: Array, near: Array) -> Moment:
+def at_moment(own: ServoMotion, time: float, w: Array, near: Array) -> Moment:
     """Everything at a time, from w = (y, y_dot) and a state x nearby.
 
     Raises SimulationError when the internal coordinates no longer describe the motion or the efforts are not determined.
@@ -281,19 +264,20 @@ def at_moment(own: Servo, time: float, w: Array, near: Array) -> Moment:
     V = np.linalg.solve(_square(own, now), np.concatenate([-now.nu, w[own.size + own.inner.size :]]))
     v = to_global_axes(own.at.system.layout, x, V)
     now = evaluate(at, clock, x, v)
-    return _accelerated(own, at, now, x, v, now.gamma)
+    return _accelerated(own, at, now, (clock, x, v), now.gamma)
 
 
-def at_rest(own: Servo, time: float, y: Array, near: Array) -> Moment:
+def at_rest(own: ServoMotion, time: float, y: Array, near: Array) -> Moment:
     """The same with the known motions held still where they are at that time, and y at rest."""
     clock = float(np.clip(time, *own.span))
     w = np.concatenate([y, np.zeros(own.size)])
     at = _guided(own, clock, w)
     x, now = _placed(own, at, clock, w, near)
-    return _accelerated(own, at, now, x, np.zeros(own.at.system.layout.v_size), np.zeros_like(now.gamma))
+    still = np.zeros(own.at.system.layout.v_size)
+    return _accelerated(own, at, now, (clock, x, still), np.zeros_like(now.gamma))
 
 
-def _placed(own: Servo, at: Evaluator, time: float, w: Array, x: Array) -> tuple[Array, Evaluation]:
+def _placed(own: ServoMotion, at: Evaluator, time: float, w: Array, x: Array) -> tuple[Array, Evaluation]:
     """The position by Newton's method from x, and the equations there at rest."""
     place, slots = own.at.system.layout, _positions(own)
     still, d = np.zeros(place.v_size), own.size
@@ -312,16 +296,19 @@ def _placed(own: Servo, at: Evaluator, time: float, w: Array, x: Array) -> tuple
     )
 
 
-def _square(own: Servo, now: Evaluation) -> Array:
+def _square(own: ServoMotion, now: Evaluation) -> Array:
     return np.concatenate([now.jacobian, unit_rows(own.elastic, now.jacobian.shape[1])])
 
 
-def _accelerated(own: Servo, at: Evaluator, now: Evaluation, x: Array, v: Array, gamma: Array) -> Moment:
+def _accelerated(
+    own: ServoMotion, at: Evaluator, now: Evaluation, state: tuple[float, Array, Array], gamma: Array
+) -> Moment:
     """Accelerations and efforts at an evaluated state."""
     V, C = now.jacobian.shape[1], own.plant.size
-    B, J, S = effort_columns(at, own.unknown, x), now.jacobian[own.plant], now.jacobian[own.known]
+    mass = evaluated_mass_matrix(at)
+    B, J, S = effort_columns(at, own.unknown, state, now.force), now.jacobian[own.plant], now.jacobian[own.known]
     matrix = np.zeros((V + C + B.shape[1], V + C + B.shape[1]))
-    matrix[:V, :V] = evaluated_mass_matrix(at)
+    matrix[:V, :V] = mass
     matrix[:V, V : V + C], matrix[V : V + C, :V] = J.T, J
     matrix[:V, V + C :], matrix[V + C :, :V] = -B, S
     try:
@@ -333,16 +320,16 @@ def _accelerated(own: Servo, at: Evaluator, now: Evaluation, x: Array, v: Array,
     acceleration = found[:V]
     joints = now.jacobian[own.inner] @ acceleration - gamma[own.inner]
     y_ddot = np.concatenate([joints, acceleration[own.elastic]])
-    return Moment(x, v, acceleration, found[V + C :], y_ddot, now.gamma[own.known])
+    return Moment(state[1], state[2], acceleration, found[V + C :], y_ddot, now.gamma[own.known])
 
 
-def slope(own: Servo, time: float, w: Array, near: Array) -> tuple[Array, Array]:
+def slope(own: ServoMotion, time: float, w: Array, near: Array) -> tuple[Array, Array]:
     """dw/dt (2 d,) and the state x."""
     moment = at_moment(own, time, w, near)
     return np.concatenate([w[own.size :], moment.y_ddot]), moment.x
 
 
-def slope_matrix(own: Servo, time: float, w: Array, near: Array) -> Array:
+def slope_matrix(own: ServoMotion, time: float, w: Array, near: Array) -> Array:
     """(2 d, 2 d) central differences of the slope."""
     scale = 1e-6 * np.maximum(1.0, np.abs(w))
     sides = [

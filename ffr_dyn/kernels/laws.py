@@ -36,6 +36,8 @@ def friction(data, start, rate, normal):
     """data: Coulomb friction, what friction at rest has more, Stribeck's velocity, creep velocity, viscous damping."""
     fall = rate / data[start + 2]
     size = data[start] + data[start + 1] * math.exp(-fall * fall)
+    if normal < 0.0:  # lifted off
+        size = 0.0
     return -normal * size * math.tanh(rate / data[start + 3]) - data[start + 4] * rate
 
 

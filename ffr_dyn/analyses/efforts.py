@@ -1,0 +1,141 @@
+"""Efforts: forces whose size an analysis finds or feeds, along a joint coordinate or at a marker along a direction.
+
+In a scene an effort is an `Actuator` or a `Load` like any other, so that a forward run takes what another analysis has found
+(`with_effort`); while an analysis looks for it, its size is a number in the compiled tables (`sized`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ffr_dyn.analyses.evaluation import Evaluator
+from ffr_dyn.errors import InputError
+from ffr_dyn.force_tables import actions_of
+from ffr_dyn.forces import Load
+from ffr_dyn.joint_forces import Actuator
+from ffr_dyn.joints import Joint
+from ffr_dyn.scene import Scene
+from ffr_dyn.timefunction import TimeFunction, constant, piecewise
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class JointEffort:
+    """A moment [N m] along a joint's angle, or a force [N] along its stroke: on j's body, its opposite on i's body.
+
+    Power is effort times the rate of the coordinate. Raises InputError for another coordinate.
+    """
+
+    name: str
+    joint: str
+    coordinate: str = "angle"
+
+    def __post_init__(self) -> None:
+        if self.coordinate not in ("angle", "stroke"):
+            raise InputError(f"effort {self.name!r}: coordinate must be 'angle' or 'stroke', not {self.coordinate!r}")
+
+
+@dataclass(frozen=True)
+class MarkerEffort:
+    """A force [N] (or, with `moment`, a moment [N m]) on a marker along a fixed direction.
+
+    direction : (3,), made a unit vector;  axes : "global", or "body" for one that turns with the marker's body
+    """
+
+    name: str
+    marker: str
+    direction: Any
+    axes: str = "global"
+    moment: bool = False
+
+    def __post_init__(self) -> None:
+        value = np.asarray(self.direction, float)
+        if value.shape != (3,) or not np.isfinite(value).all() or not np.linalg.norm(value) > 0:
+            raise InputError(f"effort {self.name!r}: direction must be three numbers, not all zero: {value}")
+        object.__setattr__(self, "direction", tuple(float(c) for c in value / np.linalg.norm(value)))
+        if self.axes not in ("global", "body"):
+            raise InputError(f"effort {self.name!r}: axes must be 'global' or 'body', not {self.axes!r}")
+
+
+Effort = JointEffort | MarkerEffort
+
+
+def unit(effort: Effort) -> str:
+    """Unit of the effort."""
+    angular = effort.moment if isinstance(effort, MarkerEffort) else effort.coordinate == "angle"
+    return "N m" if angular else "N"
+
+
+def joint_named(scene: Scene, name: str, who: str) -> Joint:
+    """The joint of that name; InputError says who asked."""
+    for joint in scene.joints:
+        if joint.name == name:
+            return joint
+    raise InputError(
+        f"{who}: there is no joint {name!r}; there are {', '.join(j.name for j in scene.joints) or 'none'}"
+    )
+
+
+def with_effort(scene: Scene, effort: Effort, times: Array, values: Array) -> Scene:
+    """The scene with an effort of the values (T,) at times (T,) [s], splined, held outside; to be run forward."""
+    if isinstance(effort, JointEffort):
+        return _with_actuator(scene, effort, recorded(times, values))
+    return replace(scene, loads=(*scene.loads, _load(effort, lambda c: recorded(times, c * np.asarray(values)))))
+
+
+def with_units(scene: Scene, efforts: tuple[Effort, ...]) -> Scene:
+    """The scene with efforts of one, whose sizes `sized` sets. InputError for a joint or marker that does not exist."""
+    for effort in efforts:
+        if isinstance(effort, JointEffort):
+            scene = _with_actuator(scene, effort, constant(1.0))
+        else:
+            scene = replace(scene, loads=(*scene.loads, _load(effort, float)))
+    return scene
+
+
+def _with_actuator(scene: Scene, effort: JointEffort, force: TimeFunction) -> Scene:
+    added = Actuator(effort.name, effort.joint, force=force, coordinate=effort.coordinate)
+    return replace(scene, forces=(*scene.forces, added))
+
+
+def _load(effort: MarkerEffort, component: Any) -> Load:
+    along = tuple(component(c) if c else 0.0 for c in effort.direction)
+    nothing = (0.0, 0.0, 0.0)
+    force, moment = (nothing, along) if effort.moment else (along, nothing)
+    return Load(effort.name, effort.marker, force, moment, axes=effort.axes)
+
+
+def sized(at: Evaluator, efforts: tuple[Effort, ...], sizes: Array) -> Evaluator:
+    """The same memory for the scene with its unit efforts at other sizes (U,)."""
+    model, scene = at.system.model, at.system.scene
+    value, data = model.loads.value.copy(), model.functions.data.copy()
+    loads, actions = [load.name for load in scene.loads], [action.name for action in actions_of(scene)]
+    for effort, size in zip(efforts, sizes, strict=True):
+        if isinstance(effort, JointEffort):
+            number = model.loads.action[actions.index(effort.name), 5]
+            data[model.functions.start[number]] = size
+        else:
+            direction = np.array(effort.direction)
+            value[loads.index(effort.name), 3 * effort.moment : 3 * effort.moment + 3] = size * direction
+    tables = model._replace(loads=model.loads._replace(value=value), functions=model.functions._replace(data=data))
+    return replace(at, system=replace(at.system, model=tables))
+
+
+def recorded(times: Array, values: Array, *, degree: int = 5) -> TimeFunction:
+    """A history (T,) at times (T,) [s] as a function of time: a spline of odd `degree`, smooth enough to drive with.
+
+    Raises InputError for too few rows.
+    """
+    from scipy.interpolate import PPoly, make_interp_spline
+
+    t, y = np.asarray(times, float), np.asarray(values, float)
+    if t.shape != y.shape or t.ndim != 1 or t.size <= degree or not (np.diff(t) > 0).all():
+        raise InputError(f"a recorded history needs more than {degree} increasing times and as many values")
+    pieces = PPoly.from_spline(make_interp_spline(t, y, k=degree))
+    inside = (pieces.x[:-1] < pieces.x[1:]) & (pieces.x[:-1] >= t[0]) & (pieces.x[:-1] < t[-1])
+    breaks = np.append(pieces.x[:-1][inside], t[-1])
+    return piecewise(breaks, pieces.c[::-1, inside].T)
