@@ -123,7 +123,9 @@ def test_flexible_pendulum(kind, reference):
     np.testing.assert_allclose(result.time, expected[:, 0], atol=1e-12)
     assert np.abs(result["rod.tip.position"][:, :2] - expected[:, 1:3]).max() < 3e-4
     assert np.ptp(result["energy.total"]) < 1e-5 * np.ptp(result["energy.gravity"])
-    assert [n for n in result.attributes["notes"] if "planar" not in n] == []
+    notes = [note for note in result.attributes["notes"] if "planar" not in note]
+    assert len(notes) == 1  # the linear theory that is asked for here is 1 mm off after this half second
+    assert "without geometric stiffening" in notes[0]
 
 
 def slider_crank(rod: FlexibleBody) -> Scene:

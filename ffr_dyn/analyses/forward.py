@@ -24,14 +24,13 @@ from ffr_dyn.result import Quantity, Result
 from ffr_dyn.result_file import ResultWriter, load_checkpoint, load_result
 from ffr_dyn.scene import Scene
 from ffr_dyn.stabilisation import Projection, Stabilisation, gains
-from ffr_dyn.view import shaped
+from ffr_dyn.validity import doubts, extremes
 from ffr_prep.body import Surface
 
 Array = np.ndarray
 
 RK4_LIMIT = 2.83  # imaginary stability limit of RK4, Hairer & Wanner 1996, IV.2
 SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, file and keyboard
-STRAINED = 0.1  # elastic rotation [rad] beyond which linear elasticity in the moving frame is doubtful
 
 
 @dataclass
@@ -45,7 +44,7 @@ class _Run:
     memory: Memory
     parts: list[dict[str, Quantity]]
     times: list[Array]
-    turned: Array
+    extremes: Array
     done: int
 
 
@@ -140,7 +139,7 @@ def _started(assembled: Assembled, method: Integrator, start: float, wanted: Map
         raise failure(system, work, status, start)
     first = with_all_reactions(assembled, method, first)
     parts, memory = measure(system, first, {}, wanted)
-    return _Run(x, v, work, stages, memory, [parts], [first.time], _elastic_turns(system, first), 0)
+    return _Run(x, v, work, stages, memory, [parts], [first.time], extremes(system, first), 0)
 
 
 def _advance(
@@ -179,7 +178,7 @@ def _advance(
             times = kept.time[looks - 1 :: looks]
             run.parts.append(part)
             run.times.append(times)
-            run.turned = np.maximum(run.turned, _elastic_turns(system, kept))
+            run.extremes = np.maximum(run.extremes, extremes(system, kept))
             run.done += filled // looks * substeps
             yield times, part
         if status != OK:
@@ -242,15 +241,6 @@ def _worst(system: System, work: Work) -> str:
     return "the scene"
 
 
-def _elastic_turns(system: System, record: Record) -> Array:
-    """(B,) largest elastic rotation [rad] at an interface of each body."""
-    turns = []
-    for b, body in enumerate(system.scene.bodies):
-        q = record.x[:, system.layout.q(b)]
-        turns.append(max((np.abs(shaped(i.phi_r, q)).max(initial=0.0) for i in body.model.interfaces), default=0.0))
-    return np.array(turns)
-
-
 # ---- stopping and going on -------------------------------------------------------------------------------------------
 
 
@@ -267,7 +257,12 @@ def _fingerprint(
 
 
 def _checkpoint(run: _Run, mark: str) -> Array:
-    arrays = {"x": run.x, "v": run.v, "turned": run.turned, **{f"work.{key}": array for key, array in leaves(run.work)}}
+    arrays = {
+        "x": run.x,
+        "v": run.v,
+        "extremes": run.extremes,
+        **{f"work.{key}": array for key, array in leaves(run.work)},
+    }
     return encode(Checkpoint(mark, run.done, arrays, run.memory))
 
 
@@ -284,9 +279,9 @@ def _resumed(assembled: Assembled, method: Integrator, path: Path, mark: str) ->
         )
     work = new_work(assembled.system.model)
     restore(work, saved.arrays, "work.")
-    x, v, turned = (saved.arrays[key].copy() for key in ("x", "v", "turned"))
+    x, v, reached = (saved.arrays[key].copy() for key in ("x", "v", "extremes"))
     stages = new_stages(assembled.system, method.stage_count)
-    return _Run(x, v, work, stages, saved.memory, [dict(earlier.quantities)], [earlier.time], turned, saved.steps)
+    return _Run(x, v, work, stages, saved.memory, [dict(earlier.quantities)], [earlier.time], reached, saved.steps)
 
 
 def _check_resumed(run: _Run, steps: int, step: float) -> None:
@@ -338,7 +333,7 @@ def _account(scene: Scene, run: _Run, notes: list[str]) -> dict[str, Any]:
         "evaluations": int(info[1]),
         "projections": int(info[2]),
         "largest_drift": [float(drift[0]), float(drift[1])],
-        "notes": [*notes, *_singular(run.work), *strained(scene, run.turned)],
+        "notes": [*notes, *_singular(run.work), *doubts(scene, run.extremes)],
     }
 
 
@@ -349,13 +344,4 @@ def _singular(work: Work) -> list[str]:
     return [
         f"the motion passes a singular position near t = {time:.6g} s, where constraints become dependent; it goes on along "
         "its branch, and reactions there are large or not unique"
-    ]
-
-
-def strained(scene: Scene, turned: Array) -> list[str]:
-    return [
-        f"body {body.name!r} turns within itself by up to {turn:.2g} rad: linear elasticity in its moving frame is "
-        "strained beyond about 0.1 rad; split the body into several or expect errors of that order squared"
-        for body, turn in zip(scene.bodies, turned, strict=True)
-        if turn > STRAINED
     ]

@@ -14,7 +14,7 @@ import numpy as np
 
 from ffr_dyn.analyses.assemble import Assembled, assemble, flattened
 from ffr_dyn.analyses.evaluation import Evaluator, copied, evaluate, evaluator, joined, locked, moved, to_global_axes
-from ffr_dyn.analyses.forward import forward, strained
+from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.kinematic import kinematic, undeformed
 from ffr_dyn.analyses.mobility import require_driven
 from ffr_dyn.analyses.outcome import efforts, outputs, result_of, with_quantities
@@ -23,6 +23,7 @@ from ffr_dyn.integrators import Integrator
 from ffr_dyn.result import Result
 from ffr_dyn.scene import Scene
 from ffr_dyn.stabilisation import Projection, Stabilisation
+from ffr_dyn.validity import strained
 
 Array = np.ndarray
 
