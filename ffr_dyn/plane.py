@@ -1,9 +1,10 @@
 """Planar scenes: found or declared, and reduced to what moves in the plane.
 
-A scene is planar about a global axis when nothing in it can leave the plane across that axis: every body has a body axis
-along the normal and is symmetric about the plane through its origin, markers that are used lie in that plane, axes of
-joints are in the plane or along the normal, and so are forces. Then the in-plane motion and all reactions are those of
-the spatial scene, while a body has three rigid coordinates, no out-of-plane modes, and a revolute joint two rows.
+A scene is planar about a global axis when its joints hold every body in the plane across that axis and nothing pushes
+against them: every body has a body axis along the normal and is symmetric about the plane through its origin, markers
+that are used lie in that plane, axes of joints are in the plane or along the normal, and so are forces. Then the in-plane
+motion and all reactions are those of the spatial scene, while a body has three rigid coordinates, no out-of-plane modes,
+and a revolute joint two rows.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ STRAINED = 0.1  # elastic rotation [rad] beyond which linear elasticity in the m
 # Share of the first frequency that a body may spin at without geometric stiffening. The frequencies of a blade are then off
 # by about half its square; a pendulum and a slider-crank with 0.08 and 0.09 were off by 1 mm in 1.2 m after 0.5 s and by
 # 21 % of the deflection.
-SPINNING = 0.05
+SPINNING = 0.03
 
 
 def extremes(system: System, record: Record) -> Array:

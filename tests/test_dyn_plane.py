@@ -136,6 +136,12 @@ SPATIAL = {
     "a moment in the plane": lambda: slider_crank(loads=(Load("push", "block.pin", moment=(1.0, 0, 0)),)),
     "a function of the user": lambda: slider_crank(loads=(Load("f", "block.pin", function=lambda t, s: (0, 0, 1)),)),
     "mass beside the plane": heavy_below,
+    "a body that no joint holds": lambda: Scene(
+        (Body("top", rigid_body("top", mass=1.0, inertia=(1, 2, 3)), omega_bar=(0, 0, 1.0)),)
+    ),
+    "a rod that may turn about itself": lambda: slider_crank(
+        joints=tuple(replace(j, kind="spherical") if j.name in ("big", "small") else j for j in slider_crank().joints)
+    ),
     "a spring aslant": lambda: slider_crank(ground={"O": (0, 0, 0), "P": (1.0, 0, 0.2)}),
 }
 

@@ -106,8 +106,8 @@ def flattened(scene: Scene, time: float) -> tuple[Scene, list[Block]]:
 
 
 def _across(scene: Scene, blocks: list[Block], time: float) -> tuple[list[bool], bool]:
-    """Which rows of a planar scene act across the plane only; and whether all others act in it only, and none of the
-    former asks for a motion, now or later.
+    """Which rows of a planar scene act across the plane only; and whether they hold every body in it and ask for no
+    motion, now or later, while all others act in the plane only.
 
     Looked at in the position and with the motion that the scene declares, and at random in the plane around it.
     """
@@ -121,6 +121,7 @@ def _across(scene: Scene, blocks: list[Block], time: float) -> tuple[list[bool],
         step = np.where(active, scale * rng.normal(size=place.v_size), 0.0)
         x, speeds = _moved(place, start, step), v + _to_global(place, start, 100 * step)
         rows = rows_at(scene, place, blocks, x, speeds, time)
+        held = np.array([row.jacobian[~active] for row in rows]).reshape(-1, np.sum(~active))
         inside.append([np.abs(row.jacobian[active]).max(initial=0.0) for row in rows])
         outside.append([np.abs(row.jacobian[~active]).max(initial=0.0) for row in rows])
         left.append([max(abs(row.Phi), abs(row.nu), abs(row.gamma)) for row in rows])
@@ -129,7 +130,8 @@ def _across(scene: Scene, blocks: list[Block], time: float) -> tuple[list[bool],
     mixed = ~across & (most_outside > RANK_TOLERANCE * most_inside)
     moving = np.array([_changes(word.function) for block in blocks for word in block.words], bool)
     asked = (most_left[across] >= ASKED).any() or moving[across].any()
-    return across.tolist(), not (mixed.any() or asked)
+    kept = np.linalg.matrix_rank(held[across]) == np.sum(~active)
+    return across.tolist(), bool(kept and not (mixed.any() or asked))
 
 
 def _changes(function: TimeFunction | None) -> bool:
