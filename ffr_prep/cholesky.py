@@ -10,16 +10,11 @@ Sources: A. George, SIAM J. Numer. Anal. 10 (1973) 345-363 (nested dissection); 
 from __future__ import annotations
 
 import heapq
-import os
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from threadpoolctl import ThreadpoolController
 
 from ffr_prep.dissection import elimination_tree
 from ffr_prep.fronts import (
@@ -37,13 +32,12 @@ from ffr_prep.fronts import (
     shape,
     update_tile,
 )
+from ffr_prep.threads import Map, threads
 
 Array = np.ndarray
-Map = Callable[[Callable[..., Any], Iterable[Any]], Iterable[Any]]
 
 _BRANCHES = 24  # a branch has at most this part of the work
 _TILE = 384
-_BLAS = ThreadpoolController()
 
 
 @dataclass(frozen=True)
@@ -92,7 +86,7 @@ def cholesky(A: sp.csr_array, positions: Array) -> Factor:
     matrix = Sorted(A.indptr, A.indices, A.data, order, place)
     fronts = _empty_fronts(matrix, np.cumsum([0, *map(len, pieces)]), np.array([len(of) for of in below]))
     division = _division(fronts, below)
-    with _threads() as each:
+    with threads() as each:
         _eliminate_all(fronts, division, matrix, each)
     return Factor(order, fronts, division, *_private_rows(fronts, division.branches))
 
@@ -103,7 +97,7 @@ def solve_cholesky(factor: Factor, b: Array) -> Array:
     fronts, targets, trunk, branches = factor.fronts, factor.targets, factor.division.trunk, factor.division.branches
     y = np.zeros((n + len(factor.copied), b.shape[1]))
     y[:n] = b[factor.order]
-    with _threads() as each:
+    with threads() as each:
         _finish(each(lambda branch: forward(fronts, targets, branch[0], branch[1], y), branches))
         np.add.at(y, factor.copied, y[n:])
         for k in trunk:
@@ -118,13 +112,6 @@ def solve_cholesky(factor: Factor, b: Array) -> Array:
 
 
 # ---- division of the work -----------------------------------------------------------------------------------------
-
-
-@contextmanager
-def _threads() -> Iterator[Map]:
-    """A map that runs on all threads there are; each calls BLAS on its own."""
-    with _BLAS.limit(limits=1), ThreadPoolExecutor(os.cpu_count()) as pool:
-        yield pool.map
 
 
 def _empty_fronts(matrix: Sorted, starts: Array, children: Array) -> Fronts:

@@ -19,6 +19,7 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from ffr_prep.errors import ComputationError
+from ffr_prep.threads import Map, pieces, sparse_product, threads
 
 Array = np.ndarray
 
@@ -72,17 +73,19 @@ def _orthonormal(vectors: Array, Q: SearchSpace, M: sp.csr_array) -> tuple[Array
 
     A second pass removes the rounding of the first.
     """
-    momenta = M @ vectors
-    coordinates = _coordinates(Q, momenta)
-    smallest = _DEPENDENT**2 * np.einsum("zi,zi->i", vectors, momenta).max(initial=0.0)
-    vectors, momenta = _normalised(vectors - _combined(Q, coordinates), M, smallest)
-    vectors, momenta = _normalised(vectors - _combined(Q, _coordinates(Q, momenta)), M, 0.5)
+    with threads() as each:
+        momenta = sparse_product(M, vectors, each)
+        coordinates = _coordinates(Q, momenta, each)
+        smallest = _DEPENDENT**2 * np.einsum("zi,zi->i", vectors, momenta).max(initial=0.0)
+        vectors, momenta = _normalised(_removed(vectors, Q, coordinates, each), M, smallest, each)
+        vectors = _removed(vectors, Q, _coordinates(Q, momenta, each), each)
+        vectors, momenta = _normalised(vectors, M, 0.5, each)
     return vectors, momenta, coordinates
 
 
-def _normalised(vectors: Array, M: sp.csr_array, smallest: float) -> tuple[Array, Array]:
+def _normalised(vectors: Array, M: sp.csr_array, smallest: float, each: Map) -> tuple[Array, Array]:
     """M-orthonormal basis of the vectors without directions of a smaller squared norm, and M times it."""
-    momenta = M @ vectors
+    momenta = sparse_product(M, vectors, each)
     squares, axes = scipy.linalg.eigh(vectors.T @ momenta)
     kept = squares > smallest
     combination = axes[:, kept] / np.sqrt(squares[kept])
@@ -113,12 +116,29 @@ def _append(Q: SearchSpace, block: Array) -> None:
         Q.size += 1
 
 
-def _coordinates(Q: SearchSpace, momenta: Array) -> Array:
+def _coordinates(Q: SearchSpace, momenta: Array, each: Map) -> Array:
     """(p, b) Q^T momenta."""
-    return np.vstack([np.zeros((0, momenta.shape[1])), *(panel @ momenta for panel in Q.used)])
+
+    def of_rows(part: slice) -> Array:
+        return np.vstack([np.zeros((0, momenta.shape[1])), *(panel[:, part] @ momenta[part] for panel in Q.used)])
+
+    return np.sum(list(each(of_rows, pieces(len(momenta)))), axis=0)
+
+
+def _removed(vectors: Array, Q: SearchSpace, coordinates: Array, each: Map) -> Array:
+    """(Z, b) vectors - Q coordinates."""
+    left = np.array(vectors)
+
+    def from_rows(part: slice) -> None:
+        for k, panel in enumerate(Q.used):
+            left[part] -= panel[:, part].T @ coordinates[k * _PANEL : (k + 1) * _PANEL]
+
+    for _ in each(from_rows, pieces(len(vectors))):
+        pass
+    return left
 
 
 def _combined(Q: SearchSpace, coordinates: Array) -> Array:
-    """(Z, b) Q coordinates (p, b); zero without Q."""
-    parts = [panel.T @ coordinates[k * _PANEL : (k + 1) * _PANEL] for k, panel in enumerate(Q.used)]
-    return np.sum(parts, axis=0)
+    """(Z, b) Q coordinates (p, b)."""
+    with threads() as each:
+        return -_removed(np.zeros((Q.panels[0].shape[1], coordinates.shape[1])), Q, coordinates, each)

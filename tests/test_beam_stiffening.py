@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.linalg
-from boxes import rotation
+from boxes import box_mesh, rotation
 from test_dyn_references import slider_crank
 
 from ffr_dyn.analyses.forward import forward
@@ -15,11 +15,13 @@ from ffr_dyn.joints import Joint
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.timefunction import user
 from ffr_prep.beam_stiffening import unit_accelerations
-from ffr_prep.body import FlexibleBody
+from ffr_prep.body import FlexibleBody, truncated
 from ffr_prep.frame import Member, named, polyline
 from ffr_prep.interface import InterfaceRegion
 from ffr_prep.material import Material
-from ffr_prep.reduction import CraigBampton
+from ffr_prep.planar import in_plane
+from ffr_prep.reduce import reduce_mesh
+from ffr_prep.reduction import CraigBampton, Eigenmodes
 from ffr_prep.reference import FixedTo, MeanAxis, SimplySupported
 from ffr_prep.section import Section, circle, general, rectangle, shear_rigid, with_mass_moments
 from ffr_prep.structural import reduce_frame
@@ -173,3 +175,82 @@ def spin_up(t: float) -> tuple[float, float, float]:
         speed / T * (t - np.sin(a * t) / a),
         speed / T * (1 - np.cos(a * t)),
     )
+
+
+# ---- three modes per plane ----------------------------------------------------------------------------------------------
+
+
+FLAP = {
+    0: 3.5160152685,
+    1: 3.6816468140,
+    2: 4.1373195730,
+    3: 4.7972785324,
+    4: 5.5850014209,
+    5: 6.4495447486,
+    6: 7.3603730193,
+}
+
+
+def slender_beam() -> tuple[FlexibleBody, float]:
+    """A cantilever, and its unit of frequency squared for deflection across the plane of rotation."""
+    section = with_mass_moments(general("rod", A=1.0, Iy=1e-6, Iz=1.1e-6, J=1e-6), 1e-9, 0.0)
+    frame = named(polyline([(0, 0, 0), (1.0, 0, 0)], Member(section, STEEL, (0, 1, 0)), elements=45), root=(0, 0, 0))
+    body = reduce_frame(
+        frame, name="beam", interfaces=[InterfaceRegion("root")], reference=FixedTo("root"), reduction=Eigenmodes(10),
+        stiffening=True,
+    )  # fmt: skip
+    return body, STEEL.E * 1e-6 / STEEL.rho
+
+
+def slender_solid() -> tuple[FlexibleBody, float]:
+    """A bar of 10 x 10.1 mm without lateral contraction."""
+    material, height, width = Material("bar", 2.1e11, 0.0, 7850.0), 0.0101, 0.01
+    mesh = box_mesh("hex27", (1.0, height, width), (24, 1, 1), origin=(0.0, -height / 2, -width / 2))
+    body = reduce_mesh(
+        mesh, name="bar", material=material, interfaces=[InterfaceRegion("left")], reference=FixedTo("left"),
+        reduction=Eigenmodes(10), stiffening=True,
+    )  # fmt: skip
+    return body, material.E * width**2 / 12 / material.rho
+
+
+@pytest.mark.parametrize("make", [slender_beam, slender_solid])
+def test_rotating_cantilevers_of_three_modes_per_plane(make):
+    """Flap and lag within 0.2 % up to the speed 6, of beams and solids alike (series solution, see above)."""
+    body, unit = make()
+    shares = [np.einsum("jj->j", body.PP_dm[c, c]) for c in range(3)]
+    chosen = np.sort(np.concatenate([np.flatnonzero(shares[c] > 0.9)[:3] for c in (1, 2)]))
+    assert chosen.size == 6
+    few = truncated(body, chosen)
+    for eta, mu in FLAP.items():
+        about_z = few.stiffening[3 + 3 + 2] - few.PP_dm[0, 0] - few.PP_dm[1, 1]
+        values, vectors = scipy.linalg.eigh(np.diag(few.omega2) + eta**2 * unit * about_z)
+        flap = np.einsum("im,ij,jm->m", vectors, few.PP_dm[2, 2], vectors) > 0.5
+        assert np.sqrt(values[flap][0] / unit) == pytest.approx(mu, rel=2e-3)
+    # lag at the last speed: its own stiffness, 10 % or 2 % higher, is another speed in its own unit
+    still = few.omega2[np.flatnonzero(shares[1][chosen] > 0.9)[0]]
+    lag_unit = still / FLAP[0] ** 2
+    eta_lag = 6 * np.sqrt(unit / lag_unit)
+    mu_lag = np.sqrt(np.interp(eta_lag**2, [e**2 for e in FLAP], [m**2 for m in FLAP.values()]) - eta_lag**2)
+    assert np.sqrt(values[~flap][0] / lag_unit) == pytest.approx(mu_lag, rel=2e-3)
+
+
+def test_spin_up_with_three_bending_modes():
+    """The case of `test_spin_up_of_a_cantilever` with three modes of bending in the plane and nothing else: 1e-3 m."""
+    section = Section("beam", A=1.0, Iy=5e-4, Iz=5e-4, J=1e-3, ky=1e7 * 2.6 / 2.8e7, kz=1e7 * 2.6 / 2.8e7)
+    member = Member(section, Material("beam", 2.8e7, 0.3, 1.2), (0, 1.0, 0))
+    frame = named(polyline([(0, 0, 0), (10.0, 0, 0)], member, elements=30), root=(0, 0, 0), tip=(10.0, 0, 0))
+    free = reduce_frame(
+        frame, name="beam", interfaces=[InterfaceRegion("root"), InterfaceRegion("tip")], reference=FixedTo("root"),
+        reduction=Eigenmodes(12), stiffening=True,
+    )  # fmt: skip
+    body = truncated(in_plane(free), 3)
+    assert np.einsum("jj->j", body.PP_dm[1, 1]).min() > 0.9
+    scene = Scene(
+        (Body("beam", body),),
+        (Joint("axis", "revolute", "ground.O", "beam.root"),),
+        (Driver("motor", "axis", user(spin_up)),),
+        ground={"O": (0, 0, 0)},
+    )
+    result = forward(scene, end=10.0, output_step=0.1, method=ROS2(2e-3))
+    deflection = result["beam.q"] @ body.interface("tip").phi_t[1]
+    np.testing.assert_allclose(deflection[[50, 68, 100]], [-0.468476, -0.573761, -0.362815], atol=1e-3)
