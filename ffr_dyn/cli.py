@@ -37,7 +37,7 @@ def cli() -> None:
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Result file (netCDF); default: <scene>.nc.")
 @click.option("--end", type=float, help="End of the run [s], instead of the scene's.")
 @click.option("--step", type=float, help="Time step [s], instead of the scene's.")
-@click.option("--method", type=click.Choice(["ros2", "rk4"]), help="Integrator, instead of the scene's.")
+@click.option("--method", type=click.Choice(["ros2", "ros3", "rk4"]), help="Integrator, instead of the scene's.")
 @click.option(
     "-p", "--parameter", "parameters", multiple=True, metavar="NAME=VALUE", help="A parameter of the scene file."
 )
@@ -57,8 +57,8 @@ def run(
 ) -> None:
     """Forward dynamics of SCENE: integrate the motion and write the result file.
 
-    ros2 treats the elastic modes implicitly: no elastic frequency limits its step. rk4 is explicit, of fourth order:
-    exact for soft bodies at small steps, unstable when step times the highest circular frequency exceeds about 2.8.
+    ros2 and ros3 treat the elastic modes implicitly: no elastic frequency limits their step. rk4 is explicit, of fourth
+    order: exact for soft bodies at small steps, unstable when step times the highest circular frequency exceeds about 2.8.
     Drift off the constraints is held by projection and reported. A run that was killed keeps what its last flush wrote,
     a few seconds old; --resume goes on from there to the same bits. Without a result file it starts at the beginning.
     """
