@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from ffr_dyn.cli_analyses import COMMANDS
+from ffr_dyn.cli_run import forward, run
 from ffr_dyn.cli_stress import stress
 from ffr_dyn.errors import InputError, SimulationError
 
@@ -27,75 +28,9 @@ Example:
 def cli() -> None:
     """Flexible multibody dynamics in the floating frame of reference: from reduced bodies to a moving machine.
 
-    A scene file (TOML) names the bodies (files from ffr-prep, or rigid ones), their joints, drivers and loads. `run`
-    computes the motion and writes one result file; `info`, `plot` and `animate` show what is in it.
+    A scene file (TOML) names the bodies (files from ffr-prep, or rigid ones), their joints, drivers and loads, and the
+    analysis. `run` does it and writes one result file; `info`, `plot` and `animate` show what is in it.
     """
-
-
-@cli.command()
-@click.argument("scene", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Result file (netCDF); default: <scene>.nc.")
-@click.option("--end", type=float, help="End of the run [s], instead of the scene's.")
-@click.option("--step", type=float, help="Time step [s], instead of the scene's.")
-@click.option("--method", type=click.Choice(["ros2", "ros3", "rk4"]), help="Integrator, instead of the scene's.")
-@click.option(
-    "-p", "--parameter", "parameters", multiple=True, metavar="NAME=VALUE", help="A parameter of the scene file."
-)
-@click.option(
-    "--keep", multiple=True, metavar="NAME", help="Quantities to keep, instead of the scene's; * and ? match."
-)
-@click.option("--resume", is_flag=True, help="Go on where the result file ends, as if the run had never stopped.")
-def run(
-    scene: Path,
-    output: Path | None,
-    end: float | None,
-    step: float | None,
-    method: str | None,
-    parameters: tuple[str, ...],
-    keep: tuple[str, ...],
-    resume: bool,
-) -> None:
-    """Forward dynamics of SCENE: integrate the motion and write the result file.
-
-    ros2 and ros3 treat the elastic modes implicitly: no elastic frequency limits their step. rk4 is explicit, of fourth
-    order: exact for soft bodies at small steps, unstable when step times the highest circular frequency exceeds about 2.8.
-    Drift off the constraints is held by projection and reported. A run that was killed keeps what its last flush wrote,
-    a few seconds old; --resume goes on from there to the same bits. Without a result file it starts at the beginning.
-    """
-    from ffr_dyn.analyses.forward import forward
-    from ffr_dyn.integrators import METHODS
-    from ffr_dyn.progress import progress
-    from ffr_dyn.scene_file import load_scene
-
-    loaded, settings = load_scene(scene, _assignments(parameters))
-    output = output or scene.with_suffix(".nc")
-    chosen = METHODS[method or type(settings.method).__name__.lower()]
-    finish = settings.end if end is None else end
-    with progress(loaded.name, finish, start=settings.start) as update:
-        result = forward(
-            loaded,
-            start=settings.start,
-            end=finish,
-            output_step=settings.output_step,
-            method=chosen(settings.method.step if step is None else step),
-            stabilisation=settings.stabilisation,
-            outputs=keep or settings.outputs,
-            path=output,
-            resume=output if resume else None,
-            progress=update,
-        )
-    for line in summary(result.attributes):
-        click.echo(line)
-    click.echo(f"result       {output}")
-
-
-def _assignments(parameters: tuple[str, ...]) -> dict[str, str]:
-    """{"crank.length": "0.15"} of ("crank.length=0.15",)."""
-    for text in parameters:
-        if "=" not in text:
-            raise InputError(f"-p {text}: write it as NAME=VALUE")
-    pairs = (text.partition("=") for text in parameters)
-    return {name.strip(): value.strip() for name, _, value in pairs}
 
 
 @cli.command()
@@ -106,21 +41,6 @@ def schema() -> None:
     from ffr_dyn.scene_schema import schema as made
 
     click.echo(json.dumps(made(), indent=2))
-
-
-def summary(attributes: object) -> list[str]:
-    """What a run reports, a line each."""
-    a = dict(attributes)  # type: ignore[call-overload]
-    lines = [
-        f"scene        {a['title']}: {a['analysis']}, {a['degrees_of_freedom']} degrees of freedom",
-        f"method       {a['method']}, {a.get('evaluations', 0)} evaluations of the equations of motion",
-    ]
-    if "largest_drift" in a:
-        position, velocity = a["largest_drift"]
-        lines.append(
-            f"constraints  left by at most {position:.1e} (rate {velocity:.1e}); {a['projections']} projections"
-        )
-    return lines + [f"note         {note}" for note in a["notes"]]
 
 
 @cli.command()
@@ -179,7 +99,7 @@ def animate(result: Path, output: Path, scale: str, duration: float | None, colo
     click.echo(f"film     {output}")
 
 
-for command in (*COMMANDS, stress):
+for command in (run, forward, *COMMANDS, stress):
     cli.add_command(command)
 
 

@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from ffr_dyn.cli_run import (
+    assignments,
+    output_option,
+    over_time,
+    parameter_option,
+    perform,
+    scene_argument,
+    scene_options,
+)
 from ffr_dyn.errors import InputError
 
 if TYPE_CHECKING:
     from ffr_dyn.analyses.efforts import Effort
+    from ffr_dyn.settings import MomentSettings, OfMoment, Settings
 
 _FORCES = """\b
 Forces are written as
@@ -19,95 +29,107 @@ Forces are written as
   name=body.interface:x,y,z              at a marker, along a global direction
 """
 
-scene_argument = click.argument("scene", type=click.Path(path_type=Path))
-output_option = click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="Result file (netCDF); default: <scene>.nc."
-)
-time_option = click.option("--time", type=float, default=0.0, show_default=True, help="[s], for what depends on time.")
+time_option = click.option("--time", type=float, help="[s], for what depends on time; default: the scene's, or 0.")
 
 
 @click.command()
 @scene_argument
+@parameter_option
 @time_option
-def check(scene: Path, time: float) -> None:
+def check(scene: Path, parameters: tuple[str, ...], time: float | None) -> None:
     """What SCENE can do: degrees of freedom, free motions, redundant rows of joints, drivers that contradict."""
     from ffr_dyn.analyses.mobility import mobility
     from ffr_dyn.scene_file import load_scene
+    from ffr_dyn.settings import Static
 
-    for line in mobility(load_scene(scene)[0], time=time).lines():
+    loaded, settings = load_scene(scene, assignments(parameters))
+    for line in mobility(loaded, time=_at_moment(settings, Static(), time, ()).time).lines():
         click.echo(line)
 
 
 @click.command()
-@scene_argument
-@output_option
-def kinematic(scene: Path, output: Path | None) -> None:
+@scene_options
+def kinematic(scene: Path, output: Path | None, parameters: tuple[str, ...], keep: tuple[str, ...]) -> None:
     """Positions, velocities and accelerations of SCENE, whose drivers prescribe all motion; bodies undeformed."""
-    from ffr_dyn.analyses.kinematic import kinematic as analysis
+    from ffr_dyn.scene_file import load_scene
+    from ffr_dyn.settings import Kinematic
 
-    _over_time(scene, output, lambda loaded, settings, **options: analysis(loaded, **options))
+    loaded, settings = load_scene(scene, assignments(parameters))
+    perform(loaded, over_time(settings, Kinematic(), keep), output or scene.with_suffix(".nc"))
 
 
 @click.command()
-@scene_argument
-@output_option
-@click.option("--quasi-static", is_flag=True, help="Elastic coordinates follow without vibration.")
-def inverse(scene: Path, output: Path | None, quasi_static: bool) -> None:
+@scene_options
+@click.option(
+    "--quasi-static/--dynamic", default=None, help="Elastic coordinates follow without vibration; default: dynamic."
+)
+def inverse(
+    scene: Path, output: Path | None, parameters: tuple[str, ...], keep: tuple[str, ...], quasi_static: bool | None
+) -> None:
     """Forces that drive SCENE along its prescribed motion, and all reactions."""
-    from ffr_dyn.analyses.inverse import Dynamic, QuasiStatic
-    from ffr_dyn.analyses.inverse import inverse as analysis
+    from ffr_dyn.scene_file import load_scene
+    from ffr_dyn.settings import Inverse
 
-    def run(loaded: Any, settings: Any, **options: Any) -> Any:
-        elastic = QuasiStatic() if quasi_static else Dynamic(settings.method, settings.stabilisation)
-        return analysis(loaded, elastic=elastic, **options)
-
-    _over_time(scene, output, run)
+    loaded, settings = load_scene(scene, assignments(parameters))
+    given = settings.analysis if isinstance(settings.analysis, Inverse) else Inverse()
+    analysis = given if quasi_static is None else Inverse(quasi_static)
+    perform(loaded, over_time(settings, analysis, keep), output or scene.with_suffix(".nc"))
 
 
 @click.command(epilog=_FORCES)
-@scene_argument
-@output_option
-@click.option("--unknown", "forces", multiple=True, required=True, metavar="FORCE", help="Force to find; repeat.")
+@scene_options
+@click.option(
+    "--unknown", "forces", multiple=True, metavar="FORCE", help="Force to find, instead of the scene's; repeat."
+)
 @click.option("--known", multiple=True, help="Driver that is a known motion, not a true driver; default: all.")
-def mixed(scene: Path, output: Path | None, forces: tuple[str, ...], known: tuple[str, ...]) -> None:
+def mixed(
+    scene: Path,
+    output: Path | None,
+    parameters: tuple[str, ...],
+    keep: tuple[str, ...],
+    forces: tuple[str, ...],
+    known: tuple[str, ...],
+) -> None:
     """Motion and unknown forces of SCENE, some motions of which are known.
 
     Forces away from the known motions are found by integration where that is stable, else as the bounded solution, which
     adds times before and after the run.
     """
-    from ffr_dyn.analyses.mixed import mixed as analysis
+    from ffr_dyn.scene_file import load_scene
+    from ffr_dyn.settings import Mixed
 
-    unknown = tuple(force_of(text) for text in forces)
-
-    def run(loaded: Any, settings: Any, **options: Any) -> Any:
-        return analysis(loaded, unknown=unknown, known=known or None, method=settings.method, **options)
-
-    _over_time(scene, output, run)
+    loaded, settings = load_scene(scene, assignments(parameters))
+    analysis = settings.analysis if isinstance(settings.analysis, Mixed) else Mixed(())
+    if forces:
+        analysis = replace(analysis, unknown=tuple(force_of(text) for text in forces))
+    if not analysis.unknown:
+        raise InputError(
+            'mixed dynamics needs forces to find: --unknown, or kind = "mixed" with [analysis.unknown.NAME]'
+        )
+    analysis = replace(analysis, known=known or analysis.known)
+    perform(loaded, over_time(settings, analysis, keep), output or scene.with_suffix(".nc"))
 
 
 @click.command()
-@scene_argument
-@output_option
+@scene_options
 @time_option
-def static(scene: Path, output: Path | None, time: float) -> None:
+def static(
+    scene: Path, output: Path | None, parameters: tuple[str, ...], keep: tuple[str, ...], time: float | None
+) -> None:
     """Static equilibrium of SCENE, downhill from its start, with reactions and stability."""
-    from ffr_dyn.analyses.static import static as analysis
-    from ffr_dyn.cli import summary
     from ffr_dyn.scene_file import load_scene
+    from ffr_dyn.settings import Static
 
-    output = output or scene.with_suffix(".nc")
-    result = analysis(load_scene(scene)[0], time=time, path=output)
-    for line in summary(result.attributes):
-        click.echo(line)
-    click.echo(f"equilibrium  {'stable' if result.attributes['stable'] else 'unstable'}")
-    click.echo(f"result       {output}")
+    loaded, settings = load_scene(scene, assignments(parameters))
+    perform(loaded, _at_moment(settings, Static(), time, keep), output or scene.with_suffix(".nc"))
 
 
 @click.command(epilog=_FORCES)
 @scene_argument
 @output_option
+@parameter_option
 @time_option
-@click.option("--at-equilibrium", is_flag=True, help="About the static equilibrium instead of the start.")
+@click.option("--at-equilibrium/--at-start", default=None, help="About the static equilibrium, or (default) the start.")
 @click.option(
     "--input", "forces", multiple=True, metavar="FORCE", help="Input: a force, or the name of a load; repeat."
 )
@@ -117,33 +139,37 @@ def static(scene: Path, output: Path | None, time: float) -> None:
 def linearise(
     scene: Path,
     output: Path | None,
-    time: float,
-    at_equilibrium: bool,
+    parameters: tuple[str, ...],
+    time: float | None,
+    at_equilibrium: bool | None,
     forces: tuple[str, ...],
     quantities: tuple[str, ...],
 ) -> None:
     """Eigenvalues and state-space matrices of SCENE about its start or its equilibrium."""
-    from ffr_dyn.analyses.linearise import as_result, table_of_modes
-    from ffr_dyn.analyses.linearise import linearise as analysis
-    from ffr_dyn.analyses.states import scene_at
-    from ffr_dyn.analyses.static import static as equilibrium
-    from ffr_dyn.result_file import save_result
     from ffr_dyn.scene_file import load_scene
+    from ffr_dyn.settings import Linearise
 
-    loaded = load_scene(scene)[0]
-    if at_equilibrium:
-        loaded = scene_at(loaded, equilibrium(loaded, time=time))
-    inputs = tuple(force_of(text) if "=" in text else text for text in forces)
-    found = analysis(loaded, time=time, inputs=inputs, outputs=quantities)
-    for line in table_of_modes(found):
-        click.echo(line)
-    for note in found.notes:
-        click.echo(f"note         {note}")
-    output = output or scene.with_suffix(".nc")
-    click.echo(f"result       {save_result(as_result(loaded, found, time), output)}")
+    loaded, settings = load_scene(scene, assignments(parameters))
+    given = settings.analysis if isinstance(settings.analysis, Linearise) else Linearise()
+    analysis = Linearise(
+        tuple(force_of(text) if "=" in text else text for text in forces) or given.inputs,
+        quantities or given.quantities,
+        given.at_equilibrium if at_equilibrium is None else at_equilibrium,
+    )
+    perform(loaded, _at_moment(settings, analysis, time, ()), output or scene.with_suffix(".nc"))
 
 
 COMMANDS = (check, kinematic, static, inverse, mixed, linearise)
+
+
+def _at_moment(
+    settings: Settings | MomentSettings, analysis: OfMoment, time: float | None, keep: tuple[str, ...]
+) -> MomentSettings:
+    """The settings of a file with another analysis, at another time if one is given."""
+    from ffr_dyn.settings import MomentSettings
+
+    given = settings.time if isinstance(settings, MomentSettings) else 0.0
+    return MomentSettings(given if time is None else time, keep or settings.outputs, analysis)
 
 
 def force_of(text: str) -> Effort:
@@ -162,26 +188,3 @@ def force_of(text: str) -> Effort:
     except ValueError:
         raise InputError(f"{text!r}: the direction {along!r} is not three numbers with commas between") from None
     return MarkerEffort(name, place, direction)
-
-
-def _over_time(scene: Path, output: Path | None, analysis: Callable[..., Any]) -> None:
-    """Run an analysis over the times of a scene file, with progress, and tell what came of it."""
-    from ffr_dyn.cli import summary
-    from ffr_dyn.progress import progress
-    from ffr_dyn.scene_file import load_scene
-
-    loaded, settings = load_scene(scene)
-    output = output or scene.with_suffix(".nc")
-    with progress(loaded.name, settings.end, start=settings.start) as update:
-        result = analysis(
-            loaded,
-            settings,
-            start=settings.start,
-            end=settings.end,
-            output_step=settings.output_step,
-            path=output,
-            progress=update,
-        )
-    for line in summary(result.attributes):
-        click.echo(line)
-    click.echo(f"result       {output}")

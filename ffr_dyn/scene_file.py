@@ -22,22 +22,24 @@ Paths are relative to the file. Angles in rad, everything in SI units unless a u
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
+from ffr_dyn.analyses.efforts import Effort
 from ffr_dyn.errors import InputError
 from ffr_dyn.forces import Load
 from ffr_dyn.formula import is_constant
-from ffr_dyn.integrators import METHODS, Integrator
+from ffr_dyn.integrators import METHODS
 from ffr_dyn.joint_forces import Actuator
 from ffr_dyn.parameters import Parameters, flattened, overridden, substituted
 from ffr_dyn.scene import Body, Scene
-from ffr_dyn.scene_schema import TABLES, BodyEntry, ForwardEntry, Kind, SceneEntry, keys_of
+from ffr_dyn.scene_schema import EFFORTS, SOLUTIONS, TABLES, BodyEntry, Kind, SceneEntry, StabilisationEntry, keys_of
 from ffr_dyn.scene_source import Source, origin, read_source
+from ffr_dyn.settings import Forward, Inverse, Kinematic, Linearise, Mixed, MomentSettings, OverTime, Settings, Static
 from ffr_dyn.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
 from ffr_dyn.state_formula import StateFormula, check_names
 from ffr_dyn.timefunction import TimeFunction, constant
@@ -46,19 +48,7 @@ from ffr_prep.body import BodyError, FlexibleBody, load_body, rigid_body, trunca
 WHOLE = ("name", "gravity", "ground", "base_acceleration")  # fields of a scene that are no tables of entries
 
 
-@dataclass(frozen=True)
-class Settings:
-    """How a scene file wants to be run."""
-
-    start: float
-    end: float
-    output_step: float
-    method: Integrator
-    stabilisation: Stabilisation
-    outputs: tuple[str, ...] = ("default",)
-
-
-def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Scene, Settings]:
+def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Scene, Settings | MomentSettings]:
     """Read a scene file.
 
     parameters : values, as text, in place of those in the file, such as {"crank.length": "0.15"}
@@ -78,7 +68,7 @@ def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Sc
         entry = SceneEntry.model_validate(tree, context={"parameters": values})
     except ValidationError as error:
         raise InputError(_explained(error, source)) from None
-    return _scene(entry, source), _settings(entry.analysis, entry.outputs)
+    return _scene(entry, source), _settings(entry.analysis, entry.outputs, source)
 
 
 def _explained(error: ValidationError, source: Source) -> str:
@@ -113,9 +103,9 @@ def _scene(entry: Any, source: Source) -> Scene:
     return scene
 
 
-def _declared(kinds: tuple[Kind, ...], keys: tuple[str, str], entry: BaseModel, source: Source) -> Any:
+def _declared(kinds: tuple[Kind, ...], keys: tuple[str, ...], entry: BaseModel, source: Source) -> Any:
     try:
-        return _made(_kind(kinds, entry), keys[1], entry)
+        return _made(_kind(kinds, entry), keys[-1], entry)
     except InputError as error:
         raise InputError(f"{origin(source, keys)}: {error}") from None
 
@@ -193,13 +183,45 @@ def _model(name: str, entry: BodyEntry) -> FlexibleBody:
     return replace(model, r_dm=np.array(entry.r_dm), rr_dm=np.array(entry.rr_dm))
 
 
-def _settings(entry: ForwardEntry, outputs: list[str]) -> Settings:
-    step = entry.output_step / 10 if entry.step is None else entry.step
-    keep = entry.stabilisation
+# ---- the analysis -------------------------------------------------------------------------------------------------
+
+
+def _settings(entry: Any, outputs: list[str], source: Source) -> Settings | MomentSettings:
+    keep = tuple(outputs)
+    if entry.kind == "static":
+        return MomentSettings(entry.time, keep, Static())
+    if entry.kind == "linearise":
+        inputs = (*_efforts("inputs", entry.inputs, source), *entry.loads)
+        return MomentSettings(entry.time, keep, Linearise(inputs, tuple(entry.quantities), entry.at_equilibrium))
+    step = getattr(entry, "step", None)
+    method = METHODS[getattr(entry, "method", "ros2")](entry.output_step / 10 if step is None else step)
+    stabilisation = _stabilisation(getattr(entry, "stabilisation", StabilisationEntry()))
+    span = (entry.start, entry.end, entry.output_step)
+    return Settings(*span, method, stabilisation, keep, _over_time(entry, source))
+
+
+def _over_time(entry: Any, source: Source) -> OverTime:
+    if entry.kind == "kinematic":
+        return Kinematic()
+    if entry.kind == "inverse":
+        return Inverse(entry.elastic == "quasi-static")
+    if entry.kind == "mixed":
+        known = None if entry.known is None else tuple(entry.known)
+        solution = entry.solution and next(k.made for k in SOLUTIONS if k.word == entry.solution.kind)(
+            **entry.solution.model_dump(exclude={"kind"})
+        )
+        return Mixed(_efforts("unknown", entry.unknown, source), known, solution)
+    return Forward()
+
+
+def _efforts(key: str, entries: Mapping[str, BaseModel], source: Source) -> tuple[Effort, ...]:
+    return tuple(_declared(EFFORTS, ("analysis", key, name), entry, source) for name, entry in entries.items())
+
+
+def _stabilisation(entry: StabilisationEntry) -> Stabilisation:
     choice: dict[str, Any] = {
-        "projection": Projection(keep.tolerance),
-        "baumgarte": Baumgarte(keep.alpha, keep.beta),
+        "projection": Projection(entry.tolerance),
+        "baumgarte": Baumgarte(entry.alpha, entry.beta),
         "none": Drifting(),
     }
-    method = METHODS[entry.method](step)
-    return Settings(entry.start, entry.end, entry.output_step, method, choice[keep.kind], tuple(outputs))
+    return choice[entry.kind]

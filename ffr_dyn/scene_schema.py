@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import typing
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -29,6 +29,9 @@ from pydantic import (
 from pydantic import Field as Key
 from pydantic_core import CoreSchema, core_schema
 
+from ffr_dyn.analyses.bounded import Bounded
+from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort
+from ffr_dyn.analyses.mixed import Causal
 from ffr_dyn.couplings import Coupling
 from ffr_dyn.curve import Curve
 from ffr_dyn.drivers import Driver, PointDriver
@@ -255,6 +258,7 @@ FIELDS: dict[str, Any] = {
     "Pressure.function": OfTime,
     "ModalForce.values": list[Number],
     "ModalForce.function": OfTime,
+    "MarkerEffort.direction": Vector,
 }
 
 # Fields that a file cannot hold: Python functions, and the name, which is the key of the entry.
@@ -289,6 +293,10 @@ TABLES: dict[str, tuple[Kind, ...]] = {
     ),
     "measurements": (Kind("", Measurement),),
 }
+
+
+EFFORTS = (Kind("joint", JointEffort), Kind("marker", MarkerEffort))  # tables of an analysis
+SOLUTIONS = (Kind("causal", Causal), Kind("bounded", Bounded))
 
 
 def keys_of(kind: Kind) -> list[Field]:
@@ -340,14 +348,18 @@ def _table_model(kinds: tuple[Kind, ...]) -> Any:
     models = [entry_model(kind) for kind in kinds]
     if len(models) == 1:
         return dict[str, models[0]]  # type: ignore[valid-type]
-    tagged = tuple(Annotated[model, Tag(f"[{kind.word}]")] for model, kind in zip(models, kinds, strict=True))
-    words = [kind.word for kind in kinds]
+    return dict[str, _one_of(models, [kind.word for kind in kinds])]  # type: ignore[misc]
+
+
+def _one_of(models: Sequence[type[BaseModel]], words: Sequence[str]) -> Any:
+    """An entry whose `kind` says which model it is of; without it, the first."""
+    tagged = tuple(Annotated[model, Tag(f"[{word}]")] for model, word in zip(models, words, strict=True))
     which = Discriminator(
         lambda given: f"[{given.get('kind', words[0]) if isinstance(given, dict) else getattr(given, 'kind', None)}]",
         custom_error_type="kind",
         custom_error_message=f"there is no such kind; there are {', '.join(words)}",
     )
-    return dict[str, Annotated[typing.Union[tagged], which]]  # type: ignore[valid-type]  # noqa: UP007
+    return Annotated[typing.Union[tagged], which]  # noqa: UP007
 
 
 # ---- bodies, analysis, the scene ----------------------------------------------------------------------------------
@@ -397,16 +409,82 @@ class StabilisationEntry(_Strict):
     beta: Annotated[float, In("1/s")] = 0.0
 
 
-class ForwardEntry(_Strict):
-    """Forward dynamics from start to end; step defaults to a tenth of output_step."""
-
-    kind: Literal["forward"] = "forward"
+class _Span(_Strict):
     end: Seconds
     output_step: Seconds
     start: Seconds = 0.0
+
+
+class _Integrated(_Span):
     method: Literal[tuple(METHODS)] = "ros2"  # type: ignore[valid-type]
     step: Seconds | None = None
+
+
+class ForwardEntry(_Integrated):
+    """Forward dynamics from start to end; step defaults to a tenth of output_step."""
+
+    kind: Literal["forward"] = "forward"
     stabilisation: StabilisationEntry = StabilisationEntry()
+
+
+class KinematicEntry(_Span):
+    """Positions, velocities, accelerations and reactions along the motion that the drivers prescribe."""
+
+    kind: Literal["kinematic"]
+
+
+class InverseEntry(_Integrated):
+    """The forces of the drivers; method, step and stabilisation are of dynamic elastic coordinates."""
+
+    kind: Literal["inverse"]
+    elastic: Literal["dynamic", "quasi-static"] = "dynamic"
+    stabilisation: StabilisationEntry = StabilisationEntry()
+
+
+class _MixedBase(_Integrated):
+    kind: Literal["mixed"]
+    known: Annotated[list[str], Key(min_length=1)] | None = None
+
+
+MixedEntry = create_model(
+    "MixedEntry",
+    __base__=_MixedBase,
+    __doc__="Known motions (drivers, by default all) and the unknown forces, by name, that realise them.",
+    unknown=(Annotated[_table_model(EFFORTS), Key(min_length=1)], ...),  # type: ignore[arg-type]
+    solution=(_one_of([entry_model(kind) for kind in SOLUTIONS], [kind.word for kind in SOLUTIONS]) | None, None),
+)
+
+
+class StaticEntry(_Strict):
+    """The equilibrium at a time."""
+
+    kind: Literal["static"]
+    time: Seconds = 0.0
+
+
+class _LineariseBase(_Strict):
+    kind: Literal["linearise"]
+    time: Seconds = 0.0
+    at_equilibrium: bool = False
+    loads: list[str] = []
+    quantities: list[str] = []
+
+
+LineariseEntry = create_model(
+    "LineariseEntry",
+    __base__=_LineariseBase,
+    __doc__="Small motions about the start or the equilibrium; inputs (forces by name) and loads feed, quantities come out.",
+    inputs=(_table_model(EFFORTS), {}),
+)
+
+ANALYSES: dict[str, Any] = {
+    "forward": ForwardEntry,
+    "kinematic": KinematicEntry,
+    "static": StaticEntry,
+    "inverse": InverseEntry,
+    "mixed": MixedEntry,
+    "linearise": LineariseEntry,
+}
 
 
 class _SceneBase(_Strict):
@@ -416,7 +494,7 @@ class _SceneBase(_Strict):
     outputs: list[str] = ["default"]
     gravity: Annotated[list[Annotated[float, In("m/s^2")]], THREE] = [0.0, 0.0, 0.0]
     base_acceleration: Annotated[list[OfTime], THREE] = [0.0, 0.0, 0.0]
-    analysis: ForwardEntry
+    analysis: _one_of(list(ANALYSES.values()), list(ANALYSES))  # type: ignore[valid-type]
     ground: dict[str, Metres] = {}
     bodies: dict[str, BodyEntry]
 

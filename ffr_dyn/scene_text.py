@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ffr_dyn.analyses.efforts import Effort
 from ffr_dyn.curve import Curve
 from ffr_dyn.errors import InputError
 from ffr_dyn.forces import Load
@@ -17,9 +18,9 @@ from ffr_dyn.formula import Measured, Operation, text_of
 from ffr_dyn.integrators import METHODS
 from ffr_dyn.joint_forces import Actuator
 from ffr_dyn.scene import Body, Scene
-from ffr_dyn.scene_file import Settings
-from ffr_dyn.scene_schema import TABLES, Kind, keys_of
-from ffr_dyn.stabilisation import Baumgarte, Projection
+from ffr_dyn.scene_schema import EFFORTS, SOLUTIONS, TABLES, Kind, keys_of
+from ffr_dyn.settings import Forward, Inverse, Kinematic, Linearise, Mixed, MomentSettings, OfMoment, OverTime, Settings
+from ffr_dyn.stabilisation import Baumgarte, Projection, Stabilisation
 from ffr_dyn.state_formula import StateFormula
 from ffr_dyn.timefunction import HARMONIC, OPERATION, PIECEWISE, POLYNOMIAL, TimeFunction, constant
 from ffr_prep.body import FlexibleBody, save_body
@@ -27,7 +28,7 @@ from ffr_prep.body import FlexibleBody, save_body
 _BARE = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
 
 
-def save_scene(scene: Scene, settings: Settings, path: str | Path) -> Path:
+def save_scene(scene: Scene, settings: Settings | MomentSettings, path: str | Path) -> Path:
     """Write a scene file, and beside it a body file <file>.<body>.ffr for every flexible body."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -42,7 +43,7 @@ def save_scene(scene: Scene, settings: Settings, path: str | Path) -> Path:
     return path
 
 
-def to_toml(scene: Scene, settings: Settings, files: Mapping[str, str] = {}) -> str:
+def to_toml(scene: Scene, settings: Settings | MomentSettings, files: Mapping[str, str] = {}) -> str:
     """The text of the scene file.
 
     files : by name of a flexible body, the file in which it is kept
@@ -64,18 +65,53 @@ def _kind(kinds: tuple[Kind, ...], thing: Any) -> Kind:
 # ---- entries ------------------------------------------------------------------------------------------------------
 
 
-def _analysis(settings: Settings) -> dict[str, Any]:
-    entry: dict[str, Any] = {"start": settings.start, "end": settings.end, "output_step": settings.output_step}
-    entry["method"] = next(word for word, made in METHODS.items() if type(settings.method) is made)
-    entry["step"] = settings.method.step
-    keep = settings.stabilisation
-    if isinstance(keep, Projection):
-        entry["stabilisation"] = {"kind": "projection", "tolerance": keep.tolerance}
-    elif isinstance(keep, Baumgarte):
-        entry["stabilisation"] = {"kind": "baumgarte", "alpha": keep.alpha, "beta": keep.beta}
+def _analysis(settings: Settings | MomentSettings) -> dict[str, Any]:
+    analysis = settings.analysis
+    entry: dict[str, Any] = {"kind": type(analysis).__name__.lower()}
+    if isinstance(settings, Settings):
+        entry |= {"start": settings.start, "end": settings.end, "output_step": settings.output_step}
     else:
-        entry["stabilisation"] = {"kind": "none"}
-    return entry
+        entry["time"] = settings.time
+    if isinstance(settings, Settings) and not isinstance(analysis, Kinematic):
+        entry["method"] = next(word for word, made in METHODS.items() if type(settings.method) is made)
+        entry["step"] = settings.method.step
+    if isinstance(settings, Settings) and isinstance(analysis, (Forward, Inverse)):
+        entry["stabilisation"] = _stabilisation(settings.stabilisation)
+    return entry | _particular(analysis)
+
+
+def _particular(analysis: OverTime | OfMoment) -> dict[str, Any]:
+    """The settings of one analysis only."""
+    if isinstance(analysis, Inverse):
+        return {"elastic": "quasi-static" if analysis.quasi_static else "dynamic"}
+    if isinstance(analysis, Mixed):
+        solution = analysis.solution
+        chosen = None if solution is None else {"kind": _kind(SOLUTIONS, solution).word, **_given(solution)}
+        return {"unknown": _efforts(analysis.unknown), "known": analysis.known, "solution": chosen}
+    if isinstance(analysis, Linearise):
+        efforts = tuple(item for item in analysis.inputs if not isinstance(item, str))
+        loads = tuple(item for item in analysis.inputs if isinstance(item, str))
+        if analysis.inputs != (*efforts, *loads):
+            raise InputError(
+                f"analysis: a scene file lists the names of loads {loads} after the other inputs; put them last"
+            )
+        wanted = {"loads": loads, "quantities": analysis.quantities, "at_equilibrium": analysis.at_equilibrium}
+        return {"inputs": _efforts(efforts), **wanted}
+    return {}
+
+
+def _efforts(efforts: tuple[Effort, ...]) -> dict[str, Any]:
+    return {effort.name: _entry(_kind(EFFORTS, effort), effort) for effort in efforts}
+
+
+def _stabilisation(keep: Stabilisation) -> dict[str, Any]:
+    if isinstance(keep, Projection):
+        return {"kind": "projection", "tolerance": keep.tolerance}
+    return (
+        {"kind": "baumgarte", "alpha": keep.alpha, "beta": keep.beta}
+        if isinstance(keep, Baumgarte)
+        else {"kind": "none"}
+    )
 
 
 def _body(body: Body, files: Mapping[str, str]) -> dict[str, Any]:

@@ -12,7 +12,10 @@ import pytest
 from synthetic import cloud
 
 from ffr_dyn import cli
+from ffr_dyn.analyses.bounded import Bounded
+from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort
 from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.mixed import Causal
 from ffr_dyn.checkpoint import fingerprint
 from ffr_dyn.couplings import Coupling
 from ffr_dyn.curve import Curve
@@ -27,9 +30,11 @@ from ffr_dyn.joints import KINDS, Joint
 from ffr_dyn.measurement import Measurement
 from ffr_dyn.result_file import load_result
 from ffr_dyn.scene import Body, Scene
-from ffr_dyn.scene_file import Settings, load_scene
-from ffr_dyn.scene_schema import TABLES, schema
+from ffr_dyn.scene_file import load_scene
+from ffr_dyn.scene_schema import EFFORTS as EFFORT_KINDS
+from ffr_dyn.scene_schema import SOLUTIONS, TABLES, schema
 from ffr_dyn.scene_text import save_scene, to_toml
+from ffr_dyn.settings import Inverse, Kinematic, Linearise, Mixed, MomentSettings, Settings, Static
 from ffr_dyn.stabilisation import Baumgarte, Drifting, Projection
 from ffr_dyn.surface_loads import ModalForce, NodalForces, Pressure
 from ffr_dyn.timefunction import evaluate, harmonic, polynomial, table
@@ -360,6 +365,63 @@ def test_a_scene_survives_its_file_to_the_bit(tmp_path, stabilisation):
     assert (tmp_path / "a.toml").read_text() == (tmp_path / "new" / "a.toml").read_text()
 
 
+EFFORTS = (JointEffort("m", "j1"), MarkerEffort("pull", "two.a", (0, 1, 0), axes="body", moment=True))
+METHOD = (0.1, 1.1, 0.1, RK4(1e-3))
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        Settings(0.1, 1.1, 0.1, ROS2(0.01), Projection(), ("two.R",), Kinematic()),
+        Settings(*METHOD, Projection(1e-7), analysis=Inverse()),
+        Settings(*METHOD, Drifting(), analysis=Inverse(quasi_static=True)),
+        Settings(*METHOD, Projection(), analysis=Mixed(EFFORTS)),
+        Settings(*METHOD, Projection(), analysis=Mixed(EFFORTS[:1], ("d1",), Causal(1e-8, 10.0))),
+        Settings(*METHOD, Projection(), analysis=Mixed(EFFORTS[1:], ("d1", "d2"), Bounded(after=0.3, parts=2))),
+        MomentSettings(0.2, ("default", "*.power"), Static()),
+        MomentSettings(0.0, ("default",), Linearise()),
+        MomentSettings(0.1, ("default",), Linearise((*EFFORTS, "push"), ("two.a.position.y",), True)),
+    ],
+    ids=lambda settings: type(settings.analysis).__name__,
+)
+def test_every_analysis_survives_its_file(tmp_path, settings):
+    given = rich(load_body(save_body(cloud(3, seed=1), tmp_path / "one.ffr")))
+    scene, back = load_scene(save_scene(given, settings, tmp_path / "a.toml"))
+    assert same(scene, given)
+    assert back == settings
+
+
+def test_inputs_of_another_order_than_the_file_has_are_refused():
+    settings = MomentSettings(analysis=Linearise(("push", EFFORTS[0])))
+    with pytest.raises(InputError, match="put them last"):
+        to_toml(rich(cloud(3, seed=1)), settings, {"one": "one.ffr"})
+
+
+ANALYSIS = "[analysis]\nend = 0.1"
+
+
+@pytest.mark.parametrize(
+    ("new", "words"),
+    [
+        ('kind = "kinetic"', ["analysis", "no such kind; there are forward, kinematic, static"]),
+        ('kind = "kinematic"\nstabilisation = {kind = "none"}', ["analysis", "'stabilisation' is not a known entry"]),
+        ('kind = "static"', ["analysis", "'end' is not a known entry"]),
+        ('kind = "mixed"', ["analysis.unknown", "required"]),
+        ('kind = "mixed"\nunknown = {}', ["analysis.unknown", "at least 1"]),
+        ('kind = "mixed"\nunknown.m = {joint = "hinge", coordinate = "turn"}', ["'m'", "'turn'"]),
+        ('kind = "mixed"\nunknown.m = {marker = "bar.b", direction = [0, 1, 0]}', ["analysis.unknown.m", "'marker'"]),
+        ('kind = "mixed"\nunknown.m = {kind = "marker", marker = "bar.b", direction = [0, 0, 0]}', ["'m'", "not all zero"]),
+        ('kind = "mixed"\nunknown.m = {joint = "hinge"}\nsolution = {kind = "bound"}', ["no such kind; there are causal"]),
+        ('kind = "inverse"\nelastic = "stiff"', ["analysis.elastic", "'dynamic' or 'quasi-static'", "'stiff'"]),
+    ],
+)  # fmt: skip
+def test_mistakes_in_an_analysis_are_named(tmp_path, new, words):
+    with pytest.raises(InputError) as caught:
+        load_scene(written(tmp_path, changed(ANALYSIS, f"[analysis]\n{new}\nend = 0.1")))
+    for word in ["scene.toml", *words]:
+        assert word in str(caught.value)
+
+
 def test_formulas_of_the_motion_survive(tmp_path):
     text = changed(
         "10 * smooth(t / 0.05) * bar.length", "-2 * hinge.angle - max(t, bar.q[1] * bar.b.velocity.x)"
@@ -409,7 +471,7 @@ def test_the_published_schema_is_that_of_the_program():
 
 def test_every_kind_is_in_the_schema():
     definitions = schema()["$defs"]
-    for kinds in TABLES.values():
+    for kinds in (*TABLES.values(), EFFORT_KINDS, SOLUTIONS):
         for kind in kinds:
             assert definitions[f"{kind.made.__name__}Entry"]["additionalProperties"] is False
     assert definitions["SpringDamperEntry"]["properties"]["free_length"]["unit"] == "m"

@@ -6,8 +6,8 @@ time they take the values at which they would stay, q_dot = q_ddot = 0, under th
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +17,10 @@ from ffr_dyn.analyses.evaluation import Evaluator, copied, evaluate, evaluator, 
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.kinematic import kinematic, undeformed
 from ffr_dyn.analyses.mobility import require_driven
-from ffr_dyn.analyses.outcome import efforts, outputs, result_of, with_quantities
+from ffr_dyn.analyses.outcome import efforts, needed, only, result_of, with_quantities
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import Integrator
+from ffr_dyn.measure import selected
 from ffr_dyn.result import Result
 from ffr_dyn.scene import Scene
 from ffr_dyn.stabilisation import Projection, Stabilisation
@@ -52,6 +53,7 @@ def inverse(
     output_step: float,
     start: float = 0.0,
     elastic: Dynamic | QuasiStatic = Dynamic(),
+    outputs: Sequence[str] = ("default",),
     path: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Result:
@@ -60,19 +62,19 @@ def inverse(
     "driver.effort" [N m or N] is the moment or force along the driven coordinate that acts on the joint's second body, its
     opposite on the first; "driver.power" = effort x rate. A driven point has "driver.force" instead.
 
+    outputs : names or patterns of the quantities to keep beside the efforts, as in `forward`
+
     Raises InputError when a rigid motion is left free or prescribed twice; SimulationError when the run fails.
     """
     require_driven(undeformed(scene), start, "inverse dynamics")
     if isinstance(elastic, QuasiStatic):
-        return _quasi_static(scene, end, output_step, start, path, progress)
+        return _quasi_static(scene, (start, end, output_step), outputs, path, progress)
     result = forward(
         scene, end=end, output_step=output_step, method=elastic.method, start=start,
-        stabilisation=elastic.stabilisation, outputs=outputs(scene), path=path, progress=progress,
+        stabilisation=elastic.stabilisation, outputs=needed(scene, outputs), path=path, progress=progress,
     )  # fmt: skip
-    named = Result(
-        result.time, result.quantities, result.geometry, {**result.attributes, "analysis": "inverse dynamics"}
-    )
-    return with_quantities(named, efforts(flattened(scene, start)[0], named), path)
+    named = replace(result, attributes={**result.attributes, "analysis": "inverse dynamics"})
+    return with_quantities(only(named, scene, outputs), efforts(flattened(scene, start)[0], named), path)
 
 
 # ---- quasi-static deformation ---------------------------------------------------------------------------------------
@@ -80,15 +82,16 @@ def inverse(
 
 def _quasi_static(
     scene: Scene,
-    end: float,
-    output_step: float,
-    start: float,
+    span: tuple[float, float, float],
+    outputs: Sequence[str],
     path: str | Path | None,
     progress: Callable[[float], None] | None,
 ) -> Result:
     """At every output time: the undeformed motion, then the deformation at which the elastic accelerations vanish."""
-    rigid = kinematic(scene, end=end, output_step=output_step, start=start)
+    start, end, output_step = span
     assembled = assemble(scene, time=start)
+    selected(assembled.system, outputs)
+    rigid = kinematic(scene, end=end, output_step=output_step, start=start)
     at, places = evaluator(assembled.system), _coordinates(assembled)
     q, rows, turned = np.zeros(places[1].size), [], np.zeros(len(scene.bodies))
     tangent = None
@@ -110,7 +113,7 @@ def _quasi_static(
         "notes": [*assembled.notes, *strained(scene, turned)],
         "status": "complete",
     }
-    return result_of(assembled.system, record, attributes, path)
+    return result_of(assembled.system, record, attributes, path, outputs)
 
 
 def _coordinates(assembled: Assembled) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ parts as that takes; where no part is small enough the mechanism locks.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -32,6 +32,7 @@ from ffr_dyn.analyses.outcome import output_times, result_of
 from ffr_dyn.errors import SimulationError
 from ffr_dyn.integrators import RK4
 from ffr_dyn.kernels.tables import Record
+from ffr_dyn.measure import selected
 from ffr_dyn.result import Result
 from ffr_dyn.scene import Body, Scene
 from ffr_prep.body import truncated
@@ -64,10 +65,13 @@ def kinematic(
     end: float,
     output_step: float,
     start: float = 0.0,
+    outputs: Sequence[str] = ("default",),
     path: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Result:
     """Positions, velocities and accelerations of a fully driven scene every `output_step` [s], and the reactions they need.
+
+    outputs : names or patterns of the quantities to keep beside the efforts, as in `forward`
 
     Raises InputError when a rigid motion is left free or prescribed twice, SimulationError when the mechanism locks: the
     message gives the time and the joint at its dead point. Positions that are nearly or exactly singular on the way, where
@@ -76,6 +80,7 @@ def kinematic(
     rigid = undeformed(scene)
     require_driven(rigid, start, "a kinematic analysis")
     assembled = assemble(rigid, time=start)
+    selected(assembled.system, outputs)
     at = evaluator(assembled.all_rows or assembled.system)
     pose = _pose(at, start, assembled.x, assembled.v)
     poses, followed = [pose], [pose]
@@ -95,7 +100,7 @@ def kinematic(
         "notes": notes,
         "status": "complete",
     }
-    return result_of(assembled.system, record, attributes, path)
+    return result_of(assembled.system, record, attributes, path, outputs)
 
 
 def undeformed(scene: Scene) -> Scene:

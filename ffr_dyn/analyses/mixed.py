@@ -9,7 +9,7 @@ times at once: it starts at rest before the known motion does, and ends at rest 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -20,9 +20,9 @@ import numpy as np
 from ffr_dyn.analyses.assemble import assemble, flattened
 from ffr_dyn.analyses.bounded import Bounded, bounded_solution
 from ffr_dyn.analyses.efforts import Effort, JointEffort, MarkerEffort, sized, unit, with_units
-from ffr_dyn.analyses.evaluation import evaluator, joined, record_states
+from ffr_dyn.analyses.evaluation import Evaluator, evaluator, joined, record_states
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.analyses.outcome import efforts, output_times, outputs, result_of, with_quantities
+from ffr_dyn.analyses.outcome import efforts, needed, only, output_times, result_of, with_quantities
 from ffr_dyn.analyses.servo import Moment, ServoMotion, at_moment, internal_values, servo, slope, slope_matrix
 from ffr_dyn.drivers import Driver, PointDriver
 from ffr_dyn.equations import System, blocks_of, compile_scene
@@ -59,6 +59,7 @@ def mixed(
     known: tuple[str, ...] | None = None,
     solution: Causal | Bounded | None = None,
     method: Integrator | None = None,
+    outputs: Sequence[str] = ("default",),
     path: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Result:
@@ -70,6 +71,7 @@ def mixed(
     solution: of forces away from the known motions: `Causal`, or `Bounded` (which adds times before the start and after the
               end); by default Causal where the internal dynamics allow it
     method  : integrator of a collocated run
+    outputs : names or patterns of the quantities to keep beside the efforts, as in `forward`
 
     The result has "name.effort" [N or N m] of every unknown force and its power.
 
@@ -81,10 +83,10 @@ def mixed(
     if partners is not None and solution is None:
         result = forward(
             scene, end=end, output_step=output_step, method=method, start=start,
-            stabilisation=Projection(1e-12), outputs=outputs(scene), path=path, progress=progress,
+            stabilisation=Projection(1e-12), outputs=needed(scene, outputs), path=path, progress=progress,
         )  # fmt: skip
-        return _named(flattened(scene, start)[0], result, partners, path)
-    return _not_collocated(scene, names, unknown, (start, end, output_step), solution, path, progress)
+        return _named(flattened(scene, start)[0], result, partners, outputs, path)
+    return _not_collocated(scene, names, unknown, (start, end, output_step), solution, outputs, path, progress)
 
 
 def _known(scene: Scene, known: tuple[str, ...] | None) -> tuple[str, ...]:
@@ -130,7 +132,13 @@ def _along(driver: Driver | PointDriver, effort: Effort) -> float:
     return float(along) if effort.axes == "global" and abs(abs(along) - 1) < 1e-15 else 0.0
 
 
-def _named(scene: Scene, result: Result, partners: dict[str, tuple[str, float]], path: str | Path | None) -> Result:
+def _named(
+    scene: Scene,
+    result: Result,
+    partners: dict[str, tuple[str, float]],
+    outputs: Sequence[str],
+    path: str | Path | None,
+) -> Result:
     """The drivers' efforts under the names of the unknown forces."""
     found = efforts(scene, result)
     for force, (driver, sign) in partners.items():
@@ -143,7 +151,7 @@ def _named(scene: Scene, result: Result, partners: dict[str, tuple[str, float]],
         found[f"{force}.effort"] = effort
         found[f"{force}.power"] = result.quantity(f"{driver}.power")
     attributes = {**result.attributes, "analysis": "mixed dynamics, collocated"}
-    return with_quantities(Result(result.time, result.quantities, result.geometry, attributes), found, path)
+    return with_quantities(only(replace(result, attributes=attributes), scene, outputs), found, path)
 
 
 # ---- not collocated --------------------------------------------------------------------------------------------------
@@ -155,6 +163,7 @@ def _not_collocated(
     unknown: tuple[Effort, ...],
     span: tuple[float, float, float],
     solution: Causal | Bounded | None,
+    outputs: Sequence[str],
     path: str | Path | None,
     progress: Callable[[float], None] | None,
 ) -> Result:
@@ -166,6 +175,8 @@ def _not_collocated(
         )
     assembled = assemble(with_units(scene, unknown), time=start)
     own = servo(assembled, names, unknown, (start, end))
+    at = _freed(own, names)
+    selected(at.system, outputs)
     w = internal_values(own, assembled.x, assembled.v)
     chosen = _solution(own, start, end, w, assembled.x, solution)
     if isinstance(chosen, Bounded):
@@ -185,7 +196,9 @@ def _not_collocated(
         "notes": [*assembled.notes, *notes],
         "status": "complete",
     }
-    return _recorded(names, unknown, own, times, moments, attributes, path)
+    record = _recorded(at, unknown, own, times, moments)
+    found = _efforts_found(at.system, record, own.unknown, np.array([moment.u for moment in moments]))
+    return with_quantities(result_of(at.system, record, attributes, outputs=outputs), found, path)
 
 
 def _solution(
@@ -236,30 +249,25 @@ def _integrated(
     return np.array(ws), xs
 
 
-def _recorded(
-    names: tuple[str, ...],
-    unknown: tuple[Effort, ...],
-    own: ServoMotion,
-    times: Array,
-    moments: list[Moment],
-    attributes: dict[str, Any],
-    path: str | Path | None,
-) -> Result:
-    """The states, in the scene without the known drivers and with the efforts found."""
+def _freed(own: ServoMotion, names: tuple[str, ...]) -> Evaluator:
+    """The scene without its known drivers, in which the efforts found act."""
     scene = own.at.system.scene
-    kept = tuple(driver for driver in scene.drivers if driver.name not in names)
-    free = replace(scene, drivers=kept)
+    free = replace(scene, drivers=tuple(driver for driver in scene.drivers if driver.name not in names))
     rows_of = {block.name: block for block in own.at.system.blocks}
-    at = evaluator(compile_scene(free, [rows_of[block.name] for block in blocks_of(free)]))
+    return evaluator(compile_scene(free, [rows_of[block.name] for block in blocks_of(free)]))
+
+
+def _recorded(
+    at: Evaluator, unknown: tuple[Effort, ...], own: ServoMotion, times: Array, moments: list[Moment]
+) -> Record:
+    """The states, with the efforts found."""
     silent = sized(at, unknown, np.zeros(len(unknown)))
     rows = []
     for time, moment in zip(times, moments, strict=True):
         here = sized(silent, own.unknown, moment.u)
         row = record_states(here, np.clip([time], *own.span), moment.x[None], moment.v[None])
         rows.append(row._replace(time=np.array([time])))
-    record = joined(rows)
-    found = _efforts_found(at.system, record, own.unknown, np.array([moment.u for moment in moments]))
-    return with_quantities(result_of(at.system, record, attributes), found, path)
+    return joined(rows)
 
 
 def _efforts_found(system: System, record: Record, efforts: tuple[Effort, ...], u: Array) -> dict[str, Quantity]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,7 @@ from ffr_dyn.equations import System
 from ffr_dyn.errors import InputError
 from ffr_dyn.joints import COORDINATES, frames
 from ffr_dyn.kernels.tables import Record
-from ffr_dyn.measure import measure, selected
+from ffr_dyn.measure import DEFAULT_OUTPUTS, measure, selected
 from ffr_dyn.result import Quantity, Result
 from ffr_dyn.result_file import save_result
 from ffr_dyn.rotation import rotation_matrix
@@ -31,17 +33,38 @@ def output_times(start: float, end: float, output_step: float) -> Array:
     return start + output_step * np.arange(rows + 1)
 
 
-def result_of(system: System, record: Record, attributes: dict[str, Any], path: str | Path | None = None) -> Result:
-    """All quantities of recorded states, efforts of the drivers included; written to `path` when it is complete."""
-    quantities, _ = measure(system, record, {}, selected(system, outputs(system.scene)))
+def result_of(
+    system: System,
+    record: Record,
+    attributes: dict[str, Any],
+    path: str | Path | None = None,
+    outputs: Sequence[str] = ("default",),
+) -> Result:
+    """Quantities of recorded states, efforts of the drivers included; written to `path` when it is complete.
+
+    outputs : names or patterns; beside them every result has the quantities of `accompanying` and the efforts
+    """
+    quantities, _ = measure(system, record, {}, selected(system, needed(system.scene, outputs)))
     plain = Result(record.time, quantities, geometry(system.scene), attributes)
-    return with_quantities(plain, efforts(system.scene, plain), path)
+    return with_quantities(only(plain, system.scene, outputs), efforts(system.scene, plain), path)
 
 
-def outputs(scene: Scene) -> tuple[str, ...]:
-    """What the results of these analyses keep: the default, the power of every driver, the rates of joint coordinates."""
+def accompanying(scene: Scene) -> tuple[str, ...]:
+    """What goes with efforts in every result: the power of every driver, the rates of joint coordinates."""
     rates = [f"{joint.name}.{coordinate}_rate" for joint in scene.joints for coordinate in COORDINATES[joint.kind]]
-    return ("default", *(f"{driver.name}.power" for driver in scene.drivers), *rates)
+    return (*(f"{driver.name}.power" for driver in scene.drivers), *rates)
+
+
+def needed(scene: Scene, outputs: Sequence[str]) -> tuple[str, ...]:
+    """What has to be computed for `outputs` and for the efforts, which come from default quantities."""
+    return ("default", *accompanying(scene), *outputs)
+
+
+def only(result: Result, scene: Scene, outputs: Sequence[str]) -> Result:
+    """The result with no more than `outputs` and what accompanies them."""
+    patterns = [*accompanying(scene), *(p for o in outputs for p in (DEFAULT_OUTPUTS if o == "default" else (o,)))]
+    kept = {name: q for name, q in result.quantities.items() if any(fnmatchcase(name, p) for p in patterns)}
+    return Result(result.time, kept, result.geometry, result.attributes)
 
 
 def with_quantities(result: Result, more: dict[str, Quantity], path: str | Path | None = None) -> Result:

@@ -9,6 +9,7 @@ with half the radius. (Nocedal & Wright 2006, ch. 4; Matthies & Strang 1979 for 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from ffr_dyn.analyses.states import held
 from ffr_dyn.analyses.tangent import Chart, chart, movement, rates, sizes, state, stiffness
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import RK4
+from ffr_dyn.measure import selected
 from ffr_dyn.result import Result
 from ffr_dyn.scene import Scene
 
@@ -45,8 +47,12 @@ class _Balance:
     iterations: int
 
 
-def static(scene: Scene, *, time: float = 0.0, path: str | Path | None = None) -> Result:
+def static(
+    scene: Scene, *, time: float = 0.0, outputs: Sequence[str] = ("default",), path: str | Path | None = None
+) -> Result:
     """The equilibrium of a scene at `time` [s] that is downhill from its start: one row, with all reactions.
+
+    outputs : names or patterns of the quantities to keep beside the efforts, as in `forward`
 
     The attributes tell whether it is stable (the tangent stiffness of the free motions is positive definite) and its lowest
     stiffness per mass [1/s^2].
@@ -54,6 +60,7 @@ def static(scene: Scene, *, time: float = 0.0, path: str | Path | None = None) -
     Raises InputError for a motion that nothing holds, with its name; SimulationError when no equilibrium is found.
     """
     assembled = assemble(in_space(held(scene, time)), time=time)
+    selected(assembled.system, outputs)
     at = evaluator(assembled.system)
     found = _balanced(at, time, assembled.x)
     lowest = float("inf")
@@ -61,7 +68,7 @@ def static(scene: Scene, *, time: float = 0.0, path: str | Path | None = None) -
         values, vectors = np.linalg.eigh(0.5 * (found.K + found.K.T))
         _require_held(found, values, vectors)
         lowest = float(values[0])
-    return _result(scene, assembled, at, found, lowest, path)
+    return _result(scene, assembled, at, found, lowest, outputs, path)
 
 
 def _balanced(at: Evaluator, time: float, x: Array) -> _Balance:
@@ -128,7 +135,13 @@ def _not_held(near: Chart, direction: Array, what: str) -> InputError:
 
 
 def _result(
-    scene: Scene, assembled: Assembled, at: Evaluator, found: _Balance, lowest: float, path: str | Path | None
+    scene: Scene,
+    assembled: Assembled,
+    at: Evaluator,
+    found: _Balance,
+    lowest: float,
+    outputs: Sequence[str],
+    path: str | Path | None,
 ) -> Result:
     still = np.zeros(assembled.system.layout.v_size)
     record = record_states(at, np.array([found.near.time]), found.near.x[None], still[None])
@@ -148,4 +161,5 @@ def _result(
         "status": "complete",
     }
     attributes = {key: value for key, value in attributes.items() if value is not None}
-    return result_of(assembled.system, with_all_reactions(assembled, RK4(1.0), record), attributes, path)
+    record = with_all_reactions(assembled, RK4(1.0), record)
+    return result_of(assembled.system, record, attributes, path, outputs)

@@ -1,0 +1,169 @@
+"""The commands `ffr-dyn run` and `forward`, and what all commands that analyse a scene have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ffr_dyn.errors import InputError
+
+if TYPE_CHECKING:
+    from ffr_dyn.scene import Scene
+    from ffr_dyn.settings import MomentSettings, OverTime, Settings
+
+scene_argument = click.argument("scene", type=click.Path(path_type=Path))
+output_option = click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Result file (netCDF); default: <scene>.nc."
+)
+parameter_option = click.option(
+    "-p", "--parameter", "parameters", multiple=True, metavar="NAME=VALUE", help="A parameter of the scene file."
+)
+keep_option = click.option(
+    "--keep", multiple=True, metavar="NAME", help="Quantities to keep, instead of the scene's; * and ? match."
+)
+_INTEGRATION = (
+    click.option("--end", type=float, help="End of the run [s], instead of the scene's."),
+    click.option("--step", type=float, help="Time step [s], instead of the scene's."),
+    click.option("--method", type=click.Choice(["ros2", "ros3", "rk4"]), help="Integrator, instead of the scene's."),
+    click.option("--resume", is_flag=True, help="Go on where the result file ends, as if the run had never stopped."),
+)
+
+
+def _all_of(*options: Callable[..., Any]) -> Callable[..., Any]:
+    def decorate(function: Any) -> Any:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return decorate
+
+
+scene_options = _all_of(scene_argument, output_option, parameter_option, keep_option)
+integration_options = _all_of(*_INTEGRATION)
+
+
+@click.command()
+@scene_options
+@integration_options
+def run(
+    scene: Path, output: Path | None, parameters: tuple[str, ...], keep: tuple[str, ...], resume: bool, **changes: Any
+) -> None:
+    """Analyse SCENE as its file says, forward dynamics if it does not, and write the result file.
+
+    ros2 and ros3 (more accurate, twice the cost of a step) treat the elastic modes implicitly: no elastic frequency limits
+    their step. rk4 is explicit, of fourth order:
+    exact for soft bodies at small steps, unstable when step times the highest circular frequency exceeds about 2.8.
+    Drift off the constraints is held by projection and reported. A run that was killed keeps what its last flush wrote,
+    a few seconds old; --resume goes on from there to the same bits. Without a result file it starts at the beginning.
+    """
+    from ffr_dyn.scene_file import load_scene
+
+    loaded, settings = load_scene(scene, assignments(parameters))
+    settings = replace(settings, outputs=keep or settings.outputs)
+    perform(loaded, _changed(settings, changes), output or scene.with_suffix(".nc"), resume)
+
+
+@click.command()
+@scene_options
+@integration_options
+def forward(
+    scene: Path, output: Path | None, parameters: tuple[str, ...], keep: tuple[str, ...], resume: bool, **changes: Any
+) -> None:
+    """Forward dynamics of SCENE, whatever analysis its file asks for; see `ffr-dyn run --help`."""
+    from ffr_dyn.scene_file import load_scene
+    from ffr_dyn.settings import Forward
+
+    loaded, settings = load_scene(scene, assignments(parameters))
+    perform(loaded, _changed(over_time(settings, Forward(), keep), changes), output or scene.with_suffix(".nc"), resume)
+
+
+def assignments(parameters: tuple[str, ...]) -> dict[str, str]:
+    """{"crank.length": "0.15"} of ("crank.length=0.15",)."""
+    for text in parameters:
+        if "=" not in text:
+            raise InputError(f"-p {text}: write it as NAME=VALUE")
+    pairs = (text.partition("=") for text in parameters)
+    return {name.strip(): value.strip() for name, _, value in pairs}
+
+
+def over_time(settings: Settings | MomentSettings, analysis: OverTime, keep: tuple[str, ...]) -> Settings:
+    """The settings of a file with another analysis. InputError where the file's own has no times."""
+    from ffr_dyn.settings import MomentSettings
+
+    if isinstance(settings, MomentSettings):
+        raise InputError(
+            f"the scene file asks for a {type(settings.analysis).__name__.lower()} analysis, which has no times; "
+            f"{type(analysis).__name__.lower()} analysis needs an [analysis] with end and output_step"
+        )
+    return replace(settings, analysis=analysis, outputs=keep or settings.outputs)
+
+
+def _changed(settings: Settings | MomentSettings, changes: Mapping[str, Any]) -> Settings | MomentSettings:
+    """Another end, step or method than the file's. InputError for an analysis that has none."""
+    from ffr_dyn.integrators import METHODS
+    from ffr_dyn.settings import Kinematic, MomentSettings
+
+    given = {key: value for key, value in changes.items() if value is not None}
+    if isinstance(settings, MomentSettings) or isinstance(settings.analysis, Kinematic):
+        known = () if isinstance(settings, MomentSettings) else ("end",)
+        for key in given:
+            if key not in known:
+                raise InputError(f"--{key}: there is no {key} of a {type(settings.analysis).__name__.lower()} analysis")
+        return replace(settings, **given)
+    method = METHODS[given.get("method", type(settings.method).__name__.lower())]
+    step = given.get("step", settings.method.step)
+    return replace(settings, end=given.get("end", settings.end), method=method(step))
+
+
+def perform(scene: Scene, settings: Settings | MomentSettings, output: Path, resume: bool = False) -> None:
+    """Analyse a scene, with progress where that takes its time, and tell what came of it."""
+    from ffr_dyn.progress import progress
+    from ffr_dyn.run import require_resumable
+    from ffr_dyn.run import run as analyse
+    from ffr_dyn.settings import Linearise, Settings
+
+    if resume:
+        require_resumable(settings)
+    if isinstance(settings, Settings):
+        with progress(scene.name, settings.end, start=settings.start) as update:
+            result = analyse(scene, settings, path=output, resume=output if resume else None, progress=update)
+        lines = summary(result.attributes)
+    elif isinstance(settings.analysis, Linearise):
+        lines = _linearised(scene, settings.analysis, settings.time, output)
+    else:
+        lines = summary(analyse(scene, settings, path=output).attributes)
+    for line in lines:
+        click.echo(line)
+    click.echo(f"result       {output}")
+
+
+def _linearised(scene: Scene, analysis: Any, time: float, output: Path) -> list[str]:
+    """The modes, a line each, and notes."""
+    from ffr_dyn.analyses.linearise import as_result, table_of_modes
+    from ffr_dyn.result_file import save_result
+    from ffr_dyn.run import linearised
+
+    found = linearised(scene, analysis, time)
+    save_result(as_result(scene, found, time), output)
+    return [*table_of_modes(found), *(f"note         {note}" for note in found.notes)]
+
+
+def summary(attributes: Mapping[str, Any]) -> list[str]:
+    """What an analysis reports, a line each."""
+    a = attributes
+    lines = [
+        f"scene        {a['title']}: {a['analysis']}, {a['degrees_of_freedom']} degrees of freedom",
+        f"method       {a['method']}, {a.get('evaluations', 0)} evaluations of the equations of motion",
+    ]
+    if "largest_drift" in a:
+        position, velocity = a["largest_drift"]
+        lines.append(
+            f"constraints  left by at most {position:.1e} (rate {velocity:.1e}); {a['projections']} projections"
+        )
+    if "stable" in a:
+        lines.append(f"equilibrium  {'stable' if a['stable'] else 'unstable'}")
+    return lines + [f"note         {note}" for note in a["notes"]]

@@ -1,0 +1,77 @@
+"""How a scene is to be analysed: the analysis and its settings, times, what to keep. `ffr_dyn.run` does what they say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ffr_dyn.analyses.bounded import Bounded
+from ffr_dyn.analyses.efforts import Effort
+from ffr_dyn.analyses.mixed import Causal
+from ffr_dyn.integrators import Integrator
+from ffr_dyn.stabilisation import Stabilisation
+
+
+@dataclass(frozen=True)
+class Forward:
+    """Forward dynamics."""
+
+
+@dataclass(frozen=True)
+class Kinematic:
+    """Positions, velocities and accelerations of a driven scene."""
+
+
+@dataclass(frozen=True)
+class Inverse:
+    """Inverse dynamics; elastic coordinates are dynamic, or quasi-static."""
+
+    quasi_static: bool = False
+
+
+@dataclass(frozen=True)
+class Mixed:
+    """Mixed dynamics; see `ffr_dyn.analyses.mixed.mixed`."""
+
+    unknown: tuple[Effort, ...]
+    known: tuple[str, ...] | None = None
+    solution: Causal | Bounded | None = None
+
+
+@dataclass(frozen=True)
+class Static:
+    """Static equilibrium."""
+
+
+@dataclass(frozen=True)
+class Linearise:
+    """Linearised equations; inputs are efforts and names of loads, quantities such as "rod.tip.position.y" their outputs."""
+
+    inputs: tuple[Effort | str, ...] = ()
+    quantities: tuple[str, ...] = ()
+    at_equilibrium: bool = False
+
+
+OverTime = Forward | Kinematic | Inverse | Mixed
+OfMoment = Static | Linearise
+
+
+@dataclass(frozen=True)
+class Settings:
+    """An analysis over a time [s]; `method` and `stabilisation` are of those that integrate."""
+
+    start: float
+    end: float
+    output_step: float
+    method: Integrator
+    stabilisation: Stabilisation
+    outputs: tuple[str, ...] = ("default",)
+    analysis: OverTime = Forward()
+
+
+@dataclass(frozen=True)
+class MomentSettings:
+    """An analysis at one `time` [s]."""
+
+    time: float = 0.0
+    outputs: tuple[str, ...] = ("default",)
+    analysis: OfMoment = Static()
