@@ -1,6 +1,17 @@
-"""One BLAS thread: as `reduce_mesh` has it, so that what a test computes beside it is equal bit by bit."""
+"""What holds for every test."""
 
+import signal
+
+import pytest
 import scipy.linalg  # noqa: F401 - a library must be loaded before it can be limited
 from threadpoolctl import threadpool_limits
 
+# One BLAS thread: as `reduce_mesh` has it, so that what a test computes beside it is equal bit by bit.
 threadpool_limits(1)
+
+
+@pytest.fixture(autouse=True)
+def broken_pipes_raise():
+    """gmsh, where a test calls it in this process, lets a write to a dead child kill the process; undo that."""
+    yield
+    signal.signal(signal.SIGPIPE, signal.SIG_IGN)

@@ -13,7 +13,7 @@ from ffr_dyn.analyses.forward import forward
 from ffr_dyn.drivers import Driver
 from ffr_dyn.forces import Load, SpringDamper
 from ffr_dyn.inertia import mass_matrix
-from ffr_dyn.integrators import RK4, ROS2
+from ffr_dyn.integrators import RK4, ROS2, ROS3
 from ffr_dyn.joints import Joint
 from ffr_dyn.rotation import rotation_matrix
 from ffr_dyn.scene import Body, Scene
@@ -59,7 +59,7 @@ def momenta(scene: Scene, result) -> np.ndarray:
     return np.array(out)
 
 
-@pytest.mark.parametrize(("method", "step", "order"), [(RK4, 4e-3, 4), (ROS2, 2e-3, 2)])
+@pytest.mark.parametrize(("method", "step", "order"), [(RK4, 4e-3, 4), (ROS2, 2e-3, 2), (ROS3, 4e-3, 3)])
 @pytest.mark.parametrize("scene", [spinning(), pendulum()], ids=["free", "pendulum"])
 def test_energy_is_conserved_at_the_order_of_the_method(scene, method, step, order):
     def drift(h: float) -> float:
@@ -71,7 +71,7 @@ def test_energy_is_conserved_at_the_order_of_the_method(scene, method, step, ord
     assert fine < 2e-4
 
 
-@pytest.mark.parametrize(("method", "step", "order"), [(RK4, 4e-3, 4), (ROS2, 2e-3, 2)])
+@pytest.mark.parametrize(("method", "step", "order"), [(RK4, 4e-3, 4), (ROS2, 2e-3, 2), (ROS3, 4e-3, 3)])
 def test_linear_and_angular_momentum_of_a_free_body_are_conserved(method, step, order):
     scene = spinning()
 
@@ -83,7 +83,7 @@ def test_linear_and_angular_momentum_of_a_free_body_are_conserved(method, step, 
     assert (fine < 1e-2).all()
 
 
-@pytest.mark.parametrize("method", [RK4, ROS2])
+@pytest.mark.parametrize("method", [RK4, ROS2, ROS3])
 def test_motion_converges_at_the_order_of_the_method(method):
     scene, order = pendulum(), method.order
 
@@ -95,7 +95,8 @@ def test_motion_converges_at_the_order_of_the_method(method):
     assert errors[1] < errors[0] / 2 ** (order - 0.4)
 
 
-def test_no_elastic_frequency_destabilises_ros2():
+@pytest.mark.parametrize("method", [ROS2, ROS3])
+def test_no_elastic_frequency_destabilises_the_implicit_methods(method):
     """h Omega_max = 4e4; RK4 refuses such a step."""
     scene = pendulum()
     stiff = tuple(
@@ -103,10 +104,10 @@ def test_no_elastic_frequency_destabilises_ros2():
         for b in scene.bodies
     )
     scene = replace(scene, bodies=stiff)
-    result = forward(scene, end=1.0, output_step=0.1, method=ROS2(0.01))
+    result = forward(scene, end=1.0, output_step=0.1, method=method(0.01))
     assert np.ptp(result["energy.total"]) < 0.05 * np.ptp(result["energy.gravity"])
     rigid = tuple(replace(b, model=as_rigid(b.model), q=None, q_dot=None, damping=0.0) for b in scene.bodies)
-    other = forward(replace(scene, bodies=rigid), end=1.0, output_step=0.1, method=ROS2(0.01))
+    other = forward(replace(scene, bodies=rigid), end=1.0, output_step=0.1, method=method(0.01))
     np.testing.assert_allclose(result["two.a.position"], other["two.a.position"], atol=2e-4)
 
 

@@ -13,8 +13,9 @@ from typing import Any, ClassVar, Protocol
 
 from ffr_dyn.integrators.rk4 import RK4
 from ffr_dyn.integrators.ros2 import ROS2
+from ffr_dyn.integrators.ros3 import ROS3
 
-__all__ = ["METHODS", "RK4", "ROS2", "Integrator"]
+__all__ = ["METHODS", "RK4", "ROS2", "ROS3", "Integrator"]
 
 
 class Integrator(Protocol):
@@ -30,4 +31,4 @@ class Integrator(Protocol):
     run: ClassVar[Any]
 
 
-METHODS: dict[str, Callable[[float], Integrator]] = {"rk4": RK4, "ros2": ROS2}
+METHODS: dict[str, Callable[[float], Integrator]] = {"rk4": RK4, "ros2": ROS2, "ros3": ROS3}

@@ -1,0 +1,129 @@
+"""A linearly implicit W-method of order three: elastic stiffness and damping implicit, everything else explicit.
+
+Four stages, stiffly accurate, with the stability of ROS34PW2 (Rang & Angermann, BIT 45 (2005) 761-787): L-stable in what is
+implicit, of order three whatever the Jacobian leaves out. ROS34PW2 wants one Jacobian for all stages of a step; here the mass
+matrix in it belongs to the stage. So the coefficients are those nearest to ROS34PW2 that satisfy, beside its conditions,
+
+    sum_i b_i c_i sum_j gamma_ij = 0   (j up to i),
+
+which takes the change of the Jacobian out of the error of third order. With the Jacobian A as in `ffr_dyn.integrators.ros2`,
+stage i is
+
+    (I - gamma h A) u_i = f(t + c_i h, y + h sum_j alpha_ij k_j) + r_i,    k_i = u_i - r_i,
+    r_i = 1/gamma sum_j gamma_ij k_j,
+
+and y+ = y + h sum_i b_i k_i. A stage costs an explicit evaluation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from ffr_dyn.integrators.ros2 import add_correction, add_elastic_part, set_elastic_diagonal
+from ffr_dyn.kernels.bodies import normalise, position_rates
+from ffr_dyn.kernels.options import entry, inlined
+from ffr_dyn.kernels.record import record
+from ffr_dyn.kernels.stiffening import solve_stiffened
+from ffr_dyn.kernels.system import (
+    acceleration_target,
+    evaluate,
+    evaluate_on_constraints,
+    finite,
+    prepare,
+    to_velocity_rates,
+)
+from ffr_dyn.kernels.tables import OK
+from ffr_dyn.kernels.vectors import add_scaled, copy, fill
+
+GAMMA = 0.43586652150845900
+# Rows of both lower triangles, four to a row.
+ALPHA = (
+    *(0.0, 0.0, 0.0, 0.0),
+    *(0.8599004143760887, 0.0, 0.0, 0.0),
+    *(0.8293784117398193, -0.11144515098558946, 0.0, 0.0),
+    *(-0.005533637718755573, 0.0043645886709089785, 1.0011690490478466, 0.0),
+)
+GAMMAS = (
+    *(0.0, 0.0, 0.0, 0.0),
+    *(-0.8599004143760892, 0.0, 0.0, 0.0),
+    *(-0.8873114027376415, 0.05189554494812108, 0.0, 0.0),
+    *(0.23966827525132695, -1.2214324880772196, 0.5458976913174336, 0.0),
+)
+WEIGHTS = (0.23413463753257138, -1.2170678994063107, 1.5470667403652802, 0.435866521508459)
+AT = (0.0, 0.8599004143760887, 0.7179332607542298, 1.0)
+
+
+@inlined
+def step(m, w, stages, t, h, x, v, alpha, beta, tolerance):
+    """One step in place. Returns a status."""
+    gh = GAMMA * h
+    xs, vs, r_x, r_v = stages.x[4], stages.v[4], stages.x[5], stages.v[5]
+    for k in range(4):
+        if k == 0:
+            status = evaluate_on_constraints(m, w, t, x, v, tolerance)
+        copy(xs, x)
+        copy(vs, v)
+        fill(r_x, 0.0)
+        fill(r_v, 0.0)
+        for j in range(k):
+            add_scaled(xs, xs, h * ALPHA[4 * k + j], stages.x[j])
+            add_scaled(vs, vs, h * ALPHA[4 * k + j], stages.v[j])
+            add_scaled(r_x, r_x, GAMMAS[4 * k + j] / GAMMA, stages.x[j])
+            add_scaled(r_v, r_v, GAMMAS[4 * k + j] / GAMMA, stages.v[j])
+        if k > 0:
+            normalise(m.bodies, xs)  # r_v goes to body axes and comes back, which wants a true rotation
+            status = evaluate(m, w, t + AT[k] * h, xs, vs)
+        if status != OK:
+            return status
+        acceleration_target(w.rows, alpha, beta, stages.target)
+        add_elastic_part(m.bodies, w.bodies.f, vs, r_x, gh)
+        fill(w.bodies.shift, 0.0)
+        if k > 0:
+            add_correction(m, w, r_v, stages.target)
+        solve_stiffened(m, w, xs, stages.target)
+        to_velocity_rates(m.bodies.where, w.bodies.A, w.bodies.acc, stages.v[k])
+        add_scaled(vs, vs, gh, stages.v[k])
+        position_rates(m.bodies, xs, vs, stages.x[k])
+        add_scaled(stages.v[k], stages.v[k], -1.0, r_v)
+    for k in range(4):
+        add_scaled(x, x, h * WEIGHTS[k], stages.x[k])
+        add_scaled(v, v, h * WEIGHTS[k], stages.v[k])
+    normalise(m.bodies, x)
+    return finite(x, v)
+
+
+@entry
+def ros3_run(m, w, stages, t0, h, first, substeps, x, v, alpha, beta, tolerance, out):
+    """Fill the rows of `out`, `substeps` steps apart, from step number `first`. Returns (rows filled, status)."""
+    number = first
+    for row in range(out.time.size):
+        set_elastic_diagonal(m.bodies, w.bodies.dinv, GAMMA * h)
+        prepare(m.bodies.where, m.markers, m.rows, m.pattern, w.bodies.dinv, w.rows.phiphi)
+        for _ in range(substeps):
+            w.info[3] = number
+            status = step(m, w, stages, t0 + number * h, h, x, v, alpha, beta, tolerance)
+            if status != OK:
+                return row, status
+            number += 1
+        w.info[3] = number
+        status = record(m, w, t0 + number * h, x, v, out, row)
+        if status != OK:
+            return row, status
+    return out.time.size, OK
+
+
+@dataclass(frozen=True)
+class ROS3:
+    """Linearly implicit, order three; no elastic frequency limits the step, and a step costs four evaluations.
+
+    Modes with h Omega > 1 are damped numerically; those the step resolves are right to third order.
+
+    step : time step [s]
+    """
+
+    step: float
+    order: ClassVar[int] = 3
+    implicit: ClassVar[bool] = True
+    stage_count: ClassVar[int] = 6
+    run: ClassVar[Any] = staticmethod(ros3_run)
