@@ -20,6 +20,7 @@ from ffr_dyn.analyses.static import static
 from ffr_dyn.drivers import Driver, PointDriver
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.forces import Load
+from ffr_dyn.formula import formula
 from ffr_dyn.integrators import RK4
 from ffr_dyn.joints import Joint
 from ffr_dyn.scene import Body, Scene
@@ -317,3 +318,69 @@ def test_work_of_the_unknown_force_is_the_change_of_energy():
     work = np.concatenate([[0.0], np.cumsum(2.5e-3 * (power[1:] + power[:-1]))])
     energy = found["energy.total"] - found["energy.total"][0]
     np.testing.assert_allclose(work, energy, atol=2e-3 * energy.max())
+
+
+# ---- where there is no bounded solution ---------------------------------------------------------------------------------
+
+PUSH = JointEffort("push", "rail", "stroke")
+
+
+def cart_with_rod(height: float, angle: float, *loads: Load, **more) -> Scene:
+    """A cart of known motion, from rest to rest in 0.3 s, with a rod on a hinge: uniform, 1 m, at an angle."""
+    cart = rigid_body("cart", mass=1.0, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
+    rod = rigid_body(
+        "rod", mass=1.0, inertia=(1e-3, 1 / 12, 1 / 12), centre_of_mass=(0.5, 0, 0), points={"o": (0, 0, 0)}
+    )
+    return Scene(
+        (Body("cart", cart), Body("rod", rod, rotation=(0, 0, angle))),
+        (
+            Joint("rail", "translational", "ground.O", "cart.c", axis=(1, 0, 0)),
+            Joint("hinge", "revolute", "cart.c", "rod.o"),
+        ),
+        (Driver("go", "rail", rest_to_rest(height, 0.3), "stroke"),),
+        loads=loads,
+        ground={"O": (0, 0, 0)},
+        **more,
+    )
+
+
+def bounded(scene: Scene, output_step: float = 0.1):
+    return mixed(scene, unknown=(PUSH,), end=0.3, output_step=output_step, solution=Bounded(0.5, 0.5))
+
+
+def test_an_inverted_rod_is_carried_by_leaning_first():
+    """Linear inverted pendulum: the rod leans into the motion before it starts. The counterpart of the failures below."""
+    found = bounded(cart_with_rod(0.1, np.pi / 2, gravity=(0, -9.81, 0)), 0.02)
+    assert found["hinge.angle"][found.time < -0.01][-1] < np.pi / 2 - 1e-3
+    assert abs(found["hinge.angle"][-1] - np.pi / 2) < 0.05
+
+
+@pytest.mark.parametrize("moment", [4.0, -4.0])
+def test_a_rod_near_its_turning_point_has_an_equilibrium(moment):
+    """m g l / 2 = 4.905 N m holds it at the angle at which the moment balances its weight."""
+    scene = cart_with_rod(0.1, -np.pi / 2, Load("twist", "rod.o", moment=(0, 0, moment)), gravity=(0, -9.81, 0))
+    angle = bounded(scene)["hinge.angle"][0]
+    assert 0.5 * 9.81 * np.cos(angle) == pytest.approx(moment, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("moment", "gravity"), [(6.0, (0, -9.81, 0)), (0.1, (0, 0, 0))], ids=["more than its weight", "nothing against it"]
+)
+def test_internal_dynamics_without_equilibrium_are_refused(moment, gravity):
+    scene = cart_with_rod(0.1, -np.pi / 2, Load("twist", "rod.o", moment=(0, 0, moment)), gravity=gravity)
+    with pytest.raises(
+        SimulationError, match=r"at t = 0 s .* no equilibrium near the known motion: nothing holds hinge\.angle"
+    ):
+        bounded(scene)
+
+
+def test_a_rod_that_hangs_first_and_stands_later_is_refused():
+    """Weight turns over during the motion: no motion grows at the start, one does at the end."""
+    weight = (0, formula("9.81 * (1 - 2 * smooth(t / 0.3))"), 0)
+    with pytest.raises(SimulationError, match="0 growing motions at the start and 1 at the end"):
+        bounded(cart_with_rod(0.1, -np.pi / 2, base_acceleration=weight))
+
+
+def test_a_motion_too_wild_for_the_output_step_is_refused():
+    with pytest.raises(SimulationError, match="did not converge: the last correction was"):
+        bounded(cart_with_rod(300.0, np.pi / 2, gravity=(0, -9.81, 0)))

@@ -110,8 +110,13 @@ def _equilibrium(own: ServoMotion, time: float, y: Array, x: Array) -> tuple[Arr
         step = np.linalg.lstsq(stiffness, -now.y_ddot, rcond=1e-12)[0]
         y = y + step
         if np.abs(step).max() < 1e-11 * max(1.0, float(np.abs(y).max())):
-            return y, x
-    raise SimulationError(f"at t = {time:.6g} s the internal dynamics have no equilibrium near the known motion")
+            if np.abs(now.y_ddot).max() <= REST * max(1.0, float(np.abs(stiffness).max())):
+                return y, x
+            break  # forces along a motion without stiffness
+    raise SimulationError(
+        f"at t = {time:.6g} s the internal dynamics have no equilibrium near the known motion: nothing holds "
+        f"{', '.join(own.names)} against the forces there; add a spring, or let another motion be known"
+    )
 
 
 def _end(own: ServoMotion, time: float, y: Array, x: Array) -> _End:
