@@ -13,7 +13,7 @@ from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.inverse import Dynamic, QuasiStatic, inverse
 from ffr_dyn.analyses.kinematic import kinematic
 from ffr_dyn.drivers import Driver
-from ffr_dyn.errors import InputError
+from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.forces import Load
 from ffr_dyn.integrators import RK4
 from ffr_dyn.joints import COORDINATES, Joint
@@ -168,3 +168,15 @@ def test_quasi_static_deformation_needs_joints_that_rigid_bodies_can_meet():
     scene = replace(scene, joints=joints, drivers=(Driver("d", "A", polynomial(0.0, 1.0)),))
     with pytest.raises(InputError, match="met by deformation only"):
         inverse(scene, end=0.1, output_step=0.05, elastic=QuasiStatic())
+
+
+def test_a_force_that_no_deformation_balances_is_refused():
+    """It pushes the first mode up below a deformation and down above it: at the deformation itself it jumps."""
+    up = np.sign(flexible_arm().bodies[1].model.interface("b").phi_t[0, 0])
+
+    def jumping(t, state):
+        return up * (1e4 if state.q("b")[:1].sum() < 0.01 else -1e4), 0, 0
+
+    scene = replace(flexible_arm(), loads=(Load("jump", "b.b", axes="body", function=jumping),))
+    with pytest.raises(SimulationError, match="no quasi-static deformation was found"):
+        inverse(scene, end=0.05, output_step=0.05, elastic=QuasiStatic())
