@@ -10,18 +10,22 @@ import pytest
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.drivers import Driver
 from ffr_dyn.forces import SpringDamper
+from ffr_dyn.inertia import quadratic_velocity
 from ffr_dyn.integrators import RK4, ROS2
 from ffr_dyn.joints import Joint
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.stabilisation import Projection
 from ffr_dyn.timefunction import polynomial
-from ffr_prep.body import FlexibleBody, rigid_body
+from ffr_prep.body import FlexibleBody, rigid_body, truncated
+from ffr_prep.frame import Member, named, polyline
 from ffr_prep.interface import InterfaceRegion
 from ffr_prep.material import Material
 from ffr_prep.mesh import read_mesh
 from ffr_prep.reduce import reduce_mesh
-from ffr_prep.reduction import CraigBampton
+from ffr_prep.reduction import CraigBampton, Eigenmodes
 from ffr_prep.reference import FixedTo, MeanAxis, SimplySupported
+from ffr_prep.section import circle
+from ffr_prep.structural import reduce_frame
 
 HERE = Path(__file__).parent
 MESHES = HERE.parent / "meshes"
@@ -159,3 +163,29 @@ def test_flexible_slider_crank(kind):
     peak = np.abs(expected[:, 1]).max()
     assert np.abs(deflection - expected[:, 1]).max() < 0.05 * peak
     assert abs(deflection.max() - expected[:, 1].max()) < 0.01 * peak
+
+
+@pytest.mark.parametrize(("kL", "stretch"), [(0.1, 3.34672085e-3), (0.5, 0.0926049797)])
+def test_a_radial_rod_stretches_under_spin_as_its_quadratic_inertia_says(kL, stretch):
+    """Clamped at the axis: u(L)/L = tan(kL)/(kL) - 1 with k^2 = rho Omega^2/E. Without the inertia terms of second order in
+    the deformation (I9) it would be (kL)^2/3."""
+    metal = Material("metal", 7e10, 0.3, 2700.0)
+    frame = named(
+        polyline([(0, 0, 0), (1.0, 0, 0)], Member(circle(0.01), metal), elements=40), root=(0, 0, 0), tip=(1, 0, 0)
+    )
+    ends = [InterfaceRegion("root"), InterfaceRegion("tip")]
+    whole = reduce_frame(frame, name="rod", interfaces=ends, reference=FixedTo("root"), reduction=Eigenmodes(240))
+    body = truncated(whole, np.flatnonzero(np.einsum("jj->j", whole.PP_dm[0, 0]) > 0.99))
+    assert body.n == 40
+    omega = np.array([0.0, 0.0, kL * np.sqrt(metal.E / metal.rho)])
+
+    def unbalanced(q):
+        return quadratic_velocity(body, q, omega, np.zeros(body.n))[6:] - body.omega2 * q
+
+    at_rest = unbalanced(np.zeros(body.n))
+    q = np.linalg.solve(at_rest[:, None] - np.array([unbalanced(unit) for unit in np.eye(body.n)]).T, at_rest)
+    assert body.interface("tip").phi_t[0] @ q == pytest.approx(stretch, rel=2e-4)
+    scene = Scene((Body("rod", body, omega_bar=omega, q=q),), (Joint("axle", "revolute", "ground.O", "rod.root"),),
+                  ground={"O": (0, 0, 0)}, plane="none")  # fmt: skip
+    result = forward(scene, end=1e-3, output_step=1e-3, method=ROS2(1e-5))
+    np.testing.assert_allclose(result["rod.tip.displacement"][-1, 0], stretch, rtol=2e-4)
