@@ -15,7 +15,7 @@ from ffr_dyn.constraints import Row, evaluate_word
 from ffr_dyn.equations import Block, System, blocks_of, compile_scene
 from ffr_dyn.errors import InputError
 from ffr_dyn.inertia import mass_matrix
-from ffr_dyn.joints import Word
+from ffr_dyn.joints import DISTANCE, Word
 from ffr_dyn.layout import Layout, initial_state, layout
 from ffr_dyn.plane import planar_forms
 from ffr_dyn.rotation import G_bar, rotation_matrix
@@ -85,9 +85,9 @@ def _movable(place: Layout) -> int:
 
 
 def rows_at(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> list[Row]:
-    """All rows of the blocks, readable form."""
+    """All rows of the blocks, readable form. InputError for a distance that is not positive at the time."""
     return [
-        evaluate_word(scene, place, x, v, word, block.markers, drive_of(word, time))
+        evaluate_word(scene, place, x, v, word, block.markers, _drive(block, word, time))
         for block in blocks
         for word in block.words
     ]
@@ -149,6 +149,13 @@ def drive_of(word: Word, time: float) -> tuple[float, float, float]:
     return (0.0, 0.0, 0.0) if word.function is None else evaluate(word.function, time)
 
 
+def _drive(block: Block, word: Word, time: float) -> tuple[float, float, float]:
+    drive = drive_of(word, time)
+    if word.kind == DISTANCE and not drive[0] > 0:
+        raise InputError(f"joint {block.name!r}: length is {drive[0]:.4g} m at t = {time:.6g} s; it must be positive")
+    return drive
+
+
 def close_positions(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> Array:
     """Newton's method on Phi(x) = 0 with least-mass-norm steps; rigid motion first, elastic coordinates if they must."""
     worst = 0.0
@@ -161,10 +168,16 @@ def close_positions(scene: Scene, place: Layout, blocks: list[Block], x: Array, 
             if worst < TOLERANCE:
                 return moved
             moved = _moved(place, moved, _limited(place, _step(scene, place, moved, rows, -Phi, elastic)))
-    names = [block.name for block in blocks for _ in block.words]
+    said = [(block.name, word) for block in blocks for word in block.words]
     at = int(np.argmax(np.abs(Phi)))
+    name, word = said[at]
+    if word.kind == DISTANCE and not rows[at].jacobian.any():
+        raise InputError(
+            f"the mechanism cannot be assembled: the points of joint {name!r} coincide, and the line between them, of no "
+            "length, has no direction; place its bodies apart"
+        )
     raise InputError(
-        f"the mechanism cannot be assembled: joint {names[at]!r} stays open by {worst:.3g} after {ITERATIONS} iterations; "
+        f"the mechanism cannot be assembled: joint {name!r} stays open by {worst:.3g} after {ITERATIONS} iterations; "
         "check the positions of the interfaces, the lengths of the bodies and the axes of the joints, or start closer"
     )
 
