@@ -384,3 +384,10 @@ def test_a_rod_that_hangs_first_and_stands_later_is_refused():
 def test_a_motion_too_wild_for_the_output_step_is_refused():
     with pytest.raises(SimulationError, match="did not converge: the last correction was"):
         bounded(cart_with_rod(300.0, np.pi / 2, gravity=(0, -9.81, 0)))
+
+
+def test_a_tip_path_out_of_reach_is_refused():
+    """An arm of 1 m whose tip is to go 1.5 m aside."""
+    far = replace(TIP, y=rest_to_rest(1.5, 0.6))
+    with pytest.raises(SimulationError, match="no position belongs to the known motions: they are out of reach"):
+        mixed(one_link(far), unknown=(MOTOR,), end=0.6, output_step=0.05, solution=Bounded(0.1, 0.1))
