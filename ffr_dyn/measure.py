@@ -13,6 +13,7 @@ from difflib import get_close_matches
 
 import numpy as np
 
+from ffr_dyn.couplings import Coupling
 from ffr_dyn.equations import System
 from ffr_dyn.errors import InputError
 from ffr_dyn.force_tables import Action, actions_of, bushings_of, loads_of
@@ -30,7 +31,18 @@ Array = np.ndarray
 # What a result keeps unless told otherwise: enough to draw, to animate and to recover stress, and what joints carry.
 DEFAULT_OUTPUTS = (
     *("*.R", "*.p", "*.v", "*.omega_bar", "*.q", "*.q_dot", "*.position", "*.velocity", "*.displacement", "*.rotation"),
-    *("*.force", "*.moment", "*.torque", "*.tension", "*.angle", "*.stroke", "energy.*", "constraint.*", "measured.*"),
+    *(
+        "*.force",
+        "*.moment",
+        "*.effort",
+        "*.torque",
+        "*.tension",
+        "*.angle",
+        "*.stroke",
+        "energy.*",
+        "constraint.*",
+        "measured.*",
+    ),
 )
 
 
@@ -178,7 +190,11 @@ def _marker(k: int) -> dict[str, Entry]:
 
 def _reactions(system: System) -> Named:
     joints = {joint.name: joint for joint in system.scene.joints}
-    for block in system.blocks:
+    couplings = {coupling.name: coupling for coupling in system.scene.couplings}
+    for number, block in enumerate(system.blocks):
+        if block.name in couplings:
+            yield f"{block.name}.effort", _coupling_effort(couplings[block.name], number)
+            continue
         for k, (what, unit) in enumerate((("force", "N"), ("moment", "N m"))):
             text = f"{what} that the first body exerts on the second at its marker"
             for suffix, axes in (
@@ -189,6 +205,13 @@ def _reactions(system: System) -> Named:
                 if suffix != "_joint" or block.name in joints:
                     entry = _reaction(block.name, block.markers[0], joints.get(block.name), k, suffix)
                     yield f"{block.name}.{what}{suffix}", _entry(unit, (XYZ,), f"{text}, {axes}", entry)
+
+
+def _coupling_effort(coupling: Coupling, number: int) -> Entry:
+    """What a coupling does to its second coordinate; to the first it does -ratio times as much."""
+    unit = "N m" if coupling.second.endswith(".angle") else "N"
+    text = f"effort of the coupling along {coupling.second}; along {coupling.first} it is -ratio times that"
+    return _entry(unit, (), text, lambda view: view.record.reaction[:, number, 0])
 
 
 def _reaction(name: str, marker: int, joint: Joint | None, k: int, suffix: str) -> Callable[[View], Array]:

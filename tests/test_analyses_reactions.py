@@ -125,7 +125,7 @@ def test_a_coupling_adds_its_multiplier_along_both_coordinates(first, second, n)
     """What joints leave open of a balance is the coupling's multiplier along the coordinates, -ratio times on the first."""
     scene = coupled(first, second, n)
     result = run(scene)
-    multiplier = result["gear.force.x"][2]
+    multiplier = result["gear.effort"][2]
     bodies = ((0, "left", "one.a", first, 0.7 * multiplier), (1, "right", "two.a", second, multiplier))
     for number, joint, marker, coordinate, effort in bodies:
         at, axis = result[f"{marker}.position"][2], np.array(scene.joints[number].axis)

@@ -88,6 +88,7 @@ def step(m, w, stages, t, h, x, v, alpha, beta, tolerance):
             fill(r_v, 0.0)
             add_scaled(r_x, r_x, -2.0, stages.x[0])
             add_scaled(r_v, r_v, -2.0, stages.v[0])
+            normalise(m.bodies, xs)  # r_v goes to body axes and comes back, which wants a true rotation
             status = evaluate(m, w, t + h, xs, vs)
         if status != OK:
             return status

@@ -345,7 +345,7 @@ def finite(x, v):
 def reactions(rows, mw, rw, out):
     """out (K, 6): force and moment (global axes) that marker i's body exerts on marker j's body at marker j.
 
-    A relation between joint coordinates has one number: the force or torque along its first coordinate, per factor.
+    A relation between joint coordinates has one number: the force or torque along a coordinate of factor one.
     """
     for k in range(rows.marker.shape[0]):
         if rows.start[k] < rows.start[k + 1] and rows.kind[rows.start[k]] == RELATION:
