@@ -13,12 +13,17 @@ import sys
 import time
 from pathlib import Path
 
+from ffr_dyn.compilation import begin_compiling
+from ffr_dyn.integrators import ROS2
+
+if __name__ == "__main__":
+    begin_compiling(ROS2)  # the first time only, while everything else is loaded and the rod is meshed and reduced
+
 import numpy as np
 
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.animate import animate
 from ffr_dyn.drivers import Driver
-from ffr_dyn.integrators import ROS2
 from ffr_dyn.joints import Joint
 from ffr_dyn.plots import plot
 from ffr_dyn.progress import progress

@@ -20,21 +20,31 @@ from ffr_dyn.layout import initial_state
 from ffr_dyn.scene import Body, Scene
 from ffr_prep.body import rigid_body
 
+_AT_WORK: dict[str, subprocess.Popen[bytes]] = {}
+
+
+def begin_compiling(kind: type[Integrator]) -> None:
+    """Start to compile the time loop of a method where it is not on disk, and go on with something else meanwhile.
+
+    For programs that mesh and reduce bodies first: a run that needs the time loop waits for it.
+    """
+    names = [name for name, known in METHODS.items() if kind is known]
+    if names and names[0] not in _AT_WORK and not _is_cached(kind):
+        print("ffr-dyn: compiling the kernels, once (about a minute) ...", file=sys.stderr, flush=True)
+        same_packages = {**os.environ, "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
+        _AT_WORK[names[0]] = subprocess.Popen([sys.executable, "-m", __name__, names[0]], env=same_packages)
+
 
 def ensure_compiled(method: Integrator) -> None:
-    """Compile the time loop of a method where no compiled form is on disk, and say so on the terminal."""
-    if _is_cached(method):
-        return
-    print("ffr-dyn: compiling the kernels, once (about half a minute) ...", file=sys.stderr, flush=True)
-    names = [name for name, kind in METHODS.items() if type(method) is kind]
-    if names:  # where the child fails, the run compiles for itself
-        same_packages = {**os.environ, "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
-        subprocess.run([sys.executable, "-m", __name__, names[0]], env=same_packages, check=False)
+    """Compile the time loop of a method where no compiled form is on disk; where that fails, the run does it itself."""
+    begin_compiling(type(method))
+    for name in [name for name, kind in METHODS.items() if type(method) is kind and name in _AT_WORK]:
+        _AT_WORK.pop(name).wait()
 
 
-def _is_cached(method: Integrator) -> bool:
-    folder = Path(method.run._cache.cache_path)
-    return any(folder.glob(f"*.{method.run.__name__}-*.nbi"))
+def _is_cached(kind: type[Integrator]) -> bool:
+    folder = Path(kind.run._cache.cache_path)
+    return any(folder.glob(f"*.{kind.run.__name__}-*.nbi"))
 
 
 def run_nothing(method: Integrator) -> None:
