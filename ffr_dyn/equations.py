@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -351,7 +352,7 @@ def new_work(m: Model) -> Work:
         A=_identities(B + 1),
         dinv=np.ones(E),
         **zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), g=9 * E, l=3 * E, Cd=6 * E, L=(B, 6, 6), f=V, acc=V),
-        **zeros(rigid=(B, 6), elastic=E, unstiffened=E, shift=V, load=int(m.bodies.where[:, 6].max())),
+        **zeros(rigid=(B, 6), elastic=E, PP=(B, 3, 3), more=V, unstiffened=E, shift=V, load=int(m.bodies.where[:, 6].max())),
         **zeros(stiff=int((m.bodies.where[:, 6] * n).sum())),
     )
     vectors = zeros(omega=(M, 3), r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3), load=(M, 6))
@@ -365,7 +366,8 @@ def new_work(m: Model) -> Work:
         rows=rows,
         loads=_load_work(m, V, M),
         field=np.zeros(3),
-        info=np.zeros(4, dtype=np.int64),
+        diagonal=np.full(1, -1.0),
+        info=np.zeros(3, dtype=np.int64),
         independence=np.ones(3),
         **zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=2),
     )
@@ -387,10 +389,16 @@ def _identities(count: int) -> Array:
     return np.repeat(np.eye(3)[None], count, axis=0)
 
 
-def new_stages(system: System, count: int) -> Stages:
-    """Scratch of an integrator with `count` stages."""
-    place, rows = system.layout, system.model.rows.kind.size
-    return Stages(np.zeros((count, place.x_size)), np.zeros((count, place.v_size)), np.zeros(rows))
+def new_stages(system: System, states: int, rows: int = 0, numbers: Sequence[float] = ()) -> Stages:
+    """Memory of an integrator: states (x, v), constraint rows, and single numbers."""
+    place, C = system.layout, system.model.rows.kind.size
+    return Stages(
+        np.zeros((states, place.x_size)),
+        np.zeros((states, place.v_size)),
+        np.zeros((rows, C)),
+        np.zeros(C),
+        np.array(numbers, dtype=float),
+    )
 
 
 def new_record(system: System, rows: int) -> Record:

@@ -202,7 +202,7 @@ def test_a_killed_run_goes_on_to_the_same_bits(tmp_path, delays):
     path, lengths = tmp_path / "run.nc", []
     here = Path(__file__).parent
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(here.parent), str(here)])}
-    ensure_compiled(SETTINGS["method"])
+    ensure_compiled(type(SETTINGS["method"]))
     for delay in delays:
         run = subprocess.Popen([sys.executable, "-c", RUN, path], env=environment)
         rows = lengths[-1] if lengths else 0

@@ -200,7 +200,7 @@ def _recorded(assembled: Assembled, poses: list[_Pose]) -> Record:
                 f"{pose.joint}; choose output times that miss it, or drive another joint"
             )
         rows.append(copied(at.record))
-    return with_all_reactions(assembled, RK4(1.0), joined(rows))
+    return with_all_reactions(assembled, joined(rows))
 
 
 def _singular_notes(poses: list[_Pose]) -> list[str]:

@@ -161,5 +161,5 @@ def _result(
         "status": "complete",
     }
     attributes = {key: value for key, value in attributes.items() if value is not None}
-    record = with_all_reactions(assembled, RK4(1.0), record)
+    record = with_all_reactions(assembled, record)
     return result_of(assembled.system, record, attributes, path, outputs)

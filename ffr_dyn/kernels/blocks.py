@@ -5,7 +5,7 @@ linear in the number of bodies (Baraff 1996), for a few loops there is little fi
 """
 
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.vectors import rigid_lower, solve_lower, solve_upper
+from ffr_dyn.kernels.vectors import in_plane, rigid_lower, solve_lower, solve_upper
 
 # The least share of a row that other rows do not contain (the square of a sine). In a singular position it is zero; with
 # this floor the motion there misses one acceleration for the moment, and goes on.
@@ -23,8 +23,13 @@ def eliminate_side(first, last, side, flexible, normal, P, L, mass, turning, all
         jac, rr, ww = all_jac[row, side], all_rr[row, side], all_ww[row, side]
         for c in range(6):
             rr[c] = jac[c]
-            if flexible and (normal < 0 or (c != normal if c < 3 else c == 3 + normal)):
+        if flexible and normal < 0:
+            for c in range(6):
                 rr[c] -= six(P, c, jac)
+        elif flexible:
+            for c in in_plane(normal):
+                rr[c] -= six(P, c, jac)
+        for c in range(6):
             ww[c] = rr[c]
         rigid_lower(L, ww, normal)
         point = jac[0] * jac[0] + jac[1] * jac[1] + jac[2] * jac[2]
