@@ -16,6 +16,7 @@ from ffr_dyn.errors import InputError
 from ffr_dyn.force_tables import Callback, FunctionTable, base_functions, load_tables, marker_numbers
 from ffr_dyn.joints import RELATION, Joint, Word, words
 from ffr_dyn.kernels.tables import (
+    LANES,
     Bodies,
     BodyWork,
     LoadWork,
@@ -253,7 +254,7 @@ def _pattern(
     for k, column in enumerate(elimination.columns):
         for later in (k, *column):
             offsets[later, k] = total
-            total += size[later] * size[k]
+            total += LANES * size[k]
     sides = [[table[marker][0] for marker in block.markers] for block in blocks]
     pairs = [
         (b, later, side, earlier, other, offsets[later, earlier])
@@ -343,7 +344,7 @@ def new_work(m: Model) -> Work:
     n, V, pairs = m.bodies.where[:, 0], 6 * B + E, m.pattern.pair_body.size
     size = np.diff(m.rows.start)
     column = np.repeat(np.arange(size.size), np.diff(m.pattern.column_start))
-    stored = int((size**2).sum() + (size[m.pattern.column[:, 0]] * size[column]).sum())
+    stored = LANES * int(size.sum() + size[column].sum())
 
     def zeros(**shapes: Any) -> dict[str, Array]:
         return {key: np.zeros(shape) for key, shape in shapes.items()}
@@ -357,8 +358,8 @@ def new_work(m: Model) -> Work:
     )
     vectors = zeros(omega=(M, 3), r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3), load=(M, 6))
     rows = RowWork(
-        **zeros(Phi=C, nu=C, gamma=C, lam=C, step=C, scale=C, jac=(C, D, 9), rr=(C, D, 6), ww=(C, D, 6)),
-        **zeros(P=(M, 6, 6), phiphi=(pairs, 6, 6), S=stored),
+        **zeros(Phi=C, nu=C, gamma=C, lam=C, left=C, scale=C, jac=(C, D, 9), X=size.size * D * 12 * LANES),
+        **zeros(Y=12 * LANES, step=size.size * LANES, wrench=6, P=(M, 6, 6), phiphi=(pairs, 6, 6), S=stored),
     )
     return Work(
         bodies=bodies,

@@ -4,7 +4,15 @@ Order of calls: `prepare` once per elastic diagonal; `evaluate_bodies`, `evaluat
 any number of `solve_motion` and `solve_correction` with that state's factors. Compiled as units in `ffr_dyn.kernels.units`.
 """
 
-from ffr_dyn.kernels.blocks import add_pair, eliminate_side, factorise_blocks, solve_blocks
+from ffr_dyn.kernels.blocks import (
+    SIDE,
+    add_pair,
+    add_scale,
+    eliminate_side,
+    factorise_blocks,
+    solve_blocks,
+    spread_rows,
+)
 from ffr_dyn.kernels.bodies import (
     accelerate,
     factorise,
@@ -14,11 +22,12 @@ from ffr_dyn.kernels.bodies import (
     reduce_forces,
     six_rows,
 )
+from ffr_dyn.kernels.lanes import combine_6, dot_rows
 from ffr_dyn.kernels.loads import apply_loads
 from ffr_dyn.kernels.markers import couple_marker, couple_pair, prepare_marker, shapes, update_marker
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.rows import evaluate_block
-from ffr_dyn.kernels.tables import NOT_FINITE, OK, RELATION
+from ffr_dyn.kernels.tables import LANES, NOT_FINITE, OK, RELATION
 from ffr_dyn.kernels.vectors import (
     add_scaled,
     copy,
@@ -63,8 +72,8 @@ def evaluate_bodies(gravity, bodies, w, x, v):
 
 @inlined
 def couple_joints(bodies, markers, rows, pattern, bw, rw):
-    """Rigid parts of all rows after elimination of the elastic coordinates, and the multiplier matrix."""
-    where = bodies.where
+    """Rows after elimination of the elastic coordinates, and the multiplier matrix."""
+    where, sides = bodies.where, rows.marker.shape[1]
     fill(rw.scale, 0.0)
     ground = where.shape[0] - 1
     for k in markers.joint:
@@ -73,32 +82,24 @@ def couple_joints(bodies, markers, rows, pattern, bw, rw):
         if n > 0:
             couple_marker(shapes(markers, k, n), bw.Cd[6 * e : 6 * (e + n)], n, where[b, 7], rw.P[k])
     for k in range(rows.marker.shape[0]):
-        for side in range(rows.marker.shape[1]):
+        for side in range(sides):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
-                first, last = rows.start[k], rows.start[k + 1]
-                flexible, normal = where[b, 0] > 0, where[b, 7]
-                mass, turning = bodies.mass[b], bw.J[b, 0, 0] + bw.J[b, 1, 1] + bw.J[b, 2, 2]
-                eliminate_side(
-                    first,
-                    last,
-                    side,
-                    flexible,
-                    normal,
-                    rw.P[marker],
-                    bw.L[b],
-                    mass,
-                    turning,
-                    rw.jac,
-                    rw.rr,
-                    rw.ww,
-                    rw.scale,
-                )
+                first, last, at = rows.start[k], rows.start[k + 1], (k * sides + side) * SIDE
+                flexible = where[b, 0] > 0
+                spread_rows(rw.jac, first, last, side, flexible, rw.X, at)
+                eliminate_side(flexible, where[b, 7], rw.P[marker].reshape(36), bw.L[b].reshape(36), rw.X, at)
+                turning = bw.J[b, 0, 0] + bw.J[b, 1, 1] + bw.J[b, 2, 2]
+                add_scale(rw.jac, first, last, side, bodies.mass[b], turning, rw.scale)
     fill(rw.S, 0.0)
     for p in range(pattern.pair_body.size):
-        flexible = where[pattern.pair_body[p], 0] > 0
-        add_pair(rows.start, pattern.pair[p], flexible, rw.phiphi[p], rw.ww, rw.jac, rw.S)
+        flexible, earlier = where[pattern.pair_body[p], 0] > 0, pattern.pair[p, 2]
+        add_pair(
+            rw.X, (pattern.pair[p, 0] * sides + pattern.pair[p, 1]) * SIDE, (earlier * sides + pattern.pair[p, 3]) * SIDE,
+            rows.start[earlier + 1] - rows.start[earlier], flexible, rw.phiphi[p].reshape(36), rw.Y, rw.S,
+            pattern.pair[p, 4],
+        )  # fmt: skip
 
 
 @inlined
@@ -143,69 +144,70 @@ def solve_motion(bodies, markers, rows, pattern, bw, rw, target, passes):
     """
     for b in range(bodies.mass.size):
         reduce_forces(bodies, bw, b)
-    reduced_rates(bodies, markers, rows, bw, rw, target, rw.lam)
-    solve_blocks(rows.start, pattern, rw.S, rw.lam)
-    react(bodies, markers, rows, bw, rw, rw.lam)
+    reduced_rates(bodies, markers, rows, bw, rw, target)
+    solve_blocks(rows.start, pattern, rw.S, rw.step)
+    react(bodies, markers, rows, bw, rw)
+    gather_rows(rows.start, rw.step, rw.lam)
     before = 0.0
     for number in range(1, passes):
-        constraint_rates(bodies.where, markers, rows, rw.jac, bw.acc, rw.step)
-        for row in range(target.size):
-            rw.step[row] -= target[row]
-        left = largest(rw.step)
+        constraint_rates(bodies.where, markers, rows, rw.jac, bw.acc, rw.left)
+        add_scaled(rw.left, rw.left, -1.0, target)
+        left = largest(rw.left)
         if number > 1 and not left < 0.5 * before:
             break
         before = left
-        solve_blocks(rows.start, pattern, rw.S, rw.step)
         copy(bw.more, bw.acc)
-        start_from_rest(bodies, bw)
-        react(bodies, markers, rows, bw, rw, rw.step)
+        solve_step(bodies, markers, rows, pattern, bw, rw, rw.left)
         add_scaled(bw.acc, bw.more, 1.0, bw.acc)
-        add_scaled(rw.lam, rw.lam, 1.0, rw.step)
+        gather_rows(rows.start, rw.step, rw.left)
+        add_scaled(rw.lam, rw.lam, 1.0, rw.left)
 
 
 @inlined
-def start_from_rest(bodies, bw):
-    """The reduced forces of a body without any."""
+def solve_step(bodies, markers, rows, pattern, bw, rw, value):
+    """acc, step from  M acc + Phi_q^T step = 0,  Phi_q acc = -value."""
     fill(bw.elastic, 0.0)
     for b in range(bodies.mass.size):
         fill(bw.rigid[b], 0.0)
-
-
-@inlined
-def reduced_rates(bodies, markers, rows, bw, rw, target, out):
-    """out = Phi_q M^-1 f - target, from the reduced forces: ww . rigid + jac_elastic . (phi elastic) of each side."""
-    where, ground = bodies.where, bodies.mass.size
-    for row in range(target.size):
-        out[row] = -target[row]
-    for k in range(rows.marker.shape[0]):
-        for side in range(rows.marker.shape[1]):
-            marker = rows.marker[k, side]
-            b = markers.body[marker] if marker >= 0 else ground
-            if b != ground:
-                n, e = where[b, 0], where[b, 3]
-                phi, elastic = shapes(markers, marker, n), bw.elastic[e : e + n]
-                add_reduced_rates(phi, rw.jac, rw.ww, bw.rigid[b], elastic, rows.start[k], rows.start[k + 1], side, n, out)
+    for k in range(rows.start.size - 1):
+        for row in range(rows.start[k], rows.start[k + 1]):
+            rw.step[LANES * k + row - rows.start[k]] = value[row]
+    solve_blocks(rows.start, pattern, rw.S, rw.step)
+    react(bodies, markers, rows, bw, rw)
 
 
 @kernel
-def add_reduced_rates(phi, jac, ww, z, elastic, first, last, side, n, out):
-    e0, e1, e2, e3, e4, e5 = six_rows(phi, elastic, n)
-    z0, z1, z2, z3, z4, z5 = z[0], z[1], z[2], z[3], z[4], z[5]
-    for row in range(first, last):
-        a, w = jac[row, side], ww[row, side]
-        out[row] += (
-            w[0] * z0 + w[1] * z1 + w[2] * z2 + w[3] * z3 + w[4] * z4 + w[5] * z5
-            + a[0] * e0 + a[1] * e1 + a[2] * e2 + a[6] * e3 + a[7] * e4 + a[8] * e5
-        )  # fmt: skip
+def gather_rows(starts, lanes, out):
+    """out (C,) = the rows of all joints from their lanes."""
+    for k in range(starts.size - 1):
+        for row in range(starts[k], starts[k + 1]):
+            out[row] = lanes[LANES * k + row - starts[k]]
+
+
+@inlined
+def reduced_rates(bodies, markers, rows, bw, rw, target):
+    """step = Phi_q M^-1 f - target, from the reduced forces of the bodies and the eliminated rows."""
+    where, ground, sides = bodies.where, bodies.mass.size, rows.marker.shape[1]
+    for k in range(rows.marker.shape[0]):
+        for row in range(rows.start[k], rows.start[k + 1]):
+            rw.step[LANES * k + row - rows.start[k]] = -target[row]
+        for side in range(sides):
+            marker = rows.marker[k, side]
+            b = markers.body[marker] if marker >= 0 else ground
+            if b != ground:
+                n, e, at = where[b, 0], where[b, 3], (k * sides + side) * SIDE
+                z, moved = bw.rigid[b], rw.wrench
+                combine_6(rw.step, LANES * k, 1.0, z, 0, 1, rw.X, at)
+                if n > 0:
+                    phi = shapes(markers, marker, n)
+                    moved[0], moved[1], moved[2], moved[3], moved[4], moved[5] = six_rows(phi, bw.elastic[e : e + n], n)
+                    combine_6(rw.step, LANES * k, 1.0, moved, 0, 1, rw.X, at + 6 * LANES)
 
 
 @kernel
 def solve_correction(bodies, markers, rows, pattern, bw, rw, value):
     """acc, step from  M acc + Phi_q^T step = 0,  Phi_q acc = -value: the mass-orthogonal projection."""
-    start_from_rest(bodies, bw)
-    copy(rw.step, value)
-    solve_blocks(rows.start, pattern, rw.S, rw.step)
-    react(bodies, markers, rows, bw, rw, rw.step)
+    solve_step(bodies, markers, rows, pattern, bw, rw, value)
 
 
 @inlined
@@ -239,37 +241,30 @@ def add_side_rates(phi, jac, acc, first, last, side, n, out):
 
 
 @inlined
-def react(bodies, markers, rows, bw, rw, lam):
-    """acc from the reduced forces, less Phi_q^T lam (C,) by the eliminated rows."""
-    where, ground = bodies.where, bodies.mass.size
+def react(bodies, markers, rows, bw, rw):
+    """acc from the reduced forces, less Phi_q^T step by the eliminated rows."""
+    where, ground, sides = bodies.where, bodies.mass.size, rows.marker.shape[1]
     for k in range(rows.marker.shape[0]):
-        for side in range(rows.marker.shape[1]):
+        for side in range(sides):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
-                n, e = where[b, 0], where[b, 3]
-                phi, first, last = shapes(markers, marker, n), rows.start[k], rows.start[k + 1]
-                elastic, dinv = bw.elastic[e : e + n], bw.dinv[e : e + n]
-                gather(phi, dinv, rw.jac, rw.ww, lam, first, last, side, n, bw.rigid[b], elastic)
+                n, e, at, z = where[b, 0], where[b, 3], (k * sides + side) * SIDE, bw.rigid[b]
+                for c in range(6):
+                    z[c] -= dot_rows(rw.X, at + LANES * c, rw.step, LANES * k)
+                if n > 0:
+                    for c in range(6):
+                        rw.wrench[c] = dot_rows(rw.X, at + LANES * (6 + c), rw.step, LANES * k)
+                    release(shapes(markers, marker, n), bw.dinv[e : e + n], rw.wrench, n, bw.elastic[e : e + n])
     for b in range(ground):
         accelerate(bodies, bw, b)
 
 
 @kernel
-def gather(phi, dinv, all_jac, all_ww, lam, first, last, side, n, rigid, elastic):
-    """Take Phi_q^T lam of some rows' side from the reduced forces of a body."""
-    f0, f1, f2, m0, m1, m2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for row in range(first, last):
-        jac, ww, value = all_jac[row, side], all_ww[row, side], lam[row]
-        for c in range(6):
-            rigid[c] -= ww[c] * value
-        f0 += jac[0] * value
-        f1 += jac[1] * value
-        f2 += jac[2] * value
-        m0 += jac[6] * value
-        m1 += jac[7] * value
-        m2 += jac[8] * value
+def release(phi, dinv, wrench, n, elastic):
+    """elastic -= dinv phi^T wrench."""
     p0, p1, p2, p3, p4, p5 = phi[:n], phi[n:], phi[2 * n :], phi[3 * n :], phi[4 * n :], phi[5 * n :]
+    f0, f1, f2, m0, m1, m2 = wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5]
     for j in range(n):
         elastic[j] -= dinv[j] * (
             p0[j] * f0 + p1[j] * f1 + p2[j] * f2 + p3[j] * m0 + p4[j] * m1 + p5[j] * m2

@@ -26,6 +26,8 @@ AFFINE, GLOBAL = 0, 1
 
 OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED = 0, 1, 2, 3, 4
 
+LANES = 8  # rows of a joint side by side (see `ffr_dyn.kernels.lanes`)
+
 # Numbers of the compiled units in `Tables.units`.
 EVALUATE, BODIES, LOADS, JOINTS, SOLVE, SETTLE, MOVE_BACK, CORRECT, TRULY, RECORD = range(10)
 
@@ -82,7 +84,7 @@ class Pattern(NamedTuple):
 
     pair_body: I1  # (P,) the body that couples two block sides
     pair: I2  # (P, 5) later block, its side, earlier block, its side, start of the target block
-    diagonal: I1  # (K,) start of the diagonal block
+    diagonal: I1  # (K,) start of the diagonal block in S
     column_start: I1  # (K + 1,)
     column: I2  # (L, 2) row block of each off-diagonal block and its start
     update_start: I1  # (K + 1,)
@@ -185,14 +187,16 @@ class RowWork(NamedTuple):
     nu: F1  # (C,) time derivative of Phi
     gamma: F1  # (C,)
     lam: F1  # (C,)
-    step: F1  # (C,) change of lam
+    left: F1  # (C,) scratch
     scale: F1  # (C,) what the entry of S on the diagonal is at least
     jac: F3  # (C, D, 9) coefficients of point velocity, omega_bar, elastic rotation rate
-    rr: F3  # (C, D, 6) rigid part after elimination of the elastic coordinates
-    ww: F3  # (C, D, 6) L^-1 rr
+    X: F1  # per block and side twelve rows of lanes: rigid part after elimination times L^-1, elastic part
+    Y: F1  # (12 * 8,) scratch
+    step: F1  # (8 K,) multipliers, the rows of each block in a row of lanes
+    wrench: F1  # (6,) scratch
     P: F3  # (M, 6, 6) [P_dm; H] dinv phi^T
     phiphi: F3  # (pairs, 6, 6) phi dinv phi'^T
-    S: F1  # pooled blocks
+    S: F1  # pooled blocks, rows of lanes (see `blocks`)
 
 
 class Work(NamedTuple):
