@@ -159,14 +159,33 @@ def _starts(sizes: list[int]) -> Array:
     return np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)]).astype(np.int64)
 
 
+def _shared(parts: list[Array], owners: list[object]) -> tuple[Array, Array]:
+    """(pool, starts): parts of one owner are stored once, so that many equal bodies stay in the processor's cache.
+
+    A part of zeros is not stored; it starts at -1, and the kernels skip it.
+    """
+    starts: dict[int, int] = {}
+    stored: list[Array] = []
+    for part, owner in zip(parts, owners, strict=True):
+        if id(owner) not in starts:
+            empty = not part.any()
+            starts[id(owner)] = -1 if empty else sum(each.size for each in stored)
+            stored += [] if empty else [np.ravel(part)]
+    return _pool(stored), np.array([starts[id(owner)] for owner in owners], dtype=np.int64)
+
+
 def _bodies(scene: Scene, place: Layout) -> Bodies:
     models = [body.model for body in scene.bodies]
     n = [m.n for m in models]
     stiffening = [_stiffening(body) for body in scene.bodies]
+    PP, PP_start = _shared([_pp_rows(m) for m in models], list(models))
+    K, K_start = _shared(
+        stiffening, [body.model if len(k) else k for body, k in zip(scene.bodies, stiffening, strict=True)]
+    )
     where = np.full((len(n) + 1, 8), -1, dtype=np.int64)
     where[-1, :7] = 0
-    starts = [_starts(n)[:-1], _starts([9 * k * k for k in n])[:-1], _starts([s.size for s in stiffening])[:-1]]
-    where[:-1, :7] = np.column_stack([n, place.ix, place.iv, *starts, [len(s) for s in stiffening]])
+    loads = np.where(K_start >= 0, [len(k) for k in stiffening], 0)
+    where[:-1, :7] = np.column_stack([n, place.ix, place.iv, _starts(n)[:-1], PP_start, K_start, loads])
     where[:-1, 7] = place.normals
     where[-1, 3] = sum(n)
     return Bodies(
@@ -175,10 +194,10 @@ def _bodies(scene: Scene, place: Layout) -> Bodies:
         moments=np.array([np.concatenate([m.r_dm, _six(m.rr_dm)]) for m in models]),
         P_dm=_pool([m.P_dm for m in models]),
         rP_dm=_pool([_nine(m.rP_dm) for m in models]),
-        PP_dm=_pool([_pp_rows(m) for m in models]),
+        PP_dm=PP,
         omega2=_pool([m.omega2 for m in models]),
         two_zeta_omega=_pool([2 * b.damping * np.sqrt(b.model.omega2) for b in scene.bodies]),
-        stiffening=_pool(stiffening),
+        stiffening=K,
     )
 
 
@@ -353,7 +372,9 @@ def new_work(m: Model) -> Work:
         A=_identities(B + 1),
         dinv=np.ones(E),
         **zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), g=9 * E, l=3 * E, Cd=6 * E, L=(B, 6, 6), f=V, acc=V),
-        **zeros(rigid=(B, 6), elastic=E, PP=(B, 3, 3), more=V, unstiffened=E, shift=V, load=int(m.bodies.where[:, 6].max())),
+        **zeros(
+            rigid=(B, 6), elastic=E, PP=(B, 3, 3), more=V, unstiffened=E, shift=V, load=int(m.bodies.where[:, 6].max())
+        ),
         **zeros(stiff=int((m.bodies.where[:, 6] * n).sum())),
     )
     vectors = zeros(omega=(M, 3), r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3), load=(M, 6))

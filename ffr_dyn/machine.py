@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ffr_dyn.equations import System, new_stages, new_work
 from ffr_dyn.kernels.packing import pack
-from ffr_dyn.kernels.tables import Clock, Record, Tables, Work
+from ffr_dyn.kernels.tables import Clock, Model, Record, Tables, Work
 from ffr_dyn.kernels.units import record_unit, rows_unit, truly_unit, unit_addresses
 
 if TYPE_CHECKING:
@@ -60,13 +60,19 @@ def new_machine(
         stages, h = new_stages(system, method.stage_count, method.row_stages, method.numbers), method.step
     clock = Clock(np.array([h]), np.zeros(3, dtype=np.int64), np.array(gains))
     units = np.array(unit_addresses(), dtype=np.int64)
-    tables = Tables(
-        0, units, system.model, new_work(system.model), stages, clock, np.array(x, dtype=float), np.array(v, dtype=float)
-    )
-    words = np.zeros(pack(tables).size, dtype=np.int64)
-    tables = tables._replace(address=words.ctypes.data)
-    words[:] = pack(tables)
-    return Machine(system, tables, words)
+    state = np.array(x, dtype=float), np.array(v, dtype=float)
+    return _packed(system, Tables(0, units, system.model, new_work(system.model), stages, clock, *state))
+
+
+def _packed(system: System, tables: Tables) -> Machine:
+    words = pack(tables)
+    words[0] = words.ctypes.data
+    return Machine(system, tables._replace(address=words.ctypes.data), words)
+
+
+def with_model(machine: Machine, model: Model) -> Machine:
+    """The same memory for other constant tables of the same shapes."""
+    return _packed(replace(machine.system, model=model), machine.tables._replace(model=model))
 
 
 def evaluate_at(machine: Machine, t: float, x: Array, v: Array) -> int:

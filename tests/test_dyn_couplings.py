@@ -12,13 +12,13 @@ from ffr_dyn.analyses.assemble import rows_at
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.couplings import Coupling
 from ffr_dyn.drivers import Driver
-from ffr_dyn.equations import compile_scene, new_work
+from ffr_dyn.equations import compile_scene
 from ffr_dyn.errors import InputError
 from ffr_dyn.integrators import RK4
 from ffr_dyn.joints import Joint
 from ffr_dyn.kernels.tables import OK
-from ffr_dyn.machine import evaluate_at, new_machine
 from ffr_dyn.layout import layout
+from ffr_dyn.machine import evaluate_at, new_machine
 from ffr_dyn.rotation import G_bar, rotation_matrix
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.timefunction import polynomial

@@ -25,8 +25,8 @@ from ffr_dyn.joint_forces import Actuator, JointFriction, JointSpring, JointStop
 from ffr_dyn.joints import Joint
 from ffr_dyn.kernels.applied import applied_loads
 from ffr_dyn.kernels.tables import OK
-from ffr_dyn.machine import evaluate_at, new_machine
 from ffr_dyn.layout import layout
+from ffr_dyn.machine import evaluate_at, new_machine
 from ffr_dyn.rotation import rotation_matrix
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.surface_loads import ModalForce, NodalForces, Pressure, distributed

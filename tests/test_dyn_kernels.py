@@ -11,13 +11,13 @@ from synthetic import cloud
 from ffr_dyn.analyses.assemble import drive_of, rows_at
 from ffr_dyn.constraints import evaluate_word
 from ffr_dyn.drivers import Driver, PointDriver
-from ffr_dyn.equations import System, compile_scene, new_work
+from ffr_dyn.equations import System, compile_scene
 from ffr_dyn.inertia import elastic_force, gravity_force, mass_matrix, quadratic_velocity
 from ffr_dyn.joints import KINDS, Joint
 from ffr_dyn.kernels.functions import evaluate_functions
 from ffr_dyn.kernels.tables import OK, Functions
-from ffr_dyn.machine import evaluate_at, new_machine
 from ffr_dyn.layout import layout
+from ffr_dyn.machine import evaluate_at, new_machine
 from ffr_dyn.rotation import G_bar, rotation_matrix, skew
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.timefunction import evaluate, harmonic, polynomial, table

@@ -1,6 +1,7 @@
 """One evaluation of the compiled equations at a state, for the analyses that look at single states.
 
-A row of a record evaluates the scene; what it leaves in the scratch memory is read here as plain matrices. Small motions, Jacobians and null spaces are in the velocities [A^T R_dot, omega_bar, q_dot].
+A row of a record evaluates the scene; what it leaves in the scratch memory is read here as plain matrices. Small motions,
+Jacobians and null spaces are in the velocities [A^T R_dot, omega_bar, q_dot].
 """
 
 from __future__ import annotations

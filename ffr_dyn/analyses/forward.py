@@ -260,9 +260,7 @@ def _changing(machine: Machine) -> Iterator[tuple[str, Array]]:
         yield from leaves(getattr(machine.tables, name), name)
 
 
-def _resumed(
-    assembled: Assembled, method: Integrator, stabilisation: Stabilisation, path: Path, mark: str
-) -> _Run:
+def _resumed(assembled: Assembled, method: Integrator, stabilisation: Stabilisation, path: Path, mark: str) -> _Run:
     """The run that a result file holds, ready to go on."""
     content = load_checkpoint(path)
     if content is None:

@@ -30,7 +30,6 @@ from ffr_dyn.analyses.forward import with_all_reactions
 from ffr_dyn.analyses.mobility import named_motion, require_driven
 from ffr_dyn.analyses.outcome import output_times, result_of
 from ffr_dyn.errors import SimulationError
-from ffr_dyn.integrators import RK4
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.measure import selected
 from ffr_dyn.result import Result

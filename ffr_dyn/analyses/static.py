@@ -23,7 +23,6 @@ from ffr_dyn.analyses.outcome import result_of
 from ffr_dyn.analyses.states import held
 from ffr_dyn.analyses.tangent import Chart, chart, movement, rates, sizes, state, stiffness
 from ffr_dyn.errors import InputError, SimulationError
-from ffr_dyn.integrators import RK4
 from ffr_dyn.measure import selected
 from ffr_dyn.result import Result
 from ffr_dyn.scene import Scene

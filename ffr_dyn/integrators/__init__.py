@@ -6,8 +6,7 @@ A method is a frozen dataclass with its settings; its compiled unit does one ste
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 from ffr_dyn.integrators.rk4 import RK4
 from ffr_dyn.integrators.ros2 import ROS2
@@ -35,4 +34,4 @@ class Integrator(Protocol):
     unit: ClassVar[Unit]
 
 
-METHODS: dict[str, Callable[[float], Integrator]] = {"rk4": RK4, "ros2": ROS2, "ros3": ROS3}
+METHODS: dict[str, type[Any]] = {"rk4": RK4, "ros2": ROS2, "ros3": ROS3}

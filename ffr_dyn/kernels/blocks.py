@@ -8,13 +8,13 @@ of the earlier, with the rows of the later side by side in it. The factor is S =
 """
 
 from ffr_dyn.kernels.lanes import (
+    clear_row,
     combine_1,
     combine_2,
     combine_3,
     combine_4,
     combine_5,
     combine_6,
-    clear_row,
     combine_12,
     copy_row,
     dot_rows,

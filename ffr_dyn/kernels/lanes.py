@@ -13,6 +13,7 @@ from numba.extending import intrinsic
 
 from ffr_dyn.kernels.tables import LANES
 
+_intrinsic: Any = intrinsic  # whose callers give one argument less than its definition has
 _REAL = types.float64
 _POOLED = types.Array(types.float64, 1, "C")
 _LIBERTIES = ("contract", "reassoc", "nsz")
@@ -38,7 +39,7 @@ def _broadcast(builder: Any, number: Any) -> Any:
 
 
 def _combination(count: int) -> Any:
-    @intrinsic
+    @_intrinsic
     def combine(typing, target, at, factor, numbers, first, stride, source, begin):  # type: ignore[no-untyped-def]
         """target row += factor sum_k numbers[first + k stride] source row k, for `count` rows that follow one another."""
         index = types.intp
@@ -67,7 +68,7 @@ combine_1, combine_2, combine_3 = _combination(1), _combination(2), _combination
 combine_4, combine_5, combine_6, combine_12 = _combination(4), _combination(5), _combination(6), _combination(12)
 
 
-@intrinsic
+@_intrinsic
 def scale_row(typing, target, at, factor):  # type: ignore[no-untyped-def]
     """target row *= factor."""
 
@@ -80,7 +81,7 @@ def scale_row(typing, target, at, factor):  # type: ignore[no-untyped-def]
     return types.void(_POOLED, types.intp, _REAL), generate
 
 
-@intrinsic
+@_intrinsic
 def copy_row(typing, source, begin, target, at):  # type: ignore[no-untyped-def]
     """target row = source row."""
 
@@ -92,7 +93,7 @@ def copy_row(typing, source, begin, target, at):  # type: ignore[no-untyped-def]
     return types.void(_POOLED, types.intp, _POOLED, types.intp), generate
 
 
-@intrinsic
+@_intrinsic
 def clear_row(typing, target, at):  # type: ignore[no-untyped-def]
     """target row = 0."""
 
@@ -104,7 +105,7 @@ def clear_row(typing, target, at):  # type: ignore[no-untyped-def]
     return types.void(_POOLED, types.intp), generate
 
 
-@intrinsic
+@_intrinsic
 def dot_rows(typing, left, at, right, begin):  # type: ignore[no-untyped-def]
     """The sum over the lanes of left row * right row."""
 

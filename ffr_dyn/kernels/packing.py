@@ -7,6 +7,7 @@ compiled code. What a table holds, and in which order, is said once: by the anno
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -19,11 +20,18 @@ from ffr_dyn.kernels.tables import Record, Tables
 
 Array = np.ndarray
 
+_intrinsic: Any = intrinsic  # whose callers give one argument less than its definition has
+
+
+@cache
+def _fields(kind: Any) -> dict[str, Any]:
+    return get_type_hints(kind, include_extras=True)
+
 
 def pack(tables: Any) -> Array:
     """Addresses and shapes of the arrays of nested named tuples, and their numbers (int64). The arrays must outlive it."""
     found: list[int] = []
-    for name, kind in get_type_hints(type(tables), include_extras=True).items():
+    for name, kind in _fields(type(tables)).items():  # type: ignore[arg-type]
         value = getattr(tables, name)
         if kind is float:
             found.append(int(np.float64(value).view(np.int64)))
@@ -45,9 +53,7 @@ def _numba_type(kind: Any) -> Any:
     if kind is int:
         return types.int64
     if hasattr(kind, "_fields"):
-        return types.BaseTuple.from_types(
-            tuple(_numba_type(each) for each in get_type_hints(kind, include_extras=True).values()), kind
-        )
+        return types.BaseTuple.from_types(tuple(_numba_type(each) for each in _fields(kind).values()), kind)
     dtype, axes = kind.__metadata__[0]
     return types.Array(getattr(types, dtype), axes, "C")
 
@@ -62,7 +68,7 @@ def _read(context: Any, builder: Any, kind: Any, base: Any, at: int) -> tuple[An
 
     if isinstance(kind, types.BaseTuple):
         values = []
-        for each in kind.types:
+        for each in kind.types:  # type: ignore[attr-defined]
             value, at = _read(context, builder, each, base, at)
             values.append(value)
         return context.make_tuple(builder, kind, values), at
@@ -83,7 +89,7 @@ def _read(context: Any, builder: Any, kind: Any, base: Any, at: int) -> tuple[An
 def _unpacker(kind: type) -> Any:
     result = _numba_type(kind)
 
-    @intrinsic
+    @_intrinsic
     def unpack(typing, address):  # type: ignore[no-untyped-def]
         def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
             base = builder.inttoptr(args[0], cgutils.intp_t.as_pointer())
@@ -97,7 +103,7 @@ def _unpacker(kind: type) -> Any:
 unpack_tables, unpack_record = _unpacker(Tables), _unpacker(Record)
 
 
-@intrinsic
+@_intrinsic
 def vector_at(typing, address, size):  # type: ignore[no-untyped-def]
     """The array of `size` numbers at an address."""
     kind = types.Array(types.float64, 1, "C")
@@ -111,7 +117,7 @@ def vector_at(typing, address, size):  # type: ignore[no-untyped-def]
     return kind(types.int64, types.int64), generate
 
 
-@intrinsic
+@_intrinsic
 def call_unit(typing, unit, address, t, first, second):  # type: ignore[no-untyped-def]
     """Call the unit at address `unit` (see `ffr_dyn.kernels.units`)."""
     signature = types.int64(types.int64, types.int64, types.float64, types.int64, types.int64)

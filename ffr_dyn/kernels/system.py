@@ -1,7 +1,7 @@
 """One evaluation of the equations of motion of a scene; everything an integrator or an analysis calls.
 
 Order of calls: `prepare` once per elastic diagonal; `evaluate_bodies`, `evaluate_loads`, `evaluate_joints` at a state; then
-any number of `solve_motion` and `solve_correction` with that state's factors. Compiled as units in `ffr_dyn.kernels.units`.
+any number of `solve_motion` and `solve_step` with that state's factors. Compiled as units in `ffr_dyn.kernels.units`.
 """
 
 from ffr_dyn.kernels.blocks import (
@@ -108,9 +108,7 @@ def evaluate_loads(m, w, t, x, v):
     for k in m.markers.active:
         b = m.markers.body[k]
         update_marker(m.bodies.where, m.markers, w.markers, w.bodies.A[b], get(w.bodies.omega, b), x, v, k)
-    apply_loads(
-        m.bodies.where, m.markers, m.loads, w.bodies.A, w.markers, w.loads, w.functions, w.user, x, w.bodies.f
-    )
+    apply_loads(m.bodies.where, m.markers, m.loads, w.bodies.A, w.markers, w.loads, w.functions, w.user, x, w.bodies.f)
 
 
 @inlined
@@ -165,7 +163,7 @@ def solve_motion(bodies, markers, rows, pattern, bw, rw, target, passes):
 
 @inlined
 def solve_step(bodies, markers, rows, pattern, bw, rw, value):
-    """acc, step from  M acc + Phi_q^T step = 0,  Phi_q acc = -value."""
+    """acc, step from  M acc + Phi_q^T step = 0,  Phi_q acc = -value: for positions and rates a mass-orthogonal projection."""
     fill(bw.elastic, 0.0)
     for b in range(bodies.mass.size):
         fill(bw.rigid[b], 0.0)
@@ -202,12 +200,6 @@ def reduced_rates(bodies, markers, rows, bw, rw, target):
                     phi = shapes(markers, marker, n)
                     moved[0], moved[1], moved[2], moved[3], moved[4], moved[5] = six_rows(phi, bw.elastic[e : e + n], n)
                     combine_6(rw.step, LANES * k, 1.0, moved, 0, 1, rw.X, at + 6 * LANES)
-
-
-@kernel
-def solve_correction(bodies, markers, rows, pattern, bw, rw, value):
-    """acc, step from  M acc + Phi_q^T step = 0,  Phi_q acc = -value: the mass-orthogonal projection."""
-    solve_step(bodies, markers, rows, pattern, bw, rw, value)
 
 
 @inlined
@@ -322,10 +314,10 @@ def acceleration_target(w, gains, target):
 @inlined
 def move_back(bodies, markers, rows, pattern, bw, rw, vd, x, v):
     """One projection of (x, v) onto the constraints, smallest in the norm of the mass matrix."""
-    solve_correction(bodies, markers, rows, pattern, bw, rw, rw.nu)
+    solve_step(bodies, markers, rows, pattern, bw, rw, rw.nu)
     to_velocity_rates(bodies.where, bw.A, bw.acc, vd)
     add_scaled(v, v, 1.0, vd)
-    solve_correction(bodies, markers, rows, pattern, bw, rw, rw.Phi)
+    solve_step(bodies, markers, rows, pattern, bw, rw, rw.Phi)
     apply_motion(bodies.where, bw.A, x, bw.acc)
     normalise(bodies, x)
 

@@ -16,8 +16,12 @@ import numpy as np
 
 Array = np.ndarray
 # Arrays of numbers and of integers by their number of axes: compiled code is told here what it finds at an address.
-F1, F2, F3, F4 = (Annotated[np.ndarray, ("float64", axes)] for axes in (1, 2, 3, 4))
-I1, I2 = (Annotated[np.ndarray, ("int64", axes)] for axes in (1, 2))
+F1 = Annotated[np.ndarray, ("float64", 1)]
+F2 = Annotated[np.ndarray, ("float64", 2)]
+F3 = Annotated[np.ndarray, ("float64", 3)]
+F4 = Annotated[np.ndarray, ("float64", 4)]
+I1 = Annotated[np.ndarray, ("int64", 1)]
+I2 = Annotated[np.ndarray, ("int64", 2)]
 
 COINCIDENCE, DOT_1, DOT_2, DRIVEN_ANGLE, DISTANCE, RELATION = 0, 1, 2, 3, 4, 5
 ANGLE, STROKE, LENGTH = 0, 1, 2
@@ -42,7 +46,7 @@ TIGHTER = 1e-4
 class Bodies(NamedTuple):
     """B bodies, E elastic coordinates in all."""
 
-    # (B + 1, 8) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening; its number of loads;
+    # (B + 1, 8) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening (or -1); its number of loads;
     # the body axis along the normal of a planar scene, or -1
     where: I2
     mass: F1  # (B,)

@@ -18,7 +18,7 @@ from ffr_dyn.kernels.bodies import mass_times
 from ffr_dyn.kernels.calls import set_diagonal
 from ffr_dyn.kernels.functions import evaluate_functions
 from ffr_dyn.kernels.loads import call_user, gravity_field
-from ffr_dyn.kernels.options import OPTIONS, inlined
+from ffr_dyn.kernels.options import OPTIONS
 from ffr_dyn.kernels.packing import call_unit, unpack_record, unpack_tables, vector_at
 from ffr_dyn.kernels.record import keep
 from ffr_dyn.kernels.stiffening import solve_stiffened
@@ -29,7 +29,6 @@ from ffr_dyn.kernels.system import (
     evaluate_loads,
     largest,
     move_back,
-    solve_correction,
     to_body_axes,
     to_velocity_rates,
 )

@@ -72,10 +72,19 @@ def cholesky_six(L):
     a1, a2, a3, a4, a5 = L[1, 0] * i0, L[2, 0] * i0, L[3, 0] * i0, L[4, 0] * i0, L[5, 0] * i0
     p1 = d1 - a1 * a1
     i1 = 1.0 / p1**0.5
-    b2, b3, b4, b5 = (L[2, 1] - a2 * a1) * i1, (L[3, 1] - a3 * a1) * i1, (L[4, 1] - a4 * a1) * i1, (L[5, 1] - a5 * a1) * i1
+    b2, b3, b4, b5 = (
+        (L[2, 1] - a2 * a1) * i1,
+        (L[3, 1] - a3 * a1) * i1,
+        (L[4, 1] - a4 * a1) * i1,
+        (L[5, 1] - a5 * a1) * i1,
+    )
     p2 = d2 - a2 * a2 - b2 * b2
     i2 = 1.0 / p2**0.5
-    c3, c4, c5 = (L[3, 2] - a3 * a2 - b3 * b2) * i2, (L[4, 2] - a4 * a2 - b4 * b2) * i2, (L[5, 2] - a5 * a2 - b5 * b2) * i2
+    c3, c4, c5 = (
+        (L[3, 2] - a3 * a2 - b3 * b2) * i2,
+        (L[4, 2] - a4 * a2 - b4 * b2) * i2,
+        (L[5, 2] - a5 * a2 - b5 * b2) * i2,
+    )
     p3 = d3 - a3 * a3 - b3 * b3 - c3 * c3
     i3 = 1.0 / p3**0.5
     e4, e5 = (L[4, 3] - a4 * a3 - b4 * b3 - c4 * c3) * i3, (L[5, 3] - a5 * a3 - b5 * b3 - c5 * c3) * i3
@@ -115,26 +124,6 @@ def upper_six(L, b):
     b1 = (b[1] - L[5, 1] * b5 - L[4, 1] * b4 - L[3, 1] * b3 - L[2, 1] * b2) * L[1, 1]
     b0 = (b[0] - L[5, 0] * b5 - L[4, 0] * b4 - L[3, 0] * b3 - L[2, 0] * b2 - L[1, 0] * b1) * L[0, 0]
     b[0], b[1], b[2], b[3], b[4], b[5] = b0, b1, b2, b3, b4, b5
-
-
-@kernel
-def solve_lower(factor, b, size):
-    """In place b <- L^-1 b."""
-    for i in range(size):
-        value = b[i]
-        for k in range(i):
-            value -= factor[i, k] * b[k]
-        b[i] = value * factor[i, i]
-
-
-@kernel
-def solve_upper(factor, b, size):
-    """In place b <- L^-T b."""
-    for i in range(size - 1, -1, -1):
-        value = b[i]
-        for k in range(i + 1, size):
-            value -= factor[k, i] * b[k]
-        b[i] = value * factor[i, i]
 
 
 @kernel
