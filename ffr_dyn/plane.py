@@ -9,21 +9,20 @@ and a revolute joint two rows.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
 
 import numpy as np
 
 from ffr_dyn.drivers import PointDriver
 from ffr_dyn.errors import InputError
-from ffr_dyn.forces import SpringDamper
 from ffr_dyn.joint_forces import JointForce
-from ffr_dyn.joints import Joint, frames
+from ffr_dyn.joints import frames
 from ffr_dyn.rotation import rotation_matrix
 from ffr_dyn.scene import Body, Scene, joint_under, marker_names, marker_number, markers
 from ffr_dyn.surface_loads import ModalForce
 from ffr_dyn.timefunction import is_zero
-from ffr_dyn.variant import with_modes
+from ffr_dyn.variant import used_interfaces, with_modes
 from ffr_prep.body import FlexibleBody, axial
 
 Array = np.ndarray
@@ -63,7 +62,7 @@ def _in_plane(scene: Scene, normal: int, *, strict: bool) -> Scene:
     bodies, kept = [], {}
     for body in scene.bodies:
         k = body_normal(body, normal)
-        keep = np.flatnonzero(_stays(body.model, k, _used(scene, body)) if strict else _mostly(body.model, k))
+        keep = np.flatnonzero(_stays(body.model, k, used_interfaces(scene, body)) if strict else _mostly(body.model, k))
         bodies.append(replace(with_modes(body, keep.tolist()), kept=(tuple(keep.tolist()), body.model.n)))
         kept[body.name] = keep
     forces = [replace(f, values=f.values[kept[f.body]]) if isinstance(f, ModalForce) else f for f in scene.forces]
@@ -99,7 +98,7 @@ def _obstacles(scene: Scene, normal: int) -> Iterator[str]:
         yield "there are forces of other kinds"
     for body in scene.bodies:
         k = body_normal(body, normal)
-        if not _symmetric(body.model, k, _used(scene, body)):
+        if not _symmetric(body.model, k, used_interfaces(scene, body)):
             yield f"body {body.name!r} is not symmetric"
     for load in scene.loads:
         k = normal if load.axes == "global" else _normal_of(scene, load.marker, normal)
@@ -160,18 +159,10 @@ def _normal_of(scene: Scene, marker: str, normal: int) -> int:
     return next((body_normal(b, normal) for b in scene.bodies if b.name == body), normal)
 
 
-def _used(scene: Scene, body: Body) -> list[str]:
-    """Interfaces of a body at which joints, loads, springs or point drivers act."""
-    paired: list[Joint | SpringDamper | PointDriver]
-    paired = [*scene.joints, *scene.springs, *(d for d in scene.drivers if isinstance(d, PointDriver))]
-    ends = [load.marker for load in scene.loads] + [end for one in paired for end in (one.i, one.j)]
-    return sorted({end.partition(".")[2] for end in ends if end.partition(".")[0] == body.name})
-
-
 # ---- symmetry of a body -------------------------------------------------------------------------------------------
 
 
-def _symmetric(body: FlexibleBody, k: int, used: list[str]) -> bool:
+def _symmetric(body: FlexibleBody, k: int, used: Sequence[str]) -> bool:
     """Whether in-plane motion excites nothing across body axis k, neither rigid nor elastic."""
     if k < 0:
         return False
@@ -199,14 +190,14 @@ def _splits(stiffening: Array, stays: Array) -> bool:
     return bool((mixed <= 1e-6 * scale).all())
 
 
-def _stays(body: FlexibleBody, k: int, used: list[str]) -> Array:
+def _stays(body: FlexibleBody, k: int, used: Sequence[str]) -> Array:
     """(n,) which modes have no momentum, and move no marker that is used, across the plane."""
     a, b = (c for c in range(3) if c != k)
     turning = axial(body.rP_dm)
     return _quiet(body, [body.P_dm[k]], [turning[a], turning[b]], used, [k], [a, b])
 
 
-def _leaves(body: FlexibleBody, k: int, used: list[str]) -> Array:
+def _leaves(body: FlexibleBody, k: int, used: Sequence[str]) -> Array:
     """(n,) which modes have no momentum, and move no marker that is used, in the plane."""
     a, b = (c for c in range(3) if c != k)
     moments = [axial(body.rP_dm)[k], body.rP_dm[a, a] + body.rP_dm[b, b]]
@@ -214,7 +205,12 @@ def _leaves(body: FlexibleBody, k: int, used: list[str]) -> Array:
 
 
 def _quiet(
-    body: FlexibleBody, momenta: list[Array], moments: list[Array], used: list[str], shifts: list[int], turns: list[int]
+    body: FlexibleBody,
+    momenta: list[Array],
+    moments: list[Array],
+    used: Sequence[str],
+    shifts: list[int],
+    turns: list[int],
 ) -> Array:
     length = np.sqrt(np.trace(body.rr_dm) / body.mass)
     parts = [part / np.sqrt(body.mass) for part in momenta]
