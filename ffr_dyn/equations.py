@@ -32,7 +32,7 @@ from ffr_dyn.kernels.tables import (
 from ffr_dyn.layout import Layout, layout
 from ffr_dyn.scene import Body, Scene, joint_of, joints_of, marker_number, markers
 from ffr_dyn.state import StateView
-from ffr_prep.body import FlexibleBody, axial
+from ffr_prep.body import axial
 
 Array = np.ndarray
 
@@ -148,8 +148,21 @@ def _nine(tensor: Array) -> Array:
     return np.concatenate([_six(tensor), axial(tensor)])
 
 
-def _pp_rows(body: FlexibleBody) -> Array:
-    return np.moveaxis(_nine(body.PP_dm), 1, 0).ravel()  # (n over i, 9, n over j)
+def _parts(tensor: Array, symmetric: bool, skew: bool) -> Array:
+    """`_nine` of a tensor, with zeros for a part that is left out."""
+    nine = _nine(tensor)
+    nine[:6] *= symmetric
+    nine[6:] *= skew
+    return nine
+
+
+def _rP_parts(body: Body) -> Array:
+    return _parts(body.model.rP_dm, "I8" not in body.dropped, "I4" not in body.dropped)
+
+
+def _PP_parts(body: Body) -> Array:
+    """(n over i, 9, n over j)."""
+    return np.moveaxis(_parts(body.model.PP_dm, "I9" not in body.dropped, "I5" not in body.dropped), 1, 0)
 
 
 def _pool(parts: list[Array]) -> Array:
@@ -174,9 +187,9 @@ def _bodies(scene: Scene, place: Layout) -> Bodies:
         where=where,
         mass=np.array([m.mass for m in models]),
         moments=np.array([np.concatenate([m.r_dm, _six(m.rr_dm)]) for m in models]),
-        P_dm=_pool([m.P_dm for m in models]),
-        rP_dm=_pool([_nine(m.rP_dm) for m in models]),
-        PP_dm=_pool([_pp_rows(m) for m in models]),
+        P_dm=_pool([b.model.P_dm * ("I3" not in b.dropped) for b in scene.bodies]),
+        rP_dm=_pool([_rP_parts(b) for b in scene.bodies]),
+        PP_dm=_pool([_PP_parts(b) for b in scene.bodies]),
         omega2=_pool([m.omega2 for m in models]),
         two_zeta_omega=_pool([2 * b.damping * np.sqrt(b.model.omega2) for b in scene.bodies]),
         stiffening=_pool(stiffening),

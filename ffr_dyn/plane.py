@@ -23,7 +23,8 @@ from ffr_dyn.rotation import rotation_matrix
 from ffr_dyn.scene import Body, Scene, joint_under, marker_names, marker_number, markers
 from ffr_dyn.surface_loads import ModalForce
 from ffr_dyn.timefunction import is_zero
-from ffr_prep.body import FlexibleBody, axial, truncated
+from ffr_dyn.variant import with_modes
+from ffr_prep.body import FlexibleBody, axial
 
 Array = np.ndarray
 
@@ -63,16 +64,7 @@ def _in_plane(scene: Scene, normal: int, *, strict: bool) -> Scene:
     for body in scene.bodies:
         k = body_normal(body, normal)
         keep = np.flatnonzero(_stays(body.model, k, _used(scene, body)) if strict else _mostly(body.model, k))
-        bodies.append(
-            replace(
-                body,
-                model=truncated(body.model, keep),
-                q=body.q[keep],
-                q_dot=body.q_dot[keep],
-                damping=body.damping[keep],
-                kept=(tuple(keep.tolist()), body.model.n),
-            )
-        )
+        bodies.append(replace(with_modes(body, keep.tolist()), kept=(tuple(keep.tolist()), body.model.n)))
         kept[body.name] = keep
     forces = [replace(f, values=f.values[kept[f.body]]) if isinstance(f, ModalForce) else f for f in scene.forces]
     return replace(scene, bodies=tuple(bodies), forces=tuple(forces), plane=AXES[normal])

@@ -29,6 +29,8 @@ Array = np.ndarray
 Force = Bushing | JointForce | SurfaceLoad
 
 GROUND = "ground"
+# Groups of inertia integrals that a body can do without: I3 and the parts, skew and symmetric, of the other two.
+INERTIA_TERMS = ("I3", "I4", "I5", "I8", "I9")
 RESERVED = (GROUND, "energy", "constraint", "measured", "time", "geometry")
 
 
@@ -42,6 +44,7 @@ class Body:
     q, q_dot : (n,) elastic coordinates and rates; default zero
     damping  : modal damping ratio, one for all modes or (n,)
     stiffening : use the geometric stiffening that the model has, if any
+    dropped  : names of the `INERTIA_TERMS` that the equations of motion leave out (see `ffr_dyn.variant.without_terms`)
     kept     : set where a planar scene leaves modes out: the numbers of those that stay, and how many there were
 
     Pose and motion are a first guess: assembly makes them meet the joints.
@@ -57,6 +60,7 @@ class Body:
     q_dot: Any = None
     damping: Any = 0.0
     stiffening: bool = True
+    dropped: tuple[str, ...] = ()
     kept: tuple[tuple[int, ...], int] | None = None
 
     def __post_init__(self) -> None:
@@ -70,6 +74,10 @@ class Body:
         object.__setattr__(self, "damping", _vector(np.broadcast_to(self.damping, n), n, f"{who}: damping"))
         if (self.damping < 0).any():
             raise InputError(f"{who}: a modal damping ratio is negative: {self.damping.min():g}")
+        for term in self.dropped:
+            if term not in INERTIA_TERMS:
+                raise InputError(f"{who}: there is no inertia term {term!r} to drop; {_offer(term, INERTIA_TERMS)}")
+        object.__setattr__(self, "dropped", tuple(t for t in INERTIA_TERMS if t in self.dropped))
 
 
 @dataclass(frozen=True)

@@ -182,6 +182,7 @@ def _body(name: str, entry: BodyEntry, source: Source) -> Body:
             q_dot=entry.q_dot,
             damping=entry.damping,
             stiffening=entry.stiffening,
+            dropped=tuple(entry.drop),
         )
     except (InputError, BodyError) as error:
         raise InputError(f"{origin(source, ('bodies', name))}: bodies.{name}: {error}") from None

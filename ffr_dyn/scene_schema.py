@@ -369,7 +369,8 @@ class BodyEntry(_Strict):
     """A flexible body from a file, or a rigid one from its mass and named points.
 
     inertia is about the centre of mass; instead of inertia and centre_of_mass, the integrals r_dm and rr_dm (first and second
-    moments about the origin) may be given. Points of a body from a file are put on its surface, at the nearest node.
+    moments about the origin) may be given. Points of a body from a file are put on its surface, at the nearest node. `drop`
+    names inertia terms that the equations of motion leave out (see `ffr_dyn.variant`).
     """
 
     file: Path | None = None
@@ -388,6 +389,7 @@ class BodyEntry(_Strict):
     q_dot: list[Number] | None = None
     damping: Number | list[Number] = 0.0
     stiffening: bool = True
+    drop: list[Literal["I3", "I4", "I5", "I8", "I9"]] = []
 
     @model_validator(mode="after")
     def _kind(self) -> BodyEntry:

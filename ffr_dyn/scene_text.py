@@ -136,6 +136,8 @@ def _body(body: Body, files: Mapping[str, str]) -> dict[str, Any]:
     entry["rotation"] = body.rotation
     if body.model.n:
         entry |= {"q": body.q, "q_dot": body.q_dot, "damping": body.damping, "stiffening": body.stiffening}
+    if body.dropped:
+        entry["drop"] = list(body.dropped)
     return entry
 
 

@@ -20,12 +20,11 @@ def convert(body: Path, output: Path, reference: str) -> None:
     """
     from ffr_prep import cli
     from ffr_prep.body import load_body, save_body
-    from ffr_prep.conversion import with_reference
     from ffr_prep.report import short_lines
 
     conditions = cli._reference(reference)
     cli._check_writable(output)
-    converted = with_reference(load_body(body), conditions)
+    converted = load_body(body).with_reference(conditions)
     save_body(converted, output)
     cli._print(short_lines(converted))
     click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")

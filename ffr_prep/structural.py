@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 from threadpoolctl import threadpool_limits
 
-from ffr_prep.beam_stiffening import unit_accelerations
+from ffr_prep.accelerations import unit_accelerations
 from ffr_prep.body import FlexibleBody, Surface
 from ffr_prep.families import Family, families
 from ffr_prep.frame import Frame, check_frame, frame_hash
