@@ -109,6 +109,12 @@ class Scene:
     name: str = "scene"
     plane: str = "auto"
 
+    def stepper(self, method: Any, **settings: Any) -> Any:
+        """A `ffr_dyn.stepper.Stepper` of the scene: inputs in, outputs out, a step at a time."""
+        from ffr_dyn.stepper import Stepper  # stands above this module, and loads the compiler
+
+        return Stepper(self, method, **settings)
+
     def __post_init__(self) -> None:
         for key in ("bodies", "joints", "drivers", "couplings", "loads", "springs", "forces", "measurements"):
             object.__setattr__(self, key, tuple(getattr(self, key)))

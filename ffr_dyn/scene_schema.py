@@ -493,6 +493,7 @@ class _SceneBase(_Strict):
     name: str = "scene"
     include: list[str] = []
     parameters: dict[str, Any] = {}
+    inputs: dict[str, Number] = {}
     outputs: list[str] = ["default"]
     gravity: Annotated[list[Annotated[float, In("m/s^2")]], THREE] = [0.0, 0.0, 0.0]
     base_acceleration: Annotated[list[OfTime], THREE] = [0.0, 0.0, 0.0]

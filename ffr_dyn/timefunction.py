@@ -1,12 +1,12 @@
 """Functions of time for drivers and loads: each with two derivatives, compiled to numbers for the kernels.
 
 constant(5.0)   polynomial(0, 150)   harmonic(amplitude=.1, frequency=2)   table(times, values)   user(f)
-and, by `ffr_dyn.formula`, formula("0.1 * sin(2 * pi * t)")
+signal("torque") and, by `ffr_dyn.formula`, formula("0.1 * sin(2 * pi * t)")
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,12 +25,14 @@ class TimeFunction:
     """A function of time as the kernels read it: its kind and its numbers; `callback` for a Python function.
 
     operands : what an operation of a formula (data: its number, its parameter) works on
+    name     : of an input of the scene, see `signal`
     """
 
     kind: int
     data: tuple[float, ...]
     callback: Callable[[float], object] | None = None
     operands: tuple[TimeFunction, ...] = ()
+    name: str = ""
 
 
 def constant(value: float) -> TimeFunction:
@@ -73,6 +75,28 @@ def piecewise(breaks: Array, coefficients: Array) -> TimeFunction:
 def user(function: Callable[[float], object]) -> TimeFunction:
     """A Python function t -> value, or t -> (value, rate, second derivative) where it drives a joint coordinate."""
     return TimeFunction(USER, (0.0,), function)
+
+
+def signal(name: str, value: float = 0.0) -> TimeFunction:
+    """An input of the scene, by name: it has its initial value until a `ffr_dyn.stepper.Stepper` sets another.
+
+    The same signal may stand in several places. Raises InputError for a name that is no word, or a value not finite.
+    """
+    if not name.isidentifier():
+        raise InputError(f"{name!r} cannot be the name of an input: use letters, digits and '_', a letter first")
+    return TimeFunction(PIECEWISE, (*SIGNAL, *_numbers(f"input {name!r}", (value, 0.0, 0.0))), name=name)
+
+
+# One piece of three coefficients from the time when it was set, for ever.
+SIGNAL = (1.0, 3.0, 0.0, 1e300)
+
+
+def signals_in(function: TimeFunction) -> Iterator[TimeFunction]:
+    """The signals of which a function is made."""
+    if function.name:
+        yield function
+    for operand in function.operands:
+        yield from signals_in(operand)
 
 
 def operation(op: int, *operands: TimeFunction, parameter: float = 0.0) -> TimeFunction:

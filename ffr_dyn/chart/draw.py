@@ -145,20 +145,22 @@ def _front(axes: Axes, diagram: Diagram, measure: str, against: str) -> None:
 
 
 def _legend(figure: Figure, shown: list[Diagram], lines: dict[tuple[str, str], tuple[str, str]]) -> None:
-    models = dict.fromkeys(model for _, model in lines)
+    """Colours mean methods, markers models."""
     handles: list[Artist] = []
-    for (series, model), (colour, marker) in lines.items():
-        name = series if len(models) == 1 else f"{series}, {model}"
-        handles.append(Line2D([], [], color=colour, marker=marker, markersize=5.5, linewidth=1.3, label=name))
+    for series, colour in {series: colour for (series, _), (colour, _) in lines.items()}.items():
+        handles.append(Line2D([], [], color=colour, linewidth=2.5, label=series))
+    models = {model: marker for (_, model), (_, marker) in lines.items()}
+    for model, marker in models.items() if len(models) > 1 else ():
+        handles.append(Line2D([], [], color="#555555", marker=marker, markersize=6, linestyle="none", label=model))
     ring: Any = {"marker": "o", "fillstyle": "none", "markersize": 10, "linestyle": "none"}
     handles.append(Line2D([], [], color=FRONT, label="Pareto front", **ring))
     if any(diagram.chosen for diagram in shown):
         handles.append(Line2D([], [], color="#F0C000", marker="*", markersize=14, linestyle="none", label="chosen"))
     if any(floor > 0 for diagram in shown for floor in diagram.reference.floors.values()):
-        handles.append(Patch(facecolor="#EEEEEE", edgecolor=FLOOR, hatch="///", label="below the reference's error"))
+        handles.append(Patch(facecolor="#EEEEEE", edgecolor=FLOOR, hatch="///", label="error of the reference"))
     lost = sum(len(diagram.lost) for diagram in shown)
-    figure.legend(handles=handles, loc="outside right upper", fontsize=10, alignment="left",
-                  title=f"{lost} variants failed: see the table" if lost else None)  # fmt: skip
+    title = f"{lost} variant{'s' * (lost > 1)} failed:\nsee the table" if lost else None
+    figure.legend(handles=handles, loc="outside right upper", fontsize=10, alignment="left", title=title)
 
 
 def _written(figure: Figure, path: Path) -> Path:

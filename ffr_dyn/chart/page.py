@@ -48,7 +48,7 @@ def page(diagram: Diagram) -> str:
         include_plotlyjs=True,
         include_mathjax=False,
         full_html=False,
-        default_height="88vh",
+        default_height="85vh",
         validate=False,
         div_id="diagram",
     )
@@ -136,9 +136,9 @@ def _layout(diagram: Diagram, views: list[tuple[str, str]], owner: list[int]) ->
         }
         for k, (measure, cost) in enumerate(views)
     ]
-    menu = {"buttons": buttons, "x": 1.0, "xanchor": "right", "y": 1.12, "yanchor": "top", "showactive": True}
+    menu = {"buttons": buttons, "x": 1.0, "xanchor": "right", "y": 1.02, "yanchor": "bottom", "showactive": True}
     return {
-        "title": {"text": html.escape(f"{diagram.title}: work and precision")},
+        "title": {"text": html.escape(f"{diagram.title}: work and precision"), "x": 0.02},
         "xaxis": axis(COST_WORDS[views[0][1]]),
         "yaxis": axis(error(views[0][0])),
         "updatemenus": [menu],

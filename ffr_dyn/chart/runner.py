@@ -231,7 +231,7 @@ class Distributed:
         from dask.distributed import as_completed
 
         futures = {self._client.submit(function, item, retries=RETRIES, pure=False): k for k, item in enumerate(items)}
-        for future in as_completed(list(futures)):
+        for future in as_completed(list(futures), loop=self._client.loop):
             if future.status == "finished":
                 yield futures[future], future.result()
             else:
@@ -239,12 +239,10 @@ class Distributed:
 
 
 def _why(future: Any) -> str:
-    from dask.distributed.scheduler import KilledWorker
-
     if future.status != "error":
         return f"the task was {future.status}: the cluster has gone"
     error = future.exception()
-    if isinstance(error, KilledWorker):
+    if type(error).__name__ == "KilledWorker":
         return f"its worker died {RETRIES + 1} times: out of memory, or killed from outside"
     return f"{type(error).__name__}: {error}"
 
