@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,7 +33,7 @@ from ffr_dyn.kernels.tables import (
 from ffr_dyn.layout import Layout, layout
 from ffr_dyn.scene import Body, Scene, joint_of, joints_of, marker_number, markers
 from ffr_dyn.state import StateView
-from ffr_prep.body import FlexibleBody, axial
+from ffr_prep.body import axial
 
 Array = np.ndarray
 
@@ -59,6 +59,7 @@ class System:
     """A compiled scene: the tables, and what connects their numbers to the scene's names.
 
     blocks : in elimination order, as the rows in the tables;  user : keeps the callback of the user's functions alive
+    inputs : where the numbers of a signal begin among those of the time functions, by its name
     """
 
     scene: Scene
@@ -67,6 +68,7 @@ class System:
     elimination: Elimination
     model: Model
     user: UserFunctions
+    inputs: Mapping[str, tuple[int, ...]]
 
 
 def blocks_of(scene: Scene) -> list[Block]:
@@ -126,7 +128,7 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: f
     }
     user = UserFunctions(functions.callbacks, place, scene)
     compiled = Model(**model, user_address=user.address, user_count=user.count)  # type: ignore[arg-type]
-    return System(scene, place, ordered, elimination, compiled, user)
+    return System(scene, place, ordered, elimination, compiled, user, functions.inputs())
 
 
 def _moving(block: Block, table: list[tuple[int, str, str]], ground: int) -> tuple[int, ...]:
@@ -147,8 +149,21 @@ def _nine(tensor: Array) -> Array:
     return np.concatenate([_six(tensor), axial(tensor)])
 
 
-def _pp_rows(body: FlexibleBody) -> Array:
-    return np.moveaxis(_nine(body.PP_dm), 1, 0).ravel()  # (n over i, 9, n over j)
+def _parts(tensor: Array, symmetric: bool, skew: bool) -> Array:
+    """`_nine` of a tensor, with zeros for a part that is left out."""
+    nine = _nine(tensor)
+    nine[:6] *= symmetric
+    nine[6:] *= skew
+    return nine
+
+
+def _rP_parts(body: Body) -> Array:
+    return _parts(body.model.rP_dm, "I8" not in body.dropped, "I4" not in body.dropped)
+
+
+def _PP_parts(body: Body) -> Array:
+    """(n over i, 9, n over j)."""
+    return np.moveaxis(_parts(body.model.PP_dm, "I9" not in body.dropped, "I5" not in body.dropped), 1, 0)
 
 
 def _pool(parts: list[Array]) -> Array:
@@ -159,29 +174,27 @@ def _starts(sizes: list[int]) -> Array:
     return np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)]).astype(np.int64)
 
 
-def _shared(parts: list[Array], owners: list[object]) -> tuple[Array, Array]:
+def _shared(parts: list[Array], owners: list[Hashable]) -> tuple[Array, Array]:
     """(pool, starts): parts of one owner are stored once, so that many equal bodies stay in the processor's cache.
 
     A part of zeros is not stored; it starts at -1, and the kernels skip it.
     """
-    starts: dict[int, int] = {}
+    starts: dict[Hashable, int] = {}
     stored: list[Array] = []
     for part, owner in zip(parts, owners, strict=True):
-        if id(owner) not in starts:
+        if owner not in starts:
             empty = not part.any()
-            starts[id(owner)] = -1 if empty else sum(each.size for each in stored)
+            starts[owner] = -1 if empty else sum(each.size for each in stored)
             stored += [] if empty else [np.ravel(part)]
-    return _pool(stored), np.array([starts[id(owner)] for owner in owners], dtype=np.int64)
+    return _pool(stored), np.array([starts[owner] for owner in owners], dtype=np.int64)
 
 
 def _bodies(scene: Scene, place: Layout) -> Bodies:
     models = [body.model for body in scene.bodies]
     n = [m.n for m in models]
     stiffening = [_stiffening(body) for body in scene.bodies]
-    PP, PP_start = _shared([_pp_rows(m) for m in models], list(models))
-    K, K_start = _shared(
-        stiffening, [body.model if len(k) else k for body, k in zip(scene.bodies, stiffening, strict=True)]
-    )
+    PP, PP_start = _shared([_PP_parts(b) for b in scene.bodies], [(id(b.model), b.dropped) for b in scene.bodies])
+    K, K_start = _shared(stiffening, [(id(b.model), b.stiffening) for b in scene.bodies])
     where = np.full((len(n) + 1, 8), -1, dtype=np.int64)
     where[-1, :7] = 0
     loads = np.where(K_start >= 0, [len(k) for k in stiffening], 0)
@@ -192,8 +205,8 @@ def _bodies(scene: Scene, place: Layout) -> Bodies:
         where=where,
         mass=np.array([m.mass for m in models]),
         moments=np.array([np.concatenate([m.r_dm, _six(m.rr_dm)]) for m in models]),
-        P_dm=_pool([m.P_dm for m in models]),
-        rP_dm=_pool([_nine(m.rP_dm) for m in models]),
+        P_dm=_pool([b.model.P_dm * ("I3" not in b.dropped) for b in scene.bodies]),
+        rP_dm=_pool([_rP_parts(b) for b in scene.bodies]),
         PP_dm=PP,
         omega2=_pool([m.omega2 for m in models]),
         two_zeta_omega=_pool([2 * b.damping * np.sqrt(b.model.omega2) for b in scene.bodies]),

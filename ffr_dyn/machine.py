@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -94,10 +95,15 @@ def fill_rows(machine: Machine, method: Integrator, record: Record, start: float
     clock.steps[2] tells how many rows were filled.
     """
     machine.tables.clock.steps[1] = substeps
-    words = pack(record)
-    return _CALL(rows_unit.address)(machine.address, start, words.ctypes.data, method.unit.address)
+    return row_filler(machine, method, record)(start)
 
 
-def step_once(machine: Machine, method: Integrator, t: float) -> int:
-    """One step of the machine's state from time t [s], at the least cost from Python. A status."""
-    return _CALL(method.unit.address)(machine.address, t, 0, 0)
+def row_filler(machine: Machine, method: Integrator, record: Record) -> Callable[[float], int]:
+    """`fill_rows` for one record, again and again at the least cost: of the time of step number 0, a status."""
+    call, words, step = _CALL(rows_unit.address), pack(record), method.unit.address
+    address, place = machine.address, words.ctypes.data
+
+    def fill(start: float, kept: Array = words) -> int:  # the numbers at `place` live as long as this function
+        return call(address, start, place, step)
+
+    return fill
