@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
@@ -24,6 +23,7 @@ from ffr_dyn.result import Quantity, Result
 from ffr_dyn.result_file import ResultWriter, load_checkpoint, load_result
 from ffr_dyn.scene import Scene
 from ffr_dyn.stabilisation import Projection, Stabilisation, gains
+from ffr_dyn.stopwatch import Stopwatch
 from ffr_dyn.validity import doubts, extremes
 from ffr_prep.body import Surface
 
@@ -60,6 +60,7 @@ def forward(
     path: str | Path | None = None,
     resume: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
+    stopwatch: Stopwatch | None = None,
 ) -> Result:
     """Integrate the equations of motion of a scene from `start` to `end` [s], keeping a row every `output_step` [s].
 
@@ -70,6 +71,7 @@ def forward(
     resume      : a result file (its `path` of before) whose run goes on from its last rows as if it had never stopped, to
                   the bit; `end` may be later than it was. A file that does not exist yet is a run from the start
     progress    : called with the time reached, a few times a second
+    stopwatch   : takes the time of the integrator's compiled loop
 
     Raises InputError for a scene or settings that cannot be used, SimulationError when the run fails: the message gives
     the time, the body or joint, the likely cause and what to change.
@@ -89,9 +91,10 @@ def forward(
         run = _started(assembled, method, start, wanted)
     _check_resumed(run, substeps * rows, output_step / substeps)
     path = resume if path is None else path
+    watch = Stopwatch() if stopwatch is None else stopwatch
     first = Result(run.times[0], run.parts[0], geometry(scene), header | {"status": "running"})
     with nullcontext() if path is None else ResultWriter(path, first, checkpoint=_checkpoint(run, mark)) as writer:
-        for times, part in _advance(assembled, run, method, stabilisation, start, substeps, rows, wanted):
+        for times, part in _advance(assembled, run, method, stabilisation, start, substeps, rows, wanted, watch):
             if writer is not None:
                 writer.append(times, {name: quantity.values for name, quantity in part.items()}, _checkpoint(run, mark))
             if progress is not None:
@@ -151,6 +154,7 @@ def _advance(
     substeps: int,
     rows: int,
     wanted: Mapping[str, Entry],
+    watch: Stopwatch,
 ) -> Iterator[tuple[Array, dict[str, Quantity]]]:
     """Yields (times, quantities) of output rows chunk after chunk, each about SECONDS_PER_CALL long.
 
@@ -162,12 +166,11 @@ def _advance(
     count = 1
     while run.done < rows * substeps:
         chunk = new_record(system, looks * min(count, rows - run.done // substeps))
-        began = clock.monotonic()
-        filled, status = method.run(
-            system.model, run.work, run.stages, start, method.step, run.done, substeps // looks,
-            run.x, run.v, alpha, beta, tolerance, chunk,
-        )  # fmt: skip
-        took = clock.monotonic() - began
+        with watch:
+            filled, status = method.run(
+                system.model, run.work, run.stages, start, method.step, run.done, substeps // looks,
+                run.x, run.v, alpha, beta, tolerance, chunk,
+            )  # fmt: skip
         filled -= filled % looks
         if filled:
             kept = with_all_reactions(assembled, method, Record(*(column[:filled] for column in chunk)))
@@ -183,7 +186,7 @@ def _advance(
             yield times, part
         if status != OK:
             raise failure(system, run.work, status, start + int(run.work.info[3]) * method.step)
-        count = int(np.clip(count * SECONDS_PER_CALL / max(took, 1e-6), 1, 10 * count))
+        count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
 
 
 def with_all_reactions(assembled: Assembled, method: Integrator, record: Record) -> Record:
