@@ -145,7 +145,9 @@ def spin_up(speed: float) -> Scene:
     hub = rigid_body("hub", mass=1.0, inertia=np.ones(3), points={"axis": np.zeros(3)})
     joints = (Joint("axle", "revolute", "ground.O", "hub.axis"), Joint("clamp", "fixed", "hub.axis", "blade.a"))
     bodies = (Body("hub", hub), Body("blade", blade))
-    return Scene(bodies, joints, (Driver("motor", "axle", speeding_up(speed, 15.0)),), ground={"O": (0, 0, 0)}, name="spin-up")
+    return Scene(
+        bodies, joints, (Driver("motor", "axle", speeding_up(speed, 15.0)),), ground={"O": (0, 0, 0)}, name="spin-up"
+    )
 
 
 def four_bar(speed: float) -> Scene:
@@ -164,7 +166,7 @@ def four_bar(speed: float) -> Scene:
         Joint("D", "revolute", "ground.D", "rocker.a"),
     )
     ground, motor = {"A": (*A, 0), "D": (*D, 0)}, Driver("motor", "A", speeding_up(speed, 2 * np.pi / speed))
-    return Scene(bodies, joints, (motor,), ground=ground, gravity=GRAVITY, name="four-bar")
+    return Scene(bodies, joints, (motor,), ground=ground, name="four-bar")
 
 
 def six_bodies() -> Scene:
@@ -219,7 +221,7 @@ def robot() -> Scene:
     )
     moves = (("yaw", 0.8, 0.0), ("shoulder", 0.3, -np.pi / 2), ("elbow", -0.5, 0.0))
     drivers = tuple(Driver(f"{name}_motor", name, _swing(angle, start)) for name, angle, start in moves)
-    return Scene(bodies, joints, drivers, ground={"O": (0, 0, 0)}, gravity=GRAVITY, name="robot arm, light last link")
+    return Scene(bodies, joints, drivers, ground={"O": (0, 0, 0)}, name="robot arm, light last link")
 
 
 def appendage() -> Scene:
@@ -241,7 +243,13 @@ def suspended() -> Scene:
     """A slow stiff four-bar whose rocker end hangs on a spring: nothing in it bends to speak of."""
     scene = four_bar(2.0)
     spring = SpringDamper("spring", "ground.S", "rocker.b", 200.0, 1.0, free_length=0.2)
-    return replace(scene, springs=(spring,), ground={**scene.ground, "S": (0.7, 0.3, 0.0)}, name="slow stiff four-bar")
+    return replace(
+        scene,
+        springs=(spring,),
+        gravity=GRAVITY,
+        ground={**scene.ground, "S": (0.7, 0.3, 0.0)},
+        name="slow stiff four-bar",
+    )
 
 
 def speeding_up(speed: float, time: float) -> TimeFunction:
@@ -252,8 +260,8 @@ def speeding_up(speed: float, time: float) -> TimeFunction:
 
 
 def _swing(angle: float, start: float) -> TimeFunction:
-    """From rest at `start` [rad] to `start + angle` and back within a second."""
-    return harmonic(amplitude=angle / 2, frequency=1.0, phase=-np.pi / 2, mean=start + angle / 2)
+    """From rest at `start` [rad] to `start + angle` and back within a second, without jumps of the acceleration."""
+    return formula(f"{start} + {angle} * (smooth(2 * t) - smooth(2 * t - 1))")
 
 
 def _corner(one: tuple[float, float], other: tuple[float, float], r: float, s: float) -> tuple[float, float]:

@@ -11,8 +11,9 @@ from ffr_dyn.errors import InputError
 from ffr_dyn.integrators import METHODS, Integrator
 from ffr_dyn.plane import AXES, body_normal, planar_forms
 from ffr_dyn.result import Result
-from ffr_dyn.scene import Scene
-from ffr_dyn.variant import STIFFENING, vary
+from ffr_dyn.scene import Body, Scene
+from ffr_dyn.surface_loads import ModalForce
+from ffr_dyn.variant import STIFFENING, vary, with_basis
 
 Array = np.ndarray
 
@@ -24,12 +25,25 @@ RIGID, QUASI_STATIC, FLEXIBLE = "rigid", "quasi-static", "flexible"
 class Part:
     """What is modelled of one body.
 
-    modes   : numbers of the elastic coordinates that stay, from 0, ascending
+    modes   : numbers of the elastic coordinates that are used, from 0, ascending
     dropped : terms that its equations leave out (see `ffr_dyn.variant.TERMS`)
+    shapes  : None where these coordinates stay as they are; or shapes made of them, each with a number per mode
     """
 
     modes: tuple[int, ...]
     dropped: tuple[str, ...] = ()
+    shapes: tuple[tuple[float, ...], ...] | None = None
+
+    @property
+    def count(self) -> int:
+        """How many elastic coordinates the body has in the model."""
+        return len(self.modes) if self.shapes is None else len(self.shapes)
+
+    def basis(self, n: int) -> Array:
+        """(n, count) V of q = V p, for the n elastic coordinates of the body."""
+        V = np.zeros((n, self.count))
+        V[list(self.modes)] = np.eye(len(self.modes)) if self.shapes is None else np.array(self.shapes).T
+        return V
 
     @property
     def stiffened(self) -> bool:
@@ -99,18 +113,53 @@ def applied(scene: Scene, choice: Choice) -> Scene:
     """The scene with this model. Raises InputError for a choice made for another scene."""
     if len(choice.parts) != len(scene.bodies):
         raise InputError(f"the model is of {len(choice.parts)} bodies, the scene has {len(scene.bodies)}")
-    modes = {b.name: list(p.modes) for b, p in zip(scene.bodies, choice.parts, strict=True) if len(p.modes) < b.model.n}
-    drop = {b.name: p.dropped for b, p in zip(scene.bodies, choice.parts, strict=True) if p.dropped}
-    varied = vary(scene, modes=modes, drop=drop)
+    pairs = list(zip(scene.bodies, choice.parts, strict=True))
+    modes = {b.name: list(p.modes) for b, p in pairs if p.shapes is None and p.count < b.model.n}
+    varied = vary(_in_shapes(scene, choice), modes=modes, drop={b.name: p.dropped for b, p in pairs if p.dropped})
     return replace(in_space(varied) if choice.plane == "none" else varied, plane=choice.plane)
+
+
+def _in_shapes(scene: Scene, choice: Choice) -> Scene:
+    """The scene with the bodies in shapes where the choice has them, and forces on modes with them."""
+    bases = {
+        b.name: p.basis(b.model.n) for b, p in zip(scene.bodies, choice.parts, strict=True) if p.shapes is not None
+    }
+    if not bases:
+        return scene
+    bodies = tuple(in_basis(body, bases[body.name]) if body.name in bases else body for body in scene.bodies)
+    forces = tuple(
+        replace(force, values=force.values @ bases[force.body])
+        if isinstance(force, ModalForce) and force.body in bases
+        else force
+        for force in scene.forces
+    )
+    return replace(scene, bodies=bodies, forces=forces)
+
+
+def in_basis(body: Body, V: Array) -> Body:
+    """The body in elastic coordinates p, q = V p (see `ffr_dyn.variant.with_basis`), from the nearest state."""
+    model = with_basis(body.model, V)
+    rates = np.einsum("ia,i,ia->a", V, body.damping * np.sqrt(body.model.omega2), V)
+    damping = rates / np.where(model.omega2 > 0, np.sqrt(model.omega2), 1.0)
+    return replace(body, model=model, q=body.q @ V, q_dot=body.q_dot @ V, damping=damping)
+
+
+def orthonormal(shapes: Array, omega2: Array) -> Array:
+    """(n, m) the span of shapes (n, m) with V^T V = I and V^T Omega^2 V diagonal, ascending; without dependent ones."""
+    left, values, _ = np.linalg.svd(shapes / np.linalg.norm(shapes, axis=0), full_matrices=False)
+    Q = left[:, values > 1e-9 * values.max()]
+    _, vectors = np.linalg.eigh(Q.T @ (omega2[:, None] * Q))
+    V = Q @ vectors
+    return V * np.sign(V[np.abs(V).argmax(axis=0), np.arange(V.shape[1])])
 
 
 def kind(scene: Scene, choice: Choice, number: int, output_step: float) -> str:
     """What a body is in a model: rigid, quasi-static (no mode is slow enough for the step to see it vibrate) or flexible."""
-    modes = choice.parts[number].modes
-    if not modes:
+    part, model = choice.parts[number], scene.bodies[number].model
+    if not part.count:
         return RIGID
-    lowest = float(np.sqrt(scene.bodies[number].model.omega2[list(modes)].min()))
+    V = part.basis(model.n)
+    lowest = float(np.sqrt(np.einsum("ia,i,ia->a", V, model.omega2, V).min()))
     implicit = type(choice.integrator(output_step)).implicit
     return QUASI_STATIC if implicit and lowest * output_step / choice.divisions > 1.0 else FLEXIBLE
 

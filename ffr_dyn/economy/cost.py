@@ -39,7 +39,7 @@ def stages(method: str) -> int:
 
 def _of_body(part: Part, planar: bool) -> float:
     rigid, flexible, linear, square, stiff, stiff_linear, stiff_square = PLANE if planar else SPACE
-    n = len(part.modes)
+    n = part.count
     if n == 0:
         return rigid
     cost = rigid + flexible + linear * n + square * n * n

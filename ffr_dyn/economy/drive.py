@@ -1,6 +1,6 @@
 """Omitted modes and terms driven one-way by a computed motion.
 
-Along a run of a smaller model, lifted into a larger one with the omitted coordinates at zero, the larger model's own equations
+Along a run of a smaller model, lifted into a larger one with the omitted coordinates at zero, the larger model's equations
 leave the residual
 
     r = f - M a - Phi_q^T lambda        with accelerations a and multipliers lambda of the run,
@@ -12,7 +12,7 @@ unit of q_j,
     m_j q_j'' + 2 zeta_j Omega_j q_j' + Omega_j^2 q_j = Z_j^T r,        m_j = Z_j^T M Z_j.
 
 So the estimate does not depend on the reference conditions: a mode of a fixed frame, which takes the frame along, gets the
-frequency of the body that is free (DESIGN: "best formed in the mean axis frame and converted"). Integrated by the exact
+frequency of the body that is free. Integrated by the exact
 solution for a force that is linear between samples (Nigam and Jennings, Bull. Seism. Soc. Am. 59 (1969), 909).
 """
 
@@ -51,23 +51,23 @@ def elastic_columns(place: Layout) -> Array:
     return np.array([k for b in range(len(place.n)) for k in range(place.q_dot(b).start, place.q_dot(b).stop)], int)
 
 
-def lift(small: Layout, large: Layout, kept: tuple[tuple[int, ...], ...], x: Array, v: Array) -> tuple[Array, Array]:
-    """States (T, .) of a model with the modes `kept` of each body in a model with all of them; the others at zero."""
-    X, V = np.zeros((len(x), large.x_size)), np.zeros((len(v), large.v_size))
-    for b, modes in enumerate(kept):
-        at = np.asarray(modes, int)
+def lift(small: Layout, large: Layout, bases: tuple[Array, ...], x: Array, v: Array) -> tuple[Array, Array]:
+    """States (T, .) of a model with the coordinates p of each body, q = V p, in a model with all q; `bases` are the V."""
+    X, W = np.zeros((len(x), large.x_size)), np.zeros((len(v), large.v_size))
+    for b, V in enumerate(bases):
         X[:, large.R(b)], X[:, large.p(b)] = x[:, small.R(b)], x[:, small.p(b)]
-        V[:, large.R_dot(b)], V[:, large.omega(b)] = v[:, small.R_dot(b)], v[:, small.omega(b)]
-        X[:, large.q(b).start + at], V[:, large.q_dot(b).start + at] = x[:, small.q(b)], v[:, small.q_dot(b)]
-    return X, V
+        W[:, large.R_dot(b)], W[:, large.omega(b)] = v[:, small.R_dot(b)], v[:, small.omega(b)]
+        X[:, large.q(b)], W[:, large.q_dot(b)] = x[:, small.q(b)] @ V.T, v[:, small.q_dot(b)] @ V.T
+    return X, W
 
 
-def _columns(small: Layout, large: Layout, kept: tuple[tuple[int, ...], ...]) -> Array:
-    """Where the velocities of the small model are among those of the large one."""
-    found: list[int] = []
-    for b, modes in enumerate(kept):
-        found += [*range(large.iv[b], large.iv[b] + 6), *(large.q_dot(b).start + k for k in modes)]
-    return np.array(found, int)
+def _map(small: Layout, large: Layout, bases: tuple[Array, ...]) -> Array:
+    """(V large, V small) velocities of the large model from those of the small one, body axes."""
+    L = np.zeros((large.v_size, small.v_size))
+    for b, V in enumerate(bases):
+        L[large.rigid(b), small.rigid(b)] = np.eye(6)
+        L[large.q_dot(b), small.q_dot(b)] = V
+    return L
 
 
 def _rows(small: System, large: System) -> list[tuple[int, int]]:
@@ -81,57 +81,48 @@ def _texts(block: object) -> list[str]:
     return [word.text for word in block.words]  # type: ignore[attr-defined]
 
 
-def samples(
-    small: Assembled, large: Assembled, kept: tuple[tuple[int, ...], ...], time: Array, x: Array, v: Array
-) -> Samples:
-    """The motion x (T, .), v (T, .) of the small model, seen by the large one."""
+def samples(small: Assembled, large: Assembled, bases: tuple[Array, ...], time: Array, x: Array, v: Array) -> Samples:
+    """The motion x (T, .), v (T, .) of the small model, seen by the large one; `bases` as in `lift`."""
     at, seen = evaluator(small.system), evaluator(large.system)
-    X, V = lift(small.system.layout, large.system.layout, kept, x, v)
-    columns, rows = _columns(small.system.layout, large.system.layout, kept), _rows(small.system, large.system)
+    X, W = lift(small.system.layout, large.system.layout, bases, x, v)
+    to_large, rows = _map(small.system.layout, large.system.layout, bases), _rows(small.system, large.system)
     M, J, r = [], [], []
     for k, t in enumerate(time):
         own = evaluate(at, float(t), x[k], v[k])
-        now = evaluate(seen, float(t), X[k], V[k])
-        mass, a, lam = evaluated_mass_matrix(seen), np.zeros(large.system.layout.v_size), np.zeros(len(now.Phi))
-        a[columns] = own.acceleration
+        now = evaluate(seen, float(t), X[k], W[k])
+        mass, lam = evaluated_mass_matrix(seen), np.zeros(len(now.Phi))
         lam[[pair[1] for pair in rows]] = own.lam[[pair[0] for pair in rows]]
         M.append(mass)
         J.append(now.jacobian)
-        r.append(now.force - mass @ a - now.jacobian[: lam.size].T @ lam)
-    return Samples(large.system, time, X, V, np.array(M), np.array(J), np.array(r))
+        r.append(now.force - mass @ (to_large @ own.acceleration) - now.jacobian.T @ lam)
+    return Samples(large.system, time, X, W, np.array(M), np.array(J), np.array(r))
 
 
-def followed(seen: Samples, columns: Array) -> Array:
-    """(T, V, c) Z: the motion of rigid coordinates that goes with a unit of each of the elastic coordinates (c,)."""
+def followed(seen: Samples, D: Array) -> Array:
+    """(T, V, c) Z: elastic directions D (V, c), among the velocities, with the motion of rigid coordinates that follows."""
     place = seen.system.layout
     rigid = np.array([k for b in range(len(place.n)) for k in range(place.rigid(b).start, place.rigid(b).stop)], int)
-    held = np.flatnonzero(np.isin(rigid, locked(place)))
+    held = unit_rows(np.flatnonzero(np.isin(rigid, locked(place))), rigid.size)
     M = seen.M[:, rigid[:, None], rigid]
-    coupling = seen.M[:, rigid[:, None], columns]
-    J, J_c = seen.jacobian[:, :, rigid], seen.jacobian[:, :, columns]
-    J = np.concatenate([J, np.broadcast_to(unit_rows(held, rigid.size), (len(M), held.size, rigid.size))], axis=1)
-    J_c = np.concatenate([J_c, np.zeros((len(M), held.size, columns.size))], axis=1)
-    scale = np.einsum("tii->ti", M)
-    length = np.maximum(np.einsum("tcr,tcr,tr->tc", J, J, 1 / scale), 1e-300)  # J M^-1 J^T, its diagonal
-    weight = np.where(length > 1e-200, STIFF / length, 0.0)
+    J = seen.jacobian[:, :, rigid]
+    J = np.concatenate([J, np.broadcast_to(held, (len(M), *held.shape))], axis=1)
+    J_D = np.concatenate([seen.jacobian @ D, np.zeros((len(M), len(held), D.shape[1]))], axis=1)
+    softness = np.einsum("tcr,tcr,tr->tc", J, J, 1 / np.einsum("tii->ti", M))  # J M^-1 J^T, its diagonal
+    weight = np.where(softness > 1e-200, STIFF / np.maximum(softness, 1e-200), 0.0)
     left = M + np.einsum("tcr,tc,tcs->trs", J, weight, J, optimize=True)
-    right = -(coupling + np.einsum("tcr,tc,tce->tre", J, weight, J_c, optimize=True))
-    Z = np.zeros((len(M), place.v_size, columns.size))
+    right = -(seen.M[:, rigid] @ D + np.einsum("tcr,tc,tce->tre", J, weight, J_D, optimize=True))
+    Z = np.broadcast_to(D, (len(M), *D.shape)).copy()
     Z[:, rigid] = np.linalg.solve(left, right)
-    Z[:, columns, np.arange(columns.size)] = 1.0
     return Z
 
 
-def driven(seen: Samples, columns: Array, Z: Array) -> tuple[Array, Array]:
-    """(T, c) q and q_dot of the elastic coordinates (c,), driven from rest by the residual as passive oscillators."""
-    bodies = seen.system.model.bodies
-    elastic = elastic_columns(seen.system.layout)
-    at = np.searchsorted(elastic, columns)
-    Omega2, damping = bodies.omega2[at], bodies.two_zeta_omega[at]
+def driven(seen: Samples, D: Array, Z: Array) -> tuple[Array, Array]:
+    """(T, c) amplitudes and rates of the directions D (V, c), driven from rest by the residual as passive oscillators."""
+    bodies, elastic = seen.system.model.bodies, elastic_columns(seen.system.layout)
+    own = D[elastic] ** 2
     force = np.einsum("tvc,tv->tc", Z, seen.residual)
-    mass = np.einsum("tvc,tvw,twc->tc", Z, seen.M, Z, optimize=True).mean(axis=0)
-    mass = np.maximum(mass, 1e-9)
-    return oscillators(seen.time, force / mass, Omega2 / mass, damping / mass)
+    mass = np.maximum(np.einsum("tvc,tvw,twc->tc", Z, seen.M, Z, optimize=True).mean(axis=0), 1e-9)
+    return oscillators(seen.time, force / mass, bodies.omega2 @ own / mass, bodies.two_zeta_omega @ own / mass)
 
 
 def oscillators(time: Array, force: Array, omega2: Array, damping: Array) -> tuple[Array, Array]:
@@ -156,5 +147,16 @@ def _update(h: float, omega2: Array, damping: Array) -> tuple[Array, ...]:
         # states q, q' h, force, its change over the step; time in units of h
         A = np.array([[0, 1, 0, 0], [-w2 * h * h, -d * h, h * h, 0], [0, 0, 0, 1], [0, 0, 0, 0]], float)
         E = expm(A)
-        found.append((E[0, 0], E[0, 1] * h, E[1, 0] / h, E[1, 1], E[0, 2] - E[0, 3], (E[1, 2] - E[1, 3]) / h, E[0, 3], E[1, 3] / h))
+        found.append(
+            (
+                E[0, 0],
+                E[0, 1] * h,
+                E[1, 0] / h,
+                E[1, 1],
+                E[0, 2] - E[0, 3],
+                (E[1, 2] - E[1, 3]) / h,
+                E[0, 3],
+                E[1, 3] / h,
+            )
+        )
     return tuple(np.array(column) for column in zip(*found, strict=True))

@@ -162,8 +162,8 @@ def limits(of: Probe, scales: Array) -> Array:
     for output, scale, unit in zip(of.outputs, scales, of.units, strict=True):
         if not output.absolute and scale <= _nothing(unit):
             raise InputError(
-                f"output {output.name!r} does not change over the run (its range is {scale:.2g} {unit}): a share of that says "
-                f"nothing; give an absolute tolerance, {output.name}=VALUE, or another output"
+                f"output {output.name!r} does not change over the run (its range is {scale:.2g} {unit}): a share of that "
+                f"says nothing; give an absolute tolerance, {output.name}=VALUE, or another output"
             )
     tolerances = np.array([output.tolerance for output in of.outputs])
     return np.where([output.absolute for output in of.outputs], tolerances, tolerances * scales)

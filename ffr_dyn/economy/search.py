@@ -21,9 +21,18 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ffr_dyn.analyses.assemble import assemble
-from ffr_dyn.economy.choice import Choice, Part, applied, full, in_plane
-from ffr_dyn.economy.contributions import Contributions, of_motion, of_omitted
-from ffr_dyn.economy.cost import of_run, per_evaluation
+from ffr_dyn.economy.choice import Choice, applied, full, in_plane, orthonormal
+from ffr_dyn.economy.contributions import (
+    LEFT,
+    LOOKED,
+    SEEN,
+    Contributions,
+    nothing,
+    of_motion,
+    of_omitted,
+    of_shapes,
+)
+from ffr_dyn.economy.cost import of_run, per_evaluation, per_row
 from ffr_dyn.economy.outputs import Output, Probe, as_output, difference, largest, limits, probe, ranges, total
 from ffr_dyn.economy.steps import chosen_step, error_of, least, share
 from ffr_dyn.economy.trial import Span, Trial, run
@@ -43,8 +52,11 @@ OF_ALL = 0.85  # of the tolerance, for everything together
 NEARLY_ALL = 0.8  # of the modes: then the search goes down from the full model
 SHORT = 2e6  # [us] of a verification that is made without being asked for
 ATTEMPTS = 4
+ROUNDS = 2
+FINER = 2  # times the steps: worth another look
+LEAST = 0.2  # of the tolerance, that the step may take whatever else there is
 UNMOVED = 1e-9  # of its range: an output that differs by less between rigid and flexible bodies is moved by no model
-TERMS = (("I5", "I8", "I9"), ("I5", "I9"), ("I5",), ("I9",))
+TERMS = (("I5", "I8", "I9"), ("I5", "I9"), ("I5",))
 
 
 @dataclass(frozen=True)
@@ -169,9 +181,55 @@ def economise(
     of = probe(assemble(scene, time=start), [as_output(one, tolerance) for one in outputs])
     search = _Search(scene, span, of, tell)
     ground = _started(search)
-    model = _modes(search, ground)
-    model = _without_terms(search, ground, model)
-    return _finished(search, ground, model, verify)
+    found = _chosen(search, ground)
+    for _ in range(ROUNDS):
+        finer = _beside(search, ground, found)
+        if finer is None:
+            break
+        ground, found = finer
+    return _finished(search, ground, found, verify)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A model with its step, and histories (T, k) of its estimated errors: of what is left out, and of the step."""
+
+    final: Trial
+    model: Histories
+    time: Histories
+
+
+def _chosen(search: _Search, ground: _Ground) -> _Found:
+    """The cheapest model beside the coarse run of everything, and its step."""
+    choice = _without_terms(search, ground, _modes(search, ground))
+    return _stepped(search, ground, choice)
+
+
+def _stepped(search: _Search, ground: _Ground, choice: Choice) -> _Found:
+    search.tell("integrator and step")
+    model = difference(search.run(choice).values, ground.pilot.values)
+    left = np.maximum(OF_ALL * ground.limits - largest(model), LEAST * ground.limits)
+    coarsest = replace(choice, method=PILOT, divisions=ground.coarsest)
+    stepped = chosen_step(search.run, coarsest, left, search.span)
+    return _Found(stepped.trial, model, stepped.error)
+
+
+def _beside(search: _Search, ground: _Ground, found: _Found) -> tuple[_Ground, _Found] | None:
+    """The model looked at again beside everything with a step that costs about as much as its final run, where that is
+    much finer than before: a coarse step damps the vibration of fast modes, and with it what they do."""
+    final = found.final.choice
+    divisions = int(per_row(final) / per_row(replace(ground.everything, divisions=1)))
+    if divisions < FINER * ground.pilot.choice.divisions:
+        return None
+    search.tell("everything, finer step")
+    everything = replace(ground.everything, divisions=divisions)
+    pilot, rigid = search.run(everything), search.run(_rigid(everything))
+    finer = replace(ground, everything=everything, pilot=pilot, rigid=rigid)
+    same = replace(final, method=PILOT, divisions=divisions)
+    error = _gap(search, finer, same, "the same with a finer step")
+    if (error + largest(found.time) <= ground.limits).all():
+        return finer, replace(found, model=difference(search.run(same).values, pilot.values))
+    return finer, _chosen(search, finer)
 
 
 # ---- the start ------------------------------------------------------------------------------------------------------
@@ -183,6 +241,7 @@ class _Ground:
 
     everything : all modes, in the plane where there is one;  spatial : the same in space
     rigid      : run with rigid bodies;  pilot : run of everything with the same coarse step
+    coarsest   : divisions of the output step with which runs come to an end
     """
 
     everything: Choice
@@ -192,6 +251,7 @@ class _Ground:
     limits: Array
     scales: Array
     unmoved: tuple[str, ...]
+    coarsest: int
 
 
 def _started(search: _Search) -> _Ground:
@@ -215,7 +275,7 @@ def _started(search: _Search) -> _Ground:
     search.note(pilot, "everything", np.zeros(len(bound)))
     still = gap <= UNMOVED * np.maximum(scales, 1e-300)
     unmoved = tuple(o.name for o, quiet in zip(search.of.outputs, still, strict=True) if quiet)
-    return _Ground(everything, spatial, rigid, pilot, bound, scales, unmoved)
+    return _Ground(everything, spatial, rigid, pilot, bound, scales, unmoved, pilot.choice.divisions)
 
 
 def _rigid(choice: Choice) -> Choice:
@@ -226,48 +286,86 @@ def _rigid(choice: Choice) -> Choice:
 
 
 def _modes(search: _Search, ground: _Ground) -> Choice:
-    """The fewest modes whose absence leaves the outputs within their share, in the order of what they do."""
-    limit = OF_MODES * ground.limits
-    if share(difference(ground.rigid.values, ground.pilot.values), limit) <= 1:
+    """The fewest modes, or shapes made of them, whose absence leaves the outputs within their share."""
+    if share(difference(ground.rigid.values, ground.pilot.values), OF_MODES * ground.limits) <= 1:
         return ground.rigid.choice
-    ranking = _ranking(search, ground)
-    order = np.argsort(-(ranking.effect / ground.limits).max(axis=1), kind="stable")
-    left = np.cumsum((ranking.effect / limit)[order[::-1]], axis=0)[::-1].max(axis=1)
-    count = int(np.sum(left > 1))
-    for _ in range(ATTEMPTS):
-        model = _with(ground.everything, ranking, order[:count])
-        error = float((_gap(search, ground, model, f"{count} modes") / limit).max())
-        if error <= 1 or count == order.size:
-            return model
-        count = min(order.size, max(count + 1, int(np.sum(left > 1 / error))))
+    offers = [_Offer(search.scene, ground, ranking) for ranking in _rankings(search, ground)]
+    for offer in sorted(offers, key=lambda offer: offer.cost):
+        found = _enough(search, ground, offer)
+        if found is not None:
+            return found
     return ground.everything
 
 
-def _ranking(search: _Search, ground: _Ground) -> Contributions:
-    """What modes do: driven by the rigid motion, or, where nearly all are needed, of the full motion."""
+class _Offer:
+    """Directions in the order of what they do: taken from the top until the rest is within its share."""
+
+    def __init__(self, scene: Scene, ground: _Ground, ranking: Contributions) -> None:
+        self.scene, self.ground, self.ranking = scene, ground, ranking
+        self.order = np.argsort(-(ranking.effect / ground.limits).max(axis=1), kind="stable")
+        rest = np.cumsum((ranking.effect / (OF_MODES * ground.limits))[self.order[::-1]], axis=0)
+        self.left = rest[::-1].max(axis=1)  # what is left out when those before are taken
+        self.cost = per_evaluation(self.model(self.count(1.0)))
+
+    def count(self, share: float) -> int:
+        """How many directions leave less than a share of what modes may take."""
+        return int(np.sum(self.left > share))
+
+    def model(self, count: int) -> Choice:
+        """The model with the first directions."""
+        return _with(self.scene, self.ground.everything, self.ranking, self.order[:count])
+
+
+def _enough(search: _Search, ground: _Ground, offer: _Offer) -> Choice | None:
+    """The model with as many directions as a coarse run shows to be enough; None where the number of attempts does not do."""
+    limit = OF_MODES * ground.limits
+    count = offer.count(1.0)
+    for _ in range(ATTEMPTS):
+        model = offer.model(count)
+        error = float((_gap(search, ground, model, f"{sum(p.count for p in model.parts)} shapes") / limit).max())
+        if error <= 1:
+            return model
+        if count == offer.order.size:
+            return None
+        count = min(offer.order.size, max(count + 1, offer.count(1 / error)))
+    return None
+
+
+def _rankings(search: _Search, ground: _Ground) -> list[Contributions]:
+    """What modes do, driven by the rigid motion or, where nearly all are needed, in the full one; and principal shapes."""
     search.tell("modes driven by the rigid motion")
-    found = of_omitted(ground.rigid, ground.pilot, search.of)
+    found = of_omitted(ground.rigid, ground.pilot, search.of, search.scene)
     search.looked(ground.everything, _evaluations(found))
     needed = (found.effect > OF_MODES * ground.limits / max(1, len(found.body))).any(axis=1)
-    if needed.mean() < NEARLY_ALL and np.isfinite(found.effect).all():
-        return found
-    search.tell("modes of the full motion")
-    search.looked(ground.everything, _evaluations(found))
-    return of_motion(ground.pilot, search.of)
+    if needed.mean() >= NEARLY_ALL or not np.isfinite(found.effect).all():
+        search.tell("modes of the full motion")
+        found = of_motion(ground.pilot, search.of, search.scene)
+        search.looked(ground.everything, _evaluations(found))
+    shapes = of_shapes(ground.pilot, search.of, search.scene)
+    search.looked(ground.everything, _evaluations(shapes))
+    return [found, shapes]
 
 
 def _evaluations(found: Contributions) -> int:
-    from ffr_dyn.economy.contributions import LOOKED, SEEN
-
     return SEEN + 2 * LOOKED * len(found.body)
 
 
-def _with(everything: Choice, ranking: Contributions, chosen: Array) -> Choice:
-    """The model with the chosen coordinates of a ranking."""
+def _with(scene: Scene, everything: Choice, ranking: Contributions, chosen: Array) -> Choice:
+    """The model with the chosen directions of a ranking."""
     parts = []
     for b, part in enumerate(everything.parts):
+        shapes = [ranking.shape[k] for k in chosen if ranking.body[k] == b]
         modes = tuple(sorted(int(ranking.mode[k]) for k in chosen if ranking.body[k] == b))
-        parts.append(replace(part, modes=modes, dropped=part.dropped if modes else ()))
+        if not shapes:
+            parts.append(replace(part, modes=(), dropped=()))
+        elif all(np.count_nonzero(np.abs(shape) > LEFT) == 1 for shape in shapes):
+            parts.append(replace(part, modes=modes))
+        elif len(shapes) >= len(part.modes):
+            parts.append(part)
+        else:
+            at = list(part.modes)
+            V = orthonormal(np.array(shapes).T[at], scene.bodies[b].model.omega2[at])
+            parts.append(replace(part, shapes=tuple(tuple(float(v) for v in column) for column in V.T)))
     return replace(everything, parts=tuple(parts))
 
 
@@ -335,15 +433,10 @@ def _dropping(choice: Choice, terms: tuple[str, ...], bodies: list[int]) -> Choi
 # ---- step and end ---------------------------------------------------------------------------------------------------
 
 
-def _finished(search: _Search, ground: _Ground, choice: Choice, verify: bool | None) -> Economy:
-    search.tell("integrator and step")
-    model = difference(search.run(choice).values, ground.pilot.values)
-    left = OF_ALL * ground.limits - largest(model)
-    stepped = chosen_step(search.run, choice, np.maximum(left, 0.2 * ground.limits), search.span)
-    final = stepped.trial
-    error = total(model, stepped.error)
+def _finished(search: _Search, ground: _Ground, found: _Found, verify: bool | None) -> Economy:
+    error, final = largest(total(found.model, found.time)), found.final
     spent = search.spent
-    search.note(final, "chosen", largest(error))
+    search.note(final, "chosen", error)
     verification = None
     if verify or (verify is None and _reference_cost(search, ground, final) <= SHORT):
         final, verification = _verified(search, ground, final)
@@ -357,9 +450,9 @@ def _finished(search: _Search, ground: _Ground, choice: Choice, verify: bool | N
         probe=search.of,
         limits=ground.limits,
         scales=ground.scales,
-        model_error=largest(model),
-        time_error=largest(stepped.error),
-        error=largest(error),
+        model_error=largest(found.model),
+        time_error=largest(found.time),
+        error=error,
         effects=omitted,
         kept=kept,
         before=of_run(search.scene, same, search.span.rows),
@@ -381,17 +474,19 @@ def _settings(span: Span, choice: Choice, of: Probe) -> Settings:
 def _explained(search: _Search, ground: _Ground, final: Trial) -> tuple[Contributions, Contributions]:
     """What the modes that stay do, and what those left out would."""
     search.tell("what is nearest to mattering")
-    nothing = Contributions(np.zeros(0, int), np.zeros(0, int), np.zeros((0, len(ground.limits))))
-    kept = of_motion(final, search.of) if any(part.modes for part in final.choice.parts) else nothing
-    omitted = of_omitted(final, ground.pilot, search.of) if final.choice.parts != ground.everything.parts else nothing
-    return kept, omitted
+    kept = nothing(search.of)
+    if any(part.modes for part in final.choice.parts):
+        kept = of_motion(final, search.of, search.scene)
+    return kept, of_omitted(final, ground.pilot, search.of, search.scene)
 
 
 # ---- verification ---------------------------------------------------------------------------------------------------
 
 
 def _reference(ground: _Ground, final: Trial) -> Choice:
-    return replace(ground.everything, method=PILOT, divisions=2 * max(final.choice.divisions, ground.pilot.choice.divisions))
+    return replace(
+        ground.everything, method=PILOT, divisions=2 * max(final.choice.divisions, ground.pilot.choice.divisions)
+    )
 
 
 def _reference_cost(search: _Search, ground: _Ground, final: Trial) -> float:
@@ -412,31 +507,31 @@ def _verified(search: _Search, ground: _Ground, final: Trial) -> tuple[Trial, Ve
         search.note(final, "verified", errors[-1])
         if (errors[-1] <= ground.limits).all() or len(errors) == ATTEMPTS:
             return final, Verification(choice, errors[-1], errors[0], own, len(errors) - 1)
-        final = _finer(search, ground, final, reference)
+        final = _finer(search, ground, final, reference, len(errors))
 
 
 def _check_accuracy(of: Probe, ground: _Ground, own: Array) -> None:
     for output, limit, known in zip(of.outputs, ground.limits, own, strict=True):
         if known > limit:
             raise InputError(
-                f"output {output.name!r}: the tolerance {limit:.2g} is below what the reference itself is known to, {known:.2g}; "
-                "ask for a larger one, or give the full scene damping: its undamped high modes ring at every step"
+                f"output {output.name!r}: the tolerance {limit:.2g} is below what the reference itself is known to, "
+                f"{known:.2g}; ask for a larger one, or give the full scene damping: its undamped high modes ring at every step"
             )
 
 
-def _finer(search: _Search, ground: _Ground, final: Trial, reference: Trial) -> Trial:
-    """A better model: of a finer step where that is what is wrong, or else with what was left out."""
+def _finer(search: _Search, ground: _Ground, final: Trial, reference: Trial, attempt: int) -> Trial:
+    """A better model: of a finer step where that is what is wrong, or else chosen anew beside the reference."""
     finer = search.run(replace(final.choice, divisions=2 * final.choice.divisions))
     gained = largest(difference(finer.values, final.values)) / ground.limits
     error = largest(difference(finer.values, reference.values)) / ground.limits
     if (error <= 1).all() or gained.max() > error.max():
         return finer
-    whole = tuple(
-        Part(everything.modes, everything.dropped) if part.modes else part
-        for part, everything in zip(final.choice.parts, ground.everything.parts, strict=True)
-    )
-    if whole == final.choice.parts:
-        whole = ground.everything.parts
-    return search.run(replace(final.choice, parts=whole))
-
-
+    choice = replace(ground.everything, method=final.choice.method, divisions=final.choice.divisions)
+    if attempt > 1:
+        return search.run(choice)
+    rigid = search.run(_rigid(reference.choice))
+    sharp = replace(ground, everything=reference.choice, pilot=reference, rigid=rigid)
+    anew = _without_terms(search, sharp, _modes(search, sharp))
+    if anew.parts == final.choice.parts:
+        return search.run(choice)
+    return search.run(replace(anew, method=choice.method, divisions=choice.divisions))

@@ -80,7 +80,9 @@ def chosen_step(run: Run, choice: Choice, limit: Array, span: Span) -> Stepped:
             return _refined(run, replace(choice, method=name), needed, sharp, limit)
         except SimulationError as error:
             failed = error
-    raise SimulationError(f"no integrator reaches the tolerance with steps down to 1/{MOST} of the output step; {failed}")
+    raise SimulationError(
+        f"no integrator reaches the tolerance with steps down to 1/{MOST} of the output step; {failed}"
+    )
 
 
 def _sharpest(span: Span) -> str:
@@ -137,7 +139,7 @@ def _signed(trial: Trial, other: Trial) -> tuple[Array, ...]:
 
 
 def _refined(run: Run, choice: Choice, needed: int, sharp: Trial, limit: Array) -> Stepped:
-    """Runs of one method, each with the step that the one before predicts, until the limit holds and no longer step would do."""
+    """Runs of one method, each with the step that the one before predicts, until the limit holds and no longer one would do."""
     best: Stepped | None = None
     for _ in range(ATTEMPTS):
         trial = run(replace(choice, divisions=needed))
