@@ -29,9 +29,15 @@ Example:
 )
 @click.option("--tolerance", type=float, default=1e-3, show_default=True, help="Share of the range of other outputs.")
 @click.option("--end", type=float, help="End of the run [s], instead of the scene's.")
-@click.option("--verify/--no-verify", default=None, help="Run everything with a finer step to check; default: if short.")
-@click.option("-o", "target", type=click.Path(path_type=Path), help="Scene file to write; default: <scene>.economised.toml.")
-@click.option("--report", type=click.Path(path_type=Path), help="Report: .html (with chart), .md or .txt; default: .html.")
+@click.option(
+    "--verify/--no-verify", default=None, help="Run everything with a finer step to check; default: if short."
+)
+@click.option(
+    "-o", "target", type=click.Path(path_type=Path), help="Scene file to write; default: <scene>.economised.toml."
+)
+@click.option(
+    "--report", type=click.Path(path_type=Path), help="Report: .html (with chart), .md or .txt; default: .html."
+)
 @click.option("--chart", type=click.Path(path_type=Path), help="Picture of error over cost, .png or .svg.")
 def economise(
     scene: Path,
@@ -46,9 +52,9 @@ def economise(
 ) -> None:
     """The cheapest model of SCENE that keeps the named outputs within their tolerances, as a scene file and a report.
 
-    SCENE is modelled with everything that could matter: flexible bodies with many modes, geometric stiffening, all terms. What
-    is not needed goes: bodies become rigid, modes, inertia terms and stiffening are left out, the computation is done in the
-    plane, the step is as long as it may be. Every error is estimated and, where that is quick, verified.
+    SCENE is modelled with everything that could matter: flexible bodies with many modes, geometric stiffening, all terms.
+    What is not needed goes: bodies become rigid, modes, inertia terms and stiffening are left out, the computation is done in
+    the plane, the step is as long as it may be. Every error is estimated and, where that is quick, verified.
     """
     from ffr_dyn.economy.picture import draw
     from ffr_dyn.economy.report import as_text, write_report

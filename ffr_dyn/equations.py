@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -57,6 +58,7 @@ class System:
     """A compiled scene: the tables, and what connects their numbers to the scene's names.
 
     blocks : in elimination order, as the rows in the tables;  user : keeps the callback of the user's functions alive
+    inputs : where the numbers of a signal begin among those of the time functions, by its name
     """
 
     scene: Scene
@@ -65,6 +67,7 @@ class System:
     elimination: Elimination
     model: Model
     user: UserFunctions
+    inputs: Mapping[str, tuple[int, ...]]
 
 
 def blocks_of(scene: Scene) -> list[Block]:
@@ -124,7 +127,7 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: f
     }
     user = UserFunctions(functions.callbacks, place, scene)
     compiled = Model(**model, user_address=user.address, user_count=user.count)  # type: ignore[arg-type]
-    return System(scene, place, ordered, elimination, compiled, user)
+    return System(scene, place, ordered, elimination, compiled, user, functions.inputs())
 
 
 def _moving(block: Block, table: list[tuple[int, str, str]], ground: int) -> tuple[int, ...]:

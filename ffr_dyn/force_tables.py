@@ -65,12 +65,16 @@ class Callback:
 
 
 class FunctionTable:
-    """Collects time functions while a scene is compiled, and the callbacks of the user with their slots."""
+    """Collects time functions while a scene is compiled, the callbacks of the user with their slots, and the scene's inputs.
+
+    signals : by name, the initial value and the numbers of the functions that hold it
+    """
 
     def __init__(self) -> None:
         self.functions: list[TimeFunction] = []
         self.callbacks: list[Callback] = []
         self.slots = 0
+        self.signals: dict[str, tuple[float, list[int]]] = {}
 
     def add(self, function: TimeFunction, what: str = "function") -> int:
         if function.callback is not None:
@@ -80,13 +84,28 @@ class FunctionTable:
             rows = [float(self.add(operand, what)) for operand in function.operands]
             function = TimeFunction(OPERATION, (*function.data, rows[0], rows[-1]))
         self.functions.append(function)
+        if function.name:
+            self._remember(function)
         return len(self.functions) - 1
+
+    def _remember(self, signal: TimeFunction) -> None:
+        value, numbers = self.signals.setdefault(signal.name, (signal.data[4], []))
+        if value != signal.data[4]:
+            raise InputError(
+                f"input {signal.name!r} starts with {value:g} in one place and {signal.data[4]:g} in another"
+            )
+        numbers.append(len(self.functions) - 1)
 
     def callback(self, function: Callable[..., Any], sizes: tuple[int, ...], what: str, *, with_state: bool) -> int:
         slot = self.slots
         self.callbacks.append(Callback(function, slot, sizes, what, with_state))
         self.slots += max(sizes)
         return slot
+
+    def inputs(self) -> dict[str, tuple[int, ...]]:
+        """By name, where the numbers of a signal begin in the tables."""
+        starts = np.cumsum([0, *(len(f.data) for f in self.functions)])
+        return {name: tuple(int(starts[k]) for k in numbers) for name, (_, numbers) in self.signals.items()}
 
     def tables(self) -> Functions:
         sizes = [len(f.data) for f in self.functions]

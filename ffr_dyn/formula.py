@@ -1,4 +1,4 @@
-"""Formulas as text: numbers, + - * / **, pi, named functions, t, parameters and measured quantities; nothing else.
+"""Formulas as text: numbers, + - * / **, pi, named functions, t, parameters, inputs, measured quantities; nothing else.
 
 formula("0.1 * smooth(t / 0.2) * sin(2 * pi * f * t)", {"f": 12.0}) is a `TimeFunction` with exact derivatives, which the
 kernels evaluate. The text is parsed, never run: it can name what is listed above and reach nothing.
@@ -165,6 +165,8 @@ class _Reader:
         raise self._refusal(node, f"is not known{_nearest(name, known)}")
 
     def _parameter(self, node: ast.expr, given: object) -> Expression:
+        if isinstance(given, TimeFunction):  # an input of the scene
+            return given
         if type(given) not in (int, float):
             raise self._refusal(node, f"is the parameter {given!r}, which is not a number")
         return constant(float(given))  # type: ignore[arg-type]
@@ -230,6 +232,8 @@ def text_of(expression: Expression) -> str:
             (expression.op, expression.parameter) if isinstance(expression, Operation) else _coded(expression)
         )
         return _written(op, parameter, [text_of(operand) for operand in expression.operands])
+    if expression.name:
+        return expression.name
     if expression == TIME:
         return "t"
     if is_constant(expression):

@@ -6,7 +6,8 @@ The figures are made without pyplot: no global state, no window, the same bytes 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -154,6 +155,15 @@ def _common_word(result: Result, names: list[str]) -> str:
 
 def _owner(result: Result, component: str) -> str:
     return component if component in result.quantities else _owner(result, component.rpartition(".")[0])
+
+
+@contextmanager
+def drawing(path: str | Path, size: tuple[float, float]) -> Iterator[Figure]:
+    """A figure of this size [inches] in the style of all pictures, written to `path` (.png, .svg or .pdf) at the end."""
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=size, layout="constrained")
+        yield figure
+        _write(figure, path)
 
 
 def _write(figure: Figure, path: str | Path) -> Path:

@@ -21,7 +21,7 @@ from ffr_dyn.joints import COORDINATES, Joint
 from ffr_dyn.measurement import Measurement
 from ffr_dyn.rotation import euler_parameters
 from ffr_dyn.surface_loads import SurfaceLoad, distributed
-from ffr_dyn.timefunction import TimeFunction, as_time_function
+from ffr_dyn.timefunction import POLYNOMIAL, TimeFunction, as_time_function, less
 from ffr_prep.body import FlexibleBody
 
 Array = np.ndarray
@@ -86,10 +86,11 @@ class Scene:
 
     ground  : name -> (3,) [m], points fixed in the global frame
     forces  : bushings, forces on joint coordinates, loads on surfaces and modes
-    gravity : (3,) [m/s^2], global
+    gravity : three components [m/s^2], global, each a number, a time function or a Python function of time. What varies is
+              kept as the base acceleration that acts in the same way, so that `gravity` is (3,), the constant components
     base_acceleration : three components [m/s^2], global, each a number, a time function or a Python function of time: the
               translational acceleration of the ground, whose frame all results refer to. It acts as gravity less this
-              acceleration; a gravity that varies is its negative
+              acceleration; the energy of gravity is that of the constant components
     plane   : "auto" finds out whether the scene is planar and then computes in the plane alone (see `ffr_dyn.plane`);
               "x", "y" or "z", its normal, declares it, so that modes mostly in the plane are kept and the rest is left
               out even where it is small only; "none" computes in space
@@ -109,13 +110,20 @@ class Scene:
     name: str = "scene"
     plane: str = "auto"
 
+    def stepper(self, method: Any, **settings: Any) -> Any:
+        """A `ffr_dyn.stepper.Stepper` of the scene: inputs in, outputs out, a step at a time."""
+        from ffr_dyn.stepper import Stepper  # stands above this module, and loads the compiler
+
+        return Stepper(self, method, **settings)
+
     def __post_init__(self) -> None:
         for key in ("bodies", "joints", "drivers", "couplings", "loads", "springs", "forces", "measurements"):
             object.__setattr__(self, key, tuple(getattr(self, key)))
         points = {key: _vector(at, 3, f"ground point {key!r}") for key, at in self.ground.items()}
         object.__setattr__(self, "ground", points)
-        object.__setattr__(self, "gravity", _vector(self.gravity, 3, "gravity"))
-        object.__setattr__(self, "base_acceleration", _acceleration(self.base_acceleration))
+        steady, base = _split_gravity(self.gravity, _acceleration("base_acceleration", self.base_acceleration))
+        object.__setattr__(self, "gravity", _vector(steady, 3, "gravity"))
+        object.__setattr__(self, "base_acceleration", base)
         if self.plane not in ("auto", "x", "y", "z", "none"):
             raise InputError(f"plane is {self.plane!r}; it must be 'auto', 'none', or the normal 'x', 'y' or 'z'")
         if not self.bodies:
@@ -267,12 +275,28 @@ def _check_joints(scene: Scene) -> None:
             raise InputError(f"joint {joint.name!r} ties {table[i][1]!r} to itself; a joint needs two different bodies")
 
 
-def _acceleration(value: Any) -> tuple[TimeFunction, TimeFunction, TimeFunction]:
-    what = "base_acceleration"
+Components = tuple[TimeFunction, TimeFunction, TimeFunction]
+
+
+def _acceleration(what: str, value: Any) -> Components:
     if np.size(value) != 3 or len(value) != 3:
         raise InputError(f"{what} needs three components, not {value!r}")
     x, y, z = (as_time_function(component, what) for component in value)
     return x, y, z
+
+
+def _split_gravity(gravity: Any, base: Components) -> tuple[Any, Components]:
+    """The constant components of gravity, and the base acceleration less those that vary."""
+    if all(isinstance(component, (int, float, np.floating, np.integer)) for component in gravity):
+        return gravity, base
+    given = _acceleration("gravity", gravity)
+    steady = [f.data[0] if _is_constant(f) else 0.0 for f in given]
+    x, y, z = (b if _is_constant(g) else less(b, g) for g, b in zip(given, base, strict=True))
+    return steady, (x, y, z)
+
+
+def _is_constant(function: TimeFunction) -> bool:
+    return function.kind == POLYNOMIAL and not any(function.data[1:])
 
 
 def _vector(value: Any, size: int, what: str) -> Array:

@@ -21,7 +21,7 @@ Paths are relative to the file. Angles in rad, everything in SI units unless a u
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -32,17 +32,18 @@ from pydantic import BaseModel, ValidationError
 from ffr_dyn.analyses.efforts import Effort
 from ffr_dyn.errors import InputError
 from ffr_dyn.forces import Load
-from ffr_dyn.formula import is_constant
+from ffr_dyn.formula import CONSTANTS, Expression, Operation, is_constant
 from ffr_dyn.integrators import METHODS
 from ffr_dyn.joint_forces import Actuator
-from ffr_dyn.parameters import Parameters, flattened, overridden, substituted
+from ffr_dyn.operations import FUNCTIONS
+from ffr_dyn.parameters import Parameters, as_number, flattened, overridden, substituted
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.scene_schema import EFFORTS, SOLUTIONS, TABLES, BodyEntry, Kind, SceneEntry, StabilisationEntry, keys_of
 from ffr_dyn.scene_source import Source, origin, read_source
 from ffr_dyn.settings import Forward, Inverse, Kinematic, Linearise, Mixed, MomentSettings, OverTime, Settings, Static
 from ffr_dyn.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
 from ffr_dyn.state_formula import StateFormula, check_names
-from ffr_dyn.timefunction import TimeFunction, constant
+from ffr_dyn.timefunction import TimeFunction, constant, signal, signals_in
 from ffr_prep.body import BodyError, FlexibleBody, load_body, rigid_body, truncated, with_point
 
 WHOLE = ("name", "gravity", "ground", "base_acceleration")  # fields of a scene that are no tables of entries
@@ -59,16 +60,24 @@ def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Sc
     source = read_source(path)
     try:
         values = Parameters(overridden(flattened(source.tree.pop("parameters", {})), parameters))
-        for name in values:
-            values[name]
         tree = substituted(source.tree, values, "")
+        known = {name: values[name] for name in values} | _signals(tree.get("inputs", {}), values)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     try:
-        entry = SceneEntry.model_validate(tree, context={"parameters": values})
+        entry = SceneEntry.model_validate(tree, context={"parameters": known})
     except ValidationError as error:
         raise InputError(_explained(error, source)) from None
     return _scene(entry, source), _settings(entry.analysis, entry.outputs, source)
+
+
+def _signals(table: Mapping[str, Any], parameters: Parameters) -> dict[str, TimeFunction]:
+    """The inputs of a file by name, with their initial values."""
+    for name in table:
+        if name in (*parameters, "t", *CONSTANTS, *FUNCTIONS):
+            raise InputError(f"inputs.{name}: formulas know that name already; give the input another")
+    start = {name: as_number(v, parameters, f"inputs.{name}") if isinstance(v, str) else v for name, v in table.items()}
+    return {name: signal(name, value) for name, value in start.items() if type(value) in (int, float)}
 
 
 def _explained(error: ValidationError, source: Source) -> str:
@@ -140,10 +149,20 @@ def _actuator(force: Any = 0.0, **given: Any) -> Actuator:
 def _separated(given: tuple[Any, ...]) -> tuple[list[float | TimeFunction], StateFormula | None]:
     """Functions of time (zero where a component is none), and those that depend on the motion (zero likewise) if any does."""
     components = [constant(c) if isinstance(c, float) else c for c in given]  # a default is a number
+    if any(not isinstance(c, TimeFunction) and any(_inputs_of(c)) for c in components):
+        raise InputError("a formula of the motion cannot use an input; add them as two forces")
     timed = [_plain(c) if isinstance(c, TimeFunction) else 0.0 for c in components]
     moving = tuple(constant(0.0) if isinstance(c, TimeFunction) else c for c in components)
     follows = any(not isinstance(c, TimeFunction) for c in components)
     return timed, StateFormula(moving) if follows else None
+
+
+def _inputs_of(expression: Expression) -> Iterator[TimeFunction]:
+    if isinstance(expression, TimeFunction):
+        yield from signals_in(expression)
+    elif isinstance(expression, Operation):
+        for operand in expression.operands:
+            yield from _inputs_of(operand)
 
 
 def _plain(function: TimeFunction) -> float | TimeFunction:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -166,6 +166,17 @@ def _of_time(value: float | str | FunctionEntry, info: ValidationInfo) -> float 
     return found.data[0] if is_constant(found) else found
 
 
+def _of_time_in(unit: str) -> Callable[[float | str | FunctionEntry, ValidationInfo], float | TimeFunction]:
+    """As `_of_time`, for a number with or without a unit of this dimension."""
+
+    def read(value: float | str | FunctionEntry, info: ValidationInfo) -> float | TimeFunction:
+        if isinstance(value, str) and split_quantity(value) is not None:
+            return as_number(value, _parameters(info), "it", unit)
+        return _of_time(value, info)
+
+    return read
+
+
 def _tabled(entry: FunctionEntry) -> TimeFunction:
     if entry.polynomial is not None:
         return polynomial(*entry.polynomial)
@@ -205,6 +216,7 @@ _Given = Annotated[
     Discriminator(_form, custom_error_type="function", custom_error_message="give a number, a formula or a table"),
 ]
 OfTime = Annotated[_Given, AfterValidator(_of_time)]
+Acceleration = Annotated[_Given, AfterValidator(_of_time_in("m/s^2"))]
 OfMotion = Annotated[_Given, AfterValidator(_expression)]
 
 
@@ -493,9 +505,10 @@ class _SceneBase(_Strict):
     name: str = "scene"
     include: list[str] = []
     parameters: dict[str, Any] = {}
+    inputs: dict[str, Number] = {}
     outputs: list[str] = ["default"]
-    gravity: Annotated[list[Annotated[float, In("m/s^2")]], THREE] = [0.0, 0.0, 0.0]
-    base_acceleration: Annotated[list[OfTime], THREE] = [0.0, 0.0, 0.0]
+    gravity: Annotated[list[Acceleration], THREE] = [0.0, 0.0, 0.0]
+    base_acceleration: Annotated[list[Acceleration], THREE] = [0.0, 0.0, 0.0]
     analysis: _one_of(list(ANALYSES.values()), list(ANALYSES))  # type: ignore[valid-type]
     ground: dict[str, Metres] = {}
     bodies: dict[str, BodyEntry]

@@ -22,7 +22,7 @@ from ffr_dyn.scene_schema import EFFORTS, SOLUTIONS, TABLES, Kind, keys_of
 from ffr_dyn.settings import Forward, Inverse, Kinematic, Linearise, Mixed, MomentSettings, OfMoment, OverTime, Settings
 from ffr_dyn.stabilisation import Baumgarte, Projection, Stabilisation
 from ffr_dyn.state_formula import StateFormula
-from ffr_dyn.timefunction import HARMONIC, OPERATION, PIECEWISE, POLYNOMIAL, TimeFunction, constant
+from ffr_dyn.timefunction import HARMONIC, OPERATION, PIECEWISE, POLYNOMIAL, TimeFunction, constant, signals_in
 from ffr_prep.body import FlexibleBody, save_body
 
 _BARE = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
@@ -52,10 +52,25 @@ def to_toml(scene: Scene, settings: Settings | MomentSettings, files: Mapping[st
     """
     top = {"name": scene.name, "gravity": scene.gravity, "base_acceleration": scene.base_acceleration}
     tree = {**top, "outputs": list(settings.outputs), "analysis": _analysis(settings), "ground": dict(scene.ground)}
+    tree["inputs"] = _inputs(scene)
     tree["bodies"] = {body.name: _body(body, files) for body in scene.bodies}
     for table, kinds in TABLES.items():
         tree[table] = {thing.name: _entry(_kind(kinds, thing), thing) for thing in getattr(scene, table)}
     return "\n".join(_lines(_data(tree, "scene"), ())) + "\n"
+
+
+def _inputs(scene: Scene) -> dict[str, float]:
+    """Initial values of the scene's inputs by name."""
+    fields_of = [value for table in TABLES for thing in getattr(scene, table) for value in _given(thing).values()]
+    return {found.name: found.data[4] for found in _signals((*fields_of, scene.base_acceleration))}
+
+
+def _signals(value: Any) -> Iterator[TimeFunction]:
+    if isinstance(value, TimeFunction):
+        yield from signals_in(value)
+    elif isinstance(value, (list, tuple)):
+        for item in value:
+            yield from _signals(item)
 
 
 def _kind(kinds: tuple[Kind, ...], thing: Any) -> Kind:
@@ -202,7 +217,7 @@ def _function(function: TimeFunction, what: str) -> Any:
     data = list(function.data)
     if function.callback is not None:
         raise InputError(f"{what} is a Python function, which a scene file cannot hold; use a formula or a table")
-    if function.kind == OPERATION:
+    if function.kind == OPERATION or function.name:
         return text_of(function)
     if function.kind == POLYNOMIAL:
         return data[0] if len(data) == 1 else {"polynomial": data}

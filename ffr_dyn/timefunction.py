@@ -1,18 +1,18 @@
 """Functions of time for drivers and loads: each with two derivatives, compiled to numbers for the kernels.
 
 constant(5.0)   polynomial(0, 150)   harmonic(amplitude=.1, frequency=2)   table(times, values)   user(f)
-and, by `ffr_dyn.formula`, formula("0.1 * sin(2 * pi * t)")
+signal("torque") and, by `ffr_dyn.formula`, formula("0.1 * sin(2 * pi * t)")
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ffr_dyn.errors import InputError
-from ffr_dyn.operations import operate
+from ffr_dyn.operations import SUBTRACT, operate
 
 Array = np.ndarray
 
@@ -25,12 +25,14 @@ class TimeFunction:
     """A function of time as the kernels read it: its kind and its numbers; `callback` for a Python function.
 
     operands : what an operation of a formula (data: its number, its parameter) works on
+    name     : of an input of the scene, see `signal`
     """
 
     kind: int
     data: tuple[float, ...]
     callback: Callable[[float], object] | None = None
     operands: tuple[TimeFunction, ...] = ()
+    name: str = ""
 
 
 def constant(value: float) -> TimeFunction:
@@ -75,9 +77,43 @@ def user(function: Callable[[float], object]) -> TimeFunction:
     return TimeFunction(USER, (0.0,), function)
 
 
+def signal(name: str, value: float = 0.0) -> TimeFunction:
+    """An input of the scene, by name: it has its initial value until a `ffr_dyn.stepper.Stepper` sets another.
+
+    The same signal may stand in several places. Raises InputError for a name that is no word, or a value not finite.
+    """
+    if not name.isidentifier():
+        raise InputError(f"{name!r} cannot be the name of an input: use letters, digits and '_', a letter first")
+    return TimeFunction(PIECEWISE, (*SIGNAL, *_numbers(f"input {name!r}", (value, 0.0, 0.0))), name=name)
+
+
+# One piece of three coefficients from the time when it was set, for ever.
+SIGNAL = (1.0, 3.0, 0.0, 1e300)
+
+
+def signals_in(function: TimeFunction) -> Iterator[TimeFunction]:
+    """The signals of which a function is made."""
+    if function.name:
+        yield function
+    for operand in function.operands:
+        yield from signals_in(operand)
+
+
 def operation(op: int, *operands: TimeFunction, parameter: float = 0.0) -> TimeFunction:
     """An operation of `ffr_dyn.operations` on one or two functions of time."""
     return TimeFunction(OPERATION, (float(op), parameter), None, operands)
+
+
+def less(a: TimeFunction, b: TimeFunction) -> TimeFunction:
+    """a - b, of the kind of b where a is zero, so that what is written as a table stays one."""
+    if not is_zero(a) or b.name or b.kind in (USER, OPERATION):
+        return operation(SUBTRACT, a, b)
+    kept = int(b.data[0]) + 3 if b.kind == PIECEWISE else 0  # counts and breaks
+    data = np.array(b.data)
+    data[kept:] *= -1
+    if b.kind == HARMONIC:
+        data[2:] *= -1  # speed and phase
+    return TimeFunction(b.kind, tuple(data.tolist()))
 
 
 def as_time_function(value: object, what: str) -> TimeFunction:

@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ffr_prep.accelerations import unit_accelerations
 from ffr_prep.beams import Beams, axis_gradients, element_coordinates, mass_points, undeformed
-from ffr_prep.stiffening import PRODUCTS
 
 Array = np.ndarray
 
@@ -69,11 +69,3 @@ def stiffness_of_tension(elements: Beams, tension: Array, e: Array) -> Array:
     n = e.shape[2]
     K = slopes.reshape(-1, n).T @ weighted.reshape(-1, n)
     return (K + K.T) / 2
-
-
-def unit_accelerations(points: Array) -> Array:
-    """(12, P, 3) acceleration fields: translations, angular accelerations, products of the angular velocity."""
-    turn = [np.cross(axis, np.eye(3)).T for axis in np.eye(3)]  # u -> axis x u
-    twice = [(turn[k] @ turn[l] + (turn[l] @ turn[k] if k != l else 0)) for k, l in PRODUCTS]  # noqa: E741
-    along = np.broadcast_to(np.eye(3)[:, None], (3, *points.shape))
-    return np.concatenate([along, [points @ A.T for A in turn], [points @ A.T for A in twice]])

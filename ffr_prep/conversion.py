@@ -10,8 +10,7 @@ all motion, and the body is the one that a reduction under them would have made,
 interfaces: Craig-Bampton, Rubin, static shapes. Plain eigenmodes belong to their conditions; converted, they stay the
 deformations that they were.
 
-The geometric stiffness by load cannot be converted. Under the rotation of the frame it changes by the work that the
-turned loads do on the modes, and how the loads of an interface are spread over its region is not kept in the body.
+The geometric stiffness by load follows as well (`ffr_prep.turned_stiffening`).
 
 Source: A. A. Shabana, Dynamics of Multibody Systems (2013), section 6.7; O. P. Agrawal, A. A. Shabana, Computers &
 Structures 21 (1985) 1303-1312.
@@ -26,6 +25,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.accelerations import turns
 from ffr_prep.basis import diagonalised, in_frame
 from ffr_prep.body import FlexibleBody, Interface, Surface
 from ffr_prep.errors import InputError
@@ -34,11 +34,9 @@ from ffr_prep.invariants import InertiaIntegrals
 from ffr_prep.reduce import described
 from ffr_prep.reference import ReferenceConditions, UserConditions, functionals
 from ffr_prep.report import interface_freedom
+from ffr_prep.turned_stiffening import condition_count, turned_stiffening
 
 Array = np.ndarray
-
-# e_a x u = TURN[a] @ u
-TURN = np.cross(np.eye(3)[:, None], np.eye(3)[None]).transpose(0, 2, 1)
 
 
 def with_reference(body: FlexibleBody, conditions: ReferenceConditions) -> FlexibleBody:
@@ -47,16 +45,12 @@ def with_reference(body: FlexibleBody, conditions: ReferenceConditions) -> Flexi
     Modes are those under the new conditions, diagonal again; with more than six conditions there are fewer. What the old
     body could not represent, the new one cannot either; its provenance says so in "warnings".
 
-    Raises InputError for a body with geometric stiffness, for conditions on the nodes of a mesh, and for conditions that
-    name an unknown interface or leave a rigid motion.
+    Also `FlexibleBody.with_reference`. Raises InputError for conditions on the nodes of a mesh, for conditions that name an
+    unknown interface or leave a rigid motion, and for a geometric stiffness that does not determine the one in the new
+    frame (`ffr_prep.turned_stiffening`).
     """
     if isinstance(conditions, UserConditions):
         raise InputError("conditions on the nodes of the mesh need the mesh: reduce it again, or use interfaces")
-    if body.stiffening is not None:
-        raise InputError(
-            f"the geometric stiffness of body {body.name!r} belongs to its reference conditions and cannot be converted: "
-            "reduce the mesh again under the new ones, or leave it out (stiffening=None)"
-        )
     model = motion_model(body)
     L = functionals(conditions, model)
     elastic = in_frame(model, L, np.eye(6 + body.n)[:, 6:])
@@ -67,6 +61,9 @@ def with_reference(body: FlexibleBody, conditions: ReferenceConditions) -> Flexi
         omega2=basis.omega2,
         interfaces=_interfaces(body, model, Z),
         surface=body.surface and _surface(body.surface, Z),
+        stiffening=None
+        if body.stiffening is None
+        else turned_stiffening(body, model, conditions, first_integrals(body), Z),
         provenance=_provenance(body, conditions),
         **vars(combined_integrals(body, Z)),
     )
@@ -99,7 +96,7 @@ def motion_model(body: FlexibleBody) -> CoupledModel:
 
 def _mass(body: FlexibleBody) -> Array:
     """(6 + n, 6 + n)."""
-    turned = (TURN @ body.r_dm).T
+    turned = (turns() @ body.r_dm).T
     return np.block(
         [
             [body.mass * np.eye(3), turned, body.P_dm],
@@ -113,7 +110,7 @@ def _coordinates(interface: Interface) -> Array:
     """(6, 6 + n) translation and rotation of an interface."""
     return np.block(
         [
-            [np.eye(3), (TURN @ interface.position).T, interface.phi_t],
+            [np.eye(3), (turns() @ interface.position).T, interface.phi_t],
             [np.zeros((3, 3)), np.eye(3), interface.phi_r],
         ]
     )
@@ -125,16 +122,21 @@ def _coordinates(interface: Interface) -> Array:
 def combined_integrals(body: FlexibleBody, Z: Array) -> InertiaIntegrals:
     """The integrals of combinations Z (6 + n, k) of rigid motions about the origin and elastic coordinates."""
     r, rr, unit = body.r_dm, body.rr_dm, np.eye(3)
-    turned = (TURN @ r).T
-    P = np.hstack([body.mass * unit, turned, body.P_dm])
-    r_turned = np.einsum("km,alm->kla", rr, TURN)
-    rP = np.concatenate([np.einsum("k,la->kla", r, unit), r_turned, body.rP_dm], axis=2)
+    P, rP = first_integrals(body)
     of_translations = np.einsum("ka,lj->klaj", unit, P)
-    of_rotations = np.einsum("akm,mlj->klaj", TURN, rP)
+    of_rotations = np.einsum("akm,mlj->klaj", turns(), rP)
     elastic = np.concatenate([of_translations[..., 6:], of_rotations[..., 6:]], axis=2).transpose(1, 0, 3, 2)
     PP = np.concatenate([of_translations, of_rotations, np.concatenate([elastic, body.PP_dm], axis=3)], axis=2)
     new = np.einsum("ia,klij,jb->klab", Z, PP, Z, optimize=True)
     return InertiaIntegrals(body.mass, r, rr, P @ Z, rP @ Z, (new + new.transpose(1, 0, 3, 2)) / 2)
+
+
+def first_integrals(body: FlexibleBody) -> tuple[Array, Array]:
+    """(3, 6 + n) P_dm and (3, 3, 6 + n) rP_dm of the rigid motions about the origin and the elastic coordinates."""
+    P = np.hstack([body.mass * np.eye(3), (turns() @ body.r_dm).T, body.P_dm])
+    of_translations = np.einsum("k,la->kla", body.r_dm, np.eye(3))
+    of_rotations = np.einsum("km,alm->kla", body.rr_dm, turns())
+    return P, np.concatenate([of_translations, of_rotations, body.rP_dm], axis=2)
 
 
 def _interfaces(body: FlexibleBody, model: CoupledModel, Z: Array) -> tuple[Interface, ...]:
@@ -144,7 +146,7 @@ def _interfaces(body: FlexibleBody, model: CoupledModel, Z: Array) -> tuple[Inte
 
 def _surface(surface: Surface, Z: Array) -> Surface:
     """Rigid motion moves the points but stresses nothing."""
-    turned = np.einsum("akm,pm->pka", TURN, surface.points)
+    turned = np.einsum("akm,pm->pka", turns(), surface.points)
     Phi = Z[:3] + turned @ Z[3:6] + surface.Phi @ Z[6:]
     beams = surface.beams and replace(surface.beams, modes=surface.beams.modes @ Z[6:])
     return replace(surface, Phi=Phi, stress=None if surface.stress is None else surface.stress @ Z[6:], beams=beams)
@@ -164,9 +166,7 @@ def _provenance(body: FlexibleBody, conditions: ReferenceConditions) -> dict[str
 def _losses(body: FlexibleBody, before: Mapping[str, Any]) -> list[str]:
     """What the conversion cannot bring back, in words."""
     lost = []
-    conditions = before.get("supports", ())
-    nodal = before.get("on_nodes")
-    count = int(nodal["shape"][0]) if isinstance(nodal, Mapping) else len(conditions)
+    count = condition_count(before)
     if count > 6:
         lost.append(
             f"the body was reduced under {count} conditions, more than the six that fix a frame: the deformations that they "

@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 import scipy.sparse as sp
 
-from ffr_prep.beam_stiffening import unit_accelerations
+from ffr_prep.accelerations import unit_accelerations
 from ffr_prep.errors import InputError
 from ffr_prep.interface import CoupledModel, InterfaceRegion
 from ffr_prep.matrix_model import MatrixModel, group_nodes, node_in_words

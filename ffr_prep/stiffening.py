@@ -21,6 +21,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from ffr_prep.accelerations import unit_accelerations
 from ffr_prep.factor import SupportedBody, solve_refined
 from ffr_prep.interface import CoupledModel
 from ffr_prep.mesh import Mesh
@@ -28,8 +29,6 @@ from ffr_prep.solids import GradientChunk, Materials, SolidMatrices, displacemen
 from ffr_prep.static_shapes import inertial_loads as loads_of
 
 Array = np.ndarray
-
-PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 def stiffening_matrices(mesh: Mesh, material: Materials, model: CoupledModel, held: SupportedBody, Phi: Array) -> Array:
@@ -62,19 +61,4 @@ def _of_chunk(chunk: GradientChunk, static: Array, Phi: Array) -> Array:
 
 def inertial_loads(points: Array, matrices: SolidMatrices) -> Array:
     """(3N, 12) nodal forces of unit accelerations: translation, rotation, products of the angular velocity."""
-    count = len(points)
-    unit = np.eye(3)
-    fields = [np.broadcast_to(unit[k], (count, 3)) for k in range(3)]
-    fields += [np.cross(unit[k], points) for k in range(3)]
-    fields += [_centripetal(points, k, l) for k, l in PRODUCTS]  # noqa: E741
-    return -(vector_mass(matrices.m) @ np.column_stack([field.ravel() for field in fields]))
-
-
-def _centripetal(points: Array, k: int, l: int) -> Array:  # noqa: E741
-    """The coefficient of omega_k omega_l in omega x (omega x u) = omega (omega . u) - omega^2 u."""
-    field = np.zeros_like(points)
-    field[:, k] += points[:, l]
-    if k == l:
-        return field - points
-    field[:, l] += points[:, k]
-    return field
+    return -(vector_mass(matrices.m) @ unit_accelerations(points).reshape(12, -1).T)

@@ -14,7 +14,7 @@ from ffr_dyn.integrators import ROS2
 from ffr_dyn.joints import Joint
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.timefunction import user
-from ffr_prep.beam_stiffening import unit_accelerations
+from ffr_prep.accelerations import unit_accelerations
 from ffr_prep.body import FlexibleBody, truncated
 from ffr_prep.frame import Member, named, polyline
 from ffr_prep.interface import InterfaceRegion

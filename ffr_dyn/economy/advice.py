@@ -51,8 +51,8 @@ def _highest(found: Economy, b: int) -> float:
     V = part.basis(model.n)
     frequencies = list(np.sqrt(np.einsum("ia,i,ia->a", V, model.omega2, V)) / (2 * np.pi))
     shares = (found.effects.effect / found.limits).max(axis=1, initial=0.0)
-    for k in np.flatnonzero((found.effects.body == b) & (shares > MATTERS)):
-        frequencies.append(float(model.frequencies[found.effects.mode[k]]))
+    omitted = np.flatnonzero((found.effects.body == b) & (shares > MATTERS))
+    frequencies += [float(model.frequencies[found.effects.mode[k]]) for k in omitted]
     return float(max(frequencies))
 
 

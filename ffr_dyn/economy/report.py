@@ -74,13 +74,13 @@ def _coordinates(choice: Choice) -> int:
 
 
 def _outputs(found: Economy) -> Table:
-    columns = ("output", "unit", "range", "tolerance", "left out", "step", "estimated")
+    columns: tuple[str, ...] = ("output", "unit", "range", "tolerance", "left out", "step", "estimated")
     verified = found.verification
     columns += ("verified", "estimate / true") if verified else ()
     rows = []
     for k, output in enumerate(found.probe.outputs):
         numbers = (found.scales, found.limits, found.model_error, found.time_error, found.error)
-        row = (output.name, found.probe.units[k], *(f"{column[k]:.3g}" for column in numbers))
+        row: tuple[str, ...] = (output.name, found.probe.units[k], *(f"{column[k]:.3g}" for column in numbers))
         if verified:
             true = verified.first[k]
             row += (f"{verified.error[k]:.3g}", f"{found.error[k] / true:.2f}" if true > 0 else "-")
@@ -110,8 +110,8 @@ def _bodies(found: Economy) -> Table:
             " ".join(kept) if flexible else "-", " ".join(dropped) or "-" if flexible else "-", _stiffening(found, b),
         ))  # fmt: skip
     text = (
-        "Quasi-static: all its frequencies are above what the step resolves, so it deforms without vibrating. Shapes are made of "
-        "several modes, of which a few carry the deformation of this motion."
+        "Quasi-static: all its frequencies are above what the step resolves, so it deforms without vibrating. Shapes "
+        "are made of several modes, of which a few carry the deformation of this motion."
     )
     columns = ("body", "modelled", "elastic coordinates", "terms kept", "terms dropped", "stiffening")
     return Table("Bodies", text, columns, tuple(rows))
@@ -165,22 +165,26 @@ def _tried(found: Economy) -> Table:
         method = f"{one.choice.method}/{one.choice.divisions}"
         rows.append((one.what, coordinates, method, f"{one.cost / found.cost:.2f}", f"{worst:.3g}"))
     text = (
-        "Cost in runs of the chosen model. Error in tolerances: of trials beside everything with the same step, of the chosen "
-        "model with its step."
+        "Cost in runs of the chosen model. Error in tolerances: of trials beside everything with the same step, of the "
+        "chosen model with its step."
     )
     return Table("Models tried", text, ("model", "coordinates by body", "integrator", "cost", "error"), tuple(rows))
 
 
 def _advice(found: Economy) -> Table:
     lines = advice(found)
-    text = "What the scene needs of its bodies, as commands to run; FILE is the mesh of the body." if lines else "No flexible bodies."
+    text = (
+        "What the scene needs of its bodies, as commands to run; FILE is the mesh of the body."
+        if lines
+        else "No flexible bodies."
+    )
     return Table("Mesh and reduction", text, (), tuple((line,) for line in lines))
 
 
 def _notes(found: Economy) -> list[str]:
     prescribed = [
-        f"output {name!r} is the same with rigid and with flexible bodies: no model changes it, its tolerance says nothing about "
-        "modes and terms"
+        f"output {name!r} is the same with rigid and with flexible bodies: no model changes it, its tolerance says nothing "
+        "about modes and terms"
         for name in found.unmoved
     ]
     return [*prescribed, *found.notes]

@@ -515,7 +515,7 @@ def _check_accuracy(of: Probe, ground: _Ground, own: Array) -> None:
         if known > limit:
             raise InputError(
                 f"output {output.name!r}: the tolerance {limit:.2g} is below what the reference itself is known to, "
-                f"{known:.2g}; ask for a larger one, or give the full scene damping: its undamped high modes ring at every step"
+                f"{known:.2g}; ask for a larger one, or give the scene damping: undamped high modes ring at every step"
             )
 
 

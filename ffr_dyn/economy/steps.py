@@ -139,7 +139,7 @@ def _signed(trial: Trial, other: Trial) -> tuple[Array, ...]:
 
 
 def _refined(run: Run, choice: Choice, needed: int, sharp: Trial, limit: Array) -> Stepped:
-    """Runs of one method, each with the step that the one before predicts, until the limit holds and no longer one would do."""
+    """Runs of one method, each with the step that the one before predicts, until the limit holds and no longer one does."""
     best: Stepped | None = None
     for _ in range(ATTEMPTS):
         trial = run(replace(choice, divisions=needed))

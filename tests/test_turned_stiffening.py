@@ -1,0 +1,197 @@
+"""Geometric stiffening in another frame: laws, equality with direct reductions, motions, guards."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from boxes import STEEL, box_mesh, moved, rotation
+from test_beam_stiffening import thin
+from test_dyn_references import slider_crank
+
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.integrators import ROS2
+from ffr_prep.body import FlexibleBody, with_point
+from ffr_prep.conversion import with_reference
+from ffr_prep.errors import InputError
+from ffr_prep.frame import Member, named, polyline
+from ffr_prep.interface import InterfaceRegion
+from ffr_prep.planar import in_plane
+from ffr_prep.reduce import reduce_mesh
+from ffr_prep.reduction import CraigBampton
+from ffr_prep.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports
+from ffr_prep.section import circle, rectangle
+from ffr_prep.structural import reduce_frame
+
+FIXED, CHORD, MEAN = FixedTo("left"), SimplySupported("left", "right"), MeanAxis()
+REFERENCES = (FIXED, CHORD, MEAN)
+TRANSLATIONS, PRODUCTS = [0, 1, 2], [6, 7, 8, 9, 10, 11]
+FORCES = [12, 13, 14, 18, 19, 20]
+PULLS = [0, 7, 8, 12, 18]  # loads that pull at a rod along x
+BOTH_ENDS = Supports(
+    tuple(
+        Support(end, motion, tuple(axis))
+        for end in ("left", "right")
+        for motion in ("translation", "rotation")
+        for axis in np.eye(3)
+    )
+)
+
+
+def block(reference, kind="mean") -> FlexibleBody:
+    """A solid bar in oblique axes."""
+    return reduce_mesh(
+        moved(box_mesh("hex20", (1.0, 0.12, 0.16), (4, 1, 1)), rotation(5), np.array([0.2, -0.1, 0.4])),
+        name="b",
+        material=STEEL,
+        interfaces=[InterfaceRegion("left", kind=kind), InterfaceRegion("right", kind=kind)],
+        reference=reference,
+        reduction=CraigBampton(4),
+        stiffening=True,
+    )
+
+
+def rod(reference, modes=6, section=None, length=1.0) -> FlexibleBody:
+    """A straight beam along x."""
+    member = Member(section or rectangle(0.05, 0.065), STEEL, (0, 1.0, 0))
+    return reduce_frame(
+        named(
+            polyline([(0, 0, 0), (length, 0, 0)], member, elements=16),
+            left=(0, 0, 0), right=(length, 0, 0), crankpin=(0, 0, 0), slider=(length, 0, 0),
+        ),
+        name="rod",
+        interfaces=[InterfaceRegion("left"), InterfaceRegion("right")],
+        reference=reference,
+        reduction=CraigBampton(modes),
+        stiffening=True,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def blocks():
+    return {reference: block(reference) for reference in REFERENCES}
+
+
+@pytest.fixture(scope="module")
+def rods():
+    return {reference: in_plane(rod(reference)) for reference in REFERENCES}
+
+
+def differences(body: FlexibleBody, expected: FlexibleBody) -> tuple[np.ndarray, np.ndarray]:
+    """(r,) largest difference of each matrix in the modes of `expected`, and their sizes, both times 1/(omega_i omega_j)."""
+    X = np.linalg.lstsq(body.surface.Phi.reshape(-1, body.n), expected.surface.Phi.reshape(-1, expected.n), rcond=None)[
+        0
+    ]
+    np.testing.assert_allclose(X.T @ X, np.eye(body.n), atol=1e-8)  # the same motions in the same frame
+    scale = np.sqrt(np.outer(expected.omega2, expected.omega2))
+    off = (X.T @ body.stiffening @ X - expected.stiffening) / scale
+    return np.abs(off).max(axis=(1, 2)), np.abs(expected.stiffening / scale).max(axis=(1, 2))
+
+
+def assert_equal(body, expected, loads, rtol):
+    off, size = (value[loads] for value in differences(body, expected))
+    assert size.max() > 0
+    assert off.max() < rtol * size.max()
+
+
+# ---- laws ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "loads"),
+    [
+        (FIXED, CHORD, TRANSLATIONS + FORCES),
+        (MEAN, CHORD, TRANSLATIONS + FORCES),
+        (FIXED, MEAN, PRODUCTS + FORCES),
+        (CHORD, MEAN, PRODUCTS + FORCES),
+    ],
+    ids=str,
+)
+def test_converting_is_reducing_in_the_new_frame(blocks, old, new, loads):
+    """Solids, mean interfaces: exact for all loads without moments."""
+    assert_equal(blocks[old].with_reference(new), blocks[new], loads, 1e-8)
+
+
+@pytest.mark.parametrize("new", REFERENCES, ids=str)
+@pytest.mark.parametrize("old", REFERENCES, ids=str)
+def test_converting_beams_is_reducing_in_the_new_frame(rods, old, new):
+    """In their plane and under tension, all that their theory knows; inertia inside the elements is theirs in the mean."""
+    converted, direct = rods[old].with_reference(new), rods[new]
+    assert_equal(converted, direct, PULLS[1:3], 0.012 if new is MEAN else 3e-3)
+    assert_equal(converted, direct, PULLS[3:], 2e-3)
+    if new is not MEAN:  # where it pulls at nothing
+        assert_equal(converted, direct, PULLS[:1], 1e-8)
+
+
+@pytest.mark.parametrize("new", REFERENCES[1:], ids=str)
+def test_back_and_forth_is_the_identity(blocks, new):
+    body = blocks[FIXED]
+    assert_equal(with_reference(with_reference(body, new), FIXED), body, slice(None), 1e-8)
+
+
+def test_the_way_to_a_frame_does_not_matter(blocks):
+    body = blocks[FIXED]
+    assert_equal(body.with_reference(CHORD).with_reference(MEAN), body.with_reference(MEAN), slice(None), 1e-8)
+
+
+def test_a_uniform_acceleration_stresses_nothing_in_the_mean_axis_frame(blocks):
+    converted = blocks[FIXED].with_reference(MEAN)
+    scale = np.sqrt(np.outer(converted.omega2, converted.omega2))
+    size = np.abs(converted.stiffening / scale).max(axis=(1, 2))
+    assert size[:6].max() < 1e-9 * size[6:12].max()
+
+
+def test_more_conditions_than_six_share_the_loads(rods):
+    """Clamped at both ends, half of an axial acceleration is carried by each: as pressed as pulled."""
+    converted = rods[FIXED].with_reference(BOTH_ENDS)
+    direct = in_plane(rod(BOTH_ENDS))
+    assert_equal(converted, direct, [0, 6, 7, 8], 0.02)
+    assert np.abs(np.trace(converted.stiffening[0])) < 1e-3 * np.abs(converted.stiffening[0]).max()
+
+
+# ---- motions ------------------------------------------------------------------------------------------------------------
+
+
+def test_the_motion_of_a_slider_crank_is_the_same():
+    """The rod of the stiffened slider-crank, reduced in one frame and converted, against reduced there: the deflection
+    of its middle from the chord, which is 4.3 mm at most."""
+
+    def deflection(body):
+        names = ("crankpin", "slider")
+        body = replace(
+            body, interfaces=tuple(replace(i, name=name) for i, name in zip(body.interfaces, names, strict=True))
+        )
+        result = forward(slider_crank(body), end=0.05, output_step=1e-3, method=ROS2(2e-5))
+        Phi = body.surface.Phi[[np.argmin(np.abs(body.surface.points[:, 0] - x)) for x in (0.0, 0.15, 0.3)]]
+        ends = np.array([i.phi_t[1] for i in body.interfaces])
+        return result["rod.q"] @ (Phi[1, 1] - ends.mean(axis=0))
+
+    made = {reference: rod(reference, 6, thin(circle(0.006)), 0.3) for reference in REFERENCES}
+    direct = {reference: deflection(made[reference]) for reference in (CHORD, MEAN)}
+    peak = np.abs(direct[CHORD]).max()
+    assert peak == pytest.approx(4.3e-3, rel=0.01)
+    for old, new in ((FIXED, CHORD), (FIXED, MEAN), (MEAN, CHORD)):
+        converted = deflection(made[old].with_reference(new))
+        assert np.abs(converted - direct[new]).max() < 1e-3 * peak
+    without = deflection(replace(made[CHORD], stiffening=None))
+    assert np.abs(without - direct[CHORD]).max() > 0.1 * peak
+
+
+# ---- guards -------------------------------------------------------------------------------------------------------------
+
+
+def test_a_body_under_more_than_six_conditions_is_refused(rods):
+    body = replace(rods[FIXED], provenance={"reference": {"type": "Supports", "supports": [{}] * 12}})
+    with pytest.raises(InputError, match="12 conditions, more than the six"):
+        body.with_reference(MEAN)
+    assert replace(body, stiffening=None).with_reference(MEAN).stiffening is None
+
+
+def test_points_that_were_added_do_not_stiffen_and_hold_nothing(blocks):
+    body = with_point(blocks[FIXED], "middle", blocks[FIXED].centre_of_mass)
+    converted = body.with_reference(MEAN)
+    assert not converted.stiffening[-6:].any()
+    np.testing.assert_array_equal(converted.stiffening[:-6], blocks[FIXED].with_reference(MEAN).stiffening)
+    with pytest.raises(InputError, match="loads at interface 'middle' have no geometric stiffness"):
+        body.with_reference(FixedTo("middle"))
