@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ffr_dyn.analyses.assemble import assemble
 from ffr_dyn.analyses.evaluation import Evaluator, evaluator, moved, record_states, to_body_axes, to_global_axes
+from ffr_dyn.economy.choice import Choice
 from ffr_dyn.economy.drive import Samples, driven, elastic_columns, followed, samples
 from ffr_dyn.economy.outputs import Probe, histories, needed
 from ffr_dyn.economy.trial import Trial, states
@@ -90,23 +91,24 @@ def of_omitted(trial: Trial, large: Trial, of: Probe, original: Scene) -> Contri
         for body, few, many in zip(original.bodies, trial.choice.parts, large.choice.parts, strict=True)
     )
     seen = samples(small, big, bases, trial.result.time[rows], x[rows], v[rows])
-    D = _missing(seen, bases)
-    if D.shape[1] == 0:
+    D, modes = _missing(seen, bases, large.choice)
+    if not modes:
         return nothing(of)
     q, q_dot = driven(seen, D, followed(seen, D))
-    return _effects(large, original, of, seen, D, q, q_dot, 1.0)
+    return replace(_effects(large, original, of, seen, D, q, q_dot, 1.0), mode=np.array(modes, int))
 
 
-def _missing(seen: Samples, bases: tuple[Array, ...]) -> Array:
-    """(V, c) what each coordinate has beyond the bases."""
-    place, found = seen.system.layout, []
+def _missing(seen: Samples, bases: tuple[Array, ...], choice: Choice) -> tuple[Array, list[int]]:
+    """(V, c) what each coordinate of a model has beyond the bases, and (c,) its number in the body."""
+    place, found, modes = seen.system.layout, [], []
     for b, V in enumerate(bases):
         rest = np.eye(len(V)) - V @ V.T
         for k in np.flatnonzero(np.abs(rest).max(axis=0, initial=0.0) > LEFT):
             direction = np.zeros(place.v_size)
             direction[place.q_dot(b)] = rest[:, k]
             found.append(direction)
-    return np.array(found).reshape(-1, place.v_size).T
+            modes.append(choice.parts[b].modes[k])
+    return np.array(found).reshape(-1, place.v_size).T, modes
 
 
 def _own(trial: Trial) -> Samples:

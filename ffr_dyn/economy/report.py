@@ -125,7 +125,9 @@ def _modes(body: Body, choice: Choice, b: int) -> str:
     hertz = np.sqrt(np.einsum("ia,i,ia->a", V, body.model.omega2, V)) / (2 * np.pi)
     if part.shapes is None:
         return ", ".join(f"{mode} ({f:.4g} Hz)" for mode, f in zip(part.modes, hertz, strict=True))
-    return f"{part.count} shapes of {len(part.modes)} modes: " + ", ".join(f"{f:.4g} Hz" for f in hertz)
+    return f"{part.count} shape{'s' * (part.count > 1)} of {len(part.modes)} modes: " + ", ".join(
+        f"{f:.4g} Hz" for f in hertz
+    )
 
 
 def _stiffening(found: Economy, b: int) -> str:
