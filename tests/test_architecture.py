@@ -229,7 +229,7 @@ def declared() -> set[str]:
     project = PROJECT["project"]
     optional = [
         requirement
-        for extra in ("video", "nastran", "pardiso")
+        for extra in ("video", "nastran", "pardiso", "ida")
         for requirement in project["optional-dependencies"][extra]
     ]
     return {distribution_name(requirement) for requirement in [*project["dependencies"], *optional]}
@@ -242,7 +242,12 @@ def third_party() -> set[str]:
 
 
 def test_every_library_is_declared_and_every_declared_one_is_used():
-    extras = {"imageio_ffmpeg": ["imageio-ffmpeg"], "pyNastran": ["pyNastran"], "pypardiso": ["pypardiso"]}
+    extras = {
+        "imageio_ffmpeg": ["imageio-ffmpeg"],
+        "pyNastran": ["pyNastran"],
+        "pypardiso": ["pypardiso"],
+        "sksundae": ["scikit-sundae"],
+    }
     owners = importlib.metadata.packages_distributions() | extras
     needed = {distribution_name(owners[name][0]) for name in third_party()}
     assert needed == declared()

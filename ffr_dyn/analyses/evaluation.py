@@ -66,9 +66,7 @@ def evaluator(system: System) -> Evaluator:
 def evaluate(at: Evaluator, time: float, x: Array, v: Array) -> Evaluation:
     """The equations at (time, x, v). Raises SimulationError as a forward run would, except for dependent rows."""
     system, work = at.system, at.work
-    _, status = RK4.run(system.model, work, at.stages, time, 1.0, 0, 0, x.copy(), v.copy(), 0.0, 0.0, 0.0, at.record)
-    if status not in (OK, SINGULAR_CONSTRAINT):
-        raise failure(system, work, status, time)
+    status = _look(at, time, x, v)
     rows, bodies, across = work.rows, work.bodies, locked(system.layout)
     still = np.zeros(across.size)
     return Evaluation(
@@ -81,6 +79,22 @@ def evaluate(at: Evaluator, time: float, x: Array, v: Array) -> Evaluation:
         rows.lam.copy(),
         status == SINGULAR_CONSTRAINT,
     )
+
+
+def accelerations(at: Evaluator, time: float, x: Array, v: Array) -> Array:
+    """(V,) d/dt of v, global axes. Raises SimulationError as a forward run would."""
+    if _look(at, time, x, v) == SINGULAR_CONSTRAINT:
+        raise failure(at.system, at.work, SINGULAR_CONSTRAINT, time)
+    return at.record.vd[0].copy()
+
+
+def _look(at: Evaluator, time: float, x: Array, v: Array) -> int:
+    """Evaluate; a status, which is OK or that of dependent rows."""
+    model, work = at.system.model, at.work
+    _, status = RK4.run(model, work, at.stages, time, 1.0, 0, 0, x.copy(), v.copy(), 0.0, 0.0, 0.0, at.record)
+    if status not in (OK, SINGULAR_CONSTRAINT):
+        raise failure(at.system, work, status, time)
+    return int(status)
 
 
 def locked(place: Layout) -> Array:
