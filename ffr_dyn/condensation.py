@@ -12,6 +12,8 @@ symmetric about a plane stays so.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from scipy.linalg import eigh, null_space, qr
 from scipy.sparse import csr_array
@@ -26,12 +28,13 @@ _SOFTEST = 1e-12  # share of the largest eigenvalue below which a mode counts as
 _INDEPENDENT = 1e-6  # of static shapes: what is left of a column after the others are taken out of it
 
 
-def statically_complete(body: FlexibleBody, count: int) -> Array:
+def statically_complete(body: FlexibleBody, count: int, interfaces: Iterable[str] | None = None) -> Array:
     """(n, count) basis V of elastic coordinates q = V p with V^T V = I and V^T Omega^2 V diagonal, ascending.
 
-    Static shapes of the interfaces come first; with fewer than these, the stiffest are missing. `count` is from 1 to n.
+    Static shapes of the named interfaces (all by default) come first; with fewer than these, the stiffest are missing.
+    `count` is from 1 to n.
     """
-    shapes = _interface_shapes(body)
+    shapes = _interface_shapes(body, None if interfaces is None else set(interfaces))
     candidates = [one for family in _families(shapes) for one in _candidates(shapes, body.omega2, family)]
     candidates.sort(key=lambda one: one[:2])
     families: dict[int, list[Array]] = {}
@@ -41,10 +44,10 @@ def statically_complete(body: FlexibleBody, count: int) -> Array:
     return V[:, np.argsort(np.einsum("ij,i,ij->j", V, body.omega2, V), kind="stable")]
 
 
-def _interface_shapes(body: FlexibleBody) -> Array:
+def _interface_shapes(body: FlexibleBody, names: set[str] | None) -> Array:
     """(6 I, n) motion of the interfaces per elastic coordinate; rotations times the body's radius of gyration."""
     length = np.sqrt(np.trace(body.rr_dm) / body.mass)
-    rows = [part for i in body.interfaces for part in (i.phi_t, length * i.phi_r)]
+    rows = [part for i in body.interfaces if names is None or i.name in names for part in (i.phi_t, length * i.phi_r)]
     return np.concatenate(rows) if rows else np.zeros((0, body.n))
 
 

@@ -9,21 +9,20 @@ and a revolute joint two rows.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
 
 import numpy as np
 
 from ffr_dyn.drivers import PointDriver
 from ffr_dyn.errors import InputError
-from ffr_dyn.forces import SpringDamper
 from ffr_dyn.joint_forces import JointForce
-from ffr_dyn.joints import Joint, frames
+from ffr_dyn.joints import frames
 from ffr_dyn.rotation import rotation_matrix
 from ffr_dyn.scene import Body, Scene, joint_under, marker_names, marker_number, markers
 from ffr_dyn.surface_loads import ModalForce
 from ffr_dyn.timefunction import is_zero
-from ffr_dyn.variant import with_modes
+from ffr_dyn.variant import used_interfaces, with_modes
 from ffr_prep.body import FlexibleBody, axial
 
 Array = np.ndarray
@@ -32,7 +31,7 @@ AXES = "xyz"
 _ZERO = 1e-9
 # What the search for a plane understands; a scene with anything else is planar only when it is declared so.
 _KNOWN = {"bodies", "joints", "drivers", "couplings", "loads", "springs", "forces", "ground"}
-_KNOWN |= {"gravity", "base_acceleration", "name", "plane"}
+_KNOWN |= {"gravity", "base_acceleration", "measurements", "name", "plane"}
 
 
 def planar_forms(scene: Scene) -> Iterator[Scene]:
@@ -63,8 +62,11 @@ def _in_plane(scene: Scene, normal: int, *, strict: bool) -> Scene:
     bodies, kept = [], {}
     for body in scene.bodies:
         k = body_normal(body, normal)
-        keep = np.flatnonzero(_stays(body.model, k, _used(scene, body)) if strict else _mostly(body.model, k))
-        bodies.append(replace(with_modes(body, keep.tolist()), kept=(tuple(keep.tolist()), body.model.n)))
+        used = used_interfaces(scene, body)
+        keep = np.flatnonzero(_stays(body.model, k, used) if strict else _mostly(body.model, k))
+        reduced = with_modes(body, keep.tolist())
+        model = _without_rounding(reduced.model, k, used)
+        bodies.append(replace(reduced, model=model, kept=(tuple(keep.tolist()), body.model.n)))
         kept[body.name] = keep
     forces = [replace(f, values=f.values[kept[f.body]]) if isinstance(f, ModalForce) else f for f in scene.forces]
     return replace(scene, bodies=tuple(bodies), forces=tuple(forces), plane=AXES[normal])
@@ -99,7 +101,7 @@ def _obstacles(scene: Scene, normal: int) -> Iterator[str]:
         yield "there are forces of other kinds"
     for body in scene.bodies:
         k = body_normal(body, normal)
-        if not _symmetric(body.model, k, _used(scene, body)):
+        if not _symmetric(body.model, k, used_interfaces(scene, body)):
             yield f"body {body.name!r} is not symmetric"
     for load in scene.loads:
         k = normal if load.axes == "global" else _normal_of(scene, load.marker, normal)
@@ -160,23 +162,15 @@ def _normal_of(scene: Scene, marker: str, normal: int) -> int:
     return next((body_normal(b, normal) for b in scene.bodies if b.name == body), normal)
 
 
-def _used(scene: Scene, body: Body) -> list[str]:
-    """Interfaces of a body at which joints, loads, springs or point drivers act."""
-    paired: list[Joint | SpringDamper | PointDriver]
-    paired = [*scene.joints, *scene.springs, *(d for d in scene.drivers if isinstance(d, PointDriver))]
-    ends = [load.marker for load in scene.loads] + [end for one in paired for end in (one.i, one.j)]
-    return sorted({end.partition(".")[2] for end in ends if end.partition(".")[0] == body.name})
-
-
 # ---- symmetry of a body -------------------------------------------------------------------------------------------
 
 
-def _symmetric(body: FlexibleBody, k: int, used: list[str]) -> bool:
+def _symmetric(body: FlexibleBody, k: int, used: Sequence[str]) -> bool:
     """Whether in-plane motion excites nothing across body axis k, neither rigid nor elastic."""
     if k < 0:
         return False
     a, b = (c for c in range(3) if c != k)
-    length = np.sqrt(np.trace(body.rr_dm) / body.mass)
+    length = _length(body)
     offsets = [body.r_dm[k] / body.mass, *(body.interface(name).position[k] for name in used)]
     products = [body.rr_dm[a, k], body.rr_dm[b, k]]
     if np.abs(offsets).max() > _ZERO * length or np.abs(products).max() > _ZERO * body.mass * length**2:
@@ -199,14 +193,14 @@ def _splits(stiffening: Array, stays: Array) -> bool:
     return bool((mixed <= 1e-6 * scale).all())
 
 
-def _stays(body: FlexibleBody, k: int, used: list[str]) -> Array:
+def _stays(body: FlexibleBody, k: int, used: Sequence[str]) -> Array:
     """(n,) which modes have no momentum, and move no marker that is used, across the plane."""
     a, b = (c for c in range(3) if c != k)
     turning = axial(body.rP_dm)
     return _quiet(body, [body.P_dm[k]], [turning[a], turning[b]], used, [k], [a, b])
 
 
-def _leaves(body: FlexibleBody, k: int, used: list[str]) -> Array:
+def _leaves(body: FlexibleBody, k: int, used: Sequence[str]) -> Array:
     """(n,) which modes have no momentum, and move no marker that is used, in the plane."""
     a, b = (c for c in range(3) if c != k)
     moments = [axial(body.rP_dm)[k], body.rP_dm[a, a] + body.rP_dm[b, b]]
@@ -214,16 +208,66 @@ def _leaves(body: FlexibleBody, k: int, used: list[str]) -> Array:
 
 
 def _quiet(
-    body: FlexibleBody, momenta: list[Array], moments: list[Array], used: list[str], shifts: list[int], turns: list[int]
+    body: FlexibleBody,
+    momenta: list[Array],
+    moments: list[Array],
+    used: Sequence[str],
+    shifts: list[int],
+    turns: list[int],
 ) -> Array:
-    length = np.sqrt(np.trace(body.rr_dm) / body.mass)
-    parts = [part / np.sqrt(body.mass) for part in momenta]
-    parts += [part / (np.sqrt(body.mass) * length) for part in moments]
+    """(n,) which modes have none of these, beside the largest motion of a marker that they make."""
+    shape, length = np.sqrt(body.mass), _length(body)
+    parts = [part / shape for part in momenta]
+    parts += [part / (shape * length) for part in moments]
     for name in used:
         interface = body.interface(name)
-        parts += [interface.phi_t[c] * np.sqrt(body.mass) for c in shifts]
-        parts += [interface.phi_r[c] * np.sqrt(body.mass) * length for c in turns]
-    return np.abs(parts).max(axis=0) < _ZERO
+        parts += [interface.phi_t[c] * shape for c in shifts]
+        parts += [interface.phi_r[c] * shape * length for c in turns]
+    return np.abs(parts).max(axis=0) < _ZERO * _sizes(body, used)
+
+
+def _sizes(body: FlexibleBody, used: Sequence[str]) -> Array:
+    """(n,) of each mode: its largest translation, or rotation times the length of the body, at the markers that are used,
+    or its mean displacement, which is one in units of 1/sqrt(mass)."""
+    shape, length = np.sqrt(body.mass), _length(body)
+    ends = [body.interface(name) for name in used]
+    motions = [np.ones((1, body.n)), *(i.phi_t * shape for i in ends), *(i.phi_r * shape * length for i in ends)]
+    return np.abs(np.vstack(motions)).max(axis=0)
+
+
+def _length(body: FlexibleBody) -> float:
+    return float(np.sqrt(np.trace(body.rr_dm) / body.mass))
+
+
+def _without_rounding(body: FlexibleBody, k: int, used: Sequence[str]) -> FlexibleBody:
+    """The body with zeros where the symmetry of in-plane modes asks for them and only rounding is left.
+
+    Rows of joints across the plane then vanish exactly, however large the modes are.
+    """
+    if not body.n:
+        return body
+    a, b = (c for c in range(3) if c != k)
+    size, length, shape = _sizes(body, used), _length(body), np.sqrt(body.mass)
+    pairs = np.sqrt(np.outer(size, size))
+    P_dm, rP_dm, PP_dm = body.P_dm.copy(), body.rP_dm.copy(), body.PP_dm.copy()
+    _drop(P_dm[k], size * shape)
+    for c in (a, b):
+        for one, other in ((c, k), (k, c)):
+            _drop(rP_dm[one, other], size * shape * length)
+            _drop(PP_dm[one, other], pairs)
+    interfaces = []
+    for interface in body.interfaces:
+        phi_t, phi_r = interface.phi_t.copy(), interface.phi_r.copy()
+        if interface.name in used:
+            _drop(phi_t[k], size / shape)
+            _drop(phi_r[a], size / (shape * length))
+            _drop(phi_r[b], size / (shape * length))
+        interfaces.append(replace(interface, phi_t=phi_t, phi_r=phi_r))
+    return replace(body, P_dm=P_dm, rP_dm=rP_dm, PP_dm=PP_dm, interfaces=tuple(interfaces))
+
+
+def _drop(part: Array, size: Array) -> None:
+    part[np.abs(part) < _ZERO * size] = 0.0
 
 
 def _mostly(body: FlexibleBody, k: int) -> Array:

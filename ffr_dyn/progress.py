@@ -25,3 +25,16 @@ def progress(
 
 def _advance(bar: tqdm, t: float) -> None:
     bar.update(min(t, bar.total) - bar.n)
+
+
+@contextmanager
+def counted(label: str, *, stream: TextIO | None = None) -> Iterator[Callable[[int, int], None]]:
+    """Yields ``update(done, total)`` for work that is counted; the bar appears with the first call, on a terminal only."""
+    with tqdm(desc=label, total=0, file=stream, disable=None, leave=False) as bar:
+
+        def update(done: int, total: int) -> None:
+            bar.total = total
+            bar.update(done - bar.n)
+            bar.refresh()
+
+        yield update

@@ -18,10 +18,10 @@ from ffr_dyn.errors import InputError
 from ffr_dyn.forces import Bushing, Load, SpringDamper
 from ffr_dyn.joint_forces import JointForce
 from ffr_dyn.joints import COORDINATES, Joint
-from ffr_dyn.measurement import Measurement
+from ffr_dyn.measurement import AnyMeasurement, Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.rotation import euler_parameters
 from ffr_dyn.surface_loads import SurfaceLoad, distributed
-from ffr_dyn.timefunction import TimeFunction, as_time_function
+from ffr_dyn.timefunction import POLYNOMIAL, TimeFunction, as_time_function, less
 from ffr_prep.body import FlexibleBody
 
 Array = np.ndarray
@@ -86,10 +86,11 @@ class Scene:
 
     ground  : name -> (3,) [m], points fixed in the global frame
     forces  : bushings, forces on joint coordinates, loads on surfaces and modes
-    gravity : (3,) [m/s^2], global
+    gravity : three components [m/s^2], global, each a number, a time function or a Python function of time. What varies is
+              kept as the base acceleration that acts in the same way, so that `gravity` is (3,), the constant components
     base_acceleration : three components [m/s^2], global, each a number, a time function or a Python function of time: the
               translational acceleration of the ground, whose frame all results refer to. It acts as gravity less this
-              acceleration; a gravity that varies is its negative
+              acceleration; the energy of gravity is that of the constant components
     plane   : "auto" finds out whether the scene is planar and then computes in the plane alone (see `ffr_dyn.plane`);
               "x", "y" or "z", its normal, declares it, so that modes mostly in the plane are kept and the rest is left
               out even where it is small only; "none" computes in space
@@ -102,7 +103,7 @@ class Scene:
     loads: tuple[Load, ...] = ()
     springs: tuple[SpringDamper, ...] = ()
     forces: tuple[Force, ...] = ()
-    measurements: tuple[Measurement, ...] = ()
+    measurements: tuple[AnyMeasurement, ...] = ()
     ground: Mapping[str, Any] = field(default_factory=dict)
     gravity: Any = (0.0, 0.0, 0.0)
     base_acceleration: Any = (0.0, 0.0, 0.0)
@@ -120,8 +121,9 @@ class Scene:
             object.__setattr__(self, key, tuple(getattr(self, key)))
         points = {key: _vector(at, 3, f"ground point {key!r}") for key, at in self.ground.items()}
         object.__setattr__(self, "ground", points)
-        object.__setattr__(self, "gravity", _vector(self.gravity, 3, "gravity"))
-        object.__setattr__(self, "base_acceleration", _acceleration(self.base_acceleration))
+        steady, base = _split_gravity(self.gravity, _acceleration("base_acceleration", self.base_acceleration))
+        object.__setattr__(self, "gravity", _vector(steady, 3, "gravity"))
+        object.__setattr__(self, "base_acceleration", base)
         if self.plane not in ("auto", "x", "y", "z", "none"):
             raise InputError(f"plane is {self.plane!r}; it must be 'auto', 'none', or the normal 'x', 'y' or 'z'")
         if not self.bodies:
@@ -226,13 +228,36 @@ def _check_point_driver(scene: Scene, driver: PointDriver) -> None:
         raise InputError(f"driver {driver.name!r} drives {i[1]!r} against itself; it needs markers of two bodies")
 
 
-def _check_measurement(scene: Scene, measurement: Measurement) -> None:
+def measured_body(scene: Scene, measurement: StressMeasurement | SectionMeasurement) -> int:
+    """The body whose stress or section forces are measured."""
+    names = [body.name for body in scene.bodies]
+    if measurement.body not in names:
+        raise InputError(
+            f"measurement {measurement.name!r}: there is no body {measurement.body!r}; {_offer(measurement.body, names)}"
+        )
+    return names.index(measurement.body)
+
+
+def _check_measurement(scene: Scene, measurement: AnyMeasurement) -> None:
+    if not isinstance(measurement, Measurement):
+        _check_stress(measurement, scene.bodies[measured_body(scene, measurement)])
+        return
     marker_number(scene, measurement.i), marker_number(scene, measurement.j)
     known = ["global", *(body.name for body in scene.bodies)]
     if measurement.axes not in known:
         raise InputError(
             f"measurement {measurement.name!r}: there are no axes {measurement.axes!r}; {_offer(measurement.axes, known)}"
         )
+
+
+def _check_stress(measurement: StressMeasurement | SectionMeasurement, body: Body) -> None:
+    """The body has what is to be measured, near the place."""
+    from ffr_dyn.stress import measured_modes  # of results, which stand above scenes
+
+    try:
+        measured_modes(measurement, body.model.surface)
+    except InputError as error:
+        raise InputError(f"measurement {measurement.name!r}: {error}") from None
 
 
 def _offer(name: str, known: Iterable[str]) -> str:
@@ -273,12 +298,28 @@ def _check_joints(scene: Scene) -> None:
             raise InputError(f"joint {joint.name!r} ties {table[i][1]!r} to itself; a joint needs two different bodies")
 
 
-def _acceleration(value: Any) -> tuple[TimeFunction, TimeFunction, TimeFunction]:
-    what = "base_acceleration"
+Components = tuple[TimeFunction, TimeFunction, TimeFunction]
+
+
+def _acceleration(what: str, value: Any) -> Components:
     if np.size(value) != 3 or len(value) != 3:
         raise InputError(f"{what} needs three components, not {value!r}")
     x, y, z = (as_time_function(component, what) for component in value)
     return x, y, z
+
+
+def _split_gravity(gravity: Any, base: Components) -> tuple[Any, Components]:
+    """The constant components of gravity, and the base acceleration less those that vary."""
+    if all(isinstance(component, (int, float, np.floating, np.integer)) for component in gravity):
+        return gravity, base
+    given = _acceleration("gravity", gravity)
+    steady = [f.data[0] if _is_constant(f) else 0.0 for f in given]
+    x, y, z = (b if _is_constant(g) else less(b, g) for g, b in zip(given, base, strict=True))
+    return steady, (x, y, z)
+
+
+def _is_constant(function: TimeFunction) -> bool:
+    return function.kind == POLYNOMIAL and not any(function.data[1:])
 
 
 def _vector(value: Any, size: int, what: str) -> Array:

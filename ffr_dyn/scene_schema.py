@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -41,7 +41,7 @@ from ffr_dyn.formula import Expression, is_constant, parse
 from ffr_dyn.integrators import METHODS
 from ffr_dyn.joint_forces import Actuator, JointFriction, JointSpring, JointStop, Servo
 from ffr_dyn.joints import Joint
-from ffr_dyn.measurement import Measurement
+from ffr_dyn.measurement import Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.parameters import as_number
 from ffr_dyn.surface_loads import ModalForce, NodalForces, Pressure
 from ffr_dyn.timefunction import HARMONIC, TimeFunction, constant, harmonic, piecewise, polynomial, table
@@ -166,6 +166,17 @@ def _of_time(value: float | str | FunctionEntry, info: ValidationInfo) -> float 
     return found.data[0] if is_constant(found) else found
 
 
+def _of_time_in(unit: str) -> Callable[[float | str | FunctionEntry, ValidationInfo], float | TimeFunction]:
+    """As `_of_time`, for a number with or without a unit of this dimension."""
+
+    def read(value: float | str | FunctionEntry, info: ValidationInfo) -> float | TimeFunction:
+        if isinstance(value, str) and split_quantity(value) is not None:
+            return as_number(value, _parameters(info), "it", unit)
+        return _of_time(value, info)
+
+    return read
+
+
 def _tabled(entry: FunctionEntry) -> TimeFunction:
     if entry.polynomial is not None:
         return polynomial(*entry.polynomial)
@@ -205,6 +216,7 @@ _Given = Annotated[
     Discriminator(_form, custom_error_type="function", custom_error_message="give a number, a formula or a table"),
 ]
 OfTime = Annotated[_Given, AfterValidator(_of_time)]
+Acceleration = Annotated[_Given, AfterValidator(_of_time_in("m/s^2"))]
 OfMotion = Annotated[_Given, AfterValidator(_expression)]
 
 
@@ -236,6 +248,8 @@ FIELDS: dict[str, Any] = {
     "PointDriver.x": OfTime,
     "PointDriver.y": OfTime,
     "PointDriver.z": OfTime,
+    "StressMeasurement.point": Metres,
+    "SectionMeasurement.point": Metres,
     "Load.force": Annotated[list[OfMotion], THREE],
     "Load.moment": Annotated[list[OfMotion], THREE],
     "SpringDamper.stiffness": or_curve("N/m"),
@@ -291,7 +305,11 @@ TABLES: dict[str, tuple[Kind, ...]] = {
         Kind("pressure", Pressure),
         Kind("modal-force", ModalForce),
     ),
-    "measurements": (Kind("", Measurement),),
+    "measurements": (
+        Kind("marker", Measurement),
+        Kind("stress", StressMeasurement),
+        Kind("section", SectionMeasurement),
+    ),
 }
 
 
@@ -495,8 +513,8 @@ class _SceneBase(_Strict):
     parameters: dict[str, Any] = {}
     inputs: dict[str, Number] = {}
     outputs: list[str] = ["default"]
-    gravity: Annotated[list[Annotated[float, In("m/s^2")]], THREE] = [0.0, 0.0, 0.0]
-    base_acceleration: Annotated[list[OfTime], THREE] = [0.0, 0.0, 0.0]
+    gravity: Annotated[list[Acceleration], THREE] = [0.0, 0.0, 0.0]
+    base_acceleration: Annotated[list[Acceleration], THREE] = [0.0, 0.0, 0.0]
     analysis: _one_of(list(ANALYSES.values()), list(ANALYSES))  # type: ignore[valid-type]
     ground: dict[str, Metres] = {}
     bodies: dict[str, BodyEntry]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.errors import InputError
-from ffr_dyn.operations import operate
+from ffr_dyn.operations import SUBTRACT, operate
 
 Array = np.ndarray
 
@@ -102,6 +102,18 @@ def signals_in(function: TimeFunction) -> Iterator[TimeFunction]:
 def operation(op: int, *operands: TimeFunction, parameter: float = 0.0) -> TimeFunction:
     """An operation of `ffr_dyn.operations` on one or two functions of time."""
     return TimeFunction(OPERATION, (float(op), parameter), None, operands)
+
+
+def less(a: TimeFunction, b: TimeFunction) -> TimeFunction:
+    """a - b, of the kind of b where a is zero, so that what is written as a table stays one."""
+    if not is_zero(a) or b.name or b.kind in (USER, OPERATION):
+        return operation(SUBTRACT, a, b)
+    kept = int(b.data[0]) + 3 if b.kind == PIECEWISE else 0  # counts and breaks
+    data = np.array(b.data)
+    data[kept:] *= -1
+    if b.kind == HARMONIC:
+        data[2:] *= -1  # speed and phase
+    return TimeFunction(b.kind, tuple(data.tolist()))
 
 
 def as_time_function(value: object, what: str) -> TimeFunction:

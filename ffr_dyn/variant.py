@@ -24,7 +24,9 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.condensation import statically_complete
+from ffr_dyn.drivers import PointDriver
 from ffr_dyn.errors import InputError
+from ffr_dyn.forces import Bushing
 from ffr_dyn.scene import INERTIA_TERMS, Body, Scene
 from ffr_dyn.surface_loads import ModalForce
 from ffr_prep.body import FlexibleBody, recombined, truncated
@@ -40,16 +42,23 @@ Modes = int | Sequence[int]
 # ---- bodies -------------------------------------------------------------------------------------------------------
 
 
-def basis_of(model: FlexibleBody, keep: Modes) -> Array:
+def basis_of(model: FlexibleBody, keep: Modes, interfaces: Iterable[str] | None = None) -> Array:
     """(n, m) how the elastic coordinates of a body follow from those of its smaller variant: q = V p, V^T V = I.
 
     keep : how many, statically complete at the interfaces (see `ffr_dyn.condensation`), or the numbers, from 0, of the modes
            that stay as they are. All of them, where that many are not there
+    interfaces : those whose statics count, all by default
     """
     if isinstance(keep, (int, np.integer)):
         if keep < 0:
             raise InputError(f"body {model.name!r}: cannot keep {keep} modes; give a number from 0")
-        return np.eye(model.n) if keep >= model.n else statically_complete(model, int(keep)) if keep else _none(model)
+        return (
+            np.eye(model.n)
+            if keep >= model.n
+            else statically_complete(model, int(keep), interfaces)
+            if keep
+            else _none(model)
+        )
     return np.eye(model.n)[:, list(keep)] if len(keep) else _none(model)
 
 
@@ -72,7 +81,7 @@ def with_basis(model: FlexibleBody, V: Array) -> FlexibleBody:
     )
 
 
-def with_modes(body: Body, keep: Modes) -> Body:
+def with_modes(body: Body, keep: Modes, interfaces: Iterable[str] | None = None) -> Body:
     """The body with fewer elastic coordinates, chosen as in `basis_of`; it starts in the nearest state (least mass).
 
     Damping ratios become those of the damping matrix in the new coordinates, without what couples these.
@@ -83,7 +92,7 @@ def with_modes(body: Body, keep: Modes) -> Body:
         return replace(body, model=model, q=body.q[at], q_dot=body.q_dot[at], damping=body.damping[at])
     if keep >= body.model.n:
         return body
-    V = basis_of(body.model, keep)
+    V = basis_of(body.model, keep, interfaces)
     model = with_basis(body.model, V)
     return replace(body, model=model, q=body.q @ V, q_dot=body.q_dot @ V, damping=_damping(body, model, V))
 
@@ -139,7 +148,8 @@ def vary(
 ) -> Scene:
     """The scene with variants of its bodies.
 
-    modes  : how many to keep of each body, or which; for all flexible bodies, or by body name (see `with_modes`)
+    modes  : how many to keep of each body, or which; for all flexible bodies, or by body name (see `with_modes`). The statics
+             are kept of the interfaces at which something acts
     drop   : `TERMS` to leave out of all bodies, or by body name
     rigid  : names of bodies that become rigid
     models : by body name, another body for it (see `with_model`); modes are kept of that one
@@ -158,17 +168,31 @@ def vary(
     for body in scene.bodies:
         made = with_model(body, models[body.name]) if body.name in models else body
         models[body.name] = made.model
-        kept = with_modes(made, wanted[body.name]) if body.name in wanted else made
+        used = used_interfaces(scene, body)
+        kept = with_modes(made, wanted[body.name], used) if body.name in wanted else made
         bodies.append(without_terms(kept, without.get(body.name, ())))
-    forces = [_in_basis(force, models, wanted) if isinstance(force, ModalForce) else force for force in scene.forces]
+    modal = {force.body for force in scene.forces if isinstance(force, ModalForce)}
+    bases = {
+        body.name: basis_of(models[body.name], wanted.get(body.name, models[body.name].n), used_interfaces(scene, body))
+        for body in scene.bodies
+        if body.name in modal
+    }
+    forces = [_in_basis(force, bases[force.body]) if isinstance(force, ModalForce) else force for force in scene.forces]
     return replace(scene, bodies=tuple(bodies), forces=tuple(forces))
 
 
-def _in_basis(force: ModalForce, models: Mapping[str, FlexibleBody], wanted: Mapping[str, Modes]) -> ModalForce:
-    model = models[force.body]
-    if len(force.values) != model.n:
+def used_interfaces(scene: Scene, body: Body) -> tuple[str, ...]:
+    """The interfaces of a body at which joints, drivers, loads, springs or bushings act."""
+    pairs: list[Any] = [*scene.joints, *scene.springs, *(d for d in scene.drivers if isinstance(d, PointDriver))]
+    pairs += [force for force in scene.forces if isinstance(force, Bushing)]
+    ends = {load.marker for load in scene.loads} | {end for pair in pairs for end in (pair.i, pair.j)}
+    return tuple(i.name for i in body.model.interfaces if f"{body.name}.{i.name}" in ends)
+
+
+def _in_basis(force: ModalForce, V: Array) -> ModalForce:
+    if len(force.values) != len(V):
         raise InputError(f"force {force.name!r} acts on modes of {force.body!r}, which another body file does not have")
-    return replace(force, values=force.values @ basis_of(model, wanted.get(force.body, model.n)))
+    return replace(force, values=force.values @ V)
 
 
 def _by_name(given: Any, everywhere: Iterable[str], names: list[str]) -> dict[str, Any]:

@@ -18,9 +18,11 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from ffr_prep.errors import ComputationError
+from ffr_prep.errors import ComputationError, InputError
 from ffr_prep.factor import CHOLESKY, FreeBody, Solver, free_body
 from ffr_prep.interface import CoupledModel
+from ffr_prep.progress import Advance, no_advance
+from ffr_prep.reference import body_length, free_rigid_motions, motion_in_words
 
 Array = np.ndarray
 
@@ -44,9 +46,9 @@ class Basis:
     warnings: tuple[str, ...] = ()
 
 
-def factorised(model: CoupledModel, solver: Solver = CHOLESKY) -> FreeBody:
+def factorised(model: CoupledModel, solver: Solver = CHOLESKY, advance: Advance = no_advance) -> FreeBody:
     """The one factorisation that serves modes, static shapes, stiffening loads and error reports of a model."""
-    return free_body(model.K, model.T, model.places, solver)
+    return free_body(model.K, model.T, model.places, solver, advance)
 
 
 # ---- from vectors to a basis --------------------------------------------------------------------------------------
@@ -136,7 +138,8 @@ def _signs(Z: Array) -> Array:
 def check_basis(model: CoupledModel, L: Array, basis: Basis) -> None:
     """Raises ComputationError when the basis is not what every later step relies on.
 
-    That is: mass-orthonormal, diagonal in the stiffness, within the reference conditions, without a rigid motion.
+    That is: mass-orthonormal, diagonal in the stiffness, within the reference conditions, without a rigid motion. Raises
+    InputError when the mass has no inertia against a rigid motion.
     """
     Z, omega2 = basis.Z, basis.omega2
     _check_small("Z^T M Z - I", Z.T @ (model.M @ Z) - np.eye(len(omega2)), 1e-9)
@@ -159,5 +162,17 @@ def _check_small(name: str, value: Array, allowed: float) -> None:
 def _rigid_content(model: CoupledModel, Z: Array) -> Array:
     """(n,) the part of each mode's unit mass norm that a rigid motion can take away."""
     momenta = model.M @ model.T
+    _check_inertia(model, model.T.T @ momenta)
     coupling = momenta.T @ Z
     return np.einsum("in,in->n", coupling, np.linalg.solve(model.T.T @ momenta, coupling))
+
+
+def _check_inertia(model: CoupledModel, of_rigid_motions: Array) -> None:
+    """A body without inertia against a rigid motion cannot be moved by it; masses on one line are such a body."""
+    length = body_length(model)
+    free = free_rigid_motions(of_rigid_motions, length)
+    if free.shape[1]:
+        raise InputError(
+            f"the mass has no inertia against {motion_in_words(free[:, 0], model.centre, length)}: give it rotary inertia, "
+            "or masses off this line"
+        )

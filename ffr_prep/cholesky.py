@@ -32,6 +32,7 @@ from ffr_prep.fronts import (
     shape,
     update_tile,
 )
+from ffr_prep.progress import Advance, no_advance
 from ffr_prep.threads import Map, threads
 
 Array = np.ndarray
@@ -71,11 +72,12 @@ class Factor:
     copied: Array
 
 
-def cholesky(A: sp.csr_array, positions: Array) -> Factor:
+def cholesky(A: sp.csr_array, positions: Array, advance: Advance = no_advance) -> Factor:
     """Factorise the symmetric positive definite A (n, n).
 
     positions : (n, 3) where each unknown is, to cut by; rows of NaN for unknowns that touch many others, such as the
                 coordinates of a rigid interface, which are eliminated last
+    advance   : called as the elimination proceeds, with the share of its operations
 
     Raises numpy.linalg.LinAlgError when A is not positive definite.
     """
@@ -87,7 +89,7 @@ def cholesky(A: sp.csr_array, positions: Array) -> Factor:
     fronts = _empty_fronts(matrix, np.cumsum([0, *map(len, pieces)]), np.array([len(of) for of in below]))
     division = _division(fronts, below)
     with threads() as each:
-        _eliminate_all(fronts, division, matrix, each)
+        _eliminate_all(fronts, division, matrix, each, _Elimination(_work(fronts), advance))
     return Factor(order, fronts, division, *_private_rows(fronts, division.branches))
 
 
@@ -123,8 +125,7 @@ def _empty_fronts(matrix: Sorted, starts: Array, children: Array) -> Fronts:
 
 def _division(fronts: Fronts, below: list[list[int]]) -> Division:
     """The tree is cut at its heaviest front until all branches are light."""
-    own, rest = np.diff(fronts.starts), np.diff(fronts.ends)
-    first, work = np.arange(len(below)), own * (own + rest) ** 2.0
+    first, work = np.arange(len(below)), _work(fronts)
     light = work.sum() / _BRANCHES
     for k, of in enumerate(below):
         first[k] = min([k, *first[of]])
@@ -137,6 +138,12 @@ def _division(fronts: Fronts, below: list[list[int]]) -> Division:
         for k in below[heaviest]:
             heapq.heappush(branches, (-work[k], k))
     return Division(np.array(sorted((first[k], k) for _, k in branches)), sorted(trunk), below)
+
+
+def _work(fronts: Fronts) -> Array:
+    """(F,) operations of each front, up to a factor."""
+    own, rest = np.diff(fronts.starts), np.diff(fronts.ends)
+    return own * (own + rest) ** 2.0
 
 
 def _private_rows(fronts: Fronts, branches: Array) -> tuple[Array, Array]:
@@ -156,13 +163,30 @@ def _private_rows(fronts: Fronts, branches: Array) -> tuple[Array, Array]:
 # ---- elimination --------------------------------------------------------------------------------------------------
 
 
-def _eliminate_all(fronts: Fronts, division: Division, matrix: Sorted, each: Map) -> None:
+@dataclass
+class _Elimination:
+    """How much of the work (F,) of the fronts is done."""
+
+    work: Array
+    advance: Advance
+    fronts: int = 0
+    done: float = 0.0
+
+    def add(self, first: int, last: int) -> None:
+        """The fronts first...last are eliminated."""
+        self.fronts += last - first + 1
+        self.done += self.work[first : last + 1].sum()
+        self.advance(self.done / self.work.sum(), f"{self.fronts} of {self.work.size} fronts")
+
+
+def _eliminate_all(fronts: Fronts, division: Division, matrix: Sorted, each: Map, elimination: _Elimination) -> None:
     results = each(lambda branch: eliminate_branch(fronts, branch[0], branch[1], matrix), division.branches)
     updates: dict[int, Array] = {}
-    for (_, last), (update, bad) in zip(division.branches, results, strict=True):
+    for (first, last), (update, bad) in zip(division.branches, results, strict=True):
         _check_pivot(bad)
         rest = shape(fronts, last)[1]
         updates[int(last)] = update.reshape(rest, rest)
+        elimination.add(int(first), int(last))
     local = np.empty(len(matrix.order), np.int32)
     for k in division.trunk:
         rest = shape(fronts, k)[1]
@@ -172,6 +196,7 @@ def _eliminate_all(fronts: Fronts, division: Division, matrix: Sorted, each: Map
             _add_tiled(fronts, k, child, updates.pop(child), update, local, each)
         _eliminate_tiled(fronts, k, update, each)
         updates[k] = update
+        elimination.add(k, k)
 
 
 def _add_tiled(fronts: Fronts, k: int, child: int, of_child: Array, update: Array, local: Array, each: Map) -> None:

@@ -2,33 +2,32 @@
 
 from __future__ import annotations
 
-import os
 import re
 import sys
-import time
-import tomllib
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import pairwise
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from ffr_prep.cli_conversion import convert
 from ffr_prep.cli_interchange import export_body, import_body
 from ffr_prep.cli_matrices import reduce_matrices_command
+from ffr_prep.cli_options import (
+    check_points,
+    check_writable,
+    interface_of,
+    material_of,
+    number_of,
+    numbers_of,
+    reference_of,
+)
 from ffr_prep.cli_reduction import NOTES as REDUCTION_NOTES
 from ffr_prep.cli_reduction import band_of, draw_quality, reduction_of, reduction_options
 from ffr_prep.cli_solver import solver_of, solver_options
 from ffr_prep.cli_structure import reduce_structure
+from ffr_prep.cli_terminal import closing, show, terminal_steps, written
 from ffr_prep.errors import ComputationError, InputError
-
-if TYPE_CHECKING:
-    from ffr_prep.interface import InterfaceRegion
-    from ffr_prep.material import Material
-    from ffr_prep.mesh import Mesh
-    from ffr_prep.reference import ReferenceConditions
 
 EXAMPLE = """\b
 Example:
@@ -63,7 +62,6 @@ MATERIAL_NOTES = """\b
 Materials: a name (steel, aluminium, titanium, ...), or E=7e10,nu=0.3,rho=5540 in SI units; for several volumes
   --material web=steel --material rim=E=7e10,nu=0.3,rho=2700, each with the name of a volume of the mesh.
 """
-_FAR = 10.0
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 120}
 
 
@@ -105,8 +103,8 @@ def mesh(mesh: Path, unit: str | None, size: float | None, numbers: tuple[str, .
     from ffr_prep.mesh import check_mesh, read_mesh
     from ffr_prep.report import mesh_lines
 
-    loaded = read_mesh(mesh, unit=unit, size=size, numbers=_numbers(numbers), order=order)
-    _print(mesh_lines(loaded))
+    loaded = read_mesh(mesh, unit=unit, size=size, numbers=numbers_of(numbers), order=order)
+    show(mesh_lines(loaded))
     check_mesh(loaded)
 
 
@@ -149,21 +147,21 @@ def reduce(
     MESH is a geometry that is meshed here (.geo, .step, .iges, .brep) or a mesh of solids (.msh, .inp, .bdf, .vtu,
     .med, ...). Everything in the body is in SI units.
     """
-    from ffr_prep.body import save_body
     from ffr_prep.mesh import read_mesh
     from ffr_prep.reduce import reduce_mesh
-    from ffr_prep.report import mesh_lines, short_lines
+    from ffr_prep.report import mesh_lines
 
-    material, regions = _material(materials), [_interface(text) for text in interfaces]
-    conditions, reduction, band = _reference(reference), reduction_of(options), band_of(options)
+    material, regions = material_of(materials), [interface_of(text) for text in interfaces]
+    conditions, reduction, band = reference_of(reference), reduction_of(options), band_of(options)
     solver = solver_of(options)
-    parameters = _numbers(numbers)
-    _check_writable(output)
-    steps = Steps(visible=sys.stderr.isatty())
+    parameters = numbers_of(numbers)
+    check_writable(output)
+    steps = terminal_steps()
     loaded = read_mesh(mesh, unit=unit, size=size, numbers=parameters, order=order, progress=steps)
     steps.end()
-    _print(mesh_lines(loaded))
-    _check_points(regions, loaded)
+    show(mesh_lines(loaded))
+    check_points(regions, loaded)
+    source = {"file": mesh.name, "unit": unit, "size": size, "numbers": parameters, "order": order}
     body = reduce_mesh(
         loaded,
         name=name or output.stem,
@@ -176,19 +174,12 @@ def reduce(
         quality=band,
         solver=solver,
         progress=steps,
-        provenance={
-            "source": {"file": mesh.name, "unit": unit, "size": size, "numbers": parameters, "order": order},
-            "notes": list(loaded.notes),
-        },
+        advance=steps.advance,
+        provenance={"source": source, "notes": list(loaded.notes)},
     )
-    steps("write the body file")
-    save_body(body, output)
-    steps.end()
-    _print(short_lines(body))
+    written(body, output, steps)
     draw_quality(body, options)
-    click.echo(f"time        {steps.in_words()}")
-    click.echo(f"memory      {peak_memory()}")
-    click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")
+    closing(output, steps)
 
 
 @cli.command()
@@ -202,7 +193,7 @@ def info(body: Path) -> None:
     from ffr_prep.body import load_body
     from ffr_prep.report import body_lines
 
-    _print(body_lines(load_body(body)))
+    show(body_lines(load_body(body)))
 
 
 @cli.command()
@@ -222,7 +213,7 @@ def modes(body: Path, output: Path, chosen: str, scale: str) -> None:
 
     loaded = load_body(body)
     numbers = _mode_numbers(chosen, loaded.n)
-    factor = "auto" if scale == "auto" else _number("--scale", scale)
+    factor = "auto" if scale == "auto" else number_of("--scale", scale)
     for path in mode_pictures(loaded, output, numbers, factor):
         click.echo(f"picture     {path}")
 
@@ -235,90 +226,6 @@ cli.add_command(reduce_structure)
 
 
 # ---- arguments ----------------------------------------------------------------------------------------------------
-
-
-def _numbers(settings: Sequence[str]) -> dict[str, float]:
-    pairs = [text.partition("=") for text in settings]
-    return {name.strip(): _number(f"--set {name}", value) for name, _, value in pairs}
-
-
-def _number(what: str, text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"{what}: {text!r} is not a number") from None
-
-
-def _material(texts: Sequence[str]) -> Material | Mapping[str, Material]:
-    """One material, or materials by group where a text is GROUP=MATERIAL."""
-    from ffr_prep.material import parse_material
-
-    groups = [re.fullmatch(r"(?!(?:E|nu|rho|name)=)([^=,]+)=(.+)", text) for text in texts]
-    if len(texts) == 1 and groups[0] is None:
-        return parse_material(texts[0])
-    wrong = [text for text, group in zip(texts, groups, strict=True) if group is None]
-    if wrong:
-        raise InputError(f"--material {wrong[0]}: with several materials, each needs its volume: VOLUME={wrong[0]}")
-    names = [group[1] for group in groups if group]
-    if len(set(names)) < len(names):
-        raise InputError(f"--material: a volume is given twice: {', '.join(names)}")
-    return {group[1]: parse_material(group[2]) for group in groups if group}
-
-
-def _interface(text: str) -> InterfaceRegion:
-    """NAME[=REGION][:rigid|mean][@x,y,z]."""
-    from ffr_prep.interface import InterfaceRegion
-
-    parts = re.fullmatch(r"([^=:@]+)(?:=([^:@]+))?(?::(\w+))?(?:@([^@]+))?", text)
-    if parts is None:
-        raise InputError(f"--interface {text}: write NAME, NAME:mean, NAME=SURFACE or NAME@x,y,z (see --help)")
-    name, region, kind, point = parts.groups()
-    return InterfaceRegion(name, region, kind or "rigid", None if point is None else _point(text, point))
-
-
-def _point(text: str, point: str) -> tuple[float, float, float]:
-    values = [_number(f"--interface {text}", value) for value in point.split(",")]
-    if len(values) != 3:
-        raise InputError(f"--interface {text}: a point has three coordinates x,y,z in metres, not {len(values)}")
-    return values[0], values[1], values[2]
-
-
-def _reference(text: str) -> ReferenceConditions:
-    from ffr_prep.reference import FixedTo, MeanAxis, SimplySupported
-
-    kind, _, names = text.partition(":")
-    interfaces = [name.strip() for name in names.split(",") if name.strip()]
-    if text == "mean-axis":
-        return MeanAxis()
-    if kind == "fixed" and len(interfaces) == 1:
-        return FixedTo(interfaces[0])
-    if kind == "simply-supported" and len(interfaces) == 2:
-        return SimplySupported(interfaces[0], interfaces[1])
-    if text.endswith(".toml"):
-        return _supports(Path(text))
-    raise InputError(
-        f"--reference {text}: write fixed:NAME, simply-supported:PIN,ROLLER, mean-axis or a FILE.toml (see --help)"
-    )
-
-
-def _supports(path: Path) -> ReferenceConditions:
-    """Prevented motions from a file: tables [[support]] with interface, motion and direction."""
-    from ffr_prep.reference import Support, Supports
-
-    try:
-        content = tomllib.loads(path.read_text())
-        entries = content.pop("support")
-        supports = tuple(Support(e.pop("interface"), e.pop("motion"), tuple(e.pop("direction"))) for e in entries)
-    except FileNotFoundError:
-        raise InputError(f"reference conditions {path} do not exist") from None
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    except (tomllib.TOMLDecodeError, KeyError, TypeError, AttributeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} is not a list of supports ({error!r}); `ffr-prep reduce --help` shows one") from None
-    unknown = [*content, *(key for entry in entries for key in entry)]
-    if unknown:
-        raise InputError(f"{path}: {unknown[0]!r} is not known; a support has interface, motion and direction")
-    return Supports(supports)
 
 
 def _mode_numbers(text: str, count: int) -> list[int]:
@@ -334,72 +241,7 @@ def _mode_numbers(text: str, count: int) -> list[int]:
     return list(dict.fromkeys(numbers))
 
 
-def _check_points(interfaces: Sequence[InterfaceRegion], mesh: Mesh) -> None:
-    """A point far away is most likely given in millimetres."""
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    reach = _FAR * max(high - low)
-    for interface in interfaces:
-        if interface.point is not None and any((interface.point < low - reach) | (interface.point > high + reach)):
-            raise InputError(
-                f"interface {interface.name!r}: its point {interface.point} is far from the body, which lies between "
-                f"({', '.join(f'{x:.4g}' for x in low)}) and ({', '.join(f'{x:.4g}' for x in high)}) m; give it in metres"
-            )
-
-
-def _check_writable(output: Path) -> None:
-    """Before the work, not after it."""
-    if output.is_dir():
-        raise InputError(f"--output {output} is a folder; name the body file to write, such as {output / 'rod.ffr'}")
-    output.parent.mkdir(parents=True, exist_ok=True)
-    if not os.access(output.parent, os.W_OK):
-        raise InputError(f"--output {output}: the folder {output.parent} cannot be written to")
-
-
-# ---- terminal -----------------------------------------------------------------------------------------------------
-
-
-@dataclass
-class Steps:
-    """Notes when each step of the work begins; tells of it on a terminal."""
-
-    visible: bool
-    begun: list[tuple[str, float]] = field(default_factory=list)
-
-    def __call__(self, step: str) -> None:
-        """A step begins, and the one before ends."""
-        self._tell_end()
-        self.begun.append((step, time.perf_counter()))
-        if self.visible:
-            click.echo(f"{step} ... ", err=True, nl=False)
-
-    def end(self) -> None:
-        """The step ends and no other begins."""
-        self._tell_end()
-        self.begun.append(("", time.perf_counter()))
-
-    def in_words(self) -> str:
-        """The steps with the seconds each took."""
-        spans = [(name, later - since) for (name, since), (_, later) in pairwise(self.begun)]
-        return ", ".join(f"{name} {span:.1f} s" for name, span in spans if name)
-
-    def _tell_end(self) -> None:
-        if self.visible and self.begun and self.begun[-1][0]:
-            click.echo(f"{time.perf_counter() - self.begun[-1][1]:.1f} s", err=True)
-
-
-def peak_memory() -> str:
-    """The most that this process ever had in memory, in words."""
-    if sys.platform == "win32":
-        return "not known on Windows"
-    import resource
-
-    unit = 1 if sys.platform == "darwin" else 1024
-    return f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 2**30:.2f} GiB at most"
-
-
-def _print(lines: Iterable[str]) -> None:
-    for line in lines:
-        click.echo(line)
+# ---- the door -----------------------------------------------------------------------------------------------------
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -6,6 +6,9 @@ from pathlib import Path
 
 import click
 
+from ffr_prep.cli_options import check_writable, reference_of
+from ffr_prep.cli_terminal import show
+
 _PATH = click.Path(path_type=Path)
 
 
@@ -18,13 +21,12 @@ def convert(body: Path, output: Path, reference: str) -> None:
 
     The motions that the body can make stay the same. What it has lost before is said, and not brought back.
     """
-    from ffr_prep import cli
     from ffr_prep.body import load_body, save_body
     from ffr_prep.report import short_lines
 
-    conditions = cli._reference(reference)
-    cli._check_writable(output)
+    conditions = reference_of(reference)
+    check_writable(output)
     converted = load_body(body).with_reference(conditions)
     save_body(converted, output)
-    cli._print(short_lines(converted))
+    show(short_lines(converted))
     click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from ffr_prep.cli_options import check_writable, interface_of, reference_of
 from ffr_prep.cli_reduction import band_of, draw_quality, reduction_of, reduction_options
+from ffr_prep.cli_solver import solver_of, solver_options
+from ffr_prep.cli_terminal import closing, show, terminal_steps, written
 from ffr_prep.errors import InputError
 
 if TYPE_CHECKING:
@@ -51,6 +53,7 @@ Reference conditions and methods are those of `ffr-prep reduce`. Geometric stiff
 @click.option("--interface", "interfaces", multiple=True, metavar="INTERFACE", help="See below; may be repeated.")
 @click.option("--reference", default="mean-axis", show_default=True, metavar="CONDITIONS", help="As in reduce.")
 @reduction_options
+@solver_options
 @click.option("--surface", type=_PATH, help="Mesh of the same solid, for drawing; in the length unit of FILES.")
 def reduce_matrices_command(
     files: tuple[Path, ...],
@@ -67,21 +70,19 @@ def reduce_matrices_command(
 
     The matrices come from any finite-element program; everything in the body is in SI units.
     """
-    from ffr_prep import cli
-    from ffr_prep.body import save_body
     from ffr_prep.matrices import reduce_matrices
     from ffr_prep.matrix_source import read_matrices
-    from ffr_prep.report import short_lines
 
-    regions = [cli._interface(text) for text in interfaces]
-    conditions, reduction, band = cli._reference(reference), reduction_of(options), band_of(options)
-    cli._check_writable(output)
-    steps = cli.Steps(visible=sys.stderr.isatty())
+    regions = [interface_of(text) for text in interfaces]
+    conditions, reduction, band = reference_of(reference), reduction_of(options), band_of(options)
+    solver = solver_of(options)
+    check_writable(output)
+    steps = terminal_steps()
     steps("read the matrices")
     model = _named(read_matrices(files, units=units), groups)
     model = model if surface is None else _drawn(model, surface)
     steps.end()
-    cli._print(_lines(model))
+    show(_lines(model))
     body = reduce_matrices(
         model,
         name=name or output.stem,
@@ -89,15 +90,13 @@ def reduce_matrices_command(
         reference=conditions,
         reduction=reduction,
         quality=band,
+        solver=solver,
         progress=steps,
+        advance=steps.advance,
     )
-    steps("write the body file")
-    save_body(body, output)
-    steps.end()
-    cli._print(short_lines(body))
+    written(body, output, steps)
     draw_quality(body, options)
-    click.echo(f"time        {steps.in_words()}")
-    click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")
+    closing(output, steps)
 
 
 def _lines(model: MatrixModel) -> Iterator[str]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
+
+from ffr_prep.cli_options import check_writable
+from ffr_prep.cli_solver import solver_of, solver_options
+from ffr_prep.cli_terminal import closing, show, terminal_steps, written
 
 if TYPE_CHECKING:
     from ffr_prep.frame import Frame
@@ -38,26 +41,27 @@ flange), general (A, Iy, Iz, J, ky, kz). References: fixed, simply-supported (pi
 @click.command("reduce-structure", epilog=NOTES)
 @click.argument("structure", type=_PATH)
 @click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
-def reduce_structure(structure: Path, output: Path) -> None:
+@solver_options
+def reduce_structure(structure: Path, output: Path, **options: Any) -> None:
     """Reduce the beams and plates that STRUCTURE describes, a TOML file, to a flexible body and write it to a file."""
-    from ffr_prep import cli
-    from ffr_prep.body import save_body
-    from ffr_prep.report import short_lines
     from ffr_prep.structural import reduce_frame
     from ffr_prep.structural_file import load_structure
 
-    cli._check_writable(output)
-    steps = cli.Steps(visible=sys.stderr.isatty())
+    solver = solver_of(options)
+    check_writable(output)
+    steps = terminal_steps()
     loaded = load_structure(structure, steps)
     steps.end()
-    cli._print(_lines(loaded.frame))
-    body = reduce_frame(**vars(loaded), progress=steps, provenance={"source": {"file": structure.name}})
-    steps("write the body file")
-    save_body(body, output)
-    steps.end()
-    cli._print(short_lines(body))
-    click.echo(f"time        {steps.in_words()}")
-    click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")
+    show(_lines(loaded.frame))
+    body = reduce_frame(
+        **vars(loaded),
+        solver=solver,
+        progress=steps,
+        advance=steps.advance,
+        provenance={"source": {"file": structure.name}},
+    )
+    written(body, output, steps)
+    closing(output, steps)
 
 
 def _lines(frame: Frame) -> Iterator[str]:

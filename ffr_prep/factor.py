@@ -26,6 +26,7 @@ from scipy.sparse.linalg import splu
 from ffr_prep.cholesky import cholesky, solve_cholesky
 from ffr_prep.errors import ComputationError, InputError
 from ffr_prep.lanczos import lowest_modes
+from ffr_prep.progress import Advance, no_advance
 from ffr_prep.slepc import SlepcProcess, mpi_modes, mpi_solve, started
 
 Array = np.ndarray
@@ -65,11 +66,11 @@ class Solver:
             )
 
 
-def _cholesky(A: sp.csr_array, positions: Array) -> Solve:
-    return partial(solve_cholesky, cholesky(A, positions))
+def _cholesky(A: sp.csr_array, positions: Array, advance: Advance) -> Solve:
+    return partial(solve_cholesky, cholesky(A, positions, advance))
 
 
-def _superlu(A: sp.csr_array, positions: Array) -> Solve:
+def _superlu(A: sp.csr_array, positions: Array, advance: Advance) -> Solve:
     """Without pivoting, so that the signs of the pivots show whether A is positive definite."""
     try:
         lu = splu(A.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
@@ -80,7 +81,7 @@ def _superlu(A: sp.csr_array, positions: Array) -> Solve:
     return lu.solve
 
 
-def _pardiso(A: sp.csr_array, positions: Array) -> Solve:
+def _pardiso(A: sp.csr_array, positions: Array, advance: Advance) -> Solve:
     """Matrix type 2, positive definite: with it Pardiso fails at a pivot that is not."""
     try:
         import pypardiso
@@ -95,7 +96,7 @@ def _pardiso(A: sp.csr_array, positions: Array) -> Solve:
     return lambda b: pardiso.solve(upper, np.asfortranarray(b))
 
 
-_FACTORISATIONS: dict[str, Callable[[sp.csr_array, Array], Solve]] = {
+_FACTORISATIONS: dict[str, Callable[[sp.csr_array, Array, Advance], Solve]] = {
     "cholesky": _cholesky,
     "superlu": _superlu,
     "pardiso": _pardiso,
@@ -106,15 +107,16 @@ CHOLESKY = Solver()
 # ---- factorisation ------------------------------------------------------------------------------------------------
 
 
-def factorise(A: sp.csr_array, positions: Array, solver: Solver = CHOLESKY) -> Solve:
+def factorise(A: sp.csr_array, positions: Array, solver: Solver = CHOLESKY, advance: Advance = no_advance) -> Solve:
     """The solver of a sparse symmetric positive definite matrix A (n, n): b (n, r) -> A^-1 b.
 
     positions : (n, 3) where each unknown is; rows of NaN for unknowns that touch many others
+    advance   : told how far the factorisation is, where the solver knows (cholesky)
 
     Raises ComputationError when A is singular to working precision, InputError when the solver is not installed.
     """
     try:
-        solve = _FACTORISATIONS[solver.name](A, positions)
+        solve = _FACTORISATIONS[solver.name](A, positions, advance)
     except np.linalg.LinAlgError as error:
         raise ComputationError(f"the stiffness matrix is not positive definite ({error}); {_REMEDY}") from None
     _check_regular(A, solve)
@@ -144,10 +146,13 @@ class FreeBody:
     lowest: Callable[[SupportedBody, sp.csr_array, int], tuple[Array, Array]]
 
 
-def free_body(K: sp.csr_array, T: Array, positions: Array, solver: Solver = CHOLESKY) -> FreeBody:
+def free_body(
+    K: sp.csr_array, T: Array, positions: Array, solver: Solver = CHOLESKY, advance: Advance = no_advance
+) -> FreeBody:
     """Clamp six coordinates, chosen so that the rigid motions T (Z, 6) are best held, and factorise once.
 
     positions : (Z, 3) where each coordinate is; rows of NaN for those of rigid interfaces
+    advance   : told how far the factorisation is, and later the search for modes
 
     Raises as `factorise`.
     """
@@ -156,7 +161,8 @@ def free_body(K: sp.csr_array, T: Array, positions: Array, solver: Solver = CHOL
     free = np.delete(np.arange(K.shape[0]), order[:6])
     clamped = K[free][:, free]
     if solver.name != "slepc":
-        return FreeBody(K, rigid, partial(_extended, factorise(clamped, positions[free], solver), free), _by_lanczos)
+        solve = factorise(clamped, positions[free], solver, advance)
+        return FreeBody(K, rigid, partial(_extended, solve, free), partial(_by_lanczos, advance))
     process = started(clamped, solver.ranks)
     solve = partial(mpi_solve, process)
     _check_regular(clamped, solve)
@@ -170,12 +176,12 @@ def _extended(solve_free: Solve, free: Array, load: Array) -> Array:
     return displacement
 
 
-def _by_lanczos(held: SupportedBody, M: sp.csr_array, count: int) -> tuple[Array, Array]:
+def _by_lanczos(advance: Advance, held: SupportedBody, M: sp.csr_array, count: int) -> tuple[Array, Array]:
     def flexibility(loads: Array) -> Array:
         return solve_supported(held, loads, np.zeros((len(held.C), loads.shape[1])))[0]
 
     start = np.random.default_rng(0).standard_normal((M.shape[0], _BLOCK))
-    return lowest_modes(flexibility, M, start, count, most=20 * count + 300)
+    return lowest_modes(flexibility, M, start, count, most=20 * count + 300, advance=advance)
 
 
 def _by_slepc(process: SlepcProcess, held: SupportedBody, M: sp.csr_array, count: int) -> tuple[Array, Array]:

@@ -19,6 +19,7 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from ffr_prep.errors import ComputationError
+from ffr_prep.progress import Advance, no_advance
 from ffr_prep.threads import Map, pieces, sparse_product, threads
 
 Array = np.ndarray
@@ -29,13 +30,19 @@ _PANEL = 64
 
 
 def lowest_modes(
-    flexibility: Callable[[Array], Array], M: sp.csr_array, start: Array, count: int, most: int
+    flexibility: Callable[[Array], Array],
+    M: sp.csr_array,
+    start: Array,
+    count: int,
+    most: int,
+    advance: Advance = no_advance,
 ) -> tuple[Array, Array]:
     """The `count` lowest omega2 (count,) [rad^2/s^2], ascending, and their M-orthonormal modes (Z, count).
 
     flexibility : (Z, b) loads -> (Z, b) displacements, symmetric and semidefinite
     start       : (Z, b) start vectors
     most        : vectors that the search space may have
+    advance     : called after each pass, with the share of the modes that have converged
 
     Raises ComputationError when the residual |G M u - u / omega2| of a mode, in the norm of the mass, is not below
     1e-9 / omega2 by then. The error of omega2 is of second order in it.
@@ -52,10 +59,11 @@ def lowest_modes(
         values, vectors = values[::-1][:count], vectors[:, ::-1][:, :count]
         coupling = momenta.T @ following
         residuals = np.linalg.norm(coupling @ vectors[-following.shape[1] :], axis=0)
-        if len(values) == count and (residuals <= _RESIDUAL * values).all():
+        converged = int(np.sum(residuals <= _RESIDUAL * values))
+        advance(converged / count, f"{converged} of {count} modes")
+        if converged == count:
             return 1 / values, _combined(Q, vectors)
         if len(T) + block.shape[1] > most or not block.size:
-            converged = int(np.sum(residuals <= _RESIDUAL * values))
             raise ComputationError(
                 f"only {converged} of {count} normal modes converged with {len(T)} vectors: ask for fewer modes"
             )

@@ -8,7 +8,7 @@ Geometric stiffening needs stresses, which matrices do not give, so bodies made 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
@@ -20,7 +20,7 @@ from threadpoolctl import threadpool_limits
 from ffr_prep.basis import Basis, check_basis, factorised
 from ffr_prep.body import FlexibleBody, Surface
 from ffr_prep.errors import ComputationError, InputError
-from ffr_prep.factor import FreeBody
+from ffr_prep.factor import CHOLESKY, FreeBody, Solver
 from ffr_prep.interface import CoupledModel, InterfaceRegion
 from ffr_prep.invariants import InertiaIntegrals
 from ffr_prep.matrix_checks import (
@@ -33,6 +33,7 @@ from ffr_prep.matrix_checks import (
 from ffr_prep.matrix_coupling import couple_matrices, tie_matrices
 from ffr_prep.matrix_model import MatrixModel, model_hash, without_empty_rows
 from ffr_prep.nodal_inertia import nodal_integrals, scalar_integrals, scalar_mass
+from ffr_prep.progress import Advance, Stages, no_advance, no_stages
 from ffr_prep.quality import Quality, assess, completed
 from ffr_prep.reduce import described, interface_shapes
 from ffr_prep.reduction import Reduction
@@ -54,14 +55,18 @@ def reduce_matrices(
     reference: ReferenceConditions,
     reduction: Reduction,
     quality: Band | None = None,
-    progress: Callable[[str], None] | None = None,
+    solver: Solver = CHOLESKY,
+    progress: Stages = no_stages,
+    advance: Advance = no_advance,
     provenance: Mapping[str, Any] | None = None,
 ) -> FlexibleBody:
     """The reduced flexible body of outside matrices, in the coordinates of their nodes.
 
     interfaces : at groups of nodes; one node gives its six coordinates, several follow rigidly or in the mean
     quality    : compare the body with the full model over this band of frequencies, and keep what was found
+    solver     : what factorises the stiffness and finds the modes
     progress   : called with the name of each stage as it begins
+    advance    : called within long stages with the share that is done and with how far that is in words
     provenance : JSON values kept with the body, beside what is recorded anyway
 
     Consistent and lumped masses are both fine, also with coordinates that have none. The body has no geometric
@@ -71,7 +76,9 @@ def reduce_matrices(
     ComputationError for a computation that failed.
     """
     with threadpool_limits(1):  # as for solids: small dense blocks, and reproducible
-        return _reduced(model, name, interfaces, reference, reduction, quality, progress or _silent, provenance or {})
+        return _reduced(
+            model, name, interfaces, reference, reduction, quality, solver, progress, advance, provenance or {}
+        )
 
 
 def _reduced(
@@ -81,7 +88,9 @@ def _reduced(
     reference: ReferenceConditions,
     reduction: Reduction,
     quality: Band | None,
-    tell: Callable[[str], None],
+    solver: Solver,
+    tell: Stages,
+    advance: Advance,
     provenance: Mapping[str, Any],
 ) -> FlexibleBody:
     tell("check the matrices")
@@ -93,7 +102,7 @@ def _reduced(
     check_connected(model, coupled, ties)
     L = functionals(reference, coupled)
     tell("factorise the stiffness")
-    body = _factorised(model, coupled, ties)
+    body = _factorised(model, coupled, ties, solver, advance)
     tell("reduce")
     basis = (
         _basis(reduction, coupled, body, L) if not mass_is_singular(model) else _shifted(reduction, coupled, body, L)
@@ -112,16 +121,22 @@ def _reduced(
         interfaces=interface_shapes(coupled, basis),
         surface=_surface(model, Phi),
         provenance=completed(
-            record(model, mass, interfaces, reference, reduction, coupled, warnings) | dict(provenance), basis, assessed
+            record(model, mass, interfaces, reference, reduction, coupled, warnings)
+            | {"solver": described(solver)}
+            | dict(provenance),
+            basis,
+            assessed,
         ),
         **vars(integrals),
     )
 
 
-def _factorised(model: MatrixModel, coupled: CoupledModel, ties: sp.csr_array) -> FreeBody:
+def _factorised(
+    model: MatrixModel, coupled: CoupledModel, ties: sp.csr_array, solver: Solver, advance: Advance
+) -> FreeBody:
     """The factorised stiffness; where it fails, the mechanism that is to blame is named."""
     try:
-        return factorised(coupled)
+        return factorised(coupled, solver, advance)
     except ComputationError:
         check_mechanisms(model, coupled, ties)
         raise
@@ -141,10 +156,6 @@ def _surface(model: MatrixModel, Phi: Array) -> Surface | None:
         return None
     used, triangles = np.unique(model.triangles, return_inverse=True)
     return Surface(model.points[used], triangles.reshape(-1, 3), model.dofs.on_nodes(Phi)[used, :3])
-
-
-def _silent(stage: str) -> None:
-    pass
 
 
 # ---- basis --------------------------------------------------------------------------------------------------------

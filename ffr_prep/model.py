@@ -12,9 +12,10 @@ import numpy as np
 from ffr_prep.basis import check_basis, factorised
 from ffr_prep.body import BeamForces, FlexibleBody, Surface
 from ffr_prep.errors import ComputationError
-from ffr_prep.factor import SupportedBody, solve_refined, supported
+from ffr_prep.factor import CHOLESKY, Solver, SupportedBody, solve_refined, supported
 from ffr_prep.interface import CoupledModel
 from ffr_prep.invariants import InertiaIntegrals
+from ffr_prep.progress import Advance, Stages, no_advance, no_stages
 from ffr_prep.quality import assess, completed
 from ffr_prep.reduce import described, interface_shapes
 from ffr_prep.reduction import Reduction
@@ -58,7 +59,9 @@ def reduce_model(
     stiffening: bool = False,
     stress: bool = False,
     quality: Band | None = None,
-    progress: Callable[[str], None] | None = None,
+    solver: Solver = CHOLESKY,
+    progress: Stages = no_stages,
+    advance: Advance = no_advance,
     provenance: Mapping[str, Any] | None = None,
 ) -> FlexibleBody:
     """The reduced flexible body of a model.
@@ -66,27 +69,28 @@ def reduce_model(
     stiffening : also compute the geometric stiffness by load, which a simulation then uses
     stress     : also keep section forces of beams and the stress at the surface per elastic coordinate
     quality    : compare the body with the full model over this band of frequencies, and keep what was found
+    solver     : what factorises the stiffness and finds the modes
     progress   : called with the name of each stage as it begins
+    advance    : called within long stages with the share that is done and with how far that is in words
     provenance : JSON values kept with the body, beside what is recorded anyway
 
     Raises InputError for input that cannot be used and ComputationError for a computation that failed.
     """
-    tell = progress or _silent
     coupled = model.coupled
     L = functionals(reference, coupled)
-    tell("factorise the stiffness")
-    body = factorised(coupled)
-    tell("reduce")
+    progress("factorise the stiffness")
+    body = factorised(coupled, solver, advance)
+    progress("reduce")
     basis = reduction.basis(coupled, body, L)
     check_basis(coupled, L, basis)
     if quality:
-        tell("compare with the full model")
+        progress("compare with the full model")
     assessed = assess(coupled, body, L, basis, quality) if quality else None
     stiffness = None
     if stiffening:
-        tell("compute the geometric stiffness")
+        progress("compute the geometric stiffness")
         stiffness = model.stiffening(static_displacements(coupled, supported(body, L)), basis.Z)
-    tell("integrate the inertia")
+    progress("integrate the inertia")
     return FlexibleBody(
         name=name,
         omega2=basis.omega2,
@@ -95,6 +99,7 @@ def reduce_model(
         stiffening=stiffness,
         provenance=completed(
             record(model, reference, reduction)
+            | {"solver": described(solver)}
             | ({"stress": model.recovery} if stress else {})
             | dict(provenance or {}),
             basis,
@@ -157,7 +162,3 @@ def merged(surfaces: Sequence[Surface]) -> Surface:
 
 def _merged_beams(beams: Sequence[BeamForces]) -> BeamForces:
     return BeamForces(**{key: np.concatenate([vars(one)[key] for one in beams]) for key in vars(beams[0])})
-
-
-def _silent(stage: str) -> None:
-    pass

@@ -149,8 +149,10 @@ def grids_of_op2(path: Path, results: Any) -> GridTable:
 
 
 def _as_floats(xyz: Array) -> Array:
-    """Some versions of pyNastran return the bits of single-precision coordinates as integers."""
-    return np.array(xyz.view(np.float32) if xyz.dtype == np.int32 else xyz, float).reshape(-1, 3)
+    """(P, 3). pyNastran returns the bits of single-precision coordinates as integers, in some versions, and rows of double
+    precision with two columns of integers before the coordinates, read as numbers."""
+    numbers = np.array(xyz.view(np.float32) if xyz.dtype == np.int32 else xyz, float)
+    return numbers.reshape(len(numbers), -1)[:, -3:]
 
 
 def _is_punch(deck: Path) -> bool:

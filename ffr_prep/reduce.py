@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
 from importlib.metadata import version
 from typing import Any
@@ -16,6 +16,7 @@ from ffr_prep.factor import CHOLESKY, Solver, supported
 from ffr_prep.interface import CoupledModel, InterfaceRegion, couple
 from ffr_prep.invariants import inertia_integrals
 from ffr_prep.mesh import Mesh, check_mesh, mesh_hash, surface_triangles
+from ffr_prep.progress import Advance, Stages, no_advance, no_stages
 from ffr_prep.quality import assess, completed
 from ffr_prep.reduction import Reduction
 from ffr_prep.reference import ReferenceConditions, functionals
@@ -43,7 +44,8 @@ def reduce_mesh(
     stress: bool = False,
     quality: Band | None = None,
     solver: Solver = CHOLESKY,
-    progress: Callable[[str], None] | None = None,
+    progress: Stages = no_stages,
+    advance: Advance = no_advance,
     provenance: Mapping[str, Any] | None = None,
 ) -> FlexibleBody:
     """The reduced flexible body of a meshed solid, in the coordinates of the mesh.
@@ -54,6 +56,7 @@ def reduce_mesh(
     quality    : compare the body with the full model over this band of frequencies, and keep what was found
     solver     : what factorises the stiffness and finds the modes
     progress   : called with the name of each stage as it begins
+    advance    : called within long stages with the share that is done and with how far that is in words
     provenance : JSON values kept with the body, beside what is recorded anyway
 
     Raises InputError for input that cannot be used and ComputationError for a computation that failed.
@@ -70,7 +73,8 @@ def reduce_mesh(
             stress,
             quality,
             solver,
-            progress or _silent,
+            progress,
+            advance,
             provenance or {},
         )
 
@@ -86,7 +90,8 @@ def _reduced(
     stress: bool,
     quality: Band | None,
     solver: Solver,
-    tell: Callable[[str], None],
+    tell: Stages,
+    advance: Advance,
     provenance: Mapping[str, Any],
 ) -> FlexibleBody:
     tell("check the mesh")
@@ -100,7 +105,7 @@ def _reduced(
     del matrices  # its stiffness takes as much memory as that of the model
     L = functionals(reference, model)
     tell("factorise the stiffness")
-    body = factorised(model, solver)
+    body = factorised(model, solver, advance)
     tell("reduce")
     basis = reduction.basis(model, body, L)
     check_basis(model, L, basis)
@@ -151,10 +156,6 @@ def boundary(mesh: Mesh, Phi: Array) -> Surface:
     """The triangulated boundary of the mesh with the basis at its points."""
     points, triangles = surface_triangles(mesh)
     return Surface(mesh.points[points], triangles, Phi[points])
-
-
-def _silent(stage: str) -> None:
-    pass
 
 
 # ---- what is known about the body ---------------------------------------------------------------------------------

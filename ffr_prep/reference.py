@@ -39,9 +39,9 @@ def functionals(conditions: ReferenceConditions, model: CoupledModel) -> Array:
     Raises InputError, naming the free motion in words, when they leave a rigid motion in the elastic field.
     """
     L = _independent(conditions.rows(model))
-    free = free_rigid_motions(L @ model.T, _length(model))
+    free = free_rigid_motions(L @ model.T, body_length(model))
     if free.shape[1]:
-        motions = " and ".join(motion_in_words(motion, model.centre, _length(model)) for motion in free.T)
+        motions = " and ".join(motion_in_words(motion, model.centre, body_length(model)) for motion in free.T)
         raise InputError(f"the reference conditions do not prevent {motions}: add a condition that does")
     return L
 
@@ -74,7 +74,7 @@ class SimplySupported:
         """(6, Z); InputError for an unknown interface or two at the same point."""
         pin, roller = _coordinates(model, self.pin), _coordinates(model, self.roller)
         chord = model.positions[interface_index(model, self.roller)] - model.positions[interface_index(model, self.pin)]
-        if np.linalg.norm(chord) <= 1e-12 * _length(model):
+        if np.linalg.norm(chord) <= 1e-12 * body_length(model):
             raise InputError(
                 f"simply supported between {self.pin!r} and {self.roller!r}: both are at the same point; "
                 "choose two interfaces that are apart"
@@ -211,5 +211,5 @@ def motion_in_words(motion: Array, centre: Array, length: float) -> str:
     return f"screw motion {through} with pitch {pitch:.4g} m/rad"
 
 
-def _length(model: CoupledModel) -> float:
+def body_length(model: CoupledModel) -> float:
     return float(np.linalg.norm(np.ptp(model.points, axis=0)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from ffr_prep.interface import InterfaceRegion, couple
 from ffr_prep.invariants import inertia_integrals
 from ffr_prep.mesh import Mesh, check_mesh, mesh_hash
 from ffr_prep.model import Model
+from ffr_prep.progress import Stages, no_stages
 from ffr_prep.reduce import boundary, described, element_counts, mesh_warnings
 from ffr_prep.solids import Materials, assemble
 from ffr_prep.stiffening import inertial_loads, stiffening_of
@@ -24,18 +25,17 @@ def solid_model(
     mesh: Mesh,
     material: Materials,
     interfaces: Sequence[InterfaceRegion],
-    progress: Callable[[str], None] | None = None,
+    progress: Stages = no_stages,
 ) -> Model:
     """The solid with its interfaces, of one material or of one for each volume group.
 
     Raises InputError for input that cannot be used.
     """
-    tell = progress or _silent
-    tell("check the mesh")
+    progress("check the mesh")
     check_mesh(mesh)
-    tell("assemble stiffness and mass")
+    progress("assemble stiffness and mass")
     matrices = assemble(mesh, material)
-    tell("tie the interfaces")
+    progress("tie the interfaces")
     coupled = couple(mesh, matrices, interfaces)
 
     def field(z: Array) -> Array:
@@ -62,7 +62,3 @@ def solid_model(
             "warnings": mesh_warnings(mesh),
         },
     )
-
-
-def _silent(stage: str) -> None:
-    pass

@@ -9,7 +9,7 @@ Sources: A. A. Shabana, Dynamics of Multibody Systems (2013), sections 6.1-6.7.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,11 +19,13 @@ from threadpoolctl import threadpool_limits
 
 from ffr_prep.accelerations import unit_accelerations
 from ffr_prep.body import FlexibleBody, Surface
+from ffr_prep.factor import CHOLESKY, Solver
 from ffr_prep.families import Family, families
 from ffr_prep.frame import Frame, check_frame, frame_hash
 from ffr_prep.interface import CoupledModel, InterfaceRegion
 from ffr_prep.invariants import InertiaIntegrals, inertia_integrals
 from ffr_prep.model import Model, merged, reduce_model, summed
+from ffr_prep.progress import Advance, Stages, no_advance, no_stages
 from ffr_prep.reduce import described
 from ffr_prep.reduction import Reduction
 from ffr_prep.reference import ReferenceConditions
@@ -58,7 +60,9 @@ def reduce_frame(
     stiffening: bool = False,
     stress: bool = False,
     quality: Band | None = None,
-    progress: Callable[[str], None] | None = None,
+    solver: Solver = CHOLESKY,
+    progress: Stages = no_stages,
+    advance: Advance = no_advance,
     provenance: Mapping[str, Any] | None = None,
 ) -> FlexibleBody:
     """The reduced flexible body of a frame of beams and plates, in the coordinates of its nodes.
@@ -68,7 +72,9 @@ def reduce_frame(
     stiffening : also compute the geometric stiffness by load, which a simulation then uses
     stress     : also keep section forces of beams and the stress on outlines and faces per elastic coordinate
     quality    : compare the body with the full model over this band of frequencies, and keep what was found
+    solver     : what factorises the stiffness and finds the modes
     progress   : called with the name of each stage as it begins
+    advance    : called within long stages with the share that is done and with how far that is in words
     provenance : JSON values kept with the body, beside what is recorded anyway
 
     Raises InputError for input that cannot be used and ComputationError for a computation that failed.
@@ -82,22 +88,21 @@ def reduce_frame(
             stiffening=stiffening,
             stress=stress,
             quality=quality,
+            solver=solver,
             progress=progress,
+            advance=advance,
             provenance=provenance,
         )
 
 
-def frame_model(
-    frame: Frame, interfaces: Sequence[InterfaceRegion], progress: Callable[[str], None] | None = None
-) -> Model:
+def frame_model(frame: Frame, interfaces: Sequence[InterfaceRegion], progress: Stages = no_stages) -> Model:
     """The frame, ready to be reduced or to be tied to other models. Errors and arguments as in `reduce_frame`."""
-    tell = progress or _silent
-    tell("check the frame")
+    progress("check the frame")
     check_frame(frame)
-    tell("assemble stiffness and mass")
+    progress("assemble stiffness and mass")
     parts = families(frame)
     matrices = assemble_frame(frame, parts)
-    tell("tie the interfaces")
+    progress("tie the interfaces")
     ties = tie(frame, interfaces)
     coupled = replace(
         couple_frame(frame, matrices.K, matrices.M, interfaces, ties),
@@ -219,7 +224,3 @@ def _strict(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _strict(entry) for key, entry in value.items()}
     return "inf" if value == np.inf else value
-
-
-def _silent(stage: str) -> None:
-    pass

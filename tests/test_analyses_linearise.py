@@ -173,6 +173,8 @@ def test_bad_input():
         MarkerEffort("f", "rod.b", (0, 0, 0))
     with pytest.raises(InputError, match="more than 5"):
         recorded(np.arange(3.0), np.arange(3.0))
+    with pytest.raises(InputError, match="10 values has 9 rates"):
+        recorded(np.arange(10.0), np.arange(10.0), rates=np.arange(9.0))
 
 
 def test_the_mass_matrix_that_the_kernels_keep_is_the_readable_one():

@@ -24,6 +24,7 @@ SCRIPTS = sorted([ROOT / "bootstrap.py", *(ROOT / "examples").glob("*.py"), *(RO
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 MESHERS_AND_PLOTTERS = {
+    "dask",
     "gmsh",
     "imageio_ffmpeg",
     "matplotlib",
@@ -229,7 +230,7 @@ def declared() -> set[str]:
     project = PROJECT["project"]
     optional = [
         requirement
-        for extra in ("video", "nastran", "pardiso", "ida")
+        for extra in ("chart", "video", "nastran", "pardiso", "ida")
         for requirement in project["optional-dependencies"][extra]
     ]
     return {distribution_name(requirement) for requirement in [*project["dependencies"], *optional]}
@@ -247,6 +248,7 @@ def test_every_library_is_declared_and_every_declared_one_is_used():
         "pyNastran": ["pyNastran"],
         "pypardiso": ["pypardiso"],
         "sksundae": ["scikit-sundae"],
+        "dask": ["dask"],
     }
     owners = importlib.metadata.packages_distributions() | extras
     needed = {distribution_name(owners[name][0]) for name in third_party()}

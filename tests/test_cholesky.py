@@ -32,6 +32,18 @@ def test_stiffness_matrices(kind, cells):
     assert_solves(A, positions)
 
 
+def test_it_tells_how_far_it_is():
+    A, positions = clamped("tet10", (8, 4, 3))
+    told = []
+    factor = cholesky(A, positions, lambda share, words: told.append((share, words)))
+    shares, count = [share for share, _ in told], len(factor.fronts.children)
+    assert len(told) > 10
+    assert 0 < shares[0] < 0.2
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1)
+    assert told[-1][1] == f"{count} of {count} fronts"
+
+
 def test_unknowns_without_a_place_come_last():
     """Six unknowns that touch everything, like those of a rigid interface."""
     A, positions = clamped("tet10", (5, 2, 2))

@@ -24,13 +24,13 @@ from ffr_dyn.integrators import RK4, ROS2
 from ffr_dyn.joint_forces import Actuator, JointFriction, JointSpring, JointStop, Servo
 from ffr_dyn.joints import Joint
 from ffr_dyn.kernels.applied import applied_loads
-from ffr_dyn.kernels.record import evaluate_truly
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.layout import layout
+from ffr_dyn.machine import evaluate_at, new_machine
 from ffr_dyn.rotation import rotation_matrix
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.surface_loads import ModalForce, NodalForces, Pressure, distributed
-from ffr_dyn.timefunction import harmonic, polynomial, table
+from ffr_dyn.timefunction import evaluate, harmonic, polynomial, table
 from ffr_prep.body import FlexibleBody, Surface, rigid_body
 
 RNG = np.random.default_rng(11)
@@ -601,8 +601,10 @@ def test_a_nodal_force_at_an_interface_is_a_load_there(axes):
 def test_a_modal_force_accelerates_as_the_mass_matrix_says():
     body = cloud(2, stiffness=20.0)
     system = compile_scene(Scene((Body("b", body),), forces=(ModalForce("m", "b", [3.0, 0.0]),)))
-    work, x = new_work(system.model), np.array([0, 0, 0, 1.0, 0, 0, 0, 0, 0])
-    assert evaluate_truly(system.model, work, 0.0, x, np.zeros(8)) == OK
+    x = np.array([0, 0, 0, 1.0, 0, 0, 0, 0, 0])
+    machine = new_machine(system, x, np.zeros(8))
+    assert evaluate_at(machine, 0.0, x, np.zeros(8)) == OK
+    work = machine.work
     np.testing.assert_allclose(mass_matrix(body, np.zeros(2)) @ work.bodies.acc, [0] * 6 + [3.0, 0.0], atol=1e-12)
 
 
@@ -811,6 +813,45 @@ def test_a_spring_to_a_missing_marker_and_a_repeated_name_are_refused():
         replace(chain(), springs=(SpringDamper("f", "one.z", "two.a", 1.0),))
     with pytest.raises(InputError, match="'tie' is used more than once"):
         replace(chain(), forces=(JointSpring("tie", "tie", 1.0),))
+
+
+def weight_on_a_spring(**changes):
+    """A block of 2 kg on a spring of 50 N/m along z."""
+    block = rigid_body("block", mass=2.0, inertia=(1, 1, 1), points={"pin": (0, 0, 0)})
+    scene = Scene(
+        (Body("block", block),),
+        (Joint("guide", "translational", "ground.O", "block.pin", axis=(0, 0, 1)),),
+        forces=(JointSpring("spring", "guide", 50.0, coordinate="stroke"),),
+        ground={"O": (0, 0, 0)},
+    )
+    return replace(scene, **changes)
+
+
+def test_gravity_may_vary_with_time():
+    """z'' + 25 z = -9.81 + 3 sin(2 pi t), from rest."""
+    wave = harmonic(amplitude=3.0, frequency=1.0, mean=-9.81)
+    result = forward(weight_on_a_spring(gravity=(0, 0, wave)), end=2.0, output_step=0.05, method=RK4(1e-3))
+    t, w0, w = result.time, 5.0, 2 * np.pi
+    exact = -9.81 / w0**2 * (1 - np.cos(w0 * t)) + 3.0 / (w0**2 - w**2) * (np.sin(w * t) - w / w0 * np.sin(w0 * t))
+    np.testing.assert_allclose(result["guide.stroke"], exact, atol=1e-9)
+
+
+def test_varying_gravity_and_a_moving_base_add_up():
+    """Gravity and base move together: a lift in free fall, whichever way it is said."""
+    falls = harmonic(amplitude=3.0, frequency=1.0)
+    scene = weight_on_a_spring(gravity=(0, 0, falls), base_acceleration=(0, 0, falls))
+    still = forward(scene, end=0.5, output_step=0.1, method=RK4(1e-3))
+    np.testing.assert_allclose(still["guide.stroke"], 0.0, atol=1e-12)
+    steps = weight_on_a_spring(gravity=(0, 0, lambda t: -9.81 if t < 0.25 else 0.0))
+    assert replace(steps, name="again").base_acceleration == steps.base_acceleration
+    assert not steps.gravity.any()
+    for given in (polynomial(1.0, 2.0), falls, table([0.0, 0.3, 1.0], [1.0, 2.0, -4.0])):
+        (_, _, opposite), at = weight_on_a_spring(gravity=(0, 0, given)).base_acceleration, 0.4
+        assert opposite.kind == given.kind
+        np.testing.assert_allclose(evaluate(opposite, at), -np.array(evaluate(given, at)), rtol=1e-14)
+    constants = weight_on_a_spring(gravity=(0, polynomial(1.0), -9.81), base_acceleration=(2.0, 0, 0))
+    np.testing.assert_array_equal(constants.gravity, [0, 1.0, -9.81])
+    assert constants.base_acceleration == weight_on_a_spring(base_acceleration=(2.0, 0, 0)).base_acceleration
 
 
 def test_base_acceleration_needs_three_components():

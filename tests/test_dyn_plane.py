@@ -161,3 +161,65 @@ def test_a_declared_plane_leaves_out_what_is_across_and_refuses_what_cannot_be()
         flattened(replace(scene, bodies=tuple(leaning)), 0.0)
     with pytest.raises(InputError, match="plane is 'w'"):
         slider_crank(plane="w")
+
+
+# ---- bodies of many modes ---------------------------------------------------------------------------------------------
+
+
+def double_pendulum(link, **changes) -> Scene:
+    return Scene(
+        (Body("one", link, (0, 0, 0)), Body("two", link, (1.0, 0, 0))),
+        (Joint("hip", "revolute", "ground.O", "one.a"), Joint("knee", "revolute", "one.b", "two.a")),
+        ground={"O": (0, 0, 0)},
+        gravity=(0, -9.81, 0),
+        **changes,
+    )
+
+
+@pytest.fixture(scope="module")
+def link():
+    """32 modes, of which the highest turn their ends by a hundred times what the lowest do, with as much more rounding."""
+    member = Member(rectangle(0.013, 0.02), ALUMINIUM, orientation=(0, 1, 0))
+    frame = named(polyline([(0, 0, 0), (1.0, 0, 0)], member, elements=12), a=(0, 0, 0), b=(1.0, 0, 0))
+    return reduce_frame(
+        frame,
+        name="link",
+        interfaces=[InterfaceRegion("a"), InterfaceRegion("b")],
+        reference=SimplySupported("a", "b"),
+        reduction=CraigBampton(26),
+    )
+
+
+def turned_modes(body, angle: float):
+    """The body turned about its own axis, which mixes what stays in the plane with what leaves it."""
+    A = rotation_matrix(euler_parameters((angle, 0, 0), "turn"))
+    return replace(
+        body,
+        P_dm=A @ body.P_dm,
+        rP_dm=np.einsum("ka,lb,abj->klj", A, A, body.rP_dm),
+        PP_dm=np.einsum("ka,lb,abij->klij", A, A, body.PP_dm),
+        rr_dm=A @ body.rr_dm @ A.T,
+        interfaces=tuple(replace(i, phi_t=A @ i.phi_t, phi_r=A @ i.phi_r) for i in body.interfaces),
+    )
+
+
+def test_rounding_of_high_modes_does_not_make_a_scene_spatial(link):
+    scene = double_pendulum(link)
+    flat, _ = flattened(scene, 0.0)
+    assert flat.plane == "z"
+    assert link.n == 32
+    assert flat.bodies[0].model.n == 14  # the others bend across the plane or twist
+    for interface in flat.bodies[0].model.interfaces:
+        assert not interface.phi_t[2].any()
+        assert not interface.phi_r[:2].any()
+    runs = [
+        forward(replace(scene, plane=plane), end=0.02, output_step=0.005, method=ROS2(1e-5))
+        for plane in ("auto", "none")
+    ]
+    for name in ("two.b.position", "one.q"):
+        np.testing.assert_allclose(runs[0][name], runs[1][name], rtol=0, atol=1e-9 * np.abs(runs[1][name]).max())
+
+
+@pytest.mark.parametrize(("angle", "plane"), [(1e-12, "z"), (1e-7, "none"), (1e-3, "none")])
+def test_a_body_that_is_really_spatial_stays_so(link, angle, plane):
+    assert flattened(double_pendulum(turned_modes(link, angle)), 0.0)[0].plane == plane

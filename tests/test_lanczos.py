@@ -28,6 +28,16 @@ def test_modes_are_the_known_ones():
     np.testing.assert_allclose(vectors.T @ (M @ vectors), np.eye(12), atol=1e-12)
 
 
+def test_it_tells_how_many_modes_have_converged():
+    flexibility, M, start, _ = problem(np.arange(1.0, 301.0) ** 2)
+    told = []
+    lowest_modes(flexibility, M, start, 12, most=200, advance=lambda share, words: told.append((share, words)))
+    shares = [share for share, _ in told]
+    assert told[0] == (0.0, "0 of 12 modes")
+    assert told[-1] == (1.0, "12 of 12 modes")
+    assert any(0 < share < 1 for share in shares)
+
+
 def test_equal_frequencies_are_all_found():
     omega2 = np.repeat(np.arange(1.0, 101.0), 3) ** 2
     flexibility, M, start, modes = problem(omega2)

@@ -227,6 +227,14 @@ def test_a_turned_frame_is_the_same_body_turned():
     assert_close(S, np.einsum("klii->kli", two.PP_dm), 1e-7)
 
 
+def test_masses_on_one_line_have_no_inertia_about_it():
+    frame = of_frame(rod(rectangle(0.02, 0.05), 1.0, 4))
+    with pytest.raises(
+        InputError, match=r"no inertia against rotation about the axis .* along \(1, 0, 0\): give it rotary"
+    ):
+        reduced(replace(frame, M=lumped(frame)), ENDS[:1], FixedTo("root"), Eigenmodes(2))
+
+
 def test_lumped_masses_without_rotary_inertia(frame_model):
     """Frequencies are those of the statically condensed model, where M is definite."""
     model = replace(frame_model, M=lumped(frame_model))
@@ -544,7 +552,7 @@ def test_an_indefinite_stiffness_is_refused(solid_model):
 
 
 def test_a_failed_factorisation_without_a_mechanism_stays_what_it_is(solid_model, monkeypatch):
-    def fails(coupled):
+    def fails(*_):
         raise ComputationError("the factorisation failed")
 
     monkeypatch.setattr("ffr_prep.matrices.factorised", fails)

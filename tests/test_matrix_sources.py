@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,6 +12,7 @@ import pytest
 import scipy.io
 import scipy.sparse as sp
 from matrix_models import bar, of_frame, rod, space_frame
+from nastran_files import write_op2
 
 from ffr_prep.abaqus_source import nodes_from_abaqus
 from ffr_prep.body import load_body
@@ -483,6 +485,29 @@ def test_op4_file(model, tmp_path, control, sparse):
     body = reduce_matrices(back, name="body", interfaces=(), reference=MeanAxis(), reduction=Eigenmodes(2))
     own = reduce_matrices(model, name="body", interfaces=(), reference=MeanAxis(), reduction=Eigenmodes(2))
     np.testing.assert_allclose(body.omega2, own.omega2, rtol=1e-5)
+
+
+@pytest.mark.parametrize("wide", [True, False], ids=["double", "single"])
+def test_op2_file(model, tmp_path, wide):
+    """A binary file: nodes, numbers, matrices and the body, with coordinates of both precisions."""
+    pytest.importorskip("pyNastran.op2.op2")
+    back = read_matrices([write_op2(model, tmp_path / "run.op2", wide=wide)])
+    assert back.source == {"format": "Nastran OP2", "files": ["run.op2"], "units": "m-kg-s", "matrices": "KGG, MGG"}
+    assert back.labels.tolist() == sorted(model.labels.tolist())
+    np.testing.assert_allclose(back.points, model.points, rtol=0, atol=0 if wide else 1e-7)
+    assert_same(replace(back, points=model.points), replace(model, groups={}, triangles=None))
+    body = reduce_matrices(back, name="body", interfaces=(), reference=MeanAxis(), reduction=Eigenmodes(2))
+    own = reduce_matrices(model, name="body", interfaces=(), reference=MeanAxis(), reduction=Eigenmodes(2))
+    np.testing.assert_allclose(body.omega2, own.omega2, rtol=1e-12 if wide else 1e-5)
+
+
+def test_op2_files_cut_short(model, tmp_path):
+    pytest.importorskip("pyNastran.op2.op2")
+    whole = write_op2(model, tmp_path / "run.op2").read_bytes()
+    for share in (0.1, 0.5, 0.9):
+        (tmp_path / "cut.op2").write_bytes(whole[: 4 * int(share * len(whole) / 4)])
+        with pytest.raises(InputError, match=r"cut\.op2"):
+            read_matrices([tmp_path / "cut.op2"])
 
 
 def test_files_that_pynastran_cannot_read(tmp_path):

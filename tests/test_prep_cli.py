@@ -1,5 +1,6 @@
 """The command line of ffr-prep: the whole way once, and every way to fail with exit code and one line."""
 
+import re
 import subprocess
 import sys
 import textwrap
@@ -14,6 +15,8 @@ from PIL import Image
 
 from ffr_prep import cli, plots
 from ffr_prep.body import load_body, rigid_body, save_body
+from ffr_prep.cli_options import interface_of, reference_of
+from ffr_prep.cli_terminal import Steps
 from ffr_prep.errors import ComputationError, InputError
 from ffr_prep.interface import InterfaceRegion
 from ffr_prep.mesh import Block
@@ -333,7 +336,7 @@ def test_body_files_that_cannot_be_used(damage, command, body_file, tmp_path, ca
     ],
 )
 def test_interfaces(text, region):
-    assert cli._interface(text) == region
+    assert interface_of(text) == region
 
 
 SUPPORTS = """
@@ -345,11 +348,11 @@ direction = [1.0, 0.0, 0.0]
 
 
 def test_reference_conditions(tmp_path):
-    assert cli._reference("mean-axis") == MeanAxis()
-    assert cli._reference("fixed:left") == FixedTo("left")
-    assert cli._reference("simply-supported:left, right") == SimplySupported("left", "right")
+    assert reference_of("mean-axis") == MeanAxis()
+    assert reference_of("fixed:left") == FixedTo("left")
+    assert reference_of("simply-supported:left, right") == SimplySupported("left", "right")
     (tmp_path / "r.toml").write_text(SUPPORTS)
-    assert cli._reference(str(tmp_path / "r.toml")) == Supports((Support("left", "translation", (1.0, 0.0, 0.0)),))
+    assert reference_of(str(tmp_path / "r.toml")) == Supports((Support("left", "translation", (1.0, 0.0, 0.0)),))
 
 
 @pytest.mark.parametrize(
@@ -366,18 +369,44 @@ def test_reference_conditions(tmp_path):
 def test_files_of_reference_conditions_that_cannot_be_used(text, message, tmp_path):
     (tmp_path / "r.toml").write_text(text)
     with pytest.raises(InputError, match=message):
-        cli._reference(str(tmp_path / "r.toml"))
+        reference_of(str(tmp_path / "r.toml"))
 
 
 def test_steps_are_told_on_a_terminal_only(capsys):
     for visible, said in ((True, "mesh ... "), (False, "")):
-        steps = cli.Steps(visible)
+        steps = Steps(visible)
         steps("mesh")
         steps("reduce")
         steps.end()
         assert capsys.readouterr().err.startswith(said)
-        assert [name for name, _ in steps.begun] == ["mesh", "reduce", ""]
-        assert steps.in_words().startswith("mesh 0.0 s, reduce 0.0 s")
+        assert [step.name for step in steps.ended] == ["mesh", "reduce"]
+        assert next(iter(steps.lines())).startswith("time        mesh 0.0 s, reduce 0.0 s")
+
+
+def test_a_terminal_shows_how_far_a_step_is(capsys, monkeypatch):
+    ticks = iter(np.arange(100.0))
+    monkeypatch.setattr("ffr_prep.cli_terminal.time.perf_counter", lambda: next(ticks))
+    steps = Steps(visible=True)
+    steps("reduce")
+    steps.advance(0.25, "5 of 20 modes")
+    steps.end()
+    shown = capsys.readouterr().err
+    assert "\rreduce ... 25 %, 5 of 20 modes" in shown
+    assert re.search(r"\rreduce \.\.\. 2\.0 s, \d+\.\d\d GiB\n$", shown)
+
+
+def test_the_memory_of_each_step_is_its_own():
+    steps = Steps(visible=False)
+    steps("large")
+    large = np.ones(3 * 2**24)
+    steps("small")
+    del large
+    steps("smaller")
+    steps.end()
+    first, _, last = (step.memory for step in steps.ended)
+    assert first - last > 300 * 2**20
+    *_, memory = steps.lines()
+    assert re.fullmatch(r"memory      \d\.\d\d GiB at most: large .* GiB, small .* GiB, smaller .* GiB", memory)
 
 
 # ---- the program as it is started ---------------------------------------------------------------------------------

@@ -331,7 +331,7 @@ def test_interface_shapes_and_surface_are_those_of_the_field(beam):
 
 
 def test_stages_and_settings_are_recorded(beam):
-    stages = []
+    stages, told = [], []
     body = reduce_mesh(
         beam,
         name="rod",
@@ -340,8 +340,11 @@ def test_stages_and_settings_are_recorded(beam):
         reference=SimplySupported("left", "right"),
         reduction=CraigBampton(2),
         progress=stages.append,
+        advance=lambda share, words: told.append((stages[-1], words)),
         provenance={"order": 7},
     )
+    assert {stage for stage, _ in told} <= {"factorise the stiffness", "reduce"}
+    assert any(words.endswith("fronts") for _, words in told)
     assert stages == sorted(set(stages), key=stages.index)
     assert len(stages) >= 4
     record = body.provenance

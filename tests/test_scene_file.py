@@ -462,6 +462,31 @@ def test_a_flexible_body_needs_a_file():
 # ---- the schema -----------------------------------------------------------------------------------------------------
 
 
+GRAVITY = """
+gravity = ["50 cm/s^2", "sin(2 * pi * t)", {table = [[0.0, 1.0], [0.0, -9.81]]}]
+[analysis]
+end = 0.1
+output_step = 0.1
+[bodies.stone]
+mass = 1.0
+inertia = [1, 1, 1]
+"""
+
+
+def test_gravity_of_a_file_may_vary_and_has_the_unit_of_an_acceleration(tmp_path):
+    (tmp_path / "scene.toml").write_text(GRAVITY)
+    scene, settings = load_scene(tmp_path / "scene.toml")
+    np.testing.assert_allclose(scene.gravity, [0.5, 0, 0])
+    acceleration = [evaluate(f, 0.25)[0] for f in scene.base_acceleration]
+    np.testing.assert_allclose(acceleration, [0, -1.0, 9.81 / 4], atol=1e-12)
+    (tmp_path / "again.toml").write_text(to_toml(scene, settings))
+    again, _ = load_scene(tmp_path / "again.toml")
+    assert again.base_acceleration == scene.base_acceleration
+    (tmp_path / "scene.toml").write_text(GRAVITY.replace("50 cm/s^2", "50 kg"))
+    with pytest.raises(InputError, match=r"gravity\.0.*kg"):
+        load_scene(tmp_path / "scene.toml")
+
+
 def test_the_published_schema_is_that_of_the_program():
     """Where it is not: ffr-dyn schema > docs/scene.schema.json."""
     assert json.loads((ROOT / "docs" / "scene.schema.json").read_text(encoding="utf-8")) == json.loads(

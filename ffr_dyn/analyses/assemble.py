@@ -74,7 +74,10 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     if shift > 1e-6:
         notes.insert(0, f"assembly moved a body by {shift:.3g} m from where the scene puts it")
     if scene.plane != "none":
-        notes.append(f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes")
+        notes.append(
+            f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes without their rounding "
+            "across it"
+        )
     all_rows = compile_scene(scene, blocks, RELAXATION) if redundant else None
     return Assembled(compile_scene(scene, kept), all_rows, x, v, _movable(place) - rows, tuple(notes), tuple(redundant))
 

@@ -7,7 +7,7 @@ In a scene an effort is an `Actuator` or a `Load` like any other, so that a forw
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,8 +17,12 @@ from ffr_dyn.force_tables import actions_of
 from ffr_dyn.forces import Load
 from ffr_dyn.joint_forces import Actuator
 from ffr_dyn.joints import Joint
+from ffr_dyn.machine import with_model
 from ffr_dyn.scene import Scene
 from ffr_dyn.timefunction import TimeFunction, constant, piecewise
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 Array = np.ndarray
 
@@ -122,11 +126,15 @@ def sized(at: Evaluator, efforts: tuple[Effort, ...], sizes: Array) -> Evaluator
             direction = np.array(effort.direction)
             value[loads.index(effort.name), 3 * effort.moment : 3 * effort.moment + 3] = size * direction
     tables = model._replace(loads=model.loads._replace(value=value), functions=model.functions._replace(data=data))
-    return replace(at, system=replace(at.system, model=tables))
+    return replace(at, machine=with_model(at.machine, tables))
 
 
-def recorded(times: Array, values: Array, *, degree: int = 5) -> TimeFunction:
+def recorded(times: Array, values: Array, *, rates: Array | None = None, degree: int = 5) -> TimeFunction:
     """A history (T,) at times (T,) [s] as a function of time: a spline of odd `degree`, smooth enough to drive with.
+
+    rates : (T,) rates of the values, where they were recorded too. The spline then goes through them, and through the values
+            in the mean. Its second derivative, which says what force a known motion needs, magnifies the rounding of a record
+            by 1/h instead of 1/h^2, h apart, and is as good at the ends as inside
 
     Raises InputError for too few rows.
     """
@@ -135,7 +143,21 @@ def recorded(times: Array, values: Array, *, degree: int = 5) -> TimeFunction:
     t, y = np.asarray(times, float), np.asarray(values, float)
     if t.shape != y.shape or t.ndim != 1 or t.size <= degree or not (np.diff(t) > 0).all():
         raise InputError(f"a recorded history needs more than {degree} increasing times and as many values")
-    pieces = PPoly.from_spline(make_interp_spline(t, y, k=degree))
+    if rates is None:
+        pieces = PPoly.from_spline(make_interp_spline(t, y, k=degree))
+    else:
+        pieces = _integral(t, y, np.asarray(rates, float), degree)
     inside = (pieces.x[:-1] < pieces.x[1:]) & (pieces.x[:-1] >= t[0]) & (pieces.x[:-1] < t[-1])
     breaks = np.append(pieces.x[:-1][inside], t[-1])
     return piecewise(breaks, pieces.c[::-1, inside].T)
+
+
+def _integral(t: Array, y: Array, rates: Array, degree: int) -> PPoly:
+    """The integral of the spline through the rates that has the mean of the values y."""
+    from scipy.interpolate import PPoly, make_interp_spline
+
+    if rates.shape != t.shape:
+        raise InputError(f"a recorded history of {t.size} values has {rates.size} rates; it needs one for each")
+    found = PPoly.from_spline(make_interp_spline(t, rates, k=degree)).antiderivative()
+    found.c[-1] += np.mean(y - found(t))
+    return found

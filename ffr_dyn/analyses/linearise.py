@@ -21,6 +21,7 @@ from ffr_dyn.analyses.mobility import named_motion
 from ffr_dyn.analyses.outcome import result_of
 from ffr_dyn.analyses.tangent import Chart, chart, derivative, rates, sizes, state, state_matrix
 from ffr_dyn.errors import InputError
+from ffr_dyn.machine import with_model
 from ffr_dyn.result import Axis, Quantity, Result
 from ffr_dyn.scene import Scene
 
@@ -144,7 +145,7 @@ def _with_inputs(at: Evaluator, scene: Scene, inputs: tuple[Effort | str, ...], 
     for item, amount in zip(inputs, u, strict=True):
         if isinstance(item, str):
             value[_load_number(scene, item)] *= 1.0 + amount
-    fed = replace(at, system=replace(at.system, model=model._replace(loads=model.loads._replace(value=value))))
+    fed = replace(at, machine=with_model(at.machine, model._replace(loads=model.loads._replace(value=value))))
     sizes = [amount for item, amount in zip(inputs, u, strict=True) if not isinstance(item, str)]
     return sized(fed, _efforts(inputs), np.array(sizes))
 

@@ -31,7 +31,6 @@ from ffr_dyn.analyses.evaluation import (
 from ffr_dyn.analyses.forward import geometry, with_all_reactions
 from ffr_dyn.analyses.outcome import output_times
 from ffr_dyn.errors import InputError, SimulationError
-from ffr_dyn.integrators import RK4
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.layout import Layout
 from ffr_dyn.measure import measure, needs_every_step, selected
@@ -120,7 +119,7 @@ def reference(
         rows.append(copied(at.record))
         if progress is not None:
             progress(time)
-    record = with_all_reactions(assembled, RK4(1.0), joined(rows))
+    record = with_all_reactions(assembled, joined(rows))
     quantities, _ = measure(assembled.system, record, {}, wanted)
     attributes = {
         "title": scene.name,

@@ -38,6 +38,7 @@ from ffr_dyn.drivers import Driver, driver_word
 from ffr_dyn.equations import Block, compile_scene
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.joints import COORDINATES, Word
+from ffr_dyn.machine import with_model
 from ffr_dyn.scene import Scene, marker_number
 from ffr_dyn.timefunction import polynomial
 
@@ -249,8 +250,8 @@ def _guided(own: ServoMotion, time: float, w: Array) -> Evaluator:
     data = model.functions.data.copy()
     y, rate = w[: own.inner.size], w[d : d + own.inner.size]
     data[own.data], data[own.data + 1] = y - rate * time, rate
-    system = replace(own.at.system, model=model._replace(functions=model.functions._replace(data=data)))
-    return replace(own.at, system=system)
+    guided = model._replace(functions=model.functions._replace(data=data))
+    return replace(own.at, machine=with_model(own.at.machine, guided))
 
 
 def at_moment(own: ServoMotion, time: float, w: Array, near: Array) -> Moment:

@@ -1,0 +1,179 @@
+"""A work-precision diagram: every variant's cost and errors, from the scene to the table."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from ffr_dyn.analyses.assemble import assemble
+from ffr_dyn.chart.measures import Measure, default_measures, measure_of
+from ffr_dyn.chart.pareto import pareto_front
+from ffr_dyn.chart.reference import Reference, distance, reference
+from ffr_dyn.chart.runner import REPEATS, Failure, Job, Outcome, Pool, Span, perform
+from ffr_dyn.chart.variants import FULL, Model, Variant, grid
+from ffr_dyn.errors import InputError
+from ffr_dyn.integrators import METHODS
+from ffr_dyn.measure import catalogue
+from ffr_dyn.scene import Scene
+from ffr_dyn.stabilisation import Projection, Stabilisation
+
+CPU, WALL, EVALUATIONS = "cpu", "wall", "evaluations"
+COSTS = (CPU, WALL, EVALUATIONS)
+
+
+@dataclass(frozen=True)
+class Point:
+    """A variant that ran.
+
+    series, label : of the line it belongs to, and its own
+    number        : its step [s] or tolerance
+    errors        : by measure, in its unit
+    wall, cpu     : (median, least, greatest) time [s];  evaluations : of the equations of motion, 0 if not known
+    """
+
+    series: str
+    model: str
+    label: str
+    kind: str
+    number: float
+    errors: Mapping[str, float]
+    wall: tuple[float, float, float]
+    cpu: tuple[float, float, float]
+    evaluations: int = 0
+
+    def cost(self, of: str) -> float:
+        """One of `COSTS`; not a number where it is not known."""
+        if of == EVALUATIONS:
+            return float(self.evaluations) if self.evaluations else float("nan")
+        return self.cpu[0] if of == CPU else self.wall[0]
+
+
+@dataclass(frozen=True)
+class Lost:
+    """A variant that did not run, and why."""
+
+    series: str
+    model: str
+    label: str
+    kind: str
+    number: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """The points of a scene, those lost, and the reference that errors are measured from."""
+
+    title: str
+    measures: tuple[Measure, ...]
+    points: tuple[Point, ...]
+    lost: tuple[Lost, ...]
+    reference: Reference
+    notes: tuple[str, ...] = ()
+    chosen: tuple[str, ...] = field(default=())  # labels of points to be pointed out
+
+    def measure(self, name: str) -> Measure:
+        """The measure of that name."""
+        for measure in self.measures:
+            if measure.name == name:
+                return measure
+        raise InputError(f"the diagram has no measure {name!r}; it has: {', '.join(m.name for m in self.measures)}")
+
+    def scale(self, measure: str) -> float:
+        """What errors are relative to; 1 where only absolute ones make sense."""
+        return self.reference.scales[measure] or 1.0
+
+    def front(self, measure: str, cost: str) -> tuple[Point, ...]:
+        """The Pareto front, cheapest first. Errors below the floor count as the floor."""
+        floor = self.reference.floors[measure]
+        errors = [max(point.errors[measure], floor) for point in self.points]
+        return tuple(self.points[k] for k in pareto_front([point.cost(cost) for point in self.points], errors))
+
+    def with_points(self, points: Sequence[Point], lost: Sequence[Lost] = ()) -> Diagram:
+        """The diagram with points of another program, say."""
+        return replace(self, points=(*self.points, *points), lost=(*self.lost, *lost))
+
+
+def quantities_of(scene: Scene, start: float = 0.0) -> dict[str, str]:
+    """The unit of every quantity that a run of the scene has, by name."""
+    return {name: entry.unit for name, entry in catalogue(assemble(scene, time=start).system).items()}
+
+
+def measures_of(scene: Scene, texts: Sequence[str], start: float = 0.0) -> tuple[Measure, ...]:
+    """The measures that texts name; without any, those of `default_measures`."""
+    quantities = quantities_of(scene, start)
+    if not texts:
+        return default_measures(scene, quantities)
+    return tuple(measure_of(text, scene, quantities) for text in dict.fromkeys(texts))
+
+
+def work_precision(
+    scene: Scene,
+    span: Span,
+    pool: Pool,
+    *,
+    measures: tuple[Measure, ...] = (),
+    methods: Mapping[str, Sequence[float] | None] | None = None,
+    models: Sequence[Model] = (FULL,),
+    stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
+    repeats: int = REPEATS,
+    limit: float = 60.0,
+    tell: Callable[[str], None] = lambda line: None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Diagram:
+    """Run all methods on all models of a scene and compare them with a verified reference of the full scene.
+
+    methods  : steps [s] or tolerances by method, None for a ladder that is chosen; default all methods
+    models   : what is simplified; the reference has the full one
+    limit    : wall time [s] that a run may take
+    tell     : told how the reference is found;  progress : told how many variants are done, of how many
+
+    Raises InputError for what cannot be compared, SimulationError where no reference can be verified.
+    """
+    measures = measures or measures_of(scene, (), span.start)
+    wanted = dict.fromkeys(METHODS) if methods is None else methods
+    variants = grid(scene, models, wanted, span.output_step)
+    found = reference(scene, span, measures, stabilisation, pool, limit=limit, tell=tell)
+    jobs = [Job(scene, variant, span, measures, stabilisation, repeats, limit) for variant in variants]
+    outcomes = run_variants(jobs, pool, progress)
+    points = [point_of(v, o, found) for v, o in zip(variants, outcomes, strict=True) if isinstance(o, Outcome)]
+    lost = [
+        Lost(v.method, v.model.label, v.label, v.kind, v.number, o.reason)
+        for v, o in zip(variants, outcomes, strict=True)
+        if isinstance(o, Failure)
+    ]
+    return Diagram(scene.name, measures, tuple(points), tuple(lost), found)
+
+
+def run_variants(
+    jobs: Sequence[Job], pool: Pool, progress: Callable[[int, int], None] = lambda done, total: None
+) -> list[Outcome | Failure]:
+    """The outcome of every job, in their order."""
+    found: list[Outcome | Failure] = [Failure("did not run")] * len(jobs)
+    progress(0, len(jobs))
+    for done, (k, outcome) in enumerate(pool.results(perform, jobs), start=1):
+        found[k] = outcome
+        progress(done, len(jobs))
+    return found
+
+
+def point_of(variant: Variant, outcome: Outcome, found: Reference) -> Point:
+    """Cost and errors of a variant."""
+    errors = {name: distance(values, found.values[name]) for name, values in outcome.values.items()}
+    return Point(
+        variant.method,
+        variant.model.label,
+        variant.label,
+        variant.kind,
+        variant.number,
+        errors,
+        spread(outcome.wall),
+        spread(outcome.cpu),
+        outcome.evaluations,
+    )
+
+
+def spread(times: Sequence[float]) -> tuple[float, float, float]:
+    """Median, least and greatest."""
+    return statistics.median(times), min(times), max(times)

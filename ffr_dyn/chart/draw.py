@@ -1,0 +1,172 @@
+"""Work-precision diagrams as pictures, by matplotlib: a panel for each measure, PNG or SVG."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator, NullFormatter
+
+from ffr_dyn.chart.diagram import CPU, EVALUATIONS, WALL, Diagram, Point
+from ffr_dyn.errors import InputError
+from ffr_dyn.plots import PALETTE
+
+COST_WORDS = {
+    CPU: "CPU time of the run [s]",
+    WALL: "wall time of the run [s]",
+    EVALUATIONS: "evaluations of the equations",
+}
+MARKERS = "os^Dv<>PXh*p"
+FRONT, FLOOR = "#222222", "#888888"
+_STYLE = {
+    "font.size": 11.0,
+    "axes.titlesize": 12.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#444444",
+    "axes.axisbelow": True,
+    "grid.color": "#E2E2E2",
+    "legend.frameon": False,
+    "svg.hashsalt": "ffr",
+}
+_METADATA = {".png": {"Software": None}, ".svg": {"Date": None}}
+
+
+def look(diagrams: Sequence[Diagram]) -> dict[tuple[str, str], tuple[str, str]]:
+    """Colour by series and marker by model, for every line (series, model)."""
+    points = [point for diagram in diagrams for point in diagram.points]
+    series = list(dict.fromkeys(point.series for point in points))
+    models = list(dict.fromkeys(point.model for point in points))
+    colours = {name: PALETTE[k % len(PALETTE)] for k, name in enumerate(series)}
+    markers = {name: MARKERS[k % len(MARKERS)] for k, name in enumerate(models)}
+    lines = dict.fromkeys((point.series, point.model) for point in points)
+    return {line: (colours[line[0]], markers[line[1]]) for line in lines}
+
+
+def draw(diagrams: Diagram | Sequence[Diagram], path: str | Path, *, against: str = CPU, title: str = "") -> Path:
+    """Draw errors over a cost ("cpu", "wall" or "evaluations"): a panel for every measure of every diagram.
+
+    Raises InputError for another kind of file, another cost, or a diagram without points.
+    """
+    shown = [diagrams] if isinstance(diagrams, Diagram) else list(diagrams)
+    path = Path(path)
+    _check(shown, path, against)
+    panels = [(diagram, measure.name) for diagram in shown for measure in diagram.measures]
+    columns = min(len(panels), 2)
+    rows = -(-len(panels) // columns)
+    lines = look(shown)
+    with mpl.rc_context(_STYLE):  # type: ignore[arg-type]
+        figure = Figure(figsize=(3.4 + 4.8 * columns, 0.6 + 3.9 * rows), layout="constrained")
+        grid = figure.subplots(rows, columns, squeeze=False).ravel()
+        for axes in grid[len(panels) :]:
+            axes.set_axis_off()
+        for axes, (diagram, measure) in zip(grid, panels, strict=False):
+            _panel(axes, diagram, measure, against, lines)
+            words = diagram.measure(measure).words
+            axes.set_title(words if len(shown) == 1 else f"{diagram.title}: {words}", fontsize=11.5)
+        _legend(figure, shown, lines)
+        figure.suptitle(title or f"{shown[0].title}: work and precision", fontweight="bold")
+        return _written(figure, path)
+
+
+def _check(shown: list[Diagram], path: Path, against: str) -> None:
+    if path.suffix.lower() not in _METADATA:
+        raise InputError(f"{path}: diagrams are drawn as {' or '.join(_METADATA)}")
+    if against not in COST_WORDS:
+        raise InputError(f"cost {against!r} is not known; there are: {', '.join(COST_WORDS)}")
+    for diagram in shown:
+        if not diagram.points:
+            reasons = "; ".join(f"{lost.label}: {lost.reason}" for lost in diagram.lost[:3])
+            raise InputError(f"{diagram.title}: there is nothing to draw, no variant ran ({reasons})")
+
+
+def _panel(
+    axes: Axes, diagram: Diagram, measure: str, against: str, lines: dict[tuple[str, str], tuple[str, str]]
+) -> None:
+    scale, floor = diagram.scale(measure), diagram.reference.floors[measure]
+    for (series, model), (colour, marker) in lines.items():
+        line = [p for p in diagram.points if (p.series, p.model) == (series, model) and p.errors[measure] > 0]
+        line = sorted((p for p in line if p.cost(against) > 0), key=lambda p: p.number, reverse=True)
+        x, y = [p.cost(against) for p in line], [p.errors[measure] / scale for p in line]
+        look_of_bars: Any = {"markersize": 5.5, "capsize": 2, "elinewidth": 1.0}
+        axes.plot(x, y, color=colour, linewidth=1.3, alpha=0.8)
+        axes.errorbar(x, y, xerr=_bars(line, against), fmt=marker, color=colour, **look_of_bars)
+    _front(axes, diagram, measure, against)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    if floor > 0:
+        low, high = axes.get_ylim()
+        axes.set_ylim(min(low, floor / scale / 3), high)
+        below: Any = {"facecolor": "#EEEEEE", "edgecolor": FLOOR, "hatch": "///", "linewidth": 0, "zorder": 0}
+        axes.axhspan(axes.get_ylim()[0], floor / scale, **below)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(numticks=12))
+        axis.set_minor_formatter(NullFormatter())
+    axes.grid(True, which="major")
+    axes.set_xlabel(COST_WORDS[against])
+    axes.set_ylabel(error_words(diagram, measure))
+
+
+def error_words(diagram: Diagram, measure: str) -> str:
+    """What the errors of a measure are, for an axis."""
+    if diagram.reference.scales[measure]:
+        return "largest error, relative"
+    return f"largest value [{diagram.measure(measure).unit}]"
+
+
+def _bars(line: list[Point], against: str) -> np.ndarray | None:
+    """(2, K) from the median down to the least time and up to the greatest."""
+    if against == EVALUATIONS:
+        return None
+    times = [point.cpu if against == CPU else point.wall for point in line]
+    return np.array([[m - least, most - m] for m, least, most in times]).reshape(-1, 2).T
+
+
+def _front(axes: Axes, diagram: Diagram, measure: str, against: str) -> None:
+    """A ring around every point of the Pareto front, and a star at the chosen ones."""
+    scale = diagram.scale(measure)
+    front = [p for p in diagram.front(measure, against) if p.errors[measure] > 0]
+    x, y = [p.cost(against) for p in front], [p.errors[measure] / scale for p in front]
+    axes.plot(x, y, "o", markersize=11, fillstyle="none", color=FRONT, markeredgewidth=1.1, zorder=5)
+    chosen = [p for p in diagram.points if p.label in diagram.chosen and p.errors[measure] > 0]
+    axes.plot(
+        [p.cost(against) for p in chosen], [p.errors[measure] / scale for p in chosen],
+        "*", markersize=17, color="#F0C000", markeredgecolor=FRONT, zorder=6,
+    )  # fmt: skip
+
+
+def _legend(figure: Figure, shown: list[Diagram], lines: dict[tuple[str, str], tuple[str, str]]) -> None:
+    """Colours mean methods, markers models."""
+    handles: list[Artist] = []
+    for series, colour in {series: colour for (series, _), (colour, _) in lines.items()}.items():
+        handles.append(Line2D([], [], color=colour, linewidth=2.5, label=series))
+    models = {model: marker for (_, model), (_, marker) in lines.items()}
+    for model, marker in models.items() if len(models) > 1 else ():
+        handles.append(Line2D([], [], color="#555555", marker=marker, markersize=6, linestyle="none", label=model))
+    ring: Any = {"marker": "o", "fillstyle": "none", "markersize": 10, "linestyle": "none"}
+    handles.append(Line2D([], [], color=FRONT, label="Pareto front", **ring))
+    if any(diagram.chosen for diagram in shown):
+        handles.append(Line2D([], [], color="#F0C000", marker="*", markersize=14, linestyle="none", label="chosen"))
+    if any(floor > 0 for diagram in shown for floor in diagram.reference.floors.values()):
+        handles.append(Patch(facecolor="#EEEEEE", edgecolor=FLOOR, hatch="///", label="error of the reference"))
+    lost = sum(len(diagram.lost) for diagram in shown)
+    title = f"{lost} variant{'s' * (lost > 1)} failed:\nsee the table" if lost else None
+    figure.legend(handles=handles, loc="outside right upper", fontsize=10, alignment="left", title=title)
+
+
+def _written(figure: Figure, path: Path) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(path.name + ".part")
+    kind = path.suffix.lower()
+    figure.savefig(temporary, format=kind[1:], dpi=130, metadata=_METADATA[kind])  # type: ignore[arg-type]
+    os.replace(temporary, path)
+    return path

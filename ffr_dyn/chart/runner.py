@@ -1,0 +1,276 @@
+"""Running variants: one after another in this process, or as Dask tasks in processes here or on a cluster.
+
+Timing. Clocked is the integrator's compiled loop alone: assembly, output files and compilation are left out. A worker process
+has one thread, so that nothing runs beside a run in its process; CPU time is that of the thread which runs it, wall time is
+the clock's. Both are taken several times, and the diagram shows the median with the least and the greatest. Locally there are
+half as many workers as processors: they do not share a core's pipelines, and neither is the machine saturated. With a busy
+machine, trust CPU time.
+
+Failures. A variant that its method cannot do, or that runs too long, has failed for good and says why. One that is lost,
+with its worker or by an unforeseen error, is tried again, `RETRIES` times, and then recorded as failed. Neither stops the
+others.
+"""
+
+from __future__ import annotations
+
+import fnmatch
+import os
+import statistics
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from ffr_dyn.analyses.assemble import assemble
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.chart.measures import Measure
+from ffr_dyn.chart.variants import Variant
+from ffr_dyn.compilation import ensure_compiled
+from ffr_dyn.errors import InputError, SimulationError
+from ffr_dyn.measure import catalogue
+from ffr_dyn.result import Result
+from ffr_dyn.scene import Scene
+from ffr_dyn.stabilisation import Projection, Stabilisation
+from ffr_dyn.stopwatch import Stopwatch
+from ffr_prep.body import BodyError
+
+Array = np.ndarray
+Item = TypeVar("Item")
+
+RETRIES = 2
+REPEATS, LEAST_SECONDS, MOST_REPEATS = 5, 0.2, 25  # a run is repeated until both is reached, or the most
+LONG = 2.0  # s of CPU time, above which one repeat is enough
+_CONNECT = 10.0  # s to wait for the scheduler of a cluster
+
+
+@dataclass(frozen=True)
+class Span:
+    """From `start` to `end` with a row every `output_step` [s]."""
+
+    end: float
+    output_step: float
+    start: float = 0.0
+
+
+@dataclass(frozen=True)
+class Job:
+    """A variant of a scene to be run.
+
+    repeats : how often it is timed;  limit : wall time [s] that a run may take
+    """
+
+    scene: Scene
+    variant: Variant
+    span: Span
+    measures: tuple[Measure, ...]
+    stabilisation: Stabilisation = Projection()  # noqa: RUF009 - frozen
+    repeats: int = REPEATS
+    limit: float = 120.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """values (T, k) and scale by measure; wall and CPU time [s] of every repeat; evaluations of the equations of motion."""
+
+    values: Mapping[str, Array]
+    scales: Mapping[str, float]
+    wall: tuple[float, ...]
+    cpu: tuple[float, ...]
+    evaluations: int
+
+    @property
+    def seconds(self) -> float:
+        """Median CPU time."""
+        return statistics.median(self.cpu)
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a variant has no outcome."""
+
+    reason: str
+
+
+# ---- one run ------------------------------------------------------------------------------------------------------
+
+
+def perform(job: Job) -> Outcome | Failure:
+    """Run a variant, and again for its times."""
+    try:
+        scene = job.variant.model.of(job.scene)
+        method = job.variant.integrator()
+        ensure_compiled(type(method))
+        outputs = _outputs(scene, job)
+        _warm_up(scene, method, job)
+        result, wall, cpu = _clocked(scene, method, job, outputs)
+        times = [(wall, cpu)]
+        while _wants_more(times, job.repeats):
+            times.append(_clocked(scene, method, job, outputs)[1:])
+    except (InputError, BodyError, SimulationError) as error:
+        return Failure(str(error))
+    values = {measure.name: measure.values(result) for measure in job.measures}
+    bad = next((name for name, history in values.items() if not np.isfinite(history).all()), None)
+    if bad is not None:
+        return Failure(f"{bad} is not finite")
+    return Outcome(
+        values,
+        {measure.name: measure.scale(result) for measure in job.measures},
+        tuple(wall for wall, _ in times),
+        tuple(cpu for _, cpu in times),
+        int(result.attributes["evaluations"]),
+    )
+
+
+def _wants_more(times: list[tuple[float, float]], repeats: int) -> bool:
+    spent = sum(cpu for _, cpu in times)
+    if len(times) >= max(repeats, 1) and (spent > LEAST_SECONDS or len(times) >= MOST_REPEATS or repeats <= 1):
+        return False
+    return spent < LONG
+
+
+def _outputs(scene: Scene, job: Job) -> tuple[str, ...]:
+    """The quantities that the measures want and the variant has; a rigid body has fewer."""
+    has = catalogue(assemble(scene, time=job.span.start).system)
+    wanted = dict.fromkeys(pattern for measure in job.measures for pattern in measure.outputs)
+    return tuple(name for name in has if any(fnmatch.fnmatchcase(name, pattern) for pattern in wanted))
+
+
+_WARM: set[type] = set()
+
+
+def _warm_up(scene: Scene, method: Any, job: Job) -> None:
+    """The first call of a method in a process loads its compiled code."""
+    if type(method) in _WARM:
+        return
+    span = job.span
+    forward(scene, start=span.start, end=span.start + span.output_step, output_step=span.output_step, method=method)
+    _WARM.add(type(method))
+
+
+def _clocked(scene: Scene, method: Any, job: Job, outputs: tuple[str, ...]) -> tuple[Result, float, float]:
+    began, stopwatch, span = time.monotonic(), Stopwatch(), job.span
+
+    def watch(reached: float) -> None:
+        if time.monotonic() - began > job.limit:
+            raise SimulationError(f"took longer than {job.limit:g} s; it had reached t = {reached:.6g} s")
+
+    result = forward(
+        scene,
+        start=span.start,
+        end=span.end,
+        output_step=span.output_step,
+        method=method,
+        stabilisation=job.stabilisation,
+        outputs=outputs,
+        progress=watch,
+        stopwatch=stopwatch,
+    )
+    return result, stopwatch.wall, stopwatch.cpu
+
+
+# ---- many runs ----------------------------------------------------------------------------------------------------
+
+
+class Pool(Protocol):
+    """What runs jobs."""
+
+    def results(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Iterator[tuple[int, Any]]:
+        """(number of the item, what the function returned or a `Failure`), in the order in which they are done."""
+
+
+class Here:
+    """One after another in this process."""
+
+    def results(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Iterator[tuple[int, Any]]:
+        """See `Pool`."""
+        for k, item in enumerate(items):
+            yield k, _tried(function, item)
+
+
+def _tried(function: Callable[[Item], Any], item: Item) -> Any:
+    for _ in range(RETRIES + 1):
+        try:
+            return function(item)
+        except Exception as error:
+            reason = f"{type(error).__name__}: {error}"
+    return Failure(reason)
+
+
+class Distributed:
+    """Tasks of a Dask client."""
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+
+    def results(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Iterator[tuple[int, Any]]:
+        """See `Pool`."""
+        from dask.distributed import as_completed
+
+        futures = {self._client.submit(function, item, retries=RETRIES, pure=False): k for k, item in enumerate(items)}
+        for future in as_completed(list(futures), loop=self._client.loop):
+            if future.status == "finished":
+                yield futures[future], future.result()
+            else:
+                yield futures[future], Failure(_why(future))
+
+
+def _why(future: Any) -> str:
+    if future.status != "error":
+        return f"the task was {future.status}: the cluster has gone"
+    error = future.exception()
+    if type(error).__name__ == "KilledWorker":
+        return f"its worker died {RETRIES + 1} times: out of memory, or killed from outside"
+    return f"{type(error).__name__}: {error}"
+
+
+@contextmanager
+def pool(workers: int | None = None, cluster: str | None = None) -> Iterator[Pool]:
+    """Where to run: a cluster by its scheduler's address, local processes (default: half the processors), or with 0 here.
+
+    Raises InputError where Dask is missing or no scheduler answers.
+    """
+    if workers == 0 and cluster is None:
+        yield Here()
+        return
+    if workers is not None and workers < 0:
+        raise InputError(f"there cannot be {workers} workers; give 0 for this process, or how many")
+    with _client(workers, cluster) as client:
+        yield Distributed(client)
+
+
+def default_workers() -> int:
+    """Half the processors that this process may use, at least one."""
+    return max(1, len(os.sched_getaffinity(0)) // 2) if os.name == "posix" else max(1, (os.cpu_count() or 2) // 2)
+
+
+@contextmanager
+def _client(workers: int | None, cluster: str | None) -> Iterator[Any]:
+    try:
+        import dask
+        from dask.distributed import Client, LocalCluster
+    except ImportError:
+        raise InputError(
+            'running variants in parallel needs Dask: pip install "ffr[chart]"; --workers 0 runs them here, one by one'
+        ) from None
+    quiet = {"distributed.scheduler.allowed-failures": RETRIES, "logging.distributed": "critical"}
+    with dask.config.set(quiet):
+        if cluster is None:
+            count = default_workers() if workers is None else workers
+            with (
+                LocalCluster(n_workers=count, threads_per_worker=1, dashboard_address=None, silence_logs=50) as local,
+                Client(local) as client,
+            ):
+                yield client
+            return
+        try:
+            client = Client(cluster, timeout=_CONNECT, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise InputError(
+                f"no scheduler answers at {cluster!r} ({error}); start one with `dask scheduler` and workers with "
+                "`dask worker ADDRESS --nthreads 1`, and give the address that it prints, such as tcp://host:8786"
+            ) from None
+        with client:
+            yield client
