@@ -9,6 +9,7 @@ import click
 
 from ffr_dyn.cli_analyses import COMMANDS
 from ffr_dyn.cli_chart import chart
+from ffr_dyn.cli_economy import economise
 from ffr_dyn.cli_realtime import realtime
 from ffr_dyn.cli_run import forward, run
 from ffr_dyn.cli_stress import stress
@@ -101,7 +102,7 @@ def animate(result: Path, output: Path, scale: str, duration: float | None, colo
     click.echo(f"film     {output}")
 
 
-for command in (run, forward, *COMMANDS, stress, chart, realtime):
+for command in (run, forward, *COMMANDS, stress, chart, economise, realtime):
     cli.add_command(command)
 
 

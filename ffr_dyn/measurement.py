@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ffr_dyn.errors import InputError
@@ -46,6 +47,9 @@ class StressMeasurement:
     point: Vector
     what: str = "von-mises"
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "point", _place(self.name, self.point))
+
 
 @dataclass(frozen=True)
 class SectionMeasurement:
@@ -65,11 +69,19 @@ class SectionMeasurement:
     place: str = "middle"
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "point", _place(self.name, self.point))
         for key, known in (("what", ("force", "moment")), ("place", ("first", "middle", "last"))):
             if getattr(self, key) not in known:
                 raise InputError(
                     f"measurement {self.name!r}: {key} is {getattr(self, key)!r}; it must be one of {', '.join(known)}"
                 )
+
+
+def _place(name: str, point: Iterable[float]) -> Vector:
+    values = [float(value) for value in point]
+    if len(values) != 3:
+        raise InputError(f"measurement {name!r}: a point has three coordinates [m], not {len(values)}")
+    return values[0], values[1], values[2]
 
 
 AnyMeasurement = Measurement | StressMeasurement | SectionMeasurement

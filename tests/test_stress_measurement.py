@@ -144,8 +144,13 @@ def test_measurements_that_cannot_be_made(boom, measurement, message):
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"), [({"what": "bending"}, "what is 'bending'"), ({"place": "end"}, "first, middle, last")]
+    ("changes", "message"),
+    [
+        ({"what": "bending"}, "what is 'bending'"),
+        ({"place": "end"}, "first, middle, last"),
+        ({"point": (1.0, 2.0)}, "three coordinates"),
+    ],
 )
 def test_section_measurements_name_what_there_is(changes, message):
     with pytest.raises(InputError, match=message):
-        SectionMeasurement("m", "boom", EDGE, **changes)
+        SectionMeasurement("m", "boom", **({"point": EDGE} | changes))

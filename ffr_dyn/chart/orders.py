@@ -8,7 +8,7 @@ import numpy as np
 
 from ffr_dyn.chart.diagram import Diagram
 
-ABOVE = 10.0  # times the floor: errors below are not the method's own
+ABOVE = 3.0  # times the floor, itself a careful estimate: errors below are not the method's own
 
 
 def observed_order(steps: Sequence[float], errors: Sequence[float], floor: float = 0.0) -> float:

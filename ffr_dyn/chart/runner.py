@@ -103,7 +103,7 @@ def perform(job: Job) -> Outcome | Failure:
     try:
         scene = job.variant.model.of(job.scene)
         method = job.variant.integrator()
-        ensure_compiled(method)
+        ensure_compiled(type(method))
         outputs = _outputs(scene, job)
         _warm_up(scene, method, job)
         result, wall, cpu = _clocked(scene, method, job, outputs)

@@ -1,0 +1,189 @@
+"""The outputs that matter: named scalar or vector histories with a tolerance, and how far two runs are apart in them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+import numpy as np
+
+from ffr_dyn.analyses.assemble import Assembled
+from ffr_dyn.errors import InputError
+from ffr_dyn.measure import catalogue
+from ffr_dyn.result import Result
+from ffr_dyn.scene import Scene
+from ffr_dyn.stress import tensors, von_mises
+
+Array = np.ndarray
+
+STRESS = "stress"
+ELASTIC = ("displacement", "q", "q_dot", "q_ddot")  # quantities that a rigid body does not have: zero
+FINEST = 1e-10  # relative tolerance below which rounding and the projection on the constraints decide
+
+
+@dataclass(frozen=True)
+class Output:
+    """A history that matters.
+
+    name      : of a component such as "rod.tip.position.y", of a quantity with all its components, or "<body>.stress", the
+                largest von Mises stress on the surface of a body
+    tolerance : largest error at any output time
+    absolute  : whether the tolerance is in the unit of the output, or else a share of its range over the run
+    """
+
+    name: str
+    tolerance: float
+    absolute: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0 < self.tolerance < np.inf:
+            raise InputError(f"output {self.name!r}: the tolerance is {self.tolerance}; it must be positive")
+        if not self.absolute and self.tolerance < FINEST:
+            raise InputError(
+                f"output {self.name!r}: a relative tolerance of {self.tolerance:g} is below the accuracy of any run "
+                f"({FINEST:g}: rounding, and the projection on the constraints); ask for a larger one"
+            )
+
+
+def as_output(given: Output | str, tolerance: float) -> Output:
+    """ "rod.tip.position.y", "rod.stress=1e6" (absolute) or "rod.stress=0.1%" (of the range) as an Output."""
+    if isinstance(given, Output):
+        return given
+    name, equals, text = given.partition("=")
+    if not equals:
+        return Output(name.strip(), tolerance)
+    share = text.strip().endswith("%")
+    try:
+        value = float(text.strip().rstrip("%"))
+    except ValueError:
+        raise InputError(f"output {given!r}: write NAME, NAME=TOLERANCE or NAME=PERCENT%") from None
+    return Output(name.strip(), value / 100 if share else value, absolute=not share)
+
+
+@dataclass(frozen=True)
+class Probe:
+    """How outputs are read from runs of the same scene with different models.
+
+    outputs    : what is asked for
+    quantities : per output, the quantity of a result that holds it
+    columns    : per output, the component, or () for all
+    units      : per output
+    """
+
+    outputs: tuple[Output, ...]
+    quantities: tuple[str, ...]
+    columns: tuple[tuple[int, ...], ...]
+    units: tuple[str, ...]
+
+
+def probe(assembled: Assembled, outputs: Sequence[Output]) -> Probe:
+    """Find the outputs among the quantities of a scene. Raises InputError for names that do not exist or repeat."""
+    if not outputs:
+        raise InputError("name at least one output, such as rod.tip.position.y: without it no model is good or bad")
+    names = [output.name for output in outputs]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"the output {name!r} is asked for more than once")
+    everything, scene = catalogue(assembled.system), assembled.system.scene
+    found = [_found(everything, scene, output.name) for output in outputs]
+    return Probe(tuple(outputs), tuple(f[0] for f in found), tuple(f[1] for f in found), tuple(f[2] for f in found))
+
+
+def _found(everything: dict, scene: Scene, name: str) -> tuple[str, tuple[int, ...], str]:
+    if name in everything:
+        return name, (), everything[name].unit
+    head, _, label = name.rpartition(".")
+    if label == STRESS:
+        _check_stress(scene, head)
+        return f"{head}.q", (), "Pa"
+    labels: list[tuple[str, ...]] = [axis.labels for axis in everything[head].axes[:1]] if head in everything else []
+    if labels and label in labels[0]:
+        return head, (labels[0].index(label),), everything[head].unit
+    close = get_close_matches(name, [*everything, *(f"{body.name}.{STRESS}" for body in scene.bodies)], 3, 0.5)
+    hint = f"did you mean {', '.join(close)}?" if close else f"there are: {', '.join(everything)}"
+    raise InputError(f"output {name!r} is none of the scene's quantities or their components; {hint}")
+
+
+def _check_stress(scene: Scene, name: str) -> None:
+    bodies = {body.name: body.model for body in scene.bodies}
+    if name not in bodies:
+        raise InputError(f"output '{name}.{STRESS}': there is no body {name!r}; there are: {', '.join(bodies)}")
+    surface = bodies[name].surface
+    if surface is None or surface.stress is None or bodies[name].n == 0:
+        raise InputError(
+            f"output '{name}.{STRESS}': body {name!r} has no stress modes; reduce it with them (ffr-prep reduce --stress)"
+        )
+
+
+def needed(of: Probe, scene: Scene) -> tuple[str, ...]:
+    """The quantities that a run of this model has to keep."""
+    rigid = {body.name for body in scene.bodies if body.model.n == 0}
+    there = [name for name in of.quantities if not _is_elastic(name, rigid)]
+    return tuple(dict.fromkeys([*there, "constraint.position"]))
+
+
+def _is_elastic(quantity: str, rigid: set[str]) -> bool:
+    return quantity.partition(".")[0] in rigid and quantity.rpartition(".")[2] in ELASTIC
+
+
+def histories(of: Probe, scene: Scene, result: Result) -> tuple[Array, ...]:
+    """(T, k) of each output in a run of this model."""
+    return tuple(_history(of, k, scene, result) for k in range(len(of.outputs)))
+
+
+def _history(of: Probe, k: int, scene: Scene, result: Result) -> Array:
+    name, quantity = of.outputs[k].name, of.quantities[k]
+    if quantity not in result.quantities:
+        return np.zeros((result.time.size, 1))
+    if name.rpartition(".")[2] == STRESS and quantity.endswith(".q"):
+        return largest_stress(scene, quantity.removesuffix(".q"), result[quantity])[:, None]
+    values = result[quantity].reshape(result.time.size, -1)
+    return values[:, list(of.columns[k])] if of.columns[k] else values
+
+
+def largest_stress(scene: Scene, name: str, q: Array) -> Array:
+    """(T,) largest von Mises stress over the surface of a body [Pa] for its elastic coordinates (T, n)."""
+    surface = next(body.model.surface for body in scene.bodies if body.name == name)
+    if surface is None:
+        return np.zeros(len(q))
+    chunk = max(1, 2_000_000 // (6 * max(1, len(surface.points))))
+    parts = [von_mises(tensors(surface, q[k : k + chunk])).max(axis=0) for k in range(0, len(q), chunk)]
+    return np.concatenate(parts)
+
+
+def ranges(values: Sequence[Array]) -> Array:
+    """(outputs,) largest range of a component over the run."""
+    return np.array([float(np.ptp(one, axis=0).max(initial=0.0)) for one in values])
+
+
+def limits(of: Probe, scales: Array) -> Array:
+    """(outputs,) tolerances in the units of the outputs. Raises InputError where a share of nothing is asked for."""
+    for output, scale, unit in zip(of.outputs, scales, of.units, strict=True):
+        if not output.absolute and scale <= _nothing(unit):
+            raise InputError(
+                f"output {output.name!r} does not change over the run (its range is {scale:.2g} {unit}): a share of that "
+                f"says nothing; give an absolute tolerance, {output.name}=VALUE, or another output"
+            )
+    tolerances = np.array([output.tolerance for output in of.outputs])
+    return np.where([output.absolute for output in of.outputs], tolerances, tolerances * scales)
+
+
+def _nothing(unit: str) -> float:
+    """A range that is rounding only."""
+    return 1e-3 if unit == "Pa" else 1e-12
+
+
+def largest(differences: Sequence[Array]) -> Array:
+    """(outputs,) largest size of a component of each difference."""
+    return np.array([float(np.abs(one).max(initial=0.0)) for one in differences])
+
+
+def difference(one: Sequence[Array], other: Sequence[Array]) -> tuple[Array, ...]:
+    """Histories of one less those of the other."""
+    return tuple(a - b for a, b in zip(one, other, strict=True))
+
+
+def total(*parts: Sequence[Array]) -> tuple[Array, ...]:
+    """The sum of histories."""
+    return tuple(np.sum(same, axis=0) for same in zip(*parts, strict=True))

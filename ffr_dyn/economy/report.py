@@ -1,0 +1,277 @@
+"""The report of a search: what is modelled, what it costs, how far off it is, and what is nearest to mattering.
+
+One set of tables, written as text, Markdown or one page of HTML that needs nothing else.
+"""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ffr_dyn.economy.advice import advice
+from ffr_dyn.economy.choice import Choice, kind
+from ffr_dyn.economy.contributions import Contributions
+from ffr_dyn.economy.search import Economy
+from ffr_dyn.errors import InputError
+from ffr_dyn.scene import INERTIA_TERMS, Body
+
+Array = np.ndarray
+
+SHOWN = 6  # rows of what is nearest to mattering
+SEPARATOR = "  "
+
+
+@dataclass(frozen=True)
+class Table:
+    """A heading, a sentence about it, names of columns, and rows of text."""
+
+    title: str
+    text: str
+    columns: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
+
+
+def tables(found: Economy) -> list[Table]:
+    """The report, part after part."""
+    parts = [_summary(found), _outputs(found), _bodies(found), _nearest(found), _tried(found), _advice(found)]
+    notes = _notes(found)
+    return [*parts, Table("Notes", "", (), tuple((note,) for note in notes))] if notes else parts
+
+
+def _summary(found: Economy) -> Table:
+    choice, settings = found.choice, found.settings
+    rows = [
+        ("scene", found.original.name),
+        ("computed", "in space" if choice.plane == "none" else f"in the plane across {choice.plane}"),
+        ("integrator", f"{choice.method}, step {settings.method.step:.6g} s ({choice.divisions} to an output row)"),
+        ("stabilisation", repr(settings.stabilisation)),
+        ("elastic coordinates", f"{_coordinates(choice)} of {sum(b.model.n for b in found.original.bodies)}"),
+        ("cost of a run", f"{found.cost / 1e6:.3g} s, everything with the same step {found.before / 1e6:.3g} s: "
+                          f"{found.before / found.cost:.1f} times as much (cost model)"),
+        ("cost of the search", f"{found.search_cost / found.cost:.1f} runs of the chosen model"),
+    ]  # fmt: skip
+    return Table("Chosen model", _verdict(found), ("", ""), tuple(rows))
+
+
+def _verdict(found: Economy) -> str:
+    verified = found.verification
+    if verified is None:
+        worst = float((found.error / found.limits).max())
+        return f"All outputs are estimated to stay within their tolerances; the nearest takes {worst:.2g} of its own."
+    worst = float((verified.error / found.limits).max())
+    if worst > 1:
+        return f"NOT within its tolerances: the verification finds {worst:.2g} times the tolerance of an output."
+    again = f" after {verified.attempts} refinements of what the estimates had chosen" if verified.attempts else ""
+    return f"Verified{again}: all outputs are within their tolerances; the nearest takes {worst:.2g} of its own."
+
+
+def _coordinates(choice: Choice) -> int:
+    return sum(part.count for part in choice.parts)
+
+
+def _outputs(found: Economy) -> Table:
+    columns: tuple[str, ...] = ("output", "unit", "range", "tolerance", "left out", "step", "estimated")
+    verified = found.verification
+    columns += ("verified", "estimate / true") if verified else ()
+    rows = []
+    for k, output in enumerate(found.probe.outputs):
+        numbers = (found.scales, found.limits, found.model_error, found.time_error, found.error)
+        row: tuple[str, ...] = (output.name, found.probe.units[k], *(f"{column[k]:.3g}" for column in numbers))
+        if verified:
+            true = verified.first[k]
+            row += (f"{verified.error[k]:.3g}", f"{found.error[k] / true:.2f}" if true > 0 else "-")
+        rows.append(row)
+    text = "Largest errors over the run: of what is left out of the model, of the step, and of both together."
+    if verified:
+        own = ", ".join(f"{value:.1g}" for value in verified.own)
+        text += (
+            f" Verified against everything, {verified.choice.method} with {verified.choice.divisions} steps to a row, itself "
+            f"known to {own}."
+        )
+    return Table("Outputs", text, columns, tuple(rows))
+
+
+def _bodies(found: Economy) -> Table:
+    rows = []
+    for b, (body, part) in enumerate(zip(found.original.bodies, found.choice.parts, strict=True)):
+        if body.model.n == 0:
+            rows.append((body.name, "rigid (given)", "-", "-", "-", "-"))
+            continue
+        what = kind(found.original, found.choice, b, found.settings.output_step)
+        kept = [term for term in INERTIA_TERMS if term not in part.dropped]
+        dropped = [term for term in INERTIA_TERMS if term in part.dropped]
+        flexible = part.count > 0
+        rows.append((
+            body.name, what, _modes(body, found.choice, b),
+            " ".join(kept) if flexible else "-", " ".join(dropped) or "-" if flexible else "-", _stiffening(found, b),
+        ))  # fmt: skip
+    text = (
+        "Quasi-static: all its frequencies are above what the step resolves, so it deforms without vibrating. Shapes "
+        "are made of several modes, of which a few carry the deformation of this motion."
+    )
+    columns = ("body", "modelled", "elastic coordinates", "terms kept", "terms dropped", "stiffening")
+    return Table("Bodies", text, columns, tuple(rows))
+
+
+def _modes(body: Body, choice: Choice, b: int) -> str:
+    part = choice.parts[b]
+    if not part.count:
+        return "none"
+    V = part.basis(body.model.n)
+    hertz = np.sqrt(np.einsum("ia,i,ia->a", V, body.model.omega2, V)) / (2 * np.pi)
+    if part.shapes is None:
+        return ", ".join(f"{mode} ({f:.4g} Hz)" for mode, f in zip(part.modes, hertz, strict=True))
+    return f"{part.count} shape{'s' * (part.count > 1)} of {len(part.modes)} modes: " + ", ".join(
+        f"{f:.4g} Hz" for f in hertz
+    )
+
+
+def _stiffening(found: Economy, b: int) -> str:
+    if found.original.bodies[b].model.stiffening is None:
+        return "not in the body"
+    part = found.choice.parts[b]
+    return "-" if not part.count else "kept" if part.stiffened else "dropped"
+
+
+def _nearest(found: Economy) -> Table:
+    out = [("left out", *row) for row in _leading(found, found.effects, most=True)]
+    kept = [("kept", *row) for row in _leading(found, found.kept, most=False)]
+    text = (
+        "What the omitted modes would do, driven by the computed motion, the largest first; and those that stay and do the "
+        "least. In units of the tolerance."
+    )
+    return Table("Nearest to mattering", text, ("", "mode", "output", "share"), (*out, *kept))
+
+
+def _leading(found: Economy, effects: Contributions, *, most: bool) -> Iterator[tuple[str, str, str]]:
+    if not len(effects.body):
+        return
+    shares = effects.effect / found.limits
+    order = np.argsort(-shares.max(axis=1) if most else shares.max(axis=1), kind="stable")
+    for k in order[: SHOWN if most else SHOWN // 2]:
+        body = found.original.bodies[effects.body[k]]
+        output = int(np.argmax(shares[k]))
+        name = f"{body.name}, mode {effects.mode[k]} ({body.model.frequencies[effects.mode[k]]:.4g} Hz)"
+        yield name, found.probe.outputs[output].name, f"{shares[k, output]:.2g}"
+
+
+def _tried(found: Economy) -> Table:
+    rows = []
+    for one in found.tried:
+        coordinates = " ".join(str(part.count) for part in one.choice.parts)
+        worst = float((one.error / found.limits).max(initial=0.0))
+        method = f"{one.choice.method}/{one.choice.divisions}"
+        rows.append((one.what, coordinates, method, f"{one.cost / found.cost:.2f}", f"{worst:.3g}"))
+    text = (
+        "Cost in runs of the chosen model. Error in tolerances: of trials beside everything with the same step, of the "
+        "chosen model with its step."
+    )
+    return Table("Models tried", text, ("model", "coordinates by body", "integrator", "cost", "error"), tuple(rows))
+
+
+def _advice(found: Economy) -> Table:
+    lines = advice(found)
+    text = (
+        "What the scene needs of its bodies, as commands to run; FILE is the mesh of the body."
+        if lines
+        else "No flexible bodies."
+    )
+    return Table("Mesh and reduction", text, (), tuple((line,) for line in lines))
+
+
+def _notes(found: Economy) -> list[str]:
+    prescribed = [
+        f"output {name!r} is the same with rigid and with flexible bodies: no model changes it, its tolerance says nothing "
+        "about modes and terms"
+        for name in found.unmoved
+    ]
+    return [*prescribed, *found.notes]
+
+
+# ---- as text ------------------------------------------------------------------------------------------------------
+
+
+def as_text(found: Economy) -> str:
+    """The report in columns, for a terminal."""
+    return "\n".join(line for table in tables(found) for line in _plain(table))
+
+
+def _plain(table: Table) -> Iterator[str]:
+    yield f"{table.title.upper()}"
+    if table.text:
+        yield table.text
+    head = [table.columns] if any(table.columns) else []
+    listed = [*head, *table.rows]
+    widths = [max((len(row[k]) for row in listed), default=0) for k in range(len(listed[0]) if listed else 0)]
+    for row in listed:
+        yield SEPARATOR + SEPARATOR.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+    yield ""
+
+
+def as_markdown(found: Economy, picture: str | None = None) -> str:
+    """The report in Markdown; `picture` a file to show."""
+    lines = [f"# Economised model: {found.original.name}", ""]
+    for table in tables(found):
+        lines += [f"## {table.title}", "", *([table.text, ""] if table.text else [])]
+        if table.columns:
+            lines += [_row(table.columns), _row(("---",) * len(table.columns)), *map(_row, table.rows), ""]
+        else:
+            lines += [*(f"* {row[0]}" for row in table.rows), ""]
+    if picture:
+        lines += ["## Chart", "", f"![cost and error of all models tried]({picture})", ""]
+    return "\n".join(lines)
+
+
+def _row(cells: tuple[str, ...]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+_STYLE = (
+    "body{font:15px/1.5 sans-serif;max-width:72em;margin:2em auto;padding:0 1em;color:#222}"
+    "table{border-collapse:collapse;margin:.5em 0 1.5em}td,th{border:1px solid #ccc;padding:.25em .6em;text-align:left}"
+    "th{background:#f2f2f2}li{font-family:monospace;margin:.3em 0}img{max-width:100%}"
+)
+
+
+def as_html(found: Economy, picture: bytes | None = None) -> str:
+    """The report as one page; `picture` a PNG that it shows."""
+    import base64
+
+    title = f"Economised model: {found.original.name}"
+    parts = [f"<h1>{html.escape(title)}</h1>", *(_section(table) for table in tables(found))]
+    if picture is not None:
+        data = base64.b64encode(picture).decode()
+        parts.append(f'<h2>Chart</h2><img alt="cost and error of all models tried" src="data:image/png;base64,{data}">')
+    head = f'<meta charset="utf-8"><title>{html.escape(title)}</title><style>{_STYLE}</style>'
+    return f'<!doctype html><html lang="en"><head>{head}</head><body>{"".join(parts)}</body></html>\n'
+
+
+def _section(table: Table) -> str:
+    text = f"<h2>{html.escape(table.title)}</h2>" + (f"<p>{html.escape(table.text)}</p>" if table.text else "")
+    if not table.columns:
+        return text + "<ul>" + "".join(f"<li>{html.escape(row[0])}</li>" for row in table.rows) + "</ul>"
+    head = "".join(f"<th>{html.escape(cell)}</th>" for cell in table.columns) if any(table.columns) else ""
+    rows = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows)
+    return f"{text}<table>{f'<tr>{head}</tr>' if head else ''}{rows}</table>"
+
+
+def write_report(found: Economy, path: str | Path) -> Path:
+    """Write the report as .html (with the chart), .md or .txt. Raises InputError for another kind of file."""
+    from ffr_dyn.economy.picture import as_png
+
+    path = Path(path)
+    if path.suffix not in (".html", ".md", ".txt"):
+        raise InputError(f"{path}: a report is written as .html, .md or .txt")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.suffix == ".html":
+        text = as_html(found, as_png(found))
+    else:
+        text = as_markdown(found) if path.suffix == ".md" else as_text(found)
+    temporary = path.with_name(path.name + ".part")
+    temporary.write_text(text, encoding="utf-8")
+    temporary.replace(path)
+    return path

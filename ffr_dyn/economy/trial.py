@@ -1,0 +1,92 @@
+"""One run of one model of a scene, with what the estimates need of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_dyn.analyses.assemble import Assembled, assemble
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.economy.choice import Choice, applied
+from ffr_dyn.economy.outputs import Probe, histories, needed
+from ffr_dyn.errors import SimulationError
+from ffr_dyn.result import Result
+from ffr_dyn.scene import Scene
+from ffr_dyn.stabilisation import Projection, Stabilisation
+
+Array = np.ndarray
+
+STATES = ("*.R", "*.p", "*.v", "*.omega_bar", "*.q", "*.q_dot")
+
+
+@dataclass(frozen=True)
+class Span:
+    """From `start` to `end` [s] with a row every `output_step` [s], and how drift is held."""
+
+    start: float
+    end: float
+    output_step: float
+    stabilisation: Stabilisation = Projection()  # noqa: RUF009 - frozen
+
+    @property
+    def rows(self) -> int:
+        """Output rows after the start."""
+        return round((self.end - self.start) / self.output_step)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A run.
+
+    scene       : with the model applied;  values : per output (T, k);  evaluations : of the equations of motion
+    result      : kept quantities and notes
+    """
+
+    choice: Choice
+    scene: Scene
+    values: tuple[Array, ...]
+    evaluations: int
+    result: Result
+
+
+def run(scene: Scene, choice: Choice, span: Span, of: Probe, *, states: bool = False) -> Trial:
+    """Run a model; with `states`, its result holds positions and velocities of all bodies too.
+
+    Raises SimulationError as `forward` does, and where the outputs are no longer finite.
+    """
+    made = applied(scene, choice)
+    outputs = (*needed(of, made), *(_states(made) if states else ()))
+    result = forward(
+        made,
+        start=span.start,
+        end=span.end,
+        output_step=span.output_step,
+        method=choice.integrator(span.output_step),
+        stabilisation=span.stabilisation,
+        outputs=outputs,
+    )
+    values = histories(of, made, result)
+    if not all(np.isfinite(one).all() for one in values):
+        raise SimulationError("an output of the run is no longer finite")
+    return Trial(choice, made, values, int(result.attributes["evaluations"]), result)
+
+
+def _states(scene: Scene) -> tuple[str, ...]:
+    return STATES if any(body.model.n for body in scene.bodies) else STATES[:4]
+
+
+def states(trial: Trial) -> tuple[Assembled, Array, Array]:
+    """The compiled model, and (T, X) positions and (T, V) velocities of a run that kept its states."""
+    assembled = assemble(trial.scene)
+    place, result = assembled.system.layout, trial.result
+    T = result.time.size
+    x, v = np.zeros((T, place.x_size)), np.zeros((T, place.v_size))
+    for b, body in enumerate(assembled.system.scene.bodies):
+        kept = list(body.kept[0]) if body.kept else list(range(place.n[b]))
+        x[:, place.R(b)], x[:, place.p(b)] = result[f"{body.name}.R"], result[f"{body.name}.p"]
+        v[:, place.R_dot(b)], v[:, place.omega(b)] = result[f"{body.name}.v"], result[f"{body.name}.omega_bar"]
+        if place.n[b]:
+            x[:, place.q(b)] = result[f"{body.name}.q"][:, kept]
+            v[:, place.q_dot(b)] = result[f"{body.name}.q_dot"][:, kept]
+    return assembled, x, v
