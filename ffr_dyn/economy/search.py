@@ -47,6 +47,7 @@ Histories = tuple[Array, ...]
 
 PILOT = "ros3"
 OF_MODES = 0.25  # share of the tolerance that modes left out may take
+OF_RIGID = 0.5  # of the tolerance, when that makes all bodies rigid
 OF_TERMS = 0.25  # of the tolerance, for every group of terms left out
 OF_ALL = 0.85  # of the tolerance, for everything together
 NEARLY_ALL = 0.8  # of the modes: then the search goes down from the full model
@@ -287,7 +288,7 @@ def _rigid(choice: Choice) -> Choice:
 
 def _modes(search: _Search, ground: _Ground) -> Choice:
     """The fewest modes, or shapes made of them, whose absence leaves the outputs within their share."""
-    if share(difference(ground.rigid.values, ground.pilot.values), OF_MODES * ground.limits) <= 1:
+    if share(difference(ground.rigid.values, ground.pilot.values), OF_RIGID * ground.limits) <= 1:
         return ground.rigid.choice
     offers = [_Offer(search.scene, ground, ranking) for ranking in _rankings(search, ground)]
     for offer in sorted(offers, key=lambda offer: offer.cost):
