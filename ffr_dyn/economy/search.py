@@ -21,6 +21,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ffr_dyn.analyses.assemble import assemble
+from ffr_dyn.economy.checks import Frequency, StiffeningLoad, frequencies, stiffening_loads
 from ffr_dyn.economy.choice import Choice, applied, full, in_plane, orthonormal
 from ffr_dyn.economy.contributions import (
     LEFT,
@@ -101,7 +102,10 @@ class Economy:
     kept         : what each mode that stays does
     before, cost : [us] of a run of everything with the same step, and of the chosen model
     search_cost  : [us] of all runs and estimates of the search without the verification
+    tried        : what was tried and how far it was from everything with the same step
+    runs         : all runs made, with their errors against the reference, or else the chosen run less its estimated error
     unmoved      : names of outputs that no model changes
+    frequencies  : of the linearised model beside those of everything;  stiffening : what stiffens bodies, and how much
     """
 
     original: Scene
@@ -120,7 +124,10 @@ class Economy:
     cost: float
     search_cost: float
     tried: tuple[Tried, ...]
+    runs: tuple[Tried, ...]
     unmoved: tuple[str, ...]
+    frequencies: tuple[Frequency, ...]
+    stiffening: tuple[StiffeningLoad, ...]
     notes: tuple[str, ...]
     verification: Verification | None
 
@@ -442,6 +449,7 @@ def _finished(search: _Search, ground: _Ground, found: _Found, verify: bool | No
     if verify or (verify is None and _reference_cost(search, ground, final) <= SHORT):
         final, verification = _verified(search, ground, final)
     kept, omitted = _explained(search, ground, final)
+    vibrations, stiffening = frequencies(final, ground.pilot), stiffening_loads(final)
     same = replace(ground.spatial, method=final.choice.method, divisions=final.choice.divisions)
     return Economy(
         original=search.scene,
@@ -460,9 +468,26 @@ def _finished(search: _Search, ground: _Ground, found: _Found, verify: bool | No
         cost=of_run(search.scene, final.choice, search.span.rows),
         search_cost=spent,
         tried=tuple(search.tried),
+        runs=_all_runs(search, found, verification),
         unmoved=ground.unmoved,
+        frequencies=vibrations,
+        stiffening=stiffening,
         notes=tuple(final.result.attributes["notes"]),
         verification=verification,
+    )
+
+
+def _all_runs(search: _Search, found: _Found, verification: Verification | None) -> tuple[Tried, ...]:
+    """Every run with its error, against the best that is known of the outputs."""
+    if verification is not None:
+        truth: Histories = search.runs[verification.choice].values
+    else:
+        truth = difference(found.final.values, total(found.model, found.time))
+    rows = search.span.rows
+    return tuple(
+        Tried(choice, "run", of_run(search.scene, choice, rows), largest(difference(trial.values, truth)))
+        for choice, trial in search.runs.items()
+        if verification is None or choice != verification.choice
     )
 
 
