@@ -243,7 +243,12 @@ def third_party() -> set[str]:
 
 
 def test_every_library_is_declared_and_every_declared_one_is_used():
-    extras = {"imageio_ffmpeg": ["imageio-ffmpeg"], "pyNastran": ["pyNastran"], "pypardiso": ["pypardiso"], "dask": ["dask"]}
+    extras = {
+        "imageio_ffmpeg": ["imageio-ffmpeg"],
+        "pyNastran": ["pyNastran"],
+        "pypardiso": ["pypardiso"],
+        "dask": ["dask"],
+    }
     owners = importlib.metadata.packages_distributions() | extras
     needed = {distribution_name(owners[name][0]) for name in third_party()}
     assert needed == declared()
