@@ -54,9 +54,10 @@ from benchmarks.exudyn_twin import (  # noqa: E402
 )
 from benchmarks.scenes import chain, free_body, pendulum_rod  # noqa: E402
 from ffr_dyn.analyses.assemble import assemble  # noqa: E402
-from ffr_dyn.equations import new_record, new_stages, new_work  # noqa: E402
+from ffr_dyn.equations import new_record  # noqa: E402
 from ffr_dyn.integrators import RK4, ROS2, Integrator  # noqa: E402
 from ffr_dyn.kernels.tables import OK  # noqa: E402
+from ffr_dyn.machine import fill_rows, new_machine  # noqa: E402
 from ffr_dyn.scene import Scene, marker_number  # noqa: E402
 from ffr_dyn.stabilisation import Projection, gains  # noqa: E402
 from ffr_prep.body import FlexibleBody  # noqa: E402
@@ -92,17 +93,16 @@ def last_tip(scene: Scene) -> str:
 def ours(scene: Scene, method: Integrator, *, per_evaluation: bool) -> Runner:
     """The compiled loop with the default stabilisation; units: bodies times evaluations or steps."""
     start = assemble(scene)
-    model, work = start.system.model, new_work(start.system.model)
-    stages = new_stages(start.system, method.stage_count)
-    out = new_record(start.system, 1)
+    machine = new_machine(start.system, start.x, start.v, method, gains(Projection()))
+    out, work = new_record(start.system, 1), machine.work
 
     def run(steps: int) -> tuple[float, int]:
-        x, v = start.x.copy(), start.v.copy()
+        machine.x[:], machine.v[:] = start.x, start.v
         work.info[1] = 0
         began = time.process_time()
-        rows, status = method.run(model, work, stages, 0.0, method.step, 0, steps, x, v, *gains(Projection()), out)
+        status = fill_rows(machine, method, out, 0.0, steps)
         took = time.process_time() - began
-        if (rows, status) != (1, OK):
+        if status != OK:
             raise RuntimeError(f"{method} on {len(scene.bodies)} bodies stopped with status {status}")
         return took, len(scene.bodies) * (int(work.info[1]) if per_evaluation else steps)
 

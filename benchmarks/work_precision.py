@@ -19,9 +19,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ffr_dyn.analyses.assemble import Assembled, assemble
-from ffr_dyn.equations import new_record, new_stages, new_work
+from ffr_dyn.equations import new_record
 from ffr_dyn.integrators import RK4, ROS2, Integrator
 from ffr_dyn.joints import Joint
+from ffr_dyn.machine import fill_rows, new_machine
 from ffr_dyn.scene import Body, Scene
 from ffr_prep.interface import InterfaceRegion
 from ffr_prep.material import Material
@@ -52,12 +53,11 @@ def run(start: Assembled, method: Integrator, repeats: int) -> tuple[np.ndarray,
     system, times = start.system, []
     substeps = round(END / ROWS / method.step)
     for _ in range(repeats):
-        work, stages, out = new_work(system.model), new_stages(system, method.stage_count), new_record(system, ROWS)
-        x, v = start.x.copy(), start.v.copy()
+        machine, out = new_machine(system, start.x, start.v, method, (0.0, 0.0, 1e-10)), new_record(system, ROWS)
         began = time.perf_counter()
-        rows, status = method.run(system.model, work, stages, 0.0, method.step, 0, substeps, x, v, 0.0, 0.0, 1e-10, out)
+        status = fill_rows(machine, method, out, 0.0, substeps)
         times.append(time.perf_counter() - began)
-        assert (rows, status) == (ROWS, 0), f"{method} failed: {rows}, {status}"
+        assert status == 0, f"{method} failed: {status}"
     return out.r[:, 1, :2].copy(), statistics.median(times), min(times), max(times)
 
 

@@ -58,12 +58,6 @@ def leaves(tables: Any, name: str = "") -> Iterator[tuple[str, Array]]:
         yield name, np.asarray(tables)
 
 
-def restore(tables: Any, arrays: Mapping[str, Array], prefix: str) -> None:
-    """Fill the arrays of nested named tuples, in place, from those that `leaves` gave with names after `prefix`."""
-    for name, array in leaves(tables):
-        array[...] = arrays[f"{prefix}{name}"]
-
-
 def encode(checkpoint: Checkpoint) -> Array:
     """The checkpoint as bytes (uint8), without pickle."""
     stored = {f"a {name}": array for name, array in checkpoint.arrays.items()}

@@ -1,8 +1,7 @@
-"""The first use of a method: its time loop is compiled in a process of its own, and read from the cache like ever after.
+"""The first use of a method: the units it needs are compiled by two processes of their own, and read from disk ever after.
 
-What a process compiles for itself it links with what it has compiled before, and the last bits of a sum may differ from
-those of the same loop read from the cache. So no run uses what it has just compiled: the first one equals all later ones
-to the bit.
+What a process compiles for itself may differ in the last bits from what it reads from disk. So no run uses what it has just
+compiled: the first one equals all later ones to the bit.
 """
 
 from __future__ import annotations
@@ -10,51 +9,59 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
+from numba.core.caching import FunctionCache
 
-from ffr_dyn.equations import compile_scene, new_record, new_stages, new_work
 from ffr_dyn.integrators import METHODS, Integrator
-from ffr_dyn.layout import initial_state
-from ffr_dyn.scene import Body, Scene
-from ffr_prep.body import rigid_body
+from ffr_dyn.kernels.units import UNITS, Unit
 
 _AT_WORK: dict[str, subprocess.Popen[bytes]] = {}
 
 
-def begin_compiling(kind: type[Integrator]) -> None:
-    """Start to compile the time loop of a method where it is not on disk, and go on with something else meanwhile.
+def begin_compiling(*kinds: type[Integrator]) -> None:
+    """Start to compile the units of some methods where they are not on disk, and go on with something else meanwhile.
 
-    For programs that mesh and reduce bodies first: a run that needs the time loop waits for it.
+    For programs that mesh and reduce bodies first: a run that needs the units waits for them.
     """
-    names = [name for name, known in METHODS.items() if kind is known]
-    if names and names[0] not in _AT_WORK and not _is_cached(kind):
-        print("ffr-dyn: compiling the kernels, once (about a minute) ...", file=sys.stderr, flush=True)
-        same_packages = {**os.environ, "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
-        _AT_WORK[names[0]] = subprocess.Popen([sys.executable, "-m", __name__, names[0]], env=same_packages)
+    units = {**UNITS, **{name: kind.unit for name, kind in METHODS.items() if kind in kinds}}
+    missing = [name for name, unit in units.items() if name not in _AT_WORK and not _is_on_disk(unit)]
+    if not missing:
+        return
+    print("ffr-dyn: compiling the kernels, once (some twenty seconds) ...", file=sys.stderr, flush=True)
+    same_packages = {**os.environ, "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
+    for share in _shares(missing):
+        process = subprocess.Popen([sys.executable, "-m", __name__, *share], env=same_packages)
+        _AT_WORK.update(dict.fromkeys(share, process))
 
 
-def ensure_compiled(method: Integrator) -> None:
-    """Compile the time loop of a method where no compiled form is on disk; where that fails, the run does it itself."""
-    begin_compiling(type(method))
-    for name in [name for name, kind in METHODS.items() if type(method) is kind and name in _AT_WORK]:
-        _AT_WORK.pop(name).wait()
+def ensure_compiled(*kinds: type[Integrator]) -> None:
+    """Have the units of some methods on disk; where that fails, the run compiles them itself."""
+    begin_compiling(*kinds)
+    for process in set(_AT_WORK.values()):
+        process.wait()
+    _AT_WORK.clear()
 
 
-def _is_cached(kind: type[Integrator]) -> bool:
-    folder = Path(kind.run._cache.cache_path)
-    return any(folder.glob(f"*.{kind.run.__name__}-*.nbi"))
+def _shares(names: Sequence[str]) -> list[list[str]]:
+    """Two parts that take about as long; `UNITS` lists the long ones first."""
+    return [share for share in ([*names[::4], *names[3::4]], [*names[1::4], *names[2::4]]) if share]
 
 
-def run_nothing(method: Integrator) -> None:
-    """A run of no steps of one body, which needs the compiled time loop."""
-    scene = Scene((Body("body", rigid_body("body", mass=1.0, inertia=np.eye(3))),))
-    system = compile_scene(scene)
-    x, v = initial_state(scene, system.layout)
-    work, stages, record = new_work(system.model), new_stages(system, method.stage_count), new_record(system, 1)
-    method.run(system.model, work, stages, 0.0, method.step, 0, 0, np.array(x), np.array(v), 0.0, 0.0, 0.0, record)
+def _is_on_disk(unit: Unit) -> bool:
+    """Whether numba has stored a compiled form of the unit."""
+    folder = Path(FunctionCache(unit.function).cache_path)
+    return any(folder.glob(f"*.{unit.function.__name__}-*.nbi"))
+
+
+def compile_units(names: Sequence[str]) -> None:
+    """Compile units and methods by their names in `UNITS` and `METHODS`."""
+    for name in names:
+        unit = UNITS[name] if name in UNITS else METHODS[name].unit
+        if not unit.address:
+            raise RuntimeError(f"unit {name} has no address")
 
 
 if __name__ == "__main__":
-    run_nothing(METHODS[sys.argv[1]](1e-3))
+    compile_units(sys.argv[1:])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from ffr_dyn.errors import InputError
 from ffr_dyn.force_tables import Callback, FunctionTable, base_functions, load_tables, marker_numbers
 from ffr_dyn.joints import RELATION, Joint, Word, words
 from ffr_dyn.kernels.tables import (
+    LANES,
     Bodies,
     BodyWork,
     LoadWork,
@@ -173,14 +174,31 @@ def _starts(sizes: list[int]) -> Array:
     return np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)]).astype(np.int64)
 
 
+def _shared(parts: list[Array], owners: list[Hashable]) -> tuple[Array, Array]:
+    """(pool, starts): parts of one owner are stored once, so that many equal bodies stay in the processor's cache.
+
+    A part of zeros is not stored; it starts at -1, and the kernels skip it.
+    """
+    starts: dict[Hashable, int] = {}
+    stored: list[Array] = []
+    for part, owner in zip(parts, owners, strict=True):
+        if owner not in starts:
+            empty = not part.any()
+            starts[owner] = -1 if empty else sum(each.size for each in stored)
+            stored += [] if empty else [np.ravel(part)]
+    return _pool(stored), np.array([starts[owner] for owner in owners], dtype=np.int64)
+
+
 def _bodies(scene: Scene, place: Layout) -> Bodies:
     models = [body.model for body in scene.bodies]
     n = [m.n for m in models]
     stiffening = [_stiffening(body) for body in scene.bodies]
+    PP, PP_start = _shared([_PP_parts(b) for b in scene.bodies], [(id(b.model), b.dropped) for b in scene.bodies])
+    K, K_start = _shared(stiffening, [(id(b.model), b.stiffening) for b in scene.bodies])
     where = np.full((len(n) + 1, 8), -1, dtype=np.int64)
     where[-1, :7] = 0
-    starts = [_starts(n)[:-1], _starts([9 * k * k for k in n])[:-1], _starts([s.size for s in stiffening])[:-1]]
-    where[:-1, :7] = np.column_stack([n, place.ix, place.iv, *starts, [len(s) for s in stiffening]])
+    loads = np.where(K_start >= 0, [len(k) for k in stiffening], 0)
+    where[:-1, :7] = np.column_stack([n, place.ix, place.iv, _starts(n)[:-1], PP_start, K_start, loads])
     where[:-1, 7] = place.normals
     where[-1, 3] = sum(n)
     return Bodies(
@@ -189,10 +207,10 @@ def _bodies(scene: Scene, place: Layout) -> Bodies:
         moments=np.array([np.concatenate([m.r_dm, _six(m.rr_dm)]) for m in models]),
         P_dm=_pool([b.model.P_dm * ("I3" not in b.dropped) for b in scene.bodies]),
         rP_dm=_pool([_rP_parts(b) for b in scene.bodies]),
-        PP_dm=_pool([_PP_parts(b) for b in scene.bodies]),
+        PP_dm=PP,
         omega2=_pool([m.omega2 for m in models]),
         two_zeta_omega=_pool([2 * b.damping * np.sqrt(b.model.omega2) for b in scene.bodies]),
-        stiffening=_pool(stiffening),
+        stiffening=K,
     )
 
 
@@ -268,7 +286,7 @@ def _pattern(
     for k, column in enumerate(elimination.columns):
         for later in (k, *column):
             offsets[later, k] = total
-            total += size[later] * size[k]
+            total += LANES * size[k]
     sides = [[table[marker][0] for marker in block.markers] for block in blocks]
     pairs = [
         (b, later, side, earlier, other, offsets[later, earlier])
@@ -358,7 +376,7 @@ def new_work(m: Model) -> Work:
     n, V, pairs = m.bodies.where[:, 0], 6 * B + E, m.pattern.pair_body.size
     size = np.diff(m.rows.start)
     column = np.repeat(np.arange(size.size), np.diff(m.pattern.column_start))
-    stored = int((size**2).sum() + (size[m.pattern.column[:, 0]] * size[column]).sum())
+    stored = LANES * int(size.sum() + size[column].sum())
 
     def zeros(**shapes: Any) -> dict[str, Array]:
         return {key: np.zeros(shape) for key, shape in shapes.items()}
@@ -367,13 +385,15 @@ def new_work(m: Model) -> Work:
         A=_identities(B + 1),
         dinv=np.ones(E),
         **zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), g=9 * E, l=3 * E, Cd=6 * E, L=(B, 6, 6), f=V, acc=V),
-        **zeros(rigid=(B, 6), elastic=E, unstiffened=E, shift=V, load=int(m.bodies.where[:, 6].max())),
+        **zeros(
+            rigid=(B, 6), elastic=E, PP=(B, 3, 3), more=V, unstiffened=E, shift=V, load=int(m.bodies.where[:, 6].max())
+        ),
         **zeros(stiff=int((m.bodies.where[:, 6] * n).sum())),
     )
     vectors = zeros(omega=(M, 3), r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3), load=(M, 6))
     rows = RowWork(
-        **zeros(Phi=C, nu=C, gamma=C, lam=C, step=C, scale=C, jac=(C, D, 9), rr=(C, D, 6), ww=(C, D, 6)),
-        **zeros(P=(M, 6, 6), phiphi=(pairs, 6, 6), S=stored),
+        **zeros(Phi=C, nu=C, gamma=C, lam=C, left=C, scale=C, jac=(C, D, 9), X=size.size * D * 12 * LANES),
+        **zeros(Y=12 * LANES, step=size.size * LANES, wrench=6, P=(M, 6, 6), phiphi=(pairs, 6, 6), S=stored),
     )
     return Work(
         bodies=bodies,
@@ -381,7 +401,8 @@ def new_work(m: Model) -> Work:
         rows=rows,
         loads=_load_work(m, V, M),
         field=np.zeros(3),
-        info=np.zeros(4, dtype=np.int64),
+        diagonal=np.full(1, -1.0),
+        info=np.zeros(3, dtype=np.int64),
         independence=np.ones(3),
         **zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=2),
     )
@@ -403,10 +424,16 @@ def _identities(count: int) -> Array:
     return np.repeat(np.eye(3)[None], count, axis=0)
 
 
-def new_stages(system: System, count: int) -> Stages:
-    """Scratch of an integrator with `count` stages."""
-    place, rows = system.layout, system.model.rows.kind.size
-    return Stages(np.zeros((count, place.x_size)), np.zeros((count, place.v_size)), np.zeros(rows))
+def new_stages(system: System, states: int, rows: int = 0, numbers: Sequence[float] = ()) -> Stages:
+    """Memory of an integrator: states (x, v), constraint rows, and single numbers."""
+    place, C = system.layout, system.model.rows.kind.size
+    return Stages(
+        np.zeros((states, place.x_size)),
+        np.zeros((states, place.v_size)),
+        np.zeros((rows, C)),
+        np.zeros(C),
+        np.array(numbers, dtype=float),
+    )
 
 
 def new_record(system: System, rows: int) -> Record:

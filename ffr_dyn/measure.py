@@ -20,11 +20,12 @@ from ffr_dyn.force_tables import Action, actions_of, bushings_of, loads_of
 from ffr_dyn.forces import SpringDamper
 from ffr_dyn.joints import COORDINATES, Joint
 from ffr_dyn.kernels.tables import Record
-from ffr_dyn.measurement import Measurement
+from ffr_dyn.measurement import Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.power import Worked, damping_power, power, reaction, spring_energy, springs_of, transmitted, work
 from ffr_dyn.result import EULER_PARAMETERS, XYZ, Axis, Quantity, mode_axis
-from ffr_dyn.scene import marker_names, markers
-from ffr_dyn.view import View, dot, times, to_axes
+from ffr_dyn.scene import marker_names, markers, measured_body
+from ffr_dyn.stress import measured_modes
+from ffr_dyn.view import View, dot, shaped, times, to_axes
 
 Array = np.ndarray
 
@@ -311,9 +312,19 @@ def _measurements(system: System) -> Named:
     units = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2", "distance": "m", "orientation": "1"}
     axes = {"distance": (), "orientation": (EULER_PARAMETERS,)}
     for m in system.scene.measurements:
+        if not isinstance(m, Measurement):
+            yield f"measured.{m.name}", _recovered(system, m)
+            continue
         text = f"{m.what} of {m.j} from {m.i}" + ("" if m.what in axes else f", {m.axes} axes")
         entry = _entry(units[m.what], axes.get(m.what, (XYZ,)), text, lambda view, m=m: _measured(view, m))  # type: ignore[misc]
         yield f"measured.{m.name}", entry
+
+
+def _recovered(system: System, m: StressMeasurement | SectionMeasurement) -> Entry:
+    """Stress or section forces: modes times elastic coordinates, and what is made of them."""
+    b = measured_body(system.scene, m)
+    found = measured_modes(m, system.scene.bodies[b].model.surface)
+    return _entry(found.unit, found.axes, found.text, lambda view: found.of(shaped(found.modes, view.q(b))))
 
 
 def _measured(view: View, m: Measurement) -> Array:

@@ -31,7 +31,7 @@ AXES = "xyz"
 _ZERO = 1e-9
 # What the search for a plane understands; a scene with anything else is planar only when it is declared so.
 _KNOWN = {"bodies", "joints", "drivers", "couplings", "loads", "springs", "forces", "ground"}
-_KNOWN |= {"gravity", "base_acceleration", "name", "plane"}
+_KNOWN |= {"gravity", "base_acceleration", "measurements", "name", "plane"}
 
 
 def planar_forms(scene: Scene) -> Iterator[Scene]:

@@ -18,7 +18,7 @@ from ffr_dyn.errors import InputError
 from ffr_dyn.forces import Bushing, Load, SpringDamper
 from ffr_dyn.joint_forces import JointForce
 from ffr_dyn.joints import COORDINATES, Joint
-from ffr_dyn.measurement import Measurement
+from ffr_dyn.measurement import AnyMeasurement, Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.rotation import euler_parameters
 from ffr_dyn.surface_loads import SurfaceLoad, distributed
 from ffr_dyn.timefunction import POLYNOMIAL, TimeFunction, as_time_function, less
@@ -103,7 +103,7 @@ class Scene:
     loads: tuple[Load, ...] = ()
     springs: tuple[SpringDamper, ...] = ()
     forces: tuple[Force, ...] = ()
-    measurements: tuple[Measurement, ...] = ()
+    measurements: tuple[AnyMeasurement, ...] = ()
     ground: Mapping[str, Any] = field(default_factory=dict)
     gravity: Any = (0.0, 0.0, 0.0)
     base_acceleration: Any = (0.0, 0.0, 0.0)
@@ -228,13 +228,36 @@ def _check_point_driver(scene: Scene, driver: PointDriver) -> None:
         raise InputError(f"driver {driver.name!r} drives {i[1]!r} against itself; it needs markers of two bodies")
 
 
-def _check_measurement(scene: Scene, measurement: Measurement) -> None:
+def measured_body(scene: Scene, measurement: StressMeasurement | SectionMeasurement) -> int:
+    """The body whose stress or section forces are measured."""
+    names = [body.name for body in scene.bodies]
+    if measurement.body not in names:
+        raise InputError(
+            f"measurement {measurement.name!r}: there is no body {measurement.body!r}; {_offer(measurement.body, names)}"
+        )
+    return names.index(measurement.body)
+
+
+def _check_measurement(scene: Scene, measurement: AnyMeasurement) -> None:
+    if not isinstance(measurement, Measurement):
+        _check_stress(measurement, scene.bodies[measured_body(scene, measurement)])
+        return
     marker_number(scene, measurement.i), marker_number(scene, measurement.j)
     known = ["global", *(body.name for body in scene.bodies)]
     if measurement.axes not in known:
         raise InputError(
             f"measurement {measurement.name!r}: there are no axes {measurement.axes!r}; {_offer(measurement.axes, known)}"
         )
+
+
+def _check_stress(measurement: StressMeasurement | SectionMeasurement, body: Body) -> None:
+    """The body has what is to be measured, near the place."""
+    from ffr_dyn.stress import measured_modes  # of results, which stand above scenes
+
+    try:
+        measured_modes(measurement, body.model.surface)
+    except InputError as error:
+        raise InputError(f"measurement {measurement.name!r}: {error}") from None
 
 
 def _offer(name: str, known: Iterable[str]) -> str:

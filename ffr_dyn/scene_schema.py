@@ -41,7 +41,7 @@ from ffr_dyn.formula import Expression, is_constant, parse
 from ffr_dyn.integrators import METHODS
 from ffr_dyn.joint_forces import Actuator, JointFriction, JointSpring, JointStop, Servo
 from ffr_dyn.joints import Joint
-from ffr_dyn.measurement import Measurement
+from ffr_dyn.measurement import Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.parameters import as_number
 from ffr_dyn.surface_loads import ModalForce, NodalForces, Pressure
 from ffr_dyn.timefunction import HARMONIC, TimeFunction, constant, harmonic, piecewise, polynomial, table
@@ -248,6 +248,8 @@ FIELDS: dict[str, Any] = {
     "PointDriver.x": OfTime,
     "PointDriver.y": OfTime,
     "PointDriver.z": OfTime,
+    "StressMeasurement.point": Metres,
+    "SectionMeasurement.point": Metres,
     "Load.force": Annotated[list[OfMotion], THREE],
     "Load.moment": Annotated[list[OfMotion], THREE],
     "SpringDamper.stiffness": or_curve("N/m"),
@@ -303,7 +305,11 @@ TABLES: dict[str, tuple[Kind, ...]] = {
         Kind("pressure", Pressure),
         Kind("modal-force", ModalForce),
     ),
-    "measurements": (Kind("", Measurement),),
+    "measurements": (
+        Kind("marker", Measurement),
+        Kind("stress", StressMeasurement),
+        Kind("section", SectionMeasurement),
+    ),
 }
 
 

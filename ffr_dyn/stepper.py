@@ -26,13 +26,14 @@ from ffr_dyn.analyses.assemble import Assembled, assemble
 from ffr_dyn.analyses.forward import failure
 from ffr_dyn.checkpoint import fingerprint, leaves
 from ffr_dyn.compilation import ensure_compiled
-from ffr_dyn.equations import System, new_record, new_stages, new_work
+from ffr_dyn.equations import System, new_record
 from ffr_dyn.errors import InputError
 from ffr_dyn.force_tables import actions_of
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.joint_forces import Actuator
 from ffr_dyn.joints import COORDINATES
 from ffr_dyn.kernels.tables import OK
+from ffr_dyn.machine import new_machine, row_filler
 from ffr_dyn.measure import DEFAULT_OUTPUTS, Entry, catalogue, needs_every_step, selected
 from ffr_dyn.scene import Scene
 from ffr_dyn.stabilisation import Projection, Stabilisation, gains
@@ -78,7 +79,7 @@ class Stepper:
             )
         readers = _readers(scene, outputs)
         assembled = assemble(replace(scene, forces=(*scene.forces, *readers)), time=start)
-        ensure_compiled(method)
+        ensure_compiled(type(method))
         self._system = assembled.system
         self._start, self._step, self._steps = start, method.step, 0
         self._loops = [_Loop(assembled.system, method, assembled.x.copy(), assembled.v.copy(), gains(stabilisation))]
@@ -155,7 +156,8 @@ class Stepper:
         loop = self._loops[0]
         status = loop.run(self._start, self._steps, count)
         if status != OK:
-            raise failure(self._system, loop.work, status, self._start + int(loop.work.info[3]) * self._step)
+            reached = int(loop.machine.tables.clock.steps[0])
+            raise failure(self._system, loop.work, status, self._start + reached * self._step)
         self._steps += count
         for other in self._loops[1:]:
             _give_all_reactions(loop, other, self.time)
@@ -170,22 +172,20 @@ class _Loop:
     def __init__(
         self, system: System, method: Integrator, x: Array, v: Array, stabilised: tuple[float, float, float]
     ) -> None:
-        self.system, self.x, self.v = system, x, v
-        self.work, self.stages = new_work(system.model), new_stages(system, method.stage_count)
+        self.system, self.machine = system, new_machine(system, x, v, method, stabilised)
         self.record = new_record(system, 1)
-        self._method, self._stabilised = method, stabilised
+        self.x, self.v, self.work = self.machine.x, self.machine.v, self.machine.work
+        self._method = method
+        self._fill = row_filler(self.machine, method, self.record)
 
     def run(self, start: float, first: int, count: int) -> int:
         """`count` steps from step number `first`, and the record of where they end. Returns a status."""
-        _, status = self._method.run(
-            self.system.model, self.work, self.stages, start, self._method.step, first, count,
-            self.x, self.v, *self._stabilised, self.record,
-        )  # fmt: skip
-        return int(status)
+        self.machine.tables.clock.steps[0], self.machine.tables.clock.steps[1] = first, count
+        return self._fill(start)
 
     def arrays(self) -> list[Array]:
         """Everything that changes."""
-        tables = (self.work, self.stages, self.record)
+        tables = (self.work, self.machine.tables.stages, self.machine.tables.clock, self.record)
         changing = [array for table in tables for _, array in leaves(table)]
         return [self.x, self.v, self.system.model.functions.data, *changing]
 

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.errors import InputError
+from ffr_dyn.measurement import SectionMeasurement, StressMeasurement
 from ffr_dyn.result import Array, Axis, Quantity, Result
 from ffr_prep.body import SECTION_FORCES, BeamForces, Surface
 
@@ -256,6 +257,62 @@ def stress_histories(result: Result, body: str, places: Mapping[str, Array], qua
             of.of(strain if of.strain else stress), of.unit, (), f"{of.words} {at}"
         )
     return Result(result.time, found, {}, {"title": result.attributes.get("title", "")})
+
+
+# ---- measurements of a scene --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class MeasuredModes:
+    """What a measurement of stress or section forces is made of: modes (k, n) per elastic coordinate, and how.
+
+    of   : (T, k) -> (T, k) or (T,)
+    text : what and where
+    """
+
+    modes: Array
+    of: Callable[[Array], Array]
+    unit: str
+    axes: tuple[Axis, ...]
+    text: str
+
+
+def measured_modes(measurement: StressMeasurement | SectionMeasurement, surface: Surface | None) -> MeasuredModes:
+    """Where and from what a measurement takes its values on the surface of its body.
+
+    Raises InputError for a body without stress modes or section forces, an unknown measure, and a place far from the body.
+    """
+    if isinstance(measurement, SectionMeasurement):
+        return _measured_section(measurement, surface)
+    if surface is None or surface.stress is None or surface.moduli is None:
+        raise InputError(
+            f"body {measurement.body!r} has no stress modes; reduce it again with them (ffr-prep reduce --stress, "
+            "reduce_mesh(..., stress=True))"
+        )
+    point = nearest_point(surface, np.array(measurement.point), measurement.body)
+    at, moduli = f"at {np.round(surface.points[point], 6).tolist()} m", surface.moduli[point]
+    modes = surface.stress[point]
+    if measurement.what == "stress":
+        return MeasuredModes(modes, lambda tensor: tensor, "Pa", (TENSOR_AXIS,), f"stress {at}, body axes")
+    if measurement.what == "strain":
+        return MeasuredModes(modes, lambda t: strain_of(t, moduli), "1", (TENSOR_AXIS,), f"strain {at}, body axes")
+    of = measure(measurement.what)
+    values = (lambda t: of.of(strain_of(t, moduli))) if of.strain else of.of
+    return MeasuredModes(modes, values, of.unit, (), f"{of.words} {at}")
+
+
+def _measured_section(measurement: SectionMeasurement, surface: Surface | None) -> MeasuredModes:
+    if surface is None or surface.beams is None:
+        raise InputError(
+            f"body {measurement.body!r} has no section forces; they belong to beams that are reduced with stress"
+        )
+    point = np.array(measurement.point, float)
+    nearest_point(surface, point, measurement.body)
+    element, first = nearest_element(surface.beams, point), 3 * (measurement.what == "moment")
+    modes = surface.beams.modes[element, PLACES.index(measurement.place), first : first + 3]
+    axis, unit = (_MOMENT_AXIS, "N m") if first else (_FORCE_AXIS, "N")
+    text = f"section {measurement.what} of element {element}, {measurement.place}, element axes"
+    return MeasuredModes(modes, lambda forces: forces, unit, (axis,), text)
 
 
 # ---- section forces of beams --------------------------------------------------------------------------------------

@@ -230,7 +230,7 @@ def declared() -> set[str]:
     project = PROJECT["project"]
     optional = [
         requirement
-        for extra in ("chart", "video", "nastran", "pardiso")
+        for extra in ("chart", "video", "nastran", "pardiso", "ida")
         for requirement in project["optional-dependencies"][extra]
     ]
     return {distribution_name(requirement) for requirement in [*project["dependencies"], *optional]}
@@ -247,6 +247,7 @@ def test_every_library_is_declared_and_every_declared_one_is_used():
         "imageio_ffmpeg": ["imageio-ffmpeg"],
         "pyNastran": ["pyNastran"],
         "pypardiso": ["pypardiso"],
+        "sksundae": ["scikit-sundae"],
         "dask": ["dask"],
     }
     owners = importlib.metadata.packages_distributions() | extras

@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 import runpy
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from synthetic import cloud
+from test_dyn_stress import random_surface
 
 from ffr_dyn.measure import DEFAULT_OUTPUTS
 from ffr_dyn.result_file import load_result
@@ -25,7 +27,9 @@ def code(page: str, language: str) -> list[str]:
 
 def test_the_scene_file_of_the_documentation_is_valid(tmp_path):
     text = code("docs/scene_file.md", "toml")[0].replace("big_eye", "a").replace("small_eye", "b")
-    save_body(cloud(7), tmp_path / "rod.ffr")
+    body = cloud(7)
+    surface = random_surface(np.random.default_rng(1), n=body.n)  # with stress and section forces
+    save_body(replace(body, surface=surface), tmp_path / "rod.ffr")
     (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
     scene, settings = load_scene(tmp_path / "scene.toml")
     assert [i.name for i in scene.bodies[1].model.interfaces][-1] == "middle"

@@ -12,13 +12,13 @@ from ffr_dyn.analyses.assemble import rows_at
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.couplings import Coupling
 from ffr_dyn.drivers import Driver
-from ffr_dyn.equations import compile_scene, new_work
+from ffr_dyn.equations import compile_scene
 from ffr_dyn.errors import InputError
 from ffr_dyn.integrators import RK4
 from ffr_dyn.joints import Joint
-from ffr_dyn.kernels.record import evaluate_truly
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.layout import layout
+from ffr_dyn.machine import evaluate_at, new_machine
 from ffr_dyn.rotation import G_bar, rotation_matrix
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.timefunction import polynomial
@@ -85,8 +85,10 @@ def test_jacobian_and_right_hand_side_of_a_coupling_equal_differences(first, sec
 def test_compiled_couplings_equal_the_readable_ones_and_the_dense_solution(first, second):
     scene = replace(arm(), couplings=(Coupling("gear", first, second, -1.5, 0.2),))
     system = compile_scene(scene)
-    (place, x, v), work = state(scene), new_work(system.model)
-    assert evaluate_truly(system.model, work, 0.0, x, v) == OK
+    place, x, v = state(scene)
+    machine = new_machine(system, x, v)
+    assert evaluate_at(machine, 0.0, x, v) == OK
+    work = machine.work
     rows = rows_at(scene, place, list(system.blocks), x, v, 0.0)
     for name in ("Phi", "nu", "gamma"):
         np.testing.assert_allclose(getattr(work.rows, name), [getattr(r, name) for r in rows], rtol=0, atol=1e-11)

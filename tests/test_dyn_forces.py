@@ -24,9 +24,9 @@ from ffr_dyn.integrators import RK4, ROS2
 from ffr_dyn.joint_forces import Actuator, JointFriction, JointSpring, JointStop, Servo
 from ffr_dyn.joints import Joint
 from ffr_dyn.kernels.applied import applied_loads
-from ffr_dyn.kernels.record import evaluate_truly
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.layout import layout
+from ffr_dyn.machine import evaluate_at, new_machine
 from ffr_dyn.rotation import rotation_matrix
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.surface_loads import ModalForce, NodalForces, Pressure, distributed
@@ -601,8 +601,10 @@ def test_a_nodal_force_at_an_interface_is_a_load_there(axes):
 def test_a_modal_force_accelerates_as_the_mass_matrix_says():
     body = cloud(2, stiffness=20.0)
     system = compile_scene(Scene((Body("b", body),), forces=(ModalForce("m", "b", [3.0, 0.0]),)))
-    work, x = new_work(system.model), np.array([0, 0, 0, 1.0, 0, 0, 0, 0, 0])
-    assert evaluate_truly(system.model, work, 0.0, x, np.zeros(8)) == OK
+    x = np.array([0, 0, 0, 1.0, 0, 0, 0, 0, 0])
+    machine = new_machine(system, x, np.zeros(8))
+    assert evaluate_at(machine, 0.0, x, np.zeros(8)) == OK
+    work = machine.work
     np.testing.assert_allclose(mass_matrix(body, np.zeros(2)) @ work.bodies.acc, [0] * 6 + [3.0, 0.0], atol=1e-12)
 
 

@@ -11,13 +11,13 @@ from synthetic import cloud
 from ffr_dyn.analyses.assemble import drive_of, rows_at
 from ffr_dyn.constraints import evaluate_word
 from ffr_dyn.drivers import Driver, PointDriver
-from ffr_dyn.equations import System, compile_scene, new_work
+from ffr_dyn.equations import System, compile_scene
 from ffr_dyn.inertia import elastic_force, gravity_force, mass_matrix, quadratic_velocity
 from ffr_dyn.joints import KINDS, Joint
 from ffr_dyn.kernels.functions import evaluate_functions
-from ffr_dyn.kernels.record import evaluate_truly
 from ffr_dyn.kernels.tables import OK, Functions
 from ffr_dyn.layout import layout
+from ffr_dyn.machine import evaluate_at, new_machine
 from ffr_dyn.rotation import G_bar, rotation_matrix, skew
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.timefunction import evaluate, harmonic, polynomial, table
@@ -180,8 +180,9 @@ def test_compiled_accelerations_and_multipliers_equal_the_dense_solution(kind, s
     scene = chain(*sizes, kind=kind, axis=(0.2, 1.0, 0.3), axis_j=(1.0, -0.5, 0.4))
     system = compile_scene(scene)
     x, v = random_state(scene)
-    work = new_work(system.model)
-    assert evaluate_truly(system.model, work, 0.0, x, v) == OK
+    machine = new_machine(system, x, v)
+    assert evaluate_at(machine, 0.0, x, v) == OK
+    work = machine.work
     M, f, rows = dense(system, x, v)
     J = np.array([row.jacobian for row in rows])
     gamma = np.array([row.gamma for row in rows])
@@ -278,8 +279,10 @@ def test_skew_and_G_bar_conventions():
 def test_compiled_drivers_equal_the_readable_ones(kind, coordinate):
     scene = replace(chain(kind=kind), drivers=(Driver("drive", "tie", DRIVE, coordinate),))
     system = compile_scene(scene)
-    (x, v), work, t = random_state(scene), new_work(system.model), 0.37
-    assert evaluate_truly(system.model, work, t, x, v) == OK
+    (x, v), t = random_state(scene), 0.37
+    machine = new_machine(system, x, v)
+    assert evaluate_at(machine, t, x, v) == OK
+    work = machine.work
     rows = rows_at(scene, system.layout, list(system.blocks), x, v, t)
     for name in ("Phi", "nu", "gamma"):
         np.testing.assert_allclose(getattr(work.rows, name), [getattr(r, name) for r in rows], rtol=0, atol=1e-11)

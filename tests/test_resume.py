@@ -147,13 +147,13 @@ def test_files_that_cannot_be_continued_are_named(tmp_path, whole):
 def test_measuring_in_parts_gives_the_same_bits():
     """Angles, elastic displacements, work: however many rows are looked at together."""
     from ffr_dyn.analyses.assemble import assemble
-    from ffr_dyn.equations import new_record, new_stages, new_work
+    from ffr_dyn.equations import new_record
     from ffr_dyn.kernels.tables import Record
+    from ffr_dyn.machine import fill_rows, new_machine
 
-    system = assemble(SCENE).system
-    state = assemble(SCENE)
-    record, x, v = new_record(system, 40), state.x.copy(), state.v.copy()
-    ROS2.run(system.model, new_work(system.model), new_stages(system, 4), 0.0, 1e-3, 0, 1, x, v, 0.0, 0.0, 1e-9, record)
+    state, method = assemble(SCENE), ROS2(1e-3)
+    system, record = state.system, new_record(state.system, 40)
+    fill_rows(new_machine(system, state.x, state.v, method, (0.0, 0.0, 1e-9)), method, record, 0.0, 1)
     wanted = selected(system, ("*",))
     once, _ = measure(system, record, {}, wanted)
     for sizes in ([1] * 40, [3, 1, 13, 7, 16], [39, 1]):
@@ -202,7 +202,7 @@ def test_a_killed_run_goes_on_to_the_same_bits(tmp_path, delays):
     path, lengths = tmp_path / "run.nc", []
     here = Path(__file__).parent
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(here.parent), str(here)])}
-    ensure_compiled(SETTINGS["method"])
+    ensure_compiled(type(SETTINGS["method"]))
     for delay in delays:
         run = subprocess.Popen([sys.executable, "-c", RUN, path], env=environment)
         rows = lengths[-1] if lengths else 0

@@ -17,6 +17,7 @@ from ffr_dyn.force_tables import actions_of
 from ffr_dyn.forces import Load
 from ffr_dyn.joint_forces import Actuator
 from ffr_dyn.joints import Joint
+from ffr_dyn.machine import with_model
 from ffr_dyn.scene import Scene
 from ffr_dyn.timefunction import TimeFunction, constant, piecewise
 
@@ -125,7 +126,7 @@ def sized(at: Evaluator, efforts: tuple[Effort, ...], sizes: Array) -> Evaluator
             direction = np.array(effort.direction)
             value[loads.index(effort.name), 3 * effort.moment : 3 * effort.moment + 3] = size * direction
     tables = model._replace(loads=model.loads._replace(value=value), functions=model.functions._replace(data=data))
-    return replace(at, system=replace(at.system, model=tables))
+    return replace(at, machine=with_model(at.machine, tables))
 
 
 def recorded(times: Array, values: Array, *, rates: Array | None = None, degree: int = 5) -> TimeFunction:

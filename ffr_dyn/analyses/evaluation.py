@@ -1,23 +1,22 @@
 """One evaluation of the compiled equations at a state, for the analyses that look at single states.
 
-A run of no steps (see `integrators`) evaluates the scene and keeps one row; what it leaves in the scratch memory is read
-here as plain matrices. Small motions, Jacobians and null spaces are in the velocities [A^T R_dot, omega_bar, q_dot].
+A row of a record evaluates the scene; what it leaves in the scratch memory is read here as plain matrices. Small motions,
+Jacobians and null spaces are in the velocities [A^T R_dot, omega_bar, q_dot].
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ffr_dyn.analyses.forward import failure
 from ffr_dyn.compilation import ensure_compiled
-from ffr_dyn.equations import System, new_record, new_stages, new_work
+from ffr_dyn.equations import System, new_record
 from ffr_dyn.inertia import mass_matrix
-from ffr_dyn.integrators import RK4
 from ffr_dyn.kernels.tables import OK, SINGULAR_CONSTRAINT, Record, Work
-from ffr_dyn.layout import Layout
+from ffr_dyn.layout import Layout, initial_state
+from ffr_dyn.machine import Machine, new_machine, record_row
 from ffr_dyn.rotation import from_vector, rotation_matrix, skew
 from ffr_dyn.scene import Scene
 
@@ -30,10 +29,16 @@ RANK_TOLERANCE = 1e-9  # of a singular value of the mass-weighted Jacobian, rela
 class Evaluator:
     """A compiled scene with the memory of one evaluation."""
 
-    system: System
-    work: Work
-    stages: Any
+    machine: Machine
     record: Record
+
+    @property
+    def system(self) -> System:
+        return self.machine.system
+
+    @property
+    def work(self) -> Work:
+        return self.machine.work
 
 
 @dataclass(frozen=True)
@@ -59,16 +64,14 @@ class Evaluation:
 
 def evaluator(system: System) -> Evaluator:
     """Memory for evaluations of a compiled scene."""
-    ensure_compiled(RK4(1.0))
-    return Evaluator(system, new_work(system.model), new_stages(system, RK4.stage_count), new_record(system, 1))
+    ensure_compiled()
+    return Evaluator(new_machine(system, *initial_state(system.scene, system.layout)), new_record(system, 1))
 
 
 def evaluate(at: Evaluator, time: float, x: Array, v: Array) -> Evaluation:
     """The equations at (time, x, v). Raises SimulationError as a forward run would, except for dependent rows."""
     system, work = at.system, at.work
-    _, status = RK4.run(system.model, work, at.stages, time, 1.0, 0, 0, x.copy(), v.copy(), 0.0, 0.0, 0.0, at.record)
-    if status not in (OK, SINGULAR_CONSTRAINT):
-        raise failure(system, work, status, time)
+    status = _look(at, time, x, v)
     rows, bodies, across = work.rows, work.bodies, locked(system.layout)
     still = np.zeros(across.size)
     return Evaluation(
@@ -81,6 +84,22 @@ def evaluate(at: Evaluator, time: float, x: Array, v: Array) -> Evaluation:
         rows.lam.copy(),
         status == SINGULAR_CONSTRAINT,
     )
+
+
+def accelerations(at: Evaluator, time: float, x: Array, v: Array) -> Array:
+    """(V,) d/dt of v, global axes. Raises SimulationError as a forward run would."""
+    if _look(at, time, x, v) == SINGULAR_CONSTRAINT:
+        raise failure(at.system, at.work, SINGULAR_CONSTRAINT, time)
+    return at.record.vd[0].copy()
+
+
+def _look(at: Evaluator, time: float, x: Array, v: Array) -> int:
+    """Evaluate; a status, which is OK or that of dependent rows."""
+    at.machine.x[:], at.machine.v[:] = x, v
+    status = record_row(at.machine, time, at.record, 0)
+    if status not in (OK, SINGULAR_CONSTRAINT):
+        raise failure(at.system, at.work, status, time)
+    return int(status)
 
 
 def locked(place: Layout) -> Array:

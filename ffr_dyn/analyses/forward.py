@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
@@ -12,18 +11,19 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.assemble import Assembled, assemble
-from ffr_dyn.checkpoint import Checkpoint, decode, encode, fingerprint, leaves, restore
+from ffr_dyn.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
 from ffr_dyn.compilation import ensure_compiled
-from ffr_dyn.equations import System, new_record, new_stages, new_work
+from ffr_dyn.equations import System, new_record
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import ROS2, Integrator
-from ffr_dyn.kernels.system import AT
-from ffr_dyn.kernels.tables import NOT_FINITE, OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, Record, Work
+from ffr_dyn.kernels.tables import AT, NOT_FINITE, OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, Record, Work
+from ffr_dyn.machine import Machine, fill_rows, new_machine, record_row
 from ffr_dyn.measure import Entry, Memory, measure, needs_every_step, selected
 from ffr_dyn.result import Quantity, Result
 from ffr_dyn.result_file import ResultWriter, load_checkpoint, load_result
 from ffr_dyn.scene import Scene
 from ffr_dyn.stabilisation import Projection, Stabilisation, gains
+from ffr_dyn.stopwatch import Stopwatch
 from ffr_dyn.validity import doubts, extremes
 from ffr_prep.body import Surface
 
@@ -37,10 +37,7 @@ SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, 
 class _Run:
     """What changes while a run goes on; `done` counts the steps."""
 
-    x: Array
-    v: Array
-    work: Work
-    stages: Any
+    machine: Machine
     memory: Memory
     parts: list[dict[str, Quantity]]
     times: list[Array]
@@ -60,6 +57,7 @@ def forward(
     path: str | Path | None = None,
     resume: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
+    stopwatch: Stopwatch | None = None,
 ) -> Result:
     """Integrate the equations of motion of a scene from `start` to `end` [s], keeping a row every `output_step` [s].
 
@@ -70,6 +68,7 @@ def forward(
     resume      : a result file (its `path` of before) whose run goes on from its last rows as if it had never stopped, to
                   the bit; `end` may be later than it was. A file that does not exist yet is a run from the start
     progress    : called with the time reached, a few times a second
+    stopwatch   : takes the time of the integrator's compiled loop
 
     Raises InputError for a scene or settings that cannot be used, SimulationError when the run fails: the message gives
     the time, the body or joint, the likely cause and what to change.
@@ -79,19 +78,20 @@ def forward(
     _check_step(scene, method)
     assembled = assemble(scene, time=start)
     wanted = selected(assembled.system, outputs)
-    ensure_compiled(method)
+    ensure_compiled(type(method))
     span = (start, end, output_step)
     mark = _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
     header = _header(scene, assembled, method, stabilisation, span)
     if resume is not None and Path(resume).exists():
-        run = _resumed(assembled, method, Path(resume), mark)
+        run = _resumed(assembled, method, stabilisation, Path(resume), mark)
     else:
-        run = _started(assembled, method, start, wanted)
+        run = _started(assembled, method, stabilisation, start, wanted)
     _check_resumed(run, substeps * rows, output_step / substeps)
     path = resume if path is None else path
+    watch = Stopwatch() if stopwatch is None else stopwatch
     first = Result(run.times[0], run.parts[0], geometry(scene), header | {"status": "running"})
     with nullcontext() if path is None else ResultWriter(path, first, checkpoint=_checkpoint(run, mark)) as writer:
-        for times, part in _advance(assembled, run, method, stabilisation, start, substeps, rows, wanted):
+        for times, part in _advance(assembled, run, method, start, substeps, rows, wanted, watch):
             if writer is not None:
                 writer.append(times, {name: quantity.values for name, quantity in part.items()}, _checkpoint(run, mark))
             if progress is not None:
@@ -129,48 +129,44 @@ def _check_step(scene: Scene, method: Integrator) -> None:
         )
 
 
-def _started(assembled: Assembled, method: Integrator, start: float, wanted: Mapping[str, Entry]) -> _Run:
+def _started(
+    assembled: Assembled, method: Integrator, stabilisation: Stabilisation, start: float, wanted: Mapping[str, Entry]
+) -> _Run:
     """The run with its first row."""
-    system, x, v = assembled.system, assembled.x.copy(), assembled.v.copy()
-    work, stages, first = new_work(system.model), new_stages(system, method.stage_count), new_record(system, 1)
-    # A run of no steps records the start.
-    _, status = method.run(system.model, work, stages, start, method.step, 0, 0, x, v, 0.0, 0.0, 0.0, first)
+    machine = new_machine(assembled.system, assembled.x, assembled.v, method, gains(stabilisation))
+    first = new_record(assembled.system, 1)
+    status = record_row(machine, start, first, 0)
     if status != OK:
-        raise failure(system, work, status, start)
-    first = with_all_reactions(assembled, method, first)
-    parts, memory = measure(system, first, {}, wanted)
-    return _Run(x, v, work, stages, memory, [parts], [first.time], extremes(system, first), 0)
+        raise failure(assembled.system, machine.work, status, start)
+    first = with_all_reactions(assembled, first)
+    parts, memory = measure(assembled.system, first, {}, wanted)
+    return _Run(machine, memory, [parts], [first.time], extremes(assembled.system, first), 0)
 
 
 def _advance(
     assembled: Assembled,
     run: _Run,
     method: Integrator,
-    stabilisation: Stabilisation,
     start: float,
     substeps: int,
     rows: int,
     wanted: Mapping[str, Entry],
+    watch: Stopwatch,
 ) -> Iterator[tuple[Array, dict[str, Quantity]]]:
     """Yields (times, quantities) of output rows chunk after chunk, each about SECONDS_PER_CALL long.
 
     Where a quantity adds up over the steps, every step is looked at and only the output rows are kept.
     """
-    system = assembled.system
-    alpha, beta, tolerance = gains(stabilisation)
+    system, steps = assembled.system, run.machine.tables.clock.steps
     looks = substeps if needs_every_step(wanted) else 1
     count = 1
     while run.done < rows * substeps:
         chunk = new_record(system, looks * min(count, rows - run.done // substeps))
-        began = clock.monotonic()
-        filled, status = method.run(
-            system.model, run.work, run.stages, start, method.step, run.done, substeps // looks,
-            run.x, run.v, alpha, beta, tolerance, chunk,
-        )  # fmt: skip
-        took = clock.monotonic() - began
-        filled -= filled % looks
+        with watch:
+            status = fill_rows(run.machine, method, chunk, start, substeps // looks)
+        filled = int(steps[2]) - int(steps[2]) % looks
         if filled:
-            kept = with_all_reactions(assembled, method, Record(*(column[:filled] for column in chunk)))
+            kept = with_all_reactions(assembled, Record(*(column[:filled] for column in chunk)))
             every, run.memory = measure(system, kept, run.memory, wanted)
             part = {
                 name: replace(quantity, values=quantity.values[looks - 1 :: looks]) for name, quantity in every.items()
@@ -182,23 +178,23 @@ def _advance(
             run.done += filled // looks * substeps
             yield times, part
         if status != OK:
-            raise failure(system, run.work, status, start + int(run.work.info[3]) * method.step)
-        count = int(np.clip(count * SECONDS_PER_CALL / max(took, 1e-6), 1, 10 * count))
+            raise failure(system, run.machine.work, status, start + int(steps[0]) * method.step)
+        count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
 
 
-def with_all_reactions(assembled: Assembled, method: Integrator, record: Record) -> Record:
+def with_all_reactions(assembled: Assembled, record: Record) -> Record:
     """The record with reactions of the redundant rows too: at every state, the smallest that give its accelerations."""
     if assembled.all_rows is None:
         return record
     system = assembled.all_rows
-    work, stages, one = new_work(system.model), new_stages(system, method.stage_count), new_record(system, 1)
+    machine, one = new_machine(system, record.x[0], record.v[0]), new_record(system, 1)
     names = [block.name for block in system.blocks]
     numbers = [names.index(block.name) for block in assembled.system.blocks]
     reaction = np.empty_like(record.reaction)
-    for row, time in enumerate(record.time):
-        x, v = record.x[row].copy(), record.v[row].copy()
-        work.loads.reference[:] = record.action[row, :, 0]
-        method.run(system.model, work, stages, time, method.step, 0, 0, x, v, 0.0, 0.0, 0.0, one)
+    for row, moment in enumerate(record.time):
+        machine.x[:], machine.v[:] = record.x[row], record.v[row]
+        machine.work.loads.reference[:] = record.action[row, :, 0]
+        record_row(machine, moment, one, 0)
         reaction[row] = one.reaction[0, numbers]
     return record._replace(reaction=reaction)
 
@@ -257,16 +253,17 @@ def _fingerprint(
 
 
 def _checkpoint(run: _Run, mark: str) -> Array:
-    arrays = {
-        "x": run.x,
-        "v": run.v,
-        "extremes": run.extremes,
-        **{f"work.{key}": array for key, array in leaves(run.work)},
-    }
+    arrays = {"extremes": run.extremes, **{f"machine.{key}": array for key, array in _changing(run.machine)}}
     return encode(Checkpoint(mark, run.done, arrays, run.memory))
 
 
-def _resumed(assembled: Assembled, method: Integrator, path: Path, mark: str) -> _Run:
+def _changing(machine: Machine) -> Iterator[tuple[str, Array]]:
+    """What of a machine's tables a run changes."""
+    for name in ("work", "stages", "clock", "x", "v"):
+        yield from leaves(getattr(machine.tables, name), name)
+
+
+def _resumed(assembled: Assembled, method: Integrator, stabilisation: Stabilisation, path: Path, mark: str) -> _Run:
     """The run that a result file holds, ready to go on."""
     content = load_checkpoint(path)
     if content is None:
@@ -277,11 +274,11 @@ def _resumed(assembled: Assembled, method: Integrator, path: Path, mark: str) ->
             f"{path} is the result of another scene or of other settings (step, method, start, output step, outputs): its "
             "run cannot be continued with these; run from the start, to another file if that one is still wanted"
         )
-    work = new_work(assembled.system.model)
-    restore(work, saved.arrays, "work.")
-    x, v, reached = (saved.arrays[key].copy() for key in ("x", "v", "extremes"))
-    stages = new_stages(assembled.system, method.stage_count)
-    return _Run(x, v, work, stages, saved.memory, [dict(earlier.quantities)], [earlier.time], reached, saved.steps)
+    machine = new_machine(assembled.system, assembled.x, assembled.v, method, gains(stabilisation))
+    for name, array in _changing(machine):
+        array[...] = saved.arrays[f"machine.{name}"]
+    reached = saved.arrays["extremes"].copy()
+    return _Run(machine, saved.memory, [dict(earlier.quantities)], [earlier.time], reached, saved.steps)
 
 
 def _check_resumed(run: _Run, steps: int, step: float) -> None:
@@ -328,12 +325,12 @@ def _result(scene: Scene, run: _Run, attributes: dict[str, Any]) -> Result:
 
 def _account(scene: Scene, run: _Run, notes: list[str]) -> dict[str, Any]:
     """What only the end of a run can tell."""
-    info, drift = run.work.info, run.work.drift
+    info, drift = run.machine.work.info, run.machine.work.drift
     return {
         "evaluations": int(info[1]),
         "projections": int(info[2]),
         "largest_drift": [float(drift[0]), float(drift[1])],
-        "notes": [*notes, *_singular(run.work), *doubts(scene, run.extremes)],
+        "notes": [*notes, *_singular(run.machine.work), *doubts(scene, run.extremes)],
     }
 
 

@@ -30,7 +30,6 @@ from ffr_dyn.analyses.forward import with_all_reactions
 from ffr_dyn.analyses.mobility import named_motion, require_driven
 from ffr_dyn.analyses.outcome import output_times, result_of
 from ffr_dyn.errors import SimulationError
-from ffr_dyn.integrators import RK4
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.measure import selected
 from ffr_dyn.result import Result
@@ -200,7 +199,7 @@ def _recorded(assembled: Assembled, poses: list[_Pose]) -> Record:
                 f"{pose.joint}; choose output times that miss it, or drive another joint"
             )
         rows.append(copied(at.record))
-    return with_all_reactions(assembled, RK4(1.0), joined(rows))
+    return with_all_reactions(assembled, joined(rows))
 
 
 def _singular_notes(poses: list[_Pose]) -> list[str]:

@@ -23,7 +23,6 @@ from ffr_dyn.analyses.outcome import result_of
 from ffr_dyn.analyses.states import held
 from ffr_dyn.analyses.tangent import Chart, chart, movement, rates, sizes, state, stiffness
 from ffr_dyn.errors import InputError, SimulationError
-from ffr_dyn.integrators import RK4
 from ffr_dyn.measure import selected
 from ffr_dyn.result import Result
 from ffr_dyn.scene import Scene
@@ -161,5 +160,5 @@ def _result(
         "status": "complete",
     }
     attributes = {key: value for key, value in attributes.items() if value is not None}
-    record = with_all_reactions(assembled, RK4(1.0), record)
+    record = with_all_reactions(assembled, record)
     return result_of(assembled.system, record, attributes, path, outputs)

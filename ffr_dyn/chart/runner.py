@@ -34,6 +34,7 @@ from ffr_dyn.measure import catalogue
 from ffr_dyn.result import Result
 from ffr_dyn.scene import Scene
 from ffr_dyn.stabilisation import Projection, Stabilisation
+from ffr_dyn.stopwatch import Stopwatch
 from ffr_prep.body import BodyError
 
 Array = np.ndarray
@@ -96,35 +97,12 @@ class Failure:
 # ---- one run ------------------------------------------------------------------------------------------------------
 
 
-class Clocked:
-    """An integrator that takes the time of its compiled loop."""
-
-    def __init__(self, method: Any) -> None:
-        self._method = method
-        self.wall = self.cpu = 0.0
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._method, name)
-
-    def __repr__(self) -> str:
-        return repr(self._method)
-
-    def run(self, *arguments: Any) -> Any:
-        """The loop of the method."""
-        wall, cpu = time.perf_counter(), time.thread_time()
-        try:
-            return self._method.run(*arguments)
-        finally:
-            self.wall += time.perf_counter() - wall
-            self.cpu += time.thread_time() - cpu
-
-
 def perform(job: Job) -> Outcome | Failure:
     """Run a variant, and again for its times."""
     try:
         scene = job.variant.model.of(job.scene)
         method = job.variant.integrator()
-        ensure_compiled(method)
+        ensure_compiled(type(method))
         outputs = _outputs(scene, job)
         _warm_up(scene, method, job)
         result, wall, cpu = _clocked(scene, method, job, outputs)
@@ -173,7 +151,7 @@ def _warm_up(scene: Scene, method: Any, job: Job) -> None:
 
 
 def _clocked(scene: Scene, method: Any, job: Job, outputs: tuple[str, ...]) -> tuple[Result, float, float]:
-    began, clocked, span = time.monotonic(), Clocked(method), job.span
+    began, stopwatch, span = time.monotonic(), Stopwatch(), job.span
 
     def watch(reached: float) -> None:
         if time.monotonic() - began > job.limit:
@@ -184,12 +162,13 @@ def _clocked(scene: Scene, method: Any, job: Job, outputs: tuple[str, ...]) -> t
         start=span.start,
         end=span.end,
         output_step=span.output_step,
-        method=clocked,  # type: ignore[arg-type]
+        method=method,
         stabilisation=job.stabilisation,
         outputs=outputs,
         progress=watch,
+        stopwatch=stopwatch,
     )
-    return result, clocked.wall, clocked.cpu
+    return result, stopwatch.wall, stopwatch.cpu
 
 
 # ---- many runs ----------------------------------------------------------------------------------------------------

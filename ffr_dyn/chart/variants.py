@@ -69,7 +69,7 @@ class Variant:
 
 def maker(method: str) -> Callable[[float], Integrator]:
     """What makes a method from its number. Raises InputError for an unknown one."""
-    known = {**METHODS, **ADAPTIVE}
+    known: dict[str, Callable[[float], Integrator]] = {**METHODS, **ADAPTIVE}
     if method not in known:
         close = get_close_matches(method, known, 1)
         hint = f"did you mean {close[0]!r}? " if close else ""

@@ -1,19 +1,17 @@
 """Time integration: one file per method, one protocol.
 
-A method is a frozen dataclass with its settings and class attributes: `order`, `implicit` (whether it treats the elastic
-forces implicitly), `stage_count` (rows of scratch it needs) and `run`, its compiled loop
-
-    run(model, work, stages, t0, h, first, substeps, x, v, alpha, beta, tolerance, out) -> (rows filled, status).
+A method is a frozen dataclass with its settings; its compiled unit does one step of a machine's state (see
+`ffr_dyn.kernels.units`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, ClassVar, Protocol
 
 from ffr_dyn.integrators.rk4 import RK4
 from ffr_dyn.integrators.ros2 import ROS2
 from ffr_dyn.integrators.ros3 import ROS3
+from ffr_dyn.kernels.units import Unit
 
 __all__ = ["METHODS", "RK4", "ROS2", "ROS3", "Integrator"]
 
@@ -25,10 +23,15 @@ class Integrator(Protocol):
     def step(self) -> float:
         """Time step [s]."""
 
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """What the unit finds in `stages.numbers` at the start: settings, and room for what it keeps."""
+
     order: ClassVar[int]
-    implicit: ClassVar[bool]
-    stage_count: ClassVar[int]
-    run: ClassVar[Any]
+    implicit: ClassVar[bool]  # whether it treats the elastic forces implicitly
+    stage_count: ClassVar[int]  # states (x, v) of memory that it needs
+    row_stages: ClassVar[int]  # the same for constraint rows
+    unit: ClassVar[Unit]
 
 
-METHODS: dict[str, Callable[[float], Integrator]] = {"rk4": RK4, "ros2": ROS2, "ros3": ROS3}
+METHODS: dict[str, type[Any]] = {"rk4": RK4, "ros2": ROS2, "ros3": ROS3}

@@ -3,70 +3,46 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.options import entry, inlined
-from ffr_dyn.kernels.record import record
-from ffr_dyn.kernels.stiffening import solve_stiffened
-from ffr_dyn.kernels.system import (
-    acceleration_target,
-    evaluate,
-    evaluate_on_constraints,
-    finite,
-    prepare,
-    to_velocity_rates,
-)
+from ffr_dyn.kernels.calls import evaluate, set_diagonal, settle, solve
+from ffr_dyn.kernels.packing import unpack_tables
+from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
-from ffr_dyn.kernels.vectors import add_scaled, copy, fill
+from ffr_dyn.kernels.units import Unit
+from ffr_dyn.kernels.vectors import add_scaled, copy
 
 
-@inlined
-def step(m, w, stages, t, h, x, v, alpha, beta, tolerance):
-    """One step in place. Returns a status."""
-    xs, vs = stages.x[4], stages.v[4]
+@Unit
+def rk4_step(at, t, unused, unused_too):
+    """One step of the machine's state from time t. Returns a status."""
+    r = unpack_tables(at)
+    h = r.clock.time[0]
+    stages, xs, vs = r.stages, r.stages.x[4], r.stages.v[4]
+    set_diagonal(r, 0.0)
     for k in range(4):
         a = 0.0 if k == 0 else (h if k == 3 else 0.5 * h)
         if k == 0:
-            status = evaluate_on_constraints(m, w, t, x, v, tolerance)
-            copy(xs, x)
-            copy(vs, v)
+            status = settle(r, t)
+            copy(xs, r.x)
+            copy(vs, r.v)
         else:
-            add_scaled(xs, x, a, stages.x[k - 1])
-            add_scaled(vs, v, a, stages.v[k - 1])
-            status = evaluate(m, w, t + a, xs, vs)
+            add_scaled(xs, r.x, a, stages.x[k - 1])
+            add_scaled(vs, r.v, a, stages.v[k - 1])
+            status = evaluate(r, t + a, xs, vs)
         if status != OK:
             return status
-        acceleration_target(w.rows, alpha, beta, stages.target)
-        solve_stiffened(m, w, xs, stages.target)
-        position_rates(m.bodies, xs, vs, stages.x[k])
-        to_velocity_rates(m.bodies.where, w.bodies.A, w.bodies.acc, stages.v[k])
+        acceleration_target(r.work.rows, r.clock.gains, stages.target)
+        solve(r, xs, stages.target)
+        position_rates(r.model.bodies, xs, vs, stages.x[k])
+        to_velocity_rates(r.model.bodies.where, r.work.bodies.A, r.work.bodies.acc, stages.v[k])
     for k in range(4):
         weight = h / 3.0 if k in (1, 2) else h / 6.0
-        add_scaled(x, x, weight, stages.x[k])
-        add_scaled(v, v, weight, stages.v[k])
-    normalise(m.bodies, x)
-    return finite(x, v)
-
-
-@entry
-def rk4_run(m, w, stages, t0, h, first, substeps, x, v, alpha, beta, tolerance, out):
-    """Fill the rows of `out`, `substeps` steps apart, from step number `first`. Returns (rows filled, status)."""
-    number = first
-    for row in range(out.time.size):
-        fill(w.bodies.dinv, 1.0)
-        prepare(m.bodies.where, m.markers, m.rows, m.pattern, w.bodies.dinv, w.rows.phiphi)
-        for _ in range(substeps):
-            w.info[3] = number
-            status = step(m, w, stages, t0 + number * h, h, x, v, alpha, beta, tolerance)
-            if status != OK:
-                return row, status
-            number += 1
-        w.info[3] = number
-        status = record(m, w, t0 + number * h, x, v, out, row)
-        if status != OK:
-            return row, status
-    return out.time.size, OK
+        add_scaled(r.x, r.x, weight, stages.x[k])
+        add_scaled(r.v, r.v, weight, stages.v[k])
+    normalise(r.model.bodies, r.x)
+    return finite(r.x, r.v)
 
 
 @dataclass(frozen=True)
@@ -81,4 +57,6 @@ class RK4:
     order: ClassVar[int] = 4
     implicit: ClassVar[bool] = False
     stage_count: ClassVar[int] = 5
-    run: ClassVar[Any] = staticmethod(rk4_run)
+    row_stages: ClassVar[int] = 0
+    numbers: ClassVar[tuple[float, ...]] = ()
+    unit: ClassVar[Unit] = rk4_step

@@ -20,114 +20,60 @@ its two sides at different rates, and drift.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from ffr_dyn.kernels.bodies import mass_times, normalise, position_rates
-from ffr_dyn.kernels.options import entry, inlined
-from ffr_dyn.kernels.record import record
-from ffr_dyn.kernels.stiffening import solve_stiffened
-from ffr_dyn.kernels.system import (
-    acceleration_target,
-    constraint_rates,
-    evaluate,
-    evaluate_on_constraints,
-    finite,
-    prepare,
-    to_body_axes,
-    to_velocity_rates,
-)
+from ffr_dyn.kernels.bodies import normalise, position_rates
+from ffr_dyn.kernels.calls import add_elastic_part, correct, evaluate, set_diagonal, settle, solve
+from ffr_dyn.kernels.packing import unpack_tables
+from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
+from ffr_dyn.kernels.units import Unit
 from ffr_dyn.kernels.vectors import add_scaled, copy, fill
 
 GAMMA = 1.0 - 0.5**0.5
 
 
-@inlined
-def set_elastic_diagonal(bodies, dinv, gh):
-    for k in range(dinv.size):
-        dinv[k] = 1.0 / (1.0 + gh * gh * bodies.omega2[k] + gh * bodies.two_zeta_omega[k])
-
-
-@inlined
-def add_elastic_part(bodies, f, v, r_x, gh):
-    """f -= gamma h Omega^2 (q_dot + r_q)."""
-    for b in range(bodies.mass.size):
-        n, i, j, e = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 2], bodies.where[b, 3]
-        for k in range(n):
-            f[j + 6 + k] -= gh * bodies.omega2[e + k] * (v[j + 6 + k] + r_x[i + 7 + k])
-
-
-@inlined
-def add_correction(m, w, r_v, target):
-    """f += M r_v, target += Phi_q r_v."""
-    bodies, bw, rw = m.bodies, w.bodies, w.rows
-    copy(bw.acc, r_v)
-    to_body_axes(bodies.where, bw.A, bw.acc)
-    copy(bw.shift, bw.acc)
-    constraint_rates(bodies.where, m.markers, m.rows, rw.jac, bw.acc, rw.lam)
-    add_scaled(target, target, 1.0, rw.lam)
-    for b in range(bodies.mass.size):
-        j, size = bodies.where[b, 2], 6 + bodies.where[b, 0]
-        mass_times(bodies, bw, b, bw.acc[j : j + size], bw.f[j : j + size])
-
-
-@inlined
-def step(m, w, stages, t, h, x, v, alpha, beta, tolerance):
-    """One step in place. Returns a status."""
+@Unit
+def ros2_step(at, t, unused, unused_too):
+    """One step of the machine's state from time t. Returns a status."""
+    r = unpack_tables(at)
+    h = r.clock.time[0]
+    bodies, stages = r.model.bodies, r.stages
     gh = GAMMA * h
+    set_diagonal(r, gh)
     xs, vs, r_x, r_v = stages.x[2], stages.v[2], stages.x[3], stages.v[3]
     for k in range(2):
         if k == 0:
-            status = evaluate_on_constraints(m, w, t, x, v, tolerance)
-            copy(xs, x)
-            copy(vs, v)
+            status = settle(r, t)
+            copy(xs, r.x)
+            copy(vs, r.v)
             fill(r_x, 0.0)
         else:
-            add_scaled(xs, x, h, stages.x[0])
-            add_scaled(vs, v, h, stages.v[0])
+            add_scaled(xs, r.x, h, stages.x[0])
+            add_scaled(vs, r.v, h, stages.v[0])
             fill(r_v, 0.0)
             add_scaled(r_x, r_x, -2.0, stages.x[0])
             add_scaled(r_v, r_v, -2.0, stages.v[0])
-            normalise(m.bodies, xs)  # r_v goes to body axes and comes back, which wants a true rotation
-            status = evaluate(m, w, t + h, xs, vs)
+            normalise(bodies, xs)  # r_v goes to body axes and comes back, which wants a true rotation
+            status = evaluate(r, t + h, xs, vs)
         if status != OK:
             return status
-        acceleration_target(w.rows, alpha, beta, stages.target)
-        add_elastic_part(m.bodies, w.bodies.f, vs, r_x, gh)
-        fill(w.bodies.shift, 0.0)
+        acceleration_target(r.work.rows, r.clock.gains, stages.target)
+        add_elastic_part(bodies, r.work.bodies.f, vs, r_x, gh)
+        fill(r.work.bodies.shift, 0.0)
         if k == 1:
-            add_correction(m, w, r_v, stages.target)
-        solve_stiffened(m, w, xs, stages.target)
-        to_velocity_rates(m.bodies.where, w.bodies.A, w.bodies.acc, stages.v[k])
+            correct(r, r_v, stages.target)
+        solve(r, xs, stages.target)
+        to_velocity_rates(bodies.where, r.work.bodies.A, r.work.bodies.acc, stages.v[k])
         add_scaled(vs, vs, gh, stages.v[k])
-        position_rates(m.bodies, xs, vs, stages.x[k])
+        position_rates(bodies, xs, vs, stages.x[k])
         add_scaled(stages.x[k], stages.x[k], 1.0, r_x)
     for k in range(2):
         weight = 1.5 * h if k == 0 else 0.5 * h
-        add_scaled(x, x, weight, stages.x[k])
-        add_scaled(v, v, weight, stages.v[k])
-    normalise(m.bodies, x)
-    return finite(x, v)
-
-
-@entry
-def ros2_run(m, w, stages, t0, h, first, substeps, x, v, alpha, beta, tolerance, out):
-    """Fill the rows of `out`, `substeps` steps apart, from step number `first`. Returns (rows filled, status)."""
-    number = first
-    for row in range(out.time.size):
-        set_elastic_diagonal(m.bodies, w.bodies.dinv, GAMMA * h)
-        prepare(m.bodies.where, m.markers, m.rows, m.pattern, w.bodies.dinv, w.rows.phiphi)
-        for _ in range(substeps):
-            w.info[3] = number
-            status = step(m, w, stages, t0 + number * h, h, x, v, alpha, beta, tolerance)
-            if status != OK:
-                return row, status
-            number += 1
-        w.info[3] = number
-        status = record(m, w, t0 + number * h, x, v, out, row)
-        if status != OK:
-            return row, status
-    return out.time.size, OK
+        add_scaled(r.x, r.x, weight, stages.x[k])
+        add_scaled(r.v, r.v, weight, stages.v[k])
+    normalise(bodies, r.x)
+    return finite(r.x, r.v)
 
 
 @dataclass(frozen=True)
@@ -143,4 +89,6 @@ class ROS2:
     order: ClassVar[int] = 2
     implicit: ClassVar[bool] = True
     stage_count: ClassVar[int] = 4
-    run: ClassVar[Any] = staticmethod(ros2_run)
+    row_stages: ClassVar[int] = 0
+    numbers: ClassVar[tuple[float, ...]] = ()
+    unit: ClassVar[Unit] = ros2_step

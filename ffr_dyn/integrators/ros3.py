@@ -18,22 +18,14 @@ and y+ = y + h sum_i b_i k_i. A stage costs an explicit evaluation.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from ffr_dyn.integrators.ros2 import add_correction, add_elastic_part, set_elastic_diagonal
 from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.options import entry, inlined
-from ffr_dyn.kernels.record import record
-from ffr_dyn.kernels.stiffening import solve_stiffened
-from ffr_dyn.kernels.system import (
-    acceleration_target,
-    evaluate,
-    evaluate_on_constraints,
-    finite,
-    prepare,
-    to_velocity_rates,
-)
+from ffr_dyn.kernels.calls import add_elastic_part, correct, evaluate, set_diagonal, settle, solve
+from ffr_dyn.kernels.packing import unpack_tables
+from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
+from ffr_dyn.kernels.units import Unit
 from ffr_dyn.kernels.vectors import add_scaled, copy, fill
 
 GAMMA = 0.43586652150845900
@@ -54,16 +46,20 @@ WEIGHTS = (0.23413463753257138, -1.2170678994063107, 1.5470667403652802, 0.43586
 AT = (0.0, 0.8599004143760887, 0.7179332607542298, 1.0)
 
 
-@inlined
-def step(m, w, stages, t, h, x, v, alpha, beta, tolerance):
-    """One step in place. Returns a status."""
+@Unit
+def ros3_step(at, t, unused, unused_too):
+    """One step of the machine's state from time t. Returns a status."""
+    r = unpack_tables(at)
+    h = r.clock.time[0]
+    bodies, stages = r.model.bodies, r.stages
     gh = GAMMA * h
+    set_diagonal(r, gh)
     xs, vs, r_x, r_v = stages.x[4], stages.v[4], stages.x[5], stages.v[5]
     for k in range(4):
         if k == 0:
-            status = evaluate_on_constraints(m, w, t, x, v, tolerance)
-        copy(xs, x)
-        copy(vs, v)
+            status = settle(r, t)
+        copy(xs, r.x)
+        copy(vs, r.v)
         fill(r_x, 0.0)
         fill(r_v, 0.0)
         for j in range(k):
@@ -72,45 +68,25 @@ def step(m, w, stages, t, h, x, v, alpha, beta, tolerance):
             add_scaled(r_x, r_x, GAMMAS[4 * k + j] / GAMMA, stages.x[j])
             add_scaled(r_v, r_v, GAMMAS[4 * k + j] / GAMMA, stages.v[j])
         if k > 0:
-            normalise(m.bodies, xs)  # r_v goes to body axes and comes back, which wants a true rotation
-            status = evaluate(m, w, t + AT[k] * h, xs, vs)
+            normalise(bodies, xs)  # r_v goes to body axes and comes back, which wants a true rotation
+            status = evaluate(r, t + AT[k] * h, xs, vs)
         if status != OK:
             return status
-        acceleration_target(w.rows, alpha, beta, stages.target)
-        add_elastic_part(m.bodies, w.bodies.f, vs, r_x, gh)
-        fill(w.bodies.shift, 0.0)
+        acceleration_target(r.work.rows, r.clock.gains, stages.target)
+        add_elastic_part(bodies, r.work.bodies.f, vs, r_x, gh)
+        fill(r.work.bodies.shift, 0.0)
         if k > 0:
-            add_correction(m, w, r_v, stages.target)
-        solve_stiffened(m, w, xs, stages.target)
-        to_velocity_rates(m.bodies.where, w.bodies.A, w.bodies.acc, stages.v[k])
+            correct(r, r_v, stages.target)
+        solve(r, xs, stages.target)
+        to_velocity_rates(bodies.where, r.work.bodies.A, r.work.bodies.acc, stages.v[k])
         add_scaled(vs, vs, gh, stages.v[k])
-        position_rates(m.bodies, xs, vs, stages.x[k])
+        position_rates(bodies, xs, vs, stages.x[k])
         add_scaled(stages.v[k], stages.v[k], -1.0, r_v)
     for k in range(4):
-        add_scaled(x, x, h * WEIGHTS[k], stages.x[k])
-        add_scaled(v, v, h * WEIGHTS[k], stages.v[k])
-    normalise(m.bodies, x)
-    return finite(x, v)
-
-
-@entry
-def ros3_run(m, w, stages, t0, h, first, substeps, x, v, alpha, beta, tolerance, out):
-    """Fill the rows of `out`, `substeps` steps apart, from step number `first`. Returns (rows filled, status)."""
-    number = first
-    for row in range(out.time.size):
-        set_elastic_diagonal(m.bodies, w.bodies.dinv, GAMMA * h)
-        prepare(m.bodies.where, m.markers, m.rows, m.pattern, w.bodies.dinv, w.rows.phiphi)
-        for _ in range(substeps):
-            w.info[3] = number
-            status = step(m, w, stages, t0 + number * h, h, x, v, alpha, beta, tolerance)
-            if status != OK:
-                return row, status
-            number += 1
-        w.info[3] = number
-        status = record(m, w, t0 + number * h, x, v, out, row)
-        if status != OK:
-            return row, status
-    return out.time.size, OK
+        add_scaled(r.x, r.x, h * WEIGHTS[k], stages.x[k])
+        add_scaled(r.v, r.v, h * WEIGHTS[k], stages.v[k])
+    normalise(bodies, r.x)
+    return finite(r.x, r.v)
 
 
 @dataclass(frozen=True)
@@ -126,4 +102,6 @@ class ROS3:
     order: ClassVar[int] = 3
     implicit: ClassVar[bool] = True
     stage_count: ClassVar[int] = 6
-    run: ClassVar[Any] = staticmethod(ros3_run)
+    row_stages: ClassVar[int] = 0
+    numbers: ClassVar[tuple[float, ...]] = ()
+    unit: ClassVar[Unit] = ros3_step

@@ -2,166 +2,202 @@
 
 The elimination order and the fill are fixed per topology by `ffr_dyn.elimination`: for chains and trees the cost is
 linear in the number of bodies (Baraff 1996), for a few loops there is little fill.
+
+A block of S couples the rows of an earlier joint with those of a later one: a row of eight numbers (see `lanes`) for each row
+of the earlier, with the rows of the later side by side in it. The factor is S = U^T U.
 """
 
+from ffr_dyn.kernels.lanes import (
+    clear_row,
+    combine_1,
+    combine_2,
+    combine_3,
+    combine_4,
+    combine_5,
+    combine_6,
+    combine_12,
+    copy_row,
+    dot_rows,
+    scale_row,
+)
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.vectors import rigid_lower, solve_lower, solve_upper
+from ffr_dyn.kernels.tables import LANES
+from ffr_dyn.kernels.vectors import in_plane
 
 # The least share of a row that other rows do not contain (the square of a sine). In a singular position it is zero; with
 # this floor the motion there misses one acceleration for the moment, and goes on.
 FLOOR = 1e-13
-
-
-@inlined
-def eliminate_side(first, last, side, flexible, normal, P, L, mass, turning, all_jac, all_rr, all_ww, scale):
-    """Rows first ... last of one side: rr = rigid part after elimination of the elastic coordinates, ww = L^-1 rr.
-
-    scale : gathers what the row's own part of the multiplier matrix is at least, by the mass or the trace of the inertia
-            `turning` of the body
-    """
-    for row in range(first, last):
-        jac, rr, ww = all_jac[row, side], all_rr[row, side], all_ww[row, side]
-        for c in range(6):
-            rr[c] = jac[c]
-            if flexible and (normal < 0 or (c != normal if c < 3 else c == 3 + normal)):
-                rr[c] -= six(P, c, jac)
-            ww[c] = rr[c]
-        rigid_lower(L, ww, normal)
-        point = jac[0] * jac[0] + jac[1] * jac[1] + jac[2] * jac[2]
-        if point > 0.0:
-            scale[row] += point / mass
-        else:
-            scale[row] += (jac[3] * jac[3] + jac[4] * jac[4] + jac[5] * jac[5]) / turning
+SIDE = 12 * LANES  # numbers of X per side of a joint
 
 
 @kernel
-def six(matrix, r, jac):
-    """Row r of a 6 x 6 matrix times the point and elastic-rotation coefficients of a row."""
-    return (
-        matrix[r, 0] * jac[0] + matrix[r, 1] * jac[1] + matrix[r, 2] * jac[2]
-        + matrix[r, 3] * jac[6] + matrix[r, 4] * jac[7] + matrix[r, 5] * jac[8]
-    )  # fmt: skip
-
-
-@inlined
-def add_pair(starts, pair, flexible, phiphi, ww, jac, S):
-    """Add the coupling of two block sides on one body to its block of S."""
-    later, side_a, earlier, side_b, offset = pair[0], pair[1], pair[2], pair[3], pair[4]
-    start_a, start_b = starts[later], starts[earlier]
-    rows_a, rows_b = starts[later + 1] - start_a, starts[earlier + 1] - start_b
-    for c in range(rows_b):
-        wc, jc = ww[start_b + c, side_b], jac[start_b + c, side_b]
-        w0, w1, w2, w3, w4, w5 = wc[0], wc[1], wc[2], wc[3], wc[4], wc[5]
-        first = c if later == earlier else 0
-        t0, t1, t2, t3, t4, t5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+def spread_rows(jac, first, last, side, flexible, X, at):
+    """X = the rigid coefficients of the rows of one side (six rows of lanes), then the elastic ones."""
+    for row in range(first, last):
+        a, r = jac[row, side], at + row - first
+        for c in range(6):
+            X[r + LANES * c] = a[c]
         if flexible:
-            t0, t1, t2 = six(phiphi, 0, jc), six(phiphi, 1, jc), six(phiphi, 2, jc)
-            t3, t4, t5 = six(phiphi, 3, jc), six(phiphi, 4, jc), six(phiphi, 5, jc)
-        for a in range(first, rows_a):
-            wa, ja = ww[start_a + a, side_a], jac[start_a + a, side_a]
-            value = wa[0] * w0 + wa[1] * w1 + wa[2] * w2 + wa[3] * w3 + wa[4] * w4 + wa[5] * w5
-            if flexible:
-                value += ja[0] * t0 + ja[1] * t1 + ja[2] * t2 + ja[6] * t3 + ja[7] * t4 + ja[8] * t5
-            S[offset + a * rows_b + c] += value
+            for c in range(3):
+                X[r + LANES * (6 + c)] = a[c]
+                X[r + LANES * (9 + c)] = a[6 + c]
 
 
-@inlined
-def block(S, offset, rows, columns):
-    return S[offset : offset + rows * columns].reshape(rows, columns)
+@kernel
+def eliminate_side(flexible, normal, P, L, X, at):
+    """First six rows of X = L^-1 (rigid - P elastic): what is left of the rows without the elastic coordinates.
+
+    P, L : pooled 6 x 6 matrices
+    """
+    elastic = at + 6 * LANES
+    if normal >= 0:
+        eliminate_in_plane(flexible, normal, P, L, X, at)
+        return
+    if flexible:
+        for c in range(6):
+            combine_6(X, at + LANES * c, -1.0, P, 6 * c, 1, X, elastic)
+    scale_row(X, at, L[0])
+    combine_1(X, at + LANES, -1.0, L, 6, 1, X, at)
+    scale_row(X, at + LANES, L[7])
+    combine_2(X, at + 2 * LANES, -1.0, L, 12, 1, X, at)
+    scale_row(X, at + 2 * LANES, L[14])
+    combine_3(X, at + 3 * LANES, -1.0, L, 18, 1, X, at)
+    scale_row(X, at + 3 * LANES, L[21])
+    combine_4(X, at + 4 * LANES, -1.0, L, 24, 1, X, at)
+    scale_row(X, at + 4 * LANES, L[28])
+    combine_5(X, at + 5 * LANES, -1.0, L, 30, 1, X, at)
+    scale_row(X, at + 5 * LANES, L[35])
+
+
+@kernel
+def eliminate_in_plane(flexible, normal, P, L, X, at):
+    """`eliminate_side` for the three rigid coordinates i, j, k of a planar body; the others are zero."""
+    i, j, k = in_plane(normal)
+    if flexible:
+        for c in (i, j, k):
+            combine_6(X, at + LANES * c, -1.0, P, 6 * c, 1, X, at + 6 * LANES)
+    for c in (normal, 3 + (normal + 1) % 3, 3 + (normal + 2) % 3):
+        scale_row(X, at + LANES * c, 0.0)
+    first, second, third = at + LANES * i, at + LANES * j, at + LANES * k
+    scale_row(X, first, L[7 * i])
+    combine_1(X, second, -1.0, L, 6 * j + i, 1, X, first)
+    scale_row(X, second, L[7 * j])
+    combine_1(X, third, -1.0, L, 6 * k + i, 1, X, first)
+    combine_1(X, third, -1.0, L, 6 * k + j, 1, X, second)
+    scale_row(X, third, L[7 * k])
+
+
+@kernel
+def add_scale(jac, first, last, side, mass, turning, scale):
+    """What the rows' own part of the multiplier matrix is at least, by the mass or the trace of the inertia of a body."""
+    for row in range(first, last):
+        a = jac[row, side]
+        point = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+        if point > 0.0:
+            scale[row] += point / mass
+        else:
+            scale[row] += (a[3] * a[3] + a[4] * a[4] + a[5] * a[5]) / turning
+
+
+@kernel
+def add_pair(X, later, earlier, rows, flexible, phiphi, Y, S, offset):
+    """Add the coupling of two block sides on one body to its block of S.
+
+    later, earlier : where the sides begin in X;  rows : of the earlier
+    phiphi (36,)   : phi dinv phi^T of the two markers;  Y : scratch of twelve rows
+    """
+    if flexible:
+        for c in range(6):
+            copy_row(X, later + LANES * c, Y, LANES * c)
+            clear_row(Y, LANES * (6 + c))
+            combine_6(Y, LANES * (6 + c), 1.0, phiphi, c, 6, X, later + 6 * LANES)
+        for row in range(rows):
+            combine_12(S, offset + LANES * row, 1.0, X, earlier + row, LANES, Y, 0)
+    else:
+        for row in range(rows):
+            combine_6(S, offset + LANES * row, 1.0, X, earlier + row, LANES, X, later)
 
 
 @inlined
 def factorise_blocks(starts, pattern, S, relaxation, scale, independence):
-    """Factorise in place (right-looking block Cholesky). Returns the row without a pivot, or -1.
+    """Factorise in place (right-looking). Returns the row without a pivot, or -1.
 
     scale (C,)        : what the entry of a row on the diagonal is at least
     independence (1,) : the least share of a row that the rows before it do not contain
     """
     independence[0] = 1.0
+    if relaxation > 0.0:
+        for k in range(starts.size - 1):
+            for row in range(starts[k + 1] - starts[k]):
+                S[pattern.diagonal[k] + (LANES + 1) * row] *= 1.0 + relaxation
     for k in range(starts.size - 1):
         size = starts[k + 1] - starts[k]
-        diagonal = block(S, pattern.diagonal[k], size, size)
-        for row in range(size):
-            diagonal[row, row] *= 1.0 + relaxation
-    for k in range(starts.size - 1):
-        size = starts[k + 1] - starts[k]
-        diagonal = block(S, pattern.diagonal[k], size, size)
-        failed = pivots(diagonal, size, scale[starts[k] : starts[k + 1]], independence)
+        failed = pivots(S, pattern.diagonal[k], size, scale[starts[k] : starts[k + 1]], independence)
         if failed >= 0:
             return starts[k] + failed
-        eliminate_block(starts, pattern, S, k, size, diagonal)
+        eliminate_block(starts, pattern, S, k, size)
     return -1
 
 
 @kernel
-def pivots(matrix, size, scale, independence):
-    """In-place lower Cholesky factor with reciprocal diagonal, pivots at least FLOOR of `scale`."""
-    for j in range(size):
-        pivot = matrix[j, j]
-        for k in range(j):
-            pivot -= matrix[j, k] * matrix[j, k]
-        share = pivot / scale[j]
-        if not scale[j] > 0.0 or share != share:
-            return j
+def pivots(S, at, size, scale, independence):
+    """Factor U of a diagonal block, with reciprocal diagonal and zeros below; pivots at least FLOOR of `scale`."""
+    for k in range(size):
+        row = at + LANES * k
+        share = S[row + k] / scale[k]
+        if not scale[k] > 0.0 or share != share:
+            return k
         independence[0] = min(independence[0], share)
-        inverse = 1.0 / (max(share, FLOOR) * scale[j]) ** 0.5
-        matrix[j, j] = inverse
-        for i in range(j + 1, size):
-            value = matrix[i, j]
-            for k in range(j):
-                value -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] = value * inverse
+        inverse = 1.0 / (max(share, FLOOR) * scale[k]) ** 0.5
+        scale_row(S, row, inverse)
+        for j in range(k):
+            S[row + j] = 0.0
+        for i in range(k + 1, size):
+            combine_1(S, at + LANES * i, -1.0, S, row + i, 1, S, row)
+        S[row + k] = inverse
     return -1
 
 
 @inlined
-def eliminate_block(starts, pattern, S, k, size, diagonal):
-    update, first = pattern.update_start[k], pattern.column_start[k]
+def eliminate_block(starts, pattern, S, k, size):
+    update, first, diagonal = pattern.update_start[k], pattern.column_start[k], pattern.diagonal[k]
     for entry in range(first, pattern.column_start[k + 1]):
-        later = pattern.column[entry, 0]
-        rows = starts[later + 1] - starts[later]
-        X = block(S, pattern.column[entry, 1], rows, size)
-        for a in range(rows):
-            solve_lower(diagonal, X[a], size)
+        X = pattern.column[entry, 1]
+        for c in range(size):
+            for j in range(c):
+                combine_1(S, X + LANES * c, -1.0, S, diagonal + LANES * j + c, 1, S, X + LANES * j)
+            scale_row(S, X + LANES * c, S[diagonal + (LANES + 1) * c])
         for other in range(first, entry + 1):
-            earlier = pattern.column[other, 0]
-            columns = starts[earlier + 1] - starts[earlier]
-            Y = block(S, pattern.column[other, 1], columns, size)
-            subtract_product(block(S, pattern.update[update], rows, columns), X, Y, size)
+            earlier, Z = pattern.column[other, 0], pattern.column[other, 1]
+            target = pattern.update[update]
+            for row in range(starts[earlier + 1] - starts[earlier]):
+                for c in range(size):
+                    combine_1(S, target + LANES * row, -1.0, S, Z + LANES * c + row, 1, S, X + LANES * c)
             update += 1
 
 
 @kernel
-def subtract_product(target, X, Y, size):
-    """target -= X Y^T."""
-    for a in range(X.shape[0]):
-        for c in range(Y.shape[0]):
-            total = 0.0
-            for k in range(size):
-                total += X[a, k] * Y[c, k]
-            target[a, c] -= total
-
-
-@kernel
-def solve_blocks(starts, pattern, S, lam):
-    """In place lam <- S^-1 lam."""
+def solve_blocks(starts, pattern, S, b):
+    """In place b <- S^-1 b; b (8 K,): the rows of each joint in a row of lanes."""
     for k in range(starts.size - 1):
-        start, size = starts[k], starts[k + 1] - starts[k]
-        solve_lower(block(S, pattern.diagonal[k], size, size), lam[start : start + size], size)
+        size, at, own = starts[k + 1] - starts[k], pattern.diagonal[k], LANES * k
+        for c in range(size):
+            value = b[own + c] * S[at + (LANES + 1) * c]
+            b[own + c] = value
+            for r in range(c + 1, size):
+                b[own + r] -= S[at + LANES * c + r] * value
         for entry in range(pattern.column_start[k], pattern.column_start[k + 1]):
-            later = pattern.column[entry, 0]
-            target, rows = starts[later], starts[later + 1] - starts[later]
-            X = block(S, pattern.column[entry, 1], rows, size)
-            for a in range(rows):
-                for c in range(size):
-                    lam[target + a] -= X[a, c] * lam[start + c]
-    for k in range(starts.size - 2, -1, -1):
-        start, size = starts[k], starts[k + 1] - starts[k]
-        for entry in range(pattern.column_start[k], pattern.column_start[k + 1]):
-            later = pattern.column[entry, 0]
-            source, rows = starts[later], starts[later + 1] - starts[later]
-            X = block(S, pattern.column[entry, 1], rows, size)
+            later, X = pattern.column[entry, 0], pattern.column[entry, 1]
             for c in range(size):
-                for a in range(rows):
-                    lam[start + c] -= X[a, c] * lam[source + a]
-        solve_upper(block(S, pattern.diagonal[k], size, size), lam[start : start + size], size)
+                combine_1(b, LANES * later, -1.0, b, own + c, 1, S, X + LANES * c)
+    for k in range(starts.size - 2, -1, -1):
+        size, at, own = starts[k + 1] - starts[k], pattern.diagonal[k], LANES * k
+        for entry in range(pattern.column_start[k], pattern.column_start[k + 1]):
+            later, X = pattern.column[entry, 0], pattern.column[entry, 1]
+            for c in range(size):
+                b[own + c] -= dot_rows(S, X + LANES * c, b, LANES * later)
+        for c in range(size - 1, -1, -1):
+            value = b[own + c]
+            for r in range(c + 1, size):
+                value -= S[at + LANES * c + r] * b[own + r]
+            b[own + c] = value * S[at + (LANES + 1) * c]

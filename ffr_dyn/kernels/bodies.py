@@ -6,7 +6,7 @@ ch. 5, written for body-frame velocities); see `ffr_dyn.inertia` for the readabl
 
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.vectors import (
-    cholesky,
+    cholesky_six,
     copy,
     cross,
     dot,
@@ -95,6 +95,33 @@ def row_dot(rows, index, q, n):
     return total
 
 
+@kernel
+def three_rows(rows, q, n):
+    """The first three of a pooled array of rows of n, times q: in one loop, which is three times as fast as three."""
+    r0, r1, r2 = rows[:n], rows[n:], rows[2 * n :]
+    t0, t1, t2 = 0.0, 0.0, 0.0
+    for j in range(n):
+        t0 += r0[j] * q[j]
+        t1 += r1[j] * q[j]
+        t2 += r2[j] * q[j]
+    return t0, t1, t2
+
+
+@kernel
+def six_rows(rows, q, n):
+    """The first six rows, as `three_rows`."""
+    r0, r1, r2, r3, r4, r5 = rows[:n], rows[n:], rows[2 * n :], rows[3 * n :], rows[4 * n :], rows[5 * n :]
+    t0, t1, t2, t3, t4, t5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(n):
+        t0 += r0[j] * q[j]
+        t1 += r1[j] * q[j]
+        t2 += r2[j] * q[j]
+        t3 += r3[j] * q[j]
+        t4 += r4[j] * q[j]
+        t5 += r5[j] * q[j]
+    return t0, t1, t2, t3, t4, t5
+
+
 @inlined
 def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s):
     """Elastic right-hand side; returns (first moment, I3 q_dot, second moment of mass, sym D, axial D) of the body."""
@@ -103,26 +130,18 @@ def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s):
     rP, P = bodies.rP_dm[9 * e : 9 * (e + n)], bodies.P_dm[3 * e : 3 * (e + n)]
     copy(g, rP)
     fill(l, 0.0)
-    contract(bodies.PP_dm[start : start + 9 * n * n], q, qd, n, g, l)
-    s = (s[0] + row_dot(P, 0, q, n), s[1] + row_dot(P, 1, q, n), s[2] + row_dot(P, 2, q, n))
-    pd = (row_dot(P, 0, qd, n), row_dot(P, 1, qd, n), row_dot(P, 2, qd, n))
+    if start >= 0:
+        contract(bodies.PP_dm[start : start + 9 * n * n], q, qd, n, g, l)
+    sx, sy, sz = three_rows(P, q, n)
+    s = (s[0] + sx, s[1] + sy, s[2] + sz)
+    pd = three_rows(P, qd, n)
+    a0, a1, a2, a3, a4, a5 = six_rows(rP, q, n)
+    b0, b1, b2, b3, b4, b5 = six_rows(g, q, n)
     W = (
-        second[0] + row_dot(rP, 0, q, n) + row_dot(g, 0, q, n),
-        second[1] + row_dot(rP, 1, q, n) + row_dot(g, 1, q, n),
-        second[2] + row_dot(rP, 2, q, n) + row_dot(g, 2, q, n),
-        second[3] + row_dot(rP, 3, q, n) + row_dot(g, 3, q, n),
-        second[4] + row_dot(rP, 4, q, n) + row_dot(g, 4, q, n),
-        second[5] + row_dot(rP, 5, q, n) + row_dot(g, 5, q, n),
-    )
-    D = (
-        row_dot(g, 0, qd, n),
-        row_dot(g, 1, qd, n),
-        row_dot(g, 2, qd, n),
-        row_dot(g, 3, qd, n),
-        row_dot(g, 4, qd, n),
-        row_dot(g, 5, qd, n),
-    )
-    D_axial = (row_dot(g, 6, qd, n), row_dot(g, 7, qd, n), row_dot(g, 8, qd, n))
+        second[0] + a0 + b0, second[1] + a1 + b1, second[2] + a2 + b2,
+        second[3] + a3 + b3, second[4] + a4 + b4, second[5] + a5 + b5,
+    )  # fmt: skip
+    D, D_axial = six_rows(g, qd, n), three_rows(g[6 * n :], qd, n)
 
     ox, oy, oz = omega
     xx, yy, zz = oy * oy + oz * oz, ox * ox + oz * oz, ox * ox + oy * oy
@@ -167,9 +186,11 @@ def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, norm
     g0, g1, h = g[c0 * n : (c0 + 1) * n], g[c1 * n : (c1 + 1) * n], g[turning * n : (turning + 1) * n]
     copy(g, rP)
     fill(l, 0.0)
-    contract_in_plane(bodies.PP_dm[start : start + 9 * n * n], q, qd, n, g0, g1, h, l, c0, c1, turning)
-    s = (s[0] + row_dot(P, 0, q, n), s[1] + row_dot(P, 1, q, n), s[2] + row_dot(P, 2, q, n))
-    pd = (row_dot(P, 0, qd, n), row_dot(P, 1, qd, n), row_dot(P, 2, qd, n))
+    if start >= 0:
+        contract_in_plane(bodies.PP_dm[start : start + 9 * n * n], q, qd, n, g0, g1, h, l, c0, c1, turning)
+    sx, sy, sz = three_rows(P, q, n)
+    s = (s[0] + sx, s[1] + sy, s[2] + sz)
+    pd = three_rows(P, qd, n)
     grown = row_dot(rP, c0, q, n) + row_dot(g0, 0, q, n) + row_dot(rP, c1, q, n) + row_dot(g1, 0, q, n)
     growing = row_dot(g0, 0, qd, n) + row_dot(g1, 0, qd, n)
     # Only the sums of both components in the plane enter; they are kept in one component.
@@ -249,6 +270,17 @@ def rigid_mass(mass, s, J, M):
 
 
 @inlined
+def prepare_body(bodies, w, b):
+    """What of the Schur complement of body b depends on the elastic diagonal alone: P_dm dinv and P_dm dinv P_dm^T."""
+    n, e = bodies.where[b, 0], bodies.where[b, 3]
+    P, Cd = bodies.P_dm[3 * e : 3 * (e + n)], w.Cd[6 * e : 6 * (e + n)]
+    for r in range(3):
+        scale_row(P, r, w.dinv[e : e + n], n, Cd, r)
+        for c in range(3):
+            w.PP[b, r, c] = row_product(Cd, r, P, c, n)
+
+
+@inlined
 def factorise(bodies, w, b):
     """Cholesky factor of the Schur complement of body b on its elastic block. Returns True when it is positive."""
     n, e, normal = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 7]
@@ -257,18 +289,55 @@ def factorise(bodies, w, b):
     P, H = bodies.P_dm[3 * e : 3 * (e + n)], w.g[9 * e + 6 * n : 9 * (e + n)]
     dinv, Cd = w.dinv[e : e + n], w.Cd[6 * e : 6 * (e + n)]
     if normal >= 0:
-        return factorise_in_plane(P, H, dinv, Cd, L, n, normal)
-    for r in range(3):
-        scale_row(P, r, dinv, n, Cd, r)
-        scale_row(H, r, dinv, n, Cd, 3 + r)
+        return factorise_in_plane(w.PP[b], P, H, dinv, Cd, L, n, normal)
     if n > 0:
         for r in range(3):
             for c in range(r + 1):
-                L[r, c] -= row_product(Cd, r, P, c, n)
-                L[3 + r, 3 + c] -= row_product(Cd, 3 + r, H, c, n)
-            for c in range(3):
-                L[3 + r, c] -= row_product(Cd, 3 + r, P, c, n)
-    return cholesky(L, 6) < 0
+                L[r, c] -= w.PP[b, r, c]
+        reduce_rotation(P, H, dinv, Cd, L, n)
+    return cholesky_six(L)
+
+
+@kernel
+def reduce_rotation(P, H, dinv, Cd, L, n):
+    """Rotational rows of [M] - C dinv C^T and of C dinv, with C = [P_dm; H], in one loop over the elastic coordinates."""
+    p0, p1, p2, h0, h1, h2 = P[:n], P[n:], P[2 * n :], H[:n], H[n:], H[2 * n :]
+    c3, c4, c5 = Cd[3 * n :], Cd[4 * n :], Cd[5 * n :]
+    xp, xq, xr, yp, yq, yr, zp, zq, zr = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(n):
+        x, y, z = dinv[j] * h0[j], dinv[j] * h1[j], dinv[j] * h2[j]
+        c3[j], c4[j], c5[j] = x, y, z
+        xp += x * p0[j]
+        xq += x * p1[j]
+        xr += x * p2[j]
+        yp += y * p0[j]
+        yq += y * p1[j]
+        yr += y * p2[j]
+        zp += z * p0[j]
+        zq += z * p1[j]
+        zr += z * p2[j]
+        xx += x * h0[j]
+        xy += x * h1[j]
+        xz += x * h2[j]
+        yy += y * h1[j]
+        yz += y * h2[j]
+        zz += z * h2[j]
+    L[3, 0] -= xp
+    L[3, 1] -= xq
+    L[3, 2] -= xr
+    L[4, 0] -= yp
+    L[4, 1] -= yq
+    L[4, 2] -= yr
+    L[5, 0] -= zp
+    L[5, 1] -= zq
+    L[5, 2] -= zr
+    L[3, 3] -= xx
+    L[4, 3] -= xy
+    L[5, 3] -= xz
+    L[4, 4] -= yy
+    L[5, 4] -= yz
+    L[5, 5] -= zz
 
 
 @kernel
@@ -280,16 +349,19 @@ def scale_row(rows, r, dinv, n, out, target):
 
 
 @kernel
-def factorise_in_plane(P, H, dinv, Cd, L, n, normal):
+def factorise_in_plane(PP, P, H, dinv, Cd, L, n, normal):
     """`factorise` for the three rigid coordinates i, j, k of a planar body."""
     i, j, k = in_plane(normal)
-    scale_row(P, i, dinv, n, Cd, i)
-    scale_row(P, j, dinv, n, Cd, j)
-    scale_row(H, normal, dinv, n, Cd, k)
-    ii, ji, jj = row_product(Cd, i, P, i, n), row_product(Cd, j, P, i, n), row_product(Cd, j, P, j, n)
-    ki, kj, kk = row_product(Cd, k, P, i, n), row_product(Cd, k, P, j, n), row_product(Cd, k, H, normal, n)
+    ki, kj, kk, ji = 0.0, 0.0, 0.0, PP[j, i]
+    first, second, turn, scaled = P[i * n :], P[j * n :], H[normal * n :], Cd[k * n :]
+    for c in range(n):
+        x = dinv[c] * turn[c]
+        scaled[c] = x
+        ki += x * first[c]
+        kj += x * second[c]
+        kk += x * turn[c]
     inertia = L[k, k]
-    ii, jj, kk = L[i, i] - ii, L[j, j] - jj, inertia - kk
+    ii, jj, kk = L[i, i] - PP[i, i], L[j, j] - PP[j, j], inertia - kk
     L[i, i] = 1.0 / ii**0.5
     L[j, i], L[k, i] = -ji * L[i, i], (L[k, i] - ki) * L[i, i]
     jj -= L[j, i] ** 2
@@ -311,28 +383,45 @@ def row_product(a, i, b, j, n):
 
 
 @inlined
-def solve_body(bodies, w, b):
-    """w.acc = M^-1 w.f for body b, without constraints."""
+def reduce_forces(bodies, w, b):
+    """w.rigid = L^-1 (f_rigid - C dinv f_elastic), w.elastic = dinv f_elastic of body b."""
     n, j, e = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3]
-    f, acc = w.f[j : j + 6 + n], w.acc[j : j + 6 + n]
+    f, z = w.f[j : j + 6 + n], w.rigid[b]
     for k in range(6):
-        acc[k] = f[k]
-        if n > 0:
-            acc[k] -= row_dot(w.Cd[6 * e : 6 * (e + n)], k, f[6:], n)
-    rigid_lower(w.L[b], acc, bodies.where[b, 7])
-    rigid_upper(w.L[b], acc, bodies.where[b, 7])
+        z[k] = f[k]
     if n > 0:
-        back_substitute(w.Cd[6 * e : 6 * (e + n)], w.dinv[e : e + n], f[6:], acc, n, acc[6:])
+        d, elastic, dinv = f[6:], w.elastic[e : e + n], w.dinv[e : e + n]
+        c0, c1, c2, c3, c4, c5 = six_rows(w.Cd[6 * e : 6 * (e + n)], d, n)
+        z[0] -= c0
+        z[1] -= c1
+        z[2] -= c2
+        z[3] -= c3
+        z[4] -= c4
+        z[5] -= c5
+        for k in range(n):
+            elastic[k] = dinv[k] * d[k]
+    rigid_lower(w.L[b], z, bodies.where[b, 7])
+
+
+@inlined
+def accelerate(bodies, w, b):
+    """w.acc of body b from its reduced forces: L^-T w.rigid, and w.elastic - (C dinv)^T of it."""
+    n, j, e = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3]
+    z, acc = w.rigid[b], w.acc[j : j + 6 + n]
+    rigid_upper(w.L[b], z, bodies.where[b, 7])
+    for k in range(6):
+        acc[k] = z[k]
+    if n > 0:
+        back_substitute(w.Cd[6 * e : 6 * (e + n)], w.elastic[e : e + n], z, n, acc[6:])
 
 
 @kernel
-def back_substitute(Cd, dinv, f, z, n, acc):
-    """acc = dinv f - Cd^T z."""
+def back_substitute(Cd, elastic, z, n, acc):
+    """acc = elastic - Cd^T z."""
     c0, c1, c2, c3, c4, c5 = Cd[:n], Cd[n:], Cd[2 * n :], Cd[3 * n :], Cd[4 * n :], Cd[5 * n :]
+    z0, z1, z2, z3, z4, z5 = z[0], z[1], z[2], z[3], z[4], z[5]
     for j in range(n):
-        acc[j] = dinv[j] * f[j] - (
-            c0[j] * z[0] + c1[j] * z[1] + c2[j] * z[2] + c3[j] * z[3] + c4[j] * z[4] + c5[j] * z[5]
-        )
+        acc[j] = elastic[j] - (c0[j] * z0 + c1[j] * z1 + c2[j] * z2 + c3[j] * z3 + c4[j] * z4 + c5[j] * z5)
 
 
 @kernel
@@ -346,13 +435,22 @@ def mass_times(bodies, w, b, y, out):
         out[3 + k] += lift[k] + dot(w.J[b, k], angular)
     if n > 0:
         P, H = bodies.P_dm[3 * e : 3 * (e + n)], w.g[9 * e + 6 * n : 9 * (e + n)]
+        momentum, spin = three_rows(P, y[6:], n), three_rows(H, y[6:], n)
         for k in range(3):
-            out[k] += row_dot(P, k, y[6:], n)
-            out[3 + k] += row_dot(H, k, y[6:], n)
-            for j in range(n):
-                out[6 + j] += P[k * n + j] * linear[k] + H[k * n + j] * angular[k]
-        for j in range(n):
-            out[6 + j] += y[6 + j]
+            out[k] += momentum[k]
+            out[3 + k] += spin[k]
+        add_motion(P, H, linear, angular, y[6:], n, out[6:])
+
+
+@kernel
+def add_motion(P, H, linear, angular, q, n, out):
+    """out += P^T linear + H^T angular + q."""
+    p0, p1, p2, h0, h1, h2 = P[:n], P[n:], P[2 * n :], H[:n], H[n:], H[2 * n :]
+    for j in range(n):
+        out[j] += (
+            p0[j] * linear[0] + p1[j] * linear[1] + p2[j] * linear[2]
+            + h0[j] * angular[0] + h1[j] * angular[1] + h2[j] * angular[2] + q[j]
+        )  # fmt: skip
 
 
 @inlined

@@ -73,7 +73,7 @@ def apply_given(where, markers, loads, w, functions, user, f, load, k):
     apply_wrench(where, markers, get(w.u, marker), f, load[marker], marker, force, moment)
 
 
-@kernel
+@inlined
 def apply_loads(where, markers, loads, A, w, s, functions, user, x, f):
     """Add all loads to the right-hand sides f, and to w.load; A (B + 1, 3, 3) of the bodies; w, s: Marker-, LoadWork."""
     for k in range(w.load.shape[0]):

@@ -1,6 +1,6 @@
 """Markers: points and small elastic rotations that move with the deformation; their velocities and bias accelerations."""
 
-from ffr_dyn.kernels.bodies import row_dot, row_product
+from ffr_dyn.kernels.bodies import row_product, six_rows
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.vectors import add, cross, get, put, scale, to_global
 
@@ -26,11 +26,12 @@ def update_marker(where, markers, w, A, omega, x, v, k):
     if n > 0:
         phi = shapes(markers, k, n)
         q, qd = x[i + 7 : i + 7 + n], v[j + 6 : j + 6 + n]
-        u = (u[0] + row_dot(phi, 0, q, n), u[1] + row_dot(phi, 1, q, n), u[2] + row_dot(phi, 2, q, n))
-        ud = (row_dot(phi, 0, qd, n), row_dot(phi, 1, qd, n), row_dot(phi, 2, qd, n))
-        for c in range(3):
-            w.theta[k, c] = row_dot(phi, 3 + c, q, n)
-            w.thetad[k, c] = row_dot(phi, 3 + c, qd, n)
+        u0, u1, u2, t0, t1, t2 = six_rows(phi, q, n)
+        u = (u[0] + u0, u[1] + u1, u[2] + u2)
+        put(w.theta, k, (t0, t1, t2))
+        u0, u1, u2, t0, t1, t2 = six_rows(phi, qd, n)
+        ud = (u0, u1, u2)
+        put(w.thetad, k, (t0, t1, t2))
     spin = cross(omega, u)
     put(w.omega, k, omega)
     put(w.u, k, u)
@@ -57,13 +58,19 @@ def axis_motion(w, k, a0):
 
 
 @kernel
-def couple_marker(phi, Cd, n, normal, P):
-    """P (6, 6) = [P_dm; H] dinv phi^T: what a unit wrench on a marker does to the rigid coordinates through the elastic."""
-    for r in range(6):
-        if normal >= 0 and (r == normal if r < 3 else r != 3 + normal):
-            continue
+def prepare_marker(phi, Cd, n, P):
+    """First three rows of P (6, 6) = [P_dm; H] dinv phi^T, which depend on the elastic diagonal alone."""
+    for r in range(3):
         for c in range(6):
             P[r, c] = row_product(Cd, r, phi, c, n)
+
+
+@kernel
+def couple_marker(phi, Cd, n, normal, P):
+    """Last three rows of P: what a unit wrench on a marker does to the rotation through the elastic coordinates."""
+    for r in range(3, 6):
+        if normal < 0 or r == 3 + normal:
+            P[r, 0], P[r, 1], P[r, 2], P[r, 3], P[r, 4], P[r, 5] = six_rows(phi, Cd[r * n :], n)
 
 
 @kernel

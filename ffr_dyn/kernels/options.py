@@ -13,21 +13,20 @@ from typing import Any
 from numba import njit
 
 # No reference counts (_nrt): kernels allocate nothing and return no arrays, and counting views took half of the run time.
-_OPTIONS: dict[str, Any] = {
-    "cache": True,
+OPTIONS: dict[str, Any] = {
     "_nrt": False,
     "error_model": "numpy",
     "fastmath": {"contract", "reassoc", "nsz"},
 }
 
-# A kernel that is called from Python: a time loop, one evaluation.
-entry: Any = functools.partial(njit, **_OPTIONS)
+# A kernel that is called from Python with tables of its own; time loops are units (see `ffr_dyn.kernels.units`).
+entry: Any = functools.partial(njit, cache=True, **OPTIONS)
 
 # A kernel that only other kernels call: without the wrappers for callers in Python and C it compiles in half the time.
-kernel: Any = functools.partial(njit, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)
+kernel: Any = functools.partial(njit, no_cpython_wrapper=True, no_cfunc_wrapper=True, **OPTIONS)
 
 # A kernel that is called from one place: numba optimises everything below a compiled function again at each level.
-inlined: Any = functools.partial(njit, inline="always", **_OPTIONS)
+inlined: Any = functools.partial(njit, inline="always", **OPTIONS)
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 

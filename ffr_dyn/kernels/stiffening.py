@@ -5,7 +5,7 @@ solved for. They enter by fixed-point iteration: each sweep solves the equations
 change from sweep to sweep is of the order (elastic deflection / size)^2, so three sweeps reach rounding in practice.
 """
 
-from ffr_dyn.kernels.options import kernel
+from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.system import solve_motion
 from ffr_dyn.kernels.vectors import copy, cross, get, subtract, to_body
 
@@ -97,7 +97,7 @@ def stiffen(bodies, w, b):
             f[k] -= w.load[load] * product[k]
 
 
-@kernel
+@inlined
 def solve_stiffened(m, w, x, target):
     """`solve_motion` with the geometric stiffening of the bodies that have it."""
     stiffened = m.bodies.stiffening.size > 0

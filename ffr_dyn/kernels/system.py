@@ -1,26 +1,39 @@
 """One evaluation of the equations of motion of a scene; everything an integrator or an analysis calls.
 
-Order of calls: `prepare` once per elastic diagonal; `evaluate` at a state; then any number of `solve_motion` and
-`solve_correction` with that state's factors.
+Order of calls: `prepare` once per elastic diagonal; `evaluate_bodies`, `evaluate_loads`, `evaluate_joints` at a state; then
+any number of `solve_motion` and `solve_step` with that state's factors. Compiled as units in `ffr_dyn.kernels.units`.
 """
 
-from ffr_dyn.kernels.actions import keep_turns
-from ffr_dyn.kernels.blocks import add_pair, eliminate_side, factorise_blocks, solve_blocks
-from ffr_dyn.kernels.bodies import back_substitute, factorise, inertia, normalise, row_dot, solve_body
-from ffr_dyn.kernels.functions import evaluate_functions
-from ffr_dyn.kernels.loads import apply_loads, call_user, gravity_field
-from ffr_dyn.kernels.markers import couple_marker, couple_pair, project, shapes, update_marker
+from ffr_dyn.kernels.blocks import (
+    SIDE,
+    add_pair,
+    add_scale,
+    eliminate_side,
+    factorise_blocks,
+    solve_blocks,
+    spread_rows,
+)
+from ffr_dyn.kernels.bodies import (
+    accelerate,
+    factorise,
+    inertia,
+    normalise,
+    prepare_body,
+    reduce_forces,
+    six_rows,
+)
+from ffr_dyn.kernels.lanes import combine_6, dot_rows
+from ffr_dyn.kernels.loads import apply_loads
+from ffr_dyn.kernels.markers import couple_marker, couple_pair, prepare_marker, shapes, update_marker
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.rows import evaluate_block
-from ffr_dyn.kernels.tables import NOT_FINITE, OK, RELATION, SINGULAR_BODY, SINGULAR_CONSTRAINT, USER_FAILED
+from ffr_dyn.kernels.tables import LANES, NOT_FINITE, OK, RELATION
 from ffr_dyn.kernels.vectors import (
     add_scaled,
     copy,
     cross,
     fill,
     get,
-    rigid_lower,
-    rigid_upper,
     subtract,
     to_body,
     to_global,
@@ -28,15 +41,23 @@ from ffr_dyn.kernels.vectors import (
 
 
 @inlined
-def prepare(where, markers, rows, pattern, dinv, phiphi):
-    """What depends on the elastic diagonal alone: phiphi, the elastic coupling between markers of one body."""
+def prepare(bodies, markers, rows, pattern, bw, rw):
+    """What depends on the elastic diagonal alone."""
+    where = bodies.where
+    for b in range(bodies.mass.size):
+        prepare_body(bodies, bw, b)
+    for k in markers.joint:
+        b = markers.body[k]
+        n, e = where[b, 0], where[b, 3]
+        if n > 0:
+            prepare_marker(shapes(markers, k, n), bw.Cd[6 * e : 6 * (e + n)], n, rw.P[k])
     for p in range(pattern.pair_body.size):
         b = pattern.pair_body[p]
         n, e = where[b, 0], where[b, 3]
         if n > 0:
             left = rows.marker[pattern.pair[p, 0], pattern.pair[p, 1]]
             right = rows.marker[pattern.pair[p, 2], pattern.pair[p, 3]]
-            couple_pair(shapes(markers, left, n), shapes(markers, right, n), dinv[e : e + n], n, phiphi[p])
+            couple_pair(shapes(markers, left, n), shapes(markers, right, n), bw.dinv[e : e + n], n, rw.phiphi[p])
 
 
 @inlined
@@ -51,8 +72,8 @@ def evaluate_bodies(gravity, bodies, w, x, v):
 
 @inlined
 def couple_joints(bodies, markers, rows, pattern, bw, rw):
-    """Rigid parts of all rows after elimination of the elastic coordinates, and the multiplier matrix."""
-    where = bodies.where
+    """Rows after elimination of the elastic coordinates, and the multiplier matrix."""
+    where, sides = bodies.where, rows.marker.shape[1]
     fill(rw.scale, 0.0)
     ground = where.shape[0] - 1
     for k in markers.joint:
@@ -61,69 +82,45 @@ def couple_joints(bodies, markers, rows, pattern, bw, rw):
         if n > 0:
             couple_marker(shapes(markers, k, n), bw.Cd[6 * e : 6 * (e + n)], n, where[b, 7], rw.P[k])
     for k in range(rows.marker.shape[0]):
-        for side in range(rows.marker.shape[1]):
+        for side in range(sides):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
-                first, last = rows.start[k], rows.start[k + 1]
-                flexible, normal = where[b, 0] > 0, where[b, 7]
-                mass, turning = bodies.mass[b], bw.J[b, 0, 0] + bw.J[b, 1, 1] + bw.J[b, 2, 2]
-                eliminate_side(
-                    first,
-                    last,
-                    side,
-                    flexible,
-                    normal,
-                    rw.P[marker],
-                    bw.L[b],
-                    mass,
-                    turning,
-                    rw.jac,
-                    rw.rr,
-                    rw.ww,
-                    rw.scale,
-                )
+                first, last, at = rows.start[k], rows.start[k + 1], (k * sides + side) * SIDE
+                flexible = where[b, 0] > 0
+                spread_rows(rw.jac, first, last, side, flexible, rw.X, at)
+                eliminate_side(flexible, where[b, 7], rw.P[marker].reshape(36), bw.L[b].reshape(36), rw.X, at)
+                turning = bw.J[b, 0, 0] + bw.J[b, 1, 1] + bw.J[b, 2, 2]
+                add_scale(rw.jac, first, last, side, bodies.mass[b], turning, rw.scale)
     fill(rw.S, 0.0)
     for p in range(pattern.pair_body.size):
-        flexible = where[pattern.pair_body[p], 0] > 0
-        add_pair(rows.start, pattern.pair[p], flexible, rw.phiphi[p], rw.ww, rw.jac, rw.S)
+        flexible, earlier = where[pattern.pair_body[p], 0] > 0, pattern.pair[p, 2]
+        add_pair(
+            rw.X, (pattern.pair[p, 0] * sides + pattern.pair[p, 1]) * SIDE, (earlier * sides + pattern.pair[p, 3]) * SIDE,
+            rows.start[earlier + 1] - rows.start[earlier], flexible, rw.phiphi[p].reshape(36), rw.Y, rw.S,
+            pattern.pair[p, 4],
+        )  # fmt: skip
 
 
-# Near a singular position the rows become dependent, and a violation eta of the constraints throws the motion from its
-# branch when it comes closer than about eta^(1/3). So on the approach (`independence` below NEAR) the violation is held far
-# lower, and at the position itself (below AT) it is left alone: along the direction that is about to be free a correction
-# would be the violation divided by the distance.
-NEAR, AT = 1e-2, 1e-6
-TIGHTER = 1e-4
+@inlined
+def evaluate_loads(m, w, t, x, v):
+    """Markers and applied loads, on top of what `evaluate_bodies` left."""
+    for k in m.markers.active:
+        b = m.markers.body[k]
+        update_marker(m.bodies.where, m.markers, w.markers, w.bodies.A[b], get(w.bodies.omega, b), x, v, k)
+    apply_loads(m.bodies.where, m.markers, m.loads, w.bodies.A, w.markers, w.loads, w.functions, w.user, x, w.bodies.f)
 
 
-@kernel
-def evaluate(m, w, t, x, v):
-    """Fill w at (t, x, v): right-hand sides, constraint rows, factors. Returns a status; w.info[0] says where."""
-    bodies, markers, rows, bw, mw, rw = m.bodies, m.markers, m.rows, w.bodies, w.markers, w.rows
-    w.info[1] += 1
-    if not call_user(m.user_address, t, x, v, w.user):
-        return USER_FAILED
-    evaluate_functions(m.functions, w.user, t, w.functions)
-    gravity_field(m.gravity, m.base, w.functions, w.field)
-    failed = evaluate_bodies(w.field, bodies, bw, x, v)
-    if failed >= 0:
-        w.info[0] = failed
-        return SINGULAR_BODY
-    for k in markers.active:
-        b = markers.body[k]
-        update_marker(bodies.where, markers, mw, bw.A[b], get(bw.omega, b), x, v, k)
-    apply_loads(bodies.where, markers, m.loads, bw.A, mw, w.loads, w.functions, w.user, x, bw.f)
-    for k in range(rows.marker.shape[0]):
-        evaluate_block(rows, w.functions, mw, rw, k)
-    couple_joints(bodies, markers, rows, m.pattern, bw, rw)
-    failed = factorise_blocks(rows.start, m.pattern, rw.S, m.relaxation, rw.scale, w.independence)
-    if failed >= 0:
-        w.info[0] = failed
-        return SINGULAR_CONSTRAINT
-    if w.independence[0] < w.independence[1]:
+@inlined
+def evaluate_joints(m, w, t):
+    """Constraint rows and the factors of the multiplier matrix. Returns the row without a pivot, or -1."""
+    for k in range(m.rows.marker.shape[0]):
+        evaluate_block(m.rows, w.functions, w.markers, w.rows, k)
+    couple_joints(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows)
+    failed = factorise_blocks(m.rows.start, m.pattern, w.rows.S, m.relaxation, w.rows.scale, w.independence)
+    if failed < 0 and w.independence[0] < w.independence[1]:
         w.independence[1], w.independence[2] = w.independence[0], t
-    return OK
+    return failed
 
 
 @kernel
@@ -135,7 +132,7 @@ def largest(values):
     return result
 
 
-@kernel
+@inlined
 def solve_motion(bodies, markers, rows, pattern, bw, rw, target, passes):
     """acc, lam from  M acc + Phi_q^T lam = f,  Phi_q acc = target (C,).
 
@@ -144,29 +141,65 @@ def solve_motion(bodies, markers, rows, pattern, bw, rw, target, passes):
     of multipliers; Bayo & Ledesma, Nonlinear Dynamics 9 (1996) 113-130).
     """
     for b in range(bodies.mass.size):
-        solve_body(bodies, bw, b)
-    fill(rw.lam, 0.0)
+        reduce_forces(bodies, bw, b)
+    reduced_rates(bodies, markers, rows, bw, rw, target)
+    solve_blocks(rows.start, pattern, rw.S, rw.step)
+    react(bodies, markers, rows, bw, rw)
+    gather_rows(rows.start, rw.step, rw.lam)
     before = 0.0
-    for number in range(passes):
-        constraint_rates(bodies.where, markers, rows, rw.jac, bw.acc, rw.step)
-        for row in range(target.size):
-            rw.step[row] -= target[row]
-        left = largest(rw.step)
-        if number > 0 and not left < 0.5 * before:
+    for number in range(1, passes):
+        constraint_rates(bodies.where, markers, rows, rw.jac, bw.acc, rw.left)
+        add_scaled(rw.left, rw.left, -1.0, target)
+        left = largest(rw.left)
+        if number > 1 and not left < 0.5 * before:
             break
         before = left
-        solve_blocks(rows.start, pattern, rw.S, rw.step)
-        react(bodies, markers, rows, bw, rw)
-        add_scaled(rw.lam, rw.lam, 1.0, rw.step)
+        copy(bw.more, bw.acc)
+        solve_step(bodies, markers, rows, pattern, bw, rw, rw.left)
+        add_scaled(bw.acc, bw.more, 1.0, bw.acc)
+        gather_rows(rows.start, rw.step, rw.left)
+        add_scaled(rw.lam, rw.lam, 1.0, rw.left)
+
+
+@inlined
+def solve_step(bodies, markers, rows, pattern, bw, rw, value):
+    """acc, step from  M acc + Phi_q^T step = 0,  Phi_q acc = -value: for positions and rates a mass-orthogonal projection."""
+    fill(bw.elastic, 0.0)
+    for b in range(bodies.mass.size):
+        fill(bw.rigid[b], 0.0)
+    for k in range(rows.start.size - 1):
+        for row in range(rows.start[k], rows.start[k + 1]):
+            rw.step[LANES * k + row - rows.start[k]] = value[row]
+    solve_blocks(rows.start, pattern, rw.S, rw.step)
+    react(bodies, markers, rows, bw, rw)
 
 
 @kernel
-def solve_correction(bodies, markers, rows, pattern, bw, rw, value):
-    """acc, step from  M acc + Phi_q^T step = 0,  Phi_q acc = -value: the mass-orthogonal projection."""
-    fill(bw.acc, 0.0)
-    copy(rw.step, value)
-    solve_blocks(rows.start, pattern, rw.S, rw.step)
-    react(bodies, markers, rows, bw, rw)
+def gather_rows(starts, lanes, out):
+    """out (C,) = the rows of all joints from their lanes."""
+    for k in range(starts.size - 1):
+        for row in range(starts[k], starts[k + 1]):
+            out[row] = lanes[LANES * k + row - starts[k]]
+
+
+@inlined
+def reduced_rates(bodies, markers, rows, bw, rw, target):
+    """step = Phi_q M^-1 f - target, from the reduced forces of the bodies and the eliminated rows."""
+    where, ground, sides = bodies.where, bodies.mass.size, rows.marker.shape[1]
+    for k in range(rows.marker.shape[0]):
+        for row in range(rows.start[k], rows.start[k + 1]):
+            rw.step[LANES * k + row - rows.start[k]] = -target[row]
+        for side in range(sides):
+            marker = rows.marker[k, side]
+            b = markers.body[marker] if marker >= 0 else ground
+            if b != ground:
+                n, e, at = where[b, 0], where[b, 3], (k * sides + side) * SIDE
+                z, moved = bw.rigid[b], rw.wrench
+                combine_6(rw.step, LANES * k, 1.0, z, 0, 1, rw.X, at)
+                if n > 0:
+                    phi = shapes(markers, marker, n)
+                    moved[0], moved[1], moved[2], moved[3], moved[4], moved[5] = six_rows(phi, bw.elastic[e : e + n], n)
+                    combine_6(rw.step, LANES * k, 1.0, moved, 0, 1, rw.X, at + 6 * LANES)
 
 
 @inlined
@@ -189,8 +222,7 @@ def add_side_rates(phi, jac, acc, first, last, side, n, out):
     e0, e1, e2, e3, e4, e5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if n > 0:
         q = acc[6:]
-        e0, e1, e2 = row_dot(phi, 0, q, n), row_dot(phi, 1, q, n), row_dot(phi, 2, q, n)
-        e3, e4, e5 = row_dot(phi, 3, q, n), row_dot(phi, 4, q, n), row_dot(phi, 5, q, n)
+        e0, e1, e2, e3, e4, e5 = six_rows(phi, q, n)
     for row in range(first, last):
         a = jac[row, side]
         out[row] += (
@@ -202,48 +234,33 @@ def add_side_rates(phi, jac, acc, first, last, side, n, out):
 
 @inlined
 def react(bodies, markers, rows, bw, rw):
-    """acc -= M^-1 Phi_q^T step, by the eliminated rows: six numbers per body, then back-substitution."""
-    where = bodies.where
-    ground = where.shape[0] - 1
-    fill(bw.elastic, 0.0)
-    for b in range(bw.rigid.shape[0]):
-        fill(bw.rigid[b], 0.0)
+    """acc from the reduced forces, less Phi_q^T step by the eliminated rows."""
+    where, ground, sides = bodies.where, bodies.mass.size, rows.marker.shape[1]
     for k in range(rows.marker.shape[0]):
-        for side in range(rows.marker.shape[1]):
+        for side in range(sides):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
-                n, e = where[b, 0], where[b, 3]
-                elastic = bw.elastic[e : e + n]
-                phi, first, last = shapes(markers, marker, n), rows.start[k], rows.start[k + 1]
-                gather(phi, rw.jac, rw.rr, rw.step, first, last, side, n, bw.rigid[b], elastic)
+                n, e, at, z = where[b, 0], where[b, 3], (k * sides + side) * SIDE, bw.rigid[b]
+                for c in range(6):
+                    z[c] -= dot_rows(rw.X, at + LANES * c, rw.step, LANES * k)
+                if n > 0:
+                    for c in range(6):
+                        rw.wrench[c] = dot_rows(rw.X, at + LANES * (6 + c), rw.step, LANES * k)
+                    release(shapes(markers, marker, n), bw.dinv[e : e + n], rw.wrench, n, bw.elastic[e : e + n])
     for b in range(ground):
-        n, j, e = where[b, 0], where[b, 2], where[b, 3]
-        z = bw.rigid[b]
-        rigid_lower(bw.L[b], z, where[b, 7])
-        rigid_upper(bw.L[b], z, where[b, 7])
-        acc = bw.acc[j : j + 6 + n]
-        for c in range(6):
-            acc[c] += z[c]
-        if n > 0:
-            step = bw.elastic[e : e + n]
-            back_substitute(bw.Cd[6 * e : 6 * (e + n)], bw.dinv[e : e + n], step, z, n, step)
-            for c in range(n):
-                acc[6 + c] += step[c]
+        accelerate(bodies, bw, b)
 
 
 @kernel
-def gather(phi, all_jac, all_rr, step, first, last, side, n, rigid, elastic):
-    """Add -Phi_q^T step of some rows' side to the rigid (eliminated) and elastic parts of a body."""
-    force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for row in range(first, last):
-        jac, rr, lam = all_jac[row, side], all_rr[row, side], step[row]
-        for c in range(6):
-            rigid[c] -= rr[c] * lam
-        force = (force[0] - jac[0] * lam, force[1] - jac[1] * lam, force[2] - jac[2] * lam)
-        moment = (moment[0] - jac[6] * lam, moment[1] - jac[7] * lam, moment[2] - jac[8] * lam)
-    if n > 0:
-        project(phi, force, moment, elastic, n)
+def release(phi, dinv, wrench, n, elastic):
+    """elastic -= dinv phi^T wrench."""
+    p0, p1, p2, p3, p4, p5 = phi[:n], phi[n:], phi[2 * n :], phi[3 * n :], phi[4 * n :], phi[5 * n :]
+    f0, f1, f2, m0, m1, m2 = wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5]
+    for j in range(n):
+        elastic[j] -= dinv[j] * (
+            p0[j] * f0 + p1[j] * f1 + p2[j] * f2 + p3[j] * m0 + p4[j] * m1 + p5[j] * m2
+        )  # fmt: skip
 
 
 @inlined
@@ -287,8 +304,9 @@ def to_body_axes(where, A, r):
 
 
 @inlined
-def acceleration_target(w, alpha, beta, target):
+def acceleration_target(w, gains, target):
     """target = gamma - 2 alpha Phi_dot - beta^2 Phi (Baumgarte 1972; alpha = beta = 0: plain index 1)."""
+    alpha, beta = gains[0], gains[1]
     for row in range(target.size):
         target[row] = w.gamma[row] - 2.0 * alpha * w.nu[row] - beta * beta * w.Phi[row]
 
@@ -296,38 +314,12 @@ def acceleration_target(w, alpha, beta, target):
 @inlined
 def move_back(bodies, markers, rows, pattern, bw, rw, vd, x, v):
     """One projection of (x, v) onto the constraints, smallest in the norm of the mass matrix."""
-    solve_correction(bodies, markers, rows, pattern, bw, rw, rw.nu)
+    solve_step(bodies, markers, rows, pattern, bw, rw, rw.nu)
     to_velocity_rates(bodies.where, bw.A, bw.acc, vd)
     add_scaled(v, v, 1.0, vd)
-    solve_correction(bodies, markers, rows, pattern, bw, rw, rw.Phi)
+    solve_step(bodies, markers, rows, pattern, bw, rw, rw.Phi)
     apply_motion(bodies.where, bw.A, x, bw.acc)
     normalise(bodies, x)
-
-
-@inlined
-def evaluate_on_constraints(m, w, t, x, v, tolerance):
-    """`evaluate` at (t, x, v), after bringing them back onto the constraints when they have left by more than `tolerance`
-    (in Phi [m, -]; a hundred times that in its rate). tolerance = 0: leave them alone. Returns a status.
-
-    The corrections are smallest in the norm of the mass matrix with the elastic diagonal of the integrator, so they keep
-    its order and do not excite stiff modes.
-    """
-    for attempt in range(5):
-        status = evaluate(m, w, t, x, v)
-        if status != OK:
-            return status
-        position, velocity = largest(w.rows.Phi), largest(w.rows.nu)
-        if attempt == 0:
-            w.drift[0], w.drift[1] = max(w.drift[0], position), max(w.drift[1], velocity)
-        allowed = tolerance * (TIGHTER if w.independence[0] < NEAR else 1.0)
-        if tolerance == 0.0 or attempt == 4 or (position <= allowed and velocity <= 100.0 * allowed):
-            break
-        if w.independence[0] < AT:
-            break
-        w.info[2] += 1
-        move_back(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, w.vd, x, v)
-    keep_turns(m.loads, w.loads)
-    return OK
 
 
 @inlined

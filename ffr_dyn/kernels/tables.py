@@ -10,11 +10,18 @@ Tables are grouped so that a kernel is handed only the group it works on (which 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 Array = np.ndarray
+# Arrays of numbers and of integers by their number of axes: compiled code is told here what it finds at an address.
+F1 = Annotated[np.ndarray, ("float64", 1)]
+F2 = Annotated[np.ndarray, ("float64", 2)]
+F3 = Annotated[np.ndarray, ("float64", 3)]
+F4 = Annotated[np.ndarray, ("float64", 4)]
+I1 = Annotated[np.ndarray, ("int64", 1)]
+I2 = Annotated[np.ndarray, ("int64", 2)]
 
 COINCIDENCE, DOT_1, DOT_2, DRIVEN_ANGLE, DISTANCE, RELATION = 0, 1, 2, 3, 4, 5
 ANGLE, STROKE, LENGTH = 0, 1, 2
@@ -23,88 +30,99 @@ AFFINE, GLOBAL = 0, 1
 
 OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED = 0, 1, 2, 3, 4
 
+LANES = 8  # rows of a joint side by side (see `ffr_dyn.kernels.lanes`)
+
+# Numbers of the compiled units in `Tables.units`.
+EVALUATE, BODIES, LOADS, JOINTS, SOLVE, SETTLE, MOVE_BACK, CORRECT, TRULY, RECORD = range(10)
+
+# Near a singular position the rows become dependent, and a violation eta of the constraints throws the motion from its
+# branch when it comes closer than about eta^(1/3). So on the approach (`independence` below NEAR) the violation is held far
+# lower, and at the position itself (below AT) it is left alone: along the direction that is about to be free a correction
+# would be the violation divided by the distance.
+NEAR, AT = 1e-2, 1e-6
+TIGHTER = 1e-4
+
 
 class Bodies(NamedTuple):
     """B bodies, E elastic coordinates in all."""
 
-    where: (
-        Array  # (B + 1, 8) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening; its number of loads;
-        # the body axis along the normal of a planar scene, or -1
-    )
-    mass: Array  # (B,)
-    moments: Array  # (B, 9) first moment r_dm (3), second moment rr_dm (6)
-    P_dm: Array  # (3 E,) per body 3 rows of n
-    rP_dm: Array  # (9 E,) per body 9 rows of n: six symmetric parts, three axial components (I4)
-    PP_dm: Array  # pooled; per body n rows of 9 n: for q_i the same nine rows over j (last three: I5)
-    omega2: Array  # (E,)
-    two_zeta_omega: Array  # (E,)
-    stiffening: Array  # pooled; per body loads x n x n, empty without geometric stiffening
+    # (B + 1, 8) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening (or -1); its number of loads;
+    # the body axis along the normal of a planar scene, or -1
+    where: I2
+    mass: F1  # (B,)
+    moments: F2  # (B, 9) first moment r_dm (3), second moment rr_dm (6)
+    P_dm: F1  # (3 E,) per body 3 rows of n
+    rP_dm: F1  # (9 E,) per body 9 rows of n: six symmetric parts, three axial components (I4)
+    PP_dm: F1  # pooled; per body n rows of 9 n: for q_i the same nine rows over j (last three: I5)
+    omega2: F1  # (E,)
+    two_zeta_omega: F1  # (E,)
+    stiffening: F1  # pooled; per body loads x n x n, empty without geometric stiffening
 
 
 class Markers(NamedTuple):
     """M markers: all interfaces of all bodies, then the ground's points."""
 
-    body: Array  # (M,)
-    u: Array  # (M, 3) undeformed position in the body frame (ground: global)
-    phi: Array  # pooled; per marker 6 rows of n: phi_t, phi_r
-    start: Array  # (M,) in phi
-    load: Array  # (M,) number of the marker's first load in its body's stiffening, or -1
-    active: Array  # markers that joints or loads use, updated at every evaluation
-    joint: Array  # markers of bodies that joints use
+    body: I1  # (M,)
+    u: F2  # (M, 3) undeformed position in the body frame (ground: global)
+    phi: F1  # pooled; per marker 6 rows of n: phi_t, phi_r
+    start: I1  # (M,) in phi
+    load: I1  # (M,) number of the marker's first load in its body's stiffening, or -1
+    active: I1  # markers that joints or loads use, updated at every evaluation
+    joint: I1  # markers of bodies that joints use
 
 
 class Rows(NamedTuple):
     """C constraint rows in K blocks (joints, drivers), blocks in elimination order."""
 
-    kind: Array  # (C,)
-    axes: Array  # (C, 6, 3) axis on i, second axis on i of an angle, axis on j; coincidence: component in [0, 0];
+    kind: I1  # (C,)
+    axes: F3  # (C, 6, 3) axis on i, second axis on i of an angle, axis on j; coincidence: component in [0, 0];
     # a relation has three such axes for each of its two joint coordinates
-    relation: Array  # (C, 5) of a relation: factor and kind of both coordinates, spacing of equivalent values or 0
-    function: Array  # (C,) time function or -1
-    start: Array  # (K + 1,) first row of each block
-    marker: Array  # (K, 2 or 4) markers i, j of a joint, or of both joints of a relation; -1 where there is none
+    relation: F2  # (C, 5) of a relation: factor and kind of both coordinates, spacing of equivalent values or 0
+    function: I1  # (C,) time function or -1
+    start: I1  # (K + 1,) first row of each block
+    marker: I2  # (K, 2 or 4) markers i, j of a joint, or of both joints of a relation; -1 where there is none
 
 
 class Pattern(NamedTuple):
     """Assembly and factorisation of the multiplier matrix, fixed per topology."""
 
-    pair_body: Array  # (P,) the body that couples two block sides
-    pair: Array  # (P, 5) later block, its side, earlier block, its side, start of the target block
-    diagonal: Array  # (K,) start of the diagonal block
-    column_start: Array  # (K + 1,)
-    column: Array  # (L, 2) row block of each off-diagonal block and its start
-    update_start: Array  # (K + 1,)
-    update: Array  # (U,) targets of the updates by column, in loop order
+    pair_body: I1  # (P,) the body that couples two block sides
+    pair: I2  # (P, 5) later block, its side, earlier block, its side, start of the target block
+    diagonal: I1  # (K,) start of the diagonal block in S
+    column_start: I1  # (K + 1,)
+    column: I2  # (L, 2) row block of each off-diagonal block and its start
+    update_start: I1  # (K + 1,)
+    update: I1  # (U,) targets of the updates by column, in loop order
 
 
 class Functions(NamedTuple):
     """F time functions: kind and numbers (see `functions`)."""
 
-    kind: Array  # (F,)
-    start: Array  # (F + 1,)
-    data: Array  # pooled
+    kind: I1  # (F,)
+    start: I1  # (F + 1,)
+    data: F1  # pooled
 
 
 class Loads(NamedTuple):
     """W wrenches on markers, Z actions on coordinates, Y bushings, U spread loads."""
 
-    wrench: Array  # (W, 3) marker, axes (0 global, 1 body), start in the user's values or -1
-    value: Array  # (W, 6) force and moment
-    function: Array  # (W, 6) factor by time function or -1
-    action: Array  # (Z, 6) coordinate, marker i, marker j, law, start in data, time function or -1
-    action_axes: Array  # (Z, 3, 3) f_i, g_i, f_j of an angle, or h_i of a stroke
-    turn: Array  # (Z,) whole turns at the start [rad]
-    bushing: Array  # (Y, 3) marker i, marker j, start in data
-    frames: Array  # (Y, 2, 3, 3) axes on i and j, one a row
-    spread: Array  # (U, 4) body, kind, start in data, time function
-    data: Array  # pooled numbers of laws, curves, bushings and spread loads
+    wrench: I2  # (W, 3) marker, axes (0 global, 1 body), start in the user's values or -1
+    value: F2  # (W, 6) force and moment
+    function: I2  # (W, 6) factor by time function or -1
+    action: I2  # (Z, 6) coordinate, marker i, marker j, law, start in data, time function or -1
+    action_axes: F3  # (Z, 3, 3) f_i, g_i, f_j of an angle, or h_i of a stroke
+    turn: F1  # (Z,) whole turns at the start [rad]
+    bushing: I2  # (Y, 3) marker i, marker j, start in data
+    frames: F4  # (Y, 2, 3, 3) axes on i and j, one a row
+    spread: I2  # (U, 4) body, kind, start in data, time function
+    data: F1  # pooled numbers of laws, curves, bushings and spread loads
 
 
 class Model(NamedTuple):
     """Constant tables of a scene."""
 
-    gravity: Array  # (3,) [m/s^2]
-    base: Array  # (3,) time function of the base's acceleration or -1
+    gravity: F1  # (3,) [m/s^2]
+    base: I1  # (3,) time function of the base's acceleration or -1
     relaxation: float  # relative, added to the diagonal of the multiplier matrix where rows depend on others; or 0
     bodies: Bodies
     markers: Markers
@@ -119,105 +137,133 @@ class Model(NamedTuple):
 class BodyWork(NamedTuple):
     """Per body, filled by `inertia` and `factorise`."""
 
-    A: Array  # (B + 1, 3, 3)
-    omega: Array  # (B + 1, 3) body axes
-    s: Array  # (B, 3) integral of u_bar dm
-    J: Array  # (B, 3, 3)
-    g: Array  # (9 E,) G_j: six symmetric rows, three axial rows H
-    l: Array  # (3 E,) integral of u_dot x phi_j dm  # noqa: E741
-    Cd: Array  # (6 E,) rows P_dm and H, times dinv
-    L: Array  # (B, 6, 6) Cholesky factor of the Schur complement, reciprocal diagonal
-    f: Array  # (V,) right-hand side in body axes
-    acc: Array  # (V,) solution in body axes
-    dinv: Array  # (E,) 1 / (1 + implicit terms); ones for explicit methods
-    rigid: Array  # (B, 6) scratch
-    elastic: Array  # (E,) scratch
-    unstiffened: Array  # (E,) elastic right-hand side without geometric stiffening
-    shift: Array  # (V,) part of acc that is no acceleration (corrections of an integrator's stage), body axes
-    stiff: Array  # pooled like stiffening, n per load: K_load q
-    load: Array  # (longest,) loads of one body
+    A: F3  # (B + 1, 3, 3)
+    omega: F2  # (B + 1, 3) body axes
+    s: F2  # (B, 3) integral of u_bar dm
+    J: F3  # (B, 3, 3)
+    g: F1  # (9 E,) G_j: six symmetric rows, three axial rows H
+    l: F1  # (3 E,) integral of u_dot x phi_j dm  # noqa: E741
+    Cd: F1  # (6 E,) rows P_dm and H, times dinv
+    L: F3  # (B, 6, 6) Cholesky factor of the Schur complement, reciprocal diagonal
+    f: F1  # (V,) right-hand side in body axes
+    acc: F1  # (V,) solution in body axes
+    dinv: F1  # (E,) 1 / (1 + implicit terms); ones for explicit methods
+    PP: F3  # (B, 3, 3) P_dm dinv P_dm^T
+    rigid: F2  # (B, 6) reduced forces L^-1 (f_rigid - C dinv f_elastic), less those of the reactions
+    elastic: F1  # (E,) dinv f_elastic, likewise
+    more: F1  # (V,) scratch
+    unstiffened: F1  # (E,) elastic right-hand side without geometric stiffening
+    shift: F1  # (V,) part of acc that is no acceleration (corrections of an integrator's stage), body axes
+    stiff: F1  # pooled like stiffening, n per load: K_load q
+    load: F1  # (longest,) loads of one body
 
 
 class MarkerWork(NamedTuple):
     """Per marker, filled by `update_marker`."""
 
-    A: Array  # (M, 3, 3) of its body
-    omega: Array  # (M, 3) of its body
-    r: Array  # (M, 3) global position
-    rd: Array  # (M, 3) global velocity
-    rb: Array  # (M, 3) quadratic velocity part of the global acceleration
-    u: Array  # (M, 3) position in body axes
-    theta: Array  # (M, 3) elastic rotation phi_r q
-    thetad: Array  # (M, 3)
-    load: Array  # (M, 6) applied force and moment, body axes
+    A: F3  # (M, 3, 3) of its body
+    omega: F2  # (M, 3) of its body
+    r: F2  # (M, 3) global position
+    rd: F2  # (M, 3) global velocity
+    rb: F2  # (M, 3) quadratic velocity part of the global acceleration
+    u: F2  # (M, 3) position in body axes
+    theta: F2  # (M, 3) elastic rotation phi_r q
+    thetad: F2  # (M, 3)
+    load: F2  # (M, 6) applied force and moment, body axes
 
 
 class LoadWork(NamedTuple):
     """Per applied load, filled by `apply_loads`."""
 
-    reference: Array  # (Z,) coordinates at the last accepted state, from which angles count their turns
-    action: Array  # (Z, 3) coordinate, rate, force
-    bushing: Array  # (Y, 18) displacement and rotation, their rates, force and moment
-    axes: Array  # (2, 3, 3, 3) scratch of a bushing
-    turn: Array  # (3, 3, 3) scratch of a bushing
-    f: Array  # (V,) scratch of the powers
-    load: Array  # (M, 6) scratch of the powers
+    reference: F1  # (Z,) coordinates at the last accepted state, from which angles count their turns
+    action: F2  # (Z, 3) coordinate, rate, force
+    bushing: F2  # (Y, 18) displacement and rotation, their rates, force and moment
+    axes: F4  # (2, 3, 3, 3) scratch of a bushing
+    turn: F3  # (3, 3, 3) scratch of a bushing
+    f: F1  # (V,) scratch of the powers
+    load: F2  # (M, 6) scratch of the powers
 
 
 class RowWork(NamedTuple):
     """Per constraint row; D = 2 sides (marker i, marker j), or 4 where there are relations."""
 
-    Phi: Array  # (C,)
-    nu: Array  # (C,) time derivative of Phi
-    gamma: Array  # (C,)
-    lam: Array  # (C,)
-    step: Array  # (C,) change of lam
-    scale: Array  # (C,) what the entry of S on the diagonal is at least
-    jac: Array  # (C, D, 9) coefficients of point velocity, omega_bar, elastic rotation rate
-    rr: Array  # (C, D, 6) rigid part after elimination of the elastic coordinates
-    ww: Array  # (C, D, 6) L^-1 rr
-    P: Array  # (M, 6, 6) [P_dm; H] dinv phi^T
-    phiphi: Array  # (pairs, 6, 6) phi dinv phi'^T
-    S: Array  # pooled blocks
+    Phi: F1  # (C,)
+    nu: F1  # (C,) time derivative of Phi
+    gamma: F1  # (C,)
+    lam: F1  # (C,)
+    left: F1  # (C,) scratch
+    scale: F1  # (C,) what the entry of S on the diagonal is at least
+    jac: F3  # (C, D, 9) coefficients of point velocity, omega_bar, elastic rotation rate
+    X: F1  # per block and side twelve rows of lanes: rigid part after elimination times L^-1, elastic part
+    Y: F1  # (12 * 8,) scratch
+    step: F1  # (8 K,) multipliers, the rows of each block in a row of lanes
+    wrench: F1  # (6,) scratch
+    P: F3  # (M, 6, 6) [P_dm; H] dinv phi^T
+    phiphi: F3  # (pairs, 6, 6) phi dinv phi'^T
+    S: F1  # pooled blocks, rows of lanes (see `blocks`)
 
 
 class Work(NamedTuple):
-    """Scratch of one evaluation; nothing in it is read before it is written, except `dinv` and what `prepare` makes."""
+    """Scratch of one evaluation; nothing in it is read before it is written, except what `prepare` makes."""
 
     bodies: BodyWork
     markers: MarkerWork
     rows: RowWork
     loads: LoadWork
-    field: Array  # (3,) gravity as the base feels it
-    vd: Array  # (V,)
-    y: Array  # (2, longest body)
-    functions: Array  # (F, 3) value, first and second time derivative
-    user: Array  # (user_count,)
-    info: Array  # (4,) integers: body or row that failed, evaluations, projections, step that failed
-    drift: Array  # (2,) largest |Phi| and |Phi_dot| met
-    independence: Array  # (3,) least share of a row that others do not contain: now, least so far, and when
+    field: F1  # (3,) gravity as the base feels it
+    vd: F1  # (V,)
+    y: F2  # (2, longest body)
+    functions: F2  # (F, 3) value, first and second time derivative
+    user: F1  # (user_count,)
+    diagonal: F1  # (1,) gamma h of the elastic diagonal that is in place (see `calls.set_diagonal`), or -1
+    info: I1  # (3,) integers: body or row that failed, evaluations, projections
+    drift: F1  # (2,) largest |Phi| and |Phi_dot| met
+    independence: F1  # (3,) least share of a row that others do not contain: now, least so far, and when
 
 
 class Stages(NamedTuple):
-    """Scratch of an integrator."""
+    """What an integrator keeps: within a step, and from step to step."""
 
-    x: Array  # (stages, X)
-    v: Array  # (stages, V)
-    target: Array  # (C,)
+    x: F2  # (stages, X)
+    v: F2  # (stages, V)
+    rows: F2  # (row stages, C)
+    target: F1  # (C,)
+    numbers: F1  # the method's own settings, and what it keeps in single numbers
+
+
+class Clock(NamedTuple):
+    """Which steps are to be done; step number k begins at the start of the run + k h."""
+
+    time: F1  # (1,) step h [s]
+    steps: I1  # (3,) number of the next step, steps from row to row, rows filled
+    gains: F1  # (3,) Baumgarte's alpha and beta, tolerance of the projection
+
+
+class Tables(NamedTuple):
+    """All that the compiled units read and write while a scene is integrated; they are given its address."""
+
+    address: int  # of these tables, packed (see `ffr_dyn.kernels.packing`)
+    units: I1  # addresses of the compiled units, by number
+    model: Model
+    work: Work
+    stages: Stages
+    clock: Clock
+    x: F1  # the state that is integrated
+    v: F1
 
 
 class Record(NamedTuple):
     """What is kept of a run, one row per output time."""
 
-    time: Array  # (T,)
-    x: Array  # (T, X)
-    v: Array  # (T, V)
-    vd: Array  # (T, V) d/dt of v
-    r: Array  # (T, M, 3) marker positions
-    rd: Array  # (T, M, 3) marker velocities
-    reaction: Array  # (T, K, 6) by block: force, moment
-    action: Array  # (T, Z, 3) coordinate, rate, force
-    bushing: Array  # (T, Y, 18) displacement and rotation, their rates, force and moment
-    power: Array  # (T, W + Z + Y + U)
-    energy: Array  # (T, 3) kinetic, strain, gravity
-    violation: Array  # (T, 2) largest |Phi|, |Phi_dot|
+    time: F1  # (T,)
+    x: F2  # (T, X)
+    v: F2  # (T, V)
+    vd: F2  # (T, V) d/dt of v
+    r: F3  # (T, M, 3) marker positions
+    rd: F3  # (T, M, 3) marker velocities
+    reaction: F3  # (T, K, 6) by block: force, moment
+    action: F3  # (T, Z, 3) coordinate, rate, force
+    bushing: F3  # (T, Y, 18) displacement and rotation, their rates, force and moment
+    power: F2  # (T, W + Z + Y + U)
+    energy: F2  # (T, 3) kinetic, strain, gravity
+    violation: F2  # (T, 2) largest |Phi|, |Phi_dot|

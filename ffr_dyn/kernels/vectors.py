@@ -62,53 +62,75 @@ def put(array, row, a):
 
 
 @kernel
-def cholesky(matrix, size):
-    """In-place lower Cholesky factor with reciprocal diagonal. Returns the row whose pivot is not positive, or -1.
+def cholesky_six(L):
+    """In-place lower Cholesky factor of a 6 x 6 matrix with reciprocal diagonal. Returns True when it is positive.
 
-    A pivot counts as positive above 1e-14 of the diagonal entry it came from.
+    A pivot counts as positive above 1e-14 of the diagonal entry it came from. Written out, since the compiler does not.
     """
-    for j in range(size):
-        pivot = matrix[j, j]
-        limit = 1e-14 * pivot
-        for k in range(j):
-            pivot -= matrix[j, k] * matrix[j, k]
-        if not pivot > limit:
-            return j
-        inverse = 1.0 / pivot**0.5
-        matrix[j, j] = inverse
-        for i in range(j + 1, size):
-            value = matrix[i, j]
-            for k in range(j):
-                value -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] = value * inverse
-    return -1
+    d0, d1, d2, d3, d4, d5 = L[0, 0], L[1, 1], L[2, 2], L[3, 3], L[4, 4], L[5, 5]
+    i0 = 1.0 / d0**0.5
+    a1, a2, a3, a4, a5 = L[1, 0] * i0, L[2, 0] * i0, L[3, 0] * i0, L[4, 0] * i0, L[5, 0] * i0
+    p1 = d1 - a1 * a1
+    i1 = 1.0 / p1**0.5
+    b2, b3, b4, b5 = (
+        (L[2, 1] - a2 * a1) * i1,
+        (L[3, 1] - a3 * a1) * i1,
+        (L[4, 1] - a4 * a1) * i1,
+        (L[5, 1] - a5 * a1) * i1,
+    )
+    p2 = d2 - a2 * a2 - b2 * b2
+    i2 = 1.0 / p2**0.5
+    c3, c4, c5 = (
+        (L[3, 2] - a3 * a2 - b3 * b2) * i2,
+        (L[4, 2] - a4 * a2 - b4 * b2) * i2,
+        (L[5, 2] - a5 * a2 - b5 * b2) * i2,
+    )
+    p3 = d3 - a3 * a3 - b3 * b3 - c3 * c3
+    i3 = 1.0 / p3**0.5
+    e4, e5 = (L[4, 3] - a4 * a3 - b4 * b3 - c4 * c3) * i3, (L[5, 3] - a5 * a3 - b5 * b3 - c5 * c3) * i3
+    p4 = d4 - a4 * a4 - b4 * b4 - c4 * c4 - e4 * e4
+    i4 = 1.0 / p4**0.5
+    g5 = (L[5, 4] - a5 * a4 - b5 * b4 - c5 * c4 - e5 * e4) * i4
+    p5 = d5 - a5 * a5 - b5 * b5 - c5 * c5 - e5 * e5 - g5 * g5
+    L[0, 0], L[1, 1], L[2, 2], L[3, 3], L[4, 4], L[5, 5] = i0, i1, i2, i3, i4, 1.0 / p5**0.5
+    L[1, 0], L[2, 0], L[3, 0], L[4, 0], L[5, 0] = a1, a2, a3, a4, a5
+    L[2, 1], L[3, 1], L[4, 1], L[5, 1] = b2, b3, b4, b5
+    L[3, 2], L[4, 2], L[5, 2] = c3, c4, c5
+    L[4, 3], L[5, 3], L[5, 4] = e4, e5, g5
+    least = 1e-14
+    first = d0 > 0.0 and p1 > least * d1 and p2 > least * d2
+    return first and p3 > least * d3 and p4 > least * d4 and p5 > least * d5
 
 
 @kernel
-def solve_lower(factor, b, size):
-    """In place b <- L^-1 b."""
-    for i in range(size):
-        value = b[i]
-        for k in range(i):
-            value -= factor[i, k] * b[k]
-        b[i] = value * factor[i, i]
+def lower_six(L, b):
+    """In place b <- L^-1 b, for a 6 x 6 factor."""
+    b0 = b[0] * L[0, 0]
+    b1 = (b[1] - L[1, 0] * b0) * L[1, 1]
+    b2 = (b[2] - L[2, 0] * b0 - L[2, 1] * b1) * L[2, 2]
+    b3 = (b[3] - L[3, 0] * b0 - L[3, 1] * b1 - L[3, 2] * b2) * L[3, 3]
+    b4 = (b[4] - L[4, 0] * b0 - L[4, 1] * b1 - L[4, 2] * b2 - L[4, 3] * b3) * L[4, 4]
+    b5 = (b[5] - L[5, 0] * b0 - L[5, 1] * b1 - L[5, 2] * b2 - L[5, 3] * b3 - L[5, 4] * b4) * L[5, 5]
+    b[0], b[1], b[2], b[3], b[4], b[5] = b0, b1, b2, b3, b4, b5
 
 
 @kernel
-def solve_upper(factor, b, size):
-    """In place b <- L^-T b."""
-    for i in range(size - 1, -1, -1):
-        value = b[i]
-        for k in range(i + 1, size):
-            value -= factor[k, i] * b[k]
-        b[i] = value * factor[i, i]
+def upper_six(L, b):
+    """In place b <- L^-T b, for a 6 x 6 factor."""
+    b5 = b[5] * L[5, 5]
+    b4 = (b[4] - L[5, 4] * b5) * L[4, 4]
+    b3 = (b[3] - L[5, 3] * b5 - L[4, 3] * b4) * L[3, 3]
+    b2 = (b[2] - L[5, 2] * b5 - L[4, 2] * b4 - L[3, 2] * b3) * L[2, 2]
+    b1 = (b[1] - L[5, 1] * b5 - L[4, 1] * b4 - L[3, 1] * b3 - L[2, 1] * b2) * L[1, 1]
+    b0 = (b[0] - L[5, 0] * b5 - L[4, 0] * b4 - L[3, 0] * b3 - L[2, 0] * b2 - L[1, 0] * b1) * L[0, 0]
+    b[0], b[1], b[2], b[3], b[4], b[5] = b0, b1, b2, b3, b4, b5
 
 
 @kernel
 def rigid_lower(factor, b, normal):
     """In place b <- L^-1 b for the rigid coordinates (6,) of a body; of a planar one, three of them and zeros."""
     if normal < 0:
-        solve_lower(factor, b, 6)
+        lower_six(factor, b)
         return
     i, j, k = in_plane(normal)
     first = b[i] * factor[i, i]
@@ -122,7 +144,7 @@ def rigid_lower(factor, b, normal):
 def rigid_upper(factor, b, normal):
     """In place b <- L^-T b, as `rigid_lower`."""
     if normal < 0:
-        solve_upper(factor, b, 6)
+        upper_six(factor, b)
         return
     i, j, k = in_plane(normal)
     b[k] = b[k] * factor[k, k]

@@ -1,0 +1,51 @@
+"""What an integrator calls: the units by name, on the unpacked tables r."""
+
+from ffr_dyn.kernels.options import inlined
+from ffr_dyn.kernels.packing import call_unit
+from ffr_dyn.kernels.system import prepare
+from ffr_dyn.kernels.tables import CORRECT, EVALUATE, SETTLE, SOLVE
+
+
+@inlined
+def evaluate(r, t, x, v):
+    """Right-hand sides, rows and factors at (t, x, v). Returns a status."""
+    return call_unit(r.units[EVALUATE], r.address, t, x.ctypes.data, v.ctypes.data)
+
+
+@inlined
+def settle(r, t):
+    """`evaluate` at the machine's state, brought back onto the constraints before. Returns a status."""
+    return call_unit(r.units[SETTLE], r.address, t, r.x.ctypes.data, r.v.ctypes.data)
+
+
+@inlined
+def solve(r, x, target):
+    """Accelerations (bodies.acc) and multipliers (rows.lam) of what was evaluated last at x."""
+    call_unit(r.units[SOLVE], r.address, 0.0, x.ctypes.data, target.ctypes.data)
+
+
+@inlined
+def correct(r, r_v, target):
+    """f += M r_v, target += Phi_q r_v."""
+    call_unit(r.units[CORRECT], r.address, 0.0, r_v.ctypes.data, target.ctypes.data)
+
+
+@inlined
+def set_diagonal(r, gh):
+    """The elastic diagonal 1 + (gamma h)^2 Omega^2 + gamma h 2 zeta Omega of a linearly implicit method; gh = 0: explicit."""
+    if r.work.diagonal[0] == gh:
+        return
+    r.work.diagonal[0] = gh
+    bodies, dinv = r.model.bodies, r.work.bodies.dinv
+    for k in range(dinv.size):
+        dinv[k] = 1.0 / (1.0 + gh * gh * bodies.omega2[k] + gh * bodies.two_zeta_omega[k])
+    prepare(bodies, r.model.markers, r.model.rows, r.model.pattern, r.work.bodies, r.work.rows)
+
+
+@inlined
+def add_elastic_part(bodies, f, v, r_x, gh):
+    """f -= gamma h Omega^2 (q_dot + r_q)."""
+    for b in range(bodies.mass.size):
+        n, i, j, e = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 2], bodies.where[b, 3]
+        for k in range(n):
+            f[j + 6 + k] -= gh * bodies.omega2[e + k] * (v[j + 6 + k] + r_x[i + 7 + k])

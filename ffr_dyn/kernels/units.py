@@ -1,0 +1,247 @@
+"""The compiled units: what is compiled once, on its own, and called by address.
+
+A unit is given the address of the packed tables, a time and two more addresses, and returns a status. Units and integrators
+call one another through the addresses in `Tables.units`, so each is compiled alone: nothing is compiled twice, an
+integrator costs no more than its own few lines, and compilation can be shared among processes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+from numba import cfunc, types
+
+from ffr_dyn.kernels.actions import keep_turns
+from ffr_dyn.kernels.bodies import mass_times
+from ffr_dyn.kernels.calls import set_diagonal
+from ffr_dyn.kernels.functions import evaluate_functions
+from ffr_dyn.kernels.loads import call_user, gravity_field
+from ffr_dyn.kernels.options import OPTIONS
+from ffr_dyn.kernels.packing import call_unit, unpack_record, unpack_tables, vector_at
+from ffr_dyn.kernels.record import keep
+from ffr_dyn.kernels.stiffening import solve_stiffened
+from ffr_dyn.kernels.system import (
+    constraint_rates,
+    evaluate_bodies,
+    evaluate_joints,
+    evaluate_loads,
+    largest,
+    move_back,
+    to_body_axes,
+    to_velocity_rates,
+)
+from ffr_dyn.kernels.tables import (
+    AT,
+    BODIES,
+    EVALUATE,
+    JOINTS,
+    LOADS,
+    MOVE_BACK,
+    NEAR,
+    OK,
+    RECORD,
+    SINGULAR_BODY,
+    SINGULAR_CONSTRAINT,
+    SOLVE,
+    TIGHTER,
+    TRULY,
+    USER_FAILED,
+)
+from ffr_dyn.kernels.vectors import add_scaled, copy, fill
+
+SIGNATURE = types.int64(types.int64, types.float64, types.int64, types.int64)
+
+
+class Unit:
+    """A function of SIGNATURE, compiled at the first use of its address, or read from disk."""
+
+    def __init__(self, function: Callable[..., int]) -> None:
+        self.function = function
+
+    @cached_property
+    def compiled(self) -> Any:
+        return cfunc(SIGNATURE, cache=True, **OPTIONS)(self.function)
+
+    @property
+    def address(self) -> int:
+        return self.compiled.address
+
+
+@Unit
+def bodies_unit(at, t, x, v):
+    """Functions of time, then inertia, forces and factors of all bodies at (t, x, v)."""
+    r = unpack_tables(at)
+    m, w, x, v = r.model, r.work, vector_at(x, r.x.size), vector_at(v, r.v.size)
+    w.info[1] += 1
+    if not call_user(m.user_address, t, x, v, w.user):
+        return USER_FAILED
+    evaluate_functions(m.functions, w.user, t, w.functions)
+    gravity_field(m.gravity, m.base, w.functions, w.field)
+    failed = evaluate_bodies(w.field, m.bodies, w.bodies, x, v)
+    if failed >= 0:
+        w.info[0] = failed
+        return SINGULAR_BODY
+    return OK
+
+
+@Unit
+def loads_unit(at, t, x, v):
+    r = unpack_tables(at)
+    evaluate_loads(r.model, r.work, t, vector_at(x, r.x.size), vector_at(v, r.v.size))
+    return OK
+
+
+@Unit
+def joints_unit(at, t, x, v):
+    r = unpack_tables(at)
+    failed = evaluate_joints(r.model, r.work, t)
+    if failed >= 0:
+        r.work.info[0] = failed
+        return SINGULAR_CONSTRAINT
+    return OK
+
+
+@Unit
+def evaluate_unit(at, t, x, v):
+    """Fill the work tables at (t, x, v): right-hand sides, constraint rows, factors. Returns a status; info[0] says where."""
+    r = unpack_tables(at)
+    status = call_unit(r.units[BODIES], at, t, x, v)
+    if status != OK:
+        return status
+    call_unit(r.units[LOADS], at, t, x, v)
+    return call_unit(r.units[JOINTS], at, t, x, v)
+
+
+@Unit
+def solve_unit(at, t, x, target):
+    """acc and lam from the right-hand sides and the target (C,) of the accelerations, with geometric stiffening."""
+    r = unpack_tables(at)
+    solve_stiffened(r.model, r.work, vector_at(x, r.x.size), vector_at(target, r.stages.target.size))
+    return OK
+
+
+@Unit
+def move_back_unit(at, t, x, v):
+    """One projection of (x, v) onto the constraints."""
+    r = unpack_tables(at)
+    m, w = r.model, r.work
+    move_back(
+        m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, w.vd, vector_at(x, r.x.size), vector_at(v, r.v.size)
+    )
+    return OK
+
+
+@Unit
+def correct_unit(at, t, r_v, target):
+    """f += M r_v, target += Phi_q r_v, for the corrections of a stage; r_v (V,) stays in bodies.shift in body axes."""
+    r = unpack_tables(at)
+    bodies, bw, rw = r.model.bodies, r.work.bodies, r.work.rows
+    correction, target = vector_at(r_v, r.v.size), vector_at(target, r.stages.target.size)
+    copy(bw.acc, correction)
+    to_body_axes(bodies.where, bw.A, bw.acc)
+    copy(bw.shift, bw.acc)
+    constraint_rates(bodies.where, r.model.markers, r.model.rows, rw.jac, bw.acc, rw.lam)
+    add_scaled(target, target, 1.0, rw.lam)
+    for b in range(bodies.mass.size):
+        j, size = bodies.where[b, 2], 6 + bodies.where[b, 0]
+        mass_times(bodies, bw, b, bw.acc[j : j + size], bw.f[j : j + size])
+    return OK
+
+
+@Unit
+def settle_unit(at, t, x, v):
+    """Evaluate at (t, x, v), after bringing them back onto the constraints when they have left by more than the tolerance
+    (in Phi [m, -]; a hundred times that in its rate). A tolerance of zero leaves them alone.
+
+    The corrections are smallest in the norm of the mass matrix with the elastic diagonal of the integrator, so they keep
+    its order and do not excite stiff modes.
+    """
+    r = unpack_tables(at)
+    w, tolerance = r.work, r.clock.gains[2]
+    for attempt in range(5):
+        status = call_unit(r.units[EVALUATE], at, t, x, v)
+        if status != OK:
+            return status
+        position, velocity = largest(w.rows.Phi), largest(w.rows.nu)
+        if attempt == 0:
+            w.drift[0], w.drift[1] = max(w.drift[0], position), max(w.drift[1], velocity)
+        allowed = tolerance * (TIGHTER if w.independence[0] < NEAR else 1.0)
+        if tolerance == 0.0 or attempt == 4 or (position <= allowed and velocity <= 100.0 * allowed):
+            break
+        if w.independence[0] < AT:
+            break
+        w.info[2] += 1
+        call_unit(r.units[MOVE_BACK], at, t, x, v)
+    keep_turns(r.model.loads, w.loads)
+    return OK
+
+
+@Unit
+def truly_unit(at, t, x, v):
+    """Accelerations and multipliers at (t, x, v) with the true mass matrix, whatever the integrator uses."""
+    r = unpack_tables(at)
+    w = r.work
+    set_diagonal(r, 0.0)
+    status = call_unit(r.units[EVALUATE], at, t, x, v)
+    if status == OK:
+        fill(w.bodies.shift, 0.0)
+        call_unit(r.units[SOLVE], at, t, x, w.rows.gamma.ctypes.data)
+        to_velocity_rates(r.model.bodies.where, w.bodies.A, w.bodies.acc, w.vd)
+    return status
+
+
+@Unit
+def record_unit(at, t, record, row):
+    """Evaluate the machine's state at time t and keep it as a row of the record. Returns a status."""
+    r = unpack_tables(at)
+    status = call_unit(r.units[TRULY], at, t, r.x.ctypes.data, r.v.ctypes.data)
+    if status == OK:
+        keep_turns(r.model.loads, r.work.loads)
+        keep(r.model, r.work, t, r.x, r.v, unpack_record(record), row)
+    return status
+
+
+@Unit
+def rows_unit(at, start, record, step):
+    """Fill the rows of a record; `step` is the address of a method's unit. Returns a status."""
+    r, out = unpack_tables(at), unpack_record(record)
+    h, steps = r.clock.time[0], r.clock.steps
+    steps[2] = 0
+    for row in range(out.time.size):
+        for _ in range(steps[1]):
+            status = call_unit(step, at, start + steps[0] * h, 0, 0)
+            if status != OK:
+                return status
+            steps[0] += 1
+        status = call_unit(r.units[RECORD], at, start + steps[0] * h, record, row)
+        if status != OK:
+            return status
+        steps[2] += 1
+    return OK
+
+
+# By name, those that take long to compile first.
+UNITS = {
+    "bodies": bodies_unit,
+    "loads": loads_unit,
+    "joints": joints_unit,
+    "solve": solve_unit,
+    "record": record_unit,
+    "move_back": move_back_unit,
+    "correct": correct_unit,
+    "truly": truly_unit,
+    "settle": settle_unit,
+    "evaluate": evaluate_unit,
+    "rows": rows_unit,
+}
+
+
+def unit_addresses() -> list[int]:
+    """In the order of the units' numbers in `tables`."""
+    numbered = (
+        evaluate_unit, bodies_unit, loads_unit, joints_unit, solve_unit, settle_unit, move_back_unit, correct_unit,
+        truly_unit, record_unit,
+    )  # fmt: skip
+    return [unit.address for unit in numbered]

@@ -1,0 +1,109 @@
+"""A compiled scene with its memory, ready to be evaluated and integrated: the door from Python to the compiled units."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ffr_dyn.equations import System, new_stages, new_work
+from ffr_dyn.kernels.packing import pack
+from ffr_dyn.kernels.tables import Clock, Model, Record, Tables, Work
+from ffr_dyn.kernels.units import record_unit, rows_unit, truly_unit, unit_addresses
+
+if TYPE_CHECKING:
+    from ffr_dyn.integrators import Integrator
+
+Array = np.ndarray
+
+_CALL = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_int64, ctypes.c_int64)
+
+
+@dataclass(frozen=True)
+class Machine:
+    """The tables of a scene, and where the compiled units find them (`words`, as `pack` wrote them)."""
+
+    system: System
+    tables: Tables
+    words: Array
+
+    @property
+    def address(self) -> int:
+        return self.tables.address
+
+    @property
+    def work(self) -> Work:
+        return self.tables.work
+
+    @property
+    def x(self) -> Array:
+        return self.tables.x
+
+    @property
+    def v(self) -> Array:
+        return self.tables.v
+
+
+def new_machine(
+    system: System,
+    x: Array,
+    v: Array,
+    method: Integrator | None = None,
+    gains: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Machine:
+    """Memory for a scene at the state (x, v), which it owns, and for a method (none: evaluations alone)."""
+    if method is None:
+        stages, h = new_stages(system, 0), 0.0
+    else:
+        stages, h = new_stages(system, method.stage_count, method.row_stages, method.numbers), method.step
+    clock = Clock(np.array([h]), np.zeros(3, dtype=np.int64), np.array(gains))
+    units = np.array(unit_addresses(), dtype=np.int64)
+    state = np.array(x, dtype=float), np.array(v, dtype=float)
+    return _packed(system, Tables(0, units, system.model, new_work(system.model), stages, clock, *state))
+
+
+def _packed(system: System, tables: Tables) -> Machine:
+    words = pack(tables)
+    words[0] = words.ctypes.data
+    return Machine(system, tables._replace(address=words.ctypes.data), words)
+
+
+def with_model(machine: Machine, model: Model) -> Machine:
+    """The same memory for other constant tables of the same shapes."""
+    return _packed(replace(machine.system, model=model), machine.tables._replace(model=model))
+
+
+def evaluate_at(machine: Machine, t: float, x: Array, v: Array) -> int:
+    """Accelerations and multipliers at (t, x, v) with the true mass matrix, in the machine's work tables. A status."""
+    x, v = np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(v, dtype=float)
+    return _CALL(truly_unit.address)(machine.address, t, x.ctypes.data, v.ctypes.data)
+
+
+def record_row(machine: Machine, t: float, record: Record, row: int) -> int:
+    """Evaluate the machine's state at time t as `evaluate_at` and keep it as a row. A status."""
+    words = pack(record)
+    return _CALL(record_unit.address)(machine.address, t, words.ctypes.data, row)
+
+
+def fill_rows(machine: Machine, method: Integrator, record: Record, start: float, substeps: int) -> int:
+    """Go on by `substeps` steps of the method per row of the record, from step number clock.steps[0]. A status.
+
+    start : time of step number 0 [s]
+    clock.steps[2] tells how many rows were filled.
+    """
+    machine.tables.clock.steps[1] = substeps
+    return row_filler(machine, method, record)(start)
+
+
+def row_filler(machine: Machine, method: Integrator, record: Record) -> Callable[[float], int]:
+    """`fill_rows` for one record, again and again at the least cost: of the time of step number 0, a status."""
+    call, words, step = _CALL(rows_unit.address), pack(record), method.unit.address
+    address, place = machine.address, words.ctypes.data
+
+    def fill(start: float, kept: Array = words) -> int:  # the numbers at `place` live as long as this function
+        return call(address, start, place, step)
+
+    return fill
