@@ -31,8 +31,16 @@ import numpy as np
 
 sys.exudynFast = True  # type: ignore[attr-defined]  # read where exudyn is first imported
 
-from benchmarks.exudyn_twin import EULER_PARAMETERS, TAIT_BRYAN, exu, items, settings, twin  # noqa: E402
-from benchmarks.scenes import chain, connecting_rod, meshed_body, pendulum, pendulum_rod, slider_crank  # noqa: E402
+from benchmarks.exudyn_twin import EULER_PARAMETERS, TAIT_BRYAN, exu, items, quiet, settings, twin  # noqa: E402
+from benchmarks.scenes import (  # noqa: E402
+    chain,
+    connecting_rod,
+    meshed_body,
+    pendulum,
+    pendulum_rod,
+    slider_crank,
+    with_middle,
+)
 from ffr_dyn.analyses.assemble import Assembled, assemble  # noqa: E402
 from ffr_dyn.chart.diagram import CPU, Diagram, Lost, Point, spread, work_precision  # noqa: E402
 from ffr_dyn.chart.draw import draw  # noqa: E402
@@ -45,7 +53,7 @@ from ffr_dyn.chart.table import write_table  # noqa: E402
 from ffr_dyn.chart.variants import FULL  # noqa: E402
 from ffr_dyn.result import Result  # noqa: E402
 from ffr_dyn.scene import Scene  # noqa: E402
-from ffr_prep.body import FlexibleBody, with_point  # noqa: E402
+from ffr_prep.body import FlexibleBody  # noqa: E402
 from ffr_prep.material import Material  # noqa: E402
 
 Array = np.ndarray
@@ -98,12 +106,6 @@ class Case:
     def steps(self) -> tuple[float, ...]:
         """Of Exudyn [s]."""
         return tuple(self.span.output_step / 2**k for k in range(self.halvings + 1))
-
-
-def with_middle(body: FlexibleBody) -> FlexibleBody:
-    """The rod with a marker "middle" between its two interfaces."""
-    ends = [interface.position for interface in body.interfaces]
-    return with_point(body, "middle", (ends[0] + ends[1]) / 2)
 
 
 def soft_rod() -> FlexibleBody:
@@ -186,16 +188,6 @@ def solve(case: Case, start: Assembled, way: Way, step: float, sensors: bool) ->
     made.mbs.SolveDynamic(short, solverType=exu.DynamicSolverType.GeneralizedAlpha)
     starting = time.process_time() - began
     return max(took - starting, 1e-9), {name: made.mbs.GetSensorStoredData(k)[:, 1:] for name, k in numbers.items()}
-
-
-@contextlib.contextmanager
-def quiet() -> Iterator[None]:
-    """Without what Exudyn prints of steps that fail."""
-    exu.config.printToConsole = False
-    try:
-        yield
-    finally:
-        exu.config.printToConsole = True
 
 
 def best_way(case: Case, start: Assembled, found: Diagram) -> Way:

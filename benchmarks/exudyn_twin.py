@@ -12,7 +12,8 @@ between the ground and a rigid body are translated; that is what the benchmarks 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import contextlib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -137,7 +138,18 @@ def _add_flexible(
     )
     mbs.SetNodeParameter(added["nGenericODE2"], "initialCoordinates", list(x[place.q(b)]))
     mbs.SetNodeParameter(added["nGenericODE2"], "initialCoordinates_t", list(v[place.q_dot(b)]))
-    return {"object": added["oFFRFreducedOrder"], "node": added["nRigidBody"], "modes": added["nGenericODE2"]}
+    number, n = added["oFFRFreducedOrder"], scene.bodies[b].model.n
+    mbs.SetObjectParameter(number, "massMatrixReduced", _sparse(np.eye(n)))  # without rounding off the diagonal: faster
+    if scene.bodies[b].damping.any():
+        rates = 2 * scene.bodies[b].damping * np.sqrt(scene.bodies[b].model.omega2)
+        mbs.SetObjectParameter(number, "dampingMatrixReduced", _sparse(np.diag(rates)))
+    return {"object": number, "node": added["nRigidBody"], "modes": added["nGenericODE2"]}
+
+
+def _sparse(matrix: Array) -> Any:
+    held = exu.MatrixContainer()
+    held.SetWithDenseMatrix(matrix, useDenseMatrix=False)
+    return held
 
 
 def _add_gravity(mbs: Any, scene: Scene, b: int, number: int, node: int | None) -> None:
@@ -271,6 +283,16 @@ def twin(
     _add_joints(mbs, scene, markers)
     _add_drivers(mbs, scene, bodies)
     return Twin(container, mbs, bodies, markers)
+
+
+@contextlib.contextmanager
+def quiet() -> Iterator[None]:
+    """Without what Exudyn prints of steps that fail."""
+    exu.config.printToConsole = False
+    try:
+        yield
+    finally:
+        exu.config.printToConsole = True
 
 
 def settings(end: float, steps: int) -> Any:

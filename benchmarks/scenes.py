@@ -19,7 +19,7 @@ from ffr_dyn.joints import Joint
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.timefunction import polynomial
 from ffr_prep.basis import factorised
-from ffr_prep.body import FlexibleBody, rigid_body
+from ffr_prep.body import FlexibleBody, rigid_body, with_point
 from ffr_prep.interface import InterfaceRegion, couple
 from ffr_prep.material import Material
 from ffr_prep.mesh import read_mesh
@@ -75,6 +75,12 @@ def connecting_rod(kind: str, modes: int) -> MeshedBody:
     """Round steel bar of 0.3 m, interfaces "crankpin" and "slider"."""
     steel = Material("steel", 2e11, 0.3, 7870.0)
     return meshed_body("slidercrank_rod.geo", "rod", steel, ("crankpin", "slider"), kind, modes)
+
+
+def with_middle(body: FlexibleBody) -> FlexibleBody:
+    """The rod with a marker "middle" between its two interfaces."""
+    ends = [interface.position for interface in body.interfaces]
+    return with_point(body, "middle", (ends[0] + ends[1]) / 2)
 
 
 def pendulum(rod: FlexibleBody) -> Scene:

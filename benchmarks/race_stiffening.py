@@ -1,0 +1,99 @@
+"""What geometric stiffening costs per step, and what it gains: part of `benchmarks.race`.
+
+Cost: processor time of the compiled loop with and without the stiffening of the same bodies, ROS3 with the same steps, runs
+in turns. Goal: at most 1.3 times.
+
+Gain: the largest offset of the middle of the slider-crank's rod from the chord, to the left of the way from pin to slider,
+over 0.084 s. A geometrically exact beam gives 4.6592e-3 m (high order, Radau IIA, right to 5e-7 m); linear theory, however
+finely integrated, is a fifth off, because the slider's inertia compresses the rod to 8 % of its buckling load.
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks.courses import FIXED_INTERFACE_MODES, chained
+from benchmarks.scenes import MESHES, pendulum, slider_crank, with_middle
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.integrators import ROS3
+from ffr_dyn.scene import Scene
+from ffr_dyn.stopwatch import Stopwatch
+from ffr_prep.body import FlexibleBody
+from ffr_prep.interface import InterfaceRegion
+from ffr_prep.material import Material
+from ffr_prep.mesh import read_mesh
+from ffr_prep.reduce import reduce_mesh
+from ffr_prep.reduction import CraigBampton
+from ffr_prep.reference import SimplySupported
+
+EXACT = 4.6592e-3  # m
+GOAL = 1.3
+
+
+def stiffened(mesh: str, material: Material, ends: tuple[str, str], modes: int) -> FlexibleBody:
+    """A rod as in `benchmarks.scenes`, with its geometric stiffness by load."""
+    return reduce_mesh(
+        read_mesh(MESHES / mesh), name="rod", material=material, interfaces=[InterfaceRegion(end) for end in ends],
+        reference=SimplySupported(*ends), reduction=CraigBampton(modes), stiffening=True,
+    )  # fmt: skip
+
+
+def linear(scene: Scene) -> Scene:
+    """Without geometric stiffening."""
+    return replace(scene, bodies=tuple(replace(body, stiffening=False) for body in scene.bodies))
+
+
+def loop_time(scene: Scene, output_step: float, rows: int, fineness: int) -> float:
+    """Processor time of a step [us]."""
+    watch = Stopwatch()
+    method, end = ROS3(output_step / fineness), rows * output_step
+    forward(scene, end=end, output_step=output_step, method=method, outputs=["*.position"], stopwatch=watch)
+    return 1e6 * watch.cpu / (rows * fineness)
+
+
+def peak(scene: Scene) -> float:
+    """Largest offset [m] of the middle of the slider-crank's rod, to the left."""
+    names = ("rod.crankpin", "rod.slider", "rod.middle")
+    outputs = [f"{name}.position" for name in names]
+    found = forward(scene, end=0.084, output_step=1e-4, method=ROS3(2.5e-5), outputs=outputs)
+    pin, slider, middle = (found[output] for output in outputs)
+    chord, offset = slider - pin, middle - (pin + slider) / 2
+    left = chord[:, 0] * offset[:, 1] - chord[:, 1] * offset[:, 0]
+    return float((left / np.linalg.norm(chord, axis=1)).max())
+
+
+def report(repeats: int) -> None:
+    """Print cost and gain."""
+    steel, metal = Material("steel", 2e11, 0.3, 7870.0), Material("metal", 7e10, 0.3, 5540.0)
+    print(f"\ngeometric stiffening: processor time of a step of ROS3 [us]; goal: at most {GOAL:g} times\n"
+          f"{'':22}{'without':>9}{'with':>9}{'ratio':>8}")  # fmt: skip
+    for modes in FIXED_INTERFACE_MODES.values():
+        rod = stiffened("slidercrank_rod.geo", steel, ("crankpin", "slider"), modes)
+        strip = stiffened("pendulum.geo", metal, ("hinge", "tip"), modes)
+        print_cost(f"slider-crank, {rod.n}", slider_crank(rod), (1e-3, 84, 8), repeats)
+        print_cost(f"pendulum, {rod.n}", pendulum(strip), (0.01, 50, 9), repeats)
+        print_cost(f"chain of 32, {rod.n}", chained(strip), (0.01, 10, 4), repeats)
+        scene = slider_crank(with_middle(rod))
+        print_gain("without", peak(linear(scene)))
+        print_gain("with", peak(scene))
+
+
+def print_cost(name: str, scene: Scene, span: tuple[float, int, int], repeats: int) -> None:
+    scene = replace(scene, plane="none")
+    pair: tuple[Callable[[], float], ...] = (
+        lambda: loop_time(linear(scene), *span),
+        lambda: loop_time(scene, *span),
+    )
+    taken = [[run() for run in pair] for _ in range(repeats)]
+    off, on = (statistics.median(column) for column in zip(*taken, strict=True))
+    met = "met" if on / off <= GOAL else "not met"
+    print(f"{name:22}{off:9.2f}{on:9.2f}{on / off:8.2f}  {met}", flush=True)
+
+
+def print_gain(words: str, value: float) -> None:
+    off = 100 * (value / EXACT - 1)
+    print(f"  {words:8} stiffening: largest deflection of the rod {1e3 * value:.4f} mm, {off:+.1f} % off the exact one")
