@@ -40,16 +40,12 @@ import numpy as np
 
 sys.exudynFast = True  # type: ignore[attr-defined]  # read where exudyn is first imported
 
-from benchmarks.courses import ACCURACY, Course, Errors, Motion, courses, errors, motion, ours, reference  # noqa: E402
+from benchmarks.courses import ACCURACY, Course, Errors, Motion, courses, drive, errors, motion, ours, reference  # noqa: E402
 from benchmarks.exudyn_twin import exu, quiet  # noqa: E402
 from benchmarks.race_exudyn import FIRST, TRAPEZOIDAL, USUAL, Way, fastest, run, variants  # noqa: E402
 from benchmarks.race_stiffening import report as report_stiffening  # noqa: E402
-from ffr_dyn.analyses.assemble import Assembled, assemble  # noqa: E402
-from ffr_dyn.analyses.forward import forward  # noqa: E402
-from ffr_dyn.errors import InputError, SimulationError  # noqa: E402
 from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator, tolerances  # noqa: E402
 from ffr_dyn.stabilisation import Projection  # noqa: E402
-from ffr_dyn.stopwatch import Stopwatch  # noqa: E402
 
 FINEST = 1024  # steps per output step that are still tried
 CLOSE = 1.06  # ratio of steps at which the search ends
@@ -123,24 +119,22 @@ def our_entry(course: Course, wanted: Motion, name: str, projection: Projection,
         nonlocal spent
         if spent > limit:
             return None
-        try:
-            found, spent, _ = ours(course, method_of(course, name, fineness)[0], projection)
-        except (InputError, SimulationError):
+        done = ours(course, method_of(course, name, fineness)[0], projection)
+        if done is None:
             return None
-        return errors(found, wanted, spent)
+        spent = done[1]
+        return errors(done[0], wanted, spent)
 
     found = coarsest(attempt, 8)
     if found is None:
         return None
-    (method, words), scene = method_of(course, name, found[0]), course.bare
+    method, words = method_of(course, name, found[0])
 
     def again() -> tuple[float, int]:
-        watch, tip = Stopwatch(), [f"{course.tip}.position"]
-        result = forward(
-            scene, end=course.end, output_step=course.output_step, method=method, stabilisation=projection,
-            outputs=tip, stopwatch=watch,
-        )  # fmt: skip
-        return watch.cpu, result.attributes["evaluations"] if name in CONTROLLED else found[0] * course.rows
+        timed = drive(course.start, course, method, projection)
+        if timed is None:
+            raise RuntimeError(f"{course.name}: {words} failed without the markers in the middle")
+        return timed.cpu, timed.evaluations if name in CONTROLLED else found[0] * course.rows
 
     return Entry(f"{words}, projection {projection.tolerance:g}", *found, again)
 
@@ -160,8 +154,8 @@ def our_entries(course: Course, wanted: Motion, log: Callable[[str], None]) -> l
 # ---- Exudyn -------------------------------------------------------------------------------------------------------
 
 
-def exudyn_errors(course: Course, start: Assembled, way: Way, steps: int, wanted: Motion) -> Errors | None:
-    found = run(course, start, way, steps, looked_at=True)
+def exudyn_errors(course: Course, way: Way, steps: int, wanted: Motion) -> Errors | None:
+    found = run(course, way, steps, looked_at=True)
     return found and errors(motion(course, found[1]), wanted, found[0])
 
 
@@ -172,14 +166,13 @@ class Search:
     course: Course
     wanted: Motion
     log: Callable[[str], None]
-    start: Assembled
     tried: dict[tuple[Way, int], Errors | None]
 
     def attempt(self, way: Way, fineness: int) -> Errors | None:
         """The errors of a run, which is made once."""
         if (way, fineness) not in self.tried:
             steps = fineness * self.course.rows
-            found = exudyn_errors(self.course, self.start, way, steps, self.wanted)
+            found = exudyn_errors(self.course, way, steps, self.wanted)
             self.tried[way, fineness] = found
             self.log(f"{way.words}, {1e6 * self.course.output_step / fineness:.4g} us: {shown(found)}")
         return self.tried[way, fineness]
@@ -212,19 +205,18 @@ def explore(search: Search, way: Way) -> None:
 
 def exudyn_entries(course: Course, wanted: Motion, log: Callable[[str], None]) -> tuple[list[Entry], Way]:
     """The best that the search finds, and the way of the first."""
-    start = assemble(course.bare)
-    search = Search(course, wanted, log, assemble(course.looked_at), {})
-    explore(search, fastest(course, start, FIRST))
+    search = Search(course, wanted, log, {})
+    explore(search, fastest(course, FIRST))
     entries = [
-        Entry(f"{way.words}, {1e6 * course.output_step / k:.4g} us", k, found, again_of(course, start, way, k))
+        Entry(f"{way.words}, {1e6 * course.output_step / k:.4g} us", k, found, again_of(course, way, k))
         for way, k, found in search.front()[:FINALISTS]
     ]
     return entries, search.front()[0][0]
 
 
-def again_of(course: Course, start: Assembled, way: Way, fineness: int) -> Callable[[], tuple[float, int]]:
+def again_of(course: Course, way: Way, fineness: int) -> Callable[[], tuple[float, int]]:
     def again() -> tuple[float, int]:
-        found = run(course, start, way, fineness * course.rows, looked_at=False)
+        found = run(course, way, fineness * course.rows, looked_at=False)
         if found is None:
             raise RuntimeError(f"{course.name}: Exudyn did not reach the end again")
         return found[0], fineness * course.rows
@@ -234,10 +226,10 @@ def again_of(course: Course, start: Assembled, way: Way, fineness: int) -> Calla
 
 def report_agreement(course: Course, entry: Entry, way: Way, wanted: Motion, seconds: float) -> None:
     """How far Exudyn's motion, extrapolated to step zero (order two) from steps as small as time allows, is from ours."""
-    start, way = assemble(course.looked_at), replace(way, method=TRAPEZOIDAL, tolerance=1e-8)
+    way = replace(way, method=TRAPEZOIDAL, tolerance=1e-8)
     finer = 2 ** int(np.clip(np.log2(seconds / (6 * entry.found.cpu)), 0, 6))
     steps = finer * entry.fineness * course.rows
-    coarse, fine = (run(course, start, way, count, looked_at=True) for count in (steps, 2 * steps))
+    coarse, fine = (run(course, way, count, looked_at=True) for count in (steps, 2 * steps))
     if coarse is None or fine is None:
         print("  Exudyn's trapezoidal rule fails at small steps")
         return
@@ -265,10 +257,9 @@ def in_turns(entries: Sequence[Entry], seconds: float) -> list[tuple[float, floa
 
 def usual_step(course: Course, fineness: int) -> float:
     """Exudyn's time per step [us] at its standard settings, over the first steps of that size."""
-    rows = max(1, min(course.rows, 200 // fineness))
-    short = replace(course, end=rows * course.output_step)
-    took, steps = again_of(short, assemble(short.bare), USUAL, fineness)()
-    return 1e6 * took / steps
+    rows = max(1, min(course.rows, 100 // fineness))
+    found = run(course, USUAL, rows * fineness, looked_at=False, end=rows * course.output_step)
+    return 1e6 * found[0] / (rows * fineness) if found else float("nan")
 
 
 def race(course: Course, seconds: float, log: Callable[[str], None]) -> None:
@@ -303,7 +294,7 @@ def print_line(name: str, taken: tuple[float, float], entry: Entry) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="shorter motions, fewer repeats")
+    parser.add_argument("--quick", action="store_true", help="fewer repeats, larger steps in the check by Exudyn")
     parser.add_argument("--scene", default="", help="scenes whose name contains this")
     parser.add_argument("--damping", type=float, default=0.0, help="modal damping ratio in both codes")
     parser.add_argument("--stiffening", action="store_true", help="only what geometric stiffening costs and gains")
@@ -318,8 +309,8 @@ def main() -> None:
             print(f"    {text}", flush=True)
 
     with quiet():
-        for course in courses(given.scene, given.damping, given.quick):
-            race(course, 2.0 if given.quick else 6.0, log)
+        for course in courses(given.scene, given.damping):
+            race(course, 2.0 if given.quick else 8.0, log)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,6 @@ import numpy as np
 
 from benchmarks.courses import Course
 from benchmarks.exudyn_twin import EULER_PARAMETERS, TAIT_BRYAN, Twin, exu, items, settings, twin
-from ffr_dyn.analyses.assemble import Assembled
 
 Array = np.ndarray
 
@@ -81,9 +80,13 @@ def solve(made: Twin, way: Way, s: Any) -> float | None:
 
 
 def run(
-    course: Course, start: Assembled, way: Way, steps: int, *, looked_at: bool, end: float | None = None
+    course: Course, way: Way, steps: int, *, looked_at: bool, end: float | None = None
 ) -> tuple[float, dict[str, Array]] | None:
-    """Processor time of the steps [s], and, looked at, the positions of the course's markers; None where it fails."""
+    """Processor time of the steps [s], and, looked at, the positions of the course's markers at the output times.
+
+    None where Exudyn fails.
+    """
+    start = course.start_looked_at if looked_at else course.start
     made = twin(course.looked_at if looked_at else course.bare, start.x, start.v, node_type=way.frame)
     end = course.end if end is None else end
     numbers = {name: made.mbs.AddSensor(position_of(made, name)) for name in course.markers} if looked_at else {}
@@ -94,8 +97,8 @@ def run(
     took = solve(made, way, s)
     if took is None or starting is None:
         return None
-    at = {name: made.mbs.GetSensorStoredData(number)[:, 1:] for name, number in numbers.items()}
-    if any(len(values) != course.rows + 1 or not np.isfinite(values).all() for values in at.values()):
+    at = {name: made.mbs.GetSensorStoredData(number)[1:, 1:] for name, number in numbers.items()}
+    if any(len(values) != course.rows or not np.isfinite(values).all() for values in at.values()):
         return None
     return max(took - starting, 1e-9), at
 
@@ -107,13 +110,13 @@ def position_of(made: Twin, name: str) -> Any:
     )  # fmt: skip
 
 
-def fastest(course: Course, start: Assembled, way: Way) -> Way:
+def fastest(course: Course, way: Way) -> Way:
     """The frame and linear solver with the least time for some steps of moderate size."""
     large = len(course.links) * (course.rod.n + 6) > UNKNOWNS
     tried = []
     for frame, solver in product(FRAMES, LINEAR_SOLVERS[2:] if large else LINEAR_SOLVERS):
         other = replace(way, frame=frame, solver=solver)
-        found = run(course, start, other, TRIED, looked_at=False, end=TRIED * course.output_step / 64)
+        found = run(course, other, TRIED, looked_at=False, end=TRIED * course.output_step / 64)
         if found is not None:
             tried.append((found[0], other))
     return min(tried, key=lambda entry: entry[0])[1]
