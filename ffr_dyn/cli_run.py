@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from ffr_dyn.scene import Scene
     from ffr_dyn.settings import MomentSettings, OverTime, Settings
 
+EVENTS_SHOWN = 20
+
 scene_argument = click.argument("scene", type=click.Path(path_type=Path))
 output_option = click.option(
     "-o", "--output", type=click.Path(path_type=Path), help="Result file (netCDF); default: <scene>.nc."
@@ -166,4 +168,6 @@ def summary(attributes: Mapping[str, Any]) -> list[str]:
         )
     if "stable" in a:
         lines.append(f"equilibrium  {'stable' if a['stable'] else 'unstable'}")
-    return lines + [f"note         {note}" for note in a["notes"]]
+    passed = [f"event        {e['event']} at t = {e['time']:.9g} s" for e in a.get("events", [])]
+    more = [f"event        ... and {len(passed) - EVENTS_SHOWN} more"] if len(passed) > EVENTS_SHOWN else []
+    return lines + passed[:EVENTS_SHOWN] + more + [f"note         {note}" for note in a["notes"]]

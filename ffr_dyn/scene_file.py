@@ -39,7 +39,17 @@ from ffr_dyn.joint_forces import Actuator
 from ffr_dyn.operations import FUNCTIONS
 from ffr_dyn.parameters import Parameters, as_number, flattened, overridden, substituted
 from ffr_dyn.scene import Body, Scene
-from ffr_dyn.scene_schema import EFFORTS, SOLUTIONS, TABLES, BodyEntry, Kind, SceneEntry, StabilisationEntry, keys_of
+from ffr_dyn.scene_schema import (
+    EFFORTS,
+    EVENTS,
+    SOLUTIONS,
+    TABLES,
+    BodyEntry,
+    Kind,
+    SceneEntry,
+    StabilisationEntry,
+    keys_of,
+)
 from ffr_dyn.scene_source import Source, origin, origin_of_name, read_source
 from ffr_dyn.settings import Forward, Inverse, Kinematic, Linearise, Mixed, MomentSettings, OverTime, Settings, Static
 from ffr_dyn.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
@@ -234,7 +244,9 @@ def _over_time(entry: Any, source: Source) -> OverTime:
             **entry.solution.model_dump(exclude={"kind"})
         )
         return Mixed(_efforts("unknown", entry.unknown, source), known, solution)
-    return Forward()
+    return Forward(
+        tuple(_declared(EVENTS, ("analysis", "events", name), e, source) for name, e in entry.events.items())
+    )
 
 
 def _efforts(key: str, entries: Mapping[str, BaseModel], source: Source) -> tuple[Effort, ...]:

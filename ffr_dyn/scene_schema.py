@@ -31,6 +31,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from ffr_dyn.analyses.bounded import Bounded
 from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort
+from ffr_dyn.analyses.events import Event
 from ffr_dyn.analyses.mixed import Causal
 from ffr_dyn.couplings import Coupling
 from ffr_dyn.curve import Curve
@@ -273,6 +274,8 @@ FIELDS: dict[str, Any] = {
     "ModalForce.values": list[Number],
     "ModalForce.function": OfTime,
     "MarkerEffort.direction": Vector,
+    "Event.quantity": str,
+    "Event.direction": Literal["rising", "falling", "either"],
 }
 
 # Fields that a file cannot hold: Python functions, and the name, which is the key of the entry.
@@ -314,6 +317,7 @@ TABLES: dict[str, tuple[Kind, ...]] = {
 
 
 EFFORTS = (Kind("joint", JointEffort), Kind("marker", MarkerEffort))  # tables of an analysis
+EVENTS = (Kind("", Event),)
 SOLUTIONS = (Kind("causal", Causal), Kind("bounded", Bounded))
 
 
@@ -440,11 +444,17 @@ class _Integrated(_Span):
     step: Seconds | None = None
 
 
-class ForwardEntry(_Integrated):
-    """Forward dynamics from start to end; step defaults to a tenth of output_step."""
-
+class _ForwardBase(_Integrated):
     kind: Literal["forward"] = "forward"
     stabilisation: StabilisationEntry = StabilisationEntry()
+
+
+ForwardEntry = create_model(
+    "ForwardEntry",
+    __base__=_ForwardBase,
+    __doc__="Forward dynamics from start to end; step defaults to a tenth of output_step.",
+    events=(_table_model(EVENTS), {}),
+)
 
 
 class KinematicEntry(_Span):

@@ -18,7 +18,7 @@ from ffr_dyn.formula import Measured, Operation, text_of
 from ffr_dyn.integrators import METHODS
 from ffr_dyn.joint_forces import Actuator
 from ffr_dyn.scene import Body, Scene
-from ffr_dyn.scene_schema import EFFORTS, SOLUTIONS, TABLES, Kind, keys_of
+from ffr_dyn.scene_schema import EFFORTS, EVENTS, SOLUTIONS, TABLES, Kind, keys_of
 from ffr_dyn.settings import Forward, Inverse, Kinematic, Linearise, Mixed, MomentSettings, OfMoment, OverTime, Settings
 from ffr_dyn.stabilisation import Baumgarte, Projection, Stabilisation
 from ffr_dyn.state_formula import StateFormula
@@ -97,6 +97,8 @@ def _analysis(settings: Settings | MomentSettings) -> dict[str, Any]:
 
 def _particular(analysis: OverTime | OfMoment) -> dict[str, Any]:
     """The settings of one analysis only."""
+    if isinstance(analysis, Forward):
+        return {"events": {event.name: _entry(EVENTS[0], event) for event in analysis.events}}
     if isinstance(analysis, Inverse):
         return {"elastic": "quasi-static" if analysis.quasi_static else "dynamic"}
     if isinstance(analysis, Mixed):

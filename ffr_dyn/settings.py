@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from ffr_dyn.analyses.bounded import Bounded
 from ffr_dyn.analyses.efforts import Effort
+from ffr_dyn.analyses.events import Event
 from ffr_dyn.analyses.mixed import Causal
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.stabilisation import Stabilisation
@@ -13,7 +14,9 @@ from ffr_dyn.stabilisation import Stabilisation
 
 @dataclass(frozen=True)
 class Forward:
-    """Forward dynamics."""
+    """Forward dynamics, with events to find."""
+
+    events: tuple[Event, ...] = ()
 
 
 @dataclass(frozen=True)

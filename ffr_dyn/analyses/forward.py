@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.assemble import Assembled, assemble
+from ffr_dyn.analyses.events import Event, Watcher
 from ffr_dyn.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
 from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import System, new_record
@@ -54,6 +55,7 @@ def forward(
     start: float = 0.0,
     stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
     outputs: Sequence[str] = ("default",),
+    events: Sequence[Event] = (),
     path: str | Path | None = None,
     resume: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
@@ -64,6 +66,8 @@ def forward(
     method      : RK4(step), ROS2(step), ...; by default ROS2 with a tenth of the output step
     outputs     : names or patterns of the quantities to keep (see `ffr_dyn.measure.selected`), such as "default",
                   "rod.*.acceleration", "*.power"
+    events      : moments to find (see `ffr_dyn.analyses.events`), which the attribute "events" of the result lists with
+                  their states; one may end the run, and its row is the last one then
     path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
     resume      : a result file (its `path` of before) whose run goes on from its last rows as if it had never stopped, to
                   the bit; `end` may be later than it was. A file that does not exist yet is a run from the start
@@ -87,16 +91,17 @@ def forward(
     else:
         run = _started(assembled, method, stabilisation, start, wanted)
     _check_resumed(run, substeps * rows, output_step / substeps)
+    watcher = _watcher(assembled, run, method, stabilisation, events, resume) if events else None
     path = resume if path is None else path
     watch = Stopwatch() if stopwatch is None else stopwatch
     first = Result(run.times[0], run.parts[0], geometry(scene), header | {"status": "running"})
     with nullcontext() if path is None else ResultWriter(path, first, checkpoint=_checkpoint(run, mark)) as writer:
-        for times, part in _advance(assembled, run, method, start, substeps, rows, wanted, watch):
+        for times, part in _advance(assembled, run, method, start, substeps, rows, wanted, watch, watcher):
             if writer is not None:
                 writer.append(times, {name: quantity.values for name, quantity in part.items()}, _checkpoint(run, mark))
             if progress is not None:
                 progress(float(times[-1]))
-        account = _account(scene, run, header["notes"])
+        account = _account(scene, run, header["notes"]) | ({} if watcher is None else {"events": watcher.found})
         if writer is not None:
             writer.close("complete", header | account)
     return _result(scene, run, header | account | {"status": "complete"})
@@ -152,13 +157,16 @@ def _advance(
     rows: int,
     wanted: Mapping[str, Entry],
     watch: Stopwatch,
+    watcher: Watcher | None = None,
 ) -> Iterator[tuple[Array, dict[str, Quantity]]]:
     """Yields (times, quantities) of output rows chunk after chunk, each about SECONDS_PER_CALL long.
 
-    Where a quantity adds up over the steps, every step is looked at and only the output rows are kept.
+    Where a quantity adds up over the steps, or events are looked for, every step is looked at and only the output rows are
+    kept.
     """
     system, steps = assembled.system, run.machine.tables.clock.steps
-    looks = substeps if needs_every_step(wanted) else 1
+    looks = substeps if needs_every_step(wanted) or watcher is not None else 1
+    ends = False
     count = 1
     while run.done < rows * substeps:
         chunk = new_record(system, looks * min(count, rows - run.done // substeps))
@@ -167,19 +175,46 @@ def _advance(
         filled = int(steps[2]) - int(steps[2]) % looks
         if filled:
             kept = with_all_reactions(assembled, Record(*(column[:filled] for column in chunk)))
+            if watcher is not None:
+                kept, ends = watcher.look(kept)
+            shown = _shown(kept.time.size, looks, ends)
             every, run.memory = measure(system, kept, run.memory, wanted)
-            part = {
-                name: replace(quantity, values=quantity.values[looks - 1 :: looks]) for name, quantity in every.items()
-            }
-            times = kept.time[looks - 1 :: looks]
+            part = {name: replace(quantity, values=quantity.values[shown]) for name, quantity in every.items()}
+            times = kept.time[shown]
             run.parts.append(part)
             run.times.append(times)
             run.extremes = np.maximum(run.extremes, extremes(system, kept))
             run.done += filled // looks * substeps
             yield times, part
+        if ends:
+            return
         if status != OK:
             raise failure(system, run.machine.work, status, start + int(steps[0]) * method.step)
         count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
+
+
+def _shown(rows: int, looks: int, ends: bool) -> Array:
+    """Numbers of the output rows among those that were looked at; the row of an event that ends the run is one."""
+    shown = np.arange(looks - 1, rows, looks)
+    return np.union1d(shown, [rows - 1]) if ends else shown
+
+
+def _watcher(
+    assembled: Assembled,
+    run: _Run,
+    method: Integrator,
+    stabilisation: Stabilisation,
+    events: Sequence[Event],
+    resume: str | Path | None,
+) -> Watcher:
+    """What looks for events from where the run stands."""
+    if resume is not None:
+        raise InputError(
+            "a run with events cannot be resumed: those of its first part are not in the file; run the whole"
+        )
+    watcher = Watcher(assembled, method, gains(stabilisation), events)
+    watcher.begin(run.machine, float(run.times[0][0]))
+    return watcher
 
 
 def with_all_reactions(assembled: Assembled, record: Record) -> Record:
