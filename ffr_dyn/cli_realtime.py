@@ -55,7 +55,9 @@ def realtime(
     from ffr_dyn.settings import Settings
 
     loaded, settings = load_scene(scene, assignments(parameters))
-    given = settings.method if isinstance(settings, Settings) else METHODS["ros2"](1e-3)
+    given: Any = METHODS["ros2"](1e-3)
+    if isinstance(settings, Settings) and not settings.method.controlled:
+        given = settings.method
     if method is not None and method not in METHODS:
         raise InputError(f"--method {method}: there is no such method; there are {', '.join(METHODS)}")
     kind: Any = type(given) if method is None else METHODS[method]

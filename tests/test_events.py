@@ -12,7 +12,8 @@ from ffr_dyn import cli
 from ffr_dyn.analyses.events import Event
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.errors import InputError
-from ffr_dyn.integrators import RK4, ROS2
+from ffr_dyn.integrators import RK4, ROS2, DormandPrince
+from ffr_dyn.integrators.tolerances import tolerances
 from ffr_dyn.joints import Joint
 from ffr_dyn.result_file import load_result
 from ffr_dyn.run import run
@@ -105,6 +106,12 @@ def test_events_converge_with_the_order_of_the_method():
 
 
 EVENT = Event("low", "arm.b.position.y", -0.3, "falling")
+
+
+def test_events_of_a_method_that_chooses_its_steps():
+    fine = forward(swinging(), end=0.5, output_step=0.5, method=RK4(1e-4), events=(EVENT,))
+    result = forward(swinging(), end=0.5, output_step=0.1, method=DormandPrince(tolerances(1e-9)), events=(EVENT,))
+    np.testing.assert_allclose(times(result), times(fine), atol=1e-8)
 
 
 def test_angles_are_unwound():

@@ -1,14 +1,15 @@
 """Events of a forward run: moments at which a quantity passes a value.
 
-Every step of the integrator is looked at. Where the quantity has passed the value within one, the step is done again, from
-the same state and shorter, until its end is the event: a root of one unknown, the length of the step, which Brent's method
-(1973) finds to the rounding of the time. So an event is as accurate as the method, and lies on the constraints as it does.
+Every step of the integrator is looked at (ten states from row to row where it chooses its steps). Where the quantity has
+passed the value within one, the step is done again, from the same state and shorter, until its end is the event: a root of
+one unknown, the length of the step, which Brent's method (1973) finds to the rounding of the time. So an event is as accurate
+as the method, and lies on the constraints as it does.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Any, Literal
 
@@ -20,7 +21,7 @@ from ffr_dyn.equations import System, new_record
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.kernels.tables import OK, Record
-from ffr_dyn.machine import Machine, new_machine, record_row, row_filler
+from ffr_dyn.machine import Machine, fill_rows, new_machine, record_row
 from ffr_dyn.measure import catalogue
 from ffr_dyn.state import StateView
 from ffr_dyn.view import View
@@ -74,15 +75,17 @@ class Watcher:
     """Looks for events in the rows of a run, one for each step. `found` lists them as plain data."""
 
     def __init__(
-        self, assembled: Assembled, method: Integrator, gains: tuple[float, float, float], events: Sequence[Event]
+        self,
+        assembled: Assembled,
+        method: Integrator,
+        gains: tuple[float, float, float],
+        spacing: float,
+        events: Sequence[Event],
     ) -> None:
         self.events, self.found = tuple(events), list[dict[str, Any]]()
         system = assembled.system
         self._seen = [_seen(system, event) for event in self.events]
-        self._system, self._step = system, method.step
-        self._machine = new_machine(system, assembled.x, assembled.v, method, gains)
-        self._record = new_record(system, 1)
-        self._fill = row_filler(self._machine, method, self._record)
+        self._system, self._method, self._gains, self._spacing = system, method, gains, spacing
         self._memory: list[Any] = [None] * len(self.events)
         self._last: Record | None = None
 
@@ -126,19 +129,14 @@ class Watcher:
         sign = 1.0 if crossing.rising else -1.0
 
         def beyond(length: float) -> float:
-            self._redo(rows, k, length)
-            return sign * (float(seen(self._record, crossing.memory)[0][0]) - event.value)
+            return sign * (float(seen(self._redone(rows, k, length), crossing.memory)[0][0]) - event.value)
 
-        whole = self._step
-        length: Any
-        if beyond(WIDTH * whole) >= 0:  # at the beginning, where the state is brought back onto the constraints
-            length = WIDTH * whole
+        whole, least, length = self._spacing, WIDTH * self._spacing, 0.0
+        if beyond(least) >= 0:  # at the beginning, where the state is brought back onto the constraints
+            length = least
         else:
-            length = (
-                whole if beyond(whole) <= 0 else brentq(beyond, WIDTH * whole, whole, xtol=WIDTH * whole, rtol=WIDTH)
-            )
-        self._redo(rows, k, length)
-        own = Record(*(column.copy() for column in self._record))
+            length = whole if beyond(whole) <= 0 else float(brentq(beyond, least, whole, xtol=least, rtol=WIDTH))
+        own = self._redone(rows, k, length)
         found = {
             "event": event.name,
             "time": float(own.time[0]),
@@ -148,16 +146,15 @@ class Watcher:
         }
         return found, event, crossing.row, own
 
-    def _redo(self, rows: Record, k: int, length: float) -> None:
-        """One step of this length from the state of a row; its end is in the record."""
-        machine, clock = self._machine, self._machine.tables.clock
-        machine.x[:], machine.v[:] = rows.x[k], rows.v[k]
+    def _redone(self, rows: Record, k: int, length: float) -> Record:
+        """A row at the end of one step of this length, or a run where the method chooses its steps, from the state of row k."""
+        method: Any = self._method if self._method.controlled else replace(self._method, step=length)  # type: ignore[type-var]
+        time, end = float(rows.time[k]), new_record(self._system, 1)
+        machine = new_machine(self._system, rows.x[k], rows.v[k], method, self._gains, start=time, spacing=length)
         machine.work.loads.reference[:] = rows.action[k, :, 0]
-        clock.time[0], clock.steps[0], clock.steps[1] = length, 0, 1
-        if self._fill(float(rows.time[k])) != OK:
-            raise SimulationError(
-                f"at t = {rows.time[k]:.6g} s an event cannot be located: a shorter step from there fails"
-            )
+        if fill_rows(machine, method, end, time, 1) != OK:
+            raise SimulationError(f"at t = {time:.6g} s an event cannot be located: a shorter step from there fails")
+        return end
 
 
 # ---- what an event looks at -----------------------------------------------------------------------------------------
