@@ -147,7 +147,7 @@ class Watcher:
         return found, event, crossing.row, own
 
     def _redone(self, rows: Record, k: int, length: float) -> Record:
-        """A row at the end of one step of this length, or a run where the method chooses its steps, from the state of row k."""
+        """A row at the end of one step of this length, or of a run where the method chooses its steps, from row k."""
         method: Any = self._method if self._method.controlled else replace(self._method, step=length)  # type: ignore[type-var]
         time, end = float(rows.time[k]), new_record(self._system, 1)
         machine = new_machine(self._system, rows.x[k], rows.v[k], method, self._gains, start=time, spacing=length)
