@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -573,7 +574,9 @@ def _finer(search: _Search, ground: _Ground, final: Trial, reference: Trial, att
     error = largest(difference(finer.values, reference.values)) / ground.limits
     if (error <= 1).all() or gained.max() > error.max():
         return finer
-    steps = {key: getattr(final.choice, key) for key in ("method", "divisions", "accuracy")}
+    steps: dict[str, Any] = {key: getattr(final.choice, key) for key in ("method", "divisions", "accuracy")}
+    if not final.choice.integrator(search.span.output_step).implicit:  # its step is for the modes that it had
+        steps = {"method": PILOT, "divisions": max(1, reference.choice.divisions // 2), "accuracy": 0.0}
     choice = replace(ground.everything, **steps)
     if attempt > 1:
         return search.run(choice)
