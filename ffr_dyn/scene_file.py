@@ -34,7 +34,7 @@ from ffr_dyn.analyses.efforts import Effort
 from ffr_dyn.errors import InputError
 from ffr_dyn.forces import Load
 from ffr_dyn.formula import CONSTANTS, Expression, Operation, is_constant
-from ffr_dyn.integrators import METHODS
+from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator, Tolerances
 from ffr_dyn.joint_forces import Actuator
 from ffr_dyn.operations import FUNCTIONS
 from ffr_dyn.parameters import Parameters, as_number, flattened, overridden, substituted
@@ -216,11 +216,18 @@ def _settings(entry: Any, outputs: list[str], source: Source) -> Settings | Mome
     if entry.kind == "linearise":
         inputs = (*_efforts("inputs", entry.inputs, source), *entry.loads)
         return MomentSettings(entry.time, keep, Linearise(inputs, tuple(entry.quantities), entry.at_equilibrium))
-    step = getattr(entry, "step", None)
-    method = METHODS[getattr(entry, "method", "ros2")](entry.output_step / 10 if step is None else step)
+    method = _method(entry)
     stabilisation = _stabilisation(getattr(entry, "stabilisation", StabilisationEntry()))
     span = (entry.start, entry.end, entry.output_step)
     return Settings(*span, method, stabilisation, keep, _over_time(entry, source))
+
+
+def _method(entry: Any) -> Integrator:
+    name, step = getattr(entry, "method", "ros2"), getattr(entry, "step", None)
+    if name in CONTROLLED:
+        given = entry.tolerances
+        return CONTROLLED[name](Tolerances() if given is None else Tolerances(**given.model_dump()))
+    return METHODS[name](entry.output_step / 10 if step is None else step)
 
 
 def _over_time(entry: Any, source: Source) -> OverTime:

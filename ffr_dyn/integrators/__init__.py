@@ -8,12 +8,26 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Protocol
 
+from ffr_dyn.integrators.dopri5 import DormandPrince
 from ffr_dyn.integrators.rk4 import RK4
 from ffr_dyn.integrators.ros2 import ROS2
-from ffr_dyn.integrators.ros3 import ROS3
+from ffr_dyn.integrators.ros3 import ROS3, AdaptiveROS3
+from ffr_dyn.integrators.tolerances import Tolerances, tolerances
 from ffr_dyn.kernels.units import Unit
 
-__all__ = ["METHODS", "RK4", "ROS2", "ROS3", "Integrator"]
+__all__ = [
+    "CONTROLLED",
+    "METHODS",
+    "RK4",
+    "ROS2",
+    "ROS3",
+    "AdaptiveROS3",
+    "Controlled",
+    "DormandPrince",
+    "Integrator",
+    "Tolerances",
+    "tolerances",
+]
 
 
 class Integrator(Protocol):
@@ -21,7 +35,7 @@ class Integrator(Protocol):
 
     @property
     def step(self) -> float:
-        """Time step [s]."""
+        """Time step [s]; zero where the method chooses it."""
 
     @property
     def numbers(self) -> tuple[float, ...]:
@@ -29,9 +43,21 @@ class Integrator(Protocol):
 
     order: ClassVar[int]
     implicit: ClassVar[bool]  # whether it treats the elastic forces implicitly
+    controlled: ClassVar[bool]  # whether it chooses its steps (see `Controlled`)
     stage_count: ClassVar[int]  # states (x, v) of memory that it needs
     row_stages: ClassVar[int]  # the same for constraint rows
     unit: ClassVar[Unit]
 
 
+class Controlled(Integrator, Protocol):
+    """A method that chooses its steps; its unit leaves the error of the step in stages.x[0], stages.v[0]."""
+
+    @property
+    def tolerances(self) -> Tolerances:
+        """What the error may be."""
+
+    estimate_order: ClassVar[int]  # the error of a step goes as h to this power
+
+
 METHODS: dict[str, type[Any]] = {"rk4": RK4, "ros2": ROS2, "ros3": ROS3}
+CONTROLLED: dict[str, type[Any]] = {"ros3-adaptive": AdaptiveROS3, "dopri5": DormandPrince}
