@@ -87,7 +87,7 @@ CASES: dict[str, tuple[Callable[[], Scene], Span, str, float]] = {
     "Dzhanibekov's top": (top, Span(10.0, 0.5), "top.omega_bar", 0.1),
     "pendulum A01": (
         pendulum,
-        Span(10.0, 0.5),
+        Span(10.0, 0.4),
         "position:bob.c",
         0.04,
     ),  # its 1e-9 kg m^2 of inertia make rounding felt at 1e-10 m
