@@ -20,8 +20,8 @@ def settle(r, t):
 
 @inlined
 def solve(r, x, target):
-    """Accelerations (bodies.acc) and multipliers (rows.lam) of what was evaluated last at x."""
-    call_unit(r.units[SOLVE], r.address, 0.0, x.ctypes.data, target.ctypes.data)
+    """Accelerations (bodies.acc) and multipliers (rows.lam) of what was evaluated last at x, near what they are now."""
+    call_unit(r.units[SOLVE], r.address, 1.0, x.ctypes.data, target.ctypes.data)
 
 
 @inlined
