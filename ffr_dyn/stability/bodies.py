@@ -31,7 +31,7 @@ def beam(name: str, length: float, density: float, bending: float, modes: int, *
     """
     at, weight = np.polynomial.legendre.leggauss(POINTS)
     s, w = 0.5 * (at + 1), 0.5 * weight * length
-    shapes = [_shape(held, k) for k in range(modes + 3)]
+    shapes = [_shape(held, k) for k in range(modes + 6)]  # six more than modes: the last are right to 1e-3 then
     values, slopes, curves = (np.array([p.deriv(d)(s) for p in shapes]) / length**d for d in (0, 1, 2))
     M, K = density * (values * w) @ values.T, bending * (curves * w) @ curves.T
     scale = 1 / np.sqrt(np.diag(M))

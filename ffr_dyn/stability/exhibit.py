@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import wrap
 
 import numpy as np
 
@@ -130,7 +131,7 @@ def draw(exhibit: Exhibit, path: str | Path) -> Path:
                 axes.set_ylim(*panel.bounds)
             axes.set(title=panel.title, xlabel=panel.x, ylabel=panel.y)
             axes.legend(fontsize=8.5)
-        figure.suptitle(exhibit.title, fontweight="bold")
+        figure.suptitle("\n".join(wrap(exhibit.title, 48 * count)), fontweight="bold")
     return Path(path)
 
 
