@@ -16,7 +16,16 @@ from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import System, new_record
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import ROS2, Integrator
-from ffr_dyn.kernels.tables import AT, NOT_FINITE, OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, Record, Work
+from ffr_dyn.kernels.tables import (
+    AT,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    OK,
+    SINGULAR_BODY,
+    SINGULAR_CONSTRAINT,
+    Record,
+    Work,
+)
 from ffr_dyn.machine import Machine, fill_rows, new_machine, record_row
 from ffr_dyn.measure import Entry, Memory, measure, needs_every_step, selected
 from ffr_dyn.result import Quantity, Result
@@ -225,7 +234,24 @@ def failure(system: System, work: Work, status: int, time: float) -> BaseExcepti
             f"{at} the state of {_worst(system, work)} is no longer finite: the step is too large for an explicit method "
             "(use ROS2 or a smaller step), or a force is not finite"
         )
+    if status == NOT_CONVERGED:
+        return SimulationError(f"{at} the iterations of the step do not converge, {_unconverged(system, where)}")
     return SimulationError(f"{at} the run stopped: {system.user.failure or 'unknown cause'}")
+
+
+def _unconverged(system: System, where: int) -> str:
+    """Of a body, or after the bodies a constraint row: where, the likely cause and what to change."""
+    bodies = system.scene.bodies
+    if where < len(bodies):
+        return (
+            f"worst in body {bodies[where].name!r}: the step is too large for its rotation or for a spring, damper, stop or "
+            "friction that acts on it; use a smaller step, ROS2, or a softer force"
+        )
+    block = system.blocks[int(np.searchsorted(system.model.rows.start, where - len(bodies), side="right")) - 1]
+    return (
+        f"worst in {block.name!r}: its constraint cannot be met within the step; use a smaller step, look for a position "
+        "where the mechanism locks or is singular, or pass it with ROS2"
+    )
 
 
 def _worst(system: System, work: Work) -> str:

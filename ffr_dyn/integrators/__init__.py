@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Protocol
 
+from ffr_dyn.integrators.generalised_alpha import HHT, GeneralisedAlpha
 from ffr_dyn.integrators.rk4 import RK4
 from ffr_dyn.integrators.ros2 import ROS2
 from ffr_dyn.integrators.ros3 import ROS3
 from ffr_dyn.kernels.units import Unit
 
-__all__ = ["METHODS", "RK4", "ROS2", "ROS3", "Integrator"]
+__all__ = ["HHT", "METHODS", "RK4", "ROS2", "ROS3", "GeneralisedAlpha", "Integrator"]
 
 
 class Integrator(Protocol):
@@ -34,4 +35,10 @@ class Integrator(Protocol):
     unit: ClassVar[Unit]
 
 
-METHODS: dict[str, type[Any]] = {"rk4": RK4, "ros2": ROS2, "ros3": ROS3}
+METHODS: dict[str, type[Any]] = {
+    "rk4": RK4,
+    "ros2": ROS2,
+    "ros3": ROS3,
+    "generalised-alpha": GeneralisedAlpha,
+    "hht": HHT,
+}
