@@ -152,6 +152,9 @@ def _models(scene: Scene, modes: str | None, drops: Sequence[str], bodies: Seque
 
 def _report(found: Diagram, against: str) -> list[str]:
     """The Pareto front of every measure, and what failed."""
+    from ffr_dyn.chart.orders import orders
+    from ffr_dyn.chart.variants import FULL
+
     lines = []
     for measure in found.measures:
         lines.append(f"\n{measure.words}: the front, cheapest first")
@@ -164,6 +167,10 @@ def _report(found: Diagram, against: str) -> list[str]:
                 f"{point.evaluations:9d} evaluations" if against == "evaluations" else f"{point.cost(against):10.3e} s"
             )
             lines.append(f"  {cost}  error {error:8.1e} {measure.unit}{relative}  {point.label}")
+        shown = {method: order for (method, model), order in orders(found, measure.name).items() if model == FULL.label}
+        if any(order == order for order in shown.values()):
+            listed = ", ".join(f"{method} {order:.1f}" for method, order in shown.items() if order == order)
+            lines.append(f"  order at the finest steps: {listed}")
     lines += [f"failed       {lost.label}: {lost.reason}" for lost in found.lost]
     return [*lines, ""]
 

@@ -12,6 +12,7 @@ import click
 from ffr_dyn.errors import InputError
 
 if TYPE_CHECKING:
+    from ffr_dyn.integrators import Integrator
     from ffr_dyn.scene import Scene
     from ffr_dyn.settings import MomentSettings, OverTime, Settings
 
@@ -28,7 +29,8 @@ keep_option = click.option(
 _INTEGRATION = (
     click.option("--end", type=float, help="End of the run [s], instead of the scene's."),
     click.option("--step", type=float, help="Time step [s], instead of the scene's."),
-    click.option("--method", type=click.Choice(["ros2", "ros3", "rk4"]), help="Integrator, instead of the scene's."),
+    click.option("--tolerance", type=float, help="Relative tolerance of a method that chooses its steps."),
+    click.option("--method", metavar="NAME", help="Integrator, instead of the scene's: ros2, ros3-adaptive, rk4, ..."),
     click.option("--resume", is_flag=True, help="Go on where the result file ends, as if the run had never stopped."),
 )
 
@@ -55,8 +57,8 @@ def run(
     """Analyse SCENE as its file says, forward dynamics if it does not, and write the result file.
 
     ros2 and ros3 (more accurate, twice the cost of a step) treat the elastic modes implicitly: no elastic frequency limits
-    their step. rk4 is explicit, of fourth order:
-    exact for soft bodies at small steps, unstable when step times the highest circular frequency exceeds about 2.8.
+    their step. rk4 is explicit, of fourth order: exact for soft bodies at small steps, unstable when step times the highest
+    circular frequency exceeds about 2.8. ros3-adaptive and dopri5 (explicit) choose their steps by --tolerance.
     Drift off the constraints is held by projection and reported. A run that was killed keeps what its last flush wrote,
     a few seconds old; --resume goes on from there to the same bits. Without a result file it starts at the beginning.
     """
@@ -104,7 +106,6 @@ def over_time(settings: Settings | MomentSettings, analysis: OverTime, keep: tup
 
 def _changed(settings: Settings | MomentSettings, changes: Mapping[str, Any]) -> Settings | MomentSettings:
     """Another end, step or method than the file's. InputError for an analysis that has none."""
-    from ffr_dyn.integrators import METHODS
     from ffr_dyn.settings import Kinematic, MomentSettings
 
     given = {key: value for key, value in changes.items() if value is not None}
@@ -114,9 +115,28 @@ def _changed(settings: Settings | MomentSettings, changes: Mapping[str, Any]) ->
             if key not in known:
                 raise InputError(f"--{key}: there is no {key} of a {type(settings.analysis).__name__.lower()} analysis")
         return replace(settings, **given)
-    method = METHODS[given.get("method", type(settings.method).__name__.lower())]
-    step = given.get("step", settings.method.step)
-    return replace(settings, end=given.get("end", settings.end), method=method(step))
+    return replace(settings, end=given.get("end", settings.end), method=_method(settings, given))
+
+
+def _method(settings: Settings, given: Mapping[str, Any]) -> Integrator:
+    """The method of the file, or the one that was asked for, with the step or the tolerance that was asked for."""
+    from ffr_dyn.integrators import CONTROLLED, METHODS, tolerances
+
+    named = given.get("method")
+    known = {**METHODS, **CONTROLLED}
+    if named is not None and named not in known:
+        raise InputError(f"--method {named}: there is no such method; there are {', '.join(known)}")
+    kind: Any = type(settings.method) if named is None else known[named]
+    if kind.controlled:
+        if "step" in given:
+            raise InputError(f"--step: {kind.__name__} chooses its steps; give --tolerance")
+        if "tolerance" in given:
+            return kind(tolerances(given["tolerance"]))
+        return settings.method if named is None else kind()
+    if "tolerance" in given:
+        raise InputError(f"--tolerance: {kind.__name__} takes steps of one length; give --step")
+    step = given.get("step", settings.method.step or settings.output_step / 10)
+    return kind(step)
 
 
 def perform(scene: Scene, settings: Settings | MomentSettings, output: Path, resume: bool = False) -> None:

@@ -14,9 +14,10 @@ from pathlib import Path
 
 from numba.core.caching import FunctionCache
 
-from ffr_dyn.integrators import METHODS, Integrator
+from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator
 from ffr_dyn.kernels.units import UNITS, Unit
 
+_METHODS = {**METHODS, **CONTROLLED}
 _AT_WORK: dict[str, subprocess.Popen[bytes]] = {}
 
 
@@ -25,7 +26,7 @@ def begin_compiling(*kinds: type[Integrator]) -> None:
 
     For programs that mesh and reduce bodies first: a run that needs the units waits for them.
     """
-    units = {**UNITS, **{name: kind.unit for name, kind in METHODS.items() if kind in kinds}}
+    units = {**UNITS, **{name: kind.unit for name, kind in _METHODS.items() if kind in kinds}}
     missing = [name for name, unit in units.items() if name not in _AT_WORK and not _is_on_disk(unit)]
     if not missing:
         return
@@ -56,9 +57,9 @@ def _is_on_disk(unit: Unit) -> bool:
 
 
 def compile_units(names: Sequence[str]) -> None:
-    """Compile units and methods by their names in `UNITS` and `METHODS`."""
+    """Compile units and methods by their names."""
     for name in names:
-        unit = UNITS[name] if name in UNITS else METHODS[name].unit
+        unit = UNITS[name] if name in UNITS else _METHODS[name].unit
         if not unit.address:
             raise RuntimeError(f"unit {name} has no address")
 

@@ -5,19 +5,21 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from ffr_dyn.equations import System, new_stages, new_work
 from ffr_dyn.kernels.packing import pack
-from ffr_dyn.kernels.tables import Clock, Model, Record, Tables, Work
-from ffr_dyn.kernels.units import record_unit, rows_unit, truly_unit, unit_addresses
+from ffr_dyn.kernels.tables import Clock, Control, Model, Record, Tables, Work
+from ffr_dyn.kernels.units import controlled_rows_unit, record_unit, rows_unit, truly_unit, unit_addresses
 
 if TYPE_CHECKING:
-    from ffr_dyn.integrators import Integrator
+    from ffr_dyn.integrators import Controlled, Integrator
 
 Array = np.ndarray
+
+LEAST_STEP = 1e-9  # of a controlled method, relative to the spacing of its rows
 
 _CALL = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_int64, ctypes.c_int64)
 
@@ -53,16 +55,40 @@ def new_machine(
     v: Array,
     method: Integrator | None = None,
     gains: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    *,
+    start: float = 0.0,
+    spacing: float = 0.0,
 ) -> Machine:
-    """Memory for a scene at the state (x, v), which it owns, and for a method (none: evaluations alone)."""
+    """Memory for a scene at the state (x, v), which it owns, and for a method (none: evaluations alone).
+
+    start   : time of step number 0 [s]
+    spacing : of the numbered steps of a method that chooses its own [s]
+    """
     if method is None:
         stages, h = new_stages(system, 0), 0.0
     else:
         stages, h = new_stages(system, method.stage_count, method.row_stages, method.numbers), method.step
-    clock = Clock(np.array([h]), np.zeros(3, dtype=np.int64), np.array(gains))
+    clock = Clock(np.array([h, h or spacing]), np.zeros(3, dtype=np.int64), np.array(gains))
+    control = _control(system, method, start, spacing)
     units = np.array(unit_addresses(), dtype=np.int64)
     state = np.array(x, dtype=float), np.array(v, dtype=float)
-    return _packed(system, Tables(0, units, system.model, new_work(system.model), stages, clock, *state))
+    return _packed(system, Tables(0, units, system.model, new_work(system.model), stages, clock, control, *state))
+
+
+def _control(system: System, method: Integrator | None, start: float, spacing: float) -> Control:
+    if method is None or not method.controlled:
+        return Control(np.zeros(0), np.zeros(2, dtype=np.int64), *(np.zeros(0) for _ in range(6)))
+    place, controlled = system.layout, cast("Controlled", method)
+    wanted = controlled.tolerances
+    x, v = np.full(place.x_size, wanted.position), np.full(place.v_size, wanted.velocity)
+    for b, body in enumerate(system.scene.bodies):
+        # Elastic coordinates are displacements times the square root of a mass; their rates count over one step.
+        elastic, n = wanted.elastic * np.sqrt(body.model.mass), body.model.n
+        x[place.ix[b] + 7 : place.ix[b] + 7 + n] = elastic
+        v[place.iv[b] + 6 : place.iv[b] + 6 + n] = -elastic
+    numbers = [0.01 * spacing, start, start, 1.0, wanted.relative, controlled.estimate_order, LEAST_STEP * spacing]
+    sizes = (place.x_size, place.v_size) * 2
+    return Control(np.array(numbers), np.zeros(2, dtype=np.int64), x, v, *(np.zeros(size) for size in sizes))
 
 
 def _packed(system: System, tables: Tables) -> Machine:
@@ -100,7 +126,8 @@ def fill_rows(machine: Machine, method: Integrator, record: Record, start: float
 
 def row_filler(machine: Machine, method: Integrator, record: Record) -> Callable[[float], int]:
     """`fill_rows` for one record, again and again at the least cost: of the time of step number 0, a status."""
-    call, words, step = _CALL(rows_unit.address), pack(record), method.unit.address
+    unit = controlled_rows_unit if method.controlled else rows_unit
+    call, words, step = _CALL(unit.address), pack(record), method.unit.address
     address, place = machine.address, words.ctypes.data
 
     def fill(start: float, kept: Array = words) -> int:  # the numbers at `place` live as long as this function

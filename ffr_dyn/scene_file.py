@@ -21,6 +21,7 @@ Paths are relative to the file. Angles in rad, everything in SI units unless a u
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -33,13 +34,13 @@ from ffr_dyn.analyses.efforts import Effort
 from ffr_dyn.errors import InputError
 from ffr_dyn.forces import Load
 from ffr_dyn.formula import CONSTANTS, Expression, Operation, is_constant
-from ffr_dyn.integrators import METHODS
+from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator, Tolerances
 from ffr_dyn.joint_forces import Actuator
 from ffr_dyn.operations import FUNCTIONS
 from ffr_dyn.parameters import Parameters, as_number, flattened, overridden, substituted
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.scene_schema import EFFORTS, SOLUTIONS, TABLES, BodyEntry, Kind, SceneEntry, StabilisationEntry, keys_of
-from ffr_dyn.scene_source import Source, origin, read_source
+from ffr_dyn.scene_source import Source, origin, origin_of_name, read_source
 from ffr_dyn.settings import Forward, Inverse, Kinematic, Linearise, Mixed, MomentSettings, OverTime, Settings, Static
 from ffr_dyn.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
 from ffr_dyn.state_formula import StateFormula, check_names
@@ -63,7 +64,8 @@ def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Sc
         tree = substituted(source.tree, values, "")
         known = {name: values[name] for name in values} | _signals(tree.get("inputs", {}), values)
     except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+        keys = tuple(str(error).partition(":")[0].split("."))
+        raise InputError(f"{origin(source, keys)}: {error}") from None
     try:
         entry = SceneEntry.model_validate(tree, context={"parameters": known})
     except ValidationError as error:
@@ -88,8 +90,9 @@ def _explained(error: ValidationError, source: Source) -> str:
         plain = isinstance(item["input"], (str, int, float, bool, list))
         value = f" (it is {item['input']!r})" if plain and item["type"] != "missing" else ""
         text = item["msg"].removeprefix("Value error, ").removeprefix("it: ")
-        where = ".".join(key for key in keys if not key.startswith(("[", "list[", "function-")))
-        lines[f"{origin(source, keys)}: {where or 'file'}: {text}{value}"] = None
+        where = tuple(key for key in keys if not key.startswith(("[", "list[", "function-")))
+        at = (*where, misspelt[1]) if (misspelt := re.match(r"'(.+?)' is not a known entry", text)) else where
+        lines[f"{origin(source, at)}: {'.'.join(where) or 'file'}: {text}{value}"] = None
     return "; ".join(lines)
 
 
@@ -108,7 +111,7 @@ def _scene(entry: Any, source: Source) -> Scene:
             if isinstance(force, (Load, Actuator)) and isinstance(force.function, StateFormula):
                 check_names(scene, force.function, f"force {force.name!r}")
     except InputError as error:
-        raise InputError(f"{origin(source, ())}: {error}") from None
+        raise InputError(f"{origin_of_name(source, str(error))}: {error}") from None
     return scene
 
 
@@ -213,11 +216,18 @@ def _settings(entry: Any, outputs: list[str], source: Source) -> Settings | Mome
     if entry.kind == "linearise":
         inputs = (*_efforts("inputs", entry.inputs, source), *entry.loads)
         return MomentSettings(entry.time, keep, Linearise(inputs, tuple(entry.quantities), entry.at_equilibrium))
-    step = getattr(entry, "step", None)
-    method = METHODS[getattr(entry, "method", "ros2")](entry.output_step / 10 if step is None else step)
+    method = _method(entry)
     stabilisation = _stabilisation(getattr(entry, "stabilisation", StabilisationEntry()))
     span = (entry.start, entry.end, entry.output_step)
     return Settings(*span, method, stabilisation, keep, _over_time(entry, source))
+
+
+def _method(entry: Any) -> Integrator:
+    name, step = getattr(entry, "method", "ros2"), getattr(entry, "step", None)
+    if name in CONTROLLED:
+        given = entry.tolerances
+        return CONTROLLED[name](Tolerances() if given is None else Tolerances(**given.model_dump()))
+    return METHODS[name](entry.output_step / 10 if step is None else step)
 
 
 def _over_time(entry: Any, source: Source) -> OverTime:

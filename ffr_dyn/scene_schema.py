@@ -38,7 +38,7 @@ from ffr_dyn.drivers import Driver, PointDriver
 from ffr_dyn.errors import InputError
 from ffr_dyn.forces import Bushing, Load, SpringDamper
 from ffr_dyn.formula import Expression, is_constant, parse
-from ffr_dyn.integrators import METHODS
+from ffr_dyn.integrators import CONTROLLED, METHODS
 from ffr_dyn.joint_forces import Actuator, JointFriction, JointSpring, JointStop, Servo
 from ffr_dyn.joints import Joint
 from ffr_dyn.measurement import Measurement, SectionMeasurement, StressMeasurement
@@ -429,6 +429,15 @@ class StabilisationEntry(_Strict):
     beta: Annotated[float, In("1/s")] = 0.0
 
 
+class TolerancesEntry(_Strict):
+    """What the error of a step may be: absolute values, plus `relative` of each coordinate's size; see `Tolerances`."""
+
+    relative: Annotated[Number, Key(gt=0)] = 1e-6
+    position: Annotated[float, In("m"), Key(gt=0)] = 1e-7
+    velocity: Annotated[float, In("m/s"), Key(gt=0)] = 1e-6
+    elastic: Annotated[float, In("m"), Key(gt=0)] = 1e-8
+
+
 class _Span(_Strict):
     end: Seconds
     output_step: Seconds
@@ -436,8 +445,18 @@ class _Span(_Strict):
 
 
 class _Integrated(_Span):
-    method: Literal[tuple(METHODS)] = "ros2"  # type: ignore[valid-type]
+    method: Literal[(*METHODS, *CONTROLLED)] = "ros2"  # type: ignore[valid-type]
     step: Seconds | None = None
+    tolerances: TolerancesEntry | None = None
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> _Integrated:
+        controlled = self.method in CONTROLLED
+        if controlled and self.step is not None:
+            raise ValueError(f"{self.method} chooses its steps: give 'tolerances' in place of 'step'")
+        if not controlled and self.tolerances is not None:
+            raise ValueError(f"{self.method} takes steps of one length: give 'step' in place of 'tolerances'")
+        return self
 
 
 class ForwardEntry(_Integrated):

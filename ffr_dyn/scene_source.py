@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ffr_dyn.errors import InputError
+from ffr_dyn.toml_lines import lines_of
 
 PATHS = ("file", "table_file")  # keys whose value is a path relative to the file in which it stands
 
@@ -31,11 +33,33 @@ def read_source(path: Path) -> Source:
     return _read(path, ())
 
 
-def origin(source: Source, keys: tuple[str, ...]) -> Path:
-    """The file of an entry, or of the nearest table around it."""
-    while keys and keys not in source.origins:
+def origin(source: Source, keys: tuple[str, ...]) -> str:
+    """File and line of an entry, or of the nearest table around it."""
+    around = keys
+    while around and around not in source.origins:
+        around = around[:-1]
+    path = source.origins[around]
+    lines = _lines(path)
+    while keys and keys not in lines:
         keys = keys[:-1]
-    return source.origins[keys]
+    return f"{path}, line {lines[keys]}" if keys else str(path)
+
+
+def origin_of_name(source: Source, message: str) -> str:
+    """File and line of the entry that a complaint names first, in quotes; of the file where it names none."""
+    for name in re.findall(r"'([^']+)'", message):
+        for table, entries in source.tree.items():
+            if isinstance(entries, dict) and name in entries:
+                return origin(source, (table, name))
+    return origin(source, ())
+
+
+def _lines(path: Path) -> dict[tuple[str, ...], int]:
+    """Where the entries of a file stand; nowhere when it can no longer be read as it was."""
+    try:
+        return lines_of(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
 
 
 def _read(path: Path, above: tuple[Path, ...]) -> Source:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, asdict, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ffr_dyn.curve import Curve
 from ffr_dyn.errors import InputError
 from ffr_dyn.forces import Load
 from ffr_dyn.formula import Measured, Operation, text_of
-from ffr_dyn.integrators import METHODS
+from ffr_dyn.integrators import CONTROLLED, METHODS, Controlled, Integrator
 from ffr_dyn.joint_forces import Actuator
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.scene_schema import EFFORTS, SOLUTIONS, TABLES, Kind, keys_of
@@ -88,11 +88,17 @@ def _analysis(settings: Settings | MomentSettings) -> dict[str, Any]:
     else:
         entry["time"] = settings.time
     if isinstance(settings, Settings) and not isinstance(analysis, Kinematic):
-        entry["method"] = next(word for word, made in METHODS.items() if type(settings.method) is made)
-        entry["step"] = settings.method.step
+        entry |= _method(settings.method)
     if isinstance(settings, Settings) and isinstance(analysis, (Forward, Inverse)):
         entry["stabilisation"] = _stabilisation(settings.stabilisation)
     return entry | _particular(analysis)
+
+
+def _method(method: Integrator) -> dict[str, Any]:
+    name = next(word for word, made in {**METHODS, **CONTROLLED}.items() if type(method) is made)
+    if name in CONTROLLED:
+        return {"method": name, "tolerances": asdict(cast("Controlled", method).tolerances)}
+    return {"method": name, "step": method.step}
 
 
 def _particular(analysis: OverTime | OfMoment) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from ffr_prep.cli_options import (
 from ffr_prep.cli_reduction import NOTES as REDUCTION_NOTES
 from ffr_prep.cli_reduction import band_of, draw_quality, reduction_of, reduction_options
 from ffr_prep.cli_solver import solver_of, solver_options
-from ffr_prep.cli_structure import reduce_structure
+from ffr_prep.cli_structure import reduce_structure_command
 from ffr_prep.cli_terminal import closing, show, terminal_steps, written
 from ffr_prep.errors import ComputationError, InputError
 
@@ -222,7 +222,7 @@ cli.add_command(convert)
 cli.add_command(export_body)
 cli.add_command(import_body)
 cli.add_command(reduce_matrices_command)
-cli.add_command(reduce_structure)
+cli.add_command(reduce_structure_command)
 
 
 # ---- arguments ----------------------------------------------------------------------------------------------------

@@ -35,6 +35,15 @@ Example of a STRUCTURE:
 Without a file: [[polylines]] with member, corners and elements, [[panels]] with shell, four corners and elements = [n, m];
 [nodes] gives names to places, such as tip = [1, 0, 0]. Sections: rectangle (b, h), circle (d), tube (d, t), i (h, b, web,
 flange), general (A, Iy, Iz, J, ky, kz). References: fixed, simply-supported (pin, roller), mean-axis, supports.
+
+\b
+Solids tied to the frame, and other reductions:
+  ties = [["frame.tip", "eye.bore"]]
+  reduction = [{method = "craig-bampton", modes = 10}, {method = "krylov", moments = 2, match = [0, 120]}]
+  [solids.eye]                      # a mesh or geometry of solids
+  file = "eye.step"
+  material = "steel"
+  interfaces = {bore = {}, pin = {kind = "mean"}}
 """
 
 
@@ -42,10 +51,9 @@ flange), general (A, Iy, Iz, J, ky, kz). References: fixed, simply-supported (pi
 @click.argument("structure", type=_PATH)
 @click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
 @solver_options
-def reduce_structure(structure: Path, output: Path, **options: Any) -> None:
+def reduce_structure_command(structure: Path, output: Path, **options: Any) -> None:
     """Reduce the beams and plates that STRUCTURE describes, a TOML file, to a flexible body and write it to a file."""
-    from ffr_prep.structural import reduce_frame
-    from ffr_prep.structural_file import load_structure
+    from ffr_prep.structural_file import load_structure, reduce_structure
 
     solver = solver_of(options)
     check_writable(output)
@@ -53,8 +61,8 @@ def reduce_structure(structure: Path, output: Path, **options: Any) -> None:
     loaded = load_structure(structure, steps)
     steps.end()
     show(_lines(loaded.frame))
-    body = reduce_frame(
-        **vars(loaded),
+    body = reduce_structure(
+        loaded,
         solver=solver,
         progress=steps,
         advance=steps.advance,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ from ffr_prep.errors import InputError
 from ffr_prep.frame import Frame, Member, Shell
 from ffr_prep.gmsh_source import WITH_UNIT, LinesAndFaces, declared_unit, faces_from_gmsh, lines_from_gmsh
 from ffr_prep.mesh import UNITS, check_request, choice
+from ffr_prep.progress import Stages, no_stages
 
 Array = np.ndarray
 
@@ -25,7 +26,7 @@ def read_frame(
     unit: str | None = None,
     size: float | None = None,
     numbers: Mapping[str, float] | None = None,
-    progress: Callable[[str], None] | None = None,
+    progress: Stages = no_stages,
 ) -> Frame:
     """A frame of beams and plates from the curves and surfaces of a file, in metres; geometry is meshed by gmsh first.
 
@@ -45,8 +46,7 @@ def read_frame(
     check_request(path, unit, size, numbers, 1)
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"{path}: frames are read from {', '.join(SUFFIXES)}; convert it with gmsh -save to .msh")
-    if progress:
-        progress("read the frame")
+    progress("read the frame")
     declared = declared_unit(path) if path.suffix.lower() in WITH_UNIT else "m"
     if shells:
         found = faces_from_gmsh(path, unit=declared, size=size, numbers=numbers)

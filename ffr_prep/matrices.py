@@ -113,13 +113,13 @@ def _reduced(
     assessed = _assessed(model, coupled, body, L, basis, quality) if quality else None
     tell("integrate the inertia")
     Phi = ties @ basis.Z
-    integrals, mass, doubts = _integrals(model, Phi)
+    integrals, mass, doubts = integrals_of(model, Phi)
     warnings = [*precision_warnings(model), *doubts]
     return FlexibleBody(
         name=name,
         omega2=basis.omega2,
         interfaces=interface_shapes(coupled, basis),
-        surface=_surface(model, Phi),
+        surface=surface_of_nodes(model, Phi),
         provenance=completed(
             record(model, mass, interfaces, reference, reduction, coupled, warnings)
             | {"solver": described(solver)}
@@ -150,7 +150,7 @@ def _assessed(model: MatrixModel, coupled: CoupledModel, body: FreeBody, L: Arra
     return assess(coupled, body, L, basis, band)
 
 
-def _surface(model: MatrixModel, Phi: Array) -> Surface | None:
+def surface_of_nodes(model: MatrixModel, Phi: Array) -> Surface | None:
     """The triangles with the translations of their nodes; None without triangles."""
     if model.triangles is None:
         return None
@@ -196,7 +196,7 @@ def _epsilon(coupled: CoupledModel) -> float:
 # ---- inertia ------------------------------------------------------------------------------------------------------
 
 
-def _integrals(model: MatrixModel, Phi: Array) -> tuple[InertiaIntegrals, str, list[str]]:
+def integrals_of(model: MatrixModel, Phi: Array) -> tuple[InertiaIntegrals, str, list[str]]:
     """The integrals, how they were found, and warnings."""
     m = scalar_mass(model.M, model.dofs)
     if m is not None:

@@ -6,7 +6,7 @@ Everything is in metres: the unit of a file is converted once, on reading.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -20,6 +20,7 @@ from ffr_prep.elements import FACE_TRIANGLES, KINDS, jacobian_determinants
 from ffr_prep.errors import InputError
 from ffr_prep.gmsh_source import BY_GMSH, GEOMETRY, IGES, WITH_UNIT, declared_unit, from_gmsh
 from ffr_prep.mesh_source import Source
+from ffr_prep.progress import Stages, no_stages
 from ffr_prep.sides import joined_by_faces, joined_by_nodes, outer_faces, whole_faces
 
 Array = np.ndarray
@@ -75,7 +76,7 @@ def read_mesh(
     size: float | None = None,
     numbers: Mapping[str, float] | None = None,
     order: int = 2,
-    progress: Callable[[str], None] | None = None,
+    progress: Stages = no_stages,
 ) -> Mesh:
     """A mesh from a file, in metres; geometry (.geo, .step, .iges, .brep) is meshed by gmsh first.
 
@@ -93,8 +94,7 @@ def read_mesh(
     """
     path, numbers = Path(path), dict(numbers or {})
     check_request(path, unit, size, numbers, order)
-    if progress:
-        progress("read the mesh")
+    progress("read the mesh")
     source, file_unit = _read(path, unit, size, numbers, order)
     if not source.blocks:
         raise InputError(f"{path} has no volume elements; only solids can be reduced, not surfaces or beams")

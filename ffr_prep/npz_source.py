@@ -12,13 +12,13 @@ units       text   such as "mm-t-s"; optional
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.body import save_arrays
 from ffr_prep.errors import InputError
 from ffr_prep.matrix_model import MatrixModel
 from ffr_prep.matrix_source import NodeTable, model_of
@@ -62,14 +62,7 @@ def save_matrices(model: MatrixModel, path: str | Path) -> Path:
         arrays |= {f"{name}/{key}": np.array(part) for key, part in parts.items()}
     if model.triangles is not None:
         arrays["triangles"] = model.labels[model.triangles]
-    temporary = path.with_name(path.name + ".part")
-    try:
-        with open(temporary, "wb") as stream:
-            np.savez_compressed(stream, **arrays)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
-    return path
+    return save_arrays(arrays, path)
 
 
 def arrays_of(path: Path) -> dict[str, Array]:

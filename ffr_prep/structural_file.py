@@ -11,8 +11,14 @@
     material = "steel"
     [interfaces.left_foot]            # at a group of nodes of the same name
 
-Paths are relative to the file; SI units but for the numbers of the geometry, whose unit it names. The whole schema is in the
-models below.
+Paths are relative to the file; SI units but for the numbers of the geometry, whose unit it names. The whole schema is
+`ffr_prep.structural_schema`. Solids may be tied to the frame:
+
+    ties = [["frame.tip", "eye.bore"]]
+    [solids.eye]
+    file = "eye.step"
+    material = "steel"
+    interfaces = {bore = {}, pin = {kind = "mean"}}
 """
 
 from __future__ import annotations
@@ -21,234 +27,58 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import ValidationError
+from threadpoolctl import threadpool_limits
 
+from ffr_prep.body import FlexibleBody
 from ffr_prep.errors import InputError
+from ffr_prep.factor import CHOLESKY, Solver
 from ffr_prep.frame import Frame, Member, Shell, joined, named, panel, polyline, triangulated
 from ffr_prep.frame_source import read_frame
 from ffr_prep.interface import InterfaceRegion
+from ffr_prep.krylov import Krylov
 from ffr_prep.material import Material, material
-from ffr_prep.reduction import CraigBampton, Eigenmodes, Guyan, Reduction, Rubin, Union
+from ffr_prep.mesh import Mesh, read_mesh
+from ffr_prep.model import reduce_model
+from ffr_prep.progress import Advance, Stages, no_advance, no_stages
+from ffr_prep.reduction import CharacteristicModes, CraigBampton, Eigenmodes, Guyan, Reduction, Rubin, Union
 from ffr_prep.reference import FixedTo, MeanAxis, ReferenceConditions, SimplySupported, Support, Supports
 from ffr_prep.section import Section, circle, general, i_section, rectangle, shear_rigid, shifted, tube
 from ffr_prep.selection import Accuracy, Band, Selection, UpTo
+from ffr_prep.solid_model import solid_model
+from ffr_prep.solids import Materials
 from ffr_prep.static_shapes import AttachmentModes, InertiaRelief
-
-Vector = tuple[float, float, float]
-Progress = Callable[[str], None]
-
-
-class _Strict(BaseModel):
-    """Unknown keys are mistakes; numbers must be finite."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-
-class RectangleEntry(_Strict):
-    """Width b along z', height h along y' [m]."""
-
-    shape: Literal["rectangle"]
-    b: float
-    h: float
-
-
-class CircleEntry(_Strict):
-    """Diameter d [m]."""
-
-    shape: Literal["circle"]
-    d: float
-
-
-class TubeEntry(_Strict):
-    """Outer diameter d and wall t [m]."""
-
-    shape: Literal["tube"]
-    d: float
-    t: float
-
-
-class IEntry(_Strict):
-    """Height h, width b, web and flange thickness [m]."""
-
-    shape: Literal["i"]
-    h: float
-    b: float
-    web: float
-    flange: float
-
-
-class GeneralEntry(_Strict):
-    """A section by its constants, as in `ffr_prep.section.general`."""
-
-    shape: Literal["general"]
-    A: float
-    Iy: float
-    Iz: float
-    J: float
-    ky: float | None = None
-    kz: float | None = None
-
-
-SectionEntry = Annotated[RectangleEntry | CircleEntry | TubeEntry | IEntry | GeneralEntry, Field(discriminator="shape")]
-
-
-class MaterialEntry(_Strict):
-    """Young's modulus [Pa], Poisson's ratio, density [kg/m^3]."""
-
-    E: float
-    nu: float
-    rho: float
-
-
-class MemberEntry(_Strict):
-    """A beam; orientation lies in its x'y' plane, offset is (y, z) of the centroid [m]; shear = false: Euler-Bernoulli."""
-
-    section: SectionEntry
-    material: str
-    orientation: Vector | None = None
-    offset: tuple[float, float] = (0.0, 0.0)
-    shear: bool = True
-
-
-class ShellEntry(_Strict):
-    """A plate of a thickness [m]; rotary_inertia = false leaves out that of the thickness."""
-
-    thickness: float
-    material: str
-    rotary_inertia: bool = True
-
-
-class GeometryEntry(_Strict):
-    """A file as in `ffr_prep.frame_source.read_frame`; size and numbers change how a geometry is meshed."""
-
-    file: Path
-    unit: Literal["m", "cm", "mm", "in"] | None = None
-    size: float | None = None
-    numbers: dict[str, float] = {}
-
-
-class PolylineEntry(_Strict):
-    """Beams from corner to corner [m], each of several elements."""
-
-    member: str
-    corners: list[Vector]
-    elements: int = 1
-
-
-class PanelEntry(_Strict):
-    """A plate between four corners [m] of n x m elements, or of twice as many triangles."""
-
-    shell: str
-    corners: list[Vector]
-    elements: tuple[int, int]
-    triangles: bool = False
-
-
-class InterfaceEntry(_Strict):
-    """At the nodes of a group, by default the one of the same name; point [m]: where its node is."""
-
-    region: str | None = None
-    kind: Literal["rigid", "mean"] = "rigid"
-    point: Vector | None = None
-
-
-class SupportEntry(_Strict):
-    """One prevented motion of an interface."""
-
-    interface: str
-    motion: Literal["translation", "rotation"]
-    direction: Vector
-
-
-class FixedEntry(_Strict):
-    """The frame moves with an interface."""
-
-    kind: Literal["fixed"]
-    interface: str
-
-
-class SimplySupportedEntry(_Strict):
-    """The x' axis of the elastic field passes through two interfaces."""
-
-    kind: Literal["simply-supported"]
-    pin: str
-    roller: str
-
-
-class MeanAxisEntry(_Strict):
-    """The frame follows the mean motion of the mass."""
-
-    kind: Literal["mean-axis"]
-
-
-class SupportsEntry(_Strict):
-    """Any choice of prevented motions."""
-
-    kind: Literal["supports"]
-    supports: list[SupportEntry]
-
-
-ReferenceEntry = Annotated[
-    FixedEntry | SimplySupportedEntry | MeanAxisEntry | SupportsEntry, Field(discriminator="kind")
-]
-
-
-class ReductionEntry(_Strict):
-    """A reduction (see `ffr_prep.reduction`) with a number of normal modes, 10 when nothing is said, or all up to a
-    frequency [Hz], or as many as a relative accuracy of the receptances in a band [low, high, error] needs.
-    """
-
-    method: Literal["craig-bampton", "eigenmodes", "rubin", "guyan", "attachment", "inertia-relief"] = "craig-bampton"
-    modes: int | None = Field(default=None, ge=0)
-    frequency: float | None = None
-    accuracy: tuple[float, float, float] | None = None
-
-    @model_validator(mode="after")
-    def _one(self) -> ReductionEntry:
-        if sum(value is not None for value in (self.modes, self.frequency, self.accuracy)) > 1:
-            raise ValueError("modes, frequency and accuracy all say how many modes to keep: give one of them")
-        return self
-
-
-class StructureEntry(_Strict):
-    """The whole file."""
-
-    name: str | None = None
-    geometry: GeometryEntry | None = None
-    polylines: list[PolylineEntry] = []
-    panels: list[PanelEntry] = []
-    materials: dict[str, MaterialEntry] = {}
-    members: dict[str, MemberEntry] = {}
-    shells: dict[str, ShellEntry] = {}
-    nodes: dict[str, Vector] = {}
-    interfaces: dict[str, InterfaceEntry] = {}
-    reference: ReferenceEntry = MeanAxisEntry(kind="mean-axis")
-    reduction: list[ReductionEntry] = Field(default=[ReductionEntry()], min_length=1)
-    stiffening: bool = False
-    stress: bool = False
-    quality: tuple[float, float] | None = None
-
-    @field_validator("reduction", mode="before")
-    @classmethod
-    def _one_or_several(cls, value: Any) -> Any:
-        return [value] if isinstance(value, dict) else value
-
-    @model_validator(mode="after")
-    def _something(self) -> StructureEntry:
-        if self.geometry is None and not self.polylines and not self.panels:
-            raise ValueError("give a [geometry] file, [[polylines]] or [[panels]]")
-        return self
+from ffr_prep.structural import frame_model
+from ffr_prep.structural_schema import (
+    FixedEntry,
+    InterfaceEntry,
+    MemberEntry,
+    PanelEntry,
+    ReductionEntry,
+    ReferenceEntry,
+    SimplySupportedEntry,
+    SolidEntry,
+    StructureEntry,
+    SupportsEntry,
+)
+from ffr_prep.tied import tied
 
 
 @dataclass(frozen=True)
 class Structure:
-    """What a structure file holds: the arguments of `ffr_prep.structural.reduce_frame`."""
+    """What a structure file holds: a frame with its interfaces, solids tied to it, and how they are reduced together.
+
+    solids : by name, the mesh, its material or one for each volume, and its interfaces
+    ties   : pairs of interfaces "part.interface" that are joined; the frame is the part "frame"
+    """
 
     name: str
     frame: Frame
     interfaces: tuple[InterfaceRegion, ...]
+    solids: Mapping[str, tuple[Mesh, Materials, tuple[InterfaceRegion, ...]]]
+    ties: tuple[tuple[str, str], ...]
     reference: ReferenceConditions
     reduction: Reduction
     stiffening: bool
@@ -256,7 +86,7 @@ class Structure:
     quality: Band | None
 
 
-def load_structure(path: str | Path, progress: Progress | None = None) -> Structure:
+def load_structure(path: str | Path, progress: Stages = no_stages) -> Structure:
     """Read a structure file, and the geometry it names.
 
     Raises InputError for a file that cannot be read, unknown or missing entries, and whatever the frame's parts refuse;
@@ -270,7 +100,9 @@ def load_structure(path: str | Path, progress: Progress | None = None) -> Struct
         return Structure(
             name=entry.name or path.stem,
             frame=frame,
-            interfaces=tuple(InterfaceRegion(name, **vars(of)) for name, of in entry.interfaces.items()),
+            interfaces=_regions(entry.interfaces),
+            solids={name: _solid(entry, of, path.parent, progress) for name, of in entry.solids.items()},
+            ties=tuple(entry.ties),
             reference=_reference(entry.reference),
             reduction=_reduction(entry.reduction),
             stiffening=entry.stiffening,
@@ -279,6 +111,35 @@ def load_structure(path: str | Path, progress: Progress | None = None) -> Struct
         )
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
+
+
+def reduce_structure(
+    structure: Structure,
+    *,
+    solver: Solver = CHOLESKY,
+    progress: Stages = no_stages,
+    advance: Advance = no_advance,
+    provenance: Mapping[str, Any] | None = None,
+) -> FlexibleBody:
+    """The reduced flexible body of a structure; settings and errors as in `ffr_prep.structural.reduce_frame`."""
+    with threadpool_limits(1):  # as for solids: small dense blocks, and reproducible
+        model = frame_model(structure.frame, structure.interfaces, progress)
+        if structure.solids:
+            solids = {name: solid_model(*parts, progress) for name, parts in structure.solids.items()}
+            model = tied({"frame": model, **solids}, structure.ties)
+        return reduce_model(
+            model,
+            name=structure.name,
+            reference=structure.reference,
+            reduction=structure.reduction,
+            stiffening=structure.stiffening,
+            stress=structure.stress,
+            quality=structure.quality,
+            solver=solver,
+            progress=progress,
+            advance=advance,
+            provenance=provenance,
+        )
 
 
 def _read(path: Path) -> StructureEntry:
@@ -309,7 +170,7 @@ def _frame(
     folder: Path,
     members: Mapping[str, Member],
     shells: Mapping[str, Shell],
-    progress: Progress | None,
+    progress: Stages,
 ) -> Frame:
     made = [polyline(p.corners, _of(members, "member", p.member), elements=p.elements) for p in entry.polylines]
     made += [_panel(p, shells) for p in entry.panels]
@@ -329,6 +190,21 @@ def _frame(
             )
         )
     return joined(*made) if len(made) > 1 else made[0]
+
+
+def _regions(entries: Mapping[str, InterfaceEntry]) -> tuple[InterfaceRegion, ...]:
+    return tuple(InterfaceRegion(name, **vars(of)) for name, of in entries.items())
+
+
+def _solid(
+    entry: StructureEntry, of: SolidEntry, folder: Path, progress: Stages
+) -> tuple[Mesh, Materials, tuple[InterfaceRegion, ...]]:
+    mesh = read_mesh(
+        folder / of.file, unit=of.unit, size=of.size, numbers=of.numbers, order=of.order, progress=progress
+    )
+    if isinstance(of.material, str):
+        return mesh, _material(entry, of.material), _regions(of.interfaces)
+    return mesh, {volume: _material(entry, name) for volume, name in of.material.items()}, _regions(of.interfaces)
 
 
 def _panel(entry: PanelEntry, shells: Mapping[str, Shell]) -> Frame:
@@ -403,8 +279,10 @@ def _part(entry: ReductionEntry) -> Reduction:
         "eigenmodes": Eigenmodes(selection),
         "rubin": Rubin(selection),
         "guyan": Guyan(),
+        "characteristic": CharacteristicModes(selection, entry.interface_modes),
         "attachment": AttachmentModes(),
         "inertia-relief": InertiaRelief(),
+        "krylov": Krylov(entry.moments, tuple(entry.match)),
     }
     return made[entry.method]
 

@@ -19,9 +19,10 @@ from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
 from ffr_dyn.drivers import Driver
 from ffr_dyn.errors import InputError
-from ffr_dyn.forces import SpringDamper
+from ffr_dyn.forces import Load, SpringDamper
 from ffr_dyn.integrators import RK4
 from ffr_dyn.joints import Joint
+from ffr_dyn.measurement import Measurement
 from ffr_dyn.result_file import load_result, save_result
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.timefunction import polynomial
@@ -140,8 +141,6 @@ def test_a_small_forward_run_is_what_the_matrices_say():
 
 
 def test_a_load_as_input_is_its_own_force():
-    from ffr_dyn.forces import Load
-
     scene = hanging(-np.pi / 2, Load("wind", "rod.b", (3.0, 0, 0)))
     one = linearise(scene, inputs=("wind",)).B
     other = linearise(scene, inputs=(MarkerEffort("wind2", "rod.b", (1, 0, 0)),)).B
@@ -156,6 +155,20 @@ def test_the_result_can_be_kept(tmp_path):
     assert len(table_of_modes(found)) == 1
 
 
+def test_any_quantity_may_be_an_output():
+    """Accelerations, powers and measurements, which no result keeps unless told: about the hanging pendulum at an angle y,
+    the tip accelerates by -(g/(4/3)) 2 y along x, and a force of 3 N along x has the power 3 (2 y_dot)."""
+    scene = hanging(-np.pi / 2, Load("wind", "rod.b", (3.0, 0, 0)))
+    scene = replace(scene, loads=(), measurements=(Measurement("far", "ground.O", "rod.b", "acceleration"),))
+    found = linearise(scene, outputs=("rod.b.acceleration.x", "rod.b.position.x", "measured.far.x"))
+    np.testing.assert_allclose(found.C[0], [-9.81 / (4 / 3) * found.C[1, 0], 0.0], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(found.C[2], found.C[0], atol=1e-12)
+    blown = replace(hanging(0.0), gravity=(0, 0, 0), loads=(Load("wind", "rod.b", (0, 3.0, 0)),))
+    power = linearise(blown, outputs=("wind.power", "rod.b.velocity.y"))
+    np.testing.assert_allclose(power.C[0], 3 * power.C[1], rtol=1e-6, atol=1e-6)
+    assert abs(power.C[0, 1]) > 1
+
+
 def test_a_state_in_motion_is_noted():
     assert "no equilibrium" in linearise(hanging(0.3)).notes[-1]
 
@@ -167,6 +180,10 @@ def test_bad_input():
         linearise(hanging(0.0), inputs=("wind",))
     with pytest.raises(InputError, match="several components"):
         linearise(hanging(0.0), outputs=("rod.R",))
+    with pytest.raises(InputError, match="adds up over time"):
+        linearise(hanging(0.0, Load("wind", "rod.b", (3.0, 0, 0))), outputs=("wind.work",))
+    with pytest.raises(InputError, match=r"rod\.b\.position"):
+        linearise(hanging(0.0), outputs=("rod.b.positio.x",))
     with pytest.raises(InputError, match="no coordinate 'stroke'"):
         linearise(hanging(0.0), inputs=(JointEffort("f", "A", "stroke"),))
     with pytest.raises(InputError, match="three numbers"):

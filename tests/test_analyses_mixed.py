@@ -9,12 +9,14 @@ import pytest
 from planar_beam import planar_beam
 from test_analyses_kinematic import bar
 
+from ffr_dyn.analyses.assemble import assemble
 from ffr_dyn.analyses.bounded import Bounded
-from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort, recorded, with_effort
+from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort, recorded, with_effort, with_units
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.inverse import QuasiStatic, inverse
 from ffr_dyn.analyses.kinematic import kinematic
 from ffr_dyn.analyses.mixed import Causal, mixed
+from ffr_dyn.analyses.servo import at_moment, internal_values, servo
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
 from ffr_dyn.drivers import Driver, PointDriver
@@ -391,3 +393,28 @@ def test_a_tip_path_out_of_reach_is_refused():
     far = replace(TIP, y=rest_to_rest(1.5, 0.6))
     with pytest.raises(SimulationError, match="no position belongs to the known motions: they are out of reach"):
         mixed(one_link(far), unknown=(MOTOR,), end=0.6, output_step=0.05, solution=Bounded(0.1, 0.1))
+
+
+def cart_with_pendulum(*drivers) -> Scene:
+    """A cart on x with a rigid pendulum: at the horizontal, forces on the cart do not turn it."""
+    cart = rigid_body("cart", mass=1.0, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
+    rod = rigid_body("rod", mass=0.5, inertia=(0.01, 0.01, 0.01), points={"pivot": (-0.5, 0, 0)})
+    joints = (
+        Joint("rail", "translational", "ground.O", "cart.c", axis=(1, 0, 0)),
+        Joint("pin", "revolute", "cart.c", "rod.pivot"),
+    )
+    bodies = (Body("cart", cart), Body("rod", rod, (0, -0.5, 0), (0, 0, -np.pi / 2)))
+    return Scene(bodies, joints, drivers, ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0))
+
+
+def test_a_position_in_which_the_forces_do_not_move_what_is_known():
+    """The angle of the pendulum known, the force on the cart unknown, through the horizontal at half a second."""
+    turn = Driver("turn", "pin", polynomial(-1.0, 2.0))
+    push = JointEffort("push", "rail", "stroke")
+    own = servo(assemble(with_units(cart_with_pendulum(turn), (push,))), ("turn",), (push,), (0.0, 1.0))
+    start = assemble(with_units(cart_with_pendulum(turn), (push,)))
+    w = internal_values(own, start.x, start.v)
+    for time in (0.0, 0.2, 0.45):
+        assert np.isfinite(at_moment(own, time, w, start.x).u).all()
+    with pytest.raises(SimulationError, match=r"at t = 0\.5 s the unknown forces no longer determine"):
+        at_moment(own, 0.5, w, start.x)

@@ -13,8 +13,9 @@ from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
 from ffr_dyn.drivers import Driver
-from ffr_dyn.errors import InputError
+from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.forces import Load, SpringDamper
+from ffr_dyn.formula import formula
 from ffr_dyn.integrators import RK4
 from ffr_dyn.joints import Joint
 from ffr_dyn.scene import Body, Scene
@@ -111,3 +112,11 @@ def test_a_free_mechanism_is_refused_by_name():
         static(free)
     with pytest.raises(InputError, match=r"nothing holds the motion A\.angle"):
         static(replace(hanging(0.3), gravity=(0, 0, -9.81)))
+
+
+def test_forces_that_are_not_finite_are_named():
+    """A formula that has no value at the time of the equilibrium."""
+    scene = hanging(0.0, Load("wind", "rod.b", (formula("1 / t"), 0, 0)))
+    assert static(scene, time=1.0).attributes["stable"]
+    with pytest.raises(SimulationError, match="forces are not finite near the equilibrium"):
+        static(scene, time=0.0)

@@ -8,8 +8,8 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from ffr_prep import body as body_module
 from ffr_prep.body import BodyError, FlexibleBody, Interface, Surface, load_body, rigid_body, save_body, truncated
+from ffr_prep.body import file as body_file
 
 
 def some_body(n=3):
@@ -194,7 +194,7 @@ def test_a_failed_write_leaves_the_existing_file(tmp_path, monkeypatch):
         stream.write(b"half a file")
         raise OSError("no space left on device")
 
-    monkeypatch.setattr(body_module.np, "savez_compressed", full_disk)
+    monkeypatch.setattr(body_file.np, "savez_compressed", full_disk)
     with pytest.raises(OSError, match="no space left"):
         save_body(some_body(2), path)
     assert path.read_bytes() == before

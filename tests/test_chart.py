@@ -482,6 +482,16 @@ def test_bad_input_is_refused_in_a_sentence(scene_file, arguments, message):
     assert message in str(done.exception)
 
 
+def test_the_example_of_the_documentation_runs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    text = (Path(__file__).resolve().parent.parent / "docs" / "chart.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.S)
+    code = code.replace("workers=2", "workers=0").replace("end=0.5, output_step=0.01", "end=0.1, output_step=0.05")
+    exec(compile(code, "chart.md", "exec"), {"scene": swinging()})
+    assert (tmp_path / "chart.png").stat().st_size > 1000
+    assert "full model" in capsys.readouterr().out
+
+
 def test_modes_of_rigid_bodies_cannot_vary():
     with pytest.raises(InputError, match="no flexible body: there are no modes and no inertia terms to vary"):
         models_of(rigid(), (2, None))

@@ -38,6 +38,7 @@ from ffr_dyn.settings import Inverse, Kinematic, Linearise, Mixed, MomentSetting
 from ffr_dyn.stabilisation import Baumgarte, Drifting, Projection
 from ffr_dyn.surface_loads import ModalForce, NodalForces, Pressure
 from ffr_dyn.timefunction import evaluate, harmonic, polynomial, table
+from ffr_dyn.toml_lines import lines_of
 from ffr_prep.body import FlexibleBody, load_body, rigid_body, save_body
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -204,10 +205,13 @@ def test_included_files_are_merged_and_keep_their_own_folder(tmp_path):
         ('include = ["none.toml"]\n', ["none.toml does not exist"]),
         ('include = "numbers.toml"\n', ["must be a list of file names"]),
         ('include = ["/numbers.toml"]\n', ["must be relative"]),
-        ("gravity = [0, 0, -9.81]\n", ["scene.toml: gravity is given in", "bar.toml too"]),
-        ("[springs.rope]\nstiffness = 1\n", ["scene.toml: springs.rope.stiffness is given in", "bar.toml too"]),
+        ("gravity = [0, 0, -9.81]\n", ["scene.toml, line 4: gravity is given in", "bar.toml, line 1 too"]),
+        ("[springs.rope]\nstiffness = 1\n", ["springs.rope.stiffness is given in", "bar.toml, line 2 too"]),
         ("[springs\n", ["bar.toml is not a readable TOML file", "line 1"]),
-        ("[bodies.bar]\nfile = 'cloud.ffr'\ncolour = 'red'\n", ["bar.toml: bodies.bar: 'colour' is not a known entry"]),
+        (
+            "[bodies.bar]\nfile = 'cloud.ffr'\ncolour = 'red'\n",
+            ["bar.toml, line 3: bodies.bar: 'colour' is not"],
+        ),
     ],
 )
 def test_mistakes_in_included_files_are_named_with_the_file(tmp_path, included, words):
@@ -276,6 +280,70 @@ def test_mistakes_are_named_with_their_place(tmp_path, old, new, words):
         load_scene(path)
     for word in ["scene.toml", *words]:
         assert word in str(caught.value)
+
+
+KEYS = [
+    k
+    for k, line in enumerate(SCENE.splitlines())
+    if " = " in line and not line.startswith(("bar.", "speed", "mom", "O "))
+]
+
+
+@pytest.mark.parametrize("k", KEYS, ids=[SCENE.splitlines()[k].partition(" ")[0] for k in KEYS])
+def test_every_misspelt_key_is_named_with_its_line(tmp_path, k):
+    lines = SCENE.splitlines()
+    key, _, rest = lines[k].partition(" ")
+    lines[k] = f"{key}x {rest}"
+    with pytest.raises(InputError, match=rf"scene\.toml, line {k + 1}: .*'{key}x' is not a known entry"):
+        load_scene(written(tmp_path, "\n".join(lines)))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "begins"),
+    [
+        ("[0, -9.81, 0]", '[0, "9.81 kg", 0]', "gravity ="),
+        ('"5 N/mm"', '"5 !"', "stiffness ="),
+        ('"2 * bar.length"', '"2 * speed + bar.mass"', "bar.mass ="),
+        ('kind = "revolute"', 'kind = "revolut"', "[joints.hinge]"),
+        ('j = "bar.a"', 'j = "bar.c"', "[bodies.bar]"),
+        ('marker = "bar.b"', "", "[loads.push]"),
+        ("[drivers]", '[drivers.m]\njoint = "hing"\nfunction = 1', "[drivers.m]"),
+        ('inertia = ["bar.mass', 'inertia = [-1.0, "bar.mass', "inertia ="),
+        ('outputs = ["default", "*.power"]', 'outputs = [\n  "default",\n  3,\n]', "outputs ="),
+    ],
+)  # fmt: skip
+def test_complaints_tell_the_line(tmp_path, old, new, begins):
+    text = changed(old, new)
+    line = next(k for k, line in enumerate(text.splitlines(), start=1) if line.startswith(begins))
+    with pytest.raises(InputError, match=rf"scene\.toml, line {line}: "):
+        load_scene(written(tmp_path, text))
+
+
+def test_lines_of_a_text():
+    text = '''# a comment
+a.b = 1
+["c d"]          # a table
+e = [
+  1,             # continued
+  {f = 2},
+]
+g = """
+[no.table]
+h = 1
+"""
+[[i]]
+j = 1
+[[i]]
+j = {k = 2}
+'''
+    found = lines_of(text)
+    assert found[("a", "b")] == 2
+    assert found[("c d",)] == 3
+    assert found[("c d", "e", "1", "f")] == 4
+    assert found[("c d", "g")] == 8
+    assert found[("i", "0", "j")] == 13
+    assert found[("i", "1", "j", "k")] == 15
+    assert ("no", "table") not in found
 
 
 # ---- there and back -------------------------------------------------------------------------------------------------

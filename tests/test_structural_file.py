@@ -13,14 +13,14 @@ from ffr_prep.body import load_body
 from ffr_prep.cli import cli, main
 from ffr_prep.errors import InputError
 from ffr_prep.frame import Member, Shell, check_frame
+from ffr_prep.krylov import Krylov
 from ffr_prep.material import Material, material
-from ffr_prep.reduction import CraigBampton, Eigenmodes, Guyan, Rubin, Union
+from ffr_prep.reduction import CharacteristicModes, CraigBampton, Eigenmodes, Guyan, Rubin, Union
 from ffr_prep.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports
 from ffr_prep.section import circle, general, i_section, rectangle, shear_rigid, shifted, tube
 from ffr_prep.selection import Accuracy, Band, UpTo
 from ffr_prep.static_shapes import AttachmentModes, InertiaRelief
-from ffr_prep.structural import reduce_frame
-from ffr_prep.structural_file import load_structure
+from ffr_prep.structural_file import load_structure, reduce_structure
 
 ROOT = Path(__file__).resolve().parent.parent
 LINE = """
@@ -57,7 +57,7 @@ def test_the_file_of_the_documentation(tmp_path):
     profile = shifted(i_section(0.2, 0.1, 0.006, 0.009), 0.1, 0)
     assert loaded.frame.members == (Member(profile, material("steel"), (1.0, 0.0, 0.0)),)
     assert len(loaded.frame.points) == 15
-    body = reduce_frame(**vars(loaded))
+    body = reduce_structure(loaded)
     assert body.stiffening is not None
     assert body.surface.stress is not None
 
@@ -138,6 +138,8 @@ materials.own = {E = 1e9, nu = 0.25, rho = 1200}
         ('{method = "rubin", modes = 3}', Rubin(3)),
         ('{method = "guyan"}', Guyan()),
         ('{method = "attachment"}', AttachmentModes()),
+        ('{method = "characteristic", modes = 3, interface_modes = 4}', CharacteristicModes(3, 4)),
+        ('{method = "krylov", moments = 3, match = [0, 120]}', Krylov(3, (0.0, 120.0))),
         ("{frequency = 500}", CraigBampton(UpTo(500.0))),
         ("{accuracy = [10, 500, 0.05]}", CraigBampton(Accuracy(Band(10.0, 500.0), 0.05))),
         ('[{modes = 2}, {method = "inertia-relief"}]', Union((CraigBampton(2), InertiaRelief()))),
@@ -149,8 +151,55 @@ def test_reductions(tmp_path, text, expected):
 
 def test_the_quality_of_a_structure_is_reported(tmp_path):
     text = "reduction = {modes = 2}\nquality = [5, 200]\n" + LINE.replace("elements = 2", "elements = 8")
-    body = reduce_frame(**vars(load_structure(written(tmp_path, text))))
+    body = reduce_structure(load_structure(written(tmp_path, text)))
     assert body.provenance["quality"]["band"] == [5, 200]
+
+
+SOLID = """
+reference = {kind = "fixed", interface = "root"}
+reduction = {modes = 4}
+ties = [["frame.b", "block.left"]]
+polylines = [{member = "bar", corners = [[-0.5, 0.05, 0.05], [0, 0.05, 0.05]], elements = 8}]
+members.bar = {section = {shape = "rectangle", b = 0.1, h = 0.1}, material = "steel", orientation = [0, 1, 0]}
+nodes = {root = [-0.5, 0.05, 0.05], b = [0, 0.05, 0.05]}
+interfaces = {root = {}, b = {}}
+[solids.block]
+file = "box.geo"
+material = "steel"
+numbers = {nx = 6, ny = 1, nz = 1}
+interfaces = {left = {}, right = {kind = "mean"}}
+"""
+
+
+def test_a_solid_is_tied_to_a_frame(tmp_path):
+    """Half beam, half solid: mass, length and frequencies of the whole cantilever; by file, by command."""
+    (tmp_path / "box.geo").symlink_to(ROOT / "meshes" / "box.geo")
+    body = reduce_structure(load_structure(written(tmp_path, SOLID)))
+    assert body.mass == pytest.approx(material("steel").rho * 1.5 * 0.01, rel=1e-9)
+    assert [i.name for i in body.interfaces] == ["root", "right"]
+    assert body.provenance["ties"] == [["frame.b", "block.left"]]
+    steel, L = material("steel"), 1.5
+    slender = 1.8751040687**2 / (2 * np.pi * L**2) * np.sqrt(steel.E * 0.01**2 / 12 / (steel.rho * 0.01))
+    assert slender * 0.95 < body.frequencies[0] < slender
+    main(["reduce-structure", str(tmp_path / "bar.toml"), "-o", str(tmp_path / "b.ffr")])
+    np.testing.assert_array_equal(load_body(tmp_path / "b.ffr").PP_dm, body.PP_dm)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('ties = [["frame.b", "block.left"]]', "", "solids and ties need each other"),
+        ("[solids.block]", "[solids.frame]", "the part 'frame' is that of beams"),
+        ('"block.left"', '"block.lef"', "'lef'"),
+        ('interfaces = {left = {}, right = {kind = "mean"}}', "", "solids.block.interfaces: Field required"),
+        ('file = "box.geo"', 'file = "none.geo"', "none.geo does not exist"),
+    ],
+)
+def test_ties_that_cannot_be(tmp_path, old, new, says):
+    (tmp_path / "box.geo").symlink_to(ROOT / "meshes" / "box.geo")
+    assert old in SOLID
+    with pytest.raises(InputError, match=says):
+        reduce_structure(load_structure(written(tmp_path, SOLID.replace(old, new))))
 
 
 # ---- guards -----------------------------------------------------------------------------------------------------------
@@ -200,5 +249,5 @@ def test_a_failed_reduction_keeps_the_old_body(tmp_path):
 
 def test_the_same_file_gives_the_same_body(tmp_path):
     path = written(tmp_path, "reduction = {modes = 4}" + LINE)
-    one, two = (reduce_frame(**vars(load_structure(path))) for _ in range(2))
+    one, two = (reduce_structure(load_structure(path)) for _ in range(2))
     np.testing.assert_array_equal(one.PP_dm, two.PP_dm)

@@ -71,10 +71,7 @@ def evaluator(system: System) -> Evaluator:
 def evaluate(at: Evaluator, time: float, x: Array, v: Array) -> Evaluation:
     """The equations at (time, x, v). Raises SimulationError as a forward run would, except for dependent rows."""
     system, work = at.system, at.work
-    at.machine.x[:], at.machine.v[:] = x, v
-    status = record_row(at.machine, time, at.record, 0)
-    if status not in (OK, SINGULAR_CONSTRAINT):
-        raise failure(system, work, status, time)
+    status = _look(at, time, x, v)
     rows, bodies, across = work.rows, work.bodies, locked(system.layout)
     still = np.zeros(across.size)
     return Evaluation(
@@ -87,6 +84,22 @@ def evaluate(at: Evaluator, time: float, x: Array, v: Array) -> Evaluation:
         rows.lam.copy(),
         status == SINGULAR_CONSTRAINT,
     )
+
+
+def accelerations(at: Evaluator, time: float, x: Array, v: Array) -> Array:
+    """(V,) d/dt of v, global axes. Raises SimulationError as a forward run would."""
+    if _look(at, time, x, v) == SINGULAR_CONSTRAINT:
+        raise failure(at.system, at.work, SINGULAR_CONSTRAINT, time)
+    return at.record.vd[0].copy()
+
+
+def _look(at: Evaluator, time: float, x: Array, v: Array) -> int:
+    """Evaluate; a status, which is OK or that of dependent rows."""
+    at.machine.x[:], at.machine.v[:] = x, v
+    status = record_row(at.machine, time, at.record, 0)
+    if status not in (OK, SINGULAR_CONSTRAINT):
+        raise failure(at.system, at.work, status, time)
+    return int(status)
 
 
 def locked(place: Layout) -> Array:

@@ -20,9 +20,11 @@ from ffr_dyn.kernels.tables import (
     AT,
     NOT_CONVERGED,
     NOT_FINITE,
+    NOW,
     OK,
     SINGULAR_BODY,
     SINGULAR_CONSTRAINT,
+    STEP_TOO_SMALL,
     Record,
     Work,
 )
@@ -39,6 +41,7 @@ from ffr_prep.body import Surface
 Array = np.ndarray
 
 RK4_LIMIT = 2.83  # imaginary stability limit of RK4, Hairer & Wanner 1996, IV.2
+LOOKS = 10  # of a quantity that adds up, from row to row, where the method chooses its steps
 SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, file and keyboard
 
 
@@ -83,7 +86,8 @@ def forward(
     the time, the body or joint, the likely cause and what to change.
     """
     method = method if method is not None else ROS2(step=output_step / 10)
-    substeps, rows = _counts(end - start, output_step, method.step)
+    spacing = output_step / LOOKS if method.controlled else method.step
+    substeps, rows = _counts(end - start, output_step, spacing)
     _check_step(scene, method)
     assembled = assemble(scene, time=start)
     wanted = selected(assembled.system, outputs)
@@ -91,10 +95,13 @@ def forward(
     span = (start, end, output_step)
     mark = _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
     header = _header(scene, assembled, method, stabilisation, span)
+    machine = new_machine(
+        assembled.system, assembled.x, assembled.v, method, gains(stabilisation), start=start, spacing=spacing
+    )
     if resume is not None and Path(resume).exists():
-        run = _resumed(assembled, method, stabilisation, Path(resume), mark)
+        run = _resumed(Path(resume), mark, machine)
     else:
-        run = _started(assembled, method, stabilisation, start, wanted)
+        run = _started(assembled, machine, start, wanted)
     _check_resumed(run, substeps * rows, output_step / substeps)
     path = resume if path is None else path
     watch = Stopwatch() if stopwatch is None else stopwatch
@@ -130,7 +137,7 @@ def _check_step(scene: Scene, method: Integrator) -> None:
     """Refuse an explicit step that cannot be stable for any state."""
     fastest = max(scene.bodies, key=lambda body: body.model.omega2.max(initial=0.0))
     omega = float(np.sqrt(fastest.model.omega2.max(initial=0.0)))
-    if not method.implicit and method.step * omega > RK4_LIMIT:
+    if not method.implicit and not method.controlled and method.step * omega > RK4_LIMIT:
         raise InputError(
             f"{type(method).__name__} with a step of {method.step:g} s is unstable: body {fastest.name!r} has a mode of "
             f"{omega / 2 / np.pi:.4g} Hz, which needs a step below {RK4_LIMIT / omega:.2g} s (joints lower this further); "
@@ -138,11 +145,8 @@ def _check_step(scene: Scene, method: Integrator) -> None:
         )
 
 
-def _started(
-    assembled: Assembled, method: Integrator, stabilisation: Stabilisation, start: float, wanted: Mapping[str, Entry]
-) -> _Run:
+def _started(assembled: Assembled, machine: Machine, start: float, wanted: Mapping[str, Entry]) -> _Run:
     """The run with its first row."""
-    machine = new_machine(assembled.system, assembled.x, assembled.v, method, gains(stabilisation))
     first = new_record(assembled.system, 1)
     status = record_row(machine, start, first, 0)
     if status != OK:
@@ -187,8 +191,14 @@ def _advance(
             run.done += filled // looks * substeps
             yield times, part
         if status != OK:
-            raise failure(system, run.machine.work, status, start + int(steps[0]) * method.step)
+            raise failure(system, run.machine.work, status, reached(run.machine, start))
         count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
+
+
+def reached(machine: Machine, start: float) -> float:
+    """Time of the machine's state [s], for a run from `start`."""
+    clock, control = machine.tables.clock, machine.tables.control
+    return float(control.numbers[NOW]) if control.numbers.size else start + int(clock.steps[0]) * float(clock.time[1])
 
 
 def with_all_reactions(assembled: Assembled, record: Record) -> Record:
@@ -236,6 +246,12 @@ def failure(system: System, work: Work, status: int, time: float) -> BaseExcepti
         )
     if status == NOT_CONVERGED:
         return SimulationError(f"{at} the iterations of the step do not converge, {_unconverged(system, where)}")
+    if status == STEP_TOO_SMALL:
+        return SimulationError(
+            f"{at} the step has become too small: the motion is not smooth there (an impact, a jump of a force or of a "
+            "driver), or the tolerances are below what rounding allows; smooth the jump, end the run before it, or use "
+            "larger tolerances"
+        )
     return SimulationError(f"{at} the run stopped: {system.user.failure or 'unknown cause'}")
 
 
@@ -285,12 +301,12 @@ def _checkpoint(run: _Run, mark: str) -> Array:
 
 def _changing(machine: Machine) -> Iterator[tuple[str, Array]]:
     """What of a machine's tables a run changes."""
-    for name in ("work", "stages", "clock", "x", "v"):
+    for name in ("work", "stages", "clock", "control", "x", "v"):
         yield from leaves(getattr(machine.tables, name), name)
 
 
-def _resumed(assembled: Assembled, method: Integrator, stabilisation: Stabilisation, path: Path, mark: str) -> _Run:
-    """The run that a result file holds, ready to go on."""
+def _resumed(path: Path, mark: str, machine: Machine) -> _Run:
+    """The run that a result file holds, ready to go on in the machine."""
     content = load_checkpoint(path)
     if content is None:
         raise InputError(f"{path} has no checkpoint: it is not the result of a forward run; run from the start")
@@ -300,11 +316,10 @@ def _resumed(assembled: Assembled, method: Integrator, stabilisation: Stabilisat
             f"{path} is the result of another scene or of other settings (step, method, start, output step, outputs): its "
             "run cannot be continued with these; run from the start, to another file if that one is still wanted"
         )
-    machine = new_machine(assembled.system, assembled.x, assembled.v, method, gains(stabilisation))
     for name, array in _changing(machine):
         array[...] = saved.arrays[f"machine.{name}"]
-    reached = saved.arrays["extremes"].copy()
-    return _Run(machine, saved.memory, [dict(earlier.quantities)], [earlier.time], reached, saved.steps)
+    extremes_then = saved.arrays["extremes"].copy()
+    return _Run(machine, saved.memory, [dict(earlier.quantities)], [earlier.time], extremes_then, saved.steps)
 
 
 def _check_resumed(run: _Run, steps: int, step: float) -> None:
@@ -355,9 +370,16 @@ def _account(scene: Scene, run: _Run, notes: list[str]) -> dict[str, Any]:
     return {
         "evaluations": int(info[1]),
         "projections": int(info[2]),
+        **_steps(run.machine),
         "largest_drift": [float(drift[0]), float(drift[1])],
         "notes": [*notes, *_singular(run.machine.work), *doubts(scene, run.extremes)],
     }
+
+
+def _steps(machine: Machine) -> dict[str, Any]:
+    """Steps that the method chose."""
+    control = machine.tables.control
+    return {"steps": int(control.counts[0]), "refused_steps": int(control.counts[1])} if control.numbers.size else {}
 
 
 def _singular(work: Work) -> list[str]:

@@ -22,6 +22,7 @@ from ffr_dyn.analyses.outcome import result_of
 from ffr_dyn.analyses.tangent import Chart, chart, derivative, rates, sizes, state, state_matrix
 from ffr_dyn.errors import InputError
 from ffr_dyn.machine import with_model
+from ffr_dyn.measure import catalogue
 from ffr_dyn.result import Axis, Quantity, Result
 from ffr_dyn.scene import Scene
 
@@ -172,17 +173,28 @@ def _output_matrices(
     near: Chart, scene: Scene, inputs: tuple[Effort | str, ...], outputs: tuple[str, ...]
 ) -> tuple[Array, Array]:
     d = near.steps.size
+    quantities = _quantities(near, outputs)
     if not outputs:
         return np.zeros((0, 2 * d)), np.zeros((0, len(inputs)))
 
     def measured(chart: Chart, deviation: Array) -> Array:
         x, v = state(chart, deviation[:d], deviation[d:])
         evaluate(chart.at, chart.time, x, v)
-        result = result_of(chart.at.system, chart.at.record, {})
+        result = result_of(chart.at.system, chart.at.record, {}, outputs=("default", *quantities))
         return np.array([_scalar(result, name) for name in outputs])
 
     C, _ = derivative(lambda deviation: measured(near, deviation), np.concatenate([near.steps, near.steps]))
     return C, _columns(lambda u: measured(_fed(near, scene, inputs, u), np.zeros(2 * d)), len(inputs))
+
+
+def _quantities(near: Chart, outputs: tuple[str, ...]) -> list[str]:
+    """The quantities of the scene of which the outputs are components; what is none of them a result will name."""
+    names = catalogue(near.at.system)
+    found = [max((n for n in names if f"{output}.".startswith(f"{n}.")), key=len, default="") for output in outputs]
+    for output, name in zip(outputs, found, strict=True):
+        if name.endswith(".work"):
+            raise InputError(f"output {output!r} adds up over time and is no function of the state; take the power")
+    return [name for name in found if name]
 
 
 def _scalar(result: Result, name: str) -> float:

@@ -46,6 +46,7 @@ Array = np.ndarray
 
 ITERATIONS = 20
 TOLERANCE = 1e-12  # of a step of the positions
+SINGULAR = 1e13  # condition of the equations for accelerations, reactions and efforts
 UNDETERMINED = 1e-8  # of the smallest singular value of P with rows and columns of length one
 
 
@@ -312,16 +313,23 @@ def _accelerated(
     matrix[:V, :V] = mass
     matrix[:V, V : V + C], matrix[V : V + C, :V] = J.T, J
     matrix[:V, V + C :], matrix[V + C :, :V] = -B, S
-    try:
-        found = np.linalg.solve(matrix, np.concatenate([now.force, gamma[own.plant], gamma[own.known]]))
-    except np.linalg.LinAlgError:
-        raise SimulationError(
-            "the unknown forces no longer determine the known motions at a position on the way"
-        ) from None
+    _check_determined(matrix, state[0])
+    found = np.linalg.solve(matrix, np.concatenate([now.force, gamma[own.plant], gamma[own.known]]))
     acceleration = found[:V]
     joints = now.jacobian[own.inner] @ acceleration - gamma[own.inner]
     y_ddot = np.concatenate([joints, acceleration[own.elastic]])
     return Moment(state[1], state[2], acceleration, found[V + C :], y_ddot, now.gamma[own.known])
+
+
+def _check_determined(matrix: Array, time: float) -> None:
+    """Rows and columns are brought to one size first, as they have different units."""
+    size = np.sqrt(np.abs(matrix).max(axis=0) * np.abs(matrix).max(axis=1))
+    scaled = matrix / np.sqrt(np.outer(size, size)) if (size > 0).all() else matrix
+    if not np.linalg.cond(scaled) < SINGULAR:
+        raise SimulationError(
+            f"at t = {time:.6g} s the unknown forces no longer determine the known motions: the mechanism passes a position "
+            "in which they do not move them; let another force be unknown, or keep away from it"
+        )
 
 
 def slope(own: ServoMotion, time: float, w: Array, near: Array) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from ffr_dyn.analyses.assemble import assemble
 from ffr_dyn.chart.measures import Measure, default_measures, measure_of
 from ffr_dyn.chart.pareto import pareto_front
-from ffr_dyn.chart.reference import Reference, distance, reference
+from ffr_dyn.chart.reference import WANTED, Reference, distance, reference
 from ffr_dyn.chart.runner import REPEATS, Failure, Job, Outcome, Pool, Span, perform
 from ffr_dyn.chart.variants import FULL, Model, Variant, grid
 from ffr_dyn.errors import InputError
@@ -119,6 +119,7 @@ def work_precision(
     stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
     repeats: int = REPEATS,
     limit: float = 60.0,
+    wanted: float = WANTED,
     tell: Callable[[str], None] = lambda line: None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Diagram:
@@ -127,14 +128,14 @@ def work_precision(
     methods  : steps [s] or tolerances by method, None for a ladder that is chosen; default all methods
     models   : what is simplified; the reference has the full one
     limit    : wall time [s] that a run may take
+    wanted   : relative error that the reference should have, see `reference`
     tell     : told how the reference is found;  progress : told how many variants are done, of how many
 
     Raises InputError for what cannot be compared, SimulationError where no reference can be verified.
     """
     measures = measures or measures_of(scene, (), span.start)
-    wanted = dict.fromkeys(METHODS) if methods is None else methods
-    variants = grid(scene, models, wanted, span.output_step)
-    found = reference(scene, span, measures, stabilisation, pool, limit=limit, tell=tell)
+    variants = grid(scene, models, dict.fromkeys(METHODS) if methods is None else methods, span.output_step)
+    found = reference(scene, span, measures, stabilisation, pool, limit=limit, wanted=wanted, tell=tell)
     jobs = [Job(scene, variant, span, measures, stabilisation, repeats, limit) for variant in variants]
     outcomes = run_variants(jobs, pool, progress)
     points = [point_of(v, o, found) for v, o in zip(variants, outcomes, strict=True) if isinstance(o, Outcome)]

@@ -21,7 +21,8 @@ from ffr_dyn.stabilisation import Stabilisation
 
 Array = np.ndarray
 
-WANTED = 1e-6  # relative to the scale of each measure: where refinement may stop
+ROUNDED = 1e-7  # below which a distance that does not fall any more is due to rounding
+WANTED = 1e-6
 POOR = 1e-2  # relative floor above which a reference is none
 FIRST_PARTS = 16  # steps per output step with which an implicit method starts
 
@@ -67,12 +68,14 @@ def reference(
     model: Model = FULL,
     methods: tuple[str, str] = ("ros3", "rk4"),
     limit: float = 60.0,
+    wanted: float = WANTED,
     tell: Callable[[str], None] = lambda line: None,
 ) -> Reference:
     """Compute and verify the reference.
 
     methods : the one that is refined first, and the one that verifies it
     limit   : wall time [s] that a single run may take
+    wanted  : distance of two runs, relative to the scale of each measure, at which refinement may stop
 
     Raises SimulationError when methods do not agree within `POOR`, or not two runs of one are possible.
     """
@@ -85,7 +88,7 @@ def reference(
     found = []
     for method in methods:
         jobs = _Jobs(scene, span, measures, stabilisation, model, method, limit)
-        refined = _refine(jobs, pool, say)
+        refined = _refine(jobs, pool, wanted, say)
         if refined is not None:
             found.append(refined)
     if len(found) < 2:
@@ -140,8 +143,11 @@ class _Jobs:
         return max(FIRST_PARTS // 2, explicit_parts(self.model.of(self.scene), self.span.output_step))
 
 
-def _refine(jobs: _Jobs, pool: Pool, say: Callable[[str], None]) -> _Refined | None:
-    """Halve the step until two runs agree, or the next would take too long; None where there are no two runs."""
+def _refine(jobs: _Jobs, pool: Pool, wanted: float, say: Callable[[str], None]) -> _Refined | None:
+    """Halve the step until two runs agree, rounding takes over, or the next run would take too long.
+
+    None where there are no two runs.
+    """
     parts, last, best = jobs.first(), None, None
     while True:
         job = jobs.job(parts)
@@ -152,10 +158,13 @@ def _refine(jobs: _Jobs, pool: Pool, say: Callable[[str], None]) -> _Refined | N
                 return best
         else:
             if last is not None:
-                best = _Refined(job.variant, outcome, distances(outcome, last))
-                worst = _badness(best)
+                found = _Refined(job.variant, outcome, distances(outcome, last))
+                worst = _badness(found)
                 say(f"{job.variant.label}: {worst:.1e} from twice the step, {outcome.wall[0]:.2g} s")
-                if worst < WANTED:
+                if best is not None and worst >= _badness(best) and worst < ROUNDED:
+                    return best
+                best = found
+                if worst < wanted:
                     return best
             if 2.2 * outcome.wall[0] > jobs.limit:
                 return best

@@ -16,6 +16,7 @@ from __future__ import annotations
 import fnmatch
 import os
 import statistics
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -243,7 +244,8 @@ def pool(workers: int | None = None, cluster: str | None = None) -> Iterator[Poo
 
 def default_workers() -> int:
     """Half the processors that this process may use, at least one."""
-    return max(1, len(os.sched_getaffinity(0)) // 2) if os.name == "posix" else max(1, (os.cpu_count() or 2) // 2)
+    processors = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+    return max(1, processors // 2)
 
 
 @contextmanager

@@ -11,14 +11,20 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.errors import InputError
-from ffr_dyn.integrators import METHODS, Integrator
+from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator, tolerances
 from ffr_dyn.scene import Scene
 from ffr_dyn.variant import Modes, vary
 from ffr_prep.body import FlexibleBody
 
 STEP, TOLERANCE = "step", "tolerance"
+
+
+def _by_tolerance(kind: type[Any]) -> Callable[[float], Integrator]:
+    return lambda relative: kind(tolerances(relative))
+
+
 # Methods that take a tolerance instead of a step, by name: what makes one from its tolerance.
-ADAPTIVE: dict[str, Callable[[float], Integrator]] = {}
+ADAPTIVE: dict[str, Callable[[float], Integrator]] = {name: _by_tolerance(kind) for name, kind in CONTROLLED.items()}
 
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 LEVELS = {True: 7, False: 4}  # steps of a ladder, each half the one before: implicit methods, explicit ones

@@ -30,11 +30,11 @@ from ffr_dyn.errors import InputError
 from ffr_dyn.kernels.actions import keep_turns
 from ffr_dyn.kernels.bodies import normalise, position_rates
 from ffr_dyn.kernels.calls import correct, evaluate, project, set_diagonal, settle, solve
-from ffr_dyn.kernels.motion import carry, farthest, largest_motion
+from ffr_dyn.kernels.motion import carry, converging, farthest, largest_motion, unconverged
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.packing import unpack_tables
 from ffr_dyn.kernels.system import finite, largest, to_velocity_rates
-from ffr_dyn.kernels.tables import NOT_CONVERGED, OK
+from ffr_dyn.kernels.tables import NOT_FINITE, OK, USER_FAILED
 from ffr_dyn.kernels.units import Unit
 from ffr_dyn.kernels.vectors import add_scaled, copy, fill
 
@@ -42,7 +42,10 @@ from ffr_dyn.kernels.vectors import add_scaled, copy, fill
 # the step's motion; corrections.
 NOW, BEFORE, NEXT, A_NOW, A_NEXT, V, MOTION, SHIFT, CORRECTION = range(9)
 # stages.numbers
-ALPHA_M, ALPHA_F, BETA, GAMMA, TOLERANCE, LIMIT, STABILISED, SCALED, STARTED, ITERATIONS = range(10)
+ALPHA_M, ALPHA_F, BETA, GAMMA, TOLERANCE, LIMIT, STABILISED, SCALED, STARTED, RATE = range(10)
+# Rows of stages.rows: multipliers before the last correction, and corrections of the position.
+LAM, ETA = range(2)
+ROUNDING = 4e-15  # of positions, over the step: what rounding leaves of a velocity
 
 
 @inlined
@@ -96,13 +99,54 @@ def newton(r, h, square, single):
     to_velocity_rates(r.model.bodies.where, r.work.bodies.A, r.work.bodies.acc, s.v[CORRECTION])
     add_scaled(s.v[NEXT], s.v[NEXT], 1.0, s.v[CORRECTION])
     if stabilised:
-        copy(s.rows[0], rows.lam)
+        copy(s.rows[ETA], rows.lam)
         for k in range(s.target.size):
             s.target[k] = rows.Phi[k] + square * s.target[k]
         project(r, s.target, s.v[MOTION])
         add_scaled(s.v[SHIFT], s.v[SHIFT], 1.0, s.v[MOTION])
         add_scaled(s.v[CORRECTION], s.v[CORRECTION], 1.0 / square, s.v[MOTION])
-        copy(rows.lam, s.rows[0])
+        copy(rows.lam, s.rows[ETA])
+
+
+@inlined
+def size_of(r, h, single):
+    """(size of the last correction, what is allowed, worst body): velocities [m/s], or unscaled accelerations and
+    multipliers."""
+    s, bodies, J = r.stages, r.model.bodies, r.work.bodies.J
+    change, worst = largest_motion(bodies, J, s.v[CORRECTION])
+    acceleration = largest_motion(bodies, J, s.v[NEXT])[0]
+    if s.numbers[SCALED] > 0.0:
+        scale = largest_motion(bodies, J, s.v[V])[0] + h * acceleration
+        return single * change, s.numbers[TOLERANCE] * scale + ROUNDING * farthest(bodies, s.x[0]) / h, worst
+    add_scaled(s.rows[LAM], s.rows[LAM], -1.0, r.work.rows.lam)
+    scale = max(acceleration, largest(r.work.rows.lam))
+    return max(change, largest(s.rows[LAM])), s.numbers[TOLERANCE] * scale, worst
+
+
+@inlined
+def iterate(r, t, h, square, single):
+    """Newton corrections until they are small enough. Returns a status."""
+    s, number = r.stages, r.stages.numbers
+    before, change, worst, converged = 0.0, 0.0, 0, False
+    rate = number[RATE] ** 0.8  # what the last step knew is worth less in this one
+    for attempt in range(int(number[LIMIT])):
+        status = evaluate(r, t + h, s.x[0], s.v[V])
+        if status != OK:
+            return status if attempt == 0 or status == USER_FAILED else unconverged(r, worst, 0.0)
+        copy(s.rows[LAM], r.work.rows.lam)
+        newton(r, h, square, single)
+        advance(r, h)
+        change, allowed, worst = size_of(r, h, single)
+        if finite(s.x[0], s.v[V]) != OK:
+            return NOT_FINITE if attempt == 0 else unconverged(r, worst, 0.0)
+        converged = converging(change, before, rate, allowed)
+        if before > 0.0:
+            rate = change / before
+        before = change
+        if converged:
+            break
+    number[RATE] = min(rate, 1.0)
+    return OK if converged else unconverged(r, worst, h * change)
 
 
 @Unit
@@ -117,41 +161,13 @@ def generalised_alpha_step(at, t, unused, unused_too):
         if status != OK:
             return status
     set_diagonal(r, square**0.5)  # in which the damping is right to a few per cent
-    for k in range(r.v.size):
-        s.v[NEXT, k] = 2.0 * s.v[NOW, k] - s.v[BEFORE, k]
+    add_scaled(s.v[NEXT], s.v[NOW], -1.0, s.v[BEFORE])
+    add_scaled(s.v[NEXT], s.v[NEXT], 1.0, s.v[NOW])
     fill(s.v[SHIFT], 0.0)
     advance(r, h)
-    before, converged = 0.0, False
-    for attempt in range(int(number[LIMIT])):
-        status = evaluate(r, t + h, s.x[0], s.v[V])
-        if status != OK:
-            return status
-        copy(s.rows[1], r.work.rows.lam)
-        newton(r, h, square, single)
-        advance(r, h)
-        number[ITERATIONS] += 1.0
-        change, worst = largest_motion(bodies, r.work.bodies.J, s.v[CORRECTION])
-        if number[SCALED] > 0.0:
-            change *= single
-            scale = largest_motion(bodies, r.work.bodies.J, s.v[V])[0]
-            scale += h * largest_motion(bodies, r.work.bodies.J, s.v[NEXT])[0]
-            allowed = number[TOLERANCE] * scale + 4e-15 * farthest(bodies, s.x[0]) / h
-        else:
-            add_scaled(s.rows[1], s.rows[1], -1.0, r.work.rows.lam)
-            change = max(change, largest(s.rows[1]))
-            scale = max(largest_motion(bodies, r.work.bodies.J, s.v[NEXT])[0], largest(r.work.rows.lam))
-            allowed = number[TOLERANCE] * scale
-        rate = change / before if attempt > 0 else 1.0
-        before = change
-        r.work.info[0] = worst
-        if (rate < 1.0 and change * rate <= (1.0 - rate) * allowed) or change <= 1e-3 * allowed:
-            converged = True
-            break
-    status = finite(s.x[0], s.v[V])
+    status = iterate(r, t, h, square, single)
     if status != OK:
         return status
-    if not converged:
-        return NOT_CONVERGED
     keep_turns(r.model.loads, r.work.loads)
     r.work.drift[0] = max(r.work.drift[0], largest(r.work.rows.Phi))
     r.work.drift[1] = max(r.work.drift[1], largest(r.work.rows.nu))
@@ -188,6 +204,7 @@ class GeneralisedAlpha:
     implicit: ClassVar[bool] = True
     stage_count: ClassVar[int] = 9
     row_stages: ClassVar[int] = 2
+    controlled: ClassVar[bool] = False
     unit: ClassVar[Unit] = generalised_alpha_step
 
     def __post_init__(self) -> None:
@@ -222,6 +239,7 @@ class HHT:
     implicit: ClassVar[bool] = True
     stage_count: ClassVar[int] = 9
     row_stages: ClassVar[int] = 2
+    controlled: ClassVar[bool] = False
     unit: ClassVar[Unit] = generalised_alpha_step
 
     def __post_init__(self) -> None:
@@ -253,4 +271,4 @@ def newmark(
     gamma = 0.5 + alpha_f - alpha_m
     beta = 0.25 * (gamma + 0.5) ** 2
     settings = (alpha_m, alpha_f, beta, gamma, tolerance, iterations, stabilised, scaled)
-    return (*(float(number) for number in settings), 0.0, 0.0)
+    return (*(float(number) for number in settings), 0.0, 1.0)

@@ -56,6 +56,7 @@ class RK4:
     step: float
     order: ClassVar[int] = 4
     implicit: ClassVar[bool] = False
+    controlled: ClassVar[bool] = False
     stage_count: ClassVar[int] = 5
     row_stages: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = ()

@@ -88,6 +88,7 @@ class ROS2:
     step: float
     order: ClassVar[int] = 2
     implicit: ClassVar[bool] = True
+    controlled: ClassVar[bool] = False
     stage_count: ClassVar[int] = 4
     row_stages: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = ()

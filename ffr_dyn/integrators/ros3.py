@@ -13,6 +13,8 @@ stage i is
     r_i = 1/gamma sum_j gamma_ij k_j,
 
 and y+ = y + h sum_i b_i k_i. A stage costs an explicit evaluation.
+
+The weights of order two that it is compared with, to choose steps, are those whose stability function is -1/4 at infinity.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from ffr_dyn.integrators.tolerances import Tolerances
 from ffr_dyn.kernels.bodies import normalise, position_rates
 from ffr_dyn.kernels.calls import add_elastic_part, correct, evaluate, set_diagonal, settle, solve
 from ffr_dyn.kernels.packing import unpack_tables
@@ -43,6 +46,8 @@ GAMMAS = (
     *(0.23966827525132695, -1.2214324880772196, 0.5458976913174336, 0.0),
 )
 WEIGHTS = (0.23413463753257138, -1.2170678994063107, 1.5470667403652802, 0.435866521508459)
+# Less the weights of order two.
+ERRORS = (-0.07173852763110697, -0.5890830943268753, 0.5469231340669933, 0.11389848789098905)
 AT = (0.0, 0.8599004143760887, 0.7179332607542298, 1.0)
 
 
@@ -82,10 +87,16 @@ def ros3_step(at, t, unused, unused_too):
         add_scaled(vs, vs, gh, stages.v[k])
         position_rates(bodies, xs, vs, stages.x[k])
         add_scaled(stages.v[k], stages.v[k], -1.0, r_v)
+    fill(xs, 0.0)
+    fill(vs, 0.0)
     for k in range(4):
         add_scaled(r.x, r.x, h * WEIGHTS[k], stages.x[k])
         add_scaled(r.v, r.v, h * WEIGHTS[k], stages.v[k])
+        add_scaled(xs, xs, h * ERRORS[k], stages.x[k])
+        add_scaled(vs, vs, h * ERRORS[k], stages.v[k])
     normalise(bodies, r.x)
+    copy(stages.x[0], xs)
+    copy(stages.v[0], vs)
     return finite(r.x, r.v)
 
 
@@ -101,6 +112,26 @@ class ROS3:
     step: float
     order: ClassVar[int] = 3
     implicit: ClassVar[bool] = True
+    controlled: ClassVar[bool] = False
+    stage_count: ClassVar[int] = 6
+    row_stages: ClassVar[int] = 0
+    numbers: ClassVar[tuple[float, ...]] = ()
+    unit: ClassVar[Unit] = ros3_step
+
+
+@dataclass(frozen=True)
+class AdaptiveROS3:
+    """ROS3 with steps chosen by the error of each.
+
+    tolerances : what an error may be
+    """
+
+    tolerances: Tolerances = Tolerances()  # noqa: RUF009 - frozen
+    order: ClassVar[int] = 3
+    estimate_order: ClassVar[int] = 3
+    implicit: ClassVar[bool] = True
+    controlled: ClassVar[bool] = True
+    step: ClassVar[float] = 0.0
     stage_count: ClassVar[int] = 6
     row_stages: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = ()

@@ -2,7 +2,11 @@
 
 import math
 
-from ffr_dyn.kernels.options import kernel
+from ffr_dyn.kernels.bodies import rotation_matrix
+from ffr_dyn.kernels.options import inlined, kernel
+from ffr_dyn.kernels.system import largest
+from ffr_dyn.kernels.tables import NOT_CONVERGED
+from ffr_dyn.kernels.vectors import to_body, to_global
 
 
 @kernel
@@ -56,3 +60,43 @@ def farthest(bodies, x):
         for k in range(n):
             result = max(result, abs(x[i + 7 + k]) / mass**0.5)
     return result
+
+
+@kernel
+def into_body_axes(bodies, x, y, A):
+    """In place: the linear parts of y, shaped like v, from global to body axes at x; A (3, 3) is scratch."""
+    for b in range(bodies.mass.size):
+        i, j = bodies.where[b, 1], bodies.where[b, 2]
+        rotation_matrix(x[i + 3], x[i + 4], x[i + 5], x[i + 6], A)
+        y[j], y[j + 1], y[j + 2] = to_body(A, (y[j], y[j + 1], y[j + 2]))
+
+
+@kernel
+def into_global_axes(bodies, x, y, A):
+    """In place: the linear parts of y, shaped like v, from body axes at x to global ones; A (3, 3) is scratch."""
+    for b in range(bodies.mass.size):
+        i, j = bodies.where[b, 1], bodies.where[b, 2]
+        rotation_matrix(x[i + 3], x[i + 4], x[i + 5], x[i + 6], A)
+        y[j], y[j + 1], y[j + 2] = to_global(A, (y[j], y[j + 1], y[j + 2]))
+
+
+@inlined
+def converging(change, before, rate, allowed):
+    """Whether the error that is left after a correction, by the rate at which corrections shrink, is allowed."""
+    shrinks = change / before if before > 0.0 else rate
+    return (shrinks < 1.0 and change * shrinks <= (1.0 - shrinks) * allowed) or change <= 1e-3 * allowed
+
+
+@inlined
+def unconverged(r, worst, motion):
+    """The status of a step whose iterations fail. info[0] = the body, or the number of bodies plus the row, that is worst.
+
+    motion : the largest correction [m]
+    """
+    violation = largest(r.work.rows.Phi)
+    r.work.info[0] = worst
+    if violation > 0.1 * motion:
+        for row in range(r.work.rows.Phi.size):
+            if abs(r.work.rows.Phi[row]) == violation:
+                r.work.info[0] = r.model.bodies.mass.size + row
+    return NOT_CONVERGED

@@ -28,7 +28,7 @@ ANGLE, STROKE, LENGTH = 0, 1, 2
 SPRING, FRICTION, ACTUATOR, SERVO, STOP = 0, 1, 2, 3, 4
 AFFINE, GLOBAL = 0, 1
 
-OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED, NOT_CONVERGED = 0, 1, 2, 3, 4, 5
+OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED, NOT_CONVERGED, STEP_TOO_SMALL = range(7)
 
 LANES = 8  # rows of a joint side by side (see `ffr_dyn.kernels.lanes`)
 
@@ -234,9 +234,30 @@ class Stages(NamedTuple):
 class Clock(NamedTuple):
     """Which steps are to be done; step number k begins at the start of the run + k h."""
 
-    time: F1  # (1,) step h [s]
+    time: F1  # (2,) step h [s]; spacing of the numbered steps, which is h unless the method chooses its steps
     steps: I1  # (3,) number of the next step, steps from row to row, rows filled
     gains: F1  # (3,) Baumgarte's alpha and beta, tolerance of the projection
+
+
+class Control(NamedTuple):
+    """Of a method that chooses its steps; empty arrays for the others.
+
+    The state runs ahead of the rows: `x`, `v` are where the last step began, and rows between are interpolated.
+    """
+
+    numbers: F1  # step to be tried, time of the state, time where the last step began, last error, relative tolerance,
+    # order of the error estimate, least step
+    counts: I1  # (2,) steps accepted, steps tried again
+    weight_x: F1  # (X,) absolute tolerances of positions
+    weight_v: F1  # (V,) of velocities; negative where the velocity times the step counts
+    x: F1  # (X,)
+    v: F1  # (V,)
+    held_x: F1  # (X,) scratch
+    held_v: F1  # (V,)
+
+
+# Numbers of `Control.numbers`.
+STEP, NOW, BEFORE, ERROR, RELATIVE, ORDER, LEAST = range(7)
 
 
 class Tables(NamedTuple):
@@ -248,6 +269,7 @@ class Tables(NamedTuple):
     work: Work
     stages: Stages
     clock: Clock
+    control: Control
     x: F1  # the state that is integrated
     v: F1
 

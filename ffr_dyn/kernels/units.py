@@ -16,6 +16,7 @@ from numba import cfunc, types
 from ffr_dyn.kernels.actions import keep_turns
 from ffr_dyn.kernels.bodies import mass_times, rotation_matrix
 from ffr_dyn.kernels.calls import set_diagonal
+from ffr_dyn.kernels.control import controlled_step, interpolate
 from ffr_dyn.kernels.functions import evaluate_functions
 from ffr_dyn.kernels.loads import call_user, gravity_field
 from ffr_dyn.kernels.markers import update_marker
@@ -43,8 +44,10 @@ from ffr_dyn.kernels.tables import (
     LOADS,
     MOVE_BACK,
     NEAR,
+    NOW,
     OK,
     RECORD,
+    SETTLE,
     SINGULAR_BODY,
     SINGULAR_CONSTRAINT,
     SOLVE,
@@ -240,7 +243,7 @@ def record_unit(at, t, record, row):
 def rows_unit(at, start, record, step):
     """Fill the rows of a record; `step` is the address of a method's unit. Returns a status."""
     r, out = unpack_tables(at), unpack_record(record)
-    h, steps = r.clock.time[0], r.clock.steps
+    h, steps = r.clock.time[1], r.clock.steps
     steps[2] = 0
     for row in range(out.time.size):
         for _ in range(steps[1]):
@@ -251,6 +254,35 @@ def rows_unit(at, start, record, step):
         status = call_unit(r.units[RECORD], at, start + steps[0] * h, record, row)
         if status != OK:
             return status
+        steps[2] += 1
+    return OK
+
+
+@Unit
+def controlled_rows_unit(at, start, record, step):
+    """`rows_unit` for a method that chooses its steps: each is tried until its error is within the tolerances."""
+    r, out = unpack_tables(at), unpack_record(record)
+    c, steps = r.control, r.clock.steps
+    steps[2] = 0
+    for row in range(out.time.size):
+        t = start + (steps[0] + steps[1]) * r.clock.time[1]
+        while c.numbers[NOW] < t:
+            status = controlled_step(r, step)
+            if status != OK:
+                return status
+        copy(c.held_x, r.x)
+        copy(c.held_v, r.v)
+        interpolate(r, t)
+        position, velocity = r.work.drift[0], r.work.drift[1]  # of the steps, not of the rows between them
+        status = call_unit(r.units[SETTLE], at, t, r.x.ctypes.data, r.v.ctypes.data)
+        r.work.drift[0], r.work.drift[1] = position, velocity
+        if status == OK:
+            status = call_unit(r.units[RECORD], at, t, record, row)
+        copy(r.x, c.held_x)
+        copy(r.v, c.held_v)
+        if status != OK:
+            return status
+        steps[0] += steps[1]
         steps[2] += 1
     return OK
 
@@ -269,6 +301,7 @@ UNITS = {
     "truly": truly_unit,
     "settle": settle_unit,
     "evaluate": evaluate_unit,
+    "controlled_rows": controlled_rows_unit,
     "rows": rows_unit,
 }
 

@@ -1,31 +1,14 @@
-"""The reduced flexible body: the one object that passes from `ffr_prep` to `ffr_dyn`.
-
-A body is a small, immutable set of arrays: inertia integrals over the mass, modal frequencies, interfaces with
-their mode shapes, and a surface to draw. This module imports numpy and the standard library only, so a simulation
-needs neither a mesher nor a finite-element library.
-
-Notation (SI units): the position of a material point in the body frame is  u_bar = u_0 + Phi q,  with the undeformed
-position u_0 [m], the mass-orthonormal basis Phi (Phi^T M Phi = I, Phi^T K Phi = diag(omega2)) and the elastic
-coordinates q (n,) [m sqrt(kg)]. Integrals over the mass carry the suffix ``_dm``; their integrand is their name.
-The numbered invariants I1...I9 and Shabana's S_bar family are read-only views of these integrals.
-"""
+"""What a reduced body is: its arrays, their views, and what they must satisfy."""
 
 from __future__ import annotations
 
-import hashlib
-import json
-import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 Array = np.ndarray
-
-MAGIC = "ffr-body"
-FORMAT_VERSION = 2  # 2 adds stress modes and section forces; files of version 1 are read as bodies without them
 
 _ORTHONORMAL_TOLERANCE = 1e-8
 
@@ -159,7 +142,7 @@ class FlexibleBody:
     def __post_init__(self) -> None:
         n = np.size(self.omega2)
         object.__setattr__(self, "mass", float(self.mass))
-        for key, shape in _shapes(n).items():
+        for key, shape in integral_shapes(n).items():
             _freeze(self, key, shape)
         object.__setattr__(self, "interfaces", tuple(self.interfaces))
         if self.stiffening is not None:
@@ -289,248 +272,11 @@ def axial(tensor: Array) -> Array:
     return np.stack([tensor[1, 2] - tensor[2, 1], tensor[2, 0] - tensor[0, 2], tensor[0, 1] - tensor[1, 0]])
 
 
-# ---- making bodies ------------------------------------------------------------------------------------------------
-
-
-def rigid_body(
-    name: str,
-    *,
-    mass: float,
-    inertia: Array,
-    centre_of_mass: Array = (0.0, 0.0, 0.0),  # type: ignore[assignment]
-    points: Mapping[str, Array] | None = None,
-    surface: Surface | None = None,
-) -> FlexibleBody:
-    """A body without elastic coordinates.
-
-    mass [kg]; inertia (3, 3) or its diagonal (3,) about the centre of mass, in body axes [kg m^2]; centre_of_mass (3,)
-    [m] in the body frame; points: named points (3,) [m] in the body frame at which joints and forces may attach.
-    Raises BodyError for a mass that is not positive, or an inertia that no mass distribution can have.
-    """
-    tensor = np.asarray(inertia, float)
-    tensor = np.diag(tensor) if tensor.ndim == 1 else tensor
-    if tensor.shape != (3, 3):
-        raise BodyError(f"body {name!r}: inertia must be (3,) or (3, 3), not {np.shape(inertia)}")
-    c = np.asarray(centre_of_mass, float)
-    about_origin = tensor + mass * (c @ c * np.eye(3) - np.outer(c, c))
-    nothing = np.zeros((3, 0))
-    return FlexibleBody(
-        name=name,
-        mass=mass,
-        r_dm=mass * c,
-        rr_dm=0.5 * np.trace(about_origin) * np.eye(3) - about_origin,
-        P_dm=nothing,
-        rP_dm=np.zeros((3, 3, 0)),
-        PP_dm=np.zeros((3, 3, 0, 0)),
-        omega2=np.zeros(0),
-        interfaces=tuple(Interface(key, at, nothing, nothing) for key, at in (points or {}).items()),
-        surface=surface,
-        provenance={"kind": "rigid"},
-    )
-
-
-def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
-    """The body with only its first ``modes`` elastic coordinates, or those whose indices are listed.
-
-    Raises BodyError for a mode that does not exist or is listed twice.
-    """
-    keep = np.arange(int(modes)) if np.ndim(modes) == 0 else np.asarray(modes, int)
-    unknown = keep[(keep < 0) | (keep >= body.n)]
-    if unknown.size or np.unique(keep).size < keep.size:
-        raise BodyError(
-            f"body {body.name!r} has {body.n} modes, counted from 0; asked to keep {keep.tolist()}: each must exist "
-            "and be named once"
-        )
-    return replace(
-        body,
-        P_dm=body.P_dm[:, keep],
-        rP_dm=body.rP_dm[:, :, keep],
-        PP_dm=body.PP_dm[:, :, keep][:, :, :, keep],
-        omega2=body.omega2[keep],
-        interfaces=tuple(replace(i, phi_t=i.phi_t[:, keep], phi_r=i.phi_r[:, keep]) for i in body.interfaces),
-        surface=body.surface and recombined(body.surface, np.eye(body.n)[:, keep], body.surface.Phi[:, :, keep]),
-        stiffening=None if body.stiffening is None else body.stiffening[:, keep][:, :, keep],
-    )
-
-
-def recombined(surface: Surface, V: Array, Phi: Array) -> Surface:
-    """The surface for other elastic coordinates p, with q = V p for V (n, m) and the basis Phi (P, 3, m).
-
-    Phi may differ from the old basis times V by rigid motions, which cause no stress.
-    """
-    stress = None if surface.stress is None else surface.stress @ V
-    beams = surface.beams and replace(surface.beams, modes=surface.beams.modes @ V)
-    return replace(surface, Phi=Phi, stress=stress, beams=beams)
-
-
-def with_point(body: FlexibleBody, name: str, position: Array) -> FlexibleBody:
-    """The body with one more interface, at the surface node nearest to `position` (3,) [m], body frame.
-
-    Joints, forces and sensors can then attach there. Its rotation is the least-squares rotation of the node's
-    neighbours on the surface. Nothing is added to the basis: what the node does under load is what the basis can show;
-    loads there do not stiffen the body.
-
-    Raises BodyError when the body has no surface.
-    """
-    if body.surface is None:
-        raise BodyError(f"body {body.name!r} has no surface to put the point {name!r} on")
-    points, Phi = body.surface.points, body.surface.Phi
-    node = int(np.argmin(((points - np.asarray(position, float)) ** 2).sum(1)))
-    here = np.flatnonzero((points == points[node]).all(1))  # points are there twice where materials meet
-    around = body.surface.triangles[np.isin(body.surface.triangles, here).any(1)]
-    ring = np.setdiff1d(around, here)
-    ring = ring[np.sort(np.unique(points[ring], axis=0, return_index=True)[1])]
-    arms, moved = points[ring] - points[node], Phi[ring] - Phi[node]
-    # omega minimises sum |omega x arm - moved|^2, so (sum arm^2 I - arm arm^T) omega = sum arm x moved
-    normal = (arms**2).sum() * np.eye(3) - arms.T @ arms
-    phi_r = np.linalg.lstsq(normal, axial(np.einsum("pk,plj->klj", arms, moved)), rcond=None)[0]
-    stiffening = body.stiffening
-    if stiffening is not None:
-        stiffening = np.concatenate([stiffening, np.zeros((6, body.n, body.n))])
-    point = Interface(name, points[node], Phi[node], phi_r)
-    return replace(body, interfaces=(*body.interfaces, point), stiffening=stiffening)
-
-
-# ---- the body file ------------------------------------------------------------------------------------------------
-# A zip of .npy members (numpy's .npz, readable without this package) and one JSON member "meta". No pickle.
-
-
-def save_body(body: FlexibleBody, path: str | Path) -> Path:
-    """Write the body to one file, atomically: an existing file is replaced only by a complete new one.
-
-    Raises BodyError when the provenance is not JSON, OSError when the file cannot be written.
-    """
-    path = Path(path)
-    arrays = {key: getattr(body, key) for key in _shapes(body.n)}
-    for k, interface in enumerate(body.interfaces):
-        for key in ("position", "phi_t", "phi_r"):
-            arrays[f"interface/{k}/{key}"] = getattr(interface, key)
-    if body.surface is not None:
-        arrays |= {f"surface/{key}": value for key, value in surface_arrays(body.surface).items()}
-    if body.stiffening is not None:
-        arrays["stiffening"] = body.stiffening
-    meta = {
-        "magic": MAGIC,
-        "format_version": FORMAT_VERSION,
-        "name": body.name,
-        "mass": body.mass,
-        "interfaces": [{"name": i.name, "kind": i.kind} for i in body.interfaces],
-        "provenance": dict(body.provenance),
-    }
-    arrays["meta"] = np.frombuffer(_header(body, meta).encode(), dtype=np.uint8)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + ".part")
-    try:
-        with open(temporary, "wb") as stream:
-            np.savez_compressed(stream, **arrays)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
-    return path
-
-
-def surface_arrays(surface: Surface) -> dict[str, Array]:
-    """The arrays of a surface by name, without those it does not have: how files keep it."""
-    arrays = {"points": surface.points, "triangles": surface.triangles, "Phi": surface.Phi}
-    if surface.stress is not None and surface.moduli is not None:
-        arrays |= {"stress": surface.stress, "moduli": surface.moduli}
-    if surface.beams is not None:
-        arrays |= {f"beams/{f.name}": getattr(surface.beams, f.name) for f in fields(BeamForces)}
-    return arrays
-
-
-def surface_of(arrays: Mapping[str, Array]) -> Surface:
-    """The surface of these arrays; the inverse of `surface_arrays`."""
-    own = {key: value for key, value in arrays.items() if "/" not in key}
-    beams = {key.removeprefix("beams/"): value for key, value in arrays.items() if key.startswith("beams/")}
-    return Surface(**own, beams=BeamForces(**beams) if beams else None)
-
-
-def load_body(path: str | Path) -> FlexibleBody:
-    """Read a body file. Raises BodyError for a missing, damaged, truncated, foreign or newer file."""
-    path = Path(path)
-    try:
-        return _from_arrays(*_read(path))
-    except FileNotFoundError:
-        raise BodyError(f"body file {path} does not exist") from None
-    except (PermissionError, IsADirectoryError) as error:
-        raise BodyError(f"body file {path} cannot be read ({error.strerror})") from None
-    except BodyError as error:
-        raise BodyError(f"{path}: {error}") from None
-    except Exception as error:  # a damaged zip, array header or field can fail in any way the readers know
-        what = str(error) or type(error).__name__
-        raise BodyError(
-            f"{path} is damaged, truncated or not a body file ({what}); make it again with ffr-prep reduce"
-        ) from None
-
-
-def content_hash(*arrays: Array) -> str:
-    """Short SHA-256 of array contents, for provenance."""
-    digest = hashlib.sha256()
-    for array in arrays:
-        digest.update(str((array.shape, array.dtype.str)).encode())
-        digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()[:16]
-
-
-def _header(body: FlexibleBody, meta: Mapping[str, Any]) -> str:
-    try:
-        return json.dumps(meta, sort_keys=True)
-    except (TypeError, ValueError) as error:
-        raise BodyError(f"body {body.name!r}: the provenance must be plain JSON values ({error})") from None
-
-
-def _read(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:
-    stored = np.load(path, allow_pickle=False)
-    if not isinstance(stored, np.lib.npyio.NpzFile):
-        raise BodyError("not a body file (a bare array); write one with ffr-prep reduce")
-    with stored:
-        meta = _meta(stored)
-        return meta, {key: stored[key] for key in stored.files if key != "meta"}
-
-
-def _meta(stored: Any) -> dict[str, Any]:
-    if "meta" not in stored.files:
-        raise BodyError("not a body file (it has no header); write one with ffr-prep reduce")
-    meta = json.loads(stored["meta"].tobytes())
-    if not isinstance(meta, dict) or meta.get("magic") != MAGIC:
-        raise BodyError("not a body file (foreign header); write one with ffr-prep reduce")
-    if meta["format_version"] > FORMAT_VERSION:
-        raise BodyError(
-            f"body format {meta['format_version']}; this program reads up to {FORMAT_VERSION}: update the program"
-        )
-    return meta
-
-
-def _from_arrays(meta: Mapping[str, Any], arrays: Mapping[str, Array]) -> FlexibleBody:
-    interfaces = tuple(
-        Interface(
-            entry["name"],
-            arrays[f"interface/{k}/position"],
-            arrays[f"interface/{k}/phi_t"],
-            arrays[f"interface/{k}/phi_r"],
-            entry["kind"],
-        )
-        for k, entry in enumerate(meta["interfaces"])
-    )
-    of_surface = {key.removeprefix("surface/"): value for key, value in arrays.items() if key.startswith("surface/")}
-    surface = surface_of(of_surface) if of_surface else None
-    core = {key: arrays[key] for key in _shapes(arrays["omega2"].size)}
-    return FlexibleBody(
-        name=meta["name"],
-        mass=meta["mass"],
-        interfaces=interfaces,
-        surface=surface,
-        stiffening=arrays.get("stiffening"),
-        provenance=meta["provenance"],
-        **core,
-    )
-
-
 # ---- guards -------------------------------------------------------------------------------------------------------
 
 
-def _shapes(n: int) -> dict[str, tuple[int, ...]]:
+def integral_shapes(n: int) -> dict[str, tuple[int, ...]]:
+    """The shapes of the arrays that every body has, by name."""
     return {
         "r_dm": (3,),
         "rr_dm": (3, 3),

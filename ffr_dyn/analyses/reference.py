@@ -1,0 +1,219 @@
+"""The same equations through solvers of other people: slow, and independent of the project's integrators.
+
+SciPy's solvers integrate the index-1 equations, (x_dot, v_dot) = (T(x) v, M^-1 (f - Phi_q^T lam)), and the state is projected
+onto the constraints at every output row. SUNDIALS' IDA solves the stabilised index-2 equations (`ffr_dyn.analyses.ida`).
+All error control and step selection are theirs; ours is the evaluation of the equations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from ffr_dyn.analyses.assemble import Assembled, assemble
+from ffr_dyn.analyses.evaluation import (
+    Evaluator,
+    accelerations,
+    copied,
+    evaluate,
+    evaluated_mass_matrix,
+    evaluator,
+    joined,
+    moved,
+    smallest_step,
+    to_body_axes,
+    to_global_axes,
+)
+from ffr_dyn.analyses.forward import geometry, with_all_reactions
+from ffr_dyn.analyses.outcome import output_times
+from ffr_dyn.errors import InputError, SimulationError
+from ffr_dyn.kernels.tables import Record
+from ffr_dyn.layout import Layout
+from ffr_dyn.measure import measure, needs_every_step, selected
+from ffr_dyn.result import Result
+from ffr_dyn.result_file import save_result
+from ffr_dyn.rotation import G_bar
+from ffr_dyn.scene import Scene
+
+Array = np.ndarray
+
+SOLVERS = ("DOP853", "Radau", "LSODA", "BDF", "RK45")
+CLOSED = 1e-12  # of Phi [m, -] after a projection
+CORRECTIONS = 10
+DIFFERENCE = 1e-7  # of a coordinate, for Jacobians
+
+
+@dataclass(frozen=True)
+class SciPy:
+    """A solver of `scipy.integrate.solve_ivp`: "DOP853" (explicit, order 8; Hairer, Norsett & Wanner 1993), "Radau"
+    (implicit, order 5; Hairer & Wanner 1996), "LSODA" (Petzold 1983), ...
+
+    rtol, atol : its tolerances, of positions, velocities and elastic coordinates alike
+    """
+
+    solver: str = "DOP853"
+    rtol: float = 1e-10
+    atol: float = 1e-12
+
+    def __post_init__(self) -> None:
+        if self.solver not in SOLVERS:
+            raise InputError(f"SciPy has no solver {self.solver!r} that is used here; there are {', '.join(SOLVERS)}")
+        check_tolerances(self.rtol, self.atol)
+
+
+@dataclass(frozen=True)
+class IDA:
+    """SUNDIALS' IDA (Hindmarsh et al. 2005): backward differentiation of orders one to five, variable steps.
+
+    rtol, atol : its tolerances of positions, velocities and elastic coordinates; multipliers are not controlled
+
+    It comes with the package scikit-sundae (`pip install ffr[ida]`).
+    """
+
+    rtol: float = 1e-8
+    atol: float = 1e-10
+
+    def __post_init__(self) -> None:
+        check_tolerances(self.rtol, self.atol)
+
+
+Reference = SciPy | IDA
+
+
+def check_tolerances(rtol: float, atol: float) -> None:
+    """InputError unless both can be met in double precision."""
+    if not (1e-13 <= rtol < 1 and 0 < atol < 1):
+        raise InputError(f"rtol is {rtol:g} and atol {atol:g}; rtol must be from 1e-13 to 1, atol positive and below 1")
+
+
+def reference(
+    scene: Scene,
+    *,
+    end: float,
+    output_step: float,
+    method: Reference = SciPy(),
+    start: float = 0.0,
+    outputs: Sequence[str] = ("default",),
+    path: str | Path | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Result:
+    """Forward dynamics by a solver of SciPy or SUNDIALS; the arguments and the result are those of `forward`.
+
+    Raises InputError for a scene or settings that cannot be used, SimulationError when the solver gives up.
+    """
+    times = output_times(start, end, output_step)
+    assembled = assemble(scene, time=start)
+    at = evaluator(assembled.system)
+    wanted = selected(assembled.system, outputs)
+    if needs_every_step(wanted):
+        raise InputError(
+            "work adds up over the steps of a method, which the solvers do not tell; keep the power instead"
+        )
+    rows: list[Record] = []
+    for time, x, v in _states(assembled, at, times, method):
+        accelerations(at, time, x, v)
+        rows.append(copied(at.record))
+        if progress is not None:
+            progress(time)
+    record = with_all_reactions(assembled, joined(rows))
+    quantities, _ = measure(assembled.system, record, {}, wanted)
+    attributes = {
+        "title": scene.name,
+        "analysis": "forward dynamics",
+        "method": f"{method!r}",
+        "stabilisation": "projection at the output rows" if isinstance(method, SciPy) else "index 2, stabilised",
+        "start": start,
+        "end": end,
+        "output_step": output_step,
+        "degrees_of_freedom": assembled.degrees_of_freedom,
+        "evaluations": int(at.work.info[1]),
+        "notes": list(assembled.notes),
+        "status": "complete",
+    }
+    result = Result(record.time, quantities, geometry(scene), attributes)
+    if path is not None:
+        save_result(result, path)
+    return result
+
+
+def _states(
+    assembled: Assembled, at: Evaluator, times: Array, method: Reference
+) -> Iterator[tuple[float, Array, Array]]:
+    """(time, x, v) at the output times."""
+    if isinstance(method, SciPy):
+        return _by_scipy(assembled, at, times, method)
+    from ffr_dyn.analyses.ida import by_ida
+
+    return by_ida(assembled, at, times, method.rtol, method.atol)
+
+
+def _by_scipy(assembled: Assembled, at: Evaluator, times: Array, method: SciPy) -> Iterator[tuple[float, Array, Array]]:
+    """From row to row, each from where the state was projected to, with the last step of the row before as a first guess."""
+    from scipy.integrate import solve_ivp
+
+    place, x, v = assembled.system.layout, assembled.x, assembled.v
+    implicit = {"jac": lambda t, y: _jacobian(at, place, t, y)} if method.solver in ("Radau", "BDF") else {}
+    yield float(times[0]), x, v
+    step = None
+    for begin, end in pairwise(times):
+        done = solve_ivp(
+            lambda t, y: _rates(at, place, t, y),
+            (begin, end),
+            np.concatenate([x, v]),
+            method=method.solver,
+            rtol=method.rtol,
+            atol=method.atol,
+            first_step=None if step is None else min(step, end - begin),
+            **implicit,
+        )
+        if not done.success:
+            raise SimulationError(f"{method.solver} gave up at t = {done.t[-1]:.6g} s: {done.message}")
+        step = float(np.diff(done.t).max())
+        x, v = closed(at, float(end), *np.split(done.y[:, -1], [place.x_size]))
+        yield float(end), x, v
+
+
+def _rates(at: Evaluator, place: Layout, time: float, y: Array) -> Array:
+    """d/dt of [x, v]."""
+    x, v = np.split(y, [place.x_size])
+    return np.concatenate([position_rates(place, x, v), accelerations(at, float(time), x, v)])
+
+
+def _jacobian(at: Evaluator, place: Layout, time: float, y: Array) -> Array:
+    """d/dy of `_rates` by differences. SciPy's own enlarges the steps of what has no effect until they overflow."""
+    base, out = _rates(at, place, time, y), np.empty((y.size, y.size))
+    for k in range(y.size):
+        step = DIFFERENCE * max(1.0, abs(y[k]))
+        beside = y.copy()
+        beside[k] += step
+        out[:, k] = (_rates(at, place, time, beside) - base) / (beside[k] - y[k])
+    return out
+
+
+def position_rates(place: Layout, x: Array, v: Array) -> Array:
+    """x_dot = T(x) v."""
+    out = np.empty(place.x_size)
+    for b in range(len(place.n)):
+        out[place.R(b)], out[place.q(b)] = v[place.R_dot(b)], v[place.q_dot(b)]
+        out[place.p(b)] = 0.5 * G_bar(x[place.p(b)]).T @ v[place.omega(b)]
+    return out
+
+
+def closed(at: Evaluator, time: float, x: Array, v: Array) -> tuple[Array, Array]:
+    """(x, v) moved onto the constraints by the smallest motion in the norm of the mass matrix, Euler parameters of length
+    one. Raises SimulationError where that does not succeed."""
+    place = at.system.layout
+    x = moved(place, x, np.zeros(place.v_size))
+    for _ in range(CORRECTIONS):
+        now = evaluate(at, time, x, v)
+        if np.abs(now.Phi).max(initial=0.0) < CLOSED:
+            break
+        x = moved(place, x, smallest_step(now.jacobian, evaluated_mass_matrix(at), -now.Phi))
+    else:
+        raise SimulationError(f"at t = {time:.6g} s the state is too far off the constraints; use smaller tolerances")
+    inside = to_body_axes(place, x, v) + smallest_step(now.jacobian, evaluated_mass_matrix(at), -now.nu)
+    return x, to_global_axes(place, x, inside)

@@ -1,0 +1,106 @@
+"""The explicit Runge-Kutta pair of orders 5 and 4 of Dormand & Prince (1980), on the index-1 equations.
+
+Seven stages, the last of which is the first of the next step. Coefficients: Hairer, Norsett & Wanner 1993, table II.5.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ffr_dyn.integrators.tolerances import Tolerances
+from ffr_dyn.kernels.bodies import normalise, position_rates
+from ffr_dyn.kernels.calls import evaluate, set_diagonal, settle, solve
+from ffr_dyn.kernels.options import inlined
+from ffr_dyn.kernels.packing import unpack_tables
+from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
+from ffr_dyn.kernels.tables import OK
+from ffr_dyn.kernels.units import Unit
+from ffr_dyn.kernels.vectors import add_scaled, copy, fill
+
+# Rows of the lower triangle, six to a row; the last are the weights of order five.
+STAGES = (
+    *(0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    *(1 / 5, 0.0, 0.0, 0.0, 0.0, 0.0),
+    *(3 / 40, 9 / 40, 0.0, 0.0, 0.0, 0.0),
+    *(44 / 45, -56 / 15, 32 / 9, 0.0, 0.0, 0.0),
+    *(19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0.0, 0.0),
+    *(9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0.0),
+    *(35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
+)
+# Less the weights of order four.
+ERRORS = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
+AT = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
+FIRST = 3  # row of the first stage; before it the error and scratch
+
+
+@inlined
+def slopes(r, x, v, k):
+    """Keep the slopes of what was evaluated last, at (x, v), as stage k."""
+    acceleration_target(r.work.rows, r.clock.gains, r.stages.target)
+    solve(r, x, r.stages.target)
+    position_rates(r.model.bodies, x, v, r.stages.x[FIRST + k])
+    to_velocity_rates(r.model.bodies.where, r.work.bodies.A, r.work.bodies.acc, r.stages.v[FIRST + k])
+
+
+@Unit
+def dopri5_step(at, t, again, unused):
+    """One step of the machine's state from time t; `again` tells that the last one was refused. Returns a status."""
+    r = unpack_tables(at)
+    h, stages = r.clock.time[0], r.stages
+    set_diagonal(r, 0.0)
+    if stages.numbers[0] == 0.0:
+        status = settle(r, t)
+        if status != OK:
+            return status
+        slopes(r, r.x, r.v, 0)
+        stages.numbers[0] = 1.0
+    elif again == 0:
+        copy(stages.x[FIRST], stages.x[FIRST + 6])
+        copy(stages.v[FIRST], stages.v[FIRST + 6])
+    xs, vs = stages.x[1], stages.v[1]
+    for k in range(1, 6):
+        copy(xs, r.x)
+        copy(vs, r.v)
+        for j in range(k):
+            add_scaled(xs, xs, h * STAGES[6 * k + j], stages.x[FIRST + j])
+            add_scaled(vs, vs, h * STAGES[6 * k + j], stages.v[FIRST + j])
+        status = evaluate(r, t + AT[k] * h, xs, vs)
+        if status != OK:
+            return status
+        slopes(r, xs, vs, k)
+    for j in range(6):
+        add_scaled(r.x, r.x, h * STAGES[36 + j], stages.x[FIRST + j])
+        add_scaled(r.v, r.v, h * STAGES[36 + j], stages.v[FIRST + j])
+    normalise(r.model.bodies, r.x)
+    status = settle(r, t + h)
+    if status != OK:
+        return status
+    slopes(r, r.x, r.v, 6)
+    fill(stages.x[0], 0.0)
+    fill(stages.v[0], 0.0)
+    for j in range(7):
+        add_scaled(stages.x[0], stages.x[0], h * ERRORS[j], stages.x[FIRST + j])
+        add_scaled(stages.v[0], stages.v[0], h * ERRORS[j], stages.v[FIRST + j])
+    return finite(r.x, r.v)
+
+
+@dataclass(frozen=True)
+class DormandPrince:
+    """Explicit, of order five, with steps chosen by the error of each; a step costs six evaluations.
+
+    For scenes without stiff modes: no step is stable above some 3.3 / omega_max of the assembled system.
+
+    tolerances : what an error may be
+    """
+
+    tolerances: Tolerances = Tolerances()  # noqa: RUF009 - frozen
+    order: ClassVar[int] = 5
+    estimate_order: ClassVar[int] = 5
+    implicit: ClassVar[bool] = False
+    controlled: ClassVar[bool] = True
+    step: ClassVar[float] = 0.0
+    stage_count: ClassVar[int] = 10
+    row_stages: ClassVar[int] = 0
+    numbers: ClassVar[tuple[float, ...]] = (0.0,)
+    unit: ClassVar[Unit] = dopri5_step

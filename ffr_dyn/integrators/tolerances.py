@@ -1,0 +1,38 @@
+"""What the error of a step may be, for methods that choose their steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_dyn.errors import InputError
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """The error of a step is held below these absolute values, plus `relative` of each coordinate's size.
+
+    position : of points [m] and rotations [rad]
+    velocity : of points [m/s] and angular velocities [rad/s]
+    elastic  : of elastic displacements [m] (root mean square over the mass of a body), and of their rates over the time
+               that the step takes
+
+    The error at the end of a run is usually some ten times larger. Raises InputError for values that are not positive.
+    """
+
+    relative: float = 1e-6
+    position: float = 1e-7
+    velocity: float = 1e-6
+    elastic: float = 1e-8
+
+    def __post_init__(self) -> None:
+        for name in ("relative", "position", "velocity", "elastic"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise InputError(f"tolerance {name!r} is {value}; it must be positive")
+
+
+def tolerances(relative: float) -> Tolerances:
+    """All tolerances in the proportions of the default ones."""
+    return Tolerances(relative, 0.1 * relative, relative, 0.01 * relative)

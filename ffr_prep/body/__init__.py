@@ -1,0 +1,45 @@
+"""The reduced flexible body: the one object that passes from `ffr_prep` to `ffr_dyn`.
+
+A body is a small, immutable set of arrays: inertia integrals over the mass, modal frequencies, interfaces with
+their mode shapes, and a surface to draw. This package imports numpy and the standard library only, so a simulation
+needs neither a mesher nor a finite-element library.
+
+Notation (SI units): the position of a material point in the body frame is  u_bar = u_0 + Phi q,  with the undeformed
+position u_0 [m], the mass-orthonormal basis Phi (Phi^T M Phi = I, Phi^T K Phi = diag(omega2)) and the elastic
+coordinates q (n,) [m sqrt(kg)]. Integrals over the mass carry the suffix ``_dm``; their integrand is their name.
+The numbered invariants I1...I9 and Shabana's S_bar family are read-only views of these integrals.
+"""
+
+from ffr_prep.body.file import content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
+from ffr_prep.body.making import recombined, rigid_body, truncated, with_point
+from ffr_prep.body.reduced import (
+    SECTION_FORCES,
+    TENSOR,
+    BeamForces,
+    BodyError,
+    FlexibleBody,
+    Interface,
+    Surface,
+    axial,
+)
+
+__all__ = [
+    "SECTION_FORCES",
+    "TENSOR",
+    "BeamForces",
+    "BodyError",
+    "FlexibleBody",
+    "Interface",
+    "Surface",
+    "axial",
+    "content_hash",
+    "load_body",
+    "recombined",
+    "rigid_body",
+    "save_arrays",
+    "save_body",
+    "surface_arrays",
+    "surface_of",
+    "truncated",
+    "with_point",
+]

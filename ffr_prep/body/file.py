@@ -1,0 +1,157 @@
+"""The body file: a zip of .npy members (numpy's .npz, readable without this package) and a JSON member "meta". No pickle."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ffr_prep.body.reduced import BeamForces, BodyError, FlexibleBody, Interface, Surface, integral_shapes
+
+Array = np.ndarray
+
+MAGIC = "ffr-body"
+FORMAT_VERSION = 2  # 2 adds stress modes and section forces; files of version 1 are read as bodies without them
+
+
+def content_hash(*arrays: Array) -> str:
+    """Short SHA-256 of array contents, for provenance."""
+    digest = hashlib.sha256()
+    for array in arrays:
+        digest.update(str((array.shape, array.dtype.str)).encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def save_body(body: FlexibleBody, path: str | Path) -> Path:
+    """Write the body to one file, atomically: an existing file is replaced only by a complete new one.
+
+    Raises BodyError when the provenance is not JSON, OSError when the file cannot be written.
+    """
+    path = Path(path)
+    arrays = {key: getattr(body, key) for key in integral_shapes(body.n)}
+    for k, interface in enumerate(body.interfaces):
+        for key in ("position", "phi_t", "phi_r"):
+            arrays[f"interface/{k}/{key}"] = getattr(interface, key)
+    if body.surface is not None:
+        arrays |= {f"surface/{key}": value for key, value in surface_arrays(body.surface).items()}
+    if body.stiffening is not None:
+        arrays["stiffening"] = body.stiffening
+    meta = {
+        "magic": MAGIC,
+        "format_version": FORMAT_VERSION,
+        "name": body.name,
+        "mass": body.mass,
+        "interfaces": [{"name": i.name, "kind": i.kind} for i in body.interfaces],
+        "provenance": dict(body.provenance),
+    }
+    arrays["meta"] = np.frombuffer(_header(body, meta).encode(), dtype=np.uint8)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return save_arrays(arrays, path)
+
+
+def save_arrays(arrays: Mapping[str, Any], path: Path) -> Path:
+    """Write a compressed .npz file that appears only when it is complete. Raises OSError when it cannot be written."""
+    temporary = path.with_name(path.name + ".part")
+    try:
+        with open(temporary, "wb") as stream:
+            np.savez_compressed(stream, **arrays)
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return path
+
+
+def surface_arrays(surface: Surface) -> dict[str, Array]:
+    """The arrays of a surface by name, without those it does not have: how files keep it."""
+    arrays = {"points": surface.points, "triangles": surface.triangles, "Phi": surface.Phi}
+    if surface.stress is not None and surface.moduli is not None:
+        arrays |= {"stress": surface.stress, "moduli": surface.moduli}
+    if surface.beams is not None:
+        arrays |= {f"beams/{f.name}": getattr(surface.beams, f.name) for f in fields(BeamForces)}
+    return arrays
+
+
+def surface_of(arrays: Mapping[str, Array]) -> Surface:
+    """The surface of these arrays; the inverse of `surface_arrays`."""
+    own = {key: value for key, value in arrays.items() if "/" not in key}
+    beams = {key.removeprefix("beams/"): value for key, value in arrays.items() if key.startswith("beams/")}
+    return Surface(**own, beams=BeamForces(**beams) if beams else None)
+
+
+def load_body(path: str | Path) -> FlexibleBody:
+    """Read a body file. Raises BodyError for a missing, damaged, truncated, foreign or newer file."""
+    path = Path(path)
+    try:
+        return _from_arrays(*_read(path))
+    except FileNotFoundError:
+        raise BodyError(f"body file {path} does not exist") from None
+    except (PermissionError, IsADirectoryError) as error:
+        raise BodyError(f"body file {path} cannot be read ({error.strerror})") from None
+    except BodyError as error:
+        raise BodyError(f"{path}: {error}") from None
+    except Exception as error:  # a damaged zip, array header or field can fail in any way the readers know
+        what = str(error) or type(error).__name__
+        raise BodyError(
+            f"{path} is damaged, truncated or not a body file ({what}); make it again with ffr-prep reduce"
+        ) from None
+
+
+def _header(body: FlexibleBody, meta: Mapping[str, Any]) -> str:
+    try:
+        return json.dumps(meta, sort_keys=True)
+    except (TypeError, ValueError) as error:
+        raise BodyError(f"body {body.name!r}: the provenance must be plain JSON values ({error})") from None
+
+
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:
+    stored = np.load(path, allow_pickle=False)
+    if not isinstance(stored, np.lib.npyio.NpzFile):
+        raise BodyError("not a body file (a bare array); write one with ffr-prep reduce")
+    with stored:
+        meta = _meta(stored)
+        return meta, {key: stored[key] for key in stored.files if key != "meta"}
+
+
+def _meta(stored: Any) -> dict[str, Any]:
+    if "meta" not in stored.files:
+        raise BodyError("not a body file (it has no header); write one with ffr-prep reduce")
+    meta = json.loads(stored["meta"].tobytes())
+    if not isinstance(meta, dict) or meta.get("magic") != MAGIC:
+        raise BodyError("not a body file (foreign header); write one with ffr-prep reduce")
+    if meta["format_version"] > FORMAT_VERSION:
+        raise BodyError(
+            f"body format {meta['format_version']}; this program reads up to {FORMAT_VERSION}: update the program"
+        )
+    return meta
+
+
+def _from_arrays(meta: Mapping[str, Any], arrays: Mapping[str, Array]) -> FlexibleBody:
+    interfaces = tuple(
+        Interface(
+            entry["name"],
+            arrays[f"interface/{k}/position"],
+            arrays[f"interface/{k}/phi_t"],
+            arrays[f"interface/{k}/phi_r"],
+            entry["kind"],
+        )
+        for k, entry in enumerate(meta["interfaces"])
+    )
+    of_surface = {key.removeprefix("surface/"): value for key, value in arrays.items() if key.startswith("surface/")}
+    surface = surface_of(of_surface) if of_surface else None
+    core = {key: arrays[key] for key in integral_shapes(arrays["omega2"].size)}
+    return FlexibleBody(
+        name=meta["name"],
+        mass=meta["mass"],
+        interfaces=interfaces,
+        surface=surface,
+        stiffening=arrays.get("stiffening"),
+        provenance=meta["provenance"],
+        **core,
+    )
