@@ -151,7 +151,7 @@ def spin_up(speed: float) -> Scene:
 
 
 def four_bar(speed: float) -> Scene:
-    """Crank of 0.1 m brought to a speed [rad/s] within half a turn, coupler of 0.4 m, rocker of 0.3 m, of aluminium bars; ground of 0.4 m."""
+    """Crank of 0.1 m brought to a speed [rad/s] within half a turn, coupler of 0.4 m, rocker of 0.3 m; aluminium bars."""
     A, B, C, D = (0.0, 0.0), (0.1, 0.0), _corner((0.1, 0.0), (0.4, 0.0), 0.4, 0.3), (0.4, 0.0)
     section = rectangle(0.02, 0.012)
     bodies = (

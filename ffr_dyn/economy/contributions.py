@@ -132,14 +132,18 @@ def _positions(seen: Samples) -> Array:
 def _effects(
     large: Trial, original: Scene, of: Probe, seen: Samples, D: Array, q: Array, q_dot: Array, sign: float
 ) -> Contributions:
-    place, Z = seen.system.layout, followed(seen, D)
-    at = evaluator(seen.system)
-    effect = np.zeros((D.shape[1], len(of.outputs)))
-    for c in range(D.shape[1]):
+    effect = effects_of(large, of, seen, followed(seen, D), sign * q, sign * q_dot)
+    return Contributions(*_named(large, original, seen, D), effect)
+
+
+def effects_of(large: Trial, of: Probe, seen: Samples, Z: Array, q: Array, q_dot: Array) -> Array:
+    """(c, outputs) largest change of an output by the motion Z (T, V, c) with amplitudes and rates (T, c)."""
+    place, at = seen.system.layout, evaluator(seen.system)
+    effect = np.zeros((Z.shape[2], len(of.outputs)))
+    for c in range(Z.shape[2]):
         rows = np.sort(np.argsort(-np.abs(q[:, c]), kind="stable")[:LOOKED])
         plain = _values(at, large.scene, of, seen.time[rows], seen.x[rows], seen.v[rows])
-        steps = sign * Z[rows, :, c] * q[rows, c][:, None]
-        rates = sign * Z[rows, :, c] * q_dot[rows, c][:, None]
+        steps, rates = (Z[rows, :, c] * values[rows, c][:, None] for values in (q, q_dot))
         x = np.array([moved(place, seen.x[k], step) for k, step in zip(rows, steps, strict=True)])
         v = np.array([
             to_global_axes(place, x[i], to_body_axes(place, seen.x[k], seen.v[k]) + rates[i])
@@ -147,7 +151,7 @@ def _effects(
         ])  # fmt: skip
         changed = _values(at, large.scene, of, seen.time[rows], x, v)
         effect[c] = [np.abs(a - b).max(initial=0.0) for a, b in zip(changed, plain, strict=True)]
-    return Contributions(*_named(large, original, seen, D), effect)
+    return effect
 
 
 def _named(large: Trial, original: Scene, seen: Samples, D: Array) -> tuple[Array, Array, tuple[Array, ...]]:

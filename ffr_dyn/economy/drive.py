@@ -116,21 +116,37 @@ def followed(seen: Samples, D: Array) -> Array:
     return Z
 
 
-def driven(seen: Samples, D: Array, Z: Array) -> tuple[Array, Array]:
-    """(T, c) amplitudes and rates of the directions D (V, c), driven from rest by the residual as passive oscillators."""
+def driven(
+    seen: Samples, D: Array, Z: Array, q: Array | None = None, q_dot: Array | None = None
+) -> tuple[Array, Array]:
+    """(T, c) amplitudes and rates of the directions D (V, c), driven by the residual as passive oscillators.
+
+    q, q_dot : (c,) at the start; rest by default
+    """
     bodies, elastic = seen.system.model.bodies, elastic_columns(seen.system.layout)
     own = D[elastic] ** 2
     force = np.einsum("tvc,tv->tc", Z, seen.residual)
     mass = np.maximum(np.einsum("tvc,tvw,twc->tc", Z, seen.M, Z, optimize=True).mean(axis=0), 1e-9)
-    return oscillators(seen.time, force / mass, bodies.omega2 @ own / mass, bodies.two_zeta_omega @ own / mass)
+    return oscillators(
+        seen.time, force / mass, bodies.omega2 @ own / mass, bodies.two_zeta_omega @ own / mass, q, q_dot
+    )
 
 
-def oscillators(time: Array, force: Array, omega2: Array, damping: Array) -> tuple[Array, Array]:
-    """(T, c) q and q_dot with q'' + damping q' + omega2 q = force (T, c), from rest; exact for a force linear in between."""
+def oscillators(
+    time: Array,
+    force: Array,
+    omega2: Array,
+    damping: Array,
+    start: Array | None = None,
+    start_rate: Array | None = None,
+) -> tuple[Array, Array]:
+    """(T, c) q and q_dot with q'' + damping q' + omega2 q = force (T, c); exact for a force linear in between."""
     h = np.diff(time)
     steps, which = np.unique(np.round(h, 15), return_inverse=True)
     updates = [_update(float(step), omega2, damping) for step in steps]
     q, rate = np.zeros_like(force), np.zeros_like(force)
+    q[0] = 0.0 if start is None else start
+    rate[0] = 0.0 if start_rate is None else start_rate
     for k in range(h.size):
         a11, a12, a21, a22, b1, b2, c1, c2 = updates[which[k]]
         q[k + 1] = a11 * q[k] + a12 * rate[k] + b1 * force[k] + c1 * force[k + 1]

@@ -1,4 +1,4 @@
-"""The models that a search tried and the one it chose, on a chart of error over cost with the Pareto front."""
+"""All runs of a search and the one it chose, on a chart of error over cost with the Pareto front."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ Array = np.ndarray
 
 
 def points(found: Economy) -> tuple[Array, Array]:
-    """(K,) costs in runs of the chosen model, and (K,) largest errors in tolerances, of models with a known error."""
-    costs = np.array([one.cost / found.cost for one in found.tried])
-    errors = np.array([float((one.error / found.limits).max(initial=0.0)) for one in found.tried])
+    """(K,) costs in runs of the chosen model, and (K,) largest errors in tolerances, of all runs of the search."""
+    costs = np.array([one.cost / found.cost for one in found.runs])
+    errors = np.array([float((one.error / found.limits).max(initial=0.0)) for one in found.runs])
     known = np.isfinite(errors) & (errors > 0)
     return costs[known], errors[known]
 
@@ -53,16 +53,16 @@ def _figure(found: Economy):  # type: ignore[no-untyped-def]
     FigureCanvasAgg(figure)
     axes = figure.subplots()
     costs, errors = points(found)
-    axes.loglog(costs, errors, "o", color="#888888", label="tried")
+    axes.loglog(costs, errors, "o", color="#888888", label="runs of the search")
     order = front(costs, errors)
-    axes.step(costs[order], errors[order], where="post", color="#0072b2", label="Pareto front of these")
+    axes.step(costs[order], errors[order], where="post", color="#0072b2", label="Pareto front")
     chosen = (found.error if found.verification is None else found.verification.error) / found.limits
     axes.plot([1.0], [max(float(chosen.max()), 1e-12)], "*", markersize=16, color="#d55e00", label="chosen", zorder=3)
     axes.axhline(1.0, color="#333333", linestyle="--", linewidth=1)
     axes.annotate("tolerance", (1.0, 1.0), xycoords=("axes fraction", "data"), ha="right", va="bottom")
     axes.set_xlabel("cost of a run, in runs of the chosen model")
     axes.set_ylabel("largest error, in tolerances")
-    axes.set_title(f"{found.original.name}: models tried", fontweight="bold")
+    axes.set_title(f"{found.original.name}: runs of the search", fontweight="bold")
     axes.grid(True, which="major", alpha=0.4)
     axes.legend()
     return figure

@@ -23,6 +23,7 @@ Array = np.ndarray
 
 SHOWN = 6  # rows of what is nearest to mattering
 SEPARATOR = "  "
+NEGLIGIBLE = 1e-4  # share of a stiffness
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,8 @@ class Table:
 
 def tables(found: Economy) -> list[Table]:
     """The report, part after part."""
-    parts = [_summary(found), _outputs(found), _bodies(found), _nearest(found), _tried(found), _advice(found)]
+    parts = [_summary(found), _outputs(found), _bodies(found), _nearest(found), *_checks(found), _tried(found)]
+    parts.append(_advice(found))
     notes = _notes(found)
     return [*parts, Table("Notes", "", (), tuple((note,) for note in notes))] if notes else parts
 
@@ -157,6 +159,23 @@ def _leading(found: Economy, effects: Contributions, *, most: bool) -> Iterator[
         output = int(np.argmax(shares[k]))
         name = f"{body.name}, mode {effects.mode[k]} ({body.model.frequencies[effects.mode[k]]:.4g} Hz)"
         yield name, found.probe.outputs[output].name, f"{shares[k, output]:.2g}"
+
+
+def _checks(found: Economy) -> Iterator[Table]:
+    if found.frequencies:
+        shifts = tuple((f"{f.model:.5g}", f"{f.everything:.5g}", f"{100 * f.shift:+.2g} %") for f in found.frequencies)
+        text = (
+            "Of the linearised model half-way through the run, and the nearest of everything there: a shift by more "
+            "than some per cent means vibration at a wrong frequency, which the contributions of omitted modes do not show."
+        )
+        yield Table("Frequencies [Hz]", text, ("model", "everything", "shift"), shifts)
+    if found.stiffening:
+        listed = [one for one in found.stiffening if one.share > 0][: 2 * SHOWN]
+        rows = tuple(
+            (s.body, s.load, f"{s.share:.2g}", "needed" if s.share > NEGLIGIBLE else "could go") for s in listed
+        )
+        text = "Largest change of the stiffness of a mode by each load on bodies whose stiffening is kept, as a share of it."
+        yield Table("Stiffening by load", text, ("body", "load", "share", ""), rows)
 
 
 def _tried(found: Economy) -> Table:

@@ -21,6 +21,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ffr_dyn.analyses.assemble import assemble
+from ffr_dyn.economy.checks import Frequency, StiffeningLoad, frequencies, stiffening_loads
 from ffr_dyn.economy.choice import Choice, applied, full, in_plane, orthonormal
 from ffr_dyn.economy.contributions import (
     LEFT,
@@ -46,17 +47,26 @@ Array = np.ndarray
 Histories = tuple[Array, ...]
 
 PILOT = "ros3"
-OF_MODES = 0.25  # share of the tolerance that modes left out may take
-OF_TERMS = 0.25  # of the tolerance, for every group of terms left out
 OF_ALL = 0.85  # of the tolerance, for everything together
 NEARLY_ALL = 0.8  # of the modes: then the search goes down from the full model
 SHORT = 2e6  # [us] of a verification that is made without being asked for
 ATTEMPTS = 4
 ROUNDS = 2
+ROOM = 1.2  # times what a model may take by itself: another look at what could be left out
+WORTH = 0.9  # of the cost: a smaller model that pays
 FINER = 2  # times the steps: worth another look
 LEAST = 0.2  # of the tolerance, that the step may take whatever else there is
 UNMOVED = 1e-9  # of its range: an output that differs by less between rigid and flexible bodies is moved by no model
 TERMS = (("I5", "I8", "I9"), ("I5", "I9"), ("I5",))
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Shares of the tolerance that may be taken by modes left out, by leaving out all, and with terms left out as well."""
+
+    modes: float = 0.25
+    rigid: float = 0.5
+    all: float = 0.5
 
 
 @dataclass(frozen=True)
@@ -100,7 +110,10 @@ class Economy:
     kept         : what each mode that stays does
     before, cost : [us] of a run of everything with the same step, and of the chosen model
     search_cost  : [us] of all runs and estimates of the search without the verification
+    tried        : what was tried and how far it was from everything with the same step
+    runs         : all runs made, with their errors against the reference, or else the chosen run less its estimated error
     unmoved      : names of outputs that no model changes
+    frequencies  : of the linearised model beside those of everything;  stiffening : what stiffens bodies, and how much
     """
 
     original: Scene
@@ -119,7 +132,10 @@ class Economy:
     cost: float
     search_cost: float
     tried: tuple[Tried, ...]
+    runs: tuple[Tried, ...]
     unmoved: tuple[str, ...]
+    frequencies: tuple[Frequency, ...]
+    stiffening: tuple[StiffeningLoad, ...]
     notes: tuple[str, ...]
     verification: Verification | None
 
@@ -200,9 +216,21 @@ class _Found:
 
 
 def _chosen(search: _Search, ground: _Ground) -> _Found:
-    """The cheapest model beside the coarse run of everything, and its step."""
-    choice = _without_terms(search, ground, _modes(search, ground))
-    return _stepped(search, ground, choice)
+    """The cheapest model beside the coarse run of everything, and its step; what the step does not take of the tolerance
+    goes to a smaller model, where there is one."""
+    found = _stepped(search, ground, _model(search, ground, Shares()))
+    room = float((OF_ALL - largest(found.time) / ground.limits).min())
+    if room <= ROOM * Shares().all:
+        return found
+    smaller = _model(search, ground, Shares(0.6 * room, room, room))
+    if per_evaluation(smaller) > WORTH * per_evaluation(found.final.choice):
+        return found
+    again = _stepped(search, ground, smaller)
+    return again if per_row(again.final.choice) < per_row(found.final.choice) else found
+
+
+def _model(search: _Search, ground: _Ground, shares: Shares) -> Choice:
+    return _without_terms(search, ground, _modes(search, ground, shares), shares)
 
 
 def _stepped(search: _Search, ground: _Ground, choice: Choice) -> _Found:
@@ -285,11 +313,11 @@ def _rigid(choice: Choice) -> Choice:
 # ---- modes ----------------------------------------------------------------------------------------------------------
 
 
-def _modes(search: _Search, ground: _Ground) -> Choice:
+def _modes(search: _Search, ground: _Ground, shares: Shares) -> Choice:
     """The fewest modes, or shapes made of them, whose absence leaves the outputs within their share."""
-    if share(difference(ground.rigid.values, ground.pilot.values), OF_MODES * ground.limits) <= 1:
+    if share(difference(ground.rigid.values, ground.pilot.values), shares.rigid * ground.limits) <= 1:
         return ground.rigid.choice
-    offers = [_Offer(search.scene, ground, ranking) for ranking in _rankings(search, ground)]
+    offers = [_Offer(search.scene, ground, ranking, shares.modes) for ranking in _rankings(search, ground)]
     for offer in sorted(offers, key=lambda offer: offer.cost):
         found = _enough(search, ground, offer)
         if found is not None:
@@ -300,10 +328,10 @@ def _modes(search: _Search, ground: _Ground) -> Choice:
 class _Offer:
     """Directions in the order of what they do: taken from the top until the rest is within its share."""
 
-    def __init__(self, scene: Scene, ground: _Ground, ranking: Contributions) -> None:
-        self.scene, self.ground, self.ranking = scene, ground, ranking
+    def __init__(self, scene: Scene, ground: _Ground, ranking: Contributions, share: float) -> None:
+        self.scene, self.ground, self.ranking, self.share = scene, ground, ranking, share
         self.order = np.argsort(-(ranking.effect / ground.limits).max(axis=1), kind="stable")
-        rest = np.cumsum((ranking.effect / (OF_MODES * ground.limits))[self.order[::-1]], axis=0)
+        rest = np.cumsum((ranking.effect / (share * ground.limits))[self.order[::-1]], axis=0)
         self.left = rest[::-1].max(axis=1)  # what is left out when those before are taken
         self.cost = per_evaluation(self.model(self.count(1.0)))
 
@@ -318,7 +346,7 @@ class _Offer:
 
 def _enough(search: _Search, ground: _Ground, offer: _Offer) -> Choice | None:
     """The model with as many directions as a coarse run shows to be enough; None where the number of attempts does not do."""
-    limit = OF_MODES * ground.limits
+    limit = offer.share * ground.limits
     count = offer.count(1.0)
     for _ in range(ATTEMPTS):
         model = offer.model(count)
@@ -336,7 +364,7 @@ def _rankings(search: _Search, ground: _Ground) -> list[Contributions]:
     search.tell("modes driven by the rigid motion")
     found = of_omitted(ground.rigid, ground.pilot, search.of, search.scene)
     search.looked(ground.everything, _evaluations(found))
-    needed = (found.effect > OF_MODES * ground.limits / max(1, len(found.body))).any(axis=1)
+    needed = (found.effect > Shares().modes * ground.limits / max(1, len(found.body))).any(axis=1)
     if needed.mean() >= NEARLY_ALL or not np.isfinite(found.effect).all():
         search.tell("modes of the full motion")
         found = of_motion(ground.pilot, search.of, search.scene)
@@ -383,13 +411,13 @@ def _gap(search: _Search, ground: _Ground, choice: Choice, what: str) -> Array:
 # ---- terms ----------------------------------------------------------------------------------------------------------
 
 
-def _without_terms(search: _Search, ground: _Ground, choice: Choice) -> Choice:
+def _without_terms(search: _Search, ground: _Ground, choice: Choice, shares: Shares) -> Choice:
     """The model without stiffening and inertia terms that the outputs do not need; what costs most is tried first."""
     flexible = [b for b, part in enumerate(choice.parts) if part.modes]
     if not flexible:
         return choice
     search.tell("terms left out")
-    limit = (OF_MODES + OF_TERMS) * ground.limits
+    limit = shares.all * ground.limits
     least = _dropping(choice, (STIFFENING, *TERMS[0]), flexible)
     if (_gap(search, ground, least, "without stiffening and " + ", ".join(TERMS[0])) <= limit).all():
         return least
@@ -441,6 +469,7 @@ def _finished(search: _Search, ground: _Ground, found: _Found, verify: bool | No
     if verify or (verify is None and _reference_cost(search, ground, final) <= SHORT):
         final, verification = _verified(search, ground, final)
     kept, omitted = _explained(search, ground, final)
+    vibrations, stiffening = frequencies(final, ground.pilot), stiffening_loads(final)
     same = replace(ground.spatial, method=final.choice.method, divisions=final.choice.divisions)
     return Economy(
         original=search.scene,
@@ -459,9 +488,26 @@ def _finished(search: _Search, ground: _Ground, found: _Found, verify: bool | No
         cost=of_run(search.scene, final.choice, search.span.rows),
         search_cost=spent,
         tried=tuple(search.tried),
+        runs=_all_runs(search, found, verification),
         unmoved=ground.unmoved,
+        frequencies=vibrations,
+        stiffening=stiffening,
         notes=tuple(final.result.attributes["notes"]),
         verification=verification,
+    )
+
+
+def _all_runs(search: _Search, found: _Found, verification: Verification | None) -> tuple[Tried, ...]:
+    """Every run with its error, against the best that is known of the outputs."""
+    if verification is not None:
+        truth: Histories = search.runs[verification.choice].values
+    else:
+        truth = difference(found.final.values, total(found.model, found.time))
+    rows = search.span.rows
+    return tuple(
+        Tried(choice, "run", of_run(search.scene, choice, rows), largest(difference(trial.values, truth)))
+        for choice, trial in search.runs.items()
+        if verification is None or choice != verification.choice
     )
 
 
@@ -531,7 +577,7 @@ def _finer(search: _Search, ground: _Ground, final: Trial, reference: Trial, att
         return search.run(choice)
     rigid = search.run(_rigid(reference.choice))
     sharp = replace(ground, everything=reference.choice, pilot=reference, rigid=rigid)
-    anew = _without_terms(search, sharp, _modes(search, sharp))
+    anew = _model(search, sharp, Shares())
     if anew.parts == final.choice.parts:
         return search.run(choice)
     return search.run(replace(anew, method=choice.method, divisions=choice.divisions))

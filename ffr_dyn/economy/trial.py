@@ -50,13 +50,15 @@ class Trial:
     result: Result
 
 
-def run(scene: Scene, choice: Choice, span: Span, of: Probe, *, states: bool = False) -> Trial:
-    """Run a model; with `states`, its result holds positions and velocities of all bodies too.
+def run(
+    scene: Scene, choice: Choice, span: Span, of: Probe, *, states: bool = False, outputs: tuple[str, ...] = ()
+) -> Trial:
+    """Run a model; with `states`, its result holds positions and velocities of all bodies too, and what `outputs` name.
 
     Raises SimulationError as `forward` does, and where the outputs are no longer finite.
     """
     made = applied(scene, choice)
-    outputs = (*needed(of, made), *(_states(made) if states else ()))
+    wanted = (*needed(of, made), *(_states(made) if states else ()), *outputs)
     result = forward(
         made,
         start=span.start,
@@ -64,7 +66,7 @@ def run(scene: Scene, choice: Choice, span: Span, of: Probe, *, states: bool = F
         output_step=span.output_step,
         method=choice.integrator(span.output_step),
         stabilisation=span.stabilisation,
-        outputs=outputs,
+        outputs=wanted,
     )
     values = histories(of, made, result)
     if not all(np.isfinite(one).all() for one in values):

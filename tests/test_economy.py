@@ -1,0 +1,413 @@
+"""The cheapest model of a scene: estimates against closed forms and full runs, the search, its report, bad input."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from benchmarks.scene_set import ALUMINIUM, GRAVITY, beam, case, pendulum, slider_crank, spin_up
+from ffr_dyn.analyses.assemble import assemble
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.cli import cli
+from ffr_dyn.drivers import Driver
+from ffr_dyn.economy.adaptive import Adaptation, adaptive_forward
+from ffr_dyn.economy.advice import advice
+from ffr_dyn.economy.choice import Part, applied, full, kind, orthonormal
+from ffr_dyn.economy.contributions import of_motion, of_omitted, of_shapes
+from ffr_dyn.economy.cost import of_run, per_evaluation
+from ffr_dyn.economy.drive import oscillators, samples
+from ffr_dyn.economy.outputs import Output, as_output, difference, largest, largest_stress, probe
+from ffr_dyn.economy.picture import front, points
+from ffr_dyn.economy.report import as_html, as_markdown, as_text, write_report
+from ffr_dyn.economy.search import Shares, economise
+from ffr_dyn.economy.steps import error_of, least
+from ffr_dyn.economy.trial import Span, run, states
+from ffr_dyn.errors import InputError, SimulationError
+from ffr_dyn.formula import formula
+from ffr_dyn.integrators import ROS2, ROS3
+from ffr_dyn.joints import Joint
+from ffr_dyn.result import Result
+from ffr_dyn.scene import Body, Scene
+from ffr_dyn.scene_file import load_scene
+from ffr_dyn.scene_text import save_scene
+from ffr_dyn.settings import Settings
+from ffr_dyn.stabilisation import Projection
+from ffr_dyn.timefunction import TimeFunction
+from ffr_dyn.variant import STIFFENING
+from ffr_prep.reference import FixedTo, MeanAxis, SimplySupported
+from ffr_prep.section import rectangle
+
+SLOW = case("slider-crank-10")
+TIP = ("rod.b.position.x", "rod.b.position.y")
+
+
+# ---- oscillators ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("omega", [3.0, 400.0])
+def test_an_oscillator_follows_a_force_that_is_linear_between_samples_exactly(omega):
+    """Closed form of an undamped oscillator under f = a + b t from rest."""
+    time, a, b = np.linspace(0, 2, 17), 2.0, -1.5
+    q, rate = oscillators(time, (a + b * time)[:, None], np.array([omega**2]), np.array([0.0]))
+    expected = (a * (1 - np.cos(omega * time)) + b * (time - np.sin(omega * time) / omega)) / omega**2
+    np.testing.assert_allclose(q[:, 0], expected, atol=1e-10 / omega)
+    speed = (a * omega * np.sin(omega * time) + b * (1 - np.cos(omega * time))) / omega**2
+    np.testing.assert_allclose(rate[:, 0], speed, atol=1e-9)
+
+
+def test_a_damped_oscillator_decays_from_where_it_starts():
+    """q = exp(-d t / 2) (cos w t + d / 2 w sin w t) of q(0) = 1, at rest; unequal samples."""
+    time, omega, d = np.array([0, 0.1, 0.3, 0.35, 1.0]), 7.0, 0.8
+    q, _ = oscillators(time, np.zeros((5, 1)), np.array([omega**2]), np.array([d]), np.array([1.0]), np.array([0.0]))
+    w = np.sqrt(omega**2 - d**2 / 4)
+    np.testing.assert_allclose(
+        q[:, 0], np.exp(-d * time / 2) * (np.cos(w * time) + d / (2 * w) * np.sin(w * time)), rtol=1e-10
+    )
+
+
+# ---- estimates ------------------------------------------------------------------------------------------------------
+
+
+def looked_at(scene: Scene, outputs, end: float, step: float, *, divisions: int = 2):
+    """Probe, span and choice of everything."""
+    return (
+        probe(assemble(scene), [Output(name, 1e-3) for name in outputs]),
+        Span(0, end, step),
+        full(scene, "ros3", divisions),
+    )
+
+
+def rigid(choice):
+    return replace(choice, parts=tuple(Part(()) for _ in choice.parts))
+
+
+def test_a_complete_model_leaves_no_residual_and_a_rigid_one_leaves_it_in_the_modes():
+    of, span, everything = looked_at(pendulum(7e9), TIP, 0.2, 0.01)
+    own = run(pendulum(7e9), everything, span, of, states=True)
+    assembled, x, v = states(own)
+    same = samples(assembled, assembled, (np.eye(14),), own.result.time, x, v)
+    size = np.abs(same.M @ np.ones(20)).max()
+    assert np.abs(same.residual).max() < 1e-8 * size
+    small, x, v = states(run(pendulum(7e9), rigid(everything), span, of, states=True))
+    seen = samples(small, assembled, (np.zeros((14, 0)),), own.result.time, x, v)
+    assert np.abs(seen.residual[:, :6]).max() < 1e-8 * size
+    assert np.abs(seen.residual[:, 6:]).max() > 0.01
+
+
+@pytest.mark.parametrize(
+    "reference", [SimplySupported("a", "b"), FixedTo("a"), MeanAxis()], ids=["simple", "fixed", "mean"]
+)
+def test_the_estimate_of_a_rigid_pendulum_is_right_whatever_its_frame(reference):
+    """What rigid motion forgets: estimated by driving the modes one-way, true by running them."""
+    rod = beam("rod", 1.2, rectangle(0.2, 0.009), replace(ALUMINIUM, E=7e9, rho=5540.0), 4, reference)
+    hinge = Joint("hinge", "revolute", "ground.O", "rod.a")
+    scene = Scene((Body("rod", rod),), (hinge,), ground={"O": rod.interface("a").position}, gravity=GRAVITY)
+    of, span, everything = looked_at(scene, TIP, 0.6, 0.01)
+    pilot = run(scene, everything, span, of, states=True)
+    stiff = run(scene, rigid(everything), span, of, states=True)
+    true = largest(difference(stiff.values, pilot.values))
+    estimated = of_omitted(stiff, pilot, of, scene).effect.sum(axis=0)
+    assert (estimated > 0.5 * true).all()
+    assert (estimated < 2.5 * true).all()
+
+
+def test_modes_have_a_rank_and_principal_shapes_need_fewer():
+    """A rod that speeds up: bending first; two shapes hold what takes more modes."""
+    scene = slider_crank(150.0)
+    of, span, everything = looked_at(scene, ("rod.stress",), 0.03, 0.001)
+    pilot = run(scene, everything, span, of, states=True)
+    modes, shapes = of_motion(pilot, of, scene), of_shapes(pilot, of, scene)
+    lowest = int(np.argmin(scene.bodies[1].model.frequencies))
+    leading = int(np.argmax(modes.effect[:, 0]))
+    assert (modes.body[leading], modes.mode[leading]) == (1, lowest)
+    rest = [np.sort(one.effect[:, 0])[::-1][2:].sum() for one in (modes, shapes)]
+    assert rest[1] < 0.5 * rest[0]
+
+
+def test_a_body_in_all_its_shapes_moves_as_before():
+    scene = pendulum(7e9)
+    of, span, everything = looked_at(scene, TIP, 0.2, 0.01)
+    V = orthonormal(np.random.default_rng(1).normal(size=(14, 14)), scene.bodies[0].model.omega2)
+    turned = replace(everything, parts=(Part(tuple(range(14)), (), tuple(tuple(c) for c in V.T.tolist())),))
+    one, other = (run(scene, choice, span, of) for choice in (everything, turned))
+    assert largest(difference(one.values, other.values)).max() < 1e-9
+
+
+def test_the_error_of_a_step_comes_with_its_sign():
+    scene = pendulum(7e9)
+    of, span, everything = looked_at(scene, TIP, 0.4, 0.02)
+    coarse, fine, finest = (run(scene, replace(rigid(everything), divisions=d), span, of) for d in (2, 4, 32))
+    true = difference(fine.values, finest.values)
+    for estimated, wanted in zip(error_of(fine, coarse), true, strict=True):
+        assert np.abs(estimated - wanted).max() < 0.3 * np.abs(wanted).max()
+
+
+def test_the_least_run_takes_shorter_steps_until_it_comes_to_an_end():
+    def fails_below_eight(choice):
+        if choice.divisions < 8:
+            raise SimulationError("too long a step")
+        return choice
+
+    everything = full(pendulum(7e9), "ros3", 1)
+    assert least(fails_below_eight, everything, 1).divisions == 8
+    with pytest.raises(SimulationError, match="no step down to"):
+        least(lambda choice: fails_below_eight(replace(choice, divisions=1)), everything, 1)
+
+
+def test_cost_grows_with_what_is_modelled():
+    scene = slider_crank(50.0)
+    everything = full(scene, "ros2", 1)
+    flat = replace(everything, plane="z")
+    plain = replace(everything, parts=tuple(replace(part, dropped=(STIFFENING,)) for part in everything.parts))
+    assert (
+        per_evaluation(rigid(flat))
+        < per_evaluation(rigid(everything))
+        < per_evaluation(plain)
+        < per_evaluation(everything)
+    )
+    assert of_run(scene, replace(everything, divisions=3), 10) == pytest.approx(3 * of_run(scene, everything, 10))
+
+
+# ---- outputs --------------------------------------------------------------------------------------------------------
+
+
+def test_outputs_are_written_with_their_own_tolerances():
+    assert as_output("rod.tip", 1e-3) == Output("rod.tip", 1e-3)
+    assert as_output("rod.stress = 2e6", 1e-3) == Output("rod.stress", 2e6, absolute=True)
+    assert as_output("rod.stress=0.5%", 1e-3) == Output("rod.stress", 0.005)
+    with pytest.raises(InputError, match="write NAME"):
+        as_output("rod.stress=little", 1e-3)
+
+
+def test_stress_is_the_largest_of_the_surface():
+    scene = slider_crank(50.0)
+    rod = scene.bodies[1].model
+    q = np.zeros((2, rod.n))
+    q[1, 0] = 1e-3
+    stress = np.abs(rod.surface.stress[:, 0, 0] * 1e-3).max()
+    np.testing.assert_allclose(largest_stress(scene, "rod", q), [0.0, stress], rtol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("outputs", "said"),
+    [
+        ((), "name at least one output"),
+        (("rod.tipp.position.x",), "did you mean"),
+        (("rood.stress",), "there is no body 'rood'"),
+        (("slider.stress",), "has no stress modes"),
+        (("slider.pin.position.x", "slider.pin.position.x"), "more than once"),
+        (("slider.pin.position.z",), "does not change over the run"),
+        (("slider.pin.position.x=-1",), "it must be positive"),
+        (("slider.pin.position.x=1e-10%",), "below the accuracy of any run"),
+    ],
+)
+def test_outputs_that_say_nothing_are_refused(outputs, said):
+    with pytest.raises(InputError, match=said):
+        economise(SLOW.scene(), outputs, end=0.14, output_step=0.014)
+
+
+# ---- the search -----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def slow():
+    return economise(
+        SLOW.scene(), SLOW.outputs, end=SLOW.end, output_step=SLOW.output_step, tolerance=1e-3, verify=True
+    )
+
+
+def test_a_slow_stiff_mechanism_is_rigid_throughout(slow):
+    assert all(part.count == 0 for part in slow.choice.parts)
+    assert slow.choice.plane == "z"
+    assert (slow.verification.error < slow.limits).all()
+    assert 0.3 < float(slow.error[0] / slow.verification.first[0]) < 5
+    assert slow.cost < slow.before / 3
+    assert [kind(slow.original, slow.choice, b, SLOW.output_step) for b in range(3)] == ["rigid"] * 3
+
+
+def test_the_same_scene_gives_the_same_model(slow):
+    again = economise(
+        SLOW.scene(), SLOW.outputs, end=SLOW.end, output_step=SLOW.output_step, tolerance=1e-3, verify=True
+    )
+    assert again.choice == slow.choice
+    np.testing.assert_array_equal(again.error, slow.error)
+    assert as_text(again) == as_text(slow)
+
+
+def test_an_output_that_no_model_changes_is_told():
+    found = economise(SLOW.scene(), ("bearing.angle",), end=0.28, output_step=0.014, verify=False)
+    assert found.unmoved == ("bearing.angle",)
+    assert "no model changes it" in as_text(found)
+
+
+@pytest.fixture(scope="module")
+def fast():
+    scene = slider_crank(150.0)
+    return economise(scene, ("slider.pin.position.x", "rod.stress=40%"), end=0.063, output_step=0.0007, tolerance=1e-2)
+
+
+def test_a_fast_slender_rod_keeps_bending_and_drops_stretching(fast):
+    """Where stress matters coarsely: bending, and no stretching, which makes about a twentieth of it."""
+    rod = fast.original.bodies[1].model
+    V = fast.choice.parts[1].basis(rod.n)
+    stretching = np.abs(rod.interface("b").phi_t[0]) > 1e-3 * np.abs(rod.interface("b").phi_t).max()
+    assert V.shape[1] >= 1
+    assert np.abs(V[~stretching]).max() > 0.9
+    assert np.abs(V[stretching]).max() < 0.1
+    assert fast.choice.parts[0].count == 0
+    assert (fast.verification.error <= fast.limits).all()
+
+
+def test_stiffening_is_kept_above_the_critical_spin():
+    """The beam's first frequency is 3.8 rad/s; a third of the published run suffices to need it."""
+    found = economise(spin_up(6.0), ("blade.b.displacement.y",), end=12.0, output_step=0.1, tolerance=1e-2)
+    blade = found.choice.parts[1]
+    assert blade.count > 0
+    assert blade.stiffened
+    assert (found.verification.error <= found.limits).all()
+    assert {one.body for one in found.stiffening} == {"blade"}
+
+
+def test_a_model_is_refined_where_verification_finds_it_wrong(monkeypatch):
+    """Estimates that promise too much are found out: with all modes declared without effect the search would stay rigid."""
+    monkeypatch.setattr("ffr_dyn.economy.search.Shares", lambda *given: Shares(1e9, 1e9, 1e9))
+    found = economise(pendulum(7e9), TIP, end=0.4, output_step=0.02, tolerance=1e-3, verify=True)
+    assert found.verification.attempts > 0
+    assert (found.verification.first > found.limits).any()
+    assert (found.verification.error <= found.limits).all()
+
+
+def test_the_reference_must_be_better_than_the_tolerance(monkeypatch):
+    monkeypatch.setattr("ffr_dyn.economy.search.error_of", lambda fine, coarse: tuple(v + 1.0 for v in fine.values))
+    with pytest.raises(InputError, match="below what the reference itself is known to"):
+        economise(SLOW.scene(), SLOW.outputs, end=0.28, output_step=0.014, verify=True)
+
+
+# ---- report, advice, chart, command ---------------------------------------------------------------------------------
+
+
+def test_the_report_says_it_all(fast, tmp_path):
+    text = as_text(fast)
+    for part in ("CHOSEN MODEL", "OUTPUTS", "BODIES", "NEAREST TO MATTERING", "MODELS TRIED", "MESH AND REDUCTION"):
+        assert part in text
+    assert "slider.pin.position.x" in text
+    assert "Verified" in text
+    assert "| rod | flexible" in as_markdown(fast, "chart.png")
+    page = as_html(fast, b"png")
+    assert page.startswith("<!doctype html>")
+    assert "http" not in page
+    for suffix in (".txt", ".md", ".html"):
+        assert write_report(fast, tmp_path / f"r{suffix}").stat().st_size > 1000
+    with pytest.raises(InputError, match="written as"):
+        write_report(fast, tmp_path / "r.pdf")
+
+
+def test_advice_is_a_command_to_run(fast):
+    lines = advice(fast)
+    assert lines[0].startswith("crank: rigid is enough")
+    assert "ffr-prep reduce FILE --interface a --interface b --method craig-bampton --frequency" in lines[1]
+    assert "--stress" in lines[1]
+
+
+def test_the_front_has_the_points_that_nothing_beats(fast):
+    costs, errors = points(fast)
+    order = front(costs, errors)
+    assert (np.diff(costs[order]) >= 0).all()
+    assert (np.diff(errors[order]) < 0).all()
+    for cost, error in zip(costs, errors, strict=True):
+        assert ((costs[order] <= cost) & (errors[order] <= error)).any()
+
+
+def test_nothing_cheaper_that_was_run_would_have_done(fast):
+    costs, errors = points(fast)
+    assert costs.size > 3
+    assert not ((costs < 0.999) & (errors <= 1)).any()
+
+
+def test_the_command_writes_a_scene_that_runs(tmp_path):
+    scene = slider_crank(50.0)
+    settings = Settings(0.0, 0.1, 0.005, ROS2(0.0005), Projection())
+    save_scene(scene, settings, tmp_path / "in.toml")
+    arguments = ["economise", str(tmp_path / "in.toml"), "--output", "slider.pin.position.x", "--tolerance", "1e-4"]
+    done = CliRunner().invoke(cli, [*arguments, "-o", str(tmp_path / "out.toml"), "--chart", str(tmp_path / "c.png")])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "out.html").exists()
+    assert (tmp_path / "c.png").stat().st_size > 1000
+    made, how = load_scene(tmp_path / "out.toml")
+    assert sum(body.model.n for body in made.bodies) < 28
+    result = forward(made, end=how.end, output_step=how.output_step, method=how.method)
+    reference = forward(scene, end=0.1, output_step=0.005, method=ROS3(0.0005))
+    off = np.abs(result["slider.pin.position.x"] - reference["slider.pin.position.x"]).max()
+    assert off < 1e-4 * np.ptp(reference["slider.pin.position.x"])
+
+
+def test_the_command_answers_a_wrong_output(tmp_path):
+    save_scene(slider_crank(50.0), Settings(0.0, 0.1, 0.005, ROS2(0.0005), Projection()), tmp_path / "in.toml")
+    with pytest.raises(InputError, match="none of the scene's quantities"):
+        CliRunner().invoke(
+            cli,
+            ["economise", str(tmp_path / "in.toml"), "--output", "nothing.x"],
+            catch_exceptions=False,
+            standalone_mode=False,
+        )
+
+
+def test_a_model_of_another_scene_is_refused():
+    with pytest.raises(InputError, match="the scene has 1"):
+        applied(pendulum(7e9), full(slider_crank(10.0), "ros2", 1))
+
+
+# ---- adaptive order -------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def adaptive() -> tuple[Scene, Result]:
+    """A crank that speeds up and slows down again within 0.3 s, damped."""
+    scene = slider_crank(40.0)
+    bodies = tuple(replace(body, damping=0.05) for body in scene.bodies)
+    motor = Driver("motor", "bearing", _up_and_down(60.0, 0.3))
+    scene = replace(scene, bodies=bodies, drivers=(motor,))
+    outputs = ("slider.pin.position.x=5e-6",)
+    return scene, adaptive_forward(
+        scene, outputs, end=0.42, output_step=2e-3, divisions=4, adaptation=Adaptation(rows=15)
+    )
+
+
+def _up_and_down(speed: float, time: float) -> TimeFunction:
+    u = f"min(t, {time})"
+    return formula(f"{speed} * ({u} - sin(2 * pi * {u} / {time}) * {time} / (2 * pi)) / 2")
+
+
+def test_a_body_becomes_flexible_and_rigid_again(adaptive):
+    _, result = adaptive
+    count = result["model.coordinates"].sum(axis=1)
+    assert count[0] == 0
+    assert count.max() > 0
+    assert count[-1] == 0
+
+
+def test_outputs_stay_within_the_tolerance_and_continuous(adaptive):
+    scene, result = adaptive
+    reference = forward(scene, end=0.42, output_step=2e-3, method=ROS3(2.5e-4))
+    off = result["slider.pin.position.x"] - reference["slider.pin.position.x"]
+    assert np.abs(off).max() < 5e-6
+    np.testing.assert_allclose(result.time, reference.time, atol=1e-12)
+
+
+def test_the_ledger_holds_what_switches_did(adaptive):
+    _, result = adaptive
+    switched, count = result["energy.switched"], result["model.coordinates"].sum(axis=1)
+    changed = np.diff(count) != 0
+    jumps = np.abs(np.diff(switched))
+    assert jumps[changed].max() > 0
+    assert jumps[~changed].max() < 0.05 * jumps[changed].max()
+    assert np.abs(switched).max() < 1e-3 * np.ptp(result["energy.kinetic"])
+
+
+@pytest.mark.parametrize("given", [{"enter": 0.1, "leave": 0.2}, {"enter": 2.0}, {"rows": 1}])
+def test_an_adaptation_that_cannot_work_is_refused(given):
+    with pytest.raises(InputError):
+        Adaptation(**given)
