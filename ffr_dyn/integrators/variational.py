@@ -30,7 +30,7 @@ from typing import ClassVar
 from ffr_dyn.integrators.generalised_alpha import check_iterations
 from ffr_dyn.kernels.actions import keep_turns
 from ffr_dyn.kernels.bodies import mass_times, normalise, six_rows, three_rows
-from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, solve
+from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, solve, solve_anew
 from ffr_dyn.kernels.motion import carry, converging, farthest, into_global_axes, largest_motion, unconverged
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import unpack_tables, vector_at
@@ -52,6 +52,7 @@ MU, KICK, MIDDLE, SHORT, END, REACTION, CHANGE = range(7)
 HALF, WHOLE, NOTHING = range(3)  # rows of stages.x: x_m, x+, zeros
 LAM, JAC = 0, 1  # rows of stages.rows: multipliers of the start; then the coefficients of the rows there
 TOLERANCE, LIMIT, STARTED = range(3)
+STUCK = 1e-6  # relative: where corrections no longer shrink below this, rounding is what is left of them
 ROUNDING = 4e-16  # of positions, over the step: what rounding leaves of a velocity
 
 
@@ -192,7 +193,7 @@ def stiffen_node(r, t, v):
     if status == OK:
         fill(bw.shift, 0.0)
         copy(s.target, r.work.rows.gamma)
-        solve(r, r.x, s.target)
+        solve_anew(r, r.x, s.target)
         fill(s.v[KICK], 0.0)
         for b in range(bodies.mass.size):
             n, j, e = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3]
@@ -285,9 +286,9 @@ def iterate(r, t, h):
         change *= 0.5 * h
         if finite(s.v[MIDDLE], s.v[END]) != OK:
             return NOT_FINITE if attempt == 0 else unconverged(r, worst, h * before)
-        allowed = s.numbers[TOLERANCE] * largest_motion(bodies, bw.J, s.v[MIDDLE])[0]
-        allowed += ROUNDING * farthest(bodies, s.x[WHOLE]) / h
-        if converging(change, before, 1.0, allowed):
+        scale = largest_motion(bodies, bw.J, s.v[MIDDLE])[0]
+        allowed = s.numbers[TOLERANCE] * scale + ROUNDING * farthest(bodies, s.x[WHOLE]) / h
+        if converging(change, before, 1.0, allowed) or (change > 0.9 * before > 0.0 and change <= STUCK * scale):
             return OK
         before = change
     return unconverged(r, worst, h * change)

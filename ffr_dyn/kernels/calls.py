@@ -20,7 +20,13 @@ def settle(r, t):
 
 @inlined
 def solve(r, x, target):
-    """Accelerations (bodies.acc) and multipliers (rows.lam) of what was evaluated last at x."""
+    """Accelerations (bodies.acc) and multipliers (rows.lam) of what was evaluated last at x, near what they are now."""
+    call_unit(r.units[SOLVE], r.address, 1.0, x.ctypes.data, target.ctypes.data)
+
+
+@inlined
+def solve_anew(r, x, target):
+    """`solve` where what was solved last has nothing to do with it."""
     call_unit(r.units[SOLVE], r.address, 0.0, x.ctypes.data, target.ctypes.data)
 
 

@@ -46,8 +46,8 @@ TIGHTER = 1e-4
 class Bodies(NamedTuple):
     """B bodies, E elastic coordinates in all."""
 
-    # (B + 1, 8) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening (or -1); its number of loads;
-    # the body axis along the normal of a planar scene, or -1
+    # (B + 1, 10) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening (or -1); its number of loads;
+    # the body axis along the normal of a planar scene, or -1; its first of `loads`; its first product in `stiff`
     where: I2
     mass: F1  # (B,)
     moments: F2  # (B, 9) first moment r_dm (3), second moment rr_dm (6)
@@ -56,7 +56,8 @@ class Bodies(NamedTuple):
     PP_dm: F1  # pooled; per body n rows of 9 n: for q_i the same nine rows over j (last three: I5)
     omega2: F1  # (E,)
     two_zeta_omega: F1  # (E,)
-    stiffening: F1  # pooled; per body loads x n x n, empty without geometric stiffening
+    stiffening: F1  # pooled; per body n x loads x n (over q_c, loads, rows), empty without geometric stiffening
+    loads: I1  # pooled; which of a body's loads stiffen it
 
 
 class Markers(NamedTuple):
@@ -154,8 +155,8 @@ class BodyWork(NamedTuple):
     more: F1  # (V,) scratch
     unstiffened: F1  # (E,) elastic right-hand side without geometric stiffening
     shift: F1  # (V,) part of acc that is no acceleration (corrections of an integrator's stage), body axes
-    stiff: F1  # pooled like stiffening, n per load: K_load q
-    load: F1  # (longest,) loads of one body
+    stiff: F1  # pooled; per body, load and elastic coordinate: K_load q
+    load: F2  # (B, longest) loads of the bodies, in the order of their stiffness
 
 
 class MarkerWork(NamedTuple):
@@ -198,8 +199,8 @@ class RowWork(NamedTuple):
     Y: F1  # (12 * 8,) scratch
     step: F1  # (8 K,) multipliers, the rows of each block in a row of lanes
     wrench: F1  # (6,) scratch
-    P: F3  # (M, 6, 6) [P_dm; H] dinv phi^T
-    phiphi: F3  # (pairs, 6, 6) phi dinv phi'^T
+    P: F2  # (M, 36) [P_dm; H] dinv phi^T; of a planar body nine numbers
+    phiphi: F2  # (pairs, 36) phi dinv phi'^T; of a planar body nine numbers
     S: F1  # pooled blocks, rows of lanes (see `blocks`)
 
 

@@ -121,10 +121,13 @@ def evaluate_unit(at, t, x, v):
 
 
 @Unit
-def solve_unit(at, t, x, target):
-    """acc and lam from the right-hand sides and the target (C,) of the accelerations, with geometric stiffening."""
+def solve_unit(at, near, x, target):
+    """acc and lam from the right-hand sides and the target (C,) of the accelerations, with geometric stiffening.
+
+    near : above zero where the last solution was that of a state nearby
+    """
     r = unpack_tables(at)
-    solve_stiffened(r.model, r.work, vector_at(x, r.x.size), vector_at(target, r.stages.target.size))
+    solve_stiffened(r.model, r.work, vector_at(x, r.x.size), vector_at(target, r.stages.target.size), near > 0.0)
     return OK
 
 
@@ -223,7 +226,7 @@ def truly_unit(at, t, x, v):
     status = call_unit(r.units[EVALUATE], at, t, x, v)
     if status == OK:
         fill(w.bodies.shift, 0.0)
-        call_unit(r.units[SOLVE], at, t, x, w.rows.gamma.ctypes.data)
+        call_unit(r.units[SOLVE], at, 0.0, x, w.rows.gamma.ctypes.data)
         to_velocity_rates(r.model.bodies.where, w.bodies.A, w.bodies.acc, w.vd)
     return status
 
