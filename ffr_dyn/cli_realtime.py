@@ -53,6 +53,7 @@ def realtime(
     from ffr_dyn.realtime import as_json, lines, measure_steps, plot_times
     from ffr_dyn.scene_file import load_scene
     from ffr_dyn.settings import Settings
+    from ffr_dyn.stabilisation import Projection
 
     loaded, settings = load_scene(scene, assignments(parameters))
     given: Any = METHODS["ros2"](1e-3)
@@ -68,6 +69,7 @@ def realtime(
             duration=duration,
             deadline=deadline,
             outputs=outputs or ("*.position",),
+            stabilisation=settings.stabilisation if isinstance(settings, Settings) else Projection(),
             paced=paced,
             progress=update,
         )

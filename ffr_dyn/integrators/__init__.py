@@ -9,14 +9,18 @@ from __future__ import annotations
 from typing import Any, ClassVar, Protocol
 
 from ffr_dyn.integrators.dopri5 import DormandPrince
+from ffr_dyn.integrators.generalised_alpha import HHT, GeneralisedAlpha
+from ffr_dyn.integrators.half_explicit import HalfExplicit
 from ffr_dyn.integrators.rk4 import RK4
 from ffr_dyn.integrators.ros2 import ROS2
 from ffr_dyn.integrators.ros3 import ROS3, AdaptiveROS3
 from ffr_dyn.integrators.tolerances import Tolerances, tolerances
+from ffr_dyn.integrators.variational import Variational
 from ffr_dyn.kernels.units import Unit
 
 __all__ = [
     "CONTROLLED",
+    "HHT",
     "METHODS",
     "RK4",
     "ROS2",
@@ -24,8 +28,11 @@ __all__ = [
     "AdaptiveROS3",
     "Controlled",
     "DormandPrince",
+    "GeneralisedAlpha",
+    "HalfExplicit",
     "Integrator",
     "Tolerances",
+    "Variational",
     "tolerances",
 ]
 
@@ -59,5 +66,13 @@ class Controlled(Integrator, Protocol):
     estimate_order: ClassVar[int]  # the error of a step goes as h to this power
 
 
-METHODS: dict[str, type[Any]] = {"rk4": RK4, "ros2": ROS2, "ros3": ROS3}
+METHODS: dict[str, type[Any]] = {
+    "rk4": RK4,
+    "ros2": ROS2,
+    "ros3": ROS3,
+    "half-explicit": HalfExplicit,
+    "generalised-alpha": GeneralisedAlpha,
+    "hht": HHT,
+    "variational": Variational,
+}
 CONTROLLED: dict[str, type[Any]] = {"ros3-adaptive": AdaptiveROS3, "dopri5": DormandPrince}

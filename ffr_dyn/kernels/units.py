@@ -14,14 +14,16 @@ from typing import Any
 from numba import cfunc, types
 
 from ffr_dyn.kernels.actions import keep_turns
-from ffr_dyn.kernels.bodies import mass_times
+from ffr_dyn.kernels.bodies import mass_times, rotation_matrix
 from ffr_dyn.kernels.calls import set_diagonal
 from ffr_dyn.kernels.control import controlled_step, interpolate
 from ffr_dyn.kernels.functions import evaluate_functions
 from ffr_dyn.kernels.loads import call_user, gravity_field
+from ffr_dyn.kernels.markers import update_marker
 from ffr_dyn.kernels.options import OPTIONS
 from ffr_dyn.kernels.packing import call_unit, unpack_record, unpack_tables, vector_at
 from ffr_dyn.kernels.record import keep
+from ffr_dyn.kernels.rows import evaluate_block
 from ffr_dyn.kernels.stiffening import solve_stiffened
 from ffr_dyn.kernels.system import (
     constraint_rates,
@@ -30,6 +32,7 @@ from ffr_dyn.kernels.system import (
     evaluate_loads,
     largest,
     move_back,
+    solve_step,
     to_body_axes,
     to_velocity_rates,
 )
@@ -52,7 +55,7 @@ from ffr_dyn.kernels.tables import (
     TRULY,
     USER_FAILED,
 )
-from ffr_dyn.kernels.vectors import add_scaled, copy, fill
+from ffr_dyn.kernels.vectors import add_scaled, copy, fill, get, put
 
 SIGNATURE = types.int64(types.int64, types.float64, types.int64, types.int64)
 
@@ -153,6 +156,36 @@ def correct_unit(at, t, r_v, target):
     for b in range(bodies.mass.size):
         j, size = bodies.where[b, 2], 6 + bodies.where[b, 0]
         mass_times(bodies, bw, b, bw.acc[j : j + size], bw.f[j : j + size])
+    return OK
+
+
+@Unit
+def look_ahead_unit(at, t, x, v):
+    """Rows (Phi, nu, gamma, jac) at (t, x, v). The factors of the last evaluation stay; markers and rotations do not."""
+    r = unpack_tables(at)
+    m, w, x, v = r.model, r.work, vector_at(x, r.x.size), vector_at(v, r.v.size)
+    if not call_user(m.user_address, t, x, v, w.user):
+        return USER_FAILED
+    evaluate_functions(m.functions, w.user, t, w.functions)
+    for b in range(m.bodies.mass.size):
+        i, j = m.bodies.where[b, 1], m.bodies.where[b, 2]
+        rotation_matrix(x[i + 3], x[i + 4], x[i + 5], x[i + 6], w.bodies.A[b])
+        put(w.bodies.omega, b, (v[j + 3], v[j + 4], v[j + 5]))
+    for k in m.markers.joint:
+        b = m.markers.body[k]
+        update_marker(m.bodies.where, m.markers, w.markers, w.bodies.A[b], get(w.bodies.omega, b), x, v, k)
+    for k in range(m.rows.marker.shape[0]):
+        evaluate_block(m.rows, w.functions, w.markers, w.rows, k)
+    return OK
+
+
+@Unit
+def project_unit(at, t, value, out):
+    """out (V,): the motion, smallest in the norm of the mass matrix, with Phi_q out = -value (C,)."""
+    r = unpack_tables(at)
+    m, w = r.model, r.work
+    solve_step(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, vector_at(value, r.stages.target.size))
+    to_velocity_rates(m.bodies.where, w.bodies.A, w.bodies.acc, vector_at(out, r.v.size))
     return OK
 
 
@@ -266,6 +299,8 @@ UNITS = {
     "record": record_unit,
     "move_back": move_back_unit,
     "correct": correct_unit,
+    "project": project_unit,
+    "look_ahead": look_ahead_unit,
     "truly": truly_unit,
     "settle": settle_unit,
     "evaluate": evaluate_unit,
@@ -278,6 +313,6 @@ def unit_addresses() -> list[int]:
     """In the order of the units' numbers in `tables`."""
     numbered = (
         evaluate_unit, bodies_unit, loads_unit, joints_unit, solve_unit, settle_unit, move_back_unit, correct_unit,
-        truly_unit, record_unit,
+        truly_unit, record_unit, look_ahead_unit, project_unit,
     )  # fmt: skip
     return [unit.address for unit in numbered]
