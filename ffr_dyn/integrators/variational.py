@@ -344,7 +344,7 @@ class Variational:
     """
 
     step: float
-    tolerance: float = 1e-13
+    tolerance: float = 1e-14
     iterations: int = 30
     order: ClassVar[int] = 2
     implicit: ClassVar[bool] = True
