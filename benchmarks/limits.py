@@ -91,13 +91,17 @@ def least(timers: Sequence[Callable[[], float]], repeats: int) -> list[float]:
 
 def links_table(repeats: int, longest: int) -> None:
     counts = [count for count in (1, 8, 64, 1000) if count <= longest]
-    print(f"\nlinks, RK4: per link and evaluation [us]\n{'n':>6}" + "".join(f"{c:>9}" for c in counts) + f"{'spread':>9}")
+    print(
+        f"\nlinks, RK4: per link and evaluation [us]\n{'n':>6}" + "".join(f"{c:>9}" for c in counts) + f"{'spread':>9}"
+    )
     for n in (8, 32):
         found = least([timer(chain(rod(n), count, "revolute"), RK4(5e-6)) for count in counts], repeats)
         each = [value / count for value, count in zip(found, counts, strict=True)]
         spread = max(each) / min(each) - 1
         goal = "met" if max(each) <= GOALS[n] else "not met"
-        print(f"{n:6d}" + "".join(f"{v:9.2f}" for v in each) + f"{spread:9.0%}   goal {GOALS[n]:g} us: {goal}", flush=True)
+        print(
+            f"{n:6d}" + "".join(f"{v:9.2f}" for v in each) + f"{spread:9.0%}   goal {GOALS[n]:g} us: {goal}", flush=True
+        )
 
 
 def modes_table(repeats: int) -> None:
@@ -126,7 +130,9 @@ def stiffened(body: FlexibleBody, factor: float) -> FlexibleBody:
 
 
 def stiff_table() -> None:
-    print("\nstiff: a pendulum swings for 1 s at h Omega_max = 1e5; error of its tip against one 1e8 times as stiff [m]")
+    print(
+        "\nstiff: a pendulum swings for 1 s at h Omega_max = 1e5; error of its tip against one 1e8 times as stiff [m]"
+    )
     body = rod(32)
     fastest = float(np.sqrt(body.omega2.max()))
     for kind in (ROS2, ROS3):
@@ -138,9 +144,8 @@ def stiff_table() -> None:
                 for f, step in ((factor, h), (factor, 2e-4))
             ]
             errors.append(np.abs(tips[0]["link0.tip.position"] - tips[1]["link0.tip.position"]).max())
-        print(
-            f"  {kind.__name__}: {errors[0]:.1e} at h = 0.02 s, {errors[1]:.1e} at 0.01 s, order {np.log2(errors[0] / errors[1]):.2f}"
-        )
+        order = np.log2(errors[0] / errors[1])
+        print(f"  {kind.__name__}: {errors[0]:.1e} at h = 0.02 s, {errors[1]:.1e} at 0.01 s, order {order:.2f}")
 
 
 def start_table() -> None:
@@ -153,7 +158,9 @@ def start_table() -> None:
         ]
     first, second, third = (float(run[1]) for run in runs)
     print(f"\nstart: import ffr_dyn {min(float(run[0]) for run in runs):.2f} s (goal 0.4)")
-    print(f"  runs: first {first:.1f} s, second {second:.2f} s, third {third:.2f} s; compiling {first - second:.1f} s (goal 20)")
+    print(
+        f"  runs: first {first:.1f} s, second {second:.2f} s, third {third:.2f} s; compiling {first - second:.1f} s (goal 20)"
+    )
 
 
 def main() -> None:
