@@ -136,7 +136,7 @@ def _method(settings: Settings, given: Mapping[str, Any]) -> Integrator:
     if "tolerance" in given:
         raise InputError(f"--tolerance: {kind.__name__} takes steps of one length; give --step")
     step = given.get("step", settings.method.step or settings.output_step / 10)
-    return kind(step)
+    return replace(settings.method, step=step) if kind is type(settings.method) else kind(step)  # type: ignore[type-var]
 
 
 def perform(scene: Scene, settings: Settings | MomentSettings, output: Path, resume: bool = False) -> None:

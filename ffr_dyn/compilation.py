@@ -15,7 +15,7 @@ from pathlib import Path
 from numba.core.caching import FunctionCache
 
 from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator
-from ffr_dyn.kernels.units import CONTROL_UNITS, LOAD_UNITS, UNITS, Unit
+from ffr_dyn.kernels.units import CONTROL_UNITS, EXTRA_UNITS, LOAD_UNITS, UNITS, Unit
 
 _METHODS = {**METHODS, **CONTROLLED}
 _AT_WORK: dict[str, subprocess.Popen[bytes]] = {}
@@ -30,7 +30,8 @@ def begin_compiling(*kinds: type[Integrator], loads: bool = True) -> None:
     """
     controlled = CONTROL_UNITS if any(kind.controlled for kind in kinds) else {}
     methods = {name: kind.unit for name, kind in _METHODS.items() if kind in kinds}
-    units = {**UNITS, **(LOAD_UNITS if loads else {}), **controlled, **methods}
+    extra = {name: EXTRA_UNITS[name] for kind in kinds for name in kind.calls}
+    units = {**UNITS, **(LOAD_UNITS if loads else {}), **controlled, **extra, **methods}
     missing = [name for name, unit in units.items() if name not in _AT_WORK and not _is_on_disk(unit)]
     if not missing:
         return
@@ -62,7 +63,13 @@ def _is_on_disk(unit: Unit) -> bool:
 
 def compile_units(names: Sequence[str]) -> None:
     """Compile units and methods by their names."""
-    units = {**UNITS, **LOAD_UNITS, **CONTROL_UNITS, **{name: kind.unit for name, kind in _METHODS.items()}}
+    units = {
+        **UNITS,
+        **LOAD_UNITS,
+        **CONTROL_UNITS,
+        **EXTRA_UNITS,
+        **{name: kind.unit for name, kind in _METHODS.items()},
+    }
     for name in names:
         unit = units[name]
         if not unit.address:

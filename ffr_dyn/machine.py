@@ -70,7 +70,8 @@ def new_machine(
         stages, h = new_stages(system, method.stage_count, method.row_stages, method.numbers), method.step
     clock = Clock(np.array([h, h or spacing]), np.zeros(3, dtype=np.int64), np.array(gains))
     control = _control(system, method, start, spacing)
-    units = np.array(unit_addresses(has_loads(system.model.loads)), dtype=np.int64)
+    calls = () if method is None else method.calls
+    units = np.array(unit_addresses(has_loads(system.model.loads), calls), dtype=np.int64)
     state = np.array(x, dtype=float), np.array(v, dtype=float)
     return _packed(system, Tables(0, units, system.model, new_work(system.model), stages, clock, control, *state))
 

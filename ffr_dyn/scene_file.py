@@ -216,18 +216,21 @@ def _settings(entry: Any, outputs: list[str], source: Source) -> Settings | Mome
     if entry.kind == "linearise":
         inputs = (*_efforts("inputs", entry.inputs, source), *entry.loads)
         return MomentSettings(entry.time, keep, Linearise(inputs, tuple(entry.quantities), entry.at_equilibrium))
-    method = _method(entry)
+    method = _method(entry, source)
     stabilisation = _stabilisation(getattr(entry, "stabilisation", StabilisationEntry()))
     span = (entry.start, entry.end, entry.output_step)
     return Settings(*span, method, stabilisation, keep, _over_time(entry, source))
 
 
-def _method(entry: Any) -> Integrator:
+def _method(entry: Any, source: Source) -> Integrator:
     name, step = getattr(entry, "method", "ros2"), getattr(entry, "step", None)
     if name in CONTROLLED:
         given = entry.tolerances
         return CONTROLLED[name](Tolerances() if given is None else Tolerances(**given.model_dump()))
-    return METHODS[name](entry.output_step / 10 if step is None else step)
+    try:
+        return METHODS[name](entry.output_step / 10 if step is None else step, **getattr(entry, "settings", {}))
+    except InputError as error:
+        raise InputError(f"{origin(source, ('analysis', 'settings'))}: analysis.settings: {error}") from None
 
 
 def _over_time(entry: Any, source: Source) -> OverTime:

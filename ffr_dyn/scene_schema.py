@@ -47,6 +47,7 @@ from ffr_dyn.scene_values import (
     Vector,
     or_curve,
 )
+from ffr_dyn.settings import settings_of
 from ffr_dyn.surface_loads import ModalForce, NodalForces, Pressure
 
 Direction = Vector | list[Vector]
@@ -263,6 +264,7 @@ class _Integrated(_Span):
     method: Literal[(*METHODS, *CONTROLLED)] = "ros2"  # type: ignore[valid-type]
     step: Seconds | None = None
     tolerances: TolerancesEntry | None = None
+    settings: dict[str, bool | int | float | str] = {}
 
     @model_validator(mode="after")
     def _one_of_both(self) -> _Integrated:
@@ -271,6 +273,11 @@ class _Integrated(_Span):
             raise ValueError(f"{self.method} chooses its steps: give 'tolerances' in place of 'step'")
         if not controlled and self.tolerances is not None:
             raise ValueError(f"{self.method} takes steps of one length: give 'step' in place of 'tolerances'")
+        known = [] if controlled else settings_of(METHODS[self.method])
+        for name in self.settings:
+            if name not in known:
+                there = f"it has {', '.join(known)}" if known else "it has none"
+                raise ValueError(f"settings: {self.method} has no setting {name!r}; {there}")
         return self
 
 

@@ -19,7 +19,18 @@ from ffr_dyn.integrators import CONTROLLED, METHODS, Controlled, Integrator
 from ffr_dyn.joint_forces import Actuator
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.scene_schema import EFFORTS, SOLUTIONS, TABLES, Kind, keys_of
-from ffr_dyn.settings import Forward, Inverse, Kinematic, Linearise, Mixed, MomentSettings, OfMoment, OverTime, Settings
+from ffr_dyn.settings import (
+    Forward,
+    Inverse,
+    Kinematic,
+    Linearise,
+    Mixed,
+    MomentSettings,
+    OfMoment,
+    OverTime,
+    Settings,
+    settings_of,
+)
 from ffr_dyn.stabilisation import Baumgarte, Projection, Stabilisation
 from ffr_dyn.state_formula import StateFormula
 from ffr_dyn.timefunction import HARMONIC, OPERATION, PIECEWISE, POLYNOMIAL, TimeFunction, constant, signals_in
@@ -99,7 +110,8 @@ def _method(method: Integrator) -> dict[str, Any]:
     name = next(word for word, made in {**METHODS, **CONTROLLED}.items() if type(method) is made)
     if name in CONTROLLED:
         return {"method": name, "tolerances": asdict(cast("Controlled", method).tolerances)}
-    return {"method": name, "step": method.step}
+    given = {key: getattr(method, key) for key in settings_of(type(method))}
+    return {"method": name, "step": method.step, **({"settings": given} if given else {})}
 
 
 def _particular(analysis: OverTime | OfMoment) -> dict[str, Any]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 from ffr_dyn.analyses.bounded import Bounded
 from ffr_dyn.analyses.efforts import Effort
@@ -75,3 +76,8 @@ class MomentSettings:
     time: float = 0.0
     outputs: tuple[str, ...] = ("default",)
     analysis: OfMoment = Static()
+
+
+def settings_of(method: type[Any]) -> list[str]:
+    """Names of what a method of fixed steps takes beside its step."""
+    return [field.name for field in fields(method) if field.name != "step"]

@@ -18,6 +18,7 @@ from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import ROS2, Integrator
 from ffr_dyn.kernels.tables import (
     AT,
+    NOT_CONVERGED,
     NOT_FINITE,
     NOW,
     OK,
@@ -243,6 +244,8 @@ def failure(system: System, work: Work, status: int, time: float) -> BaseExcepti
             f"{at} the state of {_worst(system, work)} is no longer finite: the step is too large for an explicit method "
             "(use ROS2 or a smaller step), or a force is not finite"
         )
+    if status == NOT_CONVERGED:
+        return SimulationError(f"{at} the iterations of the step do not converge, {_unconverged(system, where)}")
     if status == STEP_TOO_SMALL:
         return SimulationError(
             f"{at} the step has become too small: the motion is not smooth there (an impact, a jump of a force or of a "
@@ -250,6 +253,21 @@ def failure(system: System, work: Work, status: int, time: float) -> BaseExcepti
             "larger tolerances"
         )
     return SimulationError(f"{at} the run stopped: {system.user.failure or 'unknown cause'}")
+
+
+def _unconverged(system: System, where: int) -> str:
+    """Of a body, or after the bodies a constraint row: where, the likely cause and what to change."""
+    bodies = system.scene.bodies
+    if where < len(bodies):
+        return (
+            f"worst in body {bodies[where].name!r}: the step is too large for its rotation or for a spring, damper, stop or "
+            "friction that acts on it; use a smaller step, ROS2, or a softer force"
+        )
+    block = system.blocks[int(np.searchsorted(system.model.rows.start, where - len(bodies), side="right")) - 1]
+    return (
+        f"worst in {block.name!r}: its constraint cannot be met within the step; use a smaller step, look for a position "
+        "where the mechanism locks or is singular, or pass it with ROS2"
+    )
 
 
 def _worst(system: System, work: Work) -> str:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.economy.choice import Choice
-from ffr_dyn.economy.cost import per_row, stages
+from ffr_dyn.economy.cost import STAGES, per_row, stages
 from ffr_dyn.economy.outputs import difference, largest
 from ffr_dyn.economy.trial import Span, Trial, cost
 from ffr_dyn.errors import InputError, SimulationError
@@ -44,8 +44,8 @@ class Stepped:
 
 
 def methods(span: Span) -> tuple[str, ...]:
-    """Names of the methods that take a step."""
-    return tuple(name for name, made in METHODS.items() if _takes_a_step(made, span.output_step))
+    """Names of the methods that take a step, and a known number of evaluations for it."""
+    return tuple(name for name, made in METHODS.items() if name in STAGES and _takes_a_step(made, span.output_step))
 
 
 def _takes_a_step(made: Callable[[float], Integrator], step: float) -> bool:

@@ -26,11 +26,20 @@ from ffr_dyn.kernels.bodies import (
     six_rows,
 )
 from ffr_dyn.kernels.lanes import combine_3, combine_6, dot_rows
-from ffr_dyn.kernels.markers import couple_marker, couple_pair, plane_rows, prepare_marker, shapes, update_marker
+from ffr_dyn.kernels.markers import (
+    couple_marker,
+    couple_pair,
+    plane_rows,
+    prepare_marker,
+    project,
+    shapes,
+    update_marker,
+)
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.rows import evaluate_block
 from ffr_dyn.kernels.tables import LANES, NOT_FINITE, OK, RELATION
 from ffr_dyn.kernels.vectors import (
+    add,
     add_scaled,
     copy,
     cross,
@@ -256,6 +265,35 @@ def add_side_rates(phi, jac, acc, first, last, side, n, out):
             + a[3] * acc[3] + a[4] * acc[4] + a[5] * acc[5]
             + a[6] * e3 + a[7] * e4 + a[8] * e5
         )  # fmt: skip
+
+
+@inlined
+def add_reactions(where, markers, rows, jac, lam, out):
+    """out (V,) += Phi_q^T lam in body axes."""
+    ground = where.shape[0] - 1
+    for k in range(rows.marker.shape[0]):
+        for side in range(rows.marker.shape[1]):
+            marker = rows.marker[k, side]
+            b = markers.body[marker] if marker >= 0 else ground
+            if b != ground:
+                n, j = where[b, 0], where[b, 2]
+                phi = shapes(markers, marker, n)
+                add_side_reactions(phi, jac, lam, rows.start[k], rows.start[k + 1], side, n, out[j : j + 6 + n])
+
+
+@kernel
+def add_side_reactions(phi, jac, lam, first, last, side, n, out):
+    force, twist = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for row in range(first, last):
+        a, value = jac[row, side], lam[row]
+        force = add(force, (a[0] * value, a[1] * value, a[2] * value))
+        twist = add(twist, (a[6] * value, a[7] * value, a[8] * value))
+        for c in range(3):
+            out[3 + c] += a[3 + c] * value
+    for c in range(3):
+        out[c] += force[c]
+    if n > 0:
+        project(phi, force, twist, out[6:], n)
 
 
 @inlined

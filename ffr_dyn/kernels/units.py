@@ -7,21 +7,23 @@ integrator costs no more than its own few lines, and compilation can be shared a
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import cached_property
 from typing import Any
 
 from numba import cfunc, types
 
 from ffr_dyn.kernels.actions import keep_turns
-from ffr_dyn.kernels.bodies import mass_times
+from ffr_dyn.kernels.bodies import mass_times, rotation_matrix
 from ffr_dyn.kernels.calls import set_diagonal
 from ffr_dyn.kernels.control import controlled_step, interpolate
 from ffr_dyn.kernels.functions import evaluate_functions
 from ffr_dyn.kernels.loads import apply_loads, call_user, gravity_field, powers
+from ffr_dyn.kernels.markers import update_marker
 from ffr_dyn.kernels.options import OPTIONS
 from ffr_dyn.kernels.packing import call_unit, unpack_record, unpack_tables, vector_at
 from ffr_dyn.kernels.record import keep
+from ffr_dyn.kernels.rows import evaluate_block
 from ffr_dyn.kernels.stiffening import solve_stiffened
 from ffr_dyn.kernels.system import (
     constraint_rates,
@@ -31,6 +33,7 @@ from ffr_dyn.kernels.system import (
     has_loads,
     largest,
     move_back,
+    solve_step,
     to_body_axes,
     to_velocity_rates,
 )
@@ -55,7 +58,7 @@ from ffr_dyn.kernels.tables import (
     TRULY,
     USER_FAILED,
 )
-from ffr_dyn.kernels.vectors import add_scaled, copy, fill
+from ffr_dyn.kernels.vectors import add_scaled, copy, fill, get, put
 
 SIGNATURE = types.int64(types.int64, types.float64, types.int64, types.int64)
 
@@ -193,6 +196,36 @@ def correct_unit(at, t, r_v, target):
 
 
 @Unit
+def look_ahead_unit(at, t, x, v):
+    """Rows (Phi, nu, gamma, jac) at (t, x, v). The factors of the last evaluation stay; markers and rotations do not."""
+    r = unpack_tables(at)
+    m, w, x, v = r.model, r.work, vector_at(x, r.x.size), vector_at(v, r.v.size)
+    if not call_user(m.user_address, t, x, v, w.user):
+        return USER_FAILED
+    evaluate_functions(m.functions, w.user, t, w.functions)
+    for b in range(m.bodies.mass.size):
+        i, j = m.bodies.where[b, 1], m.bodies.where[b, 2]
+        rotation_matrix(x[i + 3], x[i + 4], x[i + 5], x[i + 6], w.bodies.A[b])
+        put(w.bodies.omega, b, (v[j + 3], v[j + 4], v[j + 5]))
+    for k in m.markers.joint:
+        b = m.markers.body[k]
+        update_marker(m.bodies.where, m.markers, w.markers, w.bodies.A[b], get(w.bodies.omega, b), x, v, k)
+    for k in range(m.rows.marker.shape[0]):
+        evaluate_block(m.rows, w.functions, w.markers, w.rows, k)
+    return OK
+
+
+@Unit
+def project_unit(at, t, value, out):
+    """out (V,): the motion, smallest in the norm of the mass matrix, with Phi_q out = -value (C,)."""
+    r = unpack_tables(at)
+    m, w = r.model, r.work
+    solve_step(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, vector_at(value, r.stages.target.size))
+    to_velocity_rates(m.bodies.where, w.bodies.A, w.bodies.acc, vector_at(out, r.v.size))
+    return OK
+
+
+@Unit
 def settle_unit(at, t, x, v):
     """Evaluate at (t, x, v), after bringing them back onto the constraints when they have left by more than the tolerance
     (in Phi [m, -]; a hundred times that in its rate). A tolerance of zero leaves them alone.
@@ -309,15 +342,17 @@ UNITS = {
     "evaluate": evaluate_unit,
     "rows": rows_unit,
 }
-# Of scenes with applied loads, and of methods that choose their steps.
+# Of scenes with applied loads, of methods that choose their steps, and of methods that ask for more.
 LOAD_UNITS = {"loads": loads_unit, "powers": powers_unit}
 CONTROL_UNITS = {"controlled_rows": controlled_rows_unit}
+EXTRA_UNITS = {"project": project_unit, "look_ahead": look_ahead_unit}
 
 
-def unit_addresses(with_loads: bool) -> list[int]:
-    """In the order of the units' numbers in `tables`; zero for those that a scene without loads does not need."""
+def unit_addresses(loads: bool, calls: Collection[str]) -> list[int]:
+    """In the order of the units' numbers in `tables`; zero for those of loads and of other methods that are not called."""
     numbered = (
         evaluate_unit, bodies_unit, markers_unit, joints_unit, solve_unit, settle_unit, move_back_unit, correct_unit,
         truly_unit, record_unit,
     )  # fmt: skip
-    return [*(unit.address for unit in numbered), *(unit.address if with_loads else 0 for unit in LOAD_UNITS.values())]
+    extra = [EXTRA_UNITS[name].address if name in calls else 0 for name in ("look_ahead", "project")]
+    return [*(unit.address for unit in numbered), *extra, *(u.address if loads else 0 for u in LOAD_UNITS.values())]
