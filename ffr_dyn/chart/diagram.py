@@ -134,7 +134,9 @@ def work_precision(
     Raises InputError for what cannot be compared, SimulationError where no reference can be verified.
     """
     measures = measures or measures_of(scene, (), span.start)
-    variants = grid(scene, models, dict.fromkeys([*METHODS, *ADAPTIVE]) if methods is None else methods, span.output_step)
+    variants = grid(
+        scene, models, dict.fromkeys([*METHODS, *ADAPTIVE]) if methods is None else methods, span.output_step
+    )
     found = reference(scene, span, measures, stabilisation, pool, limit=limit, wanted=wanted, tell=tell)
     jobs = [Job(scene, variant, span, measures, stabilisation, repeats, limit) for variant in variants]
     outcomes = run_variants(jobs, pool, progress)

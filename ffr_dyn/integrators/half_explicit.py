@@ -179,4 +179,5 @@ class HalfExplicit:
     row_stages: ClassVar[int] = JAC + 36
     controlled: ClassVar[bool] = False
     numbers: ClassVar[tuple[float, ...]] = (0.0,)
+    calls: ClassVar[tuple[str, ...]] = ("look_ahead",)
     unit: ClassVar[Unit] = half_explicit_step

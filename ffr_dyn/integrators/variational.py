@@ -351,6 +351,7 @@ class Variational:
     stage_count: ClassVar[int] = 7
     row_stages: ClassVar[int] = JAC + 36
     controlled: ClassVar[bool] = False
+    calls: ClassVar[tuple[str, ...]] = ("look_ahead",)
     unit: ClassVar[Unit] = variational_step
 
     def __post_init__(self) -> None:
