@@ -57,7 +57,7 @@ from ffr_dyn.state_formula import StateFormula, check_names
 from ffr_dyn.timefunction import TimeFunction, constant, signal, signals_in
 from ffr_prep.body import BodyError, FlexibleBody, load_body, rigid_body, truncated, with_point
 
-WHOLE = ("name", "gravity", "ground", "base_acceleration")  # fields of a scene that are no tables of entries
+WHOLE = ("name", "gravity", "ground", "base_acceleration", "plane")  # fields of a scene that are no tables of entries
 
 
 def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Scene, Settings | MomentSettings]:

@@ -366,6 +366,7 @@ class _SceneBase(Strict):
     outputs: list[str] = ["default"]
     gravity: Annotated[list[Acceleration], THREE] = [0.0, 0.0, 0.0]
     base_acceleration: Annotated[list[Acceleration], THREE] = [0.0, 0.0, 0.0]
+    plane: Literal["auto", "none", "x", "y", "z"] = "auto"
     analysis: _one_of(list(ANALYSES.values()), list(ANALYSES))  # type: ignore[valid-type]
     ground: dict[str, Metres] = {}
     bodies: dict[str, BodyEntry]

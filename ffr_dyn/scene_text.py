@@ -62,6 +62,7 @@ def to_toml(scene: Scene, settings: Settings | MomentSettings, files: Mapping[st
     Raises InputError for what a file cannot hold: Python functions, and flexible bodies without a file.
     """
     top = {"name": scene.name, "gravity": scene.gravity, "base_acceleration": scene.base_acceleration}
+    top["plane"] = scene.plane
     tree = {**top, "outputs": list(settings.outputs), "analysis": _analysis(settings), "ground": dict(scene.ground)}
     tree["inputs"] = _inputs(scene)
     tree["bodies"] = {body.name: _body(body, files) for body in scene.bodies}

@@ -53,6 +53,7 @@ class Integrator(Protocol):
     controlled: ClassVar[bool]  # whether it chooses its steps (see `Controlled`)
     stage_count: ClassVar[int]  # states (x, v) of memory that it needs
     row_stages: ClassVar[int]  # the same for constraint rows
+    calls: ClassVar[tuple[str, ...]]  # what its unit calls beside what all methods do, of `units.EXTRA_UNITS`
     unit: ClassVar[Unit]
 
 

@@ -205,6 +205,7 @@ class GeneralisedAlpha:
     stage_count: ClassVar[int] = 9
     row_stages: ClassVar[int] = 2
     controlled: ClassVar[bool] = False
+    calls: ClassVar[tuple[str, ...]] = ("project",)
     unit: ClassVar[Unit] = generalised_alpha_step
 
     def __post_init__(self) -> None:
@@ -240,6 +241,7 @@ class HHT:
     stage_count: ClassVar[int] = 9
     row_stages: ClassVar[int] = 2
     controlled: ClassVar[bool] = False
+    calls: ClassVar[tuple[str, ...]] = ("project",)
     unit: ClassVar[Unit] = generalised_alpha_step
 
     def __post_init__(self) -> None:

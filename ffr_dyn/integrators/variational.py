@@ -344,13 +344,14 @@ class Variational:
     """
 
     step: float
-    tolerance: float = 1e-13
+    tolerance: float = 1e-14
     iterations: int = 30
     order: ClassVar[int] = 2
     implicit: ClassVar[bool] = True
     stage_count: ClassVar[int] = 7
     row_stages: ClassVar[int] = JAC + 36
     controlled: ClassVar[bool] = False
+    calls: ClassVar[tuple[str, ...]] = ("look_ahead",)
     unit: ClassVar[Unit] = variational_step
 
     def __post_init__(self) -> None:

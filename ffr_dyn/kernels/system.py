@@ -1,7 +1,8 @@
 """One evaluation of the equations of motion of a scene; everything an integrator or an analysis calls.
 
-Order of calls: `prepare` once per elastic diagonal; `evaluate_bodies`, `evaluate_loads`, `evaluate_joints` at a state; then
-any number of `solve_motion` and `solve_step` with that state's factors. Compiled as units in `ffr_dyn.kernels.units`.
+Order of calls: `prepare` once per elastic diagonal; `evaluate_bodies`, `evaluate_markers`, the loads, `evaluate_joints` at a
+state; then any number of `solve_motion` and `solve_step` with that state's factors. Compiled as units in
+`ffr_dyn.kernels.units`.
 """
 
 from ffr_dyn.kernels.blocks import (
@@ -25,7 +26,6 @@ from ffr_dyn.kernels.bodies import (
     six_rows,
 )
 from ffr_dyn.kernels.lanes import combine_3, combine_6, dot_rows
-from ffr_dyn.kernels.loads import apply_loads
 from ffr_dyn.kernels.markers import (
     couple_marker,
     couple_pair,
@@ -122,12 +122,19 @@ def couple_joints(bodies, markers, rows, pattern, bw, rw):
 
 
 @inlined
-def evaluate_loads(m, w, t, x, v):
-    """Markers and applied loads, on top of what `evaluate_bodies` left."""
+def evaluate_markers(m, w, x, v):
+    """Markers in use, from what `evaluate_bodies` left; no loads on them yet."""
     for k in m.markers.active:
         b = m.markers.body[k]
         update_marker(m.bodies.where, m.markers, w.markers, w.bodies.A[b], get(w.bodies.omega, b), x, v, k)
-    apply_loads(m.bodies.where, m.markers, m.loads, w.bodies.A, w.markers, w.loads, w.functions, w.user, x, w.bodies.f)
+    for k in range(w.markers.load.shape[0]):
+        fill(w.markers.load[k], 0.0)
+
+
+@inlined
+def has_loads(loads):
+    """Whether the scene applies anything but gravity."""
+    return loads.wrench.shape[0] + loads.action.shape[0] + loads.bushing.shape[0] + loads.spread.shape[0] > 0
 
 
 @inlined

@@ -33,7 +33,9 @@ OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED, NOT_CONVERGED, 
 LANES = 8  # rows of a joint side by side (see `ffr_dyn.kernels.lanes`)
 
 # Numbers of the compiled units in `Tables.units`.
-EVALUATE, BODIES, LOADS, JOINTS, SOLVE, SETTLE, MOVE_BACK, CORRECT, TRULY, RECORD, LOOK_AHEAD, PROJECT = range(12)
+(
+    EVALUATE, BODIES, MARKERS, JOINTS, SOLVE, SETTLE, MOVE_BACK, CORRECT, TRULY, RECORD, LOOK_AHEAD, PROJECT, LOADS, POWERS,
+) = range(14)  # fmt: skip
 
 # Near a singular position the rows become dependent, and a violation eta of the constraints throws the motion from its
 # branch when it comes closer than about eta^(1/3). So on the approach (`independence` below NEAR) the violation is held far

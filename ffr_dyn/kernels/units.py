@@ -7,7 +7,7 @@ integrator costs no more than its own few lines, and compilation can be shared a
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import cached_property
 from typing import Any
 
@@ -18,7 +18,7 @@ from ffr_dyn.kernels.bodies import mass_times, rotation_matrix
 from ffr_dyn.kernels.calls import set_diagonal
 from ffr_dyn.kernels.control import controlled_step, interpolate
 from ffr_dyn.kernels.functions import evaluate_functions
-from ffr_dyn.kernels.loads import call_user, gravity_field
+from ffr_dyn.kernels.loads import apply_loads, call_user, gravity_field, powers
 from ffr_dyn.kernels.markers import update_marker
 from ffr_dyn.kernels.options import OPTIONS
 from ffr_dyn.kernels.packing import call_unit, unpack_record, unpack_tables, vector_at
@@ -29,7 +29,8 @@ from ffr_dyn.kernels.system import (
     constraint_rates,
     evaluate_bodies,
     evaluate_joints,
-    evaluate_loads,
+    evaluate_markers,
+    has_loads,
     largest,
     move_back,
     solve_step,
@@ -42,10 +43,12 @@ from ffr_dyn.kernels.tables import (
     EVALUATE,
     JOINTS,
     LOADS,
+    MARKERS,
     MOVE_BACK,
     NEAR,
     NOW,
     OK,
+    POWERS,
     RECORD,
     SETTLE,
     SINGULAR_BODY,
@@ -93,9 +96,40 @@ def bodies_unit(at, t, x, v):
 
 
 @Unit
-def loads_unit(at, t, x, v):
+def markers_unit(at, t, x, v):
     r = unpack_tables(at)
-    evaluate_loads(r.model, r.work, t, vector_at(x, r.x.size), vector_at(v, r.v.size))
+    evaluate_markers(r.model, r.work, vector_at(x, r.x.size), vector_at(v, r.v.size))
+    return OK
+
+
+@Unit
+def loads_unit(at, t, x, v):
+    """Applied loads; needed where a scene has any."""
+    r = unpack_tables(at)
+    m, w = r.model, r.work
+    x = vector_at(x, r.x.size)
+    apply_loads(m.bodies.where, m.markers, m.loads, w.bodies.A, w.markers, w.loads, w.functions, w.user, x, w.bodies.f)
+    return OK
+
+
+@Unit
+def powers_unit(at, t, record, row):
+    """Powers of the applied loads, as a row of the record; needed where a scene has any."""
+    r, out = unpack_tables(at), unpack_record(record)
+    m, w = r.model, r.work
+    powers(
+        m.bodies.where,
+        m.markers,
+        m.loads,
+        w.bodies.A,
+        w.markers,
+        w.loads,
+        w.functions,
+        w.user,
+        r.x,
+        r.v,
+        out.power[row],
+    )
     return OK
 
 
@@ -116,7 +150,9 @@ def evaluate_unit(at, t, x, v):
     status = call_unit(r.units[BODIES], at, t, x, v)
     if status != OK:
         return status
-    call_unit(r.units[LOADS], at, t, x, v)
+    call_unit(r.units[MARKERS], at, t, x, v)
+    if has_loads(r.model.loads):
+        call_unit(r.units[LOADS], at, t, x, v)
     return call_unit(r.units[JOINTS], at, t, x, v)
 
 
@@ -238,6 +274,8 @@ def record_unit(at, t, record, row):
     status = call_unit(r.units[TRULY], at, t, r.x.ctypes.data, r.v.ctypes.data)
     if status == OK:
         keep_turns(r.model.loads, r.work.loads)
+        if has_loads(r.model.loads):
+            call_unit(r.units[POWERS], at, t, record, row)
         keep(r.model, r.work, t, r.x, r.v, unpack_record(record), row)
     return status
 
@@ -293,26 +331,28 @@ def controlled_rows_unit(at, start, record, step):
 # By name, those that take long to compile first.
 UNITS = {
     "bodies": bodies_unit,
-    "loads": loads_unit,
-    "joints": joints_unit,
     "solve": solve_unit,
+    "joints": joints_unit,
     "record": record_unit,
     "move_back": move_back_unit,
+    "markers": markers_unit,
     "correct": correct_unit,
-    "project": project_unit,
-    "look_ahead": look_ahead_unit,
     "truly": truly_unit,
     "settle": settle_unit,
     "evaluate": evaluate_unit,
-    "controlled_rows": controlled_rows_unit,
     "rows": rows_unit,
 }
+# Of scenes with applied loads, of methods that choose their steps, and of methods that ask for more.
+LOAD_UNITS = {"loads": loads_unit, "powers": powers_unit}
+CONTROL_UNITS = {"controlled_rows": controlled_rows_unit}
+EXTRA_UNITS = {"project": project_unit, "look_ahead": look_ahead_unit}
 
 
-def unit_addresses() -> list[int]:
-    """In the order of the units' numbers in `tables`."""
+def unit_addresses(loads: bool, calls: Collection[str]) -> list[int]:
+    """In the order of the units' numbers in `tables`; zero for those of loads and of other methods that are not called."""
     numbered = (
-        evaluate_unit, bodies_unit, loads_unit, joints_unit, solve_unit, settle_unit, move_back_unit, correct_unit,
-        truly_unit, record_unit, look_ahead_unit, project_unit,
+        evaluate_unit, bodies_unit, markers_unit, joints_unit, solve_unit, settle_unit, move_back_unit, correct_unit,
+        truly_unit, record_unit,
     )  # fmt: skip
-    return [unit.address for unit in numbered]
+    extra = [EXTRA_UNITS[name].address if name in calls else 0 for name in ("look_ahead", "project")]
+    return [*(unit.address for unit in numbered), *extra, *(u.address if loads else 0 for u in LOAD_UNITS.values())]
