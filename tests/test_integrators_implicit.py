@@ -10,6 +10,7 @@ from synthetic import cloud
 from test_analyses_references import END, andrews
 from test_beam_stiffening import rod
 from test_chart_orders import double_pendulum, slider_crank, top
+from test_chart_orders import pendulum as pendulum_a01
 from test_dyn_laws import momenta, pendulum, spinning
 from test_dyn_references import GRAVITY, mass_point
 from test_dyn_singular import bricard, n_four_bar
@@ -285,6 +286,15 @@ def test_a_mechanism_that_locks_is_no_result(kind):
         SimulationError, match=r"at t = 0\.5\d* s .*'(motor|bearing|crankpin|wrist|guide|crank|link|slider)'"
     ):
         run(locking(), KINDS[kind](1e-3), 1.0)
+
+
+@pytest.mark.parametrize("form", ["index 3", "stabilised"])
+def test_with_its_usual_damping_a_point_mass_on_a_link_is_not_lost(form):
+    """IFToMM A01 at ten steps per swing; with little damping index 3 is weakly unstable, and says so before it is wrong."""
+    swing = run(pendulum_a01(), GeneralisedAlpha(0.04, form=form), 20.0)
+    assert abs(swing["bob.c.position"][-1, :2] @ swing["bob.c.position"][-1, :2] - 1.0) < 1e-8
+    with pytest.raises(SimulationError, match="do not converge"):
+        run(pendulum_a01(), GeneralisedAlpha(0.04, spectral_radius=0.95), 20.0)
 
 
 def test_without_scaling_index_3_is_lost_at_small_steps():

@@ -185,8 +185,8 @@ class GeneralisedAlpha:
     """Generalised-alpha: order two, implicit in everything, the constraints on positions exact.
 
     step            : time step [s]
-    spectral_radius : what is left after a step of a mode that the step does not resolve, 0 ... 1; 1 damps nothing, and is
-                      weakly unstable with constraints
+    spectral_radius : what is left after a step of a mode that the step does not resolve, 0 ... 1; near 1, index 3 is
+                      weakly unstable: reactions oscillate and grow in long runs
     form            : "index 3", or "stabilised" (Gear, Gupta & Leimkuhler): the constraints on velocities exact too
     tolerance       : of the last correction of the velocities, relative
     iterations      : Newton corrections that a step may take
@@ -195,7 +195,7 @@ class GeneralisedAlpha:
     """
 
     step: float
-    spectral_radius: float = 0.9
+    spectral_radius: float = 0.8
     form: str = "index 3"
     tolerance: float = 1e-8
     iterations: int = 20
