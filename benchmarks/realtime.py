@@ -22,7 +22,7 @@ from ffr_dyn.stabilisation import Projection
 from ffr_dyn.timefunction import signal
 
 STEP = 1e-3  # s
-KEPT = Projection(1e-6)  # m; a micrometre, where 1e-9 takes a second projection in every step
+KEPT = Projection(1e-6)  # m
 MEAN, MOST = 30e-6, 150e-6  # s, goals
 OUTPUTS = ("slider.pin.position", "crankpin.angle", "wrist.force")
 

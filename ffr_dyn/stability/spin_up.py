@@ -59,7 +59,10 @@ def spin_up() -> Exhibit:
             Claim("speed from which the beam diverges without it (its first frequency)", FIRST, measured, 1.02, "rad/s"),
             Claim("deflection of the tip at 6.8 s, with it", LARGEST, at[True], 1.005, "m"),
         ),
-        (Proof("deflection at 6.8 s without it", abs(at[False]), 1.0, True, "m"),),
+        (
+            Proof("deflection at 6.8 s without it", abs(at[False]), 1.0, True, "m"),
+            Proof("distance from the exact deflection with it", abs(at[True] - LARGEST), 1e-3, False, "m"),
+        ),
         (
             Panel(
                 "spin-up to 6 rad/s in 15 s", "time [s]", "deflection of the tip [m]", tuple(curves),
