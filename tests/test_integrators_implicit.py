@@ -27,7 +27,7 @@ from ffr_dyn.scene import Body, Scene
 from ffr_dyn.scene_file import load_scene
 from ffr_dyn.scene_text import save_scene
 from ffr_dyn.settings import Settings
-from ffr_dyn.stabilisation import Drifting, Projection
+from ffr_dyn.stabilisation import Baumgarte, Drifting, Projection
 from ffr_dyn.timefunction import polynomial, user
 from ffr_prep.body import rigid_body
 from ffr_prep.material import Material
@@ -390,3 +390,10 @@ def test_bad_settings_of_a_scene_file_are_refused(tmp_path, method, settings, me
     path.write_text(FILE.format(method=method, settings=settings))
     with pytest.raises(InputError, match=message):
         load_scene(path)
+
+
+@pytest.mark.parametrize("kind", [GeneralisedAlpha, HHT, HalfExplicit, Variational])
+def test_gains_of_accelerations_are_refused(kind):
+    top = Scene((Body("top", rigid_body("top", mass=1.0, inertia=(1, 2, 3))),))
+    with pytest.raises(InputError, match=f"{kind.__name__} holds positions or rates"):
+        forward(top, end=1.0, output_step=0.1, method=kind(0.01), stabilisation=Baumgarte(1.0, 1.0))

@@ -16,7 +16,7 @@ from ffr_dyn.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
 from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import System, new_record
 from ffr_dyn.errors import InputError, SimulationError
-from ffr_dyn.integrators import ROS2, Integrator
+from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince, Integrator
 from ffr_dyn.kernels.tables import (
     AT,
     NOT_CONVERGED,
@@ -34,13 +34,14 @@ from ffr_dyn.measure import Entry, Memory, measure, needs_every_step, selected
 from ffr_dyn.result import Quantity, Result
 from ffr_dyn.result_file import ResultWriter, load_checkpoint, load_result
 from ffr_dyn.scene import Scene
-from ffr_dyn.stabilisation import Projection, Stabilisation, gains
+from ffr_dyn.stabilisation import Baumgarte, Projection, Stabilisation, gains
 from ffr_dyn.stopwatch import Stopwatch
 from ffr_dyn.validity import doubts, extremes
 from ffr_prep.body import Surface
 
 Array = np.ndarray
 
+_OF_ACCELERATIONS = (RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince)  # methods on index-1 equations
 RK4_LIMIT = 2.83  # imaginary stability limit of RK4, Hairer & Wanner 1996, IV.2
 LOOKS = 10  # of a quantity that adds up, from row to row, where the method chooses its steps
 SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, file and keyboard
@@ -93,6 +94,7 @@ def forward(
     spacing = output_step / LOOKS if method.controlled else method.step
     substeps, rows = _counts(end - start, output_step, spacing)
     _check_step(scene, method)
+    _check_stabilisation(method, stabilisation)
     assembled = assemble(scene, time=start)
     wanted = selected(assembled.system, outputs)
     ensure_compiled(type(method), loads=has_loads(assembled.system.model.loads))
@@ -136,6 +138,15 @@ def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
     if rows < 1 or abs(rows * output_step - span) > 1e-9 * span:
         raise InputError(f"the duration {span} s is not a multiple of the output step {output_step} s")
     return substeps, rows
+
+
+def _check_stabilisation(method: Integrator, stabilisation: Stabilisation) -> None:
+    """Refuse gains of accelerations for a method that keeps constraints in another way."""
+    if isinstance(stabilisation, Baumgarte) and not isinstance(method, _OF_ACCELERATIONS):
+        raise InputError(
+            f"Baumgarte's gains act on the accelerations of the constraints, and {type(method).__name__} holds positions or "
+            f"rates themselves; leave them out, or use one of {', '.join(kind.__name__ for kind in _OF_ACCELERATIONS)}"
+        )
 
 
 def _check_step(scene: Scene, method: Integrator) -> None:
