@@ -12,6 +12,7 @@ from ffr_dyn.cli_chart import chart
 from ffr_dyn.cli_economy import economise
 from ffr_dyn.cli_realtime import realtime
 from ffr_dyn.cli_run import forward, run
+from ffr_dyn.cli_stability import stability
 from ffr_dyn.cli_stress import stress
 from ffr_dyn.errors import InputError, SimulationError
 
@@ -102,7 +103,7 @@ def animate(result: Path, output: Path, scale: str, duration: float | None, colo
     click.echo(f"film     {output}")
 
 
-for command in (run, forward, *COMMANDS, stress, chart, economise, realtime):
+for command in (run, forward, *COMMANDS, stress, chart, economise, realtime, stability):
     cli.add_command(command)
 
 

@@ -53,9 +53,12 @@ def realtime(
     from ffr_dyn.realtime import as_json, lines, measure_steps, plot_times
     from ffr_dyn.scene_file import load_scene
     from ffr_dyn.settings import Settings
+    from ffr_dyn.stabilisation import Projection
 
     loaded, settings = load_scene(scene, assignments(parameters))
-    given = settings.method if isinstance(settings, Settings) else METHODS["ros2"](1e-3)
+    given: Any = METHODS["ros2"](1e-3)
+    if isinstance(settings, Settings) and not settings.method.controlled:
+        given = settings.method
     if method is not None and method not in METHODS:
         raise InputError(f"--method {method}: there is no such method; there are {', '.join(METHODS)}")
     kind: Any = type(given) if method is None else METHODS[method]
@@ -66,6 +69,7 @@ def realtime(
             duration=duration,
             deadline=deadline,
             outputs=outputs or ("*.position",),
+            stabilisation=settings.stabilisation if isinstance(settings, Settings) else Projection(),
             paced=paced,
             progress=update,
         )

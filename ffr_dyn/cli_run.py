@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from ffr_dyn.scene import Scene
     from ffr_dyn.settings import MomentSettings, OverTime, Settings
 
+EVENTS_SHOWN = 20
+
 scene_argument = click.argument("scene", type=click.Path(path_type=Path))
 output_option = click.option(
     "-o", "--output", type=click.Path(path_type=Path), help="Result file (netCDF); default: <scene>.nc."
@@ -136,7 +138,7 @@ def _method(settings: Settings, given: Mapping[str, Any]) -> Integrator:
     if "tolerance" in given:
         raise InputError(f"--tolerance: {kind.__name__} takes steps of one length; give --step")
     step = given.get("step", settings.method.step or settings.output_step / 10)
-    return kind(step)
+    return replace(settings.method, step=step) if kind is type(settings.method) else kind(step)  # type: ignore[type-var]
 
 
 def perform(scene: Scene, settings: Settings | MomentSettings, output: Path, resume: bool = False) -> None:
@@ -186,4 +188,6 @@ def summary(attributes: Mapping[str, Any]) -> list[str]:
         )
     if "stable" in a:
         lines.append(f"equilibrium  {'stable' if a['stable'] else 'unstable'}")
-    return lines + [f"note         {note}" for note in a["notes"]]
+    passed = [f"event        {e['event']} at t = {e['time']:.9g} s" for e in a.get("events", [])]
+    more = [f"event        ... and {len(passed) - EVENTS_SHOWN} more"] if len(passed) > EVENTS_SHOWN else []
+    return lines + passed[:EVENTS_SHOWN] + more + [f"note         {note}" for note in a["notes"]]

@@ -15,18 +15,23 @@ from pathlib import Path
 from numba.core.caching import FunctionCache
 
 from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator
-from ffr_dyn.kernels.units import UNITS, Unit
+from ffr_dyn.kernels.units import CONTROL_UNITS, EXTRA_UNITS, LOAD_UNITS, UNITS, Unit
 
 _METHODS = {**METHODS, **CONTROLLED}
 _AT_WORK: dict[str, subprocess.Popen[bytes]] = {}
 
 
-def begin_compiling(*kinds: type[Integrator]) -> None:
+def begin_compiling(*kinds: type[Integrator], loads: bool = True) -> None:
     """Start to compile the units of some methods where they are not on disk, and go on with something else meanwhile.
 
     For programs that mesh and reduce bodies first: a run that needs the units waits for them.
+
+    loads : whether the scene applies anything but gravity
     """
-    units = {**UNITS, **{name: kind.unit for name, kind in _METHODS.items() if kind in kinds}}
+    controlled = CONTROL_UNITS if any(kind.controlled for kind in kinds) else {}
+    methods = {name: kind.unit for name, kind in _METHODS.items() if kind in kinds}
+    extra = {name: EXTRA_UNITS[name] for kind in kinds for name in kind.calls}
+    units = {**UNITS, **(LOAD_UNITS if loads else {}), **controlled, **extra, **methods}
     missing = [name for name, unit in units.items() if name not in _AT_WORK and not _is_on_disk(unit)]
     if not missing:
         return
@@ -37,9 +42,9 @@ def begin_compiling(*kinds: type[Integrator]) -> None:
         _AT_WORK.update(dict.fromkeys(share, process))
 
 
-def ensure_compiled(*kinds: type[Integrator]) -> None:
+def ensure_compiled(*kinds: type[Integrator], loads: bool = True) -> None:
     """Have the units of some methods on disk; where that fails, the run compiles them itself."""
-    begin_compiling(*kinds)
+    begin_compiling(*kinds, loads=loads)
     for process in set(_AT_WORK.values()):
         process.wait()
     _AT_WORK.clear()
@@ -58,8 +63,15 @@ def _is_on_disk(unit: Unit) -> bool:
 
 def compile_units(names: Sequence[str]) -> None:
     """Compile units and methods by their names."""
+    units = {
+        **UNITS,
+        **LOAD_UNITS,
+        **CONTROL_UNITS,
+        **EXTRA_UNITS,
+        **{name: kind.unit for name, kind in _METHODS.items()},
+    }
     for name in names:
-        unit = UNITS[name] if name in UNITS else _METHODS[name].unit
+        unit = units[name]
         if not unit.address:
             raise RuntimeError(f"unit {name} has no address")
 

@@ -37,6 +37,8 @@ from ffr_prep.body import axial
 
 Array = np.ndarray
 
+NOTHING = 1e-16  # of the stiffness by a load, relative to that by the others
+
 SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
@@ -192,13 +194,16 @@ def _shared(parts: list[Array], owners: list[Hashable]) -> tuple[Array, Array]:
 def _bodies(scene: Scene, place: Layout) -> Bodies:
     models = [body.model for body in scene.bodies]
     n = [m.n for m in models]
-    stiffening = [_stiffening(body) for body in scene.bodies]
     PP, PP_start = _shared([_PP_parts(b) for b in scene.bodies], [(id(b.model), b.dropped) for b in scene.bodies])
-    K, K_start = _shared(stiffening, [(id(b.model), b.stiffening) for b in scene.bodies])
-    where = np.full((len(n) + 1, 8), -1, dtype=np.int64)
-    where[-1, :7] = 0
-    loads = np.where(K_start >= 0, [len(k) for k in stiffening], 0)
+    stiffening = [_active(_stiffening(body)) for body in scene.bodies]
+    K, K_start = _shared([K for _, K in stiffening], [(id(b.model), b.stiffening) for b in scene.bodies])
+    loads = [len(which) for which, _ in stiffening]
+    where = np.full((len(n) + 1, 10), -1, dtype=np.int64)
+    where[-1, [*range(7), 8, 9]] = 0
     where[:-1, :7] = np.column_stack([n, place.ix, place.iv, _starts(n)[:-1], PP_start, K_start, loads])
+    where[:-1, 8:] = np.column_stack(
+        [_starts(loads)[:-1], _starts([a * b for a, b in zip(n, loads, strict=True)])[:-1]]
+    )
     where[:-1, 7] = place.normals
     where[-1, 3] = sum(n)
     return Bodies(
@@ -211,6 +216,7 @@ def _bodies(scene: Scene, place: Layout) -> Bodies:
         omega2=_pool([m.omega2 for m in models]),
         two_zeta_omega=_pool([2 * b.damping * np.sqrt(b.model.omega2) for b in scene.bodies]),
         stiffening=K,
+        loads=np.concatenate([which for which, _ in stiffening]) if stiffening else np.zeros(0, dtype=np.int64),
     )
 
 
@@ -220,6 +226,16 @@ def _stiffening(body: Body) -> Array:
     if body.model.stiffening is None or not body.stiffening:
         return np.zeros((0, n, n))
     return body.model.stiffening
+
+
+def _active(stiffening: Array) -> tuple[Array, Array]:
+    """(numbers of the loads, (n, loads, n) their stiffness) without those that do nothing but for rounding.
+
+    Forces at an interface that the reference conditions hold, for one.
+    """
+    size = np.abs(stiffening).max(axis=(1, 2), initial=0.0)
+    which = np.flatnonzero(size > NOTHING * size.max(initial=0.0))
+    return which.astype(np.int64), np.moveaxis(stiffening[which], 2, 0)
 
 
 # ---- markers ------------------------------------------------------------------------------------------------------
@@ -386,14 +402,20 @@ def new_work(m: Model) -> Work:
         dinv=np.ones(E),
         **zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), g=9 * E, l=3 * E, Cd=6 * E, L=(B, 6, 6), f=V, acc=V),
         **zeros(
-            rigid=(B, 6), elastic=E, PP=(B, 3, 3), more=V, unstiffened=E, shift=V, load=int(m.bodies.where[:, 6].max())
+            rigid=(B, 6),
+            elastic=E,
+            PP=(B, 3, 3),
+            more=V,
+            unstiffened=E,
+            shift=V,
+            load=(B, int(m.markers.load.max(initial=6)) + 6),
         ),
-        **zeros(stiff=int((m.bodies.where[:, 6] * n).sum())),
+        **zeros(stiff=int((m.bodies.where[:-1, 6] * n[:-1]).sum())),
     )
     vectors = zeros(omega=(M, 3), r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3), load=(M, 6))
     rows = RowWork(
         **zeros(Phi=C, nu=C, gamma=C, lam=C, left=C, scale=C, jac=(C, D, 9), X=size.size * D * 12 * LANES),
-        **zeros(Y=12 * LANES, step=size.size * LANES, wrench=6, P=(M, 6, 6), phiphi=(pairs, 6, 6), S=stored),
+        **zeros(Y=12 * LANES, step=size.size * LANES, wrench=6, P=(M, 36), phiphi=(pairs, 36), S=stored),
     )
     return Work(
         bodies=bodies,

@@ -63,7 +63,7 @@ def _in_plane(scene: Scene, normal: int, *, strict: bool) -> Scene:
     for body in scene.bodies:
         k = body_normal(body, normal)
         used = used_interfaces(scene, body)
-        keep = np.flatnonzero(_stays(body.model, k, used) if strict else _mostly(body.model, k))
+        keep = np.flatnonzero(_stays(body.model, k, used) if strict else _mostly(body.model, k, used))
         reduced = with_modes(body, keep.tolist())
         model = _without_rounding(reduced.model, k, used)
         bodies.append(replace(reduced, model=model, kept=(tuple(keep.tolist()), body.model.n)))
@@ -195,19 +195,27 @@ def _splits(stiffening: Array, stays: Array) -> bool:
 
 def _stays(body: FlexibleBody, k: int, used: Sequence[str]) -> Array:
     """(n,) which modes have no momentum, and move no marker that is used, across the plane."""
-    a, b = (c for c in range(3) if c != k)
-    turning = axial(body.rP_dm)
-    return _quiet(body, [body.P_dm[k]], [turning[a], turning[b]], used, [k], [a, b])
+    return _motion_across(body, k, used) < _ZERO * _sizes(body, used)
 
 
 def _leaves(body: FlexibleBody, k: int, used: Sequence[str]) -> Array:
     """(n,) which modes have no momentum, and move no marker that is used, in the plane."""
+    return _motion_along(body, k, used) < _ZERO * _sizes(body, used)
+
+
+def _motion_across(body: FlexibleBody, k: int, used: Sequence[str]) -> Array:
+    a, b = (c for c in range(3) if c != k)
+    turning = axial(body.rP_dm)
+    return _largest(body, [body.P_dm[k]], [turning[a], turning[b]], used, [k], [a, b])
+
+
+def _motion_along(body: FlexibleBody, k: int, used: Sequence[str]) -> Array:
     a, b = (c for c in range(3) if c != k)
     moments = [axial(body.rP_dm)[k], body.rP_dm[a, a] + body.rP_dm[b, b]]
-    return _quiet(body, [body.P_dm[a], body.P_dm[b]], moments, used, [a, b], [k])
+    return _largest(body, [body.P_dm[a], body.P_dm[b]], moments, used, [a, b], [k])
 
 
-def _quiet(
+def _largest(
     body: FlexibleBody,
     momenta: list[Array],
     moments: list[Array],
@@ -215,7 +223,7 @@ def _quiet(
     shifts: list[int],
     turns: list[int],
 ) -> Array:
-    """(n,) which modes have none of these, beside the largest motion of a marker that they make."""
+    """(n,) the largest of these that each mode makes, in units of 1/sqrt(mass)."""
     shape, length = np.sqrt(body.mass), _length(body)
     parts = [part / shape for part in momenta]
     parts += [part / (shape * length) for part in moments]
@@ -223,7 +231,7 @@ def _quiet(
         interface = body.interface(name)
         parts += [interface.phi_t[c] * shape for c in shifts]
         parts += [interface.phi_r[c] * shape * length for c in turns]
-    return np.abs(parts).max(axis=0) < _ZERO * _sizes(body, used)
+    return np.abs(parts).max(axis=0)
 
 
 def _sizes(body: FlexibleBody, used: Sequence[str]) -> Array:
@@ -270,6 +278,11 @@ def _drop(part: Array, size: Array) -> None:
     part[np.abs(part) < _ZERO * size] = 0.0
 
 
-def _mostly(body: FlexibleBody, k: int) -> Array:
-    """(n,) which modes have more of their motion in the plane than across."""
-    return np.einsum("jj->j", body.PP_dm[k, k]) < 0.5
+def _mostly(body: FlexibleBody, k: int, used: Sequence[str]) -> Array:
+    """(n,) which modes move the body and its markers more in the plane than across.
+
+    Of a mode that does neither, such as a twist with both ends held, the larger part of its motion decides.
+    """
+    along, across = _motion_along(body, k, used), _motion_across(body, k, used)
+    neither = np.maximum(along, across) < _ZERO * _sizes(body, used)
+    return np.where(neither, np.einsum("jj->j", body.PP_dm[k, k]) < 0.5, along >= across)

@@ -15,6 +15,7 @@ import numpy as np
 from ffr_dyn.errors import InputError
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.scene import Scene
+from ffr_dyn.stabilisation import Projection, Stabilisation
 from ffr_dyn.stepper import Stepper
 
 Array = np.ndarray
@@ -73,6 +74,7 @@ def measure_steps(
     duration: float = 60.0,
     deadline: float | None = None,
     outputs: tuple[str, ...] = ("*.position",),
+    stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
     paced: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Timing:
@@ -87,7 +89,7 @@ def measure_steps(
     """
     deadline = method.step if deadline is None else deadline
     count = _steps(duration, deadline, method)
-    stepper = Stepper(scene, method, outputs=outputs)
+    stepper = Stepper(scene, method, outputs=outputs, stabilisation=stabilisation)
     for _ in range(WARMING):
         _once(stepper, stepper.inputs)
     taken = np.zeros(count, dtype=np.int64)

@@ -83,4 +83,5 @@ def _over_time(
     if isinstance(analysis, Mixed):
         known, solution = analysis.known, analysis.solution
         return mixed(scene, unknown=analysis.unknown, known=known, solution=solution, method=method, **common)
-    return forward(scene, method=method, stabilisation=stabilisation, resume=resume, **common)
+    events = analysis.events
+    return forward(scene, method=method, stabilisation=stabilisation, events=events, resume=resume, **common)

@@ -39,7 +39,17 @@ from ffr_dyn.joint_forces import Actuator
 from ffr_dyn.operations import FUNCTIONS
 from ffr_dyn.parameters import Parameters, as_number, flattened, overridden, substituted
 from ffr_dyn.scene import Body, Scene
-from ffr_dyn.scene_schema import EFFORTS, SOLUTIONS, TABLES, BodyEntry, Kind, SceneEntry, StabilisationEntry, keys_of
+from ffr_dyn.scene_schema import (
+    EFFORTS,
+    EVENTS,
+    SOLUTIONS,
+    TABLES,
+    BodyEntry,
+    Kind,
+    SceneEntry,
+    StabilisationEntry,
+    keys_of,
+)
 from ffr_dyn.scene_source import Source, origin, origin_of_name, read_source
 from ffr_dyn.settings import Forward, Inverse, Kinematic, Linearise, Mixed, MomentSettings, OverTime, Settings, Static
 from ffr_dyn.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
@@ -47,7 +57,7 @@ from ffr_dyn.state_formula import StateFormula, check_names
 from ffr_dyn.timefunction import TimeFunction, constant, signal, signals_in
 from ffr_prep.body import BodyError, FlexibleBody, load_body, rigid_body, truncated, with_point
 
-WHOLE = ("name", "gravity", "ground", "base_acceleration")  # fields of a scene that are no tables of entries
+WHOLE = ("name", "gravity", "ground", "base_acceleration", "plane")  # fields of a scene that are no tables of entries
 
 
 def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Scene, Settings | MomentSettings]:
@@ -216,18 +226,21 @@ def _settings(entry: Any, outputs: list[str], source: Source) -> Settings | Mome
     if entry.kind == "linearise":
         inputs = (*_efforts("inputs", entry.inputs, source), *entry.loads)
         return MomentSettings(entry.time, keep, Linearise(inputs, tuple(entry.quantities), entry.at_equilibrium))
-    method = _method(entry)
+    method = _method(entry, source)
     stabilisation = _stabilisation(getattr(entry, "stabilisation", StabilisationEntry()))
     span = (entry.start, entry.end, entry.output_step)
     return Settings(*span, method, stabilisation, keep, _over_time(entry, source))
 
 
-def _method(entry: Any) -> Integrator:
+def _method(entry: Any, source: Source) -> Integrator:
     name, step = getattr(entry, "method", "ros2"), getattr(entry, "step", None)
     if name in CONTROLLED:
         given = entry.tolerances
         return CONTROLLED[name](Tolerances() if given is None else Tolerances(**given.model_dump()))
-    return METHODS[name](entry.output_step / 10 if step is None else step)
+    try:
+        return METHODS[name](entry.output_step / 10 if step is None else step, **getattr(entry, "settings", {}))
+    except InputError as error:
+        raise InputError(f"{origin(source, ('analysis', 'settings'))}: analysis.settings: {error}") from None
 
 
 def _over_time(entry: Any, source: Source) -> OverTime:
@@ -241,7 +254,9 @@ def _over_time(entry: Any, source: Source) -> OverTime:
             **entry.solution.model_dump(exclude={"kind"})
         )
         return Mixed(_efforts("unknown", entry.unknown, source), known, solution)
-    return Forward()
+    return Forward(
+        tuple(_declared(EVENTS, ("analysis", "events", name), e, source) for name, e in entry.events.items())
+    )
 
 
 def _efforts(key: str, entries: Mapping[str, BaseModel], source: Source) -> tuple[Effort, ...]:

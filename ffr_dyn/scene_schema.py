@@ -24,6 +24,7 @@ from pydantic import Field as Key
 
 from ffr_dyn.analyses.bounded import Bounded
 from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort
+from ffr_dyn.analyses.events import Event
 from ffr_dyn.analyses.mixed import Causal
 from ffr_dyn.couplings import Coupling
 from ffr_dyn.curve import Curve
@@ -47,6 +48,7 @@ from ffr_dyn.scene_values import (
     Vector,
     or_curve,
 )
+from ffr_dyn.settings import settings_of
 from ffr_dyn.surface_loads import ModalForce, NodalForces, Pressure
 
 Direction = Vector | list[Vector]
@@ -88,6 +90,8 @@ FIELDS: dict[str, Any] = {
     "ModalForce.values": list[Number],
     "ModalForce.function": OfTime,
     "MarkerEffort.direction": Vector,
+    "Event.quantity": str,
+    "Event.direction": Literal["rising", "falling", "either"],
 }
 
 # Fields that a file cannot hold: Python functions, and the name, which is the key of the entry.
@@ -129,6 +133,7 @@ TABLES: dict[str, tuple[Kind, ...]] = {
 
 
 EFFORTS = (Kind("joint", JointEffort), Kind("marker", MarkerEffort))  # tables of an analysis
+EVENTS = (Kind("", Event),)
 SOLUTIONS = (Kind("causal", Causal), Kind("bounded", Bounded))
 
 
@@ -263,6 +268,7 @@ class _Integrated(_Span):
     method: Literal[(*METHODS, *CONTROLLED)] = "ros2"  # type: ignore[valid-type]
     step: Seconds | None = None
     tolerances: TolerancesEntry | None = None
+    settings: dict[str, bool | int | float | str] = {}
 
     @model_validator(mode="after")
     def _one_of_both(self) -> _Integrated:
@@ -271,14 +277,25 @@ class _Integrated(_Span):
             raise ValueError(f"{self.method} chooses its steps: give 'tolerances' in place of 'step'")
         if not controlled and self.tolerances is not None:
             raise ValueError(f"{self.method} takes steps of one length: give 'step' in place of 'tolerances'")
+        known = [] if controlled else settings_of(METHODS[self.method])
+        for name in self.settings:
+            if name not in known:
+                there = f"it has {', '.join(known)}" if known else "it has none"
+                raise ValueError(f"settings: {self.method} has no setting {name!r}; {there}")
         return self
 
 
-class ForwardEntry(_Integrated):
-    """Forward dynamics from start to end; step defaults to a tenth of output_step."""
-
+class _ForwardBase(_Integrated):
     kind: Literal["forward"] = "forward"
     stabilisation: StabilisationEntry = StabilisationEntry()
+
+
+ForwardEntry = create_model(
+    "ForwardEntry",
+    __base__=_ForwardBase,
+    __doc__="Forward dynamics from start to end; step defaults to a tenth of output_step.",
+    events=(_table_model(EVENTS), {}),
+)
 
 
 class KinematicEntry(_Span):
@@ -349,6 +366,7 @@ class _SceneBase(Strict):
     outputs: list[str] = ["default"]
     gravity: Annotated[list[Acceleration], THREE] = [0.0, 0.0, 0.0]
     base_acceleration: Annotated[list[Acceleration], THREE] = [0.0, 0.0, 0.0]
+    plane: Literal["auto", "none", "x", "y", "z"] = "auto"
     analysis: _one_of(list(ANALYSES.values()), list(ANALYSES))  # type: ignore[valid-type]
     ground: dict[str, Metres] = {}
     bodies: dict[str, BodyEntry]

@@ -18,8 +18,19 @@ from ffr_dyn.formula import Measured, Operation, text_of
 from ffr_dyn.integrators import CONTROLLED, METHODS, Controlled, Integrator
 from ffr_dyn.joint_forces import Actuator
 from ffr_dyn.scene import Body, Scene
-from ffr_dyn.scene_schema import EFFORTS, SOLUTIONS, TABLES, Kind, keys_of
-from ffr_dyn.settings import Forward, Inverse, Kinematic, Linearise, Mixed, MomentSettings, OfMoment, OverTime, Settings
+from ffr_dyn.scene_schema import EFFORTS, EVENTS, SOLUTIONS, TABLES, Kind, keys_of
+from ffr_dyn.settings import (
+    Forward,
+    Inverse,
+    Kinematic,
+    Linearise,
+    Mixed,
+    MomentSettings,
+    OfMoment,
+    OverTime,
+    Settings,
+    settings_of,
+)
 from ffr_dyn.stabilisation import Baumgarte, Projection, Stabilisation
 from ffr_dyn.state_formula import StateFormula
 from ffr_dyn.timefunction import HARMONIC, OPERATION, PIECEWISE, POLYNOMIAL, TimeFunction, constant, signals_in
@@ -51,6 +62,7 @@ def to_toml(scene: Scene, settings: Settings | MomentSettings, files: Mapping[st
     Raises InputError for what a file cannot hold: Python functions, and flexible bodies without a file.
     """
     top = {"name": scene.name, "gravity": scene.gravity, "base_acceleration": scene.base_acceleration}
+    top["plane"] = scene.plane
     tree = {**top, "outputs": list(settings.outputs), "analysis": _analysis(settings), "ground": dict(scene.ground)}
     tree["inputs"] = _inputs(scene)
     tree["bodies"] = {body.name: _body(body, files) for body in scene.bodies}
@@ -98,11 +110,14 @@ def _method(method: Integrator) -> dict[str, Any]:
     name = next(word for word, made in {**METHODS, **CONTROLLED}.items() if type(method) is made)
     if name in CONTROLLED:
         return {"method": name, "tolerances": asdict(cast("Controlled", method).tolerances)}
-    return {"method": name, "step": method.step}
+    given = {key: getattr(method, key) for key in settings_of(type(method))}
+    return {"method": name, "step": method.step, **({"settings": given} if given else {})}
 
 
 def _particular(analysis: OverTime | OfMoment) -> dict[str, Any]:
     """The settings of one analysis only."""
+    if isinstance(analysis, Forward):
+        return {"events": {event.name: _entry(EVENTS[0], event) for event in analysis.events}}
     if isinstance(analysis, Inverse):
         return {"elastic": "quasi-static" if analysis.quasi_static else "dynamic"}
     if isinstance(analysis, Mixed):

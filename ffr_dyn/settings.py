@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 from ffr_dyn.analyses.bounded import Bounded
 from ffr_dyn.analyses.efforts import Effort
+from ffr_dyn.analyses.events import Event
 from ffr_dyn.analyses.mixed import Causal
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.stabilisation import Stabilisation
@@ -13,7 +15,9 @@ from ffr_dyn.stabilisation import Stabilisation
 
 @dataclass(frozen=True)
 class Forward:
-    """Forward dynamics."""
+    """Forward dynamics, with events to find."""
+
+    events: tuple[Event, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -75,3 +79,8 @@ class MomentSettings:
     time: float = 0.0
     outputs: tuple[str, ...] = ("default",)
     analysis: OfMoment = Static()
+
+
+def settings_of(method: type[Any]) -> list[str]:
+    """Names of what a method of fixed steps takes beside its step."""
+    return [field.name for field in fields(method) if field.name != "step"]

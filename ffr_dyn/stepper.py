@@ -73,6 +73,10 @@ class Stepper:
         start: float = 0.0,
         stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
     ) -> None:
+        if method.controlled:
+            raise InputError(
+                f"{type(method).__name__} chooses its steps: their cost has no bound; use ROS2, ROS3 or RK4"
+            )
         if not (np.isfinite([method.step, start]).all() and method.step > 0):
             raise InputError(
                 f"a stepper needs a positive step and a finite start; they are {method.step} and {start} s"

@@ -28,6 +28,7 @@ Array = np.ndarray
 
 _TIE = 1e-6
 _RIGID = 1e-9
+NO_INERTIA = 1e-14  # relative to the largest, of a body of size one
 _CONTAINED = 1e-8  # relative mass norm of what a vector adds to those before it
 _DEPENDENT = 1e-7  # the same among the additions, whose products square it
 
@@ -170,9 +171,12 @@ def _rigid_content(model: CoupledModel, Z: Array) -> Array:
 def _check_inertia(model: CoupledModel, of_rigid_motions: Array) -> None:
     """A body without inertia against a rigid motion cannot be moved by it; masses on one line are such a body."""
     length = body_length(model)
+    sizes = np.array([1.0, 1.0, 1.0, length, length, length])
+    least, *_, most = np.linalg.eigvalsh(of_rigid_motions / np.outer(sizes, sizes))
+    if least > NO_INERTIA * most:
+        return
     free = free_rigid_motions(of_rigid_motions, length)
-    if free.shape[1]:
-        raise InputError(
-            f"the mass has no inertia against {motion_in_words(free[:, 0], model.centre, length)}: give it rotary inertia, "
-            "or masses off this line"
-        )
+    raise InputError(
+        f"the mass has no inertia against {motion_in_words(free[:, 0], model.centre, length)}: give it rotary inertia, "
+        "or masses off this line"
+    )

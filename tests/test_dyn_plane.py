@@ -163,6 +163,20 @@ def test_a_declared_plane_leaves_out_what_is_across_and_refuses_what_cannot_be()
         slider_crank(plane="w")
 
 
+def test_twists_of_a_tall_bar_are_across_a_declared_plane():
+    """A section taller than wide moves mostly in the plane when it is twisted, and still turns its ends across it."""
+    member = Member(rectangle(0.02, 0.06), ALUMINIUM, orientation=(0, 1, 0))
+    frame = named(polyline([(0, 0, 0), (1.0, 0, 0)], member, elements=12), a=(0, 0, 0), b=(1.0, 0, 0))
+    ends = [InterfaceRegion("a"), InterfaceRegion("b")]
+    tall = reduce_frame(
+        frame, name="link", interfaces=ends, reference=SimplySupported("a", "b"), reduction=CraigBampton(6)
+    )
+    found = flattened(double_pendulum(tall), 0.0)[0]
+    declared = flattened(double_pendulum(tall, plane="z"), 0.0)[0]
+    assert found.plane == declared.plane == "z"
+    assert [body.kept for body in found.bodies] == [body.kept for body in declared.bodies]
+
+
 # ---- bodies of many modes ---------------------------------------------------------------------------------------------
 
 

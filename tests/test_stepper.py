@@ -15,7 +15,7 @@ from ffr_dyn.drivers import Driver
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.forces import Load, SpringDamper
 from ffr_dyn.formula import formula
-from ffr_dyn.integrators import RK4, ROS2
+from ffr_dyn.integrators import RK4, ROS2, DormandPrince
 from ffr_dyn.joint_forces import Actuator, Servo
 from ffr_dyn.joints import Joint
 from ffr_dyn.measure import catalogue
@@ -269,6 +269,8 @@ def test_mistakes_are_named():
         Stepper(arm(), METHOD, outputs=("bob.c.positon",))
     with pytest.raises(InputError, match="work adds up over all steps"):
         Stepper(arm(), METHOD, outputs=("spring.work",))
+    with pytest.raises(InputError, match="DormandPrince chooses its steps"):
+        Stepper(arm(), DormandPrince())
     with pytest.raises(InputError, match="positive step"):
         Stepper(arm(), ROS2(0.0))
     with pytest.raises(InputError, match="letters, digits"):

@@ -11,13 +11,15 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.assemble import Assembled, assemble
+from ffr_dyn.analyses.events import Event, Watcher
 from ffr_dyn.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
 from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import System, new_record
 from ffr_dyn.errors import InputError, SimulationError
-from ffr_dyn.integrators import ROS2, Integrator
+from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince, Integrator
 from ffr_dyn.kernels.tables import (
     AT,
+    NOT_CONVERGED,
     NOT_FINITE,
     NOW,
     OK,
@@ -27,18 +29,19 @@ from ffr_dyn.kernels.tables import (
     Record,
     Work,
 )
-from ffr_dyn.machine import Machine, fill_rows, new_machine, record_row
+from ffr_dyn.machine import Machine, fill_rows, has_loads, new_machine, record_row
 from ffr_dyn.measure import Entry, Memory, measure, needs_every_step, selected
 from ffr_dyn.result import Quantity, Result
 from ffr_dyn.result_file import ResultWriter, load_checkpoint, load_result
 from ffr_dyn.scene import Scene
-from ffr_dyn.stabilisation import Projection, Stabilisation, gains
+from ffr_dyn.stabilisation import Baumgarte, Projection, Stabilisation, gains
 from ffr_dyn.stopwatch import Stopwatch
 from ffr_dyn.validity import doubts, extremes
 from ffr_prep.body import Surface
 
 Array = np.ndarray
 
+_OF_ACCELERATIONS = (RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince)  # methods on index-1 equations
 RK4_LIMIT = 2.83  # imaginary stability limit of RK4, Hairer & Wanner 1996, IV.2
 LOOKS = 10  # of a quantity that adds up, from row to row, where the method chooses its steps
 SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, file and keyboard
@@ -65,6 +68,7 @@ def forward(
     start: float = 0.0,
     stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
     outputs: Sequence[str] = ("default",),
+    events: Sequence[Event] = (),
     path: str | Path | None = None,
     resume: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
@@ -75,6 +79,8 @@ def forward(
     method      : RK4(step), ROS2(step), ...; by default ROS2 with a tenth of the output step
     outputs     : names or patterns of the quantities to keep (see `ffr_dyn.measure.selected`), such as "default",
                   "rod.*.acceleration", "*.power"
+    events      : moments to find (see `ffr_dyn.analyses.events`), which the attribute "events" of the result lists with
+                  their states; one may end the run, and its row is the last one then
     path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
     resume      : a result file (its `path` of before) whose run goes on from its last rows as if it had never stopped, to
                   the bit; `end` may be later than it was. A file that does not exist yet is a run from the start
@@ -88,9 +94,10 @@ def forward(
     spacing = output_step / LOOKS if method.controlled else method.step
     substeps, rows = _counts(end - start, output_step, spacing)
     _check_step(scene, method)
+    _check_stabilisation(method, stabilisation)
     assembled = assemble(scene, time=start)
     wanted = selected(assembled.system, outputs)
-    ensure_compiled(type(method))
+    ensure_compiled(type(method), loads=has_loads(assembled.system.model.loads))
     span = (start, end, output_step)
     mark = _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
     header = _header(scene, assembled, method, stabilisation, span)
@@ -102,16 +109,17 @@ def forward(
     else:
         run = _started(assembled, machine, start, wanted)
     _check_resumed(run, substeps * rows, output_step / substeps)
+    watcher = _watcher(assembled, run, method, stabilisation, spacing, events, resume) if events else None
     path = resume if path is None else path
     watch = Stopwatch() if stopwatch is None else stopwatch
     first = Result(run.times[0], run.parts[0], geometry(scene), header | {"status": "running"})
     with nullcontext() if path is None else ResultWriter(path, first, checkpoint=_checkpoint(run, mark)) as writer:
-        for times, part in _advance(assembled, run, method, start, substeps, rows, wanted, watch):
+        for times, part in _advance(assembled, run, method, start, substeps, rows, wanted, watch, watcher):
             if writer is not None:
                 writer.append(times, {name: quantity.values for name, quantity in part.items()}, _checkpoint(run, mark))
             if progress is not None:
                 progress(float(times[-1]))
-        account = _account(scene, run, header["notes"])
+        account = _account(scene, run, header["notes"]) | ({} if watcher is None else {"events": watcher.found})
         if writer is not None:
             writer.close("complete", header | account)
     return _result(scene, run, header | account | {"status": "complete"})
@@ -130,6 +138,15 @@ def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
     if rows < 1 or abs(rows * output_step - span) > 1e-9 * span:
         raise InputError(f"the duration {span} s is not a multiple of the output step {output_step} s")
     return substeps, rows
+
+
+def _check_stabilisation(method: Integrator, stabilisation: Stabilisation) -> None:
+    """Refuse gains of accelerations for a method that keeps constraints in another way."""
+    if isinstance(stabilisation, Baumgarte) and not isinstance(method, _OF_ACCELERATIONS):
+        raise InputError(
+            f"Baumgarte's gains act on the accelerations of the constraints, and {type(method).__name__} holds positions or "
+            f"rates themselves; leave them out, or use one of {', '.join(kind.__name__ for kind in _OF_ACCELERATIONS)}"
+        )
 
 
 def _check_step(scene: Scene, method: Integrator) -> None:
@@ -164,13 +181,16 @@ def _advance(
     rows: int,
     wanted: Mapping[str, Entry],
     watch: Stopwatch,
+    watcher: Watcher | None = None,
 ) -> Iterator[tuple[Array, dict[str, Quantity]]]:
     """Yields (times, quantities) of output rows chunk after chunk, each about SECONDS_PER_CALL long.
 
-    Where a quantity adds up over the steps, every step is looked at and only the output rows are kept.
+    Where a quantity adds up over the steps, or events are looked for, every step is looked at and only the output rows are
+    kept.
     """
     system, steps = assembled.system, run.machine.tables.clock.steps
-    looks = substeps if needs_every_step(wanted) else 1
+    looks = substeps if needs_every_step(wanted) or watcher is not None else 1
+    ends = False
     count = 1
     while run.done < rows * substeps:
         chunk = new_record(system, looks * min(count, rows - run.done // substeps))
@@ -179,19 +199,47 @@ def _advance(
         filled = int(steps[2]) - int(steps[2]) % looks
         if filled:
             kept = with_all_reactions(assembled, Record(*(column[:filled] for column in chunk)))
+            if watcher is not None:
+                kept, ends = watcher.look(kept)
+            shown = _shown(kept.time.size, looks, ends)
             every, run.memory = measure(system, kept, run.memory, wanted)
-            part = {
-                name: replace(quantity, values=quantity.values[looks - 1 :: looks]) for name, quantity in every.items()
-            }
-            times = kept.time[looks - 1 :: looks]
+            part = {name: replace(quantity, values=quantity.values[shown]) for name, quantity in every.items()}
+            times = kept.time[shown]
             run.parts.append(part)
             run.times.append(times)
             run.extremes = np.maximum(run.extremes, extremes(system, kept))
             run.done += filled // looks * substeps
             yield times, part
+        if ends:
+            return
         if status != OK:
             raise failure(system, run.machine.work, status, reached(run.machine, start))
         count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
+
+
+def _shown(rows: int, looks: int, ends: bool) -> Array:
+    """Numbers of the output rows among those that were looked at; the row of an event that ends the run is one."""
+    shown = np.arange(looks - 1, rows, looks)
+    return np.union1d(shown, [rows - 1]) if ends else shown
+
+
+def _watcher(
+    assembled: Assembled,
+    run: _Run,
+    method: Integrator,
+    stabilisation: Stabilisation,
+    spacing: float,
+    events: Sequence[Event],
+    resume: str | Path | None,
+) -> Watcher:
+    """What looks for events from where the run stands."""
+    if resume is not None:
+        raise InputError(
+            "a run with events cannot be resumed: those of its first part are not in the file; run the whole"
+        )
+    watcher = Watcher(assembled, method, gains(stabilisation), spacing, events)
+    watcher.begin(run.machine, float(run.times[0][0]))
+    return watcher
 
 
 def reached(machine: Machine, start: float) -> float:
@@ -243,6 +291,8 @@ def failure(system: System, work: Work, status: int, time: float) -> BaseExcepti
             f"{at} the state of {_worst(system, work)} is no longer finite: the step is too large for an explicit method "
             "(use ROS2 or a smaller step), or a force is not finite"
         )
+    if status == NOT_CONVERGED:
+        return SimulationError(f"{at} the iterations of the step do not converge, {_unconverged(system, where)}")
     if status == STEP_TOO_SMALL:
         return SimulationError(
             f"{at} the step has become too small: the motion is not smooth there (an impact, a jump of a force or of a "
@@ -250,6 +300,21 @@ def failure(system: System, work: Work, status: int, time: float) -> BaseExcepti
             "larger tolerances"
         )
     return SimulationError(f"{at} the run stopped: {system.user.failure or 'unknown cause'}")
+
+
+def _unconverged(system: System, where: int) -> str:
+    """Of a body, or after the bodies a constraint row: where, the likely cause and what to change."""
+    bodies = system.scene.bodies
+    if where < len(bodies):
+        return (
+            f"worst in body {bodies[where].name!r}: the step is too large for its rotation or for a spring, damper, stop or "
+            "friction that acts on it; use a smaller step, ROS2, or a softer force"
+        )
+    block = system.blocks[int(np.searchsorted(system.model.rows.start, where - len(bodies), side="right")) - 1]
+    return (
+        f"worst in {block.name!r}: its constraint cannot be met within the step; use a smaller step, look for a position "
+        "where the mechanism locks or is singular, or pass it with ROS2"
+    )
 
 
 def _worst(system: System, work: Work) -> str:

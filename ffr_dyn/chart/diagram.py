@@ -11,7 +11,7 @@ from ffr_dyn.chart.measures import Measure, default_measures, measure_of
 from ffr_dyn.chart.pareto import pareto_front
 from ffr_dyn.chart.reference import WANTED, Reference, distance, reference
 from ffr_dyn.chart.runner import REPEATS, Failure, Job, Outcome, Pool, Span, perform
-from ffr_dyn.chart.variants import FULL, Model, Variant, grid
+from ffr_dyn.chart.variants import ADAPTIVE, FULL, Model, Variant, grid
 from ffr_dyn.errors import InputError
 from ffr_dyn.integrators import METHODS
 from ffr_dyn.measure import catalogue
@@ -134,7 +134,9 @@ def work_precision(
     Raises InputError for what cannot be compared, SimulationError where no reference can be verified.
     """
     measures = measures or measures_of(scene, (), span.start)
-    variants = grid(scene, models, dict.fromkeys(METHODS) if methods is None else methods, span.output_step)
+    variants = grid(
+        scene, models, dict.fromkeys([*METHODS, *ADAPTIVE]) if methods is None else methods, span.output_step
+    )
     found = reference(scene, span, measures, stabilisation, pool, limit=limit, wanted=wanted, tell=tell)
     jobs = [Job(scene, variant, span, measures, stabilisation, repeats, limit) for variant in variants]
     outcomes = run_variants(jobs, pool, progress)

@@ -52,8 +52,10 @@ def look(diagrams: Sequence[Diagram]) -> dict[tuple[str, str], tuple[str, str]]:
     return {line: (colours[line[0]], markers[line[1]]) for line in lines}
 
 
-def draw(diagrams: Diagram | Sequence[Diagram], path: str | Path, *, against: str = CPU, title: str = "") -> Path:
-    """Draw errors over a cost ("cpu", "wall" or "evaluations"): a panel for every measure of every diagram.
+def draw(
+    diagrams: Diagram | Sequence[Diagram], path: str | Path, *, against: str = CPU, title: str = "", columns: int = 2
+) -> Path:
+    """Draw errors over a cost ("cpu", "wall" or "evaluations"): a panel for every measure of every diagram, in columns.
 
     Raises InputError for another kind of file, another cost, or a diagram without points.
     """
@@ -61,7 +63,7 @@ def draw(diagrams: Diagram | Sequence[Diagram], path: str | Path, *, against: st
     path = Path(path)
     _check(shown, path, against)
     panels = [(diagram, measure.name) for diagram in shown for measure in diagram.measures]
-    columns = min(len(panels), 2)
+    columns = min(len(panels), columns)
     rows = -(-len(panels) // columns)
     lines = look(shown)
     with mpl.rc_context(_STYLE):  # type: ignore[arg-type]

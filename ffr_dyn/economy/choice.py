@@ -8,7 +8,7 @@ import numpy as np
 
 from ffr_dyn.analyses.assemble import in_space
 from ffr_dyn.errors import InputError
-from ffr_dyn.integrators import METHODS, Integrator
+from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator, tolerances
 from ffr_dyn.plane import AXES, body_normal, planar_forms
 from ffr_dyn.result import Result
 from ffr_dyn.scene import Body, Scene
@@ -57,17 +57,26 @@ class Choice:
 
     parts  : one for each body, in the scene's order
     plane  : "x", "y" or "z", the normal of a planar computation, or "none"
-    method : name of the integrator, one of `METHODS`
+    method : name of the integrator, one of `METHODS` or `CONTROLLED`
     divisions : steps from one output row to the next
+    accuracy : relative tolerance of a step, of a method that chooses its steps; `divisions` mean nothing then
     """
 
     parts: tuple[Part, ...]
     plane: str
     method: str
     divisions: int
+    accuracy: float = 0.0
+
+    @property
+    def controlled(self) -> bool:
+        """Whether the integrator chooses its steps."""
+        return self.method in CONTROLLED
 
     def integrator(self, output_step: float) -> Integrator:
-        """The method with its step."""
+        """The method with its step or its tolerances."""
+        if self.controlled:
+            return CONTROLLED[self.method](tolerances(self.accuracy))
         return METHODS[self.method](output_step / self.divisions)
 
 

@@ -10,11 +10,12 @@ from ffr_dyn.economy.choice import Choice, Part
 from ffr_dyn.integrators import METHODS
 from ffr_dyn.scene import Scene
 
-BASE = 1.2  # an evaluation of nothing
+BASE = 0.3  # an evaluation of nothing
 # a rigid body; more for a flexible one, per mode, per mode squared; for stiffening, per mode, per mode squared
-SPACE = (1.5, 0.65, 0.02, 0.012, 1.8, 0.03, 0.015)
-PLANE = (0.65, 0.35, 0.03, 0.004, 1.3, 0.09, 0.01)
-STAGES = {"rk4": 4, "ros2": 2, "ros3": 3}
+SPACE = (1.0, 0.65, 0.02, 0.003, 1.05, 0.02, 0.016)
+PLANE = (0.7, 0.35, 0.02, 0.003, 1.05, 0.03, 0.004)
+STAGES = {"rk4": 4, "ros2": 2, "ros3": 4}
+PROJECTION = 1.0  # evaluations per step that bring the state back to its constraints, about
 
 
 def per_evaluation(choice: Choice) -> float:
@@ -23,13 +24,18 @@ def per_evaluation(choice: Choice) -> float:
 
 
 def per_row(choice: Choice) -> float:
-    """[us] from one output row to the next."""
-    return per_evaluation(choice) * stages(choice.method) * choice.divisions
+    """[us] from one output row to the next, which is one more evaluation."""
+    return per_evaluation(choice) * ((stages(choice.method) + PROJECTION) * choice.divisions + 1)
 
 
 def of_run(scene: Scene, choice: Choice, rows: int) -> float:
     """[us] of a run; `scene` is the one that the choice is of."""
     return rows * per_row(choice)
+
+
+def of_evaluations(choice: Choice, evaluations: int) -> float:
+    """[us] of a run with as many evaluations."""
+    return evaluations * per_evaluation(choice)
 
 
 def stages(method: str) -> int:

@@ -49,7 +49,7 @@ def _summary(found: Economy) -> Table:
     rows = [
         ("scene", found.original.name),
         ("computed", "in space" if choice.plane == "none" else f"in the plane across {choice.plane}"),
-        ("integrator", f"{choice.method}, step {settings.method.step:.6g} s ({choice.divisions} to an output row)"),
+        ("integrator", _integrator(choice, settings.method.step)),
         ("stabilisation", repr(settings.stabilisation)),
         ("elastic coordinates", f"{_coordinates(choice)} of {sum(b.model.n for b in found.original.bodies)}"),
         ("cost of a run", f"{found.cost / 1e6:.3g} s, everything with the same step {found.before / 1e6:.3g} s: "
@@ -57,6 +57,12 @@ def _summary(found: Economy) -> Table:
         ("cost of the search", f"{found.search_cost / found.cost:.1f} runs of the chosen model"),
     ]  # fmt: skip
     return Table("Chosen model", _verdict(found), ("", ""), tuple(rows))
+
+
+def _integrator(choice: Choice, step: float) -> str:
+    if choice.controlled:
+        return f"{choice.method}, which chooses its steps, with a relative tolerance of {choice.accuracy:g}"
+    return f"{choice.method}, step {step:.6g} s ({choice.divisions} to an output row)"
 
 
 def _verdict(found: Economy) -> str:
@@ -183,7 +189,8 @@ def _tried(found: Economy) -> Table:
     for one in found.tried:
         coordinates = " ".join(str(part.count) for part in one.choice.parts)
         worst = float((one.error / found.limits).max(initial=0.0))
-        method = f"{one.choice.method}/{one.choice.divisions}"
+        steps = f"{one.choice.accuracy:g}" if one.choice.controlled else f"{one.choice.divisions}"
+        method = f"{one.choice.method}/{steps}"
         rows.append((one.what, coordinates, method, f"{one.cost / found.cost:.2f}", f"{worst:.3g}"))
     text = (
         "Cost in runs of the chosen model. Error in tolerances: of trials beside everything with the same step, of the "

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -33,10 +34,10 @@ from ffr_dyn.economy.contributions import (
     of_omitted,
     of_shapes,
 )
-from ffr_dyn.economy.cost import of_run, per_evaluation, per_row
+from ffr_dyn.economy.cost import of_run, per_evaluation
 from ffr_dyn.economy.outputs import Output, Probe, as_output, difference, largest, limits, probe, ranges, total
 from ffr_dyn.economy.steps import chosen_step, error_of, least, share
-from ffr_dyn.economy.trial import Span, Trial, run
+from ffr_dyn.economy.trial import Span, Trial, cost, run
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.scene import Scene
 from ffr_dyn.settings import Forward, Settings
@@ -156,7 +157,7 @@ class _Search:
         """A run of the model, made once."""
         if choice not in self.runs:
             self.runs[choice] = run(self.scene, choice, self.span, self.of, states=True)
-            self.spent += of_run(self.scene, choice, self.span.rows)
+            self.spent += cost(self.runs[choice], self.span)
         return self.runs[choice]
 
     def looked(self, choice: Choice, evaluations: int) -> None:
@@ -164,8 +165,7 @@ class _Search:
         self.spent += evaluations * per_evaluation(choice)
 
     def note(self, trial: Trial, what: str, error: Array) -> None:
-        cost = of_run(self.scene, trial.choice, self.span.rows)
-        self.tried.append(Tried(trial.choice, what, cost, error))
+        self.tried.append(Tried(trial.choice, what, cost(trial, self.span), error))
 
 
 def economise(
@@ -226,7 +226,7 @@ def _chosen(search: _Search, ground: _Ground) -> _Found:
     if per_evaluation(smaller) > WORTH * per_evaluation(found.final.choice):
         return found
     again = _stepped(search, ground, smaller)
-    return again if per_row(again.final.choice) < per_row(found.final.choice) else found
+    return again if cost(again.final, search.span) < cost(found.final, search.span) else found
 
 
 def _model(search: _Search, ground: _Ground, shares: Shares) -> Choice:
@@ -246,14 +246,16 @@ def _beside(search: _Search, ground: _Ground, found: _Found) -> tuple[_Ground, _
     """The model looked at again beside everything with a step that costs about as much as its final run, where that is
     much finer than before: a coarse step damps the vibration of fast modes, and with it what they do."""
     final = found.final.choice
-    divisions = int(per_row(final) / per_row(replace(ground.everything, divisions=1)))
+    divisions = int(
+        cost(found.final, search.span) / of_run(search.scene, replace(ground.everything, divisions=1), search.span.rows)
+    )
     if divisions < FINER * ground.pilot.choice.divisions:
         return None
     search.tell("everything, finer step")
     everything = replace(ground.everything, divisions=divisions)
     pilot, rigid = search.run(everything), search.run(_rigid(everything))
     finer = replace(ground, everything=everything, pilot=pilot, rigid=rigid)
-    same = replace(final, method=PILOT, divisions=divisions)
+    same = replace(final, method=PILOT, divisions=divisions, accuracy=0.0)
     error = _gap(search, finer, same, "the same with a finer step")
     if (error + largest(found.time) <= ground.limits).all():
         return finer, replace(found, model=difference(search.run(same).values, pilot.values))
@@ -470,7 +472,8 @@ def _finished(search: _Search, ground: _Ground, found: _Found, verify: bool | No
         final, verification = _verified(search, ground, final)
     kept, omitted = _explained(search, ground, final)
     vibrations, stiffening = frequencies(final, ground.pilot), stiffening_loads(final)
-    same = replace(ground.spatial, method=final.choice.method, divisions=final.choice.divisions)
+    method = PILOT if final.choice.controlled else final.choice.method
+    same = replace(ground.spatial, method=method, divisions=final.choice.divisions)
     return Economy(
         original=search.scene,
         choice=final.choice,
@@ -485,7 +488,7 @@ def _finished(search: _Search, ground: _Ground, found: _Found, verify: bool | No
         effects=omitted,
         kept=kept,
         before=of_run(search.scene, same, search.span.rows),
-        cost=of_run(search.scene, final.choice, search.span.rows),
+        cost=cost(final, search.span),
         search_cost=spent,
         tried=tuple(search.tried),
         runs=_all_runs(search, found, verification),
@@ -503,9 +506,8 @@ def _all_runs(search: _Search, found: _Found, verification: Verification | None)
         truth: Histories = search.runs[verification.choice].values
     else:
         truth = difference(found.final.values, total(found.model, found.time))
-    rows = search.span.rows
     return tuple(
-        Tried(choice, "run", of_run(search.scene, choice, rows), largest(difference(trial.values, truth)))
+        Tried(choice, "run", cost(trial, search.span), largest(difference(trial.values, truth)))
         for choice, trial in search.runs.items()
         if verification is None or choice != verification.choice
     )
@@ -567,12 +569,15 @@ def _check_accuracy(of: Probe, ground: _Ground, own: Array) -> None:
 
 def _finer(search: _Search, ground: _Ground, final: Trial, reference: Trial, attempt: int) -> Trial:
     """A better model: of a finer step where that is what is wrong, or else chosen anew beside the reference."""
-    finer = search.run(replace(final.choice, divisions=2 * final.choice.divisions))
+    finer = search.run(_shorter(final.choice))
     gained = largest(difference(finer.values, final.values)) / ground.limits
     error = largest(difference(finer.values, reference.values)) / ground.limits
     if (error <= 1).all() or gained.max() > error.max():
         return finer
-    choice = replace(ground.everything, method=final.choice.method, divisions=final.choice.divisions)
+    steps: dict[str, Any] = {key: getattr(final.choice, key) for key in ("method", "divisions", "accuracy")}
+    if not final.choice.integrator(search.span.output_step).implicit:  # its step is for the modes that it had
+        steps = {"method": PILOT, "divisions": max(1, reference.choice.divisions // 2), "accuracy": 0.0}
+    choice = replace(ground.everything, **steps)
     if attempt > 1:
         return search.run(choice)
     rigid = search.run(_rigid(reference.choice))
@@ -580,4 +585,11 @@ def _finer(search: _Search, ground: _Ground, final: Trial, reference: Trial, att
     anew = _model(search, sharp, Shares())
     if anew.parts == final.choice.parts:
         return search.run(choice)
-    return search.run(replace(anew, method=choice.method, divisions=choice.divisions))
+    return search.run(replace(anew, **steps))
+
+
+def _shorter(choice: Choice) -> Choice:
+    """The same model with shorter steps."""
+    if choice.controlled:
+        return replace(choice, accuracy=choice.accuracy / 10)
+    return replace(choice, divisions=2 * choice.divisions)

@@ -14,15 +14,18 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.economy.choice import Choice
-from ffr_dyn.economy.cost import per_row, stages
+from ffr_dyn.economy.cost import STAGES, per_row, stages
 from ffr_dyn.economy.outputs import difference, largest
-from ffr_dyn.economy.trial import Span, Trial
+from ffr_dyn.economy.trial import Span, Trial, cost
 from ffr_dyn.errors import InputError, SimulationError
-from ffr_dyn.integrators import METHODS, Integrator
+from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator
 
 Array = np.ndarray
 Run = Callable[[Choice], Trial]
 
+SHORT = 1  # steps to a row: with more, steps longer than a row would not do
+ACCURACIES = (1e-2, 1e-3, 1e-4, 1e-5)
+WORTH = 0.8  # of the cost: a method that chooses its steps pays
 MOST = 4096  # divisions of an output step
 ATTEMPTS = 6
 MARGIN = 1.1  # on a predicted number of divisions
@@ -41,8 +44,8 @@ class Stepped:
 
 
 def methods(span: Span) -> tuple[str, ...]:
-    """Names of the methods that take a step."""
-    return tuple(name for name, made in METHODS.items() if _takes_a_step(made, span.output_step))
+    """Names of the methods that take a step, and a known number of evaluations for it."""
+    return tuple(name for name, made in METHODS.items() if name in STAGES and _takes_a_step(made, span.output_step))
 
 
 def _takes_a_step(made: Callable[[float], Integrator], step: float) -> bool:
@@ -77,7 +80,7 @@ def chosen_step(run: Run, choice: Choice, limit: Array, span: Span) -> Stepped:
     failed: Exception | None = None
     for _, name, needed in sorted(offers)[:2]:
         try:
-            return _refined(run, replace(choice, method=name), needed, sharp, limit)
+            return _longer(run, _refined(run, replace(choice, method=name), needed, sharp, limit), limit, span)
         except SimulationError as error:
             failed = error
     raise SimulationError(
@@ -154,6 +157,35 @@ def _refined(run: Run, choice: Choice, needed: int, sharp: Trial, limit: Array) 
     if best is None:
         raise SimulationError(f"{choice.method}: errors stay above their limits with {needed} steps from row to row")
     return best
+
+
+def _longer(run: Run, fixed: Stepped, limit: Array, span: Span) -> Stepped:
+    """The run of a method that chooses its steps, where steps longer than an output row would do and that is cheaper."""
+    if fixed.trial.choice.divisions > SHORT:
+        return fixed
+    best = fixed
+    truth = difference(fixed.trial.values, fixed.error)
+    for name in CONTROLLED:
+        found = _controlled(run, replace(fixed.trial.choice, method=name, divisions=1), truth, limit, best, span)
+        best = best if found is None else found
+    return best
+
+
+def _controlled(
+    run: Run, choice: Choice, truth: tuple[Array, ...], limit: Array, best: Stepped, span: Span
+) -> Stepped | None:
+    """The first accuracy of a method that meets the limit, while its runs are cheaper than the best one."""
+    for accuracy in ACCURACIES:
+        try:
+            trial = run(replace(choice, accuracy=accuracy))
+        except (SimulationError, InputError):
+            continue
+        if cost(trial, span) > WORTH * cost(best.trial, span):
+            return None
+        error = difference(trial.values, truth)
+        if share(error, limit) <= 1:
+            return Stepped(trial, error)
+    return None
 
 
 def _measured(run: Run, trial: Trial, sharp: Trial) -> tuple[Array, ...]:

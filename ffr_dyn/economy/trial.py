@@ -9,6 +9,7 @@ import numpy as np
 from ffr_dyn.analyses.assemble import Assembled, assemble
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.economy.choice import Choice, applied
+from ffr_dyn.economy.cost import of_evaluations, of_run
 from ffr_dyn.economy.outputs import Probe, histories, needed
 from ffr_dyn.errors import SimulationError
 from ffr_dyn.result import Result
@@ -48,6 +49,13 @@ class Trial:
     values: tuple[Array, ...]
     evaluations: int
     result: Result
+
+
+def cost(trial: Trial, span: Span) -> float:
+    """[us] of a run, by the cost model: from its steps, or from its evaluations where the method chooses its steps."""
+    if trial.choice.controlled:
+        return of_evaluations(trial.choice, trial.evaluations)
+    return of_run(trial.scene, trial.choice, span.rows)
 
 
 def run(

@@ -9,14 +9,18 @@ from __future__ import annotations
 from typing import Any, ClassVar, Protocol
 
 from ffr_dyn.integrators.dopri5 import DormandPrince
+from ffr_dyn.integrators.generalised_alpha import HHT, GeneralisedAlpha
+from ffr_dyn.integrators.half_explicit import HalfExplicit
 from ffr_dyn.integrators.rk4 import RK4
 from ffr_dyn.integrators.ros2 import ROS2
 from ffr_dyn.integrators.ros3 import ROS3, AdaptiveROS3
 from ffr_dyn.integrators.tolerances import Tolerances, tolerances
+from ffr_dyn.integrators.variational import Variational
 from ffr_dyn.kernels.units import Unit
 
 __all__ = [
     "CONTROLLED",
+    "HHT",
     "METHODS",
     "RK4",
     "ROS2",
@@ -24,8 +28,11 @@ __all__ = [
     "AdaptiveROS3",
     "Controlled",
     "DormandPrince",
+    "GeneralisedAlpha",
+    "HalfExplicit",
     "Integrator",
     "Tolerances",
+    "Variational",
     "tolerances",
 ]
 
@@ -46,6 +53,7 @@ class Integrator(Protocol):
     controlled: ClassVar[bool]  # whether it chooses its steps (see `Controlled`)
     stage_count: ClassVar[int]  # states (x, v) of memory that it needs
     row_stages: ClassVar[int]  # the same for constraint rows
+    calls: ClassVar[tuple[str, ...]]  # what its unit calls beside what all methods do, of `units.EXTRA_UNITS`
     unit: ClassVar[Unit]
 
 
@@ -59,5 +67,13 @@ class Controlled(Integrator, Protocol):
     estimate_order: ClassVar[int]  # the error of a step goes as h to this power
 
 
-METHODS: dict[str, type[Any]] = {"rk4": RK4, "ros2": ROS2, "ros3": ROS3}
+METHODS: dict[str, type[Any]] = {
+    "rk4": RK4,
+    "ros2": ROS2,
+    "ros3": ROS3,
+    "half-explicit": HalfExplicit,
+    "generalised-alpha": GeneralisedAlpha,
+    "hht": HHT,
+    "variational": Variational,
+}
 CONTROLLED: dict[str, type[Any]] = {"ros3-adaptive": AdaptiveROS3, "dopri5": DormandPrince}

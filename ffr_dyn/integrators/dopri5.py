@@ -103,4 +103,5 @@ class DormandPrince:
     stage_count: ClassVar[int] = 10
     row_stages: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = (0.0,)
+    calls: ClassVar[tuple[str, ...]] = ()
     unit: ClassVar[Unit] = dopri5_step

@@ -60,4 +60,5 @@ class RK4:
     stage_count: ClassVar[int] = 5
     row_stages: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = ()
+    calls: ClassVar[tuple[str, ...]] = ()
     unit: ClassVar[Unit] = rk4_step

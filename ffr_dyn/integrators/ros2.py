@@ -92,4 +92,5 @@ class ROS2:
     stage_count: ClassVar[int] = 4
     row_stages: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = ()
+    calls: ClassVar[tuple[str, ...]] = ()
     unit: ClassVar[Unit] = ros2_step

@@ -116,6 +116,7 @@ class ROS3:
     stage_count: ClassVar[int] = 6
     row_stages: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = ()
+    calls: ClassVar[tuple[str, ...]] = ()
     unit: ClassVar[Unit] = ros3_step
 
 
@@ -135,4 +136,5 @@ class AdaptiveROS3:
     stage_count: ClassVar[int] = 6
     row_stages: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = ()
+    calls: ClassVar[tuple[str, ...]] = ()
     unit: ClassVar[Unit] = ros3_step

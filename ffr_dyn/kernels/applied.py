@@ -23,5 +23,7 @@ def applied_loads(m, w, t, x, v):
         b = m.markers.body[k]
         update_marker(bodies.where, m.markers, w.markers, bw.A[b], get(bw.omega, b), x, v, k)
     fill(bw.f, 0.0)
+    for k in range(w.markers.load.shape[0]):
+        fill(w.markers.load[k], 0.0)
     apply_loads(bodies.where, m.markers, m.loads, bw.A, w.markers, w.loads, w.functions, w.user, x, bw.f)
     return True

@@ -31,10 +31,16 @@ SIDE = 12 * LANES  # numbers of X per side of a joint
 
 
 @kernel
-def spread_rows(jac, first, last, side, flexible, X, at):
-    """X = the rigid coefficients of the rows of one side (six rows of lanes), then the elastic ones."""
+def spread_rows(jac, first, last, side, flexible, normal, X, at):
+    """X = the rigid coefficients of the rows of one side, then the elastic ones; six of each, or three in the plane."""
+    i, j, k = in_plane(normal) if normal >= 0 else (0, 0, 0)
     for row in range(first, last):
         a, r = jac[row, side], at + row - first
+        if normal >= 0:
+            X[r], X[r + LANES], X[r + 2 * LANES] = a[i], a[j], a[k]
+            if flexible:
+                X[r + 3 * LANES], X[r + 4 * LANES], X[r + 5 * LANES] = a[i], a[j], a[6 + normal]
+            continue
         for c in range(6):
             X[r + LANES * c] = a[c]
         if flexible:
@@ -44,18 +50,14 @@ def spread_rows(jac, first, last, side, flexible, X, at):
 
 
 @kernel
-def eliminate_side(flexible, normal, P, L, X, at):
+def eliminate_side(flexible, P, L, X, at):
     """First six rows of X = L^-1 (rigid - P elastic): what is left of the rows without the elastic coordinates.
 
     P, L : pooled 6 x 6 matrices
     """
-    elastic = at + 6 * LANES
-    if normal >= 0:
-        eliminate_in_plane(flexible, normal, P, L, X, at)
-        return
     if flexible:
         for c in range(6):
-            combine_6(X, at + LANES * c, -1.0, P, 6 * c, 1, X, elastic)
+            combine_6(X, at + LANES * c, -1.0, P, 6 * c, 1, X, at + 6 * LANES)
     scale_row(X, at, L[0])
     combine_1(X, at + LANES, -1.0, L, 6, 1, X, at)
     scale_row(X, at + LANES, L[7])
@@ -71,18 +73,16 @@ def eliminate_side(flexible, normal, P, L, X, at):
 
 @kernel
 def eliminate_in_plane(flexible, normal, P, L, X, at):
-    """`eliminate_side` for the three rigid coordinates i, j, k of a planar body; the others are zero."""
+    """`eliminate_side` for a planar body; P: nine numbers, of its rigid and elastic coefficients i, j, k."""
     i, j, k = in_plane(normal)
+    second, third = at + LANES, at + 2 * LANES
     if flexible:
-        for c in (i, j, k):
-            combine_6(X, at + LANES * c, -1.0, P, 6 * c, 1, X, at + 6 * LANES)
-    for c in (normal, 3 + (normal + 1) % 3, 3 + (normal + 2) % 3):
-        scale_row(X, at + LANES * c, 0.0)
-    first, second, third = at + LANES * i, at + LANES * j, at + LANES * k
-    scale_row(X, first, L[7 * i])
-    combine_1(X, second, -1.0, L, 6 * j + i, 1, X, first)
+        for c in range(3):
+            combine_3(X, at + LANES * c, -1.0, P, 3 * c, 1, X, at + 3 * LANES)
+    scale_row(X, at, L[7 * i])
+    combine_1(X, second, -1.0, L, 6 * j + i, 1, X, at)
     scale_row(X, second, L[7 * j])
-    combine_1(X, third, -1.0, L, 6 * k + i, 1, X, first)
+    combine_1(X, third, -1.0, L, 6 * k + i, 1, X, at)
     combine_1(X, third, -1.0, L, 6 * k + j, 1, X, second)
     scale_row(X, third, L[7 * k])
 
@@ -116,6 +116,21 @@ def add_pair(X, later, earlier, rows, flexible, phiphi, Y, S, offset):
     else:
         for row in range(rows):
             combine_6(S, offset + LANES * row, 1.0, X, earlier + row, LANES, X, later)
+
+
+@kernel
+def add_pair_in_plane(X, later, earlier, rows, flexible, phiphi, Y, S, offset):
+    """`add_pair` for a planar body; phiphi: nine numbers."""
+    if flexible:
+        for c in range(3):
+            copy_row(X, later + LANES * c, Y, LANES * c)
+            clear_row(Y, LANES * (3 + c))
+            combine_3(Y, LANES * (3 + c), 1.0, phiphi, c, 3, X, later + 3 * LANES)
+        for row in range(rows):
+            combine_6(S, offset + LANES * row, 1.0, X, earlier + row, LANES, Y, 0)
+    else:
+        for row in range(rows):
+            combine_3(S, offset + LANES * row, 1.0, X, earlier + row, LANES, X, later)
 
 
 @inlined

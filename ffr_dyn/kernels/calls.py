@@ -3,7 +3,7 @@
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.packing import call_unit
 from ffr_dyn.kernels.system import prepare
-from ffr_dyn.kernels.tables import CORRECT, EVALUATE, SETTLE, SOLVE
+from ffr_dyn.kernels.tables import CORRECT, EVALUATE, LOOK_AHEAD, PROJECT, SETTLE, SOLVE
 
 
 @inlined
@@ -20,7 +20,13 @@ def settle(r, t):
 
 @inlined
 def solve(r, x, target):
-    """Accelerations (bodies.acc) and multipliers (rows.lam) of what was evaluated last at x."""
+    """Accelerations (bodies.acc) and multipliers (rows.lam) of what was evaluated last at x, near what they are now."""
+    call_unit(r.units[SOLVE], r.address, 1.0, x.ctypes.data, target.ctypes.data)
+
+
+@inlined
+def solve_anew(r, x, target):
+    """`solve` where what was solved last has nothing to do with it."""
     call_unit(r.units[SOLVE], r.address, 0.0, x.ctypes.data, target.ctypes.data)
 
 
@@ -28,6 +34,18 @@ def solve(r, x, target):
 def correct(r, r_v, target):
     """f += M r_v, target += Phi_q r_v."""
     call_unit(r.units[CORRECT], r.address, 0.0, r_v.ctypes.data, target.ctypes.data)
+
+
+@inlined
+def look_ahead(r, t, x, v):
+    """Constraint rows at (t, x, v); the factors of the last evaluation stay. Returns a status."""
+    return call_unit(r.units[LOOK_AHEAD], r.address, t, x.ctypes.data, v.ctypes.data)
+
+
+@inlined
+def project(r, value, out):
+    """out, shaped like v: the smallest motion with Phi_q out = -value, by the factors of the last evaluation."""
+    call_unit(r.units[PROJECT], r.address, 0.0, value.ctypes.data, out.ctypes.data)
 
 
 @inlined

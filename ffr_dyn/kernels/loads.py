@@ -76,8 +76,6 @@ def apply_given(where, markers, loads, w, functions, user, f, load, k):
 @inlined
 def apply_loads(where, markers, loads, A, w, s, functions, user, x, f):
     """Add all loads to the right-hand sides f, and to w.load; A (B + 1, 3, 3) of the bodies; w, s: Marker-, LoadWork."""
-    for k in range(w.load.shape[0]):
-        fill(w.load[k], 0.0)
     for k in range(loads.wrench.shape[0]):
         apply_given(where, markers, loads, w, functions, user, f, w.load, k)
     for k in range(loads.action.shape[0]):

@@ -2,7 +2,7 @@
 
 from ffr_dyn.kernels.bodies import row_product, six_rows
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.vectors import add, cross, get, put, scale, to_global
+from ffr_dyn.kernels.vectors import add, cross, get, in_plane, put, scale, to_global
 
 
 @inlined
@@ -26,12 +26,20 @@ def update_marker(where, markers, w, A, omega, x, v, k):
     if n > 0:
         phi = shapes(markers, k, n)
         q, qd = x[i + 7 : i + 7 + n], v[j + 6 : j + 6 + n]
-        u0, u1, u2, t0, t1, t2 = six_rows(phi, q, n)
-        u = (u[0] + u0, u[1] + u1, u[2] + u2)
-        put(w.theta, k, (t0, t1, t2))
-        u0, u1, u2, t0, t1, t2 = six_rows(phi, qd, n)
-        ud = (u0, u1, u2)
-        put(w.thetad, k, (t0, t1, t2))
+        normal = where[b, 7]
+        if normal < 0:
+            u0, u1, u2, t0, t1, t2 = six_rows(phi, q, n)
+            u = (u[0] + u0, u[1] + u1, u[2] + u2)
+            put(w.theta, k, (t0, t1, t2))
+            u0, u1, u2, t0, t1, t2 = six_rows(phi, qd, n)
+            ud = (u0, u1, u2)
+            put(w.thetad, k, (t0, t1, t2))
+        else:
+            c0, c1, _ = in_plane(normal)
+            u0, u1, w.theta[k, normal] = plane_rows(phi, normal, q, n)
+            u = (u[0] + of_two(0, c0, c1, u0, u1), u[1] + of_two(1, c0, c1, u0, u1), u[2] + of_two(2, c0, c1, u0, u1))
+            u0, u1, w.thetad[k, normal] = plane_rows(phi, normal, qd, n)
+            ud = (of_two(0, c0, c1, u0, u1), of_two(1, c0, c1, u0, u1), of_two(2, c0, c1, u0, u1))
     spin = cross(omega, u)
     put(w.omega, k, omega)
     put(w.u, k, u)
@@ -58,30 +66,71 @@ def axis_motion(w, k, a0):
 
 
 @kernel
-def prepare_marker(phi, Cd, n, P):
-    """First three rows of P (6, 6) = [P_dm; H] dinv phi^T, which depend on the elastic diagonal alone."""
+def of_two(component, c0, c1, first, second):
+    """A component of the vector that has `first` along c0, `second` along c1 and nothing else."""
+    return first if component == c0 else (second if component == c1 else 0.0)
+
+
+@kernel
+def plane_rows(phi, normal, q, n):
+    """The two displacements and the rotation of a marker that keep to the plane, of its six pooled rows, times q."""
+    i, j, _ = in_plane(normal)
+    r0, r1, r2 = phi[i * n :], phi[j * n :], phi[(3 + normal) * n :]
+    t0, t1, t2 = 0.0, 0.0, 0.0
+    for c in range(n):
+        t0 += r0[c] * q[c]
+        t1 += r1[c] * q[c]
+        t2 += r2[c] * q[c]
+    return t0, t1, t2
+
+
+@kernel
+def prepare_marker(phi, Cd, n, normal, P):
+    """Rows of the translations of P = [P_dm; H] dinv phi^T, which depend on the elastic diagonal alone.
+
+    P (36,) : 6 x 6; of a planar body 3 x 3, for what keeps to the plane
+    """
+    if normal >= 0:
+        i, j, _ = in_plane(normal)
+        P[0], P[1], P[2] = plane_rows(phi, normal, Cd[i * n :], n)
+        P[3], P[4], P[5] = plane_rows(phi, normal, Cd[j * n :], n)
+        return
     for r in range(3):
         for c in range(6):
-            P[r, c] = row_product(Cd, r, phi, c, n)
+            P[6 * r + c] = row_product(Cd, r, phi, c, n)
 
 
 @kernel
 def couple_marker(phi, Cd, n, normal, P):
-    """Last three rows of P: what a unit wrench on a marker does to the rotation through the elastic coordinates."""
+    """Rows of the rotations of P: what a unit wrench on a marker does to them through the elastic coordinates."""
+    if normal >= 0:
+        P[6], P[7], P[8] = plane_rows(phi, normal, Cd[(3 + normal) * n :], n)
+        return
     for r in range(3, 6):
-        if normal < 0 or r == 3 + normal:
-            P[r, 0], P[r, 1], P[r, 2], P[r, 3], P[r, 4], P[r, 5] = six_rows(phi, Cd[r * n :], n)
+        at = 6 * r
+        P[at], P[at + 1], P[at + 2], P[at + 3], P[at + 4], P[at + 5] = six_rows(phi, Cd[r * n :], n)
 
 
 @kernel
-def couple_pair(left, right, dinv, n, out):
-    """out (6, 6) = phi_left dinv phi_right^T of two markers on one body."""
+def couple_pair(left, right, dinv, n, normal, out):
+    """out (36,) = phi_left dinv phi_right^T of two markers on one body: 6 x 6, or 3 x 3 in the plane."""
+    if normal >= 0:
+        i, j, k = in_plane(normal)
+        for r, a in enumerate((i, j, k)):
+            for c, b in enumerate((i, j, k)):
+                out[3 * r + c] = weighted_product(left[a * n :], right[b * n :], dinv, n)
+        return
     for r in range(6):
         for c in range(6):
-            total = 0.0
-            for j in range(n):
-                total += left[r * n + j] * dinv[j] * right[c * n + j]
-            out[r, c] = total
+            out[6 * r + c] = weighted_product(left[r * n :], right[c * n :], dinv, n)
+
+
+@kernel
+def weighted_product(left, right, weight, n):
+    total = 0.0
+    for j in range(n):
+        total += left[j] * weight[j] * right[j]
+    return total
 
 
 @kernel

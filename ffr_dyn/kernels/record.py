@@ -1,7 +1,6 @@
 """What is kept at an output time."""
 
 from ffr_dyn.kernels.bodies import energies
-from ffr_dyn.kernels.loads import powers
 from ffr_dyn.kernels.markers import update_marker
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.system import largest, reactions
@@ -10,7 +9,7 @@ from ffr_dyn.kernels.vectors import copy, get, put
 
 @inlined
 def keep(m, w, t, x, v, out, k):
-    """Write row k of `out` from an evaluated state."""
+    """Write row k of `out` from an evaluated state; the powers of loads are left to another unit."""
     out.time[k] = t
     copy(out.x[k], x)
     copy(out.v[k], v)
@@ -25,7 +24,6 @@ def keep(m, w, t, x, v, out, k):
         copy(out.action[k, action], w.loads.action[action])
     for bushing in range(m.loads.bushing.shape[0]):
         copy(out.bushing[k, bushing], w.loads.bushing[bushing])
-    powers(m.bodies.where, m.markers, m.loads, w.bodies.A, w.markers, w.loads, w.functions, w.user, x, v, out.power[k])
     kinetic, strain, gravity = energies(w.field, m.bodies, w.bodies, x, v, w.y[0], w.y[1])
     out.energy[k, 0], out.energy[k, 1], out.energy[k, 2] = kinetic, strain, gravity
     out.violation[k, 0], out.violation[k, 1] = largest(w.rows.Phi), largest(w.rows.nu)

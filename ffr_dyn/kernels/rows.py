@@ -136,9 +136,11 @@ def fill_relation(axes, relation, drive, markers, at, w, row):
 
 @kernel
 def fill_side(jac, factor, side):
-    for part in range(3):
-        for c in range(3):
-            jac[3 * part + c] = factor * side[part][c]
+    """Written out: tuples are slow to index by a loop."""
+    point, turn, elastic = side
+    jac[0], jac[1], jac[2] = factor * point[0], factor * point[1], factor * point[2]
+    jac[3], jac[4], jac[5] = factor * turn[0], factor * turn[1], factor * turn[2]
+    jac[6], jac[7], jac[8] = factor * elastic[0], factor * elastic[1], factor * elastic[2]
 
 
 @kernel

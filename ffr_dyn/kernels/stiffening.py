@@ -2,7 +2,8 @@
 
 K_sigma is a sum of constant matrices times loads, and the loads contain the accelerations and multipliers that are being
 solved for. They enter by fixed-point iteration: each sweep solves the equations with the stiffening of the last one. The
-change from sweep to sweep is of the order (elastic deflection / size)^2, so three sweeps reach rounding in practice.
+change from sweep to sweep is of the order (elastic deflection / size)^2, so three sweeps reach rounding in practice, and
+two from the loads of the stage before.
 """
 
 from ffr_dyn.kernels.options import inlined, kernel
@@ -11,47 +12,51 @@ from ffr_dyn.kernels.vectors import copy, cross, get, subtract, to_body
 
 SWEEPS = 3
 PASSES = 10
-INERTIAL = 12
 
 
 @kernel
 def multiply_stiffness(bodies, w, x):
     """w.stiff = K_load q for every load of every stiffened body; w: BodyWork."""
     for b in range(bodies.mass.size):
-        n, i, e = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 3]
-        start, loads = bodies.where[b, 5], bodies.where[b, 6]
-        out = first_product(bodies, b)
-        for load in range(loads):
-            for r in range(n):
-                total = 0.0
-                row = bodies.stiffening[start + (load * n + r) * n : start + (load * n + r + 1) * n]
-                for c in range(n):
-                    total += row[c] * x[i + 7 + c]
-                w.stiff[out + load * n + r] = total
-        for k in range(n):
-            w.unstiffened[e + k] = w.f[bodies.where[b, 2] + 6 + k]
+        n, i, e, loads = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 3], bodies.where[b, 6]
+        if loads > 0:
+            width, start, out = loads * n, bodies.where[b, 5], bodies.where[b, 9]
+            multiply(bodies.stiffening[start : start + n * width], x[i + 7 : i + 7 + n], n, w.stiff[out : out + width])
+            copy(w.unstiffened[e : e + n], w.f[bodies.where[b, 2] + 6 : bodies.where[b, 2] + 6 + n])
 
 
 @kernel
-def first_product(bodies, b):
-    """Where the products of body b begin in w.stiff."""
-    start = 0
-    for k in range(b):
-        start += bodies.where[k, 6] * bodies.where[k, 0]
-    return start
+def multiply(K, q, n, out):
+    """out = sum_c q_c K[c], two rows at a time."""
+    width = out.size
+    for k in range(width):
+        out[k] = 0.0
+    for c in range(0, n - 1, 2):
+        q0, q1, row0, row1 = q[c], q[c + 1], K[c * width : (c + 1) * width], K[(c + 1) * width : (c + 2) * width]
+        for k in range(width):
+            out[k] += q0 * row0[k] + q1 * row1[k]
+    if n % 2:
+        q0, row0 = q[n - 1], K[(n - 1) * width : n * width]
+        for k in range(width):
+            out[k] += q0 * row0[k]
 
 
 @kernel
-def frame_loads(bodies, w, field, b, known):
-    """First twelve entries of w.load: acceleration less gravity, angular acceleration, products of the angular velocity."""
+def frame_loads(bodies, w, field, b, known, load):
+    """Acceleration less gravity, angular acceleration: the first six of the loads of body b."""
     j = bodies.where[b, 2]
     gravity = to_body(w.A[b], field)
     for c in range(3):
-        w.load[c] = (w.acc[j + c] - w.shift[j + c] - gravity[c]) if known else 0.0
-        w.load[3 + c] = (w.acc[j + 3 + c] - w.shift[j + 3 + c]) if known else 0.0
-    x, y, z = get(w.omega, b)
-    w.load[6], w.load[7], w.load[8] = x * x, y * y, z * z
-    w.load[9], w.load[10], w.load[11] = x * y, x * z, y * z
+        load[c] = (w.acc[j + c] - w.shift[j + c] - gravity[c]) if known else 0.0
+        load[3 + c] = (w.acc[j + 3 + c] - w.shift[j + 3 + c]) if known else 0.0
+
+
+@kernel
+def rate_loads(omega, load):
+    """Products of the angular velocity: the next six."""
+    x, y, z = omega
+    load[6], load[7], load[8] = x * x, y * y, z * z
+    load[9], load[10], load[11] = x * y, x * z, y * z
 
 
 @kernel
@@ -88,27 +93,34 @@ def add_reaction(rw, first, last, side, u, load, slot):
 def stiffen(bodies, w, b):
     """f = unstiffened - sum over the loads of load * K_load q, elastic rows of body b."""
     n, j, e, loads = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3], bodies.where[b, 6]
-    start = first_product(bodies, b)
+    first, start, load = bodies.where[b, 8], bodies.where[b, 9], w.load[b]
     f = w.f[j + 6 : j + 6 + n]
     copy(f, w.unstiffened[e : e + n])
-    for load in range(loads):
-        product = w.stiff[start + load * n : start + (load + 1) * n]
+    for number in range(loads):
+        product, size = w.stiff[start + number * n : start + (number + 1) * n], load[bodies.loads[first + number]]
         for k in range(n):
-            f[k] -= w.load[load] * product[k]
+            f[k] -= size * product[k]
 
 
 @inlined
-def solve_stiffened(m, w, x, target):
-    """`solve_motion` with the geometric stiffening of the bodies that have it."""
+def solve_stiffened(m, w, x, target, near):
+    """`solve_motion` with the geometric stiffening of the bodies that have it.
+
+    near : the loads of the last solution are those of a state nearby, which saves a sweep
+    """
     stiffened = m.bodies.stiffening.size > 0
     passes = PASSES if m.relaxation > 0.0 else 1
     if stiffened:
         multiply_stiffness(m.bodies, w.bodies, x)
-    for sweep in range(SWEEPS if stiffened else 1):
+    first = 1 if near else 0
+    for sweep in range(first, SWEEPS if stiffened else first + 1):
         if stiffened:
             for b in range(m.bodies.mass.size):
                 if m.bodies.where[b, 6] > 0:
-                    frame_loads(m.bodies, w.bodies, w.field, b, sweep > 0)
-                    marker_loads(m.markers, m.rows, w.markers, w.rows, b, sweep > 0, w.bodies.load)
+                    load = w.bodies.load[b]
+                    rate_loads(get(w.bodies.omega, b), load)
+                    if not near or sweep > 1:
+                        frame_loads(m.bodies, w.bodies, w.field, b, sweep > 0, load)
+                        marker_loads(m.markers, m.rows, w.markers, w.rows, b, sweep > 0, load)
                     stiffen(m.bodies, w.bodies, b)
         solve_motion(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, target, passes)

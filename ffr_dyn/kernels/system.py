@@ -1,13 +1,16 @@
 """One evaluation of the equations of motion of a scene; everything an integrator or an analysis calls.
 
-Order of calls: `prepare` once per elastic diagonal; `evaluate_bodies`, `evaluate_loads`, `evaluate_joints` at a state; then
-any number of `solve_motion` and `solve_step` with that state's factors. Compiled as units in `ffr_dyn.kernels.units`.
+Order of calls: `prepare` once per elastic diagonal; `evaluate_bodies`, `evaluate_markers`, the loads, `evaluate_joints` at a
+state; then any number of `solve_motion` and `solve_step` with that state's factors. Compiled as units in
+`ffr_dyn.kernels.units`.
 """
 
 from ffr_dyn.kernels.blocks import (
     SIDE,
     add_pair,
+    add_pair_in_plane,
     add_scale,
+    eliminate_in_plane,
     eliminate_side,
     factorise_blocks,
     solve_blocks,
@@ -22,18 +25,27 @@ from ffr_dyn.kernels.bodies import (
     reduce_forces,
     six_rows,
 )
-from ffr_dyn.kernels.lanes import combine_6, dot_rows
-from ffr_dyn.kernels.loads import apply_loads
-from ffr_dyn.kernels.markers import couple_marker, couple_pair, prepare_marker, shapes, update_marker
+from ffr_dyn.kernels.lanes import combine_3, combine_6, dot_rows
+from ffr_dyn.kernels.markers import (
+    couple_marker,
+    couple_pair,
+    plane_rows,
+    prepare_marker,
+    project,
+    shapes,
+    update_marker,
+)
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.rows import evaluate_block
 from ffr_dyn.kernels.tables import LANES, NOT_FINITE, OK, RELATION
 from ffr_dyn.kernels.vectors import (
+    add,
     add_scaled,
     copy,
     cross,
     fill,
     get,
+    in_plane,
     subtract,
     to_body,
     to_global,
@@ -50,14 +62,16 @@ def prepare(bodies, markers, rows, pattern, bw, rw):
         b = markers.body[k]
         n, e = where[b, 0], where[b, 3]
         if n > 0:
-            prepare_marker(shapes(markers, k, n), bw.Cd[6 * e : 6 * (e + n)], n, rw.P[k])
+            prepare_marker(shapes(markers, k, n), bw.Cd[6 * e : 6 * (e + n)], n, where[b, 7], rw.P[k])
     for p in range(pattern.pair_body.size):
         b = pattern.pair_body[p]
         n, e = where[b, 0], where[b, 3]
         if n > 0:
             left = rows.marker[pattern.pair[p, 0], pattern.pair[p, 1]]
             right = rows.marker[pattern.pair[p, 2], pattern.pair[p, 3]]
-            couple_pair(shapes(markers, left, n), shapes(markers, right, n), bw.dinv[e : e + n], n, rw.phiphi[p])
+            couple_pair(
+                shapes(markers, left, n), shapes(markers, right, n), bw.dinv[e : e + n], n, where[b, 7], rw.phiphi[p]
+            )
 
 
 @inlined
@@ -87,28 +101,40 @@ def couple_joints(bodies, markers, rows, pattern, bw, rw):
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
                 first, last, at = rows.start[k], rows.start[k + 1], (k * sides + side) * SIDE
-                flexible = where[b, 0] > 0
-                spread_rows(rw.jac, first, last, side, flexible, rw.X, at)
-                eliminate_side(flexible, where[b, 7], rw.P[marker].reshape(36), bw.L[b].reshape(36), rw.X, at)
+                flexible, normal, L = where[b, 0] > 0, where[b, 7], bw.L[b].reshape(36)
+                spread_rows(rw.jac, first, last, side, flexible, normal, rw.X, at)
+                if normal >= 0:
+                    eliminate_in_plane(flexible, normal, rw.P[marker], L, rw.X, at)
+                else:
+                    eliminate_side(flexible, rw.P[marker], L, rw.X, at)
                 turning = bw.J[b, 0, 0] + bw.J[b, 1, 1] + bw.J[b, 2, 2]
                 add_scale(rw.jac, first, last, side, bodies.mass[b], turning, rw.scale)
     fill(rw.S, 0.0)
     for p in range(pattern.pair_body.size):
-        flexible, earlier = where[pattern.pair_body[p], 0] > 0, pattern.pair[p, 2]
-        add_pair(
-            rw.X, (pattern.pair[p, 0] * sides + pattern.pair[p, 1]) * SIDE, (earlier * sides + pattern.pair[p, 3]) * SIDE,
-            rows.start[earlier + 1] - rows.start[earlier], flexible, rw.phiphi[p].reshape(36), rw.Y, rw.S,
-            pattern.pair[p, 4],
-        )  # fmt: skip
+        b, later, earlier = pattern.pair_body[p], pattern.pair[p, 0], pattern.pair[p, 2]
+        first = (later * sides + pattern.pair[p, 1]) * SIDE
+        second = (earlier * sides + pattern.pair[p, 3]) * SIDE
+        flexible, size, at = where[b, 0] > 0, rows.start[earlier + 1] - rows.start[earlier], pattern.pair[p, 4]
+        if where[b, 7] >= 0:
+            add_pair_in_plane(rw.X, first, second, size, flexible, rw.phiphi[p], rw.Y, rw.S, at)
+        else:
+            add_pair(rw.X, first, second, size, flexible, rw.phiphi[p], rw.Y, rw.S, at)
 
 
 @inlined
-def evaluate_loads(m, w, t, x, v):
-    """Markers and applied loads, on top of what `evaluate_bodies` left."""
+def evaluate_markers(m, w, x, v):
+    """Markers in use, from what `evaluate_bodies` left; no loads on them yet."""
     for k in m.markers.active:
         b = m.markers.body[k]
         update_marker(m.bodies.where, m.markers, w.markers, w.bodies.A[b], get(w.bodies.omega, b), x, v, k)
-    apply_loads(m.bodies.where, m.markers, m.loads, w.bodies.A, w.markers, w.loads, w.functions, w.user, x, w.bodies.f)
+    for k in range(w.markers.load.shape[0]):
+        fill(w.markers.load[k], 0.0)
+
+
+@inlined
+def has_loads(loads):
+    """Whether the scene applies anything but gravity."""
+    return loads.wrench.shape[0] + loads.action.shape[0] + loads.bushing.shape[0] + loads.spread.shape[0] > 0
 
 
 @inlined
@@ -193,12 +219,21 @@ def reduced_rates(bodies, markers, rows, bw, rw, target):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
-                n, e, at = where[b, 0], where[b, 3], (k * sides + side) * SIDE
-                z, moved = bw.rigid[b], rw.wrench
+                n, e, normal, at = where[b, 0], where[b, 3], where[b, 7], (k * sides + side) * SIDE
+                z, moved, elastic = bw.rigid[b], rw.wrench, bw.elastic[e : e + n]
+                if normal >= 0:
+                    c0, c1, c2 = in_plane(normal)
+                    moved[0], moved[1], moved[2] = z[c0], z[c1], z[c2]
+                    if n > 0:
+                        moved[3], moved[4], moved[5] = plane_rows(shapes(markers, marker, n), normal, elastic, n)
+                        combine_6(rw.step, LANES * k, 1.0, moved, 0, 1, rw.X, at)
+                    else:
+                        combine_3(rw.step, LANES * k, 1.0, moved, 0, 1, rw.X, at)
+                    continue
                 combine_6(rw.step, LANES * k, 1.0, z, 0, 1, rw.X, at)
                 if n > 0:
                     phi = shapes(markers, marker, n)
-                    moved[0], moved[1], moved[2], moved[3], moved[4], moved[5] = six_rows(phi, bw.elastic[e : e + n], n)
+                    moved[0], moved[1], moved[2], moved[3], moved[4], moved[5] = six_rows(phi, elastic, n)
                     combine_6(rw.step, LANES * k, 1.0, moved, 0, 1, rw.X, at + 6 * LANES)
 
 
@@ -233,6 +268,35 @@ def add_side_rates(phi, jac, acc, first, last, side, n, out):
 
 
 @inlined
+def add_reactions(where, markers, rows, jac, lam, out):
+    """out (V,) += Phi_q^T lam in body axes."""
+    ground = where.shape[0] - 1
+    for k in range(rows.marker.shape[0]):
+        for side in range(rows.marker.shape[1]):
+            marker = rows.marker[k, side]
+            b = markers.body[marker] if marker >= 0 else ground
+            if b != ground:
+                n, j = where[b, 0], where[b, 2]
+                phi = shapes(markers, marker, n)
+                add_side_reactions(phi, jac, lam, rows.start[k], rows.start[k + 1], side, n, out[j : j + 6 + n])
+
+
+@kernel
+def add_side_reactions(phi, jac, lam, first, last, side, n, out):
+    force, twist = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for row in range(first, last):
+        a, value = jac[row, side], lam[row]
+        force = add(force, (a[0] * value, a[1] * value, a[2] * value))
+        twist = add(twist, (a[6] * value, a[7] * value, a[8] * value))
+        for c in range(3):
+            out[3 + c] += a[3 + c] * value
+    for c in range(3):
+        out[c] += force[c]
+    if n > 0:
+        project(phi, force, twist, out[6:], n)
+
+
+@inlined
 def react(bodies, markers, rows, bw, rw):
     """acc from the reduced forces, less Phi_q^T step by the eliminated rows."""
     where, ground, sides = bodies.where, bodies.mass.size, rows.marker.shape[1]
@@ -242,14 +306,42 @@ def react(bodies, markers, rows, bw, rw):
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
                 n, e, at, z = where[b, 0], where[b, 3], (k * sides + side) * SIDE, bw.rigid[b]
-                for c in range(6):
-                    z[c] -= dot_rows(rw.X, at + LANES * c, rw.step, LANES * k)
-                if n > 0:
+                normal, wrench = where[b, 7], rw.wrench
+                if normal >= 0:
+                    react_in_plane(rw.X, at, rw.step, LANES * k, normal, z)
+                else:
                     for c in range(6):
-                        rw.wrench[c] = dot_rows(rw.X, at + LANES * (6 + c), rw.step, LANES * k)
-                    release(shapes(markers, marker, n), bw.dinv[e : e + n], rw.wrench, n, bw.elastic[e : e + n])
+                        z[c] -= dot_rows(rw.X, at + LANES * c, rw.step, LANES * k)
+                if n > 0:
+                    phi, elastic = shapes(markers, marker, n), bw.elastic[e : e + n]
+                    if normal >= 0:
+                        for c in range(3):
+                            wrench[c] = dot_rows(rw.X, at + LANES * (3 + c), rw.step, LANES * k)
+                        release_in_plane(phi, normal, bw.dinv[e : e + n], wrench, n, elastic)
+                    else:
+                        for c in range(6):
+                            wrench[c] = dot_rows(rw.X, at + LANES * (6 + c), rw.step, LANES * k)
+                        release(phi, bw.dinv[e : e + n], wrench, n, elastic)
     for b in range(ground):
         accelerate(bodies, bw, b)
+
+
+@kernel
+def react_in_plane(X, at, step, own, normal, z):
+    i, j, k = in_plane(normal)
+    z[i] -= dot_rows(X, at, step, own)
+    z[j] -= dot_rows(X, at + LANES, step, own)
+    z[k] -= dot_rows(X, at + 2 * LANES, step, own)
+
+
+@kernel
+def release_in_plane(phi, normal, dinv, wrench, n, elastic):
+    """`release` for a planar body: two forces and a moment."""
+    i, j, k = in_plane(normal)
+    p0, p1, p2 = phi[i * n :], phi[j * n :], phi[k * n :]
+    f0, f1, moment = wrench[0], wrench[1], wrench[2]
+    for c in range(n):
+        elastic[c] -= dinv[c] * (p0[c] * f0 + p1[c] * f1 + p2[c] * moment)
 
 
 @kernel

@@ -33,7 +33,9 @@ OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED, NOT_CONVERGED, 
 LANES = 8  # rows of a joint side by side (see `ffr_dyn.kernels.lanes`)
 
 # Numbers of the compiled units in `Tables.units`.
-EVALUATE, BODIES, LOADS, JOINTS, SOLVE, SETTLE, MOVE_BACK, CORRECT, TRULY, RECORD = range(10)
+(
+    EVALUATE, BODIES, MARKERS, JOINTS, SOLVE, SETTLE, MOVE_BACK, CORRECT, TRULY, RECORD, LOOK_AHEAD, PROJECT, LOADS, POWERS,
+) = range(14)  # fmt: skip
 
 # Near a singular position the rows become dependent, and a violation eta of the constraints throws the motion from its
 # branch when it comes closer than about eta^(1/3). So on the approach (`independence` below NEAR) the violation is held far
@@ -46,8 +48,8 @@ TIGHTER = 1e-4
 class Bodies(NamedTuple):
     """B bodies, E elastic coordinates in all."""
 
-    # (B + 1, 8) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening (or -1); its number of loads;
-    # the body axis along the normal of a planar scene, or -1
+    # (B + 1, 10) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening (or -1); its number of loads;
+    # the body axis along the normal of a planar scene, or -1; its first of `loads`; its first product in `stiff`
     where: I2
     mass: F1  # (B,)
     moments: F2  # (B, 9) first moment r_dm (3), second moment rr_dm (6)
@@ -56,7 +58,8 @@ class Bodies(NamedTuple):
     PP_dm: F1  # pooled; per body n rows of 9 n: for q_i the same nine rows over j (last three: I5)
     omega2: F1  # (E,)
     two_zeta_omega: F1  # (E,)
-    stiffening: F1  # pooled; per body loads x n x n, empty without geometric stiffening
+    stiffening: F1  # pooled; per body n x loads x n (over q_c, loads, rows), empty without geometric stiffening
+    loads: I1  # pooled; which of a body's loads stiffen it
 
 
 class Markers(NamedTuple):
@@ -154,8 +157,8 @@ class BodyWork(NamedTuple):
     more: F1  # (V,) scratch
     unstiffened: F1  # (E,) elastic right-hand side without geometric stiffening
     shift: F1  # (V,) part of acc that is no acceleration (corrections of an integrator's stage), body axes
-    stiff: F1  # pooled like stiffening, n per load: K_load q
-    load: F1  # (longest,) loads of one body
+    stiff: F1  # pooled; per body, load and elastic coordinate: K_load q
+    load: F2  # (B, longest) loads of the bodies, in the order of their stiffness
 
 
 class MarkerWork(NamedTuple):
@@ -198,8 +201,8 @@ class RowWork(NamedTuple):
     Y: F1  # (12 * 8,) scratch
     step: F1  # (8 K,) multipliers, the rows of each block in a row of lanes
     wrench: F1  # (6,) scratch
-    P: F3  # (M, 6, 6) [P_dm; H] dinv phi^T
-    phiphi: F3  # (pairs, 6, 6) phi dinv phi'^T
+    P: F2  # (M, 36) [P_dm; H] dinv phi^T; of a planar body nine numbers
+    phiphi: F2  # (pairs, 36) phi dinv phi'^T; of a planar body nine numbers
     S: F1  # pooled blocks, rows of lanes (see `blocks`)
 
 

@@ -7,29 +7,33 @@ integrator costs no more than its own few lines, and compilation can be shared a
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import cached_property
 from typing import Any
 
 from numba import cfunc, types
 
 from ffr_dyn.kernels.actions import keep_turns
-from ffr_dyn.kernels.bodies import mass_times
+from ffr_dyn.kernels.bodies import mass_times, rotation_matrix
 from ffr_dyn.kernels.calls import set_diagonal
 from ffr_dyn.kernels.control import controlled_step, interpolate
 from ffr_dyn.kernels.functions import evaluate_functions
-from ffr_dyn.kernels.loads import call_user, gravity_field
+from ffr_dyn.kernels.loads import apply_loads, call_user, gravity_field, powers
+from ffr_dyn.kernels.markers import update_marker
 from ffr_dyn.kernels.options import OPTIONS
 from ffr_dyn.kernels.packing import call_unit, unpack_record, unpack_tables, vector_at
 from ffr_dyn.kernels.record import keep
+from ffr_dyn.kernels.rows import evaluate_block
 from ffr_dyn.kernels.stiffening import solve_stiffened
 from ffr_dyn.kernels.system import (
     constraint_rates,
     evaluate_bodies,
     evaluate_joints,
-    evaluate_loads,
+    evaluate_markers,
+    has_loads,
     largest,
     move_back,
+    solve_step,
     to_body_axes,
     to_velocity_rates,
 )
@@ -39,10 +43,12 @@ from ffr_dyn.kernels.tables import (
     EVALUATE,
     JOINTS,
     LOADS,
+    MARKERS,
     MOVE_BACK,
     NEAR,
     NOW,
     OK,
+    POWERS,
     RECORD,
     SETTLE,
     SINGULAR_BODY,
@@ -52,7 +58,7 @@ from ffr_dyn.kernels.tables import (
     TRULY,
     USER_FAILED,
 )
-from ffr_dyn.kernels.vectors import add_scaled, copy, fill
+from ffr_dyn.kernels.vectors import add_scaled, copy, fill, get, put
 
 SIGNATURE = types.int64(types.int64, types.float64, types.int64, types.int64)
 
@@ -90,9 +96,40 @@ def bodies_unit(at, t, x, v):
 
 
 @Unit
-def loads_unit(at, t, x, v):
+def markers_unit(at, t, x, v):
     r = unpack_tables(at)
-    evaluate_loads(r.model, r.work, t, vector_at(x, r.x.size), vector_at(v, r.v.size))
+    evaluate_markers(r.model, r.work, vector_at(x, r.x.size), vector_at(v, r.v.size))
+    return OK
+
+
+@Unit
+def loads_unit(at, t, x, v):
+    """Applied loads; needed where a scene has any."""
+    r = unpack_tables(at)
+    m, w = r.model, r.work
+    x = vector_at(x, r.x.size)
+    apply_loads(m.bodies.where, m.markers, m.loads, w.bodies.A, w.markers, w.loads, w.functions, w.user, x, w.bodies.f)
+    return OK
+
+
+@Unit
+def powers_unit(at, t, record, row):
+    """Powers of the applied loads, as a row of the record; needed where a scene has any."""
+    r, out = unpack_tables(at), unpack_record(record)
+    m, w = r.model, r.work
+    powers(
+        m.bodies.where,
+        m.markers,
+        m.loads,
+        w.bodies.A,
+        w.markers,
+        w.loads,
+        w.functions,
+        w.user,
+        r.x,
+        r.v,
+        out.power[row],
+    )
     return OK
 
 
@@ -113,15 +150,20 @@ def evaluate_unit(at, t, x, v):
     status = call_unit(r.units[BODIES], at, t, x, v)
     if status != OK:
         return status
-    call_unit(r.units[LOADS], at, t, x, v)
+    call_unit(r.units[MARKERS], at, t, x, v)
+    if has_loads(r.model.loads):
+        call_unit(r.units[LOADS], at, t, x, v)
     return call_unit(r.units[JOINTS], at, t, x, v)
 
 
 @Unit
-def solve_unit(at, t, x, target):
-    """acc and lam from the right-hand sides and the target (C,) of the accelerations, with geometric stiffening."""
+def solve_unit(at, near, x, target):
+    """acc and lam from the right-hand sides and the target (C,) of the accelerations, with geometric stiffening.
+
+    near : above zero where the last solution was that of a state nearby
+    """
     r = unpack_tables(at)
-    solve_stiffened(r.model, r.work, vector_at(x, r.x.size), vector_at(target, r.stages.target.size))
+    solve_stiffened(r.model, r.work, vector_at(x, r.x.size), vector_at(target, r.stages.target.size), near > 0.0)
     return OK
 
 
@@ -150,6 +192,36 @@ def correct_unit(at, t, r_v, target):
     for b in range(bodies.mass.size):
         j, size = bodies.where[b, 2], 6 + bodies.where[b, 0]
         mass_times(bodies, bw, b, bw.acc[j : j + size], bw.f[j : j + size])
+    return OK
+
+
+@Unit
+def look_ahead_unit(at, t, x, v):
+    """Rows (Phi, nu, gamma, jac) at (t, x, v). The factors of the last evaluation stay; markers and rotations do not."""
+    r = unpack_tables(at)
+    m, w, x, v = r.model, r.work, vector_at(x, r.x.size), vector_at(v, r.v.size)
+    if not call_user(m.user_address, t, x, v, w.user):
+        return USER_FAILED
+    evaluate_functions(m.functions, w.user, t, w.functions)
+    for b in range(m.bodies.mass.size):
+        i, j = m.bodies.where[b, 1], m.bodies.where[b, 2]
+        rotation_matrix(x[i + 3], x[i + 4], x[i + 5], x[i + 6], w.bodies.A[b])
+        put(w.bodies.omega, b, (v[j + 3], v[j + 4], v[j + 5]))
+    for k in m.markers.joint:
+        b = m.markers.body[k]
+        update_marker(m.bodies.where, m.markers, w.markers, w.bodies.A[b], get(w.bodies.omega, b), x, v, k)
+    for k in range(m.rows.marker.shape[0]):
+        evaluate_block(m.rows, w.functions, w.markers, w.rows, k)
+    return OK
+
+
+@Unit
+def project_unit(at, t, value, out):
+    """out (V,): the motion, smallest in the norm of the mass matrix, with Phi_q out = -value (C,)."""
+    r = unpack_tables(at)
+    m, w = r.model, r.work
+    solve_step(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, vector_at(value, r.stages.target.size))
+    to_velocity_rates(m.bodies.where, w.bodies.A, w.bodies.acc, vector_at(out, r.v.size))
     return OK
 
 
@@ -190,7 +262,7 @@ def truly_unit(at, t, x, v):
     status = call_unit(r.units[EVALUATE], at, t, x, v)
     if status == OK:
         fill(w.bodies.shift, 0.0)
-        call_unit(r.units[SOLVE], at, t, x, w.rows.gamma.ctypes.data)
+        call_unit(r.units[SOLVE], at, 0.0, x, w.rows.gamma.ctypes.data)
         to_velocity_rates(r.model.bodies.where, w.bodies.A, w.bodies.acc, w.vd)
     return status
 
@@ -202,6 +274,8 @@ def record_unit(at, t, record, row):
     status = call_unit(r.units[TRULY], at, t, r.x.ctypes.data, r.v.ctypes.data)
     if status == OK:
         keep_turns(r.model.loads, r.work.loads)
+        if has_loads(r.model.loads):
+            call_unit(r.units[POWERS], at, t, record, row)
         keep(r.model, r.work, t, r.x, r.v, unpack_record(record), row)
     return status
 
@@ -257,24 +331,28 @@ def controlled_rows_unit(at, start, record, step):
 # By name, those that take long to compile first.
 UNITS = {
     "bodies": bodies_unit,
-    "loads": loads_unit,
-    "joints": joints_unit,
     "solve": solve_unit,
+    "joints": joints_unit,
     "record": record_unit,
     "move_back": move_back_unit,
+    "markers": markers_unit,
     "correct": correct_unit,
     "truly": truly_unit,
     "settle": settle_unit,
     "evaluate": evaluate_unit,
-    "controlled_rows": controlled_rows_unit,
     "rows": rows_unit,
 }
+# Of scenes with applied loads, of methods that choose their steps, and of methods that ask for more.
+LOAD_UNITS = {"loads": loads_unit, "powers": powers_unit}
+CONTROL_UNITS = {"controlled_rows": controlled_rows_unit}
+EXTRA_UNITS = {"project": project_unit, "look_ahead": look_ahead_unit}
 
 
-def unit_addresses() -> list[int]:
-    """In the order of the units' numbers in `tables`."""
+def unit_addresses(loads: bool, calls: Collection[str]) -> list[int]:
+    """In the order of the units' numbers in `tables`; zero for those of loads and of other methods that are not called."""
     numbered = (
-        evaluate_unit, bodies_unit, loads_unit, joints_unit, solve_unit, settle_unit, move_back_unit, correct_unit,
+        evaluate_unit, bodies_unit, markers_unit, joints_unit, solve_unit, settle_unit, move_back_unit, correct_unit,
         truly_unit, record_unit,
     )  # fmt: skip
-    return [unit.address for unit in numbered]
+    extra = [EXTRA_UNITS[name].address if name in calls else 0 for name in ("look_ahead", "project")]
+    return [*(unit.address for unit in numbered), *extra, *(u.address if loads else 0 for u in LOAD_UNITS.values())]

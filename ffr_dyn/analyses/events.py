@@ -1,0 +1,191 @@
+"""Events of a forward run: moments at which a quantity passes a value.
+
+Every step of the integrator is looked at (ten states from row to row where it chooses its steps). Where the quantity has
+passed the value within one, the step is done again, from the same state and shorter, until its end is the event: a root of
+one unknown, the length of the step, which Brent's method (1973) finds to the rounding of the time. So an event is as accurate
+as the method, and lies on the constraints as it does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from typing import Any, Literal
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ffr_dyn.analyses.assemble import Assembled
+from ffr_dyn.equations import System, new_record
+from ffr_dyn.errors import InputError, SimulationError
+from ffr_dyn.integrators import Integrator
+from ffr_dyn.kernels.tables import OK, Record
+from ffr_dyn.machine import Machine, fill_rows, new_machine, record_row
+from ffr_dyn.measure import catalogue
+from ffr_dyn.state import StateView
+from ffr_dyn.view import View
+
+Array = np.ndarray
+
+WIDTH = 4 * np.finfo(float).eps  # of a step, and relative: what brentq can reach
+
+
+@dataclass(frozen=True)
+class Event:
+    """A moment at which `quantity` passes `value`.
+
+    quantity  : a component of a result, such as "rod.tip.position.y" or "hinge.angle", or a Python function (t, state) ->
+                number; `state` is a `ffr_dyn.state.StateView`
+    direction : "rising", "falling" or "either"
+    stop      : the run ends there
+
+    An event is seen when the quantity is on the two sides of the value at the two ends of a step of the integrator: twice
+    within a step is not.
+    """
+
+    name: str
+    quantity: str | Callable[[float, StateView], float]
+    value: float = 0.0
+    direction: Literal["rising", "falling", "either"] = "either"
+    stop: bool = False
+
+    def __post_init__(self) -> None:
+        if self.direction not in ("rising", "falling", "either"):
+            raise InputError(f"event {self.name!r}: direction is {self.direction!r}; it is rising, falling or either")
+        if not np.isfinite(self.value):
+            raise InputError(f"event {self.name!r}: the value is {self.value}; it must be finite")
+
+
+# (record, memory of the rows before) -> (values (T,), memory): what an event looks at
+_Seen = Callable[[Record, Any], tuple[Array, Any]]
+
+
+@dataclass(frozen=True)
+class _Crossing:
+    """An event between rows `row` - 1 and `row`; `memory` is of the rows up to the first of them."""
+
+    number: int
+    row: int
+    rising: bool
+    memory: Any
+
+
+class Watcher:
+    """Looks for events in the rows of a run, one for each step. `found` lists them as plain data."""
+
+    def __init__(
+        self,
+        assembled: Assembled,
+        method: Integrator,
+        gains: tuple[float, float, float],
+        spacing: float,
+        events: Sequence[Event],
+    ) -> None:
+        self.events, self.found = tuple(events), list[dict[str, Any]]()
+        system = assembled.system
+        self._seen = [_seen(system, event) for event in self.events]
+        self._system, self._method, self._gains, self._spacing = system, method, gains, spacing
+        self._memory: list[Any] = [None] * len(self.events)
+        self._last: Record | None = None
+
+    def begin(self, machine: Machine, time: float) -> None:
+        """Take the state of a run's machine as what comes before the first row."""
+        first = new_record(self._system, 1)
+        if record_row(machine, time, first, 0) != OK:
+            raise SimulationError(f"at t = {time:.6g} s the start has no accelerations")
+        self._memory = [seen(first, None)[1] for seen in self._seen]
+        self._last = first
+
+    def look(self, rows: Record) -> tuple[Record, bool]:
+        """The rows that belong to the run, and whether it ends: the last row is that of the event then."""
+        assert self._last is not None
+        joined = Record(*(np.concatenate(pair) for pair in zip(self._last, rows, strict=True)))
+        located = sorted(
+            (self._located(joined, crossing) for crossing in self._crossings(joined)),
+            key=lambda found: found[0]["time"],
+        )
+        for found, event, row, at_event in located:
+            self.found.append(found)
+            if event.stop:
+                before = [column[1:row] for column in joined]
+                return Record(*(np.concatenate(pair) for pair in zip(before, at_event, strict=True))), True
+        self._memory = [seen(joined, memory)[1] for seen, memory in zip(self._seen, self._memory, strict=True)]
+        self._last = Record(*(column[-1:].copy() for column in rows))
+        return rows, False
+
+    def _crossings(self, rows: Record) -> Iterator[_Crossing]:
+        for number, event in enumerate(self.events):
+            values = self._seen[number](rows, self._memory[number])[0] - event.value
+            rises, falls = (values[:-1] < 0) & (values[1:] >= 0), (values[:-1] > 0) & (values[1:] <= 0)
+            wanted = {"rising": rises, "falling": falls, "either": rises | falls}[event.direction]
+            for k in np.flatnonzero(wanted).tolist():
+                before = Record(*(column[: k + 1] for column in rows))
+                yield _Crossing(number, k + 1, bool(rises[k]), self._seen[number](before, self._memory[number])[1])
+
+    def _located(self, rows: Record, crossing: _Crossing) -> tuple[dict[str, Any], Event, int, Record]:
+        """The event as plain data, its declaration, the row that follows it, and a row of its own."""
+        event, seen, k = self.events[crossing.number], self._seen[crossing.number], crossing.row - 1
+        sign = 1.0 if crossing.rising else -1.0
+
+        def beyond(length: float) -> float:
+            return sign * (float(seen(self._redone(rows, k, length), crossing.memory)[0][0]) - event.value)
+
+        whole, least, length = self._spacing, WIDTH * self._spacing, 0.0
+        if beyond(least) >= 0:  # at the beginning, where the state is brought back onto the constraints
+            length = least
+        else:
+            length = whole if beyond(whole) <= 0 else float(brentq(beyond, least, whole, xtol=least, rtol=WIDTH))
+        own = self._redone(rows, k, length)
+        found = {
+            "event": event.name,
+            "time": float(own.time[0]),
+            "rising": crossing.rising,
+            "x": own.x[0].tolist(),
+            "v": own.v[0].tolist(),
+        }
+        return found, event, crossing.row, own
+
+    def _redone(self, rows: Record, k: int, length: float) -> Record:
+        """A row at the end of one step of this length, or of a run where the method chooses its steps, from row k."""
+        method: Any = self._method if self._method.controlled else replace(self._method, step=length)  # type: ignore[type-var]
+        time, end = float(rows.time[k]), new_record(self._system, 1)
+        machine = new_machine(self._system, rows.x[k], rows.v[k], method, self._gains, start=time, spacing=length)
+        machine.work.loads.reference[:] = rows.action[k, :, 0]
+        if fill_rows(machine, method, end, time, 1) != OK:
+            raise SimulationError(f"at t = {time:.6g} s an event cannot be located: a shorter step from there fails")
+        return end
+
+
+# ---- what an event looks at -----------------------------------------------------------------------------------------
+
+
+def _seen(system: System, event: Event) -> _Seen:
+    if not isinstance(event.quantity, str):
+        return _function(system, event.quantity)
+    known = catalogue(system)
+    head, _, label = event.quantity.rpartition(".")
+    if event.quantity in known and not known[event.quantity].axes:
+        name, at = event.quantity, None
+    elif head in known and known[head].axes and label in known[head].axes[0].labels:
+        name, at = head, known[head].axes[0].labels.index(label)
+    else:
+        close = get_close_matches(event.quantity, [*known, *(f"{n}.{c}" for n in known for c in "xyz")], 3)
+        raise InputError(
+            f"event {event.name!r}: {event.quantity!r} is no number of the scene; did you mean {', '.join(close)}?"
+        )
+    compute = known[name].compute
+
+    def values(record: Record, memory: Any) -> tuple[Array, Any]:
+        found, left = compute(View(system, record), memory)
+        return (found if at is None else found[:, at]), left
+
+    return values
+
+
+def _function(system: System, function: Callable[[float, StateView], float]) -> _Seen:
+    def values(record: Record, memory: Any) -> tuple[Array, Any]:
+        rows = zip(record.time, record.x, record.v, strict=True)
+        return np.array([float(function(t, StateView(system.scene, system.layout, x, v))) for t, x, v in rows]), None
+
+    return values

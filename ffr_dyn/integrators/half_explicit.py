@@ -1,0 +1,183 @@
+"""Half-explicit Runge-Kutta on the index-2 equations: constraints on velocities hold at every stage, to rounding.
+
+Hairer, Lubich & Roche 1989; Brasey & Hairer, SIAM J. Numer. Anal. 30 (1993) 538-552; coefficients of order four and the
+proof for multibody systems in Hairer & Wanner 1996, VII.6 (HEM4, five stages; its last three weights are Radau's):
+
+    X_{i+1} = x + h sum_j a_{i+1,j} T(X_j) V_j,      V_{i+1} = v + h sum_j a_{i+1,j} v_dot_j     (j up to i),
+    M(X_i) v_dot_i = Q(X_i, V_i) - Phi_q^T(X_i) lambda_i  with lambda_i such that  Phi_q(X_{i+1}) V_{i+1} + Phi_t = 0.
+
+No second derivative of a constraint enters. The matrix Phi_q(X_{i+1}) M^-1 Phi_q^T(X_i) is not symmetric; it is solved by
+iteration with the factors at X_i, which gains a factor of the angle turned in a stage each time and costs a back
+substitution. Positions drift off their constraints with the error of the method alone, and are projected.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ffr_dyn.kernels.actions import keep_turns
+from ffr_dyn.kernels.bodies import normalise, position_rates
+from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, solve
+from ffr_dyn.kernels.motion import into_body_axes, largest_motion
+from ffr_dyn.kernels.options import inlined, kernel
+from ffr_dyn.kernels.packing import unpack_tables, vector_at
+from ffr_dyn.kernels.system import constraint_rates, finite, largest, to_velocity_rates
+from ffr_dyn.kernels.tables import NEAR, NOT_CONVERGED, NOT_FINITE, OK, TIGHTER
+from ffr_dyn.kernels.units import Unit
+from ffr_dyn.kernels.vectors import add_scaled, copy
+
+ROOT = 6.0**0.5
+STAGES = 5
+# Row k: the coefficients that make stage k + 1, the last row those of the step.
+A = (
+    *(0.3, 0.0, 0.0, 0.0, 0.0),
+    *((1.0 + ROOT) / 30.0, (11.0 - 4.0 * ROOT) / 30.0, 0.0, 0.0, 0.0),
+    *((-79.0 - 31.0 * ROOT) / 150.0, (-1.0 - 4.0 * ROOT) / 30.0, (24.0 + 11.0 * ROOT) / 25.0, 0.0, 0.0),
+    *((14.0 + 5.0 * ROOT) / 6.0, (-8.0 + 7.0 * ROOT) / 6.0, (-9.0 - 7.0 * ROOT) / 4.0, (9.0 - ROOT) / 4.0, 0.0),
+    *(0.0, 0.0, (16.0 - ROOT) / 36.0, (16.0 + ROOT) / 36.0, 1.0 / 9.0),
+)
+C = (0.0, 0.3, (4.0 - ROOT) / 10.0, (4.0 + ROOT) / 10.0, 1.0, 1.0)
+SWEEPS = 30
+EXACT = 1e-15  # relative error of a velocity with which it is as good as rounding lets it be
+PATIENCE = 2  # sweeps that need not halve what is left: near-massless bodies gain in pairs of sweeps
+LOST = 1e-6  # relative error of a velocity with which the iteration has failed
+
+# Rows of stages.x and stages.v after those of the stages: this stage's state, the next one's, scratch.
+HERE, AHEAD, SCRATCH = STAGES, STAGES + 1, STAGES + 2
+# Rows of stages.rows: rates ahead and what they are short of; then the coefficients of the rows ahead.
+NU, SHORT, JAC = 0, 1, 2
+
+
+@inlined
+def rates_ahead(r, u, out):
+    """out (C,) = Phi_q(X_{i+1}) u, for u shaped like v."""
+    s, jac, x, y = r.stages, r.work.rows.jac, r.stages.x[AHEAD], r.stages.v[SCRATCH]
+    copy(y, u)
+    into_body_axes(r.model.bodies, x, y, r.work.loads.turn[0])
+    ahead = vector_at(s.rows.ctypes.data + 8 * JAC * out.size, jac.size).reshape(jac.shape)
+    constraint_rates(r.model.bodies.where, r.model.markers, r.model.rows, ahead, y, out)
+
+
+@inlined
+def keep_rows_ahead(r):
+    """Keep what `look_ahead` found."""
+    s, rows = r.stages, r.work.rows
+    copy(s.rows[NU], rows.nu)
+    kept = vector_at(s.rows.ctypes.data + 8 * JAC * rows.nu.size, rows.jac.size)
+    copy(kept, rows.jac.reshape(rows.jac.size))
+
+
+@inlined
+def violation_allowed(r):
+    return r.clock.gains[2] * (TIGHTER if r.work.independence[0] < NEAR else 1.0)
+
+
+@kernel
+def take_stiffening_out(bodies, w):
+    """The right-hand sides as they were evaluated: `solve` adds the forces of geometric stiffening to them."""
+    for b in range(bodies.mass.size):
+        if bodies.where[b, 6] > 0:
+            n, j, e = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3]
+            copy(w.f[j + 6 : j + 6 + n], w.unstiffened[e : e + n])
+
+
+@inlined
+def accelerate(r, k, ha):
+    """v_dot of stage k, evaluated at HERE, such that v[AHEAD] + ha v_dot obeys the constraints there. Returns a status."""
+    s, bw, rows = r.stages, r.work.bodies, r.work.rows
+    here, base, rate, short = s.v[HERE], s.v[AHEAD], s.v[k], s.rows[SHORT]
+    for j in range(here.size):
+        rate[j] = base[j] - here[j]
+    rates_ahead(r, rate, short)
+    add_scaled(s.rows[NU], s.rows[NU], 1.0, short)  # the rates of the constraints at (X_{i+1}, v[AHEAD])
+    copy(s.target, rows.gamma)
+    before, stuck = math.inf, 0
+    exact = EXACT / abs(ha) * largest_motion(r.model.bodies, bw.J, here)[0]
+    for _ in range(SWEEPS):
+        solve(r, s.x[HERE], s.target)
+        to_velocity_rates(r.model.bodies.where, bw.A, bw.acc, rate)
+        rates_ahead(r, rate, short)
+        for c in range(short.size):
+            short[c] = -s.rows[NU, c] / ha - short[c]
+        left = largest(short)
+        stuck = 0 if left < 0.5 * before else stuck + 1
+        if left <= exact or stuck == PATIENCE:
+            break
+        before = min(left, before)
+        add_scaled(s.target, s.target, 1.0, short)
+        take_stiffening_out(r.model.bodies, bw)
+    if left == 0.0:
+        return OK
+    scale = largest_motion(r.model.bodies, bw.J, here)[0] + abs(ha) * largest_motion(r.model.bodies, bw.J, rate)[0]
+    if abs(ha) * left <= LOST * scale:
+        return OK
+    if not left < math.inf:
+        return NOT_FINITE
+    for c in range(short.size):
+        if abs(short[c]) == left:
+            r.work.info[0] = r.model.bodies.mass.size + c
+    return NOT_CONVERGED
+
+
+@Unit
+def half_explicit_step(at, t, unused, unused_too):
+    """One step of the machine's state from time t. Returns a status."""
+    r = unpack_tables(at)
+    h, s, bodies, number = r.clock.time[0], r.stages, r.model.bodies, r.stages.numbers
+    set_diagonal(r, 0.0)
+    if number[0] == 0.0:
+        status = settle(r, t)
+        if status != OK:
+            return status
+    copy(s.x[HERE], r.x)
+    copy(s.v[HERE], r.v)
+    for k in range(STAGES):
+        position_rates(bodies, s.x[HERE], s.v[HERE], s.x[k])
+        copy(s.x[AHEAD], r.x)
+        copy(s.v[AHEAD], r.v)
+        for j in range(k + 1):
+            add_scaled(s.x[AHEAD], s.x[AHEAD], h * A[STAGES * k + j], s.x[j])
+        for j in range(k):
+            add_scaled(s.v[AHEAD], s.v[AHEAD], h * A[STAGES * k + j], s.v[j])
+        normalise(bodies, s.x[AHEAD])
+        status = look_ahead(r, t + C[k + 1] * h, s.x[AHEAD], s.v[HERE])
+        if status == OK:
+            keep_rows_ahead(r)
+            position = largest(r.work.rows.Phi)
+            status = evaluate(r, t + C[k] * h, s.x[HERE], s.v[HERE])
+        if status == OK:
+            if k == 0:
+                keep_turns(r.model.loads, r.work.loads)
+            status = accelerate(r, k, h * A[(STAGES + 1) * k])
+        if status != OK:
+            return status
+        add_scaled(s.v[AHEAD], s.v[AHEAD], h * A[(STAGES + 1) * k], s.v[k])
+        copy(s.x[HERE], s.x[AHEAD])
+        copy(s.v[HERE], s.v[AHEAD])
+    r.work.drift[0] = max(r.work.drift[0], position)
+    number[0] = 1.0 if position <= violation_allowed(r) or r.clock.gains[2] == 0.0 else 0.0
+    copy(r.x, s.x[HERE])
+    copy(r.v, s.v[HERE])
+    return finite(r.x, r.v)
+
+
+@dataclass(frozen=True)
+class HalfExplicit:
+    """Half-explicit Runge-Kutta of order four: the constraints on velocities hold exactly, those on positions by projection.
+
+    Explicit: the step is limited as that of `RK4`. Five evaluations a step.
+
+    step : time step [s]
+    """
+
+    step: float
+    order: ClassVar[int] = 4
+    implicit: ClassVar[bool] = False
+    stage_count: ClassVar[int] = STAGES + 3
+    row_stages: ClassVar[int] = JAC + 36
+    controlled: ClassVar[bool] = False
+    numbers: ClassVar[tuple[float, ...]] = (0.0,)
+    calls: ClassVar[tuple[str, ...]] = ("look_ahead",)
+    unit: ClassVar[Unit] = half_explicit_step

@@ -1,0 +1,362 @@
+"""A variational integrator on the Lie group with constraints at the nodes (RATTLE on R^3 x SO(3) x R^n).
+
+The motion makes the discrete action  sum h L(x_m, v_m)  stationary, L = T - V at the middle of each step,
+
+    x_m = x o exp(h/2 v_m),     x+ = x o exp(h v_m),     v_m = (R_dot, omega_bar, q_dot),     Phi(x+) = 0
+
+(Marsden & West, Acta Numerica 10 (2001) 357-514, 1.5 and 3.5; Leyendecker, Marsden & Ortiz, ZAMM 88 (2008) 677-708; with
+rotations Bou-Rabee & Marsden, Found. Comput. Math. 9 (2009) 197-219). With the momenta p = dL/dv and the forces F = dL/dx of
+the middle, F of rotations taken with R_dot held, and theta = h omega_bar, the momenta of both ends are
+
+    mu  = J^-1 p - h C F,        mu+ = J^-T p + h C^T F,
+    J^-1 = c I + theta~/2 + (1 - c)/|theta|^2 theta theta^T,     c = |theta|/2 cot(|theta|/2),
+    C = 1/2 (I + tan(|theta|/4)/|theta| theta~)      (rotations; J = I, C = 1/2 elsewhere),
+
+and a step is  mu(v_m) = mu - h/2 Phi_q^T lambda  at x, with lambda such that Phi(x+) = 0; then v+ = M^-1 (mu+ - h/2 Phi_q^T
+lambda') at x+, with lambda' such that Phi_q v+ + Phi_t = 0. Symmetric and symplectic, of order two: linear and angular
+momentum that the scene conserves are conserved to rounding, the energy of a conservative scene has an error of h^2 that does
+not grow. Applied forces that have no potential enter with F (the discrete principle of d'Alembert).
+
+The equations are solved by Newton corrections with the elastic diagonal 1 + h^2/4 Omega^2 + h/2 2 zeta Omega, as
+`ffr_dyn.integrators.generalised_alpha`. Geometric stiffening, which has no potential here, acts at the nodes.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ffr_dyn.integrators.generalised_alpha import check_iterations
+from ffr_dyn.kernels.actions import keep_turns
+from ffr_dyn.kernels.bodies import mass_times, normalise, six_rows, three_rows
+from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, solve, solve_anew
+from ffr_dyn.kernels.motion import carry, converging, farthest, into_global_axes, largest_motion, unconverged
+from ffr_dyn.kernels.options import inlined, kernel
+from ffr_dyn.kernels.packing import unpack_tables, vector_at
+from ffr_dyn.kernels.system import (
+    add_reactions,
+    constraint_rates,
+    finite,
+    largest,
+    to_body_axes,
+    to_velocity_rates,
+)
+from ffr_dyn.kernels.tables import NOT_FINITE, OK, USER_FAILED
+from ffr_dyn.kernels.units import Unit
+from ffr_dyn.kernels.vectors import add, add_scaled, copy, cross, dot, fill, get, scale, subtract
+
+# Rows of stages.v. MU: momenta at the start of the step; KICK: geometric stiffening there; MIDDLE: v_m; SHORT: what the
+# momenta of the start are short of; END: momenta at the end; REACTION: Phi_q^T lambda at the start; CHANGE: scratch.
+MU, KICK, MIDDLE, SHORT, END, REACTION, CHANGE = range(7)
+HALF, WHOLE, NOTHING = range(3)  # rows of stages.x: x_m, x+, zeros
+LAM, JAC = 0, 1  # rows of stages.rows: multipliers of the start; then the coefficients of the rows there
+TOLERANCE, LIMIT, STARTED = range(3)
+STUCK = 1e-6  # relative: where corrections no longer shrink below this, rounding is what is left of them
+ROUNDING = 4e-16  # of positions, over the step: what rounding leaves of a velocity
+
+
+@kernel
+def in_body_plane(a, normal):
+    """A vector of a planar body without what leaves the plane."""
+    if normal < 0:
+        return a
+    return (0.0 if normal == 0 else a[0], 0.0 if normal == 1 else a[1], 0.0 if normal == 2 else a[2])
+
+
+@kernel
+def about_normal(a, normal):
+    """A moment of a planar body without what does not turn it in the plane."""
+    if normal < 0:
+        return a
+    return (a[0] if normal == 0 else 0.0, a[1] if normal == 1 else 0.0, a[2] if normal == 2 else 0.0)
+
+
+@kernel
+def lagrangian_forces(bodies, w, b, y, p, Q):
+    """Q (6 + n,) = dL/dx and the applied forces of body b in body axes, from what `evaluate` left and p = M y.
+
+    Of the right-hand sides of M acc = f these are what is left without the change of the mass matrix and of the frame:
+    dL/dR = the applied force, dL/dtheta = the applied moment + p_1 x a, dL/dq_j = f_j + omega . l_j + I3_j . (a x omega).
+    """
+    n, j, e, normal = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3], bodies.where[b, 7]
+    f = w.f[j : j + 6 + n]
+    a, omega, s = (y[0], y[1], y[2]), (y[3], y[4], y[5]), get(w.s, b)
+    force = add((f[0], f[1], f[2]), cross(omega, cross(omega, s)))
+    J = w.J[b]
+    J_omega = (dot((J[0, 0], J[0, 1], J[0, 2]), omega), dot((J[1, 0], J[1, 1], J[1, 2]), omega),
+               dot((J[2, 0], J[2, 1], J[2, 2]), omega))  # fmt: skip
+    moment = add((f[3], f[4], f[5]), cross(omega, J_omega))
+    if n > 0:
+        P, g, l = bodies.P_dm[3 * e : 3 * (e + n)], w.g[9 * e : 9 * (e + n)], w.l[3 * e : 3 * (e + n)]  # noqa: E741
+        q_dot = y[6:]
+        force = add(force, scale(2.0, cross(omega, three_rows(P, q_dot, n))))
+        d0, d1, d2, d3, d4, d5 = six_rows(g, q_dot, n)
+        D_omega = (
+            d0 * omega[0] + d3 * omega[1] + d4 * omega[2],
+            d3 * omega[0] + d1 * omega[1] + d5 * omega[2],
+            d4 * omega[0] + d5 * omega[1] + d2 * omega[2],
+        )
+        moment = add(moment, scale(2.0, subtract(scale(d0 + d1 + d2, omega), D_omega)))
+        moment = add(moment, cross(omega, three_rows(g[6 * n :], q_dot, n)))
+        across = cross(a, omega)
+        for k in range(n):
+            Q[6 + k] = f[6 + k] + P[k] * across[0] + P[n + k] * across[1] + P[2 * n + k] * across[2]
+            if normal >= 0:
+                Q[6 + k] += omega[normal] * l[k]
+            else:
+                Q[6 + k] += omega[0] * l[k] + omega[1] * l[n + k] + omega[2] * l[2 * n + k]
+    force = in_body_plane(force, normal)
+    moment = about_normal(add(moment, cross((p[0], p[1], p[2]), a)), normal)
+    for k in range(3):
+        Q[k], Q[3 + k] = force[k], moment[k]
+
+
+@kernel
+def momentum(bodies, w, b, y, p):
+    """p (6 + n,) = M y of body b in body axes."""
+    normal = bodies.where[b, 7]
+    fill(p, 0.0)
+    mass_times(bodies, w, b, y, p)
+    force, moment = in_body_plane((p[0], p[1], p[2]), normal), about_normal((p[3], p[4], p[5]), normal)
+    for k in range(3):
+        p[k], p[3 + k] = force[k], moment[k]
+
+
+@kernel
+def transport(theta, p, F, h, side):
+    """Momentum of rotation at the start (side 1) or the end (side -1) of a step."""
+    square = dot(theta, theta)
+    angle = square**0.5
+    c, along, slope = 1.0 - square / 12.0, 1.0 / 12.0, 0.25
+    if angle > 1e-3:
+        c = 0.5 * angle / math.tan(0.5 * angle)
+        along, slope = (1.0 - c) / square, math.tan(0.25 * angle) / angle
+    turned = add(scale(c, p), add(scale(0.5 * side, cross(theta, p)), scale(along * dot(theta, p), theta)))
+    return subtract(turned, scale(0.5 * h, add(scale(side, F), scale(slope, cross(theta, F)))))
+
+
+@inlined
+def end_momenta(r, h):
+    """SHORT = mu - mu(v_m), END = mu+, shaped like v, from what `evaluate` left at x_m."""
+    s, bodies, bw = r.stages, r.model.bodies, r.work.bodies
+    y, p, Q = bw.acc, bw.more, s.v[CHANGE]
+    copy(y, s.v[MIDDLE])
+    to_body_axes(bodies.where, bw.A, y)
+    for b in range(bodies.mass.size):
+        n, j = bodies.where[b, 0], bodies.where[b, 2]
+        momentum(bodies, bw, b, y[j : j + 6 + n], p[j : j + 6 + n])
+        lagrangian_forces(bodies, bw, b, y[j : j + 6 + n], p[j : j + 6 + n], Q[j : j + 6 + n])
+        theta = (h * y[j + 3], h * y[j + 4], h * y[j + 5])
+        pi, tau = (p[j + 3], p[j + 4], p[j + 5]), (Q[j + 3], Q[j + 4], Q[j + 5])
+        before, after = transport(theta, pi, tau, h, 1.0), transport(theta, pi, tau, h, -1.0)
+        for k in range(6 + n):
+            s.v[SHORT, j + k] = p[j + k] - 0.5 * h * Q[j + k]
+            s.v[END, j + k] = p[j + k] + 0.5 * h * Q[j + k]
+        for k in range(3):
+            s.v[SHORT, j + 3 + k], s.v[END, j + 3 + k] = before[k], after[k]
+    to_velocity_rates(bodies.where, bw.A, s.v[SHORT], s.v[SHORT])
+    to_velocity_rates(bodies.where, bw.A, s.v[END], s.v[END])
+    for k in range(r.v.size):
+        s.v[SHORT, k] = s.v[MU, k] + 0.5 * h * s.v[KICK, k] - s.v[SHORT, k]
+
+
+@inlined
+def react_at_start(r):
+    """REACTION = Phi_q^T lambda at the start of the step, shaped like v."""
+    s, jac = r.stages, r.work.rows.jac
+    kept = vector_at(s.rows.ctypes.data + 8 * JAC * s.target.size, jac.size).reshape(jac.shape)
+    fill(s.v[REACTION], 0.0)
+    add_reactions(r.model.bodies.where, r.model.markers, r.model.rows, kept, s.rows[LAM], s.v[REACTION])
+    into_global_axes(r.model.bodies, r.x, s.v[REACTION], r.work.loads.turn[0])
+
+
+@inlined
+def keep_node(r, h):
+    """What the next step needs of its start, from an evaluation there with the true mass matrix: momenta and rows."""
+    s, bodies, bw = r.stages, r.model.bodies, r.work.bodies
+    copy(bw.acc, r.v)
+    to_body_axes(bodies.where, bw.A, bw.acc)
+    for b in range(bodies.mass.size):
+        n, j = bodies.where[b, 0], bodies.where[b, 2]
+        momentum(bodies, bw, b, bw.acc[j : j + 6 + n], s.v[MU, j : j + 6 + n])
+    to_velocity_rates(bodies.where, bw.A, s.v[MU], s.v[MU])
+    kept = vector_at(s.rows.ctypes.data + 8 * JAC * s.target.size, r.work.rows.jac.size)
+    copy(kept, r.work.rows.jac.reshape(kept.size))
+
+
+@inlined
+def stiffen_node(r, t, v):
+    """KICK = the forces of geometric stiffening at (t, r.x, v). Returns a status."""
+    s, bodies, bw = r.stages, r.model.bodies, r.work.bodies
+    status = evaluate(r, t, r.x, v)
+    if status == OK:
+        fill(bw.shift, 0.0)
+        copy(s.target, r.work.rows.gamma)
+        solve_anew(r, r.x, s.target)
+        fill(s.v[KICK], 0.0)
+        for b in range(bodies.mass.size):
+            n, j, e = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3]
+            if bodies.where[b, 6] > 0:
+                for k in range(n):
+                    s.v[KICK, j + 6 + k] = bw.f[j + 6 + k] - bw.unstiffened[e + k]
+    return status
+
+
+@inlined
+def close(r, h):
+    """v+ from the momenta END and the constraints on velocities, by the factors of an evaluation at (x+, v_m)."""
+    s, bodies, bw, rows = r.stages, r.model.bodies, r.work.bodies, r.work.rows
+    copy(bw.acc, s.v[MIDDLE])
+    to_body_axes(bodies.where, bw.A, bw.acc)
+    constraint_rates(bodies.where, r.model.markers, r.model.rows, rows.jac, bw.acc, s.target)
+    add_scaled(s.target, s.target, -1.0, rows.nu)
+    add_scaled(bw.f, s.v[END], 0.5 * h, s.v[KICK])
+    to_body_axes(bodies.where, bw.A, bw.f)
+    solve(r, s.x[NOTHING], s.target)
+    to_velocity_rates(bodies.where, bw.A, bw.acc, r.v)
+
+
+@inlined
+def begin(r, t, h, stiffened):
+    """Momenta, rows and geometric stiffening of the first node. Returns a status."""
+    set_diagonal(r, 0.0)
+    status = settle(r, t)
+    if status == OK and stiffened:
+        status = stiffen_node(r, t, r.v)
+    if status == OK:
+        keep_node(r, h)
+        copy(r.stages.v[MIDDLE], r.v)
+        r.stages.numbers[STARTED] = 1.0
+    return status
+
+
+@inlined
+def move_by(r, h, x):
+    """x = the start of the step moved by h v_m."""
+    s = r.stages
+    for k in range(r.v.size):
+        s.v[CHANGE, k] = h * s.v[MIDDLE, k]
+    carry(r.model.bodies, r.x, s.v[CHANGE], x)
+
+
+@inlined
+def newton(r, h):
+    """One correction of v_m from an evaluation in the middle of the step. s.target: what Phi_q (2/h) correction must be."""
+    s, bodies, bw = r.stages, r.model.bodies, r.work.bodies
+    end_momenta(r, h)
+    react_at_start(r)
+    for k in range(r.v.size):
+        bw.f[k] = 2.0 / h * s.v[SHORT, k] - s.v[REACTION, k]
+    to_body_axes(bodies.where, bw.A, bw.f)
+    add_reactions(bodies.where, r.model.markers, r.model.rows, r.work.rows.jac, s.rows[LAM], bw.f)
+    fill(bw.shift, 0.0)
+    solve(r, s.x[NOTHING], s.target)
+    copy(s.rows[LAM], r.work.rows.lam)
+    fill(bw.more, 0.0)
+    for b in range(bodies.mass.size):  # the momenta at the end of what is corrected
+        n, j, e = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3]
+        mass_times(bodies, bw, b, bw.acc[j : j + 6 + n], bw.more[j : j + 6 + n])
+        for k in range(n):
+            bw.more[j + 6 + k] -= (1.0 / bw.dinv[e + k] - 1.0) * bw.acc[j + 6 + k]
+    to_velocity_rates(bodies.where, bw.A, bw.more, bw.more)
+    add_scaled(s.v[END], s.v[END], 0.5 * h, bw.more)
+    to_velocity_rates(bodies.where, bw.A, bw.acc, s.v[CHANGE])
+    add_scaled(s.v[MIDDLE], s.v[MIDDLE], 0.5 * h, s.v[CHANGE])
+
+
+@inlined
+def iterate(r, t, h):
+    """Newton corrections until they are small enough. Returns a status."""
+    s, bodies, bw = r.stages, r.model.bodies, r.work.bodies
+    before, worst, change = 0.0, 0, 0.0
+    for attempt in range(int(s.numbers[LIMIT])):
+        move_by(r, h, s.x[WHOLE])
+        move_by(r, 0.5 * h, s.x[HALF])
+        status = look_ahead(r, t + h, s.x[WHOLE], s.v[MIDDLE])
+        if status != OK:
+            return status
+        for k in range(s.target.size):
+            s.target[k] = -2.0 / (h * h) * r.work.rows.Phi[k]
+        status = evaluate(r, t + 0.5 * h, s.x[HALF], s.v[MIDDLE])
+        if status != OK:
+            return status if attempt == 0 or status == USER_FAILED else unconverged(r, worst, h * before)
+        newton(r, h)
+        change, worst = largest_motion(bodies, bw.J, s.v[CHANGE])
+        change *= 0.5 * h
+        if finite(s.v[MIDDLE], s.v[END]) != OK:
+            return NOT_FINITE if attempt == 0 else unconverged(r, worst, h * before)
+        scale = largest_motion(bodies, bw.J, s.v[MIDDLE])[0]
+        allowed = s.numbers[TOLERANCE] * scale + ROUNDING * farthest(bodies, s.x[WHOLE]) / h
+        if converging(change, before, 1.0, allowed) or (change > 0.9 * before > 0.0 and change <= STUCK * scale):
+            return OK
+        before = change
+    return unconverged(r, worst, h * change)
+
+
+@Unit
+def variational_step(at, t, unused, unused_too):
+    """One step of the machine's state from time t. Returns a status."""
+    r = unpack_tables(at)
+    h, s = r.clock.time[0], r.stages
+    stiffened = r.model.bodies.stiffening.size > 0
+    if s.numbers[STARTED] == 0.0:
+        status = begin(r, t, h, stiffened)
+        if status != OK:
+            return status
+    set_diagonal(r, 0.5 * h)
+    for k in range(r.v.size):
+        s.v[MIDDLE, k] = 2.0 * r.v[k] - s.v[MIDDLE, k]
+    status = iterate(r, t, h)
+    if status != OK:
+        return status
+    move_by(r, h, s.x[WHOLE])
+    copy(r.x, s.x[WHOLE])
+    normalise(r.model.bodies, r.x)
+    set_diagonal(r, 0.0)
+    status = evaluate(r, t + h, r.x, s.v[MIDDLE])
+    if status != OK:
+        return status
+    r.work.drift[0] = max(r.work.drift[0], largest(r.work.rows.Phi))
+    keep_turns(r.model.loads, r.work.loads)
+    close(r, h)
+    if stiffened:
+        copy(s.v[CHANGE], r.v)
+        status = stiffen_node(r, t + h, s.v[CHANGE])
+        if status == OK:
+            status = evaluate(r, t + h, r.x, s.v[MIDDLE])
+        if status != OK:
+            return status
+        close(r, h)
+    keep_node(r, h)
+    return finite(r.x, r.v)
+
+
+@dataclass(frozen=True)
+class Variational:
+    """Variational (symplectic, momentum-conserving) of order two, for long runs: the error of the energy does not grow.
+
+    The constraints hold on positions and velocities.
+
+    step       : time step [s]
+    tolerance  : of the last correction of the velocities, relative
+    iterations : Newton corrections that a step may take
+    """
+
+    step: float
+    tolerance: float = 1e-14
+    iterations: int = 30
+    order: ClassVar[int] = 2
+    implicit: ClassVar[bool] = True
+    stage_count: ClassVar[int] = 7
+    row_stages: ClassVar[int] = JAC + 36
+    controlled: ClassVar[bool] = False
+    calls: ClassVar[tuple[str, ...]] = ("look_ahead",)
+    unit: ClassVar[Unit] = variational_step
+
+    def __post_init__(self) -> None:
+        check_iterations(self.tolerance, self.iterations)
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        return (self.tolerance, float(self.iterations), 0.0)
