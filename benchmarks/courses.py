@@ -155,8 +155,10 @@ def drive(start: Assembled, course: Course, method: Integrator, stabilisation: S
 
 
 def ours(
-    course: Course, method: Integrator, stabilisation: Stabilisation = Projection()
-) -> tuple[Motion, float] | None:  # noqa: B008
+    course: Course,
+    method: Integrator,
+    stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
+) -> tuple[Motion, float] | None:
     """The motion and the processor time of the compiled loop [s]; None where the method fails."""
     found = drive(course.start_looked_at, course, method, stabilisation)
     if found is None:
