@@ -30,6 +30,7 @@ Array = np.ndarray
 ACCURACY = 1e-3
 FIXED_INTERFACE_MODES = {8: 2, 32: 26}  # with six static shapes
 LINKS = 32
+STANDARD = Projection()
 LOOKS = 10  # between output times, of methods that choose their steps
 
 
@@ -154,11 +155,7 @@ def drive(start: Assembled, course: Course, method: Integrator, stabilisation: S
     return Run(record.r, watch.cpu, int(machine.work.info[1])) if status == OK else None
 
 
-def ours(
-    course: Course,
-    method: Integrator,
-    stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
-) -> tuple[Motion, float] | None:
+def ours(course: Course, method: Integrator, stabilisation: Stabilisation = STANDARD) -> tuple[Motion, float] | None:
     """The motion and the processor time of the compiled loop [s]; None where the method fails."""
     found = drive(course.start_looked_at, course, method, stabilisation)
     if found is None:

@@ -16,8 +16,8 @@ looked for by halving and then closing in to 6 %. Nothing is interpolated: what 
           gives the same motion in the same time); Newton's iterations to 1e-3, 1e-4, 1e-6, modified (full ones are two to
           ten times dearer); frames in Euler parameters and Tait-Bryan angles; three linear solvers. The fast build, one
           thread, bodies of mass terms and interface nodes. First the fastest frame and linear solver are found, then
-          everything else is changed one by one, with larger steps as far as they will do, twice over. Three of either code
-          race at the end.
+          every method with either frame and the tolerances are tried, with larger steps as far as they will do, until
+          nothing helps. Three of either code race at the end.
 
 Times are processor times of the compiled loop and of Exudyn's solver (less that of a run of two steps, that is without its
 start), medians of runs taken in turns. The reference is computed by two of our methods and, independently, by Exudyn's best
@@ -50,7 +50,7 @@ from ffr_dyn.stabilisation import Projection  # noqa: E402
 FINEST = 1024  # steps per output step that are still tried
 CLOSE = 1.06  # ratio of steps at which the search ends
 LARGER = 0.93  # ratio of fineness from one try to the next, once a step is known that will do
-PASSES = 2  # through all variants
+PASSES = 3  # through all variants, at most
 FINALISTS = 3  # of each code, raced in turns at the end
 PROJECTIONS = (Projection(), Projection(1e-6))
 TRIED = (
@@ -192,14 +192,13 @@ def explore(search: Search, way: Way) -> None:
     if coarsest(lambda k: search.attempt(way, k), 8) is None:
         raise RuntimeError(f"{search.course.name}: Exudyn is not accurate at {FINEST} steps per output step")
     for _ in range(PASSES):
-        before = search.front()[0]
-        for change in variants():
-            way, k, _ = search.front()[0]
-            other = change(way)
-            if other != way and search.accurate(other, k):
-                while k > 1 and search.accurate(other, smaller := min(k - 1, round(LARGER * k))):
-                    k = smaller
-        if search.front()[0] == before:
+        before, k, _ = search.front()[0]
+        for other in variants(before):
+            if search.accurate(other, k):
+                closing = k
+                while closing > 1 and search.accurate(other, smaller := min(closing - 1, round(LARGER * closing))):
+                    closing = smaller
+        if search.front()[0][0] == before:
             return
 
 

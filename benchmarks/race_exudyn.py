@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -42,15 +41,15 @@ FIRST = Way(ALPHA, TAIT_BRYAN, "EXUdense", 1e-4)
 USUAL = Way(ALPHA, EULER_PARAMETERS, "EXUdense", 1e-8)
 
 
-def variants() -> list[Callable[[Way], Way]]:
-    """Single changes, in the order in which they are tried."""
-    return [
-        lambda way: replace(way, frame=next(frame for frame in FRAMES if frame != way.frame)),
-        lambda way: replace(way, tolerance=1e-3),
-        lambda way: replace(way, tolerance=1e-6),
-        lambda way: replace(way, method=TRAPEZOIDAL),
-        lambda way: replace(way, method=ALPHA, radius=0.6),
+METHODS = ((ALPHA, 0.9), (TRAPEZOIDAL, 0.9), (ALPHA, 0.6))
+
+
+def variants(way: Way) -> list[Way]:
+    """Every method with either frame, then other tolerances."""
+    methods = [
+        replace(way, method=method, radius=radius, frame=frame) for frame, (method, radius) in product(FRAMES, METHODS)
     ]
+    return [*methods, *(replace(way, tolerance=tolerance) for tolerance in (1e-3, 1e-4, 1e-6))]
 
 
 def solver_settings(way: Way, end: float, steps: int) -> Any:
