@@ -143,7 +143,7 @@ def evaluate_joints(m, w, t):
     for k in range(m.rows.marker.shape[0]):
         evaluate_block(m.rows, w.functions, w.markers, w.rows, k)
     couple_joints(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows)
-    failed = factorise_blocks(m.rows.start, m.pattern, w.rows.S, m.relaxation, w.rows.scale, w.independence)
+    failed = factorise_blocks(m.rows.start, m.pattern, w.rows.S, m.relaxation, w.rows, w.independence)
     if failed < 0 and w.independence[0] < w.independence[1]:
         w.independence[1], w.independence[2] = w.independence[0], t
     return failed
@@ -169,7 +169,7 @@ def solve_motion(bodies, markers, rows, pattern, bw, rw, target, passes):
     for b in range(bodies.mass.size):
         reduce_forces(bodies, bw, b)
     reduced_rates(bodies, markers, rows, bw, rw, target)
-    solve_blocks(rows.start, pattern, rw.S, rw.step)
+    solve_blocks(rows.start, pattern, rw.S, rw.pivots, rw.step)
     react(bodies, markers, rows, bw, rw)
     gather_rows(rows.start, rw.step, rw.lam)
     before = 0.0
@@ -196,7 +196,7 @@ def solve_step(bodies, markers, rows, pattern, bw, rw, value):
     for k in range(rows.start.size - 1):
         for row in range(rows.start[k], rows.start[k + 1]):
             rw.step[LANES * k + row - rows.start[k]] = value[row]
-    solve_blocks(rows.start, pattern, rw.S, rw.step)
+    solve_blocks(rows.start, pattern, rw.S, rw.pivots, rw.step)
     react(bodies, markers, rows, bw, rw)
 
 
