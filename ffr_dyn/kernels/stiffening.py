@@ -7,11 +7,11 @@ two from the loads of the stage before.
 """
 
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.system import solve_motion
+from ffr_dyn.kernels.packing import call_unit
+from ffr_dyn.kernels.tables import MOTION
 from ffr_dyn.kernels.vectors import copy, cross, get, subtract, to_body
 
 SWEEPS = 3
-PASSES = 10
 
 
 @kernel
@@ -103,24 +103,21 @@ def stiffen(bodies, w, b):
 
 
 @inlined
-def solve_stiffened(m, w, x, target, near):
+def solve_stiffened(r, x, target, near):
     """`solve_motion` with the geometric stiffening of the bodies that have it.
 
     near : the loads of the last solution are those of a state nearby, which saves a sweep
     """
-    stiffened = m.bodies.stiffening.size > 0
-    passes = PASSES if m.relaxation > 0.0 else 1
-    if stiffened:
-        multiply_stiffness(m.bodies, w.bodies, x)
+    m, w = r.model, r.work
+    multiply_stiffness(m.bodies, w.bodies, x)
     first = 1 if near else 0
-    for sweep in range(first, SWEEPS if stiffened else first + 1):
-        if stiffened:
-            for b in range(m.bodies.mass.size):
-                if m.bodies.where[b, 6] > 0:
-                    load = w.bodies.load[b]
-                    rate_loads(get(w.bodies.omega, b), load)
-                    if not near or sweep > 1:
-                        frame_loads(m.bodies, w.bodies, w.field, b, sweep > 0, load)
-                        marker_loads(m.markers, m.rows, w.markers, w.rows, b, sweep > 0, load)
-                    stiffen(m.bodies, w.bodies, b)
-        solve_motion(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, target, passes)
+    for sweep in range(first, SWEEPS):
+        for b in range(m.bodies.mass.size):
+            if m.bodies.where[b, 6] > 0:
+                load = w.bodies.load[b]
+                rate_loads(get(w.bodies.omega, b), load)
+                if not near or sweep > 1:
+                    frame_loads(m.bodies, w.bodies, w.field, b, sweep > 0, load)
+                    marker_loads(m.markers, m.rows, w.markers, w.rows, b, sweep > 0, load)
+                stiffen(m.bodies, w.bodies, b)
+        call_unit(r.units[MOTION], r.address, 0.0, x.ctypes.data, target.ctypes.data)

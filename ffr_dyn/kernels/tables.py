@@ -35,8 +35,12 @@ MOST_ROWS = 6  # of a joint
 
 # Numbers of the compiled units in `Tables.units`.
 (
-    EVALUATE, BODIES, MARKERS, JOINTS, SOLVE, SETTLE, MOVE_BACK, CORRECT, TRULY, RECORD, LOOK_AHEAD, PROJECT, LOADS, POWERS,
-) = range(14)  # fmt: skip
+    EVALUATE, BODIES, MARKERS, CONSTRAINTS, JOINTS, BACK, REGAIN, PLAIN, MOTION, SOLVE, PREPARE, LOOK, SETTLE, MOVE_BACK,
+    CORRECT, TRULY, RECORD, LOOK_AHEAD, PROJECT, LOADS, POWERS,
+) = range(21)  # fmt: skip
+
+# Which markers are brought up to date: those that joints or loads use, those of joints, all.
+IN_USE, OF_JOINTS, ALL = 0.0, 1.0, 2.0
 
 # Near a singular position the rows become dependent, and a violation eta of the constraints throws the motion from its
 # branch when it comes closer than about eta^(1/3). So on the approach (`independence` below NEAR) the violation is held far
