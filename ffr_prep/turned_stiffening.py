@@ -29,22 +29,20 @@ Methods in Applied Mechanics and Engineering 20 (1979) 105-155 (semitangential m
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import scipy.linalg
-import scipy.sparse as sp
 
-from ffr_prep.accelerations import gradients, turns
+from ffr_prep.accelerations import INERTIAL, gradients, turns
 from ffr_prep.body import FlexibleBody
 from ffr_prep.errors import InputError
 from ffr_prep.interface import CoupledModel
+from ffr_prep.reactions import supports
 from ffr_prep.reference import ReferenceConditions
 
 Array = np.ndarray
 
-INERTIAL = 12
 _CARRIED = 1e-9
 
 
@@ -61,7 +59,7 @@ def turned_stiffening(
     """
     _check_determinate(body)
     loads = np.vstack([_inertial(motions), model.C.toarray()])
-    held = _supports(model, conditions)
+    held = supports(model, conditions)
     carried = _reactions(body, loads, held @ loads) @ held
     whole = _of_all_motions(body, model, motions)
     idle = _idle(body)
@@ -78,24 +76,6 @@ def _inertial(motions: tuple[Array, Array]) -> Array:
     """(12, 6 + n) the generalised forces of unit accelerations."""
     P, rP = motions
     return -np.concatenate([P, np.einsum("akp,pkj->aj", gradients(), rP)])
-
-
-def _supports(model: CoupledModel, conditions: ReferenceConditions) -> Array:
-    """(r, 12 + 6 I) the reactions of the conditions as combinations of the loads that the body knows.
-
-    Conditions on interface coordinates react by the loads on them, and those on the mean motion T^T M u = 0 by inertia:
-    written for a model whose coordinates are the amplitudes of the loads, their rows are the combinations.
-    """
-    count = model.C.shape[0]
-    unit = np.eye(INERTIAL + count)
-    of_loads = replace(
-        model,
-        K=sp.csr_array(unit),
-        M=sp.csr_array(np.diag(-unit[:6].sum(axis=0))),
-        T=unit[:, :6],
-        C=sp.csr_array(unit[INERTIAL:]),
-    )
-    return conditions.rows(of_loads)
 
 
 def _reactions(body: FlexibleBody, loads: Array, L: Array) -> Array:
