@@ -80,7 +80,7 @@ def element_loads(elements: Beams) -> Array:
 
 
 def section_loads(elements: Beams) -> Array:
-    """(E, 3, 3, 12) of unit accelerations a = ... + G x, the integral of rho G x x^T over the section, in element axes [N]."""
+    """(E, 3, 3, 12) of unit accelerations ... + G x, the integral of rho G x x^T over the section, in element axes [N]."""
     G = np.einsum("eck,acd,edl->aekl", elements.C, gradients(), elements.C)
     J = np.zeros((len(elements.length), 3))
     J[:, 1:] = elements.line_mass[:, None] * elements.gyration**2
@@ -136,7 +136,7 @@ def strain_functions(elements: Beams, xi: Array) -> Array:
 
 
 def _work(elements: Beams, forces: Array, spread: Array) -> Array:
-    """(E, Q, 9, 9) second derivatives of the work of section forces (E, Q, 6), and of loads within the section, on strains."""
+    """(E, Q, 9, 9) second derivatives by the strains of the work of section forces (E, Q, 6) and loads in the section."""
     N, Qy, Qz, Mx, My, Mz = np.moveaxis(forces, -1, 0)
     half = np.zeros((*N.shape, 9, 9))
     square = ((elements.EIy + elements.EIz) / elements.EA)[:, None]

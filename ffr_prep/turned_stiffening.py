@@ -16,11 +16,9 @@ moves by u and turns by phi it is
 
     -F . (theta x u) - M . (theta x phi) / 2,
 
-if the region of the interface follows the rotation to second order, 1/2 phi x (phi x r), as a rigid region does. Rigid
-translations have no gradient. So the converted body moves as the old one did. A reduction in the new frame differs by
-what interfaces that are not points do besides: of the order of their size beside that of the body, as the stress of their
-regions, which turn to first order only, is left in it. For beams it differs also by the work of shear forces and moments
-on twist, which their geometric stiffness leaves out.
+as the moments of all bodies made here are (`ffr_prep.region_rotations`). Rigid translations have no gradient. So the
+converted stiffness is the one that a reduction in the new frame computes: of solids and beams to rounding. Of plates, whose
+bending moments stiffen nothing and whose fields turn up to the size of an element, it is nearly that.
 
 Sources: Bathe, Finite Element Procedures (1996), section 6.2 (the linearised stress term); J. H. Argyris et al., Computer
 Methods in Applied Mechanics and Engineering 20 (1979) 105-155 (semitangential moments).

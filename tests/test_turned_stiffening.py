@@ -86,7 +86,7 @@ def tied_pair(reference, kind) -> FlexibleBody:
 
 def plate(reference) -> FlexibleBody:
     """A strip of quadrilaterals in the plane of x and y."""
-    strip = panel([(0, 0, 0), (1, 0, 0), (1, 0.1, 0), (0, 0.1, 0)], Shell(0.005, STEEL), elements=(16, 2))
+    strip = panel([(0, 0, 0), (1, 0, 0), (1, 0.1, 0), (0, 0.1, 0)], Shell(0.005, STEEL), elements=(32, 4))
     x = strip.points[:, 0]
     strip = replace(strip, node_groups={"left": np.flatnonzero(x < 1e-9), "right": np.flatnonzero(x > 1 - 1e-9)})
     return reduce_frame(
@@ -151,10 +151,11 @@ def test_converting_is_reducing_in_the_new_frame(made, kind, old, new):
 
 
 def test_converting_plates_is_nearly_reducing_in_the_new_frame():
-    """Bending moments of plates stiffen nothing, and their fields do not turn exactly: a few per cent."""
+    """Loads in their plane, to the square of the element size; bending moments of plates stiffen nothing."""
     plates = {reference: plate(reference) for reference in REFERENCES}
+    in_plane_loads = [0, 1, 5, 6, 7, 8, 9, 12, 13, 17, 18, 19, 23]
     for old, new in ((FIXED, CHORD), (CHORD, MEAN)):
-        assert_equal(plates[old].with_reference(new), plates[new], slice(None), 0.03)
+        assert_equal(plates[old].with_reference(new), plates[new], in_plane_loads, 0.015)
 
 
 @pytest.mark.parametrize("new", REFERENCES[1:], ids=str)
