@@ -73,6 +73,7 @@ def forward(
     resume: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
     stopwatch: Stopwatch | None = None,
+    assembled: Assembled | None = None,
 ) -> Result:
     """Integrate the equations of motion of a scene from `start` to `end` [s], keeping a row every `output_step` [s].
 
@@ -86,6 +87,7 @@ def forward(
                   the bit; `end` may be later than it was. A file that does not exist yet is a run from the start
     progress    : called with the time reached, a few times a second
     stopwatch   : takes the time of the integrator's compiled loop
+    assembled   : what `assemble` made of the scene at `start`, for programs that run it more than once
 
     Raises InputError for a scene or settings that cannot be used, SimulationError when the run fails: the message gives
     the time, the body or joint, the likely cause and what to change.
@@ -95,7 +97,7 @@ def forward(
     substeps, rows = _counts(end - start, output_step, spacing)
     _check_step(scene, method)
     _check_stabilisation(method, stabilisation)
-    assembled = assemble(scene, time=start)
+    assembled = assemble(scene, time=start) if assembled is None else assembled
     wanted = selected(assembled.system, outputs)
     ensure_compiled(type(method), loads=has_loads(assembled.system.model.loads))
     span = (start, end, output_step)
