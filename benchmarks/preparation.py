@@ -45,7 +45,7 @@ from ffr_prep.planar import in_plane
 Array = np.ndarray
 
 REFERENCE = Path(__file__).resolve().parent.parent / "tests" / "reference"
-# First flap frequency by the speed: series, agrees with Wright, Smith, Thresher & Wang, J. Appl. Mech. 49 (1982) 197-202.
+# First flap frequency by the speed: series, as in Wright, Smith, Thresher & Wang, J. Appl. Mech. 49 (1982) 197-202.
 FLAP = {
     0: 3.5160152685,
     1: 3.6816468140,
