@@ -218,9 +218,7 @@ def test_the_motion_of_a_slider_crank_is_the_same():
 
 def test_a_body_under_more_than_six_conditions_is_refused(rods):
     body = replace(rods[FIXED], provenance={"reference": {"type": "Supports", "supports": [{}] * 12}})
-    with pytest.raises(
-        InputError, match=r"12 conditions, more than the six .* reduce the mesh again .* --without-stiffening"
-    ):
+    with pytest.raises(InputError, match=r"12 conditions, .* reduce the mesh again .* --without-stiffening"):
         body.with_reference(MEAN)
     assert replace(body, stiffening=None).with_reference(MEAN).stiffening is None
 
