@@ -185,7 +185,7 @@ class ReductionEntry(_Strict):
     modes: int | None = Field(default=None, ge=0)
     frequency: float | None = None
     accuracy: tuple[float, float, float] | None = None
-    interface_modes: int = Field(default=12, ge=0)
+    interface_modes: int = Field(default=6, ge=0)
     moments: int = Field(default=2, ge=1)
     match: list[float] = [0.0]
 
