@@ -1,8 +1,10 @@
 """From a frame of beams and plates to a reduced flexible body.
 
 The families of elements (`ffr_prep.families`) deliver stiffness and mass points. Assembly is u = C S W C_bar B_1 q_n with
-the Boolean B_1, and all inertia integrals are sums over the mass points, as exact as the shape functions; the body that
-results is of the same kind as that of a meshed solid.
+the Boolean B_1 (`connectivity`). Interfaces and reference conditions leave q_n = B_2 q_f: `tie` has the independent
+coordinates of interfaces, and `ffr_prep.basis.in_frame` takes out of these what the conditions L prevent. All inertia
+integrals are sums over the mass points, as exact as the shape functions; the body that results is of the same kind as
+that of a meshed solid.
 
 Sources: A. A. Shabana, Dynamics of Multibody Systems (2013), sections 6.1-6.7.
 """

@@ -42,6 +42,7 @@ from ffr_prep.reference import ReferenceConditions
 Array = np.ndarray
 
 _CARRIED = 1e-9
+_LEAVE_OUT = "or leave the stiffness out (replace(body, stiffening=None) in Python, --without-stiffening)"
 
 
 def turned_stiffening(
@@ -133,8 +134,7 @@ def _check_determinate(body: FlexibleBody) -> None:
     if count > 6:
         raise InputError(
             f"the geometric stiffness of body {body.name!r} belongs to {count} conditions, more than the six that fix a "
-            "frame, and how they share a load is not known: reduce the mesh again under the new conditions, or leave the "
-            "stiffness out (stiffening=None)"
+            f"frame, and how they share a load is not known: reduce the mesh again under the new conditions, {_LEAVE_OUT}"
         )
 
 
@@ -152,6 +152,5 @@ def _check_known(body: FlexibleBody, idle: Array, held: Array) -> None:
         name = body.interfaces[lost[0] // 6].name
         raise InputError(
             f"loads at interface {name!r} have no geometric stiffness in body {body.name!r} (a point that was added after "
-            "the reduction?): the frame cannot be held there; choose other interfaces, or leave the stiffness out "
-            "(stiffening=None)"
+            f"the reduction?): the frame cannot be held there; choose other interfaces, {_LEAVE_OUT}"
         )
