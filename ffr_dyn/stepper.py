@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.assemble import Assembled, assemble
-from ffr_dyn.analyses.forward import failure
+from ffr_dyn.analyses.failure import failure
 from ffr_dyn.checkpoint import fingerprint, leaves
 from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import System, new_record

@@ -37,10 +37,10 @@ LANES = 8  # rows of a joint side by side (see `ffr_dyn.kernels.lanes`)
     EVALUATE, BODIES, MARKERS, JOINTS, SOLVE, SETTLE, MOVE_BACK, CORRECT, TRULY, RECORD, LOOK_AHEAD, PROJECT, LOADS, POWERS,
 ) = range(14)  # fmt: skip
 
-# Near a singular position (which steps pass as `passing` tells) the rows become dependent, and a violation eta of the constraints throws the motion from its
-# branch when it comes closer than about eta^(1/3). So on the approach (`independence` below NEAR) the violation is held far
-# lower, and at the position itself (below AT) it is left alone: along the direction that is about to be free a correction
-# would be the violation divided by the distance.
+# Near a singular position (which steps pass as `passing` tells) the rows become dependent, and a violation eta of the
+# constraints throws the motion from its branch when it comes closer than about eta^(1/3). So on the approach (`independence`
+# below NEAR) the violation is held far lower, and at the position itself (below AT) it is left alone: along the direction
+# that is about to be free a correction would be the violation divided by the distance.
 NEAR, AT = 1e-2, 1e-6
 TIGHTER = 1e-4
 
