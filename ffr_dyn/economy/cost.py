@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from ffr_dyn.economy.choice import Choice, Part
 from ffr_dyn.integrators import METHODS
-from ffr_dyn.scene import Scene
 
 BASE = 0.3  # an evaluation of nothing
 # a rigid body; more for a flexible one, per mode, per mode squared; for stiffening, per mode, per mode squared
@@ -28,8 +27,8 @@ def per_row(choice: Choice) -> float:
     return per_evaluation(choice) * ((stages(choice.method) + PROJECTION) * choice.divisions + 1)
 
 
-def of_run(scene: Scene, choice: Choice, rows: int) -> float:
-    """[us] of a run; `scene` is the one that the choice is of."""
+def of_run(choice: Choice, rows: int) -> float:
+    """[us] of a run."""
     return rows * per_row(choice)
 
 
