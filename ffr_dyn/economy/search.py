@@ -47,8 +47,8 @@ SURELY_RIGID = (
     0.25  # of the tolerance: modes that do less by the estimate alone are left out without a run of everything
 )
 SHORT = 2e6  # [us] of a verification that is made without being asked for
-FINER = 3  # times the steps: worth another look
-AGAIN = 0.6  # of the cost of the final run, that another look may cost in a run of everything
+FINER = 6  # times the steps: worth another look
+AGAIN = 1.0  # of the cost of the final run, that another look may cost in a run of everything
 
 
 @dataclass(frozen=True)
@@ -151,13 +151,16 @@ def _beside_everything(ledger: Ledger, stiff: Rigid) -> Chosen:
     if (error + largest(found.time) <= ground.limits).all():
         model = difference(ledger.run(same).values, finer.pilot.values)
         return replace(found, model=largest(model), error=largest(total(model, found.time)))
-    return _stepped(ledger, finer, selected_model(ledger, finer, omitted, Shares()), omitted)
+    return _stepped(ledger, finer, selected_model(ledger, finer, omitted, Shares()), omitted, found.final.choice)
 
 
-def _stepped(ledger: Ledger, ground: Ground, selection: Selection, omitted: Contributions) -> Chosen:
+def _stepped(
+    ledger: Ledger, ground: Ground, selection: Selection, omitted: Contributions, like: Choice | None = None
+) -> Chosen:
+    """The model with the step it needs, which may be much as that of another one, `like`."""
     model = difference(ledger.run(selection.choice).values, ground.pilot.values)
     left = np.maximum(OF_ALL * ground.limits - largest(model), LEAST * ground.limits)
-    stepped = chosen_step(ledger, selection.choice, left)
+    stepped = chosen_step(ledger, selection.choice, left, like)
     return Chosen(
         stepped.trial,
         largest(model),

@@ -20,7 +20,7 @@ Array = np.ndarray
 
 NEARLY_ALL = 0.8  # of the modes: then those of the full motion are ranked instead
 ATTEMPTS = 4
-HOPE = 2.0  # times the tolerance: where modes do more by the estimate, rigid bodies are not tried
+HOPE = 1.0  # times the tolerance: where modes do more by the estimate, rigid bodies are not tried
 SAFELY = 0.6  # of what may be left out, when what was predicted turns out too much
 
 
@@ -28,7 +28,7 @@ SAFELY = 0.6  # of what may be left out, when what was predicted turns out too m
 class Shares:
     """Shares of the tolerance that may be taken by modes left out, by terms, by rigid bodies, and by all that is left out."""
 
-    modes: float = 0.25
+    modes: float = 0.15
     terms: float = 0.15
     rigid: float = 0.5
     all: float = 0.5

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ffr_dyn.analyses.forward import RK4_LIMIT
 from ffr_dyn.economy.choice import Choice, rigid
 from ffr_dyn.economy.cost import STAGES, per_row
 from ffr_dyn.economy.ledger import Ledger
@@ -31,8 +32,10 @@ FAR = 0.1  # of the limit: steps longer than a row would do
 ACCURACIES = (1e-2, 1e-3)
 WORTH = 0.8  # of the cost: a method that chooses its steps pays
 MOST = 4096  # divisions of an output step
-ATTEMPTS = 6
+ATTEMPTS = 10
 MARGIN = 1.1  # on a predicted number of divisions
+RUNG = 2.5  # times the steps of the last run
+PAYS = 4  # coarse runs of two stages to a run as predicted: where it is worth to try these
 ONCE = 0.6  # a shorter run pays when it needs less than this share of the divisions
 NEAR = (1.25, 3.0)  # ratios of the steps of two runs whose difference tells their errors
 
@@ -60,48 +63,53 @@ def _takes_a_step(made: Callable[[float], Integrator], step: float) -> bool:
         return False
 
 
-def chosen_step(ledger: Ledger, choice: Choice, limit: Array) -> Stepped:
+def chosen_step(ledger: Ledger, choice: Choice, limit: Array, like: Choice | None = None) -> Stepped:
     """The cheapest method and step for a model with errors below `limit` (outputs,) from discretisation.
 
     choice : the model with the longest step that completes a run, by a method of the third order
+    like   : a model whose method and step are known, and likely to do
 
     Raises SimulationError when none is found.
     """
     ledger.tell("integrator and step")
-    found = _two_stages(ledger, choice, limit)
+    if like is not None and not like.controlled:
+        return _cheapest(ledger, choice, {like.method: like.divisions}, limit)
+    found = _rigid_in_two_stages(ledger, choice, limit)
     if found is None:
         coarse = ledger.run(choice)
-        error = _coarse_error(ledger, coarse, limit)
-        found = Stepped(coarse, error) if share(error, limit) <= 1 else _finer(ledger, coarse, error, limit)
+        found = _coarse(ledger, coarse, limit)
+        if found is None:
+            error = signed(coarse, ledger.run(replace(choice, divisions=2 * choice.divisions)))
+            found = Stepped(coarse, error) if share(error, limit) <= 1 else _finer(ledger, coarse, error, limit)
     return _longer(ledger, found, limit)
 
 
 # ---- a coarse step that will do ---------------------------------------------------------------------------------------
 
 
-def _two_stages(ledger: Ledger, choice: Choice, limit: Array) -> Stepped | None:
-    """The run of two stages with the coarse step, where that is enough; tried with rigid bodies first, which cost little."""
-    stiff = rigid(replace(choice, method=TWO_STAGES))
-    trial = ledger.runs.get(stiff)
-    if trial is not None:
-        error = _from_two_rows(ledger, trial)
-        if error is None or share(error, limit) > 1:
-            return None
-        if stiff.parts == choice.parts:
-            return Stepped(trial, error)
-    trial = _attempt(ledger, replace(choice, method=TWO_STAGES))
-    if trial is None:
+def _rigid_in_two_stages(ledger: Ledger, choice: Choice, limit: Array) -> Stepped | None:
+    """The coarse run of rigid bodies with two stages, which is there already, where it is good enough."""
+    trial = ledger.runs.get(replace(choice, method=TWO_STAGES))
+    if trial is None or any(part.count for part in choice.parts):
         return None
-    error = difference(trial.values, ledger.run(choice).values)
-    return Stepped(trial, error) if share(error, SURELY * limit) <= 1 else None
+    error = _from_two_rows(ledger, trial)
+    return None if error is None or share(error, limit) > 1 else Stepped(trial, error)
 
 
-def _coarse_error(ledger: Ledger, coarse: Trial, limit: Array) -> Histories:
-    """The error of the coarse run: from steps over two rows where that shows it to be small, or else from half the step."""
+def _coarse(ledger: Ledger, coarse: Trial, limit: Array) -> Stepped | None:
+    """The coarse run, or one of two stages, where steps over two rows show that this is enough."""
     error = _from_two_rows(ledger, coarse)
-    if error is not None and share(error, NEARLY * limit) <= 1:
-        return error
-    return signed(coarse, ledger.run(replace(coarse.choice, divisions=2 * coarse.choice.divisions)))
+    if error is None or share(error, NEARLY * limit) > 1:
+        return None
+    if share(error, FAR * limit) > 1:
+        return Stepped(coarse, error)
+    trial = _attempt(ledger, replace(coarse.choice, method=TWO_STAGES))
+    if trial is None:
+        return Stepped(coarse, error)
+    off = difference(trial.values, coarse.values)
+    return (
+        Stepped(trial, off) if share(off, SURELY * limit) <= 1 else None
+    )  # or else steps over two rows miss something
 
 
 def _from_two_rows(ledger: Ledger, trial: Trial) -> Histories | None:
@@ -131,41 +139,67 @@ def _on_all_rows(values: Array) -> Array:
 
 def _finer(ledger: Ledger, coarse: Trial, error: Histories, limit: Array) -> Stepped:
     """The cheaper of the methods by what they are predicted to need, run with that."""
-    needed = _needed(coarse, share(error, limit))
-    truth = difference(coarse.values, error)
-    offers = [(per_row(replace(coarse.choice, divisions=needed)), coarse.choice.method, needed)]
-    for name in (EXPLICIT, TWO_STAGES):
-        trial = _attempt(ledger, replace(coarse.choice, method=name)) if name in methods(ledger.span) else None
-        if trial is not None and cost(trial, ledger.span) < offers[0][0] * ledger.span.rows:
-            divisions = _needed(trial, share(difference(trial.values, truth), limit))
-            offers.append((per_row(replace(trial.choice, divisions=divisions)), name, divisions))
-    failed: Exception | None = None
-    for _, name, divisions in sorted(offers):
-        try:
-            return _refined(ledger, replace(coarse.choice, method=name), divisions, limit)
-        except (SimulationError, InputError) as problem:
-            failed = problem
-    raise SimulationError(
-        f"no integrator reaches the tolerance with steps down to 1/{MOST} of the output step; {failed}"
+    needed = {coarse.choice.method: _needed(coarse, share(error, limit))}
+    most, truth = (
+        per_row(replace(coarse.choice, divisions=needed[coarse.choice.method])),
+        difference(coarse.values, error),
     )
+    for name in (EXPLICIT, TWO_STAGES):
+        choice = replace(coarse.choice, method=name)
+        if name not in methods(ledger.span) or per_row(choice) * (1 if name == EXPLICIT else PAYS) > most:
+            continue
+        trial = _attempt(ledger, choice)
+        if trial is not None:
+            needed[name] = _needed(trial, MARGIN * share(difference(trial.values, truth), limit))
+    return _cheapest(ledger, coarse.choice, needed, limit)
 
 
-def _refined(ledger: Ledger, choice: Choice, needed: int, limit: Array) -> Stepped:
-    """Runs of one method, each with the step that the one before predicts, until the limit holds and no longer one does."""
+def _cheapest(ledger: Ledger, choice: Choice, needed: dict[str, int], limit: Array) -> Stepped:
+    """A run within the limit, of the method that costs least by the divisions that each is predicted to need.
+
+    Every run corrects the prediction for its method. Far predictions are approached in rungs, each of which tells the error of
+    the next.
+    """
+    before: dict[str, tuple[int, float]] = {}
     best: Stepped | None = None
     for _ in range(ATTEMPTS):
-        trial = ledger.run(replace(choice, divisions=needed))
+        name = min(needed, key=lambda name: (per_row(replace(choice, method=name, divisions=needed[name])), name))
+        divisions = _rung(ledger, replace(choice, method=name), needed[name])
+        trial = _attempt(ledger, replace(choice, method=name, divisions=divisions))
+        if trial is None:
+            needed[name] = min(MOST, 2 * divisions)
+            continue
         error = measured(ledger, trial)
         now = share(error, limit)
-        if now <= 1 and (best is None or needed < best.trial.choice.divisions):
+        if now <= 1 and (best is None or cost(trial, ledger.span) < cost(best.trial, ledger.span)):
             best = Stepped(trial, error)
-        better = int(np.ceil(needed * now ** (1 / order(trial)) * (MARGIN if now > 1 else 1.0)))
-        if best is not None and (now > 1 or better >= ONCE * needed or needed == 1):
+        power = 1 / _seen_order(trial, now, before.get(name))
+        before[name] = divisions, now
+        better = int(np.ceil(divisions * now**power * (MARGIN if now > 1 else 1.0)))
+        if best is not None and (now > 1 or better >= ONCE * divisions or divisions == 1):
             return best
-        needed = int(np.clip(better if better != needed else needed + 1, 1, MOST))
+        needed[name] = int(np.clip(better if better != divisions else divisions + 1, 1, MOST))
     if best is None:
-        raise SimulationError(f"{choice.method}: errors stay above their limits with {needed} steps from row to row")
+        raise SimulationError(
+            f"no integrator reaches the tolerance with steps down to 1/{MOST} of the output step: errors stay above their "
+            f"limits with {max(needed.values())} steps from row to row"
+        )
     return best
+
+
+def _rung(ledger: Ledger, choice: Choice, needed: int) -> int:
+    """The divisions of the next run towards those needed."""
+    there = [one.divisions for one in ledger.runs if replace(one, divisions=choice.divisions) == choice]
+    finest = max((d for d in there if d < needed), default=needed)
+    return needed if needed <= NEAR[1] * finest else int(np.ceil(RUNG * finest))
+
+
+def _seen_order(trial: Trial, error: float, before: tuple[int, float] | None) -> float:
+    """The order with which the error falls from the last run to this one, at most that of the method."""
+    if before is None or before[0] >= trial.choice.divisions or not 0 < error < before[1]:
+        return float(order(trial))
+    seen = np.log(before[1] / error) / np.log(trial.choice.divisions / before[0])
+    return float(np.clip(seen, 1.0, order(trial)))
 
 
 def measured(ledger: Ledger, trial: Trial) -> Histories:
@@ -198,11 +232,19 @@ def _longer(ledger: Ledger, fixed: Stepped, limit: Array) -> Stepped:
         return fixed
     best, truth = fixed, difference(fixed.trial.values, fixed.error)
     for name in CONTROLLED:
+        if not (CONTROLLED[name].implicit or _is_soft(ledger, fixed.trial)):
+            continue
         choice = replace(fixed.trial.choice, method=name, divisions=1, accuracy=ACCURACIES[0])
         if ledger.first_part(choice) < cost(best.trial, ledger.span):
             found = _controlled(ledger, choice, truth, limit, best)
             best = best if found is None else found
     return best
+
+
+def _is_soft(ledger: Ledger, trial: Trial) -> bool:
+    """Whether an explicit method is stable with a step of a row."""
+    omega2 = max(body.model.omega2.max(initial=0.0) for body in trial.scene.bodies)
+    return bool(np.sqrt(omega2) * ledger.span.output_step <= RK4_LIMIT)
 
 
 def _controlled(ledger: Ledger, choice: Choice, truth: Histories, limit: Array, best: Stepped) -> Stepped | None:
