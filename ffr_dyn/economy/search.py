@@ -28,7 +28,7 @@ from ffr_dyn.economy.cost import of_run
 from ffr_dyn.economy.found import Economy, Verification
 from ffr_dyn.economy.ledger import Ledger, Tried
 from ffr_dyn.economy.outputs import Output, Probe, as_output, difference, largest, probe, ranges, total
-from ffr_dyn.economy.selection import Selection, Shares, gap, selected_model
+from ffr_dyn.economy.selection import Selection, Shares, gap, selected_model, size_of
 from ffr_dyn.economy.start import PILOT, Ground, Rigid, started, unmoved
 from ffr_dyn.economy.steps import chosen_step
 from ffr_dyn.economy.terms import TermEffect
@@ -47,7 +47,7 @@ SURELY_RIGID = (
     0.25  # of the tolerance: modes that do less by the estimate alone are left out without a run of everything
 )
 SHORT = 2e6  # [us] of a verification that is made without being asked for
-FINER = 6  # times the steps: worth another look
+FINER, UNDAMPED = 6, 2  # times the steps: worth another look, sooner where vibration lasts
 AGAIN = 1.0  # of the cost of the final run, that another look may cost in a run of everything
 
 
@@ -151,7 +151,9 @@ def _beside_everything(ledger: Ledger, stiff: Rigid) -> Chosen:
     if (error + largest(found.time) <= ground.limits).all():
         model = difference(ledger.run(same).values, finer.pilot.values)
         return replace(found, model=largest(model), error=largest(total(model, found.time)))
-    return _stepped(ledger, finer, selected_model(ledger, finer, omitted, Shares()), omitted, found.final.choice)
+    return _stepped(
+        ledger, finer, selected_model(ledger, finer, omitted, Shares(), size_of(same)), omitted, found.final.choice
+    )
 
 
 def _stepped(
@@ -179,7 +181,8 @@ def _finer_ground(ledger: Ledger, ground: Ground, final: Trial) -> Ground | None
     """Everything with a step that costs a part of the final run, where that is much finer than before."""
     one = of_run(replace(ground.everything, divisions=1), ledger.span.rows)
     divisions = int(AGAIN * cost(final, ledger.span) / one)
-    if divisions < FINER * ground.coarsest:
+    lasting = any(body.model.n and not body.damping.all() for body in final.scene.bodies)
+    if divisions < (UNDAMPED if lasting else FINER) * ground.coarsest:
         return None
     ledger.tell("everything, finer step")
     everything = replace(ground.everything, divisions=divisions)

@@ -19,7 +19,8 @@ from ffr_dyn.scene import Scene
 Array = np.ndarray
 
 NEARLY_ALL = 0.8  # of the modes: then those of the full motion are ranked instead
-ATTEMPTS = 4
+ATTEMPTS = 5
+MORE = 1.2  # times as many directions, at least, after those that were not enough
 HOPE = 1.0  # times the tolerance: where modes do more by the estimate, rigid bodies are not tried
 SAFELY = 0.6  # of what may be left out, when what was predicted turns out too much
 
@@ -80,19 +81,22 @@ class Selection:
     terms: tuple[TermEffect, ...] = ()
 
 
-def selected_model(ledger: Ledger, ground: Ground, omitted: Contributions, shares: Shares) -> Selection:
+def selected_model(
+    ledger: Ledger, ground: Ground, omitted: Contributions, shares: Shares, beyond: int = -1
+) -> Selection:
     """The fewest modes, or shapes made of them, and the fewest terms whose absence leaves the outputs within their share.
 
     omitted : what modes do, driven by the rigid motion
+    beyond  : elastic coordinates of a model that is known not to do
     """
-    if (omitted.effect.sum(axis=0) <= HOPE * ground.limits).all():
+    if beyond < 0 and (omitted.effect.sum(axis=0) <= HOPE * ground.limits).all():
         stiff = rigid(ground.everything)
         if (gap(ledger, ground, stiff, "all bodies rigid") <= shares.rigid * ground.limits).all():
             return Selection(stiff)
     rankings, effects = _rankings(ledger, ground, omitted, shares)
     predicted = [ranking.model(ranking.count(shares.modes)) for ranking in rankings]
     cheapest = min(range(len(rankings)), key=lambda k: (per_evaluation(predicted[k]), k))
-    return Selection(_enough(ledger, ground, rankings[cheapest], effects, shares), effects)
+    return Selection(_enough(ledger, ground, rankings[cheapest], effects, shares, beyond), effects)
 
 
 def _rankings(
@@ -111,10 +115,10 @@ def _rankings(
 
 
 def _enough(
-    ledger: Ledger, ground: Ground, ranking: Ranking, effects: tuple[TermEffect, ...], shares: Shares
+    ledger: Ledger, ground: Ground, ranking: Ranking, effects: tuple[TermEffect, ...], shares: Shares, beyond: int
 ) -> Choice:
     """The model that a run beside everything shows to be enough; everything where the number of attempts does not do."""
-    scale, count = 1.0, 0
+    scale, count = 1.0, _more(ranking, beyond) if beyond >= 0 else 0
     for _ in range(ATTEMPTS):
         count = max(count, ranking.count(scale * shares.modes))
         model = without_minor(ranking.model(count), effects, scale * shares.terms * ground.limits)
@@ -124,12 +128,22 @@ def _enough(
         if model == ground.everything:
             break
         scale *= SAFELY / min(error, 1e6)
-        count = min(count + 1, ranking.order.size)
+        count = _more(ranking, count)
     return ground.everything
 
 
+def _more(ranking: Ranking, count: int) -> int:
+    """A number of directions after one that is not enough."""
+    return min(max(count + 1, int(MORE * count)), ranking.order.size)
+
+
+def size_of(choice: Choice) -> int:
+    """How many elastic coordinates a model has."""
+    return sum(part.count for part in choice.parts)
+
+
 def _said(model: Choice) -> str:
-    return f"{sum(part.count for part in model.parts)} elastic coordinates"
+    return f"{size_of(model)} elastic coordinates"
 
 
 def gap(ledger: Ledger, ground: Ground, choice: Choice, what: str) -> Array:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.forward import RK4_LIMIT
-from ffr_dyn.economy.choice import Choice, rigid
+from ffr_dyn.economy.choice import Choice
 from ffr_dyn.economy.cost import STAGES, per_row
 from ffr_dyn.economy.ledger import Ledger
 from ffr_dyn.economy.outputs import difference, largest
@@ -26,7 +26,7 @@ Array = np.ndarray
 Histories = tuple[Array, ...]
 
 TWO_STAGES, EXPLICIT = "ros2", "rk4"
-SURELY = 0.5  # of the limit: the difference of two coarse runs of different order that is taken for the error of one
+SURELY = 0.95  # of the limit: the difference of two coarse runs of different order that is taken for the error of one
 NEARLY = 0.8  # of the limit: an estimate from a run with steps over two rows
 FAR = 0.1  # of the limit: steps longer than a row would do
 ACCURACIES = (1e-2, 1e-3)
@@ -157,8 +157,8 @@ def _finer(ledger: Ledger, coarse: Trial, error: Histories, limit: Array) -> Ste
 def _cheapest(ledger: Ledger, choice: Choice, needed: dict[str, int], limit: Array) -> Stepped:
     """A run within the limit, of the method that costs least by the divisions that each is predicted to need.
 
-    Every run corrects the prediction for its method. Far predictions are approached in rungs, each of which tells the error of
-    the next.
+    Every run corrects the prediction for its method. Far predictions are approached in rungs, each of which tells the error
+    of the next.
     """
     before: dict[str, tuple[int, float]] = {}
     best: Stepped | None = None

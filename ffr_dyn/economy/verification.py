@@ -13,7 +13,7 @@ from ffr_dyn.economy.cost import of_run
 from ffr_dyn.economy.found import Verification
 from ffr_dyn.economy.ledger import Ledger
 from ffr_dyn.economy.outputs import Probe, difference, largest
-from ffr_dyn.economy.selection import Shares, selected_model
+from ffr_dyn.economy.selection import Shares, selected_model, size_of
 from ffr_dyn.economy.start import PILOT, Ground
 from ffr_dyn.economy.steps import error_of
 from ffr_dyn.economy.trial import Trial, cost
@@ -55,7 +55,7 @@ def verified(
         if (errors[-1] <= limits).all() or len(errors) == ATTEMPTS:
             spent = cost(sharp, ledger.span) + cost(coarse, ledger.span)
             return final, Verification(choice, errors[-1], errors[0], own, len(errors) - 1, spent)
-        final = _finer(ledger, limits, final, sharp, omitted, len(errors))
+        final = _better(ledger, limits, final, sharp, coarse, omitted, len(errors))
 
 
 def _check_accuracy(of: Probe, limits: Array, own: Array) -> None:
@@ -67,22 +67,21 @@ def _check_accuracy(of: Probe, limits: Array, own: Array) -> None:
             )
 
 
-def _finer(ledger: Ledger, limits: Array, final: Trial, sharp: Trial, omitted: Contributions, attempt: int) -> Trial:
-    """A better model: of a finer step where that is what is wrong, or else chosen anew beside the reference."""
-    finer = ledger.run(_shorter(final.choice))
-    gained = largest(difference(finer.values, final.values)) / limits
-    error = largest(difference(finer.values, sharp.values)) / limits
-    if (error <= 1).all() or gained.max() > error.max():
-        return finer
+def _better(
+    ledger: Ledger, limits: Array, final: Trial, sharp: Trial, coarse: Trial, omitted: Contributions, attempt: int
+) -> Trial:
+    """A better model: of a finer step where that is what is wrong, or else chosen anew beside everything with the same step."""
+    same = replace(final.choice, method=PILOT, divisions=coarse.choice.divisions, accuracy=0.0)
+    if (largest(difference(ledger.run(same).values, coarse.values)) <= Shares().all * limits).all():
+        return ledger.run(_shorter(final.choice))
     steps: dict[str, Any] = {key: getattr(final.choice, key) for key in ("method", "divisions", "accuracy")}
     if not final.choice.integrator(ledger.span.output_step).implicit:  # its step is for the modes that it had
-        steps = {"method": PILOT, "divisions": max(1, sharp.choice.divisions // 2), "accuracy": 0.0}
-    choice = replace(sharp.choice, **steps)
+        steps = {"method": PILOT, "divisions": coarse.choice.divisions, "accuracy": 0.0}
     if attempt > 1:
-        return ledger.run(choice)
-    ground = Ground(sharp.choice, sharp.choice, sharp, limits, limits)
-    anew = selected_model(ledger, ground, omitted, Shares()).choice
-    return ledger.run(choice if anew.parts == final.choice.parts else replace(anew, **steps))
+        return ledger.run(replace(coarse.choice, **steps))
+    ground = Ground(coarse.choice, coarse.choice, coarse, limits, limits)
+    anew = selected_model(ledger, ground, omitted, Shares(), size_of(final.choice)).choice
+    return ledger.run(replace(anew, **steps))
 
 
 def _shorter(choice: Choice) -> Choice:
