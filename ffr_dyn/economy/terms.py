@@ -52,8 +52,10 @@ def term_effects(seen: Samples, sensitivity: Contributions) -> tuple[TermEffect,
 def without_minor(choice: Choice, effects: tuple[TermEffect, ...], limit: Array) -> Choice:
     """The model without the terms that do least, which together stay below a limit (outputs,)."""
     flexible = [e for e in effects if choice.parts[e.body].count]
+    if not flexible:
+        return choice
     order = sorted(flexible, key=lambda e: float((e.effect / limit).max(initial=0.0)))
-    together = np.cumsum([e.effect for e in order], axis=0).reshape(len(order), -1)
+    together = np.cumsum([e.effect for e in order], axis=0)
     dropped = [e for e, done in zip(order, together, strict=True) if (done <= limit).all()]
     return _dropping(choice, flexible, dropped)
 
