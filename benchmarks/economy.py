@@ -7,14 +7,14 @@ processor time of the time loop of the chosen model; how many times as long othe
 
     grid     the cheapest model and step of a grid that meets the tolerance (1 at best)
     same     everything (all modes, all terms, all bodies flexible) in space, with the method and step of the chosen model
-    own      everything as `ffr-dyn run` takes it, in the plane where there is one, with its default method and the longest step
-             that meets the tolerance
+    own      everything as `ffr-dyn run` takes it, in the plane where there is one, with its default method and the longest
+             step that meets the tolerance
     best     the same with the cheapest of all methods
     default  the same with the default method and step, whether that meets the tolerance or not
 
-the cost of the search beyond one verification, in runs of the chosen model by the cost model, and as the processor time of all
-of a search without verification over that of a whole run of the chosen model, assembly and outputs included; the effectivity,
-estimated over true error, of every output. True errors are against everything on with a much finer step.
+the cost of the search beyond one verification, in runs of the chosen model by the cost model, and as the processor time of
+all of a search without verification over that of a whole run of the chosen model, assembly and outputs included; the
+effectivity, estimated over true error, of every output. True errors are against everything on with a much finer step.
 
 The grid: every set of flexible bodies (every single one and all, where there are more than three), with 1, 2, 3, 6 and all
 coordinates of each, statically complete, in the plane where there is one; stiffening on and off; every method with 1, 2, 3,
@@ -315,8 +315,8 @@ def line(row: Row) -> str:
 
 
 HEAD = (
-    f"{'case':17} {'tol':>6} {'met':4}{'worst':>5} {'plane':5}{'method':9}{'ms':>7}{'/grid':>7}{'same/':>7}{'own/':>7}{'best/':>7}"
-    f"{'default/':>8}{'search':>8}{'time':>6}{'rep':>4}   {'coordinates':20} effectivity"
+    f"{'case':17} {'tol':>6} {'met':4}{'worst':>5} {'plane':5}{'method':9}{'ms':>7}{'/grid':>7}"
+    f"{'same/':>7}{'own/':>7}{'best/':>7}{'default/':>8}{'search':>8}{'time':>6}{'rep':>4}   {'coordinates':20} effectivity"
 )
 
 

@@ -30,7 +30,7 @@ from ffr_dyn.economy.ledger import Ledger, Tried
 from ffr_dyn.economy.outputs import Output, Probe, as_output, difference, largest, probe, ranges, total
 from ffr_dyn.economy.selection import Selection, Shares, gap, selected_model, size_of
 from ffr_dyn.economy.start import PILOT, Ground, Rigid, started, unmoved
-from ffr_dyn.economy.steps import chosen_step
+from ffr_dyn.economy.steps import Stepped, chosen_step
 from ffr_dyn.economy.terms import TermEffect
 from ffr_dyn.economy.trial import Span, Trial, cost
 from ffr_dyn.economy.verification import reference_cost, verified
@@ -151,18 +151,16 @@ def _beside_everything(ledger: Ledger, stiff: Rigid) -> Chosen:
     if (error + largest(found.time) <= ground.limits).all():
         model = difference(ledger.run(same).values, finer.pilot.values)
         return replace(found, model=largest(model), error=largest(total(model, found.time)))
-    return _stepped(
-        ledger, finer, selected_model(ledger, finer, omitted, Shares(), size_of(same)), omitted, found.final.choice
-    )
+    return _stepped(ledger, finer, selected_model(ledger, finer, omitted, Shares(), size_of(same)), omitted, found)
 
 
 def _stepped(
-    ledger: Ledger, ground: Ground, selection: Selection, omitted: Contributions, like: Choice | None = None
+    ledger: Ledger, ground: Ground, selection: Selection, omitted: Contributions, like: Chosen | None = None
 ) -> Chosen:
-    """The model with the step it needs, which may be much as that of another one, `like`."""
+    """The model with the step it needs, or with that of a model much like it, whose error is taken over."""
     model = difference(ledger.run(selection.choice).values, ground.pilot.values)
     left = np.maximum(OF_ALL * ground.limits - largest(model), LEAST * ground.limits)
-    stepped = chosen_step(ledger, selection.choice, left, like)
+    stepped = chosen_step(ledger, selection.choice, left) if like is None else _as_like(ledger, selection.choice, like)
     return Chosen(
         stepped.trial,
         largest(model),
@@ -177,10 +175,17 @@ def _stepped(
     )
 
 
+def _as_like(ledger: Ledger, choice: Choice, like: Chosen) -> Stepped:
+    given = like.final.choice
+    own = replace(choice, method=given.method, divisions=given.divisions, accuracy=given.accuracy)
+    return Stepped(ledger.run(own), like.time)
+
+
 def _finer_ground(ledger: Ledger, ground: Ground, final: Trial) -> Ground | None:
     """Everything with a step that costs a part of the final run, where that is much finer than before."""
-    one = of_run(replace(ground.everything, divisions=1), ledger.span.rows)
-    divisions = int(AGAIN * cost(final, ledger.span) / one)
+    most, rows = AGAIN * cost(final, ledger.span), ledger.span.rows
+    finer = [replace(ground.everything, divisions=d) for d in range(1, final.choice.divisions + 1)]
+    divisions = max((choice.divisions for choice in finer if of_run(choice, rows) <= most), default=1)
     lasting = any(body.model.n and not body.damping.all() for body in final.scene.bodies)
     if divisions < (UNDAMPED if lasting else FINER) * ground.coarsest:
         return None

@@ -63,17 +63,14 @@ def _takes_a_step(made: Callable[[float], Integrator], step: float) -> bool:
         return False
 
 
-def chosen_step(ledger: Ledger, choice: Choice, limit: Array, like: Choice | None = None) -> Stepped:
+def chosen_step(ledger: Ledger, choice: Choice, limit: Array) -> Stepped:
     """The cheapest method and step for a model with errors below `limit` (outputs,) from discretisation.
 
     choice : the model with the longest step that completes a run, by a method of the third order
-    like   : a model whose method and step are known, and likely to do
 
     Raises SimulationError when none is found.
     """
     ledger.tell("integrator and step")
-    if like is not None and not like.controlled:
-        return _cheapest(ledger, choice, {like.method: like.divisions}, limit)
     found = _rigid_in_two_stages(ledger, choice, limit)
     if found is None:
         coarse = ledger.run(choice)
@@ -98,12 +95,12 @@ def _rigid_in_two_stages(ledger: Ledger, choice: Choice, limit: Array) -> Steppe
 
 def _coarse(ledger: Ledger, coarse: Trial, limit: Array) -> Stepped | None:
     """The coarse run, or one of two stages, where steps over two rows show that this is enough."""
-    error = _from_two_rows(ledger, coarse)
+    error, simple = _from_two_rows(ledger, coarse), replace(coarse.choice, method=TWO_STAGES)
     if error is None or share(error, NEARLY * limit) > 1:
         return None
-    if share(error, FAR * limit) > 1:
+    if share(error, FAR * limit) > 1 and simple not in ledger.runs:
         return Stepped(coarse, error)
-    trial = _attempt(ledger, replace(coarse.choice, method=TWO_STAGES))
+    trial = _attempt(ledger, simple)
     if trial is None:
         return Stepped(coarse, error)
     off = difference(trial.values, coarse.values)

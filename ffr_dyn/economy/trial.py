@@ -73,7 +73,7 @@ def make(scene: Scene, choice: Choice, span: Span) -> Made:
 def cost(trial: Trial, span: Span) -> float:
     """[us] of a run, by the cost model: from its steps, or from its evaluations where the method chooses its steps."""
     if trial.choice.controlled:
-        return of_evaluations(trial.choice, trial.evaluations)
+        return of_evaluations(trial.choice, trial.evaluations, span.rows)
     return of_run(trial.choice, span.rows)
 
 
