@@ -32,10 +32,11 @@ from ffr_prep.matrix_checks import (
 )
 from ffr_prep.matrix_coupling import couple_matrices, tie_matrices
 from ffr_prep.matrix_model import MatrixModel, model_hash, without_empty_rows
+from ffr_prep.model import interface_shapes
 from ffr_prep.nodal_inertia import nodal_integrals, scalar_integrals, scalar_mass
 from ffr_prep.progress import Advance, Stages, no_advance, no_stages
+from ffr_prep.provenance import described
 from ffr_prep.quality import Quality, assess, completed
-from ffr_prep.reduce import described, interface_shapes
 from ffr_prep.reduction import Reduction
 from ffr_prep.reference import ReferenceConditions, functionals
 from ffr_prep.selection import Band

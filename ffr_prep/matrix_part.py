@@ -20,7 +20,7 @@ from ffr_prep.matrix_coupling import couple_matrices, tie_matrices
 from ffr_prep.matrix_model import MatrixModel, model_hash, without_empty_rows
 from ffr_prep.model import Model
 from ffr_prep.progress import Stages, no_stages
-from ffr_prep.reduce import described
+from ffr_prep.provenance import described
 
 Array = np.ndarray
 
@@ -77,7 +77,7 @@ def _nothing(modes: int) -> Surface:
     )
 
 
-def _unstressed(static: Array, basis: Array) -> Array:
+def _unstressed(static: Array, loads: Array, basis: Array) -> Array:
     raise InputError(
         "geometric stiffening needs stresses, which matrices from outside do not give: reduce the body without it"
     )

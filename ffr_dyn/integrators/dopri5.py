@@ -100,6 +100,7 @@ class DormandPrince:
     implicit: ClassVar[bool] = False
     controlled: ClassVar[bool] = True
     step: ClassVar[float] = 0.0
+    repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 10
     row_stages: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = (0.0,)

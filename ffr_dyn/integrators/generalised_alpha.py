@@ -202,6 +202,7 @@ class GeneralisedAlpha:
     scaled: bool = True
     order: ClassVar[int] = 2
     implicit: ClassVar[bool] = True
+    repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 9
     row_stages: ClassVar[int] = 2
     controlled: ClassVar[bool] = False
@@ -238,6 +239,7 @@ class HHT:
     iterations: int = 20
     order: ClassVar[int] = 2
     implicit: ClassVar[bool] = True
+    repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 9
     row_stages: ClassVar[int] = 2
     controlled: ClassVar[bool] = False

@@ -175,6 +175,7 @@ class HalfExplicit:
     step: float
     order: ClassVar[int] = 4
     implicit: ClassVar[bool] = False
+    repeatable: ClassVar[bool] = True
     stage_count: ClassVar[int] = STAGES + 3
     row_stages: ClassVar[int] = JAC + 36
     controlled: ClassVar[bool] = False

@@ -57,6 +57,7 @@ class RK4:
     order: ClassVar[int] = 4
     implicit: ClassVar[bool] = False
     controlled: ClassVar[bool] = False
+    repeatable: ClassVar[bool] = True
     stage_count: ClassVar[int] = 5
     row_stages: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = ()

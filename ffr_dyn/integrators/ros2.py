@@ -89,6 +89,7 @@ class ROS2:
     order: ClassVar[int] = 2
     implicit: ClassVar[bool] = True
     controlled: ClassVar[bool] = False
+    repeatable: ClassVar[bool] = True
     stage_count: ClassVar[int] = 4
     row_stages: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = ()

@@ -113,6 +113,7 @@ class ROS3:
     order: ClassVar[int] = 3
     implicit: ClassVar[bool] = True
     controlled: ClassVar[bool] = False
+    repeatable: ClassVar[bool] = True
     stage_count: ClassVar[int] = 6
     row_stages: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = ()
@@ -133,6 +134,7 @@ class AdaptiveROS3:
     implicit: ClassVar[bool] = True
     controlled: ClassVar[bool] = True
     step: ClassVar[float] = 0.0
+    repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 6
     row_stages: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = ()

@@ -138,15 +138,12 @@ def has_loads(loads):
 
 
 @inlined
-def evaluate_joints(m, w, t):
+def evaluate_joints(m, w):
     """Constraint rows and the factors of the multiplier matrix. Returns the row without a pivot, or -1."""
     for k in range(m.rows.marker.shape[0]):
         evaluate_block(m.rows, w.functions, w.markers, w.rows, k)
     couple_joints(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows)
-    failed = factorise_blocks(m.rows.start, m.pattern, w.rows.S, m.relaxation, w.rows.scale, w.independence)
-    if failed < 0 and w.independence[0] < w.independence[1]:
-        w.independence[1], w.independence[2] = w.independence[0], t
-    return failed
+    return factorise_blocks(m.rows.start, m.pattern, w.rows.S, m.relaxation, w.rows.scale, w.independence)
 
 
 @kernel
