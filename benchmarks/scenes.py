@@ -23,9 +23,10 @@ from ffr_prep.body import FlexibleBody, rigid_body, with_point
 from ffr_prep.interface import InterfaceRegion, couple
 from ffr_prep.material import Material
 from ffr_prep.mesh import read_mesh
-from ffr_prep.reduce import nodal_basis, reduce_mesh
+from ffr_prep.reduce import reduce_mesh
 from ffr_prep.reduction import CraigBampton
 from ffr_prep.reference import ReferenceConditions, SimplySupported, functionals
+from ffr_prep.solid_model import nodal_basis
 from ffr_prep.solids import assemble, vector_mass
 
 Array = np.ndarray

@@ -107,9 +107,9 @@ def run(mesh_file: Path, body_file: Path, solver: str, ranks: int) -> None:
 def _reduced(mesh: Any, solver: str, ranks: int, clock: Clock) -> FlexibleBody:
     own: dict[str, Any] = {"solver": Solver(solver, ranks)} if solver != "eigsh" else {}
     if solver == "eigsh":
-        import ffr_prep.reduce
+        import ffr_prep.model
 
-        ffr_prep.reduce.factorised = lambda model, solver: None  # type: ignore[assignment]  # its work is the peer's own
+        ffr_prep.model.factorised = lambda *_: None  # type: ignore[assignment]  # its work is the peer's own
     return reduce_mesh(
         mesh,
         name="rod",

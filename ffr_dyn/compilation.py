@@ -29,6 +29,7 @@ from ffr_dyn.kernels.units import (
 
 _METHODS = {**METHODS, **CONTROLLED}
 _AT_WORK: dict[str, subprocess.Popen[bytes]] = {}
+_ON_DISK: set[str] = set()  # units that were found there before: a program with many runs looks once
 
 
 def begin_compiling(*kinds: type[Integrator], model: Model | None = None) -> None:
@@ -43,7 +44,8 @@ def begin_compiling(*kinds: type[Integrator], model: Model | None = None) -> Non
     extra = {name: EXTRA_UNITS[name] for kind in kinds for name in kind.calls}
     scene = units_of(model) if model else {**UNITS, **LOAD_UNITS}
     units = {**scene, **controlled, **extra, **methods}
-    missing = [name for name, unit in units.items() if name not in _AT_WORK and not _is_on_disk(unit)]
+    _ON_DISK.update(name for name, unit in units.items() if name not in _ON_DISK and _is_on_disk(unit))
+    missing = [name for name in units if name not in _AT_WORK and name not in _ON_DISK]
     if not missing:
         return
     print("ffr-dyn: compiling the kernels, once (some twenty seconds) ...", file=sys.stderr, flush=True)

@@ -433,7 +433,7 @@ def new_work(m: Model) -> Work:
         field=np.zeros(3),
         diagonal=np.full(1, -1.0),
         info=np.zeros(3, dtype=np.int64),
-        independence=np.ones(3),
+        independence=np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
         **zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=2),
     )
 
@@ -454,14 +454,16 @@ def _identities(count: int) -> Array:
     return np.repeat(np.eye(3)[None], count, axis=0)
 
 
-def new_stages(system: System, states: int, rows: int = 0, numbers: Sequence[float] = ()) -> Stages:
-    """Memory of an integrator: states (x, v), constraint rows, and single numbers."""
+def new_stages(system: System, states: int, rows: int = 0, numbers: Sequence[float] = (), kept: int = 0) -> Stages:
+    """Memory of an integrator: states (x, v), constraint rows, single numbers, and states at the starts of steps."""
     place, C = system.layout, system.model.rows.kind.size
     return Stages(
         np.zeros((states, place.x_size)),
         np.zeros((states, place.v_size)),
         np.zeros((rows, C)),
         np.zeros(C),
+        np.zeros((kept, place.x_size)),
+        np.zeros((kept, place.v_size)),
         np.array(numbers, dtype=float),
     )
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.layout import Layout
-from ffr_dyn.rotation import rotation_matrix, skew
+from ffr_dyn.rotation import cross, rotation_matrix, skew
 from ffr_dyn.scene import Scene, marker_number, markers
 
 Array = np.ndarray
@@ -60,11 +60,11 @@ def body_state(place: Layout, x: Array, v: Array, b: int) -> BodyState:
 def point_motion(state: BodyState, u0: Array, phi_t: Array, b: int) -> Motion:
     """A point at u0 (3,) with translational shapes phi_t (3, n)."""
     u, u_dot = u0 + phi_t @ state.q, phi_t @ state.q_dot
-    spin = np.cross(state.omega, u)
+    spin = cross(state.omega, u)
     return Motion(
         state.R + state.A @ u,
         state.V + state.A @ (spin + u_dot),
-        state.A @ np.cross(state.omega, spin + 2 * u_dot),
+        state.A @ cross(state.omega, spin + 2 * u_dot),
         state.A @ np.hstack([np.eye(3), -skew(u), phi_t]),
         b,
     )
@@ -72,13 +72,13 @@ def point_motion(state: BodyState, u0: Array, phi_t: Array, b: int) -> Motion:
 
 def axis_motion(state: BodyState, a0: Array, phi_r: Array, b: int) -> Motion:
     """An axis a0 (3,) on a marker with rotational shapes phi_r (3, n)."""
-    a = a0 + np.cross(phi_r @ state.q, a0)
-    twist = np.cross(phi_r @ state.q_dot, a0)
-    rate = np.cross(state.omega, a) + twist
+    a = a0 + cross(phi_r @ state.q, a0)
+    twist = cross(phi_r @ state.q_dot, a0)
+    rate = cross(state.omega, a) + twist
     return Motion(
         state.A @ a,
         state.A @ rate,
-        state.A @ np.cross(state.omega, rate + twist),
+        state.A @ cross(state.omega, rate + twist),
         state.A @ np.hstack([np.zeros((3, 3)), -skew(a), -skew(a0) @ phi_r]),
         b,
     )

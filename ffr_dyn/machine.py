@@ -67,7 +67,8 @@ def new_machine(
     if method is None:
         stages, h = new_stages(system, 0), 0.0
     else:
-        stages, h = new_stages(system, method.stage_count, method.row_stages, method.numbers), method.step
+        kept, h = 2 if method.repeatable else 0, method.step
+        stages = new_stages(system, method.stage_count, method.row_stages, method.numbers, kept)
     clock = Clock(np.array([h, h or spacing]), np.zeros(3, dtype=np.int64), np.array(gains))
     control = _control(system, method, start, spacing)
     calls = () if method is None else method.calls

@@ -178,7 +178,7 @@ def _symmetric(body: FlexibleBody, k: int, used: Sequence[str]) -> bool:
     stays, leaves = _stays(body, k, used), _leaves(body, k, used)
     if (stays == leaves).any():
         return False
-    if body.stiffening is not None and not _splits(body.stiffening, stays):
+    if body.stiffening is not None and not _splits(body.stiffening, stays, k):
         return False
     PP, turning = body.PP_dm, axial(body.PP_dm)
     mixed = np.array([PP[a, a] + PP[b, b], turning[k]])[:, stays][:, :, leaves]
@@ -186,8 +186,11 @@ def _symmetric(body: FlexibleBody, k: int, used: Sequence[str]) -> bool:
     return bool(max(np.abs(mixed).max(initial=0.0), np.abs(out).max(initial=0.0)) < _ZERO)
 
 
-def _splits(stiffening: Array, stays: Array) -> bool:
-    """Whether no load couples modes that stay in the plane with modes that leave it."""
+def _splits(stiffening: Array, stays: Array, k: int) -> bool:
+    """Whether no load in the plane across body axis k couples modes that stay in the plane with modes that leave it."""
+    in_plane = [c for c in range(3) if c != k] + [3 + k]
+    acting = [*in_plane, 6 + k, *(c + first for first in range(12, len(stiffening), 6) for c in in_plane)]
+    stiffening = stiffening[acting]
     scale = np.abs(stiffening).max(axis=(1, 2), initial=0.0)
     mixed = np.abs(stiffening[:, stays][:, :, ~stays]).max(axis=(1, 2), initial=0.0)
     return bool((mixed <= 1e-6 * scale).all())

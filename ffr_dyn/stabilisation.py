@@ -8,7 +8,8 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class Projection:
     """Positions and velocities are projected, in the norm of the mass matrix, whenever Phi exceeds `tolerance`
-    (or its rate a hundred times that). Costs nothing while the constraints hold. (Eich 1993.)
+    (or its rate a hundred times that). Costs nothing while the constraints hold. (Eich 1993.) Singular positions are stepped
+    over (see `ffr_dyn.kernels.passing`).
 
     tolerance : of Phi [m, -]
     """

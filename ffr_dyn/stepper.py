@@ -9,7 +9,8 @@
     stepper.restore(before)
 
 A step is one call of the compiled time loop: it allocates nothing, and its only iteration, the projection onto the
-constraints, ends after four corrections.
+constraints, ends after four corrections. A step across a singular position may take the time of ten: it is tried with up to
+three other places of its stages.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.assemble import Assembled, assemble
-from ffr_dyn.analyses.forward import failure
+from ffr_dyn.analyses.failure import failure
 from ffr_dyn.checkpoint import fingerprint, leaves
 from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import System, new_record

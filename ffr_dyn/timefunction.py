@@ -153,15 +153,21 @@ def evaluate(function: TimeFunction, t: float) -> tuple[float, float, float]:
         wave = amplitude * np.sin(angle)
         return mean + wave, amplitude * speed * np.cos(angle), -(speed**2) * wave
     if function.kind == POLYNOMIAL:
-        return _derivatives(np.polynomial.Polynomial(data), t)
+        return _derivatives(data, t)
     pieces, count = int(data[0]), int(data[1])
     breaks = data[2 : pieces + 3]
     inside = min(max(t, breaks[0]), breaks[-1])
     piece = min(int(np.searchsorted(breaks, inside, side="right")) - 1, pieces - 1)
     coefficients = data[pieces + 3 :].reshape(pieces, count)[piece]
-    value, rate, second = _derivatives(np.polynomial.Polynomial(coefficients), inside - breaks[piece])
+    value, rate, second = _derivatives(coefficients, inside - breaks[piece])
     return (value, rate, second) if inside == t else (value, 0.0, 0.0)
 
 
-def _derivatives(polynomial: np.polynomial.Polynomial, t: float) -> tuple[float, float, float]:
-    return float(polynomial(t)), float(polynomial.deriv()(t)), float(polynomial.deriv(2)(t))
+def _derivatives(coefficients: Array, t: float) -> tuple[float, float, float]:
+    """Value and derivatives of a polynomial, lowest power first: Horner's rule, and its derivatives by the product rule."""
+    value = rate = half = 0.0
+    for c in reversed(coefficients.tolist()):
+        half = half * t + rate
+        rate = rate * t + value
+        value = value * t + c
+    return value, rate, 2 * half

@@ -13,6 +13,7 @@ import numpy as np
 
 Array = np.ndarray
 
+INERTIAL = 12  # loads of unit accelerations
 PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 

@@ -63,9 +63,10 @@ def basis_of(model: CoupledModel, L: Array, *vectors: Array) -> Basis:
 
 
 def in_frame(model: CoupledModel, L: Array, vectors: Array) -> Array:
-    """The deformation of the vectors (Z, p) as seen from the frame of the reference conditions L (r, Z).
+    """The deformation of the vectors (Z, p) as seen from the frame of the reference conditions L (r, Z): B_2 times vectors.
 
-    With more than six conditions, the combinations with rigid motions that satisfy them: p + 6 - r vectors.
+    With T the rigid motions, B_2 = I - T (L T)^-1 L. With more than six conditions, the combinations with rigid motions that
+    satisfy them: p + 6 - r vectors.
     """
     if len(L) > 6:
         moving = np.hstack([vectors, model.T])

@@ -243,6 +243,23 @@ def axis_gradients(elements: Beams, xi: Array) -> tuple[Array, Array]:
     return slopes, twist
 
 
+def rotation_gradients(elements: Beams, xi: Array) -> Array:
+    """(E, Q, 3, 12) the derivative along the beam of the rotation of the section, in element axes [1/m]."""
+    gradient = np.zeros((len(elements.length), len(xi), 3, 12))
+    gradient[:, :, 0, 3], gradient[:, :, 0, 9] = -1 / elements.length[:, None], 1 / elements.length[:, None]
+    gradient[:, :, 2, _XY] = curvature_functions(elements.length, elements.shear_y, xi)
+    gradient[:, :, 1, _XZ] = -_SIGN * curvature_functions(elements.length, elements.shear_z, xi)
+    return gradient
+
+
+def curvature_functions(length: Array, shear: Array, xi: Array) -> Array:
+    """(E, Q, 4) derivative of the rotation of `bending_functions`."""
+    length, shear = length[:, None], shear[:, None]
+    steep = 6 / length * (2 * xi - 1)
+    curvature = [steep, 6 * xi - 4 - shear, -steep, 6 * xi - 2 + shear]
+    return np.stack(curvature, axis=-1) / (length * (1 + shear))[..., None]
+
+
 def shear_strain(length: Array, shear: Array) -> Array:
     """(E, 4) the constant shear strain, slope less rotation, of (v_1, theta_1, v_2, theta_2) in one plane."""
     half = np.full_like(length, 0.5)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -16,7 +17,10 @@ _PATH = click.Path(path_type=Path)
 @click.argument("body", type=_PATH)
 @click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
 @click.option("--reference", required=True, metavar="CONDITIONS", help="As in reduce, on the interfaces of BODY.")
-def convert(body: Path, output: Path, reference: str) -> None:
+@click.option(
+    "--without-stiffening", is_flag=True, help="Leave out the geometric stiffness, where it cannot come along."
+)
+def convert(body: Path, output: Path, reference: str, without_stiffening: bool) -> None:
     """Attach the frame of BODY in another way, without its mesh: to an interface, between two, or to the mean axis.
 
     The motions that the body can make stay the same. What it has lost before is said, and not brought back.
@@ -26,7 +30,8 @@ def convert(body: Path, output: Path, reference: str) -> None:
 
     conditions = reference_of(reference)
     check_writable(output)
-    converted = load_body(body).with_reference(conditions)
+    loaded = load_body(body)
+    converted = (replace(loaded, stiffening=None) if without_stiffening else loaded).with_reference(conditions)
     save_body(converted, output)
     show(short_lines(converted))
     click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")

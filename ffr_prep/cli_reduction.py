@@ -59,7 +59,7 @@ _OPTIONS = (
     click.option("--frequency", type=float, help="Keep all normal modes up to this frequency [Hz]."),
     click.option("--accuracy", metavar="LOW,HIGH,ERROR", help="Keep as many as the receptances in a band [Hz] need."),
     click.option(
-        "--interface-modes", type=click.IntRange(min=0), default=12, show_default=True, help="Of characteristic."
+        "--interface-modes", type=click.IntRange(min=0), default=6, show_default=True, help="Of characteristic."
     ),
     click.option("--moments", type=click.IntRange(min=1), default=2, show_default=True, help="Of krylov."),
     click.option("--match", default="0", show_default=True, metavar="F1,F2,...", help="Frequencies [Hz] of krylov."),

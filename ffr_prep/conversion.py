@@ -31,7 +31,7 @@ from ffr_prep.body import FlexibleBody, Interface, Surface
 from ffr_prep.errors import InputError
 from ffr_prep.interface import CoupledModel
 from ffr_prep.invariants import InertiaIntegrals
-from ffr_prep.reduce import described
+from ffr_prep.provenance import described
 from ffr_prep.reference import ReferenceConditions, UserConditions, functionals
 from ffr_prep.report import interface_freedom
 from ffr_prep.turned_stiffening import condition_count, turned_stiffening

@@ -39,8 +39,8 @@ class Family:
     surface    : what is drawn, of the coordinates (E, 6k, n) per elastic coordinate
     stressed   : the same with stress modes, and section forces of beams
     recovery   : how the stress is recovered, in words
-    stiffening : (r, n, n) geometric stiffness, of the static coordinates (E, 6k, r) of r loads, the first twelve being those
-                 of unit accelerations, and of the basis (E, 6k, n)
+    stiffening : (r, n, n) geometric stiffness, of the static coordinates (E, 6k, r) of r loads, their accelerations (12, r),
+                 which act inside the elements, and the basis (E, 6k, n)
     """
 
     name: str
@@ -52,7 +52,7 @@ class Family:
     surface: Callable[[Array], Surface]
     stressed: Callable[[Array], Surface]
     recovery: str
-    stiffening: Callable[[Array, Array], Array]
+    stiffening: Callable[[Array, Array, Array], Array]
 
 
 def families(frame: Frame) -> tuple[Family, ...]:

@@ -256,9 +256,8 @@ def group_nodes(frame: Frame, name: str) -> Array:
     if name not in frame.node_groups:
         near = get_close_matches(name, frame.node_groups, n=1, cutoff=0.5)
         known = ", ".join(repr(one) for one in frame.node_groups) or "none; name nodes with named(frame, ...)"
-        raise InputError(
-            f"the frame has no group of nodes {name!r}; {f'did you mean {near[0]!r}? ' if near else ''}There are: {known}"
-        )
+        meant = f"did you mean {near[0]!r}? There" if near else "there"
+        raise InputError(f"the frame has no group of nodes {name!r}; {meant} are: {known}")
     return np.unique(frame.node_groups[name])
 
 

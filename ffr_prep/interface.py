@@ -18,8 +18,10 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from ffr_prep.accelerations import INERTIAL
 from ffr_prep.errors import InputError
 from ffr_prep.mesh import Mesh, face_group, region_nodes
+from ffr_prep.region_rotations import MeanRegion, RigidRegion, force_moments
 from ffr_prep.solids import SolidMatrices, face_mass, vector_mass
 
 Array = np.ndarray
@@ -117,6 +119,32 @@ def couple(mesh: Mesh, matrices: SolidMatrices, interfaces: Sequence[InterfaceRe
     )
 
 
+def turning_regions(
+    mesh: Mesh, matrices: SolidMatrices, interfaces: Sequence[InterfaceRegion], model: CoupledModel, loads: Array
+) -> list[RigidRegion | MeanRegion]:
+    """The interfaces of the coupled `model` as their rotations do work; loads (3N, 12) the inertial ones at the nodes."""
+    count = len(mesh.points)
+    regions = [_region(mesh, interface) for interface in interfaces]
+    on_nodes = [sp.csr_array((3 * count, 6)) if _follows(r) else sp.csr_array(_on_nodes(count, r).T) for r in regions]
+    every_load = sp.hstack([sp.csr_array(loads), *on_nodes], format="csr")
+    return [_turning(region, k, matrices.K, model, every_load) for k, region in enumerate(regions)]
+
+
+def _turning(
+    region: _Region, k: int, K: sp.csr_array, model: CoupledModel, loads: sp.csr_array
+) -> RigidRegion | MeanRegion:
+    rotation, count = model.C[6 * k + 3 : 6 * k + 6], len(model.points)
+    if _follows(region):
+        sums = force_moments(region.nodes, model.points[region.nodes] - region.point, 3, count)
+        return RigidRegion(rotation, sp.csr_array(sums @ K @ model.B), (sums @ loads).toarray())
+    weighted = region.weights @ region.offsets
+    sums = force_moments(region.nodes, weighted, 3, count)
+    second_moment = region.offsets.T @ weighted
+    return MeanRegion(
+        rotation, sp.csr_array(sums @ model.B), second_moment, region.point - region.centroid, INERTIAL + 6 * k
+    )
+
+
 def interface_index(model: CoupledModel, name: str) -> int:
     """Position of the interface in the model; InputError lists the names there are."""
     if name not in model.names:
@@ -200,8 +228,12 @@ def _tilde(v: Array) -> Array:
 # ---- transformation and coordinates -------------------------------------------------------------------------------
 
 
+def _follows(region: _Region) -> bool:
+    return region.interface.kind == "rigid"
+
+
 def _rigid(regions: Sequence[_Region]) -> list[_Region]:
-    return [region for region in regions if region.interface.kind == "rigid"]
+    return [region for region in regions if _follows(region)]
 
 
 def _free_nodes(points: Array, regions: Sequence[_Region]) -> Array:
@@ -234,7 +266,7 @@ def _coordinates(count: int, regions: Sequence[_Region], B: sp.csr_array) -> sp.
     first = B.shape[1] - 6 * len(_rigid(regions))
     parts = [sp.csr_array((0, B.shape[1]))]
     for region in regions:
-        if region.interface.kind == "rigid":
+        if _follows(region):
             parts.append(sp.eye_array(6, B.shape[1], k=first, format="csr"))
             first += 6
         else:

@@ -218,9 +218,8 @@ def group_nodes(model: MatrixModel, name: str) -> Array:
     if name not in model.groups:
         near = get_close_matches(name, model.groups, n=1, cutoff=0.5)
         known = ", ".join(repr(one) for one in model.groups) or "none; name nodes by number or position"
-        raise InputError(
-            f"there is no group of nodes {name!r}; {f'did you mean {near[0]!r}? ' if near else ''}There are: {known}"
-        )
+        meant = f"did you mean {near[0]!r}? There" if near else "there"
+        raise InputError(f"there is no group of nodes {name!r}; {meant} are: {known}")
     return np.unique(model.groups[name])
 
 

@@ -140,7 +140,7 @@ def _lumped(body: FlexibleBody, at: tuple[Interface, ...]) -> Array:
     if misfit > MISFIT_LIMIT:
         raise InputError(
             f"body {body.name!r}: masses at the {len(at)} nodes miss its inertia integrals by {misfit:.1e} (at most "
-            f"{MISFIT_LIMIT}): export the surface points too, or the kind 'full'"
+            f"{MISFIT_LIMIT}): export the surface points too (--surface), or the kind 'full' (--kind full)"
         )
     return np.hstack([np.repeat(masses[:, None], 3, axis=1), np.zeros((len(at), 3))])
 

@@ -208,7 +208,7 @@ def choice(name: str, known: Mapping[str, object]) -> str:
     shown = [*near, *(other for other in known if other not in near)]
     more = f" and {len(shown) - _SHOWN} more" if len(shown) > _SHOWN else ""
     names = ", ".join(repr(one) for one in shown[:_SHOWN]) + more
-    return (f"did you mean {near[0]!r}? " if near else "") + f"There are: {names or 'none'}"
+    return (f"did you mean {near[0]!r}? There" if near else "there") + f" are: {names or 'none'}"
 
 
 # ---- outside ------------------------------------------------------------------------------------------------------

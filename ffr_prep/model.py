@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from ffr_prep.basis import check_basis, factorised
-from ffr_prep.body import BeamForces, FlexibleBody, Surface
-from ffr_prep.errors import ComputationError
+from ffr_prep.basis import Basis, check_basis, factorised
+from ffr_prep.body import BeamForces, FlexibleBody, Interface, Surface
 from ffr_prep.factor import CHOLESKY, Solver, SupportedBody, solve_refined, supported
 from ffr_prep.interface import CoupledModel
 from ffr_prep.invariants import InertiaIntegrals
 from ffr_prep.progress import Advance, Stages, no_advance, no_stages
+from ffr_prep.provenance import described
 from ffr_prep.quality import assess, completed
-from ffr_prep.reduce import described, interface_shapes
+from ffr_prep.reactions import in_equilibrium, known_loads
 from ffr_prep.reduction import Reduction
 from ffr_prep.reference import ReferenceConditions, functionals
 from ffr_prep.selection import Band
@@ -33,21 +33,23 @@ class Model:
     inertia    : inertia integrals of a basis (Z, n)
     surface    : what is drawn, with the basis (Z, n) at its points
     stressed   : the same with stress modes, and section forces where there are beams
-    stiffening : (r, n, n) geometric stiffness of a basis (Z, n) under loads with the static displacements (Z, r), the
-                 first twelve of them the inertial loads
+    stiffening : (r, n, n) geometric stiffness of a basis (Z, n) under r loads, of their static displacements (Z, r) and
+                 their amplitudes (12 + 6 I, r) of the known loads (`ffr_prep.reactions`), reactions included
     recovery   : how the stress is recovered, in words
     record     : what the model is; JSON values
     packages   : whose versions are recorded
+    doubts     : what the integrals of a basis (Z, n) cannot be trusted with, in words
     """
 
     coupled: CoupledModel
     inertia: Callable[[Array], InertiaIntegrals]
     surface: Callable[[Array], Surface]
     stressed: Callable[[Array], Surface]
-    stiffening: Callable[[Array, Array], Array]
+    stiffening: Callable[[Array, Array, Array], Array]
     recovery: str
     record: Mapping[str, Any]
     packages: tuple[str, ...] = ("ffr", "numpy", "scipy", "scikit-fem")
+    doubts: Callable[[Array], list[str]] = lambda _: []
 
 
 def reduce_model(
@@ -86,56 +88,59 @@ def reduce_model(
     if quality:
         progress("compare with the full model")
     assessed = assess(coupled, body, L, basis, quality) if quality else None
-    stiffness = None
+    progress("integrate the inertia")
+    integrals = model.inertia(basis.Z)
+    if stress:
+        progress("recover the stress")
+    surface = (model.stressed if stress else model.surface)(basis.Z)
     if stiffening:
         progress("compute the geometric stiffness")
-        stiffness = model.stiffening(static_displacements(coupled, supported(body, L)), basis.Z)
-    progress("integrate the inertia")
     return FlexibleBody(
         name=name,
         omega2=basis.omega2,
         interfaces=interface_shapes(coupled, basis),
-        surface=(model.stressed if stress else model.surface)(basis.Z),
-        stiffening=stiffness,
+        surface=surface,
+        stiffening=stiffening_matrices(model, reference, supported(body, L), basis) if stiffening else None,
         provenance=completed(
-            record(model, reference, reduction)
+            record(model, reference, reduction, model.doubts(basis.Z))
             | {"solver": described(solver)}
             | ({"stress": model.recovery} if stress else {})
             | dict(provenance or {}),
             basis,
             assessed,
         ),
-        **vars(model.inertia(basis.Z)),
+        **vars(integrals),
     )
 
 
-def static_displacements(coupled: CoupledModel, held: SupportedBody) -> Array:
-    """(Z, 12 + 6 I) of the inertial loads and of unit forces and moments at each interface.
+def interface_shapes(model: CoupledModel, basis: Basis) -> tuple[Interface, ...]:
+    """The interfaces with translation and rotation per elastic coordinate."""
+    shapes = (model.C @ basis.Z).reshape(len(model.names), 6, basis.omega2.size)
+    attached = zip(model.names, model.positions, shapes, model.kinds, strict=True)
+    return tuple(Interface(name, at, six[:3], six[3:], kind) for name, at, six, kind in attached)
+
+
+def stiffening_matrices(model: Model, reference: ReferenceConditions, held: SupportedBody, basis: Basis) -> Array:
+    """(12 + 6 I, n, n) reduced geometric stiffness per unit load, in the order of `FlexibleBody.stiffening`.
+
+    held : the body under its reference conditions
 
     Raises ComputationError when a static problem fails.
     """
-    loads = np.hstack([known_loads(coupled), coupled.C.toarray().T])
-    return solve_refined(held, loads, np.zeros((len(held.C), loads.shape[1])))[0]
+    loads = known_loads(model.coupled)
+    static = solve_refined(held, loads, np.zeros((len(held.C), loads.shape[1])))[0]
+    K = model.stiffening(static, in_equilibrium(model.coupled, reference, static), basis.Z)
+    return (K + K.transpose(0, 2, 1)) / 2
 
 
-def known_loads(coupled: CoupledModel) -> Array:
-    """(Z, 12) the inertial loads; ComputationError for a model without them."""
-    if coupled.inertial_loads is None:
-        raise ComputationError("the model does not know its inertial loads: it cannot be stiffened or tied")
-    return coupled.inertial_loads
-
-
-def record(model: Model, reference: ReferenceConditions, reduction: Reduction) -> dict[str, Any]:
+def record(model: Model, reference: ReferenceConditions, reduction: Reduction, doubts: Sequence[str]) -> dict[str, Any]:
     """Provenance as JSON values: model, settings, versions. No time and no path, so it is reproducible."""
-    return (
-        {"warnings": []}
-        | dict(model.record)
-        | {
-            "reference": described(reference),
-            "reduction": described(reduction),
-            "versions": {package: version(package) for package in model.packages},
-        }
-    )
+    return dict(model.record) | {
+        "reference": described(reference),
+        "reduction": described(reduction),
+        "versions": {package: version(package) for package in model.packages},
+        "warnings": [*model.record.get("warnings", []), *doubts],
+    }
 
 
 def summed(parts: Sequence[InertiaIntegrals]) -> InertiaIntegrals:

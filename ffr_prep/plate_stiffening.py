@@ -27,10 +27,11 @@ _ORDER = {3: 6, 4: 7}
 _CHUNK = 512
 
 
-def plate_stiffening(elements: Plates, static: Array, basis: Array) -> Array:
+def plate_stiffening(elements: Plates, static: Array, accelerations: Array, basis: Array) -> Array:
     """(r, n, n) geometric stiffness of the shapes `basis` (E, 6k, n) under the loads with displacements (E, 6k, r).
 
-    Both are nodal coordinates in body axes.
+    Both are nodal coordinates in body axes. The forces in the plane follow from the displacements alone, whatever
+    `accelerations` (12, r) act inside the elements.
     """
     K = np.zeros((static.shape[2], basis.shape[2], basis.shape[2]))
     at, _ = rule(elements.lift.shape[1], _ORDER[elements.lift.shape[1]])

@@ -86,9 +86,10 @@ def _tensor_lines(label: str, tensor: Array) -> Iterator[str]:
 
 def _interface_lines(body: FlexibleBody) -> Iterator[str]:
     width = max((len(i.name) for i in body.interfaces[:_MOST_INTERFACES]), default=0)
+    size = float(np.sqrt(np.trace(body.rr_dm) / body.mass)) if body.mass > 0 else 0.0
     for k, interface in enumerate(body.interfaces[:_MOST_INTERFACES]):
         label = "interfaces" if k == 0 else ""
-        yield f"{label:12}{interface.name:{width}}  {interface.kind:5}  at {_vector(interface.position)} m"
+        yield f"{label:12}{interface.name:{width}}  {interface.kind:5}  at {_vector(interface.position, size)} m"
     if len(body.interfaces) > _MOST_INTERFACES:
         yield f"{'':12}{len(body.interfaces) - _MOST_INTERFACES} more"
 
@@ -207,11 +208,11 @@ def _receptances_in_words(quality: Quality) -> str:
 
 
 def _steady_lines(quality: Quality) -> Iterator[str]:
-    yield f"{'':12}steady deformation by      displacement         stress, largest error"
+    yield f"{'':12}{'steady deformation by':24}{'displacement':>18}  {'stress, largest error':>21}"
     parts = zip(("gravity", "angular acceleration", "spin"), (slice(0, 3), slice(3, 6), slice(6, 12)), strict=True)
     for name, part in parts:
         both = [_largest(errors[part]) for errors in (quality.displacement_errors, quality.stress_errors)]
-        yield f"{'':14}{name:22}{both[0]:>15}{both[1]:>15}"
+        yield f"{'':14}{name:22}{both[0]:>18}  {both[1]:>21}"
 
 
 def _largest(errors: Array) -> str:
@@ -249,8 +250,8 @@ def _settings(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _vector(vector: Array) -> str:
-    shown = np.where(np.abs(vector) < _NOISE * np.abs(vector).max(), 0.0, vector) + 0.0
+def _vector(vector: Array, size: float = 0.0) -> str:
+    shown = np.where(np.abs(vector) < _NOISE * max(np.abs(vector).max(), size), 0.0, vector) + 0.0
     return "(" + ", ".join(f"{x:.5g}" for x in shown) + ")"
 
 

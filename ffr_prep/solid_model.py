@@ -7,12 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from ffr_prep.interface import InterfaceRegion, couple
+from ffr_prep.basis import Basis
+from ffr_prep.body import Surface
+from ffr_prep.interface import CoupledModel, InterfaceRegion, couple, turning_regions
 from ffr_prep.invariants import inertia_integrals
-from ffr_prep.mesh import Mesh, check_mesh, mesh_hash
+from ffr_prep.mesh import Mesh, check_mesh, mesh_hash, surface_triangles
 from ffr_prep.model import Model
 from ffr_prep.progress import Stages, no_stages
-from ffr_prep.reduce import boundary, described, element_counts, mesh_warnings
+from ffr_prep.provenance import described
+from ffr_prep.region_rotations import region_stiffening
 from ffr_prep.solids import Materials, assemble
 from ffr_prep.stiffening import inertial_loads, stiffening_of
 from ffr_prep.stress import AVERAGING, stressed_boundary
@@ -37,18 +40,25 @@ def solid_model(
     matrices = assemble(mesh, material)
     progress("tie the interfaces")
     coupled = couple(mesh, matrices, interfaces)
+    loads = inertial_loads(mesh.points, matrices)
+    regions = turning_regions(mesh, matrices, interfaces, coupled, loads)
+    coupled = replace(coupled, inertial_loads=coupled.B.T @ loads, edges=element_edges(mesh))
+    m = matrices.m
+    del matrices, loads  # the stiffness takes as much memory as that of the model
 
     def field(z: Array) -> Array:
         return (coupled.B @ z).reshape(*mesh.points.shape, z.shape[1])
 
+    def stiffening(static: Array, amplitudes: Array, basis: Array) -> Array:
+        of_stress = stiffening_of(mesh, material, field(static), field(basis))
+        return of_stress + region_stiffening(regions, static, amplitudes, basis)
+
     return Model(
-        coupled=replace(
-            coupled, inertial_loads=coupled.B.T @ inertial_loads(mesh.points, matrices), edges=element_edges(mesh)
-        ),
-        inertia=lambda basis: inertia_integrals(mesh.points, matrices.m, field(basis)),
+        coupled=coupled,
+        inertia=lambda basis: inertia_integrals(mesh.points, m, field(basis)),
         surface=lambda basis: boundary(mesh, field(basis)),
         stressed=lambda basis: stressed_boundary(mesh, material, field(basis)),
-        stiffening=lambda static, basis: stiffening_of(mesh, material, field(static), field(basis)),
+        stiffening=stiffening,
         recovery=AVERAGING,
         record={
             "mesh": {
@@ -62,3 +72,33 @@ def solid_model(
             "warnings": mesh_warnings(mesh),
         },
     )
+
+
+def nodal_basis(model: CoupledModel, basis: Basis) -> Array:
+    """Phi (N, 3, n) [1/sqrt(kg)] at the nodes of the mesh."""
+    return (model.B @ basis.Z).reshape(*model.points.shape, basis.omega2.size)
+
+
+def boundary(mesh: Mesh, Phi: Array) -> Surface:
+    """The triangulated boundary of the mesh with the basis at its points."""
+    points, triangles = surface_triangles(mesh)
+    return Surface(mesh.points[points], triangles, Phi[points])
+
+
+def mesh_warnings(mesh: Mesh) -> list[str]:
+    """What makes the results of this mesh doubtful, in words."""
+    counts = element_counts(mesh)
+    if "tet4" not in counts:
+        return []
+    return [
+        f"{counts['tet4']} first-order tetrahedra (tet4): they are far too stiff in bending (locking); "
+        "use second-order elements (tet10)"
+    ]
+
+
+def element_counts(mesh: Mesh) -> dict[str, int]:
+    """Elements by kind."""
+    counts: dict[str, int] = {}
+    for block in mesh.blocks:
+        counts[block.kind] = counts.get(block.kind, 0) + len(block.nodes)
+    return counts

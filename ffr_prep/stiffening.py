@@ -22,25 +22,10 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from ffr_prep.accelerations import unit_accelerations
-from ffr_prep.factor import SupportedBody, solve_refined
-from ffr_prep.interface import CoupledModel
 from ffr_prep.mesh import Mesh
 from ffr_prep.solids import GradientChunk, Materials, SolidMatrices, displacement_gradients, vector_mass
-from ffr_prep.static_shapes import inertial_loads as loads_of
 
 Array = np.ndarray
-
-
-def stiffening_matrices(mesh: Mesh, material: Materials, model: CoupledModel, held: SupportedBody, Phi: Array) -> Array:
-    """(12 + 6 I, n, n) reduced geometric stiffness per unit load, in the order of `FlexibleBody.stiffening`.
-
-    model : with its inertial loads; held : the body under its reference conditions; Phi (N, 3, n) nodal basis
-
-    Raises ComputationError when a static problem fails.
-    """
-    loads = np.hstack([loads_of(model), model.C.toarray().T])
-    displacement, _ = solve_refined(held, loads, np.zeros((len(held.C), loads.shape[1])))
-    return stiffening_of(mesh, material, (model.B @ displacement).reshape(*mesh.points.shape, -1), Phi)
 
 
 def stiffening_of(mesh: Mesh, material: Materials, static: Array, Phi: Array) -> Array:

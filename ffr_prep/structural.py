@@ -1,8 +1,10 @@
 """From a frame of beams and plates to a reduced flexible body.
 
 The families of elements (`ffr_prep.families`) deliver stiffness and mass points. Assembly is u = C S W C_bar B_1 q_n with
-the Boolean B_1, and all inertia integrals are sums over the mass points, as exact as the shape functions; the body that
-results is of the same kind as that of a meshed solid.
+the Boolean B_1 (`connectivity`). Interfaces and reference conditions leave q_n = B_2 q_f: `tie` has the independent
+coordinates of interfaces, and `ffr_prep.basis.in_frame` takes out of these what the conditions L prevent. All inertia
+integrals are sums over the mass points, as exact as the shape functions; the body that results is of the same kind as
+that of a meshed solid.
 
 Sources: A. A. Shabana, Dynamics of Multibody Systems (2013), sections 6.1-6.7.
 """
@@ -17,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 from threadpoolctl import threadpool_limits
 
-from ffr_prep.accelerations import unit_accelerations
+from ffr_prep.accelerations import INERTIAL, unit_accelerations
 from ffr_prep.body import FlexibleBody, Surface
 from ffr_prep.factor import CHOLESKY, Solver
 from ffr_prep.families import Family, families
@@ -26,11 +28,12 @@ from ffr_prep.interface import CoupledModel, InterfaceRegion
 from ffr_prep.invariants import InertiaIntegrals, inertia_integrals
 from ffr_prep.model import Model, merged, reduce_model, summed
 from ffr_prep.progress import Advance, Stages, no_advance, no_stages
-from ffr_prep.reduce import described
+from ffr_prep.provenance import described
 from ffr_prep.reduction import Reduction
 from ffr_prep.reference import ReferenceConditions
+from ffr_prep.region_rotations import region_stiffening
 from ffr_prep.selection import Band
-from ffr_prep.structural_interface import couple_frame, tie
+from ffr_prep.structural_interface import couple_frame, tie, turning_regions
 
 Array = np.ndarray
 
@@ -110,12 +113,15 @@ def frame_model(frame: Frame, interfaces: Sequence[InterfaceRegion], progress: S
         edges=np.concatenate([_edges(part.nodes) for part in parts]),
         dimension=max(min(part.nodes.shape[1], 3) for part in parts) - 1,
     )
+    regions = turning_regions(frame, matrices.K, interfaces, ties, coupled, matrices.loads)
 
     def nodal(part: Family, z: Array) -> Array:
         return element_values(part, ties @ z)
 
-    def stiffening(static: Array, basis: Array) -> Array:
-        return np.sum([part.stiffening(nodal(part, static), nodal(part, basis)) for part in parts], axis=0)
+    def stiffening(static: Array, amplitudes: Array, basis: Array) -> Array:
+        inside = amplitudes[:INERTIAL]
+        of_elements = [part.stiffening(nodal(part, static), inside, nodal(part, basis)) for part in parts]
+        return np.sum(of_elements, axis=0) + region_stiffening(regions, static, amplitudes, basis)
 
     def surface(basis: Array) -> Surface:
         return merged([part.surface(nodal(part, basis)) for part in parts])

@@ -156,8 +156,6 @@ def _read(path: Path) -> StructureEntry:
 def _explained(wrong: Mapping[str, Any]) -> str:
     """Where, what, and the value."""
     where = ".".join(str(part) for part in wrong["loc"]) or "the file"
-    if wrong["type"] == "extra_forbidden":
-        return f"{where}: is not a known entry here"
     value = "" if isinstance(wrong["input"], dict) else f" (it is {wrong['input']!r})"
     return f"{where}: {wrong['msg'].removeprefix('Value error, ')}{value}"
 

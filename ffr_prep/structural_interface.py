@@ -18,9 +18,11 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.accelerations import INERTIAL, turns
 from ffr_prep.errors import InputError
 from ffr_prep.frame import Frame, group_nodes
 from ffr_prep.interface import CoupledModel, InterfaceRegion, rigid_field
+from ffr_prep.region_rotations import MeanRegion, RigidRegion, force_moments
 
 Array = np.ndarray
 
@@ -72,13 +74,66 @@ def _coordinates(
 def _mean_motion(frame: Frame, nodes: Array, position: Array) -> sp.csr_array:
     """(6, 6N) the rigid motion at `position` closest to the motions of the nodes."""
     at = frame.points[nodes]
-    square = float(((at - at.mean(axis=0)) ** 2).sum() / len(at)) or 1.0
+    square = _square(frame, nodes)
     R = rigid_coordinates(at - position)
     weighted = R * np.array([1.0, 1, 1, square, square, square])[:, None]
     motion = np.linalg.solve(np.einsum("nci,ncj->ij", R, weighted), weighted.reshape(-1, 6).T)
     columns = (6 * nodes[:, None] + np.arange(6)).ravel()
     ends = columns.size * np.arange(7)
     return sp.csr_array((motion.ravel(), np.tile(columns, 6), ends), shape=(6, 6 * len(frame.points)))
+
+
+def _square(frame: Frame, nodes: Array) -> float:
+    """s^2 [m^2]; any for one node alone, as its rotation is that of the interface."""
+    at = frame.points[nodes]
+    return float(((at - at.mean(axis=0)) ** 2).sum() / len(at)) or 1.0
+
+
+def turning_regions(
+    frame: Frame,
+    K: sp.csr_array,
+    interfaces: Sequence[InterfaceRegion],
+    ties: sp.csr_array,
+    model: CoupledModel,
+    loads: Array,
+) -> list[RigidRegion | MeanRegion]:
+    """The interfaces of the coupled `model` as their rotations do work; K (6N, 6N) and loads (6N, 12) of all nodes."""
+    size = len(ties.indptr) - 1
+    on_nodes = [
+        sp.csr_array((size, 6)) if i.kind == "rigid" else sp.csr_array(_mean_motion(frame, _nodes(frame, i), at).T)
+        for i, at in zip(interfaces, model.positions, strict=True)
+    ]
+    every_load = sp.hstack([sp.csr_array(loads), *on_nodes], format="csr")
+    made: list[RigidRegion | MeanRegion] = []
+    for k, interface in enumerate(interfaces):
+        rotation, nodes = model.C[6 * k + 3 : 6 * k + 6], _nodes(frame, interface)
+        if interface.kind == "rigid":
+            sums = force_moments(nodes, frame.points[nodes] - model.positions[k], 6, len(frame.points))
+            made.append(RigidRegion(rotation, sp.csr_array(sums @ K @ ties), (sums @ every_load).toarray()))
+        else:
+            made.append(_mean_region(frame, nodes, model.positions[k], rotation, ties, INERTIAL + 6 * k))
+    return made
+
+
+def _mean_region(
+    frame: Frame, nodes: Array, position: Array, rotation: sp.csr_array, ties: sp.csr_array, first: int
+) -> MeanRegion:
+    """Its rotation R is the best fit to the nodes and their rotations: sum of |R r_i - r_i - u_i|^2 + s^2 |R - R_i|^2 / 2."""
+    mean, half = frame.points[nodes].mean(axis=0), _square(frame, nodes) / 2
+    offsets = frame.points[nodes] - mean
+    spread = force_moments(nodes, offsets, 6, len(frame.points)) + _turned_nodes(nodes, half, len(frame.points))
+    second_moment = offsets.T @ offsets + half * len(nodes) * np.eye(3)
+    return MeanRegion(rotation, sp.csr_array(spread @ ties), second_moment, position - mean, first)
+
+
+def _turned_nodes(nodes: Array, weight: float, count: int) -> sp.csr_array:
+    """(9, 6N) weight times the sum of theta~ at row 3 a + b."""
+    a, c, b = np.nonzero(turns().transpose(1, 0, 2))  # theta~_ab = sum of turns[c]_ab theta_c
+    value = weight * turns()[c, a, b]
+    columns = 6 * nodes[:, None] + 3 + c
+    rows = np.broadcast_to(3 * a + b, columns.shape)
+    values = np.broadcast_to(value, columns.shape)
+    return sp.csr_array(sp.coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(9, 6 * count)))
 
 
 def tie(frame: Frame, interfaces: Sequence[InterfaceRegion]) -> sp.csr_array:

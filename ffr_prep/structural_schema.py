@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -14,6 +15,17 @@ class _Strict(BaseModel):
     """Unknown keys are mistakes; numbers must be finite."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known(cls, given: Any) -> Any:
+        known = list(cls.model_fields)
+        for key in given if isinstance(given, dict) else ():
+            if key not in known:
+                close = get_close_matches(str(key), known, 1)
+                hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(known)}"
+                raise ValueError(f"{key!r} is not a known entry here; {hint}")
+        return given
 
 
 class RectangleEntry(_Strict):
@@ -185,7 +197,7 @@ class ReductionEntry(_Strict):
     modes: int | None = Field(default=None, ge=0)
     frequency: float | None = None
     accuracy: tuple[float, float, float] | None = None
-    interface_modes: int = Field(default=12, ge=0)
+    interface_modes: int = Field(default=6, ge=0)
     moments: int = Field(default=2, ge=1)
     match: list[float] = [0.0]
 

@@ -20,11 +20,14 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from ffr_prep.accelerations import INERTIAL
 from ffr_prep.body import Surface
 from ffr_prep.errors import InputError
 from ffr_prep.interface import CoupledModel, interface_index
 from ffr_prep.invariants import InertiaIntegrals
-from ffr_prep.model import Model, known_loads, merged, summed
+from ffr_prep.model import Model, merged, summed
+from ffr_prep.reactions import known_loads
+from ffr_prep.region_rotations import second_order_turn
 from ffr_prep.structural_interface import rigid_coordinates
 
 Array = np.ndarray
@@ -65,8 +68,18 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
     def inertia(basis: Array) -> InertiaIntegrals:
         return summed([m.inertia(x @ basis) for m, x in zip(models, own, strict=True)])
 
-    def stiffening(static: Array, basis: Array) -> Array:
-        return np.sum([m.stiffening(x @ static, x @ basis) for m, x in zip(models, own, strict=True)], axis=0)
+    def stiffening(static: Array, amplitudes: Array, basis: Array) -> Array:
+        of_ties, loads = _through_ties(parts, ties, own, static, amplitudes)
+        of_parts = [
+            m.stiffening(x @ static, part_loads, x @ basis) for m, part_loads, x in zip(models, loads, own, strict=True)
+        ]
+        of_arms = [phi.T @ second_order_turn(S) @ phi for S, rotation in of_ties for phi in [rotation @ basis]]
+        return np.sum([*of_parts, *of_arms], axis=0)
+
+    def doubts(basis: Array) -> list[str]:
+        return [
+            f"{name}: {doubt}" for (name, m), x in zip(parts.items(), own, strict=True) for doubt in m.doubts(x @ basis)
+        ]
 
     return Model(
         coupled=coupled,
@@ -80,7 +93,72 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
             "ties": [list(pair) for pair in ties],
             "warnings": [f"{name}: {w}" for name, part in parts.items() for w in part.record.get("warnings", [])],
         },
+        doubts=doubts,
     )
+
+
+# ---- loads that pass through ties ---------------------------------------------------------------------------------
+
+
+def _through_ties(
+    parts: Mapping[str, Model],
+    ties: Sequence[tuple[str, str]],
+    own: Sequence[sp.csr_array],
+    static: Array,
+    loads: Array,
+) -> tuple[list[tuple[Array, sp.csr_array]], list[Array]]:
+    """What each tie carries as (r, 3, 3) force f_a times arm d_b, with the rotation (3, Z) of its arm, and for each part
+    the amplitudes (12 + 6 I, r) of its known loads, which are those of the body and of its ties.
+
+    The dependent side of a tie is pulled by what its stiffness and its other loads ask for; the other side by the opposite.
+    """
+    names, models = list(parts), [part.coupled for part in parts.values()]
+    of_parts = _loads_of_parts(models, names, ties, loads)
+    arms = []
+    for pair in ties:
+        sides = [(names.index(part), interface) for part, _, interface in (name.partition(".") for name in pair)]
+        places = [(p, interface_index(models[p], interface)) for p, interface in sides]
+        if _own(_rows(models, places[0]), 0) is None:
+            places.reverse()
+        (d, _), (m, _) = places
+        rows = _own(_rows(models, places[0]), 0)
+        assert rows is not None  # `elimination` has refused the tie otherwise
+        z = own[d] @ static
+        wrench = models[d].K[rows] @ z - known_loads(models[d])[rows] @ of_parts[d]
+        arm = _position(models, places[0]) - _position(models, places[1])
+        of_parts[d][_amplitudes(places[0])] += wrench
+        of_parts[m][_amplitudes(places[1])] -= np.vstack([wrench[:3], wrench[3:] + np.cross(arm, wrench[:3].T).T])
+        arms.append((wrench[:3].T[:, :, None] * arm, sp.csr_array(_rows(models, places[1])[3:] @ own[m])))
+    return arms, of_parts
+
+
+def _loads_of_parts(
+    models: Sequence[CoupledModel], names: Sequence[str], ties: Sequence[tuple[str, str]], loads: Array
+) -> list[Array]:
+    """For each part its known loads (12 + 6 I, r) among those of the body; nothing at ties."""
+    gone = {name for pair in ties for name in pair}
+    made, first = [], INERTIAL
+    for name, model in zip(names, models, strict=True):
+        own = np.zeros((INERTIAL + 6 * len(model.names), loads.shape[1]))
+        own[:INERTIAL] = loads[:INERTIAL]
+        for k, interface in enumerate(model.names):
+            if f"{name}.{interface}" not in gone:
+                own[_amplitudes((0, k))] = loads[first : first + 6]
+                first += 6
+        made.append(own)
+    return made
+
+
+def _amplitudes(place: tuple[int, int]) -> slice:
+    return slice(INERTIAL + 6 * place[1], INERTIAL + 6 * place[1] + 6)
+
+
+def _rows(models: Sequence[CoupledModel], place: tuple[int, int]) -> sp.csr_array:
+    return models[place[0]].C[6 * place[1] : 6 * place[1] + 6]
+
+
+def _position(models: Sequence[CoupledModel], place: tuple[int, int]) -> Array:
+    return models[place[0]].positions[place[1]]
 
 
 # ---- elimination --------------------------------------------------------------------------------------------------
@@ -146,7 +224,7 @@ def _coupled(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]], X: sp.
         kinds=tuple(n for m, keep in zip(models, stay, strict=True) for n, k in zip(m.kinds, keep, strict=True) if k),
         positions=np.vstack([m.positions for m in models])[np.concatenate(stay).astype(bool)],
         C=sp.csr_array((_diagonal([m.C for m in models]) @ X)[np.repeat(np.concatenate(stay).astype(bool), 6)]),
-        inertial_loads=X.T @ np.vstack([known_loads(m) for m in models]),
+        inertial_loads=X.T @ np.vstack([known_loads(m)[:, :INERTIAL] for m in models]),
         edges=_edges(models),
         dimension=max(m.dimension for m in models),
     )

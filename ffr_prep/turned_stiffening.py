@@ -16,11 +16,9 @@ moves by u and turns by phi it is
 
     -F . (theta x u) - M . (theta x phi) / 2,
 
-if the region of the interface follows the rotation to second order, 1/2 phi x (phi x r), as a rigid region does. Rigid
-translations have no gradient. So the converted body moves as the old one did. A reduction in the new frame differs by
-what interfaces that are not points do besides: of the order of their size beside that of the body, as the stress of their
-regions, which turn to first order only, is left in it. For beams it differs also by the work of shear forces and moments
-on twist, which their geometric stiffness leaves out.
+as the moments of all bodies made here are (`ffr_prep.region_rotations`). Rigid translations have no gradient. So the
+converted stiffness is the one that a reduction in the new frame computes: of solids and beams to rounding. Of plates, whose
+bending moments stiffen nothing and whose fields turn up to the size of an element, it is nearly that.
 
 Sources: Bathe, Finite Element Procedures (1996), section 6.2 (the linearised stress term); J. H. Argyris et al., Computer
 Methods in Applied Mechanics and Engineering 20 (1979) 105-155 (semitangential moments).
@@ -29,23 +27,22 @@ Methods in Applied Mechanics and Engineering 20 (1979) 105-155 (semitangential m
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import scipy.linalg
-import scipy.sparse as sp
 
-from ffr_prep.accelerations import gradients, turns
+from ffr_prep.accelerations import INERTIAL, gradients, turns
 from ffr_prep.body import FlexibleBody
 from ffr_prep.errors import InputError
 from ffr_prep.interface import CoupledModel
+from ffr_prep.reactions import supports
 from ffr_prep.reference import ReferenceConditions
 
 Array = np.ndarray
 
-INERTIAL = 12
 _CARRIED = 1e-9
+_LEAVE_OUT = "or leave the stiffness out (replace(body, stiffening=None) in Python, --without-stiffening)"
 
 
 def turned_stiffening(
@@ -61,7 +58,7 @@ def turned_stiffening(
     """
     _check_determinate(body)
     loads = np.vstack([_inertial(motions), model.C.toarray()])
-    held = _supports(model, conditions)
+    held = supports(model, conditions)
     carried = _reactions(body, loads, held @ loads) @ held
     whole = _of_all_motions(body, model, motions)
     idle = _idle(body)
@@ -78,24 +75,6 @@ def _inertial(motions: tuple[Array, Array]) -> Array:
     """(12, 6 + n) the generalised forces of unit accelerations."""
     P, rP = motions
     return -np.concatenate([P, np.einsum("akp,pkj->aj", gradients(), rP)])
-
-
-def _supports(model: CoupledModel, conditions: ReferenceConditions) -> Array:
-    """(r, 12 + 6 I) the reactions of the conditions as combinations of the loads that the body knows.
-
-    Conditions on interface coordinates react by the loads on them, and those on the mean motion T^T M u = 0 by inertia:
-    written for a model whose coordinates are the amplitudes of the loads, their rows are the combinations.
-    """
-    count = model.C.shape[0]
-    unit = np.eye(INERTIAL + count)
-    of_loads = replace(
-        model,
-        K=sp.csr_array(unit),
-        M=sp.csr_array(np.diag(-unit[:6].sum(axis=0))),
-        T=unit[:, :6],
-        C=sp.csr_array(unit[INERTIAL:]),
-    )
-    return conditions.rows(of_loads)
 
 
 def _reactions(body: FlexibleBody, loads: Array, L: Array) -> Array:
@@ -155,8 +134,7 @@ def _check_determinate(body: FlexibleBody) -> None:
     if count > 6:
         raise InputError(
             f"the geometric stiffness of body {body.name!r} belongs to {count} conditions, more than the six that fix a "
-            "frame, and how they share a load is not known: reduce the mesh again under the new conditions, or leave the "
-            "stiffness out (stiffening=None)"
+            f"frame, and how they share a load is not known: reduce the mesh again under the new conditions, {_LEAVE_OUT}"
         )
 
 
@@ -174,6 +152,5 @@ def _check_known(body: FlexibleBody, idle: Array, held: Array) -> None:
         name = body.interfaces[lost[0] // 6].name
         raise InputError(
             f"loads at interface {name!r} have no geometric stiffness in body {body.name!r} (a point that was added after "
-            "the reduction?): the frame cannot be held there; choose other interfaces, or leave the stiffness out "
-            "(stiffening=None)"
+            f"the reduction?): the frame cannot be held there; choose other interfaces, {_LEAVE_OUT}"
         )

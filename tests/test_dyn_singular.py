@@ -11,13 +11,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from ffr_dyn.analyses.assemble import assemble
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.forces import Load
-from ffr_dyn.integrators import RK4
+from ffr_dyn.integrators import RK4, ROS2, ROS3, DormandPrince, HalfExplicit, Integrator, tolerances
 from ffr_dyn.joints import Joint
 from ffr_dyn.scene import Body, Scene
+from ffr_dyn.stabilisation import Drifting
+from ffr_dyn.stability.bodies import tried
+from ffr_dyn.stability.singular_four_bar import time_of_alignment
 from ffr_prep.body import rigid_body
 
 G = 9.81
@@ -61,6 +65,66 @@ def test_the_n_four_bar_passes_its_singular_positions(count, plane):
     assert np.abs(energy - energy[0]).max() < 1e-6
     assert result.attributes["degrees_of_freedom"] == 1
     assert sum("redundant" in note for note in result.attributes["notes"]) == (3 * count if plane == "none" else 0)
+
+
+def height(count: int, time: float) -> float:
+    """Of the tops, by the mechanism's one degree of freedom."""
+    J, c = (count + 1) / 3 + count, G * ((count + 1) / 2 + count)
+    motion = solve_ivp(lambda _, y: (y[1], c * np.sin(y[0]) / J), (0, time), (0, 1.0), "DOP853", rtol=1e-12, atol=1e-12)
+    return float(np.cos(motion.y[0, -1]))
+
+
+def passed(method: Integrator, steps: int, step: float, count: int = 2) -> tuple[float, float]:
+    """Largest change of energy, and how far from its branch the mechanism is, after the first singular position."""
+    outputs = ("energy.total", "s*.b.position")
+    end = round(1.5 * steps) * step
+    result = forward(n_four_bar(count), end=end, output_step=step, method=method, outputs=outputs)
+    tops = [result[f"s{k}.b.position"][-1, 1] for k in range(count + 1)]
+    change = np.abs(result["energy.total"] - result["energy.total"][0]).max()
+    return change, np.abs(np.array(tops) - height(count, end)).max()
+
+
+BESIDE = [0.0, *np.geomspace(1e-12, 1e-3, 10), *-np.geomspace(3e-12, 3e-4, 9)]
+
+
+@pytest.mark.parametrize(("kind", "off_branch"), [(RK4, 1e-7), (ROS3, 1e-4), (ROS2, 1e-2), (HalfExplicit, 1e-7)])
+@pytest.mark.parametrize("within", [0.0, 0.5])
+def test_steps_that_end_or_have_a_stage_beside_a_singular_position_keep_branch_and_energy(kind, off_branch, within):
+    """The position at a distance (in lengths of a step) from the end, or the middle, of one: as where it is at a third."""
+    aligned, steps = time_of_alignment(2), 200
+
+    def at(fraction: float) -> tuple[float, float]:
+        return passed(kind(aligned / (steps + fraction)), steps, aligned / (steps + fraction))
+
+    usual, _ = at(0.33)
+    found = np.array([at(within + off) for off in BESIDE])
+    assert found[:, 0].max() < 1.5 * usual
+    assert found[:, 1].max() < off_branch
+
+
+@pytest.mark.parametrize("steps", [2000, 6000])
+def test_short_steps_pass_a_singular_position_as_well_as_long_ones(steps):
+    aligned = time_of_alignment(2)
+    for fraction in (0.0, 0.03, 0.11, 0.5, 0.58, 1 - 1e-7):
+        change, off = passed(RK4(aligned / (steps + fraction)), steps, aligned / (steps + fraction))
+        assert change < 2e-7
+        assert off < 1e-7
+
+
+def test_steps_that_a_method_chooses_do_not_end_beside_a_singular_position():
+    """A first step that would end in it by itself."""
+    aligned = time_of_alignment(2)
+    usual, _ = passed(DormandPrince(tolerances(1e-9)), 100, 1.003 * aligned / 100)
+    change, off = passed(DormandPrince(tolerances(1e-9)), 100, aligned / 100)
+    assert change < 1.5 * usual
+    assert off < 1e-6
+
+
+def test_without_projection_positions_are_not_stepped_over():
+    aligned = time_of_alignment(2)
+    step = aligned / 200 * (1 + 1e-8)
+    result = tried(n_four_bar(2), end=300 * step, output_step=step, method=RK4(step), stabilisation=Drifting())
+    assert result is None or np.ptp(result["energy.total"]) > 1e-3
 
 
 def bricard() -> Scene:

@@ -119,7 +119,7 @@ def test_missing_groups_are_named_with_those_there_are():
         face_group(mesh, "botom")
     with pytest.raises(InputError, match=r"no group of faces or nodes 'pin'; did you mean 'pins'"):
         region_nodes(mesh, "pin")
-    with pytest.raises(InputError, match="There are: none"):
+    with pytest.raises(InputError, match="there are: none"):
         face_group(replace(mesh, face_groups={}), "left")
 
 
@@ -692,7 +692,7 @@ def test_volumes_outside_the_physical_groups_are_left_out(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"numbers": {"lenght": 3.0}}, r"no parameter 'lenght'; There are: 'x', 'y'"),
+        ({"numbers": {"lenght": 3.0}}, r"no parameter 'lenght'; there are: 'x', 'y'"),
         ({"unit": "furlong"}, "unit 'furlong' is not known"),
         ({"size": -1.0}, "element size -1.0"),
         ({"order": 3}, "element order 3"),

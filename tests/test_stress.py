@@ -16,9 +16,10 @@ from ffr_prep.factor import solve_refined, supported
 from ffr_prep.interface import InterfaceRegion, couple
 from ffr_prep.material import Material
 from ffr_prep.mesh import surface_triangles
-from ffr_prep.reduce import boundary, reduce_mesh
+from ffr_prep.reduce import reduce_mesh
 from ffr_prep.reduction import CraigBampton
 from ffr_prep.reference import FixedTo, functionals
+from ffr_prep.solid_model import boundary
 from ffr_prep.solids import STIFFNESS_ORDER, assemble
 from ffr_prep.stress import extrapolation, stressed_boundary
 

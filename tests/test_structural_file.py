@@ -208,7 +208,9 @@ def test_ties_that_cannot_be(tmp_path, old, new, says):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("x = 1\n" + LINE, "x: is not a known entry here"),
+        ("x = 1\n" + LINE, "the file: 'x' is not a known entry here; known are name, "),
+        ("stres = true\n" + LINE, "'stres' is not a known entry here; did you mean 'stress'"),
+        (LINE + "knd = 'mean'", "interfaces.b: 'knd' is not a known entry here; did you mean 'kind'"),
         ("stiffening = 3\n" + LINE, r"stiffening: Input should be a valid boolean.* \(it is 3\)"),
         ("name = 'a'", "give a .geometry. file"),
         ("name = ", "is not TOML"),

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import failure
+from ffr_dyn.analyses.failure import failure
 from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import System, new_record
 from ffr_dyn.inertia import mass_matrix

@@ -98,8 +98,10 @@ class DormandPrince:
     order: ClassVar[int] = 5
     estimate_order: ClassVar[int] = 5
     implicit: ClassVar[bool] = False
+    reach: ClassVar[float] = 0.9971  # where |R(i y)| exceeds 1, by little up to 3.3: steps are chosen by their error
     controlled: ClassVar[bool] = True
     step: ClassVar[float] = 0.0
+    repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 10
     row_stages: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = (0.0,)

@@ -7,6 +7,7 @@ controller is proportional-integral (Gustafsson 1991; Hairer & Wanner 1996, IV.8
 from ffr_dyn.kernels.bodies import normalise, position_rates
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import call_unit
+from ffr_dyn.kernels.passing import AT_LAST, HERE, is_beside
 from ffr_dyn.kernels.tables import (
     BEFORE,
     ERROR,
@@ -22,6 +23,7 @@ from ffr_dyn.kernels.tables import (
 from ffr_dyn.kernels.vectors import copy
 
 SAFETY, SMALLEST, LARGEST = 0.9, 0.2, 5.0
+SHORTER = 0.8  # a step that would end beside a singular position
 
 
 @kernel
@@ -56,7 +58,11 @@ def controlled_step(r, step):
             position = worst(stages.x[0], c.x, r.x, c.weight_x, numbers[RELATIVE], h)
             error = max(position, worst(stages.v[0], c.v, r.v, c.weight_v, numbers[RELATIVE], h))
         power = 1.0 / numbers[ORDER]
-        if error <= 1.0:
+        share = r.work.independence
+        if error <= 1.0 and is_beside(share[HERE], share[AT_LAST]):
+            error = SHORTER ** -numbers[ORDER]  # the next step shall not begin there
+        elif error <= 1.0:
+            share[AT_LAST] = share[HERE]
             error = max(error, 1e-8)
             factor = SAFETY * error ** (-0.7 * power) * numbers[ERROR] ** (0.4 * power)
             if again > 0:

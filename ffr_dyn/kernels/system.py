@@ -138,13 +138,10 @@ def has_loads(loads):
 
 
 @inlined
-def evaluate_joints(m, w, t):
+def evaluate_joints(m, w):
     """Factors of the multiplier matrix from the constraint rows. Returns the row without a pivot, or -1."""
     couple_joints(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows)
-    failed = factorise_blocks(m.rows.start, m.pattern, w.rows.S, m.relaxation, w.rows, w.independence)
-    if failed < 0 and w.independence[0] < w.independence[1]:
-        w.independence[1], w.independence[2] = w.independence[0], t
-    return failed
+    return factorise_blocks(m.rows.start, m.pattern, w.rows.S, m.relaxation, w.rows, w.independence)
 
 
 @kernel

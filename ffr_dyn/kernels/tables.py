@@ -42,10 +42,10 @@ MOST_ROWS = 6  # of a joint
 # Which markers are brought up to date: those that joints or loads use, those of joints, all.
 IN_USE, OF_JOINTS, ALL = 0.0, 1.0, 2.0
 
-# Near a singular position the rows become dependent, and a violation eta of the constraints throws the motion from its
-# branch when it comes closer than about eta^(1/3). So on the approach (`independence` below NEAR) the violation is held far
-# lower, and at the position itself (below AT) it is left alone: along the direction that is about to be free a correction
-# would be the violation divided by the distance.
+# Near a singular position (which steps pass as `passing` tells) the rows become dependent, and a violation eta of the
+# constraints throws the motion from its branch when it comes closer than about eta^(1/3). So on the approach (`independence`
+# below NEAR) the violation is held far lower, and at the position itself (below AT) it is left alone: along the direction
+# that is about to be free a correction would be the violation divided by the distance.
 NEAR, AT = 1e-2, 1e-6
 TIGHTER = 1e-4
 
@@ -228,7 +228,9 @@ class Work(NamedTuple):
     diagonal: F1  # (1,) gamma h of the elastic diagonal that is in place (see `calls.set_diagonal`), or -1
     info: I1  # (3,) integers: body or row that failed, evaluations, projections
     drift: F1  # (2,) largest |Phi| and |Phi_dot| met
-    independence: F1  # (3,) least share of a row that others do not contain: now, least so far, and when
+    # (8,) least share of a row that others do not contain: now, least so far, and when; of a step its start and end [s],
+    # the share at its start, the least of its stages, and that at the start of the step before (see `passing`)
+    independence: F1
 
 
 class Stages(NamedTuple):
@@ -238,6 +240,8 @@ class Stages(NamedTuple):
     v: F2  # (stages, V)
     rows: F2  # (row stages, C)
     target: F1  # (C,)
+    kept_x: F2  # (2, X) states at the starts of this step and of the one before; no rows where none is done again
+    kept_v: F2  # (2, V)
     numbers: F1  # the method's own settings, and what it keeps in single numbers
 
 

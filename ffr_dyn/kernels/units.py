@@ -21,6 +21,7 @@ from ffr_dyn.kernels.functions import evaluate_functions
 from ffr_dyn.kernels.loads import apply_loads, call_user, gravity_field, powers
 from ffr_dyn.kernels.options import OPTIONS
 from ffr_dyn.kernels.packing import call_unit, unpack_record, unpack_tables, vector_at
+from ffr_dyn.kernels.passing import note_independence, numbered_step
 from ffr_dyn.kernels.record import keep
 from ffr_dyn.kernels.rows import evaluate_block
 from ffr_dyn.kernels.stiffening import solve_stiffened
@@ -160,10 +161,11 @@ def powers_unit(at, t, record, row):
 @Unit
 def joints_unit(at, t, x, v):
     r = unpack_tables(at)
-    failed = evaluate_joints(r.model, r.work, t)
+    failed = evaluate_joints(r.model, r.work)
     if failed >= 0:
         r.work.info[0] = failed
         return SINGULAR_CONSTRAINT
+    note_independence(r.work.independence, t)
     return OK
 
 
@@ -360,7 +362,7 @@ def rows_unit(at, start, record, step):
     steps[2] = 0
     for row in range(out.time.size):
         for _ in range(steps[1]):
-            status = call_unit(step, at, start + steps[0] * h, 0, 0)
+            status = numbered_step(r, step, start + steps[0] * h)
             if status != OK:
                 return status
             steps[0] += 1

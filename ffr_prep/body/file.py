@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
+from zipfile import is_zipfile
 
 import numpy as np
 
@@ -97,7 +98,7 @@ def load_body(path: str | Path) -> FlexibleBody:
     except BodyError as error:
         raise BodyError(f"{path}: {error}") from None
     except Exception as error:  # a damaged zip, array header or field can fail in any way the readers know
-        what = str(error) or type(error).__name__
+        what = "no zip file" if not is_zipfile(path) else str(error) or type(error).__name__
         raise BodyError(
             f"{path} is damaged, truncated or not a body file ({what}); make it again with ffr-prep reduce"
         ) from None

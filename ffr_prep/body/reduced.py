@@ -119,8 +119,8 @@ class FlexibleBody:
     interfaces, surface : where to attach, what to draw
     stiffening: (12 + 6 I, n, n) geometric stiffness [1/s^2] per unit of: the acceleration of the body frame less gravity
         (3) [m/s^2], its angular acceleration (3) [rad/s^2], the products xx, yy, zz, xy, xz, yz of its angular velocity
-        (6) [rad^2/s^2], and for each of the I interfaces force (3) [N] and moment (3) [N m]; all in body axes. None where
-        it was not computed
+        (6) [rad^2/s^2], and for each of the I interfaces force (3) [N] and semitangential moment (3)
+        [N m]; all in body axes. None where it was not computed
     provenance: how the body was made; plain JSON values
 
     Raises BodyError when the integrals contradict each other (shape, symmetry, orthonormality, negative mass).
