@@ -13,6 +13,7 @@ from ffr_dyn.kernels.vectors import (
     fill,
     get,
     in_plane,
+    of_two,
     put,
     rigid_lower,
     rigid_upper,
@@ -86,16 +87,6 @@ def contract(PP, q, qd, n, g, l):  # noqa: E741
 
 
 @kernel
-def row_dot(rows, index, q, n):
-    """sum_j rows[index, j] q_j for a pooled array of rows of n."""
-    part = rows[index * n : (index + 1) * n]
-    total = 0.0
-    for j in range(n):
-        total += part[j] * q[j]
-    return total
-
-
-@kernel
 def three_rows(rows, q, n):
     """The first three of a pooled array of rows of n, times q: in one loop, which is three times as fast as three."""
     r0, r1, r2 = rows[:n], rows[n:], rows[2 * n :]
@@ -132,17 +123,6 @@ def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s):
     fill(l, 0.0)
     if start >= 0:
         contract(bodies.PP_dm[start : start + 9 * n * n], q, qd, n, g, l)
-    sx, sy, sz = three_rows(P, q, n)
-    s = (s[0] + sx, s[1] + sy, s[2] + sz)
-    pd = three_rows(P, qd, n)
-    a0, a1, a2, a3, a4, a5 = six_rows(rP, q, n)
-    b0, b1, b2, b3, b4, b5 = six_rows(g, q, n)
-    W = (
-        second[0] + a0 + b0, second[1] + a1 + b1, second[2] + a2 + b2,
-        second[3] + a3 + b3, second[4] + a4 + b4, second[5] + a5 + b5,
-    )  # fmt: skip
-    D, D_axial = six_rows(g, qd, n), three_rows(g[6 * n :], qd, n)
-
     ox, oy, oz = omega
     xx, yy, zz = oy * oy + oz * oz, ox * ox + oz * oz, ox * ox + oy * oy
     xy, xz, yz = -2.0 * ox * oy, -2.0 * ox * oz, -2.0 * oy * oz
@@ -150,15 +130,42 @@ def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s):
     f = w.f[first : first + n]
     omega2, damping = bodies.omega2[e : e + n], bodies.two_zeta_omega[e : e + n]
     g0, g1, g2, g3, g4, g5 = g[:n], g[n:], g[2 * n :], g[3 * n :], g[4 * n :], g[5 * n :]
-    l0, l1, l2, P0, P1, P2 = l[:n], l[n:], l[2 * n :], P[:n], P[n:], P[2 * n :]
-    for j in range(n):
+    h0, h1, h2, l0, l1, l2 = g[6 * n :], g[7 * n :], g[8 * n :], l[:n], l[n:], l[2 * n :]
+    r0, r1, r2, r3, r4, r5 = rP[:n], rP[n:], rP[2 * n :], rP[3 * n :], rP[4 * n :], rP[5 * n :]
+    P0, P1, P2 = P[:n], P[n:], P[2 * n :]
+    s0, s1, s2, p0, p1, p2 = s[0], s[1], s[2], 0.0, 0.0, 0.0
+    w0, w1, w2, w3, w4, w5 = second
+    d0, d1, d2, d3, d4, d5, a0, a1, a2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(n):  # in one loop: each row is loaded once, and a short loop costs as much as what is in it
+        x, y = q[j], qd[j]
+        s0 += P0[j] * x
+        s1 += P1[j] * x
+        s2 += P2[j] * x
+        p0 += P0[j] * y
+        p1 += P1[j] * y
+        p2 += P2[j] * y
+        w0 += (r0[j] + g0[j]) * x
+        w1 += (r1[j] + g1[j]) * x
+        w2 += (r2[j] + g2[j]) * x
+        w3 += (r3[j] + g3[j]) * x
+        w4 += (r4[j] + g4[j]) * x
+        w5 += (r5[j] + g5[j]) * x
+        d0 += g0[j] * y
+        d1 += g1[j] * y
+        d2 += g2[j] * y
+        d3 += g3[j] * y
+        d4 += g4[j] * y
+        d5 += g5[j] * y
+        a0 += h0[j] * y
+        a1 += h1[j] * y
+        a2 += h2[j] * y
         f[j] = (
             xx * g0[j] + yy * g1[j] + zz * g2[j] + xy * g3[j] + xz * g4[j] + yz * g5[j]
             - 2.0 * (ox * l0[j] + oy * l1[j] + oz * l2[j])
             + gravity[0] * P0[j] + gravity[1] * P1[j] + gravity[2] * P2[j]
-            - omega2[j] * q[j] - damping[j] * qd[j]
+            - omega2[j] * x - damping[j] * y
         )  # fmt: skip
-    return s, pd, W, D, D_axial
+    return (s0, s1, s2), (p0, p1, p2), (w0, w1, w2, w3, w4, w5), (d0, d1, d2, d3, d4, d5), (a0, a1, a2)
 
 
 @inlined
@@ -184,29 +191,38 @@ def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, norm
     c0, c1, _ = in_plane(normal)
     turning = 6 + normal
     g0, g1, h = g[c0 * n : (c0 + 1) * n], g[c1 * n : (c1 + 1) * n], g[turning * n : (turning + 1) * n]
-    copy(g, rP)
+    r0, r1 = rP[c0 * n : (c0 + 1) * n], rP[c1 * n : (c1 + 1) * n]
+    copy(g0, r0)
+    copy(g1, r1)
+    copy(h, rP[turning * n : (turning + 1) * n])
     fill(l, 0.0)
     if start >= 0:
         contract_in_plane(bodies.PP_dm[start : start + 9 * n * n], q, qd, n, g0, g1, h, l, c0, c1, turning)
-    sx, sy, sz = three_rows(P, q, n)
-    s = (s[0] + sx, s[1] + sy, s[2] + sz)
-    pd = three_rows(P, qd, n)
-    grown = row_dot(rP, c0, q, n) + row_dot(g0, 0, q, n) + row_dot(rP, c1, q, n) + row_dot(g1, 0, q, n)
-    growing = row_dot(g0, 0, qd, n) + row_dot(g1, 0, qd, n)
-    # Only the sums of both components in the plane enter; they are kept in one component.
-    W = (
-        second[0] + (grown if c0 == 0 else 0.0), second[1] + (grown if c0 == 1 else 0.0),
-        second[2], second[3], second[4], second[5],
-    )  # fmt: skip
-    D = (growing if c0 == 0 else 0.0, growing if c0 == 1 else 0.0, 0.0, 0.0, 0.0, 0.0)
     f = w.f[bodies.where[b, 2] + 6 : bodies.where[b, 2] + 6 + n]
     omega2, damping = bodies.omega2[e : e + n], bodies.two_zeta_omega[e : e + n]
     P0, P1, square = P[c0 * n : (c0 + 1) * n], P[c1 * n : (c1 + 1) * n], omega * omega
+    across, along = gravity[c0], gravity[c1]
+    s0, s1, p0, p1, grown, growing = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(n):
+        x, y, both = q[j], qd[j], g0[j] + g1[j]
+        s0 += P0[j] * x
+        s1 += P1[j] * x
+        p0 += P0[j] * y
+        p1 += P1[j] * y
+        grown += (r0[j] + r1[j] + both) * x
+        growing += both * y
         f[j] = (
-            square * (g0[j] + g1[j]) - 2.0 * omega * l[j] + gravity[c0] * P0[j] + gravity[c1] * P1[j]
-            - omega2[j] * q[j] - damping[j] * qd[j]
+            square * both - 2.0 * omega * l[j] + across * P0[j] + along * P1[j]
+            - omega2[j] * x - damping[j] * y
         )  # fmt: skip
+    s = (s[0] + of_two(0, c0, c1, s0, s1), s[1] + of_two(1, c0, c1, s0, s1), s[2] + of_two(2, c0, c1, s0, s1))
+    pd = (of_two(0, c0, c1, p0, p1), of_two(1, c0, c1, p0, p1), of_two(2, c0, c1, p0, p1))
+    # Only the sums of both components in the plane enter; they are kept in one component.
+    W = (
+        second[0] + of_two(0, c0, 3, grown, 0.0), second[1] + of_two(1, c0, 3, grown, 0.0),
+        second[2], second[3], second[4], second[5],
+    )  # fmt: skip
+    D = (of_two(0, c0, 3, growing, 0.0), of_two(1, c0, 3, growing, 0.0), 0.0, 0.0, 0.0, 0.0)
     return s, pd, W, D
 
 

@@ -2,7 +2,7 @@
 
 from ffr_dyn.kernels.bodies import row_product, six_rows
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.vectors import add, cross, get, in_plane, put, scale, to_global
+from ffr_dyn.kernels.vectors import add, cross, get, in_plane, of_two, put, scale, to_global
 
 
 @inlined
@@ -63,12 +63,6 @@ def axis_motion(w, k, a0):
     twist = cross(get(w.thetad, k), a0)
     rate = add(cross(omega, a), twist)
     return a, to_global(A, a), to_global(A, rate), to_global(A, cross(omega, add(rate, twist)))
-
-
-@kernel
-def of_two(component, c0, c1, first, second):
-    """A component of the vector that has `first` along c0, `second` along c1 and nothing else."""
-    return first if component == c0 else (second if component == c1 else 0.0)
 
 
 @kernel

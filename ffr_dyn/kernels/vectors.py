@@ -159,6 +159,12 @@ def in_plane(normal):
 
 
 @kernel
+def of_two(component, c0, c1, first, second):
+    """A component of the vector that has `first` along c0, `second` along c1 and nothing else."""
+    return first if component == c0 else (second if component == c1 else 0.0)
+
+
+@kernel
 def fill(target, value):
     for k in range(target.size):
         target[k] = value
