@@ -10,6 +10,12 @@ import scipy.linalg
 import scipy.optimize
 from boxes import STEEL, box_mesh, moved, rotation
 
+from ffr_dyn.analyses.linearise import linearise
+from ffr_dyn.analyses.states import scene_at
+from ffr_dyn.analyses.static import static
+from ffr_dyn.forces import Load
+from ffr_dyn.joints import Joint
+from ffr_dyn.scene import Body, Scene
 from ffr_prep.beam_stiffening import beam_stiffening, section_forces, strain_functions
 from ffr_prep.beam_stress import end_forces
 from ffr_prep.beams import beams, element_coordinates
@@ -19,7 +25,7 @@ from ffr_prep.interface import InterfaceRegion, couple, turning_regions
 from ffr_prep.material import Material
 from ffr_prep.reduce import reduce_mesh
 from ffr_prep.reduction import CraigBampton
-from ffr_prep.reference import FixedTo
+from ffr_prep.reference import FixedTo, SimplySupported
 from ffr_prep.region_rotations import region_stiffening, second_order_turn
 from ffr_prep.section import circle, general, rectangle, shear_rigid
 from ffr_prep.solids import assemble
@@ -209,3 +215,32 @@ def test_buckling_of_a_column_with_a_rigid_end(kind, arm):
     interval = (1e-3, np.pi / 2) if arm > 0 else (np.pi / 2, np.pi - 1e-3)
     k = scipy.optimize.brentq(lambda k: np.cos(k) - k * arm * np.sin(k), *interval)
     assert critical_load(body, -body.stiffening[FORCE]) == pytest.approx(k**2 * EI, rel=2e-3)
+
+
+# ---- motion -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("share", "what", "frame"),
+    [
+        (0.9, "moment", FixedTo("left")),
+        (0.9, "force", FixedTo("left")),
+        (0.5, "force", SimplySupported("left", "right")),
+    ],
+    ids=str,
+)
+def test_a_loaded_cantilever_vibrates_the_slower_the_nearer_it_is_to_buckling(share, what, frame):
+    """Lowest frequency about the equilibrium of a scene, against Omega^2 + load * K_sigma in the frame of the clamp."""
+    body = strip_of_beams()
+    number = MOMENT + 2 if what == "moment" else FORCE + 1
+    load = share * critical_load(body, body.stiffening[number])
+    expected = np.sqrt(scipy.linalg.eigvalsh(np.diag(body.omega2) + load * body.stiffening[number])[0]) / (2 * np.pi)
+    wrench = {"moment": (0, 0, load)} if what == "moment" else {"force": (0, load, 0)}
+    scene = Scene(
+        (Body("strip", body if frame == FixedTo("left") else body.with_reference(frame)),),
+        (Joint("clamp", "fixed", "ground.O", "strip.left"),),
+        loads=(Load("end", "strip.right", **wrench),),
+        ground={"O": (0, 0, 0)},
+    )
+    found = linearise(scene_at(scene, static(scene))).frequencies.min()
+    assert found == pytest.approx(expected, rel=2e-5)
