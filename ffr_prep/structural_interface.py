@@ -78,7 +78,7 @@ def _mean_motion(frame: Frame, nodes: Array, position: Array) -> sp.csr_array:
     """(6, 6N) the rigid motion at `position` closest to the motions of the nodes."""
     at = frame.points[nodes]
     weight = np.eye(6)
-    weight[3:, 3:] = _rotation_weight(at)
+    weight[3:, 3:] = rotation_weight(at)
     R = rigid_coordinates(at - position)
     weighted = weight @ R
     motion = np.linalg.solve(np.einsum("nci,ncj->ij", R, weighted), weighted.reshape(-1, 6).T)
@@ -87,7 +87,7 @@ def _mean_motion(frame: Frame, nodes: Array, position: Array) -> sp.csr_array:
     return sp.csr_array((motion.ravel(), np.tile(columns, 6), ends), shape=(6, 6 * len(frame.points)))
 
 
-def _rotation_weight(at: Array) -> Array:
+def rotation_weight(at: Array) -> Array:
     """s^2 P (3, 3) [m^2] of nodes at (m, 3); of any size for one place, as only the rotations count there."""
     offsets = at - at.mean(axis=0)
     moments, axes = np.linalg.eigh(offsets.T @ offsets / len(at))
@@ -129,7 +129,7 @@ def _mean_region(
     Q = (tr s^2 P) I / 2 - s^2 P has (tr Q) I - Q = s^2 P."""
     at, count = frame.points[nodes], len(frame.points)
     offsets = at - at.mean(axis=0)
-    weight = _rotation_weight(at)
+    weight = rotation_weight(at)
     Q = np.trace(weight) / 2 * np.eye(3) - weight
     turning = _rotations(nodes, count)
     of_rotations = sp.kron(np.ones((1, len(nodes))), sp.csr_array(np.einsum("cak,kb->abc", turns(), Q).reshape(9, 3)))
