@@ -255,6 +255,9 @@ def inertia(gravity_field, bodies, w, x, v, b):
     J[0, 2] = J[2, 0] = -W[4]
     J[1, 2] = J[2, 1] = -W[5]
 
+    if bodies.where[b, 7] >= 0:
+        forces_in_plane(w.f[j : j + 6], mass, s, pd, D[0] + D[1], omega, gravity, bodies.where[b, 7])
+        return
     centrifugal = cross(omega, cross(omega, s))
     coriolis = cross(omega, pd)
     J_omega = (dot(J[0], omega), dot(J[1], omega), dot(J[2], omega))
@@ -272,6 +275,26 @@ def inertia(gravity_field, bodies, w, x, v, b):
         w.f[j + 3 + k] = moment[k] - gyroscopic[k] - 2.0 * (trace * omega[k] - D_omega[k] + 0.5 * skew[k])
 
 
+@kernel
+def sense(normal):
+    """In which the two axes of the plane across body axis `normal` turn into one another about it, as `in_plane` has them."""
+    return -1.0 if normal == 1 else 1.0
+
+
+@kernel
+def forces_in_plane(f, mass, s, pd, growing, omega, gravity, normal):
+    """f (6,) of a planar body: what acts in the plane and about its normal; the rest is zero.
+
+    pd, growing : rates of the first moment and, half, of the second about the normal
+    """
+    i, j, k = in_plane(normal)
+    turn, rate = sense(normal), omega[normal]
+    fill(f, 0.0)
+    f[i] = mass * gravity[i] + rate * rate * s[i] + 2.0 * turn * rate * pd[j]
+    f[j] = mass * gravity[j] + rate * rate * s[j] - 2.0 * turn * rate * pd[i]
+    f[k] = turn * (s[i] * gravity[j] - s[j] * gravity[i]) - 2.0 * growing * rate
+
+
 @inlined
 def rigid_mass(mass, s, J, M):
     """Fill the 6 x 6 rigid block of the mass matrix."""
@@ -283,6 +306,14 @@ def rigid_mass(mass, s, J, M):
     M[3, 1], M[3, 2] = -s[2], s[1]
     M[4, 0], M[4, 2] = s[2], -s[0]
     M[5, 0], M[5, 1] = -s[1], s[0]
+
+
+@kernel
+def rigid_mass_in_plane(mass, s, inertia, M, normal):
+    """The lower triangle of the rigid block for the coordinates that move in the plane."""
+    i, j, k = in_plane(normal)
+    M[i, i], M[j, j], M[k, k] = mass, mass, inertia
+    M[k, i], M[k, j] = -sense(normal) * s[j], sense(normal) * s[i]
 
 
 @inlined
@@ -301,11 +332,12 @@ def factorise(bodies, w, b):
     """Cholesky factor of the Schur complement of body b on its elastic block. Returns True when it is positive."""
     n, e, normal = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 7]
     L = w.L[b]
-    rigid_mass(bodies.mass[b], w.s[b], w.J[b], L)
     P, H = bodies.P_dm[3 * e : 3 * (e + n)], w.g[9 * e + 6 * n : 9 * (e + n)]
     dinv, Cd = w.dinv[e : e + n], w.Cd[6 * e : 6 * (e + n)]
     if normal >= 0:
+        rigid_mass_in_plane(bodies.mass[b], get(w.s, b), w.J[b, normal, normal], L, normal)
         return factorise_in_plane(w.PP[b], P, H, dinv, Cd, L, n, normal)
+    rigid_mass(bodies.mass[b], w.s[b], w.J[b], L)
     if n > 0:
         for r in range(3):
             for c in range(r + 1):
@@ -401,34 +433,58 @@ def row_product(a, i, b, j, n):
 @inlined
 def reduce_forces(bodies, w, b):
     """w.rigid = L^-1 (f_rigid - C dinv f_elastic), w.elastic = dinv f_elastic of body b."""
-    n, j, e = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3]
+    n, j, e, normal = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3], bodies.where[b, 7]
     f, z = w.f[j : j + 6 + n], w.rigid[b]
     for k in range(6):
         z[k] = f[k]
     if n > 0:
-        d, elastic, dinv = f[6:], w.elastic[e : e + n], w.dinv[e : e + n]
-        c0, c1, c2, c3, c4, c5 = six_rows(w.Cd[6 * e : 6 * (e + n)], d, n)
-        z[0] -= c0
-        z[1] -= c1
-        z[2] -= c2
-        z[3] -= c3
-        z[4] -= c4
-        z[5] -= c5
+        d, elastic, dinv, Cd = f[6:], w.elastic[e : e + n], w.dinv[e : e + n], w.Cd[6 * e : 6 * (e + n)]
+        if normal >= 0:
+            reduce_in_plane(Cd, d, n, normal, z)
+        else:
+            c0, c1, c2, c3, c4, c5 = six_rows(Cd, d, n)
+            z[0] -= c0
+            z[1] -= c1
+            z[2] -= c2
+            z[3] -= c3
+            z[4] -= c4
+            z[5] -= c5
         for k in range(n):
             elastic[k] = dinv[k] * d[k]
-    rigid_lower(w.L[b], z, bodies.where[b, 7])
+    rigid_lower(w.L[b], z, normal)
+
+
+@kernel
+def reduce_in_plane(Cd, d, n, normal, z):
+    i, j, k = in_plane(normal)
+    first, second, third = Cd[i * n :], Cd[j * n :], Cd[k * n :]
+    t0, t1, t2 = 0.0, 0.0, 0.0
+    for c in range(n):
+        t0 += first[c] * d[c]
+        t1 += second[c] * d[c]
+        t2 += third[c] * d[c]
+    z[i] -= t0
+    z[j] -= t1
+    z[k] -= t2
 
 
 @inlined
 def accelerate(bodies, w, b):
     """w.acc of body b from its reduced forces: L^-T w.rigid, and w.elastic - (C dinv)^T of it."""
-    n, j, e = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3]
+    n, j, e, normal = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3], bodies.where[b, 7]
     z, acc = w.rigid[b], w.acc[j : j + 6 + n]
-    rigid_upper(w.L[b], z, bodies.where[b, 7])
+    rigid_upper(w.L[b], z, normal)
     for k in range(6):
         acc[k] = z[k]
     if n > 0:
-        back_substitute(w.Cd[6 * e : 6 * (e + n)], w.elastic[e : e + n], z, n, acc[6:])
+        Cd, elastic = w.Cd[6 * e : 6 * (e + n)], w.elastic[e : e + n]
+        if normal >= 0:
+            i, j, k = in_plane(normal)
+            first, second, third, own = Cd[i * n :], Cd[j * n :], Cd[k * n :], acc[6:]
+            for c in range(n):
+                own[c] = elastic[c] - (first[c] * z[i] + second[c] * z[j] + third[c] * z[k])
+        else:
+            back_substitute(Cd, elastic, z, n, acc[6:])
 
 
 @kernel
