@@ -57,9 +57,7 @@ def test_too_large_gains_stop_and_tell_what_gains_would_do():
 
 def test_a_stiff_spring_beyond_the_step_stops_and_tells_its_rate():
     spring = SpringDamper("spring", "ground.Q", "bar.b", stiffness=1e6, free_length=2.0)
-    with pytest.raises(
-        SimulationError, match=r"energy has grown.*'bar'.*1732 rad/s.*below 0\.0016 s; use that$"
-    ):
+    with pytest.raises(SimulationError, match=r"energy has grown.*'bar'.*1732 rad/s.*below 0\.0016 s; use that$"):
         forward(replace(HINGED, springs=(spring,), gravity=(0, -9.81, 0)), method=RK4(5e-3), **RUN)
 
 
