@@ -1,16 +1,24 @@
-"""What `economise` finds for the benchmark set, against an exhaustive grid of models and against the full model.
+"""What `economise` finds for the benchmark set, against an exhaustive grid of models and against everything.
 
     python -m benchmarks.economy [--no-grid] [case ...]
 
 For every case and the tolerances 1e-2, 1e-3 and 1e-4 it prints: whether the true errors are within the tolerance; the
-processor time of a run of the chosen model, against the cheapest model and step of a grid that meets the tolerance, and
-against the full model (all modes, all terms, everything flexible, in space) with the same step and with the default step; the
-cost of the search in runs of the chosen model; and the effectivity, estimated over true error, of every output. True errors
-are against everything on with a much finer step.
+processor time of the time loop of the chosen model; how many times as long other ways take:
+
+    grid     the cheapest model and step of a grid that meets the tolerance (1 at best)
+    same     everything (all modes, all terms, all bodies flexible) in space, with the method and step of the chosen model
+    own      everything as `ffr-dyn run` takes it, in the plane where there is one, with its default method and the longest
+             step that meets the tolerance
+    best     the same with the cheapest of all methods
+    default  the same with the default method and step, whether that meets the tolerance or not
+
+the cost of the search beyond one verification, in runs of the chosen model by the cost model, and as the processor time of
+all of a search without verification over that of a whole run of the chosen model, assembly and outputs included; the
+effectivity, estimated over true error, of every output. True errors are against everything on with a much finer step.
 
 The grid: every set of flexible bodies (every single one and all, where there are more than three), with 1, 2, 3, 6 and all
 coordinates of each, statically complete, in the plane where there is one; stiffening on and off; every method with 1, 2, 3,
-4, 6, 8, 12, ... steps to an output row. Inertia terms stay on in it: leaving them out does not make an evaluation cheaper.
+4, 6, 8, 12, ... steps to an output row. Inertia terms stay on in it.
 """
 
 from __future__ import annotations
@@ -25,15 +33,17 @@ import numpy as np
 
 from benchmarks.scene_set import CASES, Case, case
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.economy.choice import Choice, Part, applied, orthonormal
-from ffr_dyn.economy.cost import of_run, per_evaluation
+from ffr_dyn.economy.choice import Choice, Part, orthonormal
+from ffr_dyn.economy.cost import of_run, per_evaluation, per_row
+from ffr_dyn.economy.found import Economy
 from ffr_dyn.economy.outputs import difference, largest
-from ffr_dyn.economy.search import Economy, economise
+from ffr_dyn.economy.search import economise
 from ffr_dyn.economy.steps import methods
-from ffr_dyn.economy.trial import Span, Trial, run
+from ffr_dyn.economy.trial import Span, Trial, make, run
 from ffr_dyn.errors import InputError, SimulationError
-from ffr_dyn.integrators import METHODS
+from ffr_dyn.run import run as whole_run
 from ffr_dyn.scene import Scene
+from ffr_dyn.stopwatch import Stopwatch
 from ffr_dyn.variant import STIFFENING, basis_of
 from ffr_prep.body import truncated
 
@@ -42,6 +52,7 @@ Array = np.ndarray
 TOLERANCES = (1e-2, 1e-3, 1e-4)
 COUNTS = (1, 2, 3, 6, 99)
 DIVISIONS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
+FINE = (*DIVISIONS, 192, 256, 384, 512, 768, 1024)
 REPEATS = (4, 20)  # at least, and at most while they take less than a second
 CLOCKED = 3  # models of the grid whose runs are timed, the cheapest by the cost model
 LOW, HIGH = 0.3, 5.0  # effectivity that is asked for
@@ -57,8 +68,11 @@ class Row:
     error: Array
     chosen: float
     grid: float
-    full: float
+    same: float
+    own: float
+    best: float
     default: float
+    search: float  # all of a search without verification, over all of a run
 
     @property
     def met(self) -> bool:
@@ -83,7 +97,7 @@ def truth(scene: Scene, found: list[Economy], span: Span) -> Trial:
     else:
         everything = next(one.choice for one in finest.tried if one.what == "everything")
         choice = replace(everything, divisions=2 * finest.choice.divisions)
-    return run(scene, choice, span, finest.probe)
+    return run(make(scene, choice, span), choice, span, finest.probe)
 
 
 # ---- the grid -------------------------------------------------------------------------------------------------------
@@ -125,7 +139,7 @@ def cheapest(scene: Scene, span: Span, reference: Trial, found: Economy) -> dict
         for method in methods(span):
             for divisions in DIVISIONS:
                 choice = replace(model, method=method, divisions=divisions)
-                cost = of_run(scene, choice, span.rows)
+                cost = of_run(choice, span.rows)
                 if all(len(best[t]) >= CLOCKED and cost >= best[t][-1][0] for t in TOLERANCES):
                     break
                 error = true_error(scene, choice, span, found, reference)
@@ -164,7 +178,7 @@ def _hopeless(
 def true_error(scene: Scene, choice: Choice, span: Span, found: Economy, reference: Trial) -> Array:
     """(outputs,) largest error of a model; infinite where its run fails."""
     try:
-        return largest(difference(run(scene, choice, span, found.probe).values, reference.values))
+        return largest(difference(run(make(scene, choice, span), choice, span, found.probe).values, reference.values))
     except (SimulationError, InputError):
         return np.full(len(found.limits), np.inf)
 
@@ -173,25 +187,44 @@ def true_error(scene: Scene, choice: Choice, span: Span, found: Economy, referen
 
 
 def processor_time(scene: Scene, choice: Choice, span: Span) -> float:
-    """[s] of the time loop of a run: a whole run less one of two output rows, the least of some repetitions."""
-    made, method = applied(scene, choice), choice.integrator(span.output_step)
-
-    def clocked(end: float) -> float:
-        def once() -> None:
-            forward(made, end=end, output_step=span.output_step, method=method, outputs=("constraint.position",))
-
-        return least_time(once)
-
-    return max(clocked(span.end) - clocked(2 * span.output_step), 1e-6)
-
-
-def least_time(job: Callable[[], None]) -> float:
+    """[s] of the time loop of a run, the least of some repetitions."""
+    made, method = make(scene, choice, span), choice.integrator(span.output_step)
     times: list[float] = []
     while len(times) < REPEATS[0] or (len(times) < REPEATS[1] and sum(times) < 1.0):
+        watch = Stopwatch()
+        forward(
+            made.scene,
+            end=span.end,
+            output_step=span.output_step,
+            method=method,
+            outputs=("constraint.position",),
+            stopwatch=watch,
+            assembled=made.assembled,
+        )
+        times.append(watch.cpu)
+    return min(times)
+
+
+def least_time(job: Callable[[], object], repeats: int) -> float:
+    """[s] of processor, the least of some repetitions."""
+    times: list[float] = []
+    for _ in range(repeats):
         began = time.process_time()
         job()
         times.append(time.process_time() - began)
     return min(times)
+
+
+def search_time(one: Case, scene: Scene, tolerance: float) -> float:
+    """Processor time of a search without verification over that of a run of what it finds."""
+
+    def search() -> Economy:
+        return economise(
+            scene, one.outputs, end=one.end, output_step=one.output_step, tolerance=tolerance, verify=False
+        )
+
+    found = search()
+    return least_time(search, 2) / least_time(lambda: whole_run(found.scene, found.settings), 3)
 
 
 # ---- the benchmark --------------------------------------------------------------------------------------------------
@@ -205,12 +238,11 @@ def rows_of(one: Case, *, with_grid: bool) -> Iterator[Row]:
     ]
     reference = truth(scene, found, span)
     grid = cheapest(scene, span, reference, found[-1]) if with_grid else {tolerance: [] for tolerance in TOLERANCES}
-    spatial = full_model(found[0])
-    default = processor_time(scene, replace(spatial, method="ros2", divisions=10), span)
     for tolerance, economy in zip(TOLERANCES, found, strict=True):
-        choice = economy.choice
+        choice, everything = economy.choice, replace(reference.choice, accuracy=0.0)
         chosen = processor_time(scene, choice, span)
         times = [chosen if same(other, choice) else processor_time(scene, other, span) for other in grid[tolerance]]
+        limit = tolerance * economy.scales
         yield Row(
             one.name,
             tolerance,
@@ -218,9 +250,35 @@ def rows_of(one: Case, *, with_grid: bool) -> Iterator[Row]:
             true_error(scene, choice, span, economy, reference),
             chosen,
             min(times, default=np.nan),
-            processor_time(scene, replace(spatial, method=implicit(choice), divisions=choice.divisions), span),
-            default,
+            processor_time(
+                scene, replace(full_model(economy), method=implicit(choice), divisions=choice.divisions), span
+            ),
+            processor_time(scene, enough(scene, everything, ("ros2",), span, economy, reference, limit), span),
+            processor_time(scene, enough(scene, everything, methods(span), span, economy, reference, limit), span),
+            processor_time(scene, replace(everything, method="ros2", divisions=10), span),
+            search_time(one, scene, tolerance),
         )
+
+
+def enough(
+    scene: Scene,
+    everything: Choice,
+    names: tuple[str, ...],
+    span: Span,
+    found: Economy,
+    reference: Trial,
+    limit: Array,
+) -> Choice:
+    """The cheapest of some methods on everything with the longest step that keeps the errors below a limit."""
+    best = replace(everything, method="ros3", divisions=reference.choice.divisions)
+    for name in names:
+        for divisions in FINE:
+            choice = replace(everything, method=name, divisions=divisions)
+            if per_row(choice) >= per_row(best):
+                break
+            if (true_error(scene, choice, span, found, reference) <= limit).all():
+                best = choice
+    return best
 
 
 def same(one: Choice, other: Choice) -> bool:
@@ -230,8 +288,8 @@ def same(one: Choice, other: Choice) -> bool:
 
 
 def implicit(choice: Choice) -> str:
-    """The method of a model, or, where that is explicit, one that everything can be run with at its step."""
-    return choice.method if METHODS[choice.method].implicit else "ros3"
+    """The method of a model, or, where that is explicit or chooses its steps, one for everything at the same step."""
+    return choice.method if choice.method in ("ros2", "ros3") else "ros3"
 
 
 def full_model(found: Economy) -> Choice:
@@ -251,46 +309,46 @@ def line(row: Row) -> str:
     return (
         f"{row.case:17} {row.tolerance:6.0e} {'yes' if row.met else 'NO ':4}{(row.error / found.limits).max():5.2f} "
         f"{found.choice.plane:5}{found.choice.method}/{found.choice.divisions:<4d}{1e3 * row.chosen:8.2f}"
-        f"{row.chosen / row.grid:7.2f}{row.full / row.chosen:7.1f}{row.default / row.chosen:8.1f}"
-        f"{found.search_cost / found.cost:8.1f}{repaired:4d}   {coordinates:20} {effectivity}"
+        f"{row.chosen / row.grid:7.2f}{row.same / row.chosen:7.1f}{row.own / row.chosen:7.1f}{row.best / row.chosen:7.1f}"
+        f"{row.default / row.chosen:8.1f}{_searched(row):8.1f}{row.search:6.1f}{repaired:4d}   {coordinates:20} {effectivity}"
     )
 
 
 HEAD = (
-    f"{'case':17} {'tol':>6} {'met':4}{'worst':>5} {'plane':5}{'method':9}{'ms':>7}{'/grid':>7}{'full/':>7}{'default/':>8}"
-    f"{'search':>8}{'rep':>4}   {'coordinates':20} effectivity"
+    f"{'case':17} {'tol':>6} {'met':4}{'worst':>5} {'plane':5}{'method':9}{'ms':>7}{'/grid':>7}"
+    f"{'same/':>7}{'own/':>7}{'best/':>7}{'default/':>8}{'search':>8}{'time':>6}{'rep':>4}   {'coordinates':20} effectivity"
 )
 
 
 def summary(rows: list[Row]) -> Iterator[str]:
     """What is asked of the whole set, and what came out."""
-    gains, against = ([value(row) for row in rows] for value in (_gain, _against_default))
-    over = [_over_grid(row) for row in rows if np.isfinite(row.grid)]
+    over = [row.chosen / row.grid for row in rows if np.isfinite(row.grid)]
     every = [(row, k, float(e)) for row in rows for k, e in enumerate(row.effectivity)]
     inside = [LOW <= e <= HIGH for _, _, e in every]
     yield f"tolerances met         {sum(row.met for row in rows)} of {len(rows)}"
     if over:
         yield f"within 2x of the grid  {sum(value <= 2 for value in over)} of {len(over)}; largest {max(over):.2f}"
-    yield f"full, same step        {np.median(gains):.1f} times the chosen model in the median, {min(gains):.1f} at least"
-    yield f"full, default step     {np.median(against):.1f} times in the median, {min(against):.1f} at least"
-    search = [row.found.search_cost / row.found.cost for row in rows]
-    yield f"search                 {np.median(search):.1f} runs of the chosen model in the median, {max(search):.1f} at most"
+    for text, values in (
+        ("everything, same step  ", [row.same / row.chosen for row in rows]),
+        ("everything, own step   ", [row.own / row.chosen for row in rows]),
+        ("everything, best method", [row.best / row.chosen for row in rows]),
+        ("everything, default    ", [row.default / row.chosen for row in rows]),
+    ):
+        yield f"{text} {np.median(values):.1f} times the chosen model in the median, {min(values):.1f} at least"
+    for text, values in (
+        ("search, cost model     ", [_searched(row) for row in rows]),
+        ("search, processor time ", [row.search for row in rows]),
+    ):
+        yield f"{text} {np.median(values):.1f} runs of the chosen model in the median, {max(values):.1f} at most"
     yield f"effectivity            {sum(inside)} of {len(every)} ({100 * np.mean(inside):.0f} %) within {LOW} to {HIGH}"
     for (row, k, value), good in zip(every, inside, strict=True):
         if not good:
             yield f"  outside: {row.case}, {row.tolerance:.0e}, {row.found.probe.outputs[k].name}: {value:.2f}"
 
 
-def _over_grid(row: Row) -> float:
-    return row.chosen / row.grid
-
-
-def _gain(row: Row) -> float:
-    return row.full / row.chosen
-
-
-def _against_default(row: Row) -> float:
-    return row.default / row.chosen
+def _searched(row: Row) -> float:
+    """Cost of the search beyond one verification, in runs of the chosen model."""
+    return row.found.search_cost / row.found.cost
 
 
 def main() -> None:

@@ -84,7 +84,7 @@ class Stepper:
             )
         readers = _readers(scene, outputs)
         assembled = assemble(replace(scene, forces=(*scene.forces, *readers)), time=start)
-        ensure_compiled(type(method))
+        ensure_compiled(type(method), model=assembled.system.model)
         self._system = assembled.system
         self._start, self._step, self._steps = start, method.step, 0
         self._loops = [_Loop(assembled.system, method, assembled.x.copy(), assembled.v.copy(), gains(stabilisation))]

@@ -117,6 +117,22 @@ def without_terms(body: Body, terms: Iterable[str]) -> Body:
     return replace(body, dropped=dropped, stiffening=body.stiffening and STIFFENING not in names)
 
 
+def stiffening_by(body: Body, loads: Iterable[int]) -> Body:
+    """The body with the geometric stiffening of some loads only, by number: 0 to 2 accelerations, 3 to 5 angular ones, 6 to
+    11 the products of rates xx, yy, zz, xy, xz, yz, then a force and a moment at each interface (body axes)."""
+    model, kept = body.model, sorted(loads)
+    if model.stiffening is None:
+        return body
+    if kept and not 0 <= kept[0] <= kept[-1] < len(model.stiffening):
+        raise InputError(
+            f"body {body.name!r}: stiffening by load {kept[-1] if kept[0] >= 0 else kept[0]}: it has the loads 0 to "
+            f"{len(model.stiffening) - 1}"
+        )
+    stiffening = np.zeros_like(model.stiffening)
+    stiffening[kept] = model.stiffening[kept]
+    return replace(body, model=replace(model, stiffening=stiffening))
+
+
 def with_model(body: Body, model: FlexibleBody) -> Body:
     """The body made otherwise, from another mesh say; undeformed at the start unless it has as many modes as before.
 

@@ -15,16 +15,19 @@ from ffr_dyn.cli import cli
 from ffr_dyn.drivers import Driver
 from ffr_dyn.economy.adaptive import Adaptation, adaptive_forward
 from ffr_dyn.economy.advice import advice
-from ffr_dyn.economy.choice import Part, applied, full, kind, orthonormal
-from ffr_dyn.economy.contributions import of_motion, of_omitted, of_shapes
+from ffr_dyn.economy.choice import Part, applied, full, kind, orthonormal, rigid
+from ffr_dyn.economy.contributions import of_motion, of_omitted, of_shapes, own
 from ffr_dyn.economy.cost import of_run, per_evaluation
 from ffr_dyn.economy.drive import oscillators, samples
+from ffr_dyn.economy.ledger import Ledger
 from ffr_dyn.economy.outputs import Output, as_output, difference, largest, largest_stress, probe
 from ffr_dyn.economy.picture import front, points
 from ffr_dyn.economy.report import as_html, as_markdown, as_text, write_report
-from ffr_dyn.economy.search import Shares, economise
-from ffr_dyn.economy.steps import error_of, least
-from ffr_dyn.economy.trial import Span, run, states
+from ffr_dyn.economy.search import economise
+from ffr_dyn.economy.selection import Shares
+from ffr_dyn.economy.start import least
+from ffr_dyn.economy.steps import error_of
+from ffr_dyn.economy.trial import Span, states
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.formula import formula
 from ffr_dyn.integrators import ROS2, ROS3
@@ -72,27 +75,19 @@ def test_a_damped_oscillator_decays_from_where_it_starts():
 
 
 def looked_at(scene: Scene, outputs, end: float, step: float, *, divisions: int = 2):
-    """Probe, span and choice of everything."""
-    return (
-        probe(assemble(scene), [Output(name, 1e-3) for name in outputs]),
-        Span(0, end, step),
-        full(scene, "ros3", divisions),
-    )
-
-
-def rigid(choice):
-    return replace(choice, parts=tuple(Part(()) for _ in choice.parts))
+    """Ledger, and choice of everything."""
+    of = probe(assemble(scene), [Output(name, 1e-3) for name in outputs])
+    return Ledger(scene, Span(0, end, step), of, lambda stage: None), full(scene, "ros3", divisions)
 
 
 def test_a_complete_model_leaves_no_residual_and_a_rigid_one_leaves_it_in_the_modes():
-    of, span, everything = looked_at(pendulum(7e9), TIP, 0.2, 0.01)
-    own = run(pendulum(7e9), everything, span, of, states=True)
-    assembled, x, v = states(own)
-    same = samples(assembled, assembled, (np.eye(14),), own.result.time, x, v)
+    ledger, everything = looked_at(pendulum(7e9), TIP, 0.2, 0.01)
+    whole, stiff = ledger.run(everything), ledger.run(rigid(everything))
+    same = own(ledger, whole)
     size = np.abs(same.M @ np.ones(20)).max()
     assert np.abs(same.residual).max() < 1e-8 * size
-    small, x, v = states(run(pendulum(7e9), rigid(everything), span, of, states=True))
-    seen = samples(small, assembled, (np.zeros((14, 0)),), own.result.time, x, v)
+    few, many = stiff.made.assembled, whole.made.assembled
+    seen = samples(few, many, (np.zeros((14, 0)),), stiff.result.time, *states(stiff))
     assert np.abs(seen.residual[:, :6]).max() < 1e-8 * size
     assert np.abs(seen.residual[:, 6:]).max() > 0.01
 
@@ -105,11 +100,10 @@ def test_the_estimate_of_a_rigid_pendulum_is_right_whatever_its_frame(reference)
     rod = beam("rod", 1.2, rectangle(0.2, 0.009), replace(ALUMINIUM, E=7e9, rho=5540.0), 4, reference)
     hinge = Joint("hinge", "revolute", "ground.O", "rod.a")
     scene = Scene((Body("rod", rod),), (hinge,), ground={"O": rod.interface("a").position}, gravity=GRAVITY)
-    of, span, everything = looked_at(scene, TIP, 0.6, 0.01)
-    pilot = run(scene, everything, span, of, states=True)
-    stiff = run(scene, rigid(everything), span, of, states=True)
+    ledger, everything = looked_at(scene, TIP, 0.6, 0.01)
+    pilot, stiff = ledger.run(everything), ledger.run(rigid(everything))
     true = largest(difference(stiff.values, pilot.values))
-    estimated = of_omitted(stiff, pilot, of, scene).effect.sum(axis=0)
+    estimated = of_omitted(ledger, stiff, everything, 0.1 * true).effect.sum(axis=0)
     assert (estimated > 0.5 * true).all()
     assert (estimated < 2.5 * true).all()
 
@@ -117,9 +111,9 @@ def test_the_estimate_of_a_rigid_pendulum_is_right_whatever_its_frame(reference)
 def test_modes_have_a_rank_and_principal_shapes_need_fewer():
     """A rod that speeds up: bending first; two shapes hold what takes more modes."""
     scene = slider_crank(150.0)
-    of, span, everything = looked_at(scene, ("rod.stress",), 0.03, 0.001)
-    pilot = run(scene, everything, span, of, states=True)
-    modes, shapes = of_motion(pilot, of, scene), of_shapes(pilot, of, scene)
+    ledger, everything = looked_at(scene, ("rod.stress",), 0.03, 0.001)
+    pilot = ledger.run(everything)
+    modes, shapes = (of(ledger, pilot, np.array([1e3]), own(ledger, pilot)) for of in (of_motion, of_shapes))
     lowest = int(np.argmin(scene.bodies[1].model.frequencies))
     leading = int(np.argmax(modes.effect[:, 0]))
     assert (modes.body[leading], modes.mode[leading]) == (1, lowest)
@@ -129,17 +123,16 @@ def test_modes_have_a_rank_and_principal_shapes_need_fewer():
 
 def test_a_body_in_all_its_shapes_moves_as_before():
     scene = pendulum(7e9)
-    of, span, everything = looked_at(scene, TIP, 0.2, 0.01)
+    ledger, everything = looked_at(scene, TIP, 0.2, 0.01)
     V = orthonormal(np.random.default_rng(1).normal(size=(14, 14)), scene.bodies[0].model.omega2)
     turned = replace(everything, parts=(Part(tuple(range(14)), (), tuple(tuple(c) for c in V.T.tolist())),))
-    one, other = (run(scene, choice, span, of) for choice in (everything, turned))
+    one, other = (ledger.run(choice) for choice in (everything, turned))
     assert largest(difference(one.values, other.values)).max() < 1e-9
 
 
 def test_the_error_of_a_step_comes_with_its_sign():
-    scene = pendulum(7e9)
-    of, span, everything = looked_at(scene, TIP, 0.4, 0.02)
-    coarse, fine, finest = (run(scene, replace(rigid(everything), divisions=d), span, of) for d in (2, 4, 32))
+    ledger, everything = looked_at(pendulum(7e9), TIP, 0.4, 0.02)
+    coarse, fine, finest = (ledger.run(replace(rigid(everything), divisions=d)) for d in (2, 4, 32))
     true = difference(fine.values, finest.values)
     for estimated, wanted in zip(error_of(fine, coarse), true, strict=True):
         assert np.abs(estimated - wanted).max() < 0.3 * np.abs(wanted).max()
@@ -168,7 +161,7 @@ def test_cost_grows_with_what_is_modelled():
         < per_evaluation(plain)
         < per_evaluation(everything)
     )
-    once, thrice, more = (of_run(scene, replace(everything, divisions=d), 10) for d in (1, 3, 5))
+    once, thrice, more = (of_run(replace(everything, divisions=d), 10) for d in (1, 3, 5))
     assert thrice - once == pytest.approx(more - thrice)  # in the number of steps; rows cost something too
 
 
@@ -274,7 +267,7 @@ def test_stiffening_is_kept_above_the_critical_spin():
 
 def test_a_model_is_refined_where_verification_finds_it_wrong(monkeypatch):
     """Estimates that promise too much are found out: with all modes declared without effect the search would stay rigid."""
-    monkeypatch.setattr("ffr_dyn.economy.search.Shares", lambda *given: Shares(1e9, 1e9, 1e9))
+    monkeypatch.setattr("ffr_dyn.economy.search.Shares", lambda *given: Shares(1e9, 1e9, 1e9, 1e9))
     found = economise(pendulum(7e9), TIP, end=0.4, output_step=0.02, tolerance=1e-3, verify=True)
     assert found.verification.attempts > 0
     assert (found.verification.first > found.limits).any()
@@ -282,7 +275,9 @@ def test_a_model_is_refined_where_verification_finds_it_wrong(monkeypatch):
 
 
 def test_the_reference_must_be_better_than_the_tolerance(monkeypatch):
-    monkeypatch.setattr("ffr_dyn.economy.search.error_of", lambda fine, coarse: tuple(v + 1.0 for v in fine.values))
+    monkeypatch.setattr(
+        "ffr_dyn.economy.verification.error_of", lambda fine, coarse: tuple(v + 1.0 for v in fine.values)
+    )
     with pytest.raises(InputError, match="below what the reference itself is known to"):
         economise(SLOW.scene(), SLOW.outputs, end=0.28, output_step=0.014, verify=True)
 

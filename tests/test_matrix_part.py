@@ -61,6 +61,14 @@ def test_alone_it_is_the_body_of_its_matrices(matrices):
         np.testing.assert_array_equal(getattr(body, key), getattr(alone, key))
 
 
+def test_doubts_of_its_mass_are_kept(matrices):
+    parts = {"matrices": matrix_part(matrices, ENDS), "beam": beam(0.5, 0.5, 6, "joint", "tip")}
+    model = tied(parts, [("matrices.joint", "beam.joint")])
+    body = reduce_model(model, name="b", reference=FixedTo("root"), reduction=CraigBampton(40))
+    (warning,) = body.provenance["warnings"]
+    assert warning.startswith("matrices: the mass matrix does not say how these coordinates change the inertia")
+
+
 def test_the_others_keep_their_stress(matrices):
     parts = {"matrices": matrix_part(matrices, ENDS), "beam": beam(0.5, 0.5, 6, "joint", "tip")}
     body = reduce_model(tied(parts, [("matrices.joint", "beam.joint")]), name="b", stress=True, **END)

@@ -64,7 +64,7 @@ class Evaluation:
 
 def evaluator(system: System) -> Evaluator:
     """Memory for evaluations of a compiled scene."""
-    ensure_compiled()
+    ensure_compiled(model=system.model)
     return Evaluator(new_machine(system, *initial_state(system.scene, system.layout)), new_record(system, 1))
 
 

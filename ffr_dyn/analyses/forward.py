@@ -20,7 +20,7 @@ from ffr_dyn.equations import new_record
 from ffr_dyn.errors import InputError
 from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince, Integrator
 from ffr_dyn.kernels.tables import AT, NOW, OK, Record, Work
-from ffr_dyn.machine import Machine, fill_rows, has_loads, new_machine, record_row
+from ffr_dyn.machine import Machine, fill_rows, new_machine, record_row
 from ffr_dyn.measure import Entry, Memory, measure, needs_every_step, selected
 from ffr_dyn.result import Quantity, Result
 from ffr_dyn.result_file import ResultWriter, load_checkpoint, load_result
@@ -90,7 +90,7 @@ def forward(
     _check_stabilisation(method, stabilisation)
     assembled = assemble(scene, time=start) if assembled is None else assembled
     wanted = selected(assembled.system, outputs)
-    ensure_compiled(type(method), loads=has_loads(assembled.system.model.loads))
+    ensure_compiled(type(method), model=assembled.system.model)
     span = (start, end, output_step)
     mark = _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
     header = _header(scene, assembled, method, stabilisation, span)

@@ -10,20 +10,20 @@ than that share; what the energy does at every switch is kept.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ffr_dyn.analyses.assemble import assemble
+from ffr_dyn.analyses.assemble import assemble, close_positions, close_velocities
 from ffr_dyn.analyses.evaluation import moved, to_body_axes, to_global_axes
 from ffr_dyn.analyses.forward import geometry
-from ffr_dyn.economy.choice import Choice, Part, applied, full
+from ffr_dyn.economy.choice import Choice, Part, full
 from ffr_dyn.economy.contributions import effects_of
 from ffr_dyn.economy.drive import Samples, driven, followed, samples
 from ffr_dyn.economy.outputs import Output, Probe, as_output, limits, probe, ranges
-from ffr_dyn.economy.trial import Span, Trial, run, states
+from ffr_dyn.economy.trial import Made, Span, Trial, make, run, states
 from ffr_dyn.errors import InputError
-from ffr_dyn.layout import Layout
+from ffr_dyn.layout import Layout, initial_state
 from ffr_dyn.result import Axis, Quantity, Result
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.stabilisation import Projection, Stabilisation
@@ -91,13 +91,14 @@ def adaptive_forward(
     span = Span(start, end, output_step, stabilisation)
     of = probe(assemble(scene, time=start), [as_output(one, tolerance) for one in outputs])
     everything = replace(full(scene, method, divisions), plane=scene.plane)
-    bound = _bound(scene, everything, span, of)
+    models = _Models(span)
+    bound = _bound(scene, everything, models, of)
     state = _State(start, scene.bodies, tuple(() for _ in scene.bodies))
     pieces: list[_Piece] = []
     first, repeats = 0, 0
     while first < span.rows:
         count = min(adaptation.rows, span.rows - first)
-        piece = _piece(scene, everything, state, span, of, start + first * output_step, count)
+        piece = _piece(scene, everything, state, models, of, bound, start + first * output_step, count)
         entering = _entering(piece, bound, adaptation)
         if entering and repeats < REPEATS:
             state, repeats = _entered(piece, state, entering), repeats + 1
@@ -108,10 +109,50 @@ def adaptive_forward(
     return _result(scene, pieces, method, divisions, output_step)
 
 
-def _bound(scene: Scene, everything: Choice, span: Span, of: Probe) -> Array:
+def _bound(scene: Scene, everything: Choice, models: _Models, of: Probe) -> Array:
     if all(output.absolute for output in of.outputs):
         return np.array([output.tolerance for output in of.outputs])
-    return limits(of, ranges(run(scene, replace(everything, divisions=1), span, of).values))
+    coarse = replace(everything, divisions=1)
+    return limits(of, ranges(run(models.at(scene, coarse, models.span.start), coarse, models.span, of).values))
+
+
+@dataclass(frozen=True)
+class _Models:
+    """The compiled models of the run, by what is modelled: a switch back to one, or the next piece, only moves it."""
+
+    span: Span
+    made: dict[tuple[Part, ...], Made] = field(default_factory=dict)
+
+    def at(self, here: Scene, choice: Choice, time: float) -> Made:
+        """The model in the state that the bodies of a scene declare, its joints closed."""
+        if choice.parts not in self.made:
+            self.made[choice.parts] = make(here, choice, replace(self.span, start=time))
+            return self.made[choice.parts]
+        made = self.made[choice.parts]
+        system = made.assembled.system
+        bodies = [
+            _in_state(body, flat, choice.parts[b].modes)
+            for b, (body, flat) in enumerate(zip(here.bodies, system.scene.bodies, strict=True))
+        ]
+        flat, blocks = replace(system.scene, bodies=tuple(bodies)), list(system.blocks)
+        x, v = initial_state(flat, system.layout)
+        x = close_positions(flat, system.layout, blocks, x, v, time)
+        v = close_velocities(flat, system.layout, blocks, x, v, time)
+        return replace(made, assembled=replace(made.assembled, x=x, v=v))
+
+
+def _in_state(body: Body, flat: Body, modes: tuple[int, ...]) -> Body:
+    """The body of a compiled scene in the state of the scene's own, of which it has some modes."""
+    there = list(modes) if flat.kept is None else [modes[k] for k in flat.kept[0]]
+    return replace(
+        flat,
+        position=body.position,
+        rotation=body.rotation,
+        velocity=body.velocity,
+        omega_bar=body.omega_bar,
+        q=body.q[there],
+        q_dot=body.q_dot[there],
+    )
 
 
 # ---- one piece ------------------------------------------------------------------------------------------------------
@@ -138,14 +179,23 @@ class _Piece:
     q_dot: Array
 
 
-def _piece(scene: Scene, everything: Choice, state: _State, span: Span, of: Probe, start: float, count: int) -> _Piece:
+def _piece(
+    scene: Scene,
+    everything: Choice,
+    state: _State,
+    models: _Models,
+    of: Probe,
+    bound: Array,
+    start: float,
+    count: int,
+) -> _Piece:
     here = replace(scene, bodies=state.bodies)
     choice = replace(everything, parts=tuple(Part(modes) for modes in state.modes))
-    part = replace(span, start=start, end=start + count * span.output_step)
-    trial = run(here, choice, part, of, states=True, outputs=KEPT)
-    large = Trial(everything, applied(here, everything), (), 0, trial.result)
-    small, x, v = states(trial)
-    big = assemble(large.scene, time=start)
+    part = replace(models.span, start=start, end=start + count * models.span.output_step)
+    trial = run(models.at(here, choice, start), choice, part, of, outputs=KEPT)
+    large = models.at(here, everything, start)
+    small, big = trial.made.assembled, large.assembled
+    x, v = states(trial)
     numbers = _numbers(big.system.scene, everything)
     bases = tuple(
         np.eye(body.model.n)[list(there)][:, list(modes)]
@@ -163,7 +213,8 @@ def _piece(scene: Scene, everything: Choice, state: _State, span: Span, of: Prob
     q, q_dot = driven(seen, D[:, len(inside) :], Z[:, :, len(inside) :], *initial)
     own_q, own_rate = (_amplitudes(trial, scene, inside, name) for name in ("q", "q_dot"))
     sign = np.array([-1.0] * len(inside) + [1.0] * len(outside))
-    effects = effects_of(large, of, seen, Z, np.hstack([own_q, q]) * sign, np.hstack([own_rate, q_dot]) * sign)
+    amplitudes, rates = np.hstack([own_q, q]) * sign, np.hstack([own_rate, q_dot]) * sign
+    effects, _ = effects_of(large.scene, of, seen, Z, amplitudes, rates, bound)
     return _Piece(trial, seen, inside, outside, effects, Z, own_q, own_rate, q, q_dot)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.economy.search import Economy
+from ffr_dyn.economy.found import Economy
 from ffr_dyn.scene import Body
 
 MATTERS = 0.02  # of a tolerance: a mode that does less is not asked for

@@ -6,16 +6,17 @@ stretching mode of several vibrates too fast against what it carries. The freque
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import LinAlgError, eigvalsh, null_space
 
-from ffr_dyn.analyses.evaluation import Evaluator, evaluate, evaluator
-from ffr_dyn.analyses.linearise import linearise
-from ffr_dyn.economy.trial import Trial, states
-from ffr_dyn.errors import InputError, SimulationError
-from ffr_dyn.scene import Body, Scene, markers
+from ffr_dyn.analyses.evaluation import evaluate, evaluated_mass_matrix, evaluator
+from ffr_dyn.economy.choice import Choice
+from ffr_dyn.economy.drive import elastic_columns, lift
+from ffr_dyn.economy.trial import Made, Trial, states
+from ffr_dyn.equations import System
+from ffr_dyn.scene import Body, Scene
 
 Array = np.ndarray
 
@@ -41,40 +42,38 @@ class Frequency:
         return self.model / self.everything - 1.0
 
 
-def frequencies(final: Trial, pilot: Trial) -> tuple[Frequency, ...]:
+def frequencies(final: Trial, made: Made, everything: Choice, original: Scene) -> tuple[Frequency, ...]:
     """The lowest vibrations of the model half-way through its run, beside everything in the same position; none for a model
-    without vibration."""
-    middle = len(pilot.result.time) // 2
-    found = [_vibrations(_scene_at(trial, middle), float(pilot.result.time[middle])) for trial in (final, pilot)]
-    if not found[0].size or not found[1].size:
+    without vibration. Of small motions about that position, with the stiffness and the inertia there, without rates."""
+    if not any(part.count for part in final.choice.parts):
         return ()
-    nearest = found[1][np.abs(np.log(found[1][None] / found[0][:, None])).argmin(axis=1)]
-    pairs = zip(found[0], nearest, strict=True)
-    return tuple(Frequency(float(own), float(other)) for own, other in pairs)[:LOWEST]
+    x, v = states(final)
+    middle = len(x) // 2
+    time, small, large = float(final.result.time[middle]), final.made.assembled.system, made.assembled.system
+    bases = tuple(
+        many.basis(body.model.n).T @ few.basis(body.model.n)
+        for body, few, many in zip(original.bodies, final.choice.parts, everything.parts, strict=True)
+    )
+    lifted = lift(small.layout, large.layout, bases, x[middle : middle + 1], v[middle : middle + 1])
+    own, whole = _vibrations(small, time, x[middle], v[middle]), _vibrations(large, time, *(one[0] for one in lifted))
+    if not own.size or not whole.size:
+        return ()
+    nearest = whole[np.abs(np.log(whole[None] / own[:, None])).argmin(axis=1)]
+    return tuple(Frequency(float(one), float(other)) for one, other in zip(own, nearest, strict=True))[:LOWEST]
 
 
-def _scene_at(trial: Trial, row: int) -> Scene:
-    """The scene of a run in its state at a row."""
-    bodies = [replace(body, **_state(trial, body, row)) for body in trial.scene.bodies]
-    return replace(trial.scene, bodies=tuple(bodies))
-
-
-def _state(trial: Trial, body: Body, row: int) -> dict[str, Any]:
-    names = {"position": "R", "rotation": "p", "velocity": "v", "omega_bar": "omega_bar"}
-    names |= {"q": "q", "q_dot": "q_dot"} if body.model.n else {}
-    return {key: trial.result[f"{body.name}.{name}"][row] for key, name in names.items()}
-
-
-def _vibrations(scene: Scene, time: float) -> Array:
-    """Ascending frequencies [Hz] of what vibrates; none where nothing is free to move."""
-    if not any(body.model.n for body in scene.bodies):
-        return np.zeros(0)
+def _vibrations(system: System, time: float, x: Array, v: Array) -> Array:
+    """Ascending frequencies [Hz] of small motions that keep the joints closed."""
+    at, place = evaluator(system), system.layout
+    now = evaluate(at, time, x, v)
+    elastic, Z = elastic_columns(place), null_space(now.jacobian)
+    stiffness = Z[elastic].T @ (system.model.bodies.omega2[:, None] * Z[elastic])
     try:
-        hertz = linearise(scene, time=time).frequencies
-    except (InputError, SimulationError):
+        squares = eigvalsh(stiffness, Z.T @ evaluated_mass_matrix(at) @ Z)
+    except LinAlgError:  # an inertia that is not positive, with terms left out
         return np.zeros(0)
-    lowest = 1e-3 * min(float(body.model.frequencies.min()) for body in scene.bodies if body.model.n)
-    return np.unique(np.round(hertz[hertz > lowest], 9))
+    lowest = 1e-3 * float(np.sqrt(system.model.bodies.omega2.min(initial=np.inf)))
+    return np.sqrt(squares[squares > lowest**2]) / (2 * np.pi)
 
 
 @dataclass(frozen=True)
@@ -88,43 +87,35 @@ class StiffeningLoad:
 
 def stiffening_loads(trial: Trial) -> tuple[StiffeningLoad, ...]:
     """The loads on bodies whose stiffening is in the model, the largest first: accelerations, spin, forces at interfaces."""
-    assembled, x, v = states(trial)
+    (x, v), assembled = states(trial), trial.made.assembled
+    bodies = [b for b, body in enumerate(assembled.system.scene.bodies) if _stiffened(body)]
+    if not bodies:
+        return ()
     at, time = evaluator(assembled.system), trial.result.time
     rows = np.unique(np.linspace(0, len(time) - 1, LOOKED).round().astype(int))
     loads = []
     for row in rows:
-        now = evaluate(at, float(time[row]), x[row], v[row])
-        loads.append([_loads(at, b, now.acceleration) for b in range(len(trial.scene.bodies))])
+        evaluate(at, float(time[row]), x[row], v[row])
+        loads.append([at.work.bodies.load[b].copy() for b in bodies])
     found = []
-    for b, body in enumerate(assembled.system.scene.bodies):
-        if body.model.n and body.model.stiffening is not None and body.stiffening:
-            largest = np.abs([row[b] for row in loads]).max(axis=0)
+    for k, b in enumerate(bodies):
+        body = assembled.system.scene.bodies[b]
+        if body.model.stiffening is not None:
+            largest = np.abs([row[k] for row in loads]).max(axis=0)[: len(body.model.stiffening)]
             scaled = body.model.stiffening / np.sqrt(np.outer(body.model.omega2, body.model.omega2))
             shares = largest * np.abs(np.linalg.eigvalsh(0.5 * (scaled + scaled.transpose(0, 2, 1)))).max(axis=1)
-            names = (*INERTIAL, *(f"{w} {i.name} {c}" for i in body.model.interfaces for w in WHAT for c in "xyz"))
+            names = load_names(body)
             found += [StiffeningLoad(body.name, name, float(s)) for name, s in zip(names, shares, strict=True)]
     return tuple(sorted(found, key=lambda one: -one.share))
 
 
-WHAT = ("force at", "moment at")
+def load_names(body: Body) -> tuple[str, ...]:
+    """What stiffens a body, in words, by the number of the load."""
+    return (
+        *INERTIAL,
+        *(f"{what} {i.name} {c}" for i in body.model.interfaces for what in ("force at", "moment at") for c in "xyz"),
+    )
 
 
-def _loads(at: Evaluator, b: int, acceleration: Array) -> Array:
-    """(12 + 6 I,) of one body at the state evaluated last, as the geometric stiffness counts them; body axes."""
-    place, scene, work = at.system.layout, at.system.scene, at.work
-    x, y, z = work.bodies.omega[b]
-    gravity = work.bodies.A[b].T @ work.field
-    inertial = [acceleration[place.R_dot(b)] - gravity, acceleration[place.omega(b)]]
-    inertial.append(np.array([x * x, y * y, z * z, x * y, x * z, y * z]))
-    numbers = [k for k, (owner, _, _) in enumerate(markers(scene)) if owner == b]
-    at_interfaces = {k: work.markers.load[k].copy() for k in numbers}
-    rows = at.system.model.rows
-    for block, ends in enumerate(rows.marker):
-        lines = slice(rows.start[block], rows.start[block + 1])
-        for side, marker in enumerate(ends):
-            if marker in at_interfaces:
-                jac, lam = work.rows.jac[lines, side], work.rows.lam[lines]
-                force = -lam @ jac[:, :3]
-                moment = -lam @ jac[:, 3:6] - np.cross(work.markers.u[marker], force)
-                at_interfaces[marker] += np.concatenate([force, moment])
-    return np.concatenate([*inertial, *(at_interfaces[k] for k in numbers)])
+def _stiffened(body: Body) -> bool:
+    return bool(body.model.n) and body.model.stiffening is not None and body.stiffening

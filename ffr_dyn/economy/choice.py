@@ -13,7 +13,7 @@ from ffr_dyn.plane import AXES, body_normal, planar_forms
 from ffr_dyn.result import Result
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.surface_loads import ModalForce
-from ffr_dyn.variant import STIFFENING, vary, with_basis
+from ffr_dyn.variant import STIFFENING, stiffening_by, vary, with_basis
 
 Array = np.ndarray
 
@@ -28,11 +28,13 @@ class Part:
     modes   : numbers of the elastic coordinates that are used, from 0, ascending
     dropped : terms that its equations leave out (see `ffr_dyn.variant.TERMS`)
     shapes  : None where these coordinates stay as they are; or shapes made of them, each with a number per mode
+    loads   : numbers of the loads whose geometric stiffening is kept (see `ffr_dyn.variant.stiffening_by`), None for all
     """
 
     modes: tuple[int, ...]
     dropped: tuple[str, ...] = ()
     shapes: tuple[tuple[float, ...], ...] | None = None
+    loads: tuple[int, ...] | None = None
 
     @property
     def count(self) -> int:
@@ -86,6 +88,22 @@ def full(scene: Scene, method: str, divisions: int) -> Choice:
     return Choice(parts, "none", method, divisions)
 
 
+def rigid(choice: Choice) -> Choice:
+    """The choice with all bodies rigid."""
+    return replace(choice, parts=tuple(Part(()) for _ in choice.parts))
+
+
+def held_in_plane(choice: Choice, flat: Scene) -> Choice | None:
+    """The choice with in-plane modes only, for the scene as it is assembled, where its joints keep it to a plane."""
+    if flat.plane not in AXES:
+        return None
+    parts = tuple(
+        replace(part, modes=body.kept[0]) if body.kept else part
+        for part, body in zip(choice.parts, flat.bodies, strict=True)
+    )
+    return replace(choice, parts=parts, plane=flat.plane)
+
+
 def in_plane(scene: Scene, choice: Choice, moved: Result) -> Choice | None:
     """The choice with in-plane modes only, where symmetry and joints keep the scene to a plane; None where they do not.
 
@@ -124,7 +142,11 @@ def applied(scene: Scene, choice: Choice) -> Scene:
         raise InputError(f"the model is of {len(choice.parts)} bodies, the scene has {len(scene.bodies)}")
     pairs = list(zip(scene.bodies, choice.parts, strict=True))
     modes = {b.name: list(p.modes) for b, p in pairs if p.shapes is None and p.count < b.model.n}
-    varied = vary(_in_shapes(scene, choice), modes=modes, drop={b.name: p.dropped for b, p in pairs if p.dropped})
+    loads = {b.name: p.loads for b, p in pairs if p.count and p.loads is not None}
+    stiffened = replace(
+        scene, bodies=tuple(stiffening_by(b, loads[b.name]) if b.name in loads else b for b in scene.bodies)
+    )
+    varied = vary(_in_shapes(stiffened, choice), modes=modes, drop={b.name: p.dropped for b, p in pairs if p.dropped})
     return replace(in_space(varied) if choice.plane == "none" else varied, plane=choice.plane)
 
 

@@ -6,58 +6,87 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffr_dyn.analyses.assemble import assemble
-from ffr_dyn.analyses.evaluation import Evaluator, evaluator, moved, record_states, to_body_axes, to_global_axes
+from ffr_dyn.analyses.evaluation import evaluator, moved, record_states, to_body_axes, to_global_axes
 from ffr_dyn.economy.choice import Choice
 from ffr_dyn.economy.drive import Samples, driven, elastic_columns, followed, samples
-from ffr_dyn.economy.outputs import Probe, histories, needed
-from ffr_dyn.economy.trial import Trial, states
+from ffr_dyn.economy.ledger import Ledger
+from ffr_dyn.economy.outputs import Probe, difference, histories, needed
+from ffr_dyn.economy.trial import Made, Trial, states
+from ffr_dyn.kernels.tables import Record
+from ffr_dyn.layout import Layout
 from ffr_dyn.measure import measure, selected
 from ffr_dyn.result import Result
 from ffr_dyn.scene import Scene
 
 Array = np.ndarray
 
-SEEN = 100  # states along the run at which residuals are formed
+FEWEST = 24  # states along the run at which residuals are formed, where it has so many rows
+SHARE = 8  # rows to a state, where that is more
 LEFT = 1e-6  # of a mode: a smaller rest is rounding
 LOOKED = 4  # states at which the effect of a coordinate on the outputs is looked at: where it is largest
+MINOR = 0.05  # of a tolerance: of coordinates that do less where they are largest, no more states are looked at
 
 
 @dataclass(frozen=True)
 class Contributions:
     """Elastic directions of the whole scene and what they do.
 
-    body   : (E,) of which body;  mode : (E,) the coordinate of that body, in the scene's own numbers, that leads it
-    shape  : per direction (n,), in all elastic coordinates of its body
-    effect : (E, outputs) largest change of an output when the direction is taken away, its joints kept closed
+    body      : (E,) of which body;  mode : (E,) the coordinate of that body, in the scene's own numbers, that leads it
+    shape     : per direction (n,), in all elastic coordinates of its body
+    amplitude : (E,) its largest one
+    effect    : (E, outputs) largest change of an output when the direction is taken away, its joints kept closed
     """
 
     body: Array
     mode: Array
     shape: tuple[Array, ...]
+    amplitude: Array
     effect: Array
+
+
+@dataclass(frozen=True)
+class Looked:
+    """Directions D (V, c) among the velocities of a model, along a motion that it sees: Z (T, V, c) with what follows, and
+    amplitudes and rates (T, c) of what is added to the motion."""
+
+    seen: Samples
+    D: Array
+    Z: Array
+    q: Array
+    q_dot: Array
 
 
 def nothing(of: Probe) -> Contributions:
     """No directions."""
-    return Contributions(np.zeros(0, int), np.zeros(0, int), (), np.zeros((0, len(of.outputs))))
+    return Contributions(np.zeros(0, int), np.zeros(0, int), (), np.zeros(0), np.zeros((0, len(of.outputs))))
 
 
-def of_motion(pilot: Trial, of: Probe, original: Scene) -> Contributions:
-    """Contributions of the coordinates that a run has, from its own motion."""
-    seen = _own(pilot)
+# ---- of a run's own coordinates ---------------------------------------------------------------------------------------
+
+
+def own(ledger: Ledger, trial: Trial) -> Samples:
+    """A run seen by its own model."""
+    x, v = states(trial)
+    rows, system = _spaced(len(x)), trial.made.assembled.system
+    same = tuple(np.eye(n) for n in system.layout.n)
+    ledger.looked(trial.choice, len(rows))
+    return samples(trial.made.assembled, trial.made.assembled, same, trial.result.time[rows], x[rows], v[rows])
+
+
+def of_motion(ledger: Ledger, pilot: Trial, limit: Array, seen: Samples) -> Contributions:
+    """Contributions of the coordinates that a run has, from its own motion, `seen` as by `own`."""
     columns = elastic_columns(seen.system.layout)
     D = np.eye(seen.system.layout.v_size)[:, columns]
-    return _effects(pilot, original, of, seen, D, seen.x[:, _positions(seen)], seen.v[:, columns], -1.0)
+    looked = Looked(seen, D, followed(seen, D), -seen.x[:, _positions(seen)], -seen.v[:, columns])
+    return _contributions(ledger, looked, pilot.made, pilot.choice, limit)
 
 
-def of_shapes(pilot: Trial, of: Probe, original: Scene) -> Contributions:
+def of_shapes(ledger: Ledger, pilot: Trial, limit: Array, seen: Samples) -> Contributions:
     """Contributions of the principal shapes of a run: of each body those that carry most of its strain energy over time.
 
     A few of them hold the quasi-static deflection that many modes share (proper orthogonal decomposition in the metric of
     the stiffness; Holmes, Lumley, Berkooz, Turbulence, Coherent Structures, Dynamical Systems and Symmetry (1996), ch. 3).
     """
-    seen = _own(pilot)
     place, omega2 = seen.system.layout, seen.system.model.bodies.omega2
     columns, at = elastic_columns(place), _positions(seen)
     q, q_dot, whole = seen.x[:, at], seen.v[:, columns], pilot.result
@@ -75,32 +104,40 @@ def of_shapes(pilot: Trial, of: Probe, original: Scene) -> Contributions:
         D.append(directions)
         amplitude.append((q[:, here] * stiffness) @ left)
         rate.append((q_dot[:, here] * stiffness) @ left)
-    return _effects(pilot, original, of, seen, np.hstack(D), np.hstack(amplitude), np.hstack(rate), -1.0)
+    shapes = np.hstack(D)
+    looked = Looked(seen, shapes, followed(seen, shapes), -np.hstack(amplitude), -np.hstack(rate))
+    return _contributions(ledger, looked, pilot.made, pilot.choice, limit)
 
 
-def of_omitted(trial: Trial, large: Trial, of: Probe, original: Scene) -> Contributions:
-    """Contributions of the modes that `trial` lacks and `large` has, driven one-way by the motion of `trial`.
+# ---- of what a run lacks ----------------------------------------------------------------------------------------------
+
+
+def of_omitted(ledger: Ledger, trial: Trial, everything: Choice, limit: Array) -> Contributions:
+    """Contributions of what everything has and a run lacks, driven one-way by its motion.
 
     Of a body in shapes, the part of each mode that its shapes do not hold.
     """
-    small, x, v = states(trial)
-    big = assemble(large.scene, time=float(large.result.time[0]))
-    rows = _spaced(len(x))
+    x, v = states(trial)
+    rows, large = _spaced(len(x)), ledger.made(everything)
     bases = tuple(
         many.basis(body.model.n).T @ few.basis(body.model.n)
-        for body, few, many in zip(original.bodies, trial.choice.parts, large.choice.parts, strict=True)
+        for body, few, many in zip(ledger.scene.bodies, trial.choice.parts, everything.parts, strict=True)
     )
-    seen = samples(small, big, bases, trial.result.time[rows], x[rows], v[rows])
-    D, modes = _missing(seen, bases, large.choice)
+    D, modes = _missing(large.assembled.system.layout, bases, everything)
     if not modes:
-        return nothing(of)
-    q, q_dot = driven(seen, D, followed(seen, D))
-    return replace(_effects(large, original, of, seen, D, q, q_dot, 1.0), mode=np.array(modes, int))
+        return nothing(ledger.of)
+    small = trial.made.assembled
+    seen = samples(small, large.assembled, bases, trial.result.time[rows], x[rows], v[rows])
+    ledger.looked(trial.choice, len(rows))
+    ledger.looked(everything, len(rows))
+    Z = followed(seen, D)
+    found = _contributions(ledger, Looked(seen, D, Z, *driven(seen, D, Z)), large, everything, limit)
+    return replace(found, mode=np.array(modes, int))
 
 
-def _missing(seen: Samples, bases: tuple[Array, ...], choice: Choice) -> tuple[Array, list[int]]:
+def _missing(place: Layout, bases: tuple[Array, ...], choice: Choice) -> tuple[Array, list[int]]:
     """(V, c) what each coordinate of a model has beyond the bases, and (c,) its number in the body."""
-    place, found, modes = seen.system.layout, [], []
+    found, modes = [], []
     for b, V in enumerate(bases):
         rest = np.eye(len(V)) - V @ V.T
         for k in np.flatnonzero(np.abs(rest).max(axis=0, initial=0.0) > LEFT):
@@ -111,16 +148,12 @@ def _missing(seen: Samples, bases: tuple[Array, ...], choice: Choice) -> tuple[A
     return np.array(found).reshape(-1, place.v_size).T, modes
 
 
-def _own(trial: Trial) -> Samples:
-    """A run seen by its own model."""
-    assembled, x, v = states(trial)
-    rows = _spaced(len(x))
-    same = tuple(np.eye(n) for n in assembled.system.layout.n)
-    return samples(assembled, assembled, same, trial.result.time[rows], x[rows], v[rows])
+# ---- effects on outputs -----------------------------------------------------------------------------------------------
 
 
 def _spaced(rows: int) -> Array:
-    return np.unique(np.linspace(0, rows - 1, min(rows, SEEN)).round().astype(int))
+    """Rows of a run at which its residuals are formed."""
+    return np.unique(np.linspace(0, rows - 1, min(rows, max(FEWEST, rows // SHARE))).round().astype(int))
 
 
 def _positions(seen: Samples) -> Array:
@@ -129,46 +162,70 @@ def _positions(seen: Samples) -> Array:
     return np.array([k for b in range(len(place.n)) for k in range(place.q(b).start, place.q(b).stop)], int)
 
 
-def _effects(
-    large: Trial, original: Scene, of: Probe, seen: Samples, D: Array, q: Array, q_dot: Array, sign: float
-) -> Contributions:
-    effect = effects_of(large, of, seen, followed(seen, D), sign * q, sign * q_dot)
-    return Contributions(*_named(large, original, seen, D), effect)
+def _contributions(ledger: Ledger, looked: Looked, large: Made, choice: Choice, limit: Array) -> Contributions:
+    effect, evaluations = effects_of(large.scene, ledger.of, looked.seen, looked.Z, looked.q, looked.q_dot, limit)
+    ledger.looked(choice, evaluations)
+    amplitude = np.abs(looked.q).max(axis=0, initial=0.0)
+    return Contributions(*_named(choice, ledger.scene, looked.seen, looked.D), amplitude, effect)
 
 
-def effects_of(large: Trial, of: Probe, seen: Samples, Z: Array, q: Array, q_dot: Array) -> Array:
-    """(c, outputs) largest change of an output by the motion Z (T, V, c) with amplitudes and rates (T, c)."""
-    place, at = seen.system.layout, evaluator(seen.system)
-    effect = np.zeros((Z.shape[2], len(of.outputs)))
-    for c in range(Z.shape[2]):
-        rows = np.sort(np.argsort(-np.abs(q[:, c]), kind="stable")[:LOOKED])
-        plain = _values(at, large.scene, of, seen.time[rows], seen.x[rows], seen.v[rows])
-        steps, rates = (Z[rows, :, c] * values[rows, c][:, None] for values in (q, q_dot))
-        x = np.array([moved(place, seen.x[k], step) for k, step in zip(rows, steps, strict=True)])
-        v = np.array([
-            to_global_axes(place, x[i], to_body_axes(place, seen.x[k], seen.v[k]) + rates[i])
-            for i, k in enumerate(rows)
-        ])  # fmt: skip
-        changed = _values(at, large.scene, of, seen.time[rows], x, v)
-        effect[c] = [np.abs(a - b).max(initial=0.0) for a, b in zip(changed, plain, strict=True)]
-    return effect
+def effects_of(
+    scene: Scene, of: Probe, seen: Samples, Z: Array, q: Array, q_dot: Array, limit: Array
+) -> tuple[Array, int]:
+    """(c, outputs) largest change of an output by the motion Z (T, V, c) with amplitudes and rates (T, c), and the number of
+    evaluations; all directions are looked at where they are largest, and at more states those that matter there."""
+    effect, plain = np.zeros((Z.shape[2], len(of.outputs))), _outputs(seen, seen.record, scene, of)
+    order = np.argsort(-np.abs(q), axis=0, kind="stable")[:LOOKED]
+    pairs = [(int(order[0, c]), c) for c in range(Z.shape[2]) if order.size]
+    count = 0
+    for _ in range(2):
+        if not pairs:
+            break
+        rows, columns = np.array(pairs).T
+        shift, rates = (Z[rows, :, columns] * values[rows, columns][:, None] for values in (q, q_dot))
+        values = _outputs(seen, _changed(seen, rows, shift, rates), scene, of)
+        changes = _change(of, values, tuple(one[rows] for one in plain))
+        sizes = np.array([np.abs(one).max(axis=1, initial=0.0) for one in changes]).T
+        np.maximum.at(effect, columns, sizes)
+        count += len(pairs)
+        more = np.flatnonzero((effect > MINOR * limit).any(axis=1))
+        pairs = [(int(row), int(c)) for c in more for row in order[1:, c]]
+    return effect, count
 
 
-def _named(large: Trial, original: Scene, seen: Samples, D: Array) -> tuple[Array, Array, tuple[Array, ...]]:
+def _changed(seen: Samples, rows: Array, shift: Array, rates: Array) -> Record:
+    """What the model records at the states of `rows`, each moved by a row of `shift` and `rates` (K, V)."""
+    place = seen.system.layout
+    x = np.array([moved(place, seen.x[k], step) for k, step in zip(rows, shift, strict=True)])
+    v = np.array([
+        to_global_axes(place, x[i], to_body_axes(place, seen.x[k], seen.v[k]) + rates[i]) for i, k in enumerate(rows)
+    ])  # fmt: skip
+    return record_states(evaluator(seen.system), seen.time[rows], x, v)
+
+
+def _outputs(seen: Samples, record: Record, scene: Scene, of: Probe) -> tuple[Array, ...]:
+    """Per output (K, k) at recorded states, which follow one another in no order."""
+    quantities, _ = measure(seen.system, record, {}, selected(seen.system, needed(of, scene)))
+    return histories(of, scene, Result(np.arange(float(len(record.time))), quantities))
+
+
+def _change(of: Probe, values: tuple[Array, ...], plain: tuple[Array, ...]) -> tuple[Array, ...]:
+    """Differences of outputs; of angles, which have not been unwound, within half a turn."""
+    turns = [name.endswith(".angle") for name in of.quantities]
+    return tuple(
+        np.remainder(d + np.pi, 2 * np.pi) - np.pi if turning else d
+        for d, turning in zip(difference(values, plain), turns, strict=True)
+    )
+
+
+def _named(choice: Choice, original: Scene, seen: Samples, D: Array) -> tuple[Array, Array, tuple[Array, ...]]:
     """Of each direction the body, the leading coordinate by strain energy, and the shape in the body's own coordinates."""
     place, bodies, leading, shapes = seen.system.layout, [], [], []
     for direction in D.T:
         b = next(k for k in range(len(place.n)) if direction[place.q_dot(k)].any())
         model = original.bodies[b].model
-        shape = large.choice.parts[b].basis(model.n) @ direction[place.q_dot(b)]
+        shape = choice.parts[b].basis(model.n) @ direction[place.q_dot(b)]
         bodies.append(b)
         leading.append(int(np.argmax(np.abs(shape) * np.sqrt(model.omega2))))
         shapes.append(shape)
     return np.array(bodies, int), np.array(leading, int), tuple(shapes)
-
-
-def _values(at: Evaluator, scene: Scene, of: Probe, time: Array, x: Array, v: Array) -> tuple[Array, ...]:
-    """Outputs at states of the model."""
-    record = record_states(at, time, x, v)
-    quantities, _ = measure(at.system, record, {}, selected(at.system, needed(of, scene)))
-    return histories(of, scene, Result(time, quantities))

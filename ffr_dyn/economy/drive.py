@@ -21,10 +21,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import expm
 
 from ffr_dyn.analyses.assemble import Assembled
-from ffr_dyn.analyses.evaluation import evaluate, evaluated_mass_matrix, evaluator, locked, unit_rows
+from ffr_dyn.analyses.evaluation import (
+    Evaluator,
+    copied,
+    evaluate,
+    evaluated_mass_matrix,
+    evaluator,
+    joined,
+    locked,
+    unit_rows,
+)
 from ffr_dyn.equations import System
+from ffr_dyn.kernels.tables import Record
 from ffr_dyn.layout import Layout
 
 Array = np.ndarray
@@ -35,7 +46,10 @@ STIFF = 1e10  # how much more a violation of a constraint weighs than the inerti
 @dataclass(frozen=True)
 class Samples:
     """A motion seen by a model, T rows: time (T,), x (T, X), v (T, V) lifted into it, mass M (T, V, V), Jacobian
-    (T, C, V), residual r (T, V)."""
+    (T, C, V), residual r (T, V), accelerations of the motion (T, V), and what the model records there.
+
+    stiffening : (T, V, L) force of every load by way of geometric stiffness;  loads : (L,) of these, body and number
+    """
 
     system: System
     time: Array
@@ -44,6 +58,10 @@ class Samples:
     M: Array
     jacobian: Array
     residual: Array
+    acceleration: Array
+    record: Record
+    stiffening: Array
+    loads: tuple[tuple[int, int], ...]
 
 
 def elastic_columns(place: Layout) -> Array:
@@ -83,19 +101,64 @@ def _texts(block: object) -> list[str]:
 
 def samples(small: Assembled, large: Assembled, bases: tuple[Array, ...], time: Array, x: Array, v: Array) -> Samples:
     """The motion x (T, .), v (T, .) of the small model, seen by the large one; `bases` as in `lift`."""
-    at, seen = evaluator(small.system), evaluator(large.system)
     X, W = lift(small.system.layout, large.system.layout, bases, x, v)
     to_large, rows = _map(small.system.layout, large.system.layout, bases), _rows(small.system, large.system)
-    M, J, r = [], [], []
+    at, seen = evaluator(small.system), evaluator(large.system)
+    loads = stiffening_numbers(large.system)
+    M, J, r, acc, records, stiffening = [], [], [], [], [], []
     for k, t in enumerate(time):
         own = evaluate(at, float(t), x[k], v[k])
         now = evaluate(seen, float(t), X[k], W[k])
         mass, lam = evaluated_mass_matrix(seen), np.zeros(len(now.Phi))
         lam[[pair[1] for pair in rows]] = own.lam[[pair[0] for pair in rows]]
+        acc.append(to_large @ own.acceleration)
         M.append(mass)
         J.append(now.jacobian)
-        r.append(now.force - mass @ (to_large @ own.acceleration) - now.jacobian.T @ lam)
-    return Samples(large.system, time, X, W, np.array(M), np.array(J), np.array(r))
+        r.append(now.force - mass @ acc[-1] - now.jacobian.T @ lam)
+        records.append(copied(seen.record))
+        stiffening.append(stiffening_forces(seen, loads))
+    return Samples(
+        large.system,
+        time,
+        X,
+        W,
+        np.array(M),
+        np.array(J),
+        np.array(r),
+        np.array(acc),
+        joined(records),
+        np.array(stiffening),
+        loads,
+    )
+
+
+# ---- what stiffens ----------------------------------------------------------------------------------------------------
+
+
+def stiffening_numbers(system: System) -> tuple[tuple[int, int], ...]:
+    """(body, number of the load) of all loads that stiffen a body of the model."""
+    where, loads = system.model.bodies.where, system.model.bodies.loads
+    return tuple(
+        (b, int(number))
+        for b in range(len(system.scene.bodies))
+        for number in loads[where[b, 8] : where[b, 8] + where[b, 6]]
+    )
+
+
+def stiffening_forces(at: Evaluator, numbers: tuple[tuple[int, int], ...]) -> Array:
+    """(V, L) force of each load by way of the geometric stiffness, at the state evaluated last."""
+    place, where, work = at.system.layout, at.system.model.bodies.where, at.work.bodies
+    forces = np.zeros((place.v_size, len(numbers)))
+    for b in {b for b, _ in numbers}:
+        columns = [k for k, (body, _) in enumerate(numbers) if body == b]
+        n, start = place.n[b], int(where[b, 9])
+        products = work.stiff[start : start + len(columns) * n].reshape(-1, n)
+        sizes = work.load[b][[numbers[k][1] for k in columns]]
+        forces[place.q_dot(b), columns] = -(sizes[:, None] * products).T
+    return forces
+
+
+# ---- passive oscillators ----------------------------------------------------------------------------------------------
 
 
 def followed(seen: Samples, D: Array) -> Array:
@@ -123,13 +186,24 @@ def driven(
 
     q, q_dot : (c,) at the start; rest by default
     """
+    return oscillators(seen.time, *_oscillators(seen, D, Z, seen.residual[:, :, None]), q, q_dot)
+
+
+def responses(seen: Samples, D: Array, Z: Array, forces: Array) -> Array:
+    """(T, c, K) amplitudes of the directions D (V, c), driven by each of some forces (T, V, K) from rest."""
+    force, omega2, damping = _oscillators(seen, D, Z, forces)
+    count = forces.shape[2]
+    q, _ = oscillators(seen.time, force, np.repeat(omega2, count), np.repeat(damping, count))
+    return q.reshape(len(q), D.shape[1], count)
+
+
+def _oscillators(seen: Samples, D: Array, Z: Array, forces: Array) -> tuple[Array, Array, Array]:
+    """Force per mass (T, c K), square of the frequency (c,), and damping (c,) of directions under forces (T, V, K)."""
     bodies, elastic = seen.system.model.bodies, elastic_columns(seen.system.layout)
     own = D[elastic] ** 2
-    force = np.einsum("tvc,tv->tc", Z, seen.residual)
     mass = np.maximum(np.einsum("tvc,tvw,twc->tc", Z, seen.M, Z, optimize=True).mean(axis=0), 1e-9)
-    return oscillators(
-        seen.time, force / mass, bodies.omega2 @ own / mass, bodies.two_zeta_omega @ own / mass, q, q_dot
-    )
+    force = np.einsum("tvc,tvk->tck", Z, forces, optimize=True) / mass[:, None]
+    return force.reshape(len(Z), -1), bodies.omega2 @ own / mass, bodies.two_zeta_omega @ own / mass
 
 
 def oscillators(
@@ -156,23 +230,17 @@ def oscillators(
 
 def _update(h: float, omega2: Array, damping: Array) -> tuple[Array, ...]:
     """Coefficients of the exact step for each oscillator, from the exponential of the 4 x 4 system with a linear force."""
-    from scipy.linalg import expm
-
-    found = []
-    for w2, d in zip(omega2, damping, strict=True):
-        # states q, q' h, force, its change over the step; time in units of h
-        A = np.array([[0, 1, 0, 0], [-w2 * h * h, -d * h, h * h, 0], [0, 0, 0, 1], [0, 0, 0, 0]], float)
-        E = expm(A)
-        found.append(
-            (
-                E[0, 0],
-                E[0, 1] * h,
-                E[1, 0] / h,
-                E[1, 1],
-                E[0, 2] - E[0, 3],
-                (E[1, 2] - E[1, 3]) / h,
-                E[0, 3],
-                E[1, 3] / h,
-            )
-        )
-    return tuple(np.array(column) for column in zip(*found, strict=True))
+    A = np.zeros((omega2.size, 4, 4))  # of the states q, q' h, force, its change over the step; time in units of h
+    A[:, 0, 1], A[:, 2, 3], A[:, 1, 2] = 1.0, 1.0, h * h
+    A[:, 1, 0], A[:, 1, 1] = -omega2 * h * h, -damping * h
+    E = expm(A)
+    return (
+        E[:, 0, 0],
+        E[:, 0, 1] * h,
+        E[:, 1, 0] / h,
+        E[:, 1, 1],
+        E[:, 0, 2] - E[:, 0, 3],
+        (E[:, 1, 2] - E[:, 1, 3]) / h,
+        E[:, 0, 3],
+        E[:, 1, 3] / h,
+    )

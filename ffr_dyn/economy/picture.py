@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ffr_dyn.economy.search import Economy
+from ffr_dyn.economy.found import Economy
 
 Array = np.ndarray
 

@@ -15,7 +15,7 @@ import numpy as np
 from ffr_dyn.economy.advice import advice
 from ffr_dyn.economy.choice import Choice, kind
 from ffr_dyn.economy.contributions import Contributions
-from ffr_dyn.economy.search import Economy
+from ffr_dyn.economy.found import Economy
 from ffr_dyn.errors import InputError
 from ffr_dyn.scene import INERTIA_TERMS, Body
 

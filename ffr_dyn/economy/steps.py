@@ -1,8 +1,8 @@
 """The integrator and step that keep the error of time discretisation below a limit at the least cost.
 
-One sharp run, of the most accurate method at half the coarse step, tells the error of every method at the coarse step; the
-orders predict the step that each needs. The cheapest is run with that step and with one about twice as long, which gives the
-error with its sign:  y(h) - y = (y(2h) - y(h)) / (2^p - 1).
+The model's coarse run is there already. Two stages instead of four are tried first: where their difference is small they are
+enough. Next a run with twice the step, or half of it, tells the error of the coarse one with its sign,
+y(h) - y = (y(2h) - y(h)) / (2^p - 1), and the orders predict the step that each method needs; the cheapest is run with it.
 """
 
 from __future__ import annotations
@@ -14,22 +14,29 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.economy.choice import Choice
-from ffr_dyn.economy.cost import STAGES, per_row, stages
+from ffr_dyn.economy.cost import STAGES, per_row
+from ffr_dyn.economy.ledger import Ledger
 from ffr_dyn.economy.outputs import difference, largest
 from ffr_dyn.economy.trial import Span, Trial, cost
 from ffr_dyn.errors import InputError, SimulationError
-from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator
+from ffr_dyn.integrators import CONTROLLED, METHODS, RK4, Integrator
 
 Array = np.ndarray
-Run = Callable[[Choice], Trial]
+Histories = tuple[Array, ...]
 
-SHORT = 1  # steps to a row: with more, steps longer than a row would not do
-ACCURACIES = (1e-2, 1e-3, 1e-4, 1e-5)
+TWO_STAGES, EXPLICIT = "ros2", "rk4"
+SURELY = 0.95  # of the limit: the difference of two coarse runs of different order that is taken for the error of one
+NEARLY = 0.8  # of the limit: an estimate from a run with steps over two rows
+FAR = 0.1  # of the limit: steps longer than a row would do
+ACCURACIES = (1e-2, 1e-3)
 WORTH = 0.8  # of the cost: a method that chooses its steps pays
 MOST = 4096  # divisions of an output step
-ATTEMPTS = 6
+ATTEMPTS = 10
 MARGIN = 1.1  # on a predicted number of divisions
-ONCE = 0.75  # a shorter run pays when it needs less than this share of the divisions
+RUNG = 2.5  # times the steps of the last run
+PAYS = 4  # coarse runs of two stages to a run as predicted: where it is worth to try these
+ONCE = 0.6  # a shorter run pays when it needs less than this share of the divisions
+NEAR = (1.25, 3.0)  # ratios of the steps of two runs whose difference tells their errors
 
 
 @dataclass(frozen=True)
@@ -40,7 +47,7 @@ class Stepped:
     """
 
     trial: Trial
-    error: tuple[Array, ...]
+    error: Histories
 
 
 def methods(span: Span) -> tuple[str, ...]:
@@ -55,132 +62,194 @@ def _takes_a_step(made: Callable[[float], Integrator], step: float) -> bool:
         return False
 
 
-def least(run: Run, choice: Choice, divisions: int) -> Trial:
-    """The run with the fewest divisions, from `divisions` up by doubling, with which it comes to an end."""
-    failed: Exception | None = None
-    while divisions <= MOST:
-        try:
-            return run(replace(choice, divisions=divisions))
-        except (SimulationError, InputError) as error:
-            failed, divisions = error, 2 * divisions
-    raise SimulationError(f"no step down to 1/{MOST} of the output step completes a run: {failed}")
-
-
-def chosen_step(run: Run, choice: Choice, limit: Array, span: Span) -> Stepped:
+def chosen_step(ledger: Ledger, choice: Choice, limit: Array) -> Stepped:
     """The cheapest method and step for a model with errors below `limit` (outputs,) from discretisation.
 
-    choice : the model with the longest step that completes a run
+    choice : the model with the longest step that completes a run, by a method of the third order
 
     Raises SimulationError when none is found.
     """
-    sharp = run(replace(choice, method=_sharpest(span), divisions=2 * choice.divisions))
-    offers: list[tuple[float, str, int]] = []
-    for name in sorted(methods(span), key=lambda name: (stages(name), name)):
-        offers += _offer(run, replace(choice, method=name), sharp, limit, min(offers, default=(np.inf,))[0])
-    failed: Exception | None = None
-    for _, name, needed in sorted(offers)[:2]:
-        try:
-            return _longer(run, _refined(run, replace(choice, method=name), needed, sharp, limit), limit, span)
-        except SimulationError as error:
-            failed = error
-    raise SimulationError(
-        f"no integrator reaches the tolerance with steps down to 1/{MOST} of the output step; {failed}"
-    )
+    ledger.tell("integrator and step")
+    found = _rigid_in_two_stages(ledger, choice, limit)
+    if found is None:
+        coarse = ledger.run(choice)
+        found = _coarse(ledger, coarse, limit)
+        if found is None:
+            error = signed(coarse, ledger.run(replace(choice, divisions=2 * choice.divisions)))
+            found = Stepped(coarse, error) if share(error, limit) <= 1 else _finer(ledger, coarse, error, limit)
+    return _longer(ledger, found, limit)
 
 
-def _sharpest(span: Span) -> str:
-    """The implicit method of the highest order."""
-    return max((int(_class(name).order), name) for name in methods(span) if _class(name).implicit)[1]
+# ---- a coarse step that will do ---------------------------------------------------------------------------------------
 
 
-def _class(name: str) -> Any:
-    return METHODS[name]
+def _rigid_in_two_stages(ledger: Ledger, choice: Choice, limit: Array) -> Stepped | None:
+    """The coarse run of rigid bodies with two stages, which is there already, where it is good enough."""
+    trial = ledger.runs.get(replace(choice, method=TWO_STAGES))
+    if trial is None or any(part.count for part in choice.parts):
+        return None
+    error = _from_two_rows(ledger, trial)
+    return None if error is None or share(error, limit) > 1 else Stepped(trial, error)
 
 
-def _offer(run: Run, choice: Choice, sharp: Trial, limit: Array, least_cost: float) -> list[tuple[float, str, int]]:
-    """(cost, method, divisions) that a method is predicted to need; nothing where it cannot be the cheapest or fails."""
-    if per_row(choice) >= least_cost:
-        return []
+def _coarse(ledger: Ledger, coarse: Trial, limit: Array) -> Stepped | None:
+    """The coarse run, or one of two stages, where steps over two rows show that this is enough."""
+    error, simple = _from_two_rows(ledger, coarse), replace(coarse.choice, method=TWO_STAGES)
+    if error is None or share(error, NEARLY * limit) > 1:
+        return None
+    if share(error, FAR * limit) > 1 and simple not in ledger.runs:
+        return Stepped(coarse, error)
+    trial = _attempt(ledger, simple)
+    if trial is None:
+        return Stepped(coarse, error)
+    off = difference(trial.values, coarse.values)
+    return (
+        Stepped(trial, off) if share(off, SURELY * limit) <= 1 else None
+    )  # or else steps over two rows miss something
+
+
+def _from_two_rows(ledger: Ledger, trial: Trial) -> Histories | None:
+    """The error of a run with one step to a row, from one with steps over two rows; None where that does not complete."""
+    if trial.choice.divisions != 1:
+        return None
     try:
-        coarse = run(choice)
+        wide = ledger.over_two_rows(trial.choice)
     except (SimulationError, InputError):
-        return []
-    error = difference(coarse.values, sharp.values)
-    if choice.method == sharp.choice.method:
-        error = _signed(coarse, sharp)
-    needed = _needed(coarse, share(error, limit))
-    return [(per_row(replace(choice, divisions=needed)), choice.method, needed)]
+        return None
+    if wide is None:
+        return None
+    gain = 2.0 ** order(trial) - 1
+    return tuple(_on_all_rows((w - v[::2]) / gain) for w, v in zip(wide.values, trial.values, strict=True))
 
 
-def order(trial: Trial) -> int:
-    """Order of the method of a run."""
-    return int(_class(trial.choice.method).order)
+def _on_all_rows(values: Array) -> Array:
+    """(2 T - 1, k) with means between the rows of (T, k)."""
+    found = np.empty((2 * len(values) - 1, values.shape[1]))
+    found[::2] = values
+    found[1::2] = 0.5 * (values[1:] + values[:-1])
+    return found
 
 
-def error_of(fine: Trial, coarse: Trial) -> tuple[Array, ...]:
-    """(T, k) per output: the signed error of the finer of two runs of one method."""
-    ratio = fine.choice.divisions / coarse.choice.divisions
-    return tuple(d / (ratio ** order(fine) - 1) for d in difference(coarse.values, fine.values))
+# ---- a finer step -----------------------------------------------------------------------------------------------------
 
 
-def share(error: tuple[Array, ...], limit: Array) -> float:
-    """Largest error in units of its limit."""
-    return float((largest(error) / limit).max(initial=0.0))
+def _finer(ledger: Ledger, coarse: Trial, error: Histories, limit: Array) -> Stepped:
+    """The cheaper of the methods by what they are predicted to need, run with that."""
+    needed = {coarse.choice.method: _needed(coarse, share(error, limit))}
+    most, truth = (
+        per_row(replace(coarse.choice, divisions=needed[coarse.choice.method])),
+        difference(coarse.values, error),
+    )
+    for name in (EXPLICIT, TWO_STAGES):
+        choice = replace(coarse.choice, method=name)
+        if name not in methods(ledger.span) or per_row(choice) * (1 if name == EXPLICIT else PAYS) > most:
+            continue
+        trial = _attempt(ledger, choice)
+        if trial is not None:
+            needed[name] = _needed(trial, MARGIN * share(difference(trial.values, truth), limit))
+    return _cheapest(ledger, coarse.choice, needed, limit)
 
 
-def _needed(trial: Trial, error: float) -> int:
-    """Divisions for an error of one, from a run with that `error`."""
-    return int(np.clip(np.ceil(trial.choice.divisions * error ** (1 / order(trial)) * (1 - 1e-9)), 1, MOST))
+def _cheapest(ledger: Ledger, choice: Choice, needed: dict[str, int], limit: Array) -> Stepped:
+    """A run within the limit, of the method that costs least by the divisions that each is predicted to need.
 
-
-def _signed(trial: Trial, other: Trial) -> tuple[Array, ...]:
-    """The error of `trial`, from a run of the same method with a shorter or a longer step."""
-    if other.choice.divisions < trial.choice.divisions:
-        return error_of(trial, other)
-    gain = (other.choice.divisions / trial.choice.divisions) ** order(trial)
-    return tuple(gain * e for e in error_of(other, trial))
-
-
-def _refined(run: Run, choice: Choice, needed: int, sharp: Trial, limit: Array) -> Stepped:
-    """Runs of one method, each with the step that the one before predicts, until the limit holds and no longer one does."""
+    Every run corrects the prediction for its method. Far predictions are approached in rungs, each of which tells the error
+    of the next.
+    """
+    before: dict[str, tuple[int, float]] = {}
     best: Stepped | None = None
     for _ in range(ATTEMPTS):
-        trial = run(replace(choice, divisions=needed))
-        error = _measured(run, trial, sharp)
+        name = min(needed, key=lambda name: (per_row(replace(choice, method=name, divisions=needed[name])), name))
+        divisions = _rung(ledger, replace(choice, method=name), needed[name])
+        trial = _attempt(ledger, replace(choice, method=name, divisions=divisions))
+        if trial is None:
+            needed[name] = min(MOST, 2 * divisions)
+            continue
+        error = measured(ledger, trial)
         now = share(error, limit)
-        if now <= 1 and (best is None or needed < best.trial.choice.divisions):
+        if now <= 1 and (best is None or cost(trial, ledger.span) < cost(best.trial, ledger.span)):
             best = Stepped(trial, error)
-        better = int(np.ceil(needed * now ** (1 / order(trial)) * (MARGIN if now > 1 else 1.0)))
-        if best is not None and (now > 1 or better >= ONCE * needed or needed == 1):
+        power = 1 / _seen_order(trial, now, before.get(name))
+        before[name] = divisions, now
+        better = int(np.ceil(divisions * now**power * (MARGIN if now > 1 else 1.0)))
+        if best is not None and (now > 1 or better >= ONCE * divisions or divisions == 1):
             return best
-        needed = int(np.clip(better if better != needed else needed + 1, 1, MOST))
+        needed[name] = int(np.clip(better if better != divisions else divisions + 1, 1, MOST))
     if best is None:
-        raise SimulationError(f"{choice.method}: errors stay above their limits with {needed} steps from row to row")
+        raise SimulationError(
+            f"no integrator reaches the tolerance with steps down to 1/{MOST} of the output step: errors stay above their "
+            f"limits with {max(needed.values())} steps from row to row"
+        )
     return best
 
 
-def _longer(run: Run, fixed: Stepped, limit: Array, span: Span) -> Stepped:
+def _rung(ledger: Ledger, choice: Choice, needed: int) -> int:
+    """The divisions of the next run towards those needed."""
+    there = [one.divisions for one in ledger.runs if replace(one, divisions=choice.divisions) == choice]
+    finest = max((d for d in there if d < needed), default=needed)
+    return needed if needed <= NEAR[1] * finest else int(np.ceil(RUNG * finest))
+
+
+def _seen_order(trial: Trial, error: float, before: tuple[int, float] | None) -> float:
+    """The order with which the error falls from the last run to this one, at most that of the method."""
+    if before is None or before[0] >= trial.choice.divisions or not 0 < error < before[1]:
+        return float(order(trial))
+    seen = np.log(before[1] / error) / np.log(trial.choice.divisions / before[0])
+    return float(np.clip(seen, 1.0, order(trial)))
+
+
+def measured(ledger: Ledger, trial: Trial) -> Histories:
+    """The error of a run, from one of the same method with a step near: one that is there, or twice the step."""
+    same = [
+        other
+        for other in ledger.runs.values()
+        if replace(other.choice, divisions=trial.choice.divisions) == trial.choice and not trial.choice.controlled
+    ]
+    ratios = [trial.choice.divisions / other.choice.divisions for other in same]
+    near = [other for other, ratio in zip(same, ratios, strict=True) if NEAR[0] <= max(ratio, 1 / ratio) <= NEAR[1]]
+    if near:
+        return signed(trial, max(near, key=lambda other: other.choice.divisions))
+    if trial.choice.divisions > 1:
+        half = _attempt(ledger, replace(trial.choice, divisions=(trial.choice.divisions + 1) // 2))
+        if half is not None:
+            return error_of(trial, half)
+    error = _from_two_rows(ledger, trial)
+    if error is not None:
+        return error
+    return signed(trial, ledger.run(replace(trial.choice, divisions=2 * trial.choice.divisions)))
+
+
+# ---- steps that the method chooses ------------------------------------------------------------------------------------
+
+
+def _longer(ledger: Ledger, fixed: Stepped, limit: Array) -> Stepped:
     """The run of a method that chooses its steps, where steps longer than an output row would do and that is cheaper."""
-    if fixed.trial.choice.divisions > SHORT:
+    if fixed.trial.choice.divisions > 1 or share(fixed.error, FAR * limit) > 1:
         return fixed
-    best = fixed
-    truth = difference(fixed.trial.values, fixed.error)
+    best, truth = fixed, difference(fixed.trial.values, fixed.error)
     for name in CONTROLLED:
-        found = _controlled(run, replace(fixed.trial.choice, method=name, divisions=1), truth, limit, best, span)
-        best = best if found is None else found
+        if not (CONTROLLED[name].implicit or _is_soft(ledger, fixed.trial)):
+            continue
+        choice = replace(fixed.trial.choice, method=name, divisions=1, accuracy=ACCURACIES[0])
+        if ledger.first_part(choice) < cost(best.trial, ledger.span):
+            found = _controlled(ledger, choice, truth, limit, best)
+            best = best if found is None else found
     return best
 
 
-def _controlled(
-    run: Run, choice: Choice, truth: tuple[Array, ...], limit: Array, best: Stepped, span: Span
-) -> Stepped | None:
+def _is_soft(ledger: Ledger, trial: Trial) -> bool:
+    """Whether an explicit method is stable with a step of a row."""
+    omega2 = max(body.model.omega2.max(initial=0.0) for body in trial.scene.bodies)
+    return bool(np.sqrt(omega2) * ledger.span.output_step <= RK4.reach)
+
+
+def _controlled(ledger: Ledger, choice: Choice, truth: Histories, limit: Array, best: Stepped) -> Stepped | None:
     """The first accuracy of a method that meets the limit, while its runs are cheaper than the best one."""
     for accuracy in ACCURACIES:
-        try:
-            trial = run(replace(choice, accuracy=accuracy))
-        except (SimulationError, InputError):
+        trial = _attempt(ledger, replace(choice, accuracy=accuracy))
+        if trial is None:
             continue
-        if cost(trial, span) > WORTH * cost(best.trial, span):
+        if cost(trial, ledger.span) > WORTH * cost(best.trial, ledger.span):
             return None
         error = difference(trial.values, truth)
         if share(error, limit) <= 1:
@@ -188,14 +257,41 @@ def _controlled(
     return None
 
 
-def _measured(run: Run, trial: Trial, sharp: Trial) -> tuple[Array, ...]:
-    """The error of a run: against the sharp run where that is much finer, or else against one with twice its step."""
-    divisions = trial.choice.divisions
-    if divisions < sharp.choice.divisions and trial.choice.method != sharp.choice.method:
-        return difference(trial.values, sharp.values)
-    if divisions < sharp.choice.divisions:
-        return _signed(trial, sharp)
+# ---- orders -----------------------------------------------------------------------------------------------------------
+
+
+def _attempt(ledger: Ledger, choice: Choice) -> Trial | None:
     try:
-        return error_of(trial, run(replace(trial.choice, divisions=(divisions + 1) // 2)))
+        return ledger.run(choice)
     except (SimulationError, InputError):
-        return _signed(trial, run(replace(trial.choice, divisions=2 * divisions)))
+        return None
+
+
+def order(trial: Trial) -> int:
+    """Order of the method of a run."""
+    method: Any = METHODS[trial.choice.method]
+    return int(method.order)
+
+
+def error_of(fine: Trial, coarse: Trial) -> Histories:
+    """(T, k) per output: the signed error of the finer of two runs of one method."""
+    ratio = fine.choice.divisions / coarse.choice.divisions
+    return tuple(d / (ratio ** order(fine) - 1) for d in difference(coarse.values, fine.values))
+
+
+def signed(trial: Trial, other: Trial) -> Histories:
+    """The error of `trial`, from a run of the same method with a shorter or a longer step."""
+    if other.choice.divisions < trial.choice.divisions:
+        return error_of(trial, other)
+    gain = (other.choice.divisions / trial.choice.divisions) ** order(trial)
+    return tuple(gain * e for e in error_of(other, trial))
+
+
+def share(error: Histories, limit: Array) -> float:
+    """Largest error in units of its limit."""
+    return float((largest(error) / limit).max(initial=0.0))
+
+
+def _needed(trial: Trial, error: float) -> int:
+    """Divisions for an error of one, from a run with that `error`."""
+    return int(np.clip(np.ceil(trial.choice.divisions * error ** (1 / order(trial)) * (1 - 1e-9)), 1, MOST))

@@ -37,46 +37,62 @@ class Span:
 
 
 @dataclass(frozen=True)
+class Made:
+    """A model: the scene with it, and that scene assembled at the start of the run."""
+
+    scene: Scene
+    assembled: Assembled
+
+
+@dataclass(frozen=True)
 class Trial:
     """A run.
 
-    scene       : with the model applied;  values : per output (T, k);  evaluations : of the equations of motion
-    result      : kept quantities and notes
+    made   : the model;  values : per output (T, k);  evaluations : of the equations of motion
+    result : kept quantities, states among them, and notes
     """
 
     choice: Choice
-    scene: Scene
+    made: Made
     values: tuple[Array, ...]
     evaluations: int
     result: Result
+
+    @property
+    def scene(self) -> Scene:
+        """With the model applied."""
+        return self.made.scene
+
+
+def make(scene: Scene, choice: Choice, span: Span) -> Made:
+    """The model of a scene, assembled."""
+    applied_to = applied(scene, choice)
+    return Made(applied_to, assemble(applied_to, time=span.start))
 
 
 def cost(trial: Trial, span: Span) -> float:
     """[us] of a run, by the cost model: from its steps, or from its evaluations where the method chooses its steps."""
     if trial.choice.controlled:
-        return of_evaluations(trial.choice, trial.evaluations)
-    return of_run(trial.scene, trial.choice, span.rows)
+        return of_evaluations(trial.choice, trial.evaluations, span.rows)
+    return of_run(trial.choice, span.rows)
 
 
-def run(
-    scene: Scene, choice: Choice, span: Span, of: Probe, *, states: bool = False, outputs: tuple[str, ...] = ()
-) -> Trial:
-    """Run a model; with `states`, its result holds positions and velocities of all bodies too, and what `outputs` name.
+def run(made: Made, choice: Choice, span: Span, of: Probe, outputs: tuple[str, ...] = ()) -> Trial:
+    """Run a model, keeping its states and what `outputs` name.
 
     Raises SimulationError as `forward` does, and where the outputs are no longer finite.
     """
-    made = applied(scene, choice)
-    wanted = (*needed(of, made), *(_states(made) if states else ()), *outputs)
     result = forward(
-        made,
+        made.scene,
         start=span.start,
         end=span.end,
         output_step=span.output_step,
         method=choice.integrator(span.output_step),
         stabilisation=span.stabilisation,
-        outputs=wanted,
+        outputs=(*needed(of, made.scene), *_states(made.scene), *outputs),
+        assembled=made.assembled,
     )
-    values = histories(of, made, result)
+    values = histories(of, made.scene, result)
     if not all(np.isfinite(one).all() for one in values):
         raise SimulationError("an output of the run is no longer finite")
     return Trial(choice, made, values, int(result.attributes["evaluations"]), result)
@@ -86,17 +102,16 @@ def _states(scene: Scene) -> tuple[str, ...]:
     return STATES if any(body.model.n for body in scene.bodies) else STATES[:4]
 
 
-def states(trial: Trial) -> tuple[Assembled, Array, Array]:
-    """The compiled model, and (T, X) positions and (T, V) velocities of a run that kept its states."""
-    assembled = assemble(trial.scene)
-    place, result = assembled.system.layout, trial.result
-    T = result.time.size
+def states(trial: Trial) -> tuple[Array, Array]:
+    """(T, X) positions and (T, V) velocities of a run."""
+    system, result = trial.made.assembled.system, trial.result
+    place, T = system.layout, result.time.size
     x, v = np.zeros((T, place.x_size)), np.zeros((T, place.v_size))
-    for b, body in enumerate(assembled.system.scene.bodies):
+    for b, body in enumerate(system.scene.bodies):
         kept = list(body.kept[0]) if body.kept else list(range(place.n[b]))
         x[:, place.R(b)], x[:, place.p(b)] = result[f"{body.name}.R"], result[f"{body.name}.p"]
         v[:, place.R_dot(b)], v[:, place.omega(b)] = result[f"{body.name}.v"], result[f"{body.name}.omega_bar"]
         if place.n[b]:
             x[:, place.q(b)] = result[f"{body.name}.q"][:, kept]
             v[:, place.q_dot(b)] = result[f"{body.name}.q_dot"][:, kept]
-    return assembled, x, v
+    return x, v

@@ -1,0 +1,157 @@
+"""The modes and terms that a model needs: predicted by what they do to the outputs, then run once beside everything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ffr_dyn.economy.choice import Choice, orthonormal, rigid
+from ffr_dyn.economy.contributions import LEFT, Contributions, of_motion, of_shapes, own
+from ffr_dyn.economy.cost import per_evaluation
+from ffr_dyn.economy.ledger import Ledger
+from ffr_dyn.economy.outputs import difference, largest
+from ffr_dyn.economy.start import Ground
+from ffr_dyn.economy.terms import TermEffect, term_effects, without_minor
+from ffr_dyn.errors import SimulationError
+from ffr_dyn.scene import Scene
+
+Array = np.ndarray
+
+NEARLY_ALL = 0.8  # of the modes: then those of the full motion are ranked instead
+ATTEMPTS = 5
+MORE = 1.2  # times as many directions, at least, after those that were not enough
+HOPE = 1.0  # times the tolerance: where modes do more by the estimate, rigid bodies are not tried
+SAFELY = 0.6  # of what may be left out, when what was predicted turns out too much
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Shares of the tolerance that may be taken by modes left out, by terms, by rigid bodies, and by all that is left out."""
+
+    modes: float = 0.15
+    terms: float = 0.15
+    rigid: float = 0.5
+    all: float = 0.5
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """Directions in the order of what they do: taken from the top until the rest is within its share."""
+
+    scene: Scene
+    everything: Choice
+    found: Contributions
+    limits: Array
+
+    @property
+    def order(self) -> Array:
+        """Numbers of the directions."""
+        return np.argsort(-(self.found.effect / self.limits).max(axis=1), kind="stable")
+
+    def count(self, part: float) -> int:
+        """How many directions leave less than a share of the tolerance."""
+        rest = np.cumsum((self.found.effect / self.limits)[self.order[::-1]], axis=0)
+        return int(np.sum(rest.max(axis=1) > part))
+
+    def model(self, count: int) -> Choice:
+        """Everything with the first directions only."""
+        chosen = self.order[:count]
+        parts = list(self.everything.parts)
+        for b, part in enumerate(parts):
+            shapes = [self.found.shape[k] for k in chosen if self.found.body[k] == b]
+            if not shapes:
+                parts[b] = replace(part, modes=(), dropped=())
+            elif all(np.count_nonzero(np.abs(shape) > LEFT) == 1 for shape in shapes):
+                parts[b] = replace(
+                    part, modes=tuple(sorted(int(self.found.mode[k]) for k in chosen if self.found.body[k] == b))
+                )
+            elif len(shapes) < len(part.modes):
+                at = list(part.modes)
+                V = orthonormal(np.array(shapes).T[at], self.scene.bodies[b].model.omega2[at])
+                parts[b] = replace(part, shapes=tuple(tuple(float(v) for v in column) for column in V.T))
+        return replace(self.everything, parts=tuple(parts))
+
+
+@dataclass(frozen=True)
+class Selection:
+    """A model, and what terms do along the motion of everything, known where modes were looked at."""
+
+    choice: Choice
+    terms: tuple[TermEffect, ...] = ()
+
+
+def selected_model(
+    ledger: Ledger, ground: Ground, omitted: Contributions, shares: Shares, beyond: int = -1
+) -> Selection:
+    """The fewest modes, or shapes made of them, and the fewest terms whose absence leaves the outputs within their share.
+
+    omitted : what modes do, driven by the rigid motion
+    beyond  : elastic coordinates of a model that is known not to do
+    """
+    if beyond < 0 and (omitted.effect.sum(axis=0) <= HOPE * ground.limits).all():
+        stiff = rigid(ground.everything)
+        if (gap(ledger, ground, stiff, "all bodies rigid") <= shares.rigid * ground.limits).all():
+            return Selection(stiff)
+    rankings, effects = _rankings(ledger, ground, omitted, shares)
+    predicted = [ranking.model(ranking.count(shares.modes)) for ranking in rankings]
+    cheapest = min(range(len(rankings)), key=lambda k: (per_evaluation(predicted[k]), k))
+    return Selection(_enough(ledger, ground, rankings[cheapest], effects, shares, beyond), effects)
+
+
+def _rankings(
+    ledger: Ledger, ground: Ground, omitted: Contributions, shares: Shares
+) -> tuple[list[Ranking], tuple[TermEffect, ...]]:
+    """What modes do, driven by the rigid motion or, where nearly all are needed, in the full one; principal shapes; terms."""
+    ledger.tell("modes and terms along the motion of everything")
+    seen = own(ledger, ground.pilot)
+    needed = (omitted.effect > shares.modes * ground.limits / max(1, len(omitted.body))).any(axis=1)
+    found = omitted
+    if needed.mean() >= NEARLY_ALL or not np.isfinite(omitted.effect).all():
+        found = of_motion(ledger, ground.pilot, ground.limits, seen)
+    shapes = of_shapes(ledger, ground.pilot, ground.limits, seen)
+    rankings = [Ranking(ledger.scene, ground.everything, one, ground.limits) for one in (found, shapes)]
+    return rankings, term_effects(seen, found)
+
+
+def _enough(
+    ledger: Ledger, ground: Ground, ranking: Ranking, effects: tuple[TermEffect, ...], shares: Shares, beyond: int
+) -> Choice:
+    """The model that a run beside everything shows to be enough; everything where the number of attempts does not do."""
+    scale, count = 1.0, _more(ranking, beyond) if beyond >= 0 else 0
+    for _ in range(ATTEMPTS):
+        count = max(count, ranking.count(scale * shares.modes))
+        model = without_minor(ranking.model(count), effects, scale * shares.terms * ground.limits)
+        error = float((gap(ledger, ground, model, _said(model)) / (shares.all * ground.limits)).max())
+        if error <= 1:
+            return model
+        if model == ground.everything:
+            break
+        scale *= SAFELY / min(error, 1e6)
+        count = _more(ranking, count)
+    return ground.everything
+
+
+def _more(ranking: Ranking, count: int) -> int:
+    """A number of directions after one that is not enough."""
+    return min(max(count + 1, int(MORE * count)), ranking.order.size)
+
+
+def size_of(choice: Choice) -> int:
+    """How many elastic coordinates a model has."""
+    return sum(part.count for part in choice.parts)
+
+
+def _said(model: Choice) -> str:
+    return f"{size_of(model)} elastic coordinates"
+
+
+def gap(ledger: Ledger, ground: Ground, choice: Choice, what: str) -> Array:
+    """(outputs,) how far a model is from everything with the same coarse step; infinite where its run fails."""
+    try:
+        trial = ledger.run(choice)
+    except SimulationError:
+        return np.full(len(ground.limits), np.inf)
+    error = largest(difference(trial.values, ground.pilot.values))
+    ledger.note(trial, what, error)
+    return error

@@ -1,0 +1,91 @@
+"""The chosen model against everything on and a finer step; refined until it is within its tolerances."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ffr_dyn.economy.choice import Choice
+from ffr_dyn.economy.contributions import Contributions
+from ffr_dyn.economy.cost import of_run
+from ffr_dyn.economy.found import Verification
+from ffr_dyn.economy.ledger import Ledger
+from ffr_dyn.economy.outputs import Probe, difference, largest
+from ffr_dyn.economy.selection import Shares, selected_model, size_of
+from ffr_dyn.economy.start import PILOT, Ground
+from ffr_dyn.economy.steps import error_of
+from ffr_dyn.economy.trial import Trial, cost
+from ffr_dyn.errors import InputError
+
+Array = np.ndarray
+
+ATTEMPTS = 4
+
+
+def reference(everything: Choice, final: Trial) -> Choice:
+    """Everything with half the step of the final run, and of the coarse one."""
+    return replace(everything, method=PILOT, divisions=2 * max(final.choice.divisions, everything.divisions))
+
+
+def reference_cost(ledger: Ledger, everything: Choice, final: Trial) -> float:
+    """[us] of the reference, by the cost model."""
+    return of_run(reference(everything, final), ledger.span.rows)
+
+
+def verified(
+    ledger: Ledger, everything: Choice, limits: Array, final: Trial, omitted: Contributions
+) -> tuple[Trial, Verification]:
+    """The model that meets its tolerances against the reference, and their errors.
+
+    omitted : what modes do, driven by the rigid motion, for a model that has to be chosen anew
+
+    Raises InputError where the reference is not known well enough.
+    """
+    ledger.tell("verification: everything, finer step")
+    choice = reference(everything, final)
+    sharp, coarse = ledger.run(choice), ledger.run(replace(choice, divisions=choice.divisions // 2))
+    own = largest(error_of(sharp, coarse))
+    _check_accuracy(ledger.of, limits, own)
+    errors: list[Array] = []
+    while True:
+        errors.append(largest(difference(final.values, sharp.values)))
+        ledger.note(final, "verified", errors[-1])
+        if (errors[-1] <= limits).all() or len(errors) == ATTEMPTS:
+            spent = cost(sharp, ledger.span) + cost(coarse, ledger.span)
+            return final, Verification(choice, errors[-1], errors[0], own, len(errors) - 1, spent)
+        final = _better(ledger, limits, final, sharp, coarse, omitted, len(errors))
+
+
+def _check_accuracy(of: Probe, limits: Array, own: Array) -> None:
+    for output, limit, known in zip(of.outputs, limits, own, strict=True):
+        if known > limit:
+            raise InputError(
+                f"output {output.name!r}: the tolerance {limit:.2g} is below what the reference itself is known to, "
+                f"{known:.2g}; ask for a larger one, or give the scene damping: undamped high modes ring at every step"
+            )
+
+
+def _better(
+    ledger: Ledger, limits: Array, final: Trial, sharp: Trial, coarse: Trial, omitted: Contributions, attempt: int
+) -> Trial:
+    """A better model: of a finer step where that is what is wrong, or else chosen anew beside everything with that step."""
+    same = replace(final.choice, method=PILOT, divisions=coarse.choice.divisions, accuracy=0.0)
+    if (largest(difference(ledger.run(same).values, coarse.values)) <= Shares().all * limits).all():
+        return ledger.run(_shorter(final.choice))
+    steps: dict[str, Any] = {key: getattr(final.choice, key) for key in ("method", "divisions", "accuracy")}
+    if not final.choice.integrator(ledger.span.output_step).implicit:  # its step is for the modes that it had
+        steps = {"method": PILOT, "divisions": coarse.choice.divisions, "accuracy": 0.0}
+    if attempt > 1:
+        return ledger.run(replace(coarse.choice, **steps))
+    ground = Ground(coarse.choice, coarse.choice, coarse, limits, limits)
+    anew = selected_model(ledger, ground, omitted, Shares(), size_of(final.choice)).choice
+    return ledger.run(replace(anew, **steps))
+
+
+def _shorter(choice: Choice) -> Choice:
+    """The same model with shorter steps."""
+    if choice.controlled:
+        return replace(choice, accuracy=choice.accuracy / 10)
+    return replace(choice, divisions=2 * choice.divisions)
