@@ -29,7 +29,8 @@ def failure(system: System, work: Work, status: int, time: float) -> BaseExcepti
         if isinstance(system.user.cause, KeyboardInterrupt):
             return system.user.cause
         return SimulationError(f"the run stopped in a Python function of the scene: {system.user.failure}")
-    if status == NOT_FINITE or (status in (SINGULAR_BODY, SINGULAR_CONSTRAINT) and not _sound(work)):
+    lost = not _sound(work)
+    if status == NOT_FINITE or (lost and (status == SINGULAR_BODY or _largest(system, work)[1] > HUGE)):
         return SimulationError(
             f"{at} the state of {_worst(system, work)} is no longer finite: {_overflow(system, work)}"
         )
@@ -45,6 +46,7 @@ def failure(system: System, work: Work, status: int, time: float) -> BaseExcepti
         text = block.words[where - system.model.rows.start[row]].text
         return SimulationError(
             f"{at} the row '{text}' of {block.name!r} cannot be met by any motion: it ties bodies that cannot move there"
+            f"{', or the state is no longer finite' if lost else ''}"
         )
     if status == NOT_CONVERGED:
         return SimulationError(f"{at} the iterations of the step do not converge, {_unconverged(system, where)}")
@@ -76,7 +78,7 @@ def _worst(system: System, work: Work) -> str:
 
 def _overflow(system: System, work: Work) -> str:
     """Why a state is not finite, and what to change."""
-    name, value = max(_given(system, work), key=lambda found: found[1], default=("", 0.0))
+    name, value = _largest(system, work)
     if value > HUGE:
         return f"{name!r} exerts {value:.3g} N or N m; look at its numbers and their units"
     least, when = work.independence[1:3]
@@ -87,6 +89,11 @@ def _overflow(system: System, work: Work) -> str:
             "motions within reach, or use projection"
         )
     return "the step is too large for an explicit method (use ROS2 or a smaller step), or a force is not finite"
+
+
+def _largest(system: System, work: Work) -> tuple[str, float]:
+    """The load or actuator with the largest component, and that; zero where there is none."""
+    return max(_given(system, work), key=lambda found: found[1], default=("", 0.0))
 
 
 def _given(system: System, work: Work) -> list[tuple[str, float]]:
