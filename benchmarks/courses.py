@@ -145,7 +145,7 @@ class Run:
 
 def drive(start: Assembled, course: Course, method: Integrator, stabilisation: Stabilisation) -> Run | None:
     """The compiled loop over a course, None where the method fails."""
-    ensure_compiled(type(method))
+    ensure_compiled(type(method), model=start.system.model)
     substeps = LOOKS if method.controlled else round(course.output_step / method.step)
     spacing = course.output_step / substeps
     machine = new_machine(start.system, start.x, start.v, method, gains(stabilisation), spacing=spacing)

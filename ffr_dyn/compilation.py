@@ -15,24 +15,35 @@ from pathlib import Path
 from numba.core.caching import FunctionCache
 
 from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator
-from ffr_dyn.kernels.units import CONTROL_UNITS, EXTRA_UNITS, LOAD_UNITS, UNITS, Unit
+from ffr_dyn.kernels.tables import Model
+from ffr_dyn.kernels.units import (
+    CONTROL_UNITS,
+    EXTRA_UNITS,
+    LOAD_UNITS,
+    RELAXED_UNITS,
+    STIFFENED_UNITS,
+    UNITS,
+    Unit,
+    units_of,
+)
 
 _METHODS = {**METHODS, **CONTROLLED}
 _AT_WORK: dict[str, subprocess.Popen[bytes]] = {}
 _ON_DISK: set[str] = set()  # units that were found there before: a program with many runs looks once
 
 
-def begin_compiling(*kinds: type[Integrator], loads: bool = True) -> None:
+def begin_compiling(*kinds: type[Integrator], model: Model | None = None) -> None:
     """Start to compile the units of some methods where they are not on disk, and go on with something else meanwhile.
 
     For programs that mesh and reduce bodies first: a run that needs the units waits for them.
 
-    loads : whether the scene applies anything but gravity
+    model : tables of the scene; without them, of one with applied loads
     """
     controlled = CONTROL_UNITS if any(kind.controlled for kind in kinds) else {}
     methods = {name: kind.unit for name, kind in _METHODS.items() if kind in kinds}
     extra = {name: EXTRA_UNITS[name] for kind in kinds for name in kind.calls}
-    units = {**UNITS, **(LOAD_UNITS if loads else {}), **controlled, **extra, **methods}
+    scene = units_of(model) if model else {**UNITS, **LOAD_UNITS}
+    units = {**scene, **controlled, **extra, **methods}
     _ON_DISK.update(name for name, unit in units.items() if name not in _ON_DISK and _is_on_disk(unit))
     missing = [name for name in units if name not in _AT_WORK and name not in _ON_DISK]
     if not missing:
@@ -44,9 +55,9 @@ def begin_compiling(*kinds: type[Integrator], loads: bool = True) -> None:
         _AT_WORK.update(dict.fromkeys(share, process))
 
 
-def ensure_compiled(*kinds: type[Integrator], loads: bool = True) -> None:
+def ensure_compiled(*kinds: type[Integrator], model: Model | None = None) -> None:
     """Have the units of some methods on disk; where that fails, the run compiles them itself."""
-    begin_compiling(*kinds, loads=loads)
+    begin_compiling(*kinds, model=model)
     for process in set(_AT_WORK.values()):
         process.wait()
     _AT_WORK.clear()
@@ -68,6 +79,8 @@ def compile_units(names: Sequence[str]) -> None:
     units = {
         **UNITS,
         **LOAD_UNITS,
+        **RELAXED_UNITS,
+        **STIFFENED_UNITS,
         **CONTROL_UNITS,
         **EXTRA_UNITS,
         **{name: kind.unit for name, kind in _METHODS.items()},

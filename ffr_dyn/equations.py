@@ -414,8 +414,16 @@ def new_work(m: Model) -> Work:
     )
     vectors = zeros(omega=(M, 3), r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3), load=(M, 6))
     rows = RowWork(
-        **zeros(Phi=C, nu=C, gamma=C, lam=C, left=C, scale=C, jac=(C, D, 9), X=size.size * D * 12 * LANES),
-        **zeros(Y=12 * LANES, step=size.size * LANES, wrench=6, P=(M, 36), phiphi=(pairs, 36), S=stored),
+        **zeros(Phi=C, nu=C, gamma=C, lam=C, left=C, scale=C, least=C, jac=(C, D, 9), X=size.size * D * 12 * LANES),
+        **zeros(
+            Y=12 * LANES,
+            step=size.size * LANES,
+            pivots=size.size * LANES,
+            wrench=6,
+            P=(M, 36),
+            phiphi=(pairs, 36),
+            S=stored,
+        ),
     )
     return Work(
         bodies=bodies,

@@ -11,7 +11,7 @@ import numpy as np
 
 from ffr_dyn.equations import System, new_stages, new_work
 from ffr_dyn.kernels.packing import pack
-from ffr_dyn.kernels.tables import Clock, Control, Loads, Model, Record, Tables, Work
+from ffr_dyn.kernels.tables import Clock, Control, Model, Record, Tables, Work
 from ffr_dyn.kernels.units import controlled_rows_unit, record_unit, rows_unit, truly_unit, unit_addresses
 
 if TYPE_CHECKING:
@@ -72,14 +72,9 @@ def new_machine(
     clock = Clock(np.array([h, h or spacing]), np.zeros(3, dtype=np.int64), np.array(gains))
     control = _control(system, method, start, spacing)
     calls = () if method is None else method.calls
-    units = np.array(unit_addresses(has_loads(system.model.loads), calls), dtype=np.int64)
+    units = np.array(unit_addresses(system.model, calls), dtype=np.int64)
     state = np.array(x, dtype=float), np.array(v, dtype=float)
     return _packed(system, Tables(0, units, system.model, new_work(system.model), stages, clock, control, *state))
-
-
-def has_loads(loads: Loads) -> bool:
-    """Whether a scene applies anything but gravity."""
-    return any(table.shape[0] for table in (loads.wrench, loads.action, loads.bushing, loads.spread))
 
 
 def _control(system: System, method: Integrator | None, start: float, spacing: float) -> Control:

@@ -9,42 +9,31 @@ Geometric stiffening needs stresses, which matrices do not give, so bodies made 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from importlib.metadata import version
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from threadpoolctl import threadpool_limits
 
-from ffr_prep.basis import Basis, check_basis, factorised
-from ffr_prep.body import FlexibleBody, Surface
+from ffr_prep.basis import Basis
+from ffr_prep.body import FlexibleBody
 from ffr_prep.errors import ComputationError, InputError
 from ffr_prep.factor import CHOLESKY, FreeBody, Solver
 from ffr_prep.interface import CoupledModel, InterfaceRegion
-from ffr_prep.invariants import InertiaIntegrals
-from ffr_prep.matrix_checks import (
-    check_connected,
-    check_matrices,
-    check_mechanisms,
-    mass_is_singular,
-    precision_warnings,
-)
-from ffr_prep.matrix_coupling import couple_matrices, tie_matrices
-from ffr_prep.matrix_model import MatrixModel, model_hash, without_empty_rows
-from ffr_prep.model import interface_shapes
-from ffr_prep.nodal_inertia import nodal_integrals, scalar_integrals, scalar_mass
+from ffr_prep.matrix_checks import check_mechanisms, mass_is_singular
+from ffr_prep.matrix_coupling import tie_matrices
+from ffr_prep.matrix_model import MatrixModel
+from ffr_prep.matrix_part import checked, part_of
+from ffr_prep.model import reduce_model
 from ffr_prep.progress import Advance, Stages, no_advance, no_stages
 from ffr_prep.provenance import described
-from ffr_prep.quality import Quality, assess, completed
 from ffr_prep.reduction import Reduction
-from ffr_prep.reference import ReferenceConditions, functionals
+from ffr_prep.reference import ReferenceConditions
 from ffr_prep.selection import Band
 
 Array = np.ndarray
 
-_VERSIONED = ("ffr", "numpy", "scipy")
-_DOUBTFUL = 0.1
 _MASSLESS = 1e-9
 
 
@@ -77,89 +66,45 @@ def reduce_matrices(
     ComputationError for a computation that failed.
     """
     with threadpool_limits(1):  # as for solids: small dense blocks, and reproducible
-        return _reduced(
-            model, name, interfaces, reference, reduction, quality, solver, progress, advance, provenance or {}
-        )
-
-
-def _reduced(
-    given: MatrixModel,
-    name: str,
-    interfaces: Sequence[InterfaceRegion],
-    reference: ReferenceConditions,
-    reduction: Reduction,
-    quality: Band | None,
-    solver: Solver,
-    tell: Stages,
-    advance: Advance,
-    provenance: Mapping[str, Any],
-) -> FlexibleBody:
-    tell("check the matrices")
-    model = without_empty_rows(given)
-    check_matrices(model)
-    tell("tie the interfaces")
-    ties = tie_matrices(model, interfaces)
-    coupled = couple_matrices(model, interfaces, ties)
-    check_connected(model, coupled, ties)
-    L = functionals(reference, coupled)
-    tell("factorise the stiffness")
-    body = _factorised(model, coupled, ties, solver, advance)
-    tell("reduce")
-    basis = (
-        _basis(reduction, coupled, body, L) if not mass_is_singular(model) else _shifted(reduction, coupled, body, L)
-    )
-    check_basis(coupled, L, basis)
-    if quality:
-        tell("compare with the full model")
-    assessed = _assessed(model, coupled, body, L, basis, quality) if quality else None
-    tell("integrate the inertia")
-    Phi = ties @ basis.Z
-    integrals, mass, doubts = integrals_of(model, Phi)
-    warnings = [*precision_warnings(model), *doubts]
-    return FlexibleBody(
-        name=name,
-        omega2=basis.omega2,
-        interfaces=interface_shapes(coupled, basis),
-        surface=surface_of_nodes(model, Phi),
-        provenance=completed(
-            record(model, mass, interfaces, reference, reduction, coupled, warnings)
-            | {"solver": described(solver)}
-            | dict(provenance),
-            basis,
-            assessed,
-        ),
-        **vars(integrals),
-    )
-
-
-def _factorised(
-    model: MatrixModel, coupled: CoupledModel, ties: sp.csr_array, solver: Solver, advance: Advance
-) -> FreeBody:
-    """The factorised stiffness; where it fails, the mechanism that is to blame is named."""
-    try:
-        return factorised(coupled, solver, advance)
-    except ComputationError:
-        check_mechanisms(model, coupled, ties)
-        raise
-
-
-def _assessed(model: MatrixModel, coupled: CoupledModel, body: FreeBody, L: Array, basis: Basis, band: Band) -> Quality:
-    if mass_is_singular(model):
-        raise InputError(
-            "the quality of a reduction needs a mass for every coordinate, and some have none: leave out the quality report"
-        )
-    return assess(coupled, body, L, basis, band)
-
-
-def surface_of_nodes(model: MatrixModel, Phi: Array) -> Surface | None:
-    """The triangles with the translations of their nodes; None without triangles."""
-    if model.triangles is None:
-        return None
-    used, triangles = np.unique(model.triangles, return_inverse=True)
-    return Surface(model.points[used], triangles.reshape(-1, 3), model.dofs.on_nodes(Phi)[used, :3])
+        free = checked(model, progress)
+        singular = mass_is_singular(free)
+        if singular and quality:
+            raise InputError(
+                "the quality of a reduction needs a mass for every coordinate, and some have none: leave out the quality "
+                "report"
+            )
+        part = part_of(free, interfaces, progress)
+        try:
+            body = reduce_model(
+                part,
+                name=name,
+                reference=reference,
+                reduction=_OfMatrices(reduction, singular),
+                quality=quality,
+                solver=solver,
+                progress=progress,
+                advance=advance,
+                provenance={"reduction": described(reduction)} | dict(provenance or {}),
+            )
+        except ComputationError:
+            check_mechanisms(free, part.coupled, tie_matrices(free, interfaces))
+            raise
+    return body if free.triangles is not None else replace(body, surface=None)
 
 
 # ---- basis --------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _OfMatrices:
+    """A reduction of matrices that others made: of a mass that may be singular, and with words for what fails."""
+
+    reduction: Reduction
+    singular: bool
+
+    def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
+        """As those of `ffr_prep.reduction`."""
+        return (_shifted if self.singular else _basis)(self.reduction, model, body, L)
 
 
 def _basis(reduction: Reduction, coupled: CoupledModel, body: FreeBody, L: Array) -> Basis:
@@ -192,57 +137,3 @@ def _epsilon(coupled: CoupledModel) -> float:
     mass, stiffness = coupled.M.diagonal(), coupled.K.diagonal()
     massive = mass > 1e-12 * mass.max()
     return float(np.median(mass[massive] / stiffness[massive]))
-
-
-# ---- inertia ------------------------------------------------------------------------------------------------------
-
-
-def integrals_of(model: MatrixModel, Phi: Array) -> tuple[InertiaIntegrals, str, list[str]]:
-    """The integrals, how they were found, and warnings."""
-    m = scalar_mass(model.M, model.dofs)
-    if m is not None:
-        return scalar_integrals(model.points, model.dofs, m, Phi), "one scalar mass for x, y and z", []
-    integrals, defect = nodal_integrals(model.points, model.dofs, model.M, Phi)
-    return integrals, "general, by rigid motions of the nodes", _doubts(defect)
-
-
-def _doubts(defect: Array) -> list[str]:
-    doubtful = np.flatnonzero(defect > _DOUBTFUL)
-    if not doubtful.size:
-        return []
-    listed = ", ".join(f"{k + 1} ({defect[k]:.2g})" for k in doubtful[:10])
-    return [
-        f"the mass matrix does not say how these coordinates change the inertia: {listed}{', ...' * (doubtful.size > 10)} "
-        "(terms projected away beside 1); such as torsion of thin bars and waves as short as the elements. Mass, inertia "
-        "and momenta are exact"
-    ]
-
-
-# ---- what is known about the body ---------------------------------------------------------------------------------
-
-
-def record(
-    model: MatrixModel,
-    mass: str,
-    interfaces: Sequence[InterfaceRegion],
-    reference: ReferenceConditions,
-    reduction: Reduction,
-    coupled: CoupledModel,
-    warnings: Sequence[str],
-) -> dict[str, Any]:
-    """Provenance as JSON values: matrices, settings, versions, warnings. No time and no path, so it is reproducible."""
-    return {
-        "matrices": {
-            **model.source,
-            "hash": model_hash(model),
-            "nodes": len(model.points),
-            "degrees_of_freedom": coupled.K.shape[0],
-            "mass": mass,
-        },
-        "interfaces": [described(interface) for interface in interfaces],
-        "reference": described(reference),
-        "reduction": described(reduction),
-        "versions": {package: version(package) for package in _VERSIONED},
-        "notes": [*model.notes, "geometric stiffening is not available for matrices from outside"],
-        "warnings": list(warnings),
-    }

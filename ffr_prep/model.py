@@ -38,6 +38,7 @@ class Model:
     recovery   : how the stress is recovered, in words
     record     : what the model is; JSON values
     packages   : whose versions are recorded
+    doubts     : what the integrals of a basis (Z, n) cannot be trusted with, in words
     """
 
     coupled: CoupledModel
@@ -48,6 +49,7 @@ class Model:
     recovery: str
     record: Mapping[str, Any]
     packages: tuple[str, ...] = ("ffr", "numpy", "scipy", "scikit-fem")
+    doubts: Callable[[Array], list[str]] = lambda _: []
 
 
 def reduce_model(
@@ -100,7 +102,7 @@ def reduce_model(
         surface=surface,
         stiffening=stiffening_matrices(model, reference, supported(body, L), basis) if stiffening else None,
         provenance=completed(
-            record(model, reference, reduction)
+            record(model, reference, reduction, model.doubts(basis.Z))
             | {"solver": described(solver)}
             | ({"stress": model.recovery} if stress else {})
             | dict(provenance or {}),
@@ -131,17 +133,14 @@ def stiffening_matrices(model: Model, reference: ReferenceConditions, held: Supp
     return (K + K.transpose(0, 2, 1)) / 2
 
 
-def record(model: Model, reference: ReferenceConditions, reduction: Reduction) -> dict[str, Any]:
+def record(model: Model, reference: ReferenceConditions, reduction: Reduction, doubts: Sequence[str]) -> dict[str, Any]:
     """Provenance as JSON values: model, settings, versions. No time and no path, so it is reproducible."""
-    return (
-        {"warnings": []}
-        | dict(model.record)
-        | {
-            "reference": described(reference),
-            "reduction": described(reduction),
-            "versions": {package: version(package) for package in model.packages},
-        }
-    )
+    return dict(model.record) | {
+        "reference": described(reference),
+        "reduction": described(reduction),
+        "versions": {package: version(package) for package in model.packages},
+        "warnings": [*model.record.get("warnings", []), *doubts],
+    }
 
 
 def summed(parts: Sequence[InertiaIntegrals]) -> InertiaIntegrals:

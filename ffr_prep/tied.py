@@ -76,6 +76,11 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
         of_arms = [phi.T @ second_order_turn(S) @ phi for S, rotation in of_ties for phi in [rotation @ basis]]
         return np.sum([*of_parts, *of_arms], axis=0)
 
+    def doubts(basis: Array) -> list[str]:
+        return [
+            f"{name}: {doubt}" for (name, m), x in zip(parts.items(), own, strict=True) for doubt in m.doubts(x @ basis)
+        ]
+
     return Model(
         coupled=coupled,
         inertia=inertia,
@@ -88,6 +93,7 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
             "ties": [list(pair) for pair in ties],
             "warnings": [f"{name}: {w}" for name, part in parts.items() for w in part.record.get("warnings", [])],
         },
+        doubts=doubts,
     )
 
 

@@ -11,25 +11,16 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.assemble import Assembled, assemble
+from ffr_dyn.analyses.energy import EnergyWatch
 from ffr_dyn.analyses.events import Event, Watcher
+from ffr_dyn.analyses.failure import failure
 from ffr_dyn.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
 from ffr_dyn.compilation import ensure_compiled
-from ffr_dyn.equations import System, new_record
-from ffr_dyn.errors import InputError, SimulationError
+from ffr_dyn.equations import new_record
+from ffr_dyn.errors import InputError
 from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince, Integrator
-from ffr_dyn.kernels.tables import (
-    AT,
-    NOT_CONVERGED,
-    NOT_FINITE,
-    NOW,
-    OK,
-    SINGULAR_BODY,
-    SINGULAR_CONSTRAINT,
-    STEP_TOO_SMALL,
-    Record,
-    Work,
-)
-from ffr_dyn.machine import Machine, fill_rows, has_loads, new_machine, record_row
+from ffr_dyn.kernels.tables import AT, NOW, OK, Record, Work
+from ffr_dyn.machine import Machine, fill_rows, new_machine, record_row
 from ffr_dyn.measure import Entry, Memory, measure, needs_every_step, selected
 from ffr_dyn.result import Quantity, Result
 from ffr_dyn.result_file import ResultWriter, load_checkpoint, load_result
@@ -42,7 +33,6 @@ from ffr_prep.body import Surface
 Array = np.ndarray
 
 _OF_ACCELERATIONS = (RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince)  # methods on index-1 equations
-RK4_LIMIT = 2.83  # imaginary stability limit of RK4, Hairer & Wanner 1996, IV.2
 LOOKS = 10  # of a quantity that adds up, from row to row, where the method chooses its steps
 SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, file and keyboard
 
@@ -52,6 +42,7 @@ class _Run:
     """What changes while a run goes on; `done` counts the steps."""
 
     machine: Machine
+    energy: EnergyWatch
     memory: Memory
     parts: list[dict[str, Quantity]]
     times: list[Array]
@@ -90,7 +81,7 @@ def forward(
     assembled   : what `assemble` made of the scene at `start`, for programs that run it more than once
 
     Raises InputError for a scene or settings that cannot be used, SimulationError when the run fails: the message gives
-    the time, the body or joint, the likely cause and what to change.
+    the time, the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
     method = method if method is not None else ROS2(step=output_step / 10)
     spacing = output_step / LOOKS if method.controlled else method.step
@@ -99,17 +90,20 @@ def forward(
     _check_stabilisation(method, stabilisation)
     assembled = assemble(scene, time=start) if assembled is None else assembled
     wanted = selected(assembled.system, outputs)
-    ensure_compiled(type(method), loads=has_loads(assembled.system.model.loads))
+    ensure_compiled(type(method), model=assembled.system.model)
     span = (start, end, output_step)
     mark = _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
     header = _header(scene, assembled, method, stabilisation, span)
     machine = new_machine(
         assembled.system, assembled.x, assembled.v, method, gains(stabilisation), start=start, spacing=spacing
     )
+    energy = EnergyWatch(
+        assembled.system, method, gains(stabilisation), spacing, lambda rows: with_all_reactions(assembled, rows)
+    )
     if resume is not None and Path(resume).exists():
-        run = _resumed(Path(resume), mark, machine)
+        run = _resumed(Path(resume), mark, machine, energy)
     else:
-        run = _started(assembled, machine, start, wanted)
+        run = _started(assembled, machine, energy, start, wanted)
     _check_resumed(run, substeps * rows, output_step / substeps)
     watcher = _watcher(assembled, run, method, stabilisation, spacing, events, resume) if events else None
     path = resume if path is None else path
@@ -155,23 +149,26 @@ def _check_step(scene: Scene, method: Integrator) -> None:
     """Refuse an explicit step that cannot be stable for any state."""
     fastest = max(scene.bodies, key=lambda body: body.model.omega2.max(initial=0.0))
     omega = float(np.sqrt(fastest.model.omega2.max(initial=0.0)))
-    if not method.implicit and not method.controlled and method.step * omega > RK4_LIMIT:
+    if method.step * omega > method.reach:
         raise InputError(
             f"{type(method).__name__} with a step of {method.step:g} s is unstable: body {fastest.name!r} has a mode of "
-            f"{omega / 2 / np.pi:.4g} Hz, which needs a step below {RK4_LIMIT / omega:.2g} s (joints lower this further); "
+            f"{omega / 2 / np.pi:.4g} Hz, which needs a step below {method.reach / omega:.2g} s (joints lower this further); "
             "use ROS2, fewer modes or a smaller step"
         )
 
 
-def _started(assembled: Assembled, machine: Machine, start: float, wanted: Mapping[str, Entry]) -> _Run:
+def _started(
+    assembled: Assembled, machine: Machine, energy: EnergyWatch, start: float, wanted: Mapping[str, Entry]
+) -> _Run:
     """The run with its first row."""
     first = new_record(assembled.system, 1)
     status = record_row(machine, start, first, 0)
     if status != OK:
         raise failure(assembled.system, machine.work, status, start)
     first = with_all_reactions(assembled, first)
+    energy.look(first)
     parts, memory = measure(assembled.system, first, {}, wanted)
-    return _Run(machine, memory, [parts], [first.time], extremes(assembled.system, first), 0)
+    return _Run(machine, energy, memory, [parts], [first.time], extremes(assembled.system, first), 0)
 
 
 def _advance(
@@ -203,6 +200,7 @@ def _advance(
             kept = with_all_reactions(assembled, Record(*(column[:filled] for column in chunk)))
             if watcher is not None:
                 kept, ends = watcher.look(kept)
+            run.energy.look(kept)
             shown = _shown(kept.time.size, looks, ends)
             every, run.memory = measure(system, kept, run.memory, wanted)
             part = {name: replace(quantity, values=quantity.values[shown]) for name, quantity in every.items()}
@@ -267,67 +265,6 @@ def with_all_reactions(assembled: Assembled, record: Record) -> Record:
     return record._replace(reaction=reaction)
 
 
-def failure(system: System, work: Work, status: int, time: float) -> BaseException:
-    """What to tell about a status of the kernels."""
-    at, where = f"at t = {time:.6g} s", int(work.info[0])
-    if system.user.cause is not None:
-        if isinstance(system.user.cause, KeyboardInterrupt):
-            return system.user.cause
-        return SimulationError(f"the run stopped in a Python function of the scene: {system.user.failure}")
-    if status == SINGULAR_BODY:
-        name = system.scene.bodies[where].name
-        return SimulationError(
-            f"{at} the mass matrix of body {name!r} is not positive: it has no inertia left for rigid motion; "
-            "give it mass and inertia about all axes, or keep fewer modes"
-        )
-    if status == SINGULAR_CONSTRAINT:
-        row = int(np.searchsorted(system.model.rows.start, where, side="right")) - 1
-        block = system.blocks[row]
-        text = block.words[where - system.model.rows.start[row]].text
-        return SimulationError(
-            f"{at} the row '{text}' of {block.name!r} cannot be met by any motion: it ties bodies that cannot move there, "
-            "or the state is no longer finite"
-        )
-    if status == NOT_FINITE:
-        return SimulationError(
-            f"{at} the state of {_worst(system, work)} is no longer finite: the step is too large for an explicit method "
-            "(use ROS2 or a smaller step), or a force is not finite"
-        )
-    if status == NOT_CONVERGED:
-        return SimulationError(f"{at} the iterations of the step do not converge, {_unconverged(system, where)}")
-    if status == STEP_TOO_SMALL:
-        return SimulationError(
-            f"{at} the step has become too small: the motion is not smooth there (an impact, a jump of a force or of a "
-            "driver), or the tolerances are below what rounding allows; smooth the jump, end the run before it, or use "
-            "larger tolerances"
-        )
-    return SimulationError(f"{at} the run stopped: {system.user.failure or 'unknown cause'}")
-
-
-def _unconverged(system: System, where: int) -> str:
-    """Of a body, or after the bodies a constraint row: where, the likely cause and what to change."""
-    bodies = system.scene.bodies
-    if where < len(bodies):
-        return (
-            f"worst in body {bodies[where].name!r}: the step is too large for its rotation or for a spring, damper, stop or "
-            "friction that acts on it; use a smaller step, ROS2, or a softer force"
-        )
-    block = system.blocks[int(np.searchsorted(system.model.rows.start, where - len(bodies), side="right")) - 1]
-    return (
-        f"worst in {block.name!r}: its constraint cannot be met within the step; use a smaller step, look for a position "
-        "where the mechanism locks or is singular, or pass it with ROS2"
-    )
-
-
-def _worst(system: System, work: Work) -> str:
-    """The first body whose right-hand side is not finite."""
-    for b, body in enumerate(system.scene.bodies):
-        at = slice(system.layout.iv[b], system.layout.iv[b] + 6 + system.layout.n[b])
-        if not np.isfinite(work.bodies.f[at]).all():
-            return f"body {body.name!r}"
-    return "the scene"
-
-
 # ---- stopping and going on -------------------------------------------------------------------------------------------
 
 
@@ -354,7 +291,7 @@ def _changing(machine: Machine) -> Iterator[tuple[str, Array]]:
         yield from leaves(getattr(machine.tables, name), name)
 
 
-def _resumed(path: Path, mark: str, machine: Machine) -> _Run:
+def _resumed(path: Path, mark: str, machine: Machine, energy: EnergyWatch) -> _Run:
     """The run that a result file holds, ready to go on in the machine."""
     content = load_checkpoint(path)
     if content is None:
@@ -368,7 +305,7 @@ def _resumed(path: Path, mark: str, machine: Machine) -> _Run:
     for name, array in _changing(machine):
         array[...] = saved.arrays[f"machine.{name}"]
     extremes_then = saved.arrays["extremes"].copy()
-    return _Run(machine, saved.memory, [dict(earlier.quantities)], [earlier.time], extremes_then, saved.steps)
+    return _Run(machine, energy, saved.memory, [dict(earlier.quantities)], [earlier.time], extremes_then, saved.steps)
 
 
 def _check_resumed(run: _Run, steps: int, step: float) -> None:

@@ -13,14 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import RK4_LIMIT
 from ffr_dyn.economy.choice import Choice
 from ffr_dyn.economy.cost import STAGES, per_row
 from ffr_dyn.economy.ledger import Ledger
 from ffr_dyn.economy.outputs import difference, largest
 from ffr_dyn.economy.trial import Span, Trial, cost
 from ffr_dyn.errors import InputError, SimulationError
-from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator
+from ffr_dyn.integrators import CONTROLLED, METHODS, RK4, Integrator
 
 Array = np.ndarray
 Histories = tuple[Array, ...]
@@ -241,7 +240,7 @@ def _longer(ledger: Ledger, fixed: Stepped, limit: Array) -> Stepped:
 def _is_soft(ledger: Ledger, trial: Trial) -> bool:
     """Whether an explicit method is stable with a step of a row."""
     omega2 = max(body.model.omega2.max(initial=0.0) for body in trial.scene.bodies)
-    return bool(np.sqrt(omega2) * ledger.span.output_step <= RK4_LIMIT)
+    return bool(np.sqrt(omega2) * ledger.span.output_step <= RK4.reach)
 
 
 def _controlled(ledger: Ledger, choice: Choice, truth: Histories, limit: Array, best: Stepped) -> Stepped | None:

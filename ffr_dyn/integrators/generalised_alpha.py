@@ -23,6 +23,7 @@ The stabilised form (Gear, Gupta & Leimkuhler 1985) determines lambda+ from the 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -202,6 +203,7 @@ class GeneralisedAlpha:
     scaled: bool = True
     order: ClassVar[int] = 2
     implicit: ClassVar[bool] = True
+    reach: ClassVar[float] = math.inf
     repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 9
     row_stages: ClassVar[int] = 2
@@ -239,6 +241,7 @@ class HHT:
     iterations: int = 20
     order: ClassVar[int] = 2
     implicit: ClassVar[bool] = True
+    reach: ClassVar[float] = math.inf
     repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 9
     row_stages: ClassVar[int] = 2

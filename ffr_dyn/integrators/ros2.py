@@ -19,6 +19,7 @@ its two sides at different rates, and drift.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -88,6 +89,7 @@ class ROS2:
     step: float
     order: ClassVar[int] = 2
     implicit: ClassVar[bool] = True
+    reach: ClassVar[float] = math.inf
     controlled: ClassVar[bool] = False
     repeatable: ClassVar[bool] = True
     stage_count: ClassVar[int] = 4

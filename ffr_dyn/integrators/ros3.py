@@ -19,6 +19,7 @@ The weights of order two that it is compared with, to choose steps, are those wh
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -112,6 +113,7 @@ class ROS3:
     step: float
     order: ClassVar[int] = 3
     implicit: ClassVar[bool] = True
+    reach: ClassVar[float] = math.inf
     controlled: ClassVar[bool] = False
     repeatable: ClassVar[bool] = True
     stage_count: ClassVar[int] = 6
@@ -132,6 +134,7 @@ class AdaptiveROS3:
     order: ClassVar[int] = 3
     estimate_order: ClassVar[int] = 3
     implicit: ClassVar[bool] = True
+    reach: ClassVar[float] = math.inf
     controlled: ClassVar[bool] = True
     step: ClassVar[float] = 0.0
     repeatable: ClassVar[bool] = False

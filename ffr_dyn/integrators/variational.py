@@ -348,6 +348,7 @@ class Variational:
     iterations: int = 30
     order: ClassVar[int] = 2
     implicit: ClassVar[bool] = True
+    reach: ClassVar[float] = math.inf
     repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 7
     row_stages: ClassVar[int] = JAC + 36

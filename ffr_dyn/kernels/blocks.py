@@ -4,7 +4,7 @@ The elimination order and the fill are fixed per topology by `ffr_dyn.eliminatio
 linear in the number of bodies (Baraff 1996), for a few loops there is little fill.
 
 A block of S couples the rows of an earlier joint with those of a later one: a row of eight numbers (see `lanes`) for each row
-of the earlier, with the rows of the later side by side in it. The factor is S = U^T U.
+of the earlier, with the rows of the later side by side in it. The factor is S = U^T D U, with ones on the diagonal of U.
 """
 
 from ffr_dyn.kernels.lanes import (
@@ -17,8 +17,15 @@ from ffr_dyn.kernels.lanes import (
     combine_6,
     combine_12,
     copy_row,
-    dot_rows,
+    eliminate_rows,
+    factorise_rows,
+    gather_upper,
+    multiply_row,
     scale_row,
+    solve_lower,
+    solve_upper,
+    spread_lower,
+    subtract_product,
 )
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.tables import LANES
@@ -134,85 +141,55 @@ def add_pair_in_plane(X, later, earlier, rows, flexible, phiphi, Y, S, offset):
 
 
 @inlined
-def factorise_blocks(starts, pattern, S, relaxation, scale, independence):
+def factorise_blocks(starts, pattern, S, relaxation, rw, independence):
     """Factorise in place (right-looking). Returns the row without a pivot, or -1.
 
-    scale (C,)        : what the entry of a row on the diagonal is at least
+    rw.scale (C,)     : what the entry of a row on the diagonal is at least
     independence (1,) : the least share of a row that the rows before it do not contain
     """
     independence[0] = 1.0
+    for row in range(rw.scale.size):
+        rw.least[row] = FLOOR * rw.scale[row]
     if relaxation > 0.0:
         for k in range(starts.size - 1):
             for row in range(starts[k + 1] - starts[k]):
                 S[pattern.diagonal[k] + (LANES + 1) * row] *= 1.0 + relaxation
     for k in range(starts.size - 1):
         size = starts[k + 1] - starts[k]
-        failed = pivots(S, pattern.diagonal[k], size, scale[starts[k] : starts[k + 1]], independence)
-        if failed >= 0:
-            return starts[k] + failed
-        eliminate_block(starts, pattern, S, k, size)
-    return -1
-
-
-@kernel
-def pivots(S, at, size, scale, independence):
-    """Factor U of a diagonal block, with reciprocal diagonal and zeros below; pivots at least FLOOR of `scale`."""
-    for k in range(size):
-        row = at + LANES * k
-        share = S[row + k] / scale[k]
-        if not scale[k] > 0.0 or share != share:
-            return k
-        independence[0] = min(independence[0], share)
-        inverse = 1.0 / (max(share, FLOOR) * scale[k]) ** 0.5
-        scale_row(S, row, inverse)
-        for j in range(k):
-            S[row + j] = 0.0
-        for i in range(k + 1, size):
-            combine_1(S, at + LANES * i, -1.0, S, row + i, 1, S, row)
-        S[row + k] = inverse
+        factorise_rows(size, S, pattern.diagonal[k], rw.least, starts[k], rw.pivots, LANES * k, rw.Y)
+        for c in range(size):
+            share, scale = rw.Y[c] / rw.scale[starts[k] + c], rw.scale[starts[k] + c]
+            if not scale > 0.0 or share != share:
+                return starts[k] + c
+            independence[0] = min(independence[0], share)
+        eliminate_block(starts, pattern, S, k, size, rw.pivots, rw.Y)
     return -1
 
 
 @inlined
-def eliminate_block(starts, pattern, S, k, size):
+def eliminate_block(starts, pattern, S, k, size, pivots, Y):
     update, first, diagonal = pattern.update_start[k], pattern.column_start[k], pattern.diagonal[k]
     for entry in range(first, pattern.column_start[k + 1]):
-        X = pattern.column[entry, 1]
-        for c in range(size):
-            for j in range(c):
-                combine_1(S, X + LANES * c, -1.0, S, diagonal + LANES * j + c, 1, S, X + LANES * j)
-            scale_row(S, X + LANES * c, S[diagonal + (LANES + 1) * c])
+        eliminate_rows(size, S, diagonal, pattern.column[entry, 1], pivots, LANES * k, Y)
         for other in range(first, entry + 1):
             earlier, Z = pattern.column[other, 0], pattern.column[other, 1]
             target = pattern.update[update]
             for row in range(starts[earlier + 1] - starts[earlier]):
-                for c in range(size):
-                    combine_1(S, target + LANES * row, -1.0, S, Z + LANES * c + row, 1, S, X + LANES * c)
+                subtract_product(size, S, target + LANES * row, Z + row, Y)
             update += 1
 
 
 @kernel
-def solve_blocks(starts, pattern, S, b):
+def solve_blocks(starts, pattern, S, pivots, b):
     """In place b <- S^-1 b; b (8 K,): the rows of each joint in a row of lanes."""
     for k in range(starts.size - 1):
-        size, at, own = starts[k + 1] - starts[k], pattern.diagonal[k], LANES * k
-        for c in range(size):
-            value = b[own + c] * S[at + (LANES + 1) * c]
-            b[own + c] = value
-            for r in range(c + 1, size):
-                b[own + r] -= S[at + LANES * c + r] * value
+        size, own = starts[k + 1] - starts[k], LANES * k
+        solve_lower(size, S, pattern.diagonal[k], b, own)
         for entry in range(pattern.column_start[k], pattern.column_start[k + 1]):
-            later, X = pattern.column[entry, 0], pattern.column[entry, 1]
-            for c in range(size):
-                combine_1(b, LANES * later, -1.0, b, own + c, 1, S, X + LANES * c)
+            spread_lower(size, S, pattern.column[entry, 1], b, own, LANES * pattern.column[entry, 0])
     for k in range(starts.size - 2, -1, -1):
-        size, at, own = starts[k + 1] - starts[k], pattern.diagonal[k], LANES * k
+        size, own = starts[k + 1] - starts[k], LANES * k
+        multiply_row(b, own, pivots, own)
         for entry in range(pattern.column_start[k], pattern.column_start[k + 1]):
-            later, X = pattern.column[entry, 0], pattern.column[entry, 1]
-            for c in range(size):
-                b[own + c] -= dot_rows(S, X + LANES * c, b, LANES * later)
-        for c in range(size - 1, -1, -1):
-            value = b[own + c]
-            for r in range(c + 1, size):
-                value -= S[at + LANES * c + r] * b[own + r]
-            b[own + c] = value * S[at + (LANES + 1) * c]
+            gather_upper(size, S, pattern.column[entry, 1], b, LANES * pattern.column[entry, 0], own)
+        solve_upper(size, S, pattern.diagonal[k], b, own)

@@ -2,8 +2,7 @@
 
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.packing import call_unit
-from ffr_dyn.kernels.system import prepare
-from ffr_dyn.kernels.tables import CORRECT, EVALUATE, LOOK_AHEAD, PROJECT, SETTLE, SOLVE
+from ffr_dyn.kernels.tables import CORRECT, EVALUATE, LOOK_AHEAD, PREPARE, PROJECT, SETTLE, SOLVE
 
 
 @inlined
@@ -57,7 +56,7 @@ def set_diagonal(r, gh):
     bodies, dinv = r.model.bodies, r.work.bodies.dinv
     for k in range(dinv.size):
         dinv[k] = 1.0 / (1.0 + gh * gh * bodies.omega2[k] + gh * bodies.two_zeta_omega[k])
-    prepare(bodies, r.model.markers, r.model.rows, r.model.pattern, r.work.bodies, r.work.rows)
+    call_unit(r.units[PREPARE], r.address, 0.0, 0, 0)
 
 
 @inlined

@@ -11,7 +11,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from ffr_dyn.kernels.tables import LANES
+from ffr_dyn.kernels.tables import LANES, MOST_ROWS
 
 _intrinsic: Any = intrinsic  # whose callers give one argument less than its definition has
 _REAL = types.float64
@@ -110,16 +110,259 @@ def dot_rows(typing, left, at, right, begin):  # type: ignore[no-untyped-def]
     """The sum over the lanes of left row * right row."""
 
     def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-        from llvmlite import ir
-
         left = builder.load(_row_pointer(builder, _data(context, builder, args[0]), args[1]), align=8)
         right = builder.load(_row_pointer(builder, _data(context, builder, args[2]), args[3]), align=8)
-        product = builder.fmul(left, right, flags=_LIBERTIES)
-        vector = ir.VectorType(ir.DoubleType(), LANES)
-        name = f"llvm.vector.reduce.fadd.v{LANES}f64"
-        reduce = cgutils.get_or_insert_function(
-            builder.module, ir.FunctionType(ir.DoubleType(), [ir.DoubleType(), vector]), name
-        )
-        return builder.call(reduce, [ir.Constant(ir.DoubleType(), 0.0), product], fastmath=_LIBERTIES)
+        return _sum(builder, builder.fmul(left, right, flags=_LIBERTIES))
 
     return _REAL(_POOLED, types.intp, _POOLED, types.intp), generate
+
+
+# ---- blocks of a joint with itself and with another: as many rows as the joint has, held in registers -------------------
+
+
+def _case_by_case(context: Any, builder: Any, size: Any, emit: Any) -> Any:
+    """emit(n) for the number of rows that `size` is; nothing where it is none of a joint's."""
+    end = builder.append_basic_block()
+    cases = builder.switch(size, end)
+    for n in range(1, MOST_ROWS + 1):
+        block = builder.append_basic_block()
+        cases.add_case(context.get_constant(types.intp, n), block)
+        builder.position_at_end(block)
+        emit(n)
+        builder.branch(end)
+    builder.position_at_end(end)
+    return context.get_dummy_value()
+
+
+def _load_row(builder: Any, data: Any, at: Any, number: int = 0) -> Any:
+    return builder.load(_row_pointer(builder, data, builder.add(at, cgutils.intp_t(LANES * number))), align=8)
+
+
+def _store_row(builder: Any, row: Any, data: Any, at: Any, number: int = 0) -> None:
+    builder.store(row, _row_pointer(builder, data, builder.add(at, cgutils.intp_t(LANES * number))), align=8)
+
+
+def _lane(builder: Any, row: Any, number: int) -> Any:
+    from llvmlite import ir
+
+    return builder.extract_element(row, ir.Constant(ir.IntType(32), number))
+
+
+def _less(builder: Any, row: Any, number: Any, other: Any) -> Any:
+    """row - number other."""
+    product = builder.fmul(_broadcast(builder, number), other, flags=_LIBERTIES)
+    return builder.fsub(row, product, flags=_LIBERTIES)
+
+
+def _sum(builder: Any, row: Any) -> Any:
+    from llvmlite import ir
+
+    kind = ir.FunctionType(ir.DoubleType(), [ir.DoubleType(), row.type])
+    reduce = cgutils.get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.fadd.v{LANES}f64")
+    return builder.call(reduce, [ir.Constant(ir.DoubleType(), 0.0), row], fastmath=_LIBERTIES)
+
+
+def _merged(builder: Any, row: Any, other: Any, taken: range) -> Any:
+    """The row, with the lanes `taken` from the other."""
+    from llvmlite import ir
+
+    lanes = [LANES + k if k in taken else k for k in range(LANES)]
+    return builder.shuffle_vector(row, other, ir.Constant(ir.VectorType(ir.IntType(32), LANES), lanes))
+
+
+def _beyond(builder: Any, row: Any, number: int) -> Any:
+    """The lanes after `number`, zero elsewhere."""
+    from llvmlite import ir
+
+    return _merged(builder, row, ir.Constant(row.type, [0.0] * LANES), range(number + 1))
+
+
+def _before(builder: Any, row: Any, number: int) -> Any:
+    """The lanes before `number`, zero elsewhere."""
+    from llvmlite import ir
+
+    return _merged(builder, row, ir.Constant(row.type, [0.0] * LANES), range(number, LANES))
+
+
+@_intrinsic
+def factorise_rows(typing, size, S, at, least, first, pivots, own, raw):  # type: ignore[no-untyped-def]
+    """S = U^T D U in place for a block of `size` rows; 1 / D goes to `pivots`.
+
+    In row c of the block, lanes beyond c hold row c of U, lanes before c its column c: a solution needs both.
+
+    least : what an entry of D is at least, from number `first`;  raw : row of lanes for what D was before
+    """
+
+    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
+        from llvmlite import ir
+
+        size, S, at, least, first, pivots, own, raw = args
+        S, least, pivots, raw = (_data(context, builder, array) for array in (S, least, pivots, raw))
+        one = context.get_constant(_REAL, 1.0)
+
+        def emit(n: int) -> None:
+            rows = [_load_row(builder, S, at, k) for k in range(n)]
+            inverses = ir.Constant(rows[0].type, [0.0] * LANES)
+            for c in range(n):
+                found = _lane(builder, rows[c], c)
+                builder.store(found, builder.gep(raw, [cgutils.intp_t(c)]))
+                floor = builder.load(builder.gep(least, [builder.add(first, cgutils.intp_t(c))]))
+                pivot = builder.select(builder.fcmp_ordered(">", found, floor), found, floor)
+                inverse = builder.fdiv(one, pivot)
+                builder.store(inverse, builder.gep(pivots, [builder.add(own, cgutils.intp_t(c))]))
+                scaled = builder.fmul(rows[c], _broadcast(builder, inverse), flags=_LIBERTIES)
+                unit = _beyond(builder, scaled, c)
+                column = builder.fmul(rows[c], inverses, flags=_LIBERTIES)  # S was symmetric; zero from lane c on
+                _store_row(builder, _merged(builder, unit, column, range(c)), S, at, c)
+                inverses = builder.insert_element(inverses, inverse, ir.Constant(ir.IntType(32), c))
+                for i in range(c + 1, n):
+                    rows[i] = _less(builder, rows[i], _lane(builder, rows[c], i), unit)
+
+        return _case_by_case(context, builder, size, emit)
+
+    index = types.intp
+    return types.void(index, _POOLED, index, _POOLED, index, _POOLED, index, _POOLED), generate
+
+
+@_intrinsic
+def eliminate_rows(typing, size, S, diagonal, at, pivots, own, Y):  # type: ignore[no-untyped-def]
+    """Y = U^-T times the block at `at`, which becomes D^-1 Y, for the factor of `size` rows at `diagonal`."""
+
+    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
+        size, S, diagonal, at, pivots, own, Y = args
+        S, pivots, Y = (_data(context, builder, array) for array in (S, pivots, Y))
+
+        def emit(n: int) -> None:
+            rows = [_load_row(builder, S, at, k) for k in range(n)]
+            for c in range(n):
+                for j in range(c):
+                    place = builder.add(diagonal, cgutils.intp_t(LANES * j + c))
+                    rows[c] = _less(builder, rows[c], builder.load(builder.gep(S, [place])), rows[j])
+                inverse = builder.load(builder.gep(pivots, [builder.add(own, cgutils.intp_t(c))]))
+                _store_row(builder, rows[c], Y, cgutils.intp_t(0), c)
+                _store_row(builder, builder.fmul(rows[c], _broadcast(builder, inverse), flags=_LIBERTIES), S, at, c)
+
+        return _case_by_case(context, builder, size, emit)
+
+    index = types.intp
+    return types.void(index, _POOLED, index, index, _POOLED, index, _POOLED), generate
+
+
+@_intrinsic
+def subtract_product(typing, size, S, target, numbers, Y):  # type: ignore[no-untyped-def]
+    """The row of S at `target` less sum_c S[numbers + 8 c] Y_c, over `size` rows of Y."""
+
+    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
+        size, S, target, numbers, Y = args
+        S, Y = _data(context, builder, S), _data(context, builder, Y)
+
+        def emit(n: int) -> None:
+            row = _load_row(builder, S, target)
+            for c in range(n):
+                number = builder.load(builder.gep(S, [builder.add(numbers, cgutils.intp_t(LANES * c))]))
+                row = _less(builder, row, number, _load_row(builder, Y, cgutils.intp_t(0), c))
+            _store_row(builder, row, S, target)
+
+        return _case_by_case(context, builder, size, emit)
+
+    index = types.intp
+    return types.void(index, _POOLED, index, index, _POOLED), generate
+
+
+@_intrinsic
+def solve_lower(typing, size, S, diagonal, b, own):  # type: ignore[no-untyped-def]
+    """The row of b at `own` becomes U^-T times it."""
+
+    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
+        size, S, diagonal, b, own = args
+        S, b = _data(context, builder, S), _data(context, builder, b)
+
+        def emit(n: int) -> None:
+            row = _load_row(builder, b, own)
+            for c in range(n - 1):
+                unit = _beyond(builder, _load_row(builder, S, diagonal, c), c)
+                row = _less(builder, row, _lane(builder, row, c), unit)
+            _store_row(builder, row, b, own)
+
+        return _case_by_case(context, builder, size, emit)
+
+    index = types.intp
+    return types.void(index, _POOLED, index, _POOLED, index), generate
+
+
+@_intrinsic
+def solve_upper(typing, size, S, diagonal, b, own):  # type: ignore[no-untyped-def]
+    """The row of b at `own` becomes U^-1 times it."""
+
+    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
+        size, S, diagonal, b, own = args
+        S, b = _data(context, builder, S), _data(context, builder, b)
+
+        def emit(n: int) -> None:
+            row = _load_row(builder, b, own)
+            for c in range(n - 1, 0, -1):
+                column = _before(builder, _load_row(builder, S, diagonal, c), c)
+                row = _less(builder, row, _lane(builder, row, c), column)
+            _store_row(builder, row, b, own)
+
+        return _case_by_case(context, builder, size, emit)
+
+    index = types.intp
+    return types.void(index, _POOLED, index, _POOLED, index), generate
+
+
+@_intrinsic
+def spread_lower(typing, size, S, at, b, own, later):  # type: ignore[no-untyped-def]
+    """The row of b at `later` less sum_c b[own + c] times row c of the block at `at`, over `size` rows."""
+
+    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
+        size, S, at, b, own, later = args
+        S, b = _data(context, builder, S), _data(context, builder, b)
+
+        def emit(n: int) -> None:
+            row, mine = _load_row(builder, b, later), _load_row(builder, b, own)
+            for c in range(n):
+                row = _less(builder, row, _lane(builder, mine, c), _load_row(builder, S, at, c))
+            _store_row(builder, row, b, later)
+
+        return _case_by_case(context, builder, size, emit)
+
+    index = types.intp
+    return types.void(index, _POOLED, index, _POOLED, index, index), generate
+
+
+@_intrinsic
+def gather_upper(typing, size, S, at, b, later, own):  # type: ignore[no-untyped-def]
+    """b[own + c] less the product of row c of the block at `at` with the row of b at `later`, for `size` rows c."""
+
+    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
+        from llvmlite import ir
+
+        size, S, at, b, later, own = args
+        S, b = _data(context, builder, S), _data(context, builder, b)
+
+        def emit(n: int) -> None:
+            row, other = _load_row(builder, b, own), _load_row(builder, b, later)
+            for c in range(n):
+                total = _sum(builder, builder.fmul(_load_row(builder, S, at, c), other, flags=_LIBERTIES))
+                value = builder.fsub(_lane(builder, row, c), total, flags=_LIBERTIES)
+                row = builder.insert_element(row, value, ir.Constant(ir.IntType(32), c))
+            _store_row(builder, row, b, own)
+
+        return _case_by_case(context, builder, size, emit)
+
+    index = types.intp
+    return types.void(index, _POOLED, index, _POOLED, index, index), generate
+
+
+@_intrinsic
+def multiply_row(typing, target, at, source, begin):  # type: ignore[no-untyped-def]
+    """target row *= source row."""
+
+    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
+        target, source = _data(context, builder, args[0]), _data(context, builder, args[2])
+        row = builder.fmul(_load_row(builder, target, args[1]), _load_row(builder, source, args[3]), flags=_LIBERTIES)
+        _store_row(builder, row, target, args[1])
+        return context.get_dummy_value()
+
+    return types.void(_POOLED, types.intp, _POOLED, types.intp), generate

@@ -23,7 +23,8 @@ OPTIONS: dict[str, Any] = {
 entry: Any = functools.partial(njit, cache=True, **OPTIONS)
 
 # A kernel that only other kernels call: without the wrappers for callers in Python and C it compiles in half the time.
-kernel: Any = functools.partial(njit, no_cpython_wrapper=True, no_cfunc_wrapper=True, **OPTIONS)
+# Always inlined by the compiler, since a call that hands over a table copies some hundred words.
+kernel: Any = functools.partial(njit, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **OPTIONS)
 
 # A kernel that is called from one place: numba optimises everything below a compiled function again at each level.
 inlined: Any = functools.partial(njit, inline="always", **OPTIONS)

@@ -1,7 +1,6 @@
 """What is kept at an output time."""
 
 from ffr_dyn.kernels.bodies import energies
-from ffr_dyn.kernels.markers import update_marker
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.system import largest, reactions
 from ffr_dyn.kernels.vectors import copy, get, put
@@ -9,14 +8,12 @@ from ffr_dyn.kernels.vectors import copy, get, put
 
 @inlined
 def keep(m, w, t, x, v, out, k):
-    """Write row k of `out` from an evaluated state; the powers of loads are left to another unit."""
+    """Write row k of `out` from an evaluated state with all its markers; the powers of loads are left to another unit."""
     out.time[k] = t
     copy(out.x[k], x)
     copy(out.v[k], v)
     copy(out.vd[k], w.vd)
     for marker in range(m.markers.body.size):
-        b = m.markers.body[marker]
-        update_marker(m.bodies.where, m.markers, w.markers, w.bodies.A[b], get(w.bodies.omega, b), x, v, marker)
         put(out.r[k], marker, get(w.markers.r, marker))
         put(out.rd[k], marker, get(w.markers.rd, marker))
     reactions(m.rows, w.markers, w.rows, out.reaction[k])

@@ -7,11 +7,11 @@ two from the loads of the stage before.
 """
 
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.system import solve_motion
-from ffr_dyn.kernels.vectors import copy, cross, get, subtract, to_body
+from ffr_dyn.kernels.packing import call_unit
+from ffr_dyn.kernels.tables import MOTION
+from ffr_dyn.kernels.vectors import add_scaled, copy, cross, fill, get, subtract, to_body
 
 SWEEPS = 3
-PASSES = 10
 
 
 @kernel
@@ -27,18 +27,17 @@ def multiply_stiffness(bodies, w, x):
 
 @kernel
 def multiply(K, q, n, out):
-    """out = sum_c q_c K[c], two rows at a time."""
+    """out = sum_c q_c K[c], four rows at a time, so that each result is loaded and stored a quarter as often."""
     width = out.size
-    for k in range(width):
-        out[k] = 0.0
-    for c in range(0, n - 1, 2):
-        q0, q1, row0, row1 = q[c], q[c + 1], K[c * width : (c + 1) * width], K[(c + 1) * width : (c + 2) * width]
+    fill(out, 0.0)
+    for c in range(0, n - 3, 4):
+        q0, q1, q2, q3 = q[c], q[c + 1], q[c + 2], q[c + 3]
+        first, second = K[c * width : (c + 1) * width], K[(c + 1) * width : (c + 2) * width]
+        third, fourth = K[(c + 2) * width : (c + 3) * width], K[(c + 3) * width : (c + 4) * width]
         for k in range(width):
-            out[k] += q0 * row0[k] + q1 * row1[k]
-    if n % 2:
-        q0, row0 = q[n - 1], K[(n - 1) * width : n * width]
-        for k in range(width):
-            out[k] += q0 * row0[k]
+            out[k] += q0 * first[k] + q1 * second[k] + q2 * third[k] + q3 * fourth[k]
+    for c in range(n - n % 4, n):
+        add_scaled(out, out, q[c], K[c * width : (c + 1) * width])
 
 
 @kernel
@@ -59,21 +58,22 @@ def rate_loads(omega, load):
     load[9], load[10], load[11] = x * y, x * z, y * z
 
 
-@kernel
-def marker_loads(markers, rows, mw, rw, b, known, load):
-    """Applied loads and, once known, joint reactions at the interfaces of body b."""
+@inlined
+def marker_loads(markers, rows, mw, rw, known, load):
+    """Applied loads and, once known, joint reactions at the interfaces of all bodies."""
     for k in range(markers.body.size):
         slot = markers.load[k]
-        if markers.body[k] == b and slot >= 0:
+        if slot >= 0:
             for c in range(6):
-                load[slot + c] = mw.load[k, c]
+                load[markers.body[k], slot + c] = mw.load[k, c]
     if not known:
         return
     for block in range(rows.marker.shape[0]):
         for side in range(rows.marker.shape[1]):
             k = rows.marker[block, side]
-            if k >= 0 and markers.body[k] == b and markers.load[k] >= 0:
-                add_reaction(rw, rows.start[block], rows.start[block + 1], side, get(mw.u, k), load, markers.load[k])
+            if k >= 0 and markers.load[k] >= 0:
+                first, last, own = rows.start[block], rows.start[block + 1], load[markers.body[k]]
+                add_reaction(rw, first, last, side, get(mw.u, k), own, markers.load[k])
 
 
 @kernel
@@ -94,33 +94,37 @@ def stiffen(bodies, w, b):
     """f = unstiffened - sum over the loads of load * K_load q, elastic rows of body b."""
     n, j, e, loads = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3], bodies.where[b, 6]
     first, start, load = bodies.where[b, 8], bodies.where[b, 9], w.load[b]
-    f = w.f[j + 6 : j + 6 + n]
+    f, stiff = w.f[j + 6 : j + 6 + n], w.stiff[start : start + loads * n]
     copy(f, w.unstiffened[e : e + n])
-    for number in range(loads):
-        product, size = w.stiff[start + number * n : start + (number + 1) * n], load[bodies.loads[first + number]]
+    for number in range(0, loads - 3, 4):
+        s0, s1 = load[bodies.loads[first + number]], load[bodies.loads[first + number + 1]]
+        s2, s3 = load[bodies.loads[first + number + 2]], load[bodies.loads[first + number + 3]]
+        p0, p1 = stiff[number * n : (number + 1) * n], stiff[(number + 1) * n : (number + 2) * n]
+        p2, p3 = stiff[(number + 2) * n : (number + 3) * n], stiff[(number + 3) * n : (number + 4) * n]
         for k in range(n):
-            f[k] -= size * product[k]
+            f[k] -= s0 * p0[k] + s1 * p1[k] + s2 * p2[k] + s3 * p3[k]
+    for number in range(loads - loads % 4, loads):
+        add_scaled(f, f, -load[bodies.loads[first + number]], stiff[number * n : (number + 1) * n])
 
 
 @inlined
-def solve_stiffened(m, w, x, target, near):
+def solve_stiffened(r, x, target, near):
     """`solve_motion` with the geometric stiffening of the bodies that have it.
 
     near : the loads of the last solution are those of a state nearby, which saves a sweep
     """
-    stiffened = m.bodies.stiffening.size > 0
-    passes = PASSES if m.relaxation > 0.0 else 1
-    if stiffened:
-        multiply_stiffness(m.bodies, w.bodies, x)
-    first = 1 if near else 0
-    for sweep in range(first, SWEEPS if stiffened else first + 1):
-        if stiffened:
-            for b in range(m.bodies.mass.size):
-                if m.bodies.where[b, 6] > 0:
-                    load = w.bodies.load[b]
-                    rate_loads(get(w.bodies.omega, b), load)
-                    if not near or sweep > 1:
-                        frame_loads(m.bodies, w.bodies, w.field, b, sweep > 0, load)
-                        marker_loads(m.markers, m.rows, w.markers, w.rows, b, sweep > 0, load)
-                    stiffen(m.bodies, w.bodies, b)
-        solve_motion(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, target, passes)
+    m, w = r.model, r.work
+    multiply_stiffness(m.bodies, w.bodies, x)
+    for sweep in range(1 if near else 0, SWEEPS):
+        renewed = not near or sweep > 1
+        for b in range(m.bodies.mass.size):
+            if m.bodies.where[b, 6] > 0:
+                rate_loads(get(w.bodies.omega, b), w.bodies.load[b])
+                if renewed:
+                    frame_loads(m.bodies, w.bodies, w.field, b, sweep > 0, w.bodies.load[b])
+        if renewed:
+            marker_loads(m.markers, m.rows, w.markers, w.rows, sweep > 0, w.bodies.load)
+        for b in range(m.bodies.mass.size):
+            if m.bodies.where[b, 6] > 0:
+                stiffen(m.bodies, w.bodies, b)
+        call_unit(r.units[MOTION], r.address, 0.0, x.ctypes.data, target.ctypes.data)

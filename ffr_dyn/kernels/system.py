@@ -1,8 +1,8 @@
 """One evaluation of the equations of motion of a scene; everything an integrator or an analysis calls.
 
-Order of calls: `prepare` once per elastic diagonal; `evaluate_bodies`, `evaluate_markers`, the loads, `evaluate_joints` at a
-state; then any number of `solve_motion` and `solve_step` with that state's factors. Compiled as units in
-`ffr_dyn.kernels.units`.
+Order of calls: `prepare` once per elastic diagonal; `evaluate_bodies`, `evaluate_markers`, the loads, the constraint rows,
+`evaluate_joints` at a state; then any number of solutions with that state's factors. Compiled as units in
+`ffr_dyn.kernels.units`, and called as such where more than one place does.
 """
 
 from ffr_dyn.kernels.blocks import (
@@ -36,8 +36,8 @@ from ffr_dyn.kernels.markers import (
     update_marker,
 )
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.rows import evaluate_block
-from ffr_dyn.kernels.tables import LANES, NOT_FINITE, OK, RELATION
+from ffr_dyn.kernels.packing import call_unit
+from ffr_dyn.kernels.tables import ALL, BACK, IN_USE, LANES, LOOK, NOT_FINITE, OK, REGAIN, RELATION
 from ffr_dyn.kernels.vectors import (
     add,
     add_scaled,
@@ -122,13 +122,13 @@ def couple_joints(bodies, markers, rows, pattern, bw, rw):
 
 
 @inlined
-def evaluate_markers(m, w, x, v):
-    """Markers in use, from what `evaluate_bodies` left; no loads on them yet."""
-    for k in m.markers.active:
+def evaluate_markers(m, w, which, x, v):
+    """Markers in use, of joints, or all (see `tables`), from what `evaluate_bodies` left."""
+    some = m.markers.active if which == IN_USE else m.markers.joint
+    for number in range(m.markers.body.size if which == ALL else some.size):
+        k = number if which == ALL else some[number]
         b = m.markers.body[k]
         update_marker(m.bodies.where, m.markers, w.markers, w.bodies.A[b], get(w.bodies.omega, b), x, v, k)
-    for k in range(w.markers.load.shape[0]):
-        fill(w.markers.load[k], 0.0)
 
 
 @inlined
@@ -139,11 +139,9 @@ def has_loads(loads):
 
 @inlined
 def evaluate_joints(m, w):
-    """Constraint rows and the factors of the multiplier matrix. Returns the row without a pivot, or -1."""
-    for k in range(m.rows.marker.shape[0]):
-        evaluate_block(m.rows, w.functions, w.markers, w.rows, k)
+    """Factors of the multiplier matrix from the constraint rows. Returns the row without a pivot, or -1."""
     couple_joints(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows)
-    return factorise_blocks(m.rows.start, m.pattern, w.rows.S, m.relaxation, w.rows.scale, w.independence)
+    return factorise_blocks(m.rows.start, m.pattern, w.rows.S, m.relaxation, w.rows, w.independence)
 
 
 @kernel
@@ -156,44 +154,53 @@ def largest(values):
 
 
 @inlined
-def solve_motion(bodies, markers, rows, pattern, bw, rw, target, passes):
-    """acc, lam from  M acc + Phi_q^T lam = f,  Phi_q acc = target (C,).
+def solve_motion(r, target):
+    """acc, lam from  M acc + Phi_q^T lam = f,  Phi_q acc = target (C,)."""
+    m, w = r.model, r.work
+    for b in range(m.bodies.mass.size):
+        reduce_forces(m.bodies, w.bodies, b)
+    reduced_rates(m.bodies, m.markers, m.rows, w.bodies, w.rows, target)
+    call_unit(r.units[BACK], r.address, 0.0, 0, 0)
+    gather_rows(m.rows.start, w.rows.step, w.rows.lam)
 
-    One pass is exact where the rows are independent. With a relaxed multiplier matrix further passes remove the effect
-    of the relaxation from the motion; of the multipliers that dependent rows leave open, the smallest are found (method
-    of multipliers; Bayo & Ledesma, Nonlinear Dynamics 9 (1996) 113-130).
+
+@inlined
+def refine_motion(r, target, passes):
+    """What relaxation of the multiplier matrix does to the motion, taken out again.
+
+    Of the multipliers that dependent rows leave open, the smallest are found (method of multipliers; Bayo & Ledesma,
+    Nonlinear Dynamics 9 (1996) 113-130).
     """
-    for b in range(bodies.mass.size):
-        reduce_forces(bodies, bw, b)
-    reduced_rates(bodies, markers, rows, bw, rw, target)
-    solve_blocks(rows.start, pattern, rw.S, rw.step)
-    react(bodies, markers, rows, bw, rw)
-    gather_rows(rows.start, rw.step, rw.lam)
+    m, bw, rw = r.model, r.work.bodies, r.work.rows
     before = 0.0
     for number in range(1, passes):
-        constraint_rates(bodies.where, markers, rows, rw.jac, bw.acc, rw.left)
+        constraint_rates(m.bodies.where, m.markers, m.rows, rw.jac, bw.acc, rw.left)
         add_scaled(rw.left, rw.left, -1.0, target)
         left = largest(rw.left)
         if number > 1 and not left < 0.5 * before:
             break
         before = left
         copy(bw.more, bw.acc)
-        solve_step(bodies, markers, rows, pattern, bw, rw, rw.left)
+        call_unit(r.units[REGAIN], r.address, 0.0, rw.left.ctypes.data, 0)
         add_scaled(bw.acc, bw.more, 1.0, bw.acc)
-        gather_rows(rows.start, rw.step, rw.left)
+        gather_rows(m.rows.start, rw.step, rw.left)
         add_scaled(rw.lam, rw.lam, 1.0, rw.left)
 
 
 @inlined
-def solve_step(bodies, markers, rows, pattern, bw, rw, value):
-    """acc, step from  M acc + Phi_q^T step = 0,  Phi_q acc = -value: for positions and rates a mass-orthogonal projection."""
+def reduce_miss(rows, bw, step, value):
+    """Reduced forces and `step` of a motion that only the rows ask for: Phi_q acc = -value."""
     fill(bw.elastic, 0.0)
-    for b in range(bodies.mass.size):
-        fill(bw.rigid[b], 0.0)
+    fill(bw.rigid.reshape(bw.rigid.size), 0.0)
     for k in range(rows.start.size - 1):
         for row in range(rows.start[k], rows.start[k + 1]):
-            rw.step[LANES * k + row - rows.start[k]] = value[row]
-    solve_blocks(rows.start, pattern, rw.S, rw.step)
+            step[LANES * k + row - rows.start[k]] = value[row]
+
+
+@inlined
+def solve_back(bodies, markers, rows, pattern, bw, rw):
+    """step and acc from what the rows miss (step) and the reduced forces."""
+    solve_blocks(rows.start, pattern, rw.S, rw.pivots, rw.step)
     react(bodies, markers, rows, bw, rw)
 
 
@@ -401,14 +408,17 @@ def acceleration_target(w, gains, target):
 
 
 @inlined
-def move_back(bodies, markers, rows, pattern, bw, rw, vd, x, v):
-    """One projection of (x, v) onto the constraints, smallest in the norm of the mass matrix."""
-    solve_step(bodies, markers, rows, pattern, bw, rw, rw.nu)
-    to_velocity_rates(bodies.where, bw.A, bw.acc, vd)
-    add_scaled(v, v, 1.0, vd)
-    solve_step(bodies, markers, rows, pattern, bw, rw, rw.Phi)
-    apply_motion(bodies.where, bw.A, x, bw.acc)
+def move_back(r, t, x, v):
+    """One projection of (x, v) onto the constraints, smallest in the norm of the mass matrix: of the positions first,
+    then of the velocities onto the rows that hold there."""
+    bodies, w = r.model.bodies, r.work
+    call_unit(r.units[REGAIN], r.address, 0.0, w.rows.Phi.ctypes.data, 0)
+    apply_motion(bodies.where, w.bodies.A, x, w.bodies.acc)
     normalise(bodies, x)
+    call_unit(r.units[LOOK], r.address, t, x.ctypes.data, v.ctypes.data)
+    call_unit(r.units[REGAIN], r.address, 0.0, w.rows.nu.ctypes.data, 0)
+    to_velocity_rates(bodies.where, w.bodies.A, w.bodies.acc, w.vd)
+    add_scaled(v, v, 1.0, w.vd)
 
 
 @inlined

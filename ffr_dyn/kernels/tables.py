@@ -31,16 +31,21 @@ AFFINE, GLOBAL = 0, 1
 OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED, NOT_CONVERGED, STEP_TOO_SMALL = range(7)
 
 LANES = 8  # rows of a joint side by side (see `ffr_dyn.kernels.lanes`)
+MOST_ROWS = 6  # of a joint
 
 # Numbers of the compiled units in `Tables.units`.
 (
-    EVALUATE, BODIES, MARKERS, JOINTS, SOLVE, SETTLE, MOVE_BACK, CORRECT, TRULY, RECORD, LOOK_AHEAD, PROJECT, LOADS, POWERS,
-) = range(14)  # fmt: skip
+    EVALUATE, BODIES, MARKERS, CONSTRAINTS, JOINTS, BACK, REGAIN, PLAIN, MOTION, SOLVE, PREPARE, LOOK, SETTLE, MOVE_BACK,
+    CORRECT, TRULY, RECORD, LOOK_AHEAD, PROJECT, LOADS, POWERS,
+) = range(21)  # fmt: skip
 
-# Near a singular position (which steps pass as `passing` tells) the rows become dependent, and a violation eta of the constraints throws the motion from its
-# branch when it comes closer than about eta^(1/3). So on the approach (`independence` below NEAR) the violation is held far
-# lower, and at the position itself (below AT) it is left alone: along the direction that is about to be free a correction
-# would be the violation divided by the distance.
+# Which markers are brought up to date: those that joints or loads use, those of joints, all.
+IN_USE, OF_JOINTS, ALL = 0.0, 1.0, 2.0
+
+# Near a singular position (which steps pass as `passing` tells) the rows become dependent, and a violation eta of the
+# constraints throws the motion from its branch when it comes closer than about eta^(1/3). So on the approach (`independence`
+# below NEAR) the violation is held far lower, and at the position itself (below AT) it is left alone: along the direction
+# that is about to be free a correction would be the violation divided by the distance.
 NEAR, AT = 1e-2, 1e-6
 TIGHTER = 1e-4
 
@@ -196,9 +201,11 @@ class RowWork(NamedTuple):
     lam: F1  # (C,)
     left: F1  # (C,) scratch
     scale: F1  # (C,) what the entry of S on the diagonal is at least
+    least: F1  # (C,) what it is taken for where it is less
     jac: F3  # (C, D, 9) coefficients of point velocity, omega_bar, elastic rotation rate
     X: F1  # per block and side twelve rows of lanes: rigid part after elimination times L^-1, elastic part
     Y: F1  # (12 * 8,) scratch
+    pivots: F1  # (8 K,) reciprocal pivots of S
     step: F1  # (8 K,) multipliers, the rows of each block in a row of lanes
     wrench: F1  # (6,) scratch
     P: F2  # (M, 36) [P_dm; H] dinv phi^T; of a planar body nine numbers

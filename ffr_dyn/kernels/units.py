@@ -19,7 +19,6 @@ from ffr_dyn.kernels.calls import set_diagonal
 from ffr_dyn.kernels.control import controlled_step, interpolate
 from ffr_dyn.kernels.functions import evaluate_functions
 from ffr_dyn.kernels.loads import apply_loads, call_user, gravity_field, powers
-from ffr_dyn.kernels.markers import update_marker
 from ffr_dyn.kernels.options import OPTIONS
 from ffr_dyn.kernels.packing import call_unit, unpack_record, unpack_tables, vector_at
 from ffr_dyn.kernels.passing import note_independence, numbered_step
@@ -34,23 +33,35 @@ from ffr_dyn.kernels.system import (
     has_loads,
     largest,
     move_back,
-    solve_step,
+    prepare,
+    reduce_miss,
+    refine_motion,
+    solve_back,
+    solve_motion,
     to_body_axes,
     to_velocity_rates,
 )
 from ffr_dyn.kernels.tables import (
+    ALL,
     AT,
+    BACK,
     BODIES,
+    CONSTRAINTS,
     EVALUATE,
+    IN_USE,
     JOINTS,
     LOADS,
+    LOOK,
     MARKERS,
     MOVE_BACK,
     NEAR,
     NOW,
+    OF_JOINTS,
     OK,
+    PLAIN,
     POWERS,
     RECORD,
+    REGAIN,
     SETTLE,
     SINGULAR_BODY,
     SINGULAR_CONSTRAINT,
@@ -58,8 +69,11 @@ from ffr_dyn.kernels.tables import (
     TIGHTER,
     TRULY,
     USER_FAILED,
+    Model,
 )
-from ffr_dyn.kernels.vectors import add_scaled, copy, fill, get, put
+from ffr_dyn.kernels.vectors import add_scaled, copy, fill, put
+
+PASSES = 10  # of `relaxed_unit` at most
 
 SIGNATURE = types.int64(types.int64, types.float64, types.int64, types.int64)
 
@@ -97,9 +111,19 @@ def bodies_unit(at, t, x, v):
 
 
 @Unit
-def markers_unit(at, t, x, v):
+def markers_unit(at, which, x, v):
+    """Markers in use, of joints, or all, at (x, v)."""
     r = unpack_tables(at)
-    evaluate_markers(r.model, r.work, vector_at(x, r.x.size), vector_at(v, r.v.size))
+    evaluate_markers(r.model, r.work, which, vector_at(x, r.x.size), vector_at(v, r.v.size))
+    return OK
+
+
+@Unit
+def constraints_unit(at, t, x, v):
+    """Constraint rows from the markers of the joints."""
+    r = unpack_tables(at)
+    for k in range(r.model.rows.marker.shape[0]):
+        evaluate_block(r.model.rows, r.work.functions, r.work.markers, r.work.rows, k)
     return OK
 
 
@@ -146,37 +170,93 @@ def joints_unit(at, t, x, v):
 
 
 @Unit
+def prepare_unit(at, t, x, v):
+    """What depends on the elastic diagonal alone."""
+    r = unpack_tables(at)
+    prepare(r.model.bodies, r.model.markers, r.model.rows, r.model.pattern, r.work.bodies, r.work.rows)
+    return OK
+
+
+@Unit
 def evaluate_unit(at, t, x, v):
     """Fill the work tables at (t, x, v): right-hand sides, constraint rows, factors. Returns a status; info[0] says where."""
     r = unpack_tables(at)
     status = call_unit(r.units[BODIES], at, t, x, v)
     if status != OK:
         return status
-    call_unit(r.units[MARKERS], at, t, x, v)
+    call_unit(r.units[MARKERS], at, IN_USE, x, v)
+    for k in range(r.work.markers.load.shape[0]):
+        fill(r.work.markers.load[k], 0.0)
     if has_loads(r.model.loads):
         call_unit(r.units[LOADS], at, t, x, v)
+    call_unit(r.units[CONSTRAINTS], at, t, x, v)
     return call_unit(r.units[JOINTS], at, t, x, v)
 
 
 @Unit
-def solve_unit(at, near, x, target):
-    """acc and lam from the right-hand sides and the target (C,) of the accelerations, with geometric stiffening.
+def back_unit(at, t, x, v):
+    """Multipliers and motion of reduced forces."""
+    r = unpack_tables(at)
+    m, w = r.model, r.work
+    solve_back(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows)
+    return OK
+
+
+@Unit
+def regain_unit(at, t, value, unused):
+    """acc, step from  M acc + Phi_q^T step = 0,  Phi_q acc = -value (C,): for positions and rates a mass-orthogonal
+    projection."""
+    r = unpack_tables(at)
+    reduce_miss(r.model.rows, r.work.bodies, r.work.rows.step, vector_at(value, r.stages.target.size))
+    return call_unit(r.units[BACK], at, t, 0, 0)
+
+
+@Unit
+def plain_unit(at, t, x, target):
+    """acc and lam from the right-hand sides and the target (C,) of the accelerations."""
+    r = unpack_tables(at)
+    solve_motion(r, vector_at(target, r.stages.target.size))
+    return OK
+
+
+@Unit
+def relaxed_unit(at, t, x, target):
+    """`plain_unit` where rows depend on one another."""
+    r = unpack_tables(at)
+    call_unit(r.units[PLAIN], at, t, x, target)
+    refine_motion(r, vector_at(target, r.stages.target.size), PASSES)
+    return OK
+
+
+@Unit
+def stiffened_unit(at, near, x, target):
+    """acc and lam of a scene with geometric stiffening.
 
     near : above zero where the last solution was that of a state nearby
     """
     r = unpack_tables(at)
-    solve_stiffened(r.model, r.work, vector_at(x, r.x.size), vector_at(target, r.stages.target.size), near > 0.0)
+    solve_stiffened(r, vector_at(x, r.x.size), vector_at(target, r.stages.target.size), near > 0.0)
     return OK
+
+
+@Unit
+def look_unit(at, t, x, v):
+    """Rows (Phi, nu, gamma, jac) at (x, v) at the time of the last evaluation, whose factors stay; markers do not."""
+    r = unpack_tables(at)
+    where, bw, xs, vs = r.model.bodies.where, r.work.bodies, vector_at(x, r.x.size), vector_at(v, r.v.size)
+    for b in range(r.model.bodies.mass.size):
+        i, j = where[b, 1], where[b, 2]
+        rotation_matrix(xs[i + 3], xs[i + 4], xs[i + 5], xs[i + 6], bw.A[b])
+        put(bw.omega, b, (vs[j + 3], vs[j + 4], vs[j + 5]))
+    call_unit(r.units[MARKERS], at, OF_JOINTS, x, v)
+    return call_unit(r.units[CONSTRAINTS], at, t, x, v)
 
 
 @Unit
 def move_back_unit(at, t, x, v):
     """One projection of (x, v) onto the constraints."""
     r = unpack_tables(at)
-    m, w = r.model, r.work
-    move_back(
-        m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, w.vd, vector_at(x, r.x.size), vector_at(v, r.v.size)
-    )
+    move_back(r, t, vector_at(x, r.x.size), vector_at(v, r.v.size))
     return OK
 
 
@@ -199,31 +279,22 @@ def correct_unit(at, t, r_v, target):
 
 @Unit
 def look_ahead_unit(at, t, x, v):
-    """Rows (Phi, nu, gamma, jac) at (t, x, v). The factors of the last evaluation stay; markers and rotations do not."""
+    """`look_unit` at another time."""
     r = unpack_tables(at)
-    m, w, x, v = r.model, r.work, vector_at(x, r.x.size), vector_at(v, r.v.size)
-    if not call_user(m.user_address, t, x, v, w.user):
+    m, w = r.model, r.work
+    if not call_user(m.user_address, t, vector_at(x, r.x.size), vector_at(v, r.v.size), w.user):
         return USER_FAILED
     evaluate_functions(m.functions, w.user, t, w.functions)
-    for b in range(m.bodies.mass.size):
-        i, j = m.bodies.where[b, 1], m.bodies.where[b, 2]
-        rotation_matrix(x[i + 3], x[i + 4], x[i + 5], x[i + 6], w.bodies.A[b])
-        put(w.bodies.omega, b, (v[j + 3], v[j + 4], v[j + 5]))
-    for k in m.markers.joint:
-        b = m.markers.body[k]
-        update_marker(m.bodies.where, m.markers, w.markers, w.bodies.A[b], get(w.bodies.omega, b), x, v, k)
-    for k in range(m.rows.marker.shape[0]):
-        evaluate_block(m.rows, w.functions, w.markers, w.rows, k)
-    return OK
+    return call_unit(r.units[LOOK], at, t, x, v)
 
 
 @Unit
 def project_unit(at, t, value, out):
     """out (V,): the motion, smallest in the norm of the mass matrix, with Phi_q out = -value (C,)."""
     r = unpack_tables(at)
-    m, w = r.model, r.work
-    solve_step(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, vector_at(value, r.stages.target.size))
-    to_velocity_rates(m.bodies.where, w.bodies.A, w.bodies.acc, vector_at(out, r.v.size))
+    w = r.work
+    call_unit(r.units[REGAIN], at, t, value, 0)
+    to_velocity_rates(r.model.bodies.where, w.bodies.A, w.bodies.acc, vector_at(out, r.v.size))
     return OK
 
 
@@ -276,6 +347,7 @@ def record_unit(at, t, record, row):
     status = call_unit(r.units[TRULY], at, t, r.x.ctypes.data, r.v.ctypes.data)
     if status == OK:
         keep_turns(r.model.loads, r.work.loads)
+        call_unit(r.units[MARKERS], at, ALL, r.x.ctypes.data, r.v.ctypes.data)
         if has_loads(r.model.loads):
             call_unit(r.units[POWERS], at, t, record, row)
         keep(r.model, r.work, t, r.x, r.v, unpack_record(record), row)
@@ -333,28 +405,48 @@ def controlled_rows_unit(at, start, record, step):
 # By name, those that take long to compile first.
 UNITS = {
     "bodies": bodies_unit,
-    "solve": solve_unit,
     "joints": joints_unit,
     "record": record_unit,
-    "move_back": move_back_unit,
-    "markers": markers_unit,
+    "prepare": prepare_unit,
+    "plain": plain_unit,
+    "back": back_unit,
+    "regain": regain_unit,
+    "constraints": constraints_unit,
     "correct": correct_unit,
-    "truly": truly_unit,
+    "markers": markers_unit,
     "settle": settle_unit,
+    "move_back": move_back_unit,
+    "truly": truly_unit,
     "evaluate": evaluate_unit,
     "rows": rows_unit,
+    "look": look_unit,
 }
-# Of scenes with applied loads, of methods that choose their steps, and of methods that ask for more.
+# Of scenes that need them, of methods that choose their steps, and of methods that ask for more.
 LOAD_UNITS = {"loads": loads_unit, "powers": powers_unit}
+RELAXED_UNITS = {"relaxed": relaxed_unit}
+STIFFENED_UNITS = {"stiffened": stiffened_unit}
 CONTROL_UNITS = {"controlled_rows": controlled_rows_unit}
 EXTRA_UNITS = {"project": project_unit, "look_ahead": look_ahead_unit}
 
 
-def unit_addresses(loads: bool, calls: Collection[str]) -> list[int]:
+def units_of(model: Model) -> dict[str, Unit]:
+    """The units that a scene needs whatever the method."""
+    return {
+        **UNITS,
+        **(LOAD_UNITS if has_loads.py_func(model.loads) else {}),
+        **(RELAXED_UNITS if model.relaxation > 0.0 else {}),
+        **(STIFFENED_UNITS if model.bodies.stiffening.size else {}),
+    }
+
+
+def unit_addresses(model: Model, calls: Collection[str]) -> list[int]:
     """In the order of the units' numbers in `tables`; zero for those of loads and of other methods that are not called."""
-    numbered = (
-        evaluate_unit, bodies_unit, markers_unit, joints_unit, solve_unit, settle_unit, move_back_unit, correct_unit,
-        truly_unit, record_unit,
-    )  # fmt: skip
+    needed = units_of(model)
+    motion = "relaxed" if "relaxed" in needed else "plain"
+    solve = "stiffened" if "stiffened" in needed else motion
+    evaluating = "evaluate", "bodies", "markers", "constraints", "joints"
+    solving = "back", "regain", "plain", motion, solve, "prepare", "look", "settle", "move_back", "correct"
+    numbered = *evaluating, *solving, "truly", "record"
     extra = [EXTRA_UNITS[name].address if name in calls else 0 for name in ("look_ahead", "project")]
-    return [*(unit.address for unit in numbered), *extra, *(u.address if loads else 0 for u in LOAD_UNITS.values())]
+    loads = [needed[name].address if name in needed else 0 for name in LOAD_UNITS]
+    return [*(needed[name].address for name in numbered), *extra, *loads]

@@ -1,0 +1,215 @@
+"""Energy that comes from nowhere: the sign of a step beyond what its method bears.
+
+At every recorded row kinetic and strain energy are compared with what the scene had to give: what it began with, what
+gravity has released, and the work of all forces and drivers, by their powers at the rows. Rows may miss what happens between
+them. So where the energy is far beyond, the last part of the run is done again with a quarter of the step, and the run stops
+only when the energy does not grow there, or grows there without a source too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ffr_dyn.analyses.evaluation import evaluator
+from ffr_dyn.analyses.tangent import chart, state_matrix
+from ffr_dyn.equations import System, new_record
+from ffr_dyn.errors import SimulationError
+from ffr_dyn.inertia import mass_matrix
+from ffr_dyn.integrators import Integrator
+from ffr_dyn.kernels.tables import NOT_FINITE, OK, Record
+from ffr_dyn.machine import fill_rows, new_machine
+from ffr_dyn.power import power
+from ffr_dyn.rotation import rotation_matrix
+from ffr_dyn.view import View
+
+Array = np.ndarray
+
+BEYOND = 10.0  # times what there was to give, from where the energy is looked into
+ANCHOR = 2.5  # times that, up to where the part begins that is done again
+SHORTER = 4  # times, the steps with which it is
+ROWS = 2000  # of the part, at most
+QUIET = 1e-6  # m^2/s^2, twice the energy by mass that is not looked at
+LARGE_GAIN = 1.0  # Baumgarte's, times the step
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A recorded row: time, state, joint coordinates of the forces, kinetic and strain energy, and that with gravity's."""
+
+    time: float
+    x: Array
+    v: Array
+    reference: Array
+    energy: float
+    total: float
+
+
+@dataclass
+class EnergyWatch:
+    """What the rows so far had to give.
+
+    spacing  : of the steps, or of the rows of a method that chooses its steps [s]
+    complete : gives a record the reactions of redundant rows
+    begun    : [J] at the start, with what turned out to have a source later;  highest : [J] energy of gravity so far
+    time, powers, work : of the last row, and of each force and driver [W] and [J]
+    anchor   : the last row with an energy that is no wonder
+    """
+
+    system: System
+    method: Integrator
+    gains: tuple[float, float, float]
+    spacing: float
+    complete: Callable[[Record], Record]
+    begun: float = 0.0
+    highest: float = -np.inf
+    time: float = 0.0
+    powers: Array = field(default_factory=lambda: np.zeros(0))
+    work: Array = field(default_factory=lambda: np.zeros(0))
+    anchor: _Row | None = None
+
+    def look(self, rows: Record) -> None:
+        """Take note of the rows that follow. Raises SimulationError when their energy comes from nowhere."""
+        with np.errstate(all="ignore"):
+            energy, powers = rows.energy[:, 0] + rows.energy[:, 1], _powers(self.system, rows)
+            if self.anchor is None:
+                self._begin(rows, energy, powers)
+            given = self._given(rows, powers)
+        first = 0
+        while first < energy.size:
+            far = first + np.flatnonzero(~(energy[first:] <= BEYOND * given[first:]))[:1]
+            end = int(far[0]) if far.size else energy.size
+            for near in first + np.flatnonzero(energy[first:end] <= ANCHOR * given[first:end])[-1:]:
+                self.anchor = _row(rows, int(near), energy)
+            if far.size:
+                self.anchor = self._looked_into(_row(rows, end, energy))
+                source = energy[end] - given[end]
+                self.begun, given[end:] = self.begun + float(source), given[end:] + source
+            first = end + 1
+
+    def _begin(self, rows: Record, energy: Array, powers: Array) -> None:
+        mass = sum(body.model.mass for body in self.system.scene.bodies)
+        self.begun = float(energy[0]) + QUIET * mass
+        self.time, self.powers, self.work = float(rows.time[0]), powers[0], np.zeros(powers.shape[1])
+        self.anchor = _row(rows, 0, energy)
+
+    def _given(self, rows: Record, powers: Array) -> Array:
+        """(T,) what the scene had to give up to each row."""
+        steps = np.diff(rows.time, prepend=self.time)[:, None]
+        means = 0.5 * (powers + np.concatenate([self.powers[None], powers[:-1]]))
+        work = self.work + np.cumsum(steps * means, axis=0)
+        height = np.maximum.accumulate(np.append(self.highest, rows.energy[:, 2]))[1:]
+        self.time, self.powers, self.work, self.highest = float(rows.time[-1]), powers[-1], work[-1], float(height[-1])
+        return self.begun + np.maximum(work, 0.0).sum(axis=1) + height - rows.energy[:, 2]
+
+    def _looked_into(self, row: _Row) -> _Row:
+        """The row. Raises SimulationError when a quarter of the step tells that its energy has no source."""
+        anchor = self.anchor
+        assert anchor is not None
+        status, fine = self._again(anchor, row.time)
+        found = float(fine.energy[-1, :2].sum()) if status == OK else np.inf
+        if status == NOT_FINITE or (status == OK and not found >= 0.5 * row.energy):
+            raise SimulationError(self._told(anchor, row, found))
+        if status == OK and self._accountable():
+            with np.errstate(all="ignore"):
+                powers = _powers(self.system, self.complete(fine)).sum(axis=1)
+                work = float(np.diff(fine.time, prepend=anchor.time) @ powers)
+                grown = float(fine.energy[-1].sum()) - anchor.total
+            if not grown - work <= 0.5 * found:
+                raise SimulationError(self._told(anchor, row, found))
+        return row
+
+    def _again(self, anchor: _Row, end: float) -> tuple[int, Record]:
+        """From a row to a time with shorter steps: a status, and the rows."""
+        span = end - anchor.time
+        steps = SHORTER * max(1, round(span / self.spacing))
+        rows = min(steps, ROWS)
+        substeps = -(-steps // rows)
+        step = span / (rows * substeps)
+        method = _finer(self.method, step)
+        spacing = step * substeps if method.controlled else step
+        machine = new_machine(self.system, anchor.x, anchor.v, method, self.gains, start=anchor.time, spacing=spacing)
+        machine.work.loads.reference[:] = anchor.reference
+        record = new_record(self.system, rows)
+        return fill_rows(machine, method, record, anchor.time, 1 if method.controlled else substeps), record
+
+    def _accountable(self) -> bool:
+        """Whether the recorded powers are all there are."""
+        model = self.system.model
+        return bool((model.base < 0).all() and (model.bodies.where[:-1, 6] == 0).all())
+
+    def _told(self, anchor: _Row, row: _Row, found: float) -> str:
+        finer = f"it is {found:.3g} J" if found < row.energy else "it grows as well"
+        return (
+            f"at t = {row.time:.6g} s the energy has grown to {row.energy:.3g} J, which no force or driver has put in, most "
+            f"of all in body {self._grown(anchor, row)!r}; with a quarter of the step {finer}. {self._cause(anchor)}"
+        )
+
+    def _grown(self, anchor: _Row, row: _Row) -> str:
+        """The body whose energy has grown most."""
+        growth = _by_body(self.system, row) - _by_body(self.system, anchor)
+        return self.system.scene.bodies[int(np.argmax(np.nan_to_num(growth, nan=np.inf, posinf=np.inf)))].name
+
+    def _cause(self, anchor: _Row) -> str:
+        h, kind, alpha = self.spacing, type(self.method).__name__, max(self.gains[:2])
+        if self.method.controlled:
+            return "The tolerances of the steps are too large for this motion: use smaller ones, or ROS2"
+        if alpha * h > LARGE_GAIN:
+            return (
+                f"Baumgarte's gains of {alpha:.3g} 1/s are too large for a step of {h:.3g} s: keep them below "
+                f"{LARGE_GAIN / h:.3g} 1/s, or use projection"
+            )
+        fastest = _fastest(self.system, anchor)
+        if h * fastest > self.method.reach:
+            other = ", or ROS2" if max(self.system.layout.n) > 0 else ""
+            return (
+                f"A step of {h:.3g} s is beyond the stability of {kind}: the scene vibrates with up to {fastest:.4g} "
+                f"rad/s, which needs one below {self.method.reach / fastest:.2g} s; use that{other}"
+            )
+        return (
+            f"A step of {h:.3g} s of {kind} is too long for this motion, whose fastest rate is {fastest:.4g} 1/s (a stiff "
+            "spring or stop, fast rotation, or a mode that is loaded); use a smaller step, or projection if constraints drift"
+        )
+
+
+def _row(rows: Record, k: int, energy: Array) -> _Row:
+    state = rows.x[k].copy(), rows.v[k].copy(), rows.action[k, :, 0].copy()
+    return _Row(float(rows.time[k]), *state, float(energy[k]), float(rows.energy[k].sum()))
+
+
+def _powers(system: System, rows: Record) -> Array:
+    """(T, sources) of all forces and drivers."""
+    scene, view = system.scene, View(system, rows)
+    drives = [*scene.drivers, *(joint for joint in scene.joints if joint.kind == "distance")]
+    return np.column_stack([rows.power, *(power(view, drive) for drive in drives)])
+
+
+def _finer(method: Integrator, step: float) -> Any:
+    kept: Any = method
+    if method.controlled:
+        return replace(kept, tolerances=replace(kept.tolerances, relative=kept.tolerances.relative / 100))
+    return replace(kept, step=step)
+
+
+def _by_body(system: System, row: _Row) -> Array:
+    """(B,) kinetic and strain energy."""
+    found, place = [], system.layout
+    with np.errstate(all="ignore"):
+        for b, body in enumerate(system.scene.bodies):
+            q, q_dot = row.x[place.q(b)], row.v[place.q_dot(b)]
+            A = rotation_matrix(row.x[place.p(b)])
+            V = np.concatenate([A.T @ row.v[place.R_dot(b)], row.v[place.omega(b)], q_dot])
+            found.append(0.5 * V @ mass_matrix(body.model, q) @ V + 0.5 * body.model.omega2 @ q**2)
+    return np.array(found)
+
+
+def _fastest(system: System, row: _Row) -> float:
+    """Largest modulus of an eigenvalue of the scene at a row [1/s]; zero where it has none."""
+    try:
+        A, _ = state_matrix(chart(evaluator(system), row.time, row.x, row.v))
+    except SimulationError:
+        return 0.0
+    return float(np.abs(np.linalg.eigvals(A)).max(initial=0.0)) if np.isfinite(A).all() else 0.0

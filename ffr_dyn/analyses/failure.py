@@ -1,0 +1,106 @@
+"""What to tell of a run that failed: time, body or joint, the likely cause and what to change."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ffr_dyn.equations import System
+from ffr_dyn.errors import SimulationError
+from ffr_dyn.force_tables import actions_of
+from ffr_dyn.kernels.tables import (
+    ACTUATOR,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    SINGULAR_BODY,
+    SINGULAR_CONSTRAINT,
+    STEP_TOO_SMALL,
+    Work,
+)
+
+HUGE = 1e12  # N, N m: no force of a machine; what made the state overflow
+
+
+def failure(system: System, work: Work, status: int, time: float) -> BaseException:
+    """What to tell about a status of the kernels."""
+    at, where = f"at t = {time:.6g} s", int(work.info[0])
+    if system.user.cause is not None:
+        if isinstance(system.user.cause, KeyboardInterrupt):
+            return system.user.cause
+        return SimulationError(f"the run stopped in a Python function of the scene: {system.user.failure}")
+    if status == NOT_FINITE or (status in (SINGULAR_BODY, SINGULAR_CONSTRAINT) and not _sound(work)):
+        return SimulationError(
+            f"{at} the state of {_worst(system, work)} is no longer finite: {_overflow(system, work)}"
+        )
+    if status == SINGULAR_BODY:
+        name = system.scene.bodies[where].name
+        return SimulationError(
+            f"{at} the mass matrix of body {name!r} is not positive: it has no inertia left for rigid motion; "
+            "give it mass and inertia about all axes, or keep fewer modes"
+        )
+    if status == SINGULAR_CONSTRAINT:
+        row = int(np.searchsorted(system.model.rows.start, where, side="right")) - 1
+        block = system.blocks[row]
+        text = block.words[where - system.model.rows.start[row]].text
+        return SimulationError(
+            f"{at} the row '{text}' of {block.name!r} cannot be met by any motion: it ties bodies that cannot move there"
+        )
+    if status == NOT_CONVERGED:
+        return SimulationError(f"{at} the iterations of the step do not converge, {_unconverged(system, where)}")
+    if status == STEP_TOO_SMALL:
+        return SimulationError(
+            f"{at} the step has become too small: the motion is not smooth there (an impact, a jump of a force or of a "
+            "driver), or the tolerances are below what rounding allows; smooth the jump, end the run before it, or use "
+            "larger tolerances"
+        )
+    return SimulationError(f"{at} the run stopped: {system.user.failure or 'unknown cause'}")
+
+
+def _sound(work: Work) -> bool:
+    """Whether the state that was evaluated last was one: finite, and of a size whose square is."""
+    bodies = work.bodies
+    with np.errstate(over="ignore"):
+        return all(bool(np.isfinite(table * table).all()) for table in (bodies.A, bodies.omega, bodies.J, bodies.f))
+
+
+def _worst(system: System, work: Work) -> str:
+    """The first body whose inertia or right-hand side is not finite."""
+    for b, body in enumerate(system.scene.bodies):
+        at = slice(system.layout.iv[b], system.layout.iv[b] + 6 + system.layout.n[b])
+        if not all(np.isfinite(part).all() for part in (work.bodies.f[at], work.bodies.A[b], work.bodies.J[b])):
+            return f"body {body.name!r}"
+    return "the scene"
+
+
+def _overflow(system: System, work: Work) -> str:
+    """Why a state is not finite, and what to change."""
+    name, value = max(_given(system, work), key=lambda found: found[1], default=("", 0.0))
+    if value > HUGE:
+        return f"{name!r} exerts {value:.3g} N or N m; look at its numbers and their units"
+    return "the step is too large for an explicit method (use ROS2 or a smaller step), or a force is not finite"
+
+
+def _given(system: System, work: Work) -> list[tuple[str, float]]:
+    """The largest component of each load and actuator, by name. Other forces follow the state, and are lost with it."""
+    scene, loads, found = system.scene, system.model.loads, []
+    factors = np.append(work.functions[:, 0], 1.0)[loads.function]
+    for load, value, (*_, slot) in zip(scene.loads, loads.value * factors, loads.wrench, strict=True):
+        found.append((load.name, value + work.user[slot : slot + 6] if slot >= 0 else value))
+    for action, (*_, law, _, _), value in zip(actions_of(scene), loads.action, work.loads.action[:, 2:], strict=True):
+        if law == ACTUATOR:
+            found.append((action.name, value))
+    return [(name, float(np.nanmax(np.abs(value), initial=0.0))) for name, value in found]
+
+
+def _unconverged(system: System, where: int) -> str:
+    """Of a body, or after the bodies a constraint row: where, the likely cause and what to change."""
+    bodies = system.scene.bodies
+    if where < len(bodies):
+        return (
+            f"worst in body {bodies[where].name!r}: the step is too large for its rotation or for a spring, damper, stop or "
+            "friction that acts on it; use a smaller step, ROS2, or a softer force"
+        )
+    block = system.blocks[int(np.searchsorted(system.model.rows.start, where - len(bodies), side="right")) - 1]
+    return (
+        f"worst in {block.name!r}: its constraint cannot be met within the step; use a smaller step, look for a position "
+        "where the mechanism locks or is singular, or pass it with ROS2"
+    )
