@@ -27,6 +27,7 @@ from benchmarks.preparation_bodies import (
     slider_crank_rod,
     slider_crank_section,
     spin_up_beam,
+    strip,
     thin_ring,
     three_theories,
     tree,
@@ -41,6 +42,7 @@ from ffr_dyn.scene import Body, Scene
 from ffr_dyn.timefunction import user
 from ffr_prep.body import FlexibleBody, truncated
 from ffr_prep.planar import in_plane
+from ffr_prep.reference import FixedTo, MeanAxis, SimplySupported
 
 Array = np.ndarray
 
@@ -252,10 +254,37 @@ def _table(name: str) -> Array:
     return np.loadtxt(REFERENCE / name, delimiter=",")
 
 
+def buckling() -> Iterator[Figure]:
+    """Cantilevers under a moment and a force at the end: pi sqrt(EI GJ)/L (J. H. Argyris et al., Comput. Meth. Appl. Mech.
+    Engng 20 (1979) 105-155), 4.0126 sqrt(EI GJ)/L^2 (Timoshenko & Gere, Theory of Elastic Stability, 6.3)."""
+    for kind, off in (("beams", 1e-3), ("solid", 0.03)):
+        body = strip(kind, FixedTo("root"))
+        turned = body.interface("tip").phi_r ** 2 @ (1 / body.omega2)  # L / GJ, L / EI
+        for load, factor, number in (("moment", np.pi, 12 + 11), ("force", 4.0126, 12 + 7)):
+            scaled = body.stiffening[number] / np.sqrt(np.outer(body.omega2, body.omega2))
+            critical = -1 / np.linalg.eigvalsh(scaled)[0]
+            exact = factor / np.sqrt(turned[0] * turned[1])
+            yield Figure(f"lateral buckling of {kind} by an end {load}", abs(critical / exact - 1), off)
+
+
+def conversions() -> Iterator[Figure]:
+    """Geometric stiffness in another frame, of the body alone and of a direct reduction there."""
+    for kind in ("beams", "solid"):
+        for new in (SimplySupported("root", "tip"), MeanAxis()):
+            converted, direct = strip(kind, FixedTo("root")).with_reference(new), strip(kind, new)
+            shapes = (body.surface.Phi.reshape(-1, body.n) for body in (converted, direct))
+            X = np.linalg.lstsq(*shapes, rcond=None)[0]
+            scale = np.sqrt(np.outer(direct.omega2, direct.omega2))
+            off = np.abs((X.T @ converted.stiffening @ X - direct.stiffening) / scale).max()
+            share = off / np.abs(direct.stiffening / scale).max()
+            yield Figure(f"stiffness of {kind} converted to {type(new).__name__}: from reducing there", share, 1e-6)
+
+
 # ---- all of them --------------------------------------------------------------------------------------------------
 
 GROUPS = (
     inertia, two_elements, rings, theories, craig_bampton, steady, rotating_beams, spin_up, slider_cranks, pendulums,
+    buckling, conversions,
 )  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from ffr_prep.mesh import Block, Mesh, read_mesh
 from ffr_prep.planar import in_plane
 from ffr_prep.reduce import reduce_mesh
 from ffr_prep.reduction import CraigBampton, Eigenmodes, Guyan, Union
-from ffr_prep.reference import FixedTo, MeanAxis, SimplySupported
+from ffr_prep.reference import FixedTo, MeanAxis, ReferenceConditions, SimplySupported
 from ffr_prep.section import Section, circle, general, rectangle, shear_rigid, with_mass_moments
 from ffr_prep.selection import Band
 from ffr_prep.static_shapes import InertiaRelief
@@ -216,3 +216,17 @@ def thin_ring(rich: bool) -> tuple[FlexibleBody, float]:
         quality=Band(1.0, 50.0),
     )  # fmt: skip
     return body, STEEL.rho / STEEL.E
+
+
+def strip(kind: str, reference: ReferenceConditions) -> FlexibleBody:
+    """A strip of 1 m whose height is along y, of beams or solids, with stiffening."""
+    make = {"name": "strip", "reference": reference, "stiffening": True}
+    if kind == "beams":
+        section = shear_rigid(general("strip", A=1e-3, Iy=1e-9, Iz=1e-4, J=4e-9))
+        frame = polyline([(0, 0, 0), (1.0, 0, 0)], Member(section, STEEL, (0, 1.0, 0)), elements=40)
+        frame = named(frame, root=(0, 0, 0), tip=(1.0, 0, 0))
+        return reduce_frame(frame, interfaces=ENDS, reduction=CraigBampton(24), **make)
+    mesh = box((1.0, 0.06, 0.005), (20, 2, 1))
+    ends = [InterfaceRegion("root", "left"), InterfaceRegion("tip", "right")]
+    mesh = replace(mesh, points=mesh.points - (0, 0.03, 0.0025))
+    return reduce_mesh(mesh, material=UNCONTRACTED, interfaces=ends, reduction=CraigBampton(16), **make)

@@ -141,7 +141,13 @@ def _turning(
     sums = force_moments(region.nodes, weighted, 3, count)
     second_moment = region.offsets.T @ weighted
     return MeanRegion(
-        rotation, sp.csr_array(sums @ model.B), second_moment, region.point - region.centroid, INERTIAL + 6 * k
+        rotation=rotation,
+        spread=sp.csr_array(sums @ model.B),
+        second_moment=second_moment,
+        arm=region.point - region.centroid,
+        first=INERTIAL + 6 * k,
+        turning=sp.csr_array((0, model.B.shape[1])),
+        of_each=np.zeros((3, 3)),
     )
 
 

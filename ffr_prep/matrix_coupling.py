@@ -2,7 +2,7 @@
 
 One node with six coordinates is an interface as it is. Several nodes follow rigidly (RBE2), or move the interface in the
 mean (RBE3): the rigid motion closest to theirs in the least-squares sense, all nodes counting alike, and rotations, where
-nodes have them, by the square of the radius of gyration of the nodes (as in `ffr_prep.structural_interface`).
+nodes have them, about the line on which the nodes lie (as in `ffr_prep.structural_interface`).
 
 Source: R. H. MacNeal, The NASTRAN Theoretical Manual (1972), section 5 (rigid elements).
 """
@@ -19,7 +19,7 @@ from ffr_prep.accelerations import unit_accelerations
 from ffr_prep.errors import InputError
 from ffr_prep.interface import CoupledModel, InterfaceRegion
 from ffr_prep.matrix_model import MatrixModel, group_nodes, node_in_words
-from ffr_prep.structural_interface import rigid_coordinates
+from ffr_prep.structural_interface import rigid_coordinates, rotation_weight
 
 Array = np.ndarray
 
@@ -111,17 +111,23 @@ def _coordinates(
 def _mean_motion(model: MatrixModel, interface: InterfaceRegion, at: Array) -> sp.csr_array:
     """(6, D) the rigid motion about the point that is closest to the motions of the nodes."""
     rows, following = _following(model, interface, at)
-    root = np.sqrt(_weights(model, rows))[:, None]
-    motion = np.linalg.pinv(root * following) * root.T
+    root = _root_weight(model, rows)
+    motion = np.linalg.pinv(root @ following) @ root
     ends = np.arange(7) * rows.size
     return sp.csr_array((motion.ravel(), np.tile(rows, 6), ends), shape=(6, len(model.nodes)))
 
 
-def _weights(model: MatrixModel, rows: Array) -> Array:
-    """(r,) 1 for translations, the squared radius of gyration of the nodes [m^2] for rotations; 1 for one node."""
-    at = model.points[np.unique(model.nodes[rows])]
-    square = float(((at - at.mean(axis=0)) ** 2).sum() / len(at)) or 1.0
-    return np.where(model.components[rows] < 3, 1.0, square)
+def _root_weight(model: MatrixModel, rows: Array) -> sp.csr_array:
+    """(s, r) whose square weighs the motions of the rows: translations alike, rotations as `rotation_weight`."""
+    nodes, of_node = np.unique(model.nodes[rows], return_inverse=True)
+    values, axes = np.linalg.eigh(rotation_weight(model.points[nodes]))
+    turning = np.flatnonzero(model.components[rows] >= 3)
+    moving = np.flatnonzero(model.components[rows] < 3)
+    at = (turning, 3 * of_node[turning] + model.components[rows[turning]] - 3)
+    rotations = sp.csr_array((np.ones(turning.size), at), shape=(rows.size, 3 * len(nodes)))
+    root = (axes * np.sqrt(np.maximum(values, 0.0))).T
+    of_rotations = sp.kron(sp.eye_array(len(nodes)), sp.csr_array(root)) @ rotations.T
+    return sp.csr_array(sp.vstack([sp.eye_array(rows.size, format="csr")[moving], of_rotations]))
 
 
 def _nodes(model: MatrixModel, interface: InterfaceRegion) -> Array:
@@ -170,9 +176,8 @@ def _check_determined(model: MatrixModel, interface: InterfaceRegion) -> None:
     """Six coordinates need a node with six, or nodes that are not on one line."""
     nodes = _nodes(model, interface)
     rows, motion = _following(model, interface, model.points[nodes].mean(axis=0))
-    weights = _weights(model, rows)
-    size = np.sqrt(weights.max())
-    scaled = np.sqrt(weights)[:, None] * motion / np.array([1.0, 1.0, 1.0, size, size, size])
+    size = np.linalg.norm(np.ptp(model.points[nodes], axis=0)) or 1.0
+    scaled = (_root_weight(model, rows) @ motion) / np.array([1.0, 1.0, 1.0, size, size, size])
     if np.linalg.matrix_rank(scaled, tol=_DETERMINED * np.linalg.norm(scaled)) < 6:
         raise InputError(
             f"interface {interface.name!r}: the {len(nodes)} nodes of group {interface.region or interface.name!r} do not "

@@ -15,7 +15,8 @@ A mean interface has the rotation R of the best fit, sum of w (r + u) r^T = R U 
 first order in D = sum of w u r^T, with J = sum of w r r^T and  I_J = (tr J) I - J,  that is the mean rotation phi of
 `ffr_prep.interface` and the stretch E = D - phi~ J. To second order the rotation vector is
 phi - I_J^-1 [(J phi) x phi / 2 + ((tr E) I - E) phi], and where the point of the interface is c from the centroid it moves
-by phi x (phi x c) / 2 besides. The force and the moment of the interface do work on both.
+by phi x (phi x c) / 2 besides. The force and the moment of the interface do work on both. Where rotations R_i of the nodes
+count as well, by R_i Q beside (r + u) r^T, they are in J, D and E, and add I_J^-1 (sum of (Q theta_i) x theta_i) / 2.
 
 So the moment at an interface is the one whose work is M . phi, phi being the rotation vector: semitangential, turning with
 half the rotation, for rigid and mean interfaces, solids, beams and plates alike, and in every frame.
@@ -60,6 +61,7 @@ class MeanRegion:
     second_moment : (3, 3) J
     arm      : (3,) from the centroid to the point of the interface [m]
     first    : which of the known loads is the first force of the interface
+    turning, of_each : (3 m, Z) rotations of the nodes that count as well and what each adds to J; none of solids
     """
 
     rotation: sp.csr_array
@@ -67,6 +69,8 @@ class MeanRegion:
     second_moment: Array
     arm: Array
     first: int
+    turning: sp.csr_array
+    of_each: Array
 
 
 def region_stiffening(regions: Sequence[RigidRegion | MeanRegion], static: Array, loads: Array, basis: Array) -> Array:
@@ -81,7 +85,7 @@ def region_stiffening(regions: Sequence[RigidRegion | MeanRegion], static: Array
             S = region.internal @ static - region.loads @ loads
             K += phi.T @ second_order_turn(S.T.reshape(-1, 3, 3)) @ phi
         else:
-            K += _of_mean(region, loads[region.first : region.first + 6].T, phi, region.spread @ basis)
+            K += _of_mean(region, loads[region.first : region.first + 6].T, basis)
     return K
 
 
@@ -104,17 +108,24 @@ def force_moments(nodes: Array, offsets: Array, width: int, count: int) -> sp.cs
     )
 
 
-def _of_mean(region: MeanRegion, wrench: Array, phi: Array, spread: Array) -> Array:
+def _of_mean(region: MeanRegion, wrench: Array, basis: Array) -> Array:
     """(r, n, n) of the loads wrench (r, 6) on a mean interface."""
-    J, n = region.second_moment, phi.shape[1]
+    J, n = region.second_moment, basis.shape[1]
+    phi, spread, nodal = region.rotation @ basis, region.spread @ basis, (region.turning @ basis).reshape(-1, 3, n)
     force, moment = wrench[:, :3], wrench[:, 3:] + np.cross(region.arm, wrench[:, :3])
     turn = np.linalg.solve(_inertia(J[None])[0], moment.T).T
     stretch = spread.T.reshape(n, 3, 3) - np.einsum("akm,aj->jkm", turns(), phi) @ J
     of_stretch = np.einsum("rk,jkl,li->rij", turn, _inertia((stretch + stretch.transpose(0, 2, 1)) / 2), phi)
-    of_rotation = np.einsum("akm,ra->rkm", turns(), turn) @ J
-    of_rotation = phi.T @ (of_rotation + of_rotation.transpose(0, 2, 1)) @ phi / 2
+    of_rotation = phi.T @ _gyroscopic(turn, J) @ phi
+    of_nodes = np.einsum("pki,rkl,plj->rij", nodal, _gyroscopic(turn, region.of_each), nodal, optimize=True)
     of_arm = phi.T @ second_order_turn(-force[:, :, None] * region.arm) @ phi
-    return of_stretch + of_stretch.transpose(0, 2, 1) + of_rotation + of_arm
+    return of_stretch + of_stretch.transpose(0, 2, 1) + of_rotation - of_nodes + of_arm
+
+
+def _gyroscopic(turn: Array, second_moment: Array) -> Array:
+    """(r, 3, 3) second derivatives of turn . (J phi) x phi / 2."""
+    product = np.einsum("akm,ra->rkm", turns(), turn) @ second_moment
+    return (product + product.transpose(0, 2, 1)) / 2
 
 
 def _inertia(second_moments: Array) -> Array:

@@ -3,10 +3,13 @@
 A *rigid* interface moves its nodes as one piece; one node alone is its own interface. A *mean* interface leaves its
 nodes free. Its motion (t, omega) is the rigid motion closest to theirs,
 
-    minimise  sum |u_i - t - omega x r_i|^2 + s^2 |theta_i - omega|^2,
+    minimise  sum |u_i - t - omega x r_i|^2 + s^2 (theta_i - omega) . P (theta_i - omega),
 
-with s the radius of gyration of the nodes about their mean: translations and rotations count alike, so nodes on one line
-determine it as well. A force on it acts on all nodes alike.
+with s the radius of gyration of the nodes about their mean. Translations alone count where they tell the rotation. About
+a line on which the nodes lie they do not, so the rotations about it count: P = (1 - b/a) d d^T, a and b being the largest
+and the second moment of the nodes, d the direction of the largest; P = I for a single node. A force on the interface acts
+on all nodes alike, a moment by forces at their arms: moments on the nodes of a sheet about its normal would turn it the
+more the finer the mesh.
 
 Source: R. H. MacNeal, The NASTRAN Theoretical Manual (1972), section 5 (rigid elements).
 """
@@ -74,19 +77,23 @@ def _coordinates(
 def _mean_motion(frame: Frame, nodes: Array, position: Array) -> sp.csr_array:
     """(6, 6N) the rigid motion at `position` closest to the motions of the nodes."""
     at = frame.points[nodes]
-    square = _square(frame, nodes)
+    weight = np.eye(6)
+    weight[3:, 3:] = rotation_weight(at)
     R = rigid_coordinates(at - position)
-    weighted = R * np.array([1.0, 1, 1, square, square, square])[:, None]
+    weighted = weight @ R
     motion = np.linalg.solve(np.einsum("nci,ncj->ij", R, weighted), weighted.reshape(-1, 6).T)
     columns = (6 * nodes[:, None] + np.arange(6)).ravel()
     ends = columns.size * np.arange(7)
     return sp.csr_array((motion.ravel(), np.tile(columns, 6), ends), shape=(6, 6 * len(frame.points)))
 
 
-def _square(frame: Frame, nodes: Array) -> float:
-    """s^2 [m^2]; any for one node alone, as its rotation is that of the interface."""
-    at = frame.points[nodes]
-    return float(((at - at.mean(axis=0)) ** 2).sum() / len(at)) or 1.0
+def rotation_weight(at: Array) -> Array:
+    """s^2 P (3, 3) [m^2] of nodes at (m, 3); of any size for one place, as only the rotations count there."""
+    offsets = at - at.mean(axis=0)
+    moments, axes = np.linalg.eigh(offsets.T @ offsets / len(at))
+    if moments[-1] == 0.0:
+        return np.eye(3)
+    return moments.sum() * (1 - moments[1] / moments[2]) * np.outer(axes[:, 2], axes[:, 2])
 
 
 def turning_regions(
@@ -118,22 +125,31 @@ def turning_regions(
 def _mean_region(
     frame: Frame, nodes: Array, position: Array, rotation: sp.csr_array, ties: sp.csr_array, first: int
 ) -> MeanRegion:
-    """Its rotation R is the best fit to the nodes and their rotations: sum of |R r_i - r_i - u_i|^2 + s^2 |R - R_i|^2 / 2."""
-    mean, half = frame.points[nodes].mean(axis=0), _square(frame, nodes) / 2
-    offsets = frame.points[nodes] - mean
-    spread = force_moments(nodes, offsets, 6, len(frame.points)) + _turned_nodes(nodes, half, len(frame.points))
-    second_moment = offsets.T @ offsets + half * len(nodes) * np.eye(3)
-    return MeanRegion(rotation, sp.csr_array(spread @ ties), second_moment, position - mean, first)
+    """Its rotation R is the best fit to the nodes and their rotations R_i: sum of (r_i + u_i) r_i^T + R_i Q = R U, where
+    Q = (tr s^2 P) I / 2 - s^2 P has (tr Q) I - Q = s^2 P."""
+    at, count = frame.points[nodes], len(frame.points)
+    offsets = at - at.mean(axis=0)
+    weight = rotation_weight(at)
+    Q = np.trace(weight) / 2 * np.eye(3) - weight
+    turning = _rotations(nodes, count)
+    of_rotations = sp.kron(np.ones((1, len(nodes))), sp.csr_array(np.einsum("cak,kb->abc", turns(), Q).reshape(9, 3)))
+    spread = force_moments(nodes, offsets, 6, count) + of_rotations @ turning
+    second_moment = offsets.T @ offsets + len(nodes) * Q
+    return MeanRegion(
+        rotation=rotation,
+        spread=sp.csr_array(spread @ ties),
+        second_moment=second_moment,
+        arm=position - at.mean(axis=0),
+        first=first,
+        turning=sp.csr_array(turning @ ties),
+        of_each=Q,
+    )
 
 
-def _turned_nodes(nodes: Array, weight: float, count: int) -> sp.csr_array:
-    """(9, 6N) weight times the sum of theta~ at row 3 a + b."""
-    a, c, b = np.nonzero(turns().transpose(1, 0, 2))  # theta~_ab = sum of turns[c]_ab theta_c
-    value = weight * turns()[c, a, b]
-    columns = 6 * nodes[:, None] + 3 + c
-    rows = np.broadcast_to(3 * a + b, columns.shape)
-    values = np.broadcast_to(value, columns.shape)
-    return sp.csr_array(sp.coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(9, 6 * count)))
+def _rotations(nodes: Array, count: int) -> sp.csr_array:
+    """(3m, 6N) the rotations of the nodes (m,)."""
+    columns = (6 * nodes[:, None] + np.arange(3, 6)).ravel()
+    return sp.csr_array((np.ones(columns.size), columns, np.arange(columns.size + 1)), shape=(columns.size, 6 * count))
 
 
 def tie(frame: Frame, interfaces: Sequence[InterfaceRegion]) -> sp.csr_array:

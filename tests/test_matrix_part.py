@@ -9,7 +9,7 @@ import pytest
 from matrix_models import STEEL, lumped, of_frame, rod
 
 from ffr_prep.errors import InputError
-from ffr_prep.frame import Member, named, polyline
+from ffr_prep.frame import Member, Shell, named, panel, polyline
 from ffr_prep.interface import InterfaceRegion
 from ffr_prep.matrices import reduce_matrices
 from ffr_prep.matrix_part import matrix_part
@@ -67,6 +67,16 @@ def test_doubts_of_its_mass_are_kept(matrices):
     body = reduce_model(model, name="b", reference=FixedTo("root"), reduction=CraigBampton(40))
     (warning,) = body.provenance["warnings"]
     assert warning.startswith("matrices: the mass matrix does not say how these coordinates change the inertia")
+
+
+@pytest.mark.parametrize("point", [(0.4, 0.0, 0.0), (0.5, 0.2, -0.1)])
+def test_a_mean_interface_is_that_of_the_frame(point):
+    """The edge of a sheet: its translations, and rotations about it."""
+    sheet = panel([(0, 0, 0), (0.4, 0, 0), (0.4, 0.1, 0), (0, 0.1, 0)], Shell(0.005, STEEL), elements=(4, 2))
+    sheet = replace(sheet, node_groups={"edge": np.flatnonzero(sheet.points[:, 0] > 0.39)})
+    edge = [InterfaceRegion("edge", kind="mean", point=point)]
+    of_matrices, of_sheet = matrix_part(of_frame(sheet), edge).coupled, frame_model(sheet, edge).coupled
+    np.testing.assert_allclose(of_matrices.C.toarray(), of_sheet.C.toarray(), atol=1e-12)
 
 
 def test_the_others_keep_their_stress(matrices):

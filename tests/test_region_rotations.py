@@ -8,8 +8,15 @@ import numpy as np
 import pytest
 import scipy.linalg
 import scipy.optimize
+import scipy.sparse as sp
 from boxes import STEEL, box_mesh, moved, rotation
 
+from ffr_dyn.analyses.linearise import linearise
+from ffr_dyn.analyses.states import scene_at
+from ffr_dyn.analyses.static import static
+from ffr_dyn.forces import Load
+from ffr_dyn.joints import Joint
+from ffr_dyn.scene import Body, Scene
 from ffr_prep.beam_stiffening import beam_stiffening, section_forces, strain_functions
 from ffr_prep.beam_stress import end_forces
 from ffr_prep.beams import beams, element_coordinates
@@ -19,11 +26,12 @@ from ffr_prep.interface import InterfaceRegion, couple, turning_regions
 from ffr_prep.material import Material
 from ffr_prep.reduce import reduce_mesh
 from ffr_prep.reduction import CraigBampton
-from ffr_prep.reference import FixedTo
+from ffr_prep.reference import FixedTo, SimplySupported
 from ffr_prep.region_rotations import region_stiffening, second_order_turn
 from ffr_prep.section import circle, general, rectangle, shear_rigid
 from ffr_prep.solids import assemble
-from ffr_prep.structural import reduce_frame
+from ffr_prep.structural import frame_model, reduce_frame
+from ffr_prep.structural_interface import turning_regions as turning_nodes
 
 FORCE, MOMENT = 12 + 6, 12 + 9  # at the second interface
 ENDS = (InterfaceRegion("left"), InterfaceRegion("right"))
@@ -79,6 +87,63 @@ def test_the_work_of_a_mean_interface_is_that_of_the_best_fit():
         return -wrench[:3] @ (u.mean(axis=0) + R @ arm - arm) - wrench[3:] @ phi
 
     np.testing.assert_allclose(found, second_derivative(work, 4, 2e-4), atol=2e-5 * np.abs(found).max())
+
+
+def test_the_work_of_a_mean_interface_of_nodes_that_turn():
+    """As above, with exp(theta_i~) Q of every node in the polar decomposition: nodes nearly on a line."""
+    corners = [(0, 0, 0), (0.5, 0.05, 0.02), (1.0, 0, 0.01)]
+    frame = polyline(corners, Member(circle(0.02), STEEL), elements=1)
+    frame = replace(frame, node_groups={"all": np.arange(3)})
+    interface = InterfaceRegion("all", kind="mean", point=(0.6, 0.1, -0.1))
+    model = frame_model(frame, [interface]).coupled
+    rng = np.random.default_rng(5)
+    shapes, wrench = 0.3 * rng.normal(size=(18, 4)), rng.normal(size=6)
+    loads = np.concatenate([np.zeros(12), wrench])[:, None]
+    regions = turning_nodes(
+        frame, sp.csr_array((18, 18)), [interface], sp.eye_array(18, format="csr"), model, np.zeros((18, 12))
+    )
+    found = region_stiffening(regions, np.zeros((18, 1)), loads, shapes)[0]
+    at = frame.points - frame.points.mean(axis=0)
+    arm, Q = np.array(interface.point) - frame.points.mean(axis=0), regions[0].of_each
+    assert (
+        np.linalg.eigvalsh(np.trace(Q) * np.eye(3) - Q)[-1] > 0.9 * (at**2).sum() / 3
+    )  # the rotation about the line counts
+
+    def work(a):
+        u, turns = np.split((shapes @ a).reshape(3, 6), 2, axis=1)
+        A = (at + u - u.mean(axis=0)).T @ at + sum(scipy.linalg.expm(skew(turn)) @ Q for turn in turns)
+        R = _stationary(A)
+        phi = scipy.linalg.logm(R).real[[2, 0, 1], [1, 2, 0]]
+        return -wrench[:3] @ (u.mean(axis=0) + R @ arm - arm) - wrench[3:] @ phi
+
+    np.testing.assert_allclose(found, second_derivative(work, 4, 2e-3), atol=2e-5 * np.abs(found).max())
+
+
+def _stationary(A) -> np.ndarray:
+    """The rotation R near none with R^T A symmetric, by Newton's method; also where that is no largest fit."""
+    R = np.eye(3)
+    for _ in range(8):
+        B = R.T @ A
+        axis = (B - B.T)[[2, 0, 1], [1, 2, 0]]
+        R = R @ scipy.linalg.expm(skew(np.linalg.solve(np.trace(B) * np.eye(3) - (B + B.T) / 2, axis)))
+    return R
+
+
+def test_a_mean_interface_holds_a_sheet_whatever_its_mesh():
+    """A strip bent in its plane by a moment on its edge: as a beam, without the turning of single nodes that grows without
+    bound as the mesh is refined."""
+    L, h, t = 0.3, 0.06, 0.005
+    turned = []
+    for elements in ((10, 2), (40, 8)):
+        sheet = panel([(0, 0, 0), (L, 0, 0), (L, h, 0), (0, h, 0)], Shell(t, METAL), elements=elements)
+        x = sheet.points[:, 0]
+        sheet = replace(sheet, node_groups={"left": np.flatnonzero(x < 1e-9), "right": np.flatnonzero(x > L - 1e-9)})
+        body = reduce_frame(
+            sheet, name="s", interfaces=[ENDS[0], InterfaceRegion("right", kind="mean")], reference=FixedTo("left"),
+            reduction=CraigBampton(1),
+        )  # fmt: skip
+        turned.append(body.interface("right").phi_r[2] ** 2 @ (1 / body.omega2))
+    np.testing.assert_allclose(turned, L / (METAL.E * t * h**3 / 12), rtol=0.05)
 
 
 def test_the_work_of_section_forces_is_that_of_the_exact_strains():
@@ -209,3 +274,32 @@ def test_buckling_of_a_column_with_a_rigid_end(kind, arm):
     interval = (1e-3, np.pi / 2) if arm > 0 else (np.pi / 2, np.pi - 1e-3)
     k = scipy.optimize.brentq(lambda k: np.cos(k) - k * arm * np.sin(k), *interval)
     assert critical_load(body, -body.stiffening[FORCE]) == pytest.approx(k**2 * EI, rel=2e-3)
+
+
+# ---- motion -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("share", "what", "frame"),
+    [
+        (0.9, "moment", FixedTo("left")),
+        (0.9, "force", FixedTo("left")),
+        (0.5, "force", SimplySupported("left", "right")),
+    ],
+    ids=str,
+)
+def test_a_loaded_cantilever_vibrates_the_slower_the_nearer_it_is_to_buckling(share, what, frame):
+    """Lowest frequency about the equilibrium of a scene, against Omega^2 + load * K_sigma in the frame of the clamp."""
+    body = strip_of_beams()
+    number = MOMENT + 2 if what == "moment" else FORCE + 1
+    load = share * critical_load(body, body.stiffening[number])
+    expected = np.sqrt(scipy.linalg.eigvalsh(np.diag(body.omega2) + load * body.stiffening[number])[0]) / (2 * np.pi)
+    wrench = {"moment": (0, 0, load)} if what == "moment" else {"force": (0, load, 0)}
+    scene = Scene(
+        (Body("strip", body if frame == FixedTo("left") else body.with_reference(frame)),),
+        (Joint("clamp", "fixed", "ground.O", "strip.left"),),
+        loads=(Load("end", "strip.right", **wrench),),
+        ground={"O": (0, 0, 0)},
+    )
+    found = linearise(scene_at(scene, static(scene))).frequencies.min()
+    assert found == pytest.approx(expected, rel=2e-5)

@@ -16,7 +16,7 @@ from ffr_dyn.integrators import ROS2
 from ffr_prep.body import FlexibleBody, load_body, save_body, with_point
 from ffr_prep.conversion import with_reference
 from ffr_prep.errors import InputError
-from ffr_prep.frame import Member, Shell, named, panel, polyline
+from ffr_prep.frame import Member, Shell, joined, named, panel, polyline
 from ffr_prep.interface import InterfaceRegion
 from ffr_prep.model import reduce_model
 from ffr_prep.planar import in_plane
@@ -85,6 +85,21 @@ def tied_pair(reference, kind) -> FlexibleBody:
     return reduce_model(model, name="b", reference=reference, reduction=CraigBampton(4), stiffening=True)
 
 
+def comb(reference) -> FlexibleBody:
+    """A beam with a tooth; its last nodes and the tooth, which are nearly on a line, move an interface in the mean."""
+    section, points = rectangle(0.05, 0.065), [(0, 0, 0), (0.7, 0, 0), (0.85, 0, 0), (1, 0, 0)]
+    beam = joined(
+        polyline(points, Member(section, STEEL, (0, 1.0, 0)), elements=3),
+        polyline([(0.85, 0, 0), (0.85, 0.1, 0.05)], Member(section, STEEL, (1.0, 0, 0)), elements=1),
+    )
+    last = [node for node, x in enumerate(beam.points) if x[0] > 0.69]
+    beam = replace(named(beam, left=(0, 0, 0)), node_groups={"left": np.array([0]), "right": np.array(last)})
+    return reduce_frame(
+        beam, name="comb", interfaces=[InterfaceRegion("left"), InterfaceRegion("right", kind="mean")],
+        reference=reference, reduction=CraigBampton(6), stiffening=True,
+    )  # fmt: skip
+
+
 def plate(reference) -> FlexibleBody:
     """A strip of quadrilaterals in the plane of x and y."""
     strip = panel([(0, 0, 0), (1, 0, 0), (1, 0.1, 0), (0, 0.1, 0)], Shell(0.005, STEEL), elements=(32, 4))
@@ -104,6 +119,7 @@ BODIES = {
     "solid, mean": lambda reference: block(reference, "mean"),
     "solid, rigid": lambda reference: block(reference, "rigid"),
     "beams": lambda reference: rod(reference),
+    "beams, mean": comb,
     "solid and beam": lambda reference: tied_pair(reference, "rigid"),
     "solid and beam, mean": lambda reference: tied_pair(reference, "mean"),
 }
