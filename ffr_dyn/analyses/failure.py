@@ -18,7 +18,7 @@ from ffr_dyn.kernels.tables import (
     Work,
 )
 
-OPEN = 1e-2  # m, -: of constraints, more than drift
+OPEN, LOST = 1e-2, 1e2  # m, -: of constraints, more than drift, and what follows from a lost state
 HUGE = 1e12  # N, N m: no force of a machine; what made the state overflow
 
 
@@ -82,7 +82,7 @@ def _overflow(system: System, work: Work) -> str:
     if value > HUGE:
         return f"{name!r} exerts {value:.3g} N or N m; look at its numbers and their units"
     least, when = work.independence[1:3]
-    if least < AT or work.drift[0] > OPEN:
+    if least < AT or OPEN < work.drift[0] < LOST:
         return (
             f"its constraints came open by up to {work.drift[0]:.2g}, and were nearest to dependence at t = {when:.6g} s: "
             "the mechanism locks there (a dead point that a driver goes beyond), or passes a singular position; keep driven "
