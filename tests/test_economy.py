@@ -21,12 +21,13 @@ from ffr_dyn.economy.cost import of_run, per_evaluation
 from ffr_dyn.economy.drive import oscillators, samples
 from ffr_dyn.economy.ledger import Ledger
 from ffr_dyn.economy.outputs import Output, as_output, difference, largest, largest_stress, probe
-from ffr_dyn.economy.picture import front, points
+from ffr_dyn.economy.picture import diagram
 from ffr_dyn.economy.report import as_html, as_markdown, as_text, write_report
 from ffr_dyn.economy.search import economise
 from ffr_dyn.economy.selection import Shares
 from ffr_dyn.economy.start import least
-from ffr_dyn.economy.steps import error_of
+from ffr_dyn.economy.steps import _from_two_rows, chosen_step, error_of
+from ffr_dyn.economy.terms import TermEffect, _inertial, without_minor
 from ffr_dyn.economy.trial import Span, states
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.formula import formula
@@ -39,7 +40,7 @@ from ffr_dyn.scene_text import save_scene
 from ffr_dyn.settings import Settings
 from ffr_dyn.stabilisation import Projection
 from ffr_dyn.timefunction import TimeFunction
-from ffr_dyn.variant import STIFFENING
+from ffr_dyn.variant import STIFFENING, stiffening_by
 from ffr_prep.reference import FixedTo, MeanAxis, SimplySupported
 from ffr_prep.section import rectangle
 
@@ -165,6 +166,82 @@ def test_cost_grows_with_what_is_modelled():
     assert thrice - once == pytest.approx(more - thrice)  # in the number of steps; rows cost something too
 
 
+# ---- terms ----------------------------------------------------------------------------------------------------------
+
+
+def seen_with(kept: tuple[str, ...], dropped: tuple[str, ...]):
+    """A run without the terms of `dropped`, seen by the model without those of `kept`."""
+    ledger, everything = looked_at(slider_crank(50.0), ("rod.stress",), 0.042, 0.0021)
+    few, many = (
+        replace(everything, parts=tuple(replace(part, dropped=terms) for part in everything.parts))
+        for terms in (dropped, kept)
+    )
+    trial = ledger.run(few)
+    same = tuple(np.eye(len(part.modes)) for part in everything.parts)
+    return samples(trial.made.assembled, ledger.made(many).assembled, same, trial.result.time, *states(trial))
+
+
+@pytest.mark.parametrize("term", ["I5", "I8", "I9"])
+def test_the_force_of_an_inertia_term_is_the_residual_without_it(term):
+    seen = seen_with((STIFFENING,), (STIFFENING, term))
+    force = sum(force for _, name, _, force in _inertial(seen) if name == term)
+    size = np.abs(seen.residual).max()
+    assert size > 1e-6
+    np.testing.assert_allclose(force, seen.residual, atol=1e-5 * size)
+
+
+def test_the_forces_of_all_stiffening_loads_are_the_residual_without_stiffening():
+    seen = seen_with((), (STIFFENING,))
+    size = np.abs(seen.residual).max()
+    assert size > 1e-6
+    np.testing.assert_allclose(seen.stiffening.sum(axis=2), seen.residual, atol=2e-3 * size)
+
+
+def test_terms_go_until_their_share_is_used_up_and_loads_one_by_one():
+    everything = full(slider_crank(50.0), "ros3", 1)
+    sizes = {("I5", None): 0.5, ("I8", None): 3.0, (STIFFENING, 0): 0.2, (STIFFENING, 8): 5.0, (STIFFENING, 12): 0.1}
+    effects = tuple(TermEffect(1, term, load, np.array([size])) for (term, load), size in sizes.items())
+    crank, rod, _ = without_minor(everything, effects, np.array([1.0])).parts
+    assert (rod.dropped, rod.loads) == (("I5",), (8,))
+    assert crank == everything.parts[0]
+    assert without_minor(everything, effects, np.array([10.0])).parts[1].dropped == ("I5", "I8", STIFFENING)
+    assert without_minor(rigid(everything), effects, np.array([10.0])) == rigid(everything)
+
+
+def test_a_body_is_stiffened_by_the_loads_that_are_kept():
+    body = slider_crank(50.0).bodies[1]
+    fewer = stiffening_by(body, (8,)).model.stiffening
+    np.testing.assert_array_equal(fewer[8], body.model.stiffening[8])
+    assert np.count_nonzero(np.abs(fewer).max(axis=(1, 2))) == 1
+    with pytest.raises(InputError, match="it has the loads 0 to 23"):
+        stiffening_by(body, (24,))
+
+
+# ---- steps ----------------------------------------------------------------------------------------------------------
+
+
+def test_steps_over_two_rows_tell_the_error_of_one_row():
+    ledger, everything = looked_at(pendulum(7e9), TIP, 0.4, 0.02)
+    stiff = rigid(replace(everything, divisions=1))
+    coarse, finest = ledger.run(stiff), ledger.run(replace(stiff, divisions=16))
+    estimated, true = largest(_from_two_rows(ledger, coarse)), largest(difference(coarse.values, finest.values))
+    assert (np.abs(estimated / true - 1) < 0.5).all()
+    short, _ = looked_at(pendulum(7e9), TIP, 0.1, 0.02)
+    assert short.over_two_rows(stiff) is None
+
+
+def test_the_step_found_is_fine_enough_and_not_twice_too_fine():
+    ledger, everything = looked_at(pendulum(7e9), TIP, 0.4, 0.02)
+    stiff = rigid(replace(everything, divisions=1))
+    limit = 1e-9 * np.ptp(ledger.run(stiff).values[0]) * np.ones(2)
+    found = chosen_step(ledger, stiff, limit)
+    truth = ledger.run(replace(stiff, method="rk4", divisions=64)).values
+    assert (largest(difference(found.trial.values, truth)) <= limit).all()
+    assert found.trial.choice.divisions > 1
+    coarser = replace(found.trial.choice, divisions=found.trial.choice.divisions // 2)
+    assert (largest(difference(ledger.run(coarser).values, truth)) > limit).any()
+
+
 # ---- outputs --------------------------------------------------------------------------------------------------------
 
 
@@ -287,7 +364,15 @@ def test_the_reference_must_be_better_than_the_tolerance(monkeypatch):
 
 def test_the_report_says_it_all(fast, tmp_path):
     text = as_text(fast)
-    for part in ("CHOSEN MODEL", "OUTPUTS", "BODIES", "NEAREST TO MATTERING", "MODELS TRIED", "MESH AND REDUCTION"):
+    for part in (
+        "CHOSEN MODEL",
+        "OUTPUTS",
+        "BODIES",
+        "NEAREST TO MATTERING",
+        "TERMS NEAREST",
+        "MODELS TRIED",
+        "MESH AND REDUCTION",
+    ):
         assert part in text
     assert "slider.pin.position.x" in text
     assert "Verified" in text
@@ -308,19 +393,29 @@ def test_advice_is_a_command_to_run(fast):
     assert "--stress" in lines[1]
 
 
-def test_the_front_has_the_points_that_nothing_beats(fast):
-    costs, errors = points(fast)
-    order = front(costs, errors)
-    assert (np.diff(costs[order]) >= 0).all()
-    assert (np.diff(errors[order]) < 0).all()
-    for cost, error in zip(costs, errors, strict=True):
-        assert ((costs[order] <= cost) & (errors[order] <= error)).any()
+def test_the_chart_is_a_diagram_of_all_runs_with_the_chosen_one(fast):
+    """One star, on the chosen model; its points stand beside those of another diagram; the tolerance is drawn."""
+    chart = diagram(fast)
+    assert len(chart.points) == len(fast.runs)
+    assert len({point.label for point in chart.points}) == len(chart.points)
+    (star,) = [point for point in chart.points if point.label in chart.chosen]
+    for k, output in enumerate(fast.probe.outputs):
+        assert star.errors[output.name] == pytest.approx(fast.verification.error[k])
+        assert star.errors[output.name] <= chart.limits[output.name]
+    assert len(chart.with_points(chart.points[:1]).points) == len(chart.points) + 1
 
 
 def test_nothing_cheaper_that_was_run_would_have_done(fast):
-    costs, errors = points(fast)
+    costs = np.array([one.cost / fast.cost for one in fast.runs])
+    errors = np.array([float((one.error / fast.limits).max()) for one in fast.runs])
     assert costs.size > 3
     assert not ((costs < 0.999) & (errors <= 1)).any()
+
+
+def test_the_search_costs_a_few_runs_of_what_it_finds(slow, fast):
+    """Beyond one verification, by the cost model."""
+    assert slow.search_cost < 3 * slow.cost
+    assert fast.search_cost < 5 * fast.cost
 
 
 def test_the_command_writes_a_scene_that_runs(tmp_path):

@@ -72,6 +72,7 @@ class Diagram:
     reference: Reference
     notes: tuple[str, ...] = ()
     chosen: tuple[str, ...] = field(default=())  # labels of points to be pointed out
+    limits: Mapping[str, float] = field(default_factory=dict)  # errors that are tolerated, by measure, in its unit
 
     def measure(self, name: str) -> Measure:
         """The measure of that name."""

@@ -27,6 +27,7 @@ COST_WORDS = {
 }
 MARKERS = "os^Dv<>PXh*p"
 FRONT, FLOOR = "#222222", "#888888"
+LIMIT: Any = {"color": FRONT, "linestyle": "--", "linewidth": 1.0}
 _STYLE = {
     "font.size": 11.0,
     "axes.titlesize": 12.0,
@@ -103,6 +104,8 @@ def _panel(
         axes.plot(x, y, color=colour, linewidth=1.3, alpha=0.8)
         axes.errorbar(x, y, xerr=_bars(line, against), fmt=marker, color=colour, **look_of_bars)
     _front(axes, diagram, measure, against)
+    if measure in diagram.limits:
+        axes.axhline(diagram.limits[measure] / scale, **LIMIT)
     axes.set_xscale("log")
     axes.set_yscale("log")
     if floor > 0:
@@ -158,6 +161,8 @@ def _legend(figure: Figure, shown: list[Diagram], lines: dict[tuple[str, str], t
     handles.append(Line2D([], [], color=FRONT, label="Pareto front", **ring))
     if any(diagram.chosen for diagram in shown):
         handles.append(Line2D([], [], color="#F0C000", marker="*", markersize=14, linestyle="none", label="chosen"))
+    if any(diagram.limits for diagram in shown):
+        handles.append(Line2D([], [], label="tolerance", **LIMIT))
     if any(floor > 0 for diagram in shown for floor in diagram.reference.floors.values()):
         handles.append(Patch(facecolor="#EEEEEE", edgecolor=FLOOR, hatch="///", label="error of the reference"))
     lost = sum(len(diagram.lost) for diagram in shown)

@@ -86,6 +86,9 @@ def _traces(diagram: Diagram, measure: str, cost: str) -> Iterator[Item]:
         star = {"symbol": "star", "size": 19, "color": "#F0C000", "line": {"width": 1, "color": FRONT}}
         yield _still("chosen", [(p.cost(cost), p.errors[measure] / scale) for p in chosen], star)
     costs = [p.cost(cost) for p in diagram.points if p.cost(cost) > 0]
+    if measure in diagram.limits and costs:
+        across = [(cost, diagram.limits[measure] / scale) for cost in (min(costs) / 1.5, max(costs) * 1.5)]
+        yield _still("tolerance", across, {}) | {"mode": "lines", "line": {"dash": "dash", "color": FRONT}}
     if floor > 0 and costs:
         ends = [(min(costs) / 1.5, floor / scale), (max(costs) * 1.5, floor / scale)]
         dashed = {"mode": "lines", "line": {"dash": "dash", "color": FLOOR}}

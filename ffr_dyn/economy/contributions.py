@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffr_dyn.analyses.evaluation import evaluator, moved, record_states, to_body_axes, to_global_axes
+from ffr_dyn.analyses.evaluation import moved, record_states, to_body_axes, to_global_axes
 from ffr_dyn.economy.choice import Choice
 from ffr_dyn.economy.drive import Samples, driven, elastic_columns, followed, samples
 from ffr_dyn.economy.ledger import Ledger
@@ -200,7 +200,7 @@ def _changed(seen: Samples, rows: Array, shift: Array, rates: Array) -> Record:
     v = np.array([
         to_global_axes(place, x[i], to_body_axes(place, seen.x[k], seen.v[k]) + rates[i]) for i, k in enumerate(rows)
     ])  # fmt: skip
-    return record_states(evaluator(seen.system), seen.time[rows], x, v)
+    return record_states(seen.at, seen.time[rows], x, v)
 
 
 def _outputs(seen: Samples, record: Record, scene: Scene, of: Probe) -> tuple[Array, ...]:

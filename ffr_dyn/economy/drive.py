@@ -45,13 +45,15 @@ STIFF = 1e10  # how much more a violation of a constraint weighs than the inerti
 
 @dataclass(frozen=True)
 class Samples:
-    """A motion seen by a model, T rows: time (T,), x (T, X), v (T, V) lifted into it, mass M (T, V, V), Jacobian
-    (T, C, V), residual r (T, V), accelerations of the motion (T, V), and what the model records there.
+    """A motion seen by a model, T rows.
 
+    at         : the model with the memory of one evaluation;  record : what it records there
+    time (T,), x (T, X), v (T, V) : the motion, lifted into the model;  acceleration : (T, V) of the motion
+    M          : (T, V, V) mass;  jacobian : (T, C, V);  residual : (T, V) r of the motion
     stiffening : (T, V, L) force of every load by way of geometric stiffness;  loads : (L,) of these, body and number
     """
 
-    system: System
+    at: Evaluator
     time: Array
     x: Array
     v: Array
@@ -62,6 +64,11 @@ class Samples:
     record: Record
     stiffening: Array
     loads: tuple[tuple[int, int], ...]
+
+    @property
+    def system(self) -> System:
+        """The model."""
+        return self.at.system
 
 
 def elastic_columns(place: Layout) -> Array:
@@ -103,12 +110,13 @@ def samples(small: Assembled, large: Assembled, bases: tuple[Array, ...], time: 
     """The motion x (T, .), v (T, .) of the small model, seen by the large one; `bases` as in `lift`."""
     X, W = lift(small.system.layout, large.system.layout, bases, x, v)
     to_large, rows = _map(small.system.layout, large.system.layout, bases), _rows(small.system, large.system)
-    at, seen = evaluator(small.system), evaluator(large.system)
+    seen = evaluator(large.system)
+    at = seen if small is large else evaluator(small.system)
     loads = stiffening_numbers(large.system)
     M, J, r, acc, records, stiffening = [], [], [], [], [], []
     for k, t in enumerate(time):
         own = evaluate(at, float(t), x[k], v[k])
-        now = evaluate(seen, float(t), X[k], W[k])
+        now = own if at is seen else evaluate(seen, float(t), X[k], W[k])
         mass, lam = evaluated_mass_matrix(seen), np.zeros(len(now.Phi))
         lam[[pair[1] for pair in rows]] = own.lam[[pair[0] for pair in rows]]
         acc.append(to_large @ own.acceleration)
@@ -118,7 +126,7 @@ def samples(small: Assembled, large: Assembled, bases: tuple[Array, ...], time: 
         records.append(copied(seen.record))
         stiffening.append(stiffening_forces(seen, loads))
     return Samples(
-        large.system,
+        seen,
         time,
         X,
         W,
@@ -217,7 +225,8 @@ def oscillators(
     """(T, c) q and q_dot with q'' + damping q' + omega2 q = force (T, c); exact for a force linear in between."""
     h = np.diff(time)
     steps, which = np.unique(np.round(h, 15), return_inverse=True)
-    updates = [_update(float(step), omega2, damping) for step in steps]
+    kinds, kind = np.unique(np.array([omega2, damping]), axis=1, return_inverse=True)
+    updates = [[values[kind] for values in _update(float(step), *kinds)] for step in steps]
     q, rate = np.zeros_like(force), np.zeros_like(force)
     q[0] = 0.0 if start is None else start
     rate[0] = 0.0 if start_rate is None else start_rate

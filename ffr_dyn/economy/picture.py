@@ -1,68 +1,133 @@
-"""All runs of a search and the one it chose, on a chart of error over cost with the Pareto front."""
+"""All combinations that a search has tried, and the one it chose, as a work-precision diagram of the scene.
+
+It is a `Diagram` as `ffr-dyn chart` makes them: draw it, write its page or table, or put its points beside those of another
+diagram of the scene (`Diagram.with_points`).
+"""
 
 from __future__ import annotations
 
-import io
+from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.chart.diagram import Diagram, Point, spread
+from ffr_dyn.chart.draw import draw as draw_diagram
+from ffr_dyn.chart.reference import Reference
+from ffr_dyn.chart.variants import STEP, TOLERANCE, Model, Variant
+from ffr_dyn.economy.choice import Choice
 from ffr_dyn.economy.found import Economy
+from ffr_dyn.economy.trial import Made, Span, make
+from ffr_dyn.result import Result
+from ffr_dyn.stopwatch import Stopwatch
 
 Array = np.ndarray
 
-
-def points(found: Economy) -> tuple[Array, Array]:
-    """(K,) costs in runs of the chosen model, and (K,) largest errors in tolerances, of all runs of the search."""
-    costs = np.array([one.cost / found.cost for one in found.runs])
-    errors = np.array([float((one.error / found.limits).max(initial=0.0)) for one in found.runs])
-    known = np.isfinite(errors) & (errors > 0)
-    return costs[known], errors[known]
+REPEATS = 3  # of every run, whose median time is drawn
 
 
-def front(costs: Array, errors: Array) -> Array:
-    """Numbers of the points that no other one beats in both, by rising cost."""
-    best, found = np.inf, []
-    for k in np.lexsort((errors, costs)):
-        if errors[k] < best:
-            found.append(int(k))
-            best = errors[k]
-    return np.array(found, int)
+@dataclass(frozen=True)
+class OutputMeasure:
+    """An output of a search as a measure of a diagram."""
+
+    name: str
+    unit: str
+    own: float  # its range
+
+    @property
+    def words(self) -> str:
+        """For an axis."""
+        return self.name
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Quantities to keep."""
+        return (self.name,)
+
+    def values(self, result: Result) -> Array:
+        """(T, k) history."""
+        return result[self.name].reshape(result.time.size, -1)
+
+    def scale(self, result: Result) -> float:
+        """Its range over the run of the search."""
+        return self.own
+
+
+def diagram(found: Economy) -> Diagram:
+    """The runs of a search with their processor times, which takes some repetitions of each, and their errors."""
+    measures = tuple(
+        OutputMeasure(output.name, unit, float(scale))
+        for output, unit, scale in zip(found.probe.outputs, found.probe.units, found.scales, strict=True)
+    )
+    words = _model_words(found)
+    points = [_point(found, one.choice, words[one.choice], one.error) for one in found.runs]
+    chosen = tuple(p.label for p, one in zip(points, found.runs, strict=True) if one.choice == found.choice)
+    limits = {m.name: float(limit) for m, limit in zip(measures, found.limits, strict=True)}
+    return Diagram(found.original.name, measures, tuple(points), (), _reference(found), (), chosen, limits)
 
 
 def draw(found: Economy, path: str | Path) -> Path:
-    """Write the chart as .png or .svg."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    _figure(found).savefig(path, dpi=130, metadata={"Software": None} if path.suffix == ".png" else None)
-    return path
+    """Draw the runs of a search and the one it chose, .png or .svg, a panel for each output."""
+    return draw_diagram(diagram(found), path, title=f"{found.original.name}: what was tried, and chosen")
 
 
-def as_png(found: Economy) -> bytes:
-    """The chart as the content of a .png file."""
-    stream = io.BytesIO()
-    _figure(found).savefig(stream, format="png", dpi=110, metadata={"Software": None})
-    return stream.getvalue()
+def _reference(found: Economy) -> Reference:
+    """What errors are measured from: the run of a verification, whose own error is the floor."""
+    names = [output.name for output in found.probe.outputs]
+    verified = found.verification
+    scales = {name: float(scale) for name, scale in zip(names, found.scales, strict=True)}
+    own = np.zeros(len(names)) if verified is None else verified.own
+    variant = Variant(found.choice.method, 1.0) if verified is None else _variant(found, verified.choice, "everything")
+    story = ("estimated errors: there was no verification",) if verified is None else ("verification of the search",)
+    nothing = {name: np.zeros((0, 1)) for name in names}
+    return Reference(nothing, scales, dict(zip(names, map(float, own), strict=True)), variant, variant, story)
 
 
-def _figure(found: Economy):  # type: ignore[no-untyped-def]
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+def _model_words(found: Economy) -> dict[Choice, str]:
+    """A name for every model that was run: the coordinates of each body, and a number where that says too little."""
+    models = list(dict.fromkeys((one.choice.parts, one.choice.plane) for one in found.runs))
+    plain = [" ".join(str(part.count) for part in parts) for parts, _ in models]
+    count, seen, names = Counter(plain), Counter[str](), {}
+    for model, words in zip(models, plain, strict=True):
+        seen[words] += 1
+        names[model] = f"{words} coordinates" + (f" ({seen[words]})" if count[words] > 1 else "")
+    return {one.choice: names[one.choice.parts, one.choice.plane] for one in found.runs}
 
-    figure = Figure(figsize=(7.2, 4.6), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots()
-    costs, errors = points(found)
-    axes.loglog(costs, errors, "o", color="#888888", label="runs of the search")
-    order = front(costs, errors)
-    axes.step(costs[order], errors[order], where="post", color="#0072b2", label="Pareto front")
-    chosen = (found.error if found.verification is None else found.verification.error) / found.limits
-    axes.plot([1.0], [max(float(chosen.max()), 1e-12)], "*", markersize=16, color="#d55e00", label="chosen", zorder=3)
-    axes.axhline(1.0, color="#333333", linestyle="--", linewidth=1)
-    axes.annotate("tolerance", (1.0, 1.0), xycoords=("axes fraction", "data"), ha="right", va="bottom")
-    axes.set_xlabel("cost of a run, in runs of the chosen model")
-    axes.set_ylabel("largest error, in tolerances")
-    axes.set_title(f"{found.original.name}: runs of the search", fontweight="bold")
-    axes.grid(True, which="major", alpha=0.4)
-    axes.legend()
-    return figure
+
+def _variant(found: Economy, choice: Choice, words: str) -> Variant:
+    step = found.settings.output_step / choice.divisions
+    return Variant(choice.method, choice.accuracy if choice.controlled else step, Model(words))
+
+
+def _point(found: Economy, choice: Choice, words: str, error: Array) -> Point:
+    settings, variant = found.settings, _variant(found, choice, words)
+    span = Span(settings.start, settings.end, settings.output_step, settings.stabilisation)
+    wall, cpu, evaluations = _timed(make(found.original, choice, span), choice, span)
+    errors = {output.name: float(e) for output, e in zip(found.probe.outputs, error, strict=True)}
+    kind = TOLERANCE if choice.controlled else STEP
+    label = variant.label
+    return Point(choice.method, words, label, kind, variant.number, errors, spread(wall), spread(cpu), evaluations)
+
+
+def _timed(made: Made, choice: Choice, span: Span) -> tuple[list[float], list[float], int]:
+    """Wall and processor times [s] of the time loop of some repetitions, and evaluations."""
+    wall, cpu, evaluations = [], [], 0
+    for _ in range(REPEATS):
+        watch = Stopwatch()
+        result = forward(
+            made.scene,
+            start=span.start,
+            end=span.end,
+            output_step=span.output_step,
+            method=choice.integrator(span.output_step),
+            stabilisation=span.stabilisation,
+            outputs=("constraint.position",),
+            stopwatch=watch,
+            assembled=made.assembled,
+        )
+        wall.append(watch.wall)
+        cpu.append(watch.cpu)
+        evaluations = int(result.attributes["evaluations"])
+    return wall, cpu, evaluations

@@ -13,9 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from ffr_dyn.economy.advice import advice
+from ffr_dyn.economy.checks import load_names
 from ffr_dyn.economy.choice import Choice, kind
 from ffr_dyn.economy.contributions import Contributions
 from ffr_dyn.economy.found import Economy
+from ffr_dyn.economy.terms import TermEffect
 from ffr_dyn.errors import InputError
 from ffr_dyn.scene import INERTIA_TERMS, Body
 
@@ -38,8 +40,9 @@ class Table:
 
 def tables(found: Economy) -> list[Table]:
     """The report, part after part."""
-    parts = [_summary(found), _outputs(found), _bodies(found), _nearest(found), *_checks(found), _tried(found)]
-    parts.append(_advice(found))
+    parts = [_summary(found), _outputs(found), _bodies(found), _nearest(found)]
+    parts += [_terms(found)] if found.terms else []
+    parts += [*_checks(found), _tried(found), _advice(found)]
     notes = _notes(found)
     return [*parts, Table("Notes", "", (), tuple((note,) for note in notes))] if notes else parts
 
@@ -142,7 +145,10 @@ def _stiffening(found: Economy, b: int) -> str:
     if found.original.bodies[b].model.stiffening is None:
         return "not in the body"
     part = found.choice.parts[b]
-    return "-" if not part.count else "kept" if part.stiffened else "dropped"
+    if not part.count or not part.stiffened:
+        return "dropped" if part.count else "-"
+    names = load_names(found.original.bodies[b])
+    return "kept" if part.loads is None else "by " + ", ".join(names[k] for k in part.loads)
 
 
 def _nearest(found: Economy) -> Table:
@@ -153,6 +159,39 @@ def _nearest(found: Economy) -> Table:
         "least. In units of the tolerance."
     )
     return Table("Nearest to mattering", text, ("", "mode", "output", "share"), (*out, *kept))
+
+
+def _terms(found: Economy) -> Table:
+    """What inertia terms and stiffening loads do: those dropped that do most, and those kept that do least."""
+    here = [one for one in found.terms if found.choice.parts[one.body].count]
+    out = [one for one in here if not kept(found.choice, one)]
+
+    def size(one: TermEffect) -> float:
+        return float((one.effect / found.limits).max(initial=0.0))
+
+    listed = [("dropped", one) for one in sorted(out, key=size, reverse=True)[:SHOWN]]
+    listed += [("kept", one) for one in sorted((one for one in here if one not in out), key=size)[: SHOWN // 2]]
+    rows = tuple((state, *_said(found, one)) for state, one in listed)
+    text = (
+        "What inertia terms and the stiffening by each load do along the motion of everything, by way of the modes. The "
+        "model without those dropped was run beside everything: the errors above hold them."
+    )
+    return Table("Terms nearest to mattering", text, ("", "term", "output", "share"), rows)
+
+
+def kept(choice: Choice, one: TermEffect) -> bool:
+    """Whether a model has a term."""
+    part = choice.parts[one.body]
+    if one.load is None:
+        return one.term not in part.dropped
+    return part.stiffened and (part.loads is None or one.load in part.loads)
+
+
+def _said(found: Economy, one: TermEffect) -> tuple[str, str, str]:
+    body, shares = found.original.bodies[one.body], one.effect / found.limits
+    term = one.term if one.load is None else f"{one.term} by {load_names(body)[one.load]}"
+    output = int(np.argmax(shares))
+    return f"{body.name}, {term}", found.probe.outputs[output].name, f"{shares[output]:.2g}"
 
 
 def _leading(found: Economy, effects: Contributions, *, most: bool) -> Iterator[tuple[str, str, str]]:
@@ -171,7 +210,7 @@ def _checks(found: Economy) -> Iterator[Table]:
     if found.frequencies:
         shifts = tuple((f"{f.model:.5g}", f"{f.everything:.5g}", f"{100 * f.shift:+.2g} %") for f in found.frequencies)
         text = (
-            "Of the linearised model half-way through the run, and the nearest of everything there: a shift by more "
+            "Of small motions half-way through the run, and the nearest of everything there: a shift by more "
             "than some per cent means vibration at a wrong frequency, which the contributions of omitted modes do not show."
         )
         yield Table("Frequencies [Hz]", text, ("model", "everything", "shift"), shifts)
@@ -287,14 +326,16 @@ def _section(table: Table) -> str:
 
 def write_report(found: Economy, path: str | Path) -> Path:
     """Write the report as .html (with the chart), .md or .txt. Raises InputError for another kind of file."""
-    from ffr_dyn.economy.picture import as_png
+    from ffr_dyn.economy.picture import draw
 
     path = Path(path)
     if path.suffix not in (".html", ".md", ".txt"):
         raise InputError(f"{path}: a report is written as .html, .md or .txt")
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix == ".html":
-        text = as_html(found, as_png(found))
+        chart = draw(found, path.with_name(path.name + ".part.png"))
+        text = as_html(found, chart.read_bytes())
+        chart.unlink()
     else:
         text = as_markdown(found) if path.suffix == ".md" else as_text(found)
     temporary = path.with_name(path.name + ".part")

@@ -100,21 +100,19 @@ def economise(
     of = probe(assembled, [as_output(one, tolerance) for one in outputs])
     ledger = Ledger(scene, span, of, tell)
     stiff = started(ledger, assembled.system.scene)
-    found = _surely_rigid(ledger, stiff)
-    return _finished(ledger, _beside_everything(ledger, stiff) if found is None else found, verify)
+    limits = stiff.limits
+    omitted = None if limits is None else stiff.contributions(limits)
+    found = None if omitted is None else _surely_rigid(ledger, stiff, omitted)
+    return _finished(ledger, _beside_everything(ledger, stiff, omitted) if found is None else found, verify)
 
 
 # ---- rigid bodies -----------------------------------------------------------------------------------------------------
 
 
-def _surely_rigid(ledger: Ledger, stiff: Rigid) -> Chosen | None:
+def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chosen | None:
     """Rigid bodies, where the estimate of what they forget is far below the tolerances; None where it is not."""
-    limits = stiff.limits
-    if limits is None:
-        return None
-    omitted = stiff.contributions(limits)
-    model = omitted.effect.sum(axis=0)
-    if (model > SURELY_RIGID * limits).any():
+    limits, model = stiff.limits, omitted.effect.sum(axis=0)
+    if limits is None or (model > SURELY_RIGID * limits).any():
         return None
     pilot = replace(stiff.trial.choice, method=PILOT)
     stepped = chosen_step(ledger, pilot, np.maximum(OF_ALL * limits - model, LEAST * limits))
@@ -135,11 +133,11 @@ def _surely_rigid(ledger: Ledger, stiff: Rigid) -> Chosen | None:
 # ---- beside everything ------------------------------------------------------------------------------------------------
 
 
-def _beside_everything(ledger: Ledger, stiff: Rigid) -> Chosen:
+def _beside_everything(ledger: Ledger, stiff: Rigid, omitted: Contributions | None) -> Chosen:
     """The cheapest model beside a coarse run of everything, and its step; looked at again with a finer one where the step
     turns out much finer, since a coarse step damps the vibration of fast modes, and with it what they do."""
     ground = stiff.ground()
-    omitted = stiff.contributions(ground.limits)
+    omitted = stiff.contributions(ground.limits) if omitted is None else omitted
     selection = selected_model(ledger, ground, omitted, Shares())
     found = _stepped(ledger, ground, selection, omitted)
     finer = _finer_ground(ledger, ground, found.final)

@@ -119,16 +119,23 @@ def _enough(
 ) -> Choice:
     """The model that a run beside everything shows to be enough; everything where the number of attempts does not do."""
     scale, count = 1.0, _more(ranking, beyond) if beyond >= 0 else 0
+    terms = shares.terms
     for _ in range(ATTEMPTS):
         count = max(count, ranking.count(scale * shares.modes))
-        model = without_minor(ranking.model(count), effects, scale * shares.terms * ground.limits)
+        model = ranking.model(count)
+        if terms:
+            model = without_minor(model, effects, scale * terms * ground.limits)
         error = float((gap(ledger, ground, model, _said(model)) / (shares.all * ground.limits)).max())
         if error <= 1:
             return model
         if model == ground.everything:
             break
-        scale *= SAFELY / min(error, 1e6)
-        count = _more(ranking, count)
+        if np.isfinite(error):
+            scale *= SAFELY / error
+            count = _more(ranking, count)
+        else:  # a run that fails may miss a term
+            count = count if terms else _more(ranking, count)
+            terms = 0.0
     return ground.everything
 
 
