@@ -40,20 +40,20 @@ SIDE = 12 * LANES  # numbers of X per side of a joint
 @kernel
 def spread_rows(jac, first, last, side, flexible, normal, X, at):
     """X = the rigid coefficients of the rows of one side, then the elastic ones; six of each, or three in the plane."""
-    i, j, k = in_plane(normal) if normal >= 0 else (0, 0, 0)
+    if normal >= 0:
+        i, j, k = in_plane(normal)
+        for row in range(first, last):
+            a, r = jac[row, side], at + row - first
+            X[r], X[r + LANES], X[r + 2 * LANES] = a[i], a[j], a[k]
+            X[r + 3 * LANES], X[r + 4 * LANES], X[r + 5 * LANES] = a[i], a[j], a[6 + normal]
+        return
     for row in range(first, last):
         a, r = jac[row, side], at + row - first
-        if normal >= 0:
-            X[r], X[r + LANES], X[r + 2 * LANES] = a[i], a[j], a[k]
-            if flexible:
-                X[r + 3 * LANES], X[r + 4 * LANES], X[r + 5 * LANES] = a[i], a[j], a[6 + normal]
-            continue
-        for c in range(6):
-            X[r + LANES * c] = a[c]
+        X[r], X[r + LANES], X[r + 2 * LANES] = a[0], a[1], a[2]
+        X[r + 3 * LANES], X[r + 4 * LANES], X[r + 5 * LANES] = a[3], a[4], a[5]
         if flexible:
-            for c in range(3):
-                X[r + LANES * (6 + c)] = a[c]
-                X[r + LANES * (9 + c)] = a[6 + c]
+            X[r + 6 * LANES], X[r + 7 * LANES], X[r + 8 * LANES] = a[0], a[1], a[2]
+            X[r + 9 * LANES], X[r + 10 * LANES], X[r + 11 * LANES] = a[6], a[7], a[8]
 
 
 @kernel
@@ -97,13 +97,14 @@ def eliminate_in_plane(flexible, normal, P, L, X, at):
 @kernel
 def add_scale(jac, first, last, side, mass, turning, scale):
     """What the rows' own part of the multiplier matrix is at least, by the mass or the trace of the inertia of a body."""
+    by_mass, by_inertia = 1.0 / mass, 1.0 / turning
     for row in range(first, last):
         a = jac[row, side]
         point = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
         if point > 0.0:
-            scale[row] += point / mass
+            scale[row] += point * by_mass
         else:
-            scale[row] += (a[3] * a[3] + a[4] * a[4] + a[5] * a[5]) / turning
+            scale[row] += (a[3] * a[3] + a[4] * a[4] + a[5] * a[5]) * by_inertia
 
 
 @kernel

@@ -187,8 +187,7 @@ def evaluate_unit(at, t, x, v):
     if status != OK:
         return status
     call_unit(r.units[MARKERS], at, IN_USE, x, v)
-    for k in range(r.work.markers.load.shape[0]):
-        fill(r.work.markers.load[k], 0.0)
+    fill(r.work.markers.load.reshape(r.work.markers.load.size), 0.0)
     if has_loads(r.model.loads):
         call_unit(r.units[LOADS], at, t, x, v)
     call_unit(r.units[CONSTRAINTS], at, t, x, v)
