@@ -1,4 +1,4 @@
-"""The commands `ffr-dyn check`, `kinematic`, `static`, `inverse`, `mixed` and `linearise`."""
+"""The commands `ffr-dyn check`, `assemble`, `kinematic`, `static`, `inverse`, `mixed` and `linearise`."""
 
 from __future__ import annotations
 
@@ -45,6 +45,20 @@ def check(scene: Path, parameters: tuple[str, ...], time: float | None) -> None:
     loaded, settings = load_scene(scene, assignments(parameters))
     for line in mobility(loaded, time=_at_moment(settings, Static(), time, ()).time).lines():
         click.echo(line)
+
+
+@click.command()
+@scene_options
+@time_option
+def assemble(
+    scene: Path, output: Path | None, parameters: tuple[str, ...], keep: tuple[str, ...], time: float | None
+) -> None:
+    """Positions and velocities of SCENE that meet its joints and drivers, and what was changed of each body for it."""
+    from ffr_dyn.scene_file import load_scene
+    from ffr_dyn.settings import Assemble
+
+    loaded, settings = load_scene(scene, assignments(parameters))
+    perform(loaded, _at_moment(settings, Assemble(), time, keep), output or scene.with_suffix(".nc"))
 
 
 @click.command()
@@ -159,7 +173,7 @@ def linearise(
     perform(loaded, _at_moment(settings, analysis, time, ()), output or scene.with_suffix(".nc"))
 
 
-COMMANDS = (check, kinematic, static, inverse, mixed, linearise)
+COMMANDS = (check, assemble, kinematic, static, inverse, mixed, linearise)
 
 
 def _at_moment(

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from ffr_dyn.analyses.assembly import assembly
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.inverse import Dynamic, QuasiStatic, inverse
 from ffr_dyn.analyses.kinematic import kinematic
@@ -17,7 +18,7 @@ from ffr_dyn.errors import InputError
 from ffr_dyn.result import Result
 from ffr_dyn.result_file import save_result
 from ffr_dyn.scene import Scene
-from ffr_dyn.settings import Forward, Inverse, Kinematic, Linearise, Mixed, MomentSettings, Settings, Static
+from ffr_dyn.settings import Assemble, Forward, Inverse, Kinematic, Linearise, Mixed, MomentSettings, Settings, Static
 
 
 def run(
@@ -36,6 +37,8 @@ def run(
         require_resumable(settings)
     if isinstance(settings, Settings):
         return _over_time(scene, settings, path, resume, progress)
+    if isinstance(settings.analysis, Assemble):
+        return assembly(scene, time=settings.time, outputs=settings.outputs, path=path)
     if isinstance(settings.analysis, Static):
         return static(scene, time=settings.time, outputs=settings.outputs, path=path)
     result = as_result(scene, linearised(scene, settings.analysis, settings.time), settings.time)

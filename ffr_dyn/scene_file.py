@@ -24,6 +24,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,7 @@ from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator, Tolerances
 from ffr_dyn.joint_forces import Actuator
 from ffr_dyn.operations import FUNCTIONS
 from ffr_dyn.parameters import Parameters, as_number, flattened, overridden, substituted
-from ffr_dyn.scene import Body, Scene
+from ffr_dyn.scene import GROUND, Body, Scene
 from ffr_dyn.scene_schema import (
     EFFORTS,
     EVENTS,
@@ -51,7 +52,18 @@ from ffr_dyn.scene_schema import (
     keys_of,
 )
 from ffr_dyn.scene_source import Source, origin, origin_of_name, read_source
-from ffr_dyn.settings import Forward, Inverse, Kinematic, Linearise, Mixed, MomentSettings, OverTime, Settings, Static
+from ffr_dyn.settings import (
+    Assemble,
+    Forward,
+    Inverse,
+    Kinematic,
+    Linearise,
+    Mixed,
+    MomentSettings,
+    OverTime,
+    Settings,
+    Static,
+)
 from ffr_dyn.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
 from ffr_dyn.state_formula import StateFormula, check_names
 from ffr_dyn.timefunction import TimeFunction, constant, signal, signals_in
@@ -114,6 +126,7 @@ def _scene(entry: Any, source: Source) -> Scene:
         table: tuple(_declared(kinds, (table, name), item, source) for name, item in getattr(entry, table).items())
         for table, kinds in TABLES.items()
     }
+    _put_markers(entry, source)
     bodies = tuple(_body(name, body, source) for name, body in entry.bodies.items())
     try:
         scene = Scene(bodies=bodies, **{key: getattr(entry, key) for key in WHOLE}, **tables)
@@ -123,6 +136,20 @@ def _scene(entry: Any, source: Source) -> Scene:
     except InputError as error:
         raise InputError(f"{origin_of_name(source, str(error))}: {error}") from None
     return scene
+
+
+def _put_markers(entry: Any, source: Source) -> None:
+    """Add the markers to the points of their bodies and of the ground."""
+    points = {GROUND: entry.ground, **{name: body.points for name, body in entry.bodies.items()}}
+    for name, marker in entry.markers.items():
+        where = f"{origin(source, ('markers', name))}: markers.{name}"
+        if marker.body not in points:
+            close = get_close_matches(marker.body, points, 1)
+            hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(points)}"
+            raise InputError(f"{where}: there is no body {marker.body!r}; {hint}")
+        if name in points[marker.body]:
+            raise InputError(f"{where}: {marker.body!r} has a point {name!r} already; give the marker another name")
+        points[marker.body][name] = marker.point
 
 
 def _declared(kinds: tuple[Kind, ...], keys: tuple[str, ...], entry: BaseModel, source: Source) -> Any:
@@ -221,8 +248,8 @@ def _model(name: str, entry: BodyEntry) -> FlexibleBody:
 
 def _settings(entry: Any, outputs: list[str], source: Source) -> Settings | MomentSettings:
     keep = tuple(outputs)
-    if entry.kind == "static":
-        return MomentSettings(entry.time, keep, Static())
+    if entry.kind in ("assemble", "static"):
+        return MomentSettings(entry.time, keep, Assemble() if entry.kind == "assemble" else Static())
     if entry.kind == "linearise":
         inputs = (*_efforts("inputs", entry.inputs, source), *entry.loads)
         return MomentSettings(entry.time, keep, Linearise(inputs, tuple(entry.quantities), entry.at_equilibrium))

@@ -240,6 +240,13 @@ class BodyEntry(Strict):
         return self
 
 
+class MarkerEntry(Strict):
+    """One more point of a body, or of the ground: joints, loads and measurements know it as "body.name"."""
+
+    body: str
+    point: Metres
+
+
 class StabilisationEntry(Strict):
     """How the constraints are kept; see `ffr_dyn.stabilisation`."""
 
@@ -326,6 +333,13 @@ MixedEntry = create_model(
 )
 
 
+class AssembleEntry(Strict):
+    """Positions and velocities that meet the joints and drivers at a time, and what was changed for it."""
+
+    kind: Literal["assemble"]
+    time: Seconds = 0.0
+
+
 class StaticEntry(Strict):
     """The equilibrium at a time."""
 
@@ -351,6 +365,7 @@ LineariseEntry = create_model(
 ANALYSES: dict[str, Any] = {
     "forward": ForwardEntry,
     "kinematic": KinematicEntry,
+    "assemble": AssembleEntry,
     "static": StaticEntry,
     "inverse": InverseEntry,
     "mixed": MixedEntry,
@@ -370,6 +385,7 @@ class _SceneBase(Strict):
     analysis: _one_of(list(ANALYSES.values()), list(ANALYSES))  # type: ignore[valid-type]
     ground: dict[str, Metres] = {}
     bodies: dict[str, BodyEntry]
+    markers: dict[str, MarkerEntry] = {}
 
 
 SceneEntry: Any = create_model(

@@ -42,6 +42,11 @@ class Mixed:
 
 
 @dataclass(frozen=True)
+class Assemble:
+    """Consistent positions and velocities."""
+
+
+@dataclass(frozen=True)
 class Static:
     """Static equilibrium."""
 
@@ -56,7 +61,7 @@ class Linearise:
 
 
 OverTime = Forward | Kinematic | Inverse | Mixed
-OfMoment = Static | Linearise
+OfMoment = Assemble | Static | Linearise
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Where a motion strains the theory it was computed with: linear elasticity, and no geometric stiffening.
 
-Both are looked at along the run and told at its end; a run does not stop for them.
+Both are looked at along the run and told at its end; a run stops for a deformation that means nothing any more.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from ffr_dyn.view import shaped
 
 Array = np.ndarray
 
+MEANINGLESS = 100.0  # elastic rotation [rad]
 STRAINED = 0.1  # elastic rotation [rad] beyond which linear elasticity in the moving frame is doubtful
 # Share of the first frequency that a body may spin at without geometric stiffening. The frequencies of a blade are then off
 # by about half its square; a pendulum and a slider-crank with 0.08 and 0.09 were off by 1 mm in 1.2 m after 0.5 s and by
@@ -29,6 +30,18 @@ def extremes(system: System, record: Record) -> Array:
         turns.append(max((np.abs(shaped(i.phi_r, q)).max(initial=0.0) for i in body.model.interfaces), default=0.0))
         spins.append(np.sqrt((omega**2).sum(axis=1)).max(initial=0.0))
     return np.array([turns, spins])
+
+
+def meaningless(scene: Scene, found: Array) -> str:
+    """Why a run with these extremes (2, B) tells nothing any more; empty where it does."""
+    b = int(np.argmax(found[0]))
+    if not found[0, b] > MEANINGLESS:
+        return ""
+    doubt = " ".join(unstiffened(scene, found[1])[:1]) or "A load or a spring may be far too large, or negative."
+    return (
+        f"body {scene.bodies[b].name!r} has turned within itself by {found[0, b]:.3g} rad, which linear elasticity says "
+        f"nothing about: its motion diverges. {doubt}"
+    )
 
 
 def doubts(scene: Scene, found: Array) -> list[str]:

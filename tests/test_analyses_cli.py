@@ -93,6 +93,18 @@ def test_a_force_that_is_none(text):
         force_of(text)
 
 
+def test_assemble_writes_the_start_and_tells_what_was_changed(run):
+    said, file = run("assemble", "--time", "0.1")
+    assert "body 'rod' was changed: position by 0" not in said
+    assert "body 'rod' was changed: attitude by 0.5 rad, angular velocity by 2 rad/s" in said
+    result = load_result(file)
+    assert result.time.tolist() == [0.1]
+    np.testing.assert_allclose(result["rod.tip.position"][0], (2 * np.cos(0.5), 2 * np.sin(0.5), 0), atol=1e-12)
+    np.testing.assert_allclose(result["rod.omega_bar"][0], (0, 0, 2), atol=1e-12)
+    said, _ = run("assemble", driven=False)
+    assert "nothing was changed" in said
+
+
 # ---- what the file says -----------------------------------------------------------------------------------------------
 
 KINDS = {
@@ -103,6 +115,7 @@ KINDS = {
 }
 TIMES = 'end = 0.5\noutput_step = 0.05\nstep = 0.005\nmethod = "rk4"\n'
 AT_A_TIME = {
+    "assemble": 'kind = "assemble"\n',
     "static": 'kind = "static"\n',
     "linearise": 'kind = "linearise"\nat_equilibrium = true\nquantities = ["rod.tip.position.x"]\n'
     'inputs.m = {joint = "hinge"}\n',
@@ -142,7 +155,10 @@ def test_run_does_what_the_file_says(run_file, kind):
 def test_run_of_a_file_without_times(run_file, kind):
     failed, said, file = run_file(AT_A_TIME[kind], "run", driven=False)
     assert failed is None
-    if kind == "static":
+    if kind == "assemble":
+        assert "nothing was changed" in said
+        assert load_result(file)["rod.tip.position.x"][0] == pytest.approx(2)
+    elif kind == "static":
         assert "equilibrium  stable" in said
         assert load_result(file)["rod.tip.position.y"][0] == pytest.approx(-2, abs=1e-9)
     else:

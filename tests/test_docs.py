@@ -32,7 +32,7 @@ def test_the_scene_file_of_the_documentation_is_valid(tmp_path):
     save_body(replace(body, surface=surface), tmp_path / "rod.ffr")
     (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
     scene, settings = load_scene(tmp_path / "scene.toml")
-    assert [i.name for i in scene.bodies[1].model.interfaces][-1] == "middle"
+    assert [i.name for i in scene.bodies[1].model.interfaces][-2:] == ["middle", "pivot"]
     assert [j.name for j in scene.joints] == ["main_bearing", "crank_pin", "slider_pin", "guide"]
     assert scene.bodies[1].model.n == 6
     assert settings.method.step == 1e-4

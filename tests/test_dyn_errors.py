@@ -22,6 +22,7 @@ from ffr_dyn.joint_forces import Actuator
 from ffr_dyn.joints import Joint
 from ffr_dyn.result_file import load_result
 from ffr_dyn.scene import Body, Scene
+from ffr_dyn.stabilisation import Drifting, Projection
 from ffr_dyn.timefunction import polynomial, table
 from ffr_prep.body import BodyError, rigid_body, save_body, with_point
 
@@ -222,6 +223,33 @@ def test_a_run_that_grows_without_bound_stops():
 def test_steps_that_do_not_fit_are_refused(settings):
     with pytest.raises(InputError, match=r"step|duration"):
         forward(HINGED, **settings)
+
+
+@pytest.mark.parametrize(
+    ("method", "keep", "words"),
+    [
+        (ROS2(1e-3), Projection(), "worst in '(A|B|C|D|motor)'.*the mechanism locks"),
+        (RK4(1e-3), Projection(), "worst in '(A|B|C|D|motor)'.*the mechanism locks"),
+        (GeneralisedAlpha(1e-3), Projection(), "do not converge, worst in"),
+        (ROS2(1e-3), Drifting(), "of .* cannot be met by any motion: .*no longer finite"),
+    ],
+)
+def test_a_driver_that_goes_beyond_a_dead_point_stops_the_run(method, keep, words):
+    """A crank of 0.6 m, which cannot turn around under a coupler of 0.9 m and a rocker of 0.5 m on a base of 1 m."""
+    lengths = {"crank": 0.6, "coupler": 0.9, "rocker": 0.5}
+    crank, coupler, rocker = (Body(name, bar(name, length)) for name, length in lengths.items())
+    bodies = (
+        replace(crank, rotation=(0, 0, 1.2)),
+        replace(coupler, position=(0.2, 0.56, 0), rotation=(0, 0, -0.2)),
+        replace(rocker, position=(1, 0, 0), rotation=(0, 0, 1.5)),
+    )
+    pairs = {"A": ("ground.O", "crank.a"), "B": ("crank.b", "coupler.a"), "C": ("coupler.b", "rocker.b")}
+    joints = [Joint(name, "revolute", *pair) for name, pair in pairs.items()]
+    joints.append(Joint("D", "revolute", "ground.D", "rocker.a"))
+    motor = Driver("motor", "A", polynomial(1.2, 10.0))
+    scene = Scene(bodies, tuple(joints), drivers=(motor,), ground={"O": (0, 0, 0), "D": (1, 0, 0)})
+    with pytest.raises(SimulationError, match=rf"at t = 0\.\d+ s .*{words}"):
+        forward(scene, end=0.5, output_step=0.01, method=method, stabilisation=keep)
 
 
 def test_a_body_without_inertia_about_an_axis_is_named():

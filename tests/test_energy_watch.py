@@ -19,7 +19,8 @@ from ffr_dyn.joints import Joint
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.stabilisation import Baumgarte, Drifting
 from ffr_dyn.stability.bodies import bar, pendulum
-from ffr_dyn.timefunction import harmonic, user
+from ffr_dyn.stability.spin_up import scene as spinning
+from ffr_dyn.timefunction import harmonic, polynomial, user
 
 GROUND = {"O": (0, 0, 0), "P": (3, 0, 0), "Q": (1, 2, 0)}
 PENDULUM = pendulum(bar("upper"), bar("lower"))
@@ -68,6 +69,15 @@ def test_an_implicit_method_that_loses_the_motion_stops():
     )
     with pytest.raises(SimulationError, match=r"energy has grown.*(ROS2|too long)"):
         forward(spun, method=ROS2(5e-3), stabilisation=Drifting(), **RUN)
+
+
+def test_a_beam_that_diverges_without_stiffening_stops():
+    """At 1.4 times its first frequency: its motor puts the energy in, as linear theory has it."""
+    spun = spinning(polynomial(0.0, 5.4), stiffened=False, q=1e-6)
+    with pytest.raises(
+        SimulationError, match=r"'beam' has turned within itself by .* first frequency, without geometric"
+    ):
+        forward(spun, end=60.0, output_step=1.0, method=ROS2(5e-3))
 
 
 # ---- with one -----------------------------------------------------------------------------------------------------------

@@ -34,7 +34,7 @@ from ffr_dyn.scene_file import load_scene
 from ffr_dyn.scene_schema import EFFORTS as EFFORT_KINDS
 from ffr_dyn.scene_schema import SOLUTIONS, TABLES, schema
 from ffr_dyn.scene_text import save_scene, to_toml
-from ffr_dyn.settings import Inverse, Kinematic, Linearise, Mixed, MomentSettings, Settings, Static
+from ffr_dyn.settings import Assemble, Inverse, Kinematic, Linearise, Mixed, MomentSettings, Settings, Static
 from ffr_dyn.stabilisation import Baumgarte, Drifting, Projection
 from ffr_dyn.surface_loads import ModalForce, NodalForces, Pressure
 from ffr_dyn.timefunction import evaluate, harmonic, polynomial, table
@@ -99,6 +99,21 @@ def test_numbers_may_be_formulas_of_parameters_and_have_units(tmp_path):
     assert settings.outputs == ("default", "*.power")
     assert evaluate(scene.loads[0].force[0], 1.0)[0] == 10.0
     assert scene.loads[0].force[1:] == [0.0, 0.0]
+
+
+def test_markers_are_points_of_their_bodies(tmp_path):
+    middle, place = 'body = "bar"\npoint = ["bar.length / 2", 0, 0]', 'body = "ground"\npoint = [1, 2, 3]'
+    markers = f"[markers.middle]\n{middle}\n[markers.P]\n{place}\n"
+    text = changed("[drivers]", markers + "[drivers]").replace('marker = "bar.b"', 'marker = "bar.middle"')
+    scene, settings = load_scene(written(tmp_path, text))
+    assert scene.bodies[0].model.interface("middle").position.tolist() == [0.5, 0, 0]
+    assert scene.ground["P"] == pytest.approx([1, 2, 3])
+    again, _ = load_scene(written(tmp_path, to_toml(scene, settings)))
+    assert again.bodies[0].model.interface("middle").position.tolist() == [0.5, 0, 0]
+    with pytest.raises(InputError, match=r"line \d+: markers\.middle: there is no body 'barr'; did you mean 'bar'"):
+        load_scene(written(tmp_path, text.replace('body = "bar"', 'body = "barr"')))
+    with pytest.raises(InputError, match=r"line \d+: markers\.b: 'bar' has a point 'b' already"):
+        load_scene(written(tmp_path, text.replace("markers.middle", "markers.b")))
 
 
 def test_parameters_can_be_given_from_outside(tmp_path):
@@ -447,6 +462,7 @@ METHOD = (0.1, 1.1, 0.1, RK4(1e-3))
         Settings(*METHOD, Projection(), analysis=Mixed(EFFORTS[:1], ("d1",), Causal(1e-8, 10.0))),
         Settings(*METHOD, Projection(), analysis=Mixed(EFFORTS[1:], ("d1", "d2"), Bounded(after=0.3, parts=2))),
         MomentSettings(0.2, ("default", "*.power"), Static()),
+        MomentSettings(0.1, ("default",), Assemble()),
         MomentSettings(0.0, ("default",), Linearise()),
         MomentSettings(0.1, ("default",), Linearise((*EFFORTS, "push"), ("two.a.position.y",), True)),
     ],
@@ -471,7 +487,7 @@ ANALYSIS = "[analysis]\nend = 0.1"
 @pytest.mark.parametrize(
     ("new", "words"),
     [
-        ('kind = "kinetic"', ["analysis", "no such kind; there are forward, kinematic, static"]),
+        ('kind = "kinetic"', ["analysis", "no such kind; there are forward, kinematic, assemble"]),
         ('kind = "kinematic"\nstabilisation = {kind = "none"}', ["analysis", "'stabilisation' is not a known entry"]),
         ('kind = "static"', ["analysis", "'end' is not a known entry"]),
         ('kind = "mixed"', ["analysis.unknown", "required"]),

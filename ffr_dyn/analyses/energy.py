@@ -210,6 +210,6 @@ def _fastest(system: System, row: _Row) -> float:
     """Largest modulus of an eigenvalue of the scene at a row [1/s]; zero where it has none."""
     try:
         A, _ = state_matrix(chart(evaluator(system), row.time, row.x, row.v))
-    except SimulationError:
+    except (SimulationError, np.linalg.LinAlgError):
         return 0.0
     return float(np.abs(np.linalg.eigvals(A)).max(initial=0.0)) if np.isfinite(A).all() else 0.0

@@ -9,6 +9,7 @@ from ffr_dyn.errors import SimulationError
 from ffr_dyn.force_tables import actions_of
 from ffr_dyn.kernels.tables import (
     ACTUATOR,
+    AT,
     NOT_CONVERGED,
     NOT_FINITE,
     SINGULAR_BODY,
@@ -17,6 +18,7 @@ from ffr_dyn.kernels.tables import (
     Work,
 )
 
+OPEN, LOST = 1e-2, 1e2  # m, -: of constraints, more than drift, and what follows from a lost state
 HUGE = 1e12  # N, N m: no force of a machine; what made the state overflow
 
 
@@ -27,7 +29,8 @@ def failure(system: System, work: Work, status: int, time: float) -> BaseExcepti
         if isinstance(system.user.cause, KeyboardInterrupt):
             return system.user.cause
         return SimulationError(f"the run stopped in a Python function of the scene: {system.user.failure}")
-    if status == NOT_FINITE or (status in (SINGULAR_BODY, SINGULAR_CONSTRAINT) and not _sound(work)):
+    lost = not _sound(work)
+    if status == NOT_FINITE or (lost and (status == SINGULAR_BODY or _largest(system, work)[1] > HUGE)):
         return SimulationError(
             f"{at} the state of {_worst(system, work)} is no longer finite: {_overflow(system, work)}"
         )
@@ -43,14 +46,16 @@ def failure(system: System, work: Work, status: int, time: float) -> BaseExcepti
         text = block.words[where - system.model.rows.start[row]].text
         return SimulationError(
             f"{at} the row '{text}' of {block.name!r} cannot be met by any motion: it ties bodies that cannot move there"
+            f"{', or the state is no longer finite' if lost else ''}"
         )
     if status == NOT_CONVERGED:
         return SimulationError(f"{at} the iterations of the step do not converge, {_unconverged(system, where)}")
     if status == STEP_TOO_SMALL:
         return SimulationError(
             f"{at} the step has become too small: the motion is not smooth there (an impact, a jump of a force or of a "
-            "driver), or the tolerances are below what rounding allows; smooth the jump, end the run before it, or use "
-            "larger tolerances"
+            "driver), the mechanism locks (a dead point that a driver goes beyond), or the tolerances are below what "
+            "rounding allows; smooth the jump, end the run before it, keep driven motions within reach, or use larger "
+            "tolerances"
         )
     return SimulationError(f"{at} the run stopped: {system.user.failure or 'unknown cause'}")
 
@@ -73,10 +78,22 @@ def _worst(system: System, work: Work) -> str:
 
 def _overflow(system: System, work: Work) -> str:
     """Why a state is not finite, and what to change."""
-    name, value = max(_given(system, work), key=lambda found: found[1], default=("", 0.0))
+    name, value = _largest(system, work)
     if value > HUGE:
         return f"{name!r} exerts {value:.3g} N or N m; look at its numbers and their units"
+    least, when = work.independence[1:3]
+    if least < AT or OPEN < work.drift[0] < LOST:
+        return (
+            f"its constraints came open by up to {work.drift[0]:.2g}, and were nearest to dependence at t = {when:.6g} s: "
+            "the mechanism locks there (a dead point that a driver goes beyond), or passes a singular position; keep driven "
+            "motions within reach, or use projection"
+        )
     return "the step is too large for an explicit method (use ROS2 or a smaller step), or a force is not finite"
+
+
+def _largest(system: System, work: Work) -> tuple[str, float]:
+    """The load or actuator with the largest component, and that; zero where there is none."""
+    return max(_given(system, work), key=lambda found: found[1], default=("", 0.0))
 
 
 def _given(system: System, work: Work) -> list[tuple[str, float]]:
@@ -101,6 +118,7 @@ def _unconverged(system: System, where: int) -> str:
         )
     block = system.blocks[int(np.searchsorted(system.model.rows.start, where - len(bodies), side="right")) - 1]
     return (
-        f"worst in {block.name!r}: its constraint cannot be met within the step; use a smaller step, look for a position "
-        "where the mechanism locks or is singular, or pass it with ROS2"
+        f"worst in {block.name!r}: its constraint cannot be met, because the mechanism locks there (a dead point that a "
+        "driver goes beyond) or is singular, or because the step is too large; keep driven motions within reach, use a "
+        "smaller step, or pass a singular position with ROS2"
     )

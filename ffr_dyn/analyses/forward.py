@@ -17,7 +17,7 @@ from ffr_dyn.analyses.failure import failure
 from ffr_dyn.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
 from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import new_record
-from ffr_dyn.errors import InputError
+from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince, Integrator
 from ffr_dyn.kernels.tables import AT, NOW, OK, Record, Work
 from ffr_dyn.machine import Machine, fill_rows, new_machine, record_row
@@ -27,7 +27,7 @@ from ffr_dyn.result_file import ResultWriter, load_checkpoint, load_result
 from ffr_dyn.scene import Scene
 from ffr_dyn.stabilisation import Baumgarte, Projection, Stabilisation, gains
 from ffr_dyn.stopwatch import Stopwatch
-from ffr_dyn.validity import doubts, extremes
+from ffr_dyn.validity import doubts, extremes, meaningless
 from ffr_prep.body import Surface
 
 Array = np.ndarray
@@ -208,6 +208,8 @@ def _advance(
             run.parts.append(part)
             run.times.append(times)
             run.extremes = np.maximum(run.extremes, extremes(system, kept))
+            if lost := meaningless(system.scene, run.extremes):
+                raise SimulationError(f"by t = {times[-1]:.6g} s {lost}")
             run.done += filled // looks * substeps
             yield times, part
         if ends:

@@ -40,7 +40,8 @@ class Mobility:
     """What the joints and drivers of a scene leave free at its assembled start.
 
     degrees_of_freedom : rigid and elastic;  elastic : number of elastic coordinates
-    plane      : normal of a planar scene, "x", "y" or "z"; otherwise "none"
+    plane      : normal of a planar scene, "x", "y" or "z"; otherwise "none". A scene that declares no plane is looked at in
+                 space all the same: motions and redundant rows are those that it has there
     free       : rigid motions with all bodies undeformed; at a singular position more than the mechanism has elsewhere
     redundant  : (joint, row) pairs that follow from the other rows
     overdriven : drivers whose motion the joints and the other drivers fix already
@@ -61,7 +62,7 @@ class Mobility:
         )
         said = [about if rigid >= 0 else f"{about}; joints and drivers deform bodies in {-rigid} ways"]
         if self.plane != "none":
-            said.append(f"planar       normal {self.plane}")
+            said.append(f"planar       normal {self.plane}: runs are computed in the plane, without rows across it")
         said += [f"free         {motion.name}: moves {', '.join(motion.bodies)}" for motion in self.free]
         said += [f"redundant    {joint}: {row}" for joint, row in self.redundant]
         return said + [f"overdriven   {driver}" for driver in self.overdriven]
@@ -72,7 +73,7 @@ def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobili
 
     Raises InputError when the scene cannot be assembled.
     """
-    scene = in_space(scene)
+    plane, scene = flattened(scene, time)[0].plane, in_space(scene)
     over = overdriven(scene, time) if drivers else ()
     bare = scene if drivers and not over else replace(scene, drivers=())
     assembled = assemble(bare, time=time)
@@ -83,7 +84,7 @@ def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobili
     M = total_mass_matrix(flat, place, assembled.x)
     Z = free_motions(jacobian[:, rigid], M[np.ix_(rigid, rigid)])
     motions = tuple(_motions(flat, place, assembled.x, assembled.v, rigid, Z))
-    return Mobility(assembled.degrees_of_freedom, sum(place.n), flat.plane, motions, assembled.redundant, over)
+    return Mobility(assembled.degrees_of_freedom, sum(place.n), plane, motions, assembled.redundant, over)
 
 
 def overdriven(scene: Scene, time: float = 0.0) -> tuple[str, ...]:

@@ -153,6 +153,15 @@ def largest(values):
     return result
 
 
+@kernel
+def row_of_largest(values):
+    row = 0
+    for k in range(values.size):
+        if abs(values[k]) > abs(values[row]):
+            row = k
+    return row
+
+
 @inlined
 def solve_motion(r, target):
     """acc, lam from  M acc + Phi_q^T lam = f,  Phi_q acc = target (C,)."""

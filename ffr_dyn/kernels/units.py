@@ -36,6 +36,7 @@ from ffr_dyn.kernels.system import (
     prepare,
     reduce_miss,
     refine_motion,
+    row_of_largest,
     solve_back,
     solve_motion,
     to_body_axes,
@@ -55,6 +56,7 @@ from ffr_dyn.kernels.tables import (
     MARKERS,
     MOVE_BACK,
     NEAR,
+    NOT_CONVERGED,
     NOW,
     OF_JOINTS,
     OK,
@@ -74,7 +76,7 @@ from ffr_dyn.kernels.tables import (
 from ffr_dyn.kernels.vectors import add_scaled, copy, fill, put
 
 PASSES = 10  # of `relaxed_unit` at most
-
+UNMET = 1e3  # tolerances, beyond which a violation that the projection does not take back is no drift
 SIGNATURE = types.int64(types.int64, types.float64, types.int64, types.int64)
 
 
@@ -304,18 +306,22 @@ def settle_unit(at, t, x, v):
     (in Phi [m, -]; a hundred times that in its rate). A tolerance of zero leaves them alone.
 
     The corrections are smallest in the norm of the mass matrix with the elastic diagonal of the integrator, so they keep
-    its order and do not excite stiff modes.
+    its order and do not excite stiff modes. Where they bring nothing nearer, as beyond a dead point, the status tells so.
     """
     r = unpack_tables(at)
-    w, tolerance = r.work, r.clock.gains[2]
+    w, tolerance, before = r.work, r.clock.gains[2], 0.0
     for attempt in range(5):
         status = call_unit(r.units[EVALUATE], at, t, x, v)
         if status != OK:
             return status
         position, velocity = largest(w.rows.Phi), largest(w.rows.nu)
         if attempt == 0:
+            before = position
             w.drift[0], w.drift[1] = max(w.drift[0], position), max(w.drift[1], velocity)
         allowed = tolerance * (TIGHTER if w.independence[0] < NEAR else 1.0)
+        if attempt == 4 and position > UNMET * tolerance and position > 0.01 * before:
+            w.info[0] = r.model.bodies.mass.size + row_of_largest(w.rows.Phi)
+            return NOT_CONVERGED
         if tolerance == 0.0 or attempt == 4 or (position <= allowed and velocity <= 100.0 * allowed):
             break
         if w.independence[0] < AT:
