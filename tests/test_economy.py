@@ -28,7 +28,7 @@ from ffr_dyn.economy.selection import Shares
 from ffr_dyn.economy.start import least
 from ffr_dyn.economy.steps import _from_two_rows, chosen_step, error_of
 from ffr_dyn.economy.terms import TermEffect, _inertial, without_minor
-from ffr_dyn.economy.trial import Span, states
+from ffr_dyn.economy.trial import Span, make, states
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.formula import formula
 from ffr_dyn.integrators import ROS2, ROS3
@@ -496,6 +496,31 @@ def test_the_ledger_holds_what_switches_did(adaptive):
     assert jumps[changed].max() > 0
     assert jumps[~changed].max() < 0.05 * jumps[changed].max()
     assert np.abs(switched).max() < 1e-3 * np.ptp(result["energy.kinetic"])
+
+
+def test_a_model_is_compiled_once_however_often_the_run_switches(monkeypatch):
+    """Pieces are more than models, and each model of them is made once."""
+    made = []
+
+    def counted(scene, choice, span):
+        made.append(choice.parts)
+        return make(scene, choice, span)
+
+    monkeypatch.setattr("ffr_dyn.economy.adaptive.make", counted)
+    scene = slider_crank(40.0)
+    adaptive_forward(
+        scene, ("slider.pin.position.x=5e-6",), end=0.2, output_step=2e-3, divisions=2, adaptation=Adaptation(rows=10)
+    )
+    assert len(made) == len(set(made)) < 10
+
+
+def test_a_scene_that_is_assembled_already_runs_to_the_same_bits():
+    scene = slider_crank(40.0)
+    one, other = (
+        forward(scene, end=0.02, output_step=0.002, method=ROS3(0.002), assembled=given)
+        for given in (None, assemble(scene))
+    )
+    np.testing.assert_array_equal(one["slider.pin.position"], other["slider.pin.position"])
 
 
 @pytest.mark.parametrize("given", [{"enter": 0.1, "leave": 0.2}, {"enter": 2.0}, {"rows": 1}])

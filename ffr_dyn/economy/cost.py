@@ -2,7 +2,7 @@
 
 The constants are what `python -m benchmarks.cost_model` prints, fitted to processor times of the compiled loop for mechanisms
 of two to six bodies with none to fourteen modes a body, in the plane and in space, with and without geometric stiffening
-and I5 and I9: within 17 per cent (root mean square). Only ratios matter.
+and I5 and I9: within 14 per cent (root mean square). Only ratios matter.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ from __future__ import annotations
 from ffr_dyn.economy.choice import Choice, Part
 from ffr_dyn.integrators import METHODS
 
-BASE = 0.73  # an evaluation of nothing
+BASE = 0.20  # an evaluation of nothing
 # a rigid body; more for a flexible one, per mode, per mode squared with I5 or I9; for stiffening, per mode, per mode squared
-SPACE = (1.19, 0.47, 0.033, 0.001, 0.50, 0.023, 0.0)
-PLANE = (0.58, 0.38, 0.024, 0.004, 0.47, 0.0, 0.0)
+SPACE = (0.78, 0.32, 0.038, 0.001, 0.32, 0.048, 0.0)
+PLANE = (0.49, 0.15, 0.029, 0.002, 0.29, 0.0, 0.005)
 STAGES = {"rk4": 4, "ros2": 2, "ros3": 4}
 PROJECTION = 0.5  # evaluations per step that bring the state back to its constraints, about
-ROW = 4.3  # evaluations' time that an output row takes
+ROW = 4.6  # evaluations' time that an output row takes
 RECORDED = 1.7  # of them that are counted as evaluations
 QUADRATIC = {"I5", "I9"}  # without these two their integrals are not touched
 

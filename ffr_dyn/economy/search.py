@@ -47,8 +47,8 @@ SURELY_RIGID = (
     0.25  # of the tolerance: modes that do less by the estimate alone are left out without a run of everything
 )
 SHORT = 2e6  # [us] of a verification that is made without being asked for
-FINER, UNDAMPED = 6, 2  # times the steps: worth another look, sooner where vibration lasts
-AGAIN = 1.0  # of the cost of the final run, that another look may cost in a run of everything
+# another look with a finer step: from how many times the steps, and at what cost of a run of everything, in final runs
+DAMPED, UNDAMPED = (6, 1.0), (2, 1.3)
 
 
 @dataclass(frozen=True)
@@ -181,11 +181,12 @@ def _as_like(ledger: Ledger, choice: Choice, like: Chosen) -> Stepped:
 
 def _finer_ground(ledger: Ledger, ground: Ground, final: Trial) -> Ground | None:
     """Everything with a step that costs a part of the final run, where that is much finer than before."""
-    most, rows = AGAIN * cost(final, ledger.span), ledger.span.rows
-    finer = [replace(ground.everything, divisions=d) for d in range(1, final.choice.divisions + 1)]
-    divisions = max((choice.divisions for choice in finer if of_run(choice, rows) <= most), default=1)
     lasting = any(body.model.n and not body.damping.all() for body in final.scene.bodies)
-    if divisions < (UNDAMPED if lasting else FINER) * ground.coarsest:
+    least, most = UNDAMPED if lasting else DAMPED
+    finer = [replace(ground.everything, divisions=d) for d in range(1, final.choice.divisions + 1)]
+    allowed = most * cost(final, ledger.span)
+    divisions = max((choice.divisions for choice in finer if of_run(choice, ledger.span.rows) <= allowed), default=1)
+    if divisions < least * ground.coarsest:
         return None
     ledger.tell("everything, finer step")
     everything = replace(ground.everything, divisions=divisions)
