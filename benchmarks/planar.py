@@ -30,7 +30,7 @@ from ffr_prep.reference import SimplySupported
 from ffr_prep.section import rectangle
 from ffr_prep.structural import reduce_frame
 
-REPEATS = 4
+REPEATS = 12
 LINKS = 8
 
 
