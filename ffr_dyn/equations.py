@@ -31,12 +31,14 @@ from ffr_dyn.kernels.tables import (
     Work,
 )
 from ffr_dyn.layout import Layout, layout
+from ffr_dyn.rotation import skew
 from ffr_dyn.scene import Body, Scene, joint_of, joints_of, marker_number, markers
 from ffr_dyn.state import StateView
 from ffr_prep.body import axial
 
 Array = np.ndarray
 
+LEAST_PIVOT = 1e-14  # of what was on the diagonal; as in the kernels
 NOTHING = 1e-16  # of the stiffness by a load, relative to that by the others
 
 SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -412,6 +414,8 @@ def new_work(m: Model) -> Work:
         ),
         **zeros(stiff=int((m.bodies.where[:-1, 6] * n[:-1]).sum())),
     )
+    for b in np.flatnonzero(n[:-1] == 0):
+        bodies.s[b], bodies.J[b], bodies.L[b] = _rigid_inertia(m.bodies, int(b))
     vectors = zeros(omega=(M, 3), r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3), load=(M, 6))
     rows = RowWork(
         **zeros(Phi=C, nu=C, gamma=C, lam=C, left=C, scale=C, least=C, jac=(C, D, 9), X=size.size * D * 12 * LANES),
@@ -436,6 +440,25 @@ def new_work(m: Model) -> Work:
         independence=np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
         **zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=2),
     )
+
+
+def _rigid_inertia(bodies: Bodies, b: int) -> tuple[Array, Array, Array]:
+    """(first moment, inertia tensor, factor as the kernels want it) of a rigid body; -1 for a factor that does not exist."""
+    first, normal = bodies.moments[b, :3], bodies.where[b, 7]
+    xx, yy, zz, xy, xz, yz = bodies.moments[b, 3:]
+    J = np.array([[yy + zz, -xy, -xz], [-xy, xx + zz, -yz], [-xz, -yz, xx + yy]])
+    M = np.block([[bodies.mass[b] * np.eye(3), -skew(first)], [skew(first), J]])
+    moving = np.arange(6) if normal < 0 else np.array([*np.delete(np.arange(3), normal), 3 + normal])
+    try:
+        factor = np.linalg.cholesky(M[np.ix_(moving, moving)])
+    except np.linalg.LinAlgError:
+        return first, J, np.full((6, 6), -1.0)
+    if (np.diag(factor) ** 2 <= LEAST_PIVOT * M[moving, moving]).any():
+        return first, J, np.full((6, 6), -1.0)
+    np.fill_diagonal(factor, 1.0 / np.diag(factor))
+    L = np.eye(6)
+    L[np.ix_(moving, moving)] = factor
+    return first, J, L
 
 
 def _load_work(m: Model, V: int, M: int) -> LoadWork:

@@ -229,35 +229,44 @@ def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, norm
 @inlined
 def inertia(gravity_field, bodies, w, x, v, b):
     """Rotation, first and second moments, right-hand side w.f (body axes) of body b, without markers' loads."""
-    n, i, j = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 2]
+    n, i, j, normal = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 2], bodies.where[b, 7]
     A = w.A[b]
     rotation_matrix(x[i + 3], x[i + 4], x[i + 5], x[i + 6], A)
     omega = (v[j + 3], v[j + 4], v[j + 5])
     put(w.omega, b, omega)
     gravity = to_body(A, gravity_field)
-    mass, moments = bodies.mass[b], bodies.moments[b]
-    s = (moments[0], moments[1], moments[2])
-    W = (moments[3], moments[4], moments[5], moments[6], moments[7], moments[8])
-    pd = (0.0, 0.0, 0.0)
-    D = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    D_axial = (0.0, 0.0, 0.0)
+    s, pd, D, D_axial = get(w.s, b), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if n > 0:
-        q, qd = x[i + 7 : i + 7 + n], v[j + 6 : j + 6 + n]
-        normal = bodies.where[b, 7]
+        q, qd, moments = x[i + 7 : i + 7 + n], v[j + 6 : j + 6 + n], bodies.moments[b]
+        s = (moments[0], moments[1], moments[2])
+        W = (moments[3], moments[4], moments[5], moments[6], moments[7], moments[8])
         if normal >= 0:
             s, pd, W, D = flexible_terms_in_plane(bodies, w, b, q, qd, omega[normal], gravity, W, s, normal)
         else:
             s, pd, W, D, D_axial = flexible_terms(bodies, w, b, q, qd, omega, gravity, W, s)
-    put(w.s, b, s)
-    J = w.J[b]
+        put(w.s, b, s)
+        fill_tensor(w.J[b], W)
+    if normal >= 0:
+        forces_in_plane(w.f[j : j + 6], bodies.mass[b], s, pd, D[0] + D[1], omega, gravity, normal)
+    else:
+        forces_in_space(w.f[j : j + 6], bodies.mass[b], s, w.J[b], pd, D, D_axial, omega, gravity)
+
+
+@kernel
+def fill_tensor(J, W):
+    """The inertia tensor from the second moments of mass."""
     J[0, 0], J[1, 1], J[2, 2] = W[1] + W[2], W[0] + W[2], W[0] + W[1]
     J[0, 1] = J[1, 0] = -W[3]
     J[0, 2] = J[2, 0] = -W[4]
     J[1, 2] = J[2, 1] = -W[5]
 
-    if bodies.where[b, 7] >= 0:
-        forces_in_plane(w.f[j : j + 6], mass, s, pd, D[0] + D[1], omega, gravity, bodies.where[b, 7])
-        return
+
+@kernel
+def forces_in_space(f, mass, s, J, pd, D, D_axial, omega, gravity):
+    """f (6,) of a body: gravity and what is quadratic in the velocities.
+
+    pd, D, D_axial : rates of the first moment and, half, of the second
+    """
     centrifugal = cross(omega, cross(omega, s))
     coriolis = cross(omega, pd)
     J_omega = (dot(J[0], omega), dot(J[1], omega), dot(J[2], omega))
@@ -271,8 +280,8 @@ def inertia(gravity_field, bodies, w, x, v, b):
         D[4] * omega[0] + D[5] * omega[1] + D[2] * omega[2],
     )
     for k in range(3):
-        w.f[j + k] = mass * gravity[k] - centrifugal[k] - 2.0 * coriolis[k]
-        w.f[j + 3 + k] = moment[k] - gyroscopic[k] - 2.0 * (trace * omega[k] - D_omega[k] + 0.5 * skew[k])
+        f[k] = mass * gravity[k] - centrifugal[k] - 2.0 * coriolis[k]
+        f[3 + k] = moment[k] - gyroscopic[k] - 2.0 * (trace * omega[k] - D_omega[k] + 0.5 * skew[k])
 
 
 @kernel
@@ -329,7 +338,12 @@ def prepare_body(bodies, w, b):
 
 @inlined
 def factorise(bodies, w, b):
-    """Cholesky factor of the Schur complement of body b on its elastic block. Returns True when it is positive."""
+    """Cholesky factor of the Schur complement of body b on its elastic block. Returns True when it is positive.
+
+    That of a rigid body is constant: it was there before.
+    """
+    if bodies.where[b, 0] == 0:
+        return w.L[b, 0, 0] > 0.0
     n, e, normal = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 7]
     L = w.L[b]
     P, H = bodies.P_dm[3 * e : 3 * (e + n)], w.g[9 * e + 6 * n : 9 * (e + n)]
@@ -338,11 +352,10 @@ def factorise(bodies, w, b):
         rigid_mass_in_plane(bodies.mass[b], get(w.s, b), w.J[b, normal, normal], L, normal)
         return factorise_in_plane(w.PP[b], P, H, dinv, Cd, L, n, normal)
     rigid_mass(bodies.mass[b], w.s[b], w.J[b], L)
-    if n > 0:
-        for r in range(3):
-            for c in range(r + 1):
-                L[r, c] -= w.PP[b, r, c]
-        reduce_rotation(P, H, dinv, Cd, L, n)
+    for r in range(3):
+        for c in range(r + 1):
+            L[r, c] -= w.PP[b, r, c]
+    reduce_rotation(P, H, dinv, Cd, L, n)
     return cholesky_six(L)
 
 

@@ -152,7 +152,9 @@ class BodyWork(NamedTuple):
     g: F1  # (9 E,) G_j: six symmetric rows, three axial rows H
     l: F1  # (3 E,) integral of u_dot x phi_j dm  # noqa: E741
     Cd: F1  # (6 E,) rows P_dm and H, times dinv
-    L: F3  # (B, 6, 6) Cholesky factor of the Schur complement, reciprocal diagonal
+    # (B, 6, 6) Cholesky factor of the Schur complement, reciprocal diagonal; with s and J it is constant for a rigid body,
+    # and not positive in [0, 0] where that has none
+    L: F3
     f: F1  # (V,) right-hand side in body axes
     acc: F1  # (V,) solution in body axes
     dinv: F1  # (E,) 1 / (1 + implicit terms); ones for explicit methods
