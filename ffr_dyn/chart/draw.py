@@ -26,6 +26,7 @@ COST_WORDS = {
     EVALUATIONS: "evaluations of the equations",
 }
 MARKERS = "os^Dv<>PXh*p"
+COLOURS = (*PALETTE, "#7B3294", "#8C510A", "#808080", "#A6D96A", "#B2182B")  # as many methods are told apart
 FRONT, FLOOR = "#222222", "#888888"
 LIMIT: Any = {"color": FRONT, "linestyle": "--", "linewidth": 1.0}
 _STYLE = {
@@ -47,7 +48,7 @@ def look(diagrams: Sequence[Diagram]) -> dict[tuple[str, str], tuple[str, str]]:
     points = [point for diagram in diagrams for point in diagram.points]
     series = list(dict.fromkeys(point.series for point in points))
     models = list(dict.fromkeys(point.model for point in points))
-    colours = {name: PALETTE[k % len(PALETTE)] for k, name in enumerate(series)}
+    colours = {name: COLOURS[k % len(COLOURS)] for k, name in enumerate(series)}
     markers = {name: MARKERS[k % len(MARKERS)] for k, name in enumerate(models)}
     lines = dict.fromkeys((point.series, point.model) for point in points)
     return {line: (colours[line[0]], markers[line[1]]) for line in lines}
