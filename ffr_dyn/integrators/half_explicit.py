@@ -22,7 +22,7 @@ from ffr_dyn.kernels.bodies import normalise, position_rates
 from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, solve
 from ffr_dyn.kernels.motion import into_body_axes, largest_motion
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.packing import unpack_tables, vector_at
+from ffr_dyn.kernels.packing import tables_at, vector_at
 from ffr_dyn.kernels.system import constraint_rates, finite, largest, to_velocity_rates
 from ffr_dyn.kernels.tables import NEAR, NOT_CONVERGED, NOT_FINITE, OK, TIGHTER
 from ffr_dyn.kernels.units import Unit
@@ -124,7 +124,7 @@ def accelerate(r, k, ha):
 @Unit
 def half_explicit_step(at, t, unused, unused_too):
     """One step of the machine's state from time t. Returns a status."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     h, s, bodies, number = r.clock.time[0], r.stages, r.model.bodies, r.stages.numbers
     set_diagonal(r, 0.0)
     if number[0] == 0.0:

@@ -33,7 +33,7 @@ from ffr_dyn.kernels.bodies import mass_times, normalise, six_rows, three_rows
 from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, solve, solve_anew
 from ffr_dyn.kernels.motion import carry, converging, farthest, into_global_axes, largest_motion, unconverged
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.packing import unpack_tables, vector_at
+from ffr_dyn.kernels.packing import tables_at, vector_at
 from ffr_dyn.kernels.system import (
     add_reactions,
     constraint_rates,
@@ -297,7 +297,7 @@ def iterate(r, t, h):
 @Unit
 def variational_step(at, t, unused, unused_too):
     """One step of the machine's state from time t. Returns a status."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     h, s = r.clock.time[0], r.stages
     stiffened = r.model.bodies.stiffening.size > 0
     if s.numbers[STARTED] == 0.0:
