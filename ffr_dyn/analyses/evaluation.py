@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.analyses.failure import failure
-from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import System, new_record
 from ffr_dyn.inertia import mass_matrix
 from ffr_dyn.kernels.tables import OK, SINGULAR_CONSTRAINT, Record, Work
@@ -64,7 +63,6 @@ class Evaluation:
 
 def evaluator(system: System) -> Evaluator:
     """Memory for evaluations of a compiled scene."""
-    ensure_compiled(model=system.model)
     return Evaluator(new_machine(system, *initial_state(system.scene, system.layout)), new_record(system, 1))
 
 

@@ -16,14 +16,12 @@ from numba import types
 from numba.core import cgutils
 from numba.core.datamodel.models import OpaqueModel
 from numba.core.typing.templates import AttributeTemplate
-from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, register_model
-from numba.np.arrayobj import make_array, populate_array
+from numba.extending import infer_getattr, lower_getattr_generic, register_model
 
 from ffr_dyn.kernels.tables import Record, Tables
+from ffr_dyn.kernels.views import array_at, view_intrinsic
 
 Array = np.ndarray
-
-_intrinsic: Any = intrinsic  # whose callers give one argument less than its definition has
 
 
 @cache
@@ -119,26 +117,16 @@ def _read_field(context, builder, typ, value, attr):  # type: ignore[no-untyped-
     if isinstance(field, Packed):
         return builder.bitcast(builder.gep(base, [cgutils.intp_t(at)]), context.get_value_type(field))
     if isinstance(field, types.Array):
-        return _array(context, builder, field, word(0), [word(1 + axis) for axis in range(field.ndim)])
+        data = builder.inttoptr(word(0), context.get_data_type(field.dtype).as_pointer())
+        return array_at(context, builder, field, data, [word(1 + axis) for axis in range(field.ndim)])
     return builder.bitcast(word(0), context.get_value_type(field)) if field is types.float64 else word(0)
-
-
-def _array(context: Any, builder: Any, kind: Any, address: Any, shape: list[Any]) -> Any:
-    item = context.get_constant(types.intp, 8)
-    strides = [item]
-    for size in shape[:0:-1]:
-        strides.insert(0, builder.mul(strides[0], size, flags=["nsw"]))
-    array = make_array(kind)(context, builder)
-    data = builder.inttoptr(address, context.get_data_type(kind.dtype).as_pointer())
-    populate_array(array, data=data, shape=shape, strides=strides, itemsize=item, meminfo=None)
-    return array._getvalue()
 
 
 def _view(table: type) -> Any:
     """The compiled function that takes an address for that of such a table."""
     result = Packed(table)
 
-    @_intrinsic
+    @view_intrinsic
     def table_at(typing, address):  # type: ignore[no-untyped-def]
         def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
             return builder.inttoptr(args[0], context.get_value_type(result))
@@ -151,18 +139,7 @@ def _view(table: type) -> Any:
 tables_at, record_at = _view(Tables), _view(Record)
 
 
-@_intrinsic
-def vector_at(typing, address, size):  # type: ignore[no-untyped-def]
-    """The array of `size` numbers at an address."""
-    kind = types.Array(types.float64, 1, "C")
-
-    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-        return _array(context, builder, kind, args[0], [args[1]])
-
-    return kind(types.int64, types.int64), generate
-
-
-@_intrinsic
+@view_intrinsic
 def call_unit(typing, unit, address, t, first, second):  # type: ignore[no-untyped-def]
     """Call the unit at address `unit` (see `ffr_dyn.kernels.units`)."""
     signature = types.int64(types.int64, types.int64, types.float64, types.int64, types.int64)

@@ -14,23 +14,23 @@ from typing import Any
 from numba import cfunc, types
 
 from ffr_dyn.kernels.actions import keep_turns
-from ffr_dyn.kernels.bodies import mass_times, rotation_matrix
+from ffr_dyn.kernels.bodies import mass_times
 from ffr_dyn.kernels.calls import set_diagonal
 from ffr_dyn.kernels.control import controlled_step, interpolate
 from ffr_dyn.kernels.functions import evaluate_functions
-from ffr_dyn.kernels.loads import apply_loads, call_user, gravity_field, powers
+from ffr_dyn.kernels.loads import apply_loads, call_user, count_loads, gravity_field, power
 from ffr_dyn.kernels.options import OPTIONS
-from ffr_dyn.kernels.packing import call_unit, record_at, tables_at, vector_at
+from ffr_dyn.kernels.packing import call_unit, record_at, tables_at
 from ffr_dyn.kernels.passing import note_independence, numbered_step
 from ffr_dyn.kernels.record import keep
 from ffr_dyn.kernels.rows import evaluate_block
 from ffr_dyn.kernels.stiffening import solve_stiffened
 from ffr_dyn.kernels.system import (
+    clear_and_load,
     constraint_rates,
     evaluate_bodies,
     evaluate_joints,
     evaluate_markers,
-    has_loads,
     largest,
     move_back,
     prepare,
@@ -41,6 +41,7 @@ from ffr_dyn.kernels.system import (
     solve_motion,
     to_body_axes,
     to_velocity_rates,
+    turn_bodies,
 )
 from ffr_dyn.kernels.tables import (
     ALL,
@@ -73,7 +74,8 @@ from ffr_dyn.kernels.tables import (
     USER_FAILED,
     Model,
 )
-from ffr_dyn.kernels.vectors import add_scaled, copy, fill, put
+from ffr_dyn.kernels.vectors import add_scaled, copy, fill
+from ffr_dyn.kernels.views import part, vector_at
 
 PASSES = 10  # of `relaxed_unit` at most
 UNMET = 1e3  # tolerances, beyond which a violation that the projection does not take back is no drift
@@ -130,12 +132,13 @@ def constraints_unit(at, t, x, v):
 
 
 @Unit
-def loads_unit(at, t, x, v):
-    """Applied loads; needed where a scene has any."""
+def loads_unit(at, only, x, unused):
+    """Applied loads at x: all of them, or number `only` of them alone into the scratch of the powers."""
     r = tables_at(at)
-    m, w = r.model, r.work
-    x = vector_at(x, r.x.size)
-    apply_loads(m.bodies.where, m.markers, m.loads, w.bodies.A, w.markers, w.loads, w.functions, w.user, x, w.bodies.f)
+    f, load, first, last = r.work.bodies.f, r.work.markers.load, 0, count_loads(r.model.loads)
+    if only >= 0.0:
+        f, load, first, last = r.work.loads.f, r.work.loads.load, int(only), int(only) + 1
+    apply_loads(r.model, r.work, vector_at(x, r.x.size), f, load, first, last)
     return OK
 
 
@@ -143,20 +146,27 @@ def loads_unit(at, t, x, v):
 def powers_unit(at, t, record, row):
     """Powers of the applied loads, as a row of the record; needed where a scene has any."""
     r, out = tables_at(at), record_at(record)
+    f = r.work.loads.f
+    for k in range(count_loads(r.model.loads)):
+        fill(f, 0.0)
+        call_unit(r.units[LOADS], at, float(k), r.x.ctypes.data, 0)
+        out.power[row, k] = power(r.model.bodies.where, r.work.bodies.A, f, r.v)
+    return OK
+
+
+@Unit
+def applied_unit(at, t, x, v):
+    """Right-hand sides (V,), body axes, of the applied loads alone at (t, x, v)."""
+    r = tables_at(at)
     m, w = r.model, r.work
-    powers(
-        m.bodies.where,
-        m.markers,
-        m.loads,
-        w.bodies.A,
-        w.markers,
-        w.loads,
-        w.functions,
-        w.user,
-        r.x,
-        r.v,
-        out.power[row],
-    )
+    xs, vs = vector_at(x, r.x.size), vector_at(v, r.v.size)
+    if not call_user(m.user_address, t, xs, vs, w.user):
+        return USER_FAILED
+    evaluate_functions(m.functions, w.user, t, w.functions)
+    turn_bodies(m.bodies.where, w.bodies, xs, vs)
+    call_unit(r.units[MARKERS], at, IN_USE, x, v)
+    fill(w.bodies.f, 0.0)
+    clear_and_load(r, x)
     return OK
 
 
@@ -187,9 +197,7 @@ def evaluate_unit(at, t, x, v):
     if status != OK:
         return status
     call_unit(r.units[MARKERS], at, IN_USE, x, v)
-    fill(r.work.markers.load.reshape(r.work.markers.load.size), 0.0)
-    if has_loads(r.model.loads):
-        call_unit(r.units[LOADS], at, t, x, v)
+    clear_and_load(r, x)
     call_unit(r.units[CONSTRAINTS], at, t, x, v)
     return call_unit(r.units[JOINTS], at, t, x, v)
 
@@ -244,11 +252,7 @@ def stiffened_unit(at, near, x, target):
 def look_unit(at, t, x, v):
     """Rows (Phi, nu, gamma, jac) at (x, v) at the time of the last evaluation, whose factors stay; markers do not."""
     r = tables_at(at)
-    where, bw, xs, vs = r.model.bodies.where, r.work.bodies, vector_at(x, r.x.size), vector_at(v, r.v.size)
-    for b in range(r.model.bodies.mass.size):
-        i, j = where[b, 1], where[b, 2]
-        rotation_matrix(xs[i + 3], xs[i + 4], xs[i + 5], xs[i + 6], bw.A[b])
-        put(bw.omega, b, (vs[j + 3], vs[j + 4], vs[j + 5]))
+    turn_bodies(r.model.bodies.where, r.work.bodies, vector_at(x, r.x.size), vector_at(v, r.v.size))
     call_unit(r.units[MARKERS], at, OF_JOINTS, x, v)
     return call_unit(r.units[CONSTRAINTS], at, t, x, v)
 
@@ -274,7 +278,7 @@ def correct_unit(at, t, r_v, target):
     add_scaled(target, target, 1.0, rw.lam)
     for b in range(bodies.mass.size):
         j, size = bodies.where[b, 2], 6 + bodies.where[b, 0]
-        mass_times(bodies, bw, b, bw.acc[j : j + size], bw.f[j : j + size])
+        mass_times(bodies, bw, b, part(bw.acc, j, size), part(bw.f, j, size))
     return OK
 
 
@@ -353,7 +357,7 @@ def record_unit(at, t, record, row):
     if status == OK:
         keep_turns(r.model.loads, r.work.loads)
         call_unit(r.units[MARKERS], at, ALL, r.x.ctypes.data, r.v.ctypes.data)
-        if has_loads(r.model.loads):
+        if count_loads(r.model.loads) > 0:
             call_unit(r.units[POWERS], at, t, record, row)
         keep(r.model, r.work, t, r.x, r.v, record_at(record), row)
     return status
@@ -425,6 +429,7 @@ UNITS = {
     "evaluate": evaluate_unit,
     "rows": rows_unit,
     "look": look_unit,
+    "applied": applied_unit,
 }
 # Of scenes that need them, of methods that choose their steps, and of methods that ask for more.
 LOAD_UNITS = {"loads": loads_unit, "powers": powers_unit}
@@ -438,7 +443,7 @@ def units_of(model: Model) -> dict[str, Unit]:
     """The units that a scene needs whatever the method."""
     return {
         **UNITS,
-        **(LOAD_UNITS if has_loads.py_func(model.loads) else {}),
+        **(LOAD_UNITS if count_loads.py_func(model.loads) else {}),
         **(RELAXED_UNITS if model.relaxation > 0.0 else {}),
         **(STIFFENED_UNITS if model.bodies.stiffening.size else {}),
     }
