@@ -89,7 +89,7 @@ def lagrangian_forces(bodies, w, b, y, p, Q):
                dot((J[2, 0], J[2, 1], J[2, 2]), omega))  # fmt: skip
     moment = add((f[3], f[4], f[5]), cross(omega, J_omega))
     if n > 0:
-        P, g, l = part(bodies.P_dm, 3 * e, 3 * n), part(w.g, 9 * e, 9 * n), part(w.l, 3 * e, 3 * n)  # noqa: E741
+        P, g, l = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.g, 9 * e, 9 * n), part(w.l, 3 * e, 3 * n)  # noqa: E741
         q_dot = part(y, 6, n)
         force = add(force, scale(2.0, cross(omega, three_rows(P, q_dot, n))))
         d0, d1, d2, d3, d4, d5 = six_rows(g, q_dot, n)

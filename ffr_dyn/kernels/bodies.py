@@ -117,9 +117,9 @@ def six_rows(rows, q, n):
 @inlined
 def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s):
     """Elastic right-hand side; returns (first moment, I3 q_dot, second moment of mass, sym D, axial D) of the body."""
-    n, e, start = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4]
+    n, e, start, c = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4], bodies.where[b, 10]
     g, l = part(w.g, 9 * e, 9 * n), part(w.l, 3 * e, 3 * n)  # noqa: E741
-    rP, P = part(bodies.rP_dm, 9 * e, 9 * n), part(bodies.P_dm, 3 * e, 3 * n)
+    rP, P = part(bodies.rP_dm, 9 * c, 9 * n), part(bodies.P_dm, 3 * c, 3 * n)
     copy(g, rP)
     fill(l, 0.0)
     if start >= 0:
@@ -187,9 +187,9 @@ def contract_in_plane(PP, q, qd, n, g0, g1, h, l, first, second, turning):  # no
 @inlined
 def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, normal):
     """`flexible_terms` of a planar body that turns at the rate `omega`; without what acts across the plane."""
-    n, e, start = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4]
+    n, e, start, c = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4], bodies.where[b, 10]
     g, l = part(w.g, 9 * e, 9 * n), part(w.l, 3 * e, n)  # noqa: E741
-    rP, P = part(bodies.rP_dm, 9 * e, 9 * n), part(bodies.P_dm, 3 * e, 3 * n)
+    rP, P = part(bodies.rP_dm, 9 * c, 9 * n), part(bodies.P_dm, 3 * c, 3 * n)
     c0, c1, _ = in_plane(normal)
     turning = 6 + normal
     g0, g1, h = part(g, c0 * n, n), part(g, c1 * n, n), part(g, turning * n, n)
@@ -331,7 +331,7 @@ def rigid_mass_in_plane(mass, s, inertia, M, normal):
 def prepare_body(bodies, w, b):
     """What of the Schur complement of body b depends on the elastic diagonal alone: P_dm dinv and P_dm dinv P_dm^T."""
     n, e = bodies.where[b, 0], bodies.where[b, 3]
-    P, Cd = part(bodies.P_dm, 3 * e, 3 * n), part(w.Cd, 6 * e, 6 * n)
+    P, Cd = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.Cd, 6 * e, 6 * n)
     for r in range(3):
         scale_row(P, r, part(w.dinv, e, n), n, Cd, r)
         for c in range(3):
@@ -348,7 +348,7 @@ def factorise(bodies, w, b):
         return w.L[b, 0, 0] > 0.0
     n, e, normal = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 7]
     L = w.L[b]
-    P, H = part(bodies.P_dm, 3 * e, 3 * n), part(w.g, 9 * e + 6 * n, 3 * n)
+    P, H = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.g, 9 * e + 6 * n, 3 * n)
     dinv, Cd = part(w.dinv, e, n), part(w.Cd, 6 * e, 6 * n)
     if normal >= 0:
         rigid_mass_in_plane(bodies.mass[b], get(w.s, b), w.J[b, normal, normal], L, normal)
@@ -521,7 +521,7 @@ def mass_times(bodies, w, b, y, out):
         out[k] += bodies.mass[b] * linear[k] + turn[k]
         out[3 + k] += lift[k] + dot(w.J[b, k], angular)
     if n > 0:
-        P, H = part(bodies.P_dm, 3 * e, 3 * n), part(w.g, 9 * e + 6 * n, 3 * n)
+        P, H = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.g, 9 * e + 6 * n, 3 * n)
         momentum, spin = three_rows(P, part(y, 6, n), n), three_rows(H, part(y, 6, n), n)
         for k in range(3):
             out[k] += momentum[k]

@@ -98,9 +98,9 @@ class PackedFields(AttributeTemplate):  # type: ignore[misc]
 
     key = Packed
 
-    def generic_resolve(self, typ, attr):  # type: ignore[no-untyped-def]
+    def generic_resolve(self, value, attr):  # type: ignore[no-untyped-def]
         """None where the table has no such field."""
-        kind = _fields(typ.table).get(attr)
+        kind = _fields(value.table).get(attr)
         return None if kind is None else _numba_type(kind)
 
 
