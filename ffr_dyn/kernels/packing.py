@@ -98,7 +98,7 @@ class PackedFields(AttributeTemplate):  # type: ignore[misc]
 
     key = Packed
 
-    def generic_resolve(self, value, attr):  # type: ignore[no-untyped-def]
+    def generic_resolve(self, value, attr):  # type: ignore[no-untyped-def, override]
         """None where the table has no such field."""
         kind = _fields(value.table).get(attr)
         return None if kind is None else _numba_type(kind)
