@@ -129,6 +129,8 @@ def main() -> None:
         sys.exit(2)
     except click.ClickException as error:
         _leave(error.format_message(), error.exit_code)
+    except OSError as error:
+        _leave(f"{error.filename2 or error.filename or 'file'}: {error.strerror or error}; choose another place", 2)
     except (click.Abort, KeyboardInterrupt):
         _leave("interrupted; the result file holds what was computed", 1)
 
