@@ -12,12 +12,14 @@ from test_dyn_errors import GROUND, SCENE, run_cli
 from ffr_dyn.analyses.assemble import assemble
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.errors import InputError, SimulationError
+from ffr_dyn.forces import Load, SpringDamper
 from ffr_dyn.integrators import ROS2, ROS3
 from ffr_dyn.joints import Joint
+from ffr_dyn.operations import SQRT
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.scene_file import load_scene
 from ffr_dyn.stabilisation import Baumgarte, Projection
-from ffr_dyn.timefunction import OPERATION
+from ffr_dyn.timefunction import OPERATION, operation, polynomial
 from ffr_prep.body import BodyError, truncated, with_point
 
 
@@ -170,6 +172,27 @@ def test_gains_that_lose_the_state_are_named(method, gain):
         SimulationError, match=rf"Baumgarte's gains of 1e\+0{int(np.log10(gain))} 1/s are too large.*below 1e\+03"
     ):
         forward(scene, end=0.1, output_step=0.05, method=method(1e-3), stabilisation=Baumgarte(gain, gain))
+
+
+def test_a_load_without_a_value_is_named():
+    push = Load("push", "cloud.b", force=(0, operation(SQRT, polynomial(0.01, -1.0)), 0))
+    with pytest.raises(SimulationError, match=r"'push' has no value there; look at its formula"):
+        forward(replace(TWO, loads=(push,)), end=0.1, output_step=0.01)
+
+
+def test_a_spring_that_loses_the_state_is_no_mechanism_that_locks():
+    spring = SpringDamper("spring", "ground.P", "cloud.b", stiffness=1e14, free_length=2.0)
+    with pytest.raises(SimulationError, match=r"no longer finite: the step is too large for .* a stiff spring"):
+        forward(replace(TWO, springs=(spring,)), end=0.1, output_step=0.01)
+
+
+def test_a_body_stretched_beyond_theory_is_noted():
+    """Without rotation of an interface: modes that move the interfaces alone."""
+    model = cloud(2, stiffness=50.0)
+    still = tuple(replace(i, phi_r=0 * i.phi_r) for i in model.interfaces)
+    scene = Scene((Body("cloud", replace(model, interfaces=still), q=(0.5, 0.0)),))
+    result = forward(scene, end=0.02, output_step=0.01)
+    assert any("'cloud' deforms by up to" in note and "of its size" in note for note in result.attributes["notes"])
 
 
 TWO = Scene(

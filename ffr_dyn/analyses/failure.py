@@ -86,13 +86,16 @@ def _overflow(system: System, work: Work) -> str:
     if value > HUGE:
         return f"{name!r} exerts {value:.3g} N or N m; look at its numbers and their units"
     least, when = work.independence[1:3]
-    if least < AT or OPEN < work.drift[0] < LOST:
+    if (least < AT or work.drift[0] > OPEN) and work.drift[0] < LOST:
         return (
             f"its constraints came open by up to {work.drift[0]:.2g}, and were nearest to dependence at t = {when:.6g} s: "
             "the mechanism locks there (a dead point that a driver goes beyond), or passes a singular position; keep driven "
             "motions within reach, or use projection"
         )
-    return "the step is too large for an explicit method (use ROS2 or a smaller step), or a force is not finite"
+    return (
+        "the step is too large for a mode (use ROS2), a stiff spring or stop, or a fast rotation (use a smaller step), or a "
+        "force is not finite"
+    )
 
 
 def _largest(system: System, work: Work) -> tuple[str, float]:
