@@ -68,12 +68,21 @@ def info(result: Path) -> None:
 @click.argument("names", nargs=-1, required=True)
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="Picture, .png or .svg.")
 @click.option("--title", help="Title of the picture.")
-def plot(result: Path, names: tuple[str, ...], output: Path, title: str | None) -> None:
-    """Draw the histories NAMES of RESULT, a panel per unit. `ffr-dyn info` lists the names."""
+@click.option("--path", "plane", metavar="PLANE", help="Draw the path of one marker, such as rod.tip, in xy, zx, ...")
+def plot(result: Path, names: tuple[str, ...], output: Path, title: str | None, plane: str | None) -> None:
+    """Draw the histories NAMES of RESULT, a panel per unit. `ffr-dyn info` lists the names.
+
+    With --path xy the path of a marker in that plane instead, coloured by time.
+    """
     from ffr_dyn import plots
     from ffr_dyn.result_file import load_result
 
-    plots.plot(load_result(result), names, output, title=title)
+    if plane is None:
+        plots.plot(load_result(result), names, output, title=title)
+    elif len(names) == 1:
+        plots.plot_path(load_result(result), names[0].removesuffix(".position"), output, plane=plane, title=title)
+    else:
+        raise InputError(f"--path {plane}: give one marker, not {len(names)} names")
     click.echo(f"picture  {output}")
 
 
@@ -129,6 +138,8 @@ def main() -> None:
         sys.exit(2)
     except click.ClickException as error:
         _leave(error.format_message(), error.exit_code)
+    except OSError as error:
+        _leave(f"{error.filename2 or error.filename or 'file'}: {error.strerror or error}; choose another place", 2)
     except (click.Abort, KeyboardInterrupt):
         _leave("interrupted; the result file holds what was computed", 1)
 

@@ -359,6 +359,12 @@ def test_flexible_scene_file_runs_from_the_command_line(monkeypatch, capsys, tmp
     assert "motor.moment" in said
     run_cli(monkeypatch, capsys, "plot", tmp_path / "scene.nc", "bar.b.position", "-o", tmp_path / "p.png")
     assert (tmp_path / "p.png").stat().st_size > 1000
+    path = tmp_path / "path.png"
+    assert run_cli(monkeypatch, capsys, "plot", tmp_path / "scene.nc", "bar.b", "--path", "xy", "-o", path)[0] == 0
+    assert path.stat().st_size > 1000
+    two = run_cli(monkeypatch, capsys, "plot", tmp_path / "scene.nc", "bar.a", "bar.b", "--path", "xy", "-o", path)
+    assert two[0] == 2
+    assert "give one marker, not 2 names" in two[1]
 
 
 def test_module_runs_as_a_command():

@@ -24,7 +24,7 @@ from ffr_dyn.measure import Entry, Memory, measure, needs_every_step, selected
 from ffr_dyn.result import Quantity, Result
 from ffr_dyn.result_file import ResultWriter, load_checkpoint, load_result
 from ffr_dyn.scene import Scene
-from ffr_dyn.stabilisation import Baumgarte, Projection, Stabilisation, gains
+from ffr_dyn.stabilisation import Baumgarte, Projection, Stabilisation, excess_of_gains, gains
 from ffr_dyn.stopwatch import Stopwatch
 from ffr_dyn.validity import doubts, extremes, meaningless
 from ffr_prep.body import Surface
@@ -213,7 +213,8 @@ def _advance(
         if ends:
             return
         if status != OK:
-            raise failure(system, run.machine.work, status, reached(run.machine, start))
+            cause = excess_of_gains(run.energy.gains, run.energy.spacing)
+            raise failure(system, run.machine.work, status, reached(run.machine, start), cause)
         count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
 
 
