@@ -427,7 +427,18 @@ def new_work(m: Model) -> Work:
         bodies.s[b], bodies.J[b], bodies.L[b] = _rigid_inertia(m.bodies, int(b))
     vectors = zeros(omega=(M, 3), r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3), load=(M, 6))
     rows = RowWork(
-        **zeros(Phi=C, nu=C, gamma=C, lam=C, left=C, scale=C, least=C, jac=(C, D, 9), X=size.size * D * 12 * LANES),
+        **zeros(
+            Phi=C,
+            nu=C,
+            gamma=C,
+            lam=C,
+            left=C,
+            scale=C,
+            least=C,
+            jac=(size.size * D, 9, LANES),
+            kept=(size.size * D, 9, LANES),
+            X=size.size * D * 12 * LANES,
+        ),
         **zeros(
             Y=12 * LANES,
             step=size.size * LANES,

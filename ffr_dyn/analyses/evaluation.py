@@ -142,7 +142,7 @@ def _jacobian(system: System, work: Work) -> Array:
             b = markers.body[marker] if marker >= 0 else len(place.n)
             if b == len(place.n):
                 continue
-            part = work.rows.jac[lines, side]
+            part = work.rows.jac[block * len(ends) + side, :, : rows.start[block + 1] - rows.start[block]].T
             jacobian[lines, place.rigid(b)] += part[:, :6]
             if place.n[b]:
                 phi = shapes(system, marker)

@@ -27,7 +27,7 @@ from ffr_dyn.kernels.system import constraint_rates, finite, largest, to_velocit
 from ffr_dyn.kernels.tables import NEAR, NOT_CONVERGED, NOT_FINITE, OK, TIGHTER
 from ffr_dyn.kernels.units import Unit
 from ffr_dyn.kernels.vectors import add_scaled, copy
-from ffr_dyn.kernels.views import part, vector_at
+from ffr_dyn.kernels.views import part
 
 ROOT = 6.0**0.5
 STAGES = 5
@@ -47,18 +47,17 @@ LOST = 1e-6  # relative error of a velocity with which the iteration has failed
 
 # Rows of stages.x and stages.v after those of the stages: this stage's state, the next one's, scratch.
 HERE, AHEAD, SCRATCH = STAGES, STAGES + 1, STAGES + 2
-# Rows of stages.rows: rates ahead and what they are short of; then the coefficients of the rows ahead.
-NU, SHORT, JAC = 0, 1, 2
+# Rows of stages.rows: rates ahead and what they are short of.
+NU, SHORT = 0, 1
 
 
 @inlined
 def rates_ahead(r, u, out):
     """out (C,) = Phi_q(X_{i+1}) u, for u shaped like v."""
-    s, jac, x, y = r.stages, r.work.rows.jac, r.stages.x[AHEAD], r.stages.v[SCRATCH]
+    x, y = r.stages.x[AHEAD], r.stages.v[SCRATCH]
     copy(y, u)
     into_body_axes(r.model.bodies, x, y, r.work.loads.turn[0])
-    ahead = part(s.rows, JAC * out.size, jac.size).reshape(jac.shape)
-    constraint_rates(r.model.bodies.where, r.model.markers, r.model.rows, ahead, y, out)
+    constraint_rates(r.model.bodies.where, r.model.markers, r.model.rows, r.work.rows.kept, y, out)
 
 
 @inlined
@@ -66,8 +65,7 @@ def keep_rows_ahead(r):
     """Keep what `look_ahead` found."""
     s, rows = r.stages, r.work.rows
     copy(s.rows[NU], rows.nu)
-    kept = vector_at(s.rows.ctypes.data + 8 * JAC * rows.nu.size, rows.jac.size)
-    copy(kept, part(rows.jac, 0, rows.jac.size))
+    copy(part(rows.kept, 0, rows.kept.size), part(rows.jac, 0, rows.jac.size))
 
 
 @inlined
@@ -179,7 +177,7 @@ class HalfExplicit:
     reach: ClassVar[float] = 3.2757  # where |R(i y)| exceeds 1
     repeatable: ClassVar[bool] = True
     stage_count: ClassVar[int] = STAGES + 3
-    row_stages: ClassVar[int] = JAC + 36
+    row_stages: ClassVar[int] = 2
     controlled: ClassVar[bool] = False
     numbers: ClassVar[tuple[float, ...]] = (0.0,)
     calls: ClassVar[tuple[str, ...]] = ("look_ahead",)

@@ -51,7 +51,7 @@ from ffr_dyn.kernels.views import part
 # momenta of the start are short of; END: momenta at the end; REACTION: Phi_q^T lambda at the start; CHANGE: scratch.
 MU, KICK, MIDDLE, SHORT, END, REACTION, CHANGE = range(7)
 HALF, WHOLE, NOTHING = range(3)  # rows of stages.x: x_m, x+, zeros
-LAM, JAC = 0, 1  # rows of stages.rows: multipliers of the start; then the coefficients of the rows there
+LAM = 0  # row of stages.rows: multipliers of the start
 TOLERANCE, LIMIT, STARTED = range(3)
 STUCK = 1e-6  # relative: where corrections no longer shrink below this, rounding is what is left of them
 ROUNDING = 4e-16  # of positions, over the step: what rounding leaves of a velocity
@@ -165,10 +165,9 @@ def end_momenta(r, h):
 @inlined
 def react_at_start(r):
     """REACTION = Phi_q^T lambda at the start of the step, shaped like v."""
-    s, jac = r.stages, r.work.rows.jac
-    kept = part(s.rows, JAC * s.target.size, jac.size).reshape(jac.shape)
+    s = r.stages
     fill(s.v[REACTION], 0.0)
-    add_reactions(r.model.bodies.where, r.model.markers, r.model.rows, kept, s.rows[LAM], s.v[REACTION])
+    add_reactions(r.model.bodies.where, r.model.markers, r.model.rows, r.work.rows.kept, s.rows[LAM], s.v[REACTION])
     into_global_axes(r.model.bodies, r.x, s.v[REACTION], r.work.loads.turn[0])
 
 
@@ -182,8 +181,8 @@ def keep_node(r, h):
         n, j = bodies.where[b, 0], bodies.where[b, 2]
         momentum(bodies, bw, b, part(bw.acc, j, 6 + n), part(s.v[MU], j, 6 + n))
     to_velocity_rates(bodies.where, bw.A, s.v[MU], s.v[MU])
-    kept = part(s.rows, JAC * s.target.size, r.work.rows.jac.size)
-    copy(kept, part(r.work.rows.jac, 0, kept.size))
+    rows = r.work.rows
+    copy(part(rows.kept, 0, rows.kept.size), part(rows.jac, 0, rows.jac.size))
 
 
 @inlined
@@ -352,7 +351,7 @@ class Variational:
     reach: ClassVar[float] = math.inf
     repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 7
-    row_stages: ClassVar[int] = JAC + 36
+    row_stages: ClassVar[int] = 1
     controlled: ClassVar[bool] = False
     calls: ClassVar[tuple[str, ...]] = ("look_ahead",)
     unit: ClassVar[Unit] = variational_step

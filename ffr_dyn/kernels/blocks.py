@@ -38,22 +38,24 @@ SIDE = 12 * LANES  # numbers of X per side of a joint
 
 
 @kernel
-def spread_rows(jac, first, last, side, flexible, normal, X, at):
-    """X = the rigid coefficients of the rows of one side, then the elastic ones; six of each, or three in the plane."""
+def spread_rows(jac, flexible, normal, X, at):
+    """X = the rigid coefficients of one side (9 * 8,), then the elastic ones; six of each, or three in the plane."""
     if normal >= 0:
         i, j, k = in_plane(normal)
-        for row in range(first, last):
-            a, r = jac[row, side], at + row - first
-            X[r], X[r + LANES], X[r + 2 * LANES] = a[i], a[j], a[k]
-            X[r + 3 * LANES], X[r + 4 * LANES], X[r + 5 * LANES] = a[i], a[j], a[6 + normal]
-        return
-    for row in range(first, last):
-        a, r = jac[row, side], at + row - first
-        X[r], X[r + LANES], X[r + 2 * LANES] = a[0], a[1], a[2]
-        X[r + 3 * LANES], X[r + 4 * LANES], X[r + 5 * LANES] = a[3], a[4], a[5]
+        copy_row(jac, LANES * i, X, at)
+        copy_row(jac, LANES * j, X, at + LANES)
+        copy_row(jac, LANES * k, X, at + 2 * LANES)
         if flexible:
-            X[r + 6 * LANES], X[r + 7 * LANES], X[r + 8 * LANES] = a[0], a[1], a[2]
-            X[r + 9 * LANES], X[r + 10 * LANES], X[r + 11 * LANES] = a[6], a[7], a[8]
+            copy_row(jac, LANES * i, X, at + 3 * LANES)
+            copy_row(jac, LANES * j, X, at + 4 * LANES)
+            copy_row(jac, LANES * (6 + normal), X, at + 5 * LANES)
+        return
+    for c in range(6):
+        copy_row(jac, LANES * c, X, at + LANES * c)
+    if flexible:
+        for c in range(3):
+            copy_row(jac, LANES * c, X, at + LANES * (6 + c))
+            copy_row(jac, LANES * (6 + c), X, at + LANES * (9 + c))
 
 
 @kernel
@@ -95,16 +97,16 @@ def eliminate_in_plane(flexible, normal, P, L, X, at):
 
 
 @kernel
-def add_scale(jac, first, last, side, mass, turning, scale):
-    """What the rows' own part of the multiplier matrix is at least, by the mass or the trace of the inertia of a body."""
+def add_scale(a, first, last, mass, turning, scale):
+    """What the rows' own part of the multiplier matrix is at least, by the mass or the trace of the inertia of a body.
+
+    a : (9, 8) coefficients of the side
+    """
     by_mass, by_inertia = 1.0 / mass, 1.0 / turning
-    for row in range(first, last):
-        a = jac[row, side]
-        point = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
-        if point > 0.0:
-            scale[row] += point * by_mass
-        else:
-            scale[row] += (a[3] * a[3] + a[4] * a[4] + a[5] * a[5]) * by_inertia
+    for k in range(last - first):
+        point = a[0, k] * a[0, k] + a[1, k] * a[1, k] + a[2, k] * a[2, k]
+        turn = a[3, k] * a[3, k] + a[4, k] * a[4, k] + a[5, k] * a[5, k]
+        scale[first + k] += point * by_mass if point > 0.0 else turn * by_inertia
 
 
 @kernel

@@ -115,7 +115,7 @@ def coordinate(kind, first, second, third, w, i, j):
 
 
 @kernel
-def fill_relation(axes, relation, drive, markers, at, w, row):
+def fill_relation(axes, relation, drive, markers, at, w, row, first_side, lane):
     """a_1 coordinate_1 + a_2 coordinate_2 = s(t), up to the spacing of values that whole turns make equivalent."""
     Phi, nu, gamma = -drive[0], -drive[1], drive[2]
     for k in range(2):
@@ -127,20 +127,20 @@ def fill_relation(axes, relation, drive, markers, at, w, row):
         Phi += factor * value
         nu += factor * rate
         gamma += factor * bias
-        fill_side(w.jac[row, 2 * k], factor, side_i)
-        fill_side(w.jac[row, 2 * k + 1], factor, side_j)
+        fill_side(w.jac[first_side + 2 * k], lane, factor, side_i)
+        fill_side(w.jac[first_side + 2 * k + 1], lane, factor, side_j)
     if relation[4] > 0.0:
         Phi -= relation[4] * round(Phi / relation[4])
     w.Phi[row], w.nu[row], w.gamma[row] = Phi, nu, gamma
 
 
 @kernel
-def fill_side(jac, factor, side):
+def fill_side(jac, lane, factor, side):
     """Written out: tuples are slow to index by a loop."""
     point, turn, elastic = side
-    jac[0], jac[1], jac[2] = factor * point[0], factor * point[1], factor * point[2]
-    jac[3], jac[4], jac[5] = factor * turn[0], factor * turn[1], factor * turn[2]
-    jac[6], jac[7], jac[8] = factor * elastic[0], factor * elastic[1], factor * elastic[2]
+    jac[0, lane], jac[1, lane], jac[2, lane] = factor * point[0], factor * point[1], factor * point[2]
+    jac[3, lane], jac[4, lane], jac[5, lane] = factor * turn[0], factor * turn[1], factor * turn[2]
+    jac[6, lane], jac[7, lane], jac[8, lane] = factor * elastic[0], factor * elastic[1], factor * elastic[2]
 
 
 @kernel
@@ -158,21 +158,33 @@ def row_of(kind, axes, drive, w, i, j):
 @inlined
 def evaluate_block(rows, functions, markers, w, k):
     """Fill the rows of block k of w (a RowWork); markers: MarkerWork; functions (F, 3)."""
-    i, j = rows.marker[k, 0], rows.marker[k, 1]
+    i, j, first_side = rows.marker[k, 0], rows.marker[k, 1], k * rows.marker.shape[1]
     for row in range(rows.start[k], rows.start[k + 1]):
-        drive = ZERO
+        drive, lane = ZERO, row - rows.start[k]
         if rows.function[row] >= 0:
             drive = get(functions, rows.function[row])
         if rows.kind[row] == RELATION:
-            fill_relation(rows.axes[row], rows.relation[row], drive, markers, rows.marker[k], w, row)
+            fill_relation(rows.axes[row], rows.relation[row], drive, markers, rows.marker[k], w, row, first_side, lane)
             continue
         if rows.kind[row] == COINCIDENCE:
             Phi, nu, gamma, side_i, side_j = coincidence(markers, i, j, int(rows.axes[row, 0, 0]), drive)
             w.Phi[row], w.nu[row], w.gamma[row] = Phi, nu, gamma
-            fill_side(w.jac[row, 0], 1.0, side_i)
-            fill_side(w.jac[row, 1], 1.0, side_j)
+            fill_side(w.jac[first_side], lane, 1.0, side_i)
+            fill_side(w.jac[first_side + 1], lane, 1.0, side_j)
             continue
         Phi, nu, gamma, side_i, side_j = row_of(rows.kind[row], rows.axes[row], drive, markers, i, j)
         w.Phi[row], w.nu[row], w.gamma[row] = Phi, nu, gamma
-        fill_side(w.jac[row, 0], 1.0, side_i)
-        fill_side(w.jac[row, 1], 1.0, side_j)
+        fill_side(w.jac[first_side], lane, 1.0, side_i)
+        fill_side(w.jac[first_side + 1], lane, 1.0, side_j)
+
+
+@kernel
+def reaction(rw, rows, k, side):
+    """(force, moment about the body's origin) in body axes that block k takes from the body of a side."""
+    jac, first = rw.jac[k * rows.marker.shape[1] + side], rows.start[k]
+    force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for lane in range(rows.start[k + 1] - first):
+        lam = rw.lam[first + lane]
+        force = add(force, (jac[0, lane] * lam, jac[1, lane] * lam, jac[2, lane] * lam))
+        moment = add(moment, (jac[3, lane] * lam, jac[4, lane] * lam, jac[5, lane] * lam))
+    return force, moment

@@ -8,6 +8,7 @@ two from the loads of the stage before.
 
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import call_unit
+from ffr_dyn.kernels.rows import reaction
 from ffr_dyn.kernels.tables import MOTION
 from ffr_dyn.kernels.vectors import add_scaled, copy, cross, fill, get, subtract, to_body
 from ffr_dyn.kernels.views import part
@@ -73,21 +74,16 @@ def marker_loads(markers, rows, mw, rw, known, load):
         for side in range(rows.marker.shape[1]):
             k = rows.marker[block, side]
             if k >= 0 and markers.load[k] >= 0:
-                first, last, own = rows.start[block], rows.start[block + 1], load[markers.body[k]]
-                add_reaction(rw, first, last, side, get(mw.u, k), own, markers.load[k])
+                add_reaction(rw, rows, block, side, get(mw.u, k), load[markers.body[k]], markers.load[k])
 
 
 @kernel
-def add_reaction(rw, first, last, side, u, load, slot):
-    force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for row in range(first, last):
-        jac, lam = rw.jac[row, side], rw.lam[row]
-        force = subtract(force, (jac[0] * lam, jac[1] * lam, jac[2] * lam))
-        moment = subtract(moment, (jac[3] * lam, jac[4] * lam, jac[5] * lam))
+def add_reaction(rw, rows, block, side, u, load, slot):
+    force, moment = reaction(rw, rows, block, side)
     moment = subtract(moment, cross(u, force))
     for c in range(3):
-        load[slot + c] += force[c]
-        load[slot + 3 + c] += moment[c]
+        load[slot + c] -= force[c]
+        load[slot + 3 + c] -= moment[c]
 
 
 @kernel

@@ -39,6 +39,7 @@ from ffr_dyn.kernels.markers import (
 )
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import call_unit
+from ffr_dyn.kernels.rows import reaction
 from ffr_dyn.kernels.tables import ALL, BACK, IN_USE, LANES, LOADS, LOOK, NOT_FINITE, OK, REGAIN, RELATION
 from ffr_dyn.kernels.vectors import (
     add,
@@ -104,15 +105,16 @@ def couple_joints(bodies, markers, rows, pattern, bw, rw):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
-                first, last, at = rows.start[k], rows.start[k + 1], (k * sides + side) * SIDE
+                first, last, number = rows.start[k], rows.start[k + 1], k * sides + side
+                at, jac = number * SIDE, part(rw.jac, 9 * LANES * number, 9 * LANES)
                 flexible, normal, L = where[b, 0] > 0, where[b, 7], part(bw.L, 36 * b, 36)
-                spread_rows(rw.jac, first, last, side, flexible, normal, rw.X, at)
+                spread_rows(jac, flexible, normal, rw.X, at)
                 if normal >= 0:
                     eliminate_in_plane(flexible, normal, rw.P[marker], L, rw.X, at)
                 else:
                     eliminate_side(flexible, rw.P[marker], L, rw.X, at)
                 turning = bw.J[b, 0, 0] + bw.J[b, 1, 1] + bw.J[b, 2, 2]
-                add_scale(rw.jac, first, last, side, bodies.mass[b], turning, rw.scale)
+                add_scale(rw.jac[number], first, last, bodies.mass[b], turning, rw.scale)
     fill(rw.S, 0.0)
     for p in range(pattern.pair_body.size):
         b, later, earlier = pattern.pair_body[p], pattern.pair[p, 0], pattern.pair[p, 2]
@@ -270,55 +272,54 @@ def reduced_rates(bodies, markers, rows, bw, rw, target):
 def constraint_rates(where, markers, rows, jac, acc, out):
     """out = Phi_q acc."""
     fill(out, 0.0)
-    ground = where.shape[0] - 1
+    ground, sides = where.shape[0] - 1, rows.marker.shape[1]
     for k in range(rows.marker.shape[0]):
-        for side in range(rows.marker.shape[1]):
+        for side in range(sides):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
-                n, j = where[b, 0], where[b, 2]
+                n, j, own = where[b, 0], where[b, 2], jac[k * sides + side]
                 phi = shapes(markers, marker, n)
-                add_side_rates(phi, jac, part(acc, j, 6 + n), rows.start[k], rows.start[k + 1], side, n, out)
+                add_side_rates(phi, own, part(acc, j, 6 + n), rows.start[k], rows.start[k + 1], n, out)
 
 
 @kernel
-def add_side_rates(phi, jac, acc, first, last, side, n, out):
+def add_side_rates(phi, a, acc, first, last, n, out):
     e0, e1, e2, e3, e4, e5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if n > 0:
         q = part(acc, 6, n)
         e0, e1, e2, e3, e4, e5 = six_rows(phi, q, n)
-    for row in range(first, last):
-        a = jac[row, side]
-        out[row] += (
-            a[0] * (acc[0] + e0) + a[1] * (acc[1] + e1) + a[2] * (acc[2] + e2)
-            + a[3] * acc[3] + a[4] * acc[4] + a[5] * acc[5]
-            + a[6] * e3 + a[7] * e4 + a[8] * e5
+    for k in range(last - first):
+        out[first + k] += (
+            a[0, k] * (acc[0] + e0) + a[1, k] * (acc[1] + e1) + a[2, k] * (acc[2] + e2)
+            + a[3, k] * acc[3] + a[4, k] * acc[4] + a[5, k] * acc[5]
+            + a[6, k] * e3 + a[7, k] * e4 + a[8, k] * e5
         )  # fmt: skip
 
 
 @inlined
 def add_reactions(where, markers, rows, jac, lam, out):
     """out (V,) += Phi_q^T lam in body axes."""
-    ground = where.shape[0] - 1
+    ground, sides = where.shape[0] - 1, rows.marker.shape[1]
     for k in range(rows.marker.shape[0]):
-        for side in range(rows.marker.shape[1]):
+        for side in range(sides):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
-                n, j = where[b, 0], where[b, 2]
+                n, j, own = where[b, 0], where[b, 2], jac[k * sides + side]
                 phi = shapes(markers, marker, n)
-                add_side_reactions(phi, jac, lam, rows.start[k], rows.start[k + 1], side, n, part(out, j, 6 + n))
+                add_side_reactions(phi, own, lam, rows.start[k], rows.start[k + 1], n, part(out, j, 6 + n))
 
 
 @kernel
-def add_side_reactions(phi, jac, lam, first, last, side, n, out):
+def add_side_reactions(phi, a, lam, first, last, n, out):
     force, twist = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for row in range(first, last):
-        a, value = jac[row, side], lam[row]
-        force = add(force, (a[0] * value, a[1] * value, a[2] * value))
-        twist = add(twist, (a[6] * value, a[7] * value, a[8] * value))
+    for k in range(last - first):
+        value = lam[first + k]
+        force = add(force, (a[0, k] * value, a[1, k] * value, a[2, k] * value))
+        twist = add(twist, (a[6, k] * value, a[7, k] * value, a[8, k] * value))
         for c in range(3):
-            out[3 + c] += a[3 + c] * value
+            out[3 + c] += a[3 + c, k] * value
     for c in range(3):
         out[c] += force[c]
     if n > 0:
@@ -470,12 +471,10 @@ def reactions(rows, mw, rw, out):
             continue
         marker = rows.marker[k, 1]
         force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-        for row in range(rows.start[k], rows.start[k + 1]):
-            for side in range(1, rows.marker.shape[1], 2):  # a screw has the same markers twice
-                if rows.marker[k, side] == marker:
-                    jac, lam = rw.jac[row, side], rw.lam[row]
-                    force = subtract(force, (jac[0] * lam, jac[1] * lam, jac[2] * lam))
-                    moment = subtract(moment, (jac[3] * lam, jac[4] * lam, jac[5] * lam))
+        for side in range(1, rows.marker.shape[1], 2):  # a screw has the same markers twice
+            if rows.marker[k, side] == marker:
+                pull, turn = reaction(rw, rows, k, side)
+                force, moment = subtract(force, pull), subtract(moment, turn)
         moment = subtract(moment, cross(get(mw.u, marker), force))
         force, moment = to_global(mw.A[marker], force), to_global(mw.A[marker], moment)
         for c in range(3):

@@ -205,7 +205,9 @@ class RowWork(NamedTuple):
     left: F1  # (C,) scratch
     scale: F1  # (C,) what the entry of S on the diagonal is at least
     least: F1  # (C,) what it is taken for where it is less
-    jac: F3  # (C, D, 9) coefficients of point velocity, omega_bar, elastic rotation rate
+    # (K D, 9, 8) per side of a block: coefficients of point velocity, omega_bar, elastic rotation rate, its rows in lanes
+    jac: F3
+    kept: F3  # those of another moment, for methods that need both
     X: F1  # per block and side twelve rows of lanes: rigid part after elimination times L^-1, elastic part
     Y: F1  # (12 * 8,) scratch
     pivots: F1  # (8 K,) reciprocal pivots of S
