@@ -399,10 +399,10 @@ def _at(address: int, size: int) -> Array:
 def new_work(m: Model) -> Work:
     """Scratch for one evaluation, with the elastic diagonal of an explicit method."""
     B, E, M, C = m.bodies.mass.size, int(m.bodies.where[-1, 3]), m.markers.body.size, m.rows.kind.size
-    D = m.rows.marker.shape[1]
+    K, D = m.rows.marker.shape
     n, V, pairs = m.bodies.where[:, 0], 6 * B + E, m.pattern.pair_body.size
     size = np.diff(m.rows.start)
-    column = np.repeat(np.arange(size.size), np.diff(m.pattern.column_start))
+    column = np.repeat(np.arange(K), np.diff(m.pattern.column_start))
     stored = LANES * int(size.sum() + size[column].sum())
 
     def zeros(**shapes: Any) -> dict[str, Array]:
@@ -411,7 +411,9 @@ def new_work(m: Model) -> Work:
     bodies = BodyWork(
         A=_identities(B + 1),
         dinv=np.ones(E),
-        **zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), g=9 * E, l=3 * E, Cd=6 * E, L=(B, 6, 6), f=V, acc=V),
+        **zeros(
+            omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), inverse=(B, 2), g=9 * E, l=3 * E, Cd=6 * E, L=(B, 6, 6), f=V, acc=V
+        ),
         **zeros(
             rigid=(B, 6),
             elastic=E,
@@ -423,31 +425,16 @@ def new_work(m: Model) -> Work:
         ),
         **zeros(stiff=int((m.bodies.where[:-1, 6] * n[:-1]).sum())),
     )
+    bodies.inverse[:, 0] = [_inverse(mass) for mass in m.bodies.mass]
     for b in np.flatnonzero(n[:-1] == 0):
         bodies.s[b], bodies.J[b], bodies.L[b] = _rigid_inertia(m.bodies, int(b))
+        bodies.inverse[b, 1] = _inverse(np.trace(bodies.J[b]))
     vectors = zeros(omega=(M, 3), r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3), load=(M, 6))
     rows = RowWork(
-        **zeros(
-            Phi=C,
-            nu=C,
-            gamma=C,
-            lam=C,
-            left=C,
-            scale=C,
-            least=C,
-            jac=(size.size * D, 9, LANES),
-            kept=(size.size * D, 9, LANES),
-            X=size.size * D * 12 * LANES,
-        ),
-        **zeros(
-            Y=12 * LANES,
-            step=size.size * LANES,
-            pivots=size.size * LANES,
-            wrench=6,
-            P=(M, 36),
-            phiphi=(pairs, 36),
-            S=stored,
-        ),
+        **zeros(Phi=C, nu=C, gamma=C, lam=C, left=C),
+        **zeros(jac=(K * D, 9, LANES), kept=(K * D, 9, LANES), X=K * D * 12 * LANES, Y=12 * LANES),
+        **zeros(scale=K * LANES, least=K * LANES),
+        **zeros(pivots=K * LANES, step=K * LANES, wrench=6, P=(M, 36), phiphi=(pairs, 36), S=stored),
     )
     return Work(
         bodies=bodies,
@@ -460,6 +447,11 @@ def new_work(m: Model) -> Work:
         independence=np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
         **zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=2),
     )
+
+
+def _inverse(number: float) -> float:
+    """Zero where there is none: such a body is found when it is factorised."""
+    return 1.0 / number if number > 0.0 else 0.0
 
 
 def _rigid_inertia(bodies: Bodies, b: int) -> tuple[Array, Array, Array]:

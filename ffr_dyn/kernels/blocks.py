@@ -97,19 +97,6 @@ def eliminate_in_plane(flexible, normal, P, L, X, at):
 
 
 @kernel
-def add_scale(a, first, last, mass, turning, scale):
-    """What the rows' own part of the multiplier matrix is at least, by the mass or the trace of the inertia of a body.
-
-    a : (9, 8) coefficients of the side
-    """
-    by_mass, by_inertia = 1.0 / mass, 1.0 / turning
-    for k in range(last - first):
-        point = a[0, k] * a[0, k] + a[1, k] * a[1, k] + a[2, k] * a[2, k]
-        turn = a[3, k] * a[3, k] + a[4, k] * a[4, k] + a[5, k] * a[5, k]
-        scale[first + k] += point * by_mass if point > 0.0 else turn * by_inertia
-
-
-@kernel
 def add_pair(X, later, earlier, rows, flexible, phiphi, Y, S, offset):
     """Add the coupling of two block sides on one body to its block of S.
 
@@ -147,7 +134,7 @@ def add_pair_in_plane(X, later, earlier, rows, flexible, phiphi, Y, S, offset):
 def factorise_blocks(starts, pattern, S, relaxation, rw, independence):
     """Factorise in place (right-looking). Returns the row without a pivot, or -1.
 
-    rw.scale (C,)     : what the entry of a row on the diagonal is at least
+    rw.scale (8 K,)   : what the entry of a row on the diagonal is at least
     independence (1,) : the least share of a row that the rows before it do not contain
     """
     independence[0] = 1.0
@@ -159,9 +146,9 @@ def factorise_blocks(starts, pattern, S, relaxation, rw, independence):
                 S[pattern.diagonal[k] + (LANES + 1) * row] *= 1.0 + relaxation
     for k in range(starts.size - 1):
         size = starts[k + 1] - starts[k]
-        factorise_rows(size, S, pattern.diagonal[k], rw.least, starts[k], rw.pivots, LANES * k, rw.Y)
+        factorise_rows(size, S, pattern.diagonal[k], rw.least, LANES * k, rw.pivots, LANES * k, rw.Y)
         for c in range(size):
-            share, scale = rw.Y[c] / rw.scale[starts[k] + c], rw.scale[starts[k] + c]
+            share, scale = rw.Y[c] / rw.scale[LANES * k + c], rw.scale[LANES * k + c]
             if not scale > 0.0 or share != share:
                 return starts[k] + c
             independence[0] = min(independence[0], share)

@@ -248,6 +248,7 @@ def inertia(gravity_field, bodies, w, x, v, b):
             s, pd, W, D, D_axial = flexible_terms(bodies, w, b, q, qd, omega, gravity, W, s)
         put(w.s, b, s)
         fill_tensor(w.J[b], W)
+        w.inverse[b, 1] = 0.5 / (W[0] + W[1] + W[2])
     if normal >= 0:
         forces_in_plane(part(w.f, j, 6), bodies.mass[b], s, pd, D[0] + D[1], omega, gravity, normal)
     else:

@@ -117,6 +117,35 @@ def dot_rows(typing, left, at, right, begin):  # type: ignore[no-untyped-def]
     return _REAL(_POOLED, types.intp, _POOLED, types.intp), generate
 
 
+@_intrinsic
+def add_scale(typing, jac, by_mass, by_inertia, scale, at):  # type: ignore[no-untyped-def]
+    """What the rows' own part of the multiplier matrix is at least, by the inverse mass or inertia of the body of a side.
+
+    jac : (9 * 8,) coefficients of the side;  scale : the row of lanes at `at` takes it
+    """
+
+    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
+        jac, by_mass, by_inertia, scale, at = args
+        jac, scale = _data(context, builder, jac), _data(context, builder, scale)
+
+        def square(first: int) -> Any:
+            total = _broadcast(builder, context.get_constant(_REAL, 0.0))
+            for k in range(first, first + 3):
+                row = _load_row(builder, jac, cgutils.intp_t(0), k)
+                total = builder.fadd(total, builder.fmul(row, row, flags=_LIBERTIES), flags=_LIBERTIES)
+            return total
+
+        point, turn = square(0), square(3)
+        moves = builder.fcmp_ordered(">", point, _broadcast(builder, context.get_constant(_REAL, 0.0)))
+        point = builder.fmul(point, _broadcast(builder, by_mass), flags=_LIBERTIES)
+        turn = builder.fmul(turn, _broadcast(builder, by_inertia), flags=_LIBERTIES)
+        least = builder.select(moves, point, turn)
+        _store_row(builder, builder.fadd(_load_row(builder, scale, at), least, flags=_LIBERTIES), scale, at)
+        return context.get_dummy_value()
+
+    return types.void(_POOLED, _REAL, _REAL, _POOLED, types.intp), generate
+
+
 # ---- blocks of a joint with itself and with another: as many rows as the joint has, held in registers -------------------
 
 

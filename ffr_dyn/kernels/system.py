@@ -9,7 +9,6 @@ from ffr_dyn.kernels.blocks import (
     SIDE,
     add_pair,
     add_pair_in_plane,
-    add_scale,
     eliminate_in_plane,
     eliminate_side,
     factorise_blocks,
@@ -26,7 +25,7 @@ from ffr_dyn.kernels.bodies import (
     rotation_matrix,
     six_rows,
 )
-from ffr_dyn.kernels.lanes import combine_3, combine_6, dot_rows
+from ffr_dyn.kernels.lanes import add_scale, combine_3, combine_6, dot_rows
 from ffr_dyn.kernels.loads import count_loads
 from ffr_dyn.kernels.markers import (
     couple_marker,
@@ -105,7 +104,7 @@ def couple_joints(bodies, markers, rows, pattern, bw, rw):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
-                first, last, number = rows.start[k], rows.start[k + 1], k * sides + side
+                number = k * sides + side
                 at, jac = number * SIDE, part(rw.jac, 9 * LANES * number, 9 * LANES)
                 flexible, normal, L = where[b, 0] > 0, where[b, 7], part(bw.L, 36 * b, 36)
                 spread_rows(jac, flexible, normal, rw.X, at)
@@ -113,8 +112,7 @@ def couple_joints(bodies, markers, rows, pattern, bw, rw):
                     eliminate_in_plane(flexible, normal, rw.P[marker], L, rw.X, at)
                 else:
                     eliminate_side(flexible, rw.P[marker], L, rw.X, at)
-                turning = bw.J[b, 0, 0] + bw.J[b, 1, 1] + bw.J[b, 2, 2]
-                add_scale(rw.jac[number], first, last, bodies.mass[b], turning, rw.scale)
+                add_scale(jac, bw.inverse[b, 0], bw.inverse[b, 1], rw.scale, LANES * k)
     fill(rw.S, 0.0)
     for p in range(pattern.pair_body.size):
         b, later, earlier = pattern.pair_body[p], pattern.pair[p, 0], pattern.pair[p, 2]

@@ -150,6 +150,7 @@ class BodyWork(NamedTuple):
     omega: F2  # (B + 1, 3) body axes
     s: F2  # (B, 3) integral of u_bar dm
     J: F3  # (B, 3, 3)
+    inverse: F2  # (B, 2) 1 / mass, 1 / trace of J
     g: F1  # (9 E,) G_j: six symmetric rows, three axial rows H
     l: F1  # (3 E,) integral of u_dot x phi_j dm  # noqa: E741
     Cd: F1  # (6 E,) rows P_dm and H, times dinv
@@ -203,8 +204,8 @@ class RowWork(NamedTuple):
     gamma: F1  # (C,)
     lam: F1  # (C,)
     left: F1  # (C,) scratch
-    scale: F1  # (C,) what the entry of S on the diagonal is at least
-    least: F1  # (C,) what it is taken for where it is less
+    scale: F1  # (8 K,) what the entry of S on the diagonal is at least
+    least: F1  # (8 K,) what it is taken for where it is less
     # (K D, 9, 8) per side of a block: coefficients of point velocity, omega_bar, elastic rotation rate, its rows in lanes
     jac: F3
     kept: F3  # those of another moment, for methods that need both
