@@ -28,6 +28,7 @@ from ffr_dyn.economy.cost import of_run
 from ffr_dyn.economy.found import Economy, Verification
 from ffr_dyn.economy.ledger import Ledger, Tried
 from ffr_dyn.economy.outputs import Output, Probe, as_output, difference, largest, probe, ranges, total
+from ffr_dyn.economy.outputs import limits as limits_of
 from ffr_dyn.economy.selection import Selection, Shares, gap, selected_model, size_of
 from ffr_dyn.economy.start import PILOT, Ground, Rigid, started, unmoved
 from ffr_dyn.economy.steps import Stepped, chosen_step
@@ -116,6 +117,7 @@ def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chose
         return None
     pilot = replace(stiff.trial.choice, method=PILOT)
     stepped = chosen_step(ledger, pilot, np.maximum(OF_ALL * limits - model, LEAST * limits))
+    scales = ranges(stepped.trial.values)
     return Chosen(
         stepped.trial,
         model,
@@ -124,8 +126,8 @@ def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chose
         (),
         stiff.everything,
         stiff.spatial,
-        limits,
-        ranges(stiff.trial.values),
+        limits_of(ledger.of, scales),
+        scales,
         omitted,
     )
 
@@ -157,6 +159,8 @@ def _stepped(
 ) -> Chosen:
     """The model with the step it needs, or with that of a model much like it, whose error is taken over."""
     model = difference(ledger.run(selection.choice).values, ground.pilot.values)
+    if selection.choice.method != ground.everything.method:
+        return _at_once(ledger, ground, selection, omitted, model)
     left = np.maximum(OF_ALL * ground.limits - largest(model), LEAST * ground.limits)
     stepped = chosen_step(ledger, selection.choice, left) if like is None else _as_like(ledger, selection.choice, like)
     return Chosen(
@@ -164,6 +168,24 @@ def _stepped(
         largest(model),
         stepped.error,
         largest(total(model, stepped.error)),
+        selection.terms,
+        ground.everything,
+        ground.spatial,
+        ground.limits,
+        ground.scales,
+        omitted,
+    )
+
+
+def _at_once(
+    ledger: Ledger, ground: Ground, selection: Selection, omitted: Contributions, error: Histories
+) -> Chosen:
+    """A model of another method than everything, whose run beside that tells all of its `error`."""
+    return Chosen(
+        ledger.run(selection.choice),
+        selection.left,
+        error,
+        largest(error),
         selection.terms,
         ground.everything,
         ground.spatial,

@@ -11,7 +11,7 @@ from ffr_dyn.economy.contributions import LEFT, Contributions, of_motion, of_sha
 from ffr_dyn.economy.cost import per_evaluation
 from ffr_dyn.economy.ledger import Ledger
 from ffr_dyn.economy.outputs import difference, largest
-from ffr_dyn.economy.start import Ground
+from ffr_dyn.economy.start import SCOUT, Ground
 from ffr_dyn.economy.terms import TermEffect, term_effects, without_minor
 from ffr_dyn.errors import SimulationError
 from ffr_dyn.scene import Scene
@@ -23,13 +23,15 @@ ATTEMPTS = 5
 MORE = 1.2  # times as many directions, at least, after those that were not enough
 HOPE = 1.0  # times the tolerance: where modes do more by the estimate, rigid bodies are not tried
 SAFELY = 0.6  # of what may be left out, when what was predicted turns out too much
+DIRECTLY = 0.75  # of the tolerance: a run of two stages that is as near everything is believed, step and all
+COARSE = 5e-3  # of the range: with tolerances that are no less, two stages are tried first
 
 
 @dataclass(frozen=True)
 class Shares:
     """Shares of the tolerance that may be taken by modes left out, by terms, by rigid bodies, and by all that is left out."""
 
-    modes: float = 0.15
+    modes: float = 0.04
     terms: float = 0.15
     rigid: float = 0.5
     all: float = 0.5
@@ -54,6 +56,10 @@ class Ranking:
         rest = np.cumsum((self.found.effect / self.limits)[self.order[::-1]], axis=0)
         return int(np.sum(rest.max(axis=1) > part))
 
+    def left(self, count: int) -> Array:
+        """(outputs,) what all directions but the first do."""
+        return self.found.effect[self.order[count:]].sum(axis=0)
+
     def model(self, count: int) -> Choice:
         """Everything with the first directions only."""
         chosen = self.order[:count]
@@ -75,9 +81,13 @@ class Ranking:
 
 @dataclass(frozen=True)
 class Selection:
-    """A model, and what terms do along the motion of everything, known where modes were looked at."""
+    """A model, and what terms do along the motion of everything, known where modes were looked at.
+
+    left : (outputs,) what modes left out do, by the estimate
+    """
 
     choice: Choice
+    left: Array
     terms: tuple[TermEffect, ...] = ()
 
 
@@ -89,14 +99,19 @@ def selected_model(
     omitted : what modes do, driven by the rigid motion
     beyond  : elastic coordinates of a model that is known not to do
     """
-    if beyond < 0 and (omitted.effect.sum(axis=0) <= HOPE * ground.limits).all():
+    all_modes = omitted.effect.sum(axis=0)
+    if beyond < 0 and (all_modes <= HOPE * ground.limits).all():
         stiff = rigid(ground.everything)
+        direct = _directly(ledger, ground, stiff)
+        if direct is not None:
+            return Selection(direct, all_modes)
         if (gap(ledger, ground, stiff, "all bodies rigid") <= shares.rigid * ground.limits).all():
-            return Selection(stiff)
+            return Selection(stiff, all_modes)
     rankings, effects = _rankings(ledger, ground, omitted, shares)
     predicted = [ranking.model(ranking.count(shares.modes)) for ranking in rankings]
     cheapest = min(range(len(rankings)), key=lambda k: (per_evaluation(predicted[k]), k))
-    return Selection(_enough(ledger, ground, rankings[cheapest], effects, shares, beyond), effects)
+    choice = _enough(ledger, ground, rankings[cheapest], effects, shares, beyond)
+    return Selection(choice, rankings[cheapest].left(size_of(choice)), effects)
 
 
 def _rankings(
@@ -119,15 +134,19 @@ def _enough(
 ) -> Choice:
     """The model that a run beside everything shows to be enough; everything where the number of attempts does not do."""
     scale, count = 1.0, _more(ranking, beyond) if beyond >= 0 else 0
-    terms = shares.terms
+    terms, quick = shares.terms, beyond < 0 and bool((ground.limits >= COARSE * ground.scales).all())
     for _ in range(ATTEMPTS):
         count = max(count, ranking.count(scale * shares.modes))
         model = ranking.model(count)
         if terms:
             model = without_minor(model, effects, scale * terms * ground.limits)
+        direct = _directly(ledger, ground, model) if quick else None
+        if direct is not None:
+            return direct
         error = float((gap(ledger, ground, model, _said(model)) / (shares.all * ground.limits)).max())
         if error <= 1:
             return model
+        quick = quick and _alike(ledger, model, ground.limits)
         if model == ground.everything:
             break
         if np.isfinite(error):
@@ -137,6 +156,21 @@ def _enough(
             count = count if terms else _more(ranking, count)
             terms = 0.0
     return ground.everything
+
+
+def _directly(ledger: Ledger, ground: Ground, model: Choice) -> Choice | None:
+    """The model in two stages, where that is near everything in four: its step is told then with what is left out."""
+    simple = replace(model, method=SCOUT)
+    error = gap(ledger, ground, simple, f"{_said(model)}, two stages")
+    return simple if (error <= DIRECTLY * ground.limits).all() else None
+
+
+def _alike(ledger: Ledger, model: Choice, limits: Array) -> bool:
+    """Whether two stages do for a model, of which there are runs with two and with four."""
+    one, other = (ledger.runs.get(choice) for choice in (replace(model, method=SCOUT), model))
+    if one is None or other is None:
+        return False
+    return bool((largest(difference(one.values, other.values)) <= DIRECTLY * limits).all())
 
 
 def _more(ranking: Ranking, count: int) -> int:
@@ -150,7 +184,7 @@ def size_of(choice: Choice) -> int:
 
 
 def _said(model: Choice) -> str:
-    return f"{size_of(model)} elastic coordinates"
+    return f"{size_of(model)} elastic coordinates" if size_of(model) else "all bodies rigid"
 
 
 def gap(ledger: Ledger, ground: Ground, choice: Choice, what: str) -> Array:

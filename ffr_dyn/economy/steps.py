@@ -84,20 +84,26 @@ def chosen_step(ledger: Ledger, choice: Choice, limit: Array) -> Stepped:
 
 
 def _rigid_in_two_stages(ledger: Ledger, choice: Choice, limit: Array) -> Stepped | None:
-    """The coarse run of rigid bodies with two stages, which is there already, where it is good enough."""
-    trial = ledger.runs.get(replace(choice, method=TWO_STAGES))
-    if trial is None or any(part.count for part in choice.parts):
+    """The coarse run of rigid bodies with two stages, of which steps over two rows are there already, where it is good
+    enough."""
+    if any(part.count for part in choice.parts):
         return None
-    error = _from_two_rows(ledger, trial)
-    return None if error is None or share(error, limit) > 1 else Stepped(trial, error)
+    trial = _attempt(ledger, replace(choice, method=TWO_STAGES))
+    error = None if trial is None else _from_two_rows(ledger, trial)
+    return None if trial is None or error is None or share(error, limit) > 1 else Stepped(trial, error)
 
 
 def _coarse(ledger: Ledger, coarse: Trial, limit: Array) -> Stepped | None:
     """The coarse run, or one of two stages, where steps over two rows show that this is enough."""
-    error, simple = _from_two_rows(ledger, coarse), replace(coarse.choice, method=TWO_STAGES)
+    simple = replace(coarse.choice, method=TWO_STAGES)
+    if simple in ledger.runs:
+        off = difference(ledger.runs[simple].values, coarse.values)
+        if share(off, SURELY * limit) <= 1:
+            return Stepped(ledger.runs[simple], off)
+    error = _from_two_rows(ledger, coarse)
     if error is None or share(error, NEARLY * limit) > 1:
         return None
-    if share(error, FAR * limit) > 1 and simple not in ledger.runs:
+    if share(error, FAR * limit) > 1 or simple in ledger.runs:
         return Stepped(coarse, error)
     trial = _attempt(ledger, simple)
     if trial is None:

@@ -22,6 +22,7 @@ from ffr_dyn.errors import InputError
 Array = np.ndarray
 
 ATTEMPTS = 4
+LONGEST = 4  # times the step of the reference: of a run that tells its error
 
 
 def reference(everything: Choice, final: Trial) -> Choice:
@@ -45,8 +46,11 @@ def verified(
     """
     ledger.tell("verification: everything, finer step")
     choice = reference(everything, final)
-    sharp, coarse = ledger.run(choice), ledger.run(replace(choice, divisions=choice.divisions // 2))
+    sharp, coarse = ledger.run(choice), _coarser(ledger, choice)
     own = largest(error_of(sharp, coarse))
+    if (own > limits).any():
+        coarse = ledger.run(half(choice))
+        own = largest(error_of(sharp, coarse))
     _check_accuracy(ledger.of, limits, own)
     errors: list[Array] = []
     while True:
@@ -55,7 +59,22 @@ def verified(
         if (errors[-1] <= limits).all() or len(errors) == ATTEMPTS:
             spent = cost(sharp, ledger.span) + cost(coarse, ledger.span)
             return final, Verification(choice, errors[-1], errors[0], own, len(errors) - 1, spent)
-        final = _better(ledger, limits, final, sharp, coarse, omitted, len(errors))
+        final = _better(ledger, limits, final, ledger.run(half(choice)), omitted, len(errors))
+
+
+def half(choice: Choice) -> Choice:
+    """The same with half the steps."""
+    return replace(choice, divisions=choice.divisions // 2)
+
+
+def _coarser(ledger: Ledger, choice: Choice) -> Trial:
+    """A run that tells the error of the reference: one that is there with steps not much longer, or one of half the steps."""
+    there = [
+        trial
+        for other, trial in ledger.runs.items()
+        if replace(other, divisions=choice.divisions) == choice and 2 <= choice.divisions / other.divisions <= LONGEST
+    ]
+    return max(there, key=lambda trial: trial.choice.divisions) if there else ledger.run(half(choice))
 
 
 def _check_accuracy(of: Probe, limits: Array, own: Array) -> None:
@@ -68,7 +87,7 @@ def _check_accuracy(of: Probe, limits: Array, own: Array) -> None:
 
 
 def _better(
-    ledger: Ledger, limits: Array, final: Trial, sharp: Trial, coarse: Trial, omitted: Contributions, attempt: int
+    ledger: Ledger, limits: Array, final: Trial, coarse: Trial, omitted: Contributions, attempt: int
 ) -> Trial:
     """A better model: of a finer step where that is what is wrong, or else chosen anew beside everything with that step."""
     same = replace(final.choice, method=PILOT, divisions=coarse.choice.divisions, accuracy=0.0)
