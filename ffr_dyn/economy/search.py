@@ -50,6 +50,7 @@ SURELY_RIGID = (
 SHORT = 2e6  # [us] of a verification that is made without being asked for
 # another look with a finer step: from how many times the steps, and at what cost of a run of everything, in final runs
 DAMPED, UNDAMPED = (6, 1.0), (2, 1.3)
+FREE = 3  # times the steps, where a verification needs that run of everything anyway
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,7 @@ def economise(
     limits = stiff.limits
     omitted = None if limits is None else stiff.contributions(limits)
     found = None if omitted is None else _surely_rigid(ledger, stiff, omitted)
-    return _finished(ledger, _beside_everything(ledger, stiff, omitted) if found is None else found, verify)
+    return _finished(ledger, _beside_everything(ledger, stiff, omitted, verify) if found is None else found, verify)
 
 
 # ---- rigid bodies -----------------------------------------------------------------------------------------------------
@@ -135,14 +136,14 @@ def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chose
 # ---- beside everything ------------------------------------------------------------------------------------------------
 
 
-def _beside_everything(ledger: Ledger, stiff: Rigid, omitted: Contributions | None) -> Chosen:
+def _beside_everything(ledger: Ledger, stiff: Rigid, omitted: Contributions | None, verify: bool | None) -> Chosen:
     """The cheapest model beside a coarse run of everything, and its step; looked at again with a finer one where the step
     turns out much finer, since a coarse step damps the vibration of fast modes, and with it what they do."""
     ground = stiff.ground()
     omitted = stiff.contributions(ground.limits) if omitted is None else omitted
     selection = selected_model(ledger, ground, omitted, Shares())
     found = _stepped(ledger, ground, selection, omitted)
-    finer = _finer_ground(ledger, ground, found.final)
+    finer = _finer_ground(ledger, ground, found.final, verify)
     if finer is None:
         return found
     steps = {"method": PILOT, "divisions": finer.coarsest, "accuracy": 0.0}
@@ -201,18 +202,27 @@ def _as_like(ledger: Ledger, choice: Choice, like: Chosen) -> Stepped:
     return Stepped(ledger.run(own), like.time)
 
 
-def _finer_ground(ledger: Ledger, ground: Ground, final: Trial) -> Ground | None:
-    """Everything with a step that costs a part of the final run, where that is much finer than before."""
+def _finer_ground(ledger: Ledger, ground: Ground, final: Trial, verify: bool | None) -> Ground | None:
+    """Everything with a finer step than before: that of the final run where a verification follows, which needs such a run
+    anyway; or else one that costs a part of the final run, where that is much finer than before."""
     lasting = any(body.model.n and not body.damping.all() for body in final.scene.bodies)
     least, most = UNDAMPED if lasting else DAMPED
-    finer = [replace(ground.everything, divisions=d) for d in range(1, final.choice.divisions + 1)]
-    allowed = most * cost(final, ledger.span)
-    divisions = max((choice.divisions for choice in finer if of_run(choice, ledger.span.rows) <= allowed), default=1)
+    divisions = final.choice.divisions
+    if _is_verified(ledger, ground.everything, final, verify):
+        least = min(least, FREE)
+    else:
+        finer = [replace(ground.everything, divisions=d) for d in range(1, divisions + 1)]
+        allowed = most * cost(final, ledger.span)
+        divisions = max((one.divisions for one in finer if of_run(one, ledger.span.rows) <= allowed), default=1)
     if divisions < least * ground.coarsest:
         return None
     ledger.tell("everything, finer step")
     everything = replace(ground.everything, divisions=divisions)
     return replace(ground, everything=everything, pilot=ledger.run(everything))
+
+
+def _is_verified(ledger: Ledger, everything: Choice, final: Trial, verify: bool | None) -> bool:
+    return bool(verify) or (verify is None and reference_cost(ledger, everything, final) <= SHORT)
 
 
 # ---- the end ----------------------------------------------------------------------------------------------------------
@@ -221,7 +231,7 @@ def _finer_ground(ledger: Ledger, ground: Ground, final: Trial) -> Ground | None
 def _finished(ledger: Ledger, found: Chosen, verify: bool | None) -> Economy:
     final, verification = found.final, None
     ledger.note(final, "chosen", found.error)
-    if verify or (verify is None and reference_cost(ledger, found.everything, final) <= SHORT):
+    if _is_verified(ledger, found.everything, final, verify):
         final, verification = verified(ledger, found.everything, found.limits, final, found.omitted)
     kept, omitted = _explained(ledger, found, final)
     names = [output.name for output in ledger.of.outputs]

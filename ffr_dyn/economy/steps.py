@@ -33,7 +33,7 @@ WORTH = 0.8  # of the cost: a method that chooses its steps pays
 MOST = 4096  # divisions of an output step
 ATTEMPTS = 10
 MARGIN = 1.1  # on a predicted number of divisions
-RUNG = 2.5  # times the steps of the last run
+RUNG = 3.0  # times the steps of the last run
 PAYS = 4  # coarse runs of two stages to a run as predicted: where it is worth to try these
 ONCE = 0.6  # a shorter run pays when it needs less than this share of the divisions
 NEAR = (1.25, 3.0)  # ratios of the steps of two runs whose difference tells their errors
@@ -73,10 +73,7 @@ def chosen_step(ledger: Ledger, choice: Choice, limit: Array) -> Stepped:
     found = _rigid_in_two_stages(ledger, choice, limit)
     if found is None:
         coarse = ledger.run(choice)
-        found = _coarse(ledger, coarse, limit)
-        if found is None:
-            error = signed(coarse, ledger.run(replace(choice, divisions=2 * choice.divisions)))
-            found = Stepped(coarse, error) if share(error, limit) <= 1 else _finer(ledger, coarse, error, limit)
+        found = _coarse(ledger, coarse, limit) or _finer(ledger, coarse, limit)
     return _longer(ledger, found, limit)
 
 
@@ -109,9 +106,7 @@ def _coarse(ledger: Ledger, coarse: Trial, limit: Array) -> Stepped | None:
     if trial is None:
         return Stepped(coarse, error)
     off = difference(trial.values, coarse.values)
-    return (
-        Stepped(trial, off) if share(off, SURELY * limit) <= 1 else None
-    )  # or else steps over two rows miss something
+    return Stepped(trial, off) if share(off, SURELY * limit) <= 1 else Stepped(coarse, error)
 
 
 def _from_two_rows(ledger: Ledger, trial: Trial) -> Histories | None:
@@ -139,9 +134,14 @@ def _on_all_rows(values: Array) -> Array:
 # ---- a finer step -----------------------------------------------------------------------------------------------------
 
 
-def _finer(ledger: Ledger, coarse: Trial, error: Histories, limit: Array) -> Stepped:
-    """The cheaper of the methods by what they are predicted to need, run with that."""
-    needed = {coarse.choice.method: _needed(coarse, share(error, limit))}
+def _finer(ledger: Ledger, coarse: Trial, limit: Array) -> Stepped:
+    """The cheaper of the methods by what they are predicted to need, run with that, where the coarse run does not do."""
+    error = _from_two_rows(ledger, coarse)
+    if error is None:
+        error = signed(coarse, ledger.run(replace(coarse.choice, divisions=2 * coarse.choice.divisions)))
+        if share(error, limit) <= 1:
+            return Stepped(coarse, error)
+    needed = {coarse.choice.method: _needed(coarse, MARGIN * max(share(error, limit), 1.0))}
     most, truth = (
         per_row(replace(coarse.choice, divisions=needed[coarse.choice.method])),
         difference(coarse.values, error),
