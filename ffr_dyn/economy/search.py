@@ -29,7 +29,7 @@ from ffr_dyn.economy.found import Economy, Verification
 from ffr_dyn.economy.ledger import Ledger, Tried
 from ffr_dyn.economy.outputs import Output, Probe, as_output, difference, largest, probe, ranges, total
 from ffr_dyn.economy.outputs import limits as limits_of
-from ffr_dyn.economy.selection import Selection, Shares, gap, selected_model, size_of
+from ffr_dyn.economy.selection import Insufficient, Selection, Shares, gap, selected_model, size_of
 from ffr_dyn.economy.start import PILOT, Ground, Rigid, started, unmoved
 from ffr_dyn.economy.steps import Stepped, chosen_step
 from ffr_dyn.economy.terms import TermEffect
@@ -50,7 +50,7 @@ SURELY_RIGID = (
 SHORT = 2e6  # [us] of a verification that is made without being asked for
 # another look with a finer step: from how many times the steps, and at what cost of a run of everything, in final runs
 DAMPED, UNDAMPED = (6, 1.0), (2, 1.3)
-FREE = 3  # times the steps, where a verification needs that run of everything anyway
+FREE = 4  # times the steps, where a verification needs that run of everything anyway
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,8 @@ def _beside_everything(ledger: Ledger, stiff: Rigid, omitted: Contributions | No
     if (error + largest(found.time) <= ground.limits).all():
         model = difference(ledger.run(same).values, finer.pilot.values)
         return replace(found, model=largest(model), error=largest(total(model, found.time)))
-    return _stepped(ledger, finer, selected_model(ledger, finer, omitted, Shares(), size_of(same)), omitted, found)
+    beyond = Insufficient(size_of(same), float((error / ground.limits).max()))
+    return _stepped(ledger, finer, selected_model(ledger, finer, omitted, Shares(), beyond), omitted, found)
 
 
 def _stepped(

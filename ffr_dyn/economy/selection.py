@@ -25,6 +25,7 @@ HOPE = 1.0  # times the tolerance: where modes do more by the estimate, rigid bo
 SAFELY = 0.6  # of what may be left out, when what was predicted turns out too much
 DIRECTLY = 0.75  # of the tolerance: a run of two stages that is as near everything is believed, step and all
 COARSE = 5e-3  # of the range: with tolerances that are no less, two stages are tried first
+NEARLY_RIGID = 10.0  # times the tolerance: where modes do no more, too
 
 
 @dataclass(frozen=True)
@@ -91,16 +92,24 @@ class Selection:
     terms: tuple[TermEffect, ...] = ()
 
 
+@dataclass(frozen=True)
+class Insufficient:
+    """A model that does not do: its number of elastic coordinates, and its largest error in tolerances."""
+
+    count: int
+    error: float
+
+
 def selected_model(
-    ledger: Ledger, ground: Ground, omitted: Contributions, shares: Shares, beyond: int = -1
+    ledger: Ledger, ground: Ground, omitted: Contributions, shares: Shares, beyond: Insufficient | None = None
 ) -> Selection:
     """The fewest modes, or shapes made of them, and the fewest terms whose absence leaves the outputs within their share.
 
     omitted : what modes do, driven by the rigid motion
-    beyond  : elastic coordinates of a model that is known not to do
+    beyond  : a model that is known not to do
     """
     all_modes = omitted.effect.sum(axis=0)
-    if beyond < 0 and (all_modes <= HOPE * ground.limits).all():
+    if beyond is None and (all_modes <= HOPE * ground.limits).all():
         stiff = rigid(ground.everything)
         direct = _directly(ledger, ground, stiff)
         if direct is not None:
@@ -110,7 +119,8 @@ def selected_model(
     rankings, effects = _rankings(ledger, ground, omitted, shares)
     predicted = [ranking.model(ranking.count(shares.modes)) for ranking in rankings]
     cheapest = min(range(len(rankings)), key=lambda k: (per_evaluation(predicted[k]), k))
-    choice = _enough(ledger, ground, rankings[cheapest], effects, shares, beyond)
+    quick = bool((ground.limits >= COARSE * ground.scales).all() or (all_modes <= NEARLY_RIGID * ground.limits).all())
+    choice = _enough(ledger, ground, rankings[cheapest], effects, shares, beyond, quick=quick and beyond is None)
     return Selection(choice, rankings[cheapest].left(size_of(choice)), effects)
 
 
@@ -130,11 +140,22 @@ def _rankings(
 
 
 def _enough(
-    ledger: Ledger, ground: Ground, ranking: Ranking, effects: tuple[TermEffect, ...], shares: Shares, beyond: int
+    ledger: Ledger,
+    ground: Ground,
+    ranking: Ranking,
+    effects: tuple[TermEffect, ...],
+    shares: Shares,
+    beyond: Insufficient | None,
+    *,
+    quick: bool,
 ) -> Choice:
-    """The model that a run beside everything shows to be enough; everything where the number of attempts does not do."""
-    scale, count = 1.0, _more(ranking, beyond) if beyond >= 0 else 0
-    terms, quick = shares.terms, beyond < 0 and bool((ground.limits >= COARSE * ground.scales).all())
+    """The model that a run beside everything shows to be enough; everything where the number of attempts does not do.
+
+    quick : whether two stages are tried first
+    """
+    scale, count, terms = 1.0, 0, shares.terms
+    if beyond is not None:
+        scale, count = min(1.0, SAFELY * shares.all / beyond.error), _more(ranking, beyond.count)
     for _ in range(ATTEMPTS):
         count = max(count, ranking.count(scale * shares.modes))
         model = ranking.model(count)
@@ -146,9 +167,9 @@ def _enough(
         error = float((gap(ledger, ground, model, _said(model)) / (shares.all * ground.limits)).max())
         if error <= 1:
             return model
-        quick = quick and _alike(ledger, model, ground.limits)
         if model == ground.everything:
             break
+        quick = quick and _alike(ledger, model, ground.limits)
         if np.isfinite(error):
             scale *= SAFELY / error
             count = _more(ranking, count)

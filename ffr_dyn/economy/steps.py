@@ -27,6 +27,7 @@ Histories = tuple[Array, ...]
 TWO_STAGES, EXPLICIT = "ros2", "rk4"
 SURELY = 0.95  # of the limit: the difference of two coarse runs of different order that is taken for the error of one
 NEARLY = 0.8  # of the limit: an estimate from a run with steps over two rows
+HOPELESS = 8.0  # limits between coarse runs of two stages and of four: neither will do
 FAR = 0.1  # of the limit: steps longer than a row would do
 ACCURACIES = (1e-2, 1e-3)
 WORTH = 0.8  # of the cost: a method that chooses its steps pays
@@ -34,7 +35,6 @@ MOST = 4096  # divisions of an output step
 ATTEMPTS = 10
 MARGIN = 1.1  # on a predicted number of divisions
 RUNG = 3.0  # times the steps of the last run
-PAYS = 4  # coarse runs of two stages to a run as predicted: where it is worth to try these
 ONCE = 0.6  # a shorter run pays when it needs less than this share of the divisions
 NEAR = (1.25, 3.0)  # ratios of the steps of two runs whose difference tells their errors
 
@@ -97,7 +97,7 @@ def _coarse(ledger: Ledger, coarse: Trial, limit: Array) -> Stepped | None:
         off = difference(ledger.runs[simple].values, coarse.values)
         if share(off, SURELY * limit) <= 1:
             return Stepped(ledger.runs[simple], off)
-    error = _from_two_rows(ledger, coarse)
+    error = None if _far_off(ledger, coarse, limit) else _from_two_rows(ledger, coarse)
     if error is None or share(error, NEARLY * limit) > 1:
         return None
     if share(error, FAR * limit) > 1 or simple in ledger.runs:
@@ -107,6 +107,12 @@ def _coarse(ledger: Ledger, coarse: Trial, limit: Array) -> Stepped | None:
         return Stepped(coarse, error)
     off = difference(trial.values, coarse.values)
     return Stepped(trial, off) if share(off, SURELY * limit) <= 1 else Stepped(coarse, error)
+
+
+def _far_off(ledger: Ledger, coarse: Trial, limit: Array) -> bool:
+    """Whether two stages are known to be so far from four that these will not do either."""
+    simple = ledger.runs.get(replace(coarse.choice, method=TWO_STAGES))
+    return simple is not None and share(difference(simple.values, coarse.values), limit) > HOPELESS
 
 
 def _from_two_rows(ledger: Ledger, trial: Trial) -> Histories | None:
@@ -136,33 +142,32 @@ def _on_all_rows(values: Array) -> Array:
 
 def _finer(ledger: Ledger, coarse: Trial, limit: Array) -> Stepped:
     """The cheaper of the methods by what they are predicted to need, run with that, where the coarse run does not do."""
-    error = _from_two_rows(ledger, coarse)
+    error = None if _far_off(ledger, coarse, limit) else _from_two_rows(ledger, coarse)
     if error is None:
         error = signed(coarse, ledger.run(replace(coarse.choice, divisions=2 * coarse.choice.divisions)))
         if share(error, limit) <= 1:
             return Stepped(coarse, error)
-    needed = {coarse.choice.method: _needed(coarse, MARGIN * max(share(error, limit), 1.0))}
-    most, truth = (
-        per_row(replace(coarse.choice, divisions=needed[coarse.choice.method])),
-        difference(coarse.values, error),
-    )
-    for name in (EXPLICIT, TWO_STAGES):
-        choice = replace(coarse.choice, method=name)
-        if name not in methods(ledger.span) or per_row(choice) * (1 if name == EXPLICIT else PAYS) > most:
-            continue
-        trial = _attempt(ledger, choice)
+    now = share(error, limit)
+    needed = {coarse.choice.method: _needed(coarse, MARGIN * max(now, 1.0))}
+    most = per_row(replace(coarse.choice, divisions=needed[coarse.choice.method]))
+    explicit = replace(coarse.choice, method=EXPLICIT)
+    if EXPLICIT in methods(ledger.span) and per_row(explicit) <= most:
+        trial = _attempt(ledger, explicit)
         if trial is not None:
-            needed[name] = _needed(trial, MARGIN * share(difference(trial.values, truth), limit))
-    return _cheapest(ledger, coarse.choice, needed, limit)
+            truth = difference(coarse.values, error)
+            needed[EXPLICIT] = _needed(trial, MARGIN * share(difference(trial.values, truth), limit))
+    return _cheapest(ledger, coarse, needed, limit, now)
 
 
-def _cheapest(ledger: Ledger, choice: Choice, needed: dict[str, int], limit: Array) -> Stepped:
-    """A run within the limit, of the method that costs least by the divisions that each is predicted to need.
+def _cheapest(ledger: Ledger, coarse: Trial, needed: dict[str, int], limit: Array, now: float) -> Stepped:
+    """A run within the limit, of the method that costs least by the divisions that each is predicted to need; `now` is the
+    error of the coarse run in limits.
 
     Every run corrects the prediction for its method. Far predictions are approached in rungs, each of which tells the error
     of the next.
     """
-    before: dict[str, tuple[int, float]] = {}
+    choice = coarse.choice
+    before = {choice.method: (choice.divisions, now)}
     best: Stepped | None = None
     for _ in range(ATTEMPTS):
         name = min(needed, key=lambda name: (per_row(replace(choice, method=name, divisions=needed[name])), name))

@@ -13,16 +13,16 @@ from ffr_dyn.economy.cost import of_run
 from ffr_dyn.economy.found import Verification
 from ffr_dyn.economy.ledger import Ledger
 from ffr_dyn.economy.outputs import Probe, difference, largest
-from ffr_dyn.economy.selection import Shares, selected_model, size_of
+from ffr_dyn.economy.selection import Insufficient, Shares, selected_model, size_of
 from ffr_dyn.economy.start import PILOT, Ground
-from ffr_dyn.economy.steps import error_of
+from ffr_dyn.economy.steps import error_of, order
 from ffr_dyn.economy.trial import Trial, cost
 from ffr_dyn.errors import InputError
 
 Array = np.ndarray
 
 ATTEMPTS = 4
-LONGEST = 4  # times the step of the reference: of a run that tells its error
+LONGEST = 6  # times the step of the reference: of a run that tells its error
 
 
 def reference(everything: Choice, final: Trial) -> Choice:
@@ -47,10 +47,10 @@ def verified(
     ledger.tell("verification: everything, finer step")
     choice = reference(everything, final)
     sharp, coarse = ledger.run(choice), _coarser(ledger, choice)
-    own = largest(error_of(sharp, coarse))
+    own = _own(sharp, coarse)
     if (own > limits).any():
         coarse = ledger.run(half(choice))
-        own = largest(error_of(sharp, coarse))
+        own = _own(sharp, coarse)
     _check_accuracy(ledger.of, limits, own)
     errors: list[Array] = []
     while True:
@@ -77,6 +77,12 @@ def _coarser(ledger: Ledger, choice: Choice) -> Trial:
     return max(there, key=lambda trial: trial.choice.divisions) if there else ledger.run(half(choice))
 
 
+def _own(sharp: Trial, coarse: Trial) -> Array:
+    """(outputs,) error of the reference; from steps that are far longer, as if of an order less, which makes it larger."""
+    error, ratio = largest(error_of(sharp, coarse)), sharp.choice.divisions / coarse.choice.divisions
+    return error if ratio <= 2 else error * (ratio ** order(sharp) - 1) / (ratio ** (order(sharp) - 1) - 1)
+
+
 def _check_accuracy(of: Probe, limits: Array, own: Array) -> None:
     for output, limit, known in zip(of.outputs, limits, own, strict=True):
         if known > limit:
@@ -91,7 +97,8 @@ def _better(
 ) -> Trial:
     """A better model: of a finer step where that is what is wrong, or else chosen anew beside everything with that step."""
     same = replace(final.choice, method=PILOT, divisions=coarse.choice.divisions, accuracy=0.0)
-    if (largest(difference(ledger.run(same).values, coarse.values)) <= Shares().all * limits).all():
+    gap = largest(difference(ledger.run(same).values, coarse.values))
+    if (gap <= Shares().all * limits).all():
         return ledger.run(_shorter(final.choice))
     steps: dict[str, Any] = {key: getattr(final.choice, key) for key in ("method", "divisions", "accuracy")}
     if not final.choice.integrator(ledger.span.output_step).implicit:  # its step is for the modes that it had
@@ -99,7 +106,8 @@ def _better(
     if attempt > 1:
         return ledger.run(replace(coarse.choice, **steps))
     ground = Ground(coarse.choice, coarse.choice, coarse, limits, limits)
-    anew = selected_model(ledger, ground, omitted, Shares(), size_of(final.choice)).choice
+    beyond = Insufficient(size_of(final.choice), float((gap / limits).max()))
+    anew = selected_model(ledger, ground, omitted, Shares(), beyond).choice
     return ledger.run(replace(anew, **steps))
 
 
