@@ -33,7 +33,7 @@ from ffr_dyn.economy.selection import Insufficient, Selection, Shares, gap, sele
 from ffr_dyn.economy.start import PILOT, Ground, Rigid, started, unmoved
 from ffr_dyn.economy.steps import Stepped, chosen_step
 from ffr_dyn.economy.terms import TermEffect
-from ffr_dyn.economy.trial import Span, Trial, cost
+from ffr_dyn.economy.trial import Span, Trial, cost, rings
 from ffr_dyn.economy.verification import reference_cost, verified
 from ffr_dyn.scene import Scene
 from ffr_dyn.settings import Forward, Settings
@@ -149,7 +149,7 @@ def _beside_everything(ledger: Ledger, stiff: Rigid, omitted: Contributions | No
     steps = {"method": PILOT, "divisions": finer.coarsest, "accuracy": 0.0}
     same = replace(found.final.choice, **steps)  # type: ignore[arg-type]
     error = gap(ledger, finer, same, "the same with a finer step")
-    if (error + largest(found.time) <= ground.limits).all():
+    if (error + largest(found.time) <= OF_ALL * ground.limits).all():
         model = difference(ledger.run(same).values, finer.pilot.values)
         return replace(found, model=largest(model), error=largest(total(model, found.time)))
     beyond = Insufficient(size_of(same), float((error / ground.limits).max()))
@@ -179,9 +179,7 @@ def _stepped(
     )
 
 
-def _at_once(
-    ledger: Ledger, ground: Ground, selection: Selection, omitted: Contributions, error: Histories
-) -> Chosen:
+def _at_once(ledger: Ledger, ground: Ground, selection: Selection, omitted: Contributions, error: Histories) -> Chosen:
     """A model of another method than everything, whose run beside that tells all of its `error`."""
     return Chosen(
         ledger.run(selection.choice),
@@ -206,8 +204,7 @@ def _as_like(ledger: Ledger, choice: Choice, like: Chosen) -> Stepped:
 def _finer_ground(ledger: Ledger, ground: Ground, final: Trial, verify: bool | None) -> Ground | None:
     """Everything with a finer step than before: that of the final run where a verification follows, which needs such a run
     anyway; or else one that costs a part of the final run, where that is much finer than before."""
-    lasting = any(body.model.n and not body.damping.all() for body in final.scene.bodies)
-    least, most = UNDAMPED if lasting else DAMPED
+    least, most = UNDAMPED if rings(final) else DAMPED
     divisions = final.choice.divisions
     if _is_verified(ledger, ground.everything, final, verify):
         least = min(least, FREE)

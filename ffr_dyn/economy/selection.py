@@ -13,6 +13,7 @@ from ffr_dyn.economy.ledger import Ledger
 from ffr_dyn.economy.outputs import difference, largest
 from ffr_dyn.economy.start import SCOUT, Ground
 from ffr_dyn.economy.terms import TermEffect, term_effects, without_minor
+from ffr_dyn.economy.trial import rings
 from ffr_dyn.errors import SimulationError
 from ffr_dyn.scene import Scene
 
@@ -24,6 +25,9 @@ MORE = 1.2  # times as many directions, at least, after those that were not enou
 HOPE = 1.0  # times the tolerance: where modes do more by the estimate, rigid bodies are not tried
 SAFELY = 0.6  # of what may be left out, when what was predicted turns out too much
 DIRECTLY = 0.75  # of the tolerance: a run of two stages that is as near everything is believed, step and all
+RINGING = (
+    0.5  # the same of a fine tolerance where something vibrates undamped: the coarse run of everything errs as well
+)
 COARSE = 5e-3  # of the range: with tolerances that are no less, two stages are tried first
 NEARLY_RIGID = 10.0  # times the tolerance: where modes do no more, too
 
@@ -32,7 +36,7 @@ NEARLY_RIGID = 10.0  # times the tolerance: where modes do no more, too
 class Shares:
     """Shares of the tolerance that may be taken by modes left out, by terms, by rigid bodies, and by all that is left out."""
 
-    modes: float = 0.04
+    modes: float = 0.03
     terms: float = 0.15
     rigid: float = 0.5
     all: float = 0.5
@@ -119,7 +123,7 @@ def selected_model(
     rankings, effects = _rankings(ledger, ground, omitted, shares)
     predicted = [ranking.model(ranking.count(shares.modes)) for ranking in rankings]
     cheapest = min(range(len(rankings)), key=lambda k: (per_evaluation(predicted[k]), k))
-    quick = bool((ground.limits >= COARSE * ground.scales).all() or (all_modes <= NEARLY_RIGID * ground.limits).all())
+    quick = _is_coarse(ground) or bool((all_modes <= NEARLY_RIGID * ground.limits).all())
     choice = _enough(ledger, ground, rankings[cheapest], effects, shares, beyond, quick=quick and beyond is None)
     return Selection(choice, rankings[cheapest].left(size_of(choice)), effects)
 
@@ -183,7 +187,12 @@ def _directly(ledger: Ledger, ground: Ground, model: Choice) -> Choice | None:
     """The model in two stages, where that is near everything in four: its step is told then with what is left out."""
     simple = replace(model, method=SCOUT)
     error = gap(ledger, ground, simple, f"{_said(model)}, two stages")
-    return simple if (error <= DIRECTLY * ground.limits).all() else None
+    part = RINGING if rings(ground.pilot) and not _is_coarse(ground) else DIRECTLY
+    return simple if (error <= part * ground.limits).all() else None
+
+
+def _is_coarse(ground: Ground) -> bool:
+    return bool((ground.limits >= COARSE * ground.scales).all())
 
 
 def _alike(ledger: Ledger, model: Choice, limits: Array) -> bool:

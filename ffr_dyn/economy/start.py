@@ -91,7 +91,8 @@ class Rigid:
 
 
 def started(ledger: Ledger, flat: Scene) -> Rigid:
-    """Rigid bodies with steps as long as complete a run, over two rows at most; `flat` is the scene as it is assembled, with its plane."""
+    """Rigid bodies with steps as long as complete a run, over two rows at most; `flat` is the scene as it is assembled, with
+    its plane."""
     ledger.tell("rigid bodies, coarse step")
     spatial = full(ledger.scene, PILOT, 1)
     held = held_in_plane(spatial, flat)

@@ -17,7 +17,7 @@ from ffr_dyn.economy.choice import Choice
 from ffr_dyn.economy.cost import STAGES, per_row
 from ffr_dyn.economy.ledger import Ledger
 from ffr_dyn.economy.outputs import difference, largest
-from ffr_dyn.economy.trial import Span, Trial, cost
+from ffr_dyn.economy.trial import Span, Trial, cost, rings
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import CONTROLLED, METHODS, RK4, Integrator
 
@@ -26,6 +26,7 @@ Histories = tuple[Array, ...]
 
 TWO_STAGES, EXPLICIT = "ros2", "rk4"
 SURELY = 0.95  # of the limit: the difference of two coarse runs of different order that is taken for the error of one
+RINGING = 0.5  # the same where something vibrates without damping
 NEARLY = 0.8  # of the limit: an estimate from a run with steps over two rows
 HOPELESS = 8.0  # limits between coarse runs of two stages and of four: neither will do
 FAR = 0.1  # of the limit: steps longer than a row would do
@@ -33,7 +34,7 @@ ACCURACIES = (1e-2, 1e-3)
 WORTH = 0.8  # of the cost: a method that chooses its steps pays
 MOST = 4096  # divisions of an output step
 ATTEMPTS = 10
-MARGIN = 1.1  # on a predicted number of divisions
+MARGIN = 1.35  # on a predicted number of divisions
 RUNG = 3.0  # times the steps of the last run
 ONCE = 0.6  # a shorter run pays when it needs less than this share of the divisions
 NEAR = (1.25, 3.0)  # ratios of the steps of two runs whose difference tells their errors
@@ -93,20 +94,25 @@ def _rigid_in_two_stages(ledger: Ledger, choice: Choice, limit: Array) -> Steppe
 def _coarse(ledger: Ledger, coarse: Trial, limit: Array) -> Stepped | None:
     """The coarse run, or one of two stages, where steps over two rows show that this is enough."""
     simple = replace(coarse.choice, method=TWO_STAGES)
-    if simple in ledger.runs:
-        off = difference(ledger.runs[simple].values, coarse.values)
-        if share(off, SURELY * limit) <= 1:
-            return Stepped(ledger.runs[simple], off)
-    error = None if _far_off(ledger, coarse, limit) else _from_two_rows(ledger, coarse)
+    found = _of_both(ledger.runs[simple], coarse, limit) if simple in ledger.runs else None
+    if found is not None or _far_off(ledger, coarse, limit):
+        return found
+    error = _from_two_rows(ledger, coarse)
     if error is None or share(error, NEARLY * limit) > 1:
         return None
     if share(error, FAR * limit) > 1 or simple in ledger.runs:
         return Stepped(coarse, error)
     trial = _attempt(ledger, simple)
-    if trial is None:
-        return Stepped(coarse, error)
-    off = difference(trial.values, coarse.values)
-    return Stepped(trial, off) if share(off, SURELY * limit) <= 1 else Stepped(coarse, error)
+    return (None if trial is None else _of_both(trial, coarse, limit)) or Stepped(coarse, error)
+
+
+def _of_both(simple: Trial, coarse: Trial, limit: Array) -> Stepped | None:
+    """Two stages, where their difference from four is small. Where something rings, steps over two rows do not tell what
+    the step does to that: four stages are taken for the error of two then."""
+    off = difference(simple.values, coarse.values)
+    if share(off, (RINGING if rings(coarse) else SURELY) * limit) <= 1:
+        return Stepped(simple, off)
+    return Stepped(coarse, off) if rings(coarse) and share(off, limit) <= 1 else None
 
 
 def _far_off(ledger: Ledger, coarse: Trial, limit: Array) -> bool:

@@ -92,9 +92,7 @@ def _check_accuracy(of: Probe, limits: Array, own: Array) -> None:
             )
 
 
-def _better(
-    ledger: Ledger, limits: Array, final: Trial, coarse: Trial, omitted: Contributions, attempt: int
-) -> Trial:
+def _better(ledger: Ledger, limits: Array, final: Trial, coarse: Trial, omitted: Contributions, attempt: int) -> Trial:
     """A better model: of a finer step where that is what is wrong, or else chosen anew beside everything with that step."""
     same = replace(final.choice, method=PILOT, divisions=coarse.choice.divisions, accuracy=0.0)
     gap = largest(difference(ledger.run(same).values, coarse.values))
