@@ -25,18 +25,21 @@ MORE = 1.2  # times as many directions, at least, after those that were not enou
 HOPE = 1.0  # times the tolerance: where modes do more by the estimate, rigid bodies are not tried
 SAFELY = 0.6  # of what may be left out, when what was predicted turns out too much
 DIRECTLY = 0.75  # of the tolerance: a run of two stages that is as near everything is believed, step and all
-RINGING = (
-    0.5  # the same of a fine tolerance where something vibrates undamped: the coarse run of everything errs as well
-)
+RINGING = 0.5  # the same where something vibrates undamped and tolerances are fine: everything errs by its step as well
+WITHIN_REACH = 2.5  # times what is believed: another run of two stages is worth it
 COARSE = 5e-3  # of the range: with tolerances that are no less, two stages are tried first
 NEARLY_RIGID = 10.0  # times the tolerance: where modes do no more, too
 
 
 @dataclass(frozen=True)
 class Shares:
-    """Shares of the tolerance that may be taken by modes left out, by terms, by rigid bodies, and by all that is left out."""
+    """Shares of the tolerance that may be taken by modes left out, by terms, by rigid bodies, and by all that is left out.
+
+    modes are counted with a margin, since one more costs less than another run; bold : the same without
+    """
 
     modes: float = 0.03
+    bold: float = 0.15
     terms: float = 0.15
     rigid: float = 0.5
     all: float = 0.5
@@ -115,17 +118,18 @@ def selected_model(
     all_modes = omitted.effect.sum(axis=0)
     if beyond is None and (all_modes <= HOPE * ground.limits).all():
         stiff = rigid(ground.everything)
-        direct = _directly(ledger, ground, stiff)
-        if direct is not None:
-            return Selection(direct, all_modes)
+        if _directly(ledger, ground, stiff) <= 1:
+            return Selection(replace(stiff, method=SCOUT), all_modes)
         if (gap(ledger, ground, stiff, "all bodies rigid") <= shares.rigid * ground.limits).all():
             return Selection(stiff, all_modes)
     rankings, effects = _rankings(ledger, ground, omitted, shares)
     predicted = [ranking.model(ranking.count(shares.modes)) for ranking in rankings]
-    cheapest = min(range(len(rankings)), key=lambda k: (per_evaluation(predicted[k]), k))
-    quick = _is_coarse(ground) or bool((all_modes <= NEARLY_RIGID * ground.limits).all())
-    choice = _enough(ledger, ground, rankings[cheapest], effects, shares, beyond, quick=quick and beyond is None)
-    return Selection(choice, rankings[cheapest].left(size_of(choice)), effects)
+    best = rankings[min(range(len(rankings)), key=lambda k: (per_evaluation(predicted[k]), k))]
+    choice = None
+    if beyond is None and (_is_coarse(ground) or (all_modes <= NEARLY_RIGID * ground.limits).all()):
+        choice = _in_two_stages(ledger, ground, best, effects, shares)
+    choice = _enough(ledger, ground, best, effects, shares, beyond) if choice is None else choice
+    return Selection(choice, best.left(size_of(choice)), effects)
 
 
 def _rankings(
@@ -150,13 +154,8 @@ def _enough(
     effects: tuple[TermEffect, ...],
     shares: Shares,
     beyond: Insufficient | None,
-    *,
-    quick: bool,
 ) -> Choice:
-    """The model that a run beside everything shows to be enough; everything where the number of attempts does not do.
-
-    quick : whether two stages are tried first
-    """
+    """The model that a run beside everything shows to be enough; everything where the number of attempts does not do."""
     scale, count, terms = 1.0, 0, shares.terms
     if beyond is not None:
         scale, count = min(1.0, SAFELY * shares.all / beyond.error), _more(ranking, beyond.count)
@@ -165,15 +164,11 @@ def _enough(
         model = ranking.model(count)
         if terms:
             model = without_minor(model, effects, scale * terms * ground.limits)
-        direct = _directly(ledger, ground, model) if quick else None
-        if direct is not None:
-            return direct
         error = float((gap(ledger, ground, model, _said(model)) / (shares.all * ground.limits)).max())
         if error <= 1:
             return model
         if model == ground.everything:
             break
-        quick = quick and _alike(ledger, model, ground.limits)
         if np.isfinite(error):
             scale *= SAFELY / error
             count = _more(ranking, count)
@@ -183,24 +178,33 @@ def _enough(
     return ground.everything
 
 
-def _directly(ledger: Ledger, ground: Ground, model: Choice) -> Choice | None:
-    """The model in two stages, where that is near everything in four: its step is told then with what is left out."""
-    simple = replace(model, method=SCOUT)
-    error = gap(ledger, ground, simple, f"{_said(model)}, two stages")
+# ---- two stages -------------------------------------------------------------------------------------------------------
+
+
+def _in_two_stages(
+    ledger: Ledger, ground: Ground, ranking: Ranking, effects: tuple[TermEffect, ...], shares: Shares
+) -> Choice | None:
+    """A model in two stages: with few modes first, since they may do; with more where that is not far off."""
+    for count in dict.fromkeys(ranking.count(part) for part in (shares.bold, shares.modes)):
+        model = without_minor(ranking.model(count), effects, shares.terms * ground.limits)
+        error = _directly(ledger, ground, model)
+        if error <= 1:
+            return replace(model, method=SCOUT)
+        if error > WITHIN_REACH:
+            break
+    return None
+
+
+def _directly(ledger: Ledger, ground: Ground, model: Choice) -> float:
+    """How far the model in two stages is from everything in four, over what is believed: its step is told then with what is
+    left out."""
+    error = gap(ledger, ground, replace(model, method=SCOUT), f"{_said(model)}, two stages")
     part = RINGING if rings(ground.pilot) and not _is_coarse(ground) else DIRECTLY
-    return simple if (error <= part * ground.limits).all() else None
+    return float((error / (part * ground.limits)).max())
 
 
 def _is_coarse(ground: Ground) -> bool:
     return bool((ground.limits >= COARSE * ground.scales).all())
-
-
-def _alike(ledger: Ledger, model: Choice, limits: Array) -> bool:
-    """Whether two stages do for a model, of which there are runs with two and with four."""
-    one, other = (ledger.runs.get(choice) for choice in (replace(model, method=SCOUT), model))
-    if one is None or other is None:
-        return False
-    return bool((largest(difference(one.values, other.values)) <= DIRECTLY * limits).all())
 
 
 def _more(ranking: Ranking, count: int) -> int:

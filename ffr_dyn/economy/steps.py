@@ -212,7 +212,7 @@ def _seen_order(trial: Trial, error: float, before: tuple[int, float] | None) ->
     if before is None or before[0] >= trial.choice.divisions or not 0 < error < before[1]:
         return float(order(trial))
     seen = np.log(before[1] / error) / np.log(trial.choice.divisions / before[0])
-    return float(np.clip(seen, 1.0, order(trial)))
+    return float(np.clip(seen, 2.0, order(trial)))
 
 
 def measured(ledger: Ledger, trial: Trial) -> Histories:
