@@ -23,6 +23,7 @@ NEARLY_ALL = 0.8  # of the modes: then those of the full motion are ranked inste
 ATTEMPTS = 5
 MORE = 1.2  # times as many directions, at least, after those that were not enough
 HOPE = 1.0  # times the tolerance: where modes do more by the estimate, rigid bodies are not tried
+STUCK = 0.9  # of the error before: more directions have not helped
 SAFELY = 0.6  # of what may be left out, when what was predicted turns out too much
 DIRECTLY = 0.75  # of the tolerance: a run of two stages that is as near everything is believed, step and all
 RINGING = 0.5  # the same where something vibrates undamped and tolerances are fine: everything errs by its step as well
@@ -68,9 +69,19 @@ class Ranking:
         """(outputs,) what all directions but the first do."""
         return self.found.effect[self.order[count:]].sum(axis=0)
 
-    def model(self, count: int) -> Choice:
-        """Everything with the first directions only."""
-        chosen = self.order[:count]
+    def leaders(self, count: int) -> tuple[int, ...]:
+        """The direction with most strain energy of every body that has none among the first."""
+        there = set(self.found.body[self.order[:count]])
+        omega2 = [self.scene.bodies[b].model.omega2 for b in self.found.body]
+        energy = [
+            a * a * float(s * s @ w) for a, s, w in zip(self.found.amplitude, self.found.shape, omega2, strict=True)
+        ]
+        listed = [np.flatnonzero(self.found.body == b) for b in np.unique(self.found.body) if b not in there]
+        return tuple(int(of_body[np.argmax(np.array(energy)[of_body])]) for of_body in listed)
+
+    def model(self, count: int, also: tuple[int, ...] = ()) -> Choice:
+        """Everything with the first directions only, and some others."""
+        chosen = [*self.order[:count], *also]
         parts = list(self.everything.parts)
         for b, part in enumerate(parts):
             shapes = [self.found.shape[k] for k in chosen if self.found.body[k] == b]
@@ -157,11 +168,13 @@ def _enough(
 ) -> Choice:
     """The model that a run beside everything shows to be enough; everything where the number of attempts does not do."""
     scale, count, terms = 1.0, 0, shares.terms
+    before: float = np.inf
+    also: tuple[int, ...] = ()
     if beyond is not None:
         scale, count = min(1.0, SAFELY * shares.all / beyond.error), _more(ranking, beyond.count)
     for _ in range(ATTEMPTS):
         count = max(count, ranking.count(scale * shares.modes))
-        model = ranking.model(count)
+        model = ranking.model(count, also)
         if terms:
             model = without_minor(model, effects, scale * terms * ground.limits)
         error = float((gap(ledger, ground, model, _said(model)) / (shares.all * ground.limits)).max())
@@ -169,6 +182,9 @@ def _enough(
             return model
         if model == ground.everything:
             break
+        if error > STUCK * before:  # what is missing comes by way of a body that does nothing to the outputs itself
+            also = ranking.leaders(count)
+        before = error
         if np.isfinite(error):
             scale *= SAFELY / error
             count = _more(ranking, count)

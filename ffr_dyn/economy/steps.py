@@ -34,7 +34,7 @@ ACCURACIES = (1e-2, 1e-3)
 WORTH = 0.8  # of the cost: a method that chooses its steps pays
 MOST = 4096  # divisions of an output step
 ATTEMPTS = 10
-MARGIN = 1.35  # on a predicted number of divisions
+MARGIN = 1.6  # on an error from which the number of divisions is predicted
 RUNG = 3.0  # times the steps of the last run
 ONCE = 0.6  # a shorter run pays when it needs less than this share of the divisions
 NEAR = (1.25, 3.0)  # ratios of the steps of two runs whose difference tells their errors
@@ -116,9 +116,12 @@ def _of_both(simple: Trial, coarse: Trial, limit: Array) -> Stepped | None:
 
 
 def _far_off(ledger: Ledger, coarse: Trial, limit: Array) -> bool:
-    """Whether two stages are known to be so far from four that these will not do either."""
-    simple = ledger.runs.get(replace(coarse.choice, method=TWO_STAGES))
-    return simple is not None and share(difference(simple.values, coarse.values), limit) > HOPELESS
+    """Whether two stages, of this model or one of fewer modes, are so far from four that these will not do either."""
+    return any(
+        share(difference(trial.values, coarse.values), limit) > HOPELESS
+        for choice, trial in ledger.runs.items()
+        if choice.method == TWO_STAGES and any(part.count for part in choice.parts)
+    )
 
 
 def _from_two_rows(ledger: Ledger, trial: Trial) -> Histories | None:
@@ -188,7 +191,7 @@ def _cheapest(ledger: Ledger, coarse: Trial, needed: dict[str, int], limit: Arra
             best = Stepped(trial, error)
         power = 1 / _seen_order(trial, now, before.get(name))
         before[name] = divisions, now
-        better = int(np.ceil(divisions * now**power * (MARGIN if now > 1 else 1.0)))
+        better = int(np.ceil(divisions * (now * (MARGIN if now > 1 else 1.0)) ** power))
         if best is not None and (now > 1 or better >= ONCE * divisions or divisions == 1):
             return best
         needed[name] = int(np.clip(better if better != divisions else divisions + 1, 1, MOST))
