@@ -2,11 +2,12 @@
 
 It costs little more than a few runs of the model it finds:
 
-1. all bodies rigid, a coarse step, in the plane where the joints keep the scene to one;
+1. all bodies rigid, steps over two rows, in the plane where the joints keep the scene to one;
 2. every mode driven one-way by that motion (`drive`): what each of them does to each output. Where they do next to nothing,
    rigid bodies are the model, and nothing else is run;
 3. else everything with the coarse step, and along its motion what each inertia term and the stiffening by each load do;
-4. the modes and terms that must stay (`selection`), in a run beside that of everything, which measures what is left out;
+4. the modes and terms that must stay (`selection`), in a run beside that of everything, which measures what is left out; in
+   two stages where tolerances are coarse: if that is near everything in four, it is the model, step and all;
 5. integrator and step (`steps`); where the step turns out much finer, everything and the model once more with a finer one;
 6. if wanted, a run with everything on and a finer step, against which all errors are verified (`verification`).
 
@@ -58,6 +59,7 @@ class Chosen:
     """A model with its step, and histories (T, k) of its estimated errors: of what is left out, and of the step.
 
     everything, spatial, limits, scales : as of `Ground`;  omitted : what modes do, driven by the rigid motion
+    together : whether one run beside everything told both, as `time`; `model` is an estimate then
     """
 
     final: Trial
@@ -70,6 +72,7 @@ class Chosen:
     limits: Array
     scales: Array
     omitted: Contributions
+    together: bool = False
 
 
 def economise(
@@ -192,6 +195,7 @@ def _at_once(ledger: Ledger, ground: Ground, selection: Selection, omitted: Cont
         ground.limits,
         ground.scales,
         omitted,
+        together=True,
     )
 
 
@@ -243,6 +247,7 @@ def _finished(ledger: Ledger, found: Chosen, verify: bool | None) -> Economy:
         scales=found.scales,
         model_error=found.model,
         time_error=largest(found.time),
+        together=found.together,
         error=found.error,
         effects=omitted,
         kept=kept,

@@ -1,8 +1,8 @@
 """The integrator and step that keep the error of time discretisation below a limit at the least cost.
 
-The model's coarse run is there already. Two stages instead of four are tried first: where their difference is small they are
-enough. Next a run with twice the step, or half of it, tells the error of the coarse one with its sign,
-y(h) - y = (y(2h) - y(h)) / (2^p - 1), and the orders predict the step that each method needs; the cheapest is run with it.
+The model's coarse run is there already. One with twice the step, or half of it, tells its error with its sign,
+y(h) - y = (y(2h) - y(h)) / (2^p - 1). Two stages instead of four are tried where that is small: where they differ little
+they are enough. Where the coarse step is not, the orders predict the one that each method needs; the cheapest is run with it.
 """
 
 from __future__ import annotations
