@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -55,7 +56,7 @@ def info(result: Path) -> None:
 
     loaded = load_result(result)
     for key, value in sorted(loaded.attributes.items()):
-        for line in value if isinstance(value, list) else [value]:
+        for line in _attribute(key, value):
             click.echo(f"{key:20} {line}")
     click.echo(f"{'rows':20} {loaded.time.size}, from {loaded.time[0]:g} to {loaded.time[-1]:g} s\n")
     for name, quantity in loaded.quantities.items():
@@ -114,6 +115,19 @@ def animate(result: Path, output: Path, scale: str, duration: float | None, colo
 
 for command in (run, forward, *COMMANDS, stress, chart, economise, realtime, stability):
     cli.add_command(command)
+
+
+def _attribute(key: str, value: Any) -> list[str]:
+    """An attribute in lines: numbers with their units on one, texts a line each."""
+    if key == "largest_drift":
+        return [f"{value[0]:.3g} of positions, {value[1]:.3g} of rates"]
+    if isinstance(value, list):
+        return [str(line) for line in value]
+    return [
+        f"{value:.10g}{' s' if key in ('start', 'end', 'output_step') else ''}"
+        if isinstance(value, float)
+        else str(value)
+    ]
 
 
 def _number(text: str) -> float:
