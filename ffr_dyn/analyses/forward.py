@@ -15,7 +15,6 @@ from ffr_dyn.analyses.energy import EnergyWatch
 from ffr_dyn.analyses.events import Event, Watcher
 from ffr_dyn.analyses.failure import failure
 from ffr_dyn.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
-from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import new_record
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince, Integrator
@@ -90,7 +89,6 @@ def forward(
     _check_stabilisation(method, stabilisation)
     assembled = assemble(scene, time=start) if assembled is None else assembled
     wanted = selected(assembled.system, outputs)
-    ensure_compiled(type(method), model=assembled.system.model)
     span = (start, end, output_step)
     mark = _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
     header = _header(scene, assembled, method, stabilisation, span)
