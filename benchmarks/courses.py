@@ -15,7 +15,6 @@ import numpy as np
 
 from benchmarks.scenes import chain, connecting_rod, pendulum, pendulum_rod, slider_crank, with_middle
 from ffr_dyn.analyses.assemble import Assembled, assemble
-from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import new_record
 from ffr_dyn.integrators import RK4, ROS3, Integrator
 from ffr_dyn.kernels.tables import OK
@@ -145,7 +144,6 @@ class Run:
 
 def drive(start: Assembled, course: Course, method: Integrator, stabilisation: Stabilisation) -> Run | None:
     """The compiled loop over a course, None where the method fails."""
-    ensure_compiled(type(method), model=start.system.model)
     substeps = LOOKS if method.controlled else round(course.output_step / method.step)
     spacing = course.output_step / substeps
     machine = new_machine(start.system, start.x, start.v, method, gains(stabilisation), spacing=spacing)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -55,7 +56,7 @@ def info(result: Path) -> None:
 
     loaded = load_result(result)
     for key, value in sorted(loaded.attributes.items()):
-        for line in value if isinstance(value, list) else [value]:
+        for line in _attribute(key, value):
             click.echo(f"{key:20} {line}")
     click.echo(f"{'rows':20} {loaded.time.size}, from {loaded.time[0]:g} to {loaded.time[-1]:g} s\n")
     for name, quantity in loaded.quantities.items():
@@ -68,12 +69,21 @@ def info(result: Path) -> None:
 @click.argument("names", nargs=-1, required=True)
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="Picture, .png or .svg.")
 @click.option("--title", help="Title of the picture.")
-def plot(result: Path, names: tuple[str, ...], output: Path, title: str | None) -> None:
-    """Draw the histories NAMES of RESULT, a panel per unit. `ffr-dyn info` lists the names."""
+@click.option("--path", "plane", metavar="PLANE", help="Draw the path of one marker, such as rod.tip, in xy, zx, ...")
+def plot(result: Path, names: tuple[str, ...], output: Path, title: str | None, plane: str | None) -> None:
+    """Draw the histories NAMES of RESULT, a panel per unit. `ffr-dyn info` lists the names.
+
+    With --path xy the path of a marker in that plane instead, coloured by time.
+    """
     from ffr_dyn import plots
     from ffr_dyn.result_file import load_result
 
-    plots.plot(load_result(result), names, output, title=title)
+    if plane is None:
+        plots.plot(load_result(result), names, output, title=title)
+    elif len(names) == 1:
+        plots.plot_path(load_result(result), names[0].removesuffix(".position"), output, plane=plane, title=title)
+    else:
+        raise InputError(f"--path {plane}: give one marker, not {len(names)} names")
     click.echo(f"picture  {output}")
 
 
@@ -107,6 +117,19 @@ for command in (run, forward, *COMMANDS, stress, chart, economise, realtime, sta
     cli.add_command(command)
 
 
+def _attribute(key: str, value: Any) -> list[str]:
+    """An attribute in lines: numbers with their units on one, texts a line each."""
+    if key == "largest_drift":
+        return [f"{value[0]:.3g} of positions, {value[1]:.3g} of rates"]
+    if isinstance(value, list):
+        return [str(line) for line in value]
+    return [
+        f"{value:.10g}{' s' if key in ('start', 'end', 'output_step') else ''}"
+        if isinstance(value, float)
+        else str(value)
+    ]
+
+
 def _number(text: str) -> float:
     try:
         return float(text)
@@ -129,6 +152,8 @@ def main() -> None:
         sys.exit(2)
     except click.ClickException as error:
         _leave(error.format_message(), error.exit_code)
+    except OSError as error:
+        _leave(f"{error.filename2 or error.filename or 'file'}: {error.strerror or error}; choose another place", 2)
     except (click.Abort, KeyboardInterrupt):
         _leave("interrupted; the result file holds what was computed", 1)
 

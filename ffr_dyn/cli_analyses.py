@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -182,6 +183,8 @@ def _at_moment(
     """The settings of a file with another analysis, at another time if one is given."""
     from ffr_dyn.settings import MomentSettings
 
+    if time is not None and not math.isfinite(time):
+        raise InputError(f"--time {time}: give a time in seconds")
     given = settings.time if isinstance(settings, MomentSettings) else 0.0
     return MomentSettings(given if time is None else time, keep or settings.outputs, analysis)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffr_dyn.cli_run import assignments, parameter_option, scene_argument
+from ffr_dyn.cli_run import assignments, parameter_option, require_after, require_file, scene_argument
 from ffr_dyn.errors import InputError
 
 if TYPE_CHECKING:
@@ -95,6 +95,9 @@ def chart(
     loaded, settings = load_scene(scene, assignments(parameters))
     if not isinstance(settings, Settings) or not isinstance(settings.analysis, Forward):
         raise InputError("a chart compares runs of forward dynamics; the scene file asks for another analysis")
+    require_after("--end", end, settings.start)
+    output = output or scene.with_suffix(".chart")
+    require_file("-o", output.with_name(f"{output.name}.png"))
     span = Span(settings.end if end is None else end, settings.output_step, settings.start)
     wanted, models = _methods(methods), _models(loaded, modes, drops, bodies)
     chosen = measures_of(loaded, measures, span.start)
@@ -105,7 +108,7 @@ def chart(
         )  # fmt: skip
     for line in _report(found, against):
         click.echo(line)
-    for path in _write(found, output or scene.with_suffix(".chart"), against):
+    for path in _write(found, output, against):
         click.echo(f"written      {path}")
 
 

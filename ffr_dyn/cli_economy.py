@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ffr_dyn.cli_run import assignments, over_time, parameter_option, scene_argument
+from ffr_dyn.cli_run import assignments, over_time, parameter_option, require_after, require_file, scene_argument
 
 EXAMPLE = """\b
 Example:
@@ -65,6 +65,11 @@ def economise(
 
     loaded, given = load_scene(scene, assignments(parameters))
     settings = over_time(given, Forward(), ())
+    target = target or scene.with_suffix(".economised.toml")
+    require_after("--end", end, settings.start)
+    require_file("-o", target)
+    require_file("--report", report, (".html", ".md", ".txt"))
+    require_file("--chart", chart, (".png", ".svg"))
     found = search(
         loaded,
         outputs,
@@ -76,7 +81,6 @@ def economise(
         stabilisation=settings.stabilisation,
         tell=lambda stage: click.echo(f"... {stage}", err=True),
     )
-    target = target or scene.with_suffix(".economised.toml")
     save_scene(found.scene, found.settings, target)
     write_report(found, report or target.with_suffix(".html"))
     if chart is not None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ffr_dyn.cli_run import assignments, parameter_option, scene_argument
+from ffr_dyn.cli_run import assignments, parameter_option, require_file, scene_argument
 from ffr_dyn.errors import InputError
 
 EXAMPLE = """\b
@@ -62,6 +62,7 @@ def realtime(
     if method is not None and method not in METHODS:
         raise InputError(f"--method {method}: there is no such method; there are {', '.join(METHODS)}")
     kind: Any = type(given) if method is None else METHODS[method]
+    require_file("--plot", plot, (".png", ".svg", ".pdf"))
     with progress(loaded.name, duration) as update:
         timing = measure_steps(
             loaded,

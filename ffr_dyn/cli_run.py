@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -94,6 +96,27 @@ def assignments(parameters: tuple[str, ...]) -> dict[str, str]:
     return {name.strip(): value.strip() for name, _, value in pairs}
 
 
+def require_file(option: str, path: Path | None, suffixes: tuple[str, ...] = ()) -> None:
+    """Before the work, not after it: InputError for a file that could not be written, or not in a known format."""
+    if path is None:
+        return
+    if path.is_dir():
+        raise InputError(f"{option} {path} is a folder; name the file to write")
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise InputError(
+            f"{option} {path}: it is written as {' or '.join(suffixes)}, not {path.suffix or 'without a suffix'}"
+        )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(f"{option} {path}: the folder {path.parent} cannot be written to; choose another place")
+
+
+def require_after(option: str, end: float | None, start: float) -> None:
+    """InputError for an end that is no time after the start."""
+    if end is not None and not start < end < math.inf:
+        raise InputError(f"{option} {end:g}: give a time after the start, {start:g} s")
+
+
 def over_time(settings: Settings | MomentSettings, analysis: OverTime, keep: tuple[str, ...]) -> Settings:
     """The settings of a file with another analysis. InputError where the file's own has no times."""
     from ffr_dyn.settings import MomentSettings
@@ -137,7 +160,8 @@ def _method(settings: Settings, given: Mapping[str, Any]) -> Integrator:
         return settings.method if named is None else kind()
     if "tolerance" in given:
         raise InputError(f"--tolerance: {kind.__name__} takes steps of one length; give --step")
-    step = given.get("step", settings.method.step or settings.output_step / 10)
+    usual = settings.output_step / 10 if settings.method.controlled else settings.method.step
+    step = given.get("step", usual)
     return replace(settings.method, step=step) if kind is type(settings.method) else kind(step)  # type: ignore[type-var]
 
 

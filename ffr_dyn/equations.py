@@ -178,33 +178,41 @@ def _starts(sizes: list[int]) -> Array:
     return np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)]).astype(np.int64)
 
 
-def _shared(parts: list[Array], owners: list[Hashable]) -> tuple[Array, Array]:
-    """(pool, starts): parts of one owner are stored once, so that many equal bodies stay in the processor's cache.
-
-    A part of zeros is not stored; it starts at -1, and the kernels skip it.
-    """
+def _once(parts: list[Array], owners: list[Hashable]) -> tuple[Array, Array]:
+    """(pool, starts): parts of one owner are stored once, so that many equal bodies stay in the processor's cache."""
     starts: dict[Hashable, int] = {}
     stored: list[Array] = []
+    size = 0
     for part, owner in zip(parts, owners, strict=True):
         if owner not in starts:
-            empty = not part.any()
-            starts[owner] = -1 if empty else sum(each.size for each in stored)
-            stored += [] if empty else [np.ravel(part)]
+            starts[owner] = size
+            stored.append(part)
+            size += part.size
     return _pool(stored), np.array([starts[owner] for owner in owners], dtype=np.int64)
+
+
+def _once_unless_zero(parts: list[Array], owners: list[Hashable]) -> tuple[Array, Array]:
+    """`_once`; a part of zeros is not stored but starts at -1, and the kernels skip it."""
+    zero = np.array([not part.any() for part in parts], dtype=bool)
+    pool, starts = _once([part[:0] if none else part for part, none in zip(parts, zero, strict=True)], owners)
+    return pool, np.where(zero, -1, starts)
 
 
 def _bodies(scene: Scene, place: Layout) -> Bodies:
     models = [body.model for body in scene.bodies]
     n = [m.n for m in models]
-    PP, PP_start = _shared([_PP_parts(b) for b in scene.bodies], [(id(b.model), b.dropped) for b in scene.bodies])
+    owners: list[Hashable] = [(id(b.model), b.dropped) for b in scene.bodies]
+    PP, PP_start = _once_unless_zero([_PP_parts(b) for b in scene.bodies], owners)
+    P, P_start = _once([b.model.P_dm * ("I3" not in b.dropped) for b in scene.bodies], owners)
+    rP, _ = _once([_rP_parts(b) for b in scene.bodies], owners)
     stiffening = [_active(_stiffening(body)) for body in scene.bodies]
-    K, K_start = _shared([K for _, K in stiffening], [(id(b.model), b.stiffening) for b in scene.bodies])
+    K, K_start = _once_unless_zero([K for _, K in stiffening], [(id(b.model), b.stiffening) for b in scene.bodies])
     loads = [len(which) for which, _ in stiffening]
-    where = np.full((len(n) + 1, 10), -1, dtype=np.int64)
-    where[-1, [*range(7), 8, 9]] = 0
+    where = np.full((len(n) + 1, 11), -1, dtype=np.int64)
+    where[-1, [*range(7), 8, 9, 10]] = 0
     where[:-1, :7] = np.column_stack([n, place.ix, place.iv, _starts(n)[:-1], PP_start, K_start, loads])
     where[:-1, 8:] = np.column_stack(
-        [_starts(loads)[:-1], _starts([a * b for a, b in zip(n, loads, strict=True)])[:-1]]
+        [_starts(loads)[:-1], _starts([a * b for a, b in zip(n, loads, strict=True)])[:-1], P_start // 3]
     )
     where[:-1, 7] = place.normals
     where[-1, 3] = sum(n)
@@ -212,8 +220,8 @@ def _bodies(scene: Scene, place: Layout) -> Bodies:
         where=where,
         mass=np.array([m.mass for m in models]),
         moments=np.array([np.concatenate([m.r_dm, _six(m.rr_dm)]) for m in models]),
-        P_dm=_pool([b.model.P_dm * ("I3" not in b.dropped) for b in scene.bodies]),
-        rP_dm=_pool([_rP_parts(b) for b in scene.bodies]),
+        P_dm=P,
+        rP_dm=rP,
         PP_dm=PP,
         omega2=_pool([m.omega2 for m in models]),
         two_zeta_omega=_pool([2 * b.damping * np.sqrt(b.model.omega2) for b in scene.bodies]),
@@ -247,13 +255,14 @@ def _markers(scene: Scene, blocks: tuple[Block, ...]) -> Markers:
     table = markers(scene)
     ground = len(scene.bodies)
     interfaces = [i for body in scene.bodies for i in body.model.interfaces]
-    phi = [np.concatenate([i.phi_t, i.phi_r]) for i in interfaces] + [np.zeros((6, 0))] * len(scene.ground)
+    shapes = [np.concatenate([i.phi_t, i.phi_r]) for i in interfaces] + [np.zeros((6, 0))] * len(scene.ground)
+    phi, start = _once(shapes, [*(id(i) for i in interfaces), *("ground" for _ in scene.ground)])
     joint = sorted({k for block in blocks for k in block.markers})
     return Markers(
         body=np.array([entry[0] for entry in table], dtype=np.int64),
         u=np.array([i.position for i in interfaces] + list(scene.ground.values())).reshape(-1, 3),
-        phi=_pool(phi),
-        start=_starts([p.size for p in phi])[:-1],
+        phi=phi,
+        start=start,
         load=np.array(_load_numbers(scene), dtype=np.int64),
         active=np.array(sorted({*joint, *marker_numbers(scene)}), dtype=np.int64),
         joint=np.array([k for k in joint if table[k][0] != ground], dtype=np.int64),

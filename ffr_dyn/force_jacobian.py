@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.applied import gravity_forces
-from ffr_dyn.equations import System, new_work
+from ffr_dyn.equations import System
 from ffr_dyn.errors import SimulationError
-from ffr_dyn.kernels.applied import applied_loads
-from ffr_dyn.kernels.tables import Work
+from ffr_dyn.kernels.tables import OK
+from ffr_dyn.machine import Machine, load_at, new_machine
 from ffr_dyn.rotation import G_bar, rotation_matrix
 
 Array = np.ndarray
@@ -36,35 +36,35 @@ class ForceJacobian:
     error: Array
 
 
-def applied_forces(system: System, t: float, x: Array, v: Array, work: Work | None = None) -> Array:
+def applied_forces(system: System, t: float, x: Array, v: Array, machine: Machine | None = None) -> Array:
     """(V,) generalised forces of all applied loads and gravity at (t, x, v), in body axes.
 
-    work : carries the turns of angles that forces count; by default those of the start
+    machine : carries the turns of angles that forces count; by default those of the start
     Raises SimulationError when a Python function of the scene fails.
     """
-    w = new_work(system.model) if work is None else work
-    if not applied_loads(system.model, w, t, x, v):
+    machine = new_machine(system, x, v) if machine is None else machine
+    if load_at(machine, t, x, v) != OK:
         raise SimulationError(f"the forces stopped in a Python function of the scene: {system.user.failure}")
-    return w.bodies.f + gravity_forces(system.scene, system.layout, t, x)
+    return machine.work.bodies.f + gravity_forces(system.scene, system.layout, t, x)
 
 
-def force_jacobian(system: System, t: float, x: Array, v: Array, work: Work | None = None) -> ForceJacobian:
+def force_jacobian(system: System, t: float, x: Array, v: Array) -> ForceJacobian:
     """Derivatives by central differences with two steps, h and h / 2, extrapolated (Richardson 1911): error of order h^4.
 
     A large `error` tells of a kink of the forces nearby: the edge of a stop, the end of a curve or a limit.
     """
-    w = new_work(system.model) if work is None else work
+    machine = new_machine(system, x, v)
 
     def moved(direction: Array, h: float) -> Array:
-        return applied_forces(system, t, small_motion(system, x, h * direction), v, w)
+        return applied_forces(system, t, small_motion(system, x, h * direction), v, machine)
 
     def faster(direction: Array, h: float) -> Array:
-        return applied_forces(system, t, x, v + h * to_global(system, x, direction), w)
+        return applied_forces(system, t, x, v + h * to_global(system, x, direction), machine)
 
     steps = _steps(system)
     position, off = _derivative(moved, STEP * steps)
     velocity, rate_off = _derivative(faster, RATE_STEP * steps)
-    return ForceJacobian(applied_forces(system, t, x, v, w), position, velocity, np.array([off, rate_off]))
+    return ForceJacobian(applied_forces(system, t, x, v, machine), position, velocity, np.array([off, rate_off]))
 
 
 def _derivative(function: Callable[[Array, float], Array], steps: Array) -> tuple[Array, float]:

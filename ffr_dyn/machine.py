@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import System, new_stages, new_work
 from ffr_dyn.kernels.packing import pack
 from ffr_dyn.kernels.tables import Clock, Control, Model, Record, Tables, Work
-from ffr_dyn.kernels.units import controlled_rows_unit, record_unit, rows_unit, truly_unit, unit_addresses
+from ffr_dyn.kernels.units import applied_unit, controlled_rows_unit, record_unit, rows_unit, truly_unit, unit_addresses
 
 if TYPE_CHECKING:
     from ffr_dyn.integrators import Controlled, Integrator
@@ -63,7 +64,10 @@ def new_machine(
 
     start   : time of step number 0 [s]
     spacing : of the numbered steps of a method that chooses its own [s]
+
+    The first machine of a kind waits until what it needs is compiled.
     """
+    ensure_compiled(*(() if method is None else (type(method),)), model=system.model)
     if method is None:
         stages, h = new_stages(system, 0), 0.0
     else:
@@ -108,6 +112,12 @@ def evaluate_at(machine: Machine, t: float, x: Array, v: Array) -> int:
     """Accelerations and multipliers at (t, x, v) with the true mass matrix, in the machine's work tables. A status."""
     x, v = np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(v, dtype=float)
     return _CALL(truly_unit.address)(machine.address, t, x.ctypes.data, v.ctypes.data)
+
+
+def load_at(machine: Machine, t: float, x: Array, v: Array) -> int:
+    """Right-hand sides of the applied loads alone at (t, x, v), in the machine's work tables. A status."""
+    x, v = np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(v, dtype=float)
+    return _CALL(applied_unit.address)(machine.address, t, x.ctypes.data, v.ctypes.data)
 
 
 def record_row(machine: Machine, t: float, record: Record, row: int) -> int:

@@ -61,6 +61,8 @@ def load_result(path: str | Path) -> Result:
 @contextmanager
 def _reading(path: Path) -> Iterator[h5py.File]:
     """A result file, open; whatever is wrong with it becomes an InputError."""
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; name a result file in it")
     if not path.is_file():
         raise InputError(f"result file {path} does not exist")
     try:

@@ -13,8 +13,6 @@ from ffr_dyn.errors import InputError
 
 Array = np.ndarray
 
-IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
-
 
 def skew(a: Array) -> Array:
     """(3,) -> (3, 3) with skew(a) b = a x b."""

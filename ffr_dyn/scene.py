@@ -71,7 +71,8 @@ class Body:
         for key in ("q", "q_dot"):
             value = np.zeros(n) if getattr(self, key) is None else getattr(self, key)
             object.__setattr__(self, key, _vector(value, n, f"{who}: {key}"))
-        object.__setattr__(self, "damping", _vector(np.broadcast_to(self.damping, n), n, f"{who}: damping"))
+        damping = np.full(n, self.damping) if np.ndim(self.damping) == 0 else self.damping
+        object.__setattr__(self, "damping", _vector(damping, n, f"{who}: damping"))
         if (self.damping < 0).any():
             raise InputError(f"{who}: a modal damping ratio is negative: {self.damping.min():g}")
         for term in self.dropped:
@@ -167,6 +168,8 @@ def marker_number(scene: Scene, name: str) -> int:
     bodies = [GROUND, *(b.name for b in scene.bodies)]
     if body not in bodies:
         raise InputError(f"marker {name!r}: there is no body {body!r}; {_offer(body, bodies)}")
+    if not point:
+        raise InputError(f"marker {name!r}: write BODY.POINT, as there may be several points of a body")
     there = [n.partition(".")[2] for n in names if n.partition(".")[0] == body]
     raise InputError(f"marker {name!r}: body {body!r} has no interface {point!r}; {_offer(point, there)}")
 

@@ -291,9 +291,6 @@ def _efforts(key: str, entries: Mapping[str, BaseModel], source: Source) -> tupl
 
 
 def _stabilisation(entry: StabilisationEntry) -> Stabilisation:
-    choice: dict[str, Any] = {
-        "projection": Projection(entry.tolerance),
-        "baumgarte": Baumgarte(entry.alpha, entry.beta),
-        "none": Drifting(),
-    }
-    return choice[entry.kind]
+    if entry.alpha is not None and entry.beta is not None:
+        return Baumgarte(entry.alpha, entry.beta)
+    return Projection(entry.tolerance) if entry.kind == "projection" else Drifting()

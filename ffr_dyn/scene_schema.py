@@ -36,16 +36,16 @@ from ffr_dyn.joints import Joint
 from ffr_dyn.measurement import Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.scene_values import (
     THREE,
-    Acceleration,
     In,
     Inertia,
     Metres,
     Number,
-    OfMotion,
     OfTime,
     Seconds,
     Strict,
     Vector,
+    of_motion,
+    of_time,
     or_curve,
 )
 from ffr_dyn.settings import settings_of
@@ -59,16 +59,16 @@ Direction = Vector | list[Vector]
 FIELDS: dict[str, Any] = {
     "axis": Direction,
     "axis_j": Direction,
-    "Joint.length": OfTime,
+    "Joint.length": of_time("m"),
     "Joint.pitch": Annotated[float, In("m")],
     "Driver.function": OfTime,
-    "PointDriver.x": OfTime,
-    "PointDriver.y": OfTime,
-    "PointDriver.z": OfTime,
+    "PointDriver.x": of_time("m"),
+    "PointDriver.y": of_time("m"),
+    "PointDriver.z": of_time("m"),
     "StressMeasurement.point": Metres,
     "SectionMeasurement.point": Metres,
-    "Load.force": Annotated[list[OfMotion], THREE],
-    "Load.moment": Annotated[list[OfMotion], THREE],
+    "Load.force": Annotated[list[of_motion("N")], THREE],  # type: ignore[misc]
+    "Load.moment": Annotated[list[of_motion("N m")], THREE],  # type: ignore[misc]
     "SpringDamper.stiffness": or_curve("N/m"),
     "SpringDamper.damping": or_curve("N s/m"),
     "SpringDamper.free_length": Annotated[float, In("m")],
@@ -78,8 +78,8 @@ FIELDS: dict[str, Any] = {
     "Bushing.preload": list[Number],
     "Bushing.axes": Direction,
     "Bushing.axes_j": Direction,
-    "JointFriction.normal": OfTime,
-    "Actuator.force": OfMotion,
+    "JointFriction.normal": of_time("N"),
+    "Actuator.force": of_motion(),
     "Servo.target": OfTime,
     "NodalForces.points": list[int],
     "NodalForces.forces": list[Vector],
@@ -252,8 +252,14 @@ class StabilisationEntry(Strict):
 
     kind: Literal["projection", "baumgarte", "none"] = "projection"
     tolerance: Annotated[Number, Key(gt=0)] = 1e-9
-    alpha: Annotated[float, In("1/s")] = 0.0
-    beta: Annotated[float, In("1/s")] = 0.0
+    alpha: Annotated[float, In("1/s"), Key(gt=0)] | None = None
+    beta: Annotated[float, In("1/s"), Key(gt=0)] | None = None
+
+    @model_validator(mode="after")
+    def _with_its_gains(self) -> StabilisationEntry:
+        if (self.kind == "baumgarte") != (self.alpha is not None and self.beta is not None):
+            raise ValueError('"baumgarte" needs alpha and beta [1/s], such as 0.1 / step; the other kinds take none')
+        return self
 
 
 class TolerancesEntry(Strict):
@@ -267,13 +273,13 @@ class TolerancesEntry(Strict):
 
 class _Span(Strict):
     end: Seconds
-    output_step: Seconds
+    output_step: Annotated[float, In("s"), Key(gt=0)]
     start: Seconds = 0.0
 
 
 class _Integrated(_Span):
     method: Literal[(*METHODS, *CONTROLLED)] = "ros2"  # type: ignore[valid-type]
-    step: Seconds | None = None
+    step: Annotated[float, In("s"), Key(gt=0)] | None = None
     tolerances: TolerancesEntry | None = None
     settings: dict[str, bool | int | float | str] = {}
 
@@ -379,8 +385,8 @@ class _SceneBase(Strict):
     parameters: dict[str, Any] = {}
     inputs: dict[str, Number] = {}
     outputs: list[str] = ["default"]
-    gravity: Annotated[list[Acceleration], THREE] = [0.0, 0.0, 0.0]
-    base_acceleration: Annotated[list[Acceleration], THREE] = [0.0, 0.0, 0.0]
+    gravity: Annotated[list[of_time("m/s^2")], THREE] = [0.0, 0.0, 0.0]  # type: ignore[valid-type]
+    base_acceleration: Annotated[list[of_time("m/s^2")], THREE] = [0.0, 0.0, 0.0]  # type: ignore[valid-type]
     plane: Literal["auto", "none", "x", "y", "z"] = "auto"
     analysis: _one_of(list(ANALYSES.values()), list(ANALYSES))  # type: ignore[valid-type]
     ground: dict[str, Metres] = {}

@@ -147,13 +147,13 @@ def _of_time(value: float | str | FunctionEntry, info: ValidationInfo) -> float 
     return found.data[0] if is_constant(found) else found
 
 
-def _of_time_in(unit: str) -> Callable[[float | str | FunctionEntry, ValidationInfo], float | TimeFunction]:
-    """As `_of_time`, for a number with or without a unit of this dimension."""
+def _in_unit(unit: str | None) -> Callable[[float | str | FunctionEntry, ValidationInfo], Any]:
+    """A text that is a number with a unit becomes a number in SI units, if the unit is of this dimension."""
 
-    def read(value: float | str | FunctionEntry, info: ValidationInfo) -> float | TimeFunction:
+    def read(value: float | str | FunctionEntry, info: ValidationInfo) -> Any:
         if isinstance(value, str) and split_quantity(value) is not None:
             return as_number(value, parameters_of(info), "it", unit)
-        return _of_time(value, info)
+        return value
 
     return read
 
@@ -196,9 +196,19 @@ _Given = Annotated[
     Annotated[float, Tag("[number]")] | Annotated[str, Tag("[text]")] | Annotated[FunctionEntry, Tag("[table]")],
     Discriminator(_form, custom_error_type="function", custom_error_message="give a number, a formula or a table"),
 ]
-OfTime = Annotated[_Given, AfterValidator(_of_time)]
-Acceleration = Annotated[_Given, AfterValidator(_of_time_in("m/s^2"))]
-OfMotion = Annotated[_Given, AfterValidator(_expression)]
+
+
+def of_time(unit: str | None = None) -> Any:
+    """The type of a function of time: a number with or without a unit of this dimension, a formula of t, a table."""
+    return Annotated[_Given, AfterValidator(_in_unit(unit)), AfterValidator(_of_time)]
+
+
+def of_motion(unit: str | None = None) -> Any:
+    """As `of_time`, with formulas of the motion too."""
+    return Annotated[_Given, AfterValidator(_in_unit(unit)), AfterValidator(_expression)]
+
+
+OfTime = of_time()
 
 
 class CurveEntry(Strict):

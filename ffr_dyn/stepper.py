@@ -26,7 +26,6 @@ import numpy as np
 from ffr_dyn.analyses.assemble import Assembled, assemble
 from ffr_dyn.analyses.failure import failure
 from ffr_dyn.checkpoint import fingerprint, leaves
-from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import System, new_record
 from ffr_dyn.errors import InputError
 from ffr_dyn.force_tables import actions_of
@@ -84,7 +83,6 @@ class Stepper:
             )
         readers = _readers(scene, outputs)
         assembled = assemble(replace(scene, forces=(*scene.forces, *readers)), time=start)
-        ensure_compiled(type(method), model=assembled.system.model)
         self._system = assembled.system
         self._start, self._step, self._steps = start, method.step, 0
         self._loops = [_Loop(assembled.system, method, assembled.x.copy(), assembled.v.copy(), gains(stabilisation))]

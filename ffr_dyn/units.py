@@ -61,7 +61,7 @@ _UNITS: dict[str, tuple[float, tuple[int, int, int, int]]] = {
 }
 _SCALES = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "k": 1e3, "M": 1e6, "G": 1e9}
 _TAKES_SCALE = ("m", "g", "s", "N", "J", "W", "Pa", "Hz", "rad")
-_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-zµ].*?)\s*")
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?+)\s*([A-Za-zµ].*?)\s*")  # "1e3*t" is none
 _FACTOR = re.compile(r"([*/ ]?)\s*([A-Za-zµ]+|1)(?:\^(-?\d+))?\s*")
 
 Dimension = tuple[int, int, int, int]

@@ -102,11 +102,6 @@ def _damping(body: Body, model: FlexibleBody, V: Array) -> Array:
     return rates / np.where(model.omega2 > 0, np.sqrt(model.omega2), 1.0)
 
 
-def as_rigid(body: Body) -> Body:
-    """The body without elastic coordinates."""
-    return with_modes(body, 0)
-
-
 def without_terms(body: Body, terms: Iterable[str]) -> Body:
     """The body whose equations leave out the named `TERMS`, beside those that they leave out already."""
     names = tuple(terms)

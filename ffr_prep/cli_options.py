@@ -25,6 +25,9 @@ _FAR = 10.0
 
 
 def numbers_of(settings: Sequence[str]) -> dict[str, float]:
+    for text in settings:
+        if "=" not in text:
+            raise InputError(f"--set {text}: write it as NAME=VALUE")
     pairs = [text.partition("=") for text in settings]
     return {name.strip(): number_of(f"--set {name}", value) for name, _, value in pairs}
 

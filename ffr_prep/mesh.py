@@ -111,7 +111,7 @@ def check_request(path: Path, unit: str | None, size: float | None, numbers: Map
     if order not in (1, 2):
         raise InputError(f"element order {order} cannot be used; it must be 1 or 2")
     if not path.is_file():
-        raise InputError(f"mesh file {path} does not exist")
+        raise InputError(f"mesh file {path} {'is a folder' if path.is_dir() else 'does not exist'}")
     if size is not None and path.suffix.lower() not in GEOMETRY:
         raise InputError(f"{path} is meshed already, so an element size has no effect; leave it out")
     if path.suffix.lower() in IGES and unit not in (None, "mm"):
@@ -322,9 +322,10 @@ def _check_jacobians(mesh: Mesh) -> None:
         if bad.size == worst.size
         else "mesh finer there, smooth the mesh, or make its elements straight (first order)"
     )
+    others = f", as are {bad.size - 1} of the {worst.size - 1} others" if worst.size > 1 else ""
     raise InputError(
         f"element {bad[0]} ({kinds[bad[0]]}) at {_at(_centres(mesh)[bad[0]])} is {state} (Jacobian "
-        f"{worst[bad[0]]:.2g} of its size cubed), as are {bad.size - 1} of the {worst.size - 1} others: {remedy}"
+        f"{worst[bad[0]]:.2g} of its size cubed){others}: {remedy}"
     )
 
 

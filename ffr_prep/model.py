@@ -95,20 +95,15 @@ def reduce_model(
     surface = (model.stressed if stress else model.surface)(basis.Z)
     if stiffening:
         progress("compute the geometric stiffness")
+    recorded = record(model, reference, reduction, model.doubts(basis.Z)) | {"solver": described(solver)}
+    recovered = {"stress": model.recovery} if stress else {}
     return FlexibleBody(
         name=name,
         omega2=basis.omega2,
         interfaces=interface_shapes(coupled, basis),
         surface=surface,
         stiffening=stiffening_matrices(model, reference, supported(body, L), basis) if stiffening else None,
-        provenance=completed(
-            record(model, reference, reduction, model.doubts(basis.Z))
-            | {"solver": described(solver)}
-            | ({"stress": model.recovery} if stress else {})
-            | dict(provenance or {}),
-            basis,
-            assessed,
-        ),
+        provenance=completed(recorded | recovered | dict(provenance or {}), basis, assessed),
         **vars(integrals),
     )
 

@@ -90,6 +90,8 @@ def _drawable(body: FlexibleBody, numbers: Sequence[int]) -> Surface:
 
 def _factor(surface: Surface, k: int, scale: float | str) -> float:
     if scale != "auto":
+        if not (np.isfinite(float(scale)) and float(scale) != 0):
+            raise InputError(f"the scale of the mode shapes is {scale}; it must be a number other than zero, or 'auto'")
         return float(scale)
     largest = np.linalg.norm(surface.Phi[:, :, k - 1], axis=1).max()
     return float(_LARGEST * np.linalg.norm(np.ptp(surface.points, axis=0)) / largest)

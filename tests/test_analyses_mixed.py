@@ -284,7 +284,7 @@ def test_bad_input():
     scene = two_carts(Driver("go", "rail1", polynomial(0, 0, 1.0), "stroke"))
     with pytest.raises(InputError, match="only 0 forces"):
         mixed(scene, unknown=(), end=1.0, output_step=0.1)
-    with pytest.raises(InputError, match="must be a driver"):
+    with pytest.raises(InputError, match=r"known motion .stop. is no driver of the scene; there are: go"):
         mixed(scene, unknown=(), known=("stop",), end=1.0, output_step=0.1)
     with pytest.raises(InputError, match="positive multiple"):
         mixed(scene, unknown=(MarkerEffort("p", "one.c", (1, 0, 0)),), end=1.0, output_step=0.3, solution=Causal())

@@ -296,5 +296,5 @@ def test_truncation_keeps_the_chosen_modes():
     np.testing.assert_array_equal(one.surface.Phi[..., 0], body.surface.Phi[..., 2])
     assert truncated(body, 0).n == 0
     for wrong in ([0, 4], 4, [-1], [1, 1]):
-        with pytest.raises(BodyError, match=r"has 3 modes, counted from 0; asked to keep \["):
+        with pytest.raises(BodyError, match=r"has 3 modes(, counted from 0)?; asked to keep "):
             truncated(body, wrong)

@@ -15,7 +15,7 @@ from ffr_dyn.analyses.assemble import assemble
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.applied import applied, gravity_forces, stretch
 from ffr_dyn.curve import Curve, curve_value
-from ffr_dyn.equations import compile_scene, new_work
+from ffr_dyn.equations import compile_scene
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.force_jacobian import applied_forces, force_jacobian, small_motion
 from ffr_dyn.forces import Bushing, Load, SpringDamper
@@ -23,10 +23,9 @@ from ffr_dyn.inertia import mass_matrix
 from ffr_dyn.integrators import RK4, ROS2
 from ffr_dyn.joint_forces import Actuator, JointFriction, JointSpring, JointStop, Servo
 from ffr_dyn.joints import Joint
-from ffr_dyn.kernels.applied import applied_loads
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.layout import layout
-from ffr_dyn.machine import evaluate_at, new_machine
+from ffr_dyn.machine import evaluate_at, load_at, new_machine
 from ffr_dyn.rotation import rotation_matrix
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.surface_loads import ModalForce, NodalForces, Pressure, distributed
@@ -90,8 +89,10 @@ def test_compiled_forces_equal_the_readable_ones(force, sizes):
     scene = loaded(force, sizes)
     system = compile_scene(scene)
     for seed in range(3):
-        (x, v), work = random_state(scene, seed), new_work(system.model)
-        assert applied_loads(system.model, work, 0.37, x, v)
+        x, v = random_state(scene, seed)
+        machine = new_machine(system, x, v)
+        work = machine.work
+        assert load_at(machine, 0.37, x, v) == OK
         twin = alone(scene, x, v)
         scale = max(1.0, np.abs(twin.generalised).max())
         np.testing.assert_allclose(work.bodies.f, twin.generalised, rtol=0, atol=1e-12 * scale)
@@ -323,10 +324,11 @@ def test_a_spring_wound_at_the_start_unwinds():
 def test_turns_are_counted_from_accepted_states_and_evaluating_changes_nothing():
     scene = rotor(JointSpring("s", "hinge", 2.0, turns=1))
     system = compile_scene(scene)
-    work = new_work(system.model)
+    machine = new_machine(system, np.array([0, 0, 0, 1.0, 0, 0, 0]), np.zeros(6))
+    work = machine.work
     for angle in (0.0, 3.0, -3.0, 0.5):
         x = np.array([0, 0, 0, np.cos(angle / 2), 0, 0, np.sin(angle / 2)])
-        applied_loads(system.model, work, 0.0, x, np.zeros(6))
+        load_at(machine, 0.0, x, np.zeros(6))
         assert work.loads.action[0, 0] == pytest.approx(2 * np.pi + angle)
     assert work.loads.reference[0] == pytest.approx(2 * np.pi)
 

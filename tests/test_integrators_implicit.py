@@ -186,8 +186,11 @@ def energies(method, revolutions: float) -> np.ndarray:
 
 
 def test_the_energy_of_the_variational_method_does_not_drift():
+    # At h Omega = 1 the motion is chaotic, and which single moments stand out (up to three times) hangs on rounding.
     found = energies(Variational(0.05), 1000)
-    assert np.abs(found[50:]).max() < 1.5 * np.abs(found[:50]).max()
+    most = [np.quantile(np.abs(half), 0.9) for half in (found[:50], found[50:])]
+    assert most[1] < 1.2 * most[0]
+    assert np.abs(found).max() < 5 * most[0]
     assert abs(found[50:].mean() - found[:50].mean()) < 0.3 * found.std() + 1e-4
     assert np.abs(energies(ROS2(0.05), 1000)).max() > 10 * np.abs(found).max()
 

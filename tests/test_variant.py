@@ -22,7 +22,7 @@ from ffr_dyn.scene_text import save_scene
 from ffr_dyn.settings import Settings
 from ffr_dyn.stabilisation import Projection
 from ffr_dyn.surface_loads import ModalForce
-from ffr_dyn.variant import as_rigid, vary, with_basis, with_model, with_modes, without_terms
+from ffr_dyn.variant import vary, with_basis, with_model, with_modes, without_terms
 from ffr_prep.body import BodyError, axial, rigid_body
 from ffr_prep.interface import InterfaceRegion
 from ffr_prep.reduce import reduce_mesh
@@ -118,9 +118,9 @@ def test_bending_in_two_planes_stays_apart():
 
 
 def test_a_body_without_modes_is_rigid():
-    body = as_rigid(Body("b", cloud(4), q=[1.0, 2, 3, 4]))
+    body = with_modes(Body("b", cloud(4), q=[1.0, 2, 3, 4]), 0)
     assert body.model.n == body.q.size == 0
-    assert as_rigid(Body("b", rigid_body("b", mass=1.0, inertia=np.ones(3)))).model.n == 0
+    assert with_modes(Body("b", rigid_body("b", mass=1.0, inertia=np.ones(3))), 0).model.n == 0
 
 
 # ---- dropped terms --------------------------------------------------------------------------------------------------

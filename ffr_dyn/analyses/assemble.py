@@ -21,6 +21,7 @@ from ffr_dyn.plane import planar_forms
 from ffr_dyn.rotation import G_bar, rotation_matrix
 from ffr_dyn.scene import Scene
 from ffr_dyn.timefunction import POLYNOMIAL, TimeFunction, evaluate
+from ffr_dyn.validity import stretch
 
 Array = np.ndarray
 
@@ -30,6 +31,7 @@ RANK_TOLERANCE = 1e-8  # of a row's independent part, relative to the row
 ITERATIONS = 100
 RELAXATION = 1e-8  # of dependent rows, relative
 LARGEST_TURN = 0.5  # rad per iteration
+TORN = 0.5  # elastic displacement of an interface over the size of its body that no joint may ask for
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     place = layout(scene)
     guess, v = initial_state(scene, place)
     x = close_positions(scene, place, blocks, guess, v, time)
+    _require_shape(scene, place, guess, x)
     kept, redundant = independent_blocks(scene, place, blocks, x, v, time)
     v = close_velocities(scene, place, blocks, x, v, time)
     rows = sum(len(block.words) for block in kept)
@@ -80,6 +83,17 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
         )
     all_rows = compile_scene(scene, blocks, RELAXATION) if redundant else None
     return Assembled(compile_scene(scene, kept), all_rows, x, v, _movable(place) - rows, tuple(notes), tuple(redundant))
+
+
+def _require_shape(scene: Scene, place: Layout, guess: Array, x: Array) -> None:
+    """InputError where positions are met only by a body deformed beyond all sense."""
+    for b, body in enumerate(scene.bodies):
+        share = stretch(body.model, (x - guess)[None, place.q(b)])
+        if share > TORN:
+            raise InputError(
+                f"the mechanism cannot be assembled without deforming body {body.name!r} by {share:.3g} times its size; "
+                "check the positions of the interfaces, the lengths of the bodies and the axes of the joints, or start closer"
+            )
 
 
 def _movable(place: Layout) -> int:
@@ -149,7 +163,15 @@ def in_space(scene: Scene) -> Scene:
 
 def drive_of(word: Word, time: float) -> tuple[float, float, float]:
     """Value, rate and second derivative of what a word prescribes; zeros where it prescribes nothing."""
-    return (0.0, 0.0, 0.0) if word.function is None else evaluate(word.function, time)
+    if word.function is None:
+        return 0.0, 0.0, 0.0
+    try:
+        return evaluate(word.function, time)
+    except (ValueError, ZeroDivisionError, OverflowError) as error:
+        raise InputError(
+            f"the function of time in the row '{word.text}' has no value at t = {time:.6g} s ({error}); let the run start "
+            "where it has one, or write it another way"
+        ) from None
 
 
 def _drive(block: Block, word: Word, time: float) -> tuple[float, float, float]:

@@ -24,6 +24,7 @@ from ffr_dyn.kernels.tables import NOT_FINITE, OK, Record
 from ffr_dyn.machine import fill_rows, new_machine
 from ffr_dyn.power import power
 from ffr_dyn.rotation import rotation_matrix
+from ffr_dyn.stabilisation import excess_of_gains
 from ffr_dyn.view import View
 
 Array = np.ndarray
@@ -34,7 +35,6 @@ SHORTER = 4  # times, the steps with which it is
 ROWS = 2000  # of the part, at most
 QUIET = 1e-6  # m^2/s^2, twice the energy by mass that is not looked at
 AGREED = 0.1  # part of the energy by which both steps may differ where it is none of their doing
-LARGE_GAIN = 1.0  # Baumgarte's, times the step
 
 
 @dataclass(frozen=True)
@@ -155,14 +155,11 @@ class EnergyWatch:
         return self.system.scene.bodies[int(np.argmax(np.nan_to_num(growth, nan=np.inf, posinf=np.inf)))].name
 
     def _cause(self, anchor: _Row) -> str:
-        h, kind, alpha = self.spacing, type(self.method).__name__, max(self.gains[:2])
+        h, kind = self.spacing, type(self.method).__name__
         if self.method.controlled:
             return "The tolerances of the steps are too large for this motion: use smaller ones, or ROS2"
-        if alpha * h > LARGE_GAIN:
-            return (
-                f"Baumgarte's gains of {alpha:.3g} 1/s are too large for a step of {h:.3g} s: keep them below "
-                f"{LARGE_GAIN / h:.3g} 1/s, or use projection"
-            )
+        if excess := excess_of_gains(self.gains, h):
+            return excess
         fastest = _fastest(self.system, anchor)
         if h * fastest > self.method.reach:
             other = ", or ROS2" if max(self.system.layout.n) > 0 else ""

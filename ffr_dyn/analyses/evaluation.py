@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.analyses.failure import failure
-from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import System, new_record
 from ffr_dyn.inertia import mass_matrix
 from ffr_dyn.kernels.tables import OK, SINGULAR_CONSTRAINT, Record, Work
@@ -64,7 +63,6 @@ class Evaluation:
 
 def evaluator(system: System) -> Evaluator:
     """Memory for evaluations of a compiled scene."""
-    ensure_compiled(model=system.model)
     return Evaluator(new_machine(system, *initial_state(system.scene, system.layout)), new_record(system, 1))
 
 
@@ -222,7 +220,8 @@ def evaluated_mass_matrix(at: Evaluator) -> Array:
         block[[0, 1, 2], [0, 1, 2]] = bodies.mass[b]
         block[3:, :3], block[:3, 3:], block[3:, 3:] = s, -s, work.J[b]
         if n:
-            P, H = bodies.P_dm[3 * e : 3 * (e + n)], work.g[9 * e + 6 * n : 9 * (e + n)]
+            c = bodies.where[b, 10]
+            P, H = bodies.P_dm[3 * c : 3 * (c + n)], work.g[9 * e + 6 * n : 9 * (e + n)]
             coupling = np.concatenate([P, H]).reshape(6, n)
             M[rigid, elastic], M[elastic, rigid] = coupling, coupling.T
             M[elastic, elastic] = np.eye(n)

@@ -22,15 +22,17 @@ OPEN, LOST = 1e-2, 1e2  # m, -: of constraints, more than drift, and what follow
 HUGE = 1e12  # N, N m: no force of a machine; what made the state overflow
 
 
-def failure(system: System, work: Work, status: int, time: float) -> BaseException:
-    """What to tell about a status of the kernels."""
+def failure(system: System, work: Work, status: int, time: float, cause: str = "") -> BaseException:
+    """What to tell about a status of the kernels; `cause` of the settings, if one is known to lose any state."""
     at, where = f"at t = {time:.6g} s", int(work.info[0])
     if system.user.cause is not None:
         if isinstance(system.user.cause, KeyboardInterrupt):
             return system.user.cause
         return SimulationError(f"the run stopped in a Python function of the scene: {system.user.failure}")
     lost = not _sound(work)
-    if status == NOT_FINITE or (lost and (status == SINGULAR_BODY or _largest(system, work)[1] > HUGE)):
+    if cause and (lost or status == NOT_FINITE):
+        return SimulationError(f"{at} the state of {_worst(system, work)} is no longer finite: {cause}")
+    if status == NOT_FINITE or (lost and (status == SINGULAR_BODY or not _largest(system, work)[1] <= HUGE)):
         return SimulationError(
             f"{at} the state of {_worst(system, work)} is no longer finite: {_overflow(system, work)}"
         )
@@ -79,28 +81,37 @@ def _worst(system: System, work: Work) -> str:
 def _overflow(system: System, work: Work) -> str:
     """Why a state is not finite, and what to change."""
     name, value = _largest(system, work)
+    if np.isnan(value):
+        return f"{name!r} has no value there; look at its formula, such as a root or a logarithm of what is negative"
     if value > HUGE:
         return f"{name!r} exerts {value:.3g} N or N m; look at its numbers and their units"
     least, when = work.independence[1:3]
-    if least < AT or OPEN < work.drift[0] < LOST:
+    if (least < AT or work.drift[0] > OPEN) and work.drift[0] < LOST:
         return (
             f"its constraints came open by up to {work.drift[0]:.2g}, and were nearest to dependence at t = {when:.6g} s: "
             "the mechanism locks there (a dead point that a driver goes beyond), or passes a singular position; keep driven "
             "motions within reach, or use projection"
         )
-    return "the step is too large for an explicit method (use ROS2 or a smaller step), or a force is not finite"
+    return (
+        "the step is too large for a mode (use ROS2), a stiff spring or stop, or a fast rotation (use a smaller step), or a "
+        "force is not finite"
+    )
 
 
 def _largest(system: System, work: Work) -> tuple[str, float]:
-    """The load or actuator with the largest component, and that; zero where there is none."""
-    return max(_given(system, work), key=lambda found: found[1], default=("", 0.0))
+    """The load or actuator with the largest component, and that; zero where there is none, NaN where it has no value."""
+    return max(_given(system, work), key=lambda found: np.nan_to_num(found[1], nan=np.inf), default=("", 0.0))
 
 
 def _given(system: System, work: Work) -> list[tuple[str, float]]:
     """The largest component of each load and actuator, by name. Other forces follow the state, and are lost with it."""
     scene, loads, found = system.scene, system.model.loads, []
     factors = np.append(work.functions[:, 0], 1.0)[loads.function]
-    for load, value, (*_, slot) in zip(scene.loads, loads.value * factors, loads.wrench, strict=True):
+    with np.errstate(invalid="ignore"):
+        values = loads.value * factors
+    for load, value, (*_, slot) in zip(scene.loads, values, loads.wrench, strict=True):
+        if np.isnan(value).any() and not np.isinf(value).any():  # of time alone: not lost with the state
+            return [(load.name, np.nan)]
         found.append((load.name, value + work.user[slot : slot + 6] if slot >= 0 else value))
     for action, (*_, law, _, _), value in zip(actions_of(scene), loads.action, work.loads.action[:, 2:], strict=True):
         if law == ACTUATOR:

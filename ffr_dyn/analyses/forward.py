@@ -15,7 +15,6 @@ from ffr_dyn.analyses.energy import EnergyWatch
 from ffr_dyn.analyses.events import Event, Watcher
 from ffr_dyn.analyses.failure import failure
 from ffr_dyn.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
-from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import new_record
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince, Integrator
@@ -25,7 +24,7 @@ from ffr_dyn.measure import Entry, Memory, measure, needs_every_step, selected
 from ffr_dyn.result import Quantity, Result
 from ffr_dyn.result_file import ResultWriter, load_checkpoint, load_result
 from ffr_dyn.scene import Scene
-from ffr_dyn.stabilisation import Baumgarte, Projection, Stabilisation, gains
+from ffr_dyn.stabilisation import Baumgarte, Projection, Stabilisation, excess_of_gains, gains
 from ffr_dyn.stopwatch import Stopwatch
 from ffr_dyn.validity import doubts, extremes, meaningless
 from ffr_prep.body import Surface
@@ -90,20 +89,10 @@ def forward(
     _check_stabilisation(method, stabilisation)
     assembled = assemble(scene, time=start) if assembled is None else assembled
     wanted = selected(assembled.system, outputs)
-    ensure_compiled(type(method), model=assembled.system.model)
     span = (start, end, output_step)
     mark = _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
     header = _header(scene, assembled, method, stabilisation, span)
-    machine = new_machine(
-        assembled.system, assembled.x, assembled.v, method, gains(stabilisation), start=start, spacing=spacing
-    )
-    energy = EnergyWatch(
-        assembled.system, method, gains(stabilisation), spacing, lambda rows: with_all_reactions(assembled, rows)
-    )
-    if resume is not None and Path(resume).exists():
-        run = _resumed(Path(resume), mark, machine, energy)
-    else:
-        run = _started(assembled, machine, energy, start, wanted)
+    run = _begun(assembled, method, gains(stabilisation), start, spacing, wanted, resume, mark)
     _check_resumed(run, substeps * rows, output_step / substeps)
     watcher = _watcher(assembled, run, method, stabilisation, spacing, events, resume) if events else None
     path = resume if path is None else path
@@ -155,6 +144,25 @@ def _check_step(scene: Scene, method: Integrator) -> None:
             f"{omega / 2 / np.pi:.4g} Hz, which needs a step below {method.reach / omega:.2g} s (joints lower this further); "
             "use ROS2, fewer modes or a smaller step"
         )
+
+
+def _begun(
+    assembled: Assembled,
+    method: Integrator,
+    gained: tuple[float, float, float],
+    start: float,
+    spacing: float,
+    wanted: Mapping[str, Entry],
+    resume: str | Path | None,
+    mark: str,
+) -> _Run:
+    """The run at its start, or where the file to resume left it."""
+    system = assembled.system
+    machine = new_machine(system, assembled.x, assembled.v, method, gained, start=start, spacing=spacing)
+    energy = EnergyWatch(system, method, gained, spacing, lambda rows: with_all_reactions(assembled, rows))
+    if resume is not None and Path(resume).exists():
+        return _resumed(Path(resume), mark, machine, energy)
+    return _started(assembled, machine, energy, start, wanted)
 
 
 def _started(
@@ -215,7 +223,8 @@ def _advance(
         if ends:
             return
         if status != OK:
-            raise failure(system, run.machine.work, status, reached(run.machine, start))
+            cause = excess_of_gains(run.energy.gains, run.energy.spacing)
+            raise failure(system, run.machine.work, status, reached(run.machine, start), cause)
         count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
 
 

@@ -24,7 +24,7 @@ from ffr_dyn.measure import selected
 from ffr_dyn.result import Result
 from ffr_dyn.scene import Scene
 from ffr_dyn.stabilisation import Projection, Stabilisation
-from ffr_dyn.validity import strained
+from ffr_dyn.validity import extremes, strained
 
 Array = np.ndarray
 
@@ -93,7 +93,7 @@ def _quasi_static(
     selected(assembled.system, outputs)
     rigid = kinematic(scene, end=end, output_step=output_step, start=start)
     at, places = evaluator(assembled.system), _coordinates(assembled)
-    q, rows, turned = np.zeros(places[1].size), [], np.zeros(len(scene.bodies))
+    q, rows = np.zeros(places[1].size), []
     tangent = None
     for row, time in enumerate(rigid.time):
         x = _undeformed_state(assembled, rigid, row)
@@ -103,14 +103,14 @@ def _quasi_static(
         if progress is not None:
             progress(float(time))
     record = joined(rows)
-    turned = np.array([_turn(scene, record.x, assembled, b) for b in range(len(scene.bodies))])
+    turned, _, stretched = extremes(assembled.system, record)
     attributes = {
         "title": scene.name,
         "analysis": "inverse dynamics, quasi-static deformation",
         "method": "Newton-Raphson",
         "evaluations": int(at.work.info[1]),
         "degrees_of_freedom": assembled.degrees_of_freedom,
-        "notes": [*assembled.notes, *strained(scene, turned)],
+        "notes": [*assembled.notes, *strained(scene, turned, stretched)],
         "status": "complete",
     }
     return result_of(assembled.system, record, attributes, path, outputs)
@@ -184,8 +184,3 @@ def _tangent(at: Evaluator, places: tuple[Array, Array], time: float, x: Array, 
     h = DIFFERENCE * max(float(np.abs(q).max()), 1e-2)
     sides = [[_pose(at, places, time, x, q + sign * h * one) for sign in (1, -1)] for one in np.eye(q.size)]
     return np.array([(plus - minus) / (2 * h) for plus, minus in sides]).T
-
-
-def _turn(scene: Scene, x: Array, assembled: Assembled, b: int) -> float:
-    q = x[:, assembled.system.layout.q(b)]
-    return max((float(np.abs(q @ i.phi_r.T).max(initial=0.0)) for i in scene.bodies[b].model.interfaces), default=0.0)

@@ -93,8 +93,11 @@ def _known(scene: Scene, known: tuple[str, ...] | None) -> tuple[str, ...]:
     drivers = [driver.name for driver in scene.drivers]
     names = tuple(drivers if known is None else known)
     missing = [name for name in names if name not in drivers]
-    if missing or not names:
-        raise InputError(f"known motions {names}: each must be a driver of the scene; there are {drivers or 'none'}")
+    if not names:
+        raise InputError("mixed dynamics needs known motions, drivers of the scene; it has none")
+    if missing:
+        there = ", ".join(drivers) or "none"
+        raise InputError(f"known motion {missing[0]!r} is no driver of the scene; there are: {there}")
     return names
 
 

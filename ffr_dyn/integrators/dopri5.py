@@ -12,7 +12,7 @@ from ffr_dyn.integrators.tolerances import Tolerances
 from ffr_dyn.kernels.bodies import normalise, position_rates
 from ffr_dyn.kernels.calls import evaluate, set_diagonal, settle, solve
 from ffr_dyn.kernels.options import inlined
-from ffr_dyn.kernels.packing import unpack_tables
+from ffr_dyn.kernels.packing import tables_at
 from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.kernels.units import Unit
@@ -46,7 +46,7 @@ def slopes(r, x, v, k):
 @Unit
 def dopri5_step(at, t, again, unused):
     """One step of the machine's state from time t; `again` tells that the last one was refused. Returns a status."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     h, stages = r.clock.time[0], r.stages
     set_diagonal(r, 0.0)
     if stages.numbers[0] == 0.0:

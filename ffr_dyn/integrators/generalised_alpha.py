@@ -33,7 +33,7 @@ from ffr_dyn.kernels.bodies import normalise, position_rates
 from ffr_dyn.kernels.calls import correct, evaluate, project, set_diagonal, settle, solve, solve_anew
 from ffr_dyn.kernels.motion import carry, converging, farthest, largest_motion, unconverged
 from ffr_dyn.kernels.options import inlined
-from ffr_dyn.kernels.packing import unpack_tables
+from ffr_dyn.kernels.packing import tables_at
 from ffr_dyn.kernels.system import finite, largest, to_velocity_rates
 from ffr_dyn.kernels.tables import NOT_FINITE, OK, USER_FAILED
 from ffr_dyn.kernels.units import Unit
@@ -153,7 +153,7 @@ def iterate(r, t, h, square, single):
 @Unit
 def generalised_alpha_step(at, t, unused, unused_too):
     """One step of the machine's state from time t. Returns a status."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     h, s, bodies, number = r.clock.time[0], r.stages, r.model.bodies, r.stages.numbers
     share = (1.0 - number[ALPHA_F]) / (1.0 - number[ALPHA_M])
     square, single = share * number[BETA] * h * h, share * number[GAMMA] * h

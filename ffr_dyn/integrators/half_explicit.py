@@ -22,11 +22,12 @@ from ffr_dyn.kernels.bodies import normalise, position_rates
 from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, solve
 from ffr_dyn.kernels.motion import into_body_axes, largest_motion
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.packing import unpack_tables, vector_at
+from ffr_dyn.kernels.packing import tables_at
 from ffr_dyn.kernels.system import constraint_rates, finite, largest, to_velocity_rates
 from ffr_dyn.kernels.tables import NEAR, NOT_CONVERGED, NOT_FINITE, OK, TIGHTER
 from ffr_dyn.kernels.units import Unit
 from ffr_dyn.kernels.vectors import add_scaled, copy
+from ffr_dyn.kernels.views import part, vector_at
 
 ROOT = 6.0**0.5
 STAGES = 5
@@ -56,7 +57,7 @@ def rates_ahead(r, u, out):
     s, jac, x, y = r.stages, r.work.rows.jac, r.stages.x[AHEAD], r.stages.v[SCRATCH]
     copy(y, u)
     into_body_axes(r.model.bodies, x, y, r.work.loads.turn[0])
-    ahead = vector_at(s.rows.ctypes.data + 8 * JAC * out.size, jac.size).reshape(jac.shape)
+    ahead = part(s.rows, JAC * out.size, jac.size).reshape(jac.shape)
     constraint_rates(r.model.bodies.where, r.model.markers, r.model.rows, ahead, y, out)
 
 
@@ -66,7 +67,7 @@ def keep_rows_ahead(r):
     s, rows = r.stages, r.work.rows
     copy(s.rows[NU], rows.nu)
     kept = vector_at(s.rows.ctypes.data + 8 * JAC * rows.nu.size, rows.jac.size)
-    copy(kept, rows.jac.reshape(rows.jac.size))
+    copy(kept, part(rows.jac, 0, rows.jac.size))
 
 
 @inlined
@@ -80,7 +81,7 @@ def take_stiffening_out(bodies, w):
     for b in range(bodies.mass.size):
         if bodies.where[b, 6] > 0:
             n, j, e = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3]
-            copy(w.f[j + 6 : j + 6 + n], w.unstiffened[e : e + n])
+            copy(part(w.f, j + 6, n), part(w.unstiffened, e, n))
 
 
 @inlined
@@ -124,7 +125,7 @@ def accelerate(r, k, ha):
 @Unit
 def half_explicit_step(at, t, unused, unused_too):
     """One step of the machine's state from time t. Returns a status."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     h, s, bodies, number = r.clock.time[0], r.stages, r.model.bodies, r.stages.numbers
     set_diagonal(r, 0.0)
     if number[0] == 0.0:

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from ffr_dyn.kernels.bodies import normalise, position_rates
 from ffr_dyn.kernels.calls import evaluate, set_diagonal, settle, solve
-from ffr_dyn.kernels.packing import unpack_tables
+from ffr_dyn.kernels.packing import tables_at
 from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.kernels.units import Unit
@@ -17,7 +17,7 @@ from ffr_dyn.kernels.vectors import add_scaled, copy
 @Unit
 def rk4_step(at, t, unused, unused_too):
     """One step of the machine's state from time t. Returns a status."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     h = r.clock.time[0]
     stages, xs, vs = r.stages, r.stages.x[4], r.stages.v[4]
     set_diagonal(r, 0.0)

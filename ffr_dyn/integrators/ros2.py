@@ -25,7 +25,7 @@ from typing import ClassVar
 
 from ffr_dyn.kernels.bodies import normalise, position_rates
 from ffr_dyn.kernels.calls import add_elastic_part, correct, evaluate, set_diagonal, settle, solve
-from ffr_dyn.kernels.packing import unpack_tables
+from ffr_dyn.kernels.packing import tables_at
 from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.kernels.units import Unit
@@ -37,7 +37,7 @@ GAMMA = 1.0 - 0.5**0.5
 @Unit
 def ros2_step(at, t, unused, unused_too):
     """One step of the machine's state from time t. Returns a status."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     h = r.clock.time[0]
     bodies, stages = r.model.bodies, r.stages
     gh = GAMMA * h

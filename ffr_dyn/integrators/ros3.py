@@ -26,7 +26,7 @@ from typing import ClassVar
 from ffr_dyn.integrators.tolerances import Tolerances
 from ffr_dyn.kernels.bodies import normalise, position_rates
 from ffr_dyn.kernels.calls import add_elastic_part, correct, evaluate, set_diagonal, settle, solve
-from ffr_dyn.kernels.packing import unpack_tables
+from ffr_dyn.kernels.packing import tables_at
 from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.kernels.units import Unit
@@ -55,7 +55,7 @@ AT = (0.0, 0.8599004143760887, 0.7179332607542298, 1.0)
 @Unit
 def ros3_step(at, t, unused, unused_too):
     """One step of the machine's state from time t. Returns a status."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     h = r.clock.time[0]
     bodies, stages = r.model.bodies, r.stages
     gh = GAMMA * h

@@ -33,7 +33,7 @@ from ffr_dyn.kernels.bodies import mass_times, normalise, six_rows, three_rows
 from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, solve, solve_anew
 from ffr_dyn.kernels.motion import carry, converging, farthest, into_global_axes, largest_motion, unconverged
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.packing import unpack_tables, vector_at
+from ffr_dyn.kernels.packing import tables_at
 from ffr_dyn.kernels.system import (
     add_reactions,
     constraint_rates,
@@ -45,6 +45,7 @@ from ffr_dyn.kernels.system import (
 from ffr_dyn.kernels.tables import NOT_FINITE, OK, USER_FAILED
 from ffr_dyn.kernels.units import Unit
 from ffr_dyn.kernels.vectors import add, add_scaled, copy, cross, dot, fill, get, scale, subtract
+from ffr_dyn.kernels.views import part
 
 # Rows of stages.v. MU: momenta at the start of the step; KICK: geometric stiffening there; MIDDLE: v_m; SHORT: what the
 # momenta of the start are short of; END: momenta at the end; REACTION: Phi_q^T lambda at the start; CHANGE: scratch.
@@ -80,7 +81,7 @@ def lagrangian_forces(bodies, w, b, y, p, Q):
     dL/dR = the applied force, dL/dtheta = the applied moment + p_1 x a, dL/dq_j = f_j + omega . l_j + I3_j . (a x omega).
     """
     n, j, e, normal = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3], bodies.where[b, 7]
-    f = w.f[j : j + 6 + n]
+    f = part(w.f, j, 6 + n)
     a, omega, s = (y[0], y[1], y[2]), (y[3], y[4], y[5]), get(w.s, b)
     force = add((f[0], f[1], f[2]), cross(omega, cross(omega, s)))
     J = w.J[b]
@@ -88,8 +89,8 @@ def lagrangian_forces(bodies, w, b, y, p, Q):
                dot((J[2, 0], J[2, 1], J[2, 2]), omega))  # fmt: skip
     moment = add((f[3], f[4], f[5]), cross(omega, J_omega))
     if n > 0:
-        P, g, l = bodies.P_dm[3 * e : 3 * (e + n)], w.g[9 * e : 9 * (e + n)], w.l[3 * e : 3 * (e + n)]  # noqa: E741
-        q_dot = y[6:]
+        P, g, l = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.g, 9 * e, 9 * n), part(w.l, 3 * e, 3 * n)  # noqa: E741
+        q_dot = part(y, 6, n)
         force = add(force, scale(2.0, cross(omega, three_rows(P, q_dot, n))))
         d0, d1, d2, d3, d4, d5 = six_rows(g, q_dot, n)
         D_omega = (
@@ -98,7 +99,7 @@ def lagrangian_forces(bodies, w, b, y, p, Q):
             d4 * omega[0] + d5 * omega[1] + d2 * omega[2],
         )
         moment = add(moment, scale(2.0, subtract(scale(d0 + d1 + d2, omega), D_omega)))
-        moment = add(moment, cross(omega, three_rows(g[6 * n :], q_dot, n)))
+        moment = add(moment, cross(omega, three_rows(part(g, 6 * n, n), q_dot, n)))
         across = cross(a, omega)
         for k in range(n):
             Q[6 + k] = f[6 + k] + P[k] * across[0] + P[n + k] * across[1] + P[2 * n + k] * across[2]
@@ -145,8 +146,8 @@ def end_momenta(r, h):
     to_body_axes(bodies.where, bw.A, y)
     for b in range(bodies.mass.size):
         n, j = bodies.where[b, 0], bodies.where[b, 2]
-        momentum(bodies, bw, b, y[j : j + 6 + n], p[j : j + 6 + n])
-        lagrangian_forces(bodies, bw, b, y[j : j + 6 + n], p[j : j + 6 + n], Q[j : j + 6 + n])
+        momentum(bodies, bw, b, part(y, j, 6 + n), part(p, j, 6 + n))
+        lagrangian_forces(bodies, bw, b, part(y, j, 6 + n), part(p, j, 6 + n), part(Q, j, 6 + n))
         theta = (h * y[j + 3], h * y[j + 4], h * y[j + 5])
         pi, tau = (p[j + 3], p[j + 4], p[j + 5]), (Q[j + 3], Q[j + 4], Q[j + 5])
         before, after = transport(theta, pi, tau, h, 1.0), transport(theta, pi, tau, h, -1.0)
@@ -165,7 +166,7 @@ def end_momenta(r, h):
 def react_at_start(r):
     """REACTION = Phi_q^T lambda at the start of the step, shaped like v."""
     s, jac = r.stages, r.work.rows.jac
-    kept = vector_at(s.rows.ctypes.data + 8 * JAC * s.target.size, jac.size).reshape(jac.shape)
+    kept = part(s.rows, JAC * s.target.size, jac.size).reshape(jac.shape)
     fill(s.v[REACTION], 0.0)
     add_reactions(r.model.bodies.where, r.model.markers, r.model.rows, kept, s.rows[LAM], s.v[REACTION])
     into_global_axes(r.model.bodies, r.x, s.v[REACTION], r.work.loads.turn[0])
@@ -179,10 +180,10 @@ def keep_node(r, h):
     to_body_axes(bodies.where, bw.A, bw.acc)
     for b in range(bodies.mass.size):
         n, j = bodies.where[b, 0], bodies.where[b, 2]
-        momentum(bodies, bw, b, bw.acc[j : j + 6 + n], s.v[MU, j : j + 6 + n])
+        momentum(bodies, bw, b, part(bw.acc, j, 6 + n), part(s.v[MU], j, 6 + n))
     to_velocity_rates(bodies.where, bw.A, s.v[MU], s.v[MU])
-    kept = vector_at(s.rows.ctypes.data + 8 * JAC * s.target.size, r.work.rows.jac.size)
-    copy(kept, r.work.rows.jac.reshape(kept.size))
+    kept = part(s.rows, JAC * s.target.size, r.work.rows.jac.size)
+    copy(kept, part(r.work.rows.jac, 0, kept.size))
 
 
 @inlined
@@ -256,7 +257,7 @@ def newton(r, h):
     fill(bw.more, 0.0)
     for b in range(bodies.mass.size):  # the momenta at the end of what is corrected
         n, j, e = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3]
-        mass_times(bodies, bw, b, bw.acc[j : j + 6 + n], bw.more[j : j + 6 + n])
+        mass_times(bodies, bw, b, part(bw.acc, j, 6 + n), part(bw.more, j, 6 + n))
         for k in range(n):
             bw.more[j + 6 + k] -= (1.0 / bw.dinv[e + k] - 1.0) * bw.acc[j + 6 + k]
     to_velocity_rates(bodies.where, bw.A, bw.more, bw.more)
@@ -297,7 +298,7 @@ def iterate(r, t, h):
 @Unit
 def variational_step(at, t, unused, unused_too):
     """One step of the machine's state from time t. Returns a status."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     h, s = r.clock.time[0], r.stages
     stiffened = r.model.bodies.stiffening.size > 0
     if s.numbers[STARTED] == 0.0:

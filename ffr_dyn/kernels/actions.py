@@ -12,6 +12,7 @@ from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.rows import ZERO, coordinate
 from ffr_dyn.kernels.tables import ANGLE, LENGTH
 from ffr_dyn.kernels.vectors import cross, dot, get, scale, subtract, to_body
+from ffr_dyn.kernels.views import part
 
 
 @kernel
@@ -61,7 +62,7 @@ def apply_side(where, markers, u, f, load, k, amount, side):
         load[c] += force[c]
         load[3 + c] += moment[c]
     if n > 0:
-        project(shapes(markers, k, n), force, twist, f[j + 6 : j + 6 + n], n)
+        project(shapes(markers, k, n), force, twist, part(f, j + 6, n), n)
 
 
 @kernel

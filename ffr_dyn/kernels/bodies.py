@@ -19,6 +19,7 @@ from ffr_dyn.kernels.vectors import (
     rigid_upper,
     to_body,
 )
+from ffr_dyn.kernels.views import part, six_parts, three_parts
 
 
 @kernel
@@ -70,18 +71,18 @@ def contract(PP, q, qd, n, g, l):  # noqa: E741
     width, axial = 9 * n, 6 * n
     for i in range(0, n - 1, 2):
         q0, q1, d0, d1 = q[i], q[i + 1], qd[i], qd[i + 1]
-        row0, row1 = PP[i * width : (i + 1) * width], PP[(i + 1) * width : (i + 2) * width]
+        row0, row1 = part(PP, i * width, width), part(PP, (i + 1) * width, width)
         for k in range(width):
             g[k] += q0 * row0[k] + q1 * row1[k]
-        row0, row1 = row0[axial:], row1[axial:]
+        row0, row1 = part(row0, axial, 3 * n), part(row1, axial, 3 * n)
         for k in range(3 * n):
             l[k] += d0 * row0[k] + d1 * row1[k]
     if n % 2:
         q0, d0 = q[n - 1], qd[n - 1]
-        row0 = PP[(n - 1) * width : n * width]
+        row0 = part(PP, (n - 1) * width, width)
         for k in range(width):
             g[k] += q0 * row0[k]
-        row0 = row0[axial:]
+        row0 = part(row0, axial, 3 * n)
         for k in range(3 * n):
             l[k] += d0 * row0[k]
 
@@ -89,7 +90,7 @@ def contract(PP, q, qd, n, g, l):  # noqa: E741
 @kernel
 def three_rows(rows, q, n):
     """The first three of a pooled array of rows of n, times q: in one loop, which is three times as fast as three."""
-    r0, r1, r2 = rows[:n], rows[n:], rows[2 * n :]
+    r0, r1, r2 = three_parts(rows, n)
     t0, t1, t2 = 0.0, 0.0, 0.0
     for j in range(n):
         t0 += r0[j] * q[j]
@@ -101,7 +102,7 @@ def three_rows(rows, q, n):
 @kernel
 def six_rows(rows, q, n):
     """The first six rows, as `three_rows`."""
-    r0, r1, r2, r3, r4, r5 = rows[:n], rows[n:], rows[2 * n :], rows[3 * n :], rows[4 * n :], rows[5 * n :]
+    r0, r1, r2, r3, r4, r5 = six_parts(rows, n)
     t0, t1, t2, t3, t4, t5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(n):
         t0 += r0[j] * q[j]
@@ -116,23 +117,24 @@ def six_rows(rows, q, n):
 @inlined
 def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s):
     """Elastic right-hand side; returns (first moment, I3 q_dot, second moment of mass, sym D, axial D) of the body."""
-    n, e, start = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4]
-    g, l = w.g[9 * e : 9 * (e + n)], w.l[3 * e : 3 * (e + n)]  # noqa: E741
-    rP, P = bodies.rP_dm[9 * e : 9 * (e + n)], bodies.P_dm[3 * e : 3 * (e + n)]
+    n, e, start, c = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4], bodies.where[b, 10]
+    g, l = part(w.g, 9 * e, 9 * n), part(w.l, 3 * e, 3 * n)  # noqa: E741
+    rP, P = part(bodies.rP_dm, 9 * c, 9 * n), part(bodies.P_dm, 3 * c, 3 * n)
     copy(g, rP)
     fill(l, 0.0)
     if start >= 0:
-        contract(bodies.PP_dm[start : start + 9 * n * n], q, qd, n, g, l)
+        contract(part(bodies.PP_dm, start, 9 * n * n), q, qd, n, g, l)
     ox, oy, oz = omega
     xx, yy, zz = oy * oy + oz * oz, ox * ox + oz * oz, ox * ox + oy * oy
     xy, xz, yz = -2.0 * ox * oy, -2.0 * ox * oz, -2.0 * oy * oz
     first = bodies.where[b, 2] + 6
-    f = w.f[first : first + n]
-    omega2, damping = bodies.omega2[e : e + n], bodies.two_zeta_omega[e : e + n]
-    g0, g1, g2, g3, g4, g5 = g[:n], g[n:], g[2 * n :], g[3 * n :], g[4 * n :], g[5 * n :]
-    h0, h1, h2, l0, l1, l2 = g[6 * n :], g[7 * n :], g[8 * n :], l[:n], l[n:], l[2 * n :]
-    r0, r1, r2, r3, r4, r5 = rP[:n], rP[n:], rP[2 * n :], rP[3 * n :], rP[4 * n :], rP[5 * n :]
-    P0, P1, P2 = P[:n], P[n:], P[2 * n :]
+    f = part(w.f, first, n)
+    omega2, damping = part(bodies.omega2, e, n), part(bodies.two_zeta_omega, e, n)
+    g0, g1, g2, g3, g4, g5 = six_parts(g, n)
+    h0, h1, h2 = three_parts(part(g, 6 * n, 3 * n), n)
+    l0, l1, l2 = three_parts(l, n)
+    r0, r1, r2, r3, r4, r5 = six_parts(rP, n)
+    P0, P1, P2 = three_parts(P, n)
     s0, s1, s2, p0, p1, p2 = s[0], s[1], s[2], 0.0, 0.0, 0.0
     w0, w1, w2, w3, w4, w5 = second
     d0, d1, d2, d3, d4, d5, a0, a1, a2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -173,8 +175,8 @@ def contract_in_plane(PP, q, qd, n, g0, g1, h, l, first, second, turning):  # no
     """g0, g1, h += the rows `first`, `second`, `turning` of sum_i q_i PP_i; l += row `turning` of sum_i qd_i PP_i."""
     for i in range(n):
         qi, di, start = q[i], qd[i], 9 * n * i
-        a, b = PP[start + first * n : start + (first + 1) * n], PP[start + second * n : start + (second + 1) * n]
-        c = PP[start + turning * n : start + (turning + 1) * n]
+        a, b = part(PP, start + first * n, n), part(PP, start + second * n, n)
+        c = part(PP, start + turning * n, n)
         for j in range(n):
             g0[j] += qi * a[j]
             g1[j] += qi * b[j]
@@ -185,22 +187,22 @@ def contract_in_plane(PP, q, qd, n, g0, g1, h, l, first, second, turning):  # no
 @inlined
 def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, normal):
     """`flexible_terms` of a planar body that turns at the rate `omega`; without what acts across the plane."""
-    n, e, start = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4]
-    g, l = w.g[9 * e : 9 * (e + n)], w.l[3 * e : 3 * e + n]  # noqa: E741
-    rP, P = bodies.rP_dm[9 * e : 9 * (e + n)], bodies.P_dm[3 * e : 3 * (e + n)]
+    n, e, start, c = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4], bodies.where[b, 10]
+    g, l = part(w.g, 9 * e, 9 * n), part(w.l, 3 * e, n)  # noqa: E741
+    rP, P = part(bodies.rP_dm, 9 * c, 9 * n), part(bodies.P_dm, 3 * c, 3 * n)
     c0, c1, _ = in_plane(normal)
     turning = 6 + normal
-    g0, g1, h = g[c0 * n : (c0 + 1) * n], g[c1 * n : (c1 + 1) * n], g[turning * n : (turning + 1) * n]
-    r0, r1 = rP[c0 * n : (c0 + 1) * n], rP[c1 * n : (c1 + 1) * n]
+    g0, g1, h = part(g, c0 * n, n), part(g, c1 * n, n), part(g, turning * n, n)
+    r0, r1 = part(rP, c0 * n, n), part(rP, c1 * n, n)
     copy(g0, r0)
     copy(g1, r1)
-    copy(h, rP[turning * n : (turning + 1) * n])
+    copy(h, part(rP, turning * n, n))
     fill(l, 0.0)
     if start >= 0:
-        contract_in_plane(bodies.PP_dm[start : start + 9 * n * n], q, qd, n, g0, g1, h, l, c0, c1, turning)
-    f = w.f[bodies.where[b, 2] + 6 : bodies.where[b, 2] + 6 + n]
-    omega2, damping = bodies.omega2[e : e + n], bodies.two_zeta_omega[e : e + n]
-    P0, P1, square = P[c0 * n : (c0 + 1) * n], P[c1 * n : (c1 + 1) * n], omega * omega
+        contract_in_plane(part(bodies.PP_dm, start, 9 * n * n), q, qd, n, g0, g1, h, l, c0, c1, turning)
+    f = part(w.f, bodies.where[b, 2] + 6, n)
+    omega2, damping = part(bodies.omega2, e, n), part(bodies.two_zeta_omega, e, n)
+    P0, P1, square = part(P, c0 * n, n), part(P, c1 * n, n), omega * omega
     across, along = gravity[c0], gravity[c1]
     s0, s1, p0, p1, grown, growing = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(n):
@@ -237,7 +239,7 @@ def inertia(gravity_field, bodies, w, x, v, b):
     gravity = to_body(A, gravity_field)
     s, pd, D, D_axial = get(w.s, b), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if n > 0:
-        q, qd, moments = x[i + 7 : i + 7 + n], v[j + 6 : j + 6 + n], bodies.moments[b]
+        q, qd, moments = part(x, i + 7, n), part(v, j + 6, n), bodies.moments[b]
         s = (moments[0], moments[1], moments[2])
         W = (moments[3], moments[4], moments[5], moments[6], moments[7], moments[8])
         if normal >= 0:
@@ -247,9 +249,9 @@ def inertia(gravity_field, bodies, w, x, v, b):
         put(w.s, b, s)
         fill_tensor(w.J[b], W)
     if normal >= 0:
-        forces_in_plane(w.f[j : j + 6], bodies.mass[b], s, pd, D[0] + D[1], omega, gravity, normal)
+        forces_in_plane(part(w.f, j, 6), bodies.mass[b], s, pd, D[0] + D[1], omega, gravity, normal)
     else:
-        forces_in_space(w.f[j : j + 6], bodies.mass[b], s, w.J[b], pd, D, D_axial, omega, gravity)
+        forces_in_space(part(w.f, j, 6), bodies.mass[b], s, w.J[b], pd, D, D_axial, omega, gravity)
 
 
 @kernel
@@ -329,9 +331,9 @@ def rigid_mass_in_plane(mass, s, inertia, M, normal):
 def prepare_body(bodies, w, b):
     """What of the Schur complement of body b depends on the elastic diagonal alone: P_dm dinv and P_dm dinv P_dm^T."""
     n, e = bodies.where[b, 0], bodies.where[b, 3]
-    P, Cd = bodies.P_dm[3 * e : 3 * (e + n)], w.Cd[6 * e : 6 * (e + n)]
+    P, Cd = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.Cd, 6 * e, 6 * n)
     for r in range(3):
-        scale_row(P, r, w.dinv[e : e + n], n, Cd, r)
+        scale_row(P, r, part(w.dinv, e, n), n, Cd, r)
         for c in range(3):
             w.PP[b, r, c] = row_product(Cd, r, P, c, n)
 
@@ -346,8 +348,8 @@ def factorise(bodies, w, b):
         return w.L[b, 0, 0] > 0.0
     n, e, normal = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 7]
     L = w.L[b]
-    P, H = bodies.P_dm[3 * e : 3 * (e + n)], w.g[9 * e + 6 * n : 9 * (e + n)]
-    dinv, Cd = w.dinv[e : e + n], w.Cd[6 * e : 6 * (e + n)]
+    P, H = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.g, 9 * e + 6 * n, 3 * n)
+    dinv, Cd = part(w.dinv, e, n), part(w.Cd, 6 * e, 6 * n)
     if normal >= 0:
         rigid_mass_in_plane(bodies.mass[b], get(w.s, b), w.J[b, normal, normal], L, normal)
         return factorise_in_plane(w.PP[b], P, H, dinv, Cd, L, n, normal)
@@ -362,8 +364,8 @@ def factorise(bodies, w, b):
 @kernel
 def reduce_rotation(P, H, dinv, Cd, L, n):
     """Rotational rows of [M] - C dinv C^T and of C dinv, with C = [P_dm; H], in one loop over the elastic coordinates."""
-    p0, p1, p2, h0, h1, h2 = P[:n], P[n:], P[2 * n :], H[:n], H[n:], H[2 * n :]
-    c3, c4, c5 = Cd[3 * n :], Cd[4 * n :], Cd[5 * n :]
+    (p0, p1, p2), (h0, h1, h2) = three_parts(P, n), three_parts(H, n)
+    c3, c4, c5 = three_parts(part(Cd, 3 * n, 3 * n), n)
     xp, xq, xr, yp, yq, yr, zp, zq, zr = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(n):
@@ -404,7 +406,7 @@ def reduce_rotation(P, H, dinv, Cd, L, n):
 @kernel
 def scale_row(rows, r, dinv, n, out, target):
     """out[target] = rows[r] dinv, for pooled arrays of rows of n."""
-    row, scaled = rows[r * n : (r + 1) * n], out[target * n : (target + 1) * n]
+    row, scaled = part(rows, r * n, n), part(out, target * n, n)
     for j in range(n):
         scaled[j] = row[j] * dinv[j]
 
@@ -414,7 +416,7 @@ def factorise_in_plane(PP, P, H, dinv, Cd, L, n, normal):
     """`factorise` for the three rigid coordinates i, j, k of a planar body."""
     i, j, k = in_plane(normal)
     ki, kj, kk, ji = 0.0, 0.0, 0.0, PP[j, i]
-    first, second, turn, scaled = P[i * n :], P[j * n :], H[normal * n :], Cd[k * n :]
+    first, second, turn, scaled = part(P, i * n, n), part(P, j * n, n), part(H, normal * n, n), part(Cd, k * n, n)
     for c in range(n):
         x = dinv[c] * turn[c]
         scaled[c] = x
@@ -436,7 +438,7 @@ def factorise_in_plane(PP, P, H, dinv, Cd, L, n, normal):
 @kernel
 def row_product(a, i, b, j, n):
     """sum_k a[i, k] b[j, k] for pooled arrays of rows of n."""
-    left, right = a[i * n : (i + 1) * n], b[j * n : (j + 1) * n]
+    left, right = part(a, i * n, n), part(b, j * n, n)
     total = 0.0
     for k in range(n):
         total += left[k] * right[k]
@@ -447,11 +449,11 @@ def row_product(a, i, b, j, n):
 def reduce_forces(bodies, w, b):
     """w.rigid = L^-1 (f_rigid - C dinv f_elastic), w.elastic = dinv f_elastic of body b."""
     n, j, e, normal = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3], bodies.where[b, 7]
-    f, z = w.f[j : j + 6 + n], w.rigid[b]
+    f, z = part(w.f, j, 6 + n), w.rigid[b]
     for k in range(6):
         z[k] = f[k]
     if n > 0:
-        d, elastic, dinv, Cd = f[6:], w.elastic[e : e + n], w.dinv[e : e + n], w.Cd[6 * e : 6 * (e + n)]
+        d, elastic, dinv, Cd = part(f, 6, n), part(w.elastic, e, n), part(w.dinv, e, n), part(w.Cd, 6 * e, 6 * n)
         if normal >= 0:
             reduce_in_plane(Cd, d, n, normal, z)
         else:
@@ -470,7 +472,7 @@ def reduce_forces(bodies, w, b):
 @kernel
 def reduce_in_plane(Cd, d, n, normal, z):
     i, j, k = in_plane(normal)
-    first, second, third = Cd[i * n :], Cd[j * n :], Cd[k * n :]
+    first, second, third = part(Cd, i * n, n), part(Cd, j * n, n), part(Cd, k * n, n)
     t0, t1, t2 = 0.0, 0.0, 0.0
     for c in range(n):
         t0 += first[c] * d[c]
@@ -485,25 +487,25 @@ def reduce_in_plane(Cd, d, n, normal, z):
 def accelerate(bodies, w, b):
     """w.acc of body b from its reduced forces: L^-T w.rigid, and w.elastic - (C dinv)^T of it."""
     n, j, e, normal = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3], bodies.where[b, 7]
-    z, acc = w.rigid[b], w.acc[j : j + 6 + n]
+    z, acc = w.rigid[b], part(w.acc, j, 6 + n)
     rigid_upper(w.L[b], z, normal)
     for k in range(6):
         acc[k] = z[k]
     if n > 0:
-        Cd, elastic = w.Cd[6 * e : 6 * (e + n)], w.elastic[e : e + n]
+        Cd, elastic = part(w.Cd, 6 * e, 6 * n), part(w.elastic, e, n)
         if normal >= 0:
             i, j, k = in_plane(normal)
-            first, second, third, own = Cd[i * n :], Cd[j * n :], Cd[k * n :], acc[6:]
+            first, second, third, own = part(Cd, i * n, n), part(Cd, j * n, n), part(Cd, k * n, n), part(acc, 6, n)
             for c in range(n):
                 own[c] = elastic[c] - (first[c] * z[i] + second[c] * z[j] + third[c] * z[k])
         else:
-            back_substitute(Cd, elastic, z, n, acc[6:])
+            back_substitute(Cd, elastic, z, n, part(acc, 6, n))
 
 
 @kernel
 def back_substitute(Cd, elastic, z, n, acc):
     """acc = elastic - Cd^T z."""
-    c0, c1, c2, c3, c4, c5 = Cd[:n], Cd[n:], Cd[2 * n :], Cd[3 * n :], Cd[4 * n :], Cd[5 * n :]
+    c0, c1, c2, c3, c4, c5 = six_parts(Cd, n)
     z0, z1, z2, z3, z4, z5 = z[0], z[1], z[2], z[3], z[4], z[5]
     for j in range(n):
         acc[j] = elastic[j] - (c0[j] * z0 + c1[j] * z1 + c2[j] * z2 + c3[j] * z3 + c4[j] * z4 + c5[j] * z5)
@@ -519,18 +521,18 @@ def mass_times(bodies, w, b, y, out):
         out[k] += bodies.mass[b] * linear[k] + turn[k]
         out[3 + k] += lift[k] + dot(w.J[b, k], angular)
     if n > 0:
-        P, H = bodies.P_dm[3 * e : 3 * (e + n)], w.g[9 * e + 6 * n : 9 * (e + n)]
-        momentum, spin = three_rows(P, y[6:], n), three_rows(H, y[6:], n)
+        P, H = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.g, 9 * e + 6 * n, 3 * n)
+        momentum, spin = three_rows(P, part(y, 6, n), n), three_rows(H, part(y, 6, n), n)
         for k in range(3):
             out[k] += momentum[k]
             out[3 + k] += spin[k]
-        add_motion(P, H, linear, angular, y[6:], n, out[6:])
+        add_motion(P, H, linear, angular, part(y, 6, n), n, part(out, 6, n))
 
 
 @kernel
 def add_motion(P, H, linear, angular, q, n, out):
     """out += P^T linear + H^T angular + q."""
-    p0, p1, p2, h0, h1, h2 = P[:n], P[n:], P[2 * n :], H[:n], H[n:], H[2 * n :]
+    (p0, p1, p2), (h0, h1, h2) = three_parts(P, n), three_parts(H, n)
     for j in range(n):
         out[j] += (
             p0[j] * linear[0] + p1[j] * linear[1] + p2[j] * linear[2]

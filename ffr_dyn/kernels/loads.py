@@ -8,7 +8,7 @@ from ffr_dyn.kernels.bushings import apply_bushing
 from ffr_dyn.kernels.markers import apply_wrench
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.spread import apply_spread
-from ffr_dyn.kernels.vectors import fill, get, to_body, to_global
+from ffr_dyn.kernels.vectors import get, to_body, to_global
 
 
 @intrinsic
@@ -73,55 +73,43 @@ def apply_given(where, markers, loads, w, functions, user, f, load, k):
     apply_wrench(where, markers, get(w.u, marker), f, load[marker], marker, force, moment)
 
 
+@kernel
+def count_loads(loads):
+    """How many loads the scene applies besides gravity."""
+    return loads.wrench.shape[0] + loads.action.shape[0] + loads.bushing.shape[0] + loads.spread.shape[0]
+
+
 @inlined
-def apply_loads(where, markers, loads, A, w, s, functions, user, x, f):
-    """Add all loads to the right-hand sides f, and to w.load; A (B + 1, 3, 3) of the bodies; w, s: Marker-, LoadWork."""
-    for k in range(loads.wrench.shape[0]):
-        apply_given(where, markers, loads, w, functions, user, f, w.load, k)
-    for k in range(loads.action.shape[0]):
-        apply_action(where, markers, loads, w, s, functions, user, f, w.load, k)
-    for k in range(loads.bushing.shape[0]):
-        apply_bushing(where, markers, loads, w, s, f, w.load, k)
-    for k in range(loads.spread.shape[0]):
-        apply_spread(where, loads, A, functions, x, f, k)
+def apply_loads(m, w, x, f, load, first, last):
+    """Add loads number first ... last - 1 (wrenches, actions, bushings, spread loads) to the right-hand sides f (V,), and to
+    load (M, 6)."""
+    where, markers, loads, mw, s = m.bodies.where, m.markers, m.loads, w.markers, w.loads
+    actions = loads.wrench.shape[0]
+    bushings = actions + loads.action.shape[0]
+    spread = bushings + loads.bushing.shape[0]
+    for k in range(first, last):
+        if k < actions:
+            apply_given(where, markers, loads, mw, w.functions, w.user, f, load, k)
+        elif k < bushings:
+            apply_action(where, markers, loads, mw, s, w.functions, w.user, f, load, k - actions)
+        elif k < spread:
+            apply_bushing(where, markers, loads, mw, s, f, load, k - bushings)
+        else:
+            apply_spread(where, loads, w.bodies.A, w.functions, x, f, k - spread)
 
 
 @kernel
-def take_power(where, A, f, v):
-    """f . v for right-hand sides f in body axes, which are cleared."""
-    power = 0.0
+def power(where, A, f, v):
+    """f . v for right-hand sides f in body axes; A (B + 1, 3, 3)."""
+    result = 0.0
     for b in range(where.shape[0] - 1):
         n, j = where[b, 0], where[b, 2]
         force = to_global(A[b], (f[j], f[j + 1], f[j + 2]))
         for c in range(3):
-            power += force[c] * v[j + c]
+            result += force[c] * v[j + c]
         for c in range(3, 6 + n):
-            power += f[j + c] * v[j + c]
-    fill(f, 0.0)
-    return power
-
-
-@kernel
-def powers(where, markers, loads, A, w, s, functions, user, x, v, out):
-    """out (W + Z + Y + U,) = power of each load, after an evaluation at (x, v)."""
-    fill(s.f, 0.0)
-    at = 0
-    for k in range(loads.wrench.shape[0]):
-        apply_given(where, markers, loads, w, functions, user, s.f, s.load, k)
-        out[at] = take_power(where, A, s.f, v)
-        at += 1
-    for k in range(loads.action.shape[0]):
-        apply_action(where, markers, loads, w, s, functions, user, s.f, s.load, k)
-        out[at] = take_power(where, A, s.f, v)
-        at += 1
-    for k in range(loads.bushing.shape[0]):
-        apply_bushing(where, markers, loads, w, s, s.f, s.load, k)
-        out[at] = take_power(where, A, s.f, v)
-        at += 1
-    for k in range(loads.spread.shape[0]):
-        apply_spread(where, loads, A, functions, x, s.f, k)
-        out[at] = take_power(where, A, s.f, v)
-        at += 1
+            result += f[j + c] * v[j + c]
+    return result
 
 
 @kernel

@@ -3,13 +3,14 @@
 from ffr_dyn.kernels.bodies import row_product, six_rows
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.vectors import add, cross, get, in_plane, of_two, put, scale, to_global
+from ffr_dyn.kernels.views import part, six_parts
 
 
 @inlined
 def shapes(markers, k, n):
     """Six pooled rows of n: phi_t, phi_r of marker k."""
     start = markers.start[k]
-    return markers.phi[start : start + 6 * n]
+    return part(markers.phi, start, 6 * n)
 
 
 @inlined
@@ -25,7 +26,7 @@ def update_marker(where, markers, w, A, omega, x, v, k):
     ud = (0.0, 0.0, 0.0)
     if n > 0:
         phi = shapes(markers, k, n)
-        q, qd = x[i + 7 : i + 7 + n], v[j + 6 : j + 6 + n]
+        q, qd = part(x, i + 7, n), part(v, j + 6, n)
         normal = where[b, 7]
         if normal < 0:
             u0, u1, u2, t0, t1, t2 = six_rows(phi, q, n)
@@ -69,7 +70,7 @@ def axis_motion(w, k, a0):
 def plane_rows(phi, normal, q, n):
     """The two displacements and the rotation of a marker that keep to the plane, of its six pooled rows, times q."""
     i, j, _ = in_plane(normal)
-    r0, r1, r2 = phi[i * n :], phi[j * n :], phi[(3 + normal) * n :]
+    r0, r1, r2 = part(phi, i * n, n), part(phi, j * n, n), part(phi, (3 + normal) * n, n)
     t0, t1, t2 = 0.0, 0.0, 0.0
     for c in range(n):
         t0 += r0[c] * q[c]
@@ -86,8 +87,8 @@ def prepare_marker(phi, Cd, n, normal, P):
     """
     if normal >= 0:
         i, j, _ = in_plane(normal)
-        P[0], P[1], P[2] = plane_rows(phi, normal, Cd[i * n :], n)
-        P[3], P[4], P[5] = plane_rows(phi, normal, Cd[j * n :], n)
+        P[0], P[1], P[2] = plane_rows(phi, normal, part(Cd, i * n, n), n)
+        P[3], P[4], P[5] = plane_rows(phi, normal, part(Cd, j * n, n), n)
         return
     for r in range(3):
         for c in range(6):
@@ -98,11 +99,11 @@ def prepare_marker(phi, Cd, n, normal, P):
 def couple_marker(phi, Cd, n, normal, P):
     """Rows of the rotations of P: what a unit wrench on a marker does to them through the elastic coordinates."""
     if normal >= 0:
-        P[6], P[7], P[8] = plane_rows(phi, normal, Cd[(3 + normal) * n :], n)
+        P[6], P[7], P[8] = plane_rows(phi, normal, part(Cd, (3 + normal) * n, n), n)
         return
     for r in range(3, 6):
         at = 6 * r
-        P[at], P[at + 1], P[at + 2], P[at + 3], P[at + 4], P[at + 5] = six_rows(phi, Cd[r * n :], n)
+        P[at], P[at + 1], P[at + 2], P[at + 3], P[at + 4], P[at + 5] = six_rows(phi, part(Cd, r * n, n), n)
 
 
 @kernel
@@ -112,11 +113,11 @@ def couple_pair(left, right, dinv, n, normal, out):
         i, j, k = in_plane(normal)
         for r, a in enumerate((i, j, k)):
             for c, b in enumerate((i, j, k)):
-                out[3 * r + c] = weighted_product(left[a * n :], right[b * n :], dinv, n)
+                out[3 * r + c] = weighted_product(part(left, a * n, n), part(right, b * n, n), dinv, n)
         return
     for r in range(6):
         for c in range(6):
-            out[6 * r + c] = weighted_product(left[r * n :], right[c * n :], dinv, n)
+            out[6 * r + c] = weighted_product(part(left, r * n, n), part(right, c * n, n), dinv, n)
 
 
 @kernel
@@ -130,7 +131,7 @@ def weighted_product(left, right, weight, n):
 @kernel
 def project(phi, force, moment, out, n):
     """out += phi_t^T force + phi_r^T moment."""
-    p0, p1, p2, p3, p4, p5 = phi[:n], phi[n:], phi[2 * n :], phi[3 * n :], phi[4 * n :], phi[5 * n :]
+    p0, p1, p2, p3, p4, p5 = six_parts(phi, n)
     for j in range(n):
         out[j] += (
             p0[j] * force[0] + p1[j] * force[1] + p2[j] * force[2]
@@ -152,4 +153,4 @@ def apply_wrench(where, markers, u, f, load, k, force, moment):
         load[c] += force[c]
         load[3 + c] += moment[c]
     if n > 0:
-        project(shapes(markers, k, n), force, moment, f[j + 6 : j + 6 + n], n)
+        project(shapes(markers, k, n), force, moment, part(f, j + 6, n), n)

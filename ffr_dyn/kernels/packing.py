@@ -1,26 +1,27 @@
 """Tables at an address: how a compiled unit, which is given one number, finds the arrays it works on.
 
 A unit that took the tables themselves would have to be compiled together with everything that calls it. So `pack` writes
-the addresses and shapes of all arrays into one array of integers, and `unpack_tables`, `unpack_record` read them back inside
-compiled code. What a table holds, and in which order, is said once: by the annotations in `tables`.
+the addresses and shapes of all arrays into one array of integers, and compiled code reads them back where it uses them
+(`tables_at`, `record_at`). What a table holds, and in which order, is said once: by the annotations in `tables`.
 """
 
 from __future__ import annotations
 
 from functools import cache
+from itertools import accumulate
 from typing import Any, get_type_hints
 
 import numpy as np
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic
-from numba.np.arrayobj import make_array, populate_array
+from numba.core.datamodel.models import OpaqueModel
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import infer_getattr, lower_getattr_generic, register_model
 
 from ffr_dyn.kernels.tables import Record, Tables
+from ffr_dyn.kernels.views import array_at, view_intrinsic
 
 Array = np.ndarray
-
-_intrinsic: Any = intrinsic  # whose callers give one argument less than its definition has
 
 
 @cache
@@ -47,77 +48,98 @@ def pack(tables: Any) -> Array:
     return np.array(found, dtype=np.int64)
 
 
+def _words(kind: Any) -> int:
+    """How many words `pack` writes for a field."""
+    if kind is float or kind is int:
+        return 1
+    if hasattr(kind, "_fields"):
+        return sum(_words(each) for each in _fields(kind).values())
+    return 1 + int(kind.__metadata__[0][1])
+
+
+@cache
+def _places(kind: Any) -> dict[str, int]:
+    """Field: its first word."""
+    sizes = [_words(each) for each in _fields(kind).values()]
+    return dict(zip(_fields(kind), accumulate(sizes, initial=0), strict=False))
+
+
+class Packed(types.Type):
+    """Compiled code's view of a packed table: its address, from which a field is read where it is used.
+
+    Handed from kernel to kernel it is one word; a tuple of all arrays would be some hundred, which LLVM takes long to see
+    through and the machine long to copy.
+    """
+
+    def __init__(self, table: Any) -> None:
+        self.table = table
+        super().__init__(f"Packed({table.__name__})")
+
+
+@register_model(Packed)
+class PackedModel(OpaqueModel):  # type: ignore[misc]
+    """An address."""
+
+
 def _numba_type(kind: Any) -> Any:
     if kind is float:
         return types.float64
     if kind is int:
         return types.int64
     if hasattr(kind, "_fields"):
-        return types.BaseTuple.from_types(tuple(_numba_type(each) for each in _fields(kind).values()), kind)
+        return Packed(kind)
     dtype, axes = kind.__metadata__[0]
     return types.Array(getattr(types, dtype), axes, "C")
 
 
-def _read(context: Any, builder: Any, kind: Any, base: Any, at: int) -> tuple[Any, int]:
-    """(value of a numba type at word `at`, the next word)."""
+@infer_getattr
+class PackedFields(AttributeTemplate):  # type: ignore[misc]
+    """Types of the fields."""
+
+    key = Packed
+
+    def generic_resolve(self, value, attr):  # type: ignore[no-untyped-def, override]
+        """None where the table has no such field."""
+        kind = _fields(value.table).get(attr)
+        return None if kind is None else _numba_type(kind)
+
+
+@lower_getattr_generic(Packed)
+def _read_field(context, builder, typ, value, attr):  # type: ignore[no-untyped-def]
+    field, at = _numba_type(_fields(typ.table)[attr]), _places(typ.table)[attr]
+    base = builder.bitcast(value, cgutils.intp_t.as_pointer())
 
     def word(number: int) -> Any:
-        loaded = builder.load(builder.gep(base, [cgutils.intp_t(number)]))
+        loaded = builder.load(builder.gep(base, [cgutils.intp_t(at + number)]))
         loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
         return loaded
 
-    if isinstance(kind, types.BaseTuple):
-        values = []
-        for each in kind.types:  # type: ignore[attr-defined]
-            value, at = _read(context, builder, each, base, at)
-            values.append(value)
-        return context.make_tuple(builder, kind, values), at
-    if isinstance(kind, types.Array):
-        shape = [word(at + 1 + axis) for axis in range(kind.ndim)]
-        item = context.get_constant(types.intp, 8)
-        strides = [item]
-        for size in shape[:0:-1]:
-            strides.insert(0, builder.mul(strides[0], size, flags=["nsw"]))
-        array = make_array(kind)(context, builder)
-        data = builder.inttoptr(word(at), context.get_data_type(kind.dtype).as_pointer())
-        populate_array(array, data=data, shape=shape, strides=strides, itemsize=item, meminfo=None)
-        return array._getvalue(), at + 1 + kind.ndim
-    loaded = word(at)
-    return (builder.bitcast(loaded, context.get_value_type(kind)) if kind is types.float64 else loaded), at + 1
+    if isinstance(field, Packed):
+        return builder.bitcast(builder.gep(base, [cgutils.intp_t(at)]), context.get_value_type(field))
+    if isinstance(field, types.Array):
+        data = builder.inttoptr(word(0), context.get_data_type(field.dtype).as_pointer())
+        return array_at(context, builder, field, data, [word(1 + axis) for axis in range(field.ndim)])
+    return builder.bitcast(word(0), context.get_value_type(field)) if field is types.float64 else word(0)
 
 
-def _unpacker(kind: type) -> Any:
-    result = _numba_type(kind)
+def _view(table: type) -> Any:
+    """The compiled function that takes an address for that of such a table."""
+    result = Packed(table)
 
-    @_intrinsic
-    def unpack(typing, address):  # type: ignore[no-untyped-def]
+    @view_intrinsic
+    def table_at(typing, address):  # type: ignore[no-untyped-def]
         def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-            base = builder.inttoptr(args[0], cgutils.intp_t.as_pointer())
-            return _read(context, builder, result, base, 0)[0]
+            return builder.inttoptr(args[0], context.get_value_type(result))
 
         return result(types.int64), generate
 
-    return unpack
+    return table_at
 
 
-unpack_tables, unpack_record = _unpacker(Tables), _unpacker(Record)
+tables_at, record_at = _view(Tables), _view(Record)
 
 
-@_intrinsic
-def vector_at(typing, address, size):  # type: ignore[no-untyped-def]
-    """The array of `size` numbers at an address."""
-    kind = types.Array(types.float64, 1, "C")
-
-    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-        array, item = make_array(kind)(context, builder), context.get_constant(types.intp, 8)
-        data = builder.inttoptr(args[0], context.get_data_type(types.float64).as_pointer())
-        populate_array(array, data=data, shape=[args[1]], strides=[item], itemsize=item, meminfo=None)
-        return array._getvalue()
-
-    return kind(types.int64, types.int64), generate
-
-
-@_intrinsic
+@view_intrinsic
 def call_unit(typing, unit, address, t, first, second):  # type: ignore[no-untyped-def]
     """Call the unit at address `unit` (see `ffr_dyn.kernels.units`)."""
     signature = types.int64(types.int64, types.int64, types.float64, types.int64, types.int64)

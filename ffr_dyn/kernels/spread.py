@@ -2,6 +2,7 @@
 
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.tables import AFFINE
+from ffr_dyn.kernels.views import part
 
 
 @kernel
@@ -9,7 +10,7 @@ def add_affine(data, start, factor, q, n, f):
     """f += factor (constant + slope q); data: constant (6 + n), slope (6 + n) rows of n."""
     for r in range(6 + n):
         total = data[start + r]
-        row = data[start + (6 + n) + r * n : start + (6 + n) + (r + 1) * n]
+        row = part(data, start + (6 + n) + r * n, n)
         for c in range(n):
             total += row[c] * q[c]
         f[r] += factor * total
@@ -21,7 +22,7 @@ def turned(data, start, A, q, n, k, c):
     total = 0.0
     for l in range(3):  # noqa: E741
         value = data[start + 3 + 3 * k + l]
-        row = data[start + 12 + (3 * k + l) * n : start + 12 + (3 * k + l + 1) * n]
+        row = part(data, start + 12 + (3 * k + l) * n, n)
         for j in range(n):
             value += row[j] * q[j]
         total += value * A[l, c]
@@ -37,7 +38,7 @@ def add_global(data, start, factor, A, q, n, f):
         a, b = (c + 1) % 3, (c + 2) % 3
         f[3 + c] += factor * (turned(data, start, A, q, n, a, b) - turned(data, start, A, q, n, b, a))
         for l in range(3):  # noqa: E741
-            row = data[start + 12 + (3 * c + l) * n : start + 12 + (3 * c + l + 1) * n]
+            row = part(data, start + 12 + (3 * c + l) * n, n)
             for j in range(n):
                 f[6 + j] += factor * row[j] * A[l, c]
 
@@ -47,8 +48,8 @@ def apply_spread(where, loads, A, functions, x, f, k):
     """Add spread load k to f; A (B + 1, 3, 3)."""
     b, kind, start, function = loads.spread[k, 0], loads.spread[k, 1], loads.spread[k, 2], loads.spread[k, 3]
     n, i, j = where[b, 0], where[b, 1], where[b, 2]
-    q, part = x[i + 7 : i + 7 + n], f[j : j + 6 + n]
+    q, own = part(x, i + 7, n), part(f, j, 6 + n)
     if kind == AFFINE:
-        add_affine(loads.data, start, functions[function, 0], q, n, part)
+        add_affine(loads.data, start, functions[function, 0], q, n, own)
     else:
-        add_global(loads.data, start, functions[function, 0], A[b], q, n, part)
+        add_global(loads.data, start, functions[function, 0], A[b], q, n, own)

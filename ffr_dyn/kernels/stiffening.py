@@ -10,6 +10,7 @@ from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import call_unit
 from ffr_dyn.kernels.tables import MOTION
 from ffr_dyn.kernels.vectors import add_scaled, copy, cross, fill, get, subtract, to_body
+from ffr_dyn.kernels.views import part
 
 SWEEPS = 3
 
@@ -21,8 +22,8 @@ def multiply_stiffness(bodies, w, x):
         n, i, e, loads = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 3], bodies.where[b, 6]
         if loads > 0:
             width, start, out = loads * n, bodies.where[b, 5], bodies.where[b, 9]
-            multiply(bodies.stiffening[start : start + n * width], x[i + 7 : i + 7 + n], n, w.stiff[out : out + width])
-            copy(w.unstiffened[e : e + n], w.f[bodies.where[b, 2] + 6 : bodies.where[b, 2] + 6 + n])
+            multiply(part(bodies.stiffening, start, n * width), part(x, i + 7, n), n, part(w.stiff, out, width))
+            copy(part(w.unstiffened, e, n), part(w.f, bodies.where[b, 2] + 6, n))
 
 
 @kernel
@@ -32,12 +33,12 @@ def multiply(K, q, n, out):
     fill(out, 0.0)
     for c in range(0, n - 3, 4):
         q0, q1, q2, q3 = q[c], q[c + 1], q[c + 2], q[c + 3]
-        first, second = K[c * width : (c + 1) * width], K[(c + 1) * width : (c + 2) * width]
-        third, fourth = K[(c + 2) * width : (c + 3) * width], K[(c + 3) * width : (c + 4) * width]
+        first, second = part(K, c * width, width), part(K, (c + 1) * width, width)
+        third, fourth = part(K, (c + 2) * width, width), part(K, (c + 3) * width, width)
         for k in range(width):
             out[k] += q0 * first[k] + q1 * second[k] + q2 * third[k] + q3 * fourth[k]
     for c in range(n - n % 4, n):
-        add_scaled(out, out, q[c], K[c * width : (c + 1) * width])
+        add_scaled(out, out, q[c], part(K, c * width, width))
 
 
 @kernel
@@ -94,17 +95,17 @@ def stiffen(bodies, w, b):
     """f = unstiffened - sum over the loads of load * K_load q, elastic rows of body b."""
     n, j, e, loads = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3], bodies.where[b, 6]
     first, start, load = bodies.where[b, 8], bodies.where[b, 9], w.load[b]
-    f, stiff = w.f[j + 6 : j + 6 + n], w.stiff[start : start + loads * n]
-    copy(f, w.unstiffened[e : e + n])
+    f, stiff = part(w.f, j + 6, n), part(w.stiff, start, loads * n)
+    copy(f, part(w.unstiffened, e, n))
     for number in range(0, loads - 3, 4):
         s0, s1 = load[bodies.loads[first + number]], load[bodies.loads[first + number + 1]]
         s2, s3 = load[bodies.loads[first + number + 2]], load[bodies.loads[first + number + 3]]
-        p0, p1 = stiff[number * n : (number + 1) * n], stiff[(number + 1) * n : (number + 2) * n]
-        p2, p3 = stiff[(number + 2) * n : (number + 3) * n], stiff[(number + 3) * n : (number + 4) * n]
+        p0, p1 = part(stiff, number * n, n), part(stiff, (number + 1) * n, n)
+        p2, p3 = part(stiff, (number + 2) * n, n), part(stiff, (number + 3) * n, n)
         for k in range(n):
             f[k] -= s0 * p0[k] + s1 * p1[k] + s2 * p2[k] + s3 * p3[k]
     for number in range(loads - loads % 4, loads):
-        add_scaled(f, f, -load[bodies.loads[first + number]], stiff[number * n : (number + 1) * n])
+        add_scaled(f, f, -load[bodies.loads[first + number]], part(stiff, number * n, n))
 
 
 @inlined

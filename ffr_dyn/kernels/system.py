@@ -23,9 +23,11 @@ from ffr_dyn.kernels.bodies import (
     normalise,
     prepare_body,
     reduce_forces,
+    rotation_matrix,
     six_rows,
 )
 from ffr_dyn.kernels.lanes import combine_3, combine_6, dot_rows
+from ffr_dyn.kernels.loads import count_loads
 from ffr_dyn.kernels.markers import (
     couple_marker,
     couple_pair,
@@ -37,7 +39,7 @@ from ffr_dyn.kernels.markers import (
 )
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import call_unit
-from ffr_dyn.kernels.tables import ALL, BACK, IN_USE, LANES, LOOK, NOT_FINITE, OK, REGAIN, RELATION
+from ffr_dyn.kernels.tables import ALL, BACK, IN_USE, LANES, LOADS, LOOK, NOT_FINITE, OK, REGAIN, RELATION
 from ffr_dyn.kernels.vectors import (
     add,
     add_scaled,
@@ -46,10 +48,12 @@ from ffr_dyn.kernels.vectors import (
     fill,
     get,
     in_plane,
+    put,
     subtract,
     to_body,
     to_global,
 )
+from ffr_dyn.kernels.views import part, six_parts
 
 
 @inlined
@@ -62,7 +66,7 @@ def prepare(bodies, markers, rows, pattern, bw, rw):
         b = markers.body[k]
         n, e = where[b, 0], where[b, 3]
         if n > 0:
-            prepare_marker(shapes(markers, k, n), bw.Cd[6 * e : 6 * (e + n)], n, where[b, 7], rw.P[k])
+            prepare_marker(shapes(markers, k, n), part(bw.Cd, 6 * e, 6 * n), n, where[b, 7], rw.P[k])
     for p in range(pattern.pair_body.size):
         b = pattern.pair_body[p]
         n, e = where[b, 0], where[b, 3]
@@ -70,7 +74,7 @@ def prepare(bodies, markers, rows, pattern, bw, rw):
             left = rows.marker[pattern.pair[p, 0], pattern.pair[p, 1]]
             right = rows.marker[pattern.pair[p, 2], pattern.pair[p, 3]]
             couple_pair(
-                shapes(markers, left, n), shapes(markers, right, n), bw.dinv[e : e + n], n, where[b, 7], rw.phiphi[p]
+                shapes(markers, left, n), shapes(markers, right, n), part(bw.dinv, e, n), n, where[b, 7], rw.phiphi[p]
             )
 
 
@@ -94,14 +98,14 @@ def couple_joints(bodies, markers, rows, pattern, bw, rw):
         b = markers.body[k]
         n, e = where[b, 0], where[b, 3]
         if n > 0:
-            couple_marker(shapes(markers, k, n), bw.Cd[6 * e : 6 * (e + n)], n, where[b, 7], rw.P[k])
+            couple_marker(shapes(markers, k, n), part(bw.Cd, 6 * e, 6 * n), n, where[b, 7], rw.P[k])
     for k in range(rows.marker.shape[0]):
         for side in range(sides):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
                 first, last, at = rows.start[k], rows.start[k + 1], (k * sides + side) * SIDE
-                flexible, normal, L = where[b, 0] > 0, where[b, 7], bw.L[b].reshape(36)
+                flexible, normal, L = where[b, 0] > 0, where[b, 7], part(bw.L, 36 * b, 36)
                 spread_rows(rw.jac, first, last, side, flexible, normal, rw.X, at)
                 if normal >= 0:
                     eliminate_in_plane(flexible, normal, rw.P[marker], L, rw.X, at)
@@ -131,10 +135,22 @@ def evaluate_markers(m, w, which, x, v):
         update_marker(m.bodies.where, m.markers, w.markers, w.bodies.A[b], get(w.bodies.omega, b), x, v, k)
 
 
+@kernel
+def turn_bodies(where, w, x, v):
+    """Rotation and angular velocity of all bodies."""
+    for b in range(where.shape[0] - 1):
+        i, j = where[b, 1], where[b, 2]
+        rotation_matrix(x[i + 3], x[i + 4], x[i + 5], x[i + 6], w.A[b])
+        put(w.omega, b, (v[j + 3], v[j + 4], v[j + 5]))
+
+
 @inlined
-def has_loads(loads):
-    """Whether the scene applies anything but gravity."""
-    return loads.wrench.shape[0] + loads.action.shape[0] + loads.bushing.shape[0] + loads.spread.shape[0] > 0
+def clear_and_load(r, x):
+    """All applied loads at the address x of positions, also by marker."""
+    load = r.work.markers.load
+    fill(part(load, 0, load.size), 0.0)
+    if count_loads(r.model.loads) > 0:
+        call_unit(r.units[LOADS], r.address, -1.0, x, 0)
 
 
 @inlined
@@ -200,7 +216,7 @@ def refine_motion(r, target, passes):
 def reduce_miss(rows, bw, step, value):
     """Reduced forces and `step` of a motion that only the rows ask for: Phi_q acc = -value."""
     fill(bw.elastic, 0.0)
-    fill(bw.rigid.reshape(bw.rigid.size), 0.0)
+    fill(part(bw.rigid, 0, bw.rigid.size), 0.0)
     for k in range(rows.start.size - 1):
         for row in range(rows.start[k], rows.start[k + 1]):
             step[LANES * k + row - rows.start[k]] = value[row]
@@ -233,7 +249,7 @@ def reduced_rates(bodies, markers, rows, bw, rw, target):
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
                 n, e, normal, at = where[b, 0], where[b, 3], where[b, 7], (k * sides + side) * SIDE
-                z, moved, elastic = bw.rigid[b], rw.wrench, bw.elastic[e : e + n]
+                z, moved, elastic = bw.rigid[b], rw.wrench, part(bw.elastic, e, n)
                 if normal >= 0:
                     c0, c1, c2 = in_plane(normal)
                     moved[0], moved[1], moved[2] = z[c0], z[c1], z[c2]
@@ -262,14 +278,14 @@ def constraint_rates(where, markers, rows, jac, acc, out):
             if b != ground:
                 n, j = where[b, 0], where[b, 2]
                 phi = shapes(markers, marker, n)
-                add_side_rates(phi, jac, acc[j : j + 6 + n], rows.start[k], rows.start[k + 1], side, n, out)
+                add_side_rates(phi, jac, part(acc, j, 6 + n), rows.start[k], rows.start[k + 1], side, n, out)
 
 
 @kernel
 def add_side_rates(phi, jac, acc, first, last, side, n, out):
     e0, e1, e2, e3, e4, e5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if n > 0:
-        q = acc[6:]
+        q = part(acc, 6, n)
         e0, e1, e2, e3, e4, e5 = six_rows(phi, q, n)
     for row in range(first, last):
         a = jac[row, side]
@@ -291,7 +307,7 @@ def add_reactions(where, markers, rows, jac, lam, out):
             if b != ground:
                 n, j = where[b, 0], where[b, 2]
                 phi = shapes(markers, marker, n)
-                add_side_reactions(phi, jac, lam, rows.start[k], rows.start[k + 1], side, n, out[j : j + 6 + n])
+                add_side_reactions(phi, jac, lam, rows.start[k], rows.start[k + 1], side, n, part(out, j, 6 + n))
 
 
 @kernel
@@ -306,7 +322,7 @@ def add_side_reactions(phi, jac, lam, first, last, side, n, out):
     for c in range(3):
         out[c] += force[c]
     if n > 0:
-        project(phi, force, twist, out[6:], n)
+        project(phi, force, twist, part(out, 6, n), n)
 
 
 @inlined
@@ -326,15 +342,15 @@ def react(bodies, markers, rows, bw, rw):
                     for c in range(6):
                         z[c] -= dot_rows(rw.X, at + LANES * c, rw.step, LANES * k)
                 if n > 0:
-                    phi, elastic = shapes(markers, marker, n), bw.elastic[e : e + n]
+                    phi, elastic = shapes(markers, marker, n), part(bw.elastic, e, n)
                     if normal >= 0:
                         for c in range(3):
                             wrench[c] = dot_rows(rw.X, at + LANES * (3 + c), rw.step, LANES * k)
-                        release_in_plane(phi, normal, bw.dinv[e : e + n], wrench, n, elastic)
+                        release_in_plane(phi, normal, part(bw.dinv, e, n), wrench, n, elastic)
                     else:
                         for c in range(6):
                             wrench[c] = dot_rows(rw.X, at + LANES * (6 + c), rw.step, LANES * k)
-                        release(phi, bw.dinv[e : e + n], wrench, n, elastic)
+                        release(phi, part(bw.dinv, e, n), wrench, n, elastic)
     for b in range(ground):
         accelerate(bodies, bw, b)
 
@@ -351,7 +367,7 @@ def react_in_plane(X, at, step, own, normal, z):
 def release_in_plane(phi, normal, dinv, wrench, n, elastic):
     """`release` for a planar body: two forces and a moment."""
     i, j, k = in_plane(normal)
-    p0, p1, p2 = phi[i * n :], phi[j * n :], phi[k * n :]
+    p0, p1, p2 = part(phi, i * n, n), part(phi, j * n, n), part(phi, k * n, n)
     f0, f1, moment = wrench[0], wrench[1], wrench[2]
     for c in range(n):
         elastic[c] -= dinv[c] * (p0[c] * f0 + p1[c] * f1 + p2[c] * moment)
@@ -360,7 +376,7 @@ def release_in_plane(phi, normal, dinv, wrench, n, elastic):
 @kernel
 def release(phi, dinv, wrench, n, elastic):
     """elastic -= dinv phi^T wrench."""
-    p0, p1, p2, p3, p4, p5 = phi[:n], phi[n:], phi[2 * n :], phi[3 * n :], phi[4 * n :], phi[5 * n :]
+    p0, p1, p2, p3, p4, p5 = six_parts(phi, n)
     f0, f1, f2, m0, m1, m2 = wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5]
     for j in range(n):
         elastic[j] -= dinv[j] * (

@@ -53,13 +53,14 @@ TIGHTER = 1e-4
 class Bodies(NamedTuple):
     """B bodies, E elastic coordinates in all."""
 
-    # (B + 1, 10) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening (or -1); its number of loads;
-    # the body axis along the normal of a planar scene, or -1; its first of `loads`; its first product in `stiff`
+    # (B + 1, 11) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening (or -1); its number of loads;
+    # the body axis along the normal of a planar scene, or -1; its first of `loads`; its first product in `stiff`; the first
+    # column of its P_dm and rP_dm, which equal bodies share, so that many of them stay in the processor's cache
     where: I2
     mass: F1  # (B,)
     moments: F2  # (B, 9) first moment r_dm (3), second moment rr_dm (6)
-    P_dm: F1  # (3 E,) per body 3 rows of n
-    rP_dm: F1  # (9 E,) per body 9 rows of n: six symmetric parts, three axial components (I4)
+    P_dm: F1  # pooled; per body 3 rows of n
+    rP_dm: F1  # pooled; per body 9 rows of n: six symmetric parts, three axial components (I4)
     PP_dm: F1  # pooled; per body n rows of 9 n: for q_i the same nine rows over j (last three: I5)
     omega2: F1  # (E,)
     two_zeta_omega: F1  # (E,)
@@ -72,7 +73,7 @@ class Markers(NamedTuple):
 
     body: I1  # (M,)
     u: F2  # (M, 3) undeformed position in the body frame (ground: global)
-    phi: F1  # pooled; per marker 6 rows of n: phi_t, phi_r
+    phi: F1  # pooled, shared by equal bodies; per marker 6 rows of n: phi_t, phi_r
     start: I1  # (M,) in phi
     load: I1  # (M,) number of the marker's first load in its body's stiffening, or -1
     active: I1  # markers that joints or loads use, updated at every evaluation

@@ -14,23 +14,23 @@ from typing import Any
 from numba import cfunc, types
 
 from ffr_dyn.kernels.actions import keep_turns
-from ffr_dyn.kernels.bodies import mass_times, rotation_matrix
+from ffr_dyn.kernels.bodies import mass_times
 from ffr_dyn.kernels.calls import set_diagonal
 from ffr_dyn.kernels.control import controlled_step, interpolate
 from ffr_dyn.kernels.functions import evaluate_functions
-from ffr_dyn.kernels.loads import apply_loads, call_user, gravity_field, powers
+from ffr_dyn.kernels.loads import apply_loads, call_user, count_loads, gravity_field, power
 from ffr_dyn.kernels.options import OPTIONS
-from ffr_dyn.kernels.packing import call_unit, unpack_record, unpack_tables, vector_at
+from ffr_dyn.kernels.packing import call_unit, record_at, tables_at
 from ffr_dyn.kernels.passing import note_independence, numbered_step
 from ffr_dyn.kernels.record import keep
 from ffr_dyn.kernels.rows import evaluate_block
 from ffr_dyn.kernels.stiffening import solve_stiffened
 from ffr_dyn.kernels.system import (
+    clear_and_load,
     constraint_rates,
     evaluate_bodies,
     evaluate_joints,
     evaluate_markers,
-    has_loads,
     largest,
     move_back,
     prepare,
@@ -41,6 +41,7 @@ from ffr_dyn.kernels.system import (
     solve_motion,
     to_body_axes,
     to_velocity_rates,
+    turn_bodies,
 )
 from ffr_dyn.kernels.tables import (
     ALL,
@@ -73,7 +74,8 @@ from ffr_dyn.kernels.tables import (
     USER_FAILED,
     Model,
 )
-from ffr_dyn.kernels.vectors import add_scaled, copy, fill, put
+from ffr_dyn.kernels.vectors import add_scaled, copy, fill
+from ffr_dyn.kernels.views import part, vector_at
 
 PASSES = 10  # of `relaxed_unit` at most
 UNMET = 1e3  # tolerances, beyond which a violation that the projection does not take back is no drift
@@ -98,7 +100,7 @@ class Unit:
 @Unit
 def bodies_unit(at, t, x, v):
     """Functions of time, then inertia, forces and factors of all bodies at (t, x, v)."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     m, w, x, v = r.model, r.work, vector_at(x, r.x.size), vector_at(v, r.v.size)
     w.info[1] += 1
     if not call_user(m.user_address, t, x, v, w.user):
@@ -115,7 +117,7 @@ def bodies_unit(at, t, x, v):
 @Unit
 def markers_unit(at, which, x, v):
     """Markers in use, of joints, or all, at (x, v)."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     evaluate_markers(r.model, r.work, which, vector_at(x, r.x.size), vector_at(v, r.v.size))
     return OK
 
@@ -123,46 +125,54 @@ def markers_unit(at, which, x, v):
 @Unit
 def constraints_unit(at, t, x, v):
     """Constraint rows from the markers of the joints."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     for k in range(r.model.rows.marker.shape[0]):
         evaluate_block(r.model.rows, r.work.functions, r.work.markers, r.work.rows, k)
     return OK
 
 
 @Unit
-def loads_unit(at, t, x, v):
-    """Applied loads; needed where a scene has any."""
-    r = unpack_tables(at)
-    m, w = r.model, r.work
-    x = vector_at(x, r.x.size)
-    apply_loads(m.bodies.where, m.markers, m.loads, w.bodies.A, w.markers, w.loads, w.functions, w.user, x, w.bodies.f)
+def loads_unit(at, only, x, unused):
+    """Applied loads at x: all of them, or number `only` of them alone into the scratch of the powers."""
+    r = tables_at(at)
+    f, load, first, last = r.work.bodies.f, r.work.markers.load, 0, count_loads(r.model.loads)
+    if only >= 0.0:
+        f, load, first, last = r.work.loads.f, r.work.loads.load, int(only), int(only) + 1
+    apply_loads(r.model, r.work, vector_at(x, r.x.size), f, load, first, last)
     return OK
 
 
 @Unit
 def powers_unit(at, t, record, row):
     """Powers of the applied loads, as a row of the record; needed where a scene has any."""
-    r, out = unpack_tables(at), unpack_record(record)
+    r, out = tables_at(at), record_at(record)
+    f = r.work.loads.f
+    for k in range(count_loads(r.model.loads)):
+        fill(f, 0.0)
+        call_unit(r.units[LOADS], at, float(k), r.x.ctypes.data, 0)
+        out.power[row, k] = power(r.model.bodies.where, r.work.bodies.A, f, r.v)
+    return OK
+
+
+@Unit
+def applied_unit(at, t, x, v):
+    """Right-hand sides (V,), body axes, of the applied loads alone at (t, x, v)."""
+    r = tables_at(at)
     m, w = r.model, r.work
-    powers(
-        m.bodies.where,
-        m.markers,
-        m.loads,
-        w.bodies.A,
-        w.markers,
-        w.loads,
-        w.functions,
-        w.user,
-        r.x,
-        r.v,
-        out.power[row],
-    )
+    xs, vs = vector_at(x, r.x.size), vector_at(v, r.v.size)
+    if not call_user(m.user_address, t, xs, vs, w.user):
+        return USER_FAILED
+    evaluate_functions(m.functions, w.user, t, w.functions)
+    turn_bodies(m.bodies.where, w.bodies, xs, vs)
+    call_unit(r.units[MARKERS], at, IN_USE, x, v)
+    fill(w.bodies.f, 0.0)
+    clear_and_load(r, x)
     return OK
 
 
 @Unit
 def joints_unit(at, t, x, v):
-    r = unpack_tables(at)
+    r = tables_at(at)
     failed = evaluate_joints(r.model, r.work)
     if failed >= 0:
         r.work.info[0] = failed
@@ -174,7 +184,7 @@ def joints_unit(at, t, x, v):
 @Unit
 def prepare_unit(at, t, x, v):
     """What depends on the elastic diagonal alone."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     prepare(r.model.bodies, r.model.markers, r.model.rows, r.model.pattern, r.work.bodies, r.work.rows)
     return OK
 
@@ -182,14 +192,12 @@ def prepare_unit(at, t, x, v):
 @Unit
 def evaluate_unit(at, t, x, v):
     """Fill the work tables at (t, x, v): right-hand sides, constraint rows, factors. Returns a status; info[0] says where."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     status = call_unit(r.units[BODIES], at, t, x, v)
     if status != OK:
         return status
     call_unit(r.units[MARKERS], at, IN_USE, x, v)
-    fill(r.work.markers.load.reshape(r.work.markers.load.size), 0.0)
-    if has_loads(r.model.loads):
-        call_unit(r.units[LOADS], at, t, x, v)
+    clear_and_load(r, x)
     call_unit(r.units[CONSTRAINTS], at, t, x, v)
     return call_unit(r.units[JOINTS], at, t, x, v)
 
@@ -197,7 +205,7 @@ def evaluate_unit(at, t, x, v):
 @Unit
 def back_unit(at, t, x, v):
     """Multipliers and motion of reduced forces."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     m, w = r.model, r.work
     solve_back(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows)
     return OK
@@ -207,7 +215,7 @@ def back_unit(at, t, x, v):
 def regain_unit(at, t, value, unused):
     """acc, step from  M acc + Phi_q^T step = 0,  Phi_q acc = -value (C,): for positions and rates a mass-orthogonal
     projection."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     reduce_miss(r.model.rows, r.work.bodies, r.work.rows.step, vector_at(value, r.stages.target.size))
     return call_unit(r.units[BACK], at, t, 0, 0)
 
@@ -215,7 +223,7 @@ def regain_unit(at, t, value, unused):
 @Unit
 def plain_unit(at, t, x, target):
     """acc and lam from the right-hand sides and the target (C,) of the accelerations."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     solve_motion(r, vector_at(target, r.stages.target.size))
     return OK
 
@@ -223,7 +231,7 @@ def plain_unit(at, t, x, target):
 @Unit
 def relaxed_unit(at, t, x, target):
     """`plain_unit` where rows depend on one another."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     call_unit(r.units[PLAIN], at, t, x, target)
     refine_motion(r, vector_at(target, r.stages.target.size), PASSES)
     return OK
@@ -235,7 +243,7 @@ def stiffened_unit(at, near, x, target):
 
     near : above zero where the last solution was that of a state nearby
     """
-    r = unpack_tables(at)
+    r = tables_at(at)
     solve_stiffened(r, vector_at(x, r.x.size), vector_at(target, r.stages.target.size), near > 0.0)
     return OK
 
@@ -243,12 +251,8 @@ def stiffened_unit(at, near, x, target):
 @Unit
 def look_unit(at, t, x, v):
     """Rows (Phi, nu, gamma, jac) at (x, v) at the time of the last evaluation, whose factors stay; markers do not."""
-    r = unpack_tables(at)
-    where, bw, xs, vs = r.model.bodies.where, r.work.bodies, vector_at(x, r.x.size), vector_at(v, r.v.size)
-    for b in range(r.model.bodies.mass.size):
-        i, j = where[b, 1], where[b, 2]
-        rotation_matrix(xs[i + 3], xs[i + 4], xs[i + 5], xs[i + 6], bw.A[b])
-        put(bw.omega, b, (vs[j + 3], vs[j + 4], vs[j + 5]))
+    r = tables_at(at)
+    turn_bodies(r.model.bodies.where, r.work.bodies, vector_at(x, r.x.size), vector_at(v, r.v.size))
     call_unit(r.units[MARKERS], at, OF_JOINTS, x, v)
     return call_unit(r.units[CONSTRAINTS], at, t, x, v)
 
@@ -256,7 +260,7 @@ def look_unit(at, t, x, v):
 @Unit
 def move_back_unit(at, t, x, v):
     """One projection of (x, v) onto the constraints."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     move_back(r, t, vector_at(x, r.x.size), vector_at(v, r.v.size))
     return OK
 
@@ -264,7 +268,7 @@ def move_back_unit(at, t, x, v):
 @Unit
 def correct_unit(at, t, r_v, target):
     """f += M r_v, target += Phi_q r_v, for the corrections of a stage; r_v (V,) stays in bodies.shift in body axes."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     bodies, bw, rw = r.model.bodies, r.work.bodies, r.work.rows
     correction, target = vector_at(r_v, r.v.size), vector_at(target, r.stages.target.size)
     copy(bw.acc, correction)
@@ -274,14 +278,14 @@ def correct_unit(at, t, r_v, target):
     add_scaled(target, target, 1.0, rw.lam)
     for b in range(bodies.mass.size):
         j, size = bodies.where[b, 2], 6 + bodies.where[b, 0]
-        mass_times(bodies, bw, b, bw.acc[j : j + size], bw.f[j : j + size])
+        mass_times(bodies, bw, b, part(bw.acc, j, size), part(bw.f, j, size))
     return OK
 
 
 @Unit
 def look_ahead_unit(at, t, x, v):
     """`look_unit` at another time."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     m, w = r.model, r.work
     if not call_user(m.user_address, t, vector_at(x, r.x.size), vector_at(v, r.v.size), w.user):
         return USER_FAILED
@@ -292,7 +296,7 @@ def look_ahead_unit(at, t, x, v):
 @Unit
 def project_unit(at, t, value, out):
     """out (V,): the motion, smallest in the norm of the mass matrix, with Phi_q out = -value (C,)."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     w = r.work
     call_unit(r.units[REGAIN], at, t, value, 0)
     to_velocity_rates(r.model.bodies.where, w.bodies.A, w.bodies.acc, vector_at(out, r.v.size))
@@ -307,7 +311,7 @@ def settle_unit(at, t, x, v):
     The corrections are smallest in the norm of the mass matrix with the elastic diagonal of the integrator, so they keep
     its order and do not excite stiff modes. Where they bring nothing nearer, as beyond a dead point, the status tells so.
     """
-    r = unpack_tables(at)
+    r = tables_at(at)
     w, tolerance, before = r.work, r.clock.gains[2], 0.0
     for attempt in range(5):
         status = call_unit(r.units[EVALUATE], at, t, x, v)
@@ -334,7 +338,7 @@ def settle_unit(at, t, x, v):
 @Unit
 def truly_unit(at, t, x, v):
     """Accelerations and multipliers at (t, x, v) with the true mass matrix, whatever the integrator uses."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     w = r.work
     set_diagonal(r, 0.0)
     status = call_unit(r.units[EVALUATE], at, t, x, v)
@@ -348,21 +352,21 @@ def truly_unit(at, t, x, v):
 @Unit
 def record_unit(at, t, record, row):
     """Evaluate the machine's state at time t and keep it as a row of the record. Returns a status."""
-    r = unpack_tables(at)
+    r = tables_at(at)
     status = call_unit(r.units[TRULY], at, t, r.x.ctypes.data, r.v.ctypes.data)
     if status == OK:
         keep_turns(r.model.loads, r.work.loads)
         call_unit(r.units[MARKERS], at, ALL, r.x.ctypes.data, r.v.ctypes.data)
-        if has_loads(r.model.loads):
+        if count_loads(r.model.loads) > 0:
             call_unit(r.units[POWERS], at, t, record, row)
-        keep(r.model, r.work, t, r.x, r.v, unpack_record(record), row)
+        keep(r.model, r.work, t, r.x, r.v, record_at(record), row)
     return status
 
 
 @Unit
 def rows_unit(at, start, record, step):
     """Fill the rows of a record; `step` is the address of a method's unit. Returns a status."""
-    r, out = unpack_tables(at), unpack_record(record)
+    r, out = tables_at(at), record_at(record)
     h, steps = r.clock.time[1], r.clock.steps
     steps[2] = 0
     for row in range(out.time.size):
@@ -381,7 +385,7 @@ def rows_unit(at, start, record, step):
 @Unit
 def controlled_rows_unit(at, start, record, step):
     """`rows_unit` for a method that chooses its steps: each is tried until its error is within the tolerances."""
-    r, out = unpack_tables(at), unpack_record(record)
+    r, out = tables_at(at), record_at(record)
     c, steps = r.control, r.clock.steps
     steps[2] = 0
     for row in range(out.time.size):
@@ -425,6 +429,7 @@ UNITS = {
     "evaluate": evaluate_unit,
     "rows": rows_unit,
     "look": look_unit,
+    "applied": applied_unit,
 }
 # Of scenes that need them, of methods that choose their steps, and of methods that ask for more.
 LOAD_UNITS = {"loads": loads_unit, "powers": powers_unit}
@@ -438,7 +443,7 @@ def units_of(model: Model) -> dict[str, Unit]:
     """The units that a scene needs whatever the method."""
     return {
         **UNITS,
-        **(LOAD_UNITS if has_loads.py_func(model.loads) else {}),
+        **(LOAD_UNITS if count_loads.py_func(model.loads) else {}),
         **(RELAXED_UNITS if model.relaxation > 0.0 else {}),
         **(STIFFENED_UNITS if model.bodies.stiffening.size else {}),
     }

@@ -112,12 +112,16 @@ def _header(body: FlexibleBody, meta: Mapping[str, Any]) -> str:
 
 
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:
-    stored = np.load(path, allow_pickle=False)
-    if not isinstance(stored, np.lib.npyio.NpzFile):
-        raise BodyError("not a body file (a bare array); write one with ffr-prep reduce")
-    with stored:
-        meta = _meta(stored)
-        return meta, {key: stored[key] for key in stored.files if key != "meta"}
+    with open(path, "rb") as stream:  # NumPy would leave it open where the file is damaged
+        magic = stream.read(6)
+        if magic == b"\x93NUMPY":
+            raise BodyError("not a body file (a bare array); write one with ffr-prep reduce")
+        if magic[:2] != b"PK":
+            raise ValueError("no zip file")
+        stream.seek(0)
+        with np.load(stream, allow_pickle=False) as stored:
+            meta = _meta(stored)
+            return meta, {key: stored[key] for key in stored.files if key != "meta"}
 
 
 def _meta(stored: Any) -> dict[str, Any]:

@@ -54,6 +54,8 @@ def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
 
     Raises BodyError for a mode that does not exist or is listed twice.
     """
+    if np.ndim(modes) == 0 and not 0 <= int(modes) <= body.n:
+        raise BodyError(f"body {body.name!r} has {body.n} modes; asked to keep the first {int(modes)}")
     keep = np.arange(int(modes)) if np.ndim(modes) == 0 else np.asarray(modes, int)
     unknown = keep[(keep < 0) | (keep >= body.n)]
     if unknown.size or np.unique(keep).size < keep.size:
@@ -83,6 +85,20 @@ def recombined(surface: Surface, V: Array, Phi: Array) -> Surface:
     return replace(surface, Phi=Phi, stress=stress, beams=beams)
 
 
+def _nearest(body: FlexibleBody, name: str, points: Array, position: Array) -> int:
+    """Number of the surface node nearest to a position; a place far away is most likely one in millimetres."""
+    distances = np.linalg.norm(points - position, axis=1)
+    node = int(np.argmin(distances))
+    if not distances[node] <= np.ptp(points, axis=0).max() / 2:
+        ends = (position, points.min(axis=0), points.max(axis=0))
+        at, low, high = (", ".join(f"{x:.4g}" for x in end) for end in ends)
+        raise BodyError(
+            f"body {body.name!r}: the point {name!r} at ({at}) m is {distances[node]:.3g} m from its surface, which lies "
+            f"between ({low}) and ({high}) m; give a place on the body, in metres"
+        )
+    return node
+
+
 def with_point(body: FlexibleBody, name: str, position: Array) -> FlexibleBody:
     """The body with one more interface, at the surface node nearest to `position` (3,) [m], body frame.
 
@@ -90,12 +106,12 @@ def with_point(body: FlexibleBody, name: str, position: Array) -> FlexibleBody:
     neighbours on the surface. Nothing is added to the basis: what the node does under load is what the basis can show;
     loads there do not stiffen the body.
 
-    Raises BodyError when the body has no surface.
+    Raises BodyError when the body has no surface, or the position is farther from it than half the size of the body.
     """
     if body.surface is None:
         raise BodyError(f"body {body.name!r} has no surface to put the point {name!r} on")
     points, Phi = body.surface.points, body.surface.Phi
-    node = int(np.argmin(((points - np.asarray(position, float)) ** 2).sum(1)))
+    node = _nearest(body, name, points, np.asarray(position, float))
     here = np.flatnonzero((points == points[node]).all(1))  # points are there twice where materials meet
     around = body.surface.triangles[np.isin(body.surface.triangles, here).any(1)]
     ring = np.setdiff1d(around, here)

@@ -301,8 +301,12 @@ def _check(body: FlexibleBody) -> None:
     if not (np.isfinite(body.mass) and body.mass > 0):
         raise BodyError(f"body {body.name!r}: mass is {body.mass} kg; it must be positive")
     names = [i.name for i in body.interfaces]
-    if len(set(names)) < len(names):
-        raise BodyError(f"body {body.name!r}: interface names repeat: {names}")
+    repeated = [name for k, name in enumerate(names) if name in names[:k]]
+    if repeated:
+        raise BodyError(
+            f"body {body.name!r}: interface names repeat: {repeated[0]!r} is there more than once in {names}; each needs "
+            "a name of its own"
+        )
     if body.omega2.size and body.omega2.min() < 0:
         raise BodyError(f"body {body.name!r}: omega2 has the negative value {body.omega2.min():g}")
     parts = [i.phi_t for i in body.interfaces] + ([body.surface.Phi] if body.surface else [])
