@@ -22,6 +22,7 @@ from ffr_dyn.errors import InputError
 Array = np.ndarray
 
 ATTEMPTS = 4
+UNEXPLAINED = 0.25  # of the tolerance: an error beyond that of what is left out, which is the step's
 LONGEST = 6  # times the step of the reference: of a run that tells its error
 
 
@@ -59,7 +60,7 @@ def verified(
         if (errors[-1] <= limits).all() or len(errors) == ATTEMPTS:
             spent = cost(sharp, ledger.span) + cost(coarse, ledger.span)
             return final, Verification(choice, errors[-1], errors[0], own, len(errors) - 1, spent)
-        final = _better(ledger, limits, final, ledger.run(half(choice)), omitted, len(errors))
+        final = _better(ledger, limits, final, ledger.run(half(choice)), omitted, errors)
 
 
 def half(choice: Choice) -> Choice:
@@ -92,16 +93,20 @@ def _check_accuracy(of: Probe, limits: Array, own: Array) -> None:
             )
 
 
-def _better(ledger: Ledger, limits: Array, final: Trial, coarse: Trial, omitted: Contributions, attempt: int) -> Trial:
-    """A better model: of a finer step where that is what is wrong, or else chosen anew beside everything with that step."""
+def _better(
+    ledger: Ledger, limits: Array, final: Trial, coarse: Trial, omitted: Contributions, errors: list[Array]
+) -> Trial:
+    """A better model: of a finer step where that is what is wrong, or else chosen anew beside everything with that step, and
+    of a finer step too where what is left out does not explain the error."""
     same = replace(final.choice, method=PILOT, divisions=coarse.choice.divisions, accuracy=0.0)
     gap = largest(difference(ledger.run(same).values, coarse.values))
     if (gap <= Shares().all * limits).all():
         return ledger.run(_shorter(final.choice))
-    steps: dict[str, Any] = {key: getattr(final.choice, key) for key in ("method", "divisions", "accuracy")}
+    stepped = _shorter(final.choice) if (errors[-1] - gap > UNEXPLAINED * limits).any() else final.choice
+    steps: dict[str, Any] = {key: getattr(stepped, key) for key in ("method", "divisions", "accuracy")}
     if not final.choice.integrator(ledger.span.output_step).implicit:  # its step is for the modes that it had
         steps = {"method": PILOT, "divisions": coarse.choice.divisions, "accuracy": 0.0}
-    if attempt > 1:
+    if len(errors) > 1:
         return ledger.run(replace(coarse.choice, **steps))
     ground = Ground(coarse.choice, coarse.choice, coarse, limits, limits)
     beyond = Insufficient(size_of(final.choice), float((gap / limits).max()))
