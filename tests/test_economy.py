@@ -29,7 +29,7 @@ from ffr_dyn.economy.start import least, started
 from ffr_dyn.economy.steps import _from_two_rows, _of_both, chosen_step, error_of
 from ffr_dyn.economy.terms import TermEffect, _inertial, without_minor
 from ffr_dyn.economy.trial import Span, make, states
-from ffr_dyn.economy.verification import _own
+from ffr_dyn.economy.verification import _better, _own
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.formula import formula
 from ffr_dyn.integrators import ROS2, ROS3
@@ -405,6 +405,18 @@ def test_a_model_is_refined_where_verification_finds_it_wrong(monkeypatch):
     assert found.verification.attempts > 0
     assert (found.verification.first > found.limits).any()
     assert (found.verification.error <= found.limits).all()
+
+
+def test_a_refined_model_takes_a_finer_step_too_where_what_is_left_out_does_not_explain_its_error():
+    ledger, everything = looked_at(pendulum(7e9), TIP, 0.4, 0.02)
+    final, coarse = ledger.run(rigid(everything)), ledger.run(everything)
+    gap = largest(difference(final.values, coarse.values))
+    limits = 0.8 * gap
+    omitted = of_omitted(ledger, final, everything, limits)
+    for unexplained, divisions in ((0.1, 2), (0.5, 4)):
+        better = _better(ledger, limits, final, coarse, omitted, [gap + unexplained * limits])
+        assert better.choice.divisions == divisions
+        assert better.choice.parts[0].count > 0
 
 
 def test_the_reference_must_be_better_than_the_tolerance(monkeypatch):
