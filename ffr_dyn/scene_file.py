@@ -46,6 +46,7 @@ from ffr_dyn.scene_schema import (
     SOLUTIONS,
     TABLES,
     BodyEntry,
+    ChartEntry,
     Kind,
     SceneEntry,
     StabilisationEntry,
@@ -54,6 +55,7 @@ from ffr_dyn.scene_schema import (
 from ffr_dyn.scene_source import Source, origin, origin_of_name, read_source
 from ffr_dyn.settings import (
     Assemble,
+    Charted,
     Forward,
     Inverse,
     Kinematic,
@@ -92,7 +94,8 @@ def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Sc
         entry = SceneEntry.model_validate(tree, context={"parameters": known})
     except ValidationError as error:
         raise InputError(_explained(error, source)) from None
-    return _scene(entry, source), _settings(entry.analysis, entry.outputs, source)
+    settings = _settings(entry.analysis, entry.outputs, source)
+    return _scene(entry, source), _with_chart(settings, entry.chart, source)
 
 
 def _signals(table: Mapping[str, Any], parameters: Parameters) -> dict[str, TimeFunction]:
@@ -257,6 +260,19 @@ def _settings(entry: Any, outputs: list[str], source: Source) -> Settings | Mome
     stabilisation = _stabilisation(getattr(entry, "stabilisation", StabilisationEntry()))
     span = (entry.start, entry.end, entry.output_step)
     return Settings(*span, method, stabilisation, keep, _over_time(entry, source))
+
+
+def _with_chart(settings: Settings | MomentSettings, entry: ChartEntry, source: Source) -> Settings | MomentSettings:
+    """The settings with what a chart compares. InputError for a chart of another analysis than forward dynamics."""
+    if not entry.model_fields_set:
+        return settings
+    if isinstance(settings, MomentSettings) or not isinstance(settings.analysis, Forward):
+        where = origin(source, ("chart",))
+        raise InputError(f"{where}: chart: it compares runs of forward dynamics; the file asks for another analysis")
+    methods = tuple((name, tuple(numbers)) for name, numbers in entry.methods.items())
+    modes = tuple(None if number == "all" else number for number in entry.modes)
+    drops = tuple(tuple(terms) for terms in entry.drop)
+    return replace(settings, chart=Charted(tuple(entry.measures), methods, modes, drops))
 
 
 def _method(entry: Any, source: Source) -> Integrator:

@@ -34,7 +34,7 @@ from ffr_dyn.scene_file import load_scene
 from ffr_dyn.scene_schema import EFFORTS as EFFORT_KINDS
 from ffr_dyn.scene_schema import SOLUTIONS, TABLES, schema
 from ffr_dyn.scene_text import save_scene, to_toml
-from ffr_dyn.settings import Assemble, Inverse, Kinematic, Linearise, Mixed, MomentSettings, Settings, Static
+from ffr_dyn.settings import Assemble, Charted, Inverse, Kinematic, Linearise, Mixed, MomentSettings, Settings, Static
 from ffr_dyn.stabilisation import Baumgarte, Drifting, Projection
 from ffr_dyn.surface_loads import ModalForce, NodalForces, Pressure
 from ffr_dyn.timefunction import evaluate, harmonic, polynomial, table
@@ -456,6 +456,11 @@ METHOD = (0.1, 1.1, 0.1, RK4(1e-3))
     "settings",
     [
         Settings(0.1, 1.1, 0.1, ROS2(0.01), Projection(), ("two.R",), Kinematic()),
+        Settings(
+            *METHOD,
+            Projection(),
+            chart=Charted(("energy",), (("ros2", (0.1, 1 / 3)), ("hht", ())), (2, None), (("I5",),)),
+        ),
         Settings(*METHOD, Projection(1e-7), analysis=Inverse()),
         Settings(*METHOD, Drifting(), analysis=Inverse(quasi_static=True)),
         Settings(*METHOD, Projection(), analysis=Mixed(EFFORTS)),
