@@ -22,7 +22,7 @@ Paths are relative to the file. Angles in rad, everything in SI units unless a u
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -110,15 +110,45 @@ def _signals(table: Mapping[str, Any], parameters: Parameters) -> dict[str, Time
 def _explained(error: ValidationError, source: Source) -> str:
     """All complaints: where, what, and the value."""
     lines: dict[str, None] = {}
-    for item in error.errors():
+    for item in _likeliest(error.errors()):
         keys = tuple(str(part) for part in item["loc"])
         plain = isinstance(item["input"], (str, int, float, bool, list))
         value = f" (it is {item['input']!r})" if plain and item["type"] != "missing" else ""
-        text = item["msg"].removeprefix("Value error, ").removeprefix("it: ")
+        text = _with_nearest(item, item["msg"].removeprefix("Value error, ").removeprefix("it: "))
         where = tuple(key for key in keys if not key.startswith(("[", "list[", "function-")))
         at = (*where, misspelt[1]) if (misspelt := re.match(r"'(.+?)' is not a known entry", text)) else where
         lines[f"{origin(source, at)}: {'.'.join(where) or 'file'}: {text}{value}"] = None
     return "; ".join(lines)
+
+
+def _likeliest(items: Sequence[Any]) -> list[Any]:
+    """Of the complaints about an entry that may be one list or another, those about the list with the fewest."""
+    counts: dict[tuple[Any, ...], dict[str, int]] = {}
+    for entry, form in filter(None, map(_form, items)):
+        forms = counts.setdefault(entry, {})
+        forms[form] = forms.get(form, 0) + 1
+    best = {entry: min(forms, key=lambda form: forms[form]) for entry, forms in counts.items()}
+    return [item for item in items if (found := _form(item)) is None or found[1] == best[found[0]]]
+
+
+def _form(item: Any) -> tuple[tuple[Any, ...], str] | None:
+    """The entry that a complaint is about and the form of a list that it was read as; None where there is one form."""
+    keys = item["loc"]
+    at = next((k for k, key in enumerate(keys) if str(key).startswith("list[")), None)
+    return None if at is None else (keys[:at], keys[at])
+
+
+def _with_nearest(item: Any, text: str) -> str:
+    """A complaint about a word that is not one of those that are known, with the nearest of them."""
+    if item["type"] == "kind" and isinstance(item["input"], dict):
+        given, known = item["input"].get("kind"), text.partition("there are ")[2].split(", ")
+        text = text.replace("no such kind", f"no kind {given!r}")
+    elif item["type"] == "literal_error":
+        given, known = item["input"], re.findall(r"'([^']*)'", text)
+    else:
+        return text
+    close = get_close_matches(str(given), known, 1)
+    return f"{text}; did you mean {close[0]!r}?" if close else text
 
 
 # ---- from entries to a scene --------------------------------------------------------------------------------------

@@ -50,6 +50,12 @@ def scene(tmp_path):
         (SCENE.replace("output_step = 0.01", "output_step = -1"), ["analysis.output_step", "greater than 0"]),
         (SCENE.replace('i = "ground.O"', 'i = "ground"'), ["marker 'ground'", "write BODY.POINT"]),
         (loaded("1 m"), ["loads.push.force.1", "'m' does not fit", "given in N"]),
+        (SCENE.replace("end = 0.1", 'kind = "forwrd"\nend = 0.1'), ["no kind 'forwrd'", "did you mean 'forward'?"]),
+        (SCENE.replace("end = 0.1", 'method = "ros5"\nend = 0.1'), ["analysis.method", "did you mean 'ros3'?"]),
+        (
+            SCENE + '[forces.f]\nkind = "joint-frictoin"\n',
+            ["no kind 'joint-frictoin'", "did you mean 'joint-friction'?"],
+        ),
         (driven("1 / t"), ["angle", "no value at t = 0 s"]),
         (driven("sqrt(t - 1)"), ["angle", "no value at t = 0 s"]),
     ],
@@ -60,6 +66,17 @@ def test_a_scene_file_that_says_nothing_sensible(monkeypatch, capsys, scene, tex
     assert code == 2
     for word in words:
         assert word in said
+
+
+@pytest.mark.parametrize(
+    ("axis", "words"),
+    [("[0, 1]", "at least 3 items"), ("[0, nan, 1]", "finite"), ("[[1, 0, 0], [0, 1, 0]]", "axis")],
+)
+def test_what_may_be_a_vector_or_a_frame_is_complained_about_once(scene, axis, words):
+    scene.write_text(f"{SCENE}axis = {axis}\n")
+    with pytest.raises(InputError, match=words) as caught:
+        load_scene(scene)
+    assert str(caught.value).count("joints.hinge") <= 1
 
 
 @pytest.mark.parametrize(
