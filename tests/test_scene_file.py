@@ -271,7 +271,7 @@ MOTOR = '[drivers.m]\njoint = "hinge"\nfunction = '
         ("[drivers]", MOTOR + 'true', ["drivers.m"]),
         ("[drivers]", MOTOR + '[1]', ["give a number, a formula or a table"]),
         ("[drivers]", MOTOR + '"bar.b.position.x"', ["drivers.m", "depends on the motion"]),
-        ("[drivers]", '[drivers.m]\nkind = "pont"\njoint = "hinge"', ["drivers.m", "no kind 'pont'", "did you mean 'point'?"]),
+        ("[drivers]", '[drivers.m]\nkind = "pont"\njoint = "hinge"', ["drivers.m", "no kind 'pont'", "mean 'point'?"]),
         ("[drivers]", '[drivers.m]\nkind = "point"\ni = "ground.O"\nj = "bar.b"', ["driver 'm' prescribes nothing"]),
         ("[drivers]", MOTOR + '{piecewise = {breaks = [0, 1], coefficients = []}}', ["coefficients"]),
         ("[drivers]", MOTOR + '{piecewise = {breaks = [1, 0], coefficients = [[1]]}}', ["breaks that increase"]),
