@@ -11,16 +11,17 @@ from test_dyn_errors import GROUND, SCENE, run_cli
 
 from ffr_dyn.analyses.assemble import assemble
 from ffr_dyn.analyses.forward import forward
+from ffr_dyn.drivers import Driver
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.forces import Load, SpringDamper
 from ffr_dyn.integrators import ROS2, ROS3
-from ffr_dyn.joints import Joint
+from ffr_dyn.joints import Joint, frames
 from ffr_dyn.operations import SQRT
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.scene_file import load_scene
 from ffr_dyn.stabilisation import Baumgarte, Projection
-from ffr_dyn.timefunction import OPERATION, operation, polynomial
-from ffr_prep.body import BodyError, truncated, with_point
+from ffr_dyn.timefunction import OPERATION, constant, operation, polynomial
+from ffr_prep.body import BodyError, rigid_body, truncated, with_point
 
 
 def loaded(force: str) -> str:
@@ -158,6 +159,12 @@ def test_pictures_that_cannot_be_written(monkeypatch, capsys, scene):
     [
         (lambda: Baumgarte(-3.0, 20.0), "alpha is -3 1/s; it must be positive"),
         (lambda: Baumgarte(3.0, np.nan), "beta is nan 1/s"),
+        (lambda: Driver("d", "hinge", "3 * t"), "driver 'd': its function must be a number, a time function"),
+        (lambda: frames(Joint("j", "revolute", "a.b", "c.d", axis="z")), "'j': axis must be a vector .* it is 'z'"),
+        (lambda: Body("b", "rod.ffr"), "body 'b': its model is 'rod.ffr'; give one of load_body"),
+        (lambda: forward(TWO, end=0.1, output_step=0.1, method="ros2"), "method is 'ros2'; give one with its step"),
+        (lambda: forward(TWO, end=0.1, output_step=0.1, outputs="cloud.q"), r"write \['cloud.q'\]"),
+        (lambda: rigid_body("b", mass=np.nan, inertia=(1, 1, 1)), "mass is nan kg; it must be positive"),
         (lambda: Projection(0.0), "tolerance of the projection is 0"),
         (lambda: Body("b", cloud(3), damping=(0.1, 0.1)), "damping must be 3 numbers"),
         (lambda: with_point(cloud(3), "p", np.array([300.0, 0, 0])), r"point 'p' at \(300, 0, 0\) m is .* in metres"),
@@ -168,6 +175,10 @@ def test_pictures_that_cannot_be_written(monkeypatch, capsys, scene):
 def test_declarations_name_the_value_and_the_remedy(make, words):
     with pytest.raises((InputError, BodyError), match=words):
         make()
+
+
+def test_a_driver_takes_a_number():
+    assert Driver("d", "hinge", 0.5).function == constant(0.5)
 
 
 def pinned(far: tuple[float, float, float], **settings: object) -> Scene:
