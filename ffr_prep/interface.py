@@ -311,6 +311,9 @@ def rigid_field(offsets: Array) -> Array:
 
 
 def _check_names(interfaces: Sequence[InterfaceRegion]) -> None:
+    texts = [interface for interface in interfaces if isinstance(interface, str)]
+    if texts:
+        raise InputError(f"interface {texts[0]!r} is a text; write InterfaceRegion({texts[0]!r})")
     names = [interface.name for interface in interfaces]
     repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:

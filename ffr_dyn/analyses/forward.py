@@ -83,6 +83,8 @@ def forward(
     the time, the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
     method = method if method is not None else ROS2(step=output_step / 10)
+    if isinstance(method, (str, type)):
+        raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
     spacing = output_step / LOOKS if method.controlled else method.step
     substeps, rows = _counts(end - start, output_step, spacing)
     _check_step(scene, method)
