@@ -27,6 +27,17 @@ Example:
   ffr-dyn stress out/result.nc -o out/stress
 """
 
+PLOT_EXAMPLE = """\b
+Example:
+  ffr-dyn plot out/result.nc rod.tip.position hinge.force.y -o out/tip.png
+  ffr-dyn plot out/result.nc rod.tip --path xy -o out/path.png
+"""
+FILM_EXAMPLE = """\b
+Example:
+  ffr-dyn animate out/result.nc -o out/motion.gif --scale 50
+  ffr-dyn animate out/result.nc -o out/stress.html --colour von-mises --limit 60e6
+"""
+
 
 @click.group(epilog=EXAMPLE, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(package_name="ffr")
@@ -64,7 +75,7 @@ def info(result: Path) -> None:
         click.echo(f"{name + axes:45} [{quantity.unit}] {quantity.description}")
 
 
-@cli.command()
+@cli.command(epilog=PLOT_EXAMPLE)
 @click.argument("result", type=click.Path(path_type=Path))
 @click.argument("names", nargs=-1, required=True)
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="Picture, .png or .svg.")
@@ -87,7 +98,7 @@ def plot(result: Path, names: tuple[str, ...], output: Path, title: str | None, 
     click.echo(f"picture  {output}")
 
 
-@cli.command()
+@cli.command(epilog=FILM_EXAMPLE)
 @click.argument("result", type=click.Path(path_type=Path))
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help=".gif, .mp4 or .html.")
 @click.option("--scale", default="auto", help="Factor on the deformation: a number, or auto.", show_default=True)
