@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -24,6 +25,17 @@ Example:
   ffr-dyn plot out/result.nc rod.small_eye.position.x -o out/slider.png
   ffr-dyn animate out/result.nc -o out/motion.gif --scale auto
   ffr-dyn stress out/result.nc -o out/stress
+"""
+
+PLOT_EXAMPLE = """\b
+Example:
+  ffr-dyn plot out/result.nc rod.tip.position hinge.force.y -o out/tip.png
+  ffr-dyn plot out/result.nc rod.tip --path xy -o out/path.png
+"""
+FILM_EXAMPLE = """\b
+Example:
+  ffr-dyn animate out/result.nc -o out/motion.gif --scale 50
+  ffr-dyn animate out/result.nc -o out/stress.html --colour von-mises --limit 60e6
 """
 
 
@@ -55,7 +67,7 @@ def info(result: Path) -> None:
 
     loaded = load_result(result)
     for key, value in sorted(loaded.attributes.items()):
-        for line in value if isinstance(value, list) else [value]:
+        for line in _attribute(key, value):
             click.echo(f"{key:20} {line}")
     click.echo(f"{'rows':20} {loaded.time.size}, from {loaded.time[0]:g} to {loaded.time[-1]:g} s\n")
     for name, quantity in loaded.quantities.items():
@@ -63,7 +75,7 @@ def info(result: Path) -> None:
         click.echo(f"{name + axes:45} [{quantity.unit}] {quantity.description}")
 
 
-@cli.command()
+@cli.command(epilog=PLOT_EXAMPLE)
 @click.argument("result", type=click.Path(path_type=Path))
 @click.argument("names", nargs=-1, required=True)
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="Picture, .png or .svg.")
@@ -86,7 +98,7 @@ def plot(result: Path, names: tuple[str, ...], output: Path, title: str | None, 
     click.echo(f"picture  {output}")
 
 
-@cli.command()
+@cli.command(epilog=FILM_EXAMPLE)
 @click.argument("result", type=click.Path(path_type=Path))
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help=".gif, .mp4 or .html.")
 @click.option("--scale", default="auto", help="Factor on the deformation: a number, or auto.", show_default=True)
@@ -114,6 +126,19 @@ def animate(result: Path, output: Path, scale: str, duration: float | None, colo
 
 for command in (run, forward, *COMMANDS, stress, chart, economise, realtime, stability):
     cli.add_command(command)
+
+
+def _attribute(key: str, value: Any) -> list[str]:
+    """An attribute in lines: numbers with their units on one, texts a line each."""
+    if key == "largest_drift":
+        return [f"{value[0]:.3g} of positions, {value[1]:.3g} of rates"]
+    if isinstance(value, list):
+        return [str(line) for line in value]
+    return [
+        f"{value:.10g}{' s' if key in ('start', 'end', 'output_step') else ''}"
+        if isinstance(value, float)
+        else str(value)
+    ]
 
 
 def _number(text: str) -> float:

@@ -28,7 +28,13 @@ _FORCES = """\b
 Forces are written as
   name=joint.angle, name=joint.stroke    along a joint coordinate
   name=body.interface:x,y,z              at a marker, along a global direction
+
 """
+_MIXED = "\b\nExample:\n  ffr-dyn mixed arm.toml --unknown torque=hinge.angle --known path -o out/arm.nc\n"
+_LINEARISE = (
+    "\b\nExample:\n"
+    "  ffr-dyn linearise crane.toml --at-equilibrium --input push=trolley.hook:1,0,0 --quantity load.pin.position.x\n"
+)
 
 time_option = click.option("--time", type=float, help="[s], for what depends on time; default: the scene's, or 0.")
 
@@ -91,7 +97,7 @@ def inverse(
     perform(loaded, over_time(settings, analysis, keep), output or scene.with_suffix(".nc"))
 
 
-@click.command(epilog=_FORCES)
+@click.command(epilog=_FORCES + _MIXED)
 @scene_options
 @click.option(
     "--unknown", "forces", multiple=True, metavar="FORCE", help="Force to find, instead of the scene's; repeat."
@@ -139,7 +145,7 @@ def static(
     perform(loaded, _at_moment(settings, Static(), time, keep), output or scene.with_suffix(".nc"))
 
 
-@click.command(epilog=_FORCES)
+@click.command(epilog=_FORCES + _LINEARISE)
 @scene_argument
 @output_option
 @parameter_option

@@ -83,6 +83,8 @@ def chart(
     another one that agrees. Writes <output>.png, .svg, .html (interactive, works offline) and .csv. A variant that fails is
     listed with its reason. Variants that no other beats, the Pareto front, are ringed.
 
+    Measures, methods, modes and terms may stand in the scene file, in [chart]; options go before them.
+
     Times are those of the integrator alone on one thread, medians of several runs with bars for the spread. On a busy
     machine trust CPU time.
     """
@@ -99,8 +101,12 @@ def chart(
     output = output or scene.with_suffix(".chart")
     require_file("-o", output.with_name(f"{output.name}.png"))
     span = Span(settings.end if end is None else end, settings.output_step, settings.start)
-    wanted, models = _methods(methods), _models(loaded, modes, drops, bodies)
-    chosen = measures_of(loaded, measures, span.start)
+    asked = settings.chart
+    wanted = _methods(methods) if methods else {name: numbers or None for name, numbers in asked.methods} or None
+    numbers = asked.modes if modes is None else _numbers(modes)
+    left_out = tuple(tuple(text.split(",")) for text in drops) or asked.drops
+    models = _models(loaded, numbers, left_out, bodies)
+    chosen = measures_of(loaded, measures or asked.measures, span.start)
     with pool(workers, cluster) as where, counted(loaded.name) as update:
         found = work_precision(
             loaded, span, where, measures=chosen, methods=wanted, models=models, stabilisation=settings.stabilisation,
@@ -112,12 +118,10 @@ def chart(
         click.echo(f"written      {path}")
 
 
-def _methods(given: Sequence[str]) -> Mapping[str, Sequence[float] | None] | None:
+def _methods(given: Sequence[str]) -> Mapping[str, Sequence[float] | None]:
     """Numbers by method, None where they are to be chosen."""
     from ffr_dyn.chart.variants import maker
 
-    if not given:
-        return None
     found: dict[str, Sequence[float] | None] = {}
     for text in given:
         name, _, numbers = text.partition("=")
@@ -135,13 +139,16 @@ def _listed(text: str, of: Callable[[str], Any], what: str, form: str) -> list[A
         raise InputError(f"{what}: write it as {form}") from None
 
 
-def _models(scene: Scene, modes: str | None, drops: Sequence[str], bodies: Sequence[str]) -> tuple[Model, ...]:
+def _numbers(modes: str) -> list[int | None]:
+    return _listed(modes, lambda part: None if part == "all" else int(part), f"--modes {modes}", "2,4,8,all")
+
+
+def _models(
+    scene: Scene, numbers: Sequence[int | None], drops: Sequence[Sequence[str]], bodies: Sequence[str]
+) -> tuple[Model, ...]:
     from ffr_dyn.chart.variants import models_of
     from ffr_prep.body import load_body
 
-    numbers: list[int | None] = [None]
-    if modes is not None:
-        numbers = _listed(modes, lambda part: None if part == "all" else int(part), f"--modes {modes}", "2,4,8,all")
     meshes: dict[str, list[Any]] = {}
     for text in bodies:
         name, _, files = text.partition("=")
@@ -150,7 +157,7 @@ def _models(scene: Scene, modes: str | None, drops: Sequence[str], bodies: Seque
             raise InputError(f"--body {text}: write BODY=FILE,... with one of the bodies {', '.join(own)}")
         others = [(f"{name} of {Path(file).stem}", load_body(file)) for file in files.split(",")]
         meshes[name] = [(f"{name} of the scene", own[name]), *others]
-    return models_of(scene, numbers, [(), *(tuple(text.split(",")) for text in drops)], meshes)
+    return models_of(scene, numbers, [(), *drops], meshes)
 
 
 def _report(found: Diagram, against: str) -> list[str]:

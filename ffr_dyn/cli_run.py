@@ -51,8 +51,14 @@ def _all_of(*options: Callable[..., Any]) -> Callable[..., Any]:
 scene_options = _all_of(scene_argument, output_option, parameter_option, keep_option)
 integration_options = _all_of(*_INTEGRATION)
 
+RUN_EXAMPLE = """\b
+Example:
+  ffr-dyn run crank.toml -p crank.length=0.06 --method ros3 --step 1e-4 --keep 'rod.*' -o out/crank.nc
+  ffr-dyn run crank.toml --end 2 -o out/crank.nc --resume
+"""
 
-@click.command()
+
+@click.command(epilog=RUN_EXAMPLE)
 @scene_options
 @integration_options
 def run(

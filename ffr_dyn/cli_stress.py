@@ -14,6 +14,10 @@ Quantities:
   signed-max-principal, max-principal, min-principal     tension is positive
   xx, yy, zz, xy, xz, yz                                 components in the axes of the body
   strain-max-principal, strain-xx, ...                   the same of the strain, but for the sizes
+
+\b
+Example:
+  ffr-dyn stress out/result.nc --body rod --point 0.12,0.008,0 --from 0.03 -o out/stress
 """
 
 

@@ -9,21 +9,28 @@ import numpy as np
 
 from ffr_dyn.errors import InputError
 from ffr_dyn.joints import COINCIDENCE, COORDINATES, DOT_2, DRIVEN_ANGLE, Joint, Word, frames, word
-from ffr_dyn.timefunction import TimeFunction, as_time_function
+from ffr_dyn.timefunction import as_time_function
 
 
 @dataclass(frozen=True)
 class Driver:
     """Prescribes `coordinate` ("angle" [rad] or "stroke" [m]) of a joint as a function of time.
 
-    The angle turns f_j from f_i towards g_i, about h_i; the stroke is the distance of j from i along h_i. A Python
-    function must give (value, rate, second derivative).
+    function : a number, a time function, or a Python function that gives (value, rate, second derivative)
+
+    The angle turns f_j from f_i towards g_i, about h_i; the stroke is the distance of j from i along h_i.
+
+    Raises InputError for a function that is none of these.
     """
 
     name: str
     joint: str
-    function: TimeFunction
+    function: Any
     coordinate: str = "angle"
+
+    def __post_init__(self) -> None:
+        made = as_time_function(self.function, f"driver {self.name!r}: its function")
+        object.__setattr__(self, "function", made)
 
 
 @dataclass(frozen=True)

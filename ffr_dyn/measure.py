@@ -94,6 +94,8 @@ def selected(system: System, outputs: Sequence[str] = ("default",)) -> dict[str,
 
     "default" stands for `DEFAULT_OUTPUTS`. Raises InputError for a name or pattern that fits nothing.
     """
+    if isinstance(outputs, str):
+        raise InputError(f"outputs must be a list of names, not the text {outputs!r}; write [{outputs!r}]")
     everything = catalogue(system)
     wanted: set[str] = set()
     for pattern in outputs:

@@ -182,7 +182,7 @@ def plot_times(timing: Timing, path: str | Path) -> Path:
         axes = figure.subplots()
         axes.hist(1e6 * timing.seconds, bins=list(1e6 * np.logspace(first, last, 120)), color=PALETTE[5], log=True)
         for k, (name, at) in enumerate(marks.items()):
-            axes.axvline(1e6 * at, color=PALETTE[(6, 2, 3, 1)[k]], label=f"{name}: {_us(at)}", lw=1.8)
+            axes.axvline(1e6 * at, color=PALETTE[(6, 2, 3, 1)[k]], label=f"{name}: {1e6 * at:.1f} µs", lw=1.8)
         axes.set_xscale("log")
         axes.set_xlabel("time of a step [µs]")
         axes.set_ylabel("steps")

@@ -171,7 +171,7 @@ def _coloured_solid(plotter: Any, shown: Film, solid: Solid, colours: Colouring)
         scalars="field",
         clim=(colours.low * factor, colours.high * factor),
         cmap=colours.colour_map,
-        scalar_bar_args=_bar(colours.title("\n")),
+        scalar_bar_args=_bar(colours.title("\n") + "\n"),
         **_MATTE,
     )
     actors = [actor, *_edge_actors(plotter, edges)]

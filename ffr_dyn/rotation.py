@@ -98,11 +98,16 @@ def triad(axis: Array, what: str = "axis") -> Array:
 
     The first column is the coordinate axis least aligned with `axis`, made orthogonal to it.
     """
-    value = np.asarray(axis, float)
+    try:
+        value = np.asarray(axis, float)
+    except (TypeError, ValueError):
+        value = np.zeros(0)
     if value.shape == (3, 3):
         return rotation_matrix(euler_parameters(value, what))
     if value.shape != (3,) or not np.isfinite(value).all() or not np.linalg.norm(value) > 0:
-        raise InputError(f"{what} must be a vector of three numbers that is not zero, or a (3, 3) frame; it is {axis}")
+        raise InputError(
+            f"{what} must be a vector of three numbers that is not zero, or a (3, 3) frame; it is {axis!r}"
+        )
     h = value / np.linalg.norm(value)
     helper = np.eye(3)[int(np.argmin(np.abs(h)))]
     f = helper - (helper @ h) * h

@@ -64,6 +64,8 @@ class Body:
     kept: tuple[tuple[int, ...], int] | None = None
 
     def __post_init__(self) -> None:
+        if not isinstance(self.model, FlexibleBody):
+            raise InputError(f"body {self.name!r}: its model is {self.model!r}; give one of load_body or rigid_body")
         n, who = self.model.n, f"body {self.name!r}"
         for key in ("position", "velocity", "omega_bar"):
             object.__setattr__(self, key, _vector(getattr(self, key), 3, f"{who}: {key}"))

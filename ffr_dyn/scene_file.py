@@ -22,7 +22,7 @@ Paths are relative to the file. Angles in rad, everything in SI units unless a u
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -46,6 +46,7 @@ from ffr_dyn.scene_schema import (
     SOLUTIONS,
     TABLES,
     BodyEntry,
+    ChartEntry,
     Kind,
     SceneEntry,
     StabilisationEntry,
@@ -54,6 +55,7 @@ from ffr_dyn.scene_schema import (
 from ffr_dyn.scene_source import Source, origin, origin_of_name, read_source
 from ffr_dyn.settings import (
     Assemble,
+    Charted,
     Forward,
     Inverse,
     Kinematic,
@@ -92,7 +94,8 @@ def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Sc
         entry = SceneEntry.model_validate(tree, context={"parameters": known})
     except ValidationError as error:
         raise InputError(_explained(error, source)) from None
-    return _scene(entry, source), _settings(entry.analysis, entry.outputs, source)
+    settings = _settings(entry.analysis, entry.outputs, source)
+    return _scene(entry, source), _with_chart(settings, entry.chart, source)
 
 
 def _signals(table: Mapping[str, Any], parameters: Parameters) -> dict[str, TimeFunction]:
@@ -107,15 +110,45 @@ def _signals(table: Mapping[str, Any], parameters: Parameters) -> dict[str, Time
 def _explained(error: ValidationError, source: Source) -> str:
     """All complaints: where, what, and the value."""
     lines: dict[str, None] = {}
-    for item in error.errors():
+    for item in _likeliest(error.errors()):
         keys = tuple(str(part) for part in item["loc"])
         plain = isinstance(item["input"], (str, int, float, bool, list))
         value = f" (it is {item['input']!r})" if plain and item["type"] != "missing" else ""
-        text = item["msg"].removeprefix("Value error, ").removeprefix("it: ")
+        text = _with_nearest(item, item["msg"].removeprefix("Value error, ").removeprefix("it: "))
         where = tuple(key for key in keys if not key.startswith(("[", "list[", "function-")))
         at = (*where, misspelt[1]) if (misspelt := re.match(r"'(.+?)' is not a known entry", text)) else where
         lines[f"{origin(source, at)}: {'.'.join(where) or 'file'}: {text}{value}"] = None
     return "; ".join(lines)
+
+
+def _likeliest(items: Sequence[Any]) -> list[Any]:
+    """Of the complaints about an entry that may be one list or another, those about the list with the fewest."""
+    counts: dict[tuple[Any, ...], dict[str, int]] = {}
+    for entry, form in filter(None, map(_form, items)):
+        forms = counts.setdefault(entry, {})
+        forms[form] = forms.get(form, 0) + 1
+    best = {entry: min(forms, key=lambda form: forms[form]) for entry, forms in counts.items()}
+    return [item for item in items if (found := _form(item)) is None or found[1] == best[found[0]]]
+
+
+def _form(item: Any) -> tuple[tuple[Any, ...], str] | None:
+    """The entry that a complaint is about and the form of a list that it was read as; None where there is one form."""
+    keys = item["loc"]
+    at = next((k for k, key in enumerate(keys) if str(key).startswith("list[")), None)
+    return None if at is None else (keys[:at], keys[at])
+
+
+def _with_nearest(item: Any, text: str) -> str:
+    """A complaint about a word that is not one of those that are known, with the nearest of them."""
+    if item["type"] == "kind" and isinstance(item["input"], dict):
+        given, known = item["input"].get("kind"), text.partition("there are ")[2].split(", ")
+        text = text.replace("no such kind", f"no kind {given!r}")
+    elif item["type"] == "literal_error":
+        given, known = item["input"], re.findall(r"'([^']*)'", text)
+    else:
+        return text
+    close = get_close_matches(str(given), known, 1)
+    return f"{text}; did you mean {close[0]!r}?" if close else text
 
 
 # ---- from entries to a scene --------------------------------------------------------------------------------------
@@ -257,6 +290,19 @@ def _settings(entry: Any, outputs: list[str], source: Source) -> Settings | Mome
     stabilisation = _stabilisation(getattr(entry, "stabilisation", StabilisationEntry()))
     span = (entry.start, entry.end, entry.output_step)
     return Settings(*span, method, stabilisation, keep, _over_time(entry, source))
+
+
+def _with_chart(settings: Settings | MomentSettings, entry: ChartEntry, source: Source) -> Settings | MomentSettings:
+    """The settings with what a chart compares. InputError for a chart of another analysis than forward dynamics."""
+    if not entry.model_fields_set:
+        return settings
+    if isinstance(settings, MomentSettings) or not isinstance(settings.analysis, Forward):
+        where = origin(source, ("chart",))
+        raise InputError(f"{where}: chart: it compares runs of forward dynamics; the file asks for another analysis")
+    methods = tuple((name, tuple(numbers)) for name, numbers in entry.methods.items())
+    modes = tuple(None if number == "all" else number for number in entry.modes)
+    drops = tuple(tuple(terms) for terms in entry.drop)
+    return replace(settings, chart=Charted(tuple(entry.measures), methods, modes, drops))
 
 
 def _method(entry: Any, source: Source) -> Integrator:

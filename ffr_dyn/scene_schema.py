@@ -379,6 +379,15 @@ ANALYSES: dict[str, Any] = {
 }
 
 
+class ChartEntry(Strict):
+    """What `ffr-dyn chart` compares: steps [s] or tolerances by method, empty lists where they are to be chosen."""
+
+    measures: list[str] = []
+    methods: dict[Literal[(*METHODS, *CONTROLLED)], list[Annotated[Number, Key(gt=0)]]] = {}  # type: ignore[valid-type]
+    modes: Annotated[list[Annotated[int, Key(ge=0)] | Literal["all"]], Key(min_length=1)] = ["all"]
+    drop: list[list[Literal["I3", "I4", "I5", "I8", "I9", "stiffening"]]] = []
+
+
 class _SceneBase(Strict):
     name: str = "scene"
     include: list[str] = []
@@ -389,6 +398,7 @@ class _SceneBase(Strict):
     base_acceleration: Annotated[list[of_time("m/s^2")], THREE] = [0.0, 0.0, 0.0]  # type: ignore[valid-type]
     plane: Literal["auto", "none", "x", "y", "z"] = "auto"
     analysis: _one_of(list(ANALYSES.values()), list(ANALYSES))  # type: ignore[valid-type]
+    chart: ChartEntry = ChartEntry()
     ground: dict[str, Metres] = {}
     bodies: dict[str, BodyEntry]
     markers: dict[str, MarkerEntry] = {}

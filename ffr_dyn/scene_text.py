@@ -20,6 +20,7 @@ from ffr_dyn.joint_forces import Actuator
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.scene_schema import EFFORTS, EVENTS, SOLUTIONS, TABLES, Kind, keys_of
 from ffr_dyn.settings import (
+    Charted,
     Forward,
     Inverse,
     Kinematic,
@@ -64,6 +65,7 @@ def to_toml(scene: Scene, settings: Settings | MomentSettings, files: Mapping[st
     top = {"name": scene.name, "gravity": scene.gravity, "base_acceleration": scene.base_acceleration}
     top["plane"] = scene.plane
     tree = {**top, "outputs": list(settings.outputs), "analysis": _analysis(settings), "ground": dict(scene.ground)}
+    tree["chart"] = _chart(settings.chart) if isinstance(settings, Settings) else {}
     tree["inputs"] = _inputs(scene)
     tree["bodies"] = {body.name: _body(body, files) for body in scene.bodies}
     for table, kinds in TABLES.items():
@@ -104,6 +106,16 @@ def _analysis(settings: Settings | MomentSettings) -> dict[str, Any]:
     if isinstance(settings, Settings) and isinstance(analysis, (Forward, Inverse)):
         entry["stabilisation"] = _stabilisation(settings.stabilisation)
     return entry | _particular(analysis)
+
+
+def _chart(chart: Charted) -> dict[str, Any]:
+    entry = {
+        "measures": list(chart.measures),
+        "methods": {name: list(numbers) for name, numbers in chart.methods},
+        "modes": ["all" if number is None else number for number in chart.modes],
+        "drop": [list(terms) for terms in chart.drops],
+    }
+    return {} if chart == Charted() else entry
 
 
 def _method(method: Integrator) -> dict[str, Any]:

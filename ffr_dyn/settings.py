@@ -65,8 +65,24 @@ OfMoment = Assemble | Static | Linearise
 
 
 @dataclass(frozen=True)
+class Charted:
+    """What `ffr-dyn chart` compares (docs/chart.md).
+
+    measures : such as "deflection:rod"; () for those that fit the scene
+    methods  : (name, steps [s] or tolerances), without numbers where a ladder is to be chosen; () for all methods
+    modes    : elastic coordinates to keep of every flexible body, None for all
+    drops    : terms to leave out, one set after the other, beside none
+    """
+
+    measures: tuple[str, ...] = ()
+    methods: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    modes: tuple[int | None, ...] = (None,)
+    drops: tuple[tuple[str, ...], ...] = ()
+
+
+@dataclass(frozen=True)
 class Settings:
-    """An analysis over a time [s]; `method` and `stabilisation` are of those that integrate."""
+    """An analysis over a time [s]; `method` and `stabilisation` are of those that integrate, `chart` of forward dynamics."""
 
     start: float
     end: float
@@ -75,6 +91,7 @@ class Settings:
     stabilisation: Stabilisation
     outputs: tuple[str, ...] = ("default",)
     analysis: OverTime = Forward()
+    chart: Charted = Charted()
 
 
 @dataclass(frozen=True)

@@ -38,14 +38,10 @@ def extremes(system: System, record: Record) -> Array:
 
 def stretch(model: FlexibleBody, q: Array) -> float:
     """The largest elastic displacement of an interface, q (T, n), over the size of the body; zero for a point."""
-    places = np.array([interface.position for interface in model.interfaces])
-    if model.surface is not None:
-        places = np.concatenate([places.reshape(-1, 3), model.surface.points])
-    size = np.ptp(places, axis=0).max(initial=0.0) if len(places) else 0.0
-    if not size > 0:
+    if not model.size > 0:
         return 0.0
     moved = (np.linalg.norm(shaped(i.phi_t, q), axis=-1).max(initial=0.0) for i in model.interfaces)
-    return float(max(moved, default=0.0) / size)
+    return float(max(moved, default=0.0) / model.size)
 
 
 def meaningless(scene: Scene, found: Array) -> str:

@@ -211,6 +211,8 @@ def modes(body: Path, output: Path, chosen: str, scale: str) -> None:
     from ffr_prep.body import load_body
     from ffr_prep.plots import mode_pictures
 
+    if output.exists() and not output.is_dir():
+        raise InputError(f"--output {output} is a file; name a folder for the pictures")
     loaded = load_body(body)
     numbers = _mode_numbers(chosen, loaded.n)
     factor = "auto" if scale == "auto" else number_of("--scale", scale)

@@ -13,7 +13,13 @@ from ffr_prep.cli_terminal import show
 _PATH = click.Path(path_type=Path)
 
 
-@click.command("convert")
+_EXAMPLE = """\b
+Example:
+  ffr-prep convert rod.ffr --reference simply-supported:big_eye,small_eye -o rod_pinned.ffr
+"""
+
+
+@click.command("convert", epilog=_EXAMPLE)
 @click.argument("body", type=_PATH)
 @click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
 @click.option("--reference", required=True, metavar="CONDITIONS", help="As in reduce, on the interfaces of BODY.")

@@ -13,7 +13,18 @@ _PATH = click.Path(path_type=Path)
 _SUFFIXES = {".sid_fem": "SID", ".sid": "SID", ".fem": "MBDyn"}
 
 
-@click.command("export")
+_EXPORT = """\b
+Example:
+  ffr-prep export rod.ffr --kind full -o rod.fem
+  ffr-prep export rod.ffr -o rod.SID_FEM
+"""
+_IMPORT = """\b
+Example:
+  ffr-prep import rod.SID_FEM -o rod.ffr
+"""
+
+
+@click.command("export", epilog=_EXPORT)
 @click.argument("body", type=_PATH)
 @click.option("-o", "--output", type=_PATH, required=True, help="File to write: .SID_FEM, or .fem for MBDyn.")
 @click.option("--surface", is_flag=True, help="Also write the points of the surface as nodes.")
@@ -58,7 +69,7 @@ def export_body(
     click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")
 
 
-@click.command("import")
+@click.command("import", epilog=_IMPORT)
 @click.argument("file", type=_PATH)
 @click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
 def import_body(file: Path, output: Path) -> None:

@@ -100,7 +100,7 @@ def couple(mesh: Mesh, matrices: SolidMatrices, interfaces: Sequence[InterfaceRe
     _check_overlaps(regions)
     B = _transformation(mesh.points, regions)
     C = _coordinates(len(mesh.points), regions, B)
-    _check_independent(regions, C)
+    check_independent(interfaces, C)
     K = sp.csr_array(B.T @ matrices.K @ B)
     _check_connected(K)
     centre = mesh.points.mean(axis=0)
@@ -311,6 +311,9 @@ def rigid_field(offsets: Array) -> Array:
 
 
 def _check_names(interfaces: Sequence[InterfaceRegion]) -> None:
+    texts = [interface for interface in interfaces if isinstance(interface, str)]
+    if texts:
+        raise InputError(f"interface {texts[0]!r} is a text; write InterfaceRegion({texts[0]!r})")
     names = [interface.name for interface in interfaces]
     repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:
@@ -341,14 +344,15 @@ def _check_overlaps(regions: Sequence[_Region]) -> None:
                 )
 
 
-def _check_independent(regions: Sequence[_Region], C: sp.csr_array) -> None:
+def check_independent(interfaces: Sequence[InterfaceRegion], C: sp.csr_array) -> None:
+    """InputError where interface coordinates C (6I, Z) depend on those of the interfaces before."""
     length = np.sqrt(np.asarray((C * C).sum(axis=1))).ravel()
     gram = (C @ C.T).toarray() / np.outer(length, length)
-    for k, region in enumerate(regions):
+    for k, interface in enumerate(interfaces):
         if np.linalg.eigvalsh(gram[: 6 * k + 6, : 6 * k + 6])[0] < _DEPENDENT:
             raise InputError(
-                f"interface {region.interface.name!r} moves only with interfaces already given "
-                f"({', '.join(repr(r.interface.name) for r in regions[:k])}): its region must have nodes of its own"
+                f"interface {interface.name!r} moves only with interfaces already given "
+                f"({', '.join(repr(i.name) for i in interfaces[:k])}): its region must have nodes of its own"
             )
 
 

@@ -17,14 +17,13 @@ import scipy.sparse as sp
 
 from ffr_prep.accelerations import unit_accelerations
 from ffr_prep.errors import InputError
-from ffr_prep.interface import CoupledModel, InterfaceRegion
+from ffr_prep.interface import CoupledModel, InterfaceRegion, check_independent
 from ffr_prep.matrix_model import MatrixModel, group_nodes, node_in_words
 from ffr_prep.structural_interface import rigid_coordinates, rotation_weight
 
 Array = np.ndarray
 
 _DETERMINED = 1e-9
-_DEPENDENT = 1e-10
 
 
 def couple_matrices(model: MatrixModel, interfaces: Sequence[InterfaceRegion], ties: sp.csr_array) -> CoupledModel:
@@ -37,7 +36,7 @@ def couple_matrices(model: MatrixModel, interfaces: Sequence[InterfaceRegion], t
     free = _free_rows(model, interfaces)
     tied = [k for k, interface in enumerate(interfaces) if interface.kind == "rigid"]
     C = _coordinates(model, interfaces, positions, ties)
-    _check_independent(interfaces, C)
+    check_independent(interfaces, C)
     offsets = rigid_coordinates(model.points - centre)
     return CoupledModel(
         points=model.points,
@@ -184,14 +183,3 @@ def _check_determined(model: MatrixModel, interface: InterfaceRegion) -> None:
             f"determine its six coordinates (the first is {node_in_words(model, nodes[0])}): take a node with three "
             "rotations, or three or more nodes that are not on one line"
         )
-
-
-def _check_independent(interfaces: Sequence[InterfaceRegion], C: sp.csr_array) -> None:
-    length = np.sqrt(np.asarray((C * C).sum(axis=1))).ravel()
-    gram = (C @ C.T).toarray() / np.outer(length, length)
-    for k, interface in enumerate(interfaces):
-        if np.linalg.eigvalsh(gram[: 6 * k + 6, : 6 * k + 6])[0] < _DEPENDENT:
-            raise InputError(
-                f"interface {interface.name!r} moves only with interfaces already given "
-                f"({', '.join(repr(i.name) for i in interfaces[:k])}): its group must have nodes of its own"
-            )

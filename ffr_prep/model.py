@@ -11,6 +11,7 @@ import numpy as np
 
 from ffr_prep.basis import Basis, check_basis, factorised
 from ffr_prep.body import BeamForces, FlexibleBody, Interface, Surface
+from ffr_prep.errors import InputError
 from ffr_prep.factor import CHOLESKY, Solver, SupportedBody, solve_refined, supported
 from ffr_prep.interface import CoupledModel
 from ffr_prep.invariants import InertiaIntegrals
@@ -78,6 +79,12 @@ def reduce_model(
 
     Raises InputError for input that cannot be used and ComputationError for a computation that failed.
     """
+    for what, given, such in (
+        ("reference", reference, 'FixedTo("root")'),
+        ("reduction", reduction, "CraigBampton(10)"),
+    ):
+        if isinstance(given, (str, type)):
+            raise InputError(f"{what} is {given!r}; give one such as {such}")
     coupled = model.coupled
     L = functionals(reference, coupled)
     progress("factorise the stiffness")
@@ -95,20 +102,15 @@ def reduce_model(
     surface = (model.stressed if stress else model.surface)(basis.Z)
     if stiffening:
         progress("compute the geometric stiffness")
+    recorded = record(model, reference, reduction, model.doubts(basis.Z)) | {"solver": described(solver)}
+    recovered = {"stress": model.recovery} if stress else {}
     return FlexibleBody(
         name=name,
         omega2=basis.omega2,
         interfaces=interface_shapes(coupled, basis),
         surface=surface,
         stiffening=stiffening_matrices(model, reference, supported(body, L), basis) if stiffening else None,
-        provenance=completed(
-            record(model, reference, reduction, model.doubts(basis.Z))
-            | {"solver": described(solver)}
-            | ({"stress": model.recovery} if stress else {})
-            | dict(provenance or {}),
-            basis,
-            assessed,
-        ),
+        provenance=completed(recorded | recovered | dict(provenance or {}), basis, assessed),
         **vars(integrals),
     )
 

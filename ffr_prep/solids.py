@@ -224,6 +224,8 @@ def face_mass(points: Array, faces: Array) -> Array:
 def _element_constants(mesh: Mesh, material: Materials) -> Array:
     """(E, 3) Lame constants lam, mu [Pa] and density [kg/m^3] of every element."""
     count = sum(len(block.nodes) for block in mesh.blocks)
+    if isinstance(material, str):
+        raise InputError(f"material is the text {material!r}; write material({material!r}), of ffr_prep.material")
     if isinstance(material, Material):
         return np.tile(_constants(material), (count, 1))
     constants, uses = np.zeros((count, 3)), np.zeros(count, int)

@@ -298,3 +298,11 @@ def test_truncation_keeps_the_chosen_modes():
     for wrong in ([0, 4], 4, [-1], [1, 1]):
         with pytest.raises(BodyError, match=r"has 3 modes(, counted from 0)?; asked to keep "):
             truncated(body, wrong)
+
+
+def test_the_size_of_a_body_is_its_largest_extent():
+    body = rigid_body("bar", mass=1.0, inertia=(1, 1, 1), points={"a": (0, 0, 0), "b": (1, -2, 0.5)})
+    assert body.size == 2.0
+    assert rigid_body("point", mass=1.0, inertia=(1, 1, 1)).size == 0.0
+    surface = replace(some_body().surface, points=some_body().surface.points + np.array([9.0, 0, 0]))
+    assert replace(some_body(), surface=surface).size > some_body().size

@@ -32,6 +32,7 @@ from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import RK4, ROS2
 from ffr_dyn.joints import Joint
 from ffr_dyn.scene import Body, Scene
+from ffr_dyn.scene_file import load_scene
 from ffr_dyn.scene_text import save_scene
 from ffr_dyn.settings import Kinematic, Settings
 from ffr_dyn.stabilisation import Projection
@@ -439,6 +440,67 @@ def test_the_command_writes_pictures_page_and_table(scene_file, tmp_path):
     assert "the front, cheapest first" in done.output
     rows = list(csv.DictReader((tmp_path / "out" / "chart.csv").open(encoding="utf-8")))
     assert {row["model"] for row in rows} == {"full model", "2 modes", "without I5 I9", "2 modes, without I5 I9"}
+
+
+CHART = """
+[chart]
+measures = ["position:rod.b"]
+methods = {ros2 = [0.0125, "6.25 ms"], rk4 = [0.00625]}
+modes = [2, "all"]
+drop = [["I5", "I9"]]
+"""
+
+
+def compared(table) -> tuple[set[str], set[str], list[str]]:
+    """Models, methods with their numbers, and measures of a chart."""
+    rows = list(csv.DictReader(table.open(encoding="utf-8")))
+    measured = [key for key in rows[0] if key.startswith("relative error of")]
+    return {row["model"] for row in rows}, {f"{row['method']} {float(row['number'])}" for row in rows}, measured
+
+
+def test_a_scene_file_says_what_its_chart_compares(scene_file, tmp_path):
+    scene_file.write_text(scene_file.read_text() + CHART)
+    done = run(scene_file, "--workers", 0, "--repeats", 1, "-o", tmp_path / "c")
+    assert done.exit_code == 0, done.output
+    models, variants, measured = compared(tmp_path / "c.csv")
+    assert models == {"full model", "2 modes", "without I5 I9", "2 modes, without I5 I9"}
+    assert variants == {"ros2 0.0125", "ros2 0.00625", "rk4 0.00625"}
+    assert measured == ["relative error of position:rod.b"]
+
+
+def test_options_go_before_the_chart_of_the_file(scene_file, tmp_path):
+    scene_file.write_text(scene_file.read_text() + CHART)
+    options = ("-m", "deflection:rod", "--method", "ros2=0.0125", "--modes", "all", "--drop", "I8")
+    done = run(scene_file, *options, "--workers", 0, "--repeats", 1, "-o", tmp_path / "c")
+    assert done.exit_code == 0, done.output
+    found = compared(tmp_path / "c.csv")
+    assert found == ({"full model", "without I8"}, {"ros2 0.0125"}, ["relative error of deflection:rod"])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("[0.00625]", "[-1]", r"chart\.methods\.rk4\.0: Input should be greater than 0 \(it is -1\)"),
+        ("rk4", "rk5", r"chart\.methods.*'rk4'"),
+        ("[2,", "[-2,", r"chart\.modes.*greater than or equal to 0"),
+        ("I9", "I7", r"chart\.drop.*'I9'"),
+        ("measures", "measure", "'measure' is not a known entry here; did you mean 'measures'"),
+    ],
+)
+def test_a_chart_of_a_scene_file_that_cannot_be_drawn(scene_file, old, new, words):
+    scene_file.write_text(scene_file.read_text() + CHART.replace(old, new))
+    with pytest.raises(InputError, match=words):
+        load_scene(scene_file)
+
+
+def test_only_forward_dynamics_is_charted(scene_file):
+    text = scene_file.read_text().replace('kind = "forward"', 'kind = "kinematic"')
+    text = "\n".join(
+        line for line in text.splitlines() if not line.startswith(("method", "step", "stabilisation", "events"))
+    )
+    scene_file.write_text(text + CHART)
+    with pytest.raises(InputError, match="chart: it compares runs of forward dynamics"):
+        load_scene(scene_file)
 
 
 def test_another_body_file_is_a_model(scene_file, tmp_path):

@@ -11,16 +11,17 @@ from test_dyn_errors import GROUND, SCENE, run_cli
 
 from ffr_dyn.analyses.assemble import assemble
 from ffr_dyn.analyses.forward import forward
+from ffr_dyn.drivers import Driver
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.forces import Load, SpringDamper
 from ffr_dyn.integrators import ROS2, ROS3
-from ffr_dyn.joints import Joint
+from ffr_dyn.joints import Joint, frames
 from ffr_dyn.operations import SQRT
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.scene_file import load_scene
 from ffr_dyn.stabilisation import Baumgarte, Projection
-from ffr_dyn.timefunction import OPERATION, operation, polynomial
-from ffr_prep.body import BodyError, truncated, with_point
+from ffr_dyn.timefunction import OPERATION, constant, operation, polynomial
+from ffr_prep.body import BodyError, rigid_body, truncated, with_point
 
 
 def loaded(force: str) -> str:
@@ -50,6 +51,12 @@ def scene(tmp_path):
         (SCENE.replace("output_step = 0.01", "output_step = -1"), ["analysis.output_step", "greater than 0"]),
         (SCENE.replace('i = "ground.O"', 'i = "ground"'), ["marker 'ground'", "write BODY.POINT"]),
         (loaded("1 m"), ["loads.push.force.1", "'m' does not fit", "given in N"]),
+        (SCENE.replace("end = 0.1", 'kind = "forwrd"\nend = 0.1'), ["no kind 'forwrd'", "did you mean 'forward'?"]),
+        (SCENE.replace("end = 0.1", 'method = "ros5"\nend = 0.1'), ["analysis.method", "did you mean 'ros3'?"]),
+        (
+            SCENE + '[forces.f]\nkind = "joint-frictoin"\n',
+            ["no kind 'joint-frictoin'", "did you mean 'joint-friction'?"],
+        ),
         (driven("1 / t"), ["angle", "no value at t = 0 s"]),
         (driven("sqrt(t - 1)"), ["angle", "no value at t = 0 s"]),
     ],
@@ -60,6 +67,17 @@ def test_a_scene_file_that_says_nothing_sensible(monkeypatch, capsys, scene, tex
     assert code == 2
     for word in words:
         assert word in said
+
+
+@pytest.mark.parametrize(
+    ("axis", "words"),
+    [("[0, 1]", "at least 3 items"), ("[0, nan, 1]", "finite"), ("[[1, 0, 0], [0, 1, 0]]", "axis")],
+)
+def test_what_may_be_a_vector_or_a_frame_is_complained_about_once(scene, axis, words):
+    scene.write_text(f"{SCENE}axis = {axis}\n")
+    with pytest.raises(InputError, match=words) as caught:
+        load_scene(scene)
+    assert str(caught.value).count("joints.hinge") <= 1
 
 
 @pytest.mark.parametrize(
@@ -141,6 +159,12 @@ def test_pictures_that_cannot_be_written(monkeypatch, capsys, scene):
     [
         (lambda: Baumgarte(-3.0, 20.0), "alpha is -3 1/s; it must be positive"),
         (lambda: Baumgarte(3.0, np.nan), "beta is nan 1/s"),
+        (lambda: Driver("d", "hinge", "3 * t"), "driver 'd': its function must be a number, a time function"),
+        (lambda: frames(Joint("j", "revolute", "a.b", "c.d", axis="z")), "'j': axis must be a vector .* it is 'z'"),
+        (lambda: Body("b", "rod.ffr"), "body 'b': its model is 'rod.ffr'; give one of load_body"),
+        (lambda: forward(TWO, end=0.1, output_step=0.1, method="ros2"), "method is 'ros2'; give one with its step"),
+        (lambda: forward(TWO, end=0.1, output_step=0.1, outputs="cloud.q"), r"write \['cloud.q'\]"),
+        (lambda: rigid_body("b", mass=np.nan, inertia=(1, 1, 1)), "mass is nan kg; it must be positive"),
         (lambda: Projection(0.0), "tolerance of the projection is 0"),
         (lambda: Body("b", cloud(3), damping=(0.1, 0.1)), "damping must be 3 numbers"),
         (lambda: with_point(cloud(3), "p", np.array([300.0, 0, 0])), r"point 'p' at \(300, 0, 0\) m is .* in metres"),
@@ -151,6 +175,10 @@ def test_pictures_that_cannot_be_written(monkeypatch, capsys, scene):
 def test_declarations_name_the_value_and_the_remedy(make, words):
     with pytest.raises((InputError, BodyError), match=words):
         make()
+
+
+def test_a_driver_takes_a_number():
+    assert Driver("d", "hinge", 0.5).function == constant(0.5)
 
 
 def pinned(far: tuple[float, float, float], **settings: object) -> Scene:

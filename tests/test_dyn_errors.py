@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -357,6 +358,8 @@ def test_flexible_scene_file_runs_from_the_command_line(monkeypatch, capsys, tmp
     code, said = run_cli(monkeypatch, capsys, "info", tmp_path / "scene.nc")
     assert code == 0
     assert "motor.moment" in said
+    assert re.search(r"end +0\.1 s\n", said)
+    assert re.search(r"largest_drift +\S+ of positions, \S+ of rates\n", said)
     run_cli(monkeypatch, capsys, "plot", tmp_path / "scene.nc", "bar.b.position", "-o", tmp_path / "p.png")
     assert (tmp_path / "p.png").stat().st_size > 1000
     path = tmp_path / "path.png"

@@ -25,10 +25,11 @@ from ffr_dyn.economy.picture import diagram
 from ffr_dyn.economy.report import as_html, as_markdown, as_text, write_report
 from ffr_dyn.economy.search import economise
 from ffr_dyn.economy.selection import Shares
-from ffr_dyn.economy.start import least
-from ffr_dyn.economy.steps import _from_two_rows, chosen_step, error_of
+from ffr_dyn.economy.start import least, started
+from ffr_dyn.economy.steps import _from_two_rows, _of_both, chosen_step, error_of
 from ffr_dyn.economy.terms import TermEffect, _inertial, without_minor
 from ffr_dyn.economy.trial import Span, make, states
+from ffr_dyn.economy.verification import _better, _own
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.formula import formula
 from ffr_dyn.integrators import ROS2, ROS3
@@ -320,6 +321,61 @@ def fast():
     return economise(scene, ("slider.pin.position.x", "rod.stress=40%"), end=0.063, output_step=0.0007, tolerance=1e-2)
 
 
+@pytest.fixture(scope="module")
+def fine():
+    """The same where stress matters finely: steps shorter than an output row, and many modes."""
+    return economise(slider_crank(150.0), ("rod.stress",), end=0.063, output_step=0.0007, tolerance=1e-3, verify=True)
+
+
+def test_a_coarse_tolerance_is_met_by_two_stages_at_once(fast):
+    """The model is run with two stages only, beside everything with four, whose difference is the error."""
+    assert (fast.choice.method, fast.choice.divisions) == ("ros2", 1)
+    assert [one.what for one in fast.tried if one.choice.parts == fast.choice.parts] == [
+        f"{sum(part.count for part in fast.choice.parts)} elastic coordinates, two stages",
+        "chosen",
+        "verified",
+    ]
+    np.testing.assert_allclose(fast.error, fast.tried[-2].error)
+    assert "One run beside everything" in as_text(fast)
+    assert (fast.error / fast.verification.first > 0.3).all()
+
+
+def test_a_fine_tolerance_takes_shorter_steps_and_one_look_at_everything_with_them(fine):
+    assert fine.choice.divisions > 1
+    assert (fine.verification.error <= fine.limits).all()
+    assert 0.3 < float((fine.error / fine.verification.first)[0]) < 5
+
+
+def test_rigid_bodies_are_scouted_with_steps_over_two_rows_where_rows_are_even():
+    for end, wide in ((0.28, True), (0.266, False)):
+        ledger, _ = looked_at(SLOW.scene(), SLOW.outputs, end, 0.014)
+        stiff = started(ledger, assemble(SLOW.scene()).system.scene)
+        assert (len(ledger.wide), len(ledger.runs)) == ((1, 0) if wide else (0, 1))
+        assert stiff.trial.result.time.size == (11 if wide else 20)
+        assert stiff.everything.plane == "z"
+
+
+def test_longer_steps_tell_no_smaller_an_error_of_the_reference():
+    """From steps of twice the reference's to six times, it is not below the true error by much."""
+    ledger, everything = looked_at(slider_crank(50.0), ("rod.stress",), 0.042, 0.0021)
+    sharp, finest = (ledger.run(replace(everything, divisions=d)) for d in (6, 48))
+    true = largest(difference(sharp.values, finest.values))
+    for divisions in (1, 2, 3):
+        assert (_own(sharp, ledger.run(replace(everything, divisions=divisions))) > 0.5 * true).all()
+
+
+def test_where_something_rings_two_stages_and_four_must_agree_better():
+    """A difference that is taken for the error of two stages in a damped scene is taken for that of four in a ringing one."""
+    for damping, method in ((0.01, "ros2"), (0.0, "ros3")):
+        scene = slider_crank(50.0)
+        scene = replace(scene, bodies=tuple(replace(body, damping=damping) for body in scene.bodies))
+        ledger, everything = looked_at(scene, ("rod.stress",), 0.042, 0.0021, divisions=1)
+        two, four = (ledger.run(replace(everything, method=name)) for name in ("ros2", "ros3"))
+        limit = largest(difference(two.values, four.values)) / 0.8
+        assert _of_both(two, four, limit).trial.choice.method == method
+        assert _of_both(two, four, limit / 2) is None
+
+
 def test_a_fast_slender_rod_keeps_bending_and_drops_stretching(fast):
     """Where stress matters coarsely: bending, and no stretching, which makes about a twentieth of it."""
     rod = fast.original.bodies[1].model
@@ -344,11 +400,23 @@ def test_stiffening_is_kept_above_the_critical_spin():
 
 def test_a_model_is_refined_where_verification_finds_it_wrong(monkeypatch):
     """Estimates that promise too much are found out: with all modes declared without effect the search would stay rigid."""
-    monkeypatch.setattr("ffr_dyn.economy.search.Shares", lambda *given: Shares(1e9, 1e9, 1e9, 1e9))
+    monkeypatch.setattr("ffr_dyn.economy.search.Shares", lambda: Shares(1e9, 1e9, 1e9, 1e9, 1e9))
     found = economise(pendulum(7e9), TIP, end=0.4, output_step=0.02, tolerance=1e-3, verify=True)
     assert found.verification.attempts > 0
     assert (found.verification.first > found.limits).any()
     assert (found.verification.error <= found.limits).all()
+
+
+def test_a_refined_model_takes_a_finer_step_too_where_what_is_left_out_does_not_explain_its_error():
+    ledger, everything = looked_at(pendulum(7e9), TIP, 0.4, 0.02)
+    final, coarse = ledger.run(rigid(everything)), ledger.run(everything)
+    gap = largest(difference(final.values, coarse.values))
+    limits = 0.8 * gap
+    omitted = of_omitted(ledger, final, everything, limits)
+    for unexplained, divisions in ((0.1, 2), (0.5, 4)):
+        better = _better(ledger, limits, final, coarse, omitted, [gap + unexplained * limits])
+        assert better.choice.divisions == divisions
+        assert better.choice.parts[0].count > 0
 
 
 def test_the_reference_must_be_better_than_the_tolerance(monkeypatch):
@@ -405,17 +473,27 @@ def test_the_chart_is_a_diagram_of_all_runs_with_the_chosen_one(fast):
     assert len(chart.with_points(chart.points[:1]).points) == len(chart.points) + 1
 
 
-def test_nothing_cheaper_that_was_run_would_have_done(fast):
-    costs = np.array([one.cost / fast.cost for one in fast.runs])
-    errors = np.array([float((one.error / fast.limits).max()) for one in fast.runs])
+def test_nothing_cheaper_that_was_run_would_have_done(fine):
+    costs = np.array([one.cost / fine.cost for one in fine.runs])
+    errors = np.array([float((one.error / fine.limits).max()) for one in fine.runs])
     assert costs.size > 3
     assert not ((costs < 0.999) & (errors <= 1)).any()
 
 
-def test_the_search_costs_a_few_runs_of_what_it_finds(slow, fast):
+def test_the_search_costs_a_few_runs_of_what_it_finds(slow, fast, fine):
     """Beyond one verification, by the cost model."""
-    assert slow.search_cost < 3 * slow.cost
-    assert fast.search_cost < 5 * fast.cost
+    assert all(found.search_cost < 3 * found.cost for found in (slow, fast))
+    assert fine.search_cost < 4 * fine.cost
+
+
+def test_a_body_that_does_nothing_to_the_outputs_itself_is_found_where_more_modes_do_not_help(fine):
+    """The crank's bending changes how the rod is shaken, and nothing of the rod's stress by itself."""
+    gaps = [float(one.error[0]) for one in fine.tried if one.what.endswith("elastic coordinates")]
+    assert gaps[1] == pytest.approx(gaps[0], rel=0.1)
+    assert gaps[2] < 0.1 * gaps[1]
+    crank = fine.kept.body == 0
+    assert crank.any()
+    assert fine.kept.effect[crank].max() < 1e-6 * fine.limits[0]
 
 
 def test_the_command_writes_a_scene_that_runs(tmp_path):

@@ -175,6 +175,10 @@ def test_modes_that_a_body_does_not_have(body_file, tmp_path, capsys):
     assert_fails(capsys, "the body has 10 modes", "modes", body_file, "-o", tmp_path, "--modes", "11")
     assert_fails(capsys, "write numbers and ranges", "modes", body_file, "-o", tmp_path, "--modes", "first")
     assert_fails(capsys, "'big' is not a number", "modes", body_file, "-o", tmp_path, "--scale", "big")
+    assert_fails(capsys, "scale of the mode shapes is nan", "modes", body_file, "-o", tmp_path, "--scale", "nan")
+    assert_fails(capsys, "is a file; name a folder", "modes", body_file, "-o", body_file)
+    assert_fails(capsys, "--set wide: write it as NAME=VALUE", "mesh", tmp_path / "a.geo", "--set", "wide")
+    assert_fails(capsys, "is a folder", "mesh", tmp_path)
     assert not list(tmp_path.iterdir())
 
 

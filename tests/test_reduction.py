@@ -406,3 +406,18 @@ def test_a_basis_that_is_not_what_it_claims_is_refused(model):
         check_basis(model, np.zeros((0, len(rigid))), Basis(rigid, np.zeros(1)))
     with pytest.raises(ComputationError, match="is a rigid motion"):
         check_basis(model, np.zeros((0, len(rigid))), Basis(rigid, np.array([1e-3])))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"material": "steel"}, r"write material\('steel'\)"),
+        ({"interfaces": ("left",)}, r"write InterfaceRegion\('left'\)"),
+        ({"reference": "mean-axis"}, "reference is 'mean-axis'; give one such as FixedTo"),
+        ({"reduction": CraigBampton}, "reduction is .*; give one such as CraigBampton"),
+    ],
+)
+def test_texts_and_classes_in_place_of_objects_are_refused(change, words):
+    given = {"reference": MeanAxis(), "reduction": CraigBampton(1)}
+    with pytest.raises(InputError, match=words):
+        reduced(box_mesh("hex8", (1.0, 1.0, 1.0), (1, 1, 1)), **given | change)

@@ -34,7 +34,7 @@ from ffr_dyn.scene_file import load_scene
 from ffr_dyn.scene_schema import EFFORTS as EFFORT_KINDS
 from ffr_dyn.scene_schema import SOLUTIONS, TABLES, schema
 from ffr_dyn.scene_text import save_scene, to_toml
-from ffr_dyn.settings import Assemble, Inverse, Kinematic, Linearise, Mixed, MomentSettings, Settings, Static
+from ffr_dyn.settings import Assemble, Charted, Inverse, Kinematic, Linearise, Mixed, MomentSettings, Settings, Static
 from ffr_dyn.stabilisation import Baumgarte, Drifting, Projection
 from ffr_dyn.surface_loads import ModalForce, NodalForces, Pressure
 from ffr_dyn.timefunction import evaluate, harmonic, polynomial, table
@@ -271,7 +271,7 @@ MOTOR = '[drivers.m]\njoint = "hinge"\nfunction = '
         ("[drivers]", MOTOR + 'true', ["drivers.m"]),
         ("[drivers]", MOTOR + '[1]', ["give a number, a formula or a table"]),
         ("[drivers]", MOTOR + '"bar.b.position.x"', ["drivers.m", "depends on the motion"]),
-        ("[drivers]", '[drivers.m]\nkind = "pont"\njoint = "hinge"', ["drivers.m", "no such kind; there are joint, point"]),
+        ("[drivers]", '[drivers.m]\nkind = "pont"\njoint = "hinge"', ["drivers.m", "no kind 'pont'", "mean 'point'?"]),
         ("[drivers]", '[drivers.m]\nkind = "point"\ni = "ground.O"\nj = "bar.b"', ["driver 'm' prescribes nothing"]),
         ("[drivers]", MOTOR + '{piecewise = {breaks = [0, 1], coefficients = []}}', ["coefficients"]),
         ("[drivers]", MOTOR + '{piecewise = {breaks = [1, 0], coefficients = [[1]]}}', ["breaks that increase"]),
@@ -456,6 +456,11 @@ METHOD = (0.1, 1.1, 0.1, RK4(1e-3))
     "settings",
     [
         Settings(0.1, 1.1, 0.1, ROS2(0.01), Projection(), ("two.R",), Kinematic()),
+        Settings(
+            *METHOD,
+            Projection(),
+            chart=Charted(("energy",), (("ros2", (0.1, 1 / 3)), ("hht", ())), (2, None), (("I5",),)),
+        ),
         Settings(*METHOD, Projection(1e-7), analysis=Inverse()),
         Settings(*METHOD, Drifting(), analysis=Inverse(quasi_static=True)),
         Settings(*METHOD, Projection(), analysis=Mixed(EFFORTS)),
@@ -487,7 +492,7 @@ ANALYSIS = "[analysis]\nend = 0.1"
 @pytest.mark.parametrize(
     ("new", "words"),
     [
-        ('kind = "kinetic"', ["analysis", "no such kind; there are forward, kinematic, assemble"]),
+        ('kind = "kinetic"', ["analysis", "no kind 'kinetic'; there are forward, kinematic, assemble"]),
         ('kind = "kinematic"\nstabilisation = {kind = "none"}', ["analysis", "'stabilisation' is not a known entry"]),
         ('kind = "static"', ["analysis", "'end' is not a known entry"]),
         ('kind = "mixed"', ["analysis.unknown", "required"]),
@@ -495,7 +500,7 @@ ANALYSIS = "[analysis]\nend = 0.1"
         ('kind = "mixed"\nunknown.m = {joint = "hinge", coordinate = "turn"}', ["'m'", "'turn'"]),
         ('kind = "mixed"\nunknown.m = {marker = "bar.b", direction = [0, 1, 0]}', ["analysis.unknown.m", "'marker'"]),
         ('kind = "mixed"\nunknown.m = {kind = "marker", marker = "bar.b", direction = [0, 0, 0]}', ["'m'", "not all zero"]),
-        ('kind = "mixed"\nunknown.m = {joint = "hinge"}\nsolution = {kind = "bound"}', ["no such kind; there are causal"]),
+        ('kind = "mixed"\nunknown.m = {joint = "hinge"}\nsolution = {kind = "bound"}', ["mean 'bounded'?"]),
         ('kind = "inverse"\nelastic = "stiff"', ["analysis.elastic", "'dynamic' or 'quasi-static'", "'stiff'"]),
     ],
 )  # fmt: skip

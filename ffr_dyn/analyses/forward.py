@@ -83,6 +83,8 @@ def forward(
     the time, the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
     method = method if method is not None else ROS2(step=output_step / 10)
+    if isinstance(method, (str, type)):
+        raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
     spacing = output_step / LOOKS if method.controlled else method.step
     substeps, rows = _counts(end - start, output_step, spacing)
     _check_step(scene, method)
@@ -92,16 +94,7 @@ def forward(
     span = (start, end, output_step)
     mark = _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
     header = _header(scene, assembled, method, stabilisation, span)
-    machine = new_machine(
-        assembled.system, assembled.x, assembled.v, method, gains(stabilisation), start=start, spacing=spacing
-    )
-    energy = EnergyWatch(
-        assembled.system, method, gains(stabilisation), spacing, lambda rows: with_all_reactions(assembled, rows)
-    )
-    if resume is not None and Path(resume).exists():
-        run = _resumed(Path(resume), mark, machine, energy)
-    else:
-        run = _started(assembled, machine, energy, start, wanted)
+    run = _begun(assembled, method, gains(stabilisation), start, spacing, wanted, resume, mark)
     _check_resumed(run, substeps * rows, output_step / substeps)
     watcher = _watcher(assembled, run, method, stabilisation, spacing, events, resume) if events else None
     path = resume if path is None else path
@@ -153,6 +146,25 @@ def _check_step(scene: Scene, method: Integrator) -> None:
             f"{omega / 2 / np.pi:.4g} Hz, which needs a step below {method.reach / omega:.2g} s (joints lower this further); "
             "use ROS2, fewer modes or a smaller step"
         )
+
+
+def _begun(
+    assembled: Assembled,
+    method: Integrator,
+    gained: tuple[float, float, float],
+    start: float,
+    spacing: float,
+    wanted: Mapping[str, Entry],
+    resume: str | Path | None,
+    mark: str,
+) -> _Run:
+    """The run at its start, or where the file to resume left it."""
+    system = assembled.system
+    machine = new_machine(system, assembled.x, assembled.v, method, gained, start=start, spacing=spacing)
+    energy = EnergyWatch(system, method, gained, spacing, lambda rows: with_all_reactions(assembled, rows))
+    if resume is not None and Path(resume).exists():
+        return _resumed(Path(resume), mark, machine, energy)
+    return _started(assembled, machine, energy, start, wanted)
 
 
 def _started(

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator
 
 from ffr_dyn.chart.diagram import CPU, EVALUATIONS, WALL, Diagram, Point
 from ffr_dyn.errors import InputError
@@ -28,6 +28,7 @@ COST_WORDS = {
 MARKERS = "os^Dv<>PXh*p"
 COLOURS = (*PALETTE, "#7B3294", "#8C510A", "#808080", "#A6D96A", "#B2182B")  # as many methods are told apart
 FRONT, FLOOR = "#222222", "#888888"
+FEW = (1.0, 0.5)  # decades of an axis, over which powers of ten are too few labels; and over which all ticks get one
 LIMIT: Any = {"color": FRONT, "linestyle": "--", "linewidth": 1.0}
 _STYLE = {
     "font.size": 11.0,
@@ -78,7 +79,7 @@ def draw(
             words = diagram.measure(measure).words
             axes.set_title(words if len(shown) == 1 else f"{diagram.title}: {words}", fontsize=11.5)
         _legend(figure, shown, lines)
-        figure.suptitle(title or f"{shown[0].title}: work and precision", fontweight="bold")
+        figure.suptitle(title or f"{shown[0].title}: work and precision", fontweight="bold", x=0.01, ha="left")
         return _written(figure, path)
 
 
@@ -116,7 +117,8 @@ def _panel(
         axes.axhspan(axes.get_ylim()[0], floor / scale, **below)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(LogLocator(numticks=12))
-        axis.set_minor_formatter(NullFormatter())
+        axis.set_minor_formatter(LogFormatterSciNotation(minor_thresholds=FEW))
+    axes.tick_params(which="minor", labelsize="small")
     axes.grid(True, which="major")
     axes.set_xlabel(COST_WORDS[against])
     axes.set_ylabel(error_words(diagram, measure))
@@ -168,7 +170,7 @@ def _legend(figure: Figure, shown: list[Diagram], lines: dict[tuple[str, str], t
         handles.append(Patch(facecolor="#EEEEEE", edgecolor=FLOOR, hatch="///", label="error of the reference"))
     lost = sum(len(diagram.lost) for diagram in shown)
     title = f"{lost} variant{'s' * (lost > 1)} failed:\nsee the table" if lost else None
-    figure.legend(handles=handles, loc="outside right upper", fontsize=10, alignment="left", title=title)
+    figure.legend(handles=handles, loc="outside right center", fontsize=10, alignment="left", title=title)
 
 
 def _written(figure: Figure, path: Path) -> Path:

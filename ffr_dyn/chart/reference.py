@@ -96,6 +96,14 @@ def reference(
             "no verified reference: " + "; ".join(story) + ". Allow longer runs (--limit), or shorten the scene"
         )
     best, check = sorted(found, key=_badness)
+    values, floors = _agreed(best, check, measures, say)
+    return Reference(values, best.outcome.scales, floors, best.variant, check.variant, tuple(story))
+
+
+def _agreed(
+    best: _Refined, check: _Refined, measures: tuple[Measure, ...], say: Callable[[str], None]
+) -> tuple[dict[str, Array], dict[str, float]]:
+    """Histories and the errors that they may have, by measure. SimulationError where two methods are too far apart."""
     between = distances(best.outcome, check.outcome)
     floors = {name: max(between[name], best.distance[name]) for name in between}
     values = dict(best.outcome.values)
@@ -110,7 +118,7 @@ def reference(
                 f"{name!r}, {floor / scale:.0%} of its scale; allow longer runs (--limit), or shorten the scene: a chaotic "
                 "or unstable motion has no long reference"
             )
-    return Reference(values, best.outcome.scales, floors, best.variant, check.variant, tuple(story))
+    return values, floors
 
 
 def _badness(refined: _Refined) -> float:

@@ -43,6 +43,7 @@ class Economy:
     choice, scene, settings : the model;  scene is ready to run with `ffr_dyn.run.run(scene, settings)`
     limits       : (outputs,) tolerances in the units of the outputs;  scales : (outputs,) their ranges
     model_error, time_error, error : (outputs,) estimates: of what is left out, of the step, of both together
+    together     : whether one run beside everything told both errors, which stand as that of the step then
     effects      : what each mode left out does to each output, driven one-way by the final model's motion
     kept         : what each mode that stays does
     terms        : what inertia terms and stiffening by each load do to each output, kept or not
@@ -63,6 +64,7 @@ class Economy:
     scales: Array
     model_error: Array
     time_error: Array
+    together: bool
     error: Array
     effects: Contributions
     kept: Contributions

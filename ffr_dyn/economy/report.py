@@ -97,6 +97,8 @@ def _outputs(found: Economy) -> Table:
             row += (f"{verified.error[k]:.3g}", f"{found.error[k] / true:.2f}" if true > 0 else "-")
         rows.append(row)
     text = "Largest errors over the run: of what is left out of the model, of the step, and of both together."
+    if found.together:
+        text += " One run beside everything told the errors of the step with those of what is left out."
     if verified:
         own = ", ".join(f"{value:.1g}" for value in verified.own)
         text += (

@@ -2,11 +2,12 @@
 
 It costs little more than a few runs of the model it finds:
 
-1. all bodies rigid, a coarse step, in the plane where the joints keep the scene to one;
+1. all bodies rigid, steps over two rows, in the plane where the joints keep the scene to one;
 2. every mode driven one-way by that motion (`drive`): what each of them does to each output. Where they do next to nothing,
    rigid bodies are the model, and nothing else is run;
 3. else everything with the coarse step, and along its motion what each inertia term and the stiffening by each load do;
-4. the modes and terms that must stay (`selection`), in a run beside that of everything, which measures what is left out;
+4. the modes and terms that must stay (`selection`), in a run beside that of everything, which measures what is left out; in
+   two stages where tolerances are coarse: if that is near everything in four, it is the model, step and all;
 5. integrator and step (`steps`); where the step turns out much finer, everything and the model once more with a finer one;
 6. if wanted, a run with everything on and a finer step, against which all errors are verified (`verification`).
 
@@ -28,11 +29,12 @@ from ffr_dyn.economy.cost import of_run
 from ffr_dyn.economy.found import Economy, Verification
 from ffr_dyn.economy.ledger import Ledger, Tried
 from ffr_dyn.economy.outputs import Output, Probe, as_output, difference, largest, probe, ranges, total
-from ffr_dyn.economy.selection import Selection, Shares, gap, selected_model, size_of
+from ffr_dyn.economy.outputs import limits as limits_of
+from ffr_dyn.economy.selection import Insufficient, Selection, Shares, gap, selected_model, size_of
 from ffr_dyn.economy.start import PILOT, Ground, Rigid, started, unmoved
 from ffr_dyn.economy.steps import Stepped, chosen_step
 from ffr_dyn.economy.terms import TermEffect
-from ffr_dyn.economy.trial import Span, Trial, cost
+from ffr_dyn.economy.trial import Span, Trial, cost, rings
 from ffr_dyn.economy.verification import reference_cost, verified
 from ffr_dyn.scene import Scene
 from ffr_dyn.settings import Forward, Settings
@@ -49,6 +51,7 @@ SURELY_RIGID = (
 SHORT = 2e6  # [us] of a verification that is made without being asked for
 # another look with a finer step: from how many times the steps, and at what cost of a run of everything, in final runs
 DAMPED, UNDAMPED = (6, 1.0), (2, 1.3)
+FREE = 4  # times the steps, where a verification needs that run of everything anyway
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,7 @@ class Chosen:
     """A model with its step, and histories (T, k) of its estimated errors: of what is left out, and of the step.
 
     everything, spatial, limits, scales : as of `Ground`;  omitted : what modes do, driven by the rigid motion
+    together : whether one run beside everything told both, as `time`; `model` is an estimate then
     """
 
     final: Trial
@@ -68,6 +72,7 @@ class Chosen:
     limits: Array
     scales: Array
     omitted: Contributions
+    together: bool = False
 
 
 def economise(
@@ -103,7 +108,7 @@ def economise(
     limits = stiff.limits
     omitted = None if limits is None else stiff.contributions(limits)
     found = None if omitted is None else _surely_rigid(ledger, stiff, omitted)
-    return _finished(ledger, _beside_everything(ledger, stiff, omitted) if found is None else found, verify)
+    return _finished(ledger, _beside_everything(ledger, stiff, omitted, verify) if found is None else found, verify)
 
 
 # ---- rigid bodies -----------------------------------------------------------------------------------------------------
@@ -116,6 +121,7 @@ def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chose
         return None
     pilot = replace(stiff.trial.choice, method=PILOT)
     stepped = chosen_step(ledger, pilot, np.maximum(OF_ALL * limits - model, LEAST * limits))
+    scales = ranges(stepped.trial.values)
     return Chosen(
         stepped.trial,
         model,
@@ -124,8 +130,8 @@ def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chose
         (),
         stiff.everything,
         stiff.spatial,
-        limits,
-        ranges(stiff.trial.values),
+        limits_of(ledger.of, scales),
+        scales,
         omitted,
     )
 
@@ -133,23 +139,24 @@ def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chose
 # ---- beside everything ------------------------------------------------------------------------------------------------
 
 
-def _beside_everything(ledger: Ledger, stiff: Rigid, omitted: Contributions | None) -> Chosen:
+def _beside_everything(ledger: Ledger, stiff: Rigid, omitted: Contributions | None, verify: bool | None) -> Chosen:
     """The cheapest model beside a coarse run of everything, and its step; looked at again with a finer one where the step
     turns out much finer, since a coarse step damps the vibration of fast modes, and with it what they do."""
     ground = stiff.ground()
     omitted = stiff.contributions(ground.limits) if omitted is None else omitted
     selection = selected_model(ledger, ground, omitted, Shares())
     found = _stepped(ledger, ground, selection, omitted)
-    finer = _finer_ground(ledger, ground, found.final)
+    finer = _finer_ground(ledger, ground, found.final, verify)
     if finer is None:
         return found
     steps = {"method": PILOT, "divisions": finer.coarsest, "accuracy": 0.0}
     same = replace(found.final.choice, **steps)  # type: ignore[arg-type]
     error = gap(ledger, finer, same, "the same with a finer step")
-    if (error + largest(found.time) <= ground.limits).all():
+    if (error + largest(found.time) <= OF_ALL * ground.limits).all():
         model = difference(ledger.run(same).values, finer.pilot.values)
         return replace(found, model=largest(model), error=largest(total(model, found.time)))
-    return _stepped(ledger, finer, selected_model(ledger, finer, omitted, Shares(), size_of(same)), omitted, found)
+    beyond = Insufficient(size_of(same), float((error / ground.limits).max()))
+    return _stepped(ledger, finer, selected_model(ledger, finer, omitted, Shares(), beyond), omitted, found)
 
 
 def _stepped(
@@ -157,6 +164,8 @@ def _stepped(
 ) -> Chosen:
     """The model with the step it needs, or with that of a model much like it, whose error is taken over."""
     model = difference(ledger.run(selection.choice).values, ground.pilot.values)
+    if selection.choice.method != ground.everything.method:
+        return _at_once(ledger, ground, selection, omitted, model)
     left = np.maximum(OF_ALL * ground.limits - largest(model), LEAST * ground.limits)
     stepped = chosen_step(ledger, selection.choice, left) if like is None else _as_like(ledger, selection.choice, like)
     return Chosen(
@@ -173,24 +182,49 @@ def _stepped(
     )
 
 
+def _at_once(ledger: Ledger, ground: Ground, selection: Selection, omitted: Contributions, error: Histories) -> Chosen:
+    """A model of another method than everything, whose run beside that tells all of its `error`."""
+    return Chosen(
+        ledger.run(selection.choice),
+        selection.left,
+        error,
+        largest(error),
+        selection.terms,
+        ground.everything,
+        ground.spatial,
+        ground.limits,
+        ground.scales,
+        omitted,
+        together=True,
+    )
+
+
 def _as_like(ledger: Ledger, choice: Choice, like: Chosen) -> Stepped:
     given = like.final.choice
     own = replace(choice, method=given.method, divisions=given.divisions, accuracy=given.accuracy)
     return Stepped(ledger.run(own), like.time)
 
 
-def _finer_ground(ledger: Ledger, ground: Ground, final: Trial) -> Ground | None:
-    """Everything with a step that costs a part of the final run, where that is much finer than before."""
-    lasting = any(body.model.n and not body.damping.all() for body in final.scene.bodies)
-    least, most = UNDAMPED if lasting else DAMPED
-    finer = [replace(ground.everything, divisions=d) for d in range(1, final.choice.divisions + 1)]
-    allowed = most * cost(final, ledger.span)
-    divisions = max((choice.divisions for choice in finer if of_run(choice, ledger.span.rows) <= allowed), default=1)
+def _finer_ground(ledger: Ledger, ground: Ground, final: Trial, verify: bool | None) -> Ground | None:
+    """Everything with a finer step than before: that of the final run where a verification follows, which needs such a run
+    anyway; or else one that costs a part of the final run, where that is much finer than before."""
+    least, most = UNDAMPED if rings(final) else DAMPED
+    divisions = final.choice.divisions
+    if _is_verified(ledger, ground.everything, final, verify):
+        least = min(least, FREE)
+    else:
+        finer = [replace(ground.everything, divisions=d) for d in range(1, divisions + 1)]
+        allowed = most * cost(final, ledger.span)
+        divisions = max((one.divisions for one in finer if of_run(one, ledger.span.rows) <= allowed), default=1)
     if divisions < least * ground.coarsest:
         return None
     ledger.tell("everything, finer step")
     everything = replace(ground.everything, divisions=divisions)
     return replace(ground, everything=everything, pilot=ledger.run(everything))
+
+
+def _is_verified(ledger: Ledger, everything: Choice, final: Trial, verify: bool | None) -> bool:
+    return bool(verify) or (verify is None and reference_cost(ledger, everything, final) <= SHORT)
 
 
 # ---- the end ----------------------------------------------------------------------------------------------------------
@@ -199,7 +233,7 @@ def _finer_ground(ledger: Ledger, ground: Ground, final: Trial) -> Ground | None
 def _finished(ledger: Ledger, found: Chosen, verify: bool | None) -> Economy:
     final, verification = found.final, None
     ledger.note(final, "chosen", found.error)
-    if verify or (verify is None and reference_cost(ledger, found.everything, final) <= SHORT):
+    if _is_verified(ledger, found.everything, final, verify):
         final, verification = verified(ledger, found.everything, found.limits, final, found.omitted)
     kept, omitted = _explained(ledger, found, final)
     names = [output.name for output in ledger.of.outputs]
@@ -213,6 +247,7 @@ def _finished(ledger: Ledger, found: Chosen, verify: bool | None) -> Economy:
         scales=found.scales,
         model_error=found.model,
         time_error=largest(found.time),
+        together=found.together,
         error=found.error,
         effects=omitted,
         kept=kept,

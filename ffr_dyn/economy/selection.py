@@ -11,8 +11,9 @@ from ffr_dyn.economy.contributions import LEFT, Contributions, of_motion, of_sha
 from ffr_dyn.economy.cost import per_evaluation
 from ffr_dyn.economy.ledger import Ledger
 from ffr_dyn.economy.outputs import difference, largest
-from ffr_dyn.economy.start import Ground
+from ffr_dyn.economy.start import SCOUT, Ground
 from ffr_dyn.economy.terms import TermEffect, term_effects, without_minor
+from ffr_dyn.economy.trial import rings
 from ffr_dyn.errors import SimulationError
 from ffr_dyn.scene import Scene
 
@@ -22,14 +23,24 @@ NEARLY_ALL = 0.8  # of the modes: then those of the full motion are ranked inste
 ATTEMPTS = 5
 MORE = 1.2  # times as many directions, at least, after those that were not enough
 HOPE = 1.0  # times the tolerance: where modes do more by the estimate, rigid bodies are not tried
+STUCK = 0.9  # of the error before: more directions have not helped
 SAFELY = 0.6  # of what may be left out, when what was predicted turns out too much
+DIRECTLY = 0.75  # of the tolerance: a run of two stages that is as near everything is believed, step and all
+RINGING = 0.5  # the same where something vibrates undamped and tolerances are fine: everything errs by its step as well
+WITHIN_REACH = 2.5  # times what is believed: another run of two stages is worth it
+COARSE = 5e-3  # of the range: with tolerances that are no less, two stages are tried first
+NEARLY_RIGID = 10.0  # times the tolerance: where modes do no more, too
 
 
 @dataclass(frozen=True)
 class Shares:
-    """Shares of the tolerance that may be taken by modes left out, by terms, by rigid bodies, and by all that is left out."""
+    """Shares of the tolerance that may be taken by modes left out, by terms, by rigid bodies, and by all that is left out.
 
-    modes: float = 0.15
+    modes are counted with a margin, since one more costs less than another run; bold : the same without
+    """
+
+    modes: float = 0.03
+    bold: float = 0.15
     terms: float = 0.15
     rigid: float = 0.5
     all: float = 0.5
@@ -54,9 +65,23 @@ class Ranking:
         rest = np.cumsum((self.found.effect / self.limits)[self.order[::-1]], axis=0)
         return int(np.sum(rest.max(axis=1) > part))
 
-    def model(self, count: int) -> Choice:
-        """Everything with the first directions only."""
-        chosen = self.order[:count]
+    def left(self, count: int) -> Array:
+        """(outputs,) what all directions but the first do."""
+        return self.found.effect[self.order[count:]].sum(axis=0)
+
+    def leaders(self, count: int) -> tuple[int, ...]:
+        """The direction with most strain energy of every body that has none among the first."""
+        there = set(self.found.body[self.order[:count]])
+        omega2 = [self.scene.bodies[b].model.omega2 for b in self.found.body]
+        energy = [
+            a * a * float(s * s @ w) for a, s, w in zip(self.found.amplitude, self.found.shape, omega2, strict=True)
+        ]
+        listed = [np.flatnonzero(self.found.body == b) for b in np.unique(self.found.body) if b not in there]
+        return tuple(int(of_body[np.argmax(np.array(energy)[of_body])]) for of_body in listed)
+
+    def model(self, count: int, also: tuple[int, ...] = ()) -> Choice:
+        """Everything with the first directions only, and some others."""
+        chosen = [*self.order[:count], *also]
         parts = list(self.everything.parts)
         for b, part in enumerate(parts):
             shapes = [self.found.shape[k] for k in chosen if self.found.body[k] == b]
@@ -75,28 +100,47 @@ class Ranking:
 
 @dataclass(frozen=True)
 class Selection:
-    """A model, and what terms do along the motion of everything, known where modes were looked at."""
+    """A model, and what terms do along the motion of everything, known where modes were looked at.
+
+    left : (outputs,) what modes left out do, by the estimate
+    """
 
     choice: Choice
+    left: Array
     terms: tuple[TermEffect, ...] = ()
 
 
+@dataclass(frozen=True)
+class Insufficient:
+    """A model that does not do: its number of elastic coordinates, and its largest error in tolerances."""
+
+    count: int
+    error: float
+
+
 def selected_model(
-    ledger: Ledger, ground: Ground, omitted: Contributions, shares: Shares, beyond: int = -1
+    ledger: Ledger, ground: Ground, omitted: Contributions, shares: Shares, beyond: Insufficient | None = None
 ) -> Selection:
     """The fewest modes, or shapes made of them, and the fewest terms whose absence leaves the outputs within their share.
 
     omitted : what modes do, driven by the rigid motion
-    beyond  : elastic coordinates of a model that is known not to do
+    beyond  : a model that is known not to do
     """
-    if beyond < 0 and (omitted.effect.sum(axis=0) <= HOPE * ground.limits).all():
+    all_modes = omitted.effect.sum(axis=0)
+    if beyond is None and (all_modes <= HOPE * ground.limits).all():
         stiff = rigid(ground.everything)
+        if _directly(ledger, ground, stiff) <= 1:
+            return Selection(replace(stiff, method=SCOUT), all_modes)
         if (gap(ledger, ground, stiff, "all bodies rigid") <= shares.rigid * ground.limits).all():
-            return Selection(stiff)
+            return Selection(stiff, all_modes)
     rankings, effects = _rankings(ledger, ground, omitted, shares)
     predicted = [ranking.model(ranking.count(shares.modes)) for ranking in rankings]
-    cheapest = min(range(len(rankings)), key=lambda k: (per_evaluation(predicted[k]), k))
-    return Selection(_enough(ledger, ground, rankings[cheapest], effects, shares, beyond), effects)
+    best = rankings[min(range(len(rankings)), key=lambda k: (per_evaluation(predicted[k]), k))]
+    choice = None
+    if beyond is None and (_is_coarse(ground) or (all_modes <= NEARLY_RIGID * ground.limits).all()):
+        choice = _in_two_stages(ledger, ground, best, effects, shares)
+    choice = _enough(ledger, ground, best, effects, shares, beyond) if choice is None else choice
+    return Selection(choice, best.left(size_of(choice)), effects)
 
 
 def _rankings(
@@ -115,14 +159,22 @@ def _rankings(
 
 
 def _enough(
-    ledger: Ledger, ground: Ground, ranking: Ranking, effects: tuple[TermEffect, ...], shares: Shares, beyond: int
+    ledger: Ledger,
+    ground: Ground,
+    ranking: Ranking,
+    effects: tuple[TermEffect, ...],
+    shares: Shares,
+    beyond: Insufficient | None,
 ) -> Choice:
     """The model that a run beside everything shows to be enough; everything where the number of attempts does not do."""
-    scale, count = 1.0, _more(ranking, beyond) if beyond >= 0 else 0
-    terms = shares.terms
+    scale, count, terms = 1.0, 0, shares.terms
+    before: float = np.inf
+    also: tuple[int, ...] = ()
+    if beyond is not None:
+        scale, count = min(1.0, SAFELY * shares.all / beyond.error), _more(ranking, beyond.count)
     for _ in range(ATTEMPTS):
         count = max(count, ranking.count(scale * shares.modes))
-        model = ranking.model(count)
+        model = ranking.model(count, also)
         if terms:
             model = without_minor(model, effects, scale * terms * ground.limits)
         error = float((gap(ledger, ground, model, _said(model)) / (shares.all * ground.limits)).max())
@@ -130,6 +182,9 @@ def _enough(
             return model
         if model == ground.everything:
             break
+        if error > STUCK * before:  # what is missing comes by way of a body that does nothing to the outputs itself
+            also = ranking.leaders(count)
+        before = error
         if np.isfinite(error):
             scale *= SAFELY / error
             count = _more(ranking, count)
@@ -137,6 +192,35 @@ def _enough(
             count = count if terms else _more(ranking, count)
             terms = 0.0
     return ground.everything
+
+
+# ---- two stages -------------------------------------------------------------------------------------------------------
+
+
+def _in_two_stages(
+    ledger: Ledger, ground: Ground, ranking: Ranking, effects: tuple[TermEffect, ...], shares: Shares
+) -> Choice | None:
+    """A model in two stages: with few modes first, since they may do; with more where that is not far off."""
+    for count in dict.fromkeys(ranking.count(part) for part in (shares.bold, shares.modes)):
+        model = without_minor(ranking.model(count), effects, shares.terms * ground.limits)
+        error = _directly(ledger, ground, model)
+        if error <= 1:
+            return replace(model, method=SCOUT)
+        if error > WITHIN_REACH:
+            break
+    return None
+
+
+def _directly(ledger: Ledger, ground: Ground, model: Choice) -> float:
+    """How far the model in two stages is from everything in four, over what is believed: its step is told then with what is
+    left out."""
+    error = gap(ledger, ground, replace(model, method=SCOUT), f"{_said(model)}, two stages")
+    part = RINGING if rings(ground.pilot) and not _is_coarse(ground) else DIRECTLY
+    return float((error / (part * ground.limits)).max())
+
+
+def _is_coarse(ground: Ground) -> bool:
+    return bool((ground.limits >= COARSE * ground.scales).all())
 
 
 def _more(ranking: Ranking, count: int) -> int:
@@ -150,7 +234,7 @@ def size_of(choice: Choice) -> int:
 
 
 def _said(model: Choice) -> str:
-    return f"{size_of(model)} elastic coordinates"
+    return f"{size_of(model)} elastic coordinates" if size_of(model) else "all bodies rigid"
 
 
 def gap(ledger: Ledger, ground: Ground, choice: Choice, what: str) -> Array:

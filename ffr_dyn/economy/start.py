@@ -91,17 +91,27 @@ class Rigid:
 
 
 def started(ledger: Ledger, flat: Scene) -> Rigid:
-    """Rigid bodies with the longest step that completes a run; `flat` is the scene as it is assembled, with its plane."""
+    """Rigid bodies with steps as long as complete a run, over two rows at most; `flat` is the scene as it is assembled, with
+    its plane."""
     ledger.tell("rigid bodies, coarse step")
     spatial = full(ledger.scene, PILOT, 1)
     held = held_in_plane(spatial, flat)
     everything = spatial if held is None else held
-    trial = least(ledger.run, rigid(replace(everything, method=SCOUT)), 1)
+    trial = _scouted(ledger, rigid(replace(everything, method=SCOUT)))
     everything = replace(everything, divisions=trial.choice.divisions)
     free = None if held is not None else in_plane(ledger.scene, everything, trial.result)
     if free is not None:
-        everything, trial = free, ledger.run(rigid(replace(free, method=SCOUT)))
+        everything, trial = free, _scouted(ledger, rigid(replace(free, method=SCOUT)))
     return Rigid(ledger, trial, everything, spatial)
+
+
+def _scouted(ledger: Ledger, choice: Choice) -> Trial:
+    """A run with steps over two rows, half of what a whole one costs; where that fails, the longest that completes."""
+    try:
+        wide = ledger.over_two_rows(choice)
+    except (SimulationError, InputError):
+        wide = None
+    return least(ledger.run, choice, 1) if wide is None else wide
 
 
 def unmoved(omitted: Contributions, scales: Array, names: list[str]) -> tuple[str, ...]:

@@ -1,8 +1,8 @@
 """The integrator and step that keep the error of time discretisation below a limit at the least cost.
 
-The model's coarse run is there already. Two stages instead of four are tried first: where their difference is small they are
-enough. Next a run with twice the step, or half of it, tells the error of the coarse one with its sign,
-y(h) - y = (y(2h) - y(h)) / (2^p - 1), and the orders predict the step that each method needs; the cheapest is run with it.
+The model's coarse run is there already. One with twice the step, or half of it, tells its error with its sign,
+y(h) - y = (y(2h) - y(h)) / (2^p - 1). Two stages instead of four are tried where that is small: where they differ little
+they are enough. Where the coarse step is not, the orders predict the one that each method needs; the cheapest is run with it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ffr_dyn.economy.choice import Choice
 from ffr_dyn.economy.cost import STAGES, per_row
 from ffr_dyn.economy.ledger import Ledger
 from ffr_dyn.economy.outputs import difference, largest
-from ffr_dyn.economy.trial import Span, Trial, cost
+from ffr_dyn.economy.trial import Span, Trial, cost, rings
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import CONTROLLED, METHODS, RK4, Integrator
 
@@ -26,15 +26,16 @@ Histories = tuple[Array, ...]
 
 TWO_STAGES, EXPLICIT = "ros2", "rk4"
 SURELY = 0.95  # of the limit: the difference of two coarse runs of different order that is taken for the error of one
+RINGING = 0.5  # the same where something vibrates without damping
 NEARLY = 0.8  # of the limit: an estimate from a run with steps over two rows
+HOPELESS = 8.0  # limits between coarse runs of two stages and of four: neither will do
 FAR = 0.1  # of the limit: steps longer than a row would do
 ACCURACIES = (1e-2, 1e-3)
 WORTH = 0.8  # of the cost: a method that chooses its steps pays
 MOST = 4096  # divisions of an output step
 ATTEMPTS = 10
-MARGIN = 1.1  # on a predicted number of divisions
-RUNG = 2.5  # times the steps of the last run
-PAYS = 4  # coarse runs of two stages to a run as predicted: where it is worth to try these
+MARGIN = 1.6  # on an error from which the number of divisions is predicted
+RUNG = 3.0  # times the steps of the last run
 ONCE = 0.6  # a shorter run pays when it needs less than this share of the divisions
 NEAR = (1.25, 3.0)  # ratios of the steps of two runs whose difference tells their errors
 
@@ -73,10 +74,7 @@ def chosen_step(ledger: Ledger, choice: Choice, limit: Array) -> Stepped:
     found = _rigid_in_two_stages(ledger, choice, limit)
     if found is None:
         coarse = ledger.run(choice)
-        found = _coarse(ledger, coarse, limit)
-        if found is None:
-            error = signed(coarse, ledger.run(replace(choice, divisions=2 * choice.divisions)))
-            found = Stepped(coarse, error) if share(error, limit) <= 1 else _finer(ledger, coarse, error, limit)
+        found = _coarse(ledger, coarse, limit) or _finer(ledger, coarse, limit)
     return _longer(ledger, found, limit)
 
 
@@ -84,28 +82,46 @@ def chosen_step(ledger: Ledger, choice: Choice, limit: Array) -> Stepped:
 
 
 def _rigid_in_two_stages(ledger: Ledger, choice: Choice, limit: Array) -> Stepped | None:
-    """The coarse run of rigid bodies with two stages, which is there already, where it is good enough."""
-    trial = ledger.runs.get(replace(choice, method=TWO_STAGES))
-    if trial is None or any(part.count for part in choice.parts):
+    """The coarse run of rigid bodies with two stages, of which steps over two rows are there already, where it is good
+    enough."""
+    if any(part.count for part in choice.parts):
         return None
-    error = _from_two_rows(ledger, trial)
-    return None if error is None or share(error, limit) > 1 else Stepped(trial, error)
+    trial = _attempt(ledger, replace(choice, method=TWO_STAGES))
+    error = None if trial is None else _from_two_rows(ledger, trial)
+    return None if trial is None or error is None or share(error, limit) > 1 else Stepped(trial, error)
 
 
 def _coarse(ledger: Ledger, coarse: Trial, limit: Array) -> Stepped | None:
     """The coarse run, or one of two stages, where steps over two rows show that this is enough."""
-    error, simple = _from_two_rows(ledger, coarse), replace(coarse.choice, method=TWO_STAGES)
+    simple = replace(coarse.choice, method=TWO_STAGES)
+    found = _of_both(ledger.runs[simple], coarse, limit) if simple in ledger.runs else None
+    if found is not None or _far_off(ledger, coarse, limit):
+        return found
+    error = _from_two_rows(ledger, coarse)
     if error is None or share(error, NEARLY * limit) > 1:
         return None
-    if share(error, FAR * limit) > 1 and simple not in ledger.runs:
+    if share(error, FAR * limit) > 1 or simple in ledger.runs:
         return Stepped(coarse, error)
     trial = _attempt(ledger, simple)
-    if trial is None:
-        return Stepped(coarse, error)
-    off = difference(trial.values, coarse.values)
-    return (
-        Stepped(trial, off) if share(off, SURELY * limit) <= 1 else None
-    )  # or else steps over two rows miss something
+    return (None if trial is None else _of_both(trial, coarse, limit)) or Stepped(coarse, error)
+
+
+def _of_both(simple: Trial, coarse: Trial, limit: Array) -> Stepped | None:
+    """Two stages, where their difference from four is small. Where something rings, steps over two rows do not tell what
+    the step does to that: four stages are taken for the error of two then."""
+    off = difference(simple.values, coarse.values)
+    if share(off, (RINGING if rings(coarse) else SURELY) * limit) <= 1:
+        return Stepped(simple, off)
+    return Stepped(coarse, off) if rings(coarse) and share(off, limit) <= 1 else None
+
+
+def _far_off(ledger: Ledger, coarse: Trial, limit: Array) -> bool:
+    """Whether two stages, of this model or one of fewer modes, are so far from four that these will not do either."""
+    return any(
+        share(difference(trial.values, coarse.values), limit) > HOPELESS
+        for choice, trial in ledger.runs.items()
+        if choice.method == TWO_STAGES and any(part.count for part in choice.parts)
+    )
 
 
 def _from_two_rows(ledger: Ledger, trial: Trial) -> Histories | None:
@@ -133,30 +149,34 @@ def _on_all_rows(values: Array) -> Array:
 # ---- a finer step -----------------------------------------------------------------------------------------------------
 
 
-def _finer(ledger: Ledger, coarse: Trial, error: Histories, limit: Array) -> Stepped:
-    """The cheaper of the methods by what they are predicted to need, run with that."""
-    needed = {coarse.choice.method: _needed(coarse, share(error, limit))}
-    most, truth = (
-        per_row(replace(coarse.choice, divisions=needed[coarse.choice.method])),
-        difference(coarse.values, error),
-    )
-    for name in (EXPLICIT, TWO_STAGES):
-        choice = replace(coarse.choice, method=name)
-        if name not in methods(ledger.span) or per_row(choice) * (1 if name == EXPLICIT else PAYS) > most:
-            continue
-        trial = _attempt(ledger, choice)
+def _finer(ledger: Ledger, coarse: Trial, limit: Array) -> Stepped:
+    """The cheaper of the methods by what they are predicted to need, run with that, where the coarse run does not do."""
+    error = None if _far_off(ledger, coarse, limit) else _from_two_rows(ledger, coarse)
+    if error is None:
+        error = signed(coarse, ledger.run(replace(coarse.choice, divisions=2 * coarse.choice.divisions)))
+        if share(error, limit) <= 1:
+            return Stepped(coarse, error)
+    now = share(error, limit)
+    needed = {coarse.choice.method: _needed(coarse, MARGIN * max(now, 1.0))}
+    most = per_row(replace(coarse.choice, divisions=needed[coarse.choice.method]))
+    explicit = replace(coarse.choice, method=EXPLICIT)
+    if EXPLICIT in methods(ledger.span) and per_row(explicit) <= most:
+        trial = _attempt(ledger, explicit)
         if trial is not None:
-            needed[name] = _needed(trial, MARGIN * share(difference(trial.values, truth), limit))
-    return _cheapest(ledger, coarse.choice, needed, limit)
+            truth = difference(coarse.values, error)
+            needed[EXPLICIT] = _needed(trial, MARGIN * share(difference(trial.values, truth), limit))
+    return _cheapest(ledger, coarse, needed, limit, now)
 
 
-def _cheapest(ledger: Ledger, choice: Choice, needed: dict[str, int], limit: Array) -> Stepped:
-    """A run within the limit, of the method that costs least by the divisions that each is predicted to need.
+def _cheapest(ledger: Ledger, coarse: Trial, needed: dict[str, int], limit: Array, now: float) -> Stepped:
+    """A run within the limit, of the method that costs least by the divisions that each is predicted to need; `now` is the
+    error of the coarse run in limits.
 
     Every run corrects the prediction for its method. Far predictions are approached in rungs, each of which tells the error
     of the next.
     """
-    before: dict[str, tuple[int, float]] = {}
+    choice = coarse.choice
+    before = {choice.method: (choice.divisions, now)}
     best: Stepped | None = None
     for _ in range(ATTEMPTS):
         name = min(needed, key=lambda name: (per_row(replace(choice, method=name, divisions=needed[name])), name))
@@ -171,7 +191,7 @@ def _cheapest(ledger: Ledger, choice: Choice, needed: dict[str, int], limit: Arr
             best = Stepped(trial, error)
         power = 1 / _seen_order(trial, now, before.get(name))
         before[name] = divisions, now
-        better = int(np.ceil(divisions * now**power * (MARGIN if now > 1 else 1.0)))
+        better = int(np.ceil(divisions * (now * (MARGIN if now > 1 else 1.0)) ** power))
         if best is not None and (now > 1 or better >= ONCE * divisions or divisions == 1):
             return best
         needed[name] = int(np.clip(better if better != divisions else divisions + 1, 1, MOST))
@@ -195,7 +215,7 @@ def _seen_order(trial: Trial, error: float, before: tuple[int, float] | None) ->
     if before is None or before[0] >= trial.choice.divisions or not 0 < error < before[1]:
         return float(order(trial))
     seen = np.log(before[1] / error) / np.log(trial.choice.divisions / before[0])
-    return float(np.clip(seen, 1.0, order(trial)))
+    return float(np.clip(seen, 2.0, order(trial)))
 
 
 def measured(ledger: Ledger, trial: Trial) -> Histories:

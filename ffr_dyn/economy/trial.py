@@ -102,6 +102,11 @@ def _states(scene: Scene) -> tuple[str, ...]:
     return STATES if any(body.model.n for body in scene.bodies) else STATES[:4]
 
 
+def rings(trial: Trial) -> bool:
+    """Whether a body vibrates without damping: coarse runs damp that, and may agree on what is not so."""
+    return any(bool(body.model.n) and not body.damping.all() for body in trial.scene.bodies)
+
+
 def states(trial: Trial) -> tuple[Array, Array]:
     """(T, X) positions and (T, V) velocities of a run."""
     system, result = trial.made.assembled.system, trial.result

@@ -13,15 +13,17 @@ from ffr_dyn.economy.cost import of_run
 from ffr_dyn.economy.found import Verification
 from ffr_dyn.economy.ledger import Ledger
 from ffr_dyn.economy.outputs import Probe, difference, largest
-from ffr_dyn.economy.selection import Shares, selected_model, size_of
+from ffr_dyn.economy.selection import Insufficient, Shares, selected_model, size_of
 from ffr_dyn.economy.start import PILOT, Ground
-from ffr_dyn.economy.steps import error_of
+from ffr_dyn.economy.steps import error_of, order
 from ffr_dyn.economy.trial import Trial, cost
 from ffr_dyn.errors import InputError
 
 Array = np.ndarray
 
 ATTEMPTS = 4
+UNEXPLAINED = 0.25  # of the tolerance: an error beyond that of what is left out, which is the step's
+LONGEST = 6  # times the step of the reference: of a run that tells its error
 
 
 def reference(everything: Choice, final: Trial) -> Choice:
@@ -45,8 +47,11 @@ def verified(
     """
     ledger.tell("verification: everything, finer step")
     choice = reference(everything, final)
-    sharp, coarse = ledger.run(choice), ledger.run(replace(choice, divisions=choice.divisions // 2))
-    own = largest(error_of(sharp, coarse))
+    sharp, coarse = ledger.run(choice), _coarser(ledger, choice)
+    own = _own(sharp, coarse)
+    if (own > limits).any():
+        coarse = ledger.run(half(choice))
+        own = _own(sharp, coarse)
     _check_accuracy(ledger.of, limits, own)
     errors: list[Array] = []
     while True:
@@ -55,7 +60,28 @@ def verified(
         if (errors[-1] <= limits).all() or len(errors) == ATTEMPTS:
             spent = cost(sharp, ledger.span) + cost(coarse, ledger.span)
             return final, Verification(choice, errors[-1], errors[0], own, len(errors) - 1, spent)
-        final = _better(ledger, limits, final, sharp, coarse, omitted, len(errors))
+        final = _better(ledger, limits, final, ledger.run(half(choice)), omitted, errors)
+
+
+def half(choice: Choice) -> Choice:
+    """The same with half the steps."""
+    return replace(choice, divisions=choice.divisions // 2)
+
+
+def _coarser(ledger: Ledger, choice: Choice) -> Trial:
+    """A run that tells the error of the reference: one that is there with steps not much longer, or one of half the steps."""
+    there = [
+        trial
+        for other, trial in ledger.runs.items()
+        if replace(other, divisions=choice.divisions) == choice and 2 <= choice.divisions / other.divisions <= LONGEST
+    ]
+    return max(there, key=lambda trial: trial.choice.divisions) if there else ledger.run(half(choice))
+
+
+def _own(sharp: Trial, coarse: Trial) -> Array:
+    """(outputs,) error of the reference; from steps that are far longer, as if of an order less, which makes it larger."""
+    error, ratio = largest(error_of(sharp, coarse)), sharp.choice.divisions / coarse.choice.divisions
+    return error if ratio <= 2 else error * (ratio ** order(sharp) - 1) / (ratio ** (order(sharp) - 1) - 1)
 
 
 def _check_accuracy(of: Probe, limits: Array, own: Array) -> None:
@@ -68,19 +94,23 @@ def _check_accuracy(of: Probe, limits: Array, own: Array) -> None:
 
 
 def _better(
-    ledger: Ledger, limits: Array, final: Trial, sharp: Trial, coarse: Trial, omitted: Contributions, attempt: int
+    ledger: Ledger, limits: Array, final: Trial, coarse: Trial, omitted: Contributions, errors: list[Array]
 ) -> Trial:
-    """A better model: of a finer step where that is what is wrong, or else chosen anew beside everything with that step."""
+    """A better model: of a finer step where that is what is wrong, or else chosen anew beside everything with that step, and
+    of a finer step too where what is left out does not explain the error."""
     same = replace(final.choice, method=PILOT, divisions=coarse.choice.divisions, accuracy=0.0)
-    if (largest(difference(ledger.run(same).values, coarse.values)) <= Shares().all * limits).all():
+    gap = largest(difference(ledger.run(same).values, coarse.values))
+    if (gap <= Shares().all * limits).all():
         return ledger.run(_shorter(final.choice))
-    steps: dict[str, Any] = {key: getattr(final.choice, key) for key in ("method", "divisions", "accuracy")}
+    stepped = _shorter(final.choice) if (errors[-1] - gap > UNEXPLAINED * limits).any() else final.choice
+    steps: dict[str, Any] = {key: getattr(stepped, key) for key in ("method", "divisions", "accuracy")}
     if not final.choice.integrator(ledger.span.output_step).implicit:  # its step is for the modes that it had
         steps = {"method": PILOT, "divisions": coarse.choice.divisions, "accuracy": 0.0}
-    if attempt > 1:
+    if len(errors) > 1:
         return ledger.run(replace(coarse.choice, **steps))
     ground = Ground(coarse.choice, coarse.choice, coarse, limits, limits)
-    anew = selected_model(ledger, ground, omitted, Shares(), size_of(final.choice)).choice
+    beyond = Insufficient(size_of(final.choice), float((gap / limits).max()))
+    anew = selected_model(ledger, ground, omitted, Shares(), beyond).choice
     return ledger.run(replace(anew, **steps))
 
 

@@ -47,7 +47,7 @@ def explicit_limit() -> Exhibit:
         (
             Panel(
                 f"a free beam, {rod.n} modes: energy after {STEPS} steps",
-                "step [s]", f"energy, relative to the start ({STOPPED:g}: the run stops)",
+                "step [s]", f"energy over that at the start ({STOPPED:g}: stopped)",
                 (Curve("RK4", steps, found, points=True),),
                 (
                     Mark(f"predicted {predicted:.3g} s", predicted),

@@ -27,6 +27,8 @@ def rigid_body(
     [m] in the body frame; points: named points (3,) [m] in the body frame at which joints and forces may attach.
     Raises BodyError for a mass that is not positive, or an inertia that no mass distribution can have.
     """
+    if not 0 < mass < np.inf:
+        raise BodyError(f"body {name!r}: mass is {mass} kg; it must be positive")
     tensor = np.asarray(inertia, float)
     tensor = np.diag(tensor) if tensor.ndim == 1 else tensor
     if tensor.shape != (3, 3):

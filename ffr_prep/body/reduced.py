@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -155,6 +156,14 @@ class FlexibleBody:
     def n(self) -> int:
         """Number of elastic coordinates."""
         return int(self.omega2.size)
+
+    @cached_property
+    def size(self) -> float:
+        """Largest extent of interfaces and surface along an axis of the body [m]; zero of a point."""
+        places = np.array([interface.position for interface in self.interfaces]).reshape(-1, 3)
+        if self.surface is not None:
+            places = np.concatenate([places, self.surface.points])
+        return float(np.ptp(places, axis=0).max()) if len(places) else 0.0
 
     @property
     def frequencies(self) -> Array:
