@@ -429,7 +429,7 @@ def new_work(m: Model) -> Work:
     for b in np.flatnonzero(n[:-1] == 0):
         bodies.s[b], bodies.J[b], bodies.L[b] = _rigid_inertia(m.bodies, int(b))
         bodies.inverse[b, 1] = _inverse(np.trace(bodies.J[b]))
-    vectors = zeros(omega=(M, 3), r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3), load=(M, 6))
+    vectors = zeros(r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3), load=(M, 6))
     rows = RowWork(
         **zeros(Phi=C, nu=C, gamma=C, lam=C, left=C),
         **zeros(jac=(K * D, 9, LANES), kept=(K * D, 9, LANES), X=K * D * 12 * LANES, Y=12 * LANES),
@@ -438,7 +438,7 @@ def new_work(m: Model) -> Work:
     )
     return Work(
         bodies=bodies,
-        markers=MarkerWork(A=_identities(M), **vectors),
+        markers=MarkerWork(body=m.markers.body, A=bodies.A, omega=bodies.omega, **vectors),
         rows=rows,
         loads=_load_work(m, V, M),
         field=np.zeros(3),

@@ -24,7 +24,7 @@ def length(w, i, j):
         return 0.0, 0.0, (ZERO, ZERO, ZERO), (ZERO, ZERO, ZERO)
     along = scale(1.0 / size, d)
     rate = dot(along, subtract(get(w.rd, j), get(w.rd, i)))
-    bi, bj = to_body(w.A[i], scale(-1.0, along)), to_body(w.A[j], along)
+    bi, bj = to_body(w.A[w.body[i]], scale(-1.0, along)), to_body(w.A[w.body[j]], along)
     return size, rate, (bi, cross(get(w.u, i), bi), ZERO), (bj, cross(get(w.u, j), bj), ZERO)
 
 

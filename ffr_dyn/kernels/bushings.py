@@ -133,12 +133,12 @@ def apply_bushing(where, markers, loads, w, s, f, load, k):
     ui, uj, C = get(w.u, i), get(w.u, j), s.turn[2]
 
     force, a, a0 = (x[12], x[13], x[14]), s.axes[0, 0], frames[0]
-    d = to_body(w.A[i], subtract(get(w.r, j), get(w.r, i)))
-    on_i, on_j = combine(a, force), to_body(w.A[j], combine(s.axes[0, 1], force))
+    d = to_body(w.A[w.body[i]], subtract(get(w.r, j), get(w.r, i)))
+    on_i, on_j = combine(a, force), to_body(w.A[w.body[j]], combine(s.axes[0, 1], force))
     side_i = (scale(-1.0, on_i), add(cross(on_i, d), cross(on_i, ui)), cross(combine(a0, force), d))
     apply_side(where, markers, ui, f, load[i], i, 1.0, side_i)
     apply_side(where, markers, uj, f, load[j], j, 1.0, (on_j, cross(uj, on_j), ZERO))
-    side_i = turning_side(w.A[i], a, s.axes[1, 1], a0, C, False)
-    side_j = turning_side(w.A[j], s.axes[1, 0], s.axes[0, 1], frames[1], C, True)
+    side_i = turning_side(w.A[w.body[i]], a, s.axes[1, 1], a0, C, False)
+    side_j = turning_side(w.A[w.body[j]], s.axes[1, 0], s.axes[0, 1], frames[1], C, True)
     apply_side(where, markers, ui, f, load[i], i, 1.0, side_i)
     apply_side(where, markers, uj, f, load[j], j, 1.0, side_j)

@@ -69,7 +69,7 @@ def given_wrench(loads, functions, user, A, k):
 def apply_given(where, markers, loads, w, functions, user, f, load, k):
     """Add wrench k to f and load (M, 6)."""
     marker = loads.wrench[k, 0]
-    force, moment = given_wrench(loads, functions, user, w.A[marker], k)
+    force, moment = given_wrench(loads, functions, user, w.A[w.body[marker]], k)
     apply_wrench(where, markers, get(w.u, marker), f, load[marker], marker, force, moment)
 
 

@@ -14,8 +14,8 @@ def shapes(markers, k, n):
 
 
 @inlined
-def update_marker(where, markers, w, A, omega, x, v, k):
-    """Position, velocity, bias acceleration and elastic rotation of marker k; A, omega those of its body."""
+def update_marker(where, markers, w, x, v, k):
+    """Position, velocity, bias acceleration and elastic rotation of marker k."""
     b = markers.body[k]
     u = get(markers.u, k)
     if b == where.shape[0] - 1:
@@ -41,15 +41,12 @@ def update_marker(where, markers, w, A, omega, x, v, k):
             u = (u[0] + of_two(0, c0, c1, u0, u1), u[1] + of_two(1, c0, c1, u0, u1), u[2] + of_two(2, c0, c1, u0, u1))
             u0, u1, w.thetad[k, normal] = plane_rows(phi, normal, qd, n)
             ud = (of_two(0, c0, c1, u0, u1), of_two(1, c0, c1, u0, u1), of_two(2, c0, c1, u0, u1))
+    A, omega = w.A[b], get(w.omega, b)
     spin = cross(omega, u)
-    put(w.omega, k, omega)
     put(w.u, k, u)
     put(w.r, k, add((x[i], x[i + 1], x[i + 2]), to_global(A, u)))
     put(w.rd, k, add((v[j], v[j + 1], v[j + 2]), to_global(A, add(spin, ud))))
     put(w.rb, k, to_global(A, cross(omega, add(spin, scale(2.0, ud)))))
-    for r in range(3):
-        for c in range(3):
-            w.A[k, r, c] = A[r, c]
 
 
 @kernel
@@ -59,7 +56,7 @@ def axis_motion(w, k, a0):
     The axis turns with the body and with the infinitesimal elastic rotation theta = phi_r q: a_bar = a0 + theta x a0.
     On the ground and on rigid bodies what does not move is zero.
     """
-    A, omega = w.A[k], get(w.omega, k)
+    A, omega = w.A[w.body[k]], get(w.omega, w.body[k])
     a = add(a0, cross(get(w.theta, k), a0))
     twist = cross(get(w.thetad, k), a0)
     rate = add(cross(omega, a), twist)

@@ -18,7 +18,7 @@ ZERO = (0.0, 0.0, 0.0)
 @inlined
 def coincidence(w, i, j, c, drive):
     """(r_j - r_i)_c = s(t)."""
-    ei, ej = get(w.A[i], c), get(w.A[j], c)
+    ei, ej = get(w.A[w.body[i]], c), get(w.A[w.body[j]], c)
     side_i = (scale(-1.0, ei), cross(ei, get(w.u, i)), ZERO)
     side_j = (ej, cross(get(w.u, j), ej), ZERO)
     Phi, nu = w.r[j, c] - w.r[i, c] - drive[0], w.rd[j, c] - w.rd[i, c] - drive[1]
@@ -39,7 +39,7 @@ def dot_1(w, i, j, ai0, aj0):
     aj, gj, dj, bj = axis_motion(w, j, aj0)
     gamma = -dot(bi, gj) - 2.0 * dot(di, dj) - dot(gi, bj)
     nu = dot(di, gj) + dot(gi, dj)
-    return dot(gi, gj), nu, gamma, axis_side(w.A[i], ai, ai0, gj), axis_side(w.A[j], aj, aj0, gi)
+    return dot(gi, gj), nu, gamma, axis_side(w.A[w.body[i]], ai, ai0, gj), axis_side(w.A[w.body[j]], aj, aj0, gi)
 
 
 @kernel
@@ -50,9 +50,9 @@ def dot_2(w, i, j, a0, drive):
     db = subtract(get(w.rb, j), get(w.rb, i))
     nu = dot(rate, d) + dot(g, dd) - drive[1]
     gamma = drive[2] - dot(bias, d) - 2.0 * dot(rate, dd) - dot(g, db)
-    b = to_body(w.A[i], d)
+    b = to_body(w.A[w.body[i]], d)
     side_i = (scale(-1.0, a), add(cross(a, b), cross(a, get(w.u, i))), cross(a0, b))
-    c = to_body(w.A[j], g)
+    c = to_body(w.A[w.body[j]], g)
     return dot(g, d) - drive[0], nu, gamma, side_i, (c, cross(get(w.u, j), c), ZERO)
 
 
@@ -71,7 +71,7 @@ def driven_angle(w, i, j, f, g, fj0, drive):
     bias = add(bi, add(prescribed, scale(-2.0 * speed, dl)))
     gamma = -dot(bias, gj) - 2.0 * dot(rate, dj) - dot(gi, bj)
     nu = dot(rate, gj) + dot(gi, dj)
-    return dot(gi, gj), nu, gamma, axis_side(w.A[i], ai, across, gj), axis_side(w.A[j], aj, fj0, gi)
+    return dot(gi, gj), nu, gamma, axis_side(w.A[w.body[i]], ai, across, gj), axis_side(w.A[w.body[j]], aj, fj0, gi)
 
 
 @kernel
@@ -85,7 +85,7 @@ def distance(w, i, j, drive):
     nu = rate / s - 0.5 * speed * (square / (s * s) + 1.0)
     quadratic = dot(dd, dd) + dot(d, db) - 2.0 * rate * speed / s + square * speed * speed / (s * s)
     gamma = -quadratic / s + 0.5 * second * (square / (s * s) + 1.0)
-    bi, bj = to_body(w.A[i], scale(-1.0 / s, d)), to_body(w.A[j], scale(1.0 / s, d))
+    bi, bj = to_body(w.A[w.body[i]], scale(-1.0 / s, d)), to_body(w.A[w.body[j]], scale(1.0 / s, d))
     side_i, side_j = (bi, cross(get(w.u, i), bi), ZERO), (bj, cross(get(w.u, j), bj), ZERO)
     return 0.5 * (square / s - s), nu, gamma, side_i, side_j
 

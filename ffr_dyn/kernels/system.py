@@ -131,8 +131,7 @@ def evaluate_markers(m, w, which, x, v):
     some = m.markers.active if which == IN_USE else m.markers.joint
     for number in range(m.markers.body.size if which == ALL else some.size):
         k = number if which == ALL else some[number]
-        b = m.markers.body[k]
-        update_marker(m.bodies.where, m.markers, w.markers, w.bodies.A[b], get(w.bodies.omega, b), x, v, k)
+        update_marker(m.bodies.where, m.markers, w.markers, x, v, k)
 
 
 @kernel
@@ -474,7 +473,7 @@ def reactions(rows, mw, rw, out):
                 pull, turn = reaction(rw, rows, k, side)
                 force, moment = subtract(force, pull), subtract(moment, turn)
         moment = subtract(moment, cross(get(mw.u, marker), force))
-        force, moment = to_global(mw.A[marker], force), to_global(mw.A[marker], moment)
+        force, moment = to_global(mw.A[mw.body[marker]], force), to_global(mw.A[mw.body[marker]], moment)
         for c in range(3):
             out[k, c] = force[c]
             out[k, 3 + c] = moment[c]

@@ -173,8 +173,9 @@ class BodyWork(NamedTuple):
 class MarkerWork(NamedTuple):
     """Per marker, filled by `update_marker`."""
 
-    A: F3  # (M, 3, 3) of its body
-    omega: F2  # (M, 3) of its body
+    body: I1  # (M,)
+    A: F3  # (B + 1, 3, 3) of the bodies
+    omega: F2  # (B + 1, 3) of the bodies
     r: F2  # (M, 3) global position
     rd: F2  # (M, 3) global velocity
     rb: F2  # (M, 3) quadratic velocity part of the global acceleration
