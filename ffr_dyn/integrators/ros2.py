@@ -29,7 +29,7 @@ from ffr_dyn.kernels.packing import tables_at
 from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.kernels.units import Unit
-from ffr_dyn.kernels.vectors import add_scaled, copy, fill
+from ffr_dyn.kernels.vectors import add_both, add_scaled, copy, fill, multiple
 
 GAMMA = 1.0 - 0.5**0.5
 
@@ -49,30 +49,27 @@ def ros2_step(at, t, unused, unused_too):
             copy(xs, r.x)
             copy(vs, r.v)
             fill(r_x, 0.0)
+            fill(r.work.bodies.shift, 0.0)
         else:
             add_scaled(xs, r.x, h, stages.x[0])
             add_scaled(vs, r.v, h, stages.v[0])
-            fill(r_v, 0.0)
-            add_scaled(r_x, r_x, -2.0, stages.x[0])
-            add_scaled(r_v, r_v, -2.0, stages.v[0])
+            multiple(r_x, -2.0, stages.x[0])
+            multiple(r_v, -2.0, stages.v[0])
             normalise(bodies, xs)  # r_v goes to body axes and comes back, which wants a true rotation
             status = evaluate(r, t + h, xs, vs)
         if status != OK:
             return status
         acceleration_target(r.work.rows, r.clock.gains, stages.target)
         add_elastic_part(bodies, r.work.bodies.f, vs, r_x, gh)
-        fill(r.work.bodies.shift, 0.0)
         if k == 1:
             correct(r, r_v, stages.target)
         solve(r, xs, stages.target)
         to_velocity_rates(bodies.where, r.work.bodies.A, r.work.bodies.acc, stages.v[k])
         add_scaled(vs, vs, gh, stages.v[k])
         position_rates(bodies, xs, vs, stages.x[k])
-        add_scaled(stages.x[k], stages.x[k], 1.0, r_x)
-    for k in range(2):
-        weight = 1.5 * h if k == 0 else 0.5 * h
-        add_scaled(r.x, r.x, weight, stages.x[k])
-        add_scaled(r.v, r.v, weight, stages.v[k])
+    add_scaled(stages.x[1], stages.x[1], 1.0, r_x)
+    add_both(r.x, 1.5 * h, stages.x[0], 0.5 * h, stages.x[1])
+    add_both(r.v, 1.5 * h, stages.v[0], 0.5 * h, stages.v[1])
     normalise(bodies, r.x)
     return finite(r.x, r.v)
 

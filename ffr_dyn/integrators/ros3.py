@@ -64,6 +64,7 @@ def ros3_step(at, t, unused, unused_too):
     for k in range(4):
         if k == 0:
             status = settle(r, t)
+            fill(r.work.bodies.shift, 0.0)
         copy(xs, r.x)
         copy(vs, r.v)
         fill(r_x, 0.0)
@@ -80,7 +81,6 @@ def ros3_step(at, t, unused, unused_too):
             return status
         acceleration_target(r.work.rows, r.clock.gains, stages.target)
         add_elastic_part(bodies, r.work.bodies.f, vs, r_x, gh)
-        fill(r.work.bodies.shift, 0.0)
         if k > 0:
             correct(r, r_v, stages.target)
         solve(r, xs, stages.target)

@@ -57,9 +57,9 @@ def normalise(bodies, x):
     """Euler parameters back to unit length."""
     for b in range(bodies.mass.size):
         i = bodies.where[b, 1] + 3
-        length = (x[i] ** 2 + x[i + 1] ** 2 + x[i + 2] ** 2 + x[i + 3] ** 2) ** 0.5
-        for k in range(4):
-            x[i + k] /= length
+        p0, p1, p2, p3 = x[i], x[i + 1], x[i + 2], x[i + 3]
+        inverse = 1.0 / (p0 * p0 + p1 * p1 + p2 * p2 + p3 * p3) ** 0.5
+        x[i], x[i + 1], x[i + 2], x[i + 3] = inverse * p0, inverse * p1, inverse * p2, inverse * p3
 
 
 @kernel
@@ -523,11 +523,31 @@ def mass_times(bodies, w, b, y, out):
         out[3 + k] += lift[k] + dot(w.J[b, k], angular)
     if n > 0:
         P, H = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.g, 9 * e + 6 * n, 3 * n)
+        if bodies.where[b, 7] >= 0:
+            mass_times_in_plane(P, H, y, n, bodies.where[b, 7], out)
+            return
         momentum, spin = three_rows(P, part(y, 6, n), n), three_rows(H, part(y, 6, n), n)
         for k in range(3):
             out[k] += momentum[k]
             out[3 + k] += spin[k]
         add_motion(P, H, linear, angular, part(y, 6, n), n, part(out, 6, n))
+
+
+@kernel
+def mass_times_in_plane(P, H, y, n, normal, out):
+    """What couples the three rigid coordinates of a planar body with its elastic ones, and these with themselves."""
+    i, j, k = in_plane(normal)
+    first, second, turn = part(P, i * n, n), part(P, j * n, n), part(H, normal * n, n)
+    q, f = part(y, 6, n), part(out, 6, n)
+    yi, yj, yk, ti, tj, tk = y[i], y[j], y[k], 0.0, 0.0, 0.0
+    for c in range(n):
+        ti += first[c] * q[c]
+        tj += second[c] * q[c]
+        tk += turn[c] * q[c]
+        f[c] += first[c] * yi + second[c] * yj + turn[c] * yk + q[c]
+    out[i] += ti
+    out[j] += tj
+    out[k] += tk
 
 
 @kernel

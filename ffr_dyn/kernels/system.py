@@ -146,9 +146,9 @@ def turn_bodies(where, w, x, v):
 @inlined
 def clear_and_load(r, x):
     """All applied loads at the address x of positions, also by marker."""
-    load = r.work.markers.load
-    fill(part(load, 0, load.size), 0.0)
     if count_loads(r.model.loads) > 0:
+        load = r.work.markers.load
+        fill(part(load, 0, load.size), 0.0)
         call_unit(r.units[LOADS], r.address, -1.0, x, 0)
 
 
@@ -277,21 +277,36 @@ def constraint_rates(where, markers, rows, jac, acc, out):
             if b != ground:
                 n, j, own = where[b, 0], where[b, 2], jac[k * sides + side]
                 phi = shapes(markers, marker, n)
-                add_side_rates(phi, own, part(acc, j, 6 + n), rows.start[k], rows.start[k + 1], n, out)
+                first, last, moved = rows.start[k], rows.start[k + 1], part(acc, j, 6 + n)
+                if where[b, 7] >= 0:
+                    add_side_rates_in_plane(phi, own, moved, first, last, n, where[b, 7], out)
+                else:
+                    add_side_rates(phi, own, moved, first, last, n, out)
 
 
 @kernel
 def add_side_rates(phi, a, acc, first, last, n, out):
     e0, e1, e2, e3, e4, e5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if n > 0:
-        q = part(acc, 6, n)
-        e0, e1, e2, e3, e4, e5 = six_rows(phi, q, n)
+        e0, e1, e2, e3, e4, e5 = six_rows(phi, part(acc, 6, n), n)
     for k in range(last - first):
         out[first + k] += (
             a[0, k] * (acc[0] + e0) + a[1, k] * (acc[1] + e1) + a[2, k] * (acc[2] + e2)
             + a[3, k] * acc[3] + a[4, k] * acc[4] + a[5, k] * acc[5]
             + a[6, k] * e3 + a[7, k] * e4 + a[8, k] * e5
         )  # fmt: skip
+
+
+@kernel
+def add_side_rates_in_plane(phi, a, acc, first, last, n, normal, out):
+    i, j, turn = in_plane(normal)
+    e0, e1, e2 = 0.0, 0.0, 0.0
+    if n > 0:
+        e0, e1, e2 = plane_rows(phi, normal, part(acc, 6, n), n)
+    for k in range(last - first):
+        out[first + k] += (
+            a[i, k] * (acc[i] + e0) + a[j, k] * (acc[j] + e1) + a[turn, k] * acc[turn] + a[6 + normal, k] * e2
+        )
 
 
 @inlined

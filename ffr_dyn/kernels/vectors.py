@@ -181,3 +181,17 @@ def add_scaled(target, base, factor, direction):
     """target = base + factor direction."""
     for k in range(target.size):
         target[k] = base[k] + factor * direction[k]
+
+
+@kernel
+def add_both(target, factor, direction, other, second):
+    """target += factor direction + other second."""
+    for k in range(target.size):
+        target[k] += factor * direction[k] + other * second[k]
+
+
+@kernel
+def multiple(target, factor, source):
+    """target = factor source."""
+    for k in range(target.size):
+        target[k] = factor * source[k]
