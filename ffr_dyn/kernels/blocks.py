@@ -8,6 +8,7 @@ of the earlier, with the rows of the later side by side in it. The factor is S =
 """
 
 from ffr_dyn.kernels.lanes import (
+    clear_narrow,
     clear_row,
     combine_1,
     combine_2,
@@ -16,11 +17,16 @@ from ffr_dyn.kernels.lanes import (
     combine_5,
     combine_6,
     combine_12,
+    copy_narrow,
     copy_row,
     eliminate_rows,
     factorise_rows,
     gather_upper,
     multiply_row,
+    narrow_1,
+    narrow_3,
+    narrow_6,
+    scale_narrow,
     scale_row,
     solve_lower,
     solve_upper,
@@ -42,13 +48,13 @@ def spread_rows(jac, flexible, normal, X, at):
     """X = the rigid coefficients of one side (9 * 8,), then the elastic ones; six of each, or three in the plane."""
     if normal >= 0:
         i, j, k = in_plane(normal)
-        copy_row(jac, LANES * i, X, at)
-        copy_row(jac, LANES * j, X, at + LANES)
-        copy_row(jac, LANES * k, X, at + 2 * LANES)
+        copy_narrow(jac, LANES * i, X, at)
+        copy_narrow(jac, LANES * j, X, at + LANES)
+        copy_narrow(jac, LANES * k, X, at + 2 * LANES)
         if flexible:
-            copy_row(jac, LANES * i, X, at + 3 * LANES)
-            copy_row(jac, LANES * j, X, at + 4 * LANES)
-            copy_row(jac, LANES * (6 + normal), X, at + 5 * LANES)
+            copy_narrow(jac, LANES * i, X, at + 3 * LANES)
+            copy_narrow(jac, LANES * j, X, at + 4 * LANES)
+            copy_narrow(jac, LANES * (6 + normal), X, at + 5 * LANES)
         return
     for c in range(6):
         copy_row(jac, LANES * c, X, at + LANES * c)
@@ -87,13 +93,13 @@ def eliminate_in_plane(flexible, normal, P, L, X, at):
     second, third = at + LANES, at + 2 * LANES
     if flexible:
         for c in range(3):
-            combine_3(X, at + LANES * c, -1.0, P, 3 * c, 1, X, at + 3 * LANES)
-    scale_row(X, at, L[7 * i])
-    combine_1(X, second, -1.0, L, 6 * j + i, 1, X, at)
-    scale_row(X, second, L[7 * j])
-    combine_1(X, third, -1.0, L, 6 * k + i, 1, X, at)
-    combine_1(X, third, -1.0, L, 6 * k + j, 1, X, second)
-    scale_row(X, third, L[7 * k])
+            narrow_3(X, at + LANES * c, -1.0, P, 3 * c, 1, X, at + 3 * LANES)
+    scale_narrow(X, at, L[7 * i])
+    narrow_1(X, second, -1.0, L, 6 * j + i, 1, X, at)
+    scale_narrow(X, second, L[7 * j])
+    narrow_1(X, third, -1.0, L, 6 * k + i, 1, X, at)
+    narrow_1(X, third, -1.0, L, 6 * k + j, 1, X, second)
+    scale_narrow(X, third, L[7 * k])
 
 
 @kernel
@@ -120,14 +126,14 @@ def add_pair_in_plane(X, later, earlier, rows, flexible, phiphi, Y, S, offset):
     """`add_pair` for a planar body; phiphi: nine numbers."""
     if flexible:
         for c in range(3):
-            copy_row(X, later + LANES * c, Y, LANES * c)
-            clear_row(Y, LANES * (3 + c))
-            combine_3(Y, LANES * (3 + c), 1.0, phiphi, c, 3, X, later + 3 * LANES)
+            copy_narrow(X, later + LANES * c, Y, LANES * c)
+            clear_narrow(Y, LANES * (3 + c))
+            narrow_3(Y, LANES * (3 + c), 1.0, phiphi, c, 3, X, later + 3 * LANES)
         for row in range(rows):
-            combine_6(S, offset + LANES * row, 1.0, X, earlier + row, LANES, Y, 0)
+            narrow_6(S, offset + LANES * row, 1.0, X, earlier + row, LANES, Y, 0)
     else:
         for row in range(rows):
-            combine_3(S, offset + LANES * row, 1.0, X, earlier + row, LANES, X, later)
+            narrow_3(S, offset + LANES * row, 1.0, X, earlier + row, LANES, X, later)
 
 
 @inlined

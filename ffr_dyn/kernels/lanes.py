@@ -11,7 +11,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from ffr_dyn.kernels.tables import LANES, MOST_ROWS
+from ffr_dyn.kernels.tables import LANES, MOST_ROWS, NARROW
 
 _intrinsic: Any = intrinsic  # whose callers give one argument less than its definition has
 _REAL = types.float64
@@ -23,22 +23,22 @@ def _data(context: Any, builder: Any, array: Any) -> Any:
     return context.make_array(_POOLED)(context, builder, array).data
 
 
-def _row_pointer(builder: Any, data: Any, at: Any) -> Any:
+def _row_pointer(builder: Any, data: Any, at: Any, lanes: int = LANES) -> Any:
     from llvmlite import ir
 
-    return builder.bitcast(builder.gep(data, [at]), ir.VectorType(ir.DoubleType(), LANES).as_pointer())
+    return builder.bitcast(builder.gep(data, [at]), ir.VectorType(ir.DoubleType(), lanes).as_pointer())
 
 
-def _broadcast(builder: Any, number: Any) -> Any:
+def _broadcast(builder: Any, number: Any, lanes: int = LANES) -> Any:
     from llvmlite import ir
 
-    vector = ir.VectorType(ir.DoubleType(), LANES)
+    vector = ir.VectorType(ir.DoubleType(), lanes)
     one = builder.insert_element(ir.Constant(vector, ir.Undefined), number, ir.Constant(ir.IntType(32), 0))
-    zeros = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+    zeros = ir.Constant(ir.VectorType(ir.IntType(32), lanes), [0] * lanes)
     return builder.shuffle_vector(one, ir.Constant(vector, ir.Undefined), zeros)
 
 
-def _combination(count: int) -> Any:
+def _combination(count: int, lanes: int = LANES) -> Any:
     @_intrinsic
     def combine(typing, target, at, factor, numbers, first, stride, source, begin):  # type: ignore[no-untyped-def]
         """target row += factor sum_k numbers[first + k stride] source row k, for `count` rows that follow one another."""
@@ -48,13 +48,14 @@ def _combination(count: int) -> Any:
         def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
             out, at, factor, numbers, first, stride, source, begin = args
             numbers, source = _data(context, builder, numbers), _data(context, builder, source)
-            place = _row_pointer(builder, _data(context, builder, out), at)
+            place = _row_pointer(builder, _data(context, builder, out), at, lanes)
             total = builder.load(place, align=8)
             for k in range(count):
-                row = _row_pointer(builder, source, builder.add(begin, cgutils.intp_t(LANES * k)))
+                row = _row_pointer(builder, source, builder.add(begin, cgutils.intp_t(LANES * k)), lanes)
                 where = builder.add(first, builder.mul(stride, cgutils.intp_t(k)))
                 number = builder.fmul(factor, builder.load(builder.gep(numbers, [where])), flags=_LIBERTIES)
-                product = builder.fmul(_broadcast(builder, number), builder.load(row, align=8), flags=_LIBERTIES)
+                many = _broadcast(builder, number, lanes)
+                product = builder.fmul(many, builder.load(row, align=8), flags=_LIBERTIES)
                 total = builder.fadd(total, product, flags=_LIBERTIES)
             builder.store(total, place, align=8)
             return context.get_dummy_value()
@@ -66,55 +67,75 @@ def _combination(count: int) -> Any:
 
 combine_1, combine_2, combine_3 = _combination(1), _combination(2), _combination(3)
 combine_4, combine_5, combine_6, combine_12 = _combination(4), _combination(5), _combination(6), _combination(12)
+# In the plane a joint has at most three rows: half a row of lanes is enough.
+narrow_1, narrow_3, narrow_6 = _combination(1, NARROW), _combination(3, NARROW), _combination(6, NARROW)
 
 
-@_intrinsic
-def scale_row(typing, target, at, factor):  # type: ignore[no-untyped-def]
-    """target row *= factor."""
+def _scaling(lanes: int) -> Any:
+    @_intrinsic
+    def scale(typing, target, at, factor):  # type: ignore[no-untyped-def]
+        """target row *= factor."""
 
-    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-        place = _row_pointer(builder, _data(context, builder, args[0]), args[1])
-        row = builder.load(place, align=8)
-        builder.store(builder.fmul(row, _broadcast(builder, args[2]), flags=_LIBERTIES), place, align=8)
-        return context.get_dummy_value()
+        def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
+            place = _row_pointer(builder, _data(context, builder, args[0]), args[1], lanes)
+            row, many = builder.load(place, align=8), _broadcast(builder, args[2], lanes)
+            builder.store(builder.fmul(row, many, flags=_LIBERTIES), place, align=8)
+            return context.get_dummy_value()
 
-    return types.void(_POOLED, types.intp, _REAL), generate
+        return types.void(_POOLED, types.intp, _REAL), generate
 
-
-@_intrinsic
-def copy_row(typing, source, begin, target, at):  # type: ignore[no-untyped-def]
-    """target row = source row."""
-
-    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-        row = builder.load(_row_pointer(builder, _data(context, builder, args[0]), args[1]), align=8)
-        builder.store(row, _row_pointer(builder, _data(context, builder, args[2]), args[3]), align=8)
-        return context.get_dummy_value()
-
-    return types.void(_POOLED, types.intp, _POOLED, types.intp), generate
+    return scale
 
 
-@_intrinsic
-def clear_row(typing, target, at):  # type: ignore[no-untyped-def]
-    """target row = 0."""
+def _copying(lanes: int) -> Any:
+    @_intrinsic
+    def copy(typing, source, begin, target, at):  # type: ignore[no-untyped-def]
+        """target row = source row."""
 
-    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-        place = _row_pointer(builder, _data(context, builder, args[0]), args[1])
-        builder.store(_broadcast(builder, context.get_constant(_REAL, 0.0)), place, align=8)
-        return context.get_dummy_value()
+        def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
+            row = builder.load(_row_pointer(builder, _data(context, builder, args[0]), args[1], lanes), align=8)
+            builder.store(row, _row_pointer(builder, _data(context, builder, args[2]), args[3], lanes), align=8)
+            return context.get_dummy_value()
 
-    return types.void(_POOLED, types.intp), generate
+        return types.void(_POOLED, types.intp, _POOLED, types.intp), generate
+
+    return copy
 
 
-@_intrinsic
-def dot_rows(typing, left, at, right, begin):  # type: ignore[no-untyped-def]
-    """The sum over the lanes of left row * right row."""
+def _clearing(lanes: int) -> Any:
+    @_intrinsic
+    def clear(typing, target, at):  # type: ignore[no-untyped-def]
+        """target row = 0."""
 
-    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-        left = builder.load(_row_pointer(builder, _data(context, builder, args[0]), args[1]), align=8)
-        right = builder.load(_row_pointer(builder, _data(context, builder, args[2]), args[3]), align=8)
-        return _sum(builder, builder.fmul(left, right, flags=_LIBERTIES))
+        def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
+            place = _row_pointer(builder, _data(context, builder, args[0]), args[1], lanes)
+            builder.store(_broadcast(builder, context.get_constant(_REAL, 0.0), lanes), place, align=8)
+            return context.get_dummy_value()
 
-    return _REAL(_POOLED, types.intp, _POOLED, types.intp), generate
+        return types.void(_POOLED, types.intp), generate
+
+    return clear
+
+
+def _dotting(lanes: int) -> Any:
+    @_intrinsic
+    def dot(typing, left, at, right, begin):  # type: ignore[no-untyped-def]
+        """The sum over the lanes of left row * right row."""
+
+        def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
+            left = builder.load(_row_pointer(builder, _data(context, builder, args[0]), args[1], lanes), align=8)
+            right = builder.load(_row_pointer(builder, _data(context, builder, args[2]), args[3], lanes), align=8)
+            return _sum(builder, builder.fmul(left, right, flags=_LIBERTIES))
+
+        return _REAL(_POOLED, types.intp, _POOLED, types.intp), generate
+
+    return dot
+
+
+scale_row, scale_narrow = _scaling(LANES), _scaling(NARROW)
+copy_row, copy_narrow = _copying(LANES), _copying(NARROW)
+clear_row, clear_narrow = _clearing(LANES), _clearing(NARROW)
+dot_rows, dot_narrow = _dotting(LANES), _dotting(NARROW)
 
 
 @_intrinsic
@@ -187,7 +208,7 @@ def _sum(builder: Any, row: Any) -> Any:
     from llvmlite import ir
 
     kind = ir.FunctionType(ir.DoubleType(), [ir.DoubleType(), row.type])
-    reduce = cgutils.get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.fadd.v{LANES}f64")
+    reduce = cgutils.get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.fadd.v{row.type.count}f64")
     return builder.call(reduce, [ir.Constant(ir.DoubleType(), 0.0), row], fastmath=_LIBERTIES)
 
 

@@ -25,7 +25,7 @@ from ffr_dyn.kernels.bodies import (
     rotation_matrix,
     six_rows,
 )
-from ffr_dyn.kernels.lanes import add_scale, combine_3, combine_6, dot_rows
+from ffr_dyn.kernels.lanes import add_scale, combine_6, dot_narrow, dot_rows, narrow_3, narrow_6
 from ffr_dyn.kernels.loads import count_loads
 from ffr_dyn.kernels.markers import (
     couple_marker,
@@ -254,9 +254,9 @@ def reduced_rates(bodies, markers, rows, bw, rw, target):
                     moved[0], moved[1], moved[2] = z[c0], z[c1], z[c2]
                     if n > 0:
                         moved[3], moved[4], moved[5] = plane_rows(shapes(markers, marker, n), normal, elastic, n)
-                        combine_6(rw.step, LANES * k, 1.0, moved, 0, 1, rw.X, at)
+                        narrow_6(rw.step, LANES * k, 1.0, moved, 0, 1, rw.X, at)
                     else:
-                        combine_3(rw.step, LANES * k, 1.0, moved, 0, 1, rw.X, at)
+                        narrow_3(rw.step, LANES * k, 1.0, moved, 0, 1, rw.X, at)
                     continue
                 combine_6(rw.step, LANES * k, 1.0, z, 0, 1, rw.X, at)
                 if n > 0:
@@ -358,7 +358,7 @@ def react(bodies, markers, rows, bw, rw):
                     phi, elastic = shapes(markers, marker, n), part(bw.elastic, e, n)
                     if normal >= 0:
                         for c in range(3):
-                            wrench[c] = dot_rows(rw.X, at + LANES * (3 + c), rw.step, LANES * k)
+                            wrench[c] = dot_narrow(rw.X, at + LANES * (3 + c), rw.step, LANES * k)
                         release_in_plane(phi, normal, part(bw.dinv, e, n), wrench, n, elastic)
                     else:
                         for c in range(6):
@@ -371,9 +371,9 @@ def react(bodies, markers, rows, bw, rw):
 @kernel
 def react_in_plane(X, at, step, own, normal, z):
     i, j, k = in_plane(normal)
-    z[i] -= dot_rows(X, at, step, own)
-    z[j] -= dot_rows(X, at + LANES, step, own)
-    z[k] -= dot_rows(X, at + 2 * LANES, step, own)
+    z[i] -= dot_narrow(X, at, step, own)
+    z[j] -= dot_narrow(X, at + LANES, step, own)
+    z[k] -= dot_narrow(X, at + 2 * LANES, step, own)
 
 
 @kernel

@@ -31,6 +31,7 @@ AFFINE, GLOBAL = 0, 1
 OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED, NOT_CONVERGED, STEP_TOO_SMALL = range(7)
 
 LANES = 8  # rows of a joint side by side (see `ffr_dyn.kernels.lanes`)
+NARROW = 4  # of them are enough in the plane
 MOST_ROWS = 6  # of a joint
 
 # Numbers of the compiled units in `Tables.units`.
