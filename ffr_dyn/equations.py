@@ -417,7 +417,7 @@ def new_work(m: Model) -> Work:
         **zeros(
             rigid=(B, 6),
             elastic=E,
-            PP=(B, 3, 3),
+            T=(B, 3, 3),
             more=V,
             unstiffened=E,
             shift=V,

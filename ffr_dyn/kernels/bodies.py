@@ -7,6 +7,7 @@ ch. 5, written for body-frame velocities); see `ffr_dyn.inertia` for the readabl
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.vectors import (
     cholesky_six,
+    cholesky_three,
     copy,
     cross,
     dot,
@@ -307,12 +308,11 @@ def forces_in_plane(f, mass, s, pd, growing, omega, gravity, normal):
     f[k] = turn * (s[i] * gravity[j] - s[j] * gravity[i]) - 2.0 * growing * rate
 
 
-@inlined
-def rigid_mass(mass, s, J, M):
-    """Fill the 6 x 6 rigid block of the mass matrix."""
+@kernel
+def rotational_rows(s, J, M):
+    """Fill the last three rows of the rigid block of the mass matrix."""
     for r in range(3):
         for c in range(3):
-            M[r, c] = mass if r == c else 0.0
             M[3 + r, 3 + c] = J[r, c]
         M[3 + r, r] = 0.0
     M[3, 1], M[3, 2] = -s[2], s[1]
@@ -320,23 +320,22 @@ def rigid_mass(mass, s, J, M):
     M[5, 0], M[5, 1] = -s[1], s[0]
 
 
-@kernel
-def rigid_mass_in_plane(mass, s, inertia, M, normal):
-    """The lower triangle of the rigid block for the coordinates that move in the plane."""
-    i, j, k = in_plane(normal)
-    M[i, i], M[j, j], M[k, k] = mass, mass, inertia
-    M[k, i], M[k, j] = -sense(normal) * s[j], sense(normal) * s[i]
-
-
 @inlined
 def prepare_body(bodies, w, b):
-    """What of the Schur complement of body b depends on the elastic diagonal alone: P_dm dinv and P_dm dinv P_dm^T."""
+    """What of the Schur complement of body b depends on the elastic diagonal alone: P_dm dinv, and the factor T of the
+    translational block m I - P_dm dinv P_dm^T."""
     n, e = bodies.where[b, 0], bodies.where[b, 3]
-    P, Cd = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.Cd, 6 * e, 6 * n)
+    P, Cd, T = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.Cd, 6 * e, 6 * n), w.T[b]
     for r in range(3):
         scale_row(P, r, part(w.dinv, e, n), n, Cd, r)
-        for c in range(3):
-            w.PP[b, r, c] = row_product(Cd, r, P, c, n)
+        for c in range(r + 1):
+            T[r, c] = (bodies.mass[b] if r == c else 0.0) - row_product(Cd, r, P, c, n)
+    i, j, k = bodies.where[b, 7], 0, 0
+    if i >= 0:  # across the plane nothing moves
+        j, k = (i + 1) % 3, (i + 2) % 3
+        T[max(i, j), min(i, j)], T[max(i, k), min(i, k)], T[i, i] = 0.0, 0.0, bodies.mass[b]
+    if not cholesky_three(T):
+        T[0, 0] = -1.0
 
 
 @inlined
@@ -348,18 +347,14 @@ def factorise(bodies, w, b):
     if bodies.where[b, 0] == 0:
         return w.L[b, 0, 0] > 0.0
     n, e, normal = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 7]
-    L = w.L[b]
+    L, T = w.L[b], w.T[b]
     P, H = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.g, 9 * e + 6 * n, 3 * n)
     dinv, Cd = part(w.dinv, e, n), part(w.Cd, 6 * e, 6 * n)
     if normal >= 0:
-        rigid_mass_in_plane(bodies.mass[b], get(w.s, b), w.J[b, normal, normal], L, normal)
-        return factorise_in_plane(w.PP[b], P, H, dinv, Cd, L, n, normal)
-    rigid_mass(bodies.mass[b], w.s[b], w.J[b], L)
-    for r in range(3):
-        for c in range(r + 1):
-            L[r, c] -= w.PP[b, r, c]
+        return factorise_in_plane(T, get(w.s, b), w.J[b, normal, normal], P, H, dinv, Cd, L, n, normal)
+    rotational_rows(w.s[b], w.J[b], L)
     reduce_rotation(P, H, dinv, Cd, L, n)
-    return cholesky_six(L)
+    return cholesky_six(T, L)
 
 
 @kernel
@@ -413,27 +408,23 @@ def scale_row(rows, r, dinv, n, out, target):
 
 
 @kernel
-def factorise_in_plane(PP, P, H, dinv, Cd, L, n, normal):
+def factorise_in_plane(T, s, inertia, P, H, dinv, Cd, L, n, normal):
     """`factorise` for the three rigid coordinates i, j, k of a planar body."""
     i, j, k = in_plane(normal)
-    ki, kj, kk, ji = 0.0, 0.0, 0.0, PP[j, i]
+    ki, kj, kk = -sense(normal) * s[j], sense(normal) * s[i], inertia
     first, second, turn, scaled = part(P, i * n, n), part(P, j * n, n), part(H, normal * n, n), part(Cd, k * n, n)
     for c in range(n):
         x = dinv[c] * turn[c]
         scaled[c] = x
-        ki += x * first[c]
-        kj += x * second[c]
-        kk += x * turn[c]
-    inertia = L[k, k]
-    ii, jj, kk = L[i, i] - PP[i, i], L[j, j] - PP[j, j], inertia - kk
-    L[i, i] = 1.0 / ii**0.5
-    L[j, i], L[k, i] = -ji * L[i, i], (L[k, i] - ki) * L[i, i]
-    jj -= L[j, i] ** 2
-    L[j, j] = 1.0 / jj**0.5
-    L[k, j] = (L[k, j] - kj - L[k, i] * L[j, i]) * L[j, j]
-    kk -= L[k, i] ** 2 + L[k, j] ** 2
-    L[k, k] = 1.0 / kk**0.5
-    return ii > 0.0 and jj > 0.0 and kk > 1e-14 * inertia
+        ki -= x * first[c]
+        kj -= x * second[c]
+        kk -= x * turn[c]
+    L[i, i], L[j, i], L[j, j] = T[i, i], T[j, i], T[j, j]
+    ki *= L[i, i]
+    kj = (kj - ki * L[j, i]) * L[j, j]
+    kk -= ki * ki + kj * kj
+    L[k, i], L[k, j], L[k, k] = ki, kj, 1.0 / kk**0.5
+    return T[0, 0] > 0.0 and kk > 1e-14 * inertia
 
 
 @kernel

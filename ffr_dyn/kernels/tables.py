@@ -161,7 +161,7 @@ class BodyWork(NamedTuple):
     f: F1  # (V,) right-hand side in body axes
     acc: F1  # (V,) solution in body axes
     dinv: F1  # (E,) 1 / (1 + implicit terms); ones for explicit methods
-    PP: F3  # (B, 3, 3) P_dm dinv P_dm^T
+    T: F3  # (B, 3, 3) the part of L that depends on dinv alone: the factor of m I - P_dm dinv P_dm^T
     rigid: F2  # (B, 6) reduced forces L^-1 (f_rigid - C dinv f_elastic), less those of the reactions
     elastic: F1  # (E,) dinv f_elastic, likewise
     more: F1  # (V,) scratch

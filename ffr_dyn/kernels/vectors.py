@@ -61,25 +61,35 @@ def put(array, row, a):
     array[row, 2] = a[2]
 
 
-@kernel
-def cholesky_six(L):
-    """In-place lower Cholesky factor of a 6 x 6 matrix with reciprocal diagonal. Returns True when it is positive.
+LEAST_PIVOT = 1e-14  # of the diagonal entry that it came from
 
-    A pivot counts as positive above 1e-14 of the diagonal entry it came from. Written out, since the compiler does not.
-    """
-    d0, d1, d2, d3, d4, d5 = L[0, 0], L[1, 1], L[2, 2], L[3, 3], L[4, 4], L[5, 5]
+
+@kernel
+def cholesky_three(T):
+    """In-place lower Cholesky factor of a 3 x 3 matrix with reciprocal diagonal. Returns True when it is positive."""
+    d0, d1, d2 = T[0, 0], T[1, 1], T[2, 2]
     i0 = 1.0 / d0**0.5
-    a1, a2, a3, a4, a5 = L[1, 0] * i0, L[2, 0] * i0, L[3, 0] * i0, L[4, 0] * i0, L[5, 0] * i0
+    a1, a2 = T[1, 0] * i0, T[2, 0] * i0
     p1 = d1 - a1 * a1
     i1 = 1.0 / p1**0.5
-    b2, b3, b4, b5 = (
-        (L[2, 1] - a2 * a1) * i1,
-        (L[3, 1] - a3 * a1) * i1,
-        (L[4, 1] - a4 * a1) * i1,
-        (L[5, 1] - a5 * a1) * i1,
-    )
+    b2 = (T[2, 1] - a2 * a1) * i1
     p2 = d2 - a2 * a2 - b2 * b2
-    i2 = 1.0 / p2**0.5
+    T[0, 0], T[1, 0], T[2, 0], T[1, 1], T[2, 1], T[2, 2] = i0, a1, a2, i1, b2, 1.0 / p2**0.5
+    return d0 > 0.0 and p1 > LEAST_PIVOT * d1 and p2 > LEAST_PIVOT * d2
+
+
+@kernel
+def cholesky_six(T, L):
+    """In-place lower Cholesky factor of a 6 x 6 matrix with reciprocal diagonal. Returns True when it is positive.
+
+    T : (3, 3) that of its upper left block, or not positive in [0, 0];  L : the last three rows of the matrix
+
+    Written out, since the compiler does not.
+    """
+    i0, a1, i1, a2, b2, i2 = T[0, 0], T[1, 0], T[1, 1], T[2, 0], T[2, 1], T[2, 2]
+    d3, d4, d5 = L[3, 3], L[4, 4], L[5, 5]
+    a3, a4, a5 = L[3, 0] * i0, L[4, 0] * i0, L[5, 0] * i0
+    b3, b4, b5 = (L[3, 1] - a3 * a1) * i1, (L[4, 1] - a4 * a1) * i1, (L[5, 1] - a5 * a1) * i1
     c3, c4, c5 = (
         (L[3, 2] - a3 * a2 - b3 * b2) * i2,
         (L[4, 2] - a4 * a2 - b4 * b2) * i2,
@@ -97,9 +107,7 @@ def cholesky_six(L):
     L[2, 1], L[3, 1], L[4, 1], L[5, 1] = b2, b3, b4, b5
     L[3, 2], L[4, 2], L[5, 2] = c3, c4, c5
     L[4, 3], L[5, 3], L[5, 4] = e4, e5, g5
-    least = 1e-14
-    first = d0 > 0.0 and p1 > least * d1 and p2 > least * d2
-    return first and p3 > least * d3 and p4 > least * d4 and p5 > least * d5
+    return i0 > 0.0 and p3 > LEAST_PIVOT * d3 and p4 > LEAST_PIVOT * d4 and p5 > LEAST_PIVOT * d5
 
 
 @kernel
