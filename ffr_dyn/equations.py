@@ -397,7 +397,7 @@ def _at(address: int, size: int) -> Array:
 
 
 def new_work(m: Model) -> Work:
-    """Scratch for one evaluation, with the elastic diagonal of an explicit method."""
+    """Scratch of evaluations; what depends on the elastic diagonal is made when that is set."""
     B, E, M, C = m.bodies.mass.size, int(m.bodies.where[-1, 3]), m.markers.body.size, m.rows.kind.size
     K, D = m.rows.marker.shape
     n, V, pairs = m.bodies.where[:, 0], 6 * B + E, m.pattern.pair_body.size

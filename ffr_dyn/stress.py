@@ -7,8 +7,7 @@ components xx, yy, zz, xy, xz, yz in body axes along their last axis; shear stra
 engineering ones. Stress is found where the basis can show it: loads along the body, its own inertia among them, need
 shapes made for them (inertia relief) or many normal modes.
 
-Sources: Timoshenko & Goodier, Theory of Elasticity (1970), articles 6 and 77 (Hooke's law, principal stresses);
-O. K. Smith, Comm. ACM 4 (1961) 168 (eigenvalues of a symmetric 3 x 3 matrix by trigonometry).
+Source: Timoshenko & Goodier, Theory of Elasticity (1970), articles 6 and 77 (Hooke's law, principal stresses).
 """
 
 from __future__ import annotations
@@ -43,16 +42,11 @@ def von_mises(tensor: Array) -> Array:
 
 
 def principal_values(tensor: Array) -> Array:
-    """(..., 6) -> (..., 3) eigenvalues, descending; good to 1e-8 of the largest (Smith 1961)."""
-    xx, yy, zz, xy, xz, yz = np.moveaxis(tensor, -1, 0)
-    mean = (xx + yy + zz) / 3
-    x, y, z = xx - mean, yy - mean, zz - mean
-    half_norm = np.sqrt((x**2 + y**2 + z**2 + 2 * (xy**2 + xz**2 + yz**2)) / 6)
-    determinant = x * (y * z - yz**2) - xy * (xy * z - yz * xz) + xz * (xy * yz - y * xz)
-    cube = np.where(half_norm > 0, half_norm, 1.0) ** 3
-    angle = np.arccos(np.clip(determinant / (2 * cube), -1.0, 1.0)) / 3
-    turns = angle[..., None] + np.array([0.0, -2 * np.pi / 3, 2 * np.pi / 3])
-    return mean[..., None] + 2 * half_norm[..., None] * np.cos(turns)
+    """(..., 6) -> (..., 3) eigenvalues, descending."""
+    full = np.empty((*tensor.shape[:-1], 3, 3))
+    for part, (row, column) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
+        full[..., row, column] = full[..., column, row] = tensor[..., part]
+    return np.linalg.eigvalsh(full)[..., ::-1]
 
 
 def signed_max_principal(tensor: Array) -> Array:

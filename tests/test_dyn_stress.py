@@ -11,6 +11,7 @@ import pytest
 from boxes import STEEL, box_mesh
 from click.testing import CliRunner
 from PIL import Image
+from scipy.spatial.transform import Rotation
 from test_animate import rotating_box
 
 from ffr_dyn.analyses.forward import forward
@@ -100,13 +101,22 @@ def stressed_box(amplitude=0.01):
 # ---- measures -----------------------------------------------------------------------------------------------------
 
 
-def test_principal_values_are_the_eigenvalues():
+def test_principal_values_are_those_a_rotated_state_was_made_of():
     rng = np.random.default_rng(0)
-    ordinary = rng.normal(size=(500, 6))
-    uniaxial, hydrostatic = np.array([[2.0, 0, 0, 0, 0, 0]]), np.array([[-3.0, -3.0, -3.0, 0, 0, 0]])
-    for six in (ordinary, uniaxial, hydrostatic, np.zeros((1, 6)), 1e8 * ordinary):
-        exact = np.linalg.eigvalsh(matrices(six))[..., ::-1]
-        np.testing.assert_allclose(principal_values(six), exact, atol=3e-8 * np.abs(six).max())
+    turns = Rotation.random(500, random_state=1).as_matrix()
+    uniaxial, compressed, hydrostatic = [2.0, 0, 0], [0, 0, -2.0], [-3.0, -3.0, -3.0]
+    for values in (
+        rng.normal(size=(500, 3)),
+        uniaxial,
+        compressed,
+        hydrostatic,
+        [0, 0, 0],
+        1e8 * rng.normal(size=(500, 3)),
+    ):
+        made = np.broadcast_to(-np.sort(-np.asarray(values, dtype=float), axis=-1), (500, 3))
+        full = np.einsum("pik,pk,pjk->pij", turns, made, turns)
+        six = np.stack([full[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))], axis=1)
+        np.testing.assert_allclose(principal_values(six), made, rtol=0, atol=1e-14 * max(np.abs(made).max(), 1e-300))
 
 
 def test_von_mises_and_tresca_of_known_states():

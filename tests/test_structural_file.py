@@ -56,7 +56,7 @@ def test_the_file_of_the_documentation(tmp_path):
     assert loaded.frame.shells == (Shell(0.004, material("steel")),)
     profile = shifted(i_section(0.2, 0.1, 0.006, 0.009), 0.1, 0)
     assert loaded.frame.members == (Member(profile, material("steel"), (1.0, 0.0, 0.0)),)
-    assert len(loaded.frame.points) == 15
+    assert len(loaded.frame.points) == 45
     body = reduce_structure(loaded)
     assert body.stiffening is not None
     assert body.surface.stress is not None

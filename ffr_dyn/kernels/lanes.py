@@ -319,46 +319,32 @@ def subtract_product(typing, size, S, target, numbers, Y):  # type: ignore[no-un
     return types.void(index, _POOLED, index, index, _POOLED), generate
 
 
-@_intrinsic
-def solve_lower(typing, size, S, diagonal, b, own):  # type: ignore[no-untyped-def]
-    """The row of b at `own` becomes U^-T times it."""
+def _substitution(descending: bool, text: str) -> Any:
+    @_intrinsic
+    def substitute(typing, size, S, diagonal, b, own):  # type: ignore[no-untyped-def]
+        def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
+            size, S, diagonal, b, own = args
+            S, b = _data(context, builder, S), _data(context, builder, b)
 
-    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-        size, S, diagonal, b, own = args
-        S, b = _data(context, builder, S), _data(context, builder, b)
+            def emit(n: int) -> None:
+                row = _load_row(builder, b, own)
+                for c in range(n - 1, 0, -1) if descending else range(n - 1):
+                    kept = _before if descending else _beyond
+                    column = kept(builder, _load_row(builder, S, diagonal, c), c)
+                    row = _less(builder, row, _lane(builder, row, c), column)
+                _store_row(builder, row, b, own)
 
-        def emit(n: int) -> None:
-            row = _load_row(builder, b, own)
-            for c in range(n - 1):
-                unit = _beyond(builder, _load_row(builder, S, diagonal, c), c)
-                row = _less(builder, row, _lane(builder, row, c), unit)
-            _store_row(builder, row, b, own)
+            return _case_by_case(context, builder, size, emit)
 
-        return _case_by_case(context, builder, size, emit)
+        index = types.intp
+        return types.void(index, _POOLED, index, _POOLED, index), generate
 
-    index = types.intp
-    return types.void(index, _POOLED, index, _POOLED, index), generate
+    substitute.__doc__ = text
+    return substitute
 
 
-@_intrinsic
-def solve_upper(typing, size, S, diagonal, b, own):  # type: ignore[no-untyped-def]
-    """The row of b at `own` becomes U^-1 times it."""
-
-    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-        size, S, diagonal, b, own = args
-        S, b = _data(context, builder, S), _data(context, builder, b)
-
-        def emit(n: int) -> None:
-            row = _load_row(builder, b, own)
-            for c in range(n - 1, 0, -1):
-                column = _before(builder, _load_row(builder, S, diagonal, c), c)
-                row = _less(builder, row, _lane(builder, row, c), column)
-            _store_row(builder, row, b, own)
-
-        return _case_by_case(context, builder, size, emit)
-
-    index = types.intp
-    return types.void(index, _POOLED, index, _POOLED, index), generate
+solve_lower = _substitution(False, "The row of b at `own` becomes U^-T times it.")
+solve_upper = _substitution(True, "The row of b at `own` becomes U^-1 times it.")
 
 
 @_intrinsic

@@ -388,6 +388,8 @@ def controlled_rows_unit(at, start, record, step):
     r, out = tables_at(at), record_at(record)
     c, steps = r.control, r.clock.steps
     steps[2] = 0
+    if r.work.diagonal[0] < 0.0:
+        set_diagonal(r, 0.0)  # a row may come before the first step
     for row in range(out.time.size):
         t = start + (steps[0] + steps[1]) * r.clock.time[1]
         while c.numbers[NOW] < t:
