@@ -11,6 +11,8 @@ processor time of the time loop of the chosen model; how many times as long othe
              step that meets the tolerance
     best     the same with the cheapest of all methods
     default  the same with the default method and step, whether that meets the tolerance or not
+    space    as `own`, in space: everything that `economise` decides on left as it is but the step
+    all      as `default`, in space: everything left as it is
 
 the cost of the search beyond one verification, in runs of the chosen model by the cost model, and as the processor time of
 all of a search without verification over that of a whole run of the chosen model, assembly and outputs included; the
@@ -72,6 +74,8 @@ class Row:
     own: float
     best: float
     default: float
+    space: float
+    all: float
     search: float  # all of a search without verification, over all of a run
 
     @property
@@ -242,7 +246,8 @@ def rows_of(one: Case, *, with_grid: bool) -> Iterator[Row]:
         choice, everything = economy.choice, replace(reference.choice, accuracy=0.0)
         chosen = processor_time(scene, choice, span)
         times = [chosen if same(other, choice) else processor_time(scene, other, span) for other in grid[tolerance]]
-        limit = tolerance * economy.scales
+        limit, full = tolerance * economy.scales, full_model(economy)
+        own = enough(scene, everything, ("ros2",), span, economy, reference, limit)
         yield Row(
             one.name,
             tolerance,
@@ -250,12 +255,12 @@ def rows_of(one: Case, *, with_grid: bool) -> Iterator[Row]:
             true_error(scene, choice, span, economy, reference),
             chosen,
             min(times, default=np.nan),
-            processor_time(
-                scene, replace(full_model(economy), method=implicit(choice), divisions=choice.divisions), span
-            ),
-            processor_time(scene, enough(scene, everything, ("ros2",), span, economy, reference, limit), span),
+            processor_time(scene, replace(full, method=implicit(choice), divisions=choice.divisions), span),
+            processor_time(scene, own, span),
             processor_time(scene, enough(scene, everything, methods(span), span, economy, reference, limit), span),
             processor_time(scene, replace(everything, method="ros2", divisions=10), span),
+            processor_time(scene, replace(full, method=own.method, divisions=own.divisions), span),
+            processor_time(scene, replace(full, method="ros2", divisions=10), span),
             search_time(one, scene, tolerance),
         )
 
@@ -310,13 +315,15 @@ def line(row: Row) -> str:
         f"{row.case:17} {row.tolerance:6.0e} {'yes' if row.met else 'NO ':4}{(row.error / found.limits).max():5.2f} "
         f"{found.choice.plane:5}{found.choice.method}/{found.choice.divisions:<4d}{1e3 * row.chosen:8.2f}"
         f"{row.chosen / row.grid:7.2f}{row.same / row.chosen:7.1f}{row.own / row.chosen:7.1f}{row.best / row.chosen:7.1f}"
-        f"{row.default / row.chosen:8.1f}{_searched(row):8.1f}{row.search:6.1f}{repaired:4d}   {coordinates:20} {effectivity}"
+        f"{row.default / row.chosen:8.1f}{row.space / row.chosen:7.1f}{row.all / row.chosen:7.1f}"
+        f"{_searched(row):8.1f}{row.search:6.1f}{repaired:4d}   {coordinates:20} {effectivity}"
     )
 
 
 HEAD = (
     f"{'case':17} {'tol':>6} {'met':4}{'worst':>5} {'plane':5}{'method':9}{'ms':>7}{'/grid':>7}"
-    f"{'same/':>7}{'own/':>7}{'best/':>7}{'default/':>8}{'search':>8}{'time':>6}{'rep':>4}   {'coordinates':20} effectivity"
+    f"{'same/':>7}{'own/':>7}{'best/':>7}{'default/':>8}{'space/':>7}{'all/':>7}{'search':>8}{'time':>6}{'rep':>4}"
+    f"   {'coordinates':20} effectivity"
 )
 
 
@@ -333,6 +340,8 @@ def summary(rows: list[Row]) -> Iterator[str]:
         ("everything, own step   ", [row.own / row.chosen for row in rows]),
         ("everything, best method", [row.best / row.chosen for row in rows]),
         ("everything, default    ", [row.default / row.chosen for row in rows]),
+        ("in space, own step     ", [row.space / row.chosen for row in rows]),
+        ("in space, default      ", [row.all / row.chosen for row in rows]),
     ):
         yield f"{text} {np.median(values):.1f} times the chosen model in the median, {min(values):.1f} at least"
     for text, values in (
