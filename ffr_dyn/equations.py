@@ -396,11 +396,15 @@ def _at(address: int, size: int) -> Array:
 # ---- memory -------------------------------------------------------------------------------------------------------
 
 
-def new_work(m: Model) -> Work:
-    """Scratch of evaluations; what depends on the elastic diagonal is made when that is set."""
+def new_work(m: Model, *, keeps_terms: bool = False) -> Work:
+    """Scratch of evaluations; what depends on the elastic diagonal is made when that is set.
+
+    keeps_terms : whether the quadratic terms of all bodies are needed after an evaluation
+    """
     B, E, M, C = m.bodies.mass.size, int(m.bodies.where[-1, 3]), m.markers.body.size, m.rows.kind.size
     K, D = m.rows.marker.shape
     n, V, pairs = m.bodies.where[:, 0], 6 * B + E, m.pattern.pair_body.size
+    terms = E if keeps_terms else int(n.max())
     size = np.diff(m.rows.start)
     column = np.repeat(np.arange(K), np.diff(m.pattern.column_start))
     stored = LANES * int(size.sum() + size[column].sum())
@@ -411,8 +415,19 @@ def new_work(m: Model) -> Work:
     bodies = BodyWork(
         A=_identities(B + 1),
         dinv=np.ones(E),
+        terms=m.bodies.where[:-1, 3] * keeps_terms,
         **zeros(
-            omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), inverse=(B, 2), g=9 * E, l=3 * E, Cd=6 * E, L=(B, 6, 6), f=V, acc=V
+            omega=(B + 1, 3),
+            s=(B, 3),
+            J=(B, 3, 3),
+            inverse=(B, 2),
+            g=9 * terms,
+            l=3 * terms,
+            H=3 * E,
+            Cd=6 * E,
+            L=(B, 6, 6),
+            f=V,
+            acc=V,
         ),
         **zeros(
             rigid=(B, 6),

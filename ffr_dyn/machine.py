@@ -76,9 +76,10 @@ def new_machine(
     clock = Clock(np.array([h, h or spacing]), np.zeros(3, dtype=np.int64), np.array(gains))
     control = _control(system, method, start, spacing)
     calls = () if method is None else method.calls
+    work = new_work(system.model, keeps_terms=method is not None and method.keeps_terms)
     units = np.array(unit_addresses(system.model, calls), dtype=np.int64)
     state = np.array(x, dtype=float), np.array(v, dtype=float)
-    return _packed(system, Tables(0, units, system.model, new_work(system.model), stages, clock, control, *state))
+    return _packed(system, Tables(0, units, system.model, work, stages, clock, control, *state))
 
 
 def _control(system: System, method: Integrator | None, start: float, spacing: float) -> Control:

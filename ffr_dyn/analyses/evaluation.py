@@ -221,7 +221,7 @@ def evaluated_mass_matrix(at: Evaluator) -> Array:
         block[3:, :3], block[:3, 3:], block[3:, 3:] = s, -s, work.J[b]
         if n:
             c = bodies.where[b, 10]
-            P, H = bodies.P_dm[3 * c : 3 * (c + n)], work.g[9 * e + 6 * n : 9 * (e + n)]
+            P, H = bodies.P_dm[3 * c : 3 * (c + n)], work.H[3 * e : 3 * (e + n)]
             coupling = np.concatenate([P, H]).reshape(6, n)
             M[rigid, elastic], M[elastic, rigid] = coupling, coupling.T
             M[elastic, elastic] = np.eye(n)

@@ -55,6 +55,7 @@ class Integrator(Protocol):
     repeatable: ClassVar[bool]  # whether steps of a given length may be done again from an earlier state
     stage_count: ClassVar[int]  # states (x, v) of memory that it needs
     row_stages: ClassVar[int]  # the same for constraint rows
+    keeps_terms: ClassVar[bool]  # whether it needs the quadratic terms of all bodies after an evaluation
     calls: ClassVar[tuple[str, ...]]  # what its unit calls beside what all methods do, of `units.EXTRA_UNITS`
     unit: ClassVar[Unit]
 

@@ -104,6 +104,7 @@ class DormandPrince:
     repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 10
     row_stages: ClassVar[int] = 0
+    keeps_terms: ClassVar[bool] = False
     numbers: ClassVar[tuple[float, ...]] = (0.0,)
     calls: ClassVar[tuple[str, ...]] = ()
     unit: ClassVar[Unit] = dopri5_step

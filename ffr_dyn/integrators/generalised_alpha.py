@@ -207,6 +207,7 @@ class GeneralisedAlpha:
     repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 9
     row_stages: ClassVar[int] = 2
+    keeps_terms: ClassVar[bool] = False
     controlled: ClassVar[bool] = False
     calls: ClassVar[tuple[str, ...]] = ("project",)
     unit: ClassVar[Unit] = generalised_alpha_step
@@ -245,6 +246,7 @@ class HHT:
     repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 9
     row_stages: ClassVar[int] = 2
+    keeps_terms: ClassVar[bool] = False
     controlled: ClassVar[bool] = False
     calls: ClassVar[tuple[str, ...]] = ("project",)
     unit: ClassVar[Unit] = generalised_alpha_step

@@ -178,6 +178,7 @@ class HalfExplicit:
     repeatable: ClassVar[bool] = True
     stage_count: ClassVar[int] = STAGES + 3
     row_stages: ClassVar[int] = 2
+    keeps_terms: ClassVar[bool] = False
     controlled: ClassVar[bool] = False
     numbers: ClassVar[tuple[float, ...]] = (0.0,)
     calls: ClassVar[tuple[str, ...]] = ("look_ahead",)

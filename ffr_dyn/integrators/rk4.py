@@ -61,6 +61,7 @@ class RK4:
     repeatable: ClassVar[bool] = True
     stage_count: ClassVar[int] = 5
     row_stages: ClassVar[int] = 0
+    keeps_terms: ClassVar[bool] = False
     numbers: ClassVar[tuple[float, ...]] = ()
     calls: ClassVar[tuple[str, ...]] = ()
     unit: ClassVar[Unit] = rk4_step

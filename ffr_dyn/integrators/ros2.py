@@ -91,6 +91,7 @@ class ROS2:
     repeatable: ClassVar[bool] = True
     stage_count: ClassVar[int] = 4
     row_stages: ClassVar[int] = 0
+    keeps_terms: ClassVar[bool] = False
     numbers: ClassVar[tuple[float, ...]] = ()
     calls: ClassVar[tuple[str, ...]] = ()
     unit: ClassVar[Unit] = ros2_step

@@ -118,6 +118,7 @@ class ROS3:
     repeatable: ClassVar[bool] = True
     stage_count: ClassVar[int] = 6
     row_stages: ClassVar[int] = 0
+    keeps_terms: ClassVar[bool] = False
     numbers: ClassVar[tuple[float, ...]] = ()
     calls: ClassVar[tuple[str, ...]] = ()
     unit: ClassVar[Unit] = ros3_step
@@ -140,6 +141,7 @@ class AdaptiveROS3:
     repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 6
     row_stages: ClassVar[int] = 0
+    keeps_terms: ClassVar[bool] = False
     numbers: ClassVar[tuple[float, ...]] = ()
     calls: ClassVar[tuple[str, ...]] = ()
     unit: ClassVar[Unit] = ros3_step

@@ -80,7 +80,7 @@ def lagrangian_forces(bodies, w, b, y, p, Q):
     Of the right-hand sides of M acc = f these are what is left without the change of the mass matrix and of the frame:
     dL/dR = the applied force, dL/dtheta = the applied moment + p_1 x a, dL/dq_j = f_j + omega . l_j + I3_j . (a x omega).
     """
-    n, j, e, normal = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3], bodies.where[b, 7]
+    n, j, normal, terms = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 7], w.terms[b]
     f = part(w.f, j, 6 + n)
     a, omega, s = (y[0], y[1], y[2]), (y[3], y[4], y[5]), get(w.s, b)
     force = add((f[0], f[1], f[2]), cross(omega, cross(omega, s)))
@@ -89,7 +89,8 @@ def lagrangian_forces(bodies, w, b, y, p, Q):
                dot((J[2, 0], J[2, 1], J[2, 2]), omega))  # fmt: skip
     moment = add((f[3], f[4], f[5]), cross(omega, J_omega))
     if n > 0:
-        P, g, l = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.g, 9 * e, 9 * n), part(w.l, 3 * e, 3 * n)  # noqa: E741
+        P = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n)
+        g, l = part(w.g, 9 * terms, 9 * n), part(w.l, 3 * terms, 3 * n)  # noqa: E741
         q_dot = part(y, 6, n)
         force = add(force, scale(2.0, cross(omega, three_rows(P, q_dot, n))))
         d0, d1, d2, d3, d4, d5 = six_rows(g, q_dot, n)
@@ -352,6 +353,7 @@ class Variational:
     repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 7
     row_stages: ClassVar[int] = 1
+    keeps_terms: ClassVar[bool] = True
     controlled: ClassVar[bool] = False
     calls: ClassVar[tuple[str, ...]] = ("look_ahead",)
     unit: ClassVar[Unit] = variational_step

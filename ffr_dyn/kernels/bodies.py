@@ -119,12 +119,13 @@ def six_rows(rows, q, n):
 def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s):
     """Elastic right-hand side; returns (first moment, I3 q_dot, second moment of mass, sym D, axial D) of the body."""
     n, e, start, c = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4], bodies.where[b, 10]
-    g, l = part(w.g, 9 * e, 9 * n), part(w.l, 3 * e, 3 * n)  # noqa: E741
+    g, l = part(w.g, 9 * w.terms[b], 9 * n), part(w.l, 3 * w.terms[b], 3 * n)  # noqa: E741
     rP, P = part(bodies.rP_dm, 9 * c, 9 * n), part(bodies.P_dm, 3 * c, 3 * n)
     copy(g, rP)
     fill(l, 0.0)
     if start >= 0:
         contract(part(bodies.PP_dm, start, 9 * n * n), q, qd, n, g, l)
+    copy(part(w.H, 3 * e, 3 * n), part(g, 6 * n, 3 * n))
     ox, oy, oz = omega
     xx, yy, zz = oy * oy + oz * oz, ox * ox + oz * oz, ox * ox + oy * oy
     xy, xz, yz = -2.0 * ox * oy, -2.0 * ox * oz, -2.0 * oy * oz
@@ -189,7 +190,7 @@ def contract_in_plane(PP, q, qd, n, g0, g1, h, l, first, second, turning):  # no
 def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, normal):
     """`flexible_terms` of a planar body that turns at the rate `omega`; without what acts across the plane."""
     n, e, start, c = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4], bodies.where[b, 10]
-    g, l = part(w.g, 9 * e, 9 * n), part(w.l, 3 * e, n)  # noqa: E741
+    g, l = part(w.g, 9 * w.terms[b], 9 * n), part(w.l, 3 * w.terms[b], n)  # noqa: E741
     rP, P = part(bodies.rP_dm, 9 * c, 9 * n), part(bodies.P_dm, 3 * c, 3 * n)
     c0, c1, _ = in_plane(normal)
     turning = 6 + normal
@@ -201,6 +202,7 @@ def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, norm
     fill(l, 0.0)
     if start >= 0:
         contract_in_plane(part(bodies.PP_dm, start, 9 * n * n), q, qd, n, g0, g1, h, l, c0, c1, turning)
+    copy(part(w.H, 3 * e + normal * n, n), h)
     f = part(w.f, bodies.where[b, 2] + 6, n)
     omega2, damping = part(bodies.omega2, e, n), part(bodies.two_zeta_omega, e, n)
     P0, P1, square = part(P, c0 * n, n), part(P, c1 * n, n), omega * omega
@@ -348,7 +350,7 @@ def factorise(bodies, w, b):
         return w.L[b, 0, 0] > 0.0
     n, e, normal = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 7]
     L, T = w.L[b], w.T[b]
-    P, H = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.g, 9 * e + 6 * n, 3 * n)
+    P, H = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.H, 3 * e, 3 * n)
     dinv, Cd = part(w.dinv, e, n), part(w.Cd, 6 * e, 6 * n)
     if normal >= 0:
         return factorise_in_plane(T, get(w.s, b), w.J[b, normal, normal], P, H, dinv, Cd, L, n, normal)
@@ -513,7 +515,7 @@ def mass_times(bodies, w, b, y, out):
         out[k] += bodies.mass[b] * linear[k] + turn[k]
         out[3 + k] += lift[k] + dot(w.J[b, k], angular)
     if n > 0:
-        P, H = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.g, 9 * e + 6 * n, 3 * n)
+        P, H = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.H, 3 * e, 3 * n)
         if bodies.where[b, 7] >= 0:
             mass_times_in_plane(P, H, y, n, bodies.where[b, 7], out)
             return

@@ -152,8 +152,12 @@ class BodyWork(NamedTuple):
     s: F2  # (B, 3) integral of u_bar dm
     J: F3  # (B, 3, 3)
     inverse: F2  # (B, 2) 1 / mass, 1 / trace of J
-    g: F1  # (9 E,) G_j: six symmetric rows, three axial rows H
-    l: F1  # (3 E,) integral of u_dot x phi_j dm  # noqa: E741
+    # First column of a body in g and l: bodies share the space, so that many of them stay in the processor's cache, but for
+    # methods that need the terms of all bodies after an evaluation.
+    terms: I1  # (B,)
+    g: F1  # pooled; G_j: six symmetric rows of n, three axial ones
+    l: F1  # pooled; three rows of n, integral of u_dot x phi_j dm  # noqa: E741
+    H: F1  # (3 E,) the axial rows of G_j
     Cd: F1  # (6 E,) rows P_dm and H, times dinv
     # (B, 6, 6) Cholesky factor of the Schur complement, reciprocal diagonal; with s and J it is constant for a rigid body,
     # and not positive in [0, 0] where that has none
