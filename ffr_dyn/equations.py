@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.couplings import Coupling, coupling_word
+from ffr_dyn.decoupling import in_blocks
 from ffr_dyn.drivers import Driver, PointDriver, driver_word, path_words
 from ffr_dyn.elimination import Elimination, eliminate
 from ffr_dyn.errors import InputError
@@ -39,6 +40,7 @@ from ffr_prep.body import axial
 Array = np.ndarray
 
 LEAST_PIVOT = 1e-14  # of what was on the diagonal; as in the kernels
+ROUNDING = 1e-8  # of I5 and I9 of unit modes, and of the stiffness by a load: what symmetry leaves of zeros
 NOTHING = 1e-16  # of the stiffness by a load, relative to that by the others
 
 SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -56,6 +58,16 @@ class Block:
     markers: tuple[int, ...]
     words: tuple[Word, ...]
     driver: bool = False
+
+
+@dataclass(frozen=True)
+class _Blocks:
+    """Tables of all bodies in blocks: pool and starts (or -1), plans and starts."""
+
+    pool: Array
+    start: Array
+    plans: Array
+    first: Array
 
 
 @dataclass(frozen=True)
@@ -119,12 +131,13 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: f
     elimination = eliminate([len(k.words) for k in chosen], moving)
     ordered = tuple(chosen[k] for k in elimination.order)
     functions = FunctionTable()
+    marked = _markers(scene, ordered)
     model = {
         "gravity": np.array(scene.gravity),
         "base": base_functions(scene, functions),
         "relaxation": relaxation,
-        "bodies": _bodies(scene, place),
-        "markers": _markers(scene, ordered),
+        "bodies": _bodies(scene, place, marked),
+        "markers": marked,
         "rows": _rows(ordered, functions),
         "pattern": _pattern(ordered, [moving[k] for k in elimination.order], elimination, table),
         "loads": load_tables(scene, functions),
@@ -165,9 +178,10 @@ def _rP_parts(body: Body) -> Array:
     return _parts(body.model.rP_dm, "I8" not in body.dropped, "I4" not in body.dropped)
 
 
-def _PP_parts(body: Body) -> Array:
-    """(n over i, 9, n over j)."""
-    return np.moveaxis(_parts(body.model.PP_dm, "I9" not in body.dropped, "I5" not in body.dropped), 1, 0)
+def _PP_parts(body: Body, normal: int) -> Array:
+    """(n over i, 9, n over j); of a planar body (n, 3, n): two components in the plane, the axial one across."""
+    nine = _parts(body.model.PP_dm, "I9" not in body.dropped, "I5" not in body.dropped)
+    return np.moveaxis(nine if normal < 0 else nine[[*np.delete(np.arange(3), normal), 6 + normal]], 1, 0)
 
 
 def _pool(parts: list[Array]) -> Array:
@@ -191,28 +205,39 @@ def _once(parts: list[Array], owners: list[Hashable]) -> tuple[Array, Array]:
     return _pool(stored), np.array([starts[owner] for owner in owners], dtype=np.int64)
 
 
-def _once_unless_zero(parts: list[Array], owners: list[Hashable]) -> tuple[Array, Array]:
-    """`_once`; a part of zeros is not stored but starts at -1, and the kernels skip it."""
-    zero = np.array([not part.any() for part in parts], dtype=bool)
-    pool, starts = _once([part[:0] if none else part for part, none in zip(parts, zero, strict=True)], owners)
-    return pool, np.where(zero, -1, starts)
+def _in_blocks(tables: list[Array], owners: list[Hashable], noises: list[Array], last: list[int]) -> _Blocks:
+    """Tables of one owner are stored once; a table of zeros starts at -1, and the kernels skip it."""
+    stored: dict[Hashable, tuple[Array, Array]] = {}
+    for table, owner, noise, count in zip(tables, owners, noises, last, strict=True):
+        if owner not in stored:
+            nothing = np.zeros(0), np.zeros(0, dtype=np.int64)
+            stored[owner] = in_blocks(table, count, noise) if table.any() else nothing
+    pool, starts = _once([stored[owner][0] for owner in owners], owners)
+    plans, firsts = _once([stored[owner][1] for owner in owners], owners)
+    zero = np.array([not stored[owner][0].size for owner in owners], dtype=bool)
+    return _Blocks(pool, np.where(zero, -1, starts), plans.astype(np.int64), firsts)
 
 
-def _bodies(scene: Scene, place: Layout) -> Bodies:
+def _bodies(scene: Scene, place: Layout, marked: Markers) -> Bodies:
     models = [body.model for body in scene.bodies]
     n = [m.n for m in models]
     owners: list[Hashable] = [(id(b.model), b.dropped) for b in scene.bodies]
-    PP, PP_start = _once_unless_zero([_PP_parts(b) for b in scene.bodies], owners)
+    PP = _second_moments(scene, place)
     P, P_start = _once([b.model.P_dm * ("I3" not in b.dropped) for b in scene.bodies], owners)
     rP, _ = _once([_rP_parts(b) for b in scene.bodies], owners)
-    stiffening = [_active(_stiffening(body)) for body in scene.bodies]
-    K, K_start = _once_unless_zero([K for _, K in stiffening], [(id(b.model), b.stiffening) for b in scene.bodies])
-    loads = [len(which) for which, _ in stiffening]
-    where = np.full((len(n) + 1, 11), -1, dtype=np.int64)
-    where[-1, [*range(7), 8, 9, 10]] = 0
-    where[:-1, :7] = np.column_stack([n, place.ix, place.iv, _starts(n)[:-1], PP_start, K_start, loads])
+    K, loads = _stiffness(scene, marked)
+    counts = [len(which) for which in loads]
+    where = np.full((len(n) + 1, 13), -1, dtype=np.int64)
+    where[-1, [*range(7), *range(8, 13)]] = 0
+    where[:-1, :7] = np.column_stack([n, place.ix, place.iv, _starts(n)[:-1], PP.start, K.start, counts])
     where[:-1, 8:] = np.column_stack(
-        [_starts(loads)[:-1], _starts([a * b for a, b in zip(n, loads, strict=True)])[:-1], P_start // 3]
+        [
+            _starts(counts)[:-1],
+            _starts([a * b for a, b in zip(n, counts, strict=True)])[:-1],
+            P_start // 3,
+            PP.first,
+            len(PP.plans) + K.first,
+        ]
     )
     where[:-1, 7] = place.normals
     where[-1, 3] = sum(n)
@@ -222,12 +247,40 @@ def _bodies(scene: Scene, place: Layout) -> Bodies:
         moments=np.array([np.concatenate([m.r_dm, _six(m.rr_dm)]) for m in models]),
         P_dm=P,
         rP_dm=rP,
-        PP_dm=PP,
+        PP_dm=PP.pool,
         omega2=_pool([m.omega2 for m in models]),
         two_zeta_omega=_pool([2 * b.damping * np.sqrt(b.model.omega2) for b in scene.bodies]),
-        stiffening=K,
-        loads=np.concatenate([which for which, _ in stiffening]) if stiffening else np.zeros(0, dtype=np.int64),
+        stiffening=K.pool,
+        loads=np.concatenate(loads) if loads else np.zeros(0, dtype=np.int64),
+        blocks=np.concatenate([PP.plans, K.plans]),
     )
+
+
+def _second_moments(scene: Scene, place: Layout) -> _Blocks:
+    """I5 and I9 of all bodies: a unit mode has a second moment of one, so the size of their rounding is known."""
+    owners: list[Hashable] = [
+        (id(body.model), body.dropped, int(k)) for body, k in zip(scene.bodies, place.normals, strict=True)
+    ]
+    parts = [_PP_parts(body, int(k)) for body, k in zip(scene.bodies, place.normals, strict=True)]
+    noises = [np.full(part.shape[1], ROUNDING) for part in parts]
+    return _in_blocks(parts, owners, noises, [part.shape[1] // 3 for part in parts])
+
+
+def _stiffness(scene: Scene, marked: Markers) -> tuple[_Blocks, list[Array]]:
+    """The geometric stiffness of all bodies, and the numbers of the loads that have any."""
+    acting = [_acting(body, b, marked) for b, body in enumerate(scene.bodies)]
+    found = [_active(_stiffening(body), loads) for body, loads in zip(scene.bodies, acting, strict=True)]
+    owners: list[Hashable] = [
+        (id(body.model), body.stiffening, loads) for body, loads in zip(scene.bodies, acting, strict=True)
+    ]
+    noises = [ROUNDING * np.abs(K).max(axis=(0, 2), initial=0.0) for _, K in found]
+    return _in_blocks([K for _, K in found], owners, noises, [0] * len(found)), [which for which, _ in found]
+
+
+def _acting(body: Body, b: int, marked: Markers) -> tuple[int, ...]:
+    """Which loads body number b may have: twelve inertial ones, and those at interfaces that anything acts on."""
+    used = [int(marked.load[k]) for k in marked.active if marked.body[k] == b]
+    return (*range(12), *(first + c for first in used if first >= 0 for c in range(6)))
 
 
 def _stiffening(body: Body) -> Array:
@@ -238,14 +291,14 @@ def _stiffening(body: Body) -> Array:
     return body.model.stiffening
 
 
-def _active(stiffening: Array) -> tuple[Array, Array]:
-    """(numbers of the loads, (n, loads, n) their stiffness) without those that do nothing but for rounding.
+def _active(stiffening: Array, acting: Sequence[int]) -> tuple[Array, Array]:
+    """(numbers of the loads, (n, loads, n) their stiffness) of those that act, and not for rounding alone.
 
-    Forces at an interface that the reference conditions hold, for one.
+    Forces at an interface that the reference conditions hold do nothing.
     """
     size = np.abs(stiffening).max(axis=(1, 2), initial=0.0)
-    which = np.flatnonzero(size > NOTHING * size.max(initial=0.0))
-    return which.astype(np.int64), np.moveaxis(stiffening[which], 2, 0)
+    which = np.array([k for k in acting if k < size.size and size[k] > NOTHING * size.max()], dtype=np.int64)
+    return which, np.moveaxis(stiffening[which], 2, 0)
 
 
 # ---- markers ------------------------------------------------------------------------------------------------------
@@ -423,6 +476,7 @@ def new_work(m: Model, *, keeps_terms: bool = False) -> Work:
             inverse=(B, 2),
             g=9 * terms,
             l=3 * terms,
+            sorted=2 * int(n.max()) + int((np.maximum(9, m.bodies.where[:, 6]) * n).max()) + 1 + 3 * int(n.max()) + 1,
             H=3 * E,
             Cd=6 * E,
             L=(B, 6, 6),

@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic import cloud
+from synthetic import cloud, mirrored
 
 from ffr_dyn.analyses.assemble import drive_of, rows_at
 from ffr_dyn.constraints import evaluate_word
+from ffr_dyn.decoupling import in_blocks
 from ffr_dyn.drivers import Driver, PointDriver
 from ffr_dyn.equations import System, compile_scene
+from ffr_dyn.forces import Load
 from ffr_dyn.inertia import elastic_force, gravity_force, mass_matrix, quadratic_velocity
 from ffr_dyn.joints import KINDS, Joint
 from ffr_dyn.kernels.functions import evaluate_functions
@@ -20,6 +22,7 @@ from ffr_dyn.layout import layout
 from ffr_dyn.machine import evaluate_at, new_machine
 from ffr_dyn.rotation import G_bar, rotation_matrix, skew
 from ffr_dyn.scene import Body, Scene
+from ffr_dyn.stability.bodies import beam
 from ffr_dyn.timefunction import evaluate, harmonic, polynomial, table
 
 RNG = np.random.default_rng(7)
@@ -195,6 +198,87 @@ def test_compiled_accelerations_and_multipliers_equal_the_dense_solution(kind, s
     scale = np.abs(solution).max()
     np.testing.assert_allclose(work.bodies.acc, solution[: f.size], rtol=0, atol=1e-10 * scale)
     np.testing.assert_allclose(work.rows.lam, solution[f.size :], rtol=0, atol=1e-9 * scale)
+
+
+# ---- products in blocks ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("planes", "blocks"), [(1, 2), (2, 4)])
+@pytest.mark.parametrize("rounding", [0.0, 1e-12])
+def test_a_symmetric_body_is_computed_in_blocks_and_equals_its_twin(planes, blocks, rounding):
+    body = mirrored(24, planes, rounding=rounding)
+    scene = Scene(
+        bodies=(Body("one", body, damping=0.02), Body("two", cloud(3))),
+        joints=(Joint("root", "spherical", "ground.O", "one.a"), Joint("tie", "fixed", "one.b", "two.c")),
+        ground={"O": (0.1, 0.2, 0.3)},
+        gravity=(0.5, -9.81, 0.2),
+    )
+    system = compile_scene(scene)
+    assert system.model.bodies.blocks[0] == blocks
+    assert system.model.bodies.PP_dm.size < 0.6 * 9 * 24**2
+    x, v = random_state(scene)
+    machine = new_machine(system, x, v)
+    assert evaluate_at(machine, 0.0, x, v) == OK
+    M, f, rows = dense(system, x, v)
+    J, gamma = np.array([row.jacobian for row in rows]), np.array([row.gamma for row in rows])
+    K = np.block([[M, J.T], [J, np.zeros((gamma.size, gamma.size))]])
+    solution = np.linalg.solve(K, np.concatenate([f, gamma]))
+    np.testing.assert_allclose(machine.work.bodies.acc, solution[: f.size], rtol=0, atol=1e-10 * np.abs(solution).max())
+
+
+def products_by_plan(pool, plan, q, count, last):
+    """sum_i q_i table_i of all components, and of the last, from their blocks."""
+    n = q.size
+    sizes = plan[1 : 1 + 3 * plan[0]].reshape(-1, 3)
+    order, place, late_place = np.split(plan[1 + sizes.size :], [n, n + count])
+    found, late, at, first = [], [], 0, 0
+    for inputs, outputs, of_last in sizes:
+        block = pool[at : at + inputs * outputs].reshape(inputs, outputs)
+        y = q[order[first : first + inputs]] @ block
+        found.append(y)
+        late.append(y[outputs - of_last :])
+        at, first = at + inputs * outputs, first + inputs
+    found, late = np.append(np.concatenate(found), 0.0), np.append(np.concatenate(late), 0.0)
+    return found[place], late[late_place[:last]]
+
+
+def test_blocks_give_the_products_of_the_whole_table():
+    """Also where components vanish, coordinates are in none, and a family's rounding is not zero."""
+    rng = np.random.default_rng(5)
+    n, families = 30, np.arange(30) % 3
+    table = np.zeros((n, 6, n))
+    table[:, 0] = rng.normal(size=(n, n)) * (families[:, None] == families)
+    table[:, 1] = rng.normal(size=(n, n)) * (families[:, None] + families == 3)
+    table[:, 3] = 1e-12
+    table[:, 5] = rng.normal(size=(n, n)) * (families[:, None] == families)
+    table[7], table[:, :, 7] = 0.0, 0.0
+    table[:, :4] += np.swapaxes(table[:, :4], 0, 2)
+    table[:, 4:] -= np.swapaxes(table[:, 4:], 0, 2)
+    pool, plan = in_blocks(table, 2, np.full(6, 1e-9))
+    assert plan[0] == 3  # component 1 couples two families, but each of its products belongs to one
+    q = rng.normal(size=n)
+    expected = np.einsum("i,icj->cj", q, np.where(np.abs(table) < 1e-9, 0.0, table))
+    every, last = products_by_plan(pool, plan, q, 6 * n, 2 * n)
+    np.testing.assert_allclose(every.reshape(6, n), expected, atol=1e-13)
+    np.testing.assert_allclose(last.reshape(2, n), expected[4:], atol=1e-13)
+
+
+def test_a_body_without_symmetry_and_one_of_few_modes_are_one_block():
+    for body in (cloud(20), mirrored(8, 2)):
+        bodies = compile_scene(Scene(bodies=(Body("one", body),))).model.bodies
+        assert bodies.blocks.tolist() == [0]
+        np.testing.assert_array_equal(bodies.PP_dm.size, 9 * body.n**2)
+
+
+def test_loads_at_interfaces_that_nothing_acts_on_stiffen_nothing():
+    model = beam("one", 1.0, 1.0, 10.0, 3)
+    bar = Body("one", model)
+    ground = {"O": (0.0, 0.0, 0.0)}
+    held = Scene((bar,), (Joint("root", "revolute", "ground.O", "one.a", axis=(0, 0, 1)),), ground=ground)
+    pulled = replace(held, loads=(Load("pull", "one.b", force=(1.0, 0.0, 0.0)),))
+    first = 12 + 6 * [i.name for i in model.interfaces].index("b")
+    assert not any(first <= k < first + 6 for k in compile_scene(held).model.bodies.loads)
+    assert first in compile_scene(pulled).model.bodies.loads
 
 
 # ---- constraints: finite differences ----------------------------------------------------------------------------------

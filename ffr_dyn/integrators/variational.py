@@ -93,14 +93,18 @@ def lagrangian_forces(bodies, w, b, y, p, Q):
         g, l = part(w.g, 9 * terms, 9 * n), part(w.l, 3 * terms, 3 * n)  # noqa: E741
         q_dot = part(y, 6, n)
         force = add(force, scale(2.0, cross(omega, three_rows(P, q_dot, n))))
-        d0, d1, d2, d3, d4, d5 = six_rows(g, q_dot, n)
-        D_omega = (
-            d0 * omega[0] + d3 * omega[1] + d4 * omega[2],
-            d3 * omega[0] + d1 * omega[1] + d5 * omega[2],
-            d4 * omega[0] + d5 * omega[1] + d2 * omega[2],
-        )
-        moment = add(moment, scale(2.0, subtract(scale(d0 + d1 + d2, omega), D_omega)))
-        moment = add(moment, cross(omega, three_rows(part(g, 6 * n, n), q_dot, n)))
+        if normal >= 0:
+            d0, d1, _ = three_rows(g, q_dot, n)
+            moment = add(moment, scale(2.0 * (d0 + d1), omega))
+        else:
+            d0, d1, d2, d3, d4, d5 = six_rows(g, q_dot, n)
+            D_omega = (
+                d0 * omega[0] + d3 * omega[1] + d4 * omega[2],
+                d3 * omega[0] + d1 * omega[1] + d5 * omega[2],
+                d4 * omega[0] + d5 * omega[1] + d2 * omega[2],
+            )
+            moment = add(moment, scale(2.0, subtract(scale(d0 + d1 + d2, omega), D_omega)))
+            moment = add(moment, cross(omega, three_rows(part(g, 6 * n, n), q_dot, n)))
         across = cross(a, omega)
         for k in range(n):
             Q[6 + k] = f[6 + k] + P[k] * across[0] + P[n + k] * across[1] + P[2 * n + k] * across[2]

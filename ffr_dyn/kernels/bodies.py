@@ -20,7 +20,7 @@ from ffr_dyn.kernels.vectors import (
     rigid_upper,
     to_body,
 )
-from ffr_dyn.kernels.views import part, six_parts, three_parts
+from ffr_dyn.kernels.views import part, peek, six_parts, three_parts
 
 
 @kernel
@@ -64,28 +64,65 @@ def normalise(bodies, x):
 
 
 @kernel
-def contract(PP, q, qd, n, g, l):  # noqa: E741
-    """g += sum_i q_i PP[i], l += sum_i q_dot_i (axial rows of PP[i]): the only O(n^2) work of a body.
+def contract(table, plan, at, q, qd, n, width, last, scratch, g, l):  # noqa: E741
+    """g (width,) += sum_i q_i table_i, l (last,) += sum_i q_dot_i (the last of table_i): the only O(n^2) work of a body.
 
-    Two rows at a time, so that each result is loaded and stored half as often.
+    Block by block, as the plan that begins at `at` says (see `ffr_dyn.decoupling`).
     """
-    width, axial = 9 * n, 6 * n
-    for i in range(0, n - 1, 2):
-        q0, q1, d0, d1 = q[i], q[i + 1], qd[i], qd[i + 1]
-        row0, row1 = part(PP, i * width, width), part(PP, (i + 1) * width, width)
+    blocks = plan[at]
+    if blocks == 0:
+        add_products(table, n, width, last, q, qd, g, l)
+        return
+    order = at + 1 + 3 * blocks
+    place = order + n
+    x, xd = part(scratch, 0, n), part(scratch, n, n)
+    y, yd = part(scratch, 2 * n, width + 1), part(scratch, 2 * n + width + 1, last + 1)
+    for k in range(n):
+        number = peek(plan, order + k)
+        x[k], xd[k] = peek(q, number), peek(qd, number)
+    fill(y, 0.0)
+    fill(yd, 0.0)
+    start, first, product, late = 0, 0, 0, 0
+    for block in range(blocks):
+        count, outputs, of_last = plan[at + 1 + 3 * block], plan[at + 2 + 3 * block], plan[at + 3 + 3 * block]
+        add_products(
+            part(table, start, count * outputs), count, outputs, of_last,
+            part(x, first, count), part(xd, first, count), part(y, product, outputs), part(yd, late, of_last),
+        )  # fmt: skip
+        start += count * outputs
+        first += count
+        product += outputs
+        late += of_last
+    for k in range(width):
+        g[k] += peek(y, peek(plan, place + k))
+    place += width
+    for k in range(last):
+        l[k] += peek(yd, peek(plan, place + k))
+
+
+@kernel
+def add_products(table, count, width, last, q, qd, g, l):  # noqa: E741
+    """`contract` for one block. Four rows at a time, so that each result is loaded and stored a quarter as often."""
+    skipped = width - last
+    for i in range(0, count - 3, 4):
+        q0, q1, q2, q3 = q[i], q[i + 1], q[i + 2], q[i + 3]
+        first, second = part(table, i * width, width), part(table, (i + 1) * width, width)
+        third, fourth = part(table, (i + 2) * width, width), part(table, (i + 3) * width, width)
         for k in range(width):
-            g[k] += q0 * row0[k] + q1 * row1[k]
-        row0, row1 = part(row0, axial, 3 * n), part(row1, axial, 3 * n)
-        for k in range(3 * n):
-            l[k] += d0 * row0[k] + d1 * row1[k]
-    if n % 2:
-        q0, d0 = q[n - 1], qd[n - 1]
-        row0 = part(PP, (n - 1) * width, width)
+            g[k] += q0 * first[k] + q1 * second[k] + q2 * third[k] + q3 * fourth[k]
+        if last > 0:
+            q0, q1, q2, q3 = qd[i], qd[i + 1], qd[i + 2], qd[i + 3]
+            first, second = part(first, skipped, last), part(second, skipped, last)
+            third, fourth = part(third, skipped, last), part(fourth, skipped, last)
+            for k in range(last):
+                l[k] += q0 * first[k] + q1 * second[k] + q2 * third[k] + q3 * fourth[k]
+    for i in range(count - count % 4, count):
+        x, row = q[i], part(table, i * width, width)
         for k in range(width):
-            g[k] += q0 * row0[k]
-        row0 = part(row0, axial, 3 * n)
-        for k in range(3 * n):
-            l[k] += d0 * row0[k]
+            g[k] += x * row[k]
+        x, row = qd[i], part(row, skipped, last)
+        for k in range(last):
+            l[k] += x * row[k]
 
 
 @kernel
@@ -124,7 +161,8 @@ def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s):
     copy(g, rP)
     fill(l, 0.0)
     if start >= 0:
-        contract(part(bodies.PP_dm, start, 9 * n * n), q, qd, n, g, l)
+        table, at = part(bodies.PP_dm, start, 9 * n * n), bodies.where[b, 11]
+        contract(table, bodies.blocks, at, q, qd, n, 9 * n, 3 * n, w.sorted, g, l)
     copy(part(w.H, 3 * e, 3 * n), part(g, 6 * n, 3 * n))
     ox, oy, oz = omega
     xx, yy, zz = oy * oy + oz * oz, ox * ox + oz * oz, ox * ox + oy * oy
@@ -173,20 +211,6 @@ def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s):
 
 
 @inlined
-def contract_in_plane(PP, q, qd, n, g0, g1, h, l, first, second, turning):  # noqa: E741
-    """g0, g1, h += the rows `first`, `second`, `turning` of sum_i q_i PP_i; l += row `turning` of sum_i qd_i PP_i."""
-    for i in range(n):
-        qi, di, start = q[i], qd[i], 9 * n * i
-        a, b = part(PP, start + first * n, n), part(PP, start + second * n, n)
-        c = part(PP, start + turning * n, n)
-        for j in range(n):
-            g0[j] += qi * a[j]
-            g1[j] += qi * b[j]
-            h[j] += qi * c[j]
-            l[j] += di * c[j]
-
-
-@inlined
 def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, normal):
     """`flexible_terms` of a planar body that turns at the rate `omega`; without what acts across the plane."""
     n, e, start, c = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4], bodies.where[b, 10]
@@ -194,14 +218,15 @@ def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, norm
     rP, P = part(bodies.rP_dm, 9 * c, 9 * n), part(bodies.P_dm, 3 * c, 3 * n)
     c0, c1, _ = in_plane(normal)
     turning = 6 + normal
-    g0, g1, h = part(g, c0 * n, n), part(g, c1 * n, n), part(g, turning * n, n)
+    g0, g1, h = three_parts(g, n)
     r0, r1 = part(rP, c0 * n, n), part(rP, c1 * n, n)
     copy(g0, r0)
     copy(g1, r1)
     copy(h, part(rP, turning * n, n))
     fill(l, 0.0)
     if start >= 0:
-        contract_in_plane(part(bodies.PP_dm, start, 9 * n * n), q, qd, n, g0, g1, h, l, c0, c1, turning)
+        table, at = part(bodies.PP_dm, start, 3 * n * n), bodies.where[b, 11]
+        contract(table, bodies.blocks, at, q, qd, n, 3 * n, n, w.sorted, part(g, 0, 3 * n), l)
     copy(part(w.H, 3 * e + normal * n, n), h)
     f = part(w.f, bodies.where[b, 2] + 6, n)
     omega2, damping = part(bodies.omega2, e, n), part(bodies.two_zeta_omega, e, n)
@@ -477,15 +502,22 @@ def reduce_in_plane(Cd, d, n, normal, z):
     z[k] -= t2
 
 
+@kernel
+def accelerate_rigid(bodies, w, b):
+    """The rigid part of w.acc of body b from its reduced forces: L^-T w.rigid, which stays there."""
+    j, z = bodies.where[b, 2], w.rigid[b]
+    rigid_upper(w.L[b], z, bodies.where[b, 7])
+    for k in range(6):
+        w.acc[j + k] = z[k]
+
+
 @inlined
 def accelerate(bodies, w, b):
-    """w.acc of body b from its reduced forces: L^-T w.rigid, and w.elastic - (C dinv)^T of it."""
+    """w.acc of body b from its reduced forces: the rigid part, and w.elastic - (C dinv)^T of it."""
     n, j, e, normal = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3], bodies.where[b, 7]
-    z, acc = w.rigid[b], part(w.acc, j, 6 + n)
-    rigid_upper(w.L[b], z, normal)
-    for k in range(6):
-        acc[k] = z[k]
+    accelerate_rigid(bodies, w, b)
     if n > 0:
+        z, acc = w.rigid[b], part(w.acc, j, 6 + n)
         Cd, elastic = part(w.Cd, 6 * e, 6 * n), part(w.elastic, e, n)
         if normal >= 0:
             i, j, k = in_plane(normal)

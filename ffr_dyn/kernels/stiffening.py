@@ -6,12 +6,14 @@ change from sweep to sweep is of the order (elastic deflection / size)^2, so thr
 two from the loads of the stage before.
 """
 
+from ffr_dyn.kernels.bodies import contract
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import call_unit
 from ffr_dyn.kernels.rows import reaction
+from ffr_dyn.kernels.system import solve_loads
 from ffr_dyn.kernels.tables import MOTION
-from ffr_dyn.kernels.vectors import add_scaled, copy, cross, fill, get, subtract, to_body
-from ffr_dyn.kernels.views import part
+from ffr_dyn.kernels.vectors import copy, cross, fill, get, subtract, to_body
+from ffr_dyn.kernels.views import part, peek
 
 SWEEPS = 3
 
@@ -23,23 +25,10 @@ def multiply_stiffness(bodies, w, x):
         n, i, e, loads = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 3], bodies.where[b, 6]
         if loads > 0:
             width, start, out = loads * n, bodies.where[b, 5], bodies.where[b, 9]
-            multiply(part(bodies.stiffening, start, n * width), part(x, i + 7, n), n, part(w.stiff, out, width))
+            table, q, stiff = part(bodies.stiffening, start, n * width), part(x, i + 7, n), part(w.stiff, out, width)
+            fill(stiff, 0.0)
+            contract(table, bodies.blocks, bodies.where[b, 12], q, q, n, width, 0, w.sorted, stiff, part(stiff, 0, 0))
             copy(part(w.unstiffened, e, n), part(w.f, bodies.where[b, 2] + 6, n))
-
-
-@kernel
-def multiply(K, q, n, out):
-    """out = sum_c q_c K[c], four rows at a time, so that each result is loaded and stored a quarter as often."""
-    width = out.size
-    fill(out, 0.0)
-    for c in range(0, n - 3, 4):
-        q0, q1, q2, q3 = q[c], q[c + 1], q[c + 2], q[c + 3]
-        first, second = part(K, c * width, width), part(K, (c + 1) * width, width)
-        third, fourth = part(K, (c + 2) * width, width), part(K, (c + 3) * width, width)
-        for k in range(width):
-            out[k] += q0 * first[k] + q1 * second[k] + q2 * third[k] + q3 * fourth[k]
-    for c in range(n - n % 4, n):
-        add_scaled(out, out, q[c], part(K, c * width, width))
 
 
 @kernel
@@ -94,14 +83,21 @@ def stiffen(bodies, w, b):
     f, stiff = part(w.f, j + 6, n), part(w.stiff, start, loads * n)
     copy(f, part(w.unstiffened, e, n))
     for number in range(0, loads - 3, 4):
-        s0, s1 = load[bodies.loads[first + number]], load[bodies.loads[first + number + 1]]
-        s2, s3 = load[bodies.loads[first + number + 2]], load[bodies.loads[first + number + 3]]
+        s0, s1 = acting(bodies, load, first + number), acting(bodies, load, first + number + 1)
+        s2, s3 = acting(bodies, load, first + number + 2), acting(bodies, load, first + number + 3)
         p0, p1 = part(stiff, number * n, n), part(stiff, (number + 1) * n, n)
         p2, p3 = part(stiff, (number + 2) * n, n), part(stiff, (number + 3) * n, n)
         for k in range(n):
             f[k] -= s0 * p0[k] + s1 * p1[k] + s2 * p2[k] + s3 * p3[k]
     for number in range(loads - loads % 4, loads):
-        add_scaled(f, f, -load[bodies.loads[first + number]], part(stiff, number * n, n))
+        size, product = acting(bodies, load, first + number), part(stiff, number * n, n)
+        for k in range(n):
+            f[k] -= size * product[k]
+
+
+@kernel
+def acting(bodies, load, number):
+    return peek(load, peek(bodies.loads, number))
 
 
 @inlined
@@ -124,4 +120,7 @@ def solve_stiffened(r, x, target, near):
         for b in range(m.bodies.mass.size):
             if m.bodies.where[b, 6] > 0:
                 stiffen(m.bodies, w.bodies, b)
-        call_unit(r.units[MOTION], r.address, 0.0, x.ctypes.data, target.ctypes.data)
+        if sweep < SWEEPS - 1 and m.relaxation == 0.0:
+            solve_loads(r, target)
+        else:
+            call_unit(r.units[MOTION], r.address, 0.0, x.ctypes.data, target.ctypes.data)

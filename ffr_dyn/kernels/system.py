@@ -17,6 +17,7 @@ from ffr_dyn.kernels.blocks import (
 )
 from ffr_dyn.kernels.bodies import (
     accelerate,
+    accelerate_rigid,
     factorise,
     inertia,
     normalise,
@@ -349,11 +350,7 @@ def react(bodies, markers, rows, bw, rw):
             if b != ground:
                 n, e, at, z = where[b, 0], where[b, 3], (k * sides + side) * SIDE, bw.rigid[b]
                 normal, wrench = where[b, 7], rw.wrench
-                if normal >= 0:
-                    react_in_plane(rw.X, at, rw.step, LANES * k, normal, z)
-                else:
-                    for c in range(6):
-                        z[c] -= dot_rows(rw.X, at + LANES * c, rw.step, LANES * k)
+                react_rigid(rw.X, at, rw.step, LANES * k, normal, z)
                 if n > 0:
                     phi, elastic = shapes(markers, marker, n), part(bw.elastic, e, n)
                     if normal >= 0:
@@ -368,12 +365,38 @@ def react(bodies, markers, rows, bw, rw):
         accelerate(bodies, bw, b)
 
 
+@inlined
+def solve_loads(r, target):
+    """`solve_motion` without the elastic part of acc: what the loads of geometric stiffening are made of."""
+    m, bw, rw = r.model, r.work.bodies, r.work.rows
+    ground, sides = m.bodies.mass.size, m.rows.marker.shape[1]
+    for b in range(ground):
+        reduce_forces(m.bodies, bw, b)
+    reduced_rates(m.bodies, m.markers, m.rows, bw, rw, target)
+    solve_blocks(m.rows.start, m.pattern, rw.S, rw.pivots, rw.step)
+    gather_rows(m.rows.start, rw.step, rw.lam)
+    for k in range(m.rows.marker.shape[0]):
+        for side in range(sides):
+            marker = m.rows.marker[k, side]
+            b = m.markers.body[marker] if marker >= 0 else ground
+            if b != ground:
+                at, normal = (k * sides + side) * SIDE, m.bodies.where[b, 7]
+                react_rigid(rw.X, at, rw.step, LANES * k, normal, bw.rigid[b])
+    for b in range(ground):
+        accelerate_rigid(m.bodies, bw, b)
+
+
 @kernel
-def react_in_plane(X, at, step, own, normal, z):
-    i, j, k = in_plane(normal)
-    z[i] -= dot_narrow(X, at, step, own)
-    z[j] -= dot_narrow(X, at + LANES, step, own)
-    z[k] -= dot_narrow(X, at + 2 * LANES, step, own)
+def react_rigid(X, at, step, own, normal, z):
+    """Reduced forces z (6,) of a body less those of a side's reactions."""
+    if normal >= 0:
+        i, j, k = in_plane(normal)
+        z[i] -= dot_narrow(X, at, step, own)
+        z[j] -= dot_narrow(X, at + LANES, step, own)
+        z[k] -= dot_narrow(X, at + 2 * LANES, step, own)
+    else:
+        for c in range(6):
+            z[c] -= dot_rows(X, at + LANES * c, step, own)
 
 
 @kernel

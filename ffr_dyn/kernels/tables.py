@@ -54,19 +54,25 @@ TIGHTER = 1e-4
 class Bodies(NamedTuple):
     """B bodies, E elastic coordinates in all."""
 
-    # (B + 1, 11) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening (or -1); its number of loads;
+    # (B + 1, 13) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening (or -1); its number of loads;
     # the body axis along the normal of a planar scene, or -1; its first of `loads`; its first product in `stiff`; the first
-    # column of its P_dm and rP_dm, which equal bodies share, so that many of them stay in the processor's cache
+    # column of its P_dm and rP_dm, which equal bodies share, so that many of them stay in the processor's cache; its first
+    # of `blocks` for PP_dm and for stiffening
     where: I2
     mass: F1  # (B,)
     moments: F2  # (B, 9) first moment r_dm (3), second moment rr_dm (6)
     P_dm: F1  # pooled; per body 3 rows of n
     rP_dm: F1  # pooled; per body 9 rows of n: six symmetric parts, three axial components (I4)
-    PP_dm: F1  # pooled; per body n rows of 9 n: for q_i the same nine rows over j (last three: I5)
+    # pooled; per body n x 9 x n: for q_i the same nine rows over j (last three: I5), in blocks; in the plane n x 3 x n: two
+    # symmetric parts in it, and the axial component across
+    PP_dm: F1
     omega2: F1  # (E,)
     two_zeta_omega: F1  # (E,)
-    stiffening: F1  # pooled; per body n x loads x n (over q_c, loads, rows), empty without geometric stiffening
+    stiffening: (
+        F1  # pooled; per body n x loads x n (over q_c, loads, rows), in blocks; empty without geometric stiffening
+    )
     loads: I1  # pooled; which of a body's loads stiffen it
+    blocks: I1  # pooled; how PP_dm and stiffening are stored (see `ffr_dyn.decoupling`)
 
 
 class Markers(NamedTuple):
@@ -155,8 +161,9 @@ class BodyWork(NamedTuple):
     # First column of a body in g and l: bodies share the space, so that many of them stay in the processor's cache, but for
     # methods that need the terms of all bodies after an evaluation.
     terms: I1  # (B,)
-    g: F1  # pooled; G_j: six symmetric rows of n, three axial ones
-    l: F1  # pooled; three rows of n, integral of u_dot x phi_j dm  # noqa: E741
+    g: F1  # pooled; G_j: six symmetric rows of n, three axial ones; in the plane two and one
+    l: F1  # pooled; three rows of n, integral of u_dot x phi_j dm; in the plane one  # noqa: E741
+    sorted: F1  # scratch of products by blocks: q, q_dot, products
     H: F1  # (3 E,) the axial rows of G_j
     Cd: F1  # (6 E,) rows P_dm and H, times dinv
     # (B, 6, 6) Cholesky factor of the Schur complement, reciprocal diagonal; with s and J it is constant for a rigid body,

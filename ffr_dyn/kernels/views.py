@@ -54,6 +54,16 @@ def part(typing, array, start, size):  # type: ignore[no-untyped-def]
     return _VECTOR(array, types.int64, types.int64), generate
 
 
+@view_intrinsic
+def peek(typing, array, number):  # type: ignore[no-untyped-def]
+    """array[number] of a contiguous vector, for a number that is none of those counted from the end."""
+
+    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        return builder.load(builder.gep(_data(context, builder, array, args[0]), [args[1]], inbounds=True))
+
+    return array.dtype(array, types.int64), generate
+
+
 def _parts(count: int) -> Any:
     """The compiled function that gives the first `count` rows of `size` numbers each of a contiguous array."""
     result = types.UniTuple(_VECTOR, count)
