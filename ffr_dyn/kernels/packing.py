@@ -29,32 +29,46 @@ def _fields(kind: Any) -> dict[str, Any]:
     return get_type_hints(kind, include_extras=True)
 
 
+def _is_table(kind: Any) -> bool:
+    """Whether a field holds another named tuple, not a number or an array."""
+    return isinstance(kind, type) and issubclass(kind, tuple)
+
+
+def _array(kind: Any) -> tuple[str, int]:
+    """(dtype, number of axes) of a field that holds an array."""
+    dtype, axes = kind.__metadata__[0]
+    return dtype, axes
+
+
 def pack(tables: Any) -> Array:
     """Addresses and shapes of the arrays of nested named tuples, and their numbers (int64). The arrays must outlive it."""
+    return np.array(_packed(tables), dtype=np.int64)
+
+
+def _packed(tables: Any) -> list[int]:
     found: list[int] = []
-    for name, kind in _fields(type(tables)).items():  # type: ignore[arg-type]
-        value = getattr(tables, name)
+    for value, (name, kind) in zip(tables, _fields(type(tables)).items(), strict=True):  # type: ignore[arg-type]
         if kind is float:
             found.append(int(np.float64(value).view(np.int64)))
         elif kind is int:
             found.append(value)
-        elif hasattr(kind, "_fields"):
-            found.extend(pack(value))
+        elif _is_table(kind):
+            found.extend(_packed(value))
         else:
-            dtype, axes = kind.__metadata__[0]
+            dtype, axes = _array(kind)
             if value.dtype != dtype or value.ndim != axes or not value.flags.c_contiguous:
                 raise TypeError(f"table {name} is a {value.dtype} array of {value.ndim} axes, not {dtype} of {axes}")
             found += [value.ctypes.data, *value.shape]
-    return np.array(found, dtype=np.int64)
+    return found
 
 
 def _words(kind: Any) -> int:
     """How many words `pack` writes for a field."""
     if kind is float or kind is int:
         return 1
-    if hasattr(kind, "_fields"):
+    if _is_table(kind):
         return sum(_words(each) for each in _fields(kind).values())
-    return 1 + int(kind.__metadata__[0][1])
+    return 1 + _array(kind)[1]
 
 
 @cache
@@ -86,9 +100,9 @@ def _numba_type(kind: Any) -> Any:
         return types.float64
     if kind is int:
         return types.int64
-    if hasattr(kind, "_fields"):
+    if _is_table(kind):
         return Packed(kind)
-    dtype, axes = kind.__metadata__[0]
+    dtype, axes = _array(kind)
     return types.Array(getattr(types, dtype), axes, "C")
 
 
