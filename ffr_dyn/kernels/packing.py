@@ -18,8 +18,9 @@ from numba.core.datamodel.models import OpaqueModel
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, lower_getattr_generic, register_model
 
+from ffr_dyn.kernels.intrinsics import call_of, intrinsic
 from ffr_dyn.kernels.tables import Record, Tables
-from ffr_dyn.kernels.views import array_at, view_intrinsic
+from ffr_dyn.kernels.views import array_at
 
 Array = np.ndarray
 
@@ -140,7 +141,7 @@ def _view(table: type) -> Any:
     """The compiled function that takes an address for that of such a table."""
     result = Packed(table)
 
-    @view_intrinsic
+    @intrinsic
     def table_at(typing, address):  # type: ignore[no-untyped-def]
         def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
             return builder.inttoptr(args[0], context.get_value_type(result))
@@ -153,16 +154,5 @@ def _view(table: type) -> Any:
 tables_at, record_at = _view(Tables), _view(Record)
 
 
-@view_intrinsic
-def call_unit(typing, unit, address, t, first, second):  # type: ignore[no-untyped-def]
-    """Call the unit at address `unit` (see `ffr_dyn.kernels.units`)."""
-    signature = types.int64(types.int64, types.int64, types.float64, types.int64, types.int64)
-
-    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-        from llvmlite import ir
-
-        integer, real = ir.IntType(64), ir.DoubleType()
-        function = ir.FunctionType(integer, [integer, real, integer, integer])
-        return builder.call(builder.inttoptr(args[0], function.as_pointer()), list(args[1:]))
-
-    return signature, generate
+# call_unit(unit, address, t, first, second): the unit at address `unit` (see `ffr_dyn.kernels.units`).
+call_unit = call_of(types.int64, types.float64, types.int64, types.int64)
