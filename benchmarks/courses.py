@@ -15,10 +15,10 @@ import numpy as np
 
 from benchmarks.scenes import chain, connecting_rod, pendulum, pendulum_rod, slider_crank, with_middle
 from ffr_dyn.analyses.assemble import Assembled, assemble
-from ffr_dyn.equations import new_record
 from ffr_dyn.integrators import RK4, ROS3, Integrator
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.machine import fill_rows, new_machine
+from ffr_dyn.memory import new_record
 from ffr_dyn.scene import Scene, marker_number
 from ffr_dyn.stabilisation import Projection, Stabilisation, gains
 from ffr_dyn.stopwatch import Stopwatch

@@ -29,11 +29,12 @@ import numpy as np
 
 from benchmarks.scenes import chain, pendulum_rod
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.equations import compile_scene, new_record
+from ffr_dyn.equations import compile_scene
 from ffr_dyn.integrators import RK4, ROS2, ROS3, Integrator
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.layout import initial_state
 from ffr_dyn.machine import fill_rows, new_machine
+from ffr_dyn.memory import new_record
 from ffr_dyn.scene import Scene
 from ffr_prep.body import FlexibleBody
 from ffr_prep.reference import FixedTo

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from ffr_dyn.compilation import ensure_compiled
-from ffr_dyn.equations import System, new_stages, new_work
+from ffr_dyn.equations import System
 from ffr_dyn.kernels.packing import pack
 from ffr_dyn.kernels.tables import Clock, Control, Model, Record, Tables, Work
 from ffr_dyn.kernels.units import applied_unit, controlled_rows_unit, record_unit, rows_unit, truly_unit, unit_addresses
+from ffr_dyn.memory import new_stages, new_work
 
 if TYPE_CHECKING:
     from ffr_dyn.integrators import Controlled, Integrator

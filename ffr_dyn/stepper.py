@@ -26,7 +26,7 @@ import numpy as np
 from ffr_dyn.analyses.assemble import Assembled, assemble
 from ffr_dyn.analyses.failure import failure
 from ffr_dyn.checkpoint import fingerprint, leaves
-from ffr_dyn.equations import System, new_record
+from ffr_dyn.equations import System
 from ffr_dyn.errors import InputError
 from ffr_dyn.force_tables import actions_of
 from ffr_dyn.integrators import Integrator
@@ -35,6 +35,7 @@ from ffr_dyn.joints import COORDINATES
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.machine import new_machine, row_filler
 from ffr_dyn.measure import DEFAULT_OUTPUTS, Entry, catalogue, needs_every_step, selected
+from ffr_dyn.memory import new_record
 from ffr_dyn.scene import Scene
 from ffr_dyn.stabilisation import Projection, Stabilisation, gains
 from ffr_dyn.view import View

@@ -147,9 +147,9 @@ def test_files_that_cannot_be_continued_are_named(tmp_path, whole):
 def test_measuring_in_parts_gives_the_same_bits():
     """Angles, elastic displacements, work: however many rows are looked at together."""
     from ffr_dyn.analyses.assemble import assemble
-    from ffr_dyn.equations import new_record
     from ffr_dyn.kernels.tables import Record
     from ffr_dyn.machine import fill_rows, new_machine
+    from ffr_dyn.memory import new_record
 
     state, method = assemble(SCENE), ROS2(1e-3)
     system, record = state.system, new_record(state.system, 40)

@@ -16,12 +16,13 @@ import numpy as np
 
 from ffr_dyn.analyses.evaluation import evaluator
 from ffr_dyn.analyses.tangent import chart, state_matrix
-from ffr_dyn.equations import System, new_record
+from ffr_dyn.equations import System
 from ffr_dyn.errors import SimulationError
 from ffr_dyn.inertia import mass_matrix
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.kernels.tables import NOT_FINITE, OK, Record
 from ffr_dyn.machine import fill_rows, new_machine
+from ffr_dyn.memory import new_record
 from ffr_dyn.power import power
 from ffr_dyn.rotation import rotation_matrix
 from ffr_dyn.stabilisation import excess_of_gains

@@ -11,11 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.analyses.failure import failure
-from ffr_dyn.equations import System, new_record
+from ffr_dyn.equations import System
 from ffr_dyn.inertia import mass_matrix
 from ffr_dyn.kernels.tables import OK, SINGULAR_CONSTRAINT, Record, Work
 from ffr_dyn.layout import Layout, initial_state
 from ffr_dyn.machine import Machine, new_machine, record_row
+from ffr_dyn.memory import new_record
 from ffr_dyn.rotation import from_vector, rotation_matrix, skew
 from ffr_dyn.scene import Scene
 

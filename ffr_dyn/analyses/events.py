@@ -17,12 +17,13 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ffr_dyn.analyses.assemble import Assembled
-from ffr_dyn.equations import System, new_record
+from ffr_dyn.equations import System
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.kernels.tables import OK, Record
 from ffr_dyn.machine import Machine, fill_rows, new_machine, record_row
 from ffr_dyn.measure import catalogue
+from ffr_dyn.memory import new_record
 from ffr_dyn.state import StateView
 from ffr_dyn.view import View
 

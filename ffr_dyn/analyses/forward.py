@@ -15,12 +15,12 @@ from ffr_dyn.analyses.energy import EnergyWatch
 from ffr_dyn.analyses.events import Event, Watcher
 from ffr_dyn.analyses.failure import failure
 from ffr_dyn.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
-from ffr_dyn.equations import new_record
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince, Integrator
 from ffr_dyn.kernels.tables import AT, NOW, OK, Record, Work
 from ffr_dyn.machine import Machine, fill_rows, new_machine, record_row
 from ffr_dyn.measure import Entry, Memory, measure, needs_every_step, selected
+from ffr_dyn.memory import new_record
 from ffr_dyn.result import Quantity, Result
 from ffr_dyn.result_file import ResultWriter, load_checkpoint, load_result
 from ffr_dyn.scene import Scene

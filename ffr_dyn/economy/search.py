@@ -119,8 +119,7 @@ def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chose
     limits, model = stiff.limits, omitted.effect.sum(axis=0)
     if limits is None or (model > SURELY_RIGID * limits).any():
         return None
-    pilot = replace(stiff.trial.choice, method=PILOT)
-    stepped = chosen_step(ledger, pilot, np.maximum(OF_ALL * limits - model, LEAST * limits))
+    stepped = _with_step(ledger, replace(stiff.trial.choice, method=PILOT), model, limits)
     scales = ranges(stepped.trial.values)
     return Chosen(
         stepped.trial,
@@ -134,6 +133,11 @@ def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chose
         scales,
         omitted,
     )
+
+
+def _with_step(ledger: Ledger, choice: Choice, model: Array, limits: Array) -> Stepped:
+    """The model with the step for what its own error leaves of the tolerances."""
+    return chosen_step(ledger, choice, np.maximum(OF_ALL * limits - model, LEAST * limits))
 
 
 # ---- beside everything ------------------------------------------------------------------------------------------------
@@ -162,40 +166,32 @@ def _beside_everything(ledger: Ledger, stiff: Rigid, omitted: Contributions | No
 def _stepped(
     ledger: Ledger, ground: Ground, selection: Selection, omitted: Contributions, like: Chosen | None = None
 ) -> Chosen:
-    """The model with the step it needs, or with that of a model much like it, whose error is taken over."""
-    model = difference(ledger.run(selection.choice).values, ground.pilot.values)
-    if selection.choice.method != ground.everything.method:
-        return _at_once(ledger, ground, selection, omitted, model)
-    left = np.maximum(OF_ALL * ground.limits - largest(model), LEAST * ground.limits)
-    stepped = chosen_step(ledger, selection.choice, left) if like is None else _as_like(ledger, selection.choice, like)
+    """The model with the step it needs, or with that of a model much like it, whose error is taken over.
+
+    A model of another method than everything has its step, and its run beside that tells all of its error.
+    """
+    choice = selection.choice
+    beside = ledger.run(choice)
+    apart = difference(beside.values, ground.pilot.values)
+    together = choice.method != ground.everything.method
+    if together:
+        stepped = Stepped(beside, apart)
+    elif like is None:
+        stepped = _with_step(ledger, choice, largest(apart), ground.limits)
+    else:
+        stepped = _as_like(ledger, choice, like)
     return Chosen(
         stepped.trial,
-        largest(model),
+        selection.left if together else largest(apart),
         stepped.error,
-        largest(total(model, stepped.error)),
+        largest(apart if together else total(apart, stepped.error)),
         selection.terms,
         ground.everything,
         ground.spatial,
         ground.limits,
         ground.scales,
         omitted,
-    )
-
-
-def _at_once(ledger: Ledger, ground: Ground, selection: Selection, omitted: Contributions, error: Histories) -> Chosen:
-    """A model of another method than everything, whose run beside that tells all of its `error`."""
-    return Chosen(
-        ledger.run(selection.choice),
-        selection.left,
-        error,
-        largest(error),
-        selection.terms,
-        ground.everything,
-        ground.spatial,
-        ground.limits,
-        ground.scales,
-        omitted,
-        together=True,
+        together,
     )
 
 

@@ -1,7 +1,7 @@
 """The engine: compiled (numba) kernels that read the tables made by `ffr_dyn.equations`.
 
 Read in this order: `tables` (what the kernels read and write), `vectors`, `bodies` (inertia, quadratic velocity terms,
-Schur complement), `markers`, `loads`, `rows` (constraints), `blocks` (sparse factorisation of the multiplier system),
-`system` (one evaluation of the equations of motion). Each has a readable twin in numpy that the tests hold it to:
-`ffr_dyn.inertia`, `ffr_dyn.kinematics`, `ffr_dyn.constraints`.
+Schur complement; `planar` where they stay in a plane), `markers`, `loads`, `rows` (constraints), `blocks` (sparse
+factorisation of the multiplier system), `system` (one evaluation of the equations of motion). Each has a readable twin in
+numpy that the tests hold it to: `ffr_dyn.inertia`, `ffr_dyn.kinematics`, `ffr_dyn.constraints`.
 """

@@ -8,8 +8,8 @@ of the earlier, with the rows of the later side by side in it. The factor is S =
 """
 
 from ffr_dyn.kernels.lanes import (
-    clear_narrow,
-    clear_row,
+    assign_6,
+    assign_narrow_3,
     combine_1,
     combine_2,
     combine_3,
@@ -112,8 +112,7 @@ def add_pair(X, later, earlier, rows, flexible, phiphi, Y, S, offset):
     if flexible:
         for c in range(6):
             copy_row(X, later + LANES * c, Y, LANES * c)
-            clear_row(Y, LANES * (6 + c))
-            combine_6(Y, LANES * (6 + c), 1.0, phiphi, c, 6, X, later + 6 * LANES)
+            assign_6(Y, LANES * (6 + c), 1.0, phiphi, c, 6, X, later + 6 * LANES)
         for row in range(rows):
             combine_12(S, offset + LANES * row, 1.0, X, earlier + row, LANES, Y, 0)
     else:
@@ -127,8 +126,7 @@ def add_pair_in_plane(X, later, earlier, rows, flexible, phiphi, Y, S, offset):
     if flexible:
         for c in range(3):
             copy_narrow(X, later + LANES * c, Y, LANES * c)
-            clear_narrow(Y, LANES * (3 + c))
-            narrow_3(Y, LANES * (3 + c), 1.0, phiphi, c, 3, X, later + 3 * LANES)
+            assign_narrow_3(Y, LANES * (3 + c), 1.0, phiphi, c, 3, X, later + 3 * LANES)
         for row in range(rows):
             narrow_6(S, offset + LANES * row, 1.0, X, earlier + row, LANES, Y, 0)
     else:

@@ -5,6 +5,15 @@ ch. 5, written for body-frame velocities); see `ffr_dyn.inertia` for the readabl
 """
 
 from ffr_dyn.kernels.options import inlined, kernel
+from ffr_dyn.kernels.planar import (
+    factorise_in_plane,
+    flexible_terms_in_plane,
+    forces_in_plane,
+    mass_times_in_plane,
+    reduce_in_plane,
+    substitute_in_plane,
+)
+from ffr_dyn.kernels.products import contract
 from ffr_dyn.kernels.vectors import (
     cholesky_six,
     cholesky_three,
@@ -13,14 +22,12 @@ from ffr_dyn.kernels.vectors import (
     dot,
     fill,
     get,
-    in_plane,
-    of_two,
     put,
     rigid_lower,
     rigid_upper,
     to_body,
 )
-from ffr_dyn.kernels.views import part, peek, six_parts, three_parts
+from ffr_dyn.kernels.views import part, six_parts, three_parts
 
 
 @kernel
@@ -61,68 +68,6 @@ def normalise(bodies, x):
         p0, p1, p2, p3 = x[i], x[i + 1], x[i + 2], x[i + 3]
         inverse = 1.0 / (p0 * p0 + p1 * p1 + p2 * p2 + p3 * p3) ** 0.5
         x[i], x[i + 1], x[i + 2], x[i + 3] = inverse * p0, inverse * p1, inverse * p2, inverse * p3
-
-
-@kernel
-def contract(table, plan, at, q, qd, n, width, last, scratch, g, l):  # noqa: E741
-    """g (width,) += sum_i q_i table_i, l (last,) += sum_i q_dot_i (the last of table_i): the only O(n^2) work of a body.
-
-    Block by block, as the plan that begins at `at` says (see `ffr_dyn.decoupling`).
-    """
-    blocks = plan[at]
-    if blocks == 0:
-        add_products(table, n, width, last, q, qd, g, l)
-        return
-    order = at + 1 + 3 * blocks
-    place = order + n
-    x, xd = part(scratch, 0, n), part(scratch, n, n)
-    y, yd = part(scratch, 2 * n, width + 1), part(scratch, 2 * n + width + 1, last + 1)
-    for k in range(n):
-        number = peek(plan, order + k)
-        x[k], xd[k] = peek(q, number), peek(qd, number)
-    fill(y, 0.0)
-    fill(yd, 0.0)
-    start, first, product, late = 0, 0, 0, 0
-    for block in range(blocks):
-        count, outputs, of_last = plan[at + 1 + 3 * block], plan[at + 2 + 3 * block], plan[at + 3 + 3 * block]
-        add_products(
-            part(table, start, count * outputs), count, outputs, of_last,
-            part(x, first, count), part(xd, first, count), part(y, product, outputs), part(yd, late, of_last),
-        )  # fmt: skip
-        start += count * outputs
-        first += count
-        product += outputs
-        late += of_last
-    for k in range(width):
-        g[k] += peek(y, peek(plan, place + k))
-    place += width
-    for k in range(last):
-        l[k] += peek(yd, peek(plan, place + k))
-
-
-@kernel
-def add_products(table, count, width, last, q, qd, g, l):  # noqa: E741
-    """`contract` for one block. Four rows at a time, so that each result is loaded and stored a quarter as often."""
-    skipped = width - last
-    for i in range(0, count - 3, 4):
-        q0, q1, q2, q3 = q[i], q[i + 1], q[i + 2], q[i + 3]
-        first, second = part(table, i * width, width), part(table, (i + 1) * width, width)
-        third, fourth = part(table, (i + 2) * width, width), part(table, (i + 3) * width, width)
-        for k in range(width):
-            g[k] += q0 * first[k] + q1 * second[k] + q2 * third[k] + q3 * fourth[k]
-        if last > 0:
-            q0, q1, q2, q3 = qd[i], qd[i + 1], qd[i + 2], qd[i + 3]
-            first, second = part(first, skipped, last), part(second, skipped, last)
-            third, fourth = part(third, skipped, last), part(fourth, skipped, last)
-            for k in range(last):
-                l[k] += q0 * first[k] + q1 * second[k] + q2 * third[k] + q3 * fourth[k]
-    for i in range(count - count % 4, count):
-        x, row = q[i], part(table, i * width, width)
-        for k in range(width):
-            g[k] += x * row[k]
-        x, row = qd[i], part(row, skipped, last)
-        for k in range(last):
-            l[k] += x * row[k]
 
 
 @kernel
@@ -211,52 +156,6 @@ def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s):
 
 
 @inlined
-def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, normal):
-    """`flexible_terms` of a planar body that turns at the rate `omega`; without what acts across the plane."""
-    n, e, start, c = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4], bodies.where[b, 10]
-    g, l = part(w.g, 9 * w.terms[b], 9 * n), part(w.l, 3 * w.terms[b], n)  # noqa: E741
-    rP, P = part(bodies.rP_dm, 9 * c, 9 * n), part(bodies.P_dm, 3 * c, 3 * n)
-    c0, c1, _ = in_plane(normal)
-    turning = 6 + normal
-    g0, g1, h = three_parts(g, n)
-    r0, r1 = part(rP, c0 * n, n), part(rP, c1 * n, n)
-    copy(g0, r0)
-    copy(g1, r1)
-    copy(h, part(rP, turning * n, n))
-    fill(l, 0.0)
-    if start >= 0:
-        table, at = part(bodies.PP_dm, start, 3 * n * n), bodies.where[b, 11]
-        contract(table, bodies.blocks, at, q, qd, n, 3 * n, n, w.sorted, part(g, 0, 3 * n), l)
-    copy(part(w.H, 3 * e + normal * n, n), h)
-    f = part(w.f, bodies.where[b, 2] + 6, n)
-    omega2, damping = part(bodies.omega2, e, n), part(bodies.two_zeta_omega, e, n)
-    P0, P1, square = part(P, c0 * n, n), part(P, c1 * n, n), omega * omega
-    across, along = gravity[c0], gravity[c1]
-    s0, s1, p0, p1, grown, growing = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(n):
-        x, y, both = q[j], qd[j], g0[j] + g1[j]
-        s0 += P0[j] * x
-        s1 += P1[j] * x
-        p0 += P0[j] * y
-        p1 += P1[j] * y
-        grown += (r0[j] + r1[j] + both) * x
-        growing += both * y
-        f[j] = (
-            square * both - 2.0 * omega * l[j] + across * P0[j] + along * P1[j]
-            - omega2[j] * x - damping[j] * y
-        )  # fmt: skip
-    s = (s[0] + of_two(0, c0, c1, s0, s1), s[1] + of_two(1, c0, c1, s0, s1), s[2] + of_two(2, c0, c1, s0, s1))
-    pd = (of_two(0, c0, c1, p0, p1), of_two(1, c0, c1, p0, p1), of_two(2, c0, c1, p0, p1))
-    # Only the sums of both components in the plane enter; they are kept in one component.
-    W = (
-        second[0] + of_two(0, c0, 3, grown, 0.0), second[1] + of_two(1, c0, 3, grown, 0.0),
-        second[2], second[3], second[4], second[5],
-    )  # fmt: skip
-    D = (of_two(0, c0, 3, growing, 0.0), of_two(1, c0, 3, growing, 0.0), 0.0, 0.0, 0.0, 0.0)
-    return s, pd, W, D
-
-
-@inlined
 def inertia(gravity_field, bodies, w, x, v, b):
     """Rotation, first and second moments, right-hand side w.f (body axes) of body b, without markers' loads."""
     n, i, j, normal = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 2], bodies.where[b, 7]
@@ -313,26 +212,6 @@ def forces_in_space(f, mass, s, J, pd, D, D_axial, omega, gravity):
     for k in range(3):
         f[k] = mass * gravity[k] - centrifugal[k] - 2.0 * coriolis[k]
         f[3 + k] = moment[k] - gyroscopic[k] - 2.0 * (trace * omega[k] - D_omega[k] + 0.5 * skew[k])
-
-
-@kernel
-def sense(normal):
-    """In which the two axes of the plane across body axis `normal` turn into one another about it, as `in_plane` has them."""
-    return -1.0 if normal == 1 else 1.0
-
-
-@kernel
-def forces_in_plane(f, mass, s, pd, growing, omega, gravity, normal):
-    """f (6,) of a planar body: what acts in the plane and about its normal; the rest is zero.
-
-    pd, growing : rates of the first moment and, half, of the second about the normal
-    """
-    i, j, k = in_plane(normal)
-    turn, rate = sense(normal), omega[normal]
-    fill(f, 0.0)
-    f[i] = mass * gravity[i] + rate * rate * s[i] + 2.0 * turn * rate * pd[j]
-    f[j] = mass * gravity[j] + rate * rate * s[j] - 2.0 * turn * rate * pd[i]
-    f[k] = turn * (s[i] * gravity[j] - s[j] * gravity[i]) - 2.0 * growing * rate
 
 
 @kernel
@@ -435,26 +314,6 @@ def scale_row(rows, r, dinv, n, out, target):
 
 
 @kernel
-def factorise_in_plane(T, s, inertia, P, H, dinv, Cd, L, n, normal):
-    """`factorise` for the three rigid coordinates i, j, k of a planar body."""
-    i, j, k = in_plane(normal)
-    ki, kj, kk = -sense(normal) * s[j], sense(normal) * s[i], inertia
-    first, second, turn, scaled = part(P, i * n, n), part(P, j * n, n), part(H, normal * n, n), part(Cd, k * n, n)
-    for c in range(n):
-        x = dinv[c] * turn[c]
-        scaled[c] = x
-        ki -= x * first[c]
-        kj -= x * second[c]
-        kk -= x * turn[c]
-    L[i, i], L[j, i], L[j, j] = T[i, i], T[j, i], T[j, j]
-    ki *= L[i, i]
-    kj = (kj - ki * L[j, i]) * L[j, j]
-    kk -= ki * ki + kj * kj
-    L[k, i], L[k, j], L[k, k] = ki, kj, 1.0 / kk**0.5
-    return T[0, 0] > 0.0 and kk > 1e-14 * inertia
-
-
-@kernel
 def row_product(a, i, b, j, n):
     """sum_k a[i, k] b[j, k] for pooled arrays of rows of n."""
     left, right = part(a, i * n, n), part(b, j * n, n)
@@ -489,20 +348,6 @@ def reduce_forces(bodies, w, b):
 
 
 @kernel
-def reduce_in_plane(Cd, d, n, normal, z):
-    i, j, k = in_plane(normal)
-    first, second, third = part(Cd, i * n, n), part(Cd, j * n, n), part(Cd, k * n, n)
-    t0, t1, t2 = 0.0, 0.0, 0.0
-    for c in range(n):
-        t0 += first[c] * d[c]
-        t1 += second[c] * d[c]
-        t2 += third[c] * d[c]
-    z[i] -= t0
-    z[j] -= t1
-    z[k] -= t2
-
-
-@kernel
 def accelerate_rigid(bodies, w, b):
     """The rigid part of w.acc of body b from its reduced forces: L^-T w.rigid, which stays there."""
     j, z = bodies.where[b, 2], w.rigid[b]
@@ -520,10 +365,7 @@ def accelerate(bodies, w, b):
         z, acc = w.rigid[b], part(w.acc, j, 6 + n)
         Cd, elastic = part(w.Cd, 6 * e, 6 * n), part(w.elastic, e, n)
         if normal >= 0:
-            i, j, k = in_plane(normal)
-            first, second, third, own = part(Cd, i * n, n), part(Cd, j * n, n), part(Cd, k * n, n), part(acc, 6, n)
-            for c in range(n):
-                own[c] = elastic[c] - (first[c] * z[i] + second[c] * z[j] + third[c] * z[k])
+            substitute_in_plane(Cd, elastic, z, n, normal, part(acc, 6, n))
         else:
             back_substitute(Cd, elastic, z, n, part(acc, 6, n))
 
@@ -556,23 +398,6 @@ def mass_times(bodies, w, b, y, out):
             out[k] += momentum[k]
             out[3 + k] += spin[k]
         add_motion(P, H, linear, angular, part(y, 6, n), n, part(out, 6, n))
-
-
-@kernel
-def mass_times_in_plane(P, H, y, n, normal, out):
-    """What couples the three rigid coordinates of a planar body with its elastic ones, and these with themselves."""
-    i, j, k = in_plane(normal)
-    first, second, turn = part(P, i * n, n), part(P, j * n, n), part(H, normal * n, n)
-    q, f = part(y, 6, n), part(out, 6, n)
-    yi, yj, yk, ti, tj, tk = y[i], y[j], y[k], 0.0, 0.0, 0.0
-    for c in range(n):
-        ti += first[c] * q[c]
-        tj += second[c] * q[c]
-        tk += turn[c] * q[c]
-        f[c] += first[c] * yi + second[c] * yj + turn[c] * yk + q[c]
-    out[i] += ti
-    out[j] += tj
-    out[k] += tk
 
 
 @kernel

@@ -7,41 +7,39 @@ from __future__ import annotations
 
 from typing import Any
 
+from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic
 
+from ffr_dyn.kernels.intrinsics import data_of, intrinsic
 from ffr_dyn.kernels.tables import LANES, MOST_ROWS, NARROW
 
-_intrinsic: Any = intrinsic  # whose callers give one argument less than its definition has
 _REAL = types.float64
 _POOLED = types.Array(types.float64, 1, "C")
 _LIBERTIES = ("contract", "reassoc", "nsz")
 
 
 def _data(context: Any, builder: Any, array: Any) -> Any:
-    return context.make_array(_POOLED)(context, builder, array).data
+    return data_of(context, builder, _POOLED, array)
 
 
 def _row_pointer(builder: Any, data: Any, at: Any, lanes: int = LANES) -> Any:
-    from llvmlite import ir
-
     return builder.bitcast(builder.gep(data, [at]), ir.VectorType(ir.DoubleType(), lanes).as_pointer())
 
 
 def _broadcast(builder: Any, number: Any, lanes: int = LANES) -> Any:
-    from llvmlite import ir
-
     vector = ir.VectorType(ir.DoubleType(), lanes)
     one = builder.insert_element(ir.Constant(vector, ir.Undefined), number, ir.Constant(ir.IntType(32), 0))
     zeros = ir.Constant(ir.VectorType(ir.IntType(32), lanes), [0] * lanes)
     return builder.shuffle_vector(one, ir.Constant(vector, ir.Undefined), zeros)
 
 
-def _combination(count: int, lanes: int = LANES) -> Any:
-    @_intrinsic
+def _combination(count: int, lanes: int = LANES, *, onto: bool = True) -> Any:
+    """Of `count` source rows that follow one another; it is added onto the target row, or takes its place."""
+
+    @intrinsic
     def combine(typing, target, at, factor, numbers, first, stride, source, begin):  # type: ignore[no-untyped-def]
-        """target row += factor sum_k numbers[first + k stride] source row k, for `count` rows that follow one another."""
+        """target row += factor sum_k numbers[first + k stride] source row k."""
         index = types.intp
         signature = types.void(_POOLED, index, _REAL, _POOLED, index, index, _POOLED, index)
 
@@ -49,14 +47,14 @@ def _combination(count: int, lanes: int = LANES) -> Any:
             out, at, factor, numbers, first, stride, source, begin = args
             numbers, source = _data(context, builder, numbers), _data(context, builder, source)
             place = _row_pointer(builder, _data(context, builder, out), at, lanes)
-            total = builder.load(place, align=8)
+            total = builder.load(place, align=8) if onto else None
             for k in range(count):
                 row = _row_pointer(builder, source, builder.add(begin, cgutils.intp_t(LANES * k)), lanes)
                 where = builder.add(first, builder.mul(stride, cgutils.intp_t(k)))
                 number = builder.fmul(factor, builder.load(builder.gep(numbers, [where])), flags=_LIBERTIES)
                 many = _broadcast(builder, number, lanes)
                 product = builder.fmul(many, builder.load(row, align=8), flags=_LIBERTIES)
-                total = builder.fadd(total, product, flags=_LIBERTIES)
+                total = product if total is None else builder.fadd(total, product, flags=_LIBERTIES)
             builder.store(total, place, align=8)
             return context.get_dummy_value()
 
@@ -69,10 +67,11 @@ combine_1, combine_2, combine_3 = _combination(1), _combination(2), _combination
 combine_4, combine_5, combine_6, combine_12 = _combination(4), _combination(5), _combination(6), _combination(12)
 # In the plane a joint has at most three rows: half a row of lanes is enough.
 narrow_1, narrow_3, narrow_6 = _combination(1, NARROW), _combination(3, NARROW), _combination(6, NARROW)
+assign_6, assign_narrow_3 = _combination(6, onto=False), _combination(3, NARROW, onto=False)
 
 
 def _scaling(lanes: int) -> Any:
-    @_intrinsic
+    @intrinsic
     def scale(typing, target, at, factor):  # type: ignore[no-untyped-def]
         """target row *= factor."""
 
@@ -87,58 +86,48 @@ def _scaling(lanes: int) -> Any:
     return scale
 
 
-def _copying(lanes: int) -> Any:
-    @_intrinsic
-    def copy(typing, source, begin, target, at):  # type: ignore[no-untyped-def]
-        """target row = source row."""
+def _of_two_rows(emit: Any, lanes: int = LANES, result: Any = types.void) -> Any:
+    """The compiled function (array, at, other array, at in it): what `emit` makes of the pointers to the two rows."""
 
+    @intrinsic
+    def operate(typing, first, at, second, begin):  # type: ignore[no-untyped-def]
         def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-            row = builder.load(_row_pointer(builder, _data(context, builder, args[0]), args[1], lanes), align=8)
-            builder.store(row, _row_pointer(builder, _data(context, builder, args[2]), args[3], lanes), align=8)
-            return context.get_dummy_value()
+            one = _row_pointer(builder, _data(context, builder, args[0]), args[1], lanes)
+            other = _row_pointer(builder, _data(context, builder, args[2]), args[3], lanes)
+            found = emit(builder, one, other)
+            return context.get_dummy_value() if result is types.void else found
 
-        return types.void(_POOLED, types.intp, _POOLED, types.intp), generate
+        return result(_POOLED, types.intp, _POOLED, types.intp), generate
 
-    return copy
-
-
-def _clearing(lanes: int) -> Any:
-    @_intrinsic
-    def clear(typing, target, at):  # type: ignore[no-untyped-def]
-        """target row = 0."""
-
-        def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-            place = _row_pointer(builder, _data(context, builder, args[0]), args[1], lanes)
-            builder.store(_broadcast(builder, context.get_constant(_REAL, 0.0), lanes), place, align=8)
-            return context.get_dummy_value()
-
-        return types.void(_POOLED, types.intp), generate
-
-    return clear
+    return operate
 
 
-def _dotting(lanes: int) -> Any:
-    @_intrinsic
-    def dot(typing, left, at, right, begin):  # type: ignore[no-untyped-def]
-        """The sum over the lanes of left row * right row."""
+def _product(builder: Any, left: Any, right: Any) -> Any:
+    return builder.fmul(builder.load(left, align=8), builder.load(right, align=8), flags=_LIBERTIES)
 
-        def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-            left = builder.load(_row_pointer(builder, _data(context, builder, args[0]), args[1], lanes), align=8)
-            right = builder.load(_row_pointer(builder, _data(context, builder, args[2]), args[3], lanes), align=8)
-            return _sum(builder, builder.fmul(left, right, flags=_LIBERTIES))
 
-        return _REAL(_POOLED, types.intp, _POOLED, types.intp), generate
+def _copy(builder: Any, source: Any, target: Any) -> None:
+    """target row = source row."""
+    builder.store(builder.load(source, align=8), target, align=8)
 
-    return dot
+
+def _multiply(builder: Any, target: Any, source: Any) -> None:
+    """target row *= source row."""
+    builder.store(_product(builder, target, source), target, align=8)
+
+
+def _dot(builder: Any, left: Any, right: Any) -> Any:
+    """The sum over the lanes of left row * right row."""
+    return _sum(builder, _product(builder, left, right))
 
 
 scale_row, scale_narrow = _scaling(LANES), _scaling(NARROW)
-copy_row, copy_narrow = _copying(LANES), _copying(NARROW)
-clear_row, clear_narrow = _clearing(LANES), _clearing(NARROW)
-dot_rows, dot_narrow = _dotting(LANES), _dotting(NARROW)
+copy_row, copy_narrow = _of_two_rows(_copy), _of_two_rows(_copy, NARROW)
+multiply_row = _of_two_rows(_multiply)
+dot_rows, dot_narrow = _of_two_rows(_dot, result=_REAL), _of_two_rows(_dot, NARROW, _REAL)
 
 
-@_intrinsic
+@intrinsic
 def add_scale(typing, jac, by_mass, by_inertia, scale, at):  # type: ignore[no-untyped-def]
     """What the rows' own part of the multiplier matrix is at least, by the inverse mass or inertia of the body of a side.
 
@@ -193,8 +182,6 @@ def _store_row(builder: Any, row: Any, data: Any, at: Any, number: int = 0) -> N
 
 
 def _lane(builder: Any, row: Any, number: int) -> Any:
-    from llvmlite import ir
-
     return builder.extract_element(row, ir.Constant(ir.IntType(32), number))
 
 
@@ -205,8 +192,6 @@ def _less(builder: Any, row: Any, number: Any, other: Any) -> Any:
 
 
 def _sum(builder: Any, row: Any) -> Any:
-    from llvmlite import ir
-
     kind = ir.FunctionType(ir.DoubleType(), [ir.DoubleType(), row.type])
     reduce = cgutils.get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.fadd.v{row.type.count}f64")
     return builder.call(reduce, [ir.Constant(ir.DoubleType(), 0.0), row], fastmath=_LIBERTIES)
@@ -214,27 +199,21 @@ def _sum(builder: Any, row: Any) -> Any:
 
 def _merged(builder: Any, row: Any, other: Any, taken: range) -> Any:
     """The row, with the lanes `taken` from the other."""
-    from llvmlite import ir
-
     lanes = [LANES + k if k in taken else k for k in range(LANES)]
     return builder.shuffle_vector(row, other, ir.Constant(ir.VectorType(ir.IntType(32), LANES), lanes))
 
 
 def _beyond(builder: Any, row: Any, number: int) -> Any:
     """The lanes after `number`, zero elsewhere."""
-    from llvmlite import ir
-
     return _merged(builder, row, ir.Constant(row.type, [0.0] * LANES), range(number + 1))
 
 
 def _before(builder: Any, row: Any, number: int) -> Any:
     """The lanes before `number`, zero elsewhere."""
-    from llvmlite import ir
-
     return _merged(builder, row, ir.Constant(row.type, [0.0] * LANES), range(number, LANES))
 
 
-@_intrinsic
+@intrinsic
 def factorise_rows(typing, size, S, at, least, first, pivots, own, raw):  # type: ignore[no-untyped-def]
     """S = U^T D U in place for a block of `size` rows; 1 / D goes to `pivots`.
 
@@ -244,8 +223,6 @@ def factorise_rows(typing, size, S, at, least, first, pivots, own, raw):  # type
     """
 
     def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-        from llvmlite import ir
-
         size, S, at, least, first, pivots, own, raw = args
         S, least, pivots, raw = (_data(context, builder, array) for array in (S, least, pivots, raw))
         one = context.get_constant(_REAL, 1.0)
@@ -274,7 +251,7 @@ def factorise_rows(typing, size, S, at, least, first, pivots, own, raw):  # type
     return types.void(index, _POOLED, index, _POOLED, index, _POOLED, index, _POOLED), generate
 
 
-@_intrinsic
+@intrinsic
 def eliminate_rows(typing, size, S, diagonal, at, pivots, own, Y):  # type: ignore[no-untyped-def]
     """Y = U^-T times the block at `at`, which becomes D^-1 Y, for the factor of `size` rows at `diagonal`."""
 
@@ -298,7 +275,7 @@ def eliminate_rows(typing, size, S, diagonal, at, pivots, own, Y):  # type: igno
     return types.void(index, _POOLED, index, index, _POOLED, index, _POOLED), generate
 
 
-@_intrinsic
+@intrinsic
 def subtract_product(typing, size, S, target, numbers, Y):  # type: ignore[no-untyped-def]
     """The row of S at `target` less sum_c S[numbers + 8 c] Y_c, over `size` rows of Y."""
 
@@ -320,7 +297,7 @@ def subtract_product(typing, size, S, target, numbers, Y):  # type: ignore[no-un
 
 
 def _substitution(descending: bool, text: str) -> Any:
-    @_intrinsic
+    @intrinsic
     def substitute(typing, size, S, diagonal, b, own):  # type: ignore[no-untyped-def]
         def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
             size, S, diagonal, b, own = args
@@ -347,7 +324,7 @@ solve_lower = _substitution(False, "The row of b at `own` becomes U^-T times it.
 solve_upper = _substitution(True, "The row of b at `own` becomes U^-1 times it.")
 
 
-@_intrinsic
+@intrinsic
 def spread_lower(typing, size, S, at, b, own, later):  # type: ignore[no-untyped-def]
     """The row of b at `later` less sum_c b[own + c] times row c of the block at `at`, over `size` rows."""
 
@@ -367,13 +344,11 @@ def spread_lower(typing, size, S, at, b, own, later):  # type: ignore[no-untyped
     return types.void(index, _POOLED, index, _POOLED, index, index), generate
 
 
-@_intrinsic
+@intrinsic
 def gather_upper(typing, size, S, at, b, later, own):  # type: ignore[no-untyped-def]
     """b[own + c] less the product of row c of the block at `at` with the row of b at `later`, for `size` rows c."""
 
     def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-        from llvmlite import ir
-
         size, S, at, b, later, own = args
         S, b = _data(context, builder, S), _data(context, builder, b)
 
@@ -389,16 +364,3 @@ def gather_upper(typing, size, S, at, b, later, own):  # type: ignore[no-untyped
 
     index = types.intp
     return types.void(index, _POOLED, index, _POOLED, index, index), generate
-
-
-@_intrinsic
-def multiply_row(typing, target, at, source, begin):  # type: ignore[no-untyped-def]
-    """target row *= source row."""
-
-    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-        target, source = _data(context, builder, args[0]), _data(context, builder, args[2])
-        row = builder.fmul(_load_row(builder, target, args[1]), _load_row(builder, source, args[3]), flags=_LIBERTIES)
-        _store_row(builder, row, target, args[1])
-        return context.get_dummy_value()
-
-    return types.void(_POOLED, types.intp, _POOLED, types.intp), generate

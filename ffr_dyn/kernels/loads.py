@@ -1,30 +1,17 @@
 """All applied loads: wrenches on markers, forces on coordinates, bushings, spread loads, values of Python functions."""
 
 from numba import types
-from numba.extending import intrinsic
 
 from ffr_dyn.kernels.actions import apply_action
 from ffr_dyn.kernels.bushings import apply_bushing
+from ffr_dyn.kernels.intrinsics import call_of
 from ffr_dyn.kernels.markers import apply_wrench
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.spread import apply_spread
 from ffr_dyn.kernels.vectors import get, to_body, to_global
 
-
-@intrinsic
-def _call_address(typing, address, t, x, v, out):
-    """int function(double t, double *x, double *v, double *out) at a machine address."""
-    signature = types.int64(types.intp, types.float64, types.intp, types.intp, types.intp)
-
-    def generate(context, builder, sig, args):
-        from llvmlite import ir
-
-        integer, real = ir.IntType(64), ir.DoubleType()
-        function = ir.FunctionType(integer, [real, integer, integer, integer])
-        pointer = builder.inttoptr(args[0], function.as_pointer())
-        return builder.call(pointer, list(args[1:]))
-
-    return signature, generate
+# int function(double t, double *x, double *v, double *out) at a machine address
+_call_function = call_of(types.float64, types.int64, types.int64, types.int64)
 
 
 @kernel
@@ -32,7 +19,7 @@ def call_user(address, t, x, v, user):
     """Let the user's Python functions fill `user`. Returns True when they did."""
     if user.size == 0:
         return True
-    return _call_address(address, t, x.ctypes.data, v.ctypes.data, user.ctypes.data) == 0  # type: ignore[call-arg]
+    return _call_function(address, t, x.ctypes.data, v.ctypes.data, user.ctypes.data) == 0
 
 
 @kernel

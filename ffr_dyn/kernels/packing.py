@@ -18,8 +18,9 @@ from numba.core.datamodel.models import OpaqueModel
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, lower_getattr_generic, register_model
 
+from ffr_dyn.kernels.intrinsics import call_of, intrinsic
 from ffr_dyn.kernels.tables import Record, Tables
-from ffr_dyn.kernels.views import array_at, view_intrinsic
+from ffr_dyn.kernels.views import array_at
 
 Array = np.ndarray
 
@@ -29,32 +30,46 @@ def _fields(kind: Any) -> dict[str, Any]:
     return get_type_hints(kind, include_extras=True)
 
 
+def _is_table(kind: Any) -> bool:
+    """Whether a field holds another named tuple, not a number or an array."""
+    return isinstance(kind, type) and issubclass(kind, tuple)
+
+
+def _array(kind: Any) -> tuple[str, int]:
+    """(dtype, number of axes) of a field that holds an array."""
+    dtype, axes = kind.__metadata__[0]
+    return dtype, axes
+
+
 def pack(tables: Any) -> Array:
     """Addresses and shapes of the arrays of nested named tuples, and their numbers (int64). The arrays must outlive it."""
+    return np.array(_packed(tables), dtype=np.int64)
+
+
+def _packed(tables: Any) -> list[int]:
     found: list[int] = []
-    for name, kind in _fields(type(tables)).items():  # type: ignore[arg-type]
-        value = getattr(tables, name)
+    for value, (name, kind) in zip(tables, _fields(type(tables)).items(), strict=True):  # type: ignore[arg-type]
         if kind is float:
             found.append(int(np.float64(value).view(np.int64)))
         elif kind is int:
             found.append(value)
-        elif hasattr(kind, "_fields"):
-            found.extend(pack(value))
+        elif _is_table(kind):
+            found.extend(_packed(value))
         else:
-            dtype, axes = kind.__metadata__[0]
+            dtype, axes = _array(kind)
             if value.dtype != dtype or value.ndim != axes or not value.flags.c_contiguous:
                 raise TypeError(f"table {name} is a {value.dtype} array of {value.ndim} axes, not {dtype} of {axes}")
             found += [value.ctypes.data, *value.shape]
-    return np.array(found, dtype=np.int64)
+    return found
 
 
 def _words(kind: Any) -> int:
     """How many words `pack` writes for a field."""
     if kind is float or kind is int:
         return 1
-    if hasattr(kind, "_fields"):
+    if _is_table(kind):
         return sum(_words(each) for each in _fields(kind).values())
-    return 1 + int(kind.__metadata__[0][1])
+    return 1 + _array(kind)[1]
 
 
 @cache
@@ -86,9 +101,9 @@ def _numba_type(kind: Any) -> Any:
         return types.float64
     if kind is int:
         return types.int64
-    if hasattr(kind, "_fields"):
+    if _is_table(kind):
         return Packed(kind)
-    dtype, axes = kind.__metadata__[0]
+    dtype, axes = _array(kind)
     return types.Array(getattr(types, dtype), axes, "C")
 
 
@@ -126,7 +141,7 @@ def _view(table: type) -> Any:
     """The compiled function that takes an address for that of such a table."""
     result = Packed(table)
 
-    @view_intrinsic
+    @intrinsic
     def table_at(typing, address):  # type: ignore[no-untyped-def]
         def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
             return builder.inttoptr(args[0], context.get_value_type(result))
@@ -139,16 +154,5 @@ def _view(table: type) -> Any:
 tables_at, record_at = _view(Tables), _view(Record)
 
 
-@view_intrinsic
-def call_unit(typing, unit, address, t, first, second):  # type: ignore[no-untyped-def]
-    """Call the unit at address `unit` (see `ffr_dyn.kernels.units`)."""
-    signature = types.int64(types.int64, types.int64, types.float64, types.int64, types.int64)
-
-    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-        from llvmlite import ir
-
-        integer, real = ir.IntType(64), ir.DoubleType()
-        function = ir.FunctionType(integer, [integer, real, integer, integer])
-        return builder.call(builder.inttoptr(args[0], function.as_pointer()), list(args[1:]))
-
-    return signature, generate
+# call_unit(unit, address, t, first, second): the unit at address `unit` (see `ffr_dyn.kernels.units`).
+call_unit = call_of(types.int64, types.float64, types.int64, types.int64)

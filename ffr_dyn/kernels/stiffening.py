@@ -6,9 +6,9 @@ change from sweep to sweep is of the order (elastic deflection / size)^2, so thr
 two from the loads of the stage before.
 """
 
-from ffr_dyn.kernels.bodies import contract
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import call_unit
+from ffr_dyn.kernels.products import contract
 from ffr_dyn.kernels.rows import reaction
 from ffr_dyn.kernels.system import solve_loads
 from ffr_dyn.kernels.tables import MOTION

@@ -1,4 +1,5 @@
-"""What the kernels read (`Model`, constant) and write (`Work`, scratch). Made by `ffr_dyn.equations`; no objects inside.
+"""What the kernels read (`Model`, constant, made by `ffr_dyn.equations`) and write (`Work` and others, made by
+`ffr_dyn.memory`); no objects inside.
 
 Bodies are numbered 0 ... B-1; number B is the ground (identity rotation, no coordinates). Positions of a body are
 x = [R (3), p (4), q (n)], velocities v = [R_dot (3, global), omega_bar (3), q_dot (n)]; accelerations and generalised

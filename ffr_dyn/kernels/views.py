@@ -10,11 +10,11 @@ from typing import Any
 
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 
+from ffr_dyn.kernels.intrinsics import data_of, intrinsic
+
 _VECTOR = types.Array(types.float64, 1, "C")
-view_intrinsic: Any = intrinsic  # whose callers give one argument less than its definition has
 
 
 def array_at(context: Any, builder: Any, kind: Any, data: Any, shape: list[Any]) -> Any:
@@ -28,11 +28,7 @@ def array_at(context: Any, builder: Any, kind: Any, data: Any, shape: list[Any])
     return array._getvalue()
 
 
-def _data(context: Any, builder: Any, kind: Any, array: Any) -> Any:
-    return make_array(kind)(context, builder, array).data
-
-
-@view_intrinsic
+@intrinsic
 def vector_at(typing, address, size):  # type: ignore[no-untyped-def]
     """The array of `size` numbers at an address."""
 
@@ -43,23 +39,23 @@ def vector_at(typing, address, size):  # type: ignore[no-untyped-def]
     return _VECTOR(types.int64, types.int64), generate
 
 
-@view_intrinsic
+@intrinsic
 def part(typing, array, start, size):  # type: ignore[no-untyped-def]
     """`size` numbers from number `start` of a contiguous array on, whatever its axes: a.ravel()[start : start + size]."""
 
     def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-        first = builder.gep(_data(context, builder, array, args[0]), [args[1]], inbounds=True)
+        first = builder.gep(data_of(context, builder, array, args[0]), [args[1]], inbounds=True)
         return array_at(context, builder, _VECTOR, first, [args[2]])
 
     return _VECTOR(array, types.int64, types.int64), generate
 
 
-@view_intrinsic
+@intrinsic
 def peek(typing, array, number):  # type: ignore[no-untyped-def]
     """array[number] of a contiguous vector, for a number that is none of those counted from the end."""
 
     def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-        return builder.load(builder.gep(_data(context, builder, array, args[0]), [args[1]], inbounds=True))
+        return builder.load(builder.gep(data_of(context, builder, array, args[0]), [args[1]], inbounds=True))
 
     return array.dtype(array, types.int64), generate
 
@@ -68,10 +64,10 @@ def _parts(count: int) -> Any:
     """The compiled function that gives the first `count` rows of `size` numbers each of a contiguous array."""
     result = types.UniTuple(_VECTOR, count)
 
-    @view_intrinsic
+    @intrinsic
     def first_parts(typing, array, size):  # type: ignore[no-untyped-def]
         def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-            data, rows = _data(context, builder, array, args[0]), []
+            data, rows = data_of(context, builder, array, args[0]), []
             for number in range(count):
                 first = builder.gep(data, [builder.mul(args[1], cgutils.intp_t(number))], inbounds=True)
                 rows.append(array_at(context, builder, _VECTOR, first, [args[1]]))
