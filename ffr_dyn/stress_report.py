@@ -185,7 +185,7 @@ def _peak_picture(result: Result, body: str, spots: Sequence[HotSpot], quantity:
     camera = _view(shown.high - shown.low, next(iter(numbered.values()), shown.centre) - shown.centre)
     towards, surface = camera.axes()[0], result.geometry[body]
     marks = {f"({k})" if behind(surface, at, towards) else k: at for k, at in numbered.items()}
-    heading = _heading(result, body, of.words) + ("     (n): on the far side" if set(marks) - set(numbered) else "")
+    heading = _heading(result, body, of.words) + ("     (n): hidden" if set(marks) - set(numbered) else "")
     shown = replace(shown, colouring=shades, marks=marks, heading=heading)
     (picture,) = pictures(shown, camera, _SIZE)
     temporary = path.with_name(path.name + ".part")

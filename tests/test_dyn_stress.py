@@ -460,7 +460,7 @@ def test_the_result_file_keeps_stress_modes_and_section_forces(tmp_path):
         assert file["geometry/rod/stress"].attrs["units"] == "Pa m-1 kg-0.5"
 
 
-def test_places_on_the_far_side_are_told_from_those_that_are_seen():
+def test_places_that_the_body_hides_are_told_from_those_that_are_seen():
     surface = stressed_box().geometry["rod"]
     middle = surface.points.mean(axis=0)
     for axis in range(3):
