@@ -42,6 +42,7 @@ from ffr_prep.reference import SimplySupported
 GEOMETRY = Path(__file__).resolve().parent.parent / "meshes" / "connecting_rod.geo"
 THROW, ROD = 0.045, 0.150  # crank radius and distance of the eyes [m]
 SPEED = 4000 * 2 * np.pi / 60  # [rad/s]
+TURN = 2 * np.pi / SPEED  # [s]
 STRESS = 60e6  # [Pa], end of the colour bar: above what is left when the vibration of the start has decayed
 
 
@@ -84,6 +85,19 @@ def slider_crank(rod: FlexibleBody) -> Scene:
     )
 
 
+def motion(rod: FlexibleBody, path: Path | None = None) -> Result:
+    """Three turns."""
+    with progress("slider-crank", 3 * TURN) as update:
+        return forward(
+            slider_crank(rod),
+            end=3 * TURN,
+            output_step=TURN / 240,
+            method=ROS2(TURN / 4800),
+            path=path,
+            progress=update,
+        )
+
+
 def pictures(result: Result, folder: Path) -> None:
     """Slider motion, mid-rod deflection and reactions, and two films: coloured by deflection and by stress."""
     plot(
@@ -113,16 +127,7 @@ def main() -> None:
     rod = reduced_rod()
     save_body(rod, folder / "rod.ffr")
     print(f"body      {rod.mass:.4f} kg, {rod.n} modes, {rod.frequencies[0]:.0f} to {rod.frequencies[-1]:.0f} Hz")
-    turn = 2 * np.pi / SPEED
-    with progress("slider-crank", 3 * turn) as update:
-        result = forward(
-            slider_crank(rod),
-            end=3 * turn,
-            output_step=turn / 240,
-            method=ROS2(turn / 4800),
-            path=folder / "result.nc",
-            progress=update,
-        )
+    result = motion(rod, folder / "result.nc")
     bend = np.abs(result["rod.middle.displacement.y"]).max()
     load = np.abs(result["crank_pin.force"]).max()
     print(

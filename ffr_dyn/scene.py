@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -120,8 +120,8 @@ class Scene:
         return Stepper(self, method, **settings)
 
     def __post_init__(self) -> None:
-        for key in ("bodies", "joints", "drivers", "couplings", "loads", "springs", "forces", "measurements"):
-            object.__setattr__(self, key, tuple(getattr(self, key)))
+        for key, kinds in _DECLARATIONS.items():
+            object.__setattr__(self, key, _several(key, getattr(self, key), kinds))
         points = {key: _vector(at, 3, f"ground point {key!r}") for key, at in self.ground.items()}
         object.__setattr__(self, "ground", points)
         steady, base = _split_gravity(self.gravity, _acceleration("base_acceleration", self.base_acceleration))
@@ -148,6 +148,34 @@ class Scene:
             _check_force(self, force)
         for measurement in self.measurements:
             _check_measurement(self, measurement)
+
+
+_DECLARATIONS: dict[str, tuple[Any, ...]] = {
+    "bodies": (Body,),
+    "joints": (Joint,),
+    "drivers": (Driver, PointDriver),
+    "couplings": (Coupling,),
+    "loads": (Load,),
+    "springs": (SpringDamper,),
+    "forces": get_args(Force),
+    "measurements": get_args(AnyMeasurement),
+}
+
+
+def _several(key: str, given: Any, kinds: tuple[Any, ...]) -> tuple[Any, ...]:
+    """What is given as a tuple; InputError unless it is several things of these kinds."""
+    if isinstance(given, kinds):
+        raise InputError(
+            f"{key} of a scene is {type(given).__name__} {given.name!r} alone; give a tuple, such as (it,)"
+        )
+    if not isinstance(given, Iterable):
+        raise InputError(f"{key} of a scene is of the type {type(given).__name__}; give a tuple")
+    several = tuple(given)
+    for k, one in enumerate(several):
+        if not isinstance(one, kinds):
+            names = ", ".join(kind.__name__ for kind in kinds)
+            raise InputError(f"{key} of a scene: entry {k + 1} is of the type {type(one).__name__}; it takes: {names}")
+    return several
 
 
 def markers(scene: Scene) -> list[tuple[int, str, str]]:

@@ -30,6 +30,7 @@ from ffr_dyn.stress import (
     stressed_surface,
 )
 from ffr_dyn.units import readable
+from ffr_prep.body import Surface
 
 Places = dict[str, Array]
 
@@ -181,13 +182,35 @@ def _peak_picture(result: Result, body: str, spots: Sequence[HotSpot], quantity:
     shades = measure_colours(of, largest, frozenset([body]), lambda solid, frame: values) if largest else None
     numbered = {str(k + 1): np.array(s.position) for k, s in enumerate(spots) if s.body == body}
     shown = film_at(_at_rest(result, body), np.zeros(1), scale=0.0, colour="body")
-    shown = replace(shown, colouring=shades, marks=numbered, heading=_heading(result, body, of.words))
     camera = _view(shown.high - shown.low, next(iter(numbered.values()), shown.centre) - shown.centre)
+    towards, surface = camera.axes()[0], result.geometry[body]
+    marks = {f"({k})" if behind(surface, at, towards) else k: at for k, at in numbered.items()}
+    heading = _heading(result, body, of.words) + ("     (n): hidden" if set(marks) - set(numbered) else "")
+    shown = replace(shown, colouring=shades, marks=marks, heading=heading)
     (picture,) = pictures(shown, camera, _SIZE)
     temporary = path.with_name(path.name + ".part")
     Image.fromarray(picture).save(temporary, "PNG")
     os.replace(temporary, path)
     return path
+
+
+def behind(surface: Surface, point: Array, towards: Array) -> bool:
+    """Whether an eye far away in the direction `towards` (3,) sees a point (3,) of the undeformed surface covered by it.
+
+    Intersections of a ray with triangles: Moller & Trumbore 1997.
+    """
+    corners = surface.points[surface.triangles]
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    across = np.cross(towards, second)
+    volume = np.einsum("ti,ti->t", first, across)
+    crossed = np.abs(volume) > 1e-12 * np.linalg.norm(np.cross(first, second), axis=1)
+    first, second, across, volume = first[crossed], second[crossed], across[crossed], volume[crossed]
+    offset = point - corners[crossed, 0]
+    turned = np.cross(offset, first)
+    u, v = np.einsum("ti,ti->t", offset, across) / volume, turned @ towards / volume
+    distance = np.einsum("ti,ti->t", second, turned) / volume
+    size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
+    return bool(((u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 1e-6 * size)).any())
 
 
 def _heading(result: Result, body: str, words: str) -> str:

@@ -259,7 +259,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except click.UsageError as error:
         _leave(f"{error.format_message()} (ffr-prep --help tells more)", 2)
     except OSError as error:
-        _leave(f"{error.filename or 'file'}: {error.strerror or error}", 2)
+        _leave(f"{error.filename2 or error.filename or 'file'}: {error.strerror or error}; choose another place", 2)
     except MemoryError:
         _leave("not enough memory: make the mesh coarser", 1)
     except (click.Abort, KeyboardInterrupt):

@@ -126,7 +126,7 @@ def _run_gmsh(path: Path, job_file: Path, result: Path) -> None:
     if done.returncode == gmsh_process.UNLOADABLE:
         raise ComputationError(f"gmsh cannot be loaded ({said}); on Debian: apt-get install {_LIBRARIES}")
     if done.returncode == gmsh_process.UNREADABLE:
-        raise InputError(f"gmsh cannot read {path}: {said}")
+        raise InputError(f"gmsh cannot read {path}: {said}; is it complete, and does its ending name its format?")
     if done.returncode == gmsh_process.UNMESHED:
         raise ComputationError(f"gmsh could not mesh {path}: {said}; try another element size, or repair the geometry")
     if done.returncode:

@@ -12,6 +12,7 @@ units       text   such as "mm-t-s"; optional
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -65,13 +66,18 @@ def save_matrices(model: MatrixModel, path: str | Path) -> Path:
     return save_arrays(arrays, path)
 
 
+_ADVICE = "write it with numpy.savez or scipy.sparse.save_npz"
+
+
 def arrays_of(path: Path) -> dict[str, Array]:
     """The arrays of a .npz file by name; InputError for a file that is none."""
+    if not zipfile.is_zipfile(path):
+        raise InputError(f"{path} is damaged or not a .npz file; {_ADVICE}")
     try:
         with np.load(path, allow_pickle=False) as stored:
             return {key: stored[key] for key in stored.files}
     except Exception as error:  # a damaged zip or array header can fail in any way the readers know
-        raise InputError(f"{path} is damaged or not a .npz file ({error})") from None
+        raise InputError(f"{path} is damaged or not a .npz file ({error}); {_ADVICE}") from None
 
 
 def _matrix(path: Path, arrays: Mapping[str, Array], name: str) -> sp.csr_array:

@@ -25,7 +25,7 @@ from ffr_prep.interface import CoupledModel
 from ffr_prep.krylov import mean_motion
 from ffr_prep.modes import constraint_modes, modes_up_to, normal_modes
 from ffr_prep.receptance import free_modes, receptance_error, reference_modes
-from ffr_prep.selection import Accuracy, Selection, UpTo
+from ffr_prep.selection import Accuracy, Selection, UpTo, check_selection
 from ffr_prep.static_shapes import attachment_modes
 from ffr_prep.waves import resolution_warnings
 
@@ -51,6 +51,9 @@ class CraigBampton:
     """
 
     modes: Selection
+
+    def __post_init__(self) -> None:
+        check_selection("modes", self.modes)
 
     def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
         """Raises InputError without interfaces and for more modes than the model has."""
@@ -86,6 +89,9 @@ class Eigenmodes:
 
     modes: Selection
 
+    def __post_init__(self) -> None:
+        check_selection("modes", self.modes)
+
     def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
         """Raises InputError for more modes than the model has."""
 
@@ -107,6 +113,9 @@ class Rubin:
     """
 
     modes: Selection
+
+    def __post_init__(self) -> None:
+        check_selection("modes", self.modes)
 
     def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
         """Raises InputError without interfaces and for more modes than the model has."""
@@ -132,6 +141,10 @@ class CharacteristicModes:
 
     modes: Selection
     interface_modes: int | UpTo
+
+    def __post_init__(self) -> None:
+        check_selection("modes", self.modes)
+        check_selection("interface_modes", self.interface_modes, (UpTo,))
 
     def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
         """Raises InputError without interfaces and for more modes than there are."""

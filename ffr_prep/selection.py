@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Integral
 
 import numpy as np
 
@@ -68,3 +69,10 @@ class Accuracy:
 
 
 Selection = int | UpTo | Accuracy
+
+
+def check_selection(name: str, given: object, kinds: tuple[type, ...] = (UpTo, Accuracy)) -> None:
+    """Raises InputError unless it is a whole number or of these kinds; which numbers a model allows, it knows itself."""
+    if not isinstance(given, (Integral, *kinds)):
+        others = " or ".join(f"{kind.__name__}(...)" for kind in kinds)
+        raise InputError(f"{name} is {given!r}; give a whole number, or {others}")

@@ -37,7 +37,7 @@ from ffr_dyn.scene_text import save_scene
 from ffr_dyn.settings import Kinematic, Settings
 from ffr_dyn.stabilisation import Projection
 from ffr_dyn.stopwatch import Stopwatch
-from ffr_prep.body import rigid_body
+from ffr_prep.body import rigid_body, truncated
 
 SPAN = Span(0.4, 0.05)
 
@@ -559,6 +559,22 @@ def test_modes_of_rigid_bodies_cannot_vary():
         models_of(rigid(), (2, None))
     with pytest.raises(InputError, match="no flexible body"):
         models_of(rigid(), (None,), (("I5",),))
+
+
+def test_numbers_beyond_what_a_body_has_are_what_it_has_and_run_once():
+    scene = swinging()
+    n = scene.bodies[0].model.n
+
+    def labels(*numbers: int | None) -> list[str]:
+        return [model.label for model in models_of(scene, numbers)]
+
+    assert labels(2, 99, n, None) == ["2 modes", "full model"]
+    assert labels(99, 2, 100) == [f"{n} modes", "2 modes"]
+    assert [m.label for m in models_of(scene, (None,), ((), ("I5",), ("I5",)))] == ["full model", "without I5"]
+    fewer = truncated(scene.bodies[0].model, 2)
+    meshes = {"rod": [("own", scene.bodies[0].model), ("coarse", fewer)]}
+    found = models_of(scene, (3, 99), ((),), meshes)
+    assert [model.label for model in found] == ["3 modes, own", f"{n} modes, own", "2 modes, coarse"]
 
 
 def test_another_analysis_cannot_be_charted(tmp_path):

@@ -14,7 +14,7 @@ from ffr_dyn.analyses.forward import forward
 from ffr_dyn.drivers import Driver
 from ffr_dyn.errors import InputError, SimulationError
 from ffr_dyn.forces import Load, SpringDamper
-from ffr_dyn.integrators import ROS2, ROS3
+from ffr_dyn.integrators import HHT, RK4, ROS2, ROS3, GeneralisedAlpha, HalfExplicit, Variational
 from ffr_dyn.joints import Joint, frames
 from ffr_dyn.operations import SQRT
 from ffr_dyn.scene import Body, Scene
@@ -169,6 +169,26 @@ def test_pictures_that_cannot_be_written(monkeypatch, capsys, scene):
         (lambda: Body("b", cloud(3), damping=(0.1, 0.1)), "damping must be 3 numbers"),
         (lambda: with_point(cloud(3), "p", np.array([300.0, 0, 0])), r"point 'p' at \(300, 0, 0\) m is .* in metres"),
         (lambda: truncated(cloud(3), 99), "has 3 modes; asked to keep the first 99$"),
+        (lambda: ROS2("1e-3"), r"ROS2 needs a positive step in seconds, such as ROS2\(1e-3\); it is '1e-3'"),
+        (lambda: RK4(-1e-3), "RK4 needs a positive step .* it is -0.001"),
+        (lambda: ROS3(np.nan), "ROS3 needs a positive step .* it is nan"),
+        (lambda: HalfExplicit(None), "HalfExplicit needs a positive step .* it is None"),
+        (lambda: GeneralisedAlpha(0), "GeneralisedAlpha needs a positive step .* it is 0"),
+        (lambda: HHT(np.inf), "HHT needs a positive step .* it is inf"),
+        (lambda: Variational([1e-3]), r"Variational needs a positive step .* it is \[0.001\]"),
+        (lambda: forward(TWO, end=0.1, output_step=-0.1), "output step is -0.1 s; it must be positive"),
+        (
+            lambda: forward(TWO, start=0.1, end=0.0, output_step=0.1),
+            "duration, from start to end, is -0.1 s; it must be positive",
+        ),
+        (lambda: Scene(TWO.bodies[0]), r"bodies of a scene is Body 'cloud' alone; give a tuple, such as \(it,\)"),
+        (lambda: Scene(cloud(3)), "bodies of a scene is of the type FlexibleBody; give a tuple"),
+        (lambda: Scene((cloud(3),)), "entry 1 is of the type FlexibleBody; it takes: Body"),
+        (lambda: replace(TWO, joints=None), "joints of a scene is of the type NoneType; give a tuple"),
+        (
+            lambda: replace(TWO, forces=(Load("push", "cloud.b"),)),
+            "entry 1 is of the type Load; it takes: Bushing, Joint",
+        ),
         (lambda: with_point(with_point(cloud(3), "p", np.zeros(3)), "p", np.zeros(3)), "'p' is there more than once"),
     ],
 )

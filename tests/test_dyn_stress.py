@@ -41,7 +41,7 @@ from ffr_dyn.stress import (
     values_at,
     von_mises,
 )
-from ffr_dyn.stress_report import report_lines, stress_report
+from ffr_dyn.stress_report import behind, report_lines, stress_report
 from ffr_dyn.timefunction import polynomial
 from ffr_prep.body import SECTION_FORCES, BeamForces, Surface
 from ffr_prep.frame import Member, named, polyline
@@ -458,6 +458,21 @@ def test_the_result_file_keeps_stress_modes_and_section_forces(tmp_path):
         assert file["geometry/rod/stress"].dimensions == ("point", "component", "mode")
         assert file["geometry/rod/beams/modes"].dimensions == ("element", "place", "force", "mode")
         assert file["geometry/rod/stress"].attrs["units"] == "Pa m-1 kg-0.5"
+
+
+def test_places_that_the_body_hides_are_told_from_those_that_are_seen():
+    surface = stressed_box().geometry["rod"]
+    middle = surface.points.mean(axis=0)
+    for axis in range(3):
+        towards = np.array([0.31, 0.17, 0.23])
+        towards[axis] = 1.0
+        towards /= np.linalg.norm(towards)
+        near, far = middle.copy(), middle.copy()
+        near[axis], far[axis] = surface.points[:, axis].max(), surface.points[:, axis].min()
+        assert not behind(surface, near, towards)
+        assert behind(surface, far, towards)
+        assert behind(surface, near, -towards)
+        assert not behind(surface, far, -towards)
 
 
 def test_the_report_is_written_in_full(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -444,6 +445,10 @@ def test_the_report_says_it_all(fast, tmp_path):
         assert part in text
     assert "slider.pin.position.x" in text
     assert "Verified" in text
+    frequencies = {body.name: body.model.frequencies for body in fast.original.bodies}
+    counted = re.findall(r"(\w+), mode (\d+) \((\S+) Hz\)", text)
+    assert counted
+    assert all(f"{frequencies[body][int(mode) - 1]:.4g}" == hertz for body, mode, hertz in counted)  # from 1
     assert "| rod | flexible" in as_markdown(fast, "chart.png")
     page = as_html(fast, b"png")
     assert page.startswith("<!doctype html>")

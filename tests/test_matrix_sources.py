@@ -167,7 +167,7 @@ def test_npz_files_that_cannot_be_used(tmp_path, arrays, message):
 
 def test_files_that_are_none(tmp_path):
     (tmp_path / "bad.npz").write_bytes(b"PK not a zip")
-    with pytest.raises(InputError, match=r"bad\.npz is damaged or not a \.npz file"):
+    with pytest.raises(InputError, match=r"bad\.npz is damaged or not a \.npz file; write it with numpy\.savez"):
         read_matrices([tmp_path / "bad.npz"])
     with pytest.raises(InputError, match=r"none\.npz does not exist"):
         read_matrices([tmp_path / "none.npz"])

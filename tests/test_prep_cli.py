@@ -311,7 +311,16 @@ def test_exit_codes(error, code, message, capsys, monkeypatch):
 def test_output_that_cannot_be_written(tmp_path, capsys):
     assert_fails(capsys, "is a folder", "reduce", BAR[0], "--material", "steel", "-o", tmp_path)
     (tmp_path / "file").write_text("")
-    assert_fails(capsys, "file", "reduce", BAR[0], "--material", "steel", "-o", tmp_path / "file" / "b.ffr")
+    assert_fails(
+        capsys,
+        "file: File exists; choose another place",
+        "reduce",
+        BAR[0],
+        "--material",
+        "steel",
+        "-o",
+        tmp_path / "file" / "b.ffr",
+    )
 
 
 @pytest.mark.parametrize("damage", ["foreign", "truncated", "missing"])

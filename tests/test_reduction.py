@@ -16,8 +16,9 @@ from ffr_prep.factor import factorise, solve_refined, supported
 from ffr_prep.interface import InterfaceRegion, couple
 from ffr_prep.material import Material
 from ffr_prep.reduce import reduce_mesh
-from ffr_prep.reduction import CraigBampton, Eigenmodes
+from ffr_prep.reduction import CharacteristicModes, CraigBampton, Eigenmodes, Rubin
 from ffr_prep.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports, functionals
+from ffr_prep.selection import Accuracy, Band
 from ffr_prep.solids import assemble
 
 SIZE = (1.0, 0.1, 0.1)
@@ -380,6 +381,20 @@ def test_more_modes_than_degrees_of_freedom_are_refused():
         reduced(mesh, FixedTo("left"), Eigenmodes(500), [InterfaceRegion("left")])
     with pytest.raises(InputError, match="asked for -1 normal modes"):
         reduced(mesh, FixedTo("left"), Eigenmodes(-1), [InterfaceRegion("left")])
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: CraigBampton("a"), r"modes is 'a'; give a whole number, or UpTo\(...\) or Accuracy\(...\)"),
+        (lambda: Eigenmodes(2.5), "modes is 2.5; give a whole number"),
+        (lambda: Rubin(None), "modes is None; give a whole number"),
+        (lambda: CharacteristicModes(3, Accuracy(Band(1, 2), 0.1)), r"interface_modes is .*; .* or UpTo\(...\)$"),
+    ],
+)
+def test_modes_that_are_no_number_are_refused_at_once(make, words):
+    with pytest.raises(InputError, match=words):
+        make()
 
 
 def test_craig_bampton_needs_an_interface(beam):

@@ -82,6 +82,8 @@ def forward(
     Raises InputError for a scene or settings that cannot be used, SimulationError when the run fails: the message gives
     the time, the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
+    if not 0 < output_step < np.inf:
+        raise InputError(f"the output step is {output_step} s; it must be positive and finite")
     method = method if method is not None else ROS2(step=output_step / 10)
     if isinstance(method, (str, type)):
         raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
@@ -114,8 +116,8 @@ def forward(
 
 def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
     """(steps per output row, output rows)."""
-    if not (np.isfinite([span, output_step, step]).all() and span > 0 and output_step > 0 and step > 0):
-        raise InputError(f"duration, output step and step must be positive; they are {span}, {output_step}, {step} s")
+    if not 0 < span < np.inf:
+        raise InputError(f"the duration, from start to end, is {span} s; it must be positive and finite")
     substeps, rows = round(output_step / step), round(span / output_step)
     if substeps < 1 or abs(substeps * step - output_step) > 1e-9 * output_step:
         better = output_step / max(1, round(output_step / step))

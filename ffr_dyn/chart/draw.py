@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.legend_handler import HandlerLine2D
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator
@@ -28,7 +29,10 @@ COST_WORDS = {
 MARKERS = "os^Dv<>PXh*p"
 COLOURS = (*PALETTE, "#7B3294", "#8C510A", "#808080", "#A6D96A", "#B2182B")  # as many methods are told apart
 FRONT, FLOOR = "#222222", "#888888"
-FEW = (1.0, 0.5)  # decades of an axis, over which powers of ten are too few labels; and over which all ticks get one
+FEW = (1.0, 0.3)  # decades of an axis, over which powers of ten are too few labels; and over which all ticks get one
+ABOVE = 0.03  # of the height of a panel, free for the rings around the highest points
+ROOM = 15  # entries of a legend for which a place of the grid is high enough
+ENDS: Any = {"marker": "|", "markersize": 7}  # of the bars from the least to the greatest time
 LIMIT: Any = {"color": FRONT, "linestyle": "--", "linewidth": 1.0}
 _STYLE = {
     "font.size": 11.0,
@@ -69,8 +73,10 @@ def draw(
     columns = min(len(panels), columns)
     rows = -(-len(panels) // columns)
     lines = look(shown)
+    handles = _handles(shown, lines, bars=against != EVALUATIONS)
+    inside = len(panels) < rows * columns and len(handles) <= ROOM
     with mpl.rc_context(_STYLE):  # type: ignore[arg-type]
-        figure = Figure(figsize=(3.4 + 4.8 * columns, 0.6 + 3.9 * rows), layout="constrained")
+        figure = Figure(figsize=(4.8 * columns + (0.4 if inside else 3.4), 0.6 + 3.9 * rows), layout="constrained")
         grid = figure.subplots(rows, columns, squeeze=False).ravel()
         for axes in grid[len(panels) :]:
             axes.set_axis_off()
@@ -78,7 +84,7 @@ def draw(
             _panel(axes, diagram, measure, against, lines)
             words = diagram.measure(measure).words
             axes.set_title(words if len(shown) == 1 else f"{diagram.title}: {words}", fontsize=11.5)
-        _legend(figure, shown, lines)
+        _legend(figure, grid[-1] if inside else None, handles, sum(len(diagram.lost) for diagram in shown))
         figure.suptitle(title or f"{shown[0].title}: work and precision", fontweight="bold", x=0.01, ha="left")
         return _written(figure, path)
 
@@ -110,9 +116,10 @@ def _panel(
         axes.axhline(diagram.limits[measure] / scale, **LIMIT)
     axes.set_xscale("log")
     axes.set_yscale("log")
+    low, high = axes.get_ylim()
+    low = min(low, floor / scale / 3) if floor > 0 else low
+    axes.set_ylim(low, high * (high / low) ** ABOVE)
     if floor > 0:
-        low, high = axes.get_ylim()
-        axes.set_ylim(min(low, floor / scale / 3), high)
         below: Any = {"facecolor": "#EEEEEE", "edgecolor": FLOOR, "hatch": "///", "linewidth": 0, "zorder": 0}
         axes.axhspan(axes.get_ylim()[0], floor / scale, **below)
     for axis in (axes.xaxis, axes.yaxis):
@@ -152,14 +159,16 @@ def _front(axes: Axes, diagram: Diagram, measure: str, against: str) -> None:
     )  # fmt: skip
 
 
-def _legend(figure: Figure, shown: list[Diagram], lines: dict[tuple[str, str], tuple[str, str]]) -> None:
-    """Colours mean methods, markers models."""
+def _handles(shown: list[Diagram], lines: dict[tuple[str, str], tuple[str, str]], *, bars: bool) -> list[Artist]:
+    """Of the legend: colours mean methods, markers models."""
     handles: list[Artist] = []
     for series, colour in {series: colour for (series, _), (colour, _) in lines.items()}.items():
         handles.append(Line2D([], [], color=colour, linewidth=2.5, label=series))
     models = {model: marker for (_, model), (_, marker) in lines.items()}
     for model, marker in models.items() if len(models) > 1 else ():
         handles.append(Line2D([], [], color="#555555", marker=marker, markersize=6, linestyle="none", label=model))
+    if bars:
+        handles.append(Line2D([], [], color="#555555", label="least to greatest time", linewidth=1.0, **ENDS))
     ring: Any = {"marker": "o", "fillstyle": "none", "markersize": 10, "linestyle": "none"}
     handles.append(Line2D([], [], color=FRONT, label="Pareto front", **ring))
     if any(diagram.chosen for diagram in shown):
@@ -168,9 +177,24 @@ def _legend(figure: Figure, shown: list[Diagram], lines: dict[tuple[str, str], t
         handles.append(Line2D([], [], label="tolerance", **LIMIT))
     if any(floor > 0 for diagram in shown for floor in diagram.reference.floors.values()):
         handles.append(Patch(facecolor="#EEEEEE", edgecolor=FLOOR, hatch="///", label="error of the reference"))
-    lost = sum(len(diagram.lost) for diagram in shown)
-    title = f"{lost} variant{'s' * (lost > 1)} failed:\nsee the table" if lost else None
-    figure.legend(handles=handles, loc="outside right center", fontsize=10, alignment="left", title=title)
+    return handles
+
+
+def _legend(figure: Figure, free: Axes | None, handles: list[Artist], lost: int) -> None:
+    """In a free place of the grid, or else beside it."""
+    look: Any = {
+        "handles": handles, "fontsize": 10, "alignment": "left",
+        "title": f"{lost} variant{'s' * (lost > 1)} failed:\nsee the table" if lost else None,
+        "handler_map": {handle: HandlerLine2D(numpoints=2) for handle in handles if _is_bar(handle)},
+    }  # fmt: skip
+    if free is None:
+        figure.legend(loc="outside right center", **look)
+    else:
+        free.legend(loc="center", **look)
+
+
+def _is_bar(handle: Artist) -> bool:
+    return isinstance(handle, Line2D) and handle.get_marker() == ENDS["marker"]
 
 
 def _written(figure: Figure, path: Path) -> Path:

@@ -92,18 +92,26 @@ def models_of(
     drops: Iterable[Sequence[str]] = ((),),
     bodies: Mapping[str, Sequence[tuple[str, FlexibleBody]]] = {},
 ) -> tuple[Model, ...]:
-    """Every combination of numbers of modes (None: all), dropped terms, and body files (body -> (label, body)).
+    """Every combination of numbers of modes (None: all), dropped terms, and body files (body -> (label, body)), each once.
 
+    A number that no body has stands for the largest that one has, and is left out where all modes are asked for as well.
     Raises InputError where modes or terms vary and no body is flexible.
     """
     numbers, chosen = tuple(modes), tuple(tuple(terms) for terms in drops)
     if not any(body.model.n for body in scene.bodies) and (numbers != (None,) or any(chosen)):
         raise InputError("the scene has no flexible body: there are no modes and no inertia terms to vary")
     meshes = [[(body, label, model) for label, model in choices] for body, choices in bodies.items()]
-    return tuple(_model(*picked) for picked in product(numbers, chosen, product(*meshes)))
+    own = {body.name: body.model.n for body in scene.bodies}
+    found: list[Model] = []
+    for picked in product(*meshes):
+        most = max((own | {body: model.n for body, _, model in picked}).values())
+        counts = [number if number is None or number < most else most for number in numbers]
+        different = dict.fromkeys(None if None in counts and number == most else number for number in counts)
+        found += [_model(number, terms, picked) for number in different for terms in dict.fromkeys(chosen)]
+    return tuple(found)
 
 
-def _model(modes: int | None, drop: tuple[str, ...], meshes: tuple[tuple[str, str, FlexibleBody], ...]) -> Model:
+def _model(modes: int | None, drop: tuple[str, ...], meshes: Sequence[tuple[str, str, FlexibleBody]]) -> Model:
     words = [] if modes is None else ["rigid" if modes == 0 else f"{modes} mode{'s' * (modes > 1)}"]
     words += [f"without {' '.join(drop)}"] if drop else []
     words += [label for _, label, _ in meshes]

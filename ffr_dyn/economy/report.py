@@ -124,7 +124,8 @@ def _bodies(found: Economy) -> Table:
         ))  # fmt: skip
     text = (
         "Quasi-static: all its frequencies are above what the step resolves, so it deforms without vibrating. Shapes "
-        "are made of several modes, of which a few carry the deformation of this motion."
+        "are made of several modes, of which a few carry the deformation of this motion. Modes are counted from 1, in the "
+        "order of `ffr-prep info`."
     )
     columns = ("body", "modelled", "elastic coordinates", "terms kept", "terms dropped", "stiffening")
     return Table("Bodies", text, columns, tuple(rows))
@@ -137,7 +138,7 @@ def _modes(body: Body, choice: Choice, b: int) -> str:
     V = part.basis(body.model.n)
     hertz = np.sqrt(np.einsum("ia,i,ia->a", V, body.model.omega2, V)) / (2 * np.pi)
     if part.shapes is None:
-        return ", ".join(f"{mode} ({f:.4g} Hz)" for mode, f in zip(part.modes, hertz, strict=True))
+        return ", ".join(f"{mode + 1} ({f:.4g} Hz)" for mode, f in zip(part.modes, hertz, strict=True))
     return f"{part.count} shape{'s' * (part.count > 1)} of {len(part.modes)} modes: " + ", ".join(
         f"{f:.4g} Hz" for f in hertz
     )
@@ -204,7 +205,7 @@ def _leading(found: Economy, effects: Contributions, *, most: bool) -> Iterator[
     for k in order[: SHOWN if most else SHOWN // 2]:
         body = found.original.bodies[effects.body[k]]
         output = int(np.argmax(shares[k]))
-        name = f"{body.name}, mode {effects.mode[k]} ({body.model.frequencies[effects.mode[k]]:.4g} Hz)"
+        name = f"{body.name}, mode {effects.mode[k] + 1} ({body.model.frequencies[effects.mode[k]]:.4g} Hz)"
         yield name, found.probe.outputs[output].name, f"{shares[k, output]:.2g}"
 
 

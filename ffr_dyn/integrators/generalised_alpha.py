@@ -28,6 +28,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ffr_dyn.errors import InputError
+from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.actions import keep_turns
 from ffr_dyn.kernels.bodies import normalise, position_rates
 from ffr_dyn.kernels.calls import correct, evaluate, project, set_diagonal, settle, solve, solve_anew
@@ -213,6 +214,7 @@ class GeneralisedAlpha:
     unit: ClassVar[Unit] = generalised_alpha_step
 
     def __post_init__(self) -> None:
+        check_step(self, self.step)
         if not 0.0 <= self.spectral_radius <= 1.0:
             raise InputError(f"spectral_radius must be from 0 to 1; it is {self.spectral_radius}")
         if self.form not in ("index 3", "stabilised"):
@@ -252,6 +254,7 @@ class HHT:
     unit: ClassVar[Unit] = generalised_alpha_step
 
     def __post_init__(self) -> None:
+        check_step(self, self.step)
         if not 0.0 <= self.alpha <= 1.0 / 3.0:
             raise InputError(f"alpha must be from 0 to 1/3; it is {self.alpha}")
         if self.form not in ("index 3", "stabilised"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.bodies import normalise, position_rates
 from ffr_dyn.kernels.calls import evaluate, set_diagonal, settle, solve
 from ffr_dyn.kernels.packing import tables_at
@@ -65,3 +66,6 @@ class RK4:
     numbers: ClassVar[tuple[float, ...]] = ()
     calls: ClassVar[tuple[str, ...]] = ()
     unit: ClassVar[Unit] = rk4_step
+
+    def __post_init__(self) -> None:
+        check_step(self, self.step)

@@ -23,6 +23,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.bodies import normalise, position_rates
 from ffr_dyn.kernels.calls import add_elastic_part, correct, evaluate, set_diagonal, settle, solve
 from ffr_dyn.kernels.packing import tables_at
@@ -95,3 +96,6 @@ class ROS2:
     numbers: ClassVar[tuple[float, ...]] = ()
     calls: ClassVar[tuple[str, ...]] = ()
     unit: ClassVar[Unit] = ros2_step
+
+    def __post_init__(self) -> None:
+        check_step(self, self.step)

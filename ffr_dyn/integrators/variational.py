@@ -28,6 +28,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ffr_dyn.integrators.generalised_alpha import check_iterations
+from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.actions import keep_turns
 from ffr_dyn.kernels.bodies import mass_times, normalise, six_rows, three_rows
 from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, solve, solve_anew
@@ -363,6 +364,7 @@ class Variational:
     unit: ClassVar[Unit] = variational_step
 
     def __post_init__(self) -> None:
+        check_step(self, self.step)
         check_iterations(self.tolerance, self.iterations)
 
     @property
