@@ -16,6 +16,16 @@ Array = np.ndarray
 
 # What sorting costs: as much as this many multiplications per product (measured with 8 to 64 coordinates).
 SORTING = 8
+_NOTHING = 1e-16  # of the stiffness by a load, relative to that by the others
+
+
+def stiffening_loads(stiffening: Array) -> Array:
+    """Numbers of the loads that do anything, but for rounding, to the stiffness (loads, n, n).
+
+    Forces at an interface that the reference conditions hold do nothing.
+    """
+    size = np.abs(stiffening).max(axis=(1, 2), initial=0.0)
+    return np.flatnonzero(size > _NOTHING * size.max(initial=0.0))
 
 
 def in_blocks(table: Array, last: int, noise: Array) -> tuple[Array, Array]:

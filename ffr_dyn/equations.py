@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.couplings import Coupling, coupling_word
-from ffr_dyn.decoupling import in_blocks
+from ffr_dyn.decoupling import in_blocks, stiffening_loads
 from ffr_dyn.drivers import Driver, PointDriver, driver_word, path_words
 from ffr_dyn.elimination import Elimination, eliminate
 from ffr_dyn.errors import InputError
@@ -23,8 +23,10 @@ from ffr_prep.body import axial
 
 Array = np.ndarray
 
-ROUNDING = 1e-8  # of I5 and I9 of unit modes, and of the stiffness by a load: what symmetry leaves of zeros
-NOTHING = 1e-16  # of the stiffness by a load, relative to that by the others
+ROUNDING = 1e-8  # of I5 and I9 of unit modes: what symmetry leaves of zeros
+STIFFNESS_ROUNDING = (
+    1e-7  # the same of the stiffness by a load, relative to its largest: slopes of the modes are rougher
+)
 
 SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
@@ -256,7 +258,7 @@ def _stiffness(scene: Scene, marked: Markers) -> tuple[_Blocks, list[Array]]:
     owners: list[Hashable] = [
         (id(body.model), body.stiffening, loads) for body, loads in zip(scene.bodies, acting, strict=True)
     ]
-    noises = [ROUNDING * np.abs(K).max(axis=(0, 2), initial=0.0) for _, K in found]
+    noises = [STIFFNESS_ROUNDING * np.abs(K).max(axis=(0, 2), initial=0.0) for _, K in found]
     return _in_blocks([K for _, K in found], owners, noises, [0] * len(found)), [which for which, _ in found]
 
 
@@ -275,12 +277,8 @@ def _stiffening(body: Body) -> Array:
 
 
 def _active(stiffening: Array, acting: Sequence[int]) -> tuple[Array, Array]:
-    """(numbers of the loads, (n, loads, n) their stiffness) of those that act, and not for rounding alone.
-
-    Forces at an interface that the reference conditions hold do nothing.
-    """
-    size = np.abs(stiffening).max(axis=(1, 2), initial=0.0)
-    which = np.array([k for k in acting if k < size.size and size[k] > NOTHING * size.max()], dtype=np.int64)
+    """(numbers of the loads, (n, loads, n) their stiffness) of those that act and do anything."""
+    which = np.intersect1d(stiffening_loads(stiffening), acting).astype(np.int64)
     return which, np.moveaxis(stiffening[which], 2, 0)
 
 

@@ -14,6 +14,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
+from ffr_dyn.decoupling import stiffening_loads
 from ffr_dyn.drivers import PointDriver
 from ffr_dyn.errors import InputError
 from ffr_dyn.joint_forces import JointForce
@@ -101,7 +102,7 @@ def _obstacles(scene: Scene, normal: int) -> Iterator[str]:
         yield "there are forces of other kinds"
     for body in scene.bodies:
         k = body_normal(body, normal)
-        if not _symmetric(body.model, k, used_interfaces(scene, body)):
+        if not _symmetric(body, k, used_interfaces(scene, body)):
             yield f"body {body.name!r} is not symmetric"
     for load in scene.loads:
         k = normal if load.axes == "global" else _normal_of(scene, load.marker, normal)
@@ -165,10 +166,11 @@ def _normal_of(scene: Scene, marker: str, normal: int) -> int:
 # ---- symmetry of a body -------------------------------------------------------------------------------------------
 
 
-def _symmetric(body: FlexibleBody, k: int, used: Sequence[str]) -> bool:
+def _symmetric(part: Body, k: int, used: Sequence[str]) -> bool:
     """Whether in-plane motion excites nothing across body axis k, neither rigid nor elastic."""
     if k < 0:
         return False
+    body = part.model
     a, b = (c for c in range(3) if c != k)
     length = _length(body)
     offsets = [body.r_dm[k] / body.mass, *(body.interface(name).position[k] for name in used)]
@@ -178,7 +180,7 @@ def _symmetric(body: FlexibleBody, k: int, used: Sequence[str]) -> bool:
     stays, leaves = _stays(body, k, used), _leaves(body, k, used)
     if (stays == leaves).any():
         return False
-    if body.stiffening is not None and not _splits(body.stiffening, stays, k):
+    if part.stiffening and body.stiffening is not None and not _splits(body.stiffening, stays, k):
         return False
     PP, turning = body.PP_dm, axial(body.PP_dm)
     mixed = np.array([PP[a, a] + PP[b, b], turning[k]])[:, stays][:, :, leaves]
@@ -190,7 +192,7 @@ def _splits(stiffening: Array, stays: Array, k: int) -> bool:
     """Whether no load in the plane across body axis k couples modes that stay in the plane with modes that leave it."""
     in_plane = [c for c in range(3) if c != k] + [3 + k]
     acting = [*in_plane, 6 + k, *(c + first for first in range(12, len(stiffening), 6) for c in in_plane)]
-    stiffening = stiffening[acting]
+    stiffening = stiffening[np.intersect1d(acting, stiffening_loads(stiffening))]
     scale = np.abs(stiffening).max(axis=(1, 2), initial=0.0)
     mixed = np.abs(stiffening[:, stays][:, :, ~stays]).max(axis=(1, 2), initial=0.0)
     return bool((mixed <= 1e-6 * scale).all())

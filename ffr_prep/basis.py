@@ -27,6 +27,7 @@ from ffr_prep.reference import body_length, free_rigid_motions, motion_in_words
 Array = np.ndarray
 
 _TIE = 1e-6
+_EQUAL = 1e-8  # relative difference of squared frequencies that are meant to be equal: rounding, not the mesh
 _RIGID = 1e-9
 NO_INERTIA = 1e-14  # relative to the largest, of a body of size one
 _CONTAINED = 1e-8  # relative mass norm of what a vector adds to those before it
@@ -121,8 +122,24 @@ def diagonalised(model: CoupledModel, vectors: Array, K: Array) -> Basis:
     M = vectors.T @ (model.M @ vectors)
     scale = 1 / np.sqrt(np.diag(M))
     omega2, combination = scipy.linalg.eigh(K * np.outer(scale, scale), M * np.outer(scale, scale))
-    Z = vectors @ (scale[:, None] * combination)
+    Z = _aligned(model, vectors @ (scale[:, None] * combination), omega2)
     return Basis(Z * _signs(Z), omega2)
+
+
+def _aligned(model: CoupledModel, Z: Array, omega2: Array) -> Array:
+    """The modes, those of equal frequency turned among themselves to move along the axes: x first, then y, then z.
+
+    A round or square bar bends as easily in every plane; which two planes an eigenvalue solver picks is left to rounding.
+    In those of the axes, motions in a plane of symmetry and across it stay apart.
+    """
+    Z = Z.copy()
+    for equal in np.split(np.arange(omega2.size), np.flatnonzero(np.diff(omega2) > _EQUAL * omega2[1:]) + 1):
+        if equal.size > 1:
+            u = (model.B @ Z[:, equal]).reshape(-1, 3, equal.size)
+            along, axes = np.linalg.eigh(np.einsum("pci,c,pcj->ij", u, [1.0, 2.0, 3.0], u))
+            if np.ptp(along) > _TIE * along[-1]:  # else no direction is better than another
+                Z[:, equal] = Z[:, equal] @ axes
+    return Z
 
 
 def _signs(Z: Array) -> Array:

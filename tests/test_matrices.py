@@ -168,12 +168,15 @@ def test_a_frame_from_its_matrices(frame_model, reference):
 
 
 def test_what_a_frame_mass_does_not_say_is_small_for_slender_beams():
-    """First three bending pairs of a rod 1 m long, 5 mm thick, 32 elements: rP_dm to 1e-6 and PP_dm to 4e-3 of 1."""
+    """First three bending pairs of a rod 1 m long, 5 mm thick, 32 elements: rP_dm to 1e-6 and PP_dm to 6e-3 of 1.
+
+    In the planes of the axes; in planes between them the same error is spread over more entries.
+    """
     frame = rod(rectangle(0.005, 0.005), 1.0, 32)
     settings = {"interfaces": ENDS[:1], "reference": FixedTo("root"), "reduction": Eigenmodes(6)}
     own, body = reduce_frame(frame, name="body", **settings), reduced(of_frame(frame), **settings)
     assert np.abs(own.rP_dm - body.rP_dm).max() < 1e-6
-    assert np.abs(own.PP_dm - body.PP_dm).max() < 4e-3
+    assert np.abs(own.PP_dm - body.PP_dm).max() < 6e-3
     assert body.provenance["warnings"] == []
 
 

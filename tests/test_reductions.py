@@ -126,6 +126,21 @@ def test_frames_of_beams_are_reduced_as_well(frame, reduction):
     check_basis(frame, L, basis)
 
 
+@pytest.mark.parametrize("kind", ["hex27", "hex8"])
+def test_modes_of_equal_frequency_are_turned_to_the_axes(kind):
+    """A square bar: bending pairs, of which the first moves along y and the second along z."""
+    model = coupled(box_mesh(kind, SIZE, (6, 1, 1), origin=(0.0, -0.05, -0.05)))
+    basis = Eigenmodes(7).basis(model, factorised(model), functionals(FixedTo("left"), model))
+    u = (model.B @ basis.Z).reshape(-1, 3, 7)
+    share = np.einsum("pcj,pcj->cj", u, u) / np.einsum("pcj,pcj->j", u, u)
+    pairs = np.flatnonzero(np.diff(basis.omega2) < 1e-8 * basis.omega2[1:])
+    assert pairs.tolist()[:2] == [0, 2]
+    for first in pairs:
+        assert share[2, first] < 1e-3 * share[1, first]  # not zero: bending also spreads the section
+        assert share[1, first + 1] < 1e-3 * share[2, first + 1]
+    assert np.abs(basis.Z.T @ (model.M @ basis.Z) - np.eye(7)).max() < 1e-10
+
+
 def test_the_same_input_gives_the_same_bits(model, body):
     L = functionals(MeanAxis(), model)
     one, two = (REDUCTIONS[-1].basis(model, body, L) for _ in range(2))

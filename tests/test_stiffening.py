@@ -9,6 +9,7 @@ import pytest
 from boxes import STEEL, box_mesh
 from test_dyn_references import MESHES, slider_crank
 
+from ffr_dyn.analyses.assemble import flattened
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.drivers import Driver
 from ffr_dyn.integrators import RK4, ROS2
@@ -106,6 +107,9 @@ def test_stiffening_can_be_left_out_in_the_scene(rod):
         forward(s, end=0.008, output_step=4e-4, method=ROS2(1e-5)) for s in (without, slider_crank(plain), scene)
     ]
     np.testing.assert_array_equal(results[0]["rod.q"], results[1]["rod.q"])
+    assert all(
+        flattened(s, 0.0)[0].plane == "z" for s in (without, scene)
+    )  # a round rod, bent in the planes of the axes
     assert np.abs(results[0]["rod.q"] - results[2]["rod.q"]).max() > 0
 
 
