@@ -28,7 +28,7 @@ import numpy as np
 from benchmarks.exudyn_twin import CENTRE_OF_MASS, UNDEFORMED_BODY, exu, fem_interface, mass_terms, motion, twin
 from benchmarks.exudyn_twin import ObjectFFRFreducedOrderInterface as ReducedOrder
 from benchmarks.scenes import MeshedBody, connecting_rod, pendulum, pendulum_rod, slider_crank
-from ffr_dyn.analyses.assemble import assemble
+from ffr_dyn.analyses.assemble import assemble, in_space
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.integrators import RK4, Integrator
 from ffr_dyn.rotation import rotation_matrix
@@ -61,13 +61,13 @@ class Case:
 
 def pendulum_case(kind: str, steps: tuple[float, ...]) -> Case:
     rod = pendulum_rod(kind, 8)
-    scene = pendulum(rod.body)
+    scene = in_space(pendulum(rod.body))
     return Case(f"pendulum, {kind}", rod, scene, "rod.tip", (0.6, 0.0, 0.0), 0.5, 50, 1e-5, steps)
 
 
 def slider_crank_case(kind: str, end: float, steps: tuple[float, ...]) -> Case:
     rod = connecting_rod(kind, 8)
-    scene, rows = slider_crank(rod.body), round(end / 1e-3)
+    scene, rows = in_space(slider_crank(rod.body)), round(end / 1e-3)
     return Case(f"slider-crank, {kind}", rod, scene, "slider.pin", (0.15, 0.0, 0.0), end, rows, 2.5e-6, steps)
 
 

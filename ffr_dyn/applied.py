@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.constraints import Row, evaluate_word
+from ffr_dyn.constraints import Parts, Row, add_part, evaluate_word, summed_parts
 from ffr_dyn.curve import Curve, curve_value
 from ffr_dyn.force_tables import Action, actions_of, coordinate_axes, coordinate_ends
 from ffr_dyn.forces import (
@@ -146,7 +146,8 @@ def _coordinate(now: Moment, action: Action) -> Row:
     start = 0 if isinstance(action, SpringDamper) else turns_of(action)
     angle = np.arctan2(s.Phi, c.Phi) + 2 * np.pi * start
     rate = (c.Phi * s.nu - s.Phi * c.nu) / square
-    return Row(float(angle), float(rate), 0.0, (c.Phi * s.jacobian - s.Phi * c.jacobian) / square)
+    parts = summed_parts([(c.Phi / square, s), (-s.Phi / square, c)])
+    return Row(float(angle), float(rate), 0.0, parts, now.place.v_size)
 
 
 def _product(now: Moment, kind: int, a: Array, b: Array, i: int, j: int) -> Row:
@@ -155,15 +156,13 @@ def _product(now: Moment, kind: int, a: Array, b: Array, i: int, j: int) -> Row:
 
 def _length(now: Moment, i: int, j: int) -> Row:
     at_i, at_j = (marker_point(now.scene, now.place, now.x, now.v, k) for k in (i, j))
-    d, jacobian = at_j.r - at_i.r, np.zeros(now.place.v_size)
+    d, parts = at_j.r - at_i.r, Parts()
     size = float(np.linalg.norm(d))
     if size == 0:
-        return Row(0.0, 0.0, 0.0, jacobian)
+        return Row(0.0, 0.0, 0.0, parts, now.place.v_size)
     for at, sign in ((at_i, -1), (at_j, 1)):
-        if at.body < len(now.place.n):
-            first = now.place.iv[at.body]
-            jacobian[first : first + at.jacobian.shape[1]] += sign * d / size @ at.jacobian
-    return Row(size, float(d / size @ (at_j.r_dot - at_i.r_dot)), 0.0, jacobian)
+        add_part(now.place, parts, at, sign * d / size @ at.jacobian)
+    return Row(size, float(d / size @ (at_j.r_dot - at_i.r_dot)), 0.0, parts, now.place.v_size)
 
 
 def _law(now: Moment, action: Action, c: float, rate: float) -> float:
@@ -257,14 +256,14 @@ def _scaled(row: Row, g: float, growth: Row) -> Row:
         g * row.Phi,
         g * row.nu + row.Phi * growth.nu,
         0.0,
-        g * row.jacobian + row.Phi * growth.jacobian,
+        summed_parts([(g, row), (row.Phi, growth)]),
+        row.size,
     )
 
 
 def _mixed(terms: list[tuple[float, Row]]) -> Row:
-    values = ((f * row.Phi, f * row.nu, f * row.jacobian) for f, row in terms)
-    Phi, nu, jacobian = (sum(parts) for parts in zip(*values, strict=True))
-    return Row(float(Phi), float(nu), 0.0, np.asarray(jacobian))
+    Phi, nu = (float(sum(part)) for part in zip(*((f * row.Phi, f * row.nu) for f, row in terms), strict=True))
+    return Row(Phi, nu, 0.0, summed_parts(terms), terms[0][1].size)
 
 
 def stretch(s: float, c: float) -> tuple[float, float, float]:

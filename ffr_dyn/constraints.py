@@ -15,6 +15,7 @@ to this one, is `ffr_dyn.kernels.rows`.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,14 +29,38 @@ Array = np.ndarray
 Drive = tuple[float, float, float]
 
 
+Parts = dict[int, Array]  # by the first column of a body
+
+
 @dataclass(frozen=True)
 class Row:
-    """Phi, nu = dPhi/dt, gamma with Phi_q v_dot = gamma, and the Jacobian row (V,)."""
+    """Phi, nu = dPhi/dt, gamma with Phi_q v_dot = gamma, and the Jacobian row.
+
+    parts : of the Jacobian row of `size` V what need not vanish, (6 + n,) numbers of each body
+    """
 
     Phi: float
     nu: float
     gamma: float
-    jacobian: Array
+    parts: Parts
+    size: int
+
+    @property
+    def jacobian(self) -> Array:
+        """(V,) the whole row."""
+        whole = np.zeros(self.size)
+        for first, part in self.parts.items():
+            whole[first : first + part.size] = part
+        return whole
+
+
+def summed_parts(terms: Iterable[tuple[float, Row]]) -> Parts:
+    """Of the sum of rows, each times a number."""
+    total = Parts()
+    for factor, row in terms:
+        for first, part in row.parts.items():
+            total[first] = total[first] + factor * part if first in total else factor * part
+    return total
 
 
 def evaluate_word(
@@ -85,18 +110,18 @@ def _driven(row: Row, drive: Drive) -> Row:
 def _distance(place: Layout, at_i: Motion, at_j: Motion, drive: Drive) -> Row:
     """Half of D / s - s, with D the square of the distance, and its derivatives by the quotient rule."""
     s, speed, second = drive
-    jacobian = np.zeros(place.v_size)
+    parts = Parts()
     d, d_dot, d_bias = at_j.r - at_i.r, at_j.r_dot - at_i.r_dot, at_j.bias - at_i.bias
-    _add(place, jacobian, at_i, -d @ at_i.jacobian / s)
-    _add(place, jacobian, at_j, d @ at_j.jacobian / s)
+    add_part(place, parts, at_i, -d @ at_i.jacobian / s)
+    add_part(place, parts, at_j, d @ at_j.jacobian / s)
     D, D_dot, D_bias = d @ d, 2 * d @ d_dot, 2 * (d_dot @ d_dot + d @ d_bias)
     nu = (D_dot / s - D * speed / s**2 - speed) / 2
     bias = (D_bias / s - 2 * D_dot * speed / s**2 - D * second / s**2 + 2 * D * speed**2 / s**3 - second) / 2
-    return Row(float(D / s - s) / 2, float(nu), float(-bias), jacobian)
+    return Row(float(D / s - s) / 2, float(nu), float(-bias), parts, place.v_size)
 
 
 def _relation(scene: Scene, place: Layout, x: Array, v: Array, word: Word, at: tuple[int, ...], drive: Drive) -> Row:
-    total = Row(0.0, 0.0, 0.0, np.zeros(place.v_size))
+    total = Row(0.0, 0.0, 0.0, {}, place.v_size)
     for k in range(2):
         factor, kind = word.relation[2 * k : 2 * k + 2]
         row = _coordinate(scene, place, x, v, int(kind), word.axes[3 * k : 3 * k + 3], at[2 * k : 2 * k + 2])
@@ -128,16 +153,17 @@ def _sum(one: Row, a: float, other: Row, b: float) -> Row:
         a * one.Phi + b * other.Phi,
         a * one.nu + b * other.nu,
         a * one.gamma + b * other.gamma,
-        a * one.jacobian + b * other.jacobian,
+        summed_parts([(a, one), (b, other)]),
+        one.size,
     )
 
 
 def _coincidence(place: Layout, at_i: Motion, at_j: Motion, drive: Drive, c: int) -> Row:
-    jacobian = np.zeros(place.v_size)
-    _add(place, jacobian, at_i, -at_i.jacobian[c])
-    _add(place, jacobian, at_j, at_j.jacobian[c])
-    difference = at_j.r - at_i.r
-    return _driven(Row(difference[c], (at_j.r_dot - at_i.r_dot)[c], (at_i.bias - at_j.bias)[c], jacobian), drive)
+    parts = Parts()
+    add_part(place, parts, at_i, -at_i.jacobian[c])
+    add_part(place, parts, at_j, at_j.jacobian[c])
+    off, rate, bias = at_j.r - at_i.r, at_j.r_dot - at_i.r_dot, at_i.bias - at_j.bias
+    return _driven(Row(off[c], rate[c], bias[c], parts, place.v_size), drive)
 
 
 def _dot(place: Layout, a: Motion, sums: list[tuple[Motion, float]]) -> Row:
@@ -145,15 +171,16 @@ def _dot(place: Layout, a: Motion, sums: list[tuple[Motion, float]]) -> Row:
     d = sum(sign * m.r for m, sign in sums)
     d_dot = sum(sign * m.r_dot for m, sign in sums)
     d_bias = sum(sign * m.bias for m, sign in sums)
-    jacobian = np.zeros(place.v_size)
-    _add(place, jacobian, a, d @ a.jacobian)
+    parts = Parts()
+    add_part(place, parts, a, d @ a.jacobian)
     for m, sign in sums:
-        _add(place, jacobian, m, sign * (a.r @ m.jacobian))
+        add_part(place, parts, m, sign * (a.r @ m.jacobian))
     gamma = -(a.bias @ d + 2 * a.r_dot @ d_dot + a.r @ d_bias)
-    return Row(float(a.r @ d), float(a.r_dot @ d + a.r @ d_dot), float(gamma), jacobian)
+    return Row(float(a.r @ d), float(a.r_dot @ d + a.r @ d_dot), float(gamma), parts, place.v_size)
 
 
-def _add(place: Layout, jacobian: Array, motion: Motion, row: Array) -> None:
+def add_part(place: Layout, parts: Parts, motion: Motion, row: Array) -> None:
+    """Add the row (6 + n,) on the velocities of the body of a motion; nothing for the ground."""
     if motion.body < len(place.n):
         at = place.iv[motion.body]
-        jacobian[at : at + row.size] += row
+        parts[at] = parts[at] + row if at in parts else row

@@ -7,6 +7,7 @@ chains and trees and little for a few loops (George & Liu 1981, ch. 5).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
 
 
 @dataclass(frozen=True)
@@ -28,15 +29,25 @@ def eliminate(sizes: list[int], bodies: list[tuple[int, ...]]) -> Elimination:
     for group in at_body.values():
         for k in group:
             neighbours[k].update(g for g in group if g != k)
+
+    def degree(k: int) -> int:
+        return sum(sizes[g] for g in neighbours[k])
+
     order: list[int] = []
     columns: list[set[int]] = []
+    waiting = [(degree(k), k) for k in range(count)]
+    heapify(waiting)
     left = set(range(count))
-    while left:
-        best = min(left, key=lambda k: (sum(sizes[g] for g in neighbours[k]), k))
+    while waiting:
+        found, best = heappop(waiting)
+        if best not in left or found != degree(best):
+            continue  # its degree has changed: it waits with the new one, too
         clique = neighbours[best]
         for k in clique:
             neighbours[k] |= clique
             neighbours[k] -= {k, best}
+        for k in clique:
+            heappush(waiting, (degree(k), k))
         order.append(best)
         columns.append(set(clique))
         left.remove(best)

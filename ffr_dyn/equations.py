@@ -15,18 +15,16 @@ from ffr_dyn.elimination import Elimination, eliminate
 from ffr_dyn.errors import InputError
 from ffr_dyn.force_tables import Callback, FunctionTable, base_functions, load_tables, marker_numbers
 from ffr_dyn.joints import RELATION, Joint, Word, words
-from ffr_dyn.kernels.tables import LANES, Bodies, Markers, Model, Pattern, Rows
+from ffr_dyn.kernels.tables import LANES, SIX, Bodies, Markers, Model, Pattern, Rows
 from ffr_dyn.layout import Layout, layout
-from ffr_dyn.scene import Body, Scene, joint_of, joints_of, marker_number, markers
+from ffr_dyn.scene import Body, MarkerName, Scene, joint_of, joints_of, marker_number, markers
 from ffr_dyn.state import StateView
 from ffr_prep.body import axial
 
 Array = np.ndarray
 
 ROUNDING = 1e-8  # of I5 and I9 of unit modes: what symmetry leaves of zeros
-STIFFNESS_ROUNDING = (
-    1e-7  # the same of the stiffness by a load, relative to its largest: slopes of the modes are rougher
-)
+STIFFNESS_ROUNDING = 1e-7  # the same of the stiffness by a load, relative to its largest: slopes are rougher
 
 SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
@@ -133,7 +131,7 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: f
     return System(scene, place, ordered, elimination, compiled, user, functions.inputs())
 
 
-def _moving(block: Block, table: list[tuple[int, str, str]], ground: int) -> tuple[int, ...]:
+def _moving(block: Block, table: tuple[MarkerName, ...], ground: int) -> tuple[int, ...]:
     """The bodies that a block ties, each once."""
     return tuple(dict.fromkeys(table[k][0] for k in block.markers if table[k][0] != ground))
 
@@ -218,7 +216,7 @@ def _bodies(scene: Scene, place: Layout, marked: Markers) -> Bodies:
     where[:-1, 8:] = np.column_stack(
         [
             _starts(counts)[:-1],
-            _starts([a * b for a, b in zip(n, counts, strict=True)])[:-1],
+            _starts([a * in_sixes(b) for a, b in zip(n, counts, strict=True)])[:-1],
             P_start // 3,
             PP.first,
             len(PP.plans) + K.first,
@@ -241,6 +239,11 @@ def _bodies(scene: Scene, place: Layout, marked: Markers) -> Bodies:
     )
 
 
+def in_sixes(loads: int) -> int:
+    """How many loads there is room for."""
+    return -(-loads // SIX) * SIX
+
+
 def _second_moments(scene: Scene, place: Layout) -> _Blocks:
     """I5 and I9 of all bodies: a unit mode has a second moment of one, so the size of their rounding is known."""
     owners: list[Hashable] = [
@@ -253,7 +256,7 @@ def _second_moments(scene: Scene, place: Layout) -> _Blocks:
 
 def _stiffness(scene: Scene, marked: Markers) -> tuple[_Blocks, list[Array]]:
     """The geometric stiffness of all bodies, and the numbers of the loads that have any."""
-    acting = [_acting(body, b, marked) for b, body in enumerate(scene.bodies)]
+    acting = [_acting(numbers) for numbers in _used_markers(scene, marked)]
     found = [_active(_stiffening(body), loads) for body, loads in zip(scene.bodies, acting, strict=True)]
     owners: list[Hashable] = [
         (id(body.model), body.stiffening, loads) for body, loads in zip(scene.bodies, acting, strict=True)
@@ -262,10 +265,18 @@ def _stiffness(scene: Scene, marked: Markers) -> tuple[_Blocks, list[Array]]:
     return _in_blocks([K for _, K in found], owners, noises, [0] * len(found)), [which for which, _ in found]
 
 
-def _acting(body: Body, b: int, marked: Markers) -> tuple[int, ...]:
-    """Which loads body number b may have: twelve inertial ones, and those at interfaces that anything acts on."""
-    used = [int(marked.load[k]) for k in marked.active if marked.body[k] == b]
-    return (*range(12), *(first + c for first in used if first >= 0 for c in range(6)))
+def _used_markers(scene: Scene, marked: Markers) -> list[list[int]]:
+    """Per body, the numbers among its loads of the forces at markers that anything acts on."""
+    used: list[list[int]] = [[] for _ in scene.bodies]
+    for k in marked.active:
+        if marked.load[k] >= 0:
+            used[marked.body[k]].append(int(marked.load[k]))
+    return used
+
+
+def _acting(firsts: list[int]) -> tuple[int, ...]:
+    """Which loads a body may have: twelve inertial ones, and those at interfaces that anything acts on."""
+    return (*range(12), *(first + c for first in firsts for c in range(6)))
 
 
 def _stiffening(body: Body) -> Array:
@@ -339,7 +350,7 @@ def _pattern(
     blocks: tuple[Block, ...],
     moving: list[tuple[int, ...]],
     elimination: Elimination,
-    table: list[tuple[int, str, str]],
+    table: tuple[MarkerName, ...],
 ) -> Pattern:
     size = [len(b.words) for b in blocks]
     offsets: dict[tuple[int, int], int] = {}

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.equations import System
+from ffr_dyn.equations import System, in_sixes
 from ffr_dyn.kernels.tables import LANES, Bodies, BodyWork, LoadWork, MarkerWork, Model, Record, RowWork, Stages, Work
 from ffr_dyn.kernels.vectors import LEAST_PIVOT
 from ffr_dyn.rotation import skew
@@ -53,7 +53,9 @@ def _body_work(m: Model, keeps_terms: bool) -> BodyWork:
         sorted=np.zeros(2 * longest + products + 1 + 3 * longest + 1),
         **_zeros(H=3 * E, Cd=6 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6), elastic=E),
         **_zeros(more=V, unstiffened=E, shift=V, load=(B, int(m.markers.load.max(initial=6)) + 6)),
-        **_zeros(stiff=int((m.bodies.where[:-1, 6] * n[:-1]).sum())),
+        **_zeros(
+            stiff=sum(in_sixes(int(loads)) * int(k) for loads, k in zip(m.bodies.where[:-1, 6], n[:-1], strict=True))
+        ),
     )
     work.inverse[:, 0] = [_inverse(mass) for mass in m.bodies.mass]
     for b in np.flatnonzero(n[:-1] == 0):

@@ -6,8 +6,10 @@ A marker is named "body.interface" or "ground.point".
 from __future__ import annotations
 
 import difflib
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, get_args
 
 import numpy as np
@@ -83,6 +85,9 @@ class Body:
         object.__setattr__(self, "dropped", tuple(t for t in INERTIA_TERMS if t in self.dropped))
 
 
+MarkerName = tuple[int, str, str]  # number and name of the body, name of the point
+
+
 @dataclass(frozen=True)
 class Scene:
     """Everything an analysis needs. Raises InputError for names that do not exist, repeat or contradict each other.
@@ -118,6 +123,16 @@ class Scene:
         from ffr_dyn.stepper import Stepper  # stands above this module, and loads the compiler
 
         return Stepper(self, method, **settings)
+
+    @cached_property
+    def _markers(self) -> tuple[MarkerName, ...]:
+        listed = [(b, body.name, i.name) for b, body in enumerate(self.bodies) for i in body.model.interfaces]
+        return (*listed, *((len(self.bodies), GROUND, point) for point in self.ground))
+
+    @cached_property
+    def _numbers(self) -> dict[str, int]:
+        """Of markers, by name."""
+        return {f"{body}.{point}": k for k, (_, body, point) in enumerate(self._markers)}
 
     def __post_init__(self) -> None:
         for key, kinds in _DECLARATIONS.items():
@@ -178,22 +193,21 @@ def _several(key: str, given: Any, kinds: tuple[Any, ...]) -> tuple[Any, ...]:
     return several
 
 
-def markers(scene: Scene) -> list[tuple[int, str, str]]:
+def markers(scene: Scene) -> tuple[MarkerName, ...]:
     """All markers as (body number, body name, point name): every interface of every body, then the ground's points."""
-    listed = [(b, body.name, i.name) for b, body in enumerate(scene.bodies) for i in body.model.interfaces]
-    return listed + [(len(scene.bodies), GROUND, point) for point in scene.ground]
+    return scene._markers
 
 
-def marker_names(scene: Scene) -> list[str]:
+def marker_names(scene: Scene) -> tuple[str, ...]:
     """Names "body.interface" in the order of `markers`."""
-    return [f"{body}.{point}" for _, body, point in markers(scene)]
+    return tuple(scene._numbers)
 
 
 def marker_number(scene: Scene, name: str) -> int:
     """Index of a marker; InputError says which body or interface does not exist and what there is."""
-    names = marker_names(scene)
+    names = scene._numbers
     if name in names:
-        return names.index(name)
+        return names[name]
     body, _, point = name.partition(".")
     bodies = [GROUND, *(b.name for b in scene.bodies)]
     if body not in bodies:
@@ -313,7 +327,7 @@ def _check_names(scene: Scene) -> None:
         *scene.measurements,
     )
     names = [thing.name for thing in things]
-    repeated = sorted({name for name in names if names.count(name) > 1})
+    repeated = sorted(name for name, count in Counter(names).items() if count > 1)
     if repeated:
         raise InputError(f"the name {repeated[0]!r} is used more than once in the scene; every name must be its own")
     for name in names:

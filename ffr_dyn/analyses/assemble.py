@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import qr
+from scipy.sparse import block_diag, csr_array
 
 from ffr_dyn.constraints import Row, evaluate_word
 from ffr_dyn.equations import Block, System, blocks_of, compile_scene
@@ -19,6 +20,7 @@ from ffr_dyn.joints import DISTANCE, Word
 from ffr_dyn.layout import Layout, initial_state, layout
 from ffr_dyn.plane import planar_forms
 from ffr_dyn.rotation import G_bar, rotation_matrix
+from ffr_dyn.row_space import independent, smallest_solution
 from ffr_dyn.scene import Scene
 from ffr_dyn.timefunction import POLYNOMIAL, TimeFunction, evaluate
 from ffr_dyn.validity import stretch
@@ -138,17 +140,29 @@ def _across(scene: Scene, blocks: list[Block], time: float) -> tuple[list[bool],
         step = np.where(active, scale * rng.normal(size=place.v_size), 0.0)
         x, speeds = _moved(place, start, step), v + _to_global(place, start, 100 * step)
         rows = rows_at(scene, place, blocks, x, speeds, time)
-        held = np.array([row.jacobian[~active] for row in rows]).reshape(-1, np.sum(~active))
-        inside.append([np.abs(row.jacobian[active]).max(initial=0.0) for row in rows])
-        outside.append([np.abs(row.jacobian[~active]).max(initial=0.0) for row in rows])
+        inside.append([_largest(row, active) for row in rows])
+        outside.append([_largest(row, ~active) for row in rows])
         left.append([max(abs(row.Phi), abs(row.nu), abs(row.gamma)) for row in rows])
     most_inside, most_outside, most_left = (np.array(part).max(axis=0) for part in (inside, outside, left))
     across = most_inside <= RANK_TOLERANCE * most_outside
     mixed = ~across & (most_outside > RANK_TOLERANCE * most_inside)
     moving = np.array([_changes(word.function) for block in blocks for word in block.words], bool)
     asked = (most_left[across] >= ASKED).any() or moving[across].any()
-    kept = np.linalg.matrix_rank(held[across]) == np.sum(~active)
-    return across.tolist(), bool(kept and not (mixed.any() or asked))
+    held = [row for row, k in zip(rows, across, strict=True) if k]
+    pure = not (mixed.any() or asked) and _columns_independent(stacked(held, place)[:, ~active])
+    return across.tolist(), bool(pure)
+
+
+def _largest(row: Row, chosen: Array) -> float:
+    """The largest entry of the Jacobian row at chosen (V,) velocities."""
+    return max(
+        (float(np.abs(part[chosen[k : k + part.size]]).max(initial=0.0)) for k, part in row.parts.items()), default=0.0
+    )
+
+
+def _columns_independent(A: csr_array) -> bool:
+    """Whether no combination of the columns vanishes."""
+    return independent(csr_array(A.T)) or int(np.linalg.matrix_rank(A.toarray())) == A.shape[1]
 
 
 def _changes(function: TimeFunction | None) -> bool:
@@ -240,29 +254,45 @@ def independent_blocks(
         nearby = _neighbour(scene, place, blocks, x, v, time, rows)
         others = _independent(scene, place, nearby, rows_at(scene, place, blocks, nearby, v, time))
         keep = others if others.size > keep.size else keep
-    said = [(block, word) for block in blocks for word in block.words]
-    dropped = [said[k] for k in range(len(said)) if k not in keep]
+    said, chosen = [(block, word) for block in blocks for word in block.words], set(keep.tolist())
+    dropped = [said[k] for k in range(len(said)) if k not in chosen]
     for block, _ in dropped:
         if block.driver:
             raise InputError(f"driver {block.name!r} prescribes a motion that the joints and other drivers already fix")
     kept = iter(range(len(said)))
-    left = [replace(block, words=tuple(word for word in block.words if next(kept) in keep)) for block in blocks]
+    left = [replace(block, words=tuple(word for word in block.words if next(kept) in chosen)) for block in blocks]
     return left, [(block.name, word.text) for block, word in dropped]
 
 
 # ---- linear algebra -----------------------------------------------------------------------------------------------
 
 
-def _weights(scene: Scene, place: Layout, x: Array, elastic: bool) -> Array:
+def stacked(rows: list[Row], place: Layout) -> csr_array:
+    """(C, V) the Jacobian of the rows."""
+    starts = np.cumsum([0, *(sum(part.size for part in row.parts.values()) for row in rows)])
+    columns = [np.arange(k, k + part.size) for row in rows for k, part in row.parts.items()]
+    values = [part for row in rows for part in row.parts.values()]
+    nothing = np.zeros(0)
+    return csr_array(
+        (np.concatenate([nothing, *values]), np.concatenate([nothing.astype(int), *columns]), starts),
+        shape=(len(rows), place.v_size),
+    )
+
+
+def _weights(scene: Scene, place: Layout, x: Array, elastic: bool) -> csr_array:
     """W^(1/2) (V, V) with W the inverse mass matrix; zero for coordinates that may not move."""
-    W = np.zeros((place.v_size, place.v_size))
+    blocks, known = [], dict[tuple[int, bytes, tuple[int, ...]], Array]()
     for b, body in enumerate(scene.bodies):
-        M = mass_matrix(body.model, x[place.q(b)])
-        active = np.array([*place.active(b), *range(6, 6 + place.n[b] if elastic else 6)])
-        values, vectors = np.linalg.eigh(M[np.ix_(active, active)])
-        at = place.iv[b] + active
-        W[np.ix_(at, at)] = vectors / np.sqrt(np.maximum(values, 1e-12 * values.max()))
-    return W
+        q, n = x[place.q(b)], place.n[b]
+        active = (*place.active(b), *range(6, 6 + n if elastic else 6))
+        key = id(body.model), q.tobytes(), active
+        if key not in known:
+            at = np.ix_(active, active)
+            values, vectors = np.linalg.eigh(mass_matrix(body.model, q)[at])
+            known[key] = np.zeros((6 + n, 6 + n))
+            known[key][at] = vectors / np.sqrt(np.maximum(values, 1e-12 * values.max()))
+        blocks.append(known[key])
+    return csr_array(block_diag(blocks, format="csr"))
 
 
 def _step(scene: Scene, place: Layout, x: Array, rows: list[Row], target: Array, elastic: bool) -> Array:
@@ -270,13 +300,16 @@ def _step(scene: Scene, place: Layout, x: Array, rows: list[Row], target: Array,
     if not rows:
         return np.zeros(place.v_size)
     W = _weights(scene, place, x, elastic)
-    J = np.array([row.jacobian for row in rows])
-    return W @ np.linalg.lstsq(J @ W, target, rcond=1e-10)[0]
+    J = csr_array(stacked(rows, place) @ W)
+    return W @ smallest_solution(J, target)
 
 
 def _independent(scene: Scene, place: Layout, x: Array, rows: list[Row]) -> Array:
     """Numbers of a largest set of independent rows: pivoted QR of the weighted Jacobian, rows scaled to length one."""
-    J = np.array([row.jacobian for row in rows]) @ _weights(scene, place, x, elastic=True)
+    A = csr_array(stacked(rows, place) @ _weights(scene, place, x, elastic=True))
+    if independent(A):
+        return np.arange(len(rows))
+    J = A.toarray()
     length = np.linalg.norm(J, axis=1)
     J = J / np.where(length > 0, length, 1.0)[:, None]
     _, R, pivots = qr(J.T, mode="economic", pivoting=True)
@@ -289,10 +322,9 @@ def _neighbour(
 ) -> Array:
     """An assembled position a small free motion away from x (x itself where nothing can move)."""
     W = _weights(scene, place, x, elastic=False)
-    J = np.array([row.jacobian for row in rows]) @ W
-    _, values, basis = np.linalg.svd(J)
+    _, values, basis = np.linalg.svd((stacked(rows, place) @ W).toarray())
     rank = int((values > 1e-9 * values.max(initial=1.0)).sum())
-    direction = W @ basis[rank:].T @ np.random.default_rng(0).normal(size=basis.shape[0] - rank)
+    direction = W @ (basis[rank:].T @ np.random.default_rng(0).normal(size=basis.shape[0] - rank))
     if not direction.any():
         return x
     try:

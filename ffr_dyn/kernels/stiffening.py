@@ -11,16 +11,16 @@ from ffr_dyn.kernels.packing import call_unit
 from ffr_dyn.kernels.products import contract
 from ffr_dyn.kernels.rows import reaction
 from ffr_dyn.kernels.system import solve_loads
-from ffr_dyn.kernels.tables import MOTION
+from ffr_dyn.kernels.tables import MOTION, SIX
 from ffr_dyn.kernels.vectors import copy, cross, fill, get, subtract, to_body
-from ffr_dyn.kernels.views import part, peek
+from ffr_dyn.kernels.views import part, peek, six_parts
 
 SWEEPS = 3
 
 
 @kernel
 def multiply_stiffness(bodies, w, x):
-    """w.stiff = K_load q for every load of every stiffened body; w: BodyWork."""
+    """w.stiff = K_load q for every load of every stiffened body, and the loads by its rates; w: BodyWork."""
     for b in range(bodies.mass.size):
         n, i, e, loads = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 3], bodies.where[b, 6]
         if loads > 0:
@@ -29,6 +29,7 @@ def multiply_stiffness(bodies, w, x):
             fill(stiff, 0.0)
             contract(table, bodies.blocks, bodies.where[b, 12], q, q, n, width, 0, w.sorted, stiff, part(stiff, 0, 0))
             copy(part(w.unstiffened, e, n), part(w.f, bodies.where[b, 2] + 6, n))
+            rate_loads(get(w.omega, b), w.load[b])
 
 
 @kernel
@@ -77,27 +78,32 @@ def add_reaction(rw, rows, block, side, u, load, slot):
 
 @kernel
 def stiffen(bodies, w, b):
-    """f = unstiffened - sum over the loads of load * K_load q, elastic rows of body b."""
+    """f = unstiffened - sum over the loads of load * K_load q, elastic rows of body b. Six loads at a time."""
     n, j, e, loads = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3], bodies.where[b, 6]
     first, start, load = bodies.where[b, 8], bodies.where[b, 9], w.load[b]
-    f, stiff = part(w.f, j + 6, n), part(w.stiff, start, loads * n)
+    f = part(w.f, j + 6, n)
     copy(f, part(w.unstiffened, e, n))
-    for number in range(0, loads - 3, 4):
-        s0, s1 = acting(bodies, load, first + number), acting(bodies, load, first + number + 1)
-        s2, s3 = acting(bodies, load, first + number + 2), acting(bodies, load, first + number + 3)
-        p0, p1 = part(stiff, number * n, n), part(stiff, (number + 1) * n, n)
-        p2, p3 = part(stiff, (number + 2) * n, n), part(stiff, (number + 3) * n, n)
+    for number in range(0, loads, SIX):
+        at, left = first + number, loads - number
+        s0, s1, s2 = (
+            acting(bodies, load, at, left, 0),
+            acting(bodies, load, at, left, 1),
+            acting(bodies, load, at, left, 2),
+        )
+        s3, s4, s5 = (
+            acting(bodies, load, at, left, 3),
+            acting(bodies, load, at, left, 4),
+            acting(bodies, load, at, left, 5),
+        )
+        p0, p1, p2, p3, p4, p5 = six_parts(part(w.stiff, start + number * n, SIX * n), n)
         for k in range(n):
-            f[k] -= s0 * p0[k] + s1 * p1[k] + s2 * p2[k] + s3 * p3[k]
-    for number in range(loads - loads % 4, loads):
-        size, product = acting(bodies, load, first + number), part(stiff, number * n, n)
-        for k in range(n):
-            f[k] -= size * product[k]
+            f[k] -= s0 * p0[k] + s1 * p1[k] + s2 * p2[k] + s3 * p3[k] + s4 * p4[k] + s5 * p5[k]
 
 
 @kernel
-def acting(bodies, load, number):
-    return peek(load, peek(bodies.loads, number))
+def acting(bodies, load, at, left, number):
+    """One of the next loads, zero beyond the last."""
+    return peek(load, peek(bodies.loads, at + number)) if number < left else 0.0
 
 
 @inlined
@@ -109,13 +115,10 @@ def solve_stiffened(r, x, target, near):
     m, w = r.model, r.work
     multiply_stiffness(m.bodies, w.bodies, x)
     for sweep in range(1 if near else 0, SWEEPS):
-        renewed = not near or sweep > 1
-        for b in range(m.bodies.mass.size):
-            if m.bodies.where[b, 6] > 0:
-                rate_loads(get(w.bodies.omega, b), w.bodies.load[b])
-                if renewed:
+        if not near or sweep > 1:
+            for b in range(m.bodies.mass.size):
+                if m.bodies.where[b, 6] > 0:
                     frame_loads(m.bodies, w.bodies, w.field, b, sweep > 0, w.bodies.load[b])
-        if renewed:
             marker_loads(m.markers, m.rows, w.markers, w.rows, sweep > 0, w.bodies.load)
         for b in range(m.bodies.mass.size):
             if m.bodies.where[b, 6] > 0:

@@ -34,6 +34,7 @@ OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED, NOT_CONVERGED, 
 LANES = 8  # rows of a joint side by side (see `ffr_dyn.kernels.lanes`)
 NARROW = 4  # of them are enough in the plane
 MOST_ROWS = 6  # of a joint
+SIX = 6  # loads whose stiffening is added at a time
 
 # Numbers of the compiled units in `Tables.units`.
 (
@@ -179,7 +180,7 @@ class BodyWork(NamedTuple):
     more: F1  # (V,) scratch
     unstiffened: F1  # (E,) elastic right-hand side without geometric stiffening
     shift: F1  # (V,) part of acc that is no acceleration (corrections of an integrator's stage), body axes
-    stiff: F1  # pooled; per body, load and elastic coordinate: K_load q
+    stiff: F1  # pooled; per body, load and elastic coordinate: K_load q; zero from the last load to a multiple of six
     load: F2  # (B, longest) loads of the bodies, in the order of their stiffness
 
 
