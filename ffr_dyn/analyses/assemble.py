@@ -161,7 +161,7 @@ def _largest(row: Row, chosen: Array) -> float:
 
 
 def _columns_independent(A: csr_array) -> bool:
-    """Whether no combination of the columns vanishes. Rows have more of their own than columns: a chain adds up the latter."""
+    """Whether no combination of the columns vanishes. Rows have more of their own than columns, which a chain adds up."""
     if independent(A):
         return A.shape[0] == A.shape[1]
     return independent(csr_array(A.T)) or int(np.linalg.matrix_rank(A.toarray())) == A.shape[1]
