@@ -11,6 +11,7 @@ of meshes/pendulum.geo on revolute joints, its frame fixed to the hinge.
   stages   a stage of ROS2 and ROS3 in RK4's. Goal: 1.3
   stiff    the largest step times highest frequency at which ROS2 and ROS3 swing a pendulum, and their error against a rigid
            one at two steps: the order of the slow motion. Goal: 1e5
+  assembly position, rank of the constraints, elimination order and tables of chains: processor time per link
   start    `import ffr_dyn`, and a first run (nothing compiled yet) less a second one. Goals: 0.4 s, 20 s
 """
 
@@ -28,6 +29,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.scenes import chain, pendulum_rod
+from ffr_dyn.analyses.assemble import assemble
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.equations import compile_scene
 from ffr_dyn.integrators import RK4, ROS2, ROS3, Integrator
@@ -164,6 +166,16 @@ def start_table() -> None:
     )
 
 
+def assembly_table(longest: int) -> None:
+    print("\nassembly: processor time per link [ms]\n links   8 coordinates each")
+    body = rod(8)
+    for count in (count for count in (10, 100, 1000) if count <= longest):
+        scene = chain(body, count, "revolute")
+        began = time.process_time()
+        assemble(scene)
+        print(f"{count:6d}{1e3 * (time.process_time() - began) / count:9.2f}", flush=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="three repeats, chains of up to 64 links")
@@ -174,6 +186,7 @@ def main() -> None:
     modes_table(repeats)
     stages_table(repeats)
     stiff_table()
+    assembly_table(longest)
     start_table()
     print(f"\nat the end: load {os.getloadavg()[0]:.1f}")
 
