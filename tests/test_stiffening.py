@@ -113,6 +113,16 @@ def test_stiffening_can_be_left_out_in_the_scene(rod):
     assert np.abs(results[0]["rod.q"] - results[2]["rod.q"]).max() > 0
 
 
+def test_a_stiffened_rod_bends_in_the_plane_as_in_space(rod):
+    scene = slider_crank(rod)
+    flat, spatial = (
+        forward(replace(scene, plane=plane), end=0.02, output_step=4e-4, method=ROS2(2e-5))
+        for plane in ("auto", "none")
+    )
+    assert np.abs(deflection(rod, spatial)).max() > 5e-4
+    np.testing.assert_allclose(deflection(rod, flat), deflection(rod, spatial), rtol=0, atol=1e-9 * 5e-4)
+
+
 @pytest.mark.parametrize(("method", "step"), [(ROS2, 2e-5), (RK4, 4e-6)])
 def test_order_is_kept_with_stiffening(rod, method, step):
     scene = slider_crank(truncated(rod, 4))
