@@ -39,14 +39,20 @@ Example:
 """
 
 
-@click.group(epilog=EXAMPLE, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+CONTEXT: Any = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
+
+
+@click.group(epilog=EXAMPLE, invoke_without_command=True, context_settings=CONTEXT)
 @click.version_option(package_name="ffr")
-def cli() -> None:
+@click.pass_context
+def cli(context: click.Context) -> None:
     """Flexible multibody dynamics in the floating frame of reference: from reduced bodies to a moving machine.
 
     A scene file (TOML) names the bodies (files from ffr-prep, or rigid ones), their joints, drivers and loads, and the
     analysis. `run` does it and writes one result file; `info`, `plot` and `animate` show what is in it.
     """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
 
 
 @cli.command()
@@ -153,14 +159,14 @@ def main() -> None:
     from ffr_prep.body import BodyError
 
     try:
-        cli(standalone_mode=False)
+        cli(prog_name="ffr-dyn", standalone_mode=False)
     except (InputError, BodyError) as error:
         _leave(str(error), 2)
     except SimulationError as error:
         _leave(str(error), 1)
     except click.UsageError as error:
-        error.show()
-        sys.exit(2)
+        where = error.ctx.command_path if error.ctx else "ffr-dyn"
+        _leave(f"{error.format_message()} ({where} --help tells more)", 2)
     except click.ClickException as error:
         _leave(error.format_message(), error.exit_code)
     except OSError as error:

@@ -65,14 +65,17 @@ Materials: a name (steel, aluminium, titanium, ...), or E=7e10,nu=0.3,rho=5540 i
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 120}
 
 
-@click.group(epilog=EXAMPLE, context_settings=CONTEXT)
+@click.group(epilog=EXAMPLE, invoke_without_command=True, context_settings=CONTEXT)
 @click.version_option(package_name="ffr")
-def cli() -> None:
+@click.pass_context
+def cli(context: click.Context) -> None:
     """From a mesh to a reduced flexible body for multibody dynamics in the floating frame of reference.
 
     `reduce` computes a body file from a mesh or a CAD geometry; `mesh` shows what is in a mesh; `info` and `modes` show
     what is in a body file, in numbers and in pictures.
     """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
 
 
 # ---- options that describe a mesh ---------------------------------------------------------------------------------
@@ -251,13 +254,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     from ffr_prep.body import BodyError
 
     try:
-        cli.main(arguments, standalone_mode=False)
+        cli.main(arguments, prog_name="ffr-prep", standalone_mode=False)
     except (InputError, BodyError) as error:
         _leave(str(error), 2)
     except ComputationError as error:
         _leave(str(error), 1)
     except click.UsageError as error:
-        _leave(f"{error.format_message()} (ffr-prep --help tells more)", 2)
+        where = error.ctx.command_path if error.ctx else "ffr-prep"
+        _leave(f"{error.format_message()} ({where} --help tells more)", 2)
     except OSError as error:
         _leave(f"{error.filename2 or error.filename or 'file'}: {error.strerror or error}; choose another place", 2)
     except MemoryError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -246,3 +247,25 @@ def test_a_body_stretched_beyond_theory_is_noted():
 TWO = Scene(
     (Body("cloud", cloud(2, stiffness=50.0)),), (Joint("hinge", "revolute", "ground.O", "cloud.a"),), ground=GROUND
 )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("run", "--step", "abc", "scene.toml"), r"'--step': 'abc' is not .* \(ffr-dyn run --help tells more\)$"),
+        (("run",), r"Missing argument 'SCENE'. \(ffr-dyn run --help tells more\)$"),
+        (("walk",), r"No such command 'walk'. \(ffr-dyn --help tells more\)$"),
+    ],
+)
+def test_a_wrong_call_is_answered_in_a_line_that_names_the_help(capsys, monkeypatch, arguments, said):
+    code, told = run_cli(monkeypatch, capsys, *arguments)
+    assert code == 2
+    assert len(told.splitlines()) == 1
+    assert re.search(said, told.strip())
+
+
+def test_no_command_at_all_gets_the_help(capsys, monkeypatch):
+    code, told = run_cli(monkeypatch, capsys)
+    assert code == 0
+    assert told.startswith("Usage: ffr-dyn [OPTIONS] [COMMAND]")
+    assert "economise" in told

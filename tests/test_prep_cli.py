@@ -443,3 +443,9 @@ def test_no_traceback_at_the_door(tmp_path):
     )
     assert done.returncode == 2
     assert done.stderr == "ffr-prep: body file no.ffr does not exist\n"
+
+
+def test_a_wrong_call_names_the_help_and_none_gets_it(capsys):
+    assert_fails(capsys, "(ffr-prep reduce --help tells more)", "reduce", "--modes", "abc", "rod.msh")
+    run()
+    assert capsys.readouterr().out.startswith("Usage: ffr-prep [OPTIONS] [COMMAND]")
