@@ -56,6 +56,7 @@ COUNTS = (1, 2, 3, 6, 99)
 DIVISIONS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
 FINE = (*DIVISIONS, 192, 256, 384, 512, 768, 1024)
 REPEATS = (4, 20)  # at least, and at most while they take less than a second
+FLOOR = 16  # steps to a row, at least, that tell what no finer step will mend
 CLOCKED = 3  # models of the grid whose runs are timed, the cheapest by the cost model
 LOW, HIGH = 0.3, 5.0  # effectivity that is asked for
 
@@ -172,7 +173,7 @@ def _hopeless(
     error: Array,
 ) -> bool:
     """Whether no step makes a model good enough for a tolerance that it does not meet yet: its error with a fine step."""
-    key = (id(reference), replace(model, method="ros3", divisions=16))
+    key = (id(reference), replace(model, method="ros3", divisions=max(FLOOR, found.choice.divisions)))
     if key not in _FLOOR:
         _FLOOR[key] = true_error(scene, key[1], span, found, reference)
     open_to = [t for t in TOLERANCES if (error > t * scales).any()]
