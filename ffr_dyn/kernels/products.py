@@ -15,21 +15,22 @@ def contract(table, plan, at, q, qd, n, width, last, scratch, g, l):  # noqa: E7
     Block by block, as the plan that begins at `at` says (see `ffr_dyn.decoupling`).
     """
     blocks = plan[at]
-    if blocks == 0:
-        add_products(table, n, width, last, q, qd, g, l)
-        return
     order = at + 1 + 3 * blocks
     place = order + n
-    x, xd = part(scratch, 0, n), part(scratch, n, n)
-    y, yd = part(scratch, 2 * n, width + 1), part(scratch, 2 * n + width + 1, last + 1)
-    for k in range(n):
-        number = peek(plan, order + k)
-        x[k], xd[k] = peek(q, number), peek(qd, number)
-    fill(y, 0.0)
-    fill(yd, 0.0)
+    x, xd, y, yd = q, qd, g, l
+    if blocks > 0:
+        x, xd = part(scratch, 0, n), part(scratch, n, n)
+        y, yd = part(scratch, 2 * n, width + 1), part(scratch, 2 * n + width + 1, last + 1)
+        for k in range(n):
+            number = peek(plan, order + k)
+            x[k], xd[k] = peek(q, number), peek(qd, number)
+        fill(y, 0.0)
+        fill(yd, 0.0)
     start, first, product, late = 0, 0, 0, 0
-    for block in range(blocks):
-        count, outputs, of_last = plan[at + 1 + 3 * block], plan[at + 2 + 3 * block], plan[at + 3 + 3 * block]
+    for block in range(max(blocks, 1)):
+        count, outputs, of_last = n, width, last
+        if blocks > 0:
+            count, outputs, of_last = plan[at + 1 + 3 * block], plan[at + 2 + 3 * block], plan[at + 3 + 3 * block]
         add_products(
             part(table, start, count * outputs), count, outputs, of_last,
             part(x, first, count), part(xd, first, count), part(y, product, outputs), part(yd, late, of_last),
@@ -38,11 +39,11 @@ def contract(table, plan, at, q, qd, n, width, last, scratch, g, l):  # noqa: E7
         first += count
         product += outputs
         late += of_last
-    for k in range(width):
-        g[k] += peek(y, peek(plan, place + k))
-    place += width
-    for k in range(last):
-        l[k] += peek(yd, peek(plan, place + k))
+    if blocks > 0:
+        for k in range(width):
+            g[k] += peek(y, peek(plan, place + k))
+        for k in range(last):
+            l[k] += peek(yd, peek(plan, place + width + k))
 
 
 @kernel
