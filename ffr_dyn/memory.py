@@ -147,6 +147,7 @@ def new_record(system: System, rows: int) -> Record:
         np.zeros((rows, K, 6)),
         np.zeros((rows, Z, 3)),
         np.zeros((rows, Y, 18)),
+        np.zeros((rows, m.functions.kind.size, 3)),
         np.zeros((rows, W + Z + Y + U)),
         np.zeros((rows, 3)),
         np.zeros((rows, 2)),

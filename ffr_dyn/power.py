@@ -19,7 +19,6 @@ from ffr_dyn.forces import Bushing, SpringDamper, bushing_curves, stiffness_matr
 from ffr_dyn.joint_forces import JointSpring
 from ffr_dyn.joints import Joint
 from ffr_dyn.scene import Scene, joint_of
-from ffr_dyn.timefunction import evaluate
 from ffr_dyn.view import View, cross, dot
 
 Array = np.ndarray
@@ -82,8 +81,12 @@ def transmitted(view: View, joint: Joint) -> Array:
 
 def reaction(view: View, name: str) -> tuple[Array, Array]:
     """Force and moment (T, 3) of a joint or driver, global axes."""
-    k = [block.name for block in view.system.blocks].index(name)
+    k = _block(view, name)
     return view.record.reaction[:, k, :3], view.record.reaction[:, k, 3:]
+
+
+def _block(view: View, name: str) -> int:
+    return [block.name for block in view.system.blocks].index(name)
 
 
 def springs_of(scene: Scene) -> list[SpringDamper | JointSpring | Bushing]:
@@ -126,6 +129,12 @@ def _of_force(view: View, load: AppliedLoad) -> Array:
     return view.record.power[:, names.index(load.name)]
 
 
+def driven(view: View, driver: Driver) -> Array:
+    """(T, 3) what a driver prescribes, and two derivatives."""
+    rows, k = view.system.model.rows, _block(view, driver.name)
+    return view.record.functions[:, rows.function[rows.start[k]]]
+
+
 def between_points(view: View, block: PointDriver | Joint) -> Array:
     """(T,) power of a driven point, or of a distance joint whose length changes."""
     force, _ = reaction(view, block.name)
@@ -137,7 +146,7 @@ def _of_driver(view: View, driver: Driver) -> Array:
     joint = joint_of(view.system.scene, driver)
     force, moment = reaction(view, driver.name)
     frame_i, frame_j = view.joint_frames(joint)
-    drive = np.array([evaluate(driver.function, t) for t in view.record.time])
+    drive = driven(view, driver)
     if driver.coordinate == "stroke":
         h = frame_i[:, :, 2]
         return dot(force, h) / dot(h, h) * drive[:, 1]

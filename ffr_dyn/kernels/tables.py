@@ -321,6 +321,7 @@ class Record(NamedTuple):
     reaction: F3  # (T, K, 6) by block: force, moment
     action: F3  # (T, Z, 3) coordinate, rate, force
     bushing: F3  # (T, Y, 18) displacement and rotation, their rates, force and moment
+    functions: F3  # (T, F, 3) time functions and two derivatives
     power: F2  # (T, W + Z + Y + U)
     energy: F2  # (T, 3) kinetic, strain, gravity
     violation: F2  # (T, 2) largest |Phi|, |Phi_dot|
