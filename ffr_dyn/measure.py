@@ -373,13 +373,17 @@ def _unwound(joint: Joint) -> Entry:
 
 def unwind(time: Array, angle: Array, rate: Array, last: Unwound | None) -> tuple[Array, Unwound]:
     """Angles (T,) without jumps of a turn: each is the one nearest to what the rates (T,) predict."""
-    out = np.empty_like(angle)
     before = last or Unwound(float(angle[0]), float(rate[0]), float(time[0]))
-    for k in range(angle.size):
-        predicted = before.angle + 0.5 * (before.rate + rate[k]) * (time[k] - before.time)
-        out[k] = angle[k] + 2 * np.pi * np.round((predicted - angle[k]) / (2 * np.pi))
-        before = Unwound(float(out[k]), float(rate[k]), float(time[k]))
-    return out, before
+    earlier = [
+        np.append(first, values[:-1]) for first, values in zip(_numbers(before), (angle, rate, time), strict=True)
+    ]
+    predicted = earlier[0] + 0.5 * (earlier[1] + rate) * (time - earlier[2])
+    out = angle + 2 * np.pi * np.cumsum(np.round((predicted - angle) / (2 * np.pi)))
+    return out, Unwound(float(out[-1]), float(rate[-1]), float(time[-1]))
+
+
+def _numbers(before: Unwound) -> tuple[float, float, float]:
+    return before.angle, before.rate, before.time
 
 
 def angles(view: View, joint: Joint) -> tuple[Array, Array]:
