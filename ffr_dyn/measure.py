@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import fnmatch
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from difflib import get_close_matches
 
 import numpy as np
@@ -375,15 +375,11 @@ def unwind(time: Array, angle: Array, rate: Array, last: Unwound | None) -> tupl
     """Angles (T,) without jumps of a turn: each is the one nearest to what the rates (T,) predict."""
     before = last or Unwound(float(angle[0]), float(rate[0]), float(time[0]))
     earlier = [
-        np.append(first, values[:-1]) for first, values in zip(_numbers(before), (angle, rate, time), strict=True)
+        np.append(first, values[:-1]) for first, values in zip(astuple(before), (angle, rate, time), strict=True)
     ]
     predicted = earlier[0] + 0.5 * (earlier[1] + rate) * (time - earlier[2])
     out = angle + 2 * np.pi * np.cumsum(np.round((predicted - angle) / (2 * np.pi)))
     return out, Unwound(float(out[-1]), float(rate[-1]), float(time[-1]))
-
-
-def _numbers(before: Unwound) -> tuple[float, float, float]:
-    return before.angle, before.rate, before.time
 
 
 def angles(view: View, joint: Joint) -> tuple[Array, Array]:

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.equations import System, in_sixes
+from ffr_dyn.body_tables import in_sixes
+from ffr_dyn.equations import System
 from ffr_dyn.kernels.tables import LANES, Bodies, BodyWork, LoadWork, MarkerWork, Model, Record, RowWork, Stages, Work
 from ffr_dyn.kernels.vectors import LEAST_PIVOT
 from ffr_dyn.rotation import skew
