@@ -88,7 +88,7 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: f
     """Tables of a scene.
 
     blocks     : the constraint rows to use; default all
-    relaxation : above zero where rows depend on one another (see `kernels.system.solve_motion`)
+    relaxation : above zero where rows depend on one another (see `kernels.solution.refine_motion`)
     """
     chosen = blocks_of(scene) if blocks is None else blocks
     place = layout(scene)

@@ -24,7 +24,8 @@ from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, so
 from ffr_dyn.kernels.motion import into_body_axes, largest_motion
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import tables_at
-from ffr_dyn.kernels.system import constraint_rates, finite, largest, to_velocity_rates
+from ffr_dyn.kernels.solution import constraint_rates
+from ffr_dyn.kernels.system import finite, largest, to_velocity_rates
 from ffr_dyn.kernels.tables import NEAR, NOT_CONVERGED, NOT_FINITE, OK, TIGHTER
 from ffr_dyn.kernels.units import Unit
 from ffr_dyn.kernels.vectors import add_scaled, copy

@@ -35,14 +35,8 @@ from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, so
 from ffr_dyn.kernels.motion import carry, converging, farthest, into_global_axes, largest_motion, unconverged
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import tables_at
-from ffr_dyn.kernels.system import (
-    add_reactions,
-    constraint_rates,
-    finite,
-    largest,
-    to_body_axes,
-    to_velocity_rates,
-)
+from ffr_dyn.kernels.solution import add_reactions, constraint_rates
+from ffr_dyn.kernels.system import finite, largest, to_body_axes, to_velocity_rates
 from ffr_dyn.kernels.tables import NOT_FINITE, OK, USER_FAILED
 from ffr_dyn.kernels.units import Unit
 from ffr_dyn.kernels.vectors import add, add_scaled, copy, cross, dot, fill, get, scale, subtract

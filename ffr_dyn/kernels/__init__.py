@@ -2,6 +2,7 @@
 
 Read in this order: `tables` (what the kernels read and write), `vectors`, `bodies` (inertia, quadratic velocity terms,
 Schur complement; `planar` where they stay in a plane), `markers`, `loads`, `rows` (constraints), `blocks` (sparse
-factorisation of the multiplier system), `system` (one evaluation of the equations of motion). Each has a readable twin in
-numpy that the tests hold it to: `ffr_dyn.inertia`, `ffr_dyn.kinematics`, `ffr_dyn.constraints`.
+factorisation of the multiplier system), `system` (one evaluation of the equations of motion), `solution` (accelerations and
+multipliers from it). Each has a readable twin in numpy that the tests hold it to: `ffr_dyn.inertia`,
+`ffr_dyn.kinematics`, `ffr_dyn.constraints`.
 """

@@ -10,7 +10,7 @@ from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import call_unit
 from ffr_dyn.kernels.products import contract
 from ffr_dyn.kernels.rows import reaction
-from ffr_dyn.kernels.system import solve_loads
+from ffr_dyn.kernels.solution import solve_loads
 from ffr_dyn.kernels.tables import MOTION, SIX
 from ffr_dyn.kernels.vectors import copy, cross, fill, get, subtract, to_body
 from ffr_dyn.kernels.views import part, peek, six_parts

@@ -24,21 +24,17 @@ from ffr_dyn.kernels.packing import call_unit, record_at, tables_at
 from ffr_dyn.kernels.passing import note_independence, numbered_step
 from ffr_dyn.kernels.record import keep
 from ffr_dyn.kernels.rows import evaluate_block
+from ffr_dyn.kernels.solution import constraint_rates, reduce_miss, refine_motion, solve_back, solve_motion
 from ffr_dyn.kernels.stiffening import solve_stiffened
 from ffr_dyn.kernels.system import (
     clear_and_load,
-    constraint_rates,
     evaluate_bodies,
     evaluate_joints,
     evaluate_markers,
     largest,
     move_back,
     prepare,
-    reduce_miss,
-    refine_motion,
     row_of_largest,
-    solve_back,
-    solve_motion,
     to_body_axes,
     to_velocity_rates,
     turn_bodies,

@@ -1,0 +1,257 @@
+"""Accelerations and multipliers from what an evaluation left: reduced forces, the multiplier system, the way back.
+
+M acc + Phi_q^T lam = f,  Phi_q acc = target, by elimination of the elastic coordinates of every body, then of its rigid ones.
+"""
+
+from ffr_dyn.kernels.blocks import SIDE, solve_blocks
+from ffr_dyn.kernels.bodies import accelerate, accelerate_rigid, reduce_forces, six_rows
+from ffr_dyn.kernels.lanes import combine_6, dot_narrow, dot_rows, narrow_3, narrow_6
+from ffr_dyn.kernels.markers import plane_rows, project, shapes
+from ffr_dyn.kernels.options import inlined, kernel
+from ffr_dyn.kernels.packing import call_unit
+from ffr_dyn.kernels.system import largest
+from ffr_dyn.kernels.tables import BACK, LANES, REGAIN
+from ffr_dyn.kernels.vectors import add, add_scaled, copy, fill, in_plane
+from ffr_dyn.kernels.views import part, six_parts
+
+
+@inlined
+def solve_motion(r, target):
+    """acc, lam from  M acc + Phi_q^T lam = f,  Phi_q acc = target (C,)."""
+    m, w = r.model, r.work
+    for b in range(m.bodies.mass.size):
+        reduce_forces(m.bodies, w.bodies, b)
+    reduced_rates(m.bodies, m.markers, m.rows, w.bodies, w.rows, target)
+    call_unit(r.units[BACK], r.address, 0.0, 0, 0)
+    gather_rows(m.rows.start, w.rows.step, w.rows.lam)
+
+
+@inlined
+def refine_motion(r, target, passes):
+    """What relaxation of the multiplier matrix does to the motion, taken out again.
+
+    Of the multipliers that dependent rows leave open, the smallest are found (method of multipliers; Bayo & Ledesma,
+    Nonlinear Dynamics 9 (1996) 113-130).
+    """
+    m, bw, rw = r.model, r.work.bodies, r.work.rows
+    before = 0.0
+    for number in range(1, passes):
+        constraint_rates(m.bodies.where, m.markers, m.rows, rw.jac, bw.acc, rw.left)
+        add_scaled(rw.left, rw.left, -1.0, target)
+        left = largest(rw.left)
+        if number > 1 and not left < 0.5 * before:
+            break
+        before = left
+        copy(bw.more, bw.acc)
+        call_unit(r.units[REGAIN], r.address, 0.0, rw.left.ctypes.data, 0)
+        add_scaled(bw.acc, bw.more, 1.0, bw.acc)
+        gather_rows(m.rows.start, rw.step, rw.left)
+        add_scaled(rw.lam, rw.lam, 1.0, rw.left)
+
+
+@inlined
+def reduce_miss(rows, bw, step, value):
+    """Reduced forces and `step` of a motion that only the rows ask for: Phi_q acc = -value."""
+    fill(bw.elastic, 0.0)
+    fill(part(bw.rigid, 0, bw.rigid.size), 0.0)
+    for k in range(rows.start.size - 1):
+        for row in range(rows.start[k], rows.start[k + 1]):
+            step[LANES * k + row - rows.start[k]] = value[row]
+
+
+@inlined
+def solve_back(bodies, markers, rows, pattern, bw, rw):
+    """step and acc from what the rows miss (step) and the reduced forces."""
+    solve_blocks(rows.start, pattern, rw.S, rw.pivots, rw.step)
+    react(bodies, markers, rows, bw, rw)
+
+
+@kernel
+def gather_rows(starts, lanes, out):
+    """out (C,) = the rows of all joints from their lanes."""
+    for k in range(starts.size - 1):
+        for row in range(starts[k], starts[k + 1]):
+            out[row] = lanes[LANES * k + row - starts[k]]
+
+
+@inlined
+def reduced_rates(bodies, markers, rows, bw, rw, target):
+    """step = Phi_q M^-1 f - target, from the reduced forces of the bodies and the eliminated rows."""
+    where, ground, sides = bodies.where, bodies.mass.size, rows.marker.shape[1]
+    for k in range(rows.marker.shape[0]):
+        for row in range(rows.start[k], rows.start[k + 1]):
+            rw.step[LANES * k + row - rows.start[k]] = -target[row]
+        for side in range(sides):
+            marker = rows.marker[k, side]
+            b = markers.body[marker] if marker >= 0 else ground
+            if b != ground:
+                n, e, normal, at = where[b, 0], where[b, 3], where[b, 7], (k * sides + side) * SIDE
+                z, moved, elastic = bw.rigid[b], rw.wrench, part(bw.elastic, e, n)
+                if normal >= 0:
+                    c0, c1, c2 = in_plane(normal)
+                    moved[0], moved[1], moved[2] = z[c0], z[c1], z[c2]
+                    if n > 0:
+                        moved[3], moved[4], moved[5] = plane_rows(shapes(markers, marker, n), normal, elastic, n)
+                        narrow_6(rw.step, LANES * k, 1.0, moved, 0, 1, rw.X, at)
+                    else:
+                        narrow_3(rw.step, LANES * k, 1.0, moved, 0, 1, rw.X, at)
+                    continue
+                combine_6(rw.step, LANES * k, 1.0, z, 0, 1, rw.X, at)
+                if n > 0:
+                    phi = shapes(markers, marker, n)
+                    moved[0], moved[1], moved[2], moved[3], moved[4], moved[5] = six_rows(phi, elastic, n)
+                    combine_6(rw.step, LANES * k, 1.0, moved, 0, 1, rw.X, at + 6 * LANES)
+
+
+@inlined
+def constraint_rates(where, markers, rows, jac, acc, out):
+    """out = Phi_q acc."""
+    fill(out, 0.0)
+    ground, sides = where.shape[0] - 1, rows.marker.shape[1]
+    for k in range(rows.marker.shape[0]):
+        for side in range(sides):
+            marker = rows.marker[k, side]
+            b = markers.body[marker] if marker >= 0 else ground
+            if b != ground:
+                n, j, own = where[b, 0], where[b, 2], jac[k * sides + side]
+                phi = shapes(markers, marker, n)
+                first, last, moved = rows.start[k], rows.start[k + 1], part(acc, j, 6 + n)
+                if where[b, 7] >= 0:
+                    add_side_rates_in_plane(phi, own, moved, first, last, n, where[b, 7], out)
+                else:
+                    add_side_rates(phi, own, moved, first, last, n, out)
+
+
+@kernel
+def add_side_rates(phi, a, acc, first, last, n, out):
+    e0, e1, e2, e3, e4, e5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if n > 0:
+        e0, e1, e2, e3, e4, e5 = six_rows(phi, part(acc, 6, n), n)
+    for k in range(last - first):
+        out[first + k] += (
+            a[0, k] * (acc[0] + e0) + a[1, k] * (acc[1] + e1) + a[2, k] * (acc[2] + e2)
+            + a[3, k] * acc[3] + a[4, k] * acc[4] + a[5, k] * acc[5]
+            + a[6, k] * e3 + a[7, k] * e4 + a[8, k] * e5
+        )  # fmt: skip
+
+
+@kernel
+def add_side_rates_in_plane(phi, a, acc, first, last, n, normal, out):
+    i, j, turn = in_plane(normal)
+    e0, e1, e2 = 0.0, 0.0, 0.0
+    if n > 0:
+        e0, e1, e2 = plane_rows(phi, normal, part(acc, 6, n), n)
+    for k in range(last - first):
+        out[first + k] += (
+            a[i, k] * (acc[i] + e0) + a[j, k] * (acc[j] + e1) + a[turn, k] * acc[turn] + a[6 + normal, k] * e2
+        )
+
+
+@inlined
+def add_reactions(where, markers, rows, jac, lam, out):
+    """out (V,) += Phi_q^T lam in body axes."""
+    ground, sides = where.shape[0] - 1, rows.marker.shape[1]
+    for k in range(rows.marker.shape[0]):
+        for side in range(sides):
+            marker = rows.marker[k, side]
+            b = markers.body[marker] if marker >= 0 else ground
+            if b != ground:
+                n, j, own = where[b, 0], where[b, 2], jac[k * sides + side]
+                phi = shapes(markers, marker, n)
+                add_side_reactions(phi, own, lam, rows.start[k], rows.start[k + 1], n, part(out, j, 6 + n))
+
+
+@kernel
+def add_side_reactions(phi, a, lam, first, last, n, out):
+    force, twist = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for k in range(last - first):
+        value = lam[first + k]
+        force = add(force, (a[0, k] * value, a[1, k] * value, a[2, k] * value))
+        twist = add(twist, (a[6, k] * value, a[7, k] * value, a[8, k] * value))
+        for c in range(3):
+            out[3 + c] += a[3 + c, k] * value
+    for c in range(3):
+        out[c] += force[c]
+    if n > 0:
+        project(phi, force, twist, part(out, 6, n), n)
+
+
+@inlined
+def react(bodies, markers, rows, bw, rw):
+    """acc from the reduced forces, less Phi_q^T step by the eliminated rows."""
+    where, ground, sides = bodies.where, bodies.mass.size, rows.marker.shape[1]
+    for k in range(rows.marker.shape[0]):
+        for side in range(sides):
+            marker = rows.marker[k, side]
+            b = markers.body[marker] if marker >= 0 else ground
+            if b != ground:
+                n, e, at, z = where[b, 0], where[b, 3], (k * sides + side) * SIDE, bw.rigid[b]
+                normal, wrench = where[b, 7], rw.wrench
+                react_rigid(rw.X, at, rw.step, LANES * k, normal, z)
+                if n > 0:
+                    phi, elastic = shapes(markers, marker, n), part(bw.elastic, e, n)
+                    if normal >= 0:
+                        for c in range(3):
+                            wrench[c] = dot_narrow(rw.X, at + LANES * (3 + c), rw.step, LANES * k)
+                        release_in_plane(phi, normal, part(bw.dinv, e, n), wrench, n, elastic)
+                    else:
+                        for c in range(6):
+                            wrench[c] = dot_rows(rw.X, at + LANES * (6 + c), rw.step, LANES * k)
+                        release(phi, part(bw.dinv, e, n), wrench, n, elastic)
+    for b in range(ground):
+        accelerate(bodies, bw, b)
+
+
+@inlined
+def solve_loads(r, target):
+    """`solve_motion` without the elastic part of acc: what the loads of geometric stiffening are made of."""
+    m, bw, rw = r.model, r.work.bodies, r.work.rows
+    ground, sides = m.bodies.mass.size, m.rows.marker.shape[1]
+    for b in range(ground):
+        reduce_forces(m.bodies, bw, b)
+    reduced_rates(m.bodies, m.markers, m.rows, bw, rw, target)
+    solve_blocks(m.rows.start, m.pattern, rw.S, rw.pivots, rw.step)
+    gather_rows(m.rows.start, rw.step, rw.lam)
+    for k in range(m.rows.marker.shape[0]):
+        for side in range(sides):
+            marker = m.rows.marker[k, side]
+            b = m.markers.body[marker] if marker >= 0 else ground
+            if b != ground:
+                at, normal = (k * sides + side) * SIDE, m.bodies.where[b, 7]
+                react_rigid(rw.X, at, rw.step, LANES * k, normal, bw.rigid[b])
+    for b in range(ground):
+        accelerate_rigid(m.bodies, bw, b)
+
+
+@kernel
+def react_rigid(X, at, step, own, normal, z):
+    """Reduced forces z (6,) of a body less those of a side's reactions."""
+    if normal >= 0:
+        i, j, k = in_plane(normal)
+        z[i] -= dot_narrow(X, at, step, own)
+        z[j] -= dot_narrow(X, at + LANES, step, own)
+        z[k] -= dot_narrow(X, at + 2 * LANES, step, own)
+    else:
+        for c in range(6):
+            z[c] -= dot_rows(X, at + LANES * c, step, own)
+
+
+@kernel
+def release_in_plane(phi, normal, dinv, wrench, n, elastic):
+    """`release` for a planar body: two forces and a moment."""
+    i, j, k = in_plane(normal)
+    p0, p1, p2 = part(phi, i * n, n), part(phi, j * n, n), part(phi, k * n, n)
+    f0, f1, moment = wrench[0], wrench[1], wrench[2]
+    for c in range(n):
+        elastic[c] -= dinv[c] * (p0[c] * f0 + p1[c] * f1 + p2[c] * moment)
+
+
+@kernel
+def release(phi, dinv, wrench, n, elastic):
+    """elastic -= dinv phi^T wrench."""
+    p0, p1, p2, p3, p4, p5 = six_parts(phi, n)
+    f0, f1, f2, m0, m1, m2 = wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5]
+    for j in range(n):
+        elastic[j] -= dinv[j] * (
+            p0[j] * f0 + p1[j] * f1 + p2[j] * f2 + p3[j] * m0 + p4[j] * m1 + p5[j] * m2
+        )  # fmt: skip
