@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffr_dyn.decoupling import in_blocks, stiffening_loads
-from ffr_dyn.kernels.tables import SIX, Bodies, Markers
+from ffr_dyn.decoupling import in_blocks, stiffening_loads, symmetric_blocks
+from ffr_dyn.kernels.tables import Bodies, Markers
 from ffr_dyn.layout import Layout
 from ffr_dyn.scene import Body, Scene
 from ffr_prep.body import axial
@@ -70,6 +70,9 @@ def once(parts: Sequence[Array], owners: Sequence[Hashable]) -> tuple[Array, Arr
     return _pool(stored), np.array([first[owner] for owner in owners], dtype=np.int64)
 
 
+_NONE = np.zeros(0), np.zeros(0, dtype=np.int64)
+
+
 @dataclass(frozen=True)
 class _Blocks:
     """Tables of all bodies in blocks: pool and starts (or -1), plans and starts."""
@@ -80,17 +83,15 @@ class _Blocks:
     first: Array
 
 
-def _in_blocks(owners: Sequence[Hashable], make: Callable[[int], tuple[Array, Array, int]]) -> _Blocks:
+def _in_blocks(owners: Sequence[Hashable], make: Callable[[int], tuple[Array, Array]]) -> _Blocks:
     """Tables of one owner are made and stored once; a table of zeros starts at -1, and the kernels skip it.
 
-    make : of a body by number: the table, its rounding and the number of its last components, as `in_blocks` wants them
+    make : of a body by number: pool and plan, the pool empty where there is none
     """
     stored: dict[Hashable, tuple[Array, Array]] = {}
     for b, owner in enumerate(owners):
         if owner not in stored:
-            table, noise, last = make(b)
-            nothing = np.zeros(0), np.zeros(0, dtype=np.int64)
-            stored[owner] = in_blocks(table, last, noise) if table.any() else nothing
+            stored[owner] = make(b)
     pool, first = once([stored[owner][0] for owner in owners], owners)
     plans, first_plan = once([stored[owner][1] for owner in owners], owners)
     zero = np.array([not stored[owner][0].size for owner in owners], dtype=bool)
@@ -105,20 +106,11 @@ def body_tables(scene: Scene, place: Layout, marked: Markers) -> Bodies:
     PP = _second_moments(scene, place)
     P, P_start = once([b.model.P_dm * ("I3" not in b.dropped) for b in scene.bodies], owners)
     rP, _ = once([_rP_parts(b) for b in scene.bodies], owners)
-    K, loads = _stiffness(scene, marked)
-    counts = [len(which) for which in loads]
-    where = np.full((len(n) + 1, 13), -1, dtype=np.int64)
-    where[-1, [*range(7), *range(8, 13)]] = 0
-    where[:-1, :7] = np.column_stack([n, place.ix, place.iv, starts(n)[:-1], PP.start, K.start, counts])
-    where[:-1, 8:] = np.column_stack(
-        [
-            starts(counts)[:-1],
-            starts([a * in_sixes(b) for a, b in zip(n, counts, strict=True)])[:-1],
-            P_start // 3,
-            PP.first,
-            len(PP.plans) + K.first,
-        ]
-    )
+    K, sizes = _stiffness(scene, marked)
+    where = np.full((len(n) + 1, 11), -1, dtype=np.int64)
+    where[-1, [*range(7), *range(8, 11)]] = 0
+    where[:-1, :7] = np.column_stack([n, place.ix, place.iv, starts(n)[:-1], PP.start, K.start, sizes])
+    where[:-1, 8:] = np.column_stack([P_start // 3, PP.first, len(PP.plans) + K.first])
     where[:-1, 7] = place.normals
     where[-1, 3] = sum(n)
     return Bodies(
@@ -131,7 +123,6 @@ def body_tables(scene: Scene, place: Layout, marked: Markers) -> Bodies:
         omega2=_pool([m.omega2 for m in models]),
         two_zeta_omega=_pool([2 * b.damping * np.sqrt(b.model.omega2) for b in scene.bodies]),
         stiffening=K.pool,
-        loads=np.concatenate(loads) if loads else np.zeros(0, dtype=np.int64),
         blocks=np.concatenate([PP.plans, K.plans]),
     )
 
@@ -141,35 +132,44 @@ def _owner(body: Body) -> tuple[Hashable, ...]:
     return id(body.model), body.dropped
 
 
-def in_sixes(loads: int) -> int:
-    """How many loads there is room for."""
-    return -(-loads // SIX) * SIX
-
-
 def _second_moments(scene: Scene, place: Layout) -> _Blocks:
     """I5 and I9 of all bodies: a unit mode has a second moment of one, so the size of their rounding is known."""
 
-    def make(b: int) -> tuple[Array, Array, int]:
+    def make(b: int) -> tuple[Array, Array]:
         table = _PP_parts(scene.bodies[b], place.normals[b])
-        return table, np.full(table.shape[1], ROUNDING), table.shape[1] // 3
+        return in_blocks(table, table.shape[1] // 3, np.full(table.shape[1], ROUNDING)) if table.any() else _NONE
 
     return _in_blocks([(*_owner(body), k) for body, k in zip(scene.bodies, place.normals, strict=True)], make)
 
 
-def _stiffness(scene: Scene, marked: Markers) -> tuple[_Blocks, list[Array]]:
-    """The geometric stiffness of all bodies, and the numbers of the loads that have any."""
+def _stiffness(scene: Scene, marked: Markers) -> tuple[_Blocks, list[int]]:
+    """The geometric stiffness of all bodies, and how many numbers of it they keep."""
     acting = [_acting(numbers) for numbers in _used_markers(scene, marked)]
     owners = [(id(body.model), body.stiffening, loads) for body, loads in zip(scene.bodies, acting, strict=True)]
-    known: dict[Hashable, Array] = {}
-    for body, loads, owner in zip(scene.bodies, acting, owners, strict=True):
-        if owner not in known:
-            known[owner] = np.intersect1d(stiffening_loads(stiffness_of(body)), loads).astype(np.int64)
 
-    def make(b: int) -> tuple[Array, Array, int]:
-        K = np.moveaxis(stiffness_of(scene.bodies[b])[known[owners[b]]], 2, 0)
-        return K, STIFFNESS_ROUNDING * np.abs(K).max(axis=(0, 2), initial=0.0), 0
+    def make(b: int) -> tuple[Array, Array]:
+        K = stiffness_of(scene.bodies[b])
+        loads = np.intersect1d(stiffening_loads(K), acting[b]).astype(np.int64)
+        noise = STIFFNESS_ROUNDING * np.abs(K[loads]).max(axis=(1, 2), initial=0.0)
+        return symmetric_blocks(K[loads], loads, noise) if loads.size else _NONE
 
-    return _in_blocks(owners, make), [known[owner] for owner in owners]
+    blocks = _in_blocks(owners, make)
+    return blocks, [_kept(blocks, b) for b in range(len(owners))]
+
+
+def _kept(blocks: _Blocks, b: int) -> int:
+    """How many numbers a sum of the matrices of body b has."""
+    plan = blocks.plans[blocks.first[b] :]
+    return 0 if blocks.start[b] < 0 else int(plan[4 : 4 + 2 * plan[0] : 2].sum())
+
+
+def loads_that_stiffen(bodies: Bodies, b: int) -> Array:
+    """Numbers of the loads of body b that its stiffness depends on."""
+    if bodies.where[b, 6] == 0:
+        return np.zeros(0, dtype=np.int64)
+    plan = bodies.blocks[bodies.where[b, 10] :]
+    first = 3 + 2 * plan[0] + 5 * plan[1] + bodies.where[b, 0]
+    return np.sort(plan[first : first + plan[3 : 3 + 2 * plan[0] : 2].sum()])
 
 
 def _used_markers(scene: Scene, marked: Markers) -> list[list[int]]:

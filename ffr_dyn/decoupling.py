@@ -12,10 +12,13 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from ffr_dyn.kernels.tables import LANES
+
 Array = np.ndarray
 
 # What sorting costs: as much as this many multiplications per product (measured with 8 to 64 coordinates).
 SORTING = 8
+LONGEST = 16  # coordinates of a block of a symmetric sum at most (likewise)
 _NOTHING = 1e-16  # of the stiffness by a load, relative to that by the others
 
 
@@ -65,6 +68,64 @@ def in_blocks(table: Array, last: int, noise: Array) -> tuple[Array, Array]:
     listed = np.concatenate(order)
     rest = np.setdiff1d(np.arange(n), listed)  # coordinates that nothing is multiplied by
     return np.concatenate(pool), np.concatenate([[len(pool)], plan, listed, rest, places, last_places]).astype(np.int64)
+
+
+def symmetric_blocks(matrices: Array, numbers: Array, noise: Array) -> tuple[Array, Array]:
+    """(pool, plan) of symmetric matrices (L, n, n) whose weighted sums are multiplied, as `kernels.stiffening` reads them.
+
+    Of a sum only the blocks on one side of the diagonal are kept: each serves its coordinates and those across.
+
+    numbers : (L,) where their weights are found
+    noise   : (L,) entries that are not larger are rounding
+
+    pool : per group of matrices that share blocks, what each has in those blocks, one row per matrix, of whole lanes
+    plan : number of groups, of blocks, of places (each family of coordinates begins a row of lanes); of each group the
+           number of matrices and of entries; of each block its first entry, its first row and their number, its first
+           column and their number; the places of the coordinates; the numbers by group
+    """
+    n = matrices.shape[1]
+    coupled = np.abs(matrices) > noise[:, None, None]
+    family = _blocks(np.moveaxis(coupled, 0, 1))[0] if n > SORTING else np.zeros(n, dtype=int)
+    parts = [np.flatnonzero(family == f) for f in np.unique(family)]
+    parts = [part for each in parts for part in np.array_split(each, -(-each.size // LONGEST))]
+    first = np.cumsum([0, *(in_lanes(part.size) for part in parts)])
+    places = np.empty(n, dtype=np.int64)
+    for part, at in zip(parts, first, strict=False):
+        places[part] = at + np.arange(part.size)
+    pairs = [(a, b) for k in range(len(parts)) for a, b in ((k, other) for other in range(k, len(parts)))]
+    pairs = [min(((a, b), (b, a)), key=lambda p: effort(parts[p[0]].size, parts[p[1]].size)) for a, b in pairs]
+    touched = np.array([coupled[:, parts[a]][:, :, parts[b]].any(axis=(1, 2)) for a, b in pairs], dtype=float)
+    _, group = connected_components(csr_array(touched @ touched.T), directed=False)
+    pool: list[Array] = []
+    sizes: list[int] = []
+    blocks: list[tuple[int, ...]] = []
+    listed: list[Array] = []
+    kept = 0
+    for g in np.unique(group[touched.any(axis=1)]):
+        own = [pairs[k] for k in np.flatnonzero(group == g)]
+        which = np.flatnonzero(touched[group == g].any(axis=0))
+        rows = [matrices[which][:, parts[a]][:, :, parts[b]].reshape(which.size, -1) for a, b in own]
+        begin = np.cumsum([0, *(row.shape[1] for row in rows)])
+        rows.append(np.zeros((which.size, in_lanes(begin[-1]) - begin[-1])))
+        pool.append(np.concatenate(rows, axis=1))
+        sizes += pool[-1].shape
+        blocks += [
+            (kept + k, first[a], parts[a].size, first[b], parts[b].size) for k, (a, b) in zip(begin, own, strict=False)
+        ]
+        kept += pool[-1].shape[1]
+        listed.append(numbers[which])
+    plan = np.concatenate([[len(pool), len(blocks), first[-1]], sizes, np.ravel(blocks), places, *listed])
+    return np.concatenate([part.ravel() for part in pool]), plan.astype(np.int64)
+
+
+def effort(rows: int, columns: int) -> int:
+    """How many pieces of a block are multiplied one by one: four rows, or one, by a row of lanes of its columns."""
+    return (rows // 4 + rows % 4) * in_lanes(columns)
+
+
+def in_lanes(count: int) -> int:
+    """How many numbers whole rows of lanes have that hold so many."""
+    return -(-count // LANES) * LANES
 
 
 def _blocks(coupled: Array) -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ffr_dyn.alignment import aligned
 from ffr_dyn.body_tables import body_tables, once, starts, stiffness_of
 from ffr_dyn.couplings import Coupling, coupling_word
 from ffr_dyn.drivers import Driver, PointDriver, driver_word, path_words
@@ -112,7 +113,7 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: f
     }
     user = UserFunctions(functions.callbacks, place, scene)
     compiled = Model(**model, user_address=user.address, user_count=user.count)  # type: ignore[arg-type]
-    return System(scene, place, ordered, elimination, compiled, user, functions.inputs())
+    return System(scene, place, ordered, elimination, aligned(compiled), user, functions.inputs())
 
 
 def _moving(block: Block, table: tuple[MarkerName, ...], ground: int) -> tuple[int, ...]:

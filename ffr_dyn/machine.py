@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from ffr_dyn.alignment import aligned
 from ffr_dyn.compilation import ensure_compiled
 from ffr_dyn.equations import System
 from ffr_dyn.kernels.packing import pack
@@ -79,8 +80,9 @@ def new_machine(
     calls = () if method is None else method.calls
     work = new_work(system.model, keeps_terms=method is not None and method.keeps_terms)
     units = np.array(unit_addresses(system.model, calls), dtype=np.int64)
-    state = np.array(x, dtype=float), np.array(v, dtype=float)
-    return _packed(system, Tables(0, units, system.model, work, stages, clock, control, *state))
+    own = np.array(x, dtype=float), np.array(v, dtype=float)
+    units, work, stages, clock, control, own = aligned((units, work, stages, clock, control, own))
+    return _packed(system, Tables(0, units, system.model, work, stages, clock, control, *own))
 
 
 def _control(system: System, method: Integrator | None, start: float, spacing: float) -> Control:

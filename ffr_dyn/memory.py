@@ -7,9 +7,20 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.body_tables import in_sixes
 from ffr_dyn.equations import System
-from ffr_dyn.kernels.tables import LANES, Bodies, BodyWork, LoadWork, MarkerWork, Model, Record, RowWork, Stages, Work
+from ffr_dyn.kernels.tables import (
+    LANES,
+    STAGES,
+    Bodies,
+    BodyWork,
+    LoadWork,
+    MarkerWork,
+    Model,
+    Record,
+    RowWork,
+    Stages,
+    Work,
+)
 from ffr_dyn.kernels.vectors import LEAST_PIVOT
 from ffr_dyn.rotation import skew
 
@@ -45,17 +56,18 @@ def _body_work(m: Model, keeps_terms: bool) -> BodyWork:
     """Scratch of the bodies; the factors of rigid ones, which are constant, are in it."""
     B, E, n = m.bodies.mass.size, int(m.bodies.where[-1, 3]), m.bodies.where[:, 0]
     V, longest = 6 * B + E, int(n.max())
-    terms, products = E if keeps_terms else longest, int((np.maximum(9, m.bodies.where[:, 6]) * n).max())
+    E_s = E if m.bodies.stiffening.size else 0
+    terms, loads = E if keeps_terms else longest, int(m.markers.load.max(initial=6)) + 6
     work = BodyWork(
         A=_identities(B + 1),
         dinv=np.ones(E),
         terms=m.bodies.where[:-1, 3] * keeps_terms,
         **_zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), inverse=(B, 2), g=9 * terms, l=3 * terms),
-        sorted=np.zeros(2 * longest + products + 1 + 3 * longest + 1),
+        sorted=np.zeros(14 * longest + 3 * LANES * longest + loads),
         **_zeros(H=3 * E, Cd=6 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6), elastic=E),
-        **_zeros(more=V, unstiffened=E, shift=V, load=(B, int(m.markers.load.max(initial=6)) + 6)),
+        **_zeros(more=V, unstiffened=E, shift=V, load=(B, loads)),
         **_zeros(
-            stiff=sum(in_sixes(int(loads)) * int(k) for loads, k in zip(m.bodies.where[:-1, 6], n[:-1], strict=True))
+            stiff=E_s, last=E_s, steady=2, change=(3 * STAGES, E_s), K_sigma=int(m.bodies.where[:, 6].max()) + LANES
         ),
     )
     work.inverse[:, 0] = [_inverse(mass) for mass in m.bodies.mass]

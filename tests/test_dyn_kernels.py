@@ -9,12 +9,14 @@ import pytest
 from synthetic import cloud, mirrored
 
 from ffr_dyn.analyses.assemble import drive_of, rows_at
+from ffr_dyn.body_tables import loads_that_stiffen
 from ffr_dyn.constraints import evaluate_word
 from ffr_dyn.decoupling import in_blocks
 from ffr_dyn.drivers import Driver, PointDriver
 from ffr_dyn.equations import System, compile_scene
 from ffr_dyn.forces import Load
 from ffr_dyn.inertia import elastic_force, gravity_force, mass_matrix, quadratic_velocity
+from ffr_dyn.integrators import RK4
 from ffr_dyn.joints import KINDS, Joint
 from ffr_dyn.kernels.functions import evaluate_functions
 from ffr_dyn.kernels.tables import OK, Functions
@@ -263,6 +265,45 @@ def test_blocks_give_the_products_of_the_whole_table():
     np.testing.assert_allclose(last.reshape(2, n), expected[4:], atol=1e-13)
 
 
+@pytest.mark.parametrize("n", [1, 3, 8, 11, 30, 75])
+@pytest.mark.parametrize("families", [1, 4])
+def test_geometric_stiffness_in_blocks_is_the_sum_of_the_whole(n, families):
+    """Each load couples a family of coordinates with one other, or, with one family, all with all; 18 loads act."""
+    rng = np.random.default_rng(n)
+    family = rng.permutation(n) % families
+    K = 1e-3 * rng.normal(size=(30, n, n))
+    for load, matrix in enumerate(K):
+        matrix += matrix.T
+        matrix *= (family[:, None] ^ family) == load % families
+    body = replace(cloud(n, points=30), stiffening=K)
+    scene = Scene(
+        bodies=(Body("one", body), Body("rigid", cloud(0)), Body("two", body)),
+        joints=(Joint("root", "spherical", "ground.O", "two.a"), Joint("tie", "spherical", "two.a", "rigid.b")),
+        loads=(Load("push", "one.c", force=(1.0, 2.0, 3.0)),),
+        ground={"O": (0.1, 0.2, 0.3)},
+    )
+    system = compile_scene(scene)
+    x, v = random_state(scene)
+    machine = new_machine(system, x, v)
+    assert evaluate_at(machine, 0.0, x, v) == OK
+    work = machine.work.bodies
+    for b, at_marker in ((0, 24), (2, 12)):
+        loads, first = loads_that_stiffen(system.model.bodies, b), system.model.bodies.where[b, 3]
+        assert loads.tolist() == [k for k in (*range(12), *range(at_marker, at_marker + 6)) if K[k].any()]
+        expected = np.einsum("l,lij,j->i", work.load[b, loads], K[loads], x[system.layout.q(b)])
+        found = work.stiff[first : first + n]
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max(initial=1e-3))
+
+
+def test_tables_lie_at_the_starts_of_cache_lines():
+    system = compile_scene(Scene(bodies=(Body("one", cloud(5)), Body("two", cloud(3)))))
+    machine = new_machine(system, *random_state(system.scene), RK4(1e-3))
+    for tables in (system.model.bodies, machine.work.rows, machine.work.bodies, machine.tables.stages):
+        assert all(array.ctypes.data % 64 == 0 and array.flags.c_contiguous for array in tables if array.size)
+    assert machine.work.markers.A is machine.work.bodies.A
+    assert machine.tables.x.ctypes.data % 64 == 0
+
+
 def test_a_body_without_symmetry_and_one_of_few_modes_are_one_block():
     for body in (cloud(20), mirrored(8, 2)):
         bodies = compile_scene(Scene(bodies=(Body("one", body),))).model.bodies
@@ -277,8 +318,8 @@ def test_loads_at_interfaces_that_nothing_acts_on_stiffen_nothing():
     held = Scene((bar,), (Joint("root", "revolute", "ground.O", "one.a", axis=(0, 0, 1)),), ground=ground)
     pulled = replace(held, loads=(Load("pull", "one.b", force=(1.0, 0.0, 0.0)),))
     first = 12 + 6 * [i.name for i in model.interfaces].index("b")
-    assert not any(first <= k < first + 6 for k in compile_scene(held).model.bodies.loads)
-    assert first in compile_scene(pulled).model.bodies.loads
+    assert not any(first <= k < first + 6 for k in loads_that_stiffen(compile_scene(held).model.bodies, 0))
+    assert first in loads_that_stiffen(compile_scene(pulled).model.bodies, 0)
 
 
 # ---- constraints: finite differences ----------------------------------------------------------------------------------

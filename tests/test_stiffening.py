@@ -132,8 +132,7 @@ def test_order_is_kept_with_stiffening(rod, method, step):
 
     truth = end(step / 8)
     errors = [np.abs(end(h) - truth).max() for h in (step, step / 2)]
-    # What two sweeps from the loads of the stage before leave is some 1e-9 of the motion, and goes with the step.
-    assert errors[1] < max(errors[0] / 2 ** (method.order - 0.5), 1e-9 * np.abs(truth).max())
+    assert errors[1] < max(errors[0] / 2 ** (method.order - 0.5), 2e-10 * np.abs(truth).max())
 
 
 # ---- spin-up of a rotating cantilever ---------------------------------------------------------------------------------

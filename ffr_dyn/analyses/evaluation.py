@@ -221,7 +221,7 @@ def evaluated_mass_matrix(at: Evaluator) -> Array:
         block[[0, 1, 2], [0, 1, 2]] = bodies.mass[b]
         block[3:, :3], block[:3, 3:], block[3:, 3:] = s, -s, work.J[b]
         if n:
-            c = bodies.where[b, 10]
+            c = bodies.where[b, 8]
             P, H = bodies.P_dm[3 * c : 3 * (c + n)], work.H[3 * e : 3 * (e + n)]
             coupling = np.concatenate([P, H]).reshape(6, n)
             M[rigid, elastic], M[elastic, rigid] = coupling, coupling.T

@@ -34,6 +34,7 @@ from ffr_dyn.analyses.evaluation import (
     locked,
     unit_rows,
 )
+from ffr_dyn.body_tables import loads_that_stiffen, stiffness_of
 from ffr_dyn.equations import System
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.layout import Layout
@@ -145,24 +146,17 @@ def samples(small: Assembled, large: Assembled, bases: tuple[Array, ...], time: 
 
 def stiffening_numbers(system: System) -> tuple[tuple[int, int], ...]:
     """(body, number of the load) of all loads that stiffen a body of the model."""
-    where, loads = system.model.bodies.where, system.model.bodies.loads
-    return tuple(
-        (b, int(number))
-        for b in range(len(system.scene.bodies))
-        for number in loads[where[b, 8] : where[b, 8] + where[b, 6]]
-    )
+    bodies = system.model.bodies
+    return tuple((b, int(k)) for b in range(len(system.scene.bodies)) for k in loads_that_stiffen(bodies, b))
 
 
 def stiffening_forces(at: Evaluator, numbers: tuple[tuple[int, int], ...]) -> Array:
     """(V, L) force of each load by way of the geometric stiffness, at the state evaluated last."""
-    place, where, work = at.system.layout, at.system.model.bodies.where, at.work.bodies
+    place, scene = at.system.layout, at.system.scene
     forces = np.zeros((place.v_size, len(numbers)))
-    for b in {b for b, _ in numbers}:
-        columns = [k for k, (body, _) in enumerate(numbers) if body == b]
-        n, start = place.n[b], int(where[b, 9])
-        products = work.stiff[start : start + len(columns) * n].reshape(-1, n)
-        sizes = work.load[b][[numbers[k][1] for k in columns]]
-        forces[place.q_dot(b), columns] = -(sizes[:, None] * products).T
+    for k, (b, load) in enumerate(numbers):
+        q = at.record.x[0, place.q(b)]
+        forces[place.q_dot(b), k] = -at.work.bodies.load[b, load] * (stiffness_of(scene.bodies[b])[load] @ q)
     return forces
 
 

@@ -38,7 +38,7 @@ FIRST = 3  # row of the first stage; before it the error and scratch
 def slopes(r, x, v, k):
     """Keep the slopes of what was evaluated last, at (x, v), as stage k."""
     acceleration_target(r.work.rows, r.clock.gains, r.stages.target)
-    solve(r, x, r.stages.target)
+    solve(r, x, r.stages.target, k)
     position_rates(r.model.bodies, x, v, r.stages.x[FIRST + k])
     to_velocity_rates(r.model.bodies.where, r.work.bodies.A, r.work.bodies.acc, r.stages.v[FIRST + k])
 

@@ -31,7 +31,7 @@ from ffr_dyn.errors import InputError
 from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.actions import keep_turns
 from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.calls import correct, evaluate, project, set_diagonal, settle, solve, solve_anew
+from ffr_dyn.kernels.calls import correct, evaluate, project, set_diagonal, settle, solve_again, solve_anew
 from ffr_dyn.kernels.motion import carry, converging, farthest, largest_motion, unconverged
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.packing import tables_at
@@ -97,7 +97,7 @@ def newton(r, h, square, single):
     stabilised = s.numbers[STABILISED] > 0.0
     for k in range(s.target.size):
         s.target[k] = -rows.nu[k] / single if stabilised else -rows.Phi[k] / square
-    solve(r, s.x[0], s.target)
+    solve_again(r, s.x[0], s.target)
     to_velocity_rates(r.model.bodies.where, r.work.bodies.A, r.work.bodies.acc, s.v[CORRECTION])
     add_scaled(s.v[NEXT], s.v[NEXT], 1.0, s.v[CORRECTION])
     if stabilised:

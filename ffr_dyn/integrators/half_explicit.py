@@ -20,7 +20,7 @@ from typing import ClassVar
 from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.actions import keep_turns
 from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, solve
+from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, solve, solve_again
 from ffr_dyn.kernels.motion import into_body_axes, largest_motion
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import tables_at
@@ -96,8 +96,11 @@ def accelerate(r, k, ha):
     copy(s.target, rows.gamma)
     before, stuck = math.inf, 0
     exact = EXACT / abs(ha) * largest_motion(r.model.bodies, bw.J, here)[0]
-    for _ in range(SWEEPS):
-        solve(r, s.x[HERE], s.target)
+    for sweep in range(SWEEPS):
+        if sweep == 0:
+            solve(r, s.x[HERE], s.target, k)
+        else:
+            solve_again(r, s.x[HERE], s.target)
         to_velocity_rates(r.model.bodies.where, bw.A, bw.acc, rate)
         rates_ahead(r, rate, short)
         for c in range(short.size):

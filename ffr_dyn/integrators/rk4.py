@@ -35,7 +35,7 @@ def rk4_step(at, t, unused, unused_too):
         if status != OK:
             return status
         acceleration_target(r.work.rows, r.clock.gains, stages.target)
-        solve(r, xs, stages.target)
+        solve(r, xs, stages.target, k)
         position_rates(r.model.bodies, xs, vs, stages.x[k])
         to_velocity_rates(r.model.bodies.where, r.work.bodies.A, r.work.bodies.acc, stages.v[k])
     for k in range(4):

@@ -64,7 +64,7 @@ def ros2_step(at, t, unused, unused_too):
         add_elastic_part(bodies, r.work.bodies.f, vs, r_x, gh)
         if k == 1:
             correct(r, r_v, stages.target)
-        solve(r, xs, stages.target)
+        solve(r, xs, stages.target, k)
         to_velocity_rates(bodies.where, r.work.bodies.A, r.work.bodies.acc, stages.v[k])
         add_scaled(vs, vs, gh, stages.v[k])
         position_rates(bodies, xs, vs, stages.x[k])

@@ -31,7 +31,7 @@ from ffr_dyn.integrators.generalised_alpha import check_iterations
 from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.actions import keep_turns
 from ffr_dyn.kernels.bodies import mass_times, normalise, six_rows, three_rows
-from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, solve, solve_anew
+from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, solve_again, solve_anew
 from ffr_dyn.kernels.motion import carry, converging, farthest, into_global_axes, largest_motion, unconverged
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import tables_at
@@ -84,7 +84,7 @@ def lagrangian_forces(bodies, w, b, y, p, Q):
                dot((J[2, 0], J[2, 1], J[2, 2]), omega))  # fmt: skip
     moment = add((f[3], f[4], f[5]), cross(omega, J_omega))
     if n > 0:
-        P = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n)
+        P = part(bodies.P_dm, 3 * bodies.where[b, 8], 3 * n)
         g, l = part(w.g, 9 * terms, 9 * n), part(w.l, 3 * terms, 3 * n)  # noqa: E741
         q_dot = part(y, 6, n)
         force = add(force, scale(2.0, cross(omega, three_rows(P, q_dot, n))))
@@ -213,7 +213,7 @@ def close(r, h):
     add_scaled(s.target, s.target, -1.0, rows.nu)
     add_scaled(bw.f, s.v[END], 0.5 * h, s.v[KICK])
     to_body_axes(bodies.where, bw.A, bw.f)
-    solve(r, s.x[NOTHING], s.target)
+    solve_again(r, s.x[NOTHING], s.target)
     to_velocity_rates(bodies.where, bw.A, bw.acc, r.v)
 
 
@@ -251,7 +251,7 @@ def newton(r, h):
     to_body_axes(bodies.where, bw.A, bw.f)
     add_reactions(bodies.where, r.model.markers, r.model.rows, r.work.rows.jac, s.rows[LAM], bw.f)
     fill(bw.shift, 0.0)
-    solve(r, s.x[NOTHING], s.target)
+    solve_again(r, s.x[NOTHING], s.target)
     copy(s.rows[LAM], r.work.rows.lam)
     fill(bw.more, 0.0)
     for b in range(bodies.mass.size):  # the momenta at the end of what is corrected

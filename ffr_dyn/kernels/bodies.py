@@ -100,13 +100,13 @@ def six_rows(rows, q, n):
 @inlined
 def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s):
     """Elastic right-hand side; returns (first moment, I3 q_dot, second moment of mass, sym D, axial D) of the body."""
-    n, e, start, c = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4], bodies.where[b, 10]
+    n, e, start, c = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4], bodies.where[b, 8]
     g, l = part(w.g, 9 * w.terms[b], 9 * n), part(w.l, 3 * w.terms[b], 3 * n)  # noqa: E741
     rP, P = part(bodies.rP_dm, 9 * c, 9 * n), part(bodies.P_dm, 3 * c, 3 * n)
     copy(g, rP)
     fill(l, 0.0)
     if start >= 0:
-        table, at = part(bodies.PP_dm, start, 9 * n * n), bodies.where[b, 11]
+        table, at = part(bodies.PP_dm, start, 9 * n * n), bodies.where[b, 9]
         contract(table, bodies.blocks, at, q, qd, n, 9 * n, 3 * n, w.sorted, g, l)
     copy(part(w.H, 3 * e, 3 * n), part(g, 6 * n, 3 * n))
     ox, oy, oz = omega
@@ -231,7 +231,7 @@ def prepare_body(bodies, w, b):
     """What of the Schur complement of body b depends on the elastic diagonal alone: P_dm dinv, and the factor T of the
     translational block m I - P_dm dinv P_dm^T."""
     n, e = bodies.where[b, 0], bodies.where[b, 3]
-    P, Cd, T = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.Cd, 6 * e, 6 * n), w.T[b]
+    P, Cd, T = part(bodies.P_dm, 3 * bodies.where[b, 8], 3 * n), part(w.Cd, 6 * e, 6 * n), w.T[b]
     for r in range(3):
         scale_row(P, r, part(w.dinv, e, n), n, Cd, r)
         for c in range(r + 1):
@@ -254,7 +254,7 @@ def factorise(bodies, w, b):
         return w.L[b, 0, 0] > 0.0
     n, e, normal = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 7]
     L, T = w.L[b], w.T[b]
-    P, H = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.H, 3 * e, 3 * n)
+    P, H = part(bodies.P_dm, 3 * bodies.where[b, 8], 3 * n), part(w.H, 3 * e, 3 * n)
     dinv, Cd = part(w.dinv, e, n), part(w.Cd, 6 * e, 6 * n)
     if normal >= 0:
         return factorise_in_plane(T, get(w.s, b), w.J[b, normal, normal], P, H, dinv, Cd, L, n, normal)
@@ -347,22 +347,15 @@ def reduce_forces(bodies, w, b):
     rigid_lower(w.L[b], z, normal)
 
 
-@kernel
-def accelerate_rigid(bodies, w, b):
-    """The rigid part of w.acc of body b from its reduced forces: L^-T w.rigid, which stays there."""
-    j, z = bodies.where[b, 2], w.rigid[b]
-    rigid_upper(w.L[b], z, bodies.where[b, 7])
-    for k in range(6):
-        w.acc[j + k] = z[k]
-
-
 @inlined
 def accelerate(bodies, w, b):
-    """w.acc of body b from its reduced forces: the rigid part, and w.elastic - (C dinv)^T of it."""
+    """w.acc of body b from its reduced forces: the rigid part, L^-T w.rigid, and w.elastic - (C dinv)^T of it."""
     n, j, e, normal = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3], bodies.where[b, 7]
-    accelerate_rigid(bodies, w, b)
+    z, acc = w.rigid[b], part(w.acc, j, 6 + n)
+    rigid_upper(w.L[b], z, normal)
+    for k in range(6):
+        acc[k] = z[k]
     if n > 0:
-        z, acc = w.rigid[b], part(w.acc, j, 6 + n)
         Cd, elastic = part(w.Cd, 6 * e, 6 * n), part(w.elastic, e, n)
         if normal >= 0:
             substitute_in_plane(Cd, elastic, z, n, normal, part(acc, 6, n))
@@ -389,7 +382,7 @@ def mass_times(bodies, w, b, y, out):
         out[k] += bodies.mass[b] * linear[k] + turn[k]
         out[3 + k] += lift[k] + dot(w.J[b, k], angular)
     if n > 0:
-        P, H = part(bodies.P_dm, 3 * bodies.where[b, 10], 3 * n), part(w.H, 3 * e, 3 * n)
+        P, H = part(bodies.P_dm, 3 * bodies.where[b, 8], 3 * n), part(w.H, 3 * e, 3 * n)
         if bodies.where[b, 7] >= 0:
             mass_times_in_plane(P, H, y, n, bodies.where[b, 7], out)
             return

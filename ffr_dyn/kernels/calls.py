@@ -2,7 +2,7 @@
 
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.packing import call_unit
-from ffr_dyn.kernels.tables import CORRECT, EVALUATE, LOOK_AHEAD, PREPARE, PROJECT, SETTLE, SOLVE
+from ffr_dyn.kernels.tables import AGAIN, ANEW, CORRECT, EVALUATE, LOOK_AHEAD, PREPARE, PROJECT, SETTLE, SOLVE
 
 
 @inlined
@@ -18,15 +18,21 @@ def settle(r, t):
 
 
 @inlined
-def solve(r, x, target):
-    """Accelerations (bodies.acc) and multipliers (rows.lam) of what was evaluated last at x, near what they are now."""
-    call_unit(r.units[SOLVE], r.address, 1.0, x.ctypes.data, target.ctypes.data)
+def solve(r, x, target, stage):
+    """Accelerations (bodies.acc) and multipliers (rows.lam) of what was evaluated last at x, in stage number `stage`."""
+    call_unit(r.units[SOLVE], r.address, float(stage), x.ctypes.data, target.ctypes.data)
+
+
+@inlined
+def solve_again(r, x, target):
+    """`solve` near what was solved last."""
+    call_unit(r.units[SOLVE], r.address, AGAIN, x.ctypes.data, target.ctypes.data)
 
 
 @inlined
 def solve_anew(r, x, target):
     """`solve` where what was solved last has nothing to do with it."""
-    call_unit(r.units[SOLVE], r.address, 0.0, x.ctypes.data, target.ctypes.data)
+    call_unit(r.units[SOLVE], r.address, ANEW, x.ctypes.data, target.ctypes.data)
 
 
 @inlined

@@ -11,27 +11,21 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
-from ffr_dyn.kernels.intrinsics import data_of, intrinsic
-from ffr_dyn.kernels.tables import LANES, MOST_ROWS, NARROW
-
-_REAL = types.float64
-_POOLED = types.Array(types.float64, 1, "C")
-_LIBERTIES = ("contract", "reassoc", "nsz")
-
-
-def _data(context: Any, builder: Any, array: Any) -> Any:
-    return data_of(context, builder, _POOLED, array)
-
-
-def _row_pointer(builder: Any, data: Any, at: Any, lanes: int = LANES) -> Any:
-    return builder.bitcast(builder.gep(data, [at]), ir.VectorType(ir.DoubleType(), lanes).as_pointer())
-
-
-def _broadcast(builder: Any, number: Any, lanes: int = LANES) -> Any:
-    vector = ir.VectorType(ir.DoubleType(), lanes)
-    one = builder.insert_element(ir.Constant(vector, ir.Undefined), number, ir.Constant(ir.IntType(32), 0))
-    zeros = ir.Constant(ir.VectorType(ir.IntType(32), lanes), [0] * lanes)
-    return builder.shuffle_vector(one, ir.Constant(vector, ir.Undefined), zeros)
+from ffr_dyn.kernels.intrinsics import (
+    LIBERTIES,
+    POOLED,
+    REAL,
+    broadcast,
+    case_by_case,
+    intrinsic,
+    lane_of,
+    load_row,
+    pooled_data,
+    row_pointer,
+    store_row,
+    sum_of_lanes,
+)
+from ffr_dyn.kernels.tables import LANES, NARROW
 
 
 def _combination(count: int, lanes: int = LANES, *, onto: bool = True) -> Any:
@@ -41,20 +35,20 @@ def _combination(count: int, lanes: int = LANES, *, onto: bool = True) -> Any:
     def combine(typing, target, at, factor, numbers, first, stride, source, begin):  # type: ignore[no-untyped-def]
         """target row += factor sum_k numbers[first + k stride] source row k."""
         index = types.intp
-        signature = types.void(_POOLED, index, _REAL, _POOLED, index, index, _POOLED, index)
+        signature = types.void(POOLED, index, REAL, POOLED, index, index, POOLED, index)
 
         def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
             out, at, factor, numbers, first, stride, source, begin = args
-            numbers, source = _data(context, builder, numbers), _data(context, builder, source)
-            place = _row_pointer(builder, _data(context, builder, out), at, lanes)
+            numbers, source = pooled_data(context, builder, numbers), pooled_data(context, builder, source)
+            place = row_pointer(builder, pooled_data(context, builder, out), at, lanes)
             total = builder.load(place, align=8) if onto else None
             for k in range(count):
-                row = _row_pointer(builder, source, builder.add(begin, cgutils.intp_t(LANES * k)), lanes)
+                row = row_pointer(builder, source, builder.add(begin, cgutils.intp_t(LANES * k)), lanes)
                 where = builder.add(first, builder.mul(stride, cgutils.intp_t(k)))
-                number = builder.fmul(factor, builder.load(builder.gep(numbers, [where])), flags=_LIBERTIES)
-                many = _broadcast(builder, number, lanes)
-                product = builder.fmul(many, builder.load(row, align=8), flags=_LIBERTIES)
-                total = product if total is None else builder.fadd(total, product, flags=_LIBERTIES)
+                number = builder.fmul(factor, builder.load(builder.gep(numbers, [where])), flags=LIBERTIES)
+                many = broadcast(builder, number, lanes)
+                product = builder.fmul(many, builder.load(row, align=8), flags=LIBERTIES)
+                total = product if total is None else builder.fadd(total, product, flags=LIBERTIES)
             builder.store(total, place, align=8)
             return context.get_dummy_value()
 
@@ -76,12 +70,12 @@ def _scaling(lanes: int) -> Any:
         """target row *= factor."""
 
         def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-            place = _row_pointer(builder, _data(context, builder, args[0]), args[1], lanes)
-            row, many = builder.load(place, align=8), _broadcast(builder, args[2], lanes)
-            builder.store(builder.fmul(row, many, flags=_LIBERTIES), place, align=8)
+            place = row_pointer(builder, pooled_data(context, builder, args[0]), args[1], lanes)
+            row, many = builder.load(place, align=8), broadcast(builder, args[2], lanes)
+            builder.store(builder.fmul(row, many, flags=LIBERTIES), place, align=8)
             return context.get_dummy_value()
 
-        return types.void(_POOLED, types.intp, _REAL), generate
+        return types.void(POOLED, types.intp, REAL), generate
 
     return scale
 
@@ -92,18 +86,18 @@ def _of_two_rows(emit: Any, lanes: int = LANES, result: Any = types.void) -> Any
     @intrinsic
     def operate(typing, first, at, second, begin):  # type: ignore[no-untyped-def]
         def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-            one = _row_pointer(builder, _data(context, builder, args[0]), args[1], lanes)
-            other = _row_pointer(builder, _data(context, builder, args[2]), args[3], lanes)
+            one = row_pointer(builder, pooled_data(context, builder, args[0]), args[1], lanes)
+            other = row_pointer(builder, pooled_data(context, builder, args[2]), args[3], lanes)
             found = emit(builder, one, other)
             return context.get_dummy_value() if result is types.void else found
 
-        return result(_POOLED, types.intp, _POOLED, types.intp), generate
+        return result(POOLED, types.intp, POOLED, types.intp), generate
 
     return operate
 
 
 def _product(builder: Any, left: Any, right: Any) -> Any:
-    return builder.fmul(builder.load(left, align=8), builder.load(right, align=8), flags=_LIBERTIES)
+    return builder.fmul(builder.load(left, align=8), builder.load(right, align=8), flags=LIBERTIES)
 
 
 def _copy(builder: Any, source: Any, target: Any) -> None:
@@ -118,13 +112,13 @@ def _multiply(builder: Any, target: Any, source: Any) -> None:
 
 def _dot(builder: Any, left: Any, right: Any) -> Any:
     """The sum over the lanes of left row * right row."""
-    return _sum(builder, _product(builder, left, right))
+    return sum_of_lanes(builder, _product(builder, left, right))
 
 
 scale_row, scale_narrow = _scaling(LANES), _scaling(NARROW)
 copy_row, copy_narrow = _of_two_rows(_copy), _of_two_rows(_copy, NARROW)
 multiply_row = _of_two_rows(_multiply)
-dot_rows, dot_narrow = _of_two_rows(_dot, result=_REAL), _of_two_rows(_dot, NARROW, _REAL)
+dot_rows, dot_narrow = _of_two_rows(_dot, result=REAL), _of_two_rows(_dot, NARROW, REAL)
 
 
 @intrinsic
@@ -136,65 +130,33 @@ def add_scale(typing, jac, by_mass, by_inertia, scale, at):  # type: ignore[no-u
 
     def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
         jac, by_mass, by_inertia, scale, at = args
-        jac, scale = _data(context, builder, jac), _data(context, builder, scale)
+        jac, scale = pooled_data(context, builder, jac), pooled_data(context, builder, scale)
 
         def square(first: int) -> Any:
-            total = _broadcast(builder, context.get_constant(_REAL, 0.0))
+            total = broadcast(builder, context.get_constant(REAL, 0.0))
             for k in range(first, first + 3):
-                row = _load_row(builder, jac, cgutils.intp_t(0), k)
-                total = builder.fadd(total, builder.fmul(row, row, flags=_LIBERTIES), flags=_LIBERTIES)
+                row = load_row(builder, jac, cgutils.intp_t(0), k)
+                total = builder.fadd(total, builder.fmul(row, row, flags=LIBERTIES), flags=LIBERTIES)
             return total
 
         point, turn = square(0), square(3)
-        moves = builder.fcmp_ordered(">", point, _broadcast(builder, context.get_constant(_REAL, 0.0)))
-        point = builder.fmul(point, _broadcast(builder, by_mass), flags=_LIBERTIES)
-        turn = builder.fmul(turn, _broadcast(builder, by_inertia), flags=_LIBERTIES)
+        moves = builder.fcmp_ordered(">", point, broadcast(builder, context.get_constant(REAL, 0.0)))
+        point = builder.fmul(point, broadcast(builder, by_mass), flags=LIBERTIES)
+        turn = builder.fmul(turn, broadcast(builder, by_inertia), flags=LIBERTIES)
         least = builder.select(moves, point, turn)
-        _store_row(builder, builder.fadd(_load_row(builder, scale, at), least, flags=_LIBERTIES), scale, at)
+        store_row(builder, builder.fadd(load_row(builder, scale, at), least, flags=LIBERTIES), scale, at)
         return context.get_dummy_value()
 
-    return types.void(_POOLED, _REAL, _REAL, _POOLED, types.intp), generate
+    return types.void(POOLED, REAL, REAL, POOLED, types.intp), generate
 
 
 # ---- blocks of a joint with itself and with another: as many rows as the joint has, held in registers -------------------
 
 
-def _case_by_case(context: Any, builder: Any, size: Any, emit: Any) -> Any:
-    """emit(n) for the number of rows that `size` is; nothing where it is none of a joint's."""
-    end = builder.append_basic_block()
-    cases = builder.switch(size, end)
-    for n in range(1, MOST_ROWS + 1):
-        block = builder.append_basic_block()
-        cases.add_case(context.get_constant(types.intp, n), block)
-        builder.position_at_end(block)
-        emit(n)
-        builder.branch(end)
-    builder.position_at_end(end)
-    return context.get_dummy_value()
-
-
-def _load_row(builder: Any, data: Any, at: Any, number: int = 0) -> Any:
-    return builder.load(_row_pointer(builder, data, builder.add(at, cgutils.intp_t(LANES * number))), align=8)
-
-
-def _store_row(builder: Any, row: Any, data: Any, at: Any, number: int = 0) -> None:
-    builder.store(row, _row_pointer(builder, data, builder.add(at, cgutils.intp_t(LANES * number))), align=8)
-
-
-def _lane(builder: Any, row: Any, number: int) -> Any:
-    return builder.extract_element(row, ir.Constant(ir.IntType(32), number))
-
-
 def _less(builder: Any, row: Any, number: Any, other: Any) -> Any:
     """row - number other."""
-    product = builder.fmul(_broadcast(builder, number), other, flags=_LIBERTIES)
-    return builder.fsub(row, product, flags=_LIBERTIES)
-
-
-def _sum(builder: Any, row: Any) -> Any:
-    kind = ir.FunctionType(ir.DoubleType(), [ir.DoubleType(), row.type])
-    reduce = cgutils.get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.fadd.v{row.type.count}f64")
-    return builder.call(reduce, [ir.Constant(ir.DoubleType(), 0.0), row], fastmath=_LIBERTIES)
+    product = builder.fmul(broadcast(builder, number), other, flags=LIBERTIES)
+    return builder.fsub(row, product, flags=LIBERTIES)
 
 
 def _merged(builder: Any, row: Any, other: Any, taken: range) -> Any:
@@ -224,31 +186,31 @@ def factorise_rows(typing, size, S, at, least, first, pivots, own, raw):  # type
 
     def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
         size, S, at, least, first, pivots, own, raw = args
-        S, least, pivots, raw = (_data(context, builder, array) for array in (S, least, pivots, raw))
-        one = context.get_constant(_REAL, 1.0)
+        S, least, pivots, raw = (pooled_data(context, builder, array) for array in (S, least, pivots, raw))
+        one = context.get_constant(REAL, 1.0)
 
         def emit(n: int) -> None:
-            rows = [_load_row(builder, S, at, k) for k in range(n)]
+            rows = [load_row(builder, S, at, k) for k in range(n)]
             inverses = ir.Constant(rows[0].type, [0.0] * LANES)
             for c in range(n):
-                found = _lane(builder, rows[c], c)
+                found = lane_of(builder, rows[c], c)
                 builder.store(found, builder.gep(raw, [cgutils.intp_t(c)]))
                 floor = builder.load(builder.gep(least, [builder.add(first, cgutils.intp_t(c))]))
                 pivot = builder.select(builder.fcmp_ordered(">", found, floor), found, floor)
                 inverse = builder.fdiv(one, pivot)
                 builder.store(inverse, builder.gep(pivots, [builder.add(own, cgutils.intp_t(c))]))
-                scaled = builder.fmul(rows[c], _broadcast(builder, inverse), flags=_LIBERTIES)
+                scaled = builder.fmul(rows[c], broadcast(builder, inverse), flags=LIBERTIES)
                 unit = _beyond(builder, scaled, c)
-                column = builder.fmul(rows[c], inverses, flags=_LIBERTIES)  # S was symmetric; zero from lane c on
-                _store_row(builder, _merged(builder, unit, column, range(c)), S, at, c)
+                column = builder.fmul(rows[c], inverses, flags=LIBERTIES)  # S was symmetric; zero from lane c on
+                store_row(builder, _merged(builder, unit, column, range(c)), S, at, c)
                 inverses = builder.insert_element(inverses, inverse, ir.Constant(ir.IntType(32), c))
                 for i in range(c + 1, n):
-                    rows[i] = _less(builder, rows[i], _lane(builder, rows[c], i), unit)
+                    rows[i] = _less(builder, rows[i], lane_of(builder, rows[c], i), unit)
 
-        return _case_by_case(context, builder, size, emit)
+        return case_by_case(context, builder, size, emit)
 
     index = types.intp
-    return types.void(index, _POOLED, index, _POOLED, index, _POOLED, index, _POOLED), generate
+    return types.void(index, POOLED, index, POOLED, index, POOLED, index, POOLED), generate
 
 
 @intrinsic
@@ -257,22 +219,22 @@ def eliminate_rows(typing, size, S, diagonal, at, pivots, own, Y):  # type: igno
 
     def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
         size, S, diagonal, at, pivots, own, Y = args
-        S, pivots, Y = (_data(context, builder, array) for array in (S, pivots, Y))
+        S, pivots, Y = (pooled_data(context, builder, array) for array in (S, pivots, Y))
 
         def emit(n: int) -> None:
-            rows = [_load_row(builder, S, at, k) for k in range(n)]
+            rows = [load_row(builder, S, at, k) for k in range(n)]
             for c in range(n):
                 for j in range(c):
                     place = builder.add(diagonal, cgutils.intp_t(LANES * j + c))
                     rows[c] = _less(builder, rows[c], builder.load(builder.gep(S, [place])), rows[j])
                 inverse = builder.load(builder.gep(pivots, [builder.add(own, cgutils.intp_t(c))]))
-                _store_row(builder, rows[c], Y, cgutils.intp_t(0), c)
-                _store_row(builder, builder.fmul(rows[c], _broadcast(builder, inverse), flags=_LIBERTIES), S, at, c)
+                store_row(builder, rows[c], Y, cgutils.intp_t(0), c)
+                store_row(builder, builder.fmul(rows[c], broadcast(builder, inverse), flags=LIBERTIES), S, at, c)
 
-        return _case_by_case(context, builder, size, emit)
+        return case_by_case(context, builder, size, emit)
 
     index = types.intp
-    return types.void(index, _POOLED, index, index, _POOLED, index, _POOLED), generate
+    return types.void(index, POOLED, index, index, POOLED, index, POOLED), generate
 
 
 @intrinsic
@@ -281,19 +243,19 @@ def subtract_product(typing, size, S, target, numbers, Y):  # type: ignore[no-un
 
     def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
         size, S, target, numbers, Y = args
-        S, Y = _data(context, builder, S), _data(context, builder, Y)
+        S, Y = pooled_data(context, builder, S), pooled_data(context, builder, Y)
 
         def emit(n: int) -> None:
-            row = _load_row(builder, S, target)
+            row = load_row(builder, S, target)
             for c in range(n):
                 number = builder.load(builder.gep(S, [builder.add(numbers, cgutils.intp_t(LANES * c))]))
-                row = _less(builder, row, number, _load_row(builder, Y, cgutils.intp_t(0), c))
-            _store_row(builder, row, S, target)
+                row = _less(builder, row, number, load_row(builder, Y, cgutils.intp_t(0), c))
+            store_row(builder, row, S, target)
 
-        return _case_by_case(context, builder, size, emit)
+        return case_by_case(context, builder, size, emit)
 
     index = types.intp
-    return types.void(index, _POOLED, index, index, _POOLED), generate
+    return types.void(index, POOLED, index, index, POOLED), generate
 
 
 def _substitution(descending: bool, text: str) -> Any:
@@ -301,20 +263,20 @@ def _substitution(descending: bool, text: str) -> Any:
     def substitute(typing, size, S, diagonal, b, own):  # type: ignore[no-untyped-def]
         def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
             size, S, diagonal, b, own = args
-            S, b = _data(context, builder, S), _data(context, builder, b)
+            S, b = pooled_data(context, builder, S), pooled_data(context, builder, b)
 
             def emit(n: int) -> None:
-                row = _load_row(builder, b, own)
+                row = load_row(builder, b, own)
                 for c in range(n - 1, 0, -1) if descending else range(n - 1):
                     kept = _before if descending else _beyond
-                    column = kept(builder, _load_row(builder, S, diagonal, c), c)
-                    row = _less(builder, row, _lane(builder, row, c), column)
-                _store_row(builder, row, b, own)
+                    column = kept(builder, load_row(builder, S, diagonal, c), c)
+                    row = _less(builder, row, lane_of(builder, row, c), column)
+                store_row(builder, row, b, own)
 
-            return _case_by_case(context, builder, size, emit)
+            return case_by_case(context, builder, size, emit)
 
         index = types.intp
-        return types.void(index, _POOLED, index, _POOLED, index), generate
+        return types.void(index, POOLED, index, POOLED, index), generate
 
     substitute.__doc__ = text
     return substitute
@@ -330,18 +292,18 @@ def spread_lower(typing, size, S, at, b, own, later):  # type: ignore[no-untyped
 
     def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
         size, S, at, b, own, later = args
-        S, b = _data(context, builder, S), _data(context, builder, b)
+        S, b = pooled_data(context, builder, S), pooled_data(context, builder, b)
 
         def emit(n: int) -> None:
-            row, mine = _load_row(builder, b, later), _load_row(builder, b, own)
+            row, mine = load_row(builder, b, later), load_row(builder, b, own)
             for c in range(n):
-                row = _less(builder, row, _lane(builder, mine, c), _load_row(builder, S, at, c))
-            _store_row(builder, row, b, later)
+                row = _less(builder, row, lane_of(builder, mine, c), load_row(builder, S, at, c))
+            store_row(builder, row, b, later)
 
-        return _case_by_case(context, builder, size, emit)
+        return case_by_case(context, builder, size, emit)
 
     index = types.intp
-    return types.void(index, _POOLED, index, _POOLED, index, index), generate
+    return types.void(index, POOLED, index, POOLED, index, index), generate
 
 
 @intrinsic
@@ -350,17 +312,17 @@ def gather_upper(typing, size, S, at, b, later, own):  # type: ignore[no-untyped
 
     def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
         size, S, at, b, later, own = args
-        S, b = _data(context, builder, S), _data(context, builder, b)
+        S, b = pooled_data(context, builder, S), pooled_data(context, builder, b)
 
         def emit(n: int) -> None:
-            row, other = _load_row(builder, b, own), _load_row(builder, b, later)
+            row, other = load_row(builder, b, own), load_row(builder, b, later)
             for c in range(n):
-                total = _sum(builder, builder.fmul(_load_row(builder, S, at, c), other, flags=_LIBERTIES))
-                value = builder.fsub(_lane(builder, row, c), total, flags=_LIBERTIES)
+                total = sum_of_lanes(builder, builder.fmul(load_row(builder, S, at, c), other, flags=LIBERTIES))
+                value = builder.fsub(lane_of(builder, row, c), total, flags=LIBERTIES)
                 row = builder.insert_element(row, value, ir.Constant(ir.IntType(32), c))
-            _store_row(builder, row, b, own)
+            store_row(builder, row, b, own)
 
-        return _case_by_case(context, builder, size, emit)
+        return case_by_case(context, builder, size, emit)
 
     index = types.intp
-    return types.void(index, _POOLED, index, _POOLED, index, index), generate
+    return types.void(index, POOLED, index, POOLED, index, index), generate

@@ -18,7 +18,7 @@ def sense(normal):
 @inlined
 def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, normal):
     """`flexible_terms` of a planar body that turns at the rate `omega`; without what acts across the plane."""
-    n, e, start, c = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4], bodies.where[b, 10]
+    n, e, start, c = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4], bodies.where[b, 8]
     g, l = part(w.g, 9 * w.terms[b], 9 * n), part(w.l, 3 * w.terms[b], n)  # noqa: E741
     rP, P = part(bodies.rP_dm, 9 * c, 9 * n), part(bodies.P_dm, 3 * c, 3 * n)
     c0, c1, _ = in_plane(normal)
@@ -30,7 +30,7 @@ def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, norm
     copy(h, part(rP, turning * n, n))
     fill(l, 0.0)
     if start >= 0:
-        table, at = part(bodies.PP_dm, start, 3 * n * n), bodies.where[b, 11]
+        table, at = part(bodies.PP_dm, start, 3 * n * n), bodies.where[b, 9]
         contract(table, bodies.blocks, at, q, qd, n, 3 * n, n, w.sorted, part(g, 0, 3 * n), l)
     copy(part(w.H, 3 * e + normal * n, n), h)
     f = part(w.f, bodies.where[b, 2] + 6, n)

@@ -4,7 +4,7 @@ M acc + Phi_q^T lam = f,  Phi_q acc = target, by elimination of the elastic coor
 """
 
 from ffr_dyn.kernels.blocks import SIDE, solve_blocks
-from ffr_dyn.kernels.bodies import accelerate, accelerate_rigid, reduce_forces, six_rows
+from ffr_dyn.kernels.bodies import accelerate, reduce_forces, six_rows
 from ffr_dyn.kernels.lanes import combine_6, dot_narrow, dot_rows, narrow_3, narrow_6
 from ffr_dyn.kernels.markers import plane_rows, project, shapes
 from ffr_dyn.kernels.options import inlined, kernel
@@ -200,27 +200,6 @@ def react(bodies, markers, rows, bw, rw):
                         release(phi, part(bw.dinv, e, n), wrench, n, elastic)
     for b in range(ground):
         accelerate(bodies, bw, b)
-
-
-@inlined
-def solve_loads(r, target):
-    """`solve_motion` without the elastic part of acc: what the loads of geometric stiffening are made of."""
-    m, bw, rw = r.model, r.work.bodies, r.work.rows
-    ground, sides = m.bodies.mass.size, m.rows.marker.shape[1]
-    for b in range(ground):
-        reduce_forces(m.bodies, bw, b)
-    reduced_rates(m.bodies, m.markers, m.rows, bw, rw, target)
-    solve_blocks(m.rows.start, m.pattern, rw.S, rw.pivots, rw.step)
-    gather_rows(m.rows.start, rw.step, rw.lam)
-    for k in range(m.rows.marker.shape[0]):
-        for side in range(sides):
-            marker = m.rows.marker[k, side]
-            b = m.markers.body[marker] if marker >= 0 else ground
-            if b != ground:
-                at, normal = (k * sides + side) * SIDE, m.bodies.where[b, 7]
-                react_rigid(rw.X, at, rw.step, LANES * k, normal, bw.rigid[b])
-    for b in range(ground):
-        accelerate_rigid(m.bodies, bw, b)
 
 
 @kernel

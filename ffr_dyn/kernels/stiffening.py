@@ -2,44 +2,83 @@
 
 K_sigma is a sum of constant matrices times loads, and the loads contain the accelerations and multipliers that are being
 solved for. They enter by fixed-point iteration: each sweep solves the equations with the stiffening of the last one. The
-change from sweep to sweep is of the order (elastic deflection / size)^2, so three sweeps reach rounding in practice, and
-two from the loads of the stage before.
+change from sweep to sweep is of the order (elastic deflection / size)^2.
+
+Within a step the first guess is extrapolated from the same stages of the steps before, right to third order in the step. One
+sweep that begins with it is right to that order, times the small factor above: none of the methods loses its order. More
+follow where the guess turns out poor, as after an impact.
 """
 
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import call_unit
-from ffr_dyn.kernels.products import contract
 from ffr_dyn.kernels.rows import reaction
-from ffr_dyn.kernels.solution import solve_loads
-from ffr_dyn.kernels.tables import MOTION, SIX
-from ffr_dyn.kernels.vectors import copy, cross, fill, get, subtract, to_body
-from ffr_dyn.kernels.views import part, peek, six_parts
+from ffr_dyn.kernels.symmetric import multiply_both_ways, multiply_square, weighted_sum
+from ffr_dyn.kernels.tables import AGAIN, ANEW, MOTION, RELATIVE, STAGES
+from ffr_dyn.kernels.vectors import add_scaled, copy, cross, fill, get, subtract, to_body
+from ffr_dyn.kernels.views import part, peek
 
-SWEEPS = 3
+SWEEPS = 4  # at most
+# By what the forces may change in a sweep, relative to those of the body with most, for it to be the last: one that begins
+# with a guess after steps of equal length, and any other.
+ENOUGH, STRICT = 1e-2, 1e-10
+SETTLED = 4 * STAGES  # solutions in steps of equal length before a guess is one of third order, whatever the method
 
 
 @kernel
-def multiply_stiffness(bodies, w, x):
-    """w.stiff = K_load q for every load of every stiffened body, and the loads by its rates; w: BodyWork."""
+def keep_unstiffened(bodies, w):
+    """Elastic right-hand sides without stiffening, and the loads by the rates of all stiffened bodies; w: BodyWork."""
     for b in range(bodies.mass.size):
-        n, i, e, loads = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 3], bodies.where[b, 6]
-        if loads > 0:
-            width, start, out = loads * n, bodies.where[b, 5], bodies.where[b, 9]
-            table, q, stiff = part(bodies.stiffening, start, n * width), part(x, i + 7, n), part(w.stiff, out, width)
-            fill(stiff, 0.0)
-            contract(table, bodies.blocks, bodies.where[b, 12], q, q, n, width, 0, w.sorted, stiff, part(stiff, 0, 0))
+        n, e = bodies.where[b, 0], bodies.where[b, 3]
+        if bodies.where[b, 6] > 0:
             copy(part(w.unstiffened, e, n), part(w.f, bodies.where[b, 2] + 6, n))
             rate_loads(get(w.omega, b), w.load[b])
 
 
 @kernel
-def frame_loads(bodies, w, field, b, known, load):
+def multiply_stiffness(bodies, w, x, b):
+    """w.stiff of body b: the sum of load * K_load over its loads, times q. Returns the squares of its length and of its
+    change."""
+    plan, at, n, i = bodies.blocks, bodies.where[b, 10], bodies.where[b, 0], bodies.where[b, 1]
+    groups, size = plan[at], plan[at + 2]
+    block = at + 3 + 2 * groups
+    place = block + 5 * plan[at + 1]
+    number, start, out = place + n, bodies.where[b, 5], 0
+    for group in range(groups):
+        count, entries = plan[at + 3 + 2 * group], plan[at + 4 + 2 * group]
+        for k in range(count):
+            w.sorted[k] = peek(w.load[b], peek(plan, number + k))
+        weighted_sum(count, w.sorted, bodies.stiffening, start, entries, w.K_sigma, out)
+        start, out, number = start + count * entries, out + entries, number + count
+    q, y, z = part(w.sorted, 0, size), part(w.sorted, size, size), part(w.sorted, 2 * size, size)
+    fill(part(w.sorted, 0, 3 * size), 0.0)
+    for k in range(n):
+        q[peek(plan, place + k)] = x[i + 7 + k]
+    while block < place:
+        first, row, rows = peek(plan, block), peek(plan, block + 1), peek(plan, block + 2)
+        column, columns = peek(plan, block + 3), peek(plan, block + 4)
+        if row == column:
+            multiply_square(w.K_sigma, first, rows, columns, q, y, z, row, column)
+        else:
+            multiply_both_ways(w.K_sigma, first, rows, columns, q, y, z, row, column)
+        block += 5
+    stiff, found, force, change = part(w.stiff, bodies.where[b, 3], n), part(w.sorted, 0, n), 0.0, 0.0
+    for k in range(n):
+        found[k] = peek(y, peek(plan, place + k)) + peek(z, peek(plan, place + k))
+    for k in range(n):
+        force += found[k] * found[k]
+        change += (found[k] - stiff[k]) * (found[k] - stiff[k])
+    copy(stiff, found)
+    return force, change
+
+
+@kernel
+def frame_loads(bodies, w, field, b):
     """Acceleration less gravity, angular acceleration: the first six of the loads of body b."""
-    j = bodies.where[b, 2]
+    j, load = bodies.where[b, 2], w.load[b]
     gravity = to_body(w.A[b], field)
     for c in range(3):
-        load[c] = (w.acc[j + c] - w.shift[j + c] - gravity[c]) if known else 0.0
-        load[3 + c] = (w.acc[j + 3 + c] - w.shift[j + 3 + c]) if known else 0.0
+        load[c] = w.acc[j + c] - w.shift[j + c] - gravity[c]
+        load[3 + c] = w.acc[j + 3 + c] - w.shift[j + 3 + c]
 
 
 @kernel
@@ -51,15 +90,13 @@ def rate_loads(omega, load):
 
 
 @inlined
-def marker_loads(markers, rows, mw, rw, known, load):
-    """Applied loads and, once known, joint reactions at the interfaces of all bodies."""
+def marker_loads(markers, rows, mw, rw, load):
+    """Applied loads and joint reactions at the interfaces of all bodies."""
     for k in range(markers.body.size):
         slot = markers.load[k]
         if slot >= 0:
             for c in range(6):
                 load[markers.body[k], slot + c] = mw.load[k, c]
-    if not known:
-        return
     for block in range(rows.marker.shape[0]):
         for side in range(rows.marker.shape[1]):
             k = rows.marker[block, side]
@@ -77,53 +114,75 @@ def add_reaction(rw, rows, block, side, u, load, slot):
 
 
 @kernel
-def stiffen(bodies, w, b):
-    """f = unstiffened - sum over the loads of load * K_load q, elastic rows of body b. Six loads at a time."""
-    n, j, e, loads = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3], bodies.where[b, 6]
-    first, start, load = bodies.where[b, 8], bodies.where[b, 9], w.load[b]
-    f = part(w.f, j + 6, n)
-    copy(f, part(w.unstiffened, e, n))
-    for number in range(0, loads, SIX):
-        at, left = first + number, loads - number
-        s0, s1, s2 = (
-            acting(bodies, load, at, left, 0),
-            acting(bodies, load, at, left, 1),
-            acting(bodies, load, at, left, 2),
-        )
-        s3, s4, s5 = (
-            acting(bodies, load, at, left, 3),
-            acting(bodies, load, at, left, 4),
-            acting(bodies, load, at, left, 5),
-        )
-        p0, p1, p2, p3, p4, p5 = six_parts(part(w.stiff, start + number * n, SIX * n), n)
-        for k in range(n):
-            f[k] -= s0 * p0[k] + s1 * p1[k] + s2 * p2[k] + s3 * p3[k] + s4 * p4[k] + s5 * p5[k]
-
-
-@kernel
-def acting(bodies, load, at, left, number):
-    """One of the next loads, zero beyond the last."""
-    return peek(load, peek(bodies.loads, at + number)) if number < left else 0.0
+def stiffen(bodies, w):
+    """f = unstiffened - K_sigma q, elastic rows of all stiffened bodies."""
+    for b in range(bodies.mass.size):
+        n, e = bodies.where[b, 0], bodies.where[b, 3]
+        if bodies.where[b, 6] > 0:
+            add_scaled(part(w.f, bodies.where[b, 2] + 6, n), part(w.unstiffened, e, n), -1.0, part(w.stiff, e, n))
 
 
 @inlined
-def solve_stiffened(r, x, target, near):
+def guess_stiffening(w, stage):
+    """w.stiff from the last solution and what stage number `stage` added to the one before in three steps."""
+    stiff, last = w.stiff, w.last
+    one, two, three = w.change[stage], w.change[STAGES + stage], w.change[2 * STAGES + stage]
+    for k in range(stiff.size):
+        stiff[k] = last[k] + 3.0 * (one[k] - two[k]) + three[k]
+
+
+@inlined
+def keep_change(w, stage):
+    """What the solution at stage number `stage` added to the one before."""
+    one, two, three = w.change[stage], w.change[STAGES + stage], w.change[2 * STAGES + stage]
+    for k in range(w.stiff.size):
+        three[k], two[k], one[k] = two[k], one[k], w.stiff[k] - w.last[k]
+
+
+@inlined
+def is_settled(r, w):
+    """Whether the last steps were of the length of this one."""
+    h, steady = r.clock.time[0], w.steady
+    if steady[0] != h:
+        steady[0], steady[1] = h, 0.0
+    steady[1] += 1.0
+    return steady[1] > SETTLED
+
+
+@inlined
+def solve_stiffened(r, x, target, stage):
     """`solve_motion` with the geometric stiffening of the bodies that have it.
 
-    near : the loads of the last solution are those of a state nearby, which saves a sweep
+    stage : number of a step's stage, from 0; AGAIN: near the last solution; ANEW: not near any
     """
-    m, w = r.model, r.work
-    multiply_stiffness(m.bodies, w.bodies, x)
-    for sweep in range(1 if near else 0, SWEEPS):
-        if not near or sweep > 1:
-            for b in range(m.bodies.mass.size):
-                if m.bodies.where[b, 6] > 0:
-                    frame_loads(m.bodies, w.bodies, w.field, b, sweep > 0, w.bodies.load[b])
-            marker_loads(m.markers, m.rows, w.markers, w.rows, sweep > 0, w.bodies.load)
+    m, w = r.model, r.work.bodies
+    keep_unstiffened(m.bodies, w)
+    enough = STRICT
+    if stage == ANEW:
+        fill(w.stiff, 0.0)
+    elif stage == AGAIN:
+        copy(w.stiff, w.last)
+    else:
+        guess_stiffening(w, stage)
+        if is_settled(r, w):
+            enough = ENOUGH
+        elif r.control.numbers.size > 0:
+            enough = r.control.numbers[RELATIVE]
+    for _ in range(SWEEPS):
+        stiffen(m.bodies, w)
+        call_unit(r.units[MOTION], r.address, 0.0, x.ctypes.data, target.ctypes.data)
         for b in range(m.bodies.mass.size):
             if m.bodies.where[b, 6] > 0:
-                stiffen(m.bodies, w.bodies, b)
-        if sweep < SWEEPS - 1 and m.relaxation == 0.0:
-            solve_loads(r, target)
-        else:
-            call_unit(r.units[MOTION], r.address, 0.0, x.ctypes.data, target.ctypes.data)
+                frame_loads(m.bodies, w, r.work.field, b)
+        marker_loads(m.markers, m.rows, r.work.markers, r.work.rows, w.load)
+        greatest, change = 0.0, 0.0
+        for b in range(m.bodies.mass.size):
+            if m.bodies.where[b, 6] > 0:
+                force, moved = multiply_stiffness(m.bodies, w, x, b)
+                greatest, change = max(greatest, force), max(change, moved)
+        if change <= enough * enough * greatest:
+            break
+    if stage >= 0:
+        keep_change(w, stage)
+    if stage != ANEW:
+        copy(w.last, w.stiff)

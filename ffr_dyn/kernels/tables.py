@@ -34,13 +34,16 @@ OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED, NOT_CONVERGED, 
 LANES = 8  # rows of a joint side by side (see `ffr_dyn.kernels.lanes`)
 NARROW = 4  # of them are enough in the plane
 MOST_ROWS = 6  # of a joint
-SIX = 6  # loads whose stiffening is added at a time
+STAGES = 7  # of a step, at most
 
 # Numbers of the compiled units in `Tables.units`.
 (
     EVALUATE, BODIES, MARKERS, CONSTRAINTS, JOINTS, BACK, REGAIN, PLAIN, MOTION, SOLVE, PREPARE, LOOK, SETTLE, MOVE_BACK,
     CORRECT, TRULY, RECORD, LOOK_AHEAD, PROJECT, LOADS, POWERS,
 ) = range(21)  # fmt: skip
+
+# A solution of a step's stage is called by its number; near the last solution, or not near any:
+AGAIN, ANEW = -1, -2
 
 # Which markers are brought up to date: those that joints or loads use, those of joints, all.
 IN_USE, OF_JOINTS, ALL = 0.0, 1.0, 2.0
@@ -56,10 +59,10 @@ TIGHTER = 1e-4
 class Bodies(NamedTuple):
     """B bodies, E elastic coordinates in all."""
 
-    # (B + 1, 13) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening (or -1); its number of loads;
-    # the body axis along the normal of a planar scene, or -1; its first of `loads`; its first product in `stiff`; the first
-    # column of its P_dm and rP_dm, which equal bodies share, so that many of them stay in the processor's cache; its first
-    # of `blocks` for PP_dm and for stiffening
+    # (B + 1, 11) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening (or -1); how many numbers its
+    # K_sigma has, 0 without geometric stiffening; the body axis along the normal of a planar scene, or -1; the first column
+    # of its P_dm and rP_dm, which equal bodies share, so that many of them stay in the processor's cache; its first of
+    # `blocks` for PP_dm and for stiffening
     where: I2
     mass: F1  # (B,)
     moments: F2  # (B, 9) first moment r_dm (3), second moment rr_dm (6)
@@ -70,10 +73,7 @@ class Bodies(NamedTuple):
     PP_dm: F1
     omega2: F1  # (E,)
     two_zeta_omega: F1  # (E,)
-    stiffening: (
-        F1  # pooled; per body n x loads x n (over q_c, loads, rows), in blocks; empty without geometric stiffening
-    )
-    loads: I1  # pooled; which of a body's loads stiffen it
+    stiffening: F1  # pooled; of each body the stiffness by each load, in blocks; empty without geometric stiffening
     blocks: I1  # pooled; how PP_dm and stiffening are stored (see `ffr_dyn.decoupling`)
 
 
@@ -165,7 +165,7 @@ class BodyWork(NamedTuple):
     terms: I1  # (B,)
     g: F1  # pooled; G_j: six symmetric rows of n, three axial ones; in the plane two and one
     l: F1  # pooled; three rows of n, integral of u_dot x phi_j dm; in the plane one  # noqa: E741
-    sorted: F1  # scratch of products by blocks: q, q_dot, products
+    sorted: F1  # scratch of products by blocks: q, q_dot, products; or q, K_sigma q, loads
     H: F1  # (3 E,) the axial rows of G_j
     Cd: F1  # (6 E,) rows P_dm and H, times dinv
     # (B, 6, 6) Cholesky factor of the Schur complement, reciprocal diagonal; with s and J it is constant for a rigid body,
@@ -180,7 +180,12 @@ class BodyWork(NamedTuple):
     more: F1  # (V,) scratch
     unstiffened: F1  # (E,) elastic right-hand side without geometric stiffening
     shift: F1  # (V,) part of acc that is no acceleration (corrections of an integrator's stage), body axes
-    stiff: F1  # pooled; per body, load and elastic coordinate: K_load q; zero from the last load to a multiple of six
+    # Of scenes with geometric stiffening (E_s = E, else 0):
+    K_sigma: F1  # scratch: that of one body, in blocks on one side of the diagonal
+    stiff: F1  # (E_s,) K_sigma q
+    last: F1  # (E_s,) that of the last solution in a step
+    steady: F1  # (2,) length of the last step, and how many solutions there were in steps of that length
+    change: F2  # (3 STAGES, E_s) by what stages of the last step, and of two before, differed from the stage before
     load: F2  # (B, longest) loads of the bodies, in the order of their stiffness
 
 
