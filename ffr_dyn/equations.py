@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,6 +100,10 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: f
     ordered = tuple(chosen[k] for k in elimination.order)
     functions = FunctionTable()
     marked = _markers(scene, ordered)
+    equal = [
+        (id(body.model), np.asarray(body.damping).tobytes(), k)
+        for body, k in zip(scene.bodies, place.normals, strict=True)
+    ]
     model = {
         "gravity": np.array(scene.gravity),
         "base": base_functions(scene, functions),
@@ -107,7 +111,7 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: f
         "bodies": body_tables(scene, place, marked),
         "markers": marked,
         "rows": _rows(ordered, functions),
-        "pattern": _pattern(ordered, [moving[k] for k in elimination.order], elimination, table),
+        "pattern": _pattern(ordered, [moving[k] for k in elimination.order], elimination, marked, equal),
         "loads": load_tables(scene, functions),
         "functions": functions.tables(),
     }
@@ -162,24 +166,33 @@ def _rows(blocks: tuple[Block, ...], functions: FunctionTable) -> Rows:
     for row, word in enumerate(listed):
         axes[row, : len(word.axes)] = word.axes
     sides = max((len(block.markers) for block in blocks), default=2)
+    marker = np.array([b.markers + (-1,) * (sides - len(b.markers)) for b in blocks], dtype=np.int64).reshape(-1, sides)
     return Rows(
         kind=np.array([word.kind for word in listed], dtype=np.int64),
         axes=axes,
         relation=np.array([word.relation for word in listed], dtype=float).reshape(-1, 5),
         function=np.array(function, dtype=np.int64),
         start=starts([len(b.words) for b in blocks]),
-        marker=np.array([b.markers + (-1,) * (sides - len(b.markers)) for b in blocks], dtype=np.int64).reshape(
-            -1, sides
-        ),
+        marker=marker,
+        first=_first_of_each(marker),
     )
+
+
+def _first_of_each(numbers: Array) -> Array:
+    """Of numbers in any order, 1 where one is there for the first time."""
+    first = np.zeros(numbers.size, dtype=np.int64)
+    first[np.unique(numbers, return_index=True)[1]] = 1
+    return first.reshape(numbers.shape)
 
 
 def _pattern(
     blocks: tuple[Block, ...],
     moving: list[tuple[int, ...]],
     elimination: Elimination,
-    table: tuple[MarkerName, ...],
+    marked: Markers,
+    equal: Sequence[Hashable],
 ) -> Pattern:
+    """equal : per body, what two bodies have in common whose elastic coordinates couple equal markers equally"""
     size = [len(b.words) for b in blocks]
     offsets: dict[tuple[int, int], int] = {}
     total = 0
@@ -187,7 +200,7 @@ def _pattern(
         for later in (k, *column):
             offsets[later, k] = total
             total += LANES * size[k]
-    sides = [[table[marker][0] for marker in block.markers] for block in blocks]
+    sides = [[int(marked.body[marker]) for marker in block.markers] for block in blocks]
     pairs = [
         (b, later, side, earlier, other, offsets[later, earlier])
         for earlier in range(len(blocks))
@@ -196,19 +209,38 @@ def _pattern(
         for side in _where(sides[later], b)
         for other in _where(sides[earlier], b)
     ]
-    listed = np.array(pairs, dtype=np.int64).reshape(-1, 6)
+    listed = np.array(sorted(pairs, key=lambda pair: pair[1]), dtype=np.int64).reshape(-1, 6)
+    shared = _shared(listed, [block.markers for block in blocks], marked, equal)
+    reach = [max(column, default=k) for k, column in enumerate(elimination.columns)]
     updates = [
         [offsets[a, b] for at, a in enumerate(column) for b in column[: at + 1]] for column in elimination.columns
     ]
     stored = [(later, offsets[later, k]) for k, column in enumerate(elimination.columns) for later in column]
     return Pattern(
         pair_body=listed[:, 0].copy(),
-        pair=listed[:, 1:].copy(),
+        pair=np.column_stack([listed[:, 1:], shared]),
+        sample=np.unique(shared, return_index=True)[1],
+        pair_start=starts(np.bincount(listed[:, 1], minlength=len(blocks)).tolist()),
+        reach=np.array(np.maximum.accumulate(reach), dtype=np.int64) if reach else np.zeros(0, dtype=np.int64),
         diagonal=np.array([offsets[k, k] for k in range(len(blocks))], dtype=np.int64),
         column_start=starts([len(column) for column in elimination.columns]),
         column=np.array(stored, dtype=np.int64).reshape(-1, 2),
         update_start=starts([len(column) for column in updates]),
         update=np.array([offset for column in updates for offset in column], dtype=np.int64),
+    )
+
+
+def _shared(pairs: Array, of: list[tuple[int, ...]], marked: Markers, equal: Sequence[Hashable]) -> Array:
+    """(P,) numbers of pairs, the same for those of equal markers on equal bodies; `of`: the markers of each block."""
+    numbers: dict[Hashable, int] = {}
+    return np.array(
+        [
+            numbers.setdefault(
+                (equal[b], *(int(marked.start[of[k][side]]) for k, side in ((later, i), (earlier, j)))), len(numbers)
+            )
+            for b, later, i, earlier, j, _ in pairs.tolist()
+        ],
+        dtype=np.int64,
     )
 
 

@@ -79,7 +79,7 @@ def _body_work(m: Model, keeps_terms: bool) -> BodyWork:
 
 def _row_work(m: Model) -> RowWork:
     K, D = m.rows.marker.shape
-    C, M, pairs = m.rows.kind.size, m.markers.body.size, m.pattern.pair_body.size
+    C, M, pairs = m.rows.kind.size, m.markers.body.size, m.pattern.sample.size
     size = np.diff(m.rows.start)
     column = np.repeat(np.arange(K), np.diff(m.pattern.column_start))
     stored = LANES * int(size.sum() + size[column].sum())

@@ -12,7 +12,7 @@ from ffr_dyn.kernels.packing import tables_at
 from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.kernels.units import Unit
-from ffr_dyn.kernels.vectors import add_scaled, copy
+from ffr_dyn.kernels.vectors import add_four, add_scaled, copy
 
 
 @Unit
@@ -38,10 +38,9 @@ def rk4_step(at, t, unused, unused_too):
         solve(r, xs, stages.target, k)
         position_rates(r.model.bodies, xs, vs, stages.x[k])
         to_velocity_rates(r.model.bodies.where, r.work.bodies.A, r.work.bodies.acc, stages.v[k])
-    for k in range(4):
-        weight = h / 3.0 if k in (1, 2) else h / 6.0
-        add_scaled(r.x, r.x, weight, stages.x[k])
-        add_scaled(r.v, r.v, weight, stages.v[k])
+    outer, inner = h / 6.0, h / 3.0
+    add_four(r.x, outer, stages.x[0], inner, stages.x[1], inner, stages.x[2], outer, stages.x[3])
+    add_four(r.v, outer, stages.v[0], inner, stages.v[1], inner, stages.v[2], outer, stages.v[3])
     normalise(r.model.bodies, r.x)
     return finite(r.x, r.v)
 

@@ -31,7 +31,7 @@ from ffr_dyn.kernels.packing import tables_at
 from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.kernels.units import Unit
-from ffr_dyn.kernels.vectors import add_scaled, copy, fill
+from ffr_dyn.kernels.vectors import add_four, add_scaled, add_three, copy, fill, weigh_four, weigh_three
 
 GAMMA = 0.43586652150845900
 # Rows of both lower triangles, four to a row.
@@ -66,16 +66,21 @@ def ros3_step(at, t, unused, unused_too):
         if k == 0:
             status = settle(r, t)
             fill(r.work.bodies.shift, 0.0)
-        copy(xs, r.x)
-        copy(vs, r.v)
-        fill(r_x, 0.0)
-        fill(r_v, 0.0)
-        for j in range(k):
-            add_scaled(xs, xs, h * ALPHA[4 * k + j], stages.x[j])
-            add_scaled(vs, vs, h * ALPHA[4 * k + j], stages.v[j])
-            add_scaled(r_x, r_x, GAMMAS[4 * k + j] / GAMMA, stages.x[j])
-            add_scaled(r_v, r_v, GAMMAS[4 * k + j] / GAMMA, stages.v[j])
-        if k > 0:
+            copy(xs, r.x)
+            copy(vs, r.v)
+            fill(r_x, 0.0)
+            fill(r_v, 0.0)
+        else:
+            m, n = (
+                min(1, k - 1),
+                min(2, k - 1),
+            )  # the coefficients of later stages, which may hold anything, are zero
+            a0, a1, a2 = h * ALPHA[4 * k], h * ALPHA[4 * k + 1], h * ALPHA[4 * k + 2]
+            g0, g1, g2 = GAMMAS[4 * k] / GAMMA, GAMMAS[4 * k + 1] / GAMMA, GAMMAS[4 * k + 2] / GAMMA
+            add_three(xs, r.x, a0, stages.x[0], a1, stages.x[m], a2, stages.x[n])
+            add_three(vs, r.v, a0, stages.v[0], a1, stages.v[m], a2, stages.v[n])
+            weigh_three(r_x, g0, stages.x[0], g1, stages.x[m], g2, stages.x[n])
+            weigh_three(r_v, g0, stages.v[0], g1, stages.v[m], g2, stages.v[n])
             normalise(bodies, xs)  # r_v goes to body axes and comes back, which wants a true rotation
             status = evaluate(r, t + AT[k] * h, xs, vs)
         if status != OK:
@@ -89,13 +94,12 @@ def ros3_step(at, t, unused, unused_too):
         add_scaled(vs, vs, gh, stages.v[k])
         position_rates(bodies, xs, vs, stages.x[k])
         add_scaled(stages.v[k], stages.v[k], -1.0, r_v)
-    fill(xs, 0.0)
-    fill(vs, 0.0)
-    for k in range(4):
-        add_scaled(r.x, r.x, h * WEIGHTS[k], stages.x[k])
-        add_scaled(r.v, r.v, h * WEIGHTS[k], stages.v[k])
-        add_scaled(xs, xs, h * ERRORS[k], stages.x[k])
-        add_scaled(vs, vs, h * ERRORS[k], stages.v[k])
+    w0, w1, w2, w3 = h * WEIGHTS[0], h * WEIGHTS[1], h * WEIGHTS[2], h * WEIGHTS[3]
+    e0, e1, e2, e3 = h * ERRORS[0], h * ERRORS[1], h * ERRORS[2], h * ERRORS[3]
+    add_four(r.x, w0, stages.x[0], w1, stages.x[1], w2, stages.x[2], w3, stages.x[3])
+    add_four(r.v, w0, stages.v[0], w1, stages.v[1], w2, stages.v[2], w3, stages.v[3])
+    weigh_four(xs, e0, stages.x[0], e1, stages.x[1], e2, stages.x[2], e3, stages.x[3])
+    weigh_four(vs, e0, stages.v[0], e1, stages.v[1], e2, stages.v[2], e3, stages.v[3])
     normalise(bodies, r.x)
     copy(stages.x[0], xs)
     copy(stages.v[0], vs)

@@ -8,17 +8,8 @@ of the earlier, with the rows of the later side by side in it. The factor is S =
 """
 
 from ffr_dyn.kernels.lanes import (
-    assign_6,
     assign_narrow_3,
-    combine_1,
-    combine_2,
-    combine_3,
-    combine_4,
-    combine_5,
-    combine_6,
-    combine_12,
     copy_narrow,
-    copy_row,
     eliminate_rows,
     factorise_rows,
     gather_upper,
@@ -27,7 +18,6 @@ from ffr_dyn.kernels.lanes import (
     narrow_3,
     narrow_6,
     scale_narrow,
-    scale_row,
     solve_lower,
     solve_upper,
     spread_lower,
@@ -35,7 +25,8 @@ from ffr_dyn.kernels.lanes import (
 )
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.tables import LANES
-from ffr_dyn.kernels.vectors import in_plane
+from ffr_dyn.kernels.vectors import fill, in_plane
+from ffr_dyn.kernels.views import part
 
 # The least share of a row that other rows do not contain (the square of a sine). In a singular position it is zero; with
 # this floor the motion there misses one acceleration for the moment, and goes on.
@@ -44,51 +35,24 @@ SIDE = 12 * LANES  # numbers of X per side of a joint
 
 
 @kernel
-def spread_rows(jac, flexible, normal, X, at):
-    """X = the rigid coefficients of one side (9 * 8,), then the elastic ones; six of each, or three in the plane."""
-    if normal >= 0:
-        i, j, k = in_plane(normal)
-        copy_narrow(jac, LANES * i, X, at)
-        copy_narrow(jac, LANES * j, X, at + LANES)
-        copy_narrow(jac, LANES * k, X, at + 2 * LANES)
-        if flexible:
-            copy_narrow(jac, LANES * i, X, at + 3 * LANES)
-            copy_narrow(jac, LANES * j, X, at + 4 * LANES)
-            copy_narrow(jac, LANES * (6 + normal), X, at + 5 * LANES)
-        return
-    for c in range(6):
-        copy_row(jac, LANES * c, X, at + LANES * c)
+def spread_in_plane(jac, flexible, normal, X, at):
+    """X = the rigid coefficients of one side (9 * 8,) that keep to the plane, then the elastic ones: three of each."""
+    i, j, k = in_plane(normal)
+    copy_narrow(jac, LANES * i, X, at)
+    copy_narrow(jac, LANES * j, X, at + LANES)
+    copy_narrow(jac, LANES * k, X, at + 2 * LANES)
     if flexible:
-        for c in range(3):
-            copy_row(jac, LANES * c, X, at + LANES * (6 + c))
-            copy_row(jac, LANES * (6 + c), X, at + LANES * (9 + c))
-
-
-@kernel
-def eliminate_side(flexible, P, L, X, at):
-    """First six rows of X = L^-1 (rigid - P elastic): what is left of the rows without the elastic coordinates.
-
-    P, L : pooled 6 x 6 matrices
-    """
-    if flexible:
-        for c in range(6):
-            combine_6(X, at + LANES * c, -1.0, P, 6 * c, 1, X, at + 6 * LANES)
-    scale_row(X, at, L[0])
-    combine_1(X, at + LANES, -1.0, L, 6, 1, X, at)
-    scale_row(X, at + LANES, L[7])
-    combine_2(X, at + 2 * LANES, -1.0, L, 12, 1, X, at)
-    scale_row(X, at + 2 * LANES, L[14])
-    combine_3(X, at + 3 * LANES, -1.0, L, 18, 1, X, at)
-    scale_row(X, at + 3 * LANES, L[21])
-    combine_4(X, at + 4 * LANES, -1.0, L, 24, 1, X, at)
-    scale_row(X, at + 4 * LANES, L[28])
-    combine_5(X, at + 5 * LANES, -1.0, L, 30, 1, X, at)
-    scale_row(X, at + 5 * LANES, L[35])
+        copy_narrow(jac, LANES * i, X, at + 3 * LANES)
+        copy_narrow(jac, LANES * j, X, at + 4 * LANES)
+        copy_narrow(jac, LANES * (6 + normal), X, at + 5 * LANES)
 
 
 @kernel
 def eliminate_in_plane(flexible, normal, P, L, X, at):
-    """`eliminate_side` for a planar body; P: nine numbers, of its rigid and elastic coefficients i, j, k."""
+    """First three rows of X = L^-1 (rigid - P elastic); P: nine numbers, of its rigid and elastic coefficients i, j, k.
+
+    L : pooled 6 x 6 matrix
+    """
     i, j, k = in_plane(normal)
     second, third = at + LANES, at + 2 * LANES
     if flexible:
@@ -103,26 +67,8 @@ def eliminate_in_plane(flexible, normal, P, L, X, at):
 
 
 @kernel
-def add_pair(X, later, earlier, rows, flexible, phiphi, Y, S, offset):
-    """Add the coupling of two block sides on one body to its block of S.
-
-    later, earlier : where the sides begin in X;  rows : of the earlier
-    phiphi (36,)   : phi dinv phi^T of the two markers;  Y : scratch of twelve rows
-    """
-    if flexible:
-        for c in range(6):
-            copy_row(X, later + LANES * c, Y, LANES * c)
-            assign_6(Y, LANES * (6 + c), 1.0, phiphi, c, 6, X, later + 6 * LANES)
-        for row in range(rows):
-            combine_12(S, offset + LANES * row, 1.0, X, earlier + row, LANES, Y, 0)
-    else:
-        for row in range(rows):
-            combine_6(S, offset + LANES * row, 1.0, X, earlier + row, LANES, X, later)
-
-
-@kernel
 def add_pair_in_plane(X, later, earlier, rows, flexible, phiphi, Y, S, offset):
-    """`add_pair` for a planar body; phiphi: nine numbers."""
+    """Add the coupling of two sides on one planar body to its block of S (see `sides`); Y: scratch; phiphi: nine numbers."""
     if flexible:
         for c in range(3):
             copy_narrow(X, later + LANES * c, Y, LANES * c)
@@ -134,29 +80,38 @@ def add_pair_in_plane(X, later, earlier, rows, flexible, phiphi, Y, S, offset):
             narrow_3(S, offset + LANES * row, 1.0, X, earlier + row, LANES, X, later)
 
 
+@kernel
+def clear_column(pattern, S, k):
+    """Zeros in the column of block k."""
+    first = pattern.diagonal[k]
+    end = pattern.diagonal[k + 1] if k + 1 < pattern.diagonal.size else S.size
+    fill(part(S, first, end - first), 0.0)
+
+
+@kernel
+def relax_block(starts, pattern, S, relaxation, k):
+    """Add to the diagonal of block k what lets dependent rows be eliminated."""
+    for row in range(starts[k + 1] - starts[k]):
+        S[pattern.diagonal[k] + (LANES + 1) * row] *= 1.0 + relaxation
+
+
 @inlined
-def factorise_blocks(starts, pattern, S, relaxation, rw, independence):
-    """Factorise in place (right-looking). Returns the row without a pivot, or -1.
+def factorise_block(starts, pattern, S, rw, independence, k):
+    """Factorise block k in place (right-looking). Returns the row without a pivot, or -1.
 
     rw.scale (8 K,)   : what the entry of a row on the diagonal is at least
-    independence (1,) : the least share of a row that the rows before it do not contain
+    independence (1,) : the least share of a row that the rows before it do not contain, so far
     """
-    independence[0] = 1.0
-    for row in range(rw.scale.size):
-        rw.least[row] = FLOOR * rw.scale[row]
-    if relaxation > 0.0:
-        for k in range(starts.size - 1):
-            for row in range(starts[k + 1] - starts[k]):
-                S[pattern.diagonal[k] + (LANES + 1) * row] *= 1.0 + relaxation
-    for k in range(starts.size - 1):
-        size = starts[k + 1] - starts[k]
-        factorise_rows(size, S, pattern.diagonal[k], rw.least, LANES * k, rw.pivots, LANES * k, rw.Y)
-        for c in range(size):
-            share, scale = rw.Y[c] / rw.scale[LANES * k + c], rw.scale[LANES * k + c]
-            if not scale > 0.0 or share != share:
-                return starts[k] + c
-            independence[0] = min(independence[0], share)
-        eliminate_block(starts, pattern, S, k, size, rw.pivots, rw.Y)
+    size, own = starts[k + 1] - starts[k], LANES * k
+    for row in range(size):
+        rw.least[own + row] = FLOOR * rw.scale[own + row]
+    factorise_rows(size, S, pattern.diagonal[k], rw.least, own, rw.pivots, own, rw.Y)
+    for c in range(size):
+        share, scale = rw.Y[c] / rw.scale[own + c], rw.scale[own + c]
+        if not scale > 0.0 or share != share:
+            return starts[k] + c
+        independence[0] = min(independence[0], share)
+    eliminate_block(starts, pattern, S, k, size, rw.pivots, rw.Y)
     return -1
 
 

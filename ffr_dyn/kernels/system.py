@@ -7,12 +7,12 @@ Order of calls: `prepare` once per elastic diagonal; `evaluate_bodies`, `evaluat
 
 from ffr_dyn.kernels.blocks import (
     SIDE,
-    add_pair,
     add_pair_in_plane,
+    clear_column,
     eliminate_in_plane,
-    eliminate_side,
-    factorise_blocks,
-    spread_rows,
+    factorise_block,
+    relax_block,
+    spread_in_plane,
 )
 from ffr_dyn.kernels.bodies import factorise, inertia, normalise, prepare_body, rotation_matrix
 from ffr_dyn.kernels.lanes import add_scale
@@ -21,6 +21,7 @@ from ffr_dyn.kernels.markers import couple_marker, couple_pair, prepare_marker, 
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import call_unit
 from ffr_dyn.kernels.rows import reaction
+from ffr_dyn.kernels.sides import couple_flexible, couple_rigid, eliminate_flexible, eliminate_rigid
 from ffr_dyn.kernels.tables import ALL, IN_USE, LANES, LOADS, LOOK, NOT_FINITE, OK, REGAIN, RELATION
 from ffr_dyn.kernels.vectors import add_scaled, cross, fill, get, put, subtract, to_body, to_global
 from ffr_dyn.kernels.views import part
@@ -37,14 +38,20 @@ def prepare(bodies, markers, rows, pattern, bw, rw):
         n, e = where[b, 0], where[b, 3]
         if n > 0:
             prepare_marker(shapes(markers, k, n), part(bw.Cd, 6 * e, 6 * n), n, where[b, 7], rw.P[k])
-    for p in range(pattern.pair_body.size):
+    for number in range(pattern.sample.size):
+        p = pattern.sample[number]
         b = pattern.pair_body[p]
         n, e = where[b, 0], where[b, 3]
         if n > 0:
             left = rows.marker[pattern.pair[p, 0], pattern.pair[p, 1]]
             right = rows.marker[pattern.pair[p, 2], pattern.pair[p, 3]]
             couple_pair(
-                shapes(markers, left, n), shapes(markers, right, n), part(bw.dinv, e, n), n, where[b, 7], rw.phiphi[p]
+                shapes(markers, left, n),
+                shapes(markers, right, n),
+                part(bw.dinv, e, n),
+                n,
+                where[b, 7],
+                rw.phiphi[number],
             )
 
 
@@ -59,40 +66,41 @@ def evaluate_bodies(gravity, bodies, w, x, v):
 
 
 @inlined
-def couple_joints(bodies, markers, rows, pattern, bw, rw):
-    """Rows after elimination of the elastic coordinates, and the multiplier matrix."""
+def couple_joint(bodies, markers, rows, pattern, bw, rw, k):
+    """Rows of joint k after elimination of the elastic coordinates, and what couples it with itself and the joints before."""
     where, sides = bodies.where, rows.marker.shape[1]
-    fill(rw.scale, 0.0)
     ground = where.shape[0] - 1
-    for k in markers.joint:
-        b = markers.body[k]
-        n, e = where[b, 0], where[b, 3]
-        if n > 0:
-            couple_marker(shapes(markers, k, n), part(bw.Cd, 6 * e, 6 * n), n, where[b, 7], rw.P[k])
-    for k in range(rows.marker.shape[0]):
-        for side in range(sides):
-            marker = rows.marker[k, side]
-            b = markers.body[marker] if marker >= 0 else ground
-            if b != ground:
-                number = k * sides + side
-                at, jac = number * SIDE, part(rw.jac, 9 * LANES * number, 9 * LANES)
-                flexible, normal, L = where[b, 0] > 0, where[b, 7], part(bw.L, 36 * b, 36)
-                spread_rows(jac, flexible, normal, rw.X, at)
-                if normal >= 0:
-                    eliminate_in_plane(flexible, normal, rw.P[marker], L, rw.X, at)
-                else:
-                    eliminate_side(flexible, rw.P[marker], L, rw.X, at)
-                add_scale(jac, bw.inverse[b, 0], bw.inverse[b, 1], rw.scale, LANES * k)
-    fill(rw.S, 0.0)
-    for p in range(pattern.pair_body.size):
-        b, later, earlier = pattern.pair_body[p], pattern.pair[p, 0], pattern.pair[p, 2]
-        first = (later * sides + pattern.pair[p, 1]) * SIDE
+    fill(part(rw.scale, LANES * k, LANES), 0.0)
+    for side in range(sides):
+        marker = rows.marker[k, side]
+        b = markers.body[marker] if marker >= 0 else ground
+        if b != ground:
+            number, n, e = k * sides + side, where[b, 0], where[b, 3]
+            at, jac = number * SIDE, part(rw.jac, 9 * LANES * number, 9 * LANES)
+            flexible, normal, L, P = n > 0, where[b, 7], part(bw.L, 36 * b, 36), rw.P[marker]
+            if flexible and rows.first[k, side] == 1:
+                couple_marker(shapes(markers, marker, n), part(bw.Cd, 6 * e, 6 * n), n, normal, P)
+            if normal >= 0:
+                spread_in_plane(jac, flexible, normal, rw.X, at)
+                eliminate_in_plane(flexible, normal, P, L, rw.X, at)
+            elif flexible:
+                eliminate_flexible(jac, P, L, rw.X, at)
+            else:
+                eliminate_rigid(jac, P, L, rw.X, at)
+            add_scale(jac, bw.inverse[b, 0], bw.inverse[b, 1], rw.scale, LANES * k)
+    clear_column(pattern, rw.S, k)
+    for p in range(pattern.pair_start[k], pattern.pair_start[k + 1]):
+        b, earlier = pattern.pair_body[p], pattern.pair[p, 2]
+        first = (k * sides + pattern.pair[p, 1]) * SIDE
         second = (earlier * sides + pattern.pair[p, 3]) * SIDE
-        flexible, size, at = where[b, 0] > 0, rows.start[earlier + 1] - rows.start[earlier], pattern.pair[p, 4]
+        flexible, size = where[b, 0] > 0, rows.start[earlier + 1] - rows.start[earlier]
+        at, phiphi = pattern.pair[p, 4], rw.phiphi[pattern.pair[p, 5]]
         if where[b, 7] >= 0:
-            add_pair_in_plane(rw.X, first, second, size, flexible, rw.phiphi[p], rw.Y, rw.S, at)
+            add_pair_in_plane(rw.X, first, second, size, flexible, phiphi, rw.Y, rw.S, at)
+        elif flexible:
+            couple_flexible(rw.X, first, second, size, phiphi, rw.S, at)
         else:
-            add_pair(rw.X, first, second, size, flexible, rw.phiphi[p], rw.Y, rw.S, at)
+            couple_rigid(rw.X, first, second, size, phiphi, rw.S, at)
 
 
 @inlined
@@ -124,9 +132,22 @@ def clear_and_load(r, x):
 
 @inlined
 def evaluate_joints(m, w):
-    """Factors of the multiplier matrix from the constraint rows. Returns the row without a pivot, or -1."""
-    couple_joints(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows)
-    return factorise_blocks(m.rows.start, m.pattern, w.rows.S, m.relaxation, w.rows, w.independence)
+    """Factors of the multiplier matrix from the constraint rows. Returns the row without a pivot, or -1.
+
+    A joint is eliminated as soon as all that its column reaches is there, while what it needs is still near at hand.
+    """
+    w.independence[0] = 1.0
+    done = 0
+    for k in range(m.rows.marker.shape[0]):
+        couple_joint(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, k)
+        if m.relaxation > 0.0:
+            relax_block(m.rows.start, m.pattern, w.rows.S, m.relaxation, k)
+        while done <= k and m.pattern.reach[done] <= k:
+            failed = factorise_block(m.rows.start, m.pattern, w.rows.S, w.rows, w.independence, done)
+            if failed >= 0:
+                return failed
+            done += 1
+    return -1
 
 
 @kernel

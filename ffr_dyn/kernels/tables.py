@@ -99,13 +99,19 @@ class Rows(NamedTuple):
     function: I1  # (C,) time function or -1
     start: I1  # (K + 1,) first row of each block
     marker: I2  # (K, 2 or 4) markers i, j of a joint, or of both joints of a relation; -1 where there is none
+    first: I2  # likewise: whether no block before has the marker
 
 
 class Pattern(NamedTuple):
     """Assembly and factorisation of the multiplier matrix, fixed per topology."""
 
     pair_body: I1  # (P,) the body that couples two block sides
-    pair: I2  # (P, 5) later block, its side, earlier block, its side, start of the target block
+    # (P, 6) later block, its side, earlier block, its side, start of the target block, number in `phiphi`, which equal pairs
+    # share; in order of the later
+    pair: I2
+    sample: I1  # a pair of each number
+    pair_start: I1  # (K + 1,) the first pair of each later block
+    reach: I1  # (K,) last block that the columns of a block and of those before it reach
     diagonal: I1  # (K,) start of the diagonal block in S
     column_start: I1  # (K + 1,)
     column: I2  # (L, 2) row block of each off-diagonal block and its start
@@ -235,7 +241,7 @@ class RowWork(NamedTuple):
     step: F1  # (8 K,) multipliers, the rows of each block in a row of lanes
     wrench: F1  # (6,) scratch
     P: F2  # (M, 36) [P_dm; H] dinv phi^T; of a planar body nine numbers
-    phiphi: F2  # (pairs, 36) phi dinv phi'^T; of a planar body nine numbers
+    phiphi: F2  # (pairs that differ, 36) phi dinv phi'^T; of a planar body nine numbers
     S: F1  # pooled blocks, rows of lanes (see `blocks`)
 
 

@@ -203,3 +203,31 @@ def multiple(target, factor, source):
     """target = factor source."""
     for k in range(target.size):
         target[k] = factor * source[k]
+
+
+@kernel
+def weigh_three(target, f0, d0, f1, d1, f2, d2):
+    """target = f0 d0 + f1 d1 + f2 d2, in one pass."""
+    for k in range(target.size):
+        target[k] = f0 * d0[k] + f1 * d1[k] + f2 * d2[k]
+
+
+@kernel
+def add_three(target, base, f0, d0, f1, d1, f2, d2):
+    """target = base + f0 d0 + f1 d1 + f2 d2, in one pass."""
+    for k in range(target.size):
+        target[k] = base[k] + f0 * d0[k] + f1 * d1[k] + f2 * d2[k]
+
+
+@kernel
+def weigh_four(target, f0, d0, f1, d1, f2, d2, f3, d3):
+    """target = f0 d0 + f1 d1 + f2 d2 + f3 d3, in one pass."""
+    for k in range(target.size):
+        target[k] = f0 * d0[k] + f1 * d1[k] + f2 * d2[k] + f3 * d3[k]
+
+
+@kernel
+def add_four(target, f0, d0, f1, d1, f2, d2, f3, d3):
+    """target += f0 d0 + f1 d1 + f2 d2 + f3 d3, in one pass."""
+    for k in range(target.size):
+        target[k] += f0 * d0[k] + f1 * d1[k] + f2 * d2[k] + f3 * d3[k]
