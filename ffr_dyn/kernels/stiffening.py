@@ -20,7 +20,7 @@ from ffr_dyn.kernels.views import part, peek
 SWEEPS = 4  # at most
 # By what the forces may change in a sweep, relative to those of the body with most, for it to be the last: one that begins
 # with a guess after steps of equal length, and any other.
-ENOUGH, STRICT = 1e-2, 1e-10
+ENOUGH, STRICT = 3e-2, 1e-10
 SETTLED = 4 * STAGES  # solutions in steps of equal length before a guess is one of third order, whatever the method
 
 
