@@ -76,7 +76,7 @@ def report(repeats: int) -> None:
         strip = stiffened("pendulum.geo", metal, ("hinge", "tip"), modes)
         print_cost(f"slider-crank, {rod.n}", slider_crank(rod), (1e-3, 84, 8), repeats)
         print_cost(f"pendulum, {rod.n}", pendulum(strip), (0.01, 50, 9), repeats)
-        print_cost(f"chain of 32, {rod.n}", chained(strip), (0.01, 10, 4), repeats)
+        print_cost(f"chain of 32, {rod.n}", chained(strip), (0.01, 50, 4), repeats)
         scene = slider_crank(with_middle(rod))
         print_gain("without", peak(linear(scene)))
         print_gain("with", peak(scene))

@@ -67,7 +67,7 @@ def _body_work(m: Model, keeps_terms: bool) -> BodyWork:
         **_zeros(H=3 * E, Cd=6 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6), elastic=E),
         **_zeros(more=V, unstiffened=E, shift=V, load=(B, loads)),
         **_zeros(
-            stiff=E_s, last=E_s, steady=2, change=(3 * STAGES, E_s), K_sigma=int(m.bodies.where[:, 6].max()) + LANES
+            stiff=E_s, last=E_s, steady=3, change=(3 * STAGES, E_s), K_sigma=int(m.bodies.where[:, 6].max()) + LANES
         ),
     )
     work.inverse[:, 0] = [_inverse(mass) for mass in m.bodies.mass]

@@ -2,7 +2,7 @@
 
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.packing import call_unit
-from ffr_dyn.kernels.tables import AGAIN, ANEW, CORRECT, EVALUATE, LOOK_AHEAD, PREPARE, PROJECT, SETTLE, SOLVE
+from ffr_dyn.kernels.tables import AGAIN, ASIDE, CORRECT, EVALUATE, LOOK_AHEAD, PREPARE, PROJECT, SETTLE, SOLVE
 
 
 @inlined
@@ -32,7 +32,7 @@ def solve_again(r, x, target):
 @inlined
 def solve_anew(r, x, target):
     """`solve` where what was solved last has nothing to do with it."""
-    call_unit(r.units[SOLVE], r.address, ANEW, x.ctypes.data, target.ctypes.data)
+    call_unit(r.units[SOLVE], r.address, ASIDE, x.ctypes.data, target.ctypes.data)
 
 
 @inlined

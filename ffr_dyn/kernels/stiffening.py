@@ -13,15 +13,15 @@ from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import call_unit
 from ffr_dyn.kernels.rows import reaction
 from ffr_dyn.kernels.symmetric import multiply_both_ways, multiply_square, weighted_sum
-from ffr_dyn.kernels.tables import AGAIN, ANEW, MOTION, RELATIVE, STAGES
+from ffr_dyn.kernels.tables import ASIDE, MOTION, RELATIVE, STAGES
 from ffr_dyn.kernels.vectors import add_scaled, copy, cross, fill, get, subtract, to_body
 from ffr_dyn.kernels.views import part, peek
 
 SWEEPS = 4  # at most
 # By what the forces may change in a sweep, relative to those of the body with most, for it to be the last: one that begins
 # with a guess after steps of equal length, and any other.
-ENOUGH, STRICT = 3e-2, 1e-10
-SETTLED = 4 * STAGES  # solutions in steps of equal length before a guess is one of third order, whatever the method
+ENOUGH, STRICT = 3e-2, 1e-8
+SETTLED = 4  # steps of equal length before a guess is one of third order
 
 
 @kernel
@@ -140,31 +140,31 @@ def keep_change(w, stage):
 
 
 @inlined
-def is_settled(r, w):
+def is_settled(r, w, stage):
     """Whether the last steps were of the length of this one."""
     h, steady = r.clock.time[0], w.steady
     if steady[0] != h:
-        steady[0], steady[1] = h, 0.0
-    steady[1] += 1.0
-    return steady[1] > SETTLED
+        steady[0], steady[1] = h, -1.0
+    if steady[1] < 0.0 or stage <= steady[2]:
+        steady[1] += 1.0
+    steady[2] = stage
+    return steady[1] >= SETTLED
 
 
 @inlined
 def solve_stiffened(r, x, target, stage):
     """`solve_motion` with the geometric stiffening of the bodies that have it.
 
-    stage : number of a step's stage, from 0; AGAIN: near the last solution; ANEW: not near any
+    stage : number of a step's stage, from 0; AGAIN: near the last solution; ASIDE: so, and nothing is kept of it
     """
     m, w = r.model, r.work.bodies
     keep_unstiffened(m.bodies, w)
     enough = STRICT
-    if stage == ANEW:
-        fill(w.stiff, 0.0)
-    elif stage == AGAIN:
+    if stage < 0:
         copy(w.stiff, w.last)
     else:
         guess_stiffening(w, stage)
-        if is_settled(r, w):
+        if is_settled(r, w, stage):
             enough = ENOUGH
         elif r.control.numbers.size > 0:
             enough = r.control.numbers[RELATIVE]
@@ -184,5 +184,5 @@ def solve_stiffened(r, x, target, stage):
             break
     if stage >= 0:
         keep_change(w, stage)
-    if stage != ANEW:
+    if stage != ASIDE:
         copy(w.last, w.stiff)

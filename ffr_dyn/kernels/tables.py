@@ -42,8 +42,8 @@ STAGES = 7  # of a step, at most
     CORRECT, TRULY, RECORD, LOOK_AHEAD, PROJECT, LOADS, POWERS,
 ) = range(21)  # fmt: skip
 
-# A solution of a step's stage is called by its number; near the last solution, or not near any:
-AGAIN, ANEW = -1, -2
+# A solution of a step's stage is called by its number; near the last one, or aside from the steps:
+AGAIN, ASIDE = -1, -2
 
 # Which markers are brought up to date: those that joints or loads use, those of joints, all.
 IN_USE, OF_JOINTS, ALL = 0.0, 1.0, 2.0
@@ -189,8 +189,8 @@ class BodyWork(NamedTuple):
     # Of scenes with geometric stiffening (E_s = E, else 0):
     K_sigma: F1  # scratch: that of one body, in blocks on one side of the diagonal
     stiff: F1  # (E_s,) K_sigma q
-    last: F1  # (E_s,) that of the last solution in a step
-    steady: F1  # (2,) length of the last step, and how many solutions there were in steps of that length
+    last: F1  # (E_s,) that of the last solution in a step; zero before the first
+    steady: F1  # (3,) length of the last step, how many there were of that length before it, its last stage
     change: F2  # (3 STAGES, E_s) by what stages of the last step, and of two before, differed from the stage before
     load: F2  # (B, longest) loads of the bodies, in the order of their stiffness
 

@@ -41,7 +41,7 @@ from ffr_dyn.kernels.system import (
 )
 from ffr_dyn.kernels.tables import (
     ALL,
-    ANEW,
+    ASIDE,
     AT,
     BACK,
     BODIES,
@@ -238,7 +238,7 @@ def relaxed_unit(at, t, x, target):
 def stiffened_unit(at, stage, x, target):
     """acc and lam of a scene with geometric stiffening.
 
-    stage : number of a step's stage, from 0; AGAIN: near the last solution; ANEW: not near any
+    stage : number of a step's stage, from 0; AGAIN: near the last solution; ASIDE: so, and nothing is kept of it
     """
     r = tables_at(at)
     solve_stiffened(r, vector_at(x, r.x.size), vector_at(target, r.stages.target.size), int(stage))
@@ -341,7 +341,7 @@ def truly_unit(at, t, x, v):
     status = call_unit(r.units[EVALUATE], at, t, x, v)
     if status == OK:
         fill(w.bodies.shift, 0.0)
-        call_unit(r.units[SOLVE], at, ANEW, x, w.rows.gamma.ctypes.data)
+        call_unit(r.units[SOLVE], at, ASIDE, x, w.rows.gamma.ctypes.data)
         to_velocity_rates(r.model.bodies.where, w.bodies.A, w.bodies.acc, w.vd)
     return status
 
