@@ -8,16 +8,10 @@ of the earlier, with the rows of the later side by side in it. The factor is S =
 """
 
 from ffr_dyn.kernels.lanes import (
-    assign_narrow_3,
-    copy_narrow,
     eliminate_rows,
     factorise_rows,
     gather_upper,
     multiply_row,
-    narrow_1,
-    narrow_3,
-    narrow_6,
-    scale_narrow,
     solve_lower,
     solve_upper,
     spread_lower,
@@ -25,59 +19,13 @@ from ffr_dyn.kernels.lanes import (
 )
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.tables import LANES
-from ffr_dyn.kernels.vectors import fill, in_plane
+from ffr_dyn.kernels.vectors import fill
 from ffr_dyn.kernels.views import part
 
 # The least share of a row that other rows do not contain (the square of a sine). In a singular position it is zero; with
 # this floor the motion there misses one acceleration for the moment, and goes on.
 FLOOR = 1e-13
 SIDE = 12 * LANES  # numbers of X per side of a joint
-
-
-@kernel
-def spread_in_plane(jac, flexible, normal, X, at):
-    """X = the rigid coefficients of one side (9 * 8,) that keep to the plane, then the elastic ones: three of each."""
-    i, j, k = in_plane(normal)
-    copy_narrow(jac, LANES * i, X, at)
-    copy_narrow(jac, LANES * j, X, at + LANES)
-    copy_narrow(jac, LANES * k, X, at + 2 * LANES)
-    if flexible:
-        copy_narrow(jac, LANES * i, X, at + 3 * LANES)
-        copy_narrow(jac, LANES * j, X, at + 4 * LANES)
-        copy_narrow(jac, LANES * (6 + normal), X, at + 5 * LANES)
-
-
-@kernel
-def eliminate_in_plane(flexible, normal, P, L, X, at):
-    """First three rows of X = L^-1 (rigid - P elastic); P: nine numbers, of its rigid and elastic coefficients i, j, k.
-
-    L : pooled 6 x 6 matrix
-    """
-    i, j, k = in_plane(normal)
-    second, third = at + LANES, at + 2 * LANES
-    if flexible:
-        for c in range(3):
-            narrow_3(X, at + LANES * c, -1.0, P, 3 * c, 1, X, at + 3 * LANES)
-    scale_narrow(X, at, L[7 * i])
-    narrow_1(X, second, -1.0, L, 6 * j + i, 1, X, at)
-    scale_narrow(X, second, L[7 * j])
-    narrow_1(X, third, -1.0, L, 6 * k + i, 1, X, at)
-    narrow_1(X, third, -1.0, L, 6 * k + j, 1, X, second)
-    scale_narrow(X, third, L[7 * k])
-
-
-@kernel
-def add_pair_in_plane(X, later, earlier, rows, flexible, phiphi, Y, S, offset):
-    """Add the coupling of two sides on one planar body to its block of S (see `sides`); Y: scratch; phiphi: nine numbers."""
-    if flexible:
-        for c in range(3):
-            copy_narrow(X, later + LANES * c, Y, LANES * c)
-            assign_narrow_3(Y, LANES * (3 + c), 1.0, phiphi, c, 3, X, later + 3 * LANES)
-        for row in range(rows):
-            narrow_6(S, offset + LANES * row, 1.0, X, earlier + row, LANES, Y, 0)
-    else:
-        for row in range(rows):
-            narrow_3(S, offset + LANES * row, 1.0, X, earlier + row, LANES, X, later)
 
 
 @kernel

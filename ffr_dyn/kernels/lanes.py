@@ -28,8 +28,8 @@ from ffr_dyn.kernels.intrinsics import (
 from ffr_dyn.kernels.tables import LANES, NARROW
 
 
-def _combination(count: int, lanes: int = LANES, *, onto: bool = True) -> Any:
-    """Of `count` source rows that follow one another; it is added onto the target row, or takes its place."""
+def _combination(count: int, lanes: int = LANES) -> Any:
+    """Of `count` source rows that follow one another."""
 
     @intrinsic
     def combine(typing, target, at, factor, numbers, first, stride, source, begin):  # type: ignore[no-untyped-def]
@@ -41,14 +41,14 @@ def _combination(count: int, lanes: int = LANES, *, onto: bool = True) -> Any:
             out, at, factor, numbers, first, stride, source, begin = args
             numbers, source = pooled_data(context, builder, numbers), pooled_data(context, builder, source)
             place = row_pointer(builder, pooled_data(context, builder, out), at, lanes)
-            total = builder.load(place, align=8) if onto else None
+            total = builder.load(place, align=8)
             for k in range(count):
                 row = row_pointer(builder, source, builder.add(begin, cgutils.intp_t(LANES * k)), lanes)
                 where = builder.add(first, builder.mul(stride, cgutils.intp_t(k)))
                 number = builder.fmul(factor, builder.load(builder.gep(numbers, [where])), flags=LIBERTIES)
                 many = broadcast(builder, number, lanes)
                 product = builder.fmul(many, builder.load(row, align=8), flags=LIBERTIES)
-                total = product if total is None else builder.fadd(total, product, flags=LIBERTIES)
+                total = builder.fadd(total, product, flags=LIBERTIES)
             builder.store(total, place, align=8)
             return context.get_dummy_value()
 
@@ -57,27 +57,8 @@ def _combination(count: int, lanes: int = LANES, *, onto: bool = True) -> Any:
     return combine
 
 
-combine_1, combine_2, combine_3 = _combination(1), _combination(2), _combination(3)
-combine_4, combine_5, combine_6, combine_12 = _combination(4), _combination(5), _combination(6), _combination(12)
 # In the plane a joint has at most three rows: half a row of lanes is enough.
-narrow_1, narrow_3, narrow_6 = _combination(1, NARROW), _combination(3, NARROW), _combination(6, NARROW)
-assign_6, assign_narrow_3 = _combination(6, onto=False), _combination(3, NARROW, onto=False)
-
-
-def _scaling(lanes: int) -> Any:
-    @intrinsic
-    def scale(typing, target, at, factor):  # type: ignore[no-untyped-def]
-        """target row *= factor."""
-
-        def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-            place = row_pointer(builder, pooled_data(context, builder, args[0]), args[1], lanes)
-            row, many = builder.load(place, align=8), broadcast(builder, args[2], lanes)
-            builder.store(builder.fmul(row, many, flags=LIBERTIES), place, align=8)
-            return context.get_dummy_value()
-
-        return types.void(POOLED, types.intp, REAL), generate
-
-    return scale
+combine_6, narrow_3, narrow_6 = _combination(6), _combination(3, NARROW), _combination(6, NARROW)
 
 
 def _of_two_rows(emit: Any, lanes: int = LANES, result: Any = types.void) -> Any:
@@ -100,11 +81,6 @@ def _product(builder: Any, left: Any, right: Any) -> Any:
     return builder.fmul(builder.load(left, align=8), builder.load(right, align=8), flags=LIBERTIES)
 
 
-def _copy(builder: Any, source: Any, target: Any) -> None:
-    """target row = source row."""
-    builder.store(builder.load(source, align=8), target, align=8)
-
-
 def _multiply(builder: Any, target: Any, source: Any) -> None:
     """target row *= source row."""
     builder.store(_product(builder, target, source), target, align=8)
@@ -115,8 +91,6 @@ def _dot(builder: Any, left: Any, right: Any) -> Any:
     return sum_of_lanes(builder, _product(builder, left, right))
 
 
-scale_row, scale_narrow = _scaling(LANES), _scaling(NARROW)
-copy_row, copy_narrow = _of_two_rows(_copy), _of_two_rows(_copy, NARROW)
 multiply_row = _of_two_rows(_multiply)
 dot_rows, dot_narrow = _of_two_rows(_dot, result=REAL), _of_two_rows(_dot, NARROW, REAL)
 

@@ -7,12 +7,9 @@ Order of calls: `prepare` once per elastic diagonal; `evaluate_bodies`, `evaluat
 
 from ffr_dyn.kernels.blocks import (
     SIDE,
-    add_pair_in_plane,
     clear_column,
-    eliminate_in_plane,
     factorise_block,
     relax_block,
-    spread_in_plane,
 )
 from ffr_dyn.kernels.bodies import factorise, inertia, normalise, prepare_body, rotation_matrix
 from ffr_dyn.kernels.lanes import add_scale
@@ -21,9 +18,18 @@ from ffr_dyn.kernels.markers import couple_marker, couple_pair, prepare_marker, 
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import call_unit
 from ffr_dyn.kernels.rows import reaction
-from ffr_dyn.kernels.sides import couple_flexible, couple_rigid, eliminate_flexible, eliminate_rigid
+from ffr_dyn.kernels.sides import (
+    couple_flexible,
+    couple_flexible_in_plane,
+    couple_rigid,
+    couple_rigid_in_plane,
+    eliminate_flexible,
+    eliminate_flexible_in_plane,
+    eliminate_rigid,
+    eliminate_rigid_in_plane,
+)
 from ffr_dyn.kernels.tables import ALL, IN_USE, LANES, LOADS, LOOK, NOT_FINITE, OK, REGAIN, RELATION
-from ffr_dyn.kernels.vectors import add_scaled, cross, fill, get, put, subtract, to_body, to_global
+from ffr_dyn.kernels.vectors import add_scaled, cross, fill, get, in_plane, put, subtract, to_body, to_global
 from ffr_dyn.kernels.views import part
 
 
@@ -81,8 +87,11 @@ def couple_joint(bodies, markers, rows, pattern, bw, rw, k):
             if flexible and rows.first[k, side] == 1:
                 couple_marker(shapes(markers, marker, n), part(bw.Cd, 6 * e, 6 * n), n, normal, P)
             if normal >= 0:
-                spread_in_plane(jac, flexible, normal, rw.X, at)
-                eliminate_in_plane(flexible, normal, P, L, rw.X, at)
+                c0, c1, c2 = in_plane(normal)
+                if flexible:
+                    eliminate_flexible_in_plane(jac, c0, c1, c2, 6 + normal, P, L, rw.X, at)
+                else:
+                    eliminate_rigid_in_plane(jac, c0, c1, c2, 6 + normal, P, L, rw.X, at)
             elif flexible:
                 eliminate_flexible(jac, P, L, rw.X, at)
             else:
@@ -96,7 +105,10 @@ def couple_joint(bodies, markers, rows, pattern, bw, rw, k):
         flexible, size = where[b, 0] > 0, rows.start[earlier + 1] - rows.start[earlier]
         at, phiphi = pattern.pair[p, 4], rw.phiphi[pattern.pair[p, 5]]
         if where[b, 7] >= 0:
-            add_pair_in_plane(rw.X, first, second, size, flexible, phiphi, rw.Y, rw.S, at)
+            if flexible:
+                couple_flexible_in_plane(rw.X, first, second, size, phiphi, rw.S, at)
+            else:
+                couple_rigid_in_plane(rw.X, first, second, size, phiphi, rw.S, at)
         elif flexible:
             couple_flexible(rw.X, first, second, size, phiphi, rw.S, at)
         else:
