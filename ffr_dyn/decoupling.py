@@ -71,29 +71,35 @@ def in_blocks(table: Array, last: int, noise: Array) -> tuple[Array, Array]:
 
 
 def symmetric_blocks(matrices: Array, numbers: Array, noise: Array) -> tuple[Array, Array]:
-    """(pool, plan) of symmetric matrices (L, n, n) whose weighted sums are multiplied, as `kernels.stiffening` reads them.
+    """(pool, plan) of matrices (L, n, n) whose weighted sums are multiplied, as `kernels.stiffening` reads them.
 
-    Of a sum only the blocks on one side of the diagonal are kept: each serves its coordinates and those across.
+    Of symmetric ones, as all are but those of some files of other programs, only the blocks on one side of the diagonal are
+    kept: each serves its coordinates and those across.
 
     numbers : (L,) where their weights are found
     noise   : (L,) entries that are not larger are rounding
 
     pool : per group of matrices that share blocks, what each has in those blocks, one row per matrix, of whole lanes
-    plan : number of groups, of blocks, of places (each family of coordinates begins a row of lanes); of each group the
-           number of matrices and of entries; of each block its first entry, its first row and their number, its first
-           column and their number; the places of the coordinates; the numbers by group
+    plan : number of groups, of blocks, of places (each family of coordinates begins a row of lanes), whether the matrices
+           are symmetric; of each group the number of matrices and of entries; of each block its first entry, its first row
+           and their number, its first column and their number; the places of the coordinates; the numbers by group
     """
     n = matrices.shape[1]
+    matrices = np.swapaxes(matrices, 1, 2)  # rows are multiplied by numbers, and added up
     coupled = np.abs(matrices) > noise[:, None, None]
-    family = _blocks(np.moveaxis(coupled, 0, 1))[0] if n > SORTING else np.zeros(n, dtype=int)
+    symmetric = bool((np.abs(matrices - np.swapaxes(matrices, 1, 2)) <= noise[:, None, None]).all())
+    family = (
+        _blocks(np.moveaxis(coupled | np.swapaxes(coupled, 1, 2), 0, 1))[0] if n > SORTING else np.zeros(n, dtype=int)
+    )
     parts = [np.flatnonzero(family == f) for f in np.unique(family)]
     parts = [part for each in parts for part in np.array_split(each, -(-each.size // LONGEST))]
     first = np.cumsum([0, *(in_lanes(part.size) for part in parts)])
     places = np.empty(n, dtype=np.int64)
     for part, at in zip(parts, first, strict=False):
         places[part] = at + np.arange(part.size)
-    pairs = [(a, b) for k in range(len(parts)) for a, b in ((k, other) for other in range(k, len(parts)))]
-    pairs = [min(((a, b), (b, a)), key=lambda p: effort(parts[p[0]].size, parts[p[1]].size)) for a, b in pairs]
+    pairs = [(a, b) for a in range(len(parts)) for b in range(a if symmetric else 0, len(parts))]
+    if symmetric:
+        pairs = [min(((a, b), (b, a)), key=lambda p: _effort(parts[p[0]].size, parts[p[1]].size)) for a, b in pairs]
     touched = np.array([coupled[:, parts[a]][:, :, parts[b]].any(axis=(1, 2)) for a, b in pairs], dtype=float)
     _, group = connected_components(csr_array(touched @ touched.T), directed=False)
     pool: list[Array] = []
@@ -114,11 +120,11 @@ def symmetric_blocks(matrices: Array, numbers: Array, noise: Array) -> tuple[Arr
         ]
         kept += pool[-1].shape[1]
         listed.append(numbers[which])
-    plan = np.concatenate([[len(pool), len(blocks), first[-1]], sizes, np.ravel(blocks), places, *listed])
+    plan = np.concatenate([[len(pool), len(blocks), first[-1], symmetric], sizes, np.ravel(blocks), places, *listed])
     return np.concatenate([part.ravel() for part in pool]), plan.astype(np.int64)
 
 
-def effort(rows: int, columns: int) -> int:
+def _effort(rows: int, columns: int) -> int:
     """How many pieces of a block are multiplied one by one: four rows, or one, by a row of lanes of its columns."""
     return (rows // 4 + rows % 4) * in_lanes(columns)
 

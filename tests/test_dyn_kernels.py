@@ -267,13 +267,14 @@ def test_blocks_give_the_products_of_the_whole_table():
 
 @pytest.mark.parametrize("n", [1, 3, 8, 11, 30, 75])
 @pytest.mark.parametrize("families", [1, 4])
-def test_geometric_stiffness_in_blocks_is_the_sum_of_the_whole(n, families):
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_geometric_stiffness_in_blocks_is_the_sum_of_the_whole(n, families, symmetric):
     """Each load couples a family of coordinates with one other, or, with one family, all with all; 18 loads act."""
     rng = np.random.default_rng(n)
     family = rng.permutation(n) % families
     K = 1e-3 * rng.normal(size=(30, n, n))
     for load, matrix in enumerate(K):
-        matrix += matrix.T
+        matrix += matrix.T * symmetric
         matrix *= (family[:, None] ^ family) == load % families
     body = replace(cloud(n, points=30), stiffening=K)
     scene = Scene(

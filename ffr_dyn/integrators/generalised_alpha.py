@@ -31,7 +31,7 @@ from ffr_dyn.errors import InputError
 from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.actions import keep_turns
 from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.calls import correct, evaluate, project, set_diagonal, settle, solve_again, solve_anew
+from ffr_dyn.kernels.calls import correct, evaluate, project, set_diagonal, settle, solve_again, solve_aside
 from ffr_dyn.kernels.motion import carry, converging, farthest, largest_motion, unconverged
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.packing import tables_at
@@ -60,7 +60,7 @@ def start(r, t, h, lag):
         if status == OK:
             fill(r.work.bodies.shift, 0.0)
             copy(s.target, r.work.rows.gamma)
-            solve_anew(r, r.x if attempt == 0 else s.x[0], s.target)
+            solve_aside(r, r.x if attempt == 0 else s.x[0], s.target)
             to_velocity_rates(bodies.where, r.work.bodies.A, r.work.bodies.acc, s.v[NOW if attempt == 0 else A_NOW])
         if status == OK and attempt == 0:
             position_rates(bodies, r.x, r.v, s.x[1])

@@ -31,7 +31,7 @@ from ffr_dyn.integrators.generalised_alpha import check_iterations
 from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.actions import keep_turns
 from ffr_dyn.kernels.bodies import mass_times, normalise, six_rows, three_rows
-from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, solve_again, solve_anew
+from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, solve_again, solve_aside
 from ffr_dyn.kernels.motion import carry, converging, farthest, into_global_axes, largest_motion, unconverged
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import tables_at
@@ -193,7 +193,7 @@ def stiffen_node(r, t, v):
     if status == OK:
         fill(bw.shift, 0.0)
         copy(s.target, r.work.rows.gamma)
-        solve_anew(r, r.x, s.target)
+        solve_aside(r, r.x, s.target)
         fill(s.v[KICK], 0.0)
         for b in range(bodies.mass.size):
             n, j, e = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3]

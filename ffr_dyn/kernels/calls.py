@@ -30,8 +30,8 @@ def solve_again(r, x, target):
 
 
 @inlined
-def solve_anew(r, x, target):
-    """`solve` where what was solved last has nothing to do with it."""
+def solve_aside(r, x, target):
+    """`solve` aside from the steps, which do not go on from it."""
     call_unit(r.units[SOLVE], r.address, ASIDE, x.ctypes.data, target.ctypes.data)
 
 

@@ -12,7 +12,7 @@ follow where the guess turns out poor, as after an impact.
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import call_unit
 from ffr_dyn.kernels.rows import reaction
-from ffr_dyn.kernels.symmetric import multiply_both_ways, multiply_square, weighted_sum
+from ffr_dyn.kernels.symmetric import multiply_both_ways, multiply_one_way, weighted_sum
 from ffr_dyn.kernels.tables import ASIDE, MOTION, RELATIVE, STAGES
 from ffr_dyn.kernels.vectors import add_scaled, copy, cross, fill, get, subtract, to_body
 from ffr_dyn.kernels.views import part, peek
@@ -39,12 +39,12 @@ def multiply_stiffness(bodies, w, x, b):
     """w.stiff of body b: the sum of load * K_load over its loads, times q. Returns the squares of its length and of its
     change."""
     plan, at, n, i = bodies.blocks, bodies.where[b, 10], bodies.where[b, 0], bodies.where[b, 1]
-    groups, size = plan[at], plan[at + 2]
-    block = at + 3 + 2 * groups
+    groups, size, symmetric = plan[at], plan[at + 2], plan[at + 3] == 1
+    block = at + 4 + 2 * groups
     place = block + 5 * plan[at + 1]
     number, start, out = place + n, bodies.where[b, 5], 0
     for group in range(groups):
-        count, entries = plan[at + 3 + 2 * group], plan[at + 4 + 2 * group]
+        count, entries = plan[at + 4 + 2 * group], plan[at + 5 + 2 * group]
         for k in range(count):
             w.sorted[k] = peek(w.load[b], peek(plan, number + k))
         weighted_sum(count, w.sorted, bodies.stiffening, start, entries, w.K_sigma, out)
@@ -56,8 +56,8 @@ def multiply_stiffness(bodies, w, x, b):
     while block < place:
         first, row, rows = peek(plan, block), peek(plan, block + 1), peek(plan, block + 2)
         column, columns = peek(plan, block + 3), peek(plan, block + 4)
-        if row == column:
-            multiply_square(w.K_sigma, first, rows, columns, q, y, z, row, column)
+        if row == column or not symmetric:
+            multiply_one_way(w.K_sigma, first, rows, columns, q, y, z, row, column)
         else:
             multiply_both_ways(w.K_sigma, first, rows, columns, q, y, z, row, column)
         block += 5

@@ -114,7 +114,7 @@ def _block_product(across: bool) -> Any:
     return multiply
 
 
-multiply_square, multiply_both_ways = _block_product(False), _block_product(True)
+multiply_one_way, multiply_both_ways = _block_product(False), _block_product(True)
 
 
 @intrinsic
