@@ -160,7 +160,7 @@ def _stiffness(scene: Scene, marked: Markers) -> tuple[_Blocks, list[int]]:
 def _kept(blocks: _Blocks, b: int) -> int:
     """How many numbers a sum of the matrices of body b has."""
     plan = blocks.plans[blocks.first[b] :]
-    return 0 if blocks.start[b] < 0 else int(plan[5 : 5 + 2 * plan[0] : 2].sum())
+    return 0 if blocks.start[b] < 0 else int(plan[4 : 4 + 2 * plan[0] : 2].sum())
 
 
 def loads_that_stiffen(bodies: Bodies, b: int) -> Array:
@@ -168,8 +168,8 @@ def loads_that_stiffen(bodies: Bodies, b: int) -> Array:
     if bodies.where[b, 6] == 0:
         return np.zeros(0, dtype=np.int64)
     plan = bodies.blocks[bodies.where[b, 10] :]
-    first = 4 + 2 * plan[0] + 5 * plan[1] + bodies.where[b, 0]
-    return np.sort(plan[first : first + plan[4 : 4 + 2 * plan[0] : 2].sum()])
+    first = 3 + 2 * plan[0] + bodies.where[b, 0]
+    return np.sort(plan[first : first + plan[3 : 3 + 2 * plan[0] : 2].sum()])
 
 
 def _used_markers(scene: Scene, marked: Markers) -> list[list[int]]:

@@ -12,13 +12,12 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from ffr_dyn.kernels.tables import LANES
+from ffr_dyn.kernels.tables import LANES, QUAD
 
 Array = np.ndarray
 
 # What sorting costs: as much as this many multiplications per product (measured with 8 to 64 coordinates).
 SORTING = 8
-LONGEST = 16  # coordinates of a block of a symmetric sum at most (likewise)
 _NOTHING = 1e-16  # of the stiffness by a load, relative to that by the others
 
 
@@ -80,53 +79,56 @@ def symmetric_blocks(matrices: Array, numbers: Array, noise: Array) -> tuple[Arr
     noise   : (L,) entries that are not larger are rounding
 
     pool : per group of matrices that share blocks, what each has in those blocks, one row per matrix, of whole lanes
-    plan : number of groups, of blocks, of places (each family of coordinates begins a row of lanes), whether the matrices
-           are symmetric; of each group the number of matrices and of entries; of each block its first entry, its first row
-           and their number, its first column and their number; the places of the coordinates; the numbers by group
+    plan : number of groups, of parts (of families, at most a row of lanes each), of places (each part begins such a row),
+           of each group the number of matrices and of entries; the places of the coordinates; the numbers by group; of each
+           part its first place, its fours of rows, how many blocks serve them alone, and how many also what lies across; of
+           each block, by part, its first entry, its columns, their first place
     """
     n = matrices.shape[1]
-    matrices = np.swapaxes(matrices, 1, 2)  # rows are multiplied by numbers, and added up
     coupled = np.abs(matrices) > noise[:, None, None]
     symmetric = bool((np.abs(matrices - np.swapaxes(matrices, 1, 2)) <= noise[:, None, None]).all())
     family = (
         _blocks(np.moveaxis(coupled | np.swapaxes(coupled, 1, 2), 0, 1))[0] if n > SORTING else np.zeros(n, dtype=int)
     )
     parts = [np.flatnonzero(family == f) for f in np.unique(family)]
-    parts = [part for each in parts for part in np.array_split(each, -(-each.size // LONGEST))]
+    parts = [part for each in parts for part in np.split(each, range(LANES, each.size, LANES))]
     first = np.cumsum([0, *(in_lanes(part.size) for part in parts)])
     places = np.empty(n, dtype=np.int64)
     for part, at in zip(parts, first, strict=False):
         places[part] = at + np.arange(part.size)
     pairs = [(a, b) for a in range(len(parts)) for b in range(a if symmetric else 0, len(parts))]
     if symmetric:
-        pairs = [min(((a, b), (b, a)), key=lambda p: _effort(parts[p[0]].size, parts[p[1]].size)) for a, b in pairs]
-    touched = np.array([coupled[:, parts[a]][:, :, parts[b]].any(axis=(1, 2)) for a, b in pairs], dtype=float)
+        pairs = [min(((a, b), (b, a)), key=lambda p: (_quads(parts[p[0]].size), -parts[p[1]].size)) for a, b in pairs]
+    pairs.sort(key=lambda p: -parts[p[1]].size)  # rows that fill the lanes begin at whole ones
+    every = np.arange(len(matrices))
+    touched = np.array([coupled[np.ix_(every, parts[a], parts[b])].any(axis=(1, 2)) for a, b in pairs], dtype=float)
     _, group = connected_components(csr_array(touched @ touched.T), directed=False)
     pool: list[Array] = []
     sizes: list[int] = []
-    blocks: list[tuple[int, ...]] = []
+    alone: list[list[tuple[int, int, int]]] = [[] for _ in parts]
+    across: list[list[tuple[int, int, int]]] = [[] for _ in parts]
     listed: list[Array] = []
     kept = 0
     for g in np.unique(group[touched.any(axis=1)]):
         own = [pairs[k] for k in np.flatnonzero(group == g)]
         which = np.flatnonzero(touched[group == g].any(axis=0))
-        rows = [matrices[which][:, parts[a]][:, :, parts[b]].reshape(which.size, -1) for a, b in own]
+        rows = [matrices[np.ix_(which, parts[a], parts[b])].reshape(which.size, -1) for a, b in own]
         begin = np.cumsum([0, *(row.shape[1] for row in rows)])
         rows.append(np.zeros((which.size, in_lanes(begin[-1]) - begin[-1])))
         pool.append(np.concatenate(rows, axis=1))
         sizes += pool[-1].shape
-        blocks += [
-            (kept + k, first[a], parts[a].size, first[b], parts[b].size) for k, (a, b) in zip(begin, own, strict=False)
-        ]
+        for k, (a, b) in zip(begin, own, strict=False):
+            (across if symmetric and a != b else alone)[a].append((kept + k, parts[b].size, first[b]))
         kept += pool[-1].shape[1]
         listed.append(numbers[which])
-    plan = np.concatenate([[len(pool), len(blocks), first[-1], symmetric], sizes, np.ravel(blocks), places, *listed])
-    return np.concatenate([part.ravel() for part in pool]), plan.astype(np.int64)
+    heads = [(first[a], _quads(part.size), len(alone[a]), len(across[a])) for a, part in enumerate(parts)]
+    plan = [np.array([len(pool), len(parts), first[-1], *sizes]), places, *listed, np.ravel(heads)]
+    plan += [np.ravel(blocks) for both in zip(alone, across, strict=True) for blocks in both]
+    return np.concatenate([part.ravel() for part in pool]), np.concatenate(plan).astype(np.int64)
 
 
-def _effort(rows: int, columns: int) -> int:
-    """How many pieces of a block are multiplied one by one: four rows, or one, by a row of lanes of its columns."""
-    return (rows // 4 + rows % 4) * in_lanes(columns)
+def _quads(rows: int) -> int:
+    return -(-rows // QUAD)
 
 
 def in_lanes(count: int) -> int:

@@ -10,6 +10,7 @@ import numpy as np
 from ffr_dyn.equations import System
 from ffr_dyn.kernels.tables import (
     LANES,
+    QUAD,
     STAGES,
     Bodies,
     BodyWork,
@@ -66,9 +67,8 @@ def _body_work(m: Model, keeps_terms: bool) -> BodyWork:
         sorted=np.zeros(14 * longest + 3 * LANES * longest + loads),
         **_zeros(H=3 * E, Cd=6 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6), elastic=E),
         **_zeros(more=V, unstiffened=E, shift=V, load=(B, loads)),
-        **_zeros(
-            stiff=E_s, last=E_s, steady=3, change=(3 * STAGES, E_s), K_sigma=int(m.bodies.where[:, 6].max()) + LANES
-        ),
+        **_zeros(stiff=E_s, last=E_s, steady=3, change=(3 * STAGES, E_s)),
+        K_sigma=np.zeros(int(m.bodies.where[:, 6].max()) + QUAD * LANES),
     )
     work.inverse[:, 0] = [_inverse(mass) for mass in m.bodies.mass]
     for b in np.flatnonzero(n[:-1] == 0):

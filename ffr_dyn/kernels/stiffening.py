@@ -12,8 +12,8 @@ follow where the guess turns out poor, as after an impact.
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import call_unit
 from ffr_dyn.kernels.rows import reaction
-from ffr_dyn.kernels.symmetric import multiply_both_ways, multiply_one_way, weighted_sum
-from ffr_dyn.kernels.tables import ASIDE, MOTION, RELATIVE, STAGES
+from ffr_dyn.kernels.symmetric import multiply_blocks, weighted_sum
+from ffr_dyn.kernels.tables import ASIDE, LANES, MOTION, QUAD, RELATIVE, STAGES
 from ffr_dyn.kernels.vectors import add_scaled, copy, cross, fill, get, subtract, to_body
 from ffr_dyn.kernels.views import part, peek
 
@@ -38,36 +38,31 @@ def keep_unstiffened(bodies, w):
 def multiply_stiffness(bodies, w, x, b):
     """w.stiff of body b: the sum of load * K_load over its loads, times q. Returns the squares of its length and of its
     change."""
-    plan, at, n, i = bodies.blocks, bodies.where[b, 10], bodies.where[b, 0], bodies.where[b, 1]
-    groups, size, symmetric = plan[at], plan[at + 2], plan[at + 3] == 1
-    block = at + 4 + 2 * groups
-    place = block + 5 * plan[at + 1]
+    plan, at, n = bodies.blocks, bodies.where[b, 10], bodies.where[b, 0]
+    groups, parts, size = plan[at], plan[at + 1], plan[at + 2]
+    place, load, own = at + 3 + 2 * groups, w.load[b], part(x, bodies.where[b, 1] + 7, n)
+    q, y, z = part(w.sorted, 0, size), part(w.sorted, size, size), part(w.sorted, 2 * size, size)
+    weights = part(w.sorted, 3 * size, load.size)
+    fill(part(w.sorted, 0, 2 * size), 0.0)
+    for k in range(n):
+        q[peek(plan, place + k)] = own[k]
     number, start, out = place + n, bodies.where[b, 5], 0
     for group in range(groups):
-        count, entries = plan[at + 4 + 2 * group], plan[at + 5 + 2 * group]
+        count, entries = plan[at + 3 + 2 * group], plan[at + 4 + 2 * group]
         for k in range(count):
-            w.sorted[k] = peek(w.load[b], peek(plan, number + k))
-        weighted_sum(count, w.sorted, bodies.stiffening, start, entries, w.K_sigma, out)
+            weights[k] = peek(load, peek(plan, number + k))
+        weighted_sum(count, weights, bodies.stiffening, start, entries, w.K_sigma, out)
         start, out, number = start + count * entries, out + entries, number + count
-    q, y, z = part(w.sorted, 0, size), part(w.sorted, size, size), part(w.sorted, 2 * size, size)
-    fill(part(w.sorted, 0, 3 * size), 0.0)
-    for k in range(n):
-        q[peek(plan, place + k)] = x[i + 7 + k]
-    while block < place:
-        first, row, rows = peek(plan, block), peek(plan, block + 1), peek(plan, block + 2)
-        column, columns = peek(plan, block + 3), peek(plan, block + 4)
-        if row == column or not symmetric:
-            multiply_one_way(w.K_sigma, first, rows, columns, q, y, z, row, column)
-        else:
-            multiply_both_ways(w.K_sigma, first, rows, columns, q, y, z, row, column)
-        block += 5
-    stiff, found, force, change = part(w.stiff, bodies.where[b, 3], n), part(w.sorted, 0, n), 0.0, 0.0
+    fill(part(w.K_sigma, out, QUAD * LANES), 0.0)  # what the last rows read beyond their end
+    multiply_blocks(parts, plan, number, w.K_sigma, q, y, z)
+    stiff, force, change = part(w.stiff, bodies.where[b, 3], n), 0.0, 0.0
+    found = part(w.sorted, 0, n)
     for k in range(n):
         found[k] = peek(y, peek(plan, place + k)) + peek(z, peek(plan, place + k))
     for k in range(n):
         force += found[k] * found[k]
         change += (found[k] - stiff[k]) * (found[k] - stiff[k])
-    copy(stiff, found)
+        stiff[k] = found[k]
     return force, change
 
 

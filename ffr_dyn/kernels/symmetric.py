@@ -1,6 +1,6 @@
 """Products of a weighted sum of symmetric matrices, in blocks of which those on one side of the diagonal serve both sides.
 
-As `ffr_dyn.decoupling.symmetric_blocks` stores them. Columns are taken by rows of lanes; arrays are pooled.
+As `ffr_dyn.decoupling.symmetric_blocks` stores them; arrays are pooled.
 """
 
 from __future__ import annotations
@@ -16,14 +16,17 @@ from ffr_dyn.kernels.intrinsics import (
     POOLED,
     broadcast,
     case_by_case,
+    data_of,
     intrinsic,
     load_row,
     pooled_data,
     row_pointer,
     store_row,
-    sum_of_lanes,
 )
-from ffr_dyn.kernels.tables import LANES, MOST_ROWS
+from ffr_dyn.kernels.tables import LANES, MOST_ROWS, QUAD
+
+IN_ORDER = ("contract", "nsz")
+PART, BLOCK = 4, 3  # how many numbers of a plan each of them has
 
 
 def _lanes_of(builder: Any, row: Any, other: Any, lanes: list[int]) -> Any:
@@ -53,68 +56,69 @@ def _sums(builder: Any, rows: list[Any]) -> Any:
     )
 
 
-def _block_product(across: bool) -> Any:
-    @intrinsic
-    def multiply(typing, K, first, rows, columns, x, y, z, row, column):  # type: ignore[no-untyped-def]
-        """y += K^T x for the block of K (rows x columns) that begins at `first`, whose rows and columns are those at `row`
-        and `column` of x and y; and with what lies across the diagonal, z += K x.
+@intrinsic
+def multiply_blocks(typing, parts, plan, at, K, x, y, z):  # type: ignore[no-untyped-def]
+    """y + z = K x, for blocks of K and the plan of `ffr_dyn.decoupling.symmetric_blocks`, whose parts begin at `at`.
 
-        Whole rows of lanes of y are read and written: x is zero, and y is not used, between the columns and the next row.
-        """
+    Four rows at a time meet all blocks that they have, at most eight columns wide: some serve them alone, the others what
+    lies across the diagonal, too.
 
-        def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-            K, first, rows, columns, x, y, z, row, column = args
-            K, x, y, z = (pooled_data(context, builder, array) for array in (K, x, y, z))
-            widths = builder.sdiv(builder.add(columns, cgutils.intp_t(LANES - 1)), cgutils.intp_t(LANES))
-            quads = builder.sdiv(rows, cgutils.intp_t(4))
-            done = builder.mul(quads, cgutils.intp_t(4))
-            results = [cgutils.alloca_once(builder, ir.VectorType(ir.DoubleType(), LANES)) for _ in range(2)]
+    z : set;  y : was zero;  x : zero between a part and the next row of lanes. What y and z have there is not used.
+    """
 
-            def emit(begin: Any, count: int, shift: Any, other: Any) -> None:
-                """`count` rows from row `begin` of the block on, a row of lanes of their columns."""
-                own = builder.add(row, begin)
-                at = builder.add(builder.add(first, shift), builder.mul(begin, columns))
-                entries = []
-                for k in range(count):
-                    weight = builder.load(builder.gep(x, [builder.add(own, cgutils.intp_t(k))]))
-                    entries.append(load_row(builder, K, builder.add(at, builder.mul(columns, cgutils.intp_t(k)))))
-                    product = builder.fmul(broadcast(builder, weight), entries[k], flags=LIBERTIES)
-                    sum_ = builder.fadd(builder.load(results[k % 2]), product, flags=LIBERTIES)
-                    builder.store(sum_, results[k % 2])
-                if not across:
-                    return
-                products = [builder.fmul(entry, other, flags=LIBERTIES) for entry in entries]
-                if count == 1:
-                    target = builder.gep(z, [own])
-                    builder.store(
-                        builder.fadd(builder.load(target), sum_of_lanes(builder, products[0]), flags=LIBERTIES), target
-                    )
-                else:
-                    target = row_pointer(builder, z, own, 4)
-                    total = builder.fadd(builder.load(target, align=8), _sums(builder, products), flags=LIBERTIES)
-                    builder.store(total, target, align=8)
+    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
+        parts, plan, at, K, x, y, z = args
+        K, x, y, z = (pooled_data(context, builder, array) for array in (K, x, y, z))
+        plan = data_of(context, builder, sig.args[1], plan)
+        zero = ir.Constant(ir.VectorType(ir.DoubleType(), LANES), [0.0] * LANES)
+        sums = [cgutils.alloca_once(builder, zero.type) for _ in range(QUAD)]
+        blocks = cgutils.alloca_once_value(builder, builder.add(at, builder.mul(parts, cgutils.intp_t(PART))))
 
-            with cgutils.for_range(builder, widths) as loop:
-                shift = builder.mul(loop.index, cgutils.intp_t(LANES))
-                place = builder.add(column, shift)
-                builder.store(load_row(builder, y, place), results[0])
-                builder.store(ir.Constant(ir.VectorType(ir.DoubleType(), LANES), [0.0] * LANES), results[1])
-                other = load_row(builder, x, place) if across else None
-                with cgutils.for_range(builder, quads) as inner:
-                    emit(builder.mul(inner.index, cgutils.intp_t(4)), 4, shift, other)
-                with cgutils.for_range(builder, builder.sub(rows, done)) as inner:
-                    emit(builder.add(done, inner.index), 1, shift, other)
-                found = builder.fadd(builder.load(results[0]), builder.load(results[1]), flags=LIBERTIES)
-                store_row(builder, found, y, place)
-            return context.get_dummy_value()
+        def integer(begin: Any, number: int) -> Any:
+            return builder.load(builder.gep(plan, [builder.add(begin, cgutils.intp_t(number))]))
 
-        index = types.intp
-        return types.void(POOLED, index, index, index, POOLED, POOLED, POOLED, index, index), generate
+        def emit(block: Any, begin: Any, own: list[Any] | None) -> None:
+            """A block's share of four rows from its row `begin` on; own: their x."""
+            first, stride, column = (integer(block, k) for k in range(BLOCK))
+            place = builder.add(first, builder.mul(begin, stride))
+            starts = [builder.add(place, builder.mul(stride, cgutils.intp_t(k))) for k in range(QUAD)]
+            rows = [load_row(builder, K, start) for start in starts]
+            other = load_row(builder, x, column)
+            for sum_, row in zip(sums, rows, strict=True):
+                product = builder.fmul(row, other, flags=LIBERTIES)
+                builder.store(builder.fadd(builder.load(sum_), product, flags=LIBERTIES), sum_)
+            if own is not None:
+                products = [builder.fmul(number, row, flags=IN_ORDER) for number, row in zip(own, rows, strict=True)]
+                pairs = [builder.fadd(products[k], products[k + 1], flags=IN_ORDER) for k in range(0, QUAD, 2)]
+                # y last: the next four rows wait for it
+                total = builder.fadd(load_row(builder, y, column), builder.fadd(*pairs, flags=IN_ORDER), flags=IN_ORDER)
+                store_row(builder, total, y, column)
 
-    return multiply
+        with cgutils.for_range(builder, parts) as part:
+            header = builder.add(at, builder.mul(part.index, cgutils.intp_t(PART)))
+            row, quads, alone, across = (integer(header, k) for k in range(PART))
+            start = builder.load(blocks)
+            middle = builder.add(start, builder.mul(alone, cgutils.intp_t(BLOCK)))
+            with cgutils.for_range(builder, quads) as quad:
+                begin = builder.mul(quad.index, cgutils.intp_t(QUAD))
+                place = builder.add(row, begin)
+                own = [
+                    broadcast(builder, builder.load(builder.gep(x, [builder.add(place, cgutils.intp_t(k))])))
+                    for k in range(QUAD)
+                ]
+                for sum_ in sums:
+                    builder.store(zero, sum_)
+                with cgutils.for_range(builder, alone) as loop:
+                    emit(builder.add(start, builder.mul(loop.index, cgutils.intp_t(BLOCK))), begin, None)
+                with cgutils.for_range(builder, across) as loop:
+                    emit(builder.add(middle, builder.mul(loop.index, cgutils.intp_t(BLOCK))), begin, own)
+                total = _sums(builder, [builder.load(sum_) for sum_ in sums])
+                builder.store(total, row_pointer(builder, z, place, QUAD), align=8)
+            builder.store(builder.add(middle, builder.mul(across, cgutils.intp_t(BLOCK))), blocks)
+        return context.get_dummy_value()
 
-
-multiply_one_way, multiply_both_ways = _block_product(False), _block_product(True)
+    index = types.intp
+    return types.void(index, plan, index, POOLED, POOLED, POOLED, POOLED), generate
 
 
 @intrinsic

@@ -33,6 +33,7 @@ OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED, NOT_CONVERGED, 
 
 LANES = 8  # rows of a joint side by side (see `ffr_dyn.kernels.lanes`)
 NARROW = 4  # of them are enough in the plane
+QUAD = 4  # rows of a symmetric matrix that are multiplied together
 MOST_ROWS = 6  # of a joint
 STAGES = 7  # of a step, at most
 
@@ -171,7 +172,7 @@ class BodyWork(NamedTuple):
     terms: I1  # (B,)
     g: F1  # pooled; G_j: six symmetric rows of n, three axial ones; in the plane two and one
     l: F1  # pooled; three rows of n, integral of u_dot x phi_j dm; in the plane one  # noqa: E741
-    sorted: F1  # scratch of products by blocks: q, q_dot, products; or q, K_sigma q, loads
+    sorted: F1  # scratch of products by blocks: q, q_dot, products; or q, the two parts of K_sigma q, loads
     H: F1  # (3 E,) the axial rows of G_j
     Cd: F1  # (6 E,) rows P_dm and H, times dinv
     # (B, 6, 6) Cholesky factor of the Schur complement, reciprocal diagonal; with s and J it is constant for a rigid body,
