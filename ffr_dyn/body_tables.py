@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.decoupling import in_blocks, stiffening_loads, symmetric_blocks
-from ffr_dyn.kernels.tables import Bodies, Markers
+from ffr_dyn.kernels.tables import LANES, Bodies, Markers
 from ffr_dyn.layout import Layout
 from ffr_dyn.scene import Body, Scene
 from ffr_prep.body import axial
@@ -52,7 +52,7 @@ def _pool(parts: list[Array]) -> Array:
     return np.concatenate([np.ravel(p) for p in parts]) if parts else np.zeros(0)
 
 
-def starts(sizes: list[int]) -> Array:
+def starts(sizes: Sequence[int] | Array) -> Array:
     """Where parts of these sizes begin one after another, and the end."""
     return np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)]).astype(np.int64)
 
@@ -119,7 +119,7 @@ def body_tables(scene: Scene, place: Layout, marked: Markers) -> Bodies:
         moments=np.array([np.concatenate([m.r_dm, _six(m.rr_dm)]) for m in models]),
         P_dm=P,
         rP_dm=rP,
-        PP_dm=PP.pool,
+        PP_dm=np.concatenate([PP.pool, np.zeros(LANES)]),  # whole rows of lanes are read
         omega2=_pool([m.omega2 for m in models]),
         two_zeta_omega=_pool([2 * b.damping * np.sqrt(b.model.omega2) for b in scene.bodies]),
         stiffening=K.pool,

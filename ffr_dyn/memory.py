@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ffr_dyn.body_tables import starts
 from ffr_dyn.equations import System
 from ffr_dyn.kernels.tables import (
     LANES,
@@ -58,11 +59,12 @@ def _body_work(m: Model, keeps_terms: bool) -> BodyWork:
     B, E, n = m.bodies.mass.size, int(m.bodies.where[-1, 3]), m.bodies.where[:, 0]
     V, longest = 6 * B + E, int(n.max())
     E_s = E if m.bodies.stiffening.size else 0
-    terms, loads = E if keeps_terms else longest, int(m.markers.load.max(initial=6)) + 6
+    spaced = n[:-1] + LANES  # sums in whole rows of lanes end beyond the terms
+    terms, loads = int(spaced.sum() if keeps_terms else spaced.max(initial=0)), int(m.markers.load.max(initial=6)) + 6
     work = BodyWork(
         A=_identities(B + 1),
         dinv=np.ones(E),
-        terms=m.bodies.where[:-1, 3] * keeps_terms,
+        terms=starts(spaced)[:-1] * keeps_terms,
         **_zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), inverse=(B, 2), g=9 * terms, l=3 * terms),
         sorted=np.zeros(14 * longest + 3 * LANES * longest + loads),
         **_zeros(H=3 * E, Cd=6 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6), elastic=E),

@@ -20,7 +20,6 @@ from ffr_dyn.kernels.vectors import (
     copy,
     cross,
     dot,
-    fill,
     get,
     put,
     rigid_lower,
@@ -103,11 +102,7 @@ def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s):
     n, e, start, c = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4], bodies.where[b, 8]
     g, l = part(w.g, 9 * w.terms[b], 9 * n), part(w.l, 3 * w.terms[b], 3 * n)  # noqa: E741
     rP, P = part(bodies.rP_dm, 9 * c, 9 * n), part(bodies.P_dm, 3 * c, 3 * n)
-    copy(g, rP)
-    fill(l, 0.0)
-    if start >= 0:
-        table, at = part(bodies.PP_dm, start, 9 * n * n), bodies.where[b, 9]
-        contract(table, bodies.blocks, at, q, qd, n, 9 * n, 3 * n, w.sorted, g, l)
+    contract(bodies.PP_dm, start, bodies.blocks, bodies.where[b, 9], q, qd, 9 * n, 3 * n, w.sorted, rP, g, l)
     copy(part(w.H, 3 * e, 3 * n), part(g, 6 * n, 3 * n))
     ox, oy, oz = omega
     xx, yy, zz = oy * oy + oz * oz, ox * ox + oz * oz, ox * ox + oy * oy

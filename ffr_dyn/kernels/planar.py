@@ -28,10 +28,8 @@ def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, norm
     copy(g0, r0)
     copy(g1, r1)
     copy(h, part(rP, turning * n, n))
-    fill(l, 0.0)
-    if start >= 0:
-        table, at = part(bodies.PP_dm, start, 3 * n * n), bodies.where[b, 9]
-        contract(table, bodies.blocks, at, q, qd, n, 3 * n, n, w.sorted, part(g, 0, 3 * n), l)
+    terms, at = part(g, 0, 3 * n), bodies.where[b, 9]
+    contract(bodies.PP_dm, start, bodies.blocks, at, q, qd, 3 * n, n, w.sorted, terms, terms, l)
     copy(part(w.H, 3 * e + normal * n, n), h)
     f = part(w.f, bodies.where[b, 2] + 6, n)
     omega2, damping = part(bodies.omega2, e, n), part(bodies.two_zeta_omega, e, n)
