@@ -104,13 +104,15 @@ def body_tables(scene: Scene, place: Layout, marked: Markers) -> Bodies:
     n = [m.n for m in models]
     owners = [_owner(body) for body in scene.bodies]
     PP = _second_moments(scene, place)
-    P, P_start = once([b.model.P_dm * ("I3" not in b.dropped) for b in scene.bodies], owners)
+    omega2, column = once([m.omega2 for m in models], owners)
+    damping, _ = once([2 * b.damping * np.sqrt(b.model.omega2) for b in scene.bodies], owners)
+    P, _ = once([b.model.P_dm * ("I3" not in b.dropped) for b in scene.bodies], owners)
     rP, _ = once([_rP_parts(b) for b in scene.bodies], owners)
     K, sizes = _stiffness(scene, marked)
     where = np.full((len(n) + 1, 11), -1, dtype=np.int64)
     where[-1, [*range(7), *range(8, 11)]] = 0
     where[:-1, :7] = np.column_stack([n, place.ix, place.iv, starts(n)[:-1], PP.start, K.start, sizes])
-    where[:-1, 8:] = np.column_stack([P_start // 3, PP.first, len(PP.plans) + K.first])
+    where[:-1, 8:] = np.column_stack([column, PP.first, len(PP.plans) + K.first])
     where[:-1, 7] = place.normals
     where[-1, 3] = sum(n)
     return Bodies(
@@ -120,16 +122,21 @@ def body_tables(scene: Scene, place: Layout, marked: Markers) -> Bodies:
         P_dm=P,
         rP_dm=rP,
         PP_dm=np.concatenate([PP.pool, np.zeros(LANES)]),  # whole rows of lanes are read
-        omega2=_pool([m.omega2 for m in models]),
-        two_zeta_omega=_pool([2 * b.damping * np.sqrt(b.model.omega2) for b in scene.bodies]),
+        omega2=omega2,
+        two_zeta_omega=damping,
         stiffening=K.pool,
         blocks=np.concatenate([PP.plans, K.plans]),
     )
 
 
 def _owner(body: Body) -> tuple[Hashable, ...]:
-    """Bodies with the same share their tables of inertia."""
-    return id(body.model), body.dropped
+    """Bodies with the same share what they have by coordinate."""
+    return id(body.model), body.dropped, body.damping.tobytes()
+
+
+def of_coordinates(bodies: Bodies, table: Array) -> Array:
+    """(E,) of all elastic coordinates, one body after another, from a table of which equal bodies share their part."""
+    return _pool([table[where[8] : where[8] + where[0]] for where in bodies.where[:-1]])
 
 
 def _second_moments(scene: Scene, place: Layout) -> _Blocks:
@@ -139,7 +146,8 @@ def _second_moments(scene: Scene, place: Layout) -> _Blocks:
         table = _PP_parts(scene.bodies[b], place.normals[b])
         return in_blocks(table, table.shape[1] // 3, np.full(table.shape[1], ROUNDING)) if table.any() else _NONE
 
-    return _in_blocks([(*_owner(body), k) for body, k in zip(scene.bodies, place.normals, strict=True)], make)
+    owners = [(id(body.model), body.dropped, k) for body, k in zip(scene.bodies, place.normals, strict=True)]
+    return _in_blocks(owners, make)
 
 
 def _stiffness(scene: Scene, marked: Markers) -> tuple[_Blocks, list[int]]:

@@ -63,11 +63,11 @@ def _body_work(m: Model, keeps_terms: bool) -> BodyWork:
     terms, loads = int(spaced.sum() if keeps_terms else spaced.max(initial=0)), int(m.markers.load.max(initial=6)) + 6
     work = BodyWork(
         A=_identities(B + 1),
-        dinv=np.ones(E),
+        dinv=np.ones(m.bodies.omega2.size),
         terms=starts(spaced)[:-1] * keeps_terms,
         **_zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), inverse=(B, 2), g=9 * terms, l=3 * terms),
         sorted=np.zeros(14 * longest + 3 * LANES * longest + loads),
-        **_zeros(H=3 * E, Cd=6 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6), elastic=E),
+        **_zeros(H=3 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6)),
         **_zeros(more=V, unstiffened=E, shift=V, load=(B, loads)),
         **_zeros(stiff=E_s, last=E_s, steady=3, change=(3 * STAGES, E_s)),
         K_sigma=np.zeros(int(m.bodies.where[:, 6].max()) + QUAD * LANES),

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, eigvalsh, null_space
 
 from ffr_dyn.analyses.evaluation import evaluate, evaluated_mass_matrix, evaluator
+from ffr_dyn.body_tables import of_coordinates
 from ffr_dyn.economy.choice import Choice
 from ffr_dyn.economy.drive import elastic_columns, lift
 from ffr_dyn.economy.trial import Made, Trial, states
@@ -67,12 +68,13 @@ def _vibrations(system: System, time: float, x: Array, v: Array) -> Array:
     at, place = evaluator(system), system.layout
     now = evaluate(at, time, x, v)
     elastic, Z = elastic_columns(place), null_space(now.jacobian)
-    stiffness = Z[elastic].T @ (system.model.bodies.omega2[:, None] * Z[elastic])
+    omega2 = of_coordinates(system.model.bodies, system.model.bodies.omega2)
+    stiffness = Z[elastic].T @ (omega2[:, None] * Z[elastic])
     try:
         squares = eigvalsh(stiffness, Z.T @ evaluated_mass_matrix(at) @ Z)
     except LinAlgError:  # an inertia that is not positive, with terms left out
         return np.zeros(0)
-    lowest = 1e-3 * float(np.sqrt(system.model.bodies.omega2.min(initial=np.inf)))
+    lowest = 1e-3 * float(np.sqrt(omega2.min(initial=np.inf)))
     return np.sqrt(squares[squares > lowest**2]) / (2 * np.pi)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffr_dyn.analyses.evaluation import moved, record_states, to_body_axes, to_global_axes
+from ffr_dyn.body_tables import of_coordinates
 from ffr_dyn.economy.choice import Choice
 from ffr_dyn.economy.drive import Samples, driven, elastic_columns, followed, samples
 from ffr_dyn.economy.ledger import Ledger
@@ -87,7 +88,8 @@ def of_shapes(ledger: Ledger, pilot: Trial, limit: Array, seen: Samples) -> Cont
     A few of them hold the quasi-static deflection that many modes share (proper orthogonal decomposition in the metric of
     the stiffness; Holmes, Lumley, Berkooz, Turbulence, Coherent Structures, Dynamical Systems and Symmetry (1996), ch. 3).
     """
-    place, omega2 = seen.system.layout, seen.system.model.bodies.omega2
+    place, bodies = seen.system.layout, seen.system.model.bodies
+    omega2 = of_coordinates(bodies, bodies.omega2)
     columns, at = elastic_columns(place), _positions(seen)
     q, q_dot, whole = seen.x[:, at], seen.v[:, columns], pilot.result
     D, amplitude, rate = [], [], []

@@ -34,7 +34,7 @@ from ffr_dyn.analyses.evaluation import (
     locked,
     unit_rows,
 )
-from ffr_dyn.body_tables import loads_that_stiffen, stiffness_of
+from ffr_dyn.body_tables import loads_that_stiffen, of_coordinates, stiffness_of
 from ffr_dyn.equations import System
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.layout import Layout
@@ -205,7 +205,8 @@ def _oscillators(seen: Samples, D: Array, Z: Array, forces: Array) -> tuple[Arra
     own = D[elastic] ** 2
     mass = np.maximum(np.einsum("tvc,tvw,twc->tc", Z, seen.M, Z, optimize=True).mean(axis=0), 1e-9)
     force = np.einsum("tvc,tvk->tck", Z, forces, optimize=True) / mass[:, None]
-    return force.reshape(len(Z), -1), bodies.omega2 @ own / mass, bodies.two_zeta_omega @ own / mass
+    omega2, damping = of_coordinates(bodies, bodies.omega2), of_coordinates(bodies, bodies.two_zeta_omega)
+    return force.reshape(len(Z), -1), omega2 @ own / mass, damping @ own / mass
 
 
 def oscillators(

@@ -255,10 +255,10 @@ def newton(r, h):
     copy(s.rows[LAM], r.work.rows.lam)
     fill(bw.more, 0.0)
     for b in range(bodies.mass.size):  # the momenta at the end of what is corrected
-        n, j, e = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3]
+        n, j, shared = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 8]
         mass_times(bodies, bw, b, part(bw.acc, j, 6 + n), part(bw.more, j, 6 + n))
         for k in range(n):
-            bw.more[j + 6 + k] -= (1.0 / bw.dinv[e + k] - 1.0) * bw.acc[j + 6 + k]
+            bw.more[j + 6 + k] -= (1.0 / bw.dinv[shared + k] - 1.0) * bw.acc[j + 6 + k]
     to_velocity_rates(bodies.where, bw.A, bw.more, bw.more)
     add_scaled(s.v[END], s.v[END], 0.5 * h, bw.more)
     to_velocity_rates(bodies.where, bw.A, bw.acc, s.v[CHANGE])

@@ -109,7 +109,7 @@ def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s):
     xy, xz, yz = -2.0 * ox * oy, -2.0 * ox * oz, -2.0 * oy * oz
     first = bodies.where[b, 2] + 6
     f = part(w.f, first, n)
-    omega2, damping = part(bodies.omega2, e, n), part(bodies.two_zeta_omega, e, n)
+    omega2, damping = part(bodies.omega2, c, n), part(bodies.two_zeta_omega, c, n)
     g0, g1, g2, g3, g4, g5 = six_parts(g, n)
     h0, h1, h2 = three_parts(part(g, 6 * n, 3 * n), n)
     l0, l1, l2 = three_parts(l, n)
@@ -223,14 +223,14 @@ def rotational_rows(s, J, M):
 
 @inlined
 def prepare_body(bodies, w, b):
-    """What of the Schur complement of body b depends on the elastic diagonal alone: P_dm dinv, and the factor T of the
-    translational block m I - P_dm dinv P_dm^T."""
-    n, e = bodies.where[b, 0], bodies.where[b, 3]
-    P, Cd, T = part(bodies.P_dm, 3 * bodies.where[b, 8], 3 * n), part(w.Cd, 6 * e, 6 * n), w.T[b]
+    """What of the Schur complement of body b depends on the elastic diagonal alone: the factor T of the translational block
+    m I - P_dm dinv P_dm^T."""
+    n, shared = bodies.where[b, 0], bodies.where[b, 8]
+    P, dinv, T = part(bodies.P_dm, 3 * shared, 3 * n), part(w.dinv, shared, n), w.T[b]
     for r in range(3):
-        scale_row(P, r, part(w.dinv, e, n), n, Cd, r)
         for c in range(r + 1):
-            T[r, c] = (bodies.mass[b] if r == c else 0.0) - row_product(Cd, r, P, c, n)
+            product = weighted_product(part(P, r * n, n), part(P, c * n, n), dinv, n)
+            T[r, c] = (bodies.mass[b] if r == c else 0.0) - product
     i, j, k = bodies.where[b, 7], 0, 0
     if i >= 0:  # across the plane nothing moves
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -247,27 +247,31 @@ def factorise(bodies, w, b):
     """
     if bodies.where[b, 0] == 0:
         return w.L[b, 0, 0] > 0.0
-    n, e, normal = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 7]
+    n, normal = bodies.where[b, 0], bodies.where[b, 7]
     L, T = w.L[b], w.T[b]
-    P, H = part(bodies.P_dm, 3 * bodies.where[b, 8], 3 * n), part(w.H, 3 * e, 3 * n)
-    dinv, Cd = part(w.dinv, e, n), part(w.Cd, 6 * e, 6 * n)
+    P, H, dinv = coupling(bodies, w, b)
     if normal >= 0:
-        return factorise_in_plane(T, get(w.s, b), w.J[b, normal, normal], P, H, dinv, Cd, L, n, normal)
+        return factorise_in_plane(T, get(w.s, b), w.J[b, normal, normal], P, H, dinv, L, n, normal)
     rotational_rows(w.s[b], w.J[b], L)
-    reduce_rotation(P, H, dinv, Cd, L, n)
+    reduce_rotation(P, H, dinv, L, n)
     return cholesky_six(T, L)
 
 
+@inlined
+def coupling(bodies, w, b):
+    """P_dm, H, dinv of body b: what couples its rigid and its elastic coordinates, and the inverse elastic diagonal."""
+    n, e, shared = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 8]
+    return part(bodies.P_dm, 3 * shared, 3 * n), part(w.H, 3 * e, 3 * n), part(w.dinv, shared, n)
+
+
 @kernel
-def reduce_rotation(P, H, dinv, Cd, L, n):
-    """Rotational rows of [M] - C dinv C^T and of C dinv, with C = [P_dm; H], in one loop over the elastic coordinates."""
+def reduce_rotation(P, H, dinv, L, n):
+    """Rotational rows of [M] - C dinv C^T, with C = [P_dm; H], in one loop over the elastic coordinates."""
     (p0, p1, p2), (h0, h1, h2) = three_parts(P, n), three_parts(H, n)
-    c3, c4, c5 = three_parts(part(Cd, 3 * n, 3 * n), n)
     xp, xq, xr, yp, yq, yr, zp, zq, zr = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(n):
         x, y, z = dinv[j] * h0[j], dinv[j] * h1[j], dinv[j] * h2[j]
-        c3[j], c4[j], c5[j] = x, y, z
         xp += x * p0[j]
         xq += x * p1[j]
         xr += x * p2[j]
@@ -301,70 +305,77 @@ def reduce_rotation(P, H, dinv, Cd, L, n):
 
 
 @kernel
-def scale_row(rows, r, dinv, n, out, target):
-    """out[target] = rows[r] dinv, for pooled arrays of rows of n."""
-    row, scaled = part(rows, r * n, n), part(out, target * n, n)
-    for j in range(n):
-        scaled[j] = row[j] * dinv[j]
-
-
-@kernel
-def row_product(a, i, b, j, n):
-    """sum_k a[i, k] b[j, k] for pooled arrays of rows of n."""
-    left, right = part(a, i * n, n), part(b, j * n, n)
+def weighted_product(left, right, weight, n):
+    """sum_k left[k] weight[k] right[k]."""
     total = 0.0
     for k in range(n):
-        total += left[k] * right[k]
+        total += left[k] * weight[k] * right[k]
     return total
 
 
 @inlined
 def reduce_forces(bodies, w, b):
-    """w.rigid = L^-1 (f_rigid - C dinv f_elastic), w.elastic = dinv f_elastic of body b."""
-    n, j, e, normal = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3], bodies.where[b, 7]
+    """w.rigid = L^-1 (f_rigid - C dinv f_elastic), and dinv f_elastic where the elastic accelerations of body b will be."""
+    n, j, normal = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 7]
     f, z = part(w.f, j, 6 + n), w.rigid[b]
     for k in range(6):
         z[k] = f[k]
     if n > 0:
-        d, elastic, dinv, Cd = part(f, 6, n), part(w.elastic, e, n), part(w.dinv, e, n), part(w.Cd, 6 * e, 6 * n)
+        P, H, dinv = coupling(bodies, w, b)
+        d, elastic = part(f, 6, n), part(w.acc, j + 6, n)
         if normal >= 0:
-            reduce_in_plane(Cd, d, n, normal, z)
+            reduce_in_plane(P, H, dinv, d, n, normal, z, elastic)
         else:
-            c0, c1, c2, c3, c4, c5 = six_rows(Cd, d, n)
-            z[0] -= c0
-            z[1] -= c1
-            z[2] -= c2
-            z[3] -= c3
-            z[4] -= c4
-            z[5] -= c5
-        for k in range(n):
-            elastic[k] = dinv[k] * d[k]
+            reduce_in_space(P, H, dinv, d, n, z, elastic)
     rigid_lower(w.L[b], z, normal)
+
+
+@kernel
+def reduce_in_space(P, H, dinv, d, n, z, elastic):
+    """elastic = dinv d, z -= C elastic."""
+    (p0, p1, p2), (h0, h1, h2) = three_parts(P, n), three_parts(H, n)
+    t0, t1, t2, t3, t4, t5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(n):
+        y = dinv[k] * d[k]
+        elastic[k] = y
+        t0 += p0[k] * y
+        t1 += p1[k] * y
+        t2 += p2[k] * y
+        t3 += h0[k] * y
+        t4 += h1[k] * y
+        t5 += h2[k] * y
+    z[0] -= t0
+    z[1] -= t1
+    z[2] -= t2
+    z[3] -= t3
+    z[4] -= t4
+    z[5] -= t5
 
 
 @inlined
 def accelerate(bodies, w, b):
-    """w.acc of body b from its reduced forces: the rigid part, L^-T w.rigid, and w.elastic - (C dinv)^T of it."""
-    n, j, e, normal = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3], bodies.where[b, 7]
+    """w.acc of body b from its reduced forces: the rigid part, L^-T w.rigid, and what is there of the elastic one less
+    dinv C^T of it."""
+    n, j, normal = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 7]
     z, acc = w.rigid[b], part(w.acc, j, 6 + n)
     rigid_upper(w.L[b], z, normal)
     for k in range(6):
         acc[k] = z[k]
     if n > 0:
-        Cd, elastic = part(w.Cd, 6 * e, 6 * n), part(w.elastic, e, n)
+        P, H, dinv = coupling(bodies, w, b)
         if normal >= 0:
-            substitute_in_plane(Cd, elastic, z, n, normal, part(acc, 6, n))
+            substitute_in_plane(P, H, dinv, z, n, normal, part(acc, 6, n))
         else:
-            back_substitute(Cd, elastic, z, n, part(acc, 6, n))
+            back_substitute(P, H, dinv, z, n, part(acc, 6, n))
 
 
 @kernel
-def back_substitute(Cd, elastic, z, n, acc):
-    """acc = elastic - Cd^T z."""
-    c0, c1, c2, c3, c4, c5 = six_parts(Cd, n)
+def back_substitute(P, H, dinv, z, n, elastic):
+    """elastic -= dinv C^T z."""
+    (p0, p1, p2), (h0, h1, h2) = three_parts(P, n), three_parts(H, n)
     z0, z1, z2, z3, z4, z5 = z[0], z[1], z[2], z[3], z[4], z[5]
-    for j in range(n):
-        acc[j] = elastic[j] - (c0[j] * z0 + c1[j] * z1 + c2[j] * z2 + c3[j] * z3 + c4[j] * z4 + c5[j] * z5)
+    for k in range(n):
+        elastic[k] -= dinv[k] * (p0[k] * z0 + p1[k] * z1 + p2[k] * z2 + h0[k] * z3 + h1[k] * z4 + h2[k] * z5)
 
 
 @kernel
@@ -404,7 +415,7 @@ def energies(gravity, bodies, w, x, v, y, My):
     """(kinetic, strain, gravity) energy of all bodies; y, My scratch of the longest body. Needs `inertia` before."""
     kinetic, strain, potential = 0.0, 0.0, 0.0
     for b in range(bodies.mass.size):
-        n, i, j, e = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 2], bodies.where[b, 3]
+        n, i, j, shared = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 2], bodies.where[b, 8]
         linear = to_body(w.A[b], (v[j], v[j + 1], v[j + 2]))
         for k in range(3):
             y[k] = linear[k]
@@ -416,7 +427,7 @@ def energies(gravity, bodies, w, x, v, y, My):
         for k in range(6 + n):
             kinetic += 0.5 * y[k] * My[k]
         for k in range(n):
-            strain += 0.5 * bodies.omega2[e + k] * x[i + 7 + k] ** 2
+            strain += 0.5 * bodies.omega2[shared + k] * x[i + 7 + k] ** 2
         field = to_body(w.A[b], gravity)
         potential -= bodies.mass[b] * dot(gravity, (x[i], x[i + 1], x[i + 2])) + dot(field, get(w.s, b))
     return kinetic, strain, potential

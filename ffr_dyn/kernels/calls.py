@@ -69,6 +69,6 @@ def set_diagonal(r, gh):
 def add_elastic_part(bodies, f, v, r_x, gh):
     """f -= gamma h Omega^2 (q_dot + r_q)."""
     for b in range(bodies.mass.size):
-        n, i, j, e = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 2], bodies.where[b, 3]
+        n, i, j, shared = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 2], bodies.where[b, 8]
         for k in range(n):
-            f[j + 6 + k] -= gh * bodies.omega2[e + k] * (v[j + 6 + k] + r_x[i + 7 + k])
+            f[j + 6 + k] -= gh * bodies.omega2[shared + k] * (v[j + 6 + k] + r_x[i + 7 + k])

@@ -1,6 +1,6 @@
 """Markers: points and small elastic rotations that move with the deformation; their velocities and bias accelerations."""
 
-from ffr_dyn.kernels.bodies import row_product, six_rows
+from ffr_dyn.kernels.bodies import six_rows, weighted_product
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.vectors import add, cross, get, in_plane, of_two, put, scale, to_global
 from ffr_dyn.kernels.views import part, six_parts
@@ -77,30 +77,49 @@ def plane_rows(phi, normal, q, n):
 
 
 @kernel
-def prepare_marker(phi, Cd, n, normal, P):
+def prepare_marker(phi, P_dm, dinv, n, normal, P):
     """Rows of the translations of P = [P_dm; H] dinv phi^T, which depend on the elastic diagonal alone.
 
     P (36,) : 6 x 6; of a planar body 3 x 3, for what keeps to the plane
     """
     if normal >= 0:
-        i, j, _ = in_plane(normal)
-        P[0], P[1], P[2] = plane_rows(phi, normal, part(Cd, i * n, n), n)
-        P[3], P[4], P[5] = plane_rows(phi, normal, part(Cd, j * n, n), n)
+        i, j, k = in_plane(normal)
+        for r, a in enumerate((i, j)):
+            for c, b in enumerate((i, j, k)):
+                P[3 * r + c] = weighted_product(part(P_dm, a * n, n), part(phi, b * n, n), dinv, n)
         return
     for r in range(3):
         for c in range(6):
-            P[6 * r + c] = row_product(Cd, r, phi, c, n)
+            P[6 * r + c] = weighted_product(part(P_dm, r * n, n), part(phi, c * n, n), dinv, n)
 
 
 @kernel
-def couple_marker(phi, Cd, n, normal, P):
+def couple_marker(phi, H, dinv, n, normal, P):
     """Rows of the rotations of P: what a unit wrench on a marker does to them through the elastic coordinates."""
     if normal >= 0:
-        P[6], P[7], P[8] = plane_rows(phi, normal, part(Cd, (3 + normal) * n, n), n)
+        i, j, k = in_plane(normal)
+        p0, p1, p2, turn = part(phi, i * n, n), part(phi, j * n, n), part(phi, k * n, n), part(H, normal * n, n)
+        t0, t1, t2 = 0.0, 0.0, 0.0
+        for c in range(n):
+            y = dinv[c] * turn[c]
+            t0 += p0[c] * y
+            t1 += p1[c] * y
+            t2 += p2[c] * y
+        P[6], P[7], P[8] = t0, t1, t2
         return
-    for r in range(3, 6):
-        at = 6 * r
-        P[at], P[at + 1], P[at + 2], P[at + 3], P[at + 4], P[at + 5] = six_rows(phi, part(Cd, r * n, n), n)
+    for r in range(3):
+        row, at = part(H, r * n, n), 18 + 6 * r
+        p0, p1, p2, p3, p4, p5 = six_parts(phi, n)
+        t0, t1, t2, t3, t4, t5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for c in range(n):
+            y = dinv[c] * row[c]
+            t0 += p0[c] * y
+            t1 += p1[c] * y
+            t2 += p2[c] * y
+            t3 += p3[c] * y
+            t4 += p4[c] * y
+            t5 += p5[c] * y
+        P[at], P[at + 1], P[at + 2], P[at + 3], P[at + 4], P[at + 5] = t0, t1, t2, t3, t4, t5
 
 
 @kernel
@@ -115,14 +134,6 @@ def couple_pair(left, right, dinv, n, normal, out):
     for r in range(6):
         for c in range(6):
             out[6 * r + c] = weighted_product(part(left, r * n, n), part(right, c * n, n), dinv, n)
-
-
-@kernel
-def weighted_product(left, right, weight, n):
-    total = 0.0
-    for j in range(n):
-        total += left[j] * weight[j] * right[j]
-    return total
 
 
 @kernel

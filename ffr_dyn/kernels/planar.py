@@ -32,7 +32,7 @@ def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, norm
     contract(bodies.PP_dm, start, bodies.blocks, at, q, qd, 3 * n, n, w.sorted, terms, terms, l)
     copy(part(w.H, 3 * e + normal * n, n), h)
     f = part(w.f, bodies.where[b, 2] + 6, n)
-    omega2, damping = part(bodies.omega2, e, n), part(bodies.two_zeta_omega, e, n)
+    omega2, damping = part(bodies.omega2, c, n), part(bodies.two_zeta_omega, c, n)
     P0, P1, square = part(P, c0 * n, n), part(P, c1 * n, n), omega * omega
     across, along = gravity[c0], gravity[c1]
     s0, s1, p0, p1, grown, growing = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -74,14 +74,13 @@ def forces_in_plane(f, mass, s, pd, growing, omega, gravity, normal):
 
 
 @kernel
-def factorise_in_plane(T, s, inertia, P, H, dinv, Cd, L, n, normal):
+def factorise_in_plane(T, s, inertia, P, H, dinv, L, n, normal):
     """`factorise` for the three rigid coordinates i, j, k of a planar body."""
     i, j, k = in_plane(normal)
     ki, kj, kk = -sense(normal) * s[j], sense(normal) * s[i], inertia
-    first, second, turn, scaled = part(P, i * n, n), part(P, j * n, n), part(H, normal * n, n), part(Cd, k * n, n)
+    first, second, turn = part(P, i * n, n), part(P, j * n, n), part(H, normal * n, n)
     for c in range(n):
         x = dinv[c] * turn[c]
-        scaled[c] = x
         ki -= x * first[c]
         kj -= x * second[c]
         kk -= x * turn[c]
@@ -94,27 +93,29 @@ def factorise_in_plane(T, s, inertia, P, H, dinv, Cd, L, n, normal):
 
 
 @kernel
-def reduce_in_plane(Cd, d, n, normal, z):
-    """z -= Cd d, for the rigid coordinates that move."""
+def reduce_in_plane(P, H, dinv, d, n, normal, z, elastic):
+    """elastic = dinv d, z -= C elastic for the rigid coordinates that move."""
     i, j, k = in_plane(normal)
-    first, second, third = part(Cd, i * n, n), part(Cd, j * n, n), part(Cd, k * n, n)
+    first, second, third = part(P, i * n, n), part(P, j * n, n), part(H, normal * n, n)
     t0, t1, t2 = 0.0, 0.0, 0.0
     for c in range(n):
-        t0 += first[c] * d[c]
-        t1 += second[c] * d[c]
-        t2 += third[c] * d[c]
+        y = dinv[c] * d[c]
+        elastic[c] = y
+        t0 += first[c] * y
+        t1 += second[c] * y
+        t2 += third[c] * y
     z[i] -= t0
     z[j] -= t1
     z[k] -= t2
 
 
 @inlined
-def substitute_in_plane(Cd, elastic, z, n, normal, acc):
+def substitute_in_plane(P, H, dinv, z, n, normal, elastic):
     """`back_substitute` for the rigid coordinates that move."""
     i, j, k = in_plane(normal)
-    first, second, third = part(Cd, i * n, n), part(Cd, j * n, n), part(Cd, k * n, n)
+    first, second, third = part(P, i * n, n), part(P, j * n, n), part(H, normal * n, n)
     for c in range(n):
-        acc[c] = elastic[c] - (first[c] * z[i] + second[c] * z[j] + third[c] * z[k])
+        elastic[c] -= dinv[c] * (first[c] * z[i] + second[c] * z[j] + third[c] * z[k])
 
 
 @kernel

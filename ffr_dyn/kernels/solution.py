@@ -52,7 +52,7 @@ def refine_motion(r, target, passes):
 @inlined
 def reduce_miss(rows, bw, step, value):
     """Reduced forces and `step` of a motion that only the rows ask for: Phi_q acc = -value."""
-    fill(bw.elastic, 0.0)
+    fill(bw.acc, 0.0)
     fill(part(bw.rigid, 0, bw.rigid.size), 0.0)
     for k in range(rows.start.size - 1):
         for row in range(rows.start[k], rows.start[k + 1]):
@@ -85,8 +85,8 @@ def reduced_rates(bodies, markers, rows, bw, rw, target):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
-                n, e, normal, at = where[b, 0], where[b, 3], where[b, 7], (k * sides + side) * SIDE
-                z, moved, elastic = bw.rigid[b], rw.wrench, part(bw.elastic, e, n)
+                n, normal, at = where[b, 0], where[b, 7], (k * sides + side) * SIDE
+                z, moved, elastic = bw.rigid[b], rw.wrench, part(bw.acc, where[b, 2] + 6, n)
                 if normal >= 0:
                     c0, c1, c2 = in_plane(normal)
                     moved[0], moved[1], moved[2] = z[c0], z[c1], z[c2]
@@ -185,19 +185,20 @@ def react(bodies, markers, rows, bw, rw):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
-                n, e, at, z = where[b, 0], where[b, 3], (k * sides + side) * SIDE, bw.rigid[b]
+                n, at, z = where[b, 0], (k * sides + side) * SIDE, bw.rigid[b]
                 normal, wrench = where[b, 7], rw.wrench
                 react_rigid(rw.X, at, rw.step, LANES * k, normal, z)
                 if n > 0:
-                    phi, elastic = shapes(markers, marker, n), part(bw.elastic, e, n)
+                    phi, elastic = shapes(markers, marker, n), part(bw.acc, where[b, 2] + 6, n)
+                    dinv = part(bw.dinv, where[b, 8], n)
                     if normal >= 0:
                         for c in range(3):
                             wrench[c] = dot_narrow(rw.X, at + LANES * (3 + c), rw.step, LANES * k)
-                        release_in_plane(phi, normal, part(bw.dinv, e, n), wrench, n, elastic)
+                        release_in_plane(phi, normal, dinv, wrench, n, elastic)
                     else:
                         for c in range(6):
                             wrench[c] = dot_rows(rw.X, at + LANES * (6 + c), rw.step, LANES * k)
-                        release(phi, part(bw.dinv, e, n), wrench, n, elastic)
+                        release(phi, dinv, wrench, n, elastic)
     for b in range(ground):
         accelerate(bodies, bw, b)
 

@@ -11,7 +11,7 @@ from ffr_dyn.kernels.blocks import (
     factorise_block,
     relax_block,
 )
-from ffr_dyn.kernels.bodies import factorise, inertia, normalise, prepare_body, rotation_matrix
+from ffr_dyn.kernels.bodies import coupling, factorise, inertia, normalise, prepare_body, rotation_matrix
 from ffr_dyn.kernels.lanes import add_scale
 from ffr_dyn.kernels.loads import count_loads
 from ffr_dyn.kernels.markers import couple_marker, couple_pair, prepare_marker, shapes, update_marker
@@ -41,20 +41,21 @@ def prepare(bodies, markers, rows, pattern, bw, rw):
         prepare_body(bodies, bw, b)
     for k in markers.joint:
         b = markers.body[k]
-        n, e = where[b, 0], where[b, 3]
+        n, shared = where[b, 0], where[b, 8]
         if n > 0:
-            prepare_marker(shapes(markers, k, n), part(bw.Cd, 6 * e, 6 * n), n, where[b, 7], rw.P[k])
+            P_dm, dinv = part(bodies.P_dm, 3 * shared, 3 * n), part(bw.dinv, shared, n)
+            prepare_marker(shapes(markers, k, n), P_dm, dinv, n, where[b, 7], rw.P[k])
     for number in range(pattern.sample.size):
         p = pattern.sample[number]
         b = pattern.pair_body[p]
-        n, e = where[b, 0], where[b, 3]
+        n = where[b, 0]
         if n > 0:
             left = rows.marker[pattern.pair[p, 0], pattern.pair[p, 1]]
             right = rows.marker[pattern.pair[p, 2], pattern.pair[p, 3]]
             couple_pair(
                 shapes(markers, left, n),
                 shapes(markers, right, n),
-                part(bw.dinv, e, n),
+                part(bw.dinv, where[b, 8], n),
                 n,
                 where[b, 7],
                 rw.phiphi[number],
@@ -81,11 +82,12 @@ def couple_joint(bodies, markers, rows, pattern, bw, rw, k):
         marker = rows.marker[k, side]
         b = markers.body[marker] if marker >= 0 else ground
         if b != ground:
-            number, n, e = k * sides + side, where[b, 0], where[b, 3]
+            number, n = k * sides + side, where[b, 0]
             at, jac = number * SIDE, part(rw.jac, 9 * LANES * number, 9 * LANES)
             flexible, normal, L, P = n > 0, where[b, 7], part(bw.L, 36 * b, 36), rw.P[marker]
             if flexible and rows.first[k, side] == 1:
-                couple_marker(shapes(markers, marker, n), part(bw.Cd, 6 * e, 6 * n), n, normal, P)
+                _, H, dinv = coupling(bodies, bw, b)
+                couple_marker(shapes(markers, marker, n), H, dinv, n, normal, P)
             if normal >= 0:
                 c0, c1, c2 = in_plane(normal)
                 if flexible:

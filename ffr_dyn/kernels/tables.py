@@ -61,9 +61,9 @@ class Bodies(NamedTuple):
     """B bodies, E elastic coordinates in all."""
 
     # (B + 1, 11) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening (or -1); how many numbers its
-    # K_sigma has, 0 without geometric stiffening; the body axis along the normal of a planar scene, or -1; the first column
-    # of its P_dm and rP_dm, which equal bodies share, so that many of them stay in the processor's cache; its first of
-    # `blocks` for PP_dm and for stiffening
+    # K_sigma has, 0 without geometric stiffening; the body axis along the normal of a planar scene, or -1; its first in
+    # omega2 and the other rows by coordinate, which equal bodies share, so that many of them stay in the processor's cache;
+    # its first of `blocks` for PP_dm and for stiffening
     where: I2
     mass: F1  # (B,)
     moments: F2  # (B, 9) first moment r_dm (3), second moment rr_dm (6)
@@ -72,8 +72,8 @@ class Bodies(NamedTuple):
     # pooled; per body n x 9 x n: for q_i the same nine rows over j (last three: I5), in blocks; in the plane n x 3 x n: two
     # symmetric parts in it, and the axial component across
     PP_dm: F1
-    omega2: F1  # (E,)
-    two_zeta_omega: F1  # (E,)
+    omega2: F1  # pooled, n of each body
+    two_zeta_omega: F1  # likewise
     stiffening: F1  # pooled; of each body the stiffness by each load, in blocks; empty without geometric stiffening
     blocks: I1  # pooled; how PP_dm and stiffening are stored (see `ffr_dyn.decoupling`)
 
@@ -174,16 +174,16 @@ class BodyWork(NamedTuple):
     l: F1  # pooled; three rows of n, integral of u_dot x phi_j dm; in the plane one  # noqa: E741
     sorted: F1  # scratch of products by blocks: q, q_dot, products; or q, the two parts of K_sigma q, loads
     H: F1  # (3 E,) the axial rows of G_j
-    Cd: F1  # (6 E,) rows P_dm and H, times dinv
     # (B, 6, 6) Cholesky factor of the Schur complement, reciprocal diagonal; with s and J it is constant for a rigid body,
     # and not positive in [0, 0] where that has none
     L: F3
     f: F1  # (V,) right-hand side in body axes
     acc: F1  # (V,) solution in body axes
-    dinv: F1  # (E,) 1 / (1 + implicit terms); ones for explicit methods
+    dinv: F1  # as omega2: 1 / (1 + implicit terms); ones for explicit methods
     T: F3  # (B, 3, 3) the part of L that depends on dinv alone: the factor of m I - P_dm dinv P_dm^T
-    rigid: F2  # (B, 6) reduced forces L^-1 (f_rigid - C dinv f_elastic), less those of the reactions
-    elastic: F1  # (E,) dinv f_elastic, likewise
+    # (B, 6) reduced forces L^-1 (f_rigid - C dinv f_elastic), C = [P_dm; H], less those of the reactions; dinv f_elastic,
+    # likewise, is where the elastic accelerations will be
+    rigid: F2
     more: F1  # (V,) scratch
     unstiffened: F1  # (E,) elastic right-hand side without geometric stiffening
     shift: F1  # (V,) part of acc that is no acceleration (corrections of an integrator's stage), body axes
