@@ -31,7 +31,7 @@ from ffr_dyn.kernels.packing import tables_at
 from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.kernels.units import Unit
-from ffr_dyn.kernels.vectors import add_four, add_scaled, add_three, copy, fill, weigh_four, weigh_three
+from ffr_dyn.kernels.vectors import add_four, add_scaled, combine_three, copy, fill, weigh_four
 
 GAMMA = 0.43586652150845900
 # Rows of both lower triangles, four to a row.
@@ -77,10 +77,8 @@ def ros3_step(at, t, unused, unused_too):
             )  # the coefficients of later stages, which may hold anything, are zero
             a0, a1, a2 = h * ALPHA[4 * k], h * ALPHA[4 * k + 1], h * ALPHA[4 * k + 2]
             g0, g1, g2 = GAMMAS[4 * k] / GAMMA, GAMMAS[4 * k + 1] / GAMMA, GAMMAS[4 * k + 2] / GAMMA
-            add_three(xs, r.x, a0, stages.x[0], a1, stages.x[m], a2, stages.x[n])
-            add_three(vs, r.v, a0, stages.v[0], a1, stages.v[m], a2, stages.v[n])
-            weigh_three(r_x, g0, stages.x[0], g1, stages.x[m], g2, stages.x[n])
-            weigh_three(r_v, g0, stages.v[0], g1, stages.v[m], g2, stages.v[n])
+            combine_three(stages.x[0], stages.x[m], stages.x[n], xs, r.x, a0, a1, a2, r_x, g0, g1, g2)
+            combine_three(stages.v[0], stages.v[m], stages.v[n], vs, r.v, a0, a1, a2, r_v, g0, g1, g2)
             normalise(bodies, xs)  # r_v goes to body axes and comes back, which wants a true rotation
             status = evaluate(r, t + AT[k] * h, xs, vs)
         if status != OK:
@@ -95,14 +93,13 @@ def ros3_step(at, t, unused, unused_too):
         position_rates(bodies, xs, vs, stages.x[k])
         add_scaled(stages.v[k], stages.v[k], -1.0, r_v)
     w0, w1, w2, w3 = h * WEIGHTS[0], h * WEIGHTS[1], h * WEIGHTS[2], h * WEIGHTS[3]
-    e0, e1, e2, e3 = h * ERRORS[0], h * ERRORS[1], h * ERRORS[2], h * ERRORS[3]
     add_four(r.x, w0, stages.x[0], w1, stages.x[1], w2, stages.x[2], w3, stages.x[3])
     add_four(r.v, w0, stages.v[0], w1, stages.v[1], w2, stages.v[2], w3, stages.v[3])
-    weigh_four(xs, e0, stages.x[0], e1, stages.x[1], e2, stages.x[2], e3, stages.x[3])
-    weigh_four(vs, e0, stages.v[0], e1, stages.v[1], e2, stages.v[2], e3, stages.v[3])
     normalise(bodies, r.x)
-    copy(stages.x[0], xs)
-    copy(stages.v[0], vs)
+    if r.control.numbers.size > 0:
+        e0, e1, e2, e3 = h * ERRORS[0], h * ERRORS[1], h * ERRORS[2], h * ERRORS[3]
+        weigh_four(stages.x[0], e0, stages.x[0], e1, stages.x[1], e2, stages.x[2], e3, stages.x[3])
+        weigh_four(stages.v[0], e0, stages.v[0], e1, stages.v[1], e2, stages.v[2], e3, stages.v[3])
     return finite(r.x, r.v)
 
 

@@ -206,17 +206,12 @@ def multiple(target, factor, source):
 
 
 @kernel
-def weigh_three(target, f0, d0, f1, d1, f2, d2):
-    """target = f0 d0 + f1 d1 + f2 d2, in one pass."""
+def combine_three(d0, d1, d2, target, base, f0, f1, f2, other, g0, g1, g2):
+    """target = base + f0 d0 + f1 d1 + f2 d2, other = g0 d0 + g1 d1 + g2 d2, in one pass."""
     for k in range(target.size):
-        target[k] = f0 * d0[k] + f1 * d1[k] + f2 * d2[k]
-
-
-@kernel
-def add_three(target, base, f0, d0, f1, d1, f2, d2):
-    """target = base + f0 d0 + f1 d1 + f2 d2, in one pass."""
-    for k in range(target.size):
-        target[k] = base[k] + f0 * d0[k] + f1 * d1[k] + f2 * d2[k]
+        first, second, third = d0[k], d1[k], d2[k]
+        target[k] = base[k] + f0 * first + f1 * second + f2 * third
+        other[k] = g0 * first + g1 * second + g2 * third
 
 
 @kernel
