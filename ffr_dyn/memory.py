@@ -11,6 +11,7 @@ from ffr_dyn.body_tables import starts
 from ffr_dyn.equations import System
 from ffr_dyn.kernels.tables import (
     LANES,
+    MOST_ROWS,
     QUAD,
     STAGES,
     Bodies,
@@ -66,7 +67,7 @@ def _body_work(m: Model, keeps_terms: bool) -> BodyWork:
         dinv=np.ones(m.bodies.omega2.size),
         terms=starts(spaced)[:-1] * keeps_terms,
         **_zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), inverse=(B, 2), g=9 * terms, l=3 * terms),
-        sorted=np.zeros(14 * longest + 3 * LANES * longest + loads),
+        sorted=np.zeros(2 * LANES * MOST_ROWS + 14 * longest + 3 * LANES * longest + loads),
         **_zeros(H=3 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6)),
         **_zeros(more=V, unstiffened=E, shift=V, load=(B, loads)),
         **_zeros(stiff=E_s, last=E_s, steady=3, change=(3 * STAGES, E_s)),
