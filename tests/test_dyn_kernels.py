@@ -9,7 +9,7 @@ import pytest
 from synthetic import cloud, mirrored
 
 from ffr_dyn.analyses.assemble import drive_of, rows_at
-from ffr_dyn.body_tables import loads_that_stiffen
+from ffr_dyn.body_tables import loads_that_stiffen, of_coordinates
 from ffr_dyn.constraints import evaluate_word
 from ffr_dyn.decoupling import in_blocks
 from ffr_dyn.drivers import Driver, PointDriver
@@ -310,6 +310,18 @@ def test_a_body_without_symmetry_and_one_of_few_modes_are_one_block():
         bodies = compile_scene(Scene(bodies=(Body("one", body),))).model.bodies
         assert bodies.blocks.tolist() == [0]
         assert bodies.PP_dm.size == 9 * body.n**2 + LANES
+
+
+def test_equal_bodies_share_what_they_have_by_coordinate_unless_their_damping_differs():
+    model = cloud(4)
+    ratios = (0.01, 0.05, 0.01)
+    bodies = compile_scene(
+        Scene(bodies=tuple(Body(f"b{k}", model, damping=r) for k, r in enumerate(ratios)))
+    ).model.bodies
+    assert bodies.omega2.size == bodies.two_zeta_omega.size == 2 * model.n
+    np.testing.assert_array_equal(of_coordinates(bodies, bodies.omega2), np.tile(model.omega2, 3))
+    expected = np.concatenate([2 * r * np.sqrt(model.omega2) for r in ratios])
+    np.testing.assert_allclose(of_coordinates(bodies, bodies.two_zeta_omega), expected, rtol=1e-15)
 
 
 def test_loads_at_interfaces_that_nothing_acts_on_stiffen_nothing():

@@ -72,7 +72,7 @@ class Bodies(NamedTuple):
     # pooled; per body n x 9 x n: for q_i the same nine rows over j (last three: I5), in blocks; in the plane n x 3 x n: two
     # symmetric parts in it, and the axial component across
     PP_dm: F1
-    omega2: F1  # pooled, n of each body
+    omega2: F1  # pooled, n of all bodies that differ
     two_zeta_omega: F1  # likewise
     stiffening: F1  # pooled; of each body the stiffness by each load, in blocks; empty without geometric stiffening
     blocks: I1  # pooled; how PP_dm and stiffening are stored (see `ffr_dyn.decoupling`)
@@ -172,7 +172,7 @@ class BodyWork(NamedTuple):
     terms: I1  # (B,)
     g: F1  # pooled; G_j: six symmetric rows of n, three axial ones; in the plane two and one
     l: F1  # pooled; three rows of n, integral of u_dot x phi_j dm; in the plane one  # noqa: E741
-    sorted: F1  # scratch of products by blocks: q, q_dot, products; or q, the two parts of K_sigma q, loads
+    sorted: F1  # scratch of products by blocks: zeros, q, q_dot, products; or q, the two parts of K_sigma q, loads
     H: F1  # (3 E,) the axial rows of G_j
     # (B, 6, 6) Cholesky factor of the Schur complement, reciprocal diagonal; with s and J it is constant for a rigid body,
     # and not positive in [0, 0] where that has none
