@@ -5,7 +5,7 @@ Forces on joint coordinates are in `ffr_dyn.joint_forces`, those on surfaces and
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sized
 from dataclasses import dataclass
 from typing import Any
 
@@ -42,8 +42,10 @@ class Load:
         if self.axes not in ("global", "body"):
             raise InputError(f"load {self.name!r}: axes must be 'global' or 'body', not {self.axes!r}")
         for what, value in (("force", self.force), ("moment", self.moment)):
-            if len(value) != 3:
-                raise InputError(f"load {self.name!r}: {what} needs three components, not {len(value)}")
+            if not isinstance(value, Sized) or len(value) != 3:
+                found = len(value) if isinstance(value, Sized) else value
+                whole = "a function (t, state) that gives all of them goes to `function`"
+                raise InputError(f"load {self.name!r}: {what} needs three components, not {found}; {whole}")
 
 
 @dataclass(frozen=True)

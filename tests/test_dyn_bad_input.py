@@ -187,6 +187,10 @@ def test_pictures_that_cannot_be_written(monkeypatch, capsys, scene):
         (lambda: Scene((cloud(3),)), "entry 1 is of the type FlexibleBody; it takes: Body"),
         (lambda: replace(TWO, joints=None), "joints of a scene is of the type NoneType; give a tuple"),
         (
+            lambda: Load("push", "cloud.b", force=lambda t: (t, 0.0, 0.0)),
+            "load 'push': force needs three components, not .*; a function .* goes to `function`",
+        ),
+        (
             lambda: replace(TWO, forces=(Load("push", "cloud.b"),)),
             "entry 1 is of the type Load; it takes: Bushing, Joint",
         ),
