@@ -78,7 +78,8 @@ def new_machine(
     clock = Clock(np.array([h, h or spacing]), np.zeros(3, dtype=np.int64), np.array(gains))
     control = _control(system, method, start, spacing)
     calls = () if method is None else method.calls
-    work = new_work(system.model, keeps_terms=method is not None and method.keeps_terms)
+    keeps_terms, looks_ahead = (False, 0) if method is None else (method.keeps_terms, method.looks_ahead)
+    work = new_work(system.model, keeps_terms=keeps_terms, looks_ahead=looks_ahead)
     units = np.array(unit_addresses(system.model, calls), dtype=np.int64)
     own = np.array(x, dtype=float), np.array(v, dtype=float)
     units, work, stages, clock, control, own = aligned((units, work, stages, clock, control, own))

@@ -56,6 +56,7 @@ class Integrator(Protocol):
     stage_count: ClassVar[int]  # states (x, v) of memory that it needs
     row_stages: ClassVar[int]  # the same for constraint rows
     keeps_terms: ClassVar[bool]  # whether it needs the quadratic terms of all bodies after an evaluation
+    looks_ahead: ClassVar[int]  # order to which it takes geometric stiffening as a function of time, or 0: not
     calls: ClassVar[tuple[str, ...]]  # what its unit calls beside what all methods do, of `units.EXTRA_UNITS`
     unit: ClassVar[Unit]
 

@@ -105,6 +105,7 @@ class DormandPrince:
     stage_count: ClassVar[int] = 10
     row_stages: ClassVar[int] = 0
     keeps_terms: ClassVar[bool] = False
+    looks_ahead: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = (0.0,)
     calls: ClassVar[tuple[str, ...]] = ()
     unit: ClassVar[Unit] = dopri5_step

@@ -209,6 +209,7 @@ class GeneralisedAlpha:
     stage_count: ClassVar[int] = 9
     row_stages: ClassVar[int] = 2
     keeps_terms: ClassVar[bool] = False
+    looks_ahead: ClassVar[int] = 0
     controlled: ClassVar[bool] = False
     calls: ClassVar[tuple[str, ...]] = ("project",)
     unit: ClassVar[Unit] = generalised_alpha_step
@@ -249,6 +250,7 @@ class HHT:
     stage_count: ClassVar[int] = 9
     row_stages: ClassVar[int] = 2
     keeps_terms: ClassVar[bool] = False
+    looks_ahead: ClassVar[int] = 0
     controlled: ClassVar[bool] = False
     calls: ClassVar[tuple[str, ...]] = ("project",)
     unit: ClassVar[Unit] = generalised_alpha_step

@@ -184,6 +184,7 @@ class HalfExplicit:
     stage_count: ClassVar[int] = STAGES + 3
     row_stages: ClassVar[int] = 2
     keeps_terms: ClassVar[bool] = False
+    looks_ahead: ClassVar[int] = 0
     controlled: ClassVar[bool] = False
     numbers: ClassVar[tuple[float, ...]] = (0.0,)
     calls: ClassVar[tuple[str, ...]] = ("look_ahead",)

@@ -7,12 +7,14 @@ from typing import ClassVar
 
 from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.calls import evaluate, set_diagonal, settle, solve
+from ffr_dyn.kernels.calls import evaluate, set_diagonal, settle, solve_stage
 from ffr_dyn.kernels.packing import tables_at
 from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.kernels.units import Unit
 from ffr_dyn.kernels.vectors import add_four, add_scaled, copy
+
+AT, WEIGHTS = (0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 
 
 @Unit
@@ -23,7 +25,8 @@ def rk4_step(at, t, unused, unused_too):
     stages, xs, vs = r.stages, r.stages.x[4], r.stages.v[4]
     set_diagonal(r, 0.0)
     for k in range(4):
-        a = 0.0 if k == 0 else (h if k == 3 else 0.5 * h)
+        at, weight = AT[k], WEIGHTS[k]
+        a = at * h
         if k == 0:
             status = settle(r, t)
             copy(xs, r.x)
@@ -35,7 +38,7 @@ def rk4_step(at, t, unused, unused_too):
         if status != OK:
             return status
         acceleration_target(r.work.rows, r.clock.gains, stages.target)
-        solve(r, xs, stages.target, k)
+        solve_stage(r, xs, stages.target, k, at, weight)
         position_rates(r.model.bodies, xs, vs, stages.x[k])
         to_velocity_rates(r.model.bodies.where, r.work.bodies.A, r.work.bodies.acc, stages.v[k])
     outer, inner = h / 6.0, h / 3.0
@@ -62,6 +65,7 @@ class RK4:
     stage_count: ClassVar[int] = 5
     row_stages: ClassVar[int] = 0
     keeps_terms: ClassVar[bool] = False
+    looks_ahead: ClassVar[int] = 4
     numbers: ClassVar[tuple[float, ...]] = ()
     calls: ClassVar[tuple[str, ...]] = ()
     unit: ClassVar[Unit] = rk4_step

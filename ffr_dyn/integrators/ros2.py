@@ -25,7 +25,7 @@ from typing import ClassVar
 
 from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.calls import add_elastic_part, correct, evaluate, set_diagonal, settle, solve
+from ffr_dyn.kernels.calls import add_elastic_part, correct, evaluate, set_diagonal, settle, solve_stage
 from ffr_dyn.kernels.packing import tables_at
 from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
@@ -64,7 +64,7 @@ def ros2_step(at, t, unused, unused_too):
         add_elastic_part(bodies, r.work.bodies.f, vs, r_x, gh)
         if k == 1:
             correct(r, r_v, stages.target)
-        solve(r, xs, stages.target, k)
+        solve_stage(r, xs, stages.target, k, float(k), 0.5)
         to_velocity_rates(bodies.where, r.work.bodies.A, r.work.bodies.acc, stages.v[k])
         add_scaled(vs, vs, gh, stages.v[k])
         position_rates(bodies, xs, vs, stages.x[k])
@@ -93,6 +93,7 @@ class ROS2:
     stage_count: ClassVar[int] = 4
     row_stages: ClassVar[int] = 0
     keeps_terms: ClassVar[bool] = False
+    looks_ahead: ClassVar[int] = 2
     numbers: ClassVar[tuple[float, ...]] = ()
     calls: ClassVar[tuple[str, ...]] = ()
     unit: ClassVar[Unit] = ros2_step

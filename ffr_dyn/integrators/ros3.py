@@ -26,7 +26,7 @@ from typing import ClassVar
 from ffr_dyn.integrators.step import check_step
 from ffr_dyn.integrators.tolerances import Tolerances
 from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.calls import add_elastic_part, correct, evaluate, set_diagonal, settle, solve
+from ffr_dyn.kernels.calls import add_elastic_part, correct, evaluate, set_diagonal, settle, solve_stage
 from ffr_dyn.kernels.packing import tables_at
 from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
@@ -87,7 +87,7 @@ def ros3_step(at, t, unused, unused_too):
         add_elastic_part(bodies, r.work.bodies.f, vs, r_x, gh)
         if k > 0:
             correct(r, r_v, stages.target)
-        solve(r, xs, stages.target, k)
+        solve_stage(r, xs, stages.target, k, AT[k], WEIGHTS[k])
         to_velocity_rates(bodies.where, r.work.bodies.A, r.work.bodies.acc, stages.v[k])
         add_scaled(vs, vs, gh, stages.v[k])
         position_rates(bodies, xs, vs, stages.x[k])
@@ -121,6 +121,7 @@ class ROS3:
     stage_count: ClassVar[int] = 6
     row_stages: ClassVar[int] = 0
     keeps_terms: ClassVar[bool] = False
+    looks_ahead: ClassVar[int] = 3
     numbers: ClassVar[tuple[float, ...]] = ()
     calls: ClassVar[tuple[str, ...]] = ()
     unit: ClassVar[Unit] = ros3_step
@@ -147,6 +148,7 @@ class AdaptiveROS3:
     stage_count: ClassVar[int] = 6
     row_stages: ClassVar[int] = 0
     keeps_terms: ClassVar[bool] = False
+    looks_ahead: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = ()
     calls: ClassVar[tuple[str, ...]] = ()
     unit: ClassVar[Unit] = ros3_step

@@ -353,6 +353,7 @@ class Variational:
     stage_count: ClassVar[int] = 7
     row_stages: ClassVar[int] = 1
     keeps_terms: ClassVar[bool] = True
+    looks_ahead: ClassVar[int] = 0
     controlled: ClassVar[bool] = False
     calls: ClassVar[tuple[str, ...]] = ("look_ahead",)
     unit: ClassVar[Unit] = variational_step

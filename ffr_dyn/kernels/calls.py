@@ -24,6 +24,17 @@ def solve(r, x, target, stage):
 
 
 @inlined
+def solve_stage(r, x, target, stage, at, weight):
+    """`solve` in a method that looks ahead.
+
+    at, weight : what part of the step after its start, from 0 in the first stage; of the stage in what the step adds
+    """
+    place = r.work.bodies.stage
+    place[0], place[1] = at, weight
+    solve(r, x, target, stage)
+
+
+@inlined
 def solve_again(r, x, target):
     """`solve` near what was solved last."""
     call_unit(r.units[SOLVE], r.address, AGAIN, x.ctypes.data, target.ctypes.data)

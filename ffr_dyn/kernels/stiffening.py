@@ -6,22 +6,36 @@ change from sweep to sweep is of the order (elastic deflection / size)^2.
 
 Within a step the first guess is extrapolated from the same stages of the steps before, right to third order in the step. One
 sweep that begins with it is right to that order, times the small factor above: none of the methods loses its order. More
-follow where the guess turns out poor, as after an impact.
+follow where the guess turns out poor, as after an impact. Where that factor is very small even less has to be done in every
+stage: see `ffr_dyn.kernels.ahead`.
 """
 
+from ffr_dyn.kernels.ahead import (
+    BEARABLE,
+    COUNT,
+    FEEDBACK,
+    IN_USE,
+    SETTLED,
+    WATCH,
+    add_to_means,
+    begin_step,
+    keep_start,
+    loads_as_expected,
+    stiffen_ahead,
+    stiffen_by_expected,
+)
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import call_unit
-from ffr_dyn.kernels.rows import reaction
-from ffr_dyn.kernels.symmetric import multiply_blocks, weighted_sum
-from ffr_dyn.kernels.tables import ASIDE, LANES, MOTION, QUAD, RELATIVE, STAGES
-from ffr_dyn.kernels.vectors import add_scaled, copy, cross, fill, get, subtract, to_body
-from ffr_dyn.kernels.views import part, peek
+from ffr_dyn.kernels.stiffness import find_loads, multiply_stiffness, rate_loads, sum_stiffness
+from ffr_dyn.kernels.tables import ASIDE, MOTION, RELATIVE, STAGES
+from ffr_dyn.kernels.vectors import add_scaled, copy, get
+from ffr_dyn.kernels.views import part
 
 SWEEPS = 4  # at most
 # By what the forces may change in a sweep, relative to those of the body with most, for it to be the last: one that begins
 # with a guess after steps of equal length, and any other.
 ENOUGH, STRICT = 3e-2, 1e-8
-SETTLED = 4  # steps of equal length before a guess is one of third order
+REPEATED = 4  # steps of equal length before a guess is one of third order
 
 
 @kernel
@@ -35,77 +49,17 @@ def keep_unstiffened(bodies, w):
 
 
 @kernel
-def multiply_stiffness(bodies, w, x, b):
-    """w.stiff of body b: the sum of load * K_load over its loads, times q. Returns the squares of its length and of its
-    change."""
-    plan, at, n = bodies.blocks, bodies.where[b, 10], bodies.where[b, 0]
-    groups, parts, size = plan[at], plan[at + 1], plan[at + 2]
-    place, load, own = at + 3 + 2 * groups, w.load[b], part(x, bodies.where[b, 1] + 7, n)
-    q, y, z = part(w.sorted, 0, size), part(w.sorted, size, size), part(w.sorted, 2 * size, size)
-    weights = part(w.sorted, 3 * size, load.size)
-    fill(part(w.sorted, 0, 2 * size), 0.0)
-    for k in range(n):
-        q[peek(plan, place + k)] = own[k]
-    number, start, out = place + n, bodies.where[b, 5], 0
-    for group in range(groups):
-        count, entries = plan[at + 3 + 2 * group], plan[at + 4 + 2 * group]
-        for k in range(count):
-            weights[k] = peek(load, peek(plan, number + k))
-        weighted_sum(count, weights, bodies.stiffening, start, entries, w.K_sigma, out)
-        start, out, number = start + count * entries, out + entries, number + count
-    fill(part(w.K_sigma, out, QUAD * LANES), 0.0)  # what the last rows read beyond their end
-    multiply_blocks(parts, plan, number, w.K_sigma, q, y, z)
-    stiff, force, change = part(w.stiff, bodies.where[b, 3], n), 0.0, 0.0
-    found = part(w.sorted, 0, n)
-    for k in range(n):
-        found[k] = peek(y, peek(plan, place + k)) + peek(z, peek(plan, place + k))
+def renew_stiffness(bodies, w, x, b):
+    """w.stiff of body b by its loads. Returns the squares of its length and of its change."""
+    n, K = bodies.where[b, 0], part(w.K_sigma, 0, w.K_sigma.size)
+    stiff, found, force, change = part(w.stiff, bodies.where[b, 3], n), part(w.scratch, 0, n), 0.0, 0.0
+    sum_stiffness(bodies, w, w.load[b], b, K)
+    multiply_stiffness(bodies, w, b, K, part(x, bodies.where[b, 1] + 7, n), found)
     for k in range(n):
         force += found[k] * found[k]
         change += (found[k] - stiff[k]) * (found[k] - stiff[k])
         stiff[k] = found[k]
     return force, change
-
-
-@kernel
-def frame_loads(bodies, w, field, b):
-    """Acceleration less gravity, angular acceleration: the first six of the loads of body b."""
-    j, load = bodies.where[b, 2], w.load[b]
-    gravity = to_body(w.A[b], field)
-    for c in range(3):
-        load[c] = w.acc[j + c] - w.shift[j + c] - gravity[c]
-        load[3 + c] = w.acc[j + 3 + c] - w.shift[j + 3 + c]
-
-
-@kernel
-def rate_loads(omega, load):
-    """Products of the angular velocity: the next six."""
-    x, y, z = omega
-    load[6], load[7], load[8] = x * x, y * y, z * z
-    load[9], load[10], load[11] = x * y, x * z, y * z
-
-
-@inlined
-def marker_loads(markers, rows, mw, rw, load):
-    """Applied loads and joint reactions at the interfaces of all bodies."""
-    for k in range(markers.body.size):
-        slot = markers.load[k]
-        if slot >= 0:
-            for c in range(6):
-                load[markers.body[k], slot + c] = mw.load[k, c]
-    for block in range(rows.marker.shape[0]):
-        for side in range(rows.marker.shape[1]):
-            k = rows.marker[block, side]
-            if k >= 0 and markers.load[k] >= 0:
-                add_reaction(rw, rows, block, side, get(mw.u, k), load[markers.body[k]], markers.load[k])
-
-
-@kernel
-def add_reaction(rw, rows, block, side, u, load, slot):
-    force, moment = reaction(rw, rows, block, side)
-    moment = subtract(moment, cross(u, force))
-    for c in range(3):
-        load[slot + c] -= force[c]
-        load[slot + 3 + c] -= moment[c]
 
 
 @kernel
@@ -143,7 +97,57 @@ def is_settled(r, w, stage):
     if steady[1] < 0.0 or stage <= steady[2]:
         steady[1] += 1.0
     steady[2] = stage
-    return steady[1] >= SETTLED
+    return steady[1] >= REPEATED
+
+
+@inlined
+def solve_so(r, w, x, target):
+    """Motion, multipliers and loads with the forces w.stiff."""
+    stiffen(r.model.bodies, w)
+    call_unit(r.units[MOTION], r.address, 0.0, x.ctypes.data, target.ctypes.data)
+    find_loads(r, w)
+
+
+@inlined
+def sweep(r, w, x, target, enough, most):
+    """Solve until the forces change by less than enough. Returns the square of the feedback, by what a change changes them
+    again; -1 where there was but one."""
+    bodies, feedback, before = r.model.bodies, -1.0, 0.0
+    for number in range(most):
+        solve_so(r, w, x, target)
+        greatest, change = 0.0, 0.0
+        for b in range(bodies.mass.size):
+            if bodies.where[b, 6] > 0:
+                force, moved = renew_stiffness(bodies, w, x, b)
+                greatest, change = max(greatest, force), max(change, moved)
+        if number == 1:
+            feedback = change / before
+        if change <= enough * enough * greatest:
+            break
+        before = change
+    return feedback
+
+
+@inlined
+def solve_start_ahead(r, w, x, target):
+    """The first stage of a step as in `ahead`. Returns whether that can be, for it and the stages to come."""
+    bodies, ahead = r.model.bodies, w.ahead
+    if not begin_step(r, w):
+        return False
+    stiffen_by_expected(bodies, w, x)
+    keep_start(bodies, w, x)
+    if ahead[COUNT] < SETTLED:
+        return False
+    solve_so(r, w, x, target)
+    if not loads_as_expected(bodies, w):
+        ahead[COUNT] = -1.0
+        return False
+    if (ahead[COUNT] - SETTLED) % WATCH == 0.0:
+        ahead[FEEDBACK] = max(sweep(r, w, x, target, STRICT, 2), 0.0)
+        stiffen_by_expected(bodies, w, x)
+        solve_so(r, w, x, target)
+    ahead[IN_USE] = 1.0
+    return True
 
 
 @inlined
@@ -152,9 +156,20 @@ def solve_stiffened(r, x, target, stage):
 
     stage : number of a step's stage, from 0; AGAIN: near the last solution; ASIDE: so, and nothing is kept of it
     """
-    m, w = r.model, r.work.bodies
-    keep_unstiffened(m.bodies, w)
-    enough = STRICT
+    bodies, w = r.model.bodies, r.work.bodies
+    if stage > 0 and w.ahead[IN_USE] > 0.0:
+        stiffen_ahead(bodies, w, x)
+        call_unit(r.units[MOTION], r.address, 0.0, x.ctypes.data, target.ctypes.data)
+        find_loads(r, w)
+        add_to_means(bodies, w)
+        return
+    keep_unstiffened(bodies, w)
+    allowed, enough = w.ahead[BEARABLE] > 0.0, STRICT
+    if stage == 0 and allowed and solve_start_ahead(r, w, x, target):
+        add_to_means(bodies, w)
+        copy(w.last, w.stiff)
+        w.steady[1] = -1.0
+        return
     if stage < 0:
         copy(w.stiff, w.last)
     else:
@@ -163,21 +178,14 @@ def solve_stiffened(r, x, target, stage):
             enough = ENOUGH
         elif r.control.numbers.size > 0:
             enough = r.control.numbers[RELATIVE]
-    for _ in range(SWEEPS):
-        stiffen(m.bodies, w)
-        call_unit(r.units[MOTION], r.address, 0.0, x.ctypes.data, target.ctypes.data)
-        for b in range(m.bodies.mass.size):
-            if m.bodies.where[b, 6] > 0:
-                frame_loads(m.bodies, w, r.work.field, b)
-        marker_loads(m.markers, m.rows, r.work.markers, r.work.rows, w.load)
-        greatest, change = 0.0, 0.0
-        for b in range(m.bodies.mass.size):
-            if m.bodies.where[b, 6] > 0:
-                force, moved = multiply_stiffness(m.bodies, w, x, b)
-                greatest, change = max(greatest, force), max(change, moved)
-        if change <= enough * enough * greatest:
-            break
+    if stage == 0 and w.ahead[COUNT] <= -WATCH:
+        w.ahead[COUNT], enough = 0.0, STRICT
+    feedback = sweep(r, w, x, target, enough, SWEEPS)
+    if stage == 0 and (feedback >= 0.0 or enough == STRICT):
+        w.ahead[FEEDBACK] = max(feedback, 0.0)
     if stage >= 0:
         keep_change(w, stage)
+        if allowed:
+            add_to_means(bodies, w)
     if stage != ASIDE:
         copy(w.last, w.stiff)
