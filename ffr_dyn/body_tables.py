@@ -176,7 +176,7 @@ def loads_that_stiffen(bodies: Bodies, b: int) -> Array:
     if bodies.where[b, 6] == 0:
         return np.zeros(0, dtype=np.int64)
     plan = bodies.blocks[bodies.where[b, 10] :]
-    first = 3 + 2 * plan[0] + bodies.where[b, 0]
+    first = 3 + 2 * plan[0] + 2 * bodies.where[b, 0]
     return np.sort(plan[first : first + plan[3 : 3 + 2 * plan[0] : 2].sum()])
 
 

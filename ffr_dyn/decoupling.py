@@ -80,9 +80,10 @@ def symmetric_blocks(matrices: Array, numbers: Array, noise: Array) -> tuple[Arr
 
     pool : per group of matrices that share blocks, what each has in those blocks, one row per matrix, of whole lanes
     plan : number of groups, of parts (of families, at most a row of lanes each), of places (each part begins such a row),
-           of each group the number of matrices and of entries; the places of the coordinates; the numbers by group; of each
-           part its first place, its fours of rows, how many blocks serve them alone, and how many also what lies across; of
-           each block, by part, its first entry, its columns, their first place
+           of each group the number of matrices and of entries; the places of the coordinates; where the diagonal is among the
+           entries of all groups (past their end where it vanishes); the numbers by group; of each part its first place, its
+           fours of rows, how many blocks serve them alone, and how many also what lies across; of each block, by part, its
+           first entry, its columns, their first place
     """
     n = matrices.shape[1]
     coupled = np.abs(matrices) > noise[:, None, None]
@@ -108,7 +109,7 @@ def symmetric_blocks(matrices: Array, numbers: Array, noise: Array) -> tuple[Arr
     alone: list[list[tuple[int, int, int]]] = [[] for _ in parts]
     across: list[list[tuple[int, int, int]]] = [[] for _ in parts]
     listed: list[Array] = []
-    kept = 0
+    kept, diagonal = 0, np.full(n, -1)
     for g in np.unique(group[touched.any(axis=1)]):
         own = [pairs[k] for k in np.flatnonzero(group == g)]
         which = np.flatnonzero(touched[group == g].any(axis=0))
@@ -118,11 +119,14 @@ def symmetric_blocks(matrices: Array, numbers: Array, noise: Array) -> tuple[Arr
         pool.append(np.concatenate(rows, axis=1))
         sizes += pool[-1].shape
         for k, (a, b) in zip(begin, own, strict=False):
+            if a == b:
+                diagonal[parts[a]] = kept + k + np.arange(parts[a].size) * (parts[a].size + 1)
             (across if symmetric and a != b else alone)[a].append((kept + k, parts[b].size, first[b]))
         kept += pool[-1].shape[1]
         listed.append(numbers[which])
+    diagonal[diagonal < 0] = kept
     heads = [(first[a], _quads(part.size), len(alone[a]), len(across[a])) for a, part in enumerate(parts)]
-    plan = [np.array([len(pool), len(parts), first[-1], *sizes]), places, *listed, np.ravel(heads)]
+    plan = [np.array([len(pool), len(parts), first[-1], *sizes]), places, diagonal, *listed, np.ravel(heads)]
     plan += [np.ravel(blocks) for both in zip(alone, across, strict=True) for blocks in both]
     return np.concatenate([part.ravel() for part in pool]), np.concatenate(plan).astype(np.int64)
 

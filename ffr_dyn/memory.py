@@ -15,6 +15,7 @@ from ffr_dyn.kernels.tables import (
     MOST_ROWS,
     QUAD,
     STAGES,
+    WATCH,
     Bodies,
     BodyWork,
     LoadWork,
@@ -62,7 +63,6 @@ def _body_work(m: Model, keeps_terms: bool, looks_ahead: int) -> BodyWork:
     B, E, n = m.bodies.mass.size, int(m.bodies.where[-1, 3]), m.bodies.where[:, 0]
     V, longest = 6 * B + E, int(n.max())
     E_s = E if m.bodies.stiffening.size else 0
-    kept = m.bodies.where[:-1, 6] + QUAD * LANES
     E_a, B_a = (E_s, B if E_s else 0) if looks_ahead else (0, 0)
     spaced = n[:-1] + LANES  # sums in whole rows of lanes end beyond the terms
     terms, loads = int(spaced.sum() if keeps_terms else spaced.max(initial=0)), int(m.markers.load.max(initial=6)) + 6
@@ -75,11 +75,10 @@ def _body_work(m: Model, keeps_terms: bool, looks_ahead: int) -> BodyWork:
         **_zeros(H=3 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6)),
         **_zeros(more=V, unstiffened=E, shift=V, load=(B, loads)),
         **_zeros(stiff=E_s, last=E_s, steady=3, change=(3 * STAGES, E_s)),
-        K_sigma=np.zeros(int(kept.max(initial=0) + kept.sum())),
-        sums=kept.max(initial=0) + starts(kept)[:-1],
-        scratch=np.zeros(2 * longest),
+        K_sigma=np.zeros(int(m.bodies.where[:, 6].max()) + QUAD * LANES),
+        scratch=np.zeros(longest),
         ahead=_ahead(looks_ahead),
-        **_zeros(stage=2, past=(8, E_a), mean=(MEANS, B_a, loads), expected=(B_a, loads)),
+        **_zeros(stage=2, past=(8, E_a), diagonal=E_a, mean=(MEANS, B_a, loads), expected=(B_a, loads)),
     )
     work.inverse[:, 0] = [_inverse(mass) for mass in m.bodies.mass]
     for b in np.flatnonzero(n[:-1] == 0):
@@ -88,17 +87,17 @@ def _body_work(m: Model, keeps_terms: bool, looks_ahead: int) -> BodyWork:
     return work
 
 
-# By order: values at the end of the last of some intervals by the means over them, polynomials; and half of the feedback that
-# the damping of ROS2, ROS3, RK4 bears (derived in `tests/test_stiffening_ahead.py`).
+# By order: weights that give the value at the end of the last of some intervals by the means over them, polynomials; and half
+# of the feedback that the damping of ROS2, ROS3, RK4 bears (`tests/test_stiffening_ahead.py` derives both).
 _AT_END = {2: (3 / 2, -1 / 2, 0.0, 0.0), 3: (11 / 6, -7 / 6, 1 / 3, 0.0), 4: (25 / 12, -23 / 12, 13 / 12, -1 / 4)}
-_BEARABLE = {2: 0.003, 3: 0.008, 4: 0.008}
+_BEARABLE = {2: 0.003, 3: 0.008, 4: 0.007}
 
 
 def _ahead(order: int) -> Array:
     """How geometric stiffening is extrapolated to an order, or not (see `ffr_dyn.kernels.ahead`)."""
     if order == 0:
         return np.zeros(7 + MEANS)
-    return np.array([0.0, 0.0, 0.0, 0.0, _BEARABLE[order] ** 2, 0.5 * (order > 2), (order > 3) / 6, *_AT_END[order]])
+    return np.array([0.0, 0.0, WATCH, 0.0, _BEARABLE[order] ** 2, 0.5 * (order > 2), (order > 3) / 6, *_AT_END[order]])
 
 
 def _row_work(m: Model) -> RowWork:

@@ -25,8 +25,7 @@ def rk4_step(at, t, unused, unused_too):
     stages, xs, vs = r.stages, r.stages.x[4], r.stages.v[4]
     set_diagonal(r, 0.0)
     for k in range(4):
-        at, weight = AT[k], WEIGHTS[k]
-        a = at * h
+        a = AT[k] * h
         if k == 0:
             status = settle(r, t)
             copy(xs, r.x)
@@ -38,7 +37,7 @@ def rk4_step(at, t, unused, unused_too):
         if status != OK:
             return status
         acceleration_target(r.work.rows, r.clock.gains, stages.target)
-        solve_stage(r, xs, stages.target, k, at, weight)
+        solve_stage(r, xs, stages.target, k, AT[k], WEIGHTS[k])
         position_rates(r.model.bodies, xs, vs, stages.x[k])
         to_velocity_rates(r.model.bodies.where, r.work.bodies.A, r.work.bodies.acc, stages.v[k])
     outer, inner = h / 6.0, h / 3.0

@@ -13,21 +13,22 @@ stage: see `ffr_dyn.kernels.ahead`.
 from ffr_dyn.kernels.ahead import (
     BEARABLE,
     COUNT,
-    FEEDBACK,
     IN_USE,
+    PAUSE,
     SETTLED,
-    WATCH,
     add_to_means,
     begin_step,
+    give_up,
     keep_start,
     loads_as_expected,
     stiffen_ahead,
     stiffen_by_expected,
+    take_up,
 )
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import call_unit
 from ffr_dyn.kernels.stiffness import find_loads, multiply_stiffness, rate_loads, sum_stiffness
-from ffr_dyn.kernels.tables import ASIDE, MOTION, RELATIVE, STAGES
+from ffr_dyn.kernels.tables import ASIDE, MOTION, RELATIVE, STAGES, WATCH
 from ffr_dyn.kernels.vectors import add_scaled, copy, get
 from ffr_dyn.kernels.views import part
 
@@ -51,10 +52,10 @@ def keep_unstiffened(bodies, w):
 @kernel
 def renew_stiffness(bodies, w, x, b):
     """w.stiff of body b by its loads. Returns the squares of its length and of its change."""
-    n, K = bodies.where[b, 0], part(w.K_sigma, 0, w.K_sigma.size)
+    n = bodies.where[b, 0]
     stiff, found, force, change = part(w.stiff, bodies.where[b, 3], n), part(w.scratch, 0, n), 0.0, 0.0
-    sum_stiffness(bodies, w, w.load[b], b, K)
-    multiply_stiffness(bodies, w, b, K, part(x, bodies.where[b, 1] + 7, n), found)
+    sum_stiffness(bodies, w, w.load[b], b)
+    multiply_stiffness(bodies, w, b, part(x, bodies.where[b, 1] + 7, n), found)
     for k in range(n):
         force += found[k] * found[k]
         change += (found[k] - stiff[k]) * (found[k] - stiff[k])
@@ -140,10 +141,12 @@ def solve_start_ahead(r, w, x, target):
         return False
     solve_so(r, w, x, target)
     if not loads_as_expected(bodies, w):
-        ahead[COUNT] = -1.0
+        give_up(w)
         return False
     if (ahead[COUNT] - SETTLED) % WATCH == 0.0:
-        ahead[FEEDBACK] = max(sweep(r, w, x, target, STRICT, 2), 0.0)
+        if sweep(r, w, x, target, STRICT, 2) > ahead[BEARABLE]:
+            give_up(w)
+            return False
         stiffen_by_expected(bodies, w, x)
         solve_so(r, w, x, target)
     ahead[IN_USE] = 1.0
@@ -178,11 +181,10 @@ def solve_stiffened(r, x, target, stage):
             enough = ENOUGH
         elif r.control.numbers.size > 0:
             enough = r.control.numbers[RELATIVE]
-    if stage == 0 and w.ahead[COUNT] <= -WATCH:
-        w.ahead[COUNT], enough = 0.0, STRICT
-    feedback = sweep(r, w, x, target, enough, SWEEPS)
-    if stage == 0 and (feedback >= 0.0 or enough == STRICT):
-        w.ahead[FEEDBACK] = max(feedback, 0.0)
+    if stage == 0 and w.ahead[COUNT] <= -w.ahead[PAUSE]:
+        take_up(w, sweep(r, w, x, target, STRICT, SWEEPS))
+    else:
+        sweep(r, w, x, target, enough, SWEEPS)
     if stage >= 0:
         keep_change(w, stage)
         if allowed:

@@ -9,37 +9,46 @@ from ffr_dyn.kernels.views import part, peek
 
 
 @kernel
-def sum_stiffness(bodies, w, load, b, K):
-    """K = K_sigma of body b, in blocks: the sum of load * K_load."""
+def sum_stiffness(bodies, w, load, b):
+    """w.K_sigma of body b, in blocks: the sum of load * K_load."""
     plan, at = bodies.blocks, bodies.where[b, 10]
     groups, size = plan[at], plan[at + 2]
-    number, start, out = at + 3 + 2 * groups + bodies.where[b, 0], bodies.where[b, 5], 0
+    number, start, out = at + 3 + 2 * groups + 2 * bodies.where[b, 0], bodies.where[b, 5], 0
     weights = part(w.sorted, 3 * size, load.size)
     for group in range(groups):
         count, entries = plan[at + 3 + 2 * group], plan[at + 4 + 2 * group]
         for k in range(count):
             weights[k] = peek(load, peek(plan, number + k))
-        weighted_sum(count, weights, bodies.stiffening, start, entries, K, out)
+        weighted_sum(count, weights, bodies.stiffening, start, entries, w.K_sigma, out)
         start, out, number = start + count * entries, out + entries, number + count
-    fill(part(K, out, QUAD * LANES), 0.0)  # what the last rows read beyond their end
+    fill(part(w.K_sigma, out, QUAD * LANES), 0.0)  # what the last rows read beyond their end
 
 
 @kernel
-def multiply_stiffness(bodies, w, b, K, q, found):
-    """found (n,) = K q, for K_sigma of body b."""
+def multiply_stiffness(bodies, w, b, q, found):
+    """found (n,) = K_sigma q, with that of body b in place."""
     plan, at, n = bodies.blocks, bodies.where[b, 10], bodies.where[b, 0]
     groups, parts, size = plan[at], plan[at + 1], plan[at + 2]
     place = at + 3 + 2 * groups
-    blocks = place + n
+    blocks = place + 2 * n
     for group in range(groups):
         blocks += plan[at + 3 + 2 * group]
     x, y, z = part(w.sorted, 0, size), part(w.sorted, size, size), part(w.sorted, 2 * size, size)
     fill(part(w.sorted, 0, 2 * size), 0.0)
     for k in range(n):
         x[peek(plan, place + k)] = q[k]
-    multiply_blocks(parts, plan, blocks, K, x, y, z)
+    multiply_blocks(parts, plan, blocks, w.K_sigma, x, y, z)
     for k in range(n):
         found[k] = peek(y, peek(plan, place + k)) + peek(z, peek(plan, place + k))
+
+
+@kernel
+def take_diagonal(bodies, w, b, diagonal):
+    """That of K_sigma (n,), with that of body b in place."""
+    plan, at, n = bodies.blocks, bodies.where[b, 10], bodies.where[b, 0]
+    place = at + 3 + 2 * plan[at] + n
+    for k in range(n):
+        diagonal[k] = peek(w.K_sigma, peek(plan, place + k))
 
 
 @kernel

@@ -36,7 +36,8 @@ NARROW = 4  # of them are enough in the plane
 QUAD = 4  # rows of a symmetric matrix that are multiplied together
 MOST_ROWS = 6  # of a joint
 STAGES = 7  # of a step, at most
-MEANS = 4  # over so many steps of the loads that stiffen
+MEANS = 4  # over so many steps, of the loads that stiffen
+WATCH = 32  # steps from one look at their feedback to the next
 RATES, INERTIAL = 6, 12  # of these the first by angular velocities, the first at an interface
 
 # Numbers of the compiled units in `Tables.units`.
@@ -190,19 +191,18 @@ class BodyWork(NamedTuple):
     unstiffened: F1  # (E,) elastic right-hand side without geometric stiffening
     shift: F1  # (V,) part of acc that is no acceleration (corrections of an integrator's stage), body axes
     # Of scenes with geometric stiffening (E_s = E, else 0):
-    # Scratch: that of one body, in blocks on one side of the diagonal; then, pooled, those at the start of a step
-    K_sigma: F1
-    sums: I1  # (B,) first of a body's own in K_sigma
-    scratch: F1  # (2 longest,)
+    K_sigma: F1  # scratch: that of one body, in blocks on one side of the diagonal
+    scratch: F1  # (longest,) of one body
     stiff: F1  # (E_s,) K_sigma q
     last: F1  # (E_s,) that of the last solution in a step; zero before the first
     steady: F1  # (3,) length of the last step, how many there were of that length before it, its last stage
     change: F2  # (3 STAGES, E_s) by what stages of the last step, and of two before, differed from the stage before
     load: F2  # (B, longest) loads of the bodies, in the order of their stiffness
-    # Of methods that look ahead (see `kernels.ahead`):
-    ahead: F1  # (7 + MEANS,)
+    # Of methods that look ahead (E_s, B, or 0):
+    ahead: F1  # (7 + MEANS,) see `kernels.ahead`
     stage: F1  # (2,) what part of the step after its start, weight
     past: F2  # (8, E_s) K_sigma q at the start of this step, its three backward differences; q, likewise
+    diagonal: F1  # (E_s,) of K_sigma at the start of this step
     mean: F3  # (MEANS, B, longest) loads, over this step so far and over those before
     expected: F2  # (B, longest) loads at the start of this step
 
