@@ -317,8 +317,13 @@ def _resumed(path: Path, mark: str, machine: Machine, energy: EnergyWatch) -> _R
             f"{path} is the result of another scene or of other settings (step, method, start, output step, outputs): its "
             "run cannot be continued with these; run from the start, to another file if that one is still wanted"
         )
-    for name, array in _changing(machine):
-        array[...] = saved.arrays[f"machine.{name}"]
+    changing = {f"machine.{name}": array for name, array in _changing(machine)}
+    if any(name not in saved.arrays or saved.arrays[name].shape != array.shape for name, array in changing.items()):
+        raise InputError(
+            f"{path} was written by another version of ffr_dyn, which keeps other things; run from the start"
+        )
+    for name, array in changing.items():
+        array[...] = saved.arrays[name]
     extremes_then = saved.arrays["extremes"].copy()
     return _Run(machine, energy, saved.memory, [dict(earlier.quantities)], [earlier.time], extremes_then, saved.steps)
 
