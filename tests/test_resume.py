@@ -144,6 +144,23 @@ def test_files_that_cannot_be_continued_are_named(tmp_path, whole):
         forward(SCENE, **SETTINGS, resume=tmp_path / "text.nc")
 
 
+def test_a_checkpoint_of_another_version_is_refused(tmp_path, monkeypatch):
+    """One that lacks something that this version keeps, and one that has it in another shape."""
+    path = tmp_path / "run.nc"
+    forward(SCENE, **SETTINGS | {"end": 0.02}, path=path)
+    name = "machine.work.bodies.f"
+    for change in ({}, {name: np.zeros(1)}):
+
+        def older(content, change=change):
+            saved = decode(content)
+            kept = {key: array for key, array in saved.arrays.items() if key != name}
+            return replace(saved, arrays=kept | change)
+
+        monkeypatch.setattr("ffr_dyn.analyses.forward.decode", older)
+        with pytest.raises(InputError, match="another version"):
+            forward(SCENE, **SETTINGS, resume=path)
+
+
 def test_measuring_in_parts_gives_the_same_bits():
     """Angles, elastic displacements, work: however many rows are looked at together."""
     from ffr_dyn.analyses.assemble import assemble

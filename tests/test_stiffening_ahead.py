@@ -23,7 +23,7 @@ from ffr_dyn.machine import fill_rows, new_machine
 from ffr_dyn.memory import _AT_END, _BEARABLE, new_record
 from ffr_dyn.scene import Body, Scene
 from ffr_dyn.stepper import Stepper
-from ffr_dyn.timefunction import polynomial, user
+from ffr_dyn.timefunction import polynomial
 from ffr_prep.material import Material
 from ffr_prep.reference import FixedTo
 from ffr_prep.section import rectangle
@@ -152,7 +152,7 @@ def test_looking_ahead_keeps_the_order(method, step):
 
 @pytest.mark.parametrize(("method", "step"), [(ROS2, 0.02), (ROS3, 0.02), (ROS3, 0.006), (ROS3, 0.06)])
 def test_fast_vibrations_do_not_grow_from_forces_that_come_late(method, step):
-    """2000 steps of undamped modes, most of them too fast for the steps, with a stiffening as large as what holds the lowest."""
+    """2000 steps of undamped modes, most of them too fast for the steps; stiffening is as large as what holds the lowest."""
     spun = replace(spinning_blade(10.0), gravity=(0.0, 0.0, 0.0))
     scene = replace(spun, bodies=(replace(spun.bodies[0], q=1e-3 * np.ones(spun.bodies[0].model.n)),))
     ahead, swept = (

@@ -118,6 +118,16 @@ def keep_differences(now, past, row, first, n):
 
 
 @inlined
+def start_ahead(r, w, x):
+    """w.stiff and what the stages need at the start of a step. Returns whether it may be used."""
+    if not begin_step(r, w):
+        return False
+    stiffen_by_expected(r.model.bodies, w, x)
+    keep_start(r.model.bodies, w, x)
+    return w.ahead[COUNT] >= SETTLED
+
+
+@inlined
 def stiffen_ahead(bodies, w, x):
     """f -= K_sigma q in a stage."""
     at = w.stage[AT]

@@ -17,18 +17,15 @@ from ffr_dyn.kernels.ahead import (
     PAUSE,
     SETTLED,
     add_to_means,
-    begin_step,
     give_up,
-    keep_start,
     loads_as_expected,
     stiffen_ahead,
-    stiffen_by_expected,
     take_up,
 )
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.packing import call_unit
 from ffr_dyn.kernels.stiffness import find_loads, multiply_stiffness, rate_loads, sum_stiffness
-from ffr_dyn.kernels.tables import ASIDE, MOTION, RELATIVE, STAGES, WATCH
+from ffr_dyn.kernels.tables import ASIDE, MOTION, RELATIVE, STAGES, START, WATCH
 from ffr_dyn.kernels.vectors import add_scaled, copy, get
 from ffr_dyn.kernels.views import part
 
@@ -102,55 +99,26 @@ def is_settled(r, w, stage):
 
 
 @inlined
-def solve_so(r, w, x, target):
-    """Motion, multipliers and loads with the forces w.stiff."""
-    stiffen(r.model.bodies, w)
-    call_unit(r.units[MOTION], r.address, 0.0, x.ctypes.data, target.ctypes.data)
-    find_loads(r, w)
+def first_guess(r, w, stage):
+    """w.stiff to begin with. Returns by what it may be off."""
+    if stage < 0:
+        copy(w.stiff, w.last)
+        return STRICT
+    guess_stiffening(w, stage)
+    if is_settled(r, w, stage):
+        return ENOUGH
+    return r.control.numbers[RELATIVE] if r.control.numbers.size > 0 else STRICT
 
 
 @inlined
-def sweep(r, w, x, target, enough, most):
-    """Solve until the forces change by less than enough. Returns the square of the feedback, by what a change changes them
-    again; -1 where there was but one."""
-    bodies, feedback, before = r.model.bodies, -1.0, 0.0
-    for number in range(most):
-        solve_so(r, w, x, target)
-        greatest, change = 0.0, 0.0
-        for b in range(bodies.mass.size):
-            if bodies.where[b, 6] > 0:
-                force, moved = renew_stiffness(bodies, w, x, b)
-                greatest, change = max(greatest, force), max(change, moved)
-        if number == 1:
-            feedback = change / before
-        if change <= enough * enough * greatest:
-            break
-        before = change
-    return feedback
-
-
-@inlined
-def solve_start_ahead(r, w, x, target):
-    """The first stage of a step as in `ahead`. Returns whether that can be, for it and the stages to come."""
-    bodies, ahead = r.model.bodies, w.ahead
-    if not begin_step(r, w):
-        return False
-    stiffen_by_expected(bodies, w, x)
-    keep_start(bodies, w, x)
-    if ahead[COUNT] < SETTLED:
-        return False
-    solve_so(r, w, x, target)
-    if not loads_as_expected(bodies, w):
-        give_up(w)
-        return False
-    if (ahead[COUNT] - SETTLED) % WATCH == 0.0:
-        if sweep(r, w, x, target, STRICT, 2) > ahead[BEARABLE]:
-            give_up(w)
-            return False
-        stiffen_by_expected(bodies, w, x)
-        solve_so(r, w, x, target)
-    ahead[IN_USE] = 1.0
-    return True
+def renew_all(bodies, w, x):
+    """w.stiff by the loads. Returns the squares of its length and of its change, of the body with most."""
+    greatest, change = 0.0, 0.0
+    for b in range(bodies.mass.size):
+        if bodies.where[b, 6] > 0:
+            force, moved = renew_stiffness(bodies, w, x, b)
+            greatest, change = max(greatest, force), max(change, moved)
+    return greatest, change
 
 
 @inlined
@@ -159,35 +127,60 @@ def solve_stiffened(r, x, target, stage):
 
     stage : number of a step's stage, from 0; AGAIN: near the last solution; ASIDE: so, and nothing is kept of it
     """
-    bodies, w = r.model.bodies, r.work.bodies
-    if stage > 0 and w.ahead[IN_USE] > 0.0:
+    bodies, w, ahead = r.model.bodies, r.work.bodies, r.work.bodies.ahead
+    # A later stage of a step without sweeps; the first stage of one, whose feedback has been looked at; sweeps, after which
+    # it may be tried again to do without.
+    late = stage > 0 and ahead[IN_USE] > 0.0
+    expected, looked, waited, enough = False, False, False, STRICT
+    if late:
         stiffen_ahead(bodies, w, x)
+    else:
+        keep_unstiffened(bodies, w)
+        expected = (
+            stage == 0 and ahead[BEARABLE] > 0.0 and call_unit(r.units[START], r.address, 0.0, x.ctypes.data, 0) == 1
+        )
+        if not expected:
+            enough = first_guess(r, w, stage)
+            waited = stage == 0 and ahead[COUNT] <= -ahead[PAUSE]
+            enough = STRICT if waited else enough
+        looked = (ahead[COUNT] - SETTLED) % WATCH > 0.0
+    sweeps, before, feedback = 0, 0.0, 0.0
+    while True:  # one loop: each of its parts is compiled once
+        if not late:
+            stiffen(bodies, w)
         call_unit(r.units[MOTION], r.address, 0.0, x.ctypes.data, target.ctypes.data)
         find_loads(r, w)
+        if expected and not loads_as_expected(bodies, w):
+            give_up(w)
+            expected = False
+        if late or (expected and looked):
+            break
+        greatest, change = renew_all(bodies, w, x)
+        sweeps += 1
+        if sweeps == 2:
+            feedback = change / before
+        before = change
+        small = change <= enough * enough * greatest
+        if not expected and (small or sweeps == SWEEPS):
+            break
+        if expected and (small or sweeps == 2):
+            if feedback > ahead[BEARABLE]:
+                give_up(w)
+                expected = False
+            else:
+                copy(w.stiff, w.past[0])
+                looked = True
+    if late or expected:
         add_to_means(bodies, w)
+        if expected:
+            ahead[IN_USE], w.steady[1] = 1.0, -1.0
+            copy(w.last, w.stiff)
         return
-    keep_unstiffened(bodies, w)
-    allowed, enough = w.ahead[BEARABLE] > 0.0, STRICT
-    if stage == 0 and allowed and solve_start_ahead(r, w, x, target):
-        add_to_means(bodies, w)
-        copy(w.last, w.stiff)
-        w.steady[1] = -1.0
-        return
-    if stage < 0:
-        copy(w.stiff, w.last)
-    else:
-        guess_stiffening(w, stage)
-        if is_settled(r, w, stage):
-            enough = ENOUGH
-        elif r.control.numbers.size > 0:
-            enough = r.control.numbers[RELATIVE]
-    if stage == 0 and w.ahead[COUNT] <= -w.ahead[PAUSE]:
-        take_up(w, sweep(r, w, x, target, STRICT, SWEEPS))
-    else:
-        sweep(r, w, x, target, enough, SWEEPS)
+    if waited:
+        take_up(w, feedback)
     if stage >= 0:
         keep_change(w, stage)
-        if allowed:
+        if ahead[BEARABLE] > 0.0:
             add_to_means(bodies, w)
     if stage != ASIDE:
         copy(w.last, w.stiff)

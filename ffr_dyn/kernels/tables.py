@@ -43,8 +43,8 @@ RATES, INERTIAL = 6, 12  # of these the first by angular velocities, the first a
 # Numbers of the compiled units in `Tables.units`.
 (
     EVALUATE, BODIES, MARKERS, CONSTRAINTS, JOINTS, BACK, REGAIN, PLAIN, MOTION, SOLVE, PREPARE, LOOK, SETTLE, MOVE_BACK,
-    CORRECT, TRULY, RECORD, LOOK_AHEAD, PROJECT, LOADS, POWERS,
-) = range(21)  # fmt: skip
+    CORRECT, TRULY, RECORD, LOOK_AHEAD, PROJECT, LOADS, POWERS, START,
+) = range(22)  # fmt: skip
 
 # A solution of a step's stage is called by its number; near the last one, or aside from the steps:
 AGAIN, ASIDE = -1, -2

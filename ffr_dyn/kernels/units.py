@@ -14,6 +14,7 @@ from typing import Any
 from numba import cfunc, types
 
 from ffr_dyn.kernels.actions import keep_turns
+from ffr_dyn.kernels.ahead import start_ahead
 from ffr_dyn.kernels.bodies import mass_times
 from ffr_dyn.kernels.calls import set_diagonal
 from ffr_dyn.kernels.control import controlled_step, interpolate
@@ -246,6 +247,13 @@ def stiffened_unit(at, stage, x, target):
 
 
 @Unit
+def start_unit(at, t, x, unused):
+    """Geometric stiffening at the start of a step, from what is known before it. Returns whether it may be used."""
+    r = tables_at(at)
+    return 1 if start_ahead(r, r.work.bodies, vector_at(x, r.x.size)) else 0
+
+
+@Unit
 def look_unit(at, t, x, v):
     """Rows (Phi, nu, gamma, jac) at (x, v) at the time of the last evaluation, whose factors stay; markers do not."""
     r = tables_at(at)
@@ -433,7 +441,7 @@ UNITS = {
 # Of scenes that need them, of methods that choose their steps, and of methods that ask for more.
 LOAD_UNITS = {"loads": loads_unit, "powers": powers_unit}
 RELAXED_UNITS = {"relaxed": relaxed_unit}
-STIFFENED_UNITS = {"stiffened": stiffened_unit}
+STIFFENED_UNITS = {"stiffened": stiffened_unit, "start": start_unit}
 CONTROL_UNITS = {"controlled_rows": controlled_rows_unit}
 EXTRA_UNITS = {"project": project_unit, "look_ahead": look_ahead_unit}
 
@@ -457,5 +465,5 @@ def unit_addresses(model: Model, calls: Collection[str]) -> list[int]:
     solving = "back", "regain", "plain", motion, solve, "prepare", "look", "settle", "move_back", "correct"
     numbered = *evaluating, *solving, "truly", "record"
     extra = [EXTRA_UNITS[name].address if name in calls else 0 for name in ("look_ahead", "project")]
-    loads = [needed[name].address if name in needed else 0 for name in LOAD_UNITS]
-    return [*(needed[name].address for name in numbered), *extra, *loads]
+    others = [needed[name].address if name in needed else 0 for name in (*LOAD_UNITS, "start")]
+    return [*(needed[name].address for name in numbered), *extra, *others]
