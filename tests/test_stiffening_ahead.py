@@ -206,6 +206,20 @@ def test_a_load_that_jumps_is_swept_and_costs_no_accuracy():
     assert errors[0] < 1.2 * errors[1]
 
 
+@pytest.mark.parametrize("share", [0.02, 0.2])
+def test_loads_that_are_noisy_cost_no_accuracy(share):
+    """A pull along the blade that is another in every step."""
+    step = 2e-4
+    noise = np.random.default_rng(1).uniform(-1, 1, 1000)
+    pull = Load("pull", "blade.tip", force=(lambda t: 60.0 * (1 + share * noise[int(t / step + 0.01)]), 0.0, 0.0))
+    scene = replace(spinning_blade(10.0), loads=(pull,))
+    found, swept, truth = (
+        forward(scene, end=0.1, output_step=0.002, method=method)["blade.q"]
+        for method in (ROS3(step), SweptROS3(step), SweptROS3(step / 8))
+    )
+    assert np.abs(found - truth).max() < 1.2 * np.abs(swept - truth).max()
+
+
 def test_a_new_length_of_steps_begins_anew():
     machine, go = machine_of(spinning_blade(), ROS3(2e-4))
     go(20)

@@ -16,7 +16,8 @@ over the step, as if the method integrated them, too; the means over the last st
 
 So the loads act late on the motion that makes them. That can feed a vibration, by as much as what the loads change in
 themselves: the ratio of two sweeps. It must be less than half of what the damping of the method bears, whatever the
-frequency, and is looked at from time to time; else, and where loads jump, sweeps are done (`ffr_dyn.kernels.stiffening`).
+frequency, and is looked at from time to time, as are the forces; else, and where loads jump, sweeps are done
+(`ffr_dyn.kernels.stiffening`).
 """
 
 from ffr_dyn.kernels.options import inlined, kernel
@@ -60,7 +61,7 @@ def begin_step(r, w):
 
 @kernel
 def give_up(w):
-    """Go on by sweeps for a while, longer each time."""
+    """Go on by sweeps for a while, twice as long as the time before; each look that finds nothing wrong halves that again."""
     w.ahead[COUNT], w.ahead[PAUSE] = -1.0, 2.0 * w.ahead[PAUSE]
     fill(part(w.change, 0, w.change.size), 0.0)
 

@@ -33,6 +33,7 @@ SWEEPS = 4  # at most
 # By what the forces may change in a sweep, relative to those of the body with most, for it to be the last: one that begins
 # with a guess after steps of equal length, and any other.
 ENOUGH, STRICT = 3e-2, 1e-8
+ROUGH = 0.1  # by what, likewise, forces without sweeps may be off where that is looked at
 REPEATED = 4  # steps of equal length before a guess is one of third order
 
 
@@ -144,7 +145,7 @@ def solve_stiffened(r, x, target, stage):
             waited = stage == 0 and ahead[COUNT] <= -ahead[PAUSE]
             enough = STRICT if waited else enough
         looked = (ahead[COUNT] - SETTLED) % WATCH > 0.0
-    sweeps, before, feedback = 0, 0.0, 0.0
+    sweeps, before, feedback, rough = 0, 0.0, 0.0, False
     while True:  # one loop: each of its parts is compiled once
         if not late:
             stiffen(bodies, w)
@@ -159,17 +160,20 @@ def solve_stiffened(r, x, target, stage):
         sweeps += 1
         if sweeps == 2:
             feedback = change / before
+        if expected and sweeps == 1:
+            rough = change > ROUGH * ROUGH * greatest
         before = change
         small = change <= enough * enough * greatest
         if not expected and (small or sweeps == SWEEPS):
             break
         if expected and (small or sweeps == 2):
-            if feedback > ahead[BEARABLE]:
+            if rough or feedback > ahead[BEARABLE]:
                 give_up(w)
                 expected = False
             else:
                 copy(w.stiff, w.past[0])
                 looked = True
+                ahead[PAUSE] = max(0.5 * ahead[PAUSE], WATCH)
     if late or expected:
         add_to_means(bodies, w)
         if expected:
