@@ -301,7 +301,7 @@ def main() -> None:
     given = parser.parse_args()
     print(f"Exudyn {exu.config.Version()}; load {os.getloadavg()[0]:.1f} on {os.cpu_count()} processors")
     if given.stiffening:
-        return report_stiffening(3 if given.quick else 9)
+        return report_stiffening(5 if given.quick else 25)
 
     def log(text: str) -> None:
         if given.search:

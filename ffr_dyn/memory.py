@@ -97,7 +97,9 @@ def _ahead(order: int) -> Array:
     """How geometric stiffening is extrapolated to an order, or not (see `ffr_dyn.kernels.ahead`)."""
     if order == 0:
         return np.zeros(7 + MEANS)
-    return np.array([0.0, 0.0, WATCH, 0.0, _BEARABLE[order] ** 2, 0.5 * (order > 2), (order > 3) / 6, *_AT_END[order]])
+    return np.array(
+        [0.0, 0.0, WATCH / 2, 0.0, _BEARABLE[order] ** 2, 0.5 * (order > 2), (order > 3) / 6, *_AT_END[order]]
+    )
 
 
 def _row_work(m: Model) -> RowWork:

@@ -184,7 +184,7 @@ def test_loads_that_change_themselves_too_much_are_swept():
         machine, go = machine_of(links, ROS3(1e-4))
         go(300)
         ahead = machine.work.bodies.ahead
-        assert bool(ahead[PAUSE] == WATCH) is used
+        assert bool(ahead[PAUSE] < WATCH) is used
         assert bool(ahead[COUNT] > 0.0) is used
 
 

@@ -29,8 +29,8 @@ from ffr_dyn.kernels.views import part
 SETTLED = MEANS + 3  # steps of equal length before F and Q are known; before the loads at the start of one are, MEANS
 JUMP = 0.25  # of the loads at the start of a step, relative to what they are
 # Numbers of `w.ahead`: length of this step; how many before it were as long, or, less than zero, since all this was given up;
-# after how many it may be taken up again; whether the stages of this step are solved so; what the feedback may be, squared;
-# factors of the second and third differences; the first weight of the means.
+# how many there are before it is taken up again, once it is; whether the stages of this step are solved so; what the feedback
+# may be, squared; factors of the second and third differences; the first weight of the means.
 LENGTH, COUNT, PAUSE, IN_USE, BEARABLE, SECOND, THIRD, WEIGHTS = range(8)
 # Numbers of `w.stage`: what part of the step it is after the start, and its weight.
 AT, WEIGHT = range(2)
@@ -64,6 +64,7 @@ def give_up(w):
     """Go on by sweeps for a while, twice as long as the time before; each look that finds nothing wrong halves that again."""
     w.ahead[COUNT], w.ahead[PAUSE] = -1.0, 2.0 * w.ahead[PAUSE]
     fill(part(w.change, 0, w.change.size), 0.0)
+    w.steady[1] = -1.0
 
 
 @kernel

@@ -173,7 +173,7 @@ def solve_stiffened(r, x, target, stage):
             else:
                 copy(w.stiff, w.past[0])
                 looked = True
-                ahead[PAUSE] = max(0.5 * ahead[PAUSE], WATCH)
+                ahead[PAUSE] = max(0.5 * ahead[PAUSE], WATCH / 2)
     if late or expected:
         add_to_means(bodies, w)
         if expected:
