@@ -123,50 +123,52 @@ def renew_all(bodies, w, x):
 
 
 @inlined
+def move(r, w, x, target):
+    """Motion and multipliers, and the loads that they make."""
+    call_unit(r.units[MOTION], r.address, 0.0, x.ctypes.data, target.ctypes.data)
+    find_loads(r, w)
+
+
+@inlined
 def solve_stiffened(r, x, target, stage):
     """`solve_motion` with the geometric stiffening of the bodies that have it.
 
     stage : number of a step's stage, from 0; AGAIN: near the last solution; ASIDE: so, and nothing is kept of it
     """
     bodies, w, ahead = r.model.bodies, r.work.bodies, r.work.bodies.ahead
-    # A later stage of a step without sweeps; the first stage of one, whose feedback has been looked at; sweeps, after which
-    # it may be tried again to do without.
-    late = stage > 0 and ahead[IN_USE] > 0.0
-    expected, looked, waited, enough = False, False, False, STRICT
-    if late:
+    if stage > 0 and ahead[IN_USE] > 0.0:
         stiffen_ahead(bodies, w, x)
-    else:
-        keep_unstiffened(bodies, w)
-        expected = (
-            stage == 0 and ahead[BEARABLE] > 0.0 and call_unit(r.units[START], r.address, 0.0, x.ctypes.data, 0) == 1
-        )
-        if not expected:
-            enough = first_guess(r, w, stage)
-            waited = stage == 0 and ahead[COUNT] <= -ahead[PAUSE]
-            enough = STRICT if waited else enough
-        looked = (ahead[COUNT] - SETTLED) % WATCH > 0.0
+        move(r, w, x, target)
+        add_to_means(bodies, w)
+        return
+    keep_unstiffened(bodies, w)
+    expected = stage == 0 and ahead[BEARABLE] > 0.0 and call_unit(r.units[START], r.address, 0.0, x.ctypes.data, 0) == 1
+    looked = (ahead[COUNT] - SETTLED) % WATCH > 0.0
+    waited, enough = False, STRICT
+    if not expected:
+        enough = first_guess(r, w, stage)
+        waited = stage == 0 and ahead[COUNT] <= -ahead[PAUSE]
+        enough = STRICT if waited else enough
     sweeps, before, feedback, rough = 0, 0.0, 0.0, False
-    while True:  # one loop: each of its parts is compiled once
-        if not late:
-            stiffen(bodies, w)
-        call_unit(r.units[MOTION], r.address, 0.0, x.ctypes.data, target.ctypes.data)
-        find_loads(r, w)
+    while True:
+        stiffen(bodies, w)
+        move(r, w, x, target)
         if expected and not loads_as_expected(bodies, w):
             give_up(w)
             expected = False
-        if late or (expected and looked):
+        if expected and looked:
             break
         greatest, change = renew_all(bodies, w, x)
         sweeps += 1
-        if sweeps == 2:
-            feedback = change / before
-        if expected and sweeps == 1:
-            rough = change > ROUGH * ROUGH * greatest
-        before = change
         small = change <= enough * enough * greatest
+        if sweeps == 1:
+            rough = change > ROUGH * ROUGH * greatest
+        elif sweeps == 2:
+            feedback = change / before
+        before = change
         if not expected and (small or sweeps == SWEEPS):
             break
-        if expected and (small or sweeps == 2):
+        if expected and (small or sweeps == 2):  # the look: on with the expected forces, or with these
             if rough or feedback > ahead[BEARABLE]:
                 give_up(w)
                 expected = False
@@ -174,17 +176,13 @@ def solve_stiffened(r, x, target, stage):
                 copy(w.stiff, w.past[0])
                 looked = True
                 ahead[PAUSE] = max(0.5 * ahead[PAUSE], WATCH / 2)
-    if late or expected:
-        add_to_means(bodies, w)
-        if expected:
-            ahead[IN_USE], w.steady[1] = 1.0, -1.0
-            copy(w.last, w.stiff)
-        return
+    if expected:
+        ahead[IN_USE], w.steady[1] = 1.0, -1.0
+    elif stage >= 0:
+        keep_change(w, stage)
     if waited:
         take_up(w, feedback)
-    if stage >= 0:
-        keep_change(w, stage)
-        if ahead[BEARABLE] > 0.0:
-            add_to_means(bodies, w)
+    if stage >= 0 and ahead[BEARABLE] > 0.0:
+        add_to_means(bodies, w)
     if stage != ASIDE:
         copy(w.last, w.stiff)
