@@ -320,7 +320,8 @@ def _resumed(path: Path, mark: str, machine: Machine, energy: EnergyWatch) -> _R
     changing = {f"machine.{name}": array for name, array in _changing(machine)}
     if any(name not in saved.arrays or saved.arrays[name].shape != array.shape for name, array in changing.items()):
         raise InputError(
-            f"{path} was written by another version of ffr_dyn, which keeps other things; run from the start"
+            f"{path} was written by another version of ffr_dyn, whose runs this one cannot continue; run from the start, to "
+            "another file if that one is still wanted"
         )
     for name, array in changing.items():
         array[...] = saved.arrays[name]
