@@ -28,11 +28,11 @@ import numpy as np
 from benchmarks.exudyn_twin import CENTRE_OF_MASS, UNDEFORMED_BODY, exu, fem_interface, mass_terms, motion, twin
 from benchmarks.exudyn_twin import ObjectFFRFreducedOrderInterface as ReducedOrder
 from benchmarks.scenes import MeshedBody, connecting_rod, pendulum, pendulum_rod, slider_crank
-from ffr_dyn.analyses.assemble import assemble, in_space
 from ffr_dyn.analyses.forward import forward
+from ffr_dyn.consistency.assemble import assemble, in_space
+from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.integrators import RK4, Integrator
-from ffr_dyn.rotation import rotation_matrix
-from ffr_dyn.scene import Scene
+from ffr_dyn.scene.scene import Scene
 
 Array = np.ndarray
 

@@ -43,7 +43,6 @@ from benchmarks.scenes import (  # noqa: E402
     slider_crank,
     with_middle,
 )
-from ffr_dyn.analyses.assemble import Assembled, assemble, in_space  # noqa: E402
 from ffr_dyn.chart.diagram import CPU, Diagram, Lost, Point, spread, work_precision  # noqa: E402
 from ffr_dyn.chart.draw import draw  # noqa: E402
 from ffr_dyn.chart.measures import Measure, Quantity  # noqa: E402
@@ -53,10 +52,11 @@ from ffr_dyn.chart.reference import distance  # noqa: E402
 from ffr_dyn.chart.runner import Span, pool  # noqa: E402
 from ffr_dyn.chart.table import write_table  # noqa: E402
 from ffr_dyn.chart.variants import FULL  # noqa: E402
-from ffr_dyn.result import Result  # noqa: E402
-from ffr_dyn.scene import Scene  # noqa: E402
+from ffr_dyn.consistency.assemble import Assembled, assemble, in_space  # noqa: E402
+from ffr_dyn.results.result import Result  # noqa: E402
+from ffr_dyn.scene.scene import Scene  # noqa: E402
 from ffr_prep.body import FlexibleBody  # noqa: E402
-from ffr_prep.material import Material  # noqa: E402
+from ffr_prep.model.material import Material  # noqa: E402
 
 Array = np.ndarray
 

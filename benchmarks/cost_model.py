@@ -17,14 +17,14 @@ import numpy as np
 from scipy.optimize import nnls
 
 from benchmarks.scene_set import chain, four_bar, slider_crank
-from ffr_dyn.analyses.assemble import assemble
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.economy.choice import Choice, full, held_in_plane
-from ffr_dyn.economy.trial import Span, make
-from ffr_dyn.errors import SimulationError
-from ffr_dyn.scene import Scene
-from ffr_dyn.stopwatch import Stopwatch
-from ffr_dyn.variant import STIFFENING
+from ffr_dyn.consistency.assemble import assemble
+from ffr_dyn.economy.model_choice import Choice, full, held_in_plane
+from ffr_dyn.economy.run import Span, make
+from ffr_dyn.functions.stopwatch import Stopwatch
+from ffr_dyn.scene.scene import Scene
+from ffr_dyn.variants.variant import STIFFENING
+from ffr_prep.common.errors import ComputationError
 
 Array = np.ndarray
 
@@ -65,7 +65,7 @@ def models(scene: Scene) -> Iterator[Choice]:
 
 
 def timed(scene: Scene, choice: Choice, span: Span) -> Timing:
-    """The time loop of a model. Raises SimulationError where its run fails."""
+    """The time loop of a model. Raises ComputationError where its run fails."""
     made = make(scene, choice, span)
     times, evaluations = np.zeros(2), np.zeros(2)
     for k, divisions in enumerate((FEW, MANY)):
@@ -107,7 +107,7 @@ def main() -> None:
         for choice in models(scene):
             try:
                 timings.append(timed(scene, choice, span))
-            except SimulationError:  # bodies in which a term that is missing counts
+            except ComputationError:  # bodies in which a term that is missing counts
                 continue
     A = np.array([features(timing.choice) for timing in timings])
     times = np.array([timing.evaluation for timing in timings])

@@ -14,14 +14,14 @@ from functools import cached_property
 import numpy as np
 
 from benchmarks.scenes import chain, connecting_rod, pendulum, pendulum_rod, slider_crank, with_middle
-from ffr_dyn.analyses.assemble import Assembled, assemble
+from ffr_dyn.compile.engine import fill_rows, new_machine
+from ffr_dyn.compile.workspace import new_record
+from ffr_dyn.consistency.assemble import Assembled, assemble
+from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import RK4, ROS3, Integrator
+from ffr_dyn.integrators.stabilisation import Projection, Stabilisation, gains
 from ffr_dyn.kernels.tables import OK
-from ffr_dyn.machine import fill_rows, new_machine
-from ffr_dyn.memory import new_record
-from ffr_dyn.scene import Scene, marker_number
-from ffr_dyn.stabilisation import Projection, Stabilisation, gains
-from ffr_dyn.stopwatch import Stopwatch
+from ffr_dyn.scene.scene import Scene, marker_number
 from ffr_prep.body import FlexibleBody
 
 Array = np.ndarray

@@ -36,19 +36,19 @@ import numpy as np
 
 from benchmarks.scene_set import CASES, Case, case
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.economy.choice import Choice, Part, orthonormal
+from ffr_dyn.analyses.run import run as whole_run
 from ffr_dyn.economy.cost import of_run, per_evaluation, per_row
-from ffr_dyn.economy.found import Economy
+from ffr_dyn.economy.model_choice import Choice, Part, orthonormal
 from ffr_dyn.economy.outputs import difference, largest
+from ffr_dyn.economy.result import Economy
+from ffr_dyn.economy.run import Span, Trial, make, run
 from ffr_dyn.economy.search import economise
 from ffr_dyn.economy.steps import methods
-from ffr_dyn.economy.trial import Span, Trial, make, run
-from ffr_dyn.errors import InputError, SimulationError
-from ffr_dyn.run import run as whole_run
-from ffr_dyn.scene import Scene
-from ffr_dyn.stopwatch import Stopwatch
-from ffr_dyn.variant import STIFFENING, basis_of
+from ffr_dyn.functions.stopwatch import Stopwatch
+from ffr_dyn.scene.scene import Scene
+from ffr_dyn.variants.variant import STIFFENING, basis_of
 from ffr_prep.body import truncated
+from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray
 
@@ -186,7 +186,7 @@ def true_error(scene: Scene, choice: Choice, span: Span, found: Economy, referen
     """(outputs,) largest error of a model; infinite where its run fails."""
     try:
         return largest(difference(run(make(scene, choice, span), choice, span, found.probe).values, reference.values))
-    except (SimulationError, InputError):
+    except (ComputationError, InputError):
         return np.full(len(found.limits), np.inf)
 
 

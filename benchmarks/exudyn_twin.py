@@ -25,10 +25,10 @@ from exudyn.FEM import FEMinterface, ObjectFFRFreducedOrderInterface
 from exudyn.rigidBodyUtilities import GetRigidBodyNode
 
 from benchmarks.scenes import MeshedBody
-from ffr_dyn.layout import layout
-from ffr_dyn.rotation import rotation_matrix
-from ffr_dyn.scene import GROUND, Scene, joint_of
-from ffr_dyn.timefunction import evaluate
+from ffr_dyn.equations.layout import layout
+from ffr_dyn.functions.rotation import rotation_matrix
+from ffr_dyn.functions.time_functions import evaluate
+from ffr_dyn.scene.scene import GROUND, Scene, joint_of
 from ffr_prep.body import FlexibleBody, Interface
 
 Array = np.ndarray

@@ -29,17 +29,17 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.scenes import chain, pendulum_rod
-from ffr_dyn.analyses.assemble import assemble
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.equations import compile_scene
+from ffr_dyn.compile.engine import fill_rows, new_machine
+from ffr_dyn.compile.scene_tables import compile_scene
+from ffr_dyn.compile.workspace import new_record
+from ffr_dyn.consistency.assemble import assemble
+from ffr_dyn.equations.layout import initial_state
 from ffr_dyn.integrators import RK4, ROS2, ROS3, Integrator
 from ffr_dyn.kernels.tables import OK
-from ffr_dyn.layout import initial_state
-from ffr_dyn.machine import fill_rows, new_machine
-from ffr_dyn.memory import new_record
-from ffr_dyn.scene import Scene
+from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import FlexibleBody
-from ffr_prep.reference import FixedTo
+from ffr_prep.model.reference import FixedTo
 
 STATIC = 6  # shapes of the rod beside its fixed-interface modes
 SECONDS = 0.1  # processor time of one timed run

@@ -19,10 +19,10 @@ import numpy as np
 from PIL import Image
 
 from examples.connecting_rod import TURN, motion, reduced_rod
-from ffr_dyn.film import camera_for, film_at
-from ffr_dyn.render import pictures
-from ffr_dyn.result import Result
-from ffr_dyn.stress_report import stress_report
+from ffr_dyn.pictures.film import camera_for, film_at
+from ffr_dyn.pictures.render import pictures
+from ffr_dyn.pictures.stress_report import stress_report
+from ffr_dyn.results.result import Result
 
 SIZE = (1200, 720)
 MOMENT = 687 / 240 * TURN  # [s], where the rod is bent most

@@ -16,19 +16,19 @@ from dataclasses import replace
 import numpy as np
 
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.drivers import Driver
+from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import RK4, ROS2, Integrator
-from ffr_dyn.joints import Joint
-from ffr_dyn.scene import Body, Scene
-from ffr_dyn.timefunction import polynomial
+from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import FlexibleBody, rigid_body
-from ffr_prep.frame import Member, named, polyline
-from ffr_prep.interface import InterfaceRegion
-from ffr_prep.material import Material
-from ffr_prep.reduction import CraigBampton
-from ffr_prep.reference import SimplySupported
-from ffr_prep.section import rectangle
-from ffr_prep.structural import reduce_frame
+from ffr_prep.model.coupled import InterfaceRegion
+from ffr_prep.model.material import Material
+from ffr_prep.model.reference import SimplySupported
+from ffr_prep.pipelines.structures import reduce_frame
+from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.structures.frame import Member, named, polyline
+from ffr_prep.structures.sections import rectangle
 
 REPEATS = 20
 LINKS = 8

@@ -34,15 +34,16 @@ from benchmarks.preparation_bodies import (
 )
 from benchmarks.scenes import slider_crank
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.drivers import Driver
+from ffr_dyn.functions.time_functions import user
 from ffr_dyn.integrators import ROS2
-from ffr_dyn.joints import Joint
-from ffr_dyn.result import Result
-from ffr_dyn.scene import Body, Scene
-from ffr_dyn.timefunction import user
+from ffr_dyn.results.result import Result
+from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import FlexibleBody, truncated
-from ffr_prep.planar import in_plane
-from ffr_prep.reference import FixedTo, MeanAxis, SimplySupported
+from ffr_prep.body.planar import in_plane
+from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
+from ffr_prep.reduction.conversion import with_reference
 
 Array = np.ndarray
 
@@ -271,7 +272,7 @@ def conversions() -> Iterator[Figure]:
     """Geometric stiffness in another frame, of the body alone and of a direct reduction there."""
     for kind in ("beams", "solid"):
         for new in (SimplySupported("root", "tip"), MeanAxis()):
-            converted, direct = strip(kind, FixedTo("root")).with_reference(new), strip(kind, new)
+            converted, direct = with_reference(strip(kind, FixedTo("root")), new), strip(kind, new)
             shapes = (body.surface.Phi.reshape(-1, body.n) for body in (converted, direct))
             X = np.linalg.lstsq(*shapes, rcond=None)[0]
             scale = np.sqrt(np.outer(direct.omega2, direct.omega2))

@@ -9,18 +9,18 @@ from pathlib import Path
 import numpy as np
 
 from ffr_prep.body import FlexibleBody, truncated
-from ffr_prep.frame import Member, Shell, joined, named, panel, polyline, triangulated
-from ffr_prep.interface import InterfaceRegion
-from ffr_prep.material import Material
-from ffr_prep.mesh import Block, Mesh, read_mesh
-from ffr_prep.planar import in_plane
-from ffr_prep.reduce import reduce_mesh
-from ffr_prep.reduction import CraigBampton, Eigenmodes, Guyan, Union
-from ffr_prep.reference import FixedTo, MeanAxis, ReferenceConditions, SimplySupported
-from ffr_prep.section import Section, circle, general, rectangle, shear_rigid, with_mass_moments
-from ffr_prep.selection import Band
-from ffr_prep.static_shapes import InertiaRelief
-from ffr_prep.structural import reduce_frame
+from ffr_prep.body.planar import in_plane
+from ffr_prep.mesh.mesh import Block, Mesh, read_mesh
+from ffr_prep.model.coupled import InterfaceRegion
+from ffr_prep.model.material import Material
+from ffr_prep.model.reference import FixedTo, MeanAxis, ReferenceConditions, SimplySupported
+from ffr_prep.pipelines.mesh import reduce_mesh
+from ffr_prep.pipelines.structures import reduce_frame
+from ffr_prep.reduction.component_modes import CraigBampton, Eigenmodes, Guyan, Union
+from ffr_prep.reduction.selection import Band
+from ffr_prep.reduction.static_shapes import InertiaRelief
+from ffr_prep.structures.frame import Member, Shell, joined, named, panel, polyline, triangulated
+from ffr_prep.structures.sections import Section, circle, general, rectangle, shear_rigid, with_mass_moments
 
 Array = np.ndarray
 

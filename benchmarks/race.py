@@ -45,7 +45,7 @@ from benchmarks.exudyn_twin import exu, quiet  # noqa: E402
 from benchmarks.race_exudyn import FIRST, TRAPEZOIDAL, USUAL, Way, fastest, run, variants  # noqa: E402
 from benchmarks.race_stiffening import report as report_stiffening  # noqa: E402
 from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator, tolerances  # noqa: E402
-from ffr_dyn.stabilisation import Projection  # noqa: E402
+from ffr_dyn.integrators.stabilisation import Projection  # noqa: E402
 
 FINEST = 1024  # steps per output step that are still tried
 CLOSE = 1.06  # ratio of steps at which the search ends

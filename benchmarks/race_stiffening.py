@@ -19,16 +19,16 @@ import numpy as np
 from benchmarks.courses import FIXED_INTERFACE_MODES, chained
 from benchmarks.scenes import MESHES, pendulum, slider_crank, with_middle
 from ffr_dyn.analyses.forward import forward
+from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import ROS3
-from ffr_dyn.scene import Scene
-from ffr_dyn.stopwatch import Stopwatch
+from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import FlexibleBody
-from ffr_prep.interface import InterfaceRegion
-from ffr_prep.material import Material
-from ffr_prep.mesh import read_mesh
-from ffr_prep.reduce import reduce_mesh
-from ffr_prep.reduction import CraigBampton
-from ffr_prep.reference import SimplySupported
+from ffr_prep.mesh.mesh import read_mesh
+from ffr_prep.model.coupled import InterfaceRegion
+from ffr_prep.model.material import Material
+from ffr_prep.model.reference import SimplySupported
+from ffr_prep.pipelines.mesh import reduce_mesh
+from ffr_prep.reduction.component_modes import CraigBampton
 
 EXACT = 4.6592e-3  # m
 GOAL = 1.3

@@ -14,12 +14,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.scenes import connecting_rod, slider_crank
-from ffr_dyn.forces import Load
+from ffr_dyn.functions.time_functions import signal
 from ffr_dyn.integrators import ROS2
-from ffr_dyn.realtime import SOFT, lines, measure_steps, plot_times
-from ffr_dyn.scene import Scene
-from ffr_dyn.stabilisation import Projection
-from ffr_dyn.timefunction import signal
+from ffr_dyn.integrators.stabilisation import Projection
+from ffr_dyn.realtime.deadline import SOFT, lines, measure_steps, plot_times
+from ffr_dyn.scene.forces import Load
+from ffr_dyn.scene.scene import Scene
 
 STEP = 1e-3  # s
 KEPT = Projection(1e-6)  # m

@@ -17,20 +17,20 @@ from functools import cache, partial
 
 import numpy as np
 
-from ffr_dyn.drivers import Driver
-from ffr_dyn.forces import Load, SpringDamper
-from ffr_dyn.formula import formula
-from ffr_dyn.joints import Joint
-from ffr_dyn.scene import Body, Scene
-from ffr_dyn.timefunction import TimeFunction, harmonic
+from ffr_dyn.functions.formula import formula
+from ffr_dyn.functions.time_functions import TimeFunction, harmonic
+from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.forces import Load, SpringDamper
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import FlexibleBody, rigid_body
-from ffr_prep.frame import Member, named, polyline
-from ffr_prep.interface import InterfaceRegion
-from ffr_prep.material import Material
-from ffr_prep.reduction import CraigBampton
-from ffr_prep.reference import FixedTo, ReferenceConditions, SimplySupported
-from ffr_prep.section import Section, circle, general, rectangle, tube
-from ffr_prep.structural import reduce_frame
+from ffr_prep.model.coupled import InterfaceRegion
+from ffr_prep.model.material import Material
+from ffr_prep.model.reference import FixedTo, ReferenceConditions, SimplySupported
+from ffr_prep.pipelines.structures import reduce_frame
+from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.structures.frame import Member, named, polyline
+from ffr_prep.structures.sections import Section, circle, general, rectangle, tube
 
 GRAVITY = (0.0, -9.81, 0.0)
 STEEL = Material("steel", 2e11, 0.3, 7870.0)
@@ -297,7 +297,7 @@ def case(name: str) -> Case:
 
 
 def main() -> None:
-    from ffr_dyn.analyses.assemble import assemble
+    from ffr_dyn.consistency.assemble import assemble
 
     for one in CASES:
         began = time.perf_counter()

@@ -14,20 +14,21 @@ import numpy as np
 import scipy.sparse as sp
 from threadpoolctl import threadpool_limits
 
-from ffr_dyn.drivers import Driver
-from ffr_dyn.joints import Joint
-from ffr_dyn.scene import Body, Scene
-from ffr_dyn.timefunction import polynomial
-from ffr_prep.basis import factorised
+from ffr_dyn.functions.time_functions import polynomial
+from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import FlexibleBody, rigid_body, with_point
-from ffr_prep.interface import InterfaceRegion, couple
-from ffr_prep.material import Material
-from ffr_prep.mesh import read_mesh
-from ffr_prep.reduce import reduce_mesh
-from ffr_prep.reduction import CraigBampton
-from ffr_prep.reference import ReferenceConditions, SimplySupported, functionals
-from ffr_prep.solid_model import nodal_basis
-from ffr_prep.solids import assemble, vector_mass
+from ffr_prep.mesh.mesh import read_mesh
+from ffr_prep.model.coupled import InterfaceRegion
+from ffr_prep.model.material import Material
+from ffr_prep.model.reference import ReferenceConditions, SimplySupported, functionals
+from ffr_prep.pipelines.mesh import reduce_mesh
+from ffr_prep.reduction.basis import factorised
+from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.solids.assembly import assemble, vector_mass
+from ffr_prep.solids.interfaces import couple
+from ffr_prep.solids.model import nodal_basis
 
 Array = np.ndarray
 

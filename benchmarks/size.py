@@ -33,15 +33,15 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse.linalg as spl
 
-from ffr_prep.basis import Basis, diagonalised, restricted
 from ffr_prep.body import FlexibleBody, save_body
-from ffr_prep.factor import FreeBody, Solver
-from ffr_prep.interface import CoupledModel, InterfaceRegion
-from ffr_prep.material import material
-from ffr_prep.mesh import read_mesh
-from ffr_prep.reduce import reduce_mesh
-from ffr_prep.reduction import CraigBampton
-from ffr_prep.reference import SimplySupported
+from ffr_prep.mesh.mesh import read_mesh
+from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
+from ffr_prep.model.material import material
+from ffr_prep.model.reference import SimplySupported
+from ffr_prep.pipelines.mesh import reduce_mesh
+from ffr_prep.reduction.basis import Basis, diagonalised, restricted
+from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.solvers.factor import FreeBody, Solver
 
 Array = np.ndarray
 
@@ -107,9 +107,9 @@ def run(mesh_file: Path, body_file: Path, solver: str, ranks: int) -> None:
 def _reduced(mesh: Any, solver: str, ranks: int, clock: Clock) -> FlexibleBody:
     own: dict[str, Any] = {"solver": Solver(solver, ranks)} if solver != "eigsh" else {}
     if solver == "eigsh":
-        import ffr_prep.model
+        import ffr_prep.model.model
 
-        ffr_prep.model.factorised = lambda *_: None  # type: ignore[assignment]  # its work is the peer's own
+        ffr_prep.model.model.factorised = lambda *_: None  # type: ignore[assignment]  # its work is the peer's own
     return reduce_mesh(
         mesh,
         name="rod",

@@ -54,15 +54,15 @@ from benchmarks.exudyn_twin import (  # noqa: E402
     twin,
 )
 from benchmarks.scenes import chain, free_body, pendulum_rod  # noqa: E402
-from ffr_dyn.analyses.assemble import assemble  # noqa: E402
+from ffr_dyn.compile.engine import fill_rows, new_machine  # noqa: E402
+from ffr_dyn.compile.workspace import new_record  # noqa: E402
+from ffr_dyn.consistency.assemble import assemble  # noqa: E402
 from ffr_dyn.integrators import RK4, ROS2, Integrator  # noqa: E402
+from ffr_dyn.integrators.stabilisation import Projection, gains  # noqa: E402
 from ffr_dyn.kernels.tables import OK  # noqa: E402
-from ffr_dyn.machine import fill_rows, new_machine  # noqa: E402
-from ffr_dyn.memory import new_record  # noqa: E402
-from ffr_dyn.scene import Scene, marker_number  # noqa: E402
-from ffr_dyn.stabilisation import Projection, gains  # noqa: E402
+from ffr_dyn.scene.scene import Scene, marker_number  # noqa: E402
 from ffr_prep.body import FlexibleBody  # noqa: E402
-from ffr_prep.reference import FixedTo  # noqa: E402
+from ffr_prep.model.reference import FixedTo  # noqa: E402
 
 Array = np.ndarray
 

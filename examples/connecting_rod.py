@@ -13,7 +13,7 @@ import sys
 import time
 from pathlib import Path
 
-from ffr_dyn.compilation import begin_compiling
+from ffr_dyn.compile.first_use import begin_compiling
 from ffr_dyn.integrators import ROS2
 
 if __name__ == "__main__":
@@ -22,22 +22,22 @@ if __name__ == "__main__":
 import numpy as np
 
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.animate import animate
-from ffr_dyn.drivers import Driver
-from ffr_dyn.joints import Joint
-from ffr_dyn.plots import plot
-from ffr_dyn.progress import progress
-from ffr_dyn.result import Result
-from ffr_dyn.scene import Body, Scene
-from ffr_dyn.stress_report import report_lines, stress_report
-from ffr_dyn.timefunction import polynomial
+from ffr_dyn.cli.progress_bar import progress
+from ffr_dyn.functions.time_functions import polynomial
+from ffr_dyn.pictures.animate import animate
+from ffr_dyn.pictures.histories import plot
+from ffr_dyn.pictures.stress_report import report_lines, stress_report
+from ffr_dyn.results.result import Result
+from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import FlexibleBody, rigid_body, save_body, with_point
-from ffr_prep.interface import InterfaceRegion
-from ffr_prep.material import material
-from ffr_prep.mesh import read_mesh
-from ffr_prep.reduce import reduce_mesh
-from ffr_prep.reduction import CraigBampton
-from ffr_prep.reference import SimplySupported
+from ffr_prep.mesh.mesh import read_mesh
+from ffr_prep.model.coupled import InterfaceRegion
+from ffr_prep.model.material import material
+from ffr_prep.model.reference import SimplySupported
+from ffr_prep.pipelines.mesh import reduce_mesh
+from ffr_prep.reduction.component_modes import CraigBampton
 
 GEOMETRY = Path(__file__).resolve().parent.parent / "meshes" / "connecting_rod.geo"
 THROW, ROD = 0.045, 0.150  # crank radius and distance of the eyes [m]

@@ -8,8 +8,8 @@ from itertools import permutations, product
 
 import numpy as np
 
-from ffr_prep.material import Material
-from ffr_prep.mesh import Block, Mesh
+from ffr_prep.mesh.mesh import Block, Mesh
+from ffr_prep.model.material import Material
 
 STEEL = Material(name="steel", E=2.1e11, nu=0.3, rho=7850.0)
 KINDS = ("tet4", "tet10", "hex8", "hex20", "hex27")

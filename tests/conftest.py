@@ -1,10 +1,15 @@
 """What holds for every test."""
 
 import signal
+import sys
+from pathlib import Path
 
 import pytest
 import scipy.linalg  # noqa: F401 - a library must be loaded before it can be limited
 from threadpoolctl import threadpool_limits
+
+# Tests borrow scenes and bodies from each other across the folders.
+sys.path += sorted(str(folder) for folder in Path(__file__).parent.rglob("[!_.]*") if folder.is_dir())
 
 # One BLAS thread: as `reduce_mesh` has it, so that what a test computes beside it is equal bit by bit.
 threadpool_limits(1)

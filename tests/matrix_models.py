@@ -6,13 +6,13 @@ import numpy as np
 import scipy.sparse as sp
 from boxes import STEEL, box_mesh
 
-from ffr_prep.families import families
-from ffr_prep.frame import Frame, Member, joined, named, polyline
-from ffr_prep.matrix_model import MatrixModel
-from ffr_prep.mesh import Mesh, region_nodes
-from ffr_prep.section import Section, rectangle, shifted, tube
-from ffr_prep.solids import assemble, vector_mass
-from ffr_prep.structural import assemble_frame
+from ffr_prep.matrices.model import MatrixModel
+from ffr_prep.mesh.mesh import Mesh, region_nodes
+from ffr_prep.solids.assembly import assemble, vector_mass
+from ffr_prep.structures.element_families import families
+from ffr_prep.structures.frame import Frame, Member, joined, named, polyline
+from ffr_prep.structures.model import assemble_frame
+from ffr_prep.structures.sections import Section, rectangle, shifted, tube
 
 
 def rod(section: Section, length: float, elements: int) -> Frame:

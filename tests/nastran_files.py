@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
-from ffr_prep.matrix_model import MatrixModel
+from ffr_prep.matrices.model import MatrixModel
 
 
 def write_op2(model: MatrixModel, path: Path, *, wide: bool = True) -> Path:

@@ -21,7 +21,7 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
 from ffr_dyn.analyses.servo import ServoMotion, at_moment, at_rest, slope, slope_matrix
-from ffr_dyn.errors import InputError, SimulationError
+from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray
 
@@ -63,12 +63,12 @@ def bounded_solution(
 ) -> tuple[Array, Array, list[Array], list[str]]:
     """Times (T,), w (T, 2 d), states x, and notes.
 
-    Raises InputError when the known motion does not start and end at rest; SimulationError when nothing converges.
+    Raises InputError when the known motion does not start and end at rest; ComputationError when nothing converges.
     """
     route = _equilibria(own, output_step, w, x)
     first, last = (_end(own, *route[k]) for k in (0, -1))
     if first.growing.shape[0] + last.other.shape[0] != w.size or first.growing.shape != last.growing.shape:
-        raise SimulationError(
+        raise ComputationError(
             f"the internal dynamics have {first.growing.shape[0]} growing motions at the start and "
             f"{last.growing.shape[0]} at the end: there is no bounded solution that belongs to both"
         )
@@ -113,7 +113,7 @@ def _equilibrium(own: ServoMotion, time: float, y: Array, x: Array) -> tuple[Arr
             if np.abs(now.y_ddot).max() <= REST * max(1.0, float(np.abs(stiffness).max())):
                 return y, x
             break  # forces along a motion without stiffness
-    raise SimulationError(
+    raise ComputationError(
         f"at t = {time:.6g} s the internal dynamics have no equilibrium near the known motion: nothing holds "
         f"{', '.join(own.names)} against the forces there; add a spring, or let another motion be known"
     )
@@ -171,7 +171,7 @@ def _collocated(
             matrices = np.array([slope_matrix(own, t, w, x) for t, w, x in zip(times, ws, xs, strict=True)])
             solve, renewed = _linear(times, matrices, first, last), True
         before = size
-    raise SimulationError(
+    raise ComputationError(
         f"the bounded solution did not converge: the last correction was {size:.3g}; use a smaller output step or more parts"
     )
 

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ffr_dyn.analyses.evaluation import Evaluator
-from ffr_dyn.errors import InputError
-from ffr_dyn.force_tables import actions_of
-from ffr_dyn.forces import Load
-from ffr_dyn.joint_forces import Actuator
-from ffr_dyn.joints import Joint
-from ffr_dyn.machine import with_model
-from ffr_dyn.scene import Scene
-from ffr_dyn.timefunction import TimeFunction, constant, piecewise
+from ffr_dyn.compile.engine import with_model
+from ffr_dyn.consistency.evaluation import Evaluator
+from ffr_dyn.functions.time_functions import TimeFunction, constant, piecewise
+from ffr_dyn.scene.applied_loads import actions_of
+from ffr_dyn.scene.forces import Load
+from ffr_dyn.scene.joint_forces import Actuator
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.errors import InputError
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly

@@ -14,19 +14,19 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.analyses.evaluation import evaluator
-from ffr_dyn.analyses.tangent import chart, state_matrix
-from ffr_dyn.equations import System
-from ffr_dyn.errors import SimulationError
-from ffr_dyn.inertia import mass_matrix
+from ffr_dyn.compile.engine import fill_rows, new_machine
+from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.compile.workspace import new_record
+from ffr_dyn.consistency.evaluation import evaluator
+from ffr_dyn.consistency.tangent import chart, state_matrix
+from ffr_dyn.equations.inertia import mass_matrix
+from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.integrators import Integrator
+from ffr_dyn.integrators.stabilisation import excess_of_gains
 from ffr_dyn.kernels.tables import NOT_FINITE, OK, Record
-from ffr_dyn.machine import fill_rows, new_machine
-from ffr_dyn.memory import new_record
-from ffr_dyn.power import power
-from ffr_dyn.rotation import rotation_matrix
-from ffr_dyn.stabilisation import excess_of_gains
-from ffr_dyn.view import View
+from ffr_dyn.results.power import power
+from ffr_dyn.results.recorded_motion import View
+from ffr_prep.common.errors import ComputationError
 
 Array = np.ndarray
 
@@ -74,7 +74,7 @@ class EnergyWatch:
     anchor: _Row | None = None
 
     def look(self, rows: Record) -> None:
-        """Take note of the rows that follow. Raises SimulationError when their energy comes from nowhere."""
+        """Take note of the rows that follow. Raises ComputationError when their energy comes from nowhere."""
         with np.errstate(all="ignore"):
             energy, powers = rows.energy[:, 0] + rows.energy[:, 1], _powers(self.system, rows)
             if self.anchor is None:
@@ -108,20 +108,20 @@ class EnergyWatch:
         return self.begun + np.maximum(work, 0.0).sum(axis=1) + height - rows.energy[:, 2]
 
     def _looked_into(self, row: _Row) -> _Row:
-        """The row. Raises SimulationError when a quarter of the step tells that its energy has no source."""
+        """The row. Raises ComputationError when a quarter of the step tells that its energy has no source."""
         anchor = self.anchor
         assert anchor is not None
         status, fine = self._again(anchor, row.time)
         found = float(fine.energy[-1, :2].sum()) if status == OK else np.inf
         if status == NOT_FINITE or (status == OK and not found >= 0.5 * row.energy):
-            raise SimulationError(self._told(anchor, row, found))
+            raise ComputationError(self._told(anchor, row, found))
         if status == OK and not abs(found - row.energy) <= AGREED * row.energy and self._accountable():
             with np.errstate(all="ignore"):
                 powers = _powers(self.system, self.complete(fine)).sum(axis=1)
                 work = float(np.diff(fine.time, prepend=anchor.time) @ powers)
                 grown = float(fine.energy[-1].sum()) - anchor.total
             if not grown - work <= 0.5 * found:
-                raise SimulationError(self._told(anchor, row, found))
+                raise ComputationError(self._told(anchor, row, found))
         return row
 
     def _again(self, anchor: _Row, end: float) -> tuple[int, Record]:
@@ -209,6 +209,6 @@ def _fastest(system: System, row: _Row) -> float:
     """Largest modulus of an eigenvalue of the scene at a row [1/s]; zero where it has none."""
     try:
         A, _ = state_matrix(chart(evaluator(system), row.time, row.x, row.v))
-    except (SimulationError, np.linalg.LinAlgError):
+    except (ComputationError, np.linalg.LinAlgError):
         return 0.0
     return float(np.abs(np.linalg.eigvals(A)).max(initial=0.0)) if np.isfinite(A).all() else 0.0

@@ -16,16 +16,16 @@ from typing import Any, Literal
 import numpy as np
 from scipy.optimize import brentq
 
-from ffr_dyn.analyses.assemble import Assembled
-from ffr_dyn.equations import System
-from ffr_dyn.errors import InputError, SimulationError
+from ffr_dyn.compile.engine import Machine, fill_rows, new_machine, record_row
+from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.compile.workspace import new_record
+from ffr_dyn.consistency.assemble import Assembled
+from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.kernels.tables import OK, Record
-from ffr_dyn.machine import Machine, fill_rows, new_machine, record_row
-from ffr_dyn.measure import catalogue
-from ffr_dyn.memory import new_record
-from ffr_dyn.state import StateView
-from ffr_dyn.view import View
+from ffr_dyn.results.quantities import catalogue
+from ffr_dyn.results.recorded_motion import View
+from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray
 
@@ -37,7 +37,7 @@ class Event:
     """A moment at which `quantity` passes `value`.
 
     quantity  : a component of a result, such as "rod.tip.position.y" or "hinge.angle", or a Python function (t, state) ->
-                number; `state` is a `ffr_dyn.state.StateView`
+                number; `state` is a `ffr_dyn.equations.state_view.StateView`
     direction : "rising", "falling" or "either"
     stop      : the run ends there
 
@@ -94,7 +94,7 @@ class Watcher:
         """Take the state of a run's machine as what comes before the first row."""
         first = new_record(self._system, 1)
         if record_row(machine, time, first, 0) != OK:
-            raise SimulationError(f"at t = {time:.6g} s the start has no accelerations")
+            raise ComputationError(f"at t = {time:.6g} s the start has no accelerations")
         self._memory = [seen(first, None)[1] for seen in self._seen]
         self._last = first
 
@@ -154,7 +154,7 @@ class Watcher:
         machine = new_machine(self._system, rows.x[k], rows.v[k], method, self._gains, start=time, spacing=length)
         machine.work.loads.reference[:] = rows.action[k, :, 0]
         if fill_rows(machine, method, end, time, 1) != OK:
-            raise SimulationError(f"at t = {time:.6g} s an event cannot be located: a shorter step from there fails")
+            raise ComputationError(f"at t = {time:.6g} s an event cannot be located: a shorter step from there fails")
         return end
 
 

@@ -10,24 +10,24 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.analyses.assemble import Assembled, assemble
+from ffr_dyn.analyses.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
 from ffr_dyn.analyses.energy import EnergyWatch
 from ffr_dyn.analyses.events import Event, Watcher
-from ffr_dyn.analyses.failure import failure
-from ffr_dyn.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
-from ffr_dyn.errors import InputError, SimulationError
+from ffr_dyn.compile.engine import Machine, fill_rows, new_machine, record_row
+from ffr_dyn.compile.workspace import new_record
+from ffr_dyn.consistency.assemble import Assembled, assemble
+from ffr_dyn.consistency.failure import failure
+from ffr_dyn.consistency.validity import doubts, extremes, meaningless
+from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince, Integrator
+from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation, excess_of_gains, gains
 from ffr_dyn.kernels.tables import AT, NOW, OK, Record, Work
-from ffr_dyn.machine import Machine, fill_rows, new_machine, record_row
-from ffr_dyn.measure import Entry, Memory, measure, needs_every_step, selected
-from ffr_dyn.memory import new_record
-from ffr_dyn.result import Quantity, Result
-from ffr_dyn.result_file import ResultWriter, load_checkpoint, load_result
-from ffr_dyn.scene import Scene
-from ffr_dyn.stabilisation import Baumgarte, Projection, Stabilisation, excess_of_gains, gains
-from ffr_dyn.stopwatch import Stopwatch
-from ffr_dyn.validity import doubts, extremes, meaningless
+from ffr_dyn.results.file import ResultWriter, load_checkpoint, load_result
+from ffr_dyn.results.quantities import Entry, Memory, measure, needs_every_step, selected
+from ffr_dyn.results.result import Quantity, Result
+from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import Surface
+from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray
 
@@ -68,18 +68,16 @@ def forward(
     """Integrate the equations of motion of a scene from `start` to `end` [s], keeping a row every `output_step` [s].
 
     method      : RK4(step), ROS2(step), ...; by default ROS2 with a tenth of the output step
-    outputs     : names or patterns of the quantities to keep (see `ffr_dyn.measure.selected`), such as "default",
-                  "rod.*.acceleration", "*.power"
-    events      : moments to find (see `ffr_dyn.analyses.events`), which the attribute "events" of the result lists with
-                  their states; one may end the run, and its row is the last one then
+    outputs     : names or patterns of the quantities to keep (`ffr_dyn.results.quantities.selected`), such as "*.power"
+    events      : moments to find (`ffr_dyn.analyses.events`), listed in the result's attribute "events"; one may end the run
     path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
-    resume      : a result file (its `path` of before) whose run goes on from its last rows as if it had never stopped, to
-                  the bit; `end` may be later than it was. A file that does not exist yet is a run from the start
+    resume      : a result file whose run goes on from its last rows as if it had never stopped, to the bit; `end` may be
+                  later than it was. A file that does not exist yet is a run from the start
     progress    : called with the time reached, a few times a second
     stopwatch   : takes the time of the integrator's compiled loop
     assembled   : what `assemble` made of the scene at `start`, for programs that run it more than once
 
-    Raises InputError for a scene or settings that cannot be used, SimulationError when the run fails: the message gives
+    Raises InputError for a scene or settings that cannot be used, ComputationError when the run fails: the message gives
     the time, the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
     if not 0 < output_step < np.inf:
@@ -221,7 +219,7 @@ def _advance(
             run.times.append(times)
             run.extremes = np.maximum(run.extremes, extremes(system, kept))
             if lost := meaningless(system.scene, run.extremes):
-                raise SimulationError(f"by t = {times[-1]:.6g} s {lost}")
+                raise ComputationError(f"by t = {times[-1]:.6g} s {lost}")
             run.done += filled // looks * substeps
             yield times, part
         if ends:

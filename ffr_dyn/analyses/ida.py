@@ -16,19 +16,20 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.analyses.assemble import Assembled
-from ffr_dyn.analyses.evaluation import (
+from ffr_dyn.consistency.assemble import Assembled
+from ffr_dyn.consistency.evaluation import (
     Evaluator,
     accelerations,
+    closed,
     evaluate,
     evaluated_mass_matrix,
     locked,
+    position_rates,
     to_body_axes,
     to_global_axes,
 )
-from ffr_dyn.analyses.reference import closed, position_rates
-from ffr_dyn.errors import InputError, SimulationError
-from ffr_dyn.layout import Layout
+from ffr_dyn.equations.layout import Layout
+from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray
 
@@ -51,7 +52,7 @@ class _Parts:
 def by_ida(
     assembled: Assembled, at: Evaluator, times: Array, rtol: float, atol: float
 ) -> Iterator[tuple[float, Array, Array]]:
-    """(time, x, v) at the output times. Raises InputError without the package, SimulationError when IDA gives up."""
+    """(time, x, v) at the output times. Raises InputError without the package, ComputationError when IDA gives up."""
     try:
         from sksundae.ida import IDA
     except ImportError:
@@ -78,7 +79,7 @@ def by_ida(
     for time in times[1:].tolist():
         done = solver.step(time, tstop=time)
         if not done.success or not np.isfinite(done.y).all():
-            raise SimulationError(
+            raise ComputationError(
                 f"IDA gave up before t = {time:.6g} s: {done.message}; use other tolerances or another method"
             )
         yield time, *closed(at, time, done.y[part.x].copy(), done.y[part.v].copy())

@@ -12,19 +12,19 @@ from pathlib import Path
 
 import numpy as np
 
-from ffr_dyn.analyses.assemble import Assembled, assemble, flattened
-from ffr_dyn.analyses.evaluation import Evaluator, copied, evaluate, evaluator, joined, locked, moved, to_global_axes
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.kinematic import kinematic, undeformed
-from ffr_dyn.analyses.mobility import require_driven
 from ffr_dyn.analyses.outcome import efforts, needed, only, result_of, with_quantities
-from ffr_dyn.errors import InputError, SimulationError
+from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
+from ffr_dyn.consistency.evaluation import Evaluator, copied, evaluate, evaluator, joined, locked, moved, to_global_axes
+from ffr_dyn.consistency.mobility import require_driven
+from ffr_dyn.consistency.validity import extremes, strained
 from ffr_dyn.integrators import Integrator
-from ffr_dyn.measure import selected
-from ffr_dyn.result import Result
-from ffr_dyn.scene import Scene
-from ffr_dyn.stabilisation import Projection, Stabilisation
-from ffr_dyn.validity import extremes, strained
+from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
+from ffr_dyn.results.quantities import selected
+from ffr_dyn.results.result import Result
+from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray
 
@@ -64,7 +64,7 @@ def inverse(
 
     outputs : names or patterns of the quantities to keep beside the efforts, as in `forward`
 
-    Raises InputError when a rigid motion is left free or prescribed twice; SimulationError when the run fails.
+    Raises InputError when a rigid motion is left free or prescribed twice; ComputationError when the run fails.
     """
     require_driven(undeformed(scene), start, "inverse dynamics")
     if isinstance(elastic, QuasiStatic):
@@ -173,7 +173,7 @@ def _deformed(
         if size > 0.1 * before:
             tangent = None
         before = size
-    raise SimulationError(
+    raise ComputationError(
         f"at t = {time:.6g} s no quasi-static deformation was found: the load is near to buckling a body, or the elastic "
         "forces are not finite; use elastic=Dynamic()"
     )

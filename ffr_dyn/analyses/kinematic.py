@@ -14,8 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ffr_dyn.analyses.assemble import Assembled, assemble
-from ffr_dyn.analyses.evaluation import (
+from ffr_dyn.analyses.forward import with_all_reactions
+from ffr_dyn.analyses.outcome import output_times, result_of
+from ffr_dyn.consistency.assemble import Assembled, assemble
+from ffr_dyn.consistency.evaluation import (
     Evaluation,
     Evaluator,
     copied,
@@ -26,15 +28,13 @@ from ffr_dyn.analyses.evaluation import (
     to_global_axes,
     total_mass_matrix,
 )
-from ffr_dyn.analyses.forward import with_all_reactions
-from ffr_dyn.analyses.mobility import named_motion, require_driven
-from ffr_dyn.analyses.outcome import output_times, result_of
-from ffr_dyn.errors import SimulationError
+from ffr_dyn.consistency.mobility import named_motion, require_driven
 from ffr_dyn.kernels.tables import Record
-from ffr_dyn.measure import selected
-from ffr_dyn.result import Result
-from ffr_dyn.scene import Body, Scene
+from ffr_dyn.results.quantities import selected
+from ffr_dyn.results.result import Result
+from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import truncated
+from ffr_prep.common.errors import ComputationError
 
 Array = np.ndarray
 
@@ -72,7 +72,7 @@ def kinematic(
 
     outputs : names or patterns of the quantities to keep beside the efforts, as in `forward`
 
-    Raises InputError when a rigid motion is left free or prescribed twice, SimulationError when the mechanism locks: the
+    Raises InputError when a rigid motion is left free or prescribed twice, ComputationError when the mechanism locks: the
     message gives the time and the joint at its dead point. Positions that are nearly or exactly singular on the way, where
     the motion could branch, are told in the notes.
     """
@@ -178,23 +178,23 @@ def _conditioning(at: Evaluator, now: Evaluation, x: Array) -> tuple[float, floa
     return float(values[place.v_size - 1]), sign, np.linalg.solve(lower.T, basis[place.v_size - 1])
 
 
-def _locked(at: Evaluator, pose: _Pose) -> SimulationError:
+def _locked(at: Evaluator, pose: _Pose) -> ComputationError:
     drivers = ", ".join(repr(driver.name) for driver in at.system.scene.drivers)
-    return SimulationError(
+    return ComputationError(
         f"at t = {pose.time:.6g} s the mechanism locks: {pose.joint} is at a dead point beyond which no position meets the "
         f"joints and drivers ({drivers}); keep the driven motion within reach, or drive another joint"
     )
 
 
 def _recorded(assembled: Assembled, poses: list[_Pose]) -> Record:
-    """Rows of the result. Raises SimulationError where a pose is singular, since accelerations are not determined there."""
+    """Rows of the result. Raises ComputationError where a pose is singular, since accelerations are not determined there."""
     at, best = evaluator(assembled.system), max(pose.conditioning for pose in poses)
     rows = []
     for pose in poses:
         v = to_global_axes(assembled.system.layout, pose.x, pose.v)
         now = evaluate(at, pose.time, pose.x, v)
         if now.singular or pose.conditioning < SINGULAR * best:
-            raise SimulationError(
+            raise ComputationError(
                 f"at t = {pose.time:.6g} s the position is singular: the drivers do not determine the motion of "
                 f"{pose.joint}; choose output times that miss it, or drive another joint"
             )

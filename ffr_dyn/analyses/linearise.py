@@ -14,17 +14,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffr_dyn.analyses.assemble import assemble, in_space
 from ffr_dyn.analyses.efforts import Effort, sized, with_units
-from ffr_dyn.analyses.evaluation import Evaluator, evaluate, evaluator, to_global_axes
-from ffr_dyn.analyses.mobility import named_motion
 from ffr_dyn.analyses.outcome import result_of
-from ffr_dyn.analyses.tangent import Chart, chart, derivative, rates, sizes, state, state_matrix
-from ffr_dyn.errors import InputError
-from ffr_dyn.machine import with_model
-from ffr_dyn.measure import catalogue
-from ffr_dyn.result import Axis, Quantity, Result
-from ffr_dyn.scene import Scene
+from ffr_dyn.compile.engine import with_model
+from ffr_dyn.consistency.assemble import assemble, in_space
+from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator, to_global_axes
+from ffr_dyn.consistency.mobility import named_motion
+from ffr_dyn.consistency.tangent import Chart, chart, derivative, rates, sizes, state, state_matrix
+from ffr_dyn.results.quantities import catalogue
+from ffr_dyn.results.result import Axis, Quantity, Result
+from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
 

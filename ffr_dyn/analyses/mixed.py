@@ -17,22 +17,22 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.analyses.assemble import assemble, flattened
 from ffr_dyn.analyses.bounded import Bounded, bounded_solution
 from ffr_dyn.analyses.efforts import Effort, JointEffort, MarkerEffort, sized, unit, with_units
-from ffr_dyn.analyses.evaluation import Evaluator, evaluator, joined, record_states
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.outcome import efforts, needed, only, output_times, result_of, with_quantities
 from ffr_dyn.analyses.servo import Moment, ServoMotion, at_moment, internal_values, servo, slope, slope_matrix
-from ffr_dyn.drivers import Driver, PointDriver
-from ffr_dyn.equations import System, blocks_of, compile_scene
-from ffr_dyn.errors import InputError, SimulationError
+from ffr_dyn.compile.scene_tables import System, blocks_of, compile_scene
+from ffr_dyn.consistency.assemble import assemble, flattened
+from ffr_dyn.consistency.evaluation import Evaluator, evaluator, joined, record_states
 from ffr_dyn.integrators import Integrator
+from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.kernels.tables import Record
-from ffr_dyn.measure import measure, selected
-from ffr_dyn.result import Quantity, Result
-from ffr_dyn.scene import GROUND, Scene
-from ffr_dyn.stabilisation import Projection
+from ffr_dyn.results.quantities import measure, selected
+from ffr_dyn.results.result import Quantity, Result
+from ffr_dyn.scene.drivers import Driver, PointDriver
+from ffr_dyn.scene.scene import GROUND, Scene
+from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray
 
@@ -75,7 +75,7 @@ def mixed(
 
     The result has "name.effort" [N or N m] of every unknown force and its power.
 
-    Raises InputError when motions and forces do not fit (the combination that is undetermined is told), SimulationError when
+    Raises InputError when motions and forces do not fit (the combination that is undetermined is told), ComputationError when
     the run fails or a causal one is asked for and cannot be trusted.
     """
     names = _known(scene, known)
@@ -207,7 +207,7 @@ def _not_collocated(
 def _solution(
     own: ServoMotion, start: float, end: float, w: Array, x: Array, wanted: Causal | Bounded | None
 ) -> Causal | Bounded:
-    """What was asked for, or what the internal dynamics allow at the start; SimulationError for a causal run they do not."""
+    """What was asked for, or what the internal dynamics allow at the start; ComputationError for a causal run they do not."""
     if isinstance(wanted, Bounded) or own.size == 0:
         return wanted or Causal()
     causal = wanted or Causal()
@@ -216,7 +216,7 @@ def _solution(
         return causal
     if wanted is None:
         return Bounded()
-    raise SimulationError(
+    raise ComputationError(
         f"the internal dynamics are unstable: errors grow e-fold in {1 / rate:.3g} s, over a run of {end - start:g} s; use "
         "solution=Bounded(), for a known motion that starts and ends at rest"
     )
@@ -244,7 +244,7 @@ def _integrated(
         while solver.status == "running":
             message = solver.step()
         if solver.status == "failed":
-            raise SimulationError(f"at t = {solver.t:.6g} s the internal dynamics could not be integrated: {message}")
+            raise ComputationError(f"at t = {solver.t:.6g} s the internal dynamics could not be integrated: {message}")
         ws.append(solver.y)
         xs.append(at_moment(own, float(time), solver.y, nearest[0]).x)
         if progress is not None:

@@ -11,16 +11,16 @@ import numpy as np
 
 from ffr_dyn.analyses.efforts import joint_named
 from ffr_dyn.analyses.forward import geometry
-from ffr_dyn.drivers import Driver
-from ffr_dyn.equations import System
-from ffr_dyn.errors import InputError
-from ffr_dyn.joints import COORDINATES, frames
+from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.kernels.tables import Record
-from ffr_dyn.measure import DEFAULT_OUTPUTS, measure, selected
-from ffr_dyn.result import Quantity, Result
-from ffr_dyn.result_file import save_result
-from ffr_dyn.rotation import rotation_matrix
-from ffr_dyn.scene import GROUND, Scene
+from ffr_dyn.results.file import save_result
+from ffr_dyn.results.quantities import DEFAULT_OUTPUTS, measure, selected
+from ffr_dyn.results.result import Quantity, Result
+from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.joints import COORDINATES, frames
+from ffr_dyn.scene.scene import GROUND, Scene
+from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
 

@@ -14,36 +14,30 @@ from pathlib import Path
 
 import numpy as np
 
-from ffr_dyn.analyses.assemble import Assembled, assemble
-from ffr_dyn.analyses.evaluation import (
+from ffr_dyn.analyses.forward import geometry, with_all_reactions
+from ffr_dyn.analyses.ida import by_ida
+from ffr_dyn.analyses.outcome import output_times
+from ffr_dyn.consistency.assemble import Assembled, assemble
+from ffr_dyn.consistency.evaluation import (
     Evaluator,
     accelerations,
+    closed,
     copied,
-    evaluate,
-    evaluated_mass_matrix,
     evaluator,
     joined,
-    moved,
-    smallest_step,
-    to_body_axes,
-    to_global_axes,
+    position_rates,
 )
-from ffr_dyn.analyses.forward import geometry, with_all_reactions
-from ffr_dyn.analyses.outcome import output_times
-from ffr_dyn.errors import InputError, SimulationError
+from ffr_dyn.equations.layout import Layout
 from ffr_dyn.kernels.tables import Record
-from ffr_dyn.layout import Layout
-from ffr_dyn.measure import measure, needs_every_step, selected
-from ffr_dyn.result import Result
-from ffr_dyn.result_file import save_result
-from ffr_dyn.rotation import G_bar
-from ffr_dyn.scene import Scene
+from ffr_dyn.results.file import save_result
+from ffr_dyn.results.quantities import measure, needs_every_step, selected
+from ffr_dyn.results.result import Result
+from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray
 
 SOLVERS = ("DOP853", "Radau", "LSODA", "BDF", "RK45")
-CLOSED = 1e-12  # of Phi [m, -] after a projection
-CORRECTIONS = 10
 DIFFERENCE = 1e-7  # of a coordinate, for Jacobians
 
 
@@ -103,7 +97,7 @@ def reference(
 ) -> Result:
     """Forward dynamics by a solver of SciPy or SUNDIALS; the arguments and the result are those of `forward`.
 
-    Raises InputError for a scene or settings that cannot be used, SimulationError when the solver gives up.
+    Raises InputError for a scene or settings that cannot be used, ComputationError when the solver gives up.
     """
     times = output_times(start, end, output_step)
     assembled = assemble(scene, time=start)
@@ -146,8 +140,6 @@ def _states(
     """(time, x, v) at the output times."""
     if isinstance(method, SciPy):
         return _by_scipy(assembled, at, times, method)
-    from ffr_dyn.analyses.ida import by_ida
-
     return by_ida(assembled, at, times, method.rtol, method.atol)
 
 
@@ -171,7 +163,7 @@ def _by_scipy(assembled: Assembled, at: Evaluator, times: Array, method: SciPy) 
             **implicit,
         )
         if not done.success:
-            raise SimulationError(f"{method.solver} gave up at t = {done.t[-1]:.6g} s: {done.message}")
+            raise ComputationError(f"{method.solver} gave up at t = {done.t[-1]:.6g} s: {done.message}")
         step = float(np.diff(done.t).max())
         x, v = closed(at, float(end), *np.split(done.y[:, -1], [place.x_size]))
         yield float(end), x, v
@@ -192,28 +184,3 @@ def _jacobian(at: Evaluator, place: Layout, time: float, y: Array) -> Array:
         beside[k] += step
         out[:, k] = (_rates(at, place, time, beside) - base) / (beside[k] - y[k])
     return out
-
-
-def position_rates(place: Layout, x: Array, v: Array) -> Array:
-    """x_dot = T(x) v."""
-    out = np.empty(place.x_size)
-    for b in range(len(place.n)):
-        out[place.R(b)], out[place.q(b)] = v[place.R_dot(b)], v[place.q_dot(b)]
-        out[place.p(b)] = 0.5 * G_bar(x[place.p(b)]).T @ v[place.omega(b)]
-    return out
-
-
-def closed(at: Evaluator, time: float, x: Array, v: Array) -> tuple[Array, Array]:
-    """(x, v) moved onto the constraints by the smallest motion in the norm of the mass matrix, Euler parameters of length
-    one. Raises SimulationError where that does not succeed."""
-    place = at.system.layout
-    x = moved(place, x, np.zeros(place.v_size))
-    for _ in range(CORRECTIONS):
-        now = evaluate(at, time, x, v)
-        if np.abs(now.Phi).max(initial=0.0) < CLOSED:
-            break
-        x = moved(place, x, smallest_step(now.jacobian, evaluated_mass_matrix(at), -now.Phi))
-    else:
-        raise SimulationError(f"at t = {time:.6g} s the state is too far off the constraints; use smaller tolerances")
-    inside = to_body_axes(place, x, v) + smallest_step(now.jacobian, evaluated_mass_matrix(at), -now.nu)
-    return x, to_global_axes(place, x, inside)

@@ -16,9 +16,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import qr
 
-from ffr_dyn.analyses.assemble import Assembled
 from ffr_dyn.analyses.efforts import Effort, sized
-from ffr_dyn.analyses.evaluation import (
+from ffr_dyn.compile.engine import with_model
+from ffr_dyn.compile.scene_tables import Block, compile_scene
+from ffr_dyn.consistency.assemble import Assembled
+from ffr_dyn.consistency.evaluation import (
     Evaluation,
     Evaluator,
     evaluate,
@@ -32,15 +34,13 @@ from ffr_dyn.analyses.evaluation import (
     total_mass_matrix,
     unit_rows,
 )
-from ffr_dyn.analyses.mobility import coordinate_gradients, coordinate_word
-from ffr_dyn.constraints import evaluate_word
-from ffr_dyn.drivers import Driver, driver_word
-from ffr_dyn.equations import Block, compile_scene
-from ffr_dyn.errors import InputError, SimulationError
-from ffr_dyn.joints import COORDINATES, Word
-from ffr_dyn.machine import with_model
-from ffr_dyn.scene import Scene, marker_number
-from ffr_dyn.timefunction import polynomial
+from ffr_dyn.consistency.mobility import coordinate_gradients, coordinate_word
+from ffr_dyn.equations.constraints import evaluate_word
+from ffr_dyn.functions.time_functions import polynomial
+from ffr_dyn.scene.drivers import Driver, driver_word
+from ffr_dyn.scene.joints import COORDINATES, Word
+from ffr_dyn.scene.scene import Scene, marker_number
+from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray
 
@@ -258,7 +258,7 @@ def _guided(own: ServoMotion, time: float, w: Array) -> Evaluator:
 def at_moment(own: ServoMotion, time: float, w: Array, near: Array) -> Moment:
     """Everything at a time, from w = (y, y_dot) and a state x nearby.
 
-    Raises SimulationError when the internal coordinates no longer describe the motion or the efforts are not determined.
+    Raises ComputationError when the internal coordinates no longer describe the motion or the efforts are not determined.
     """
     clock = float(np.clip(time, *own.span))
     at = _guided(own, clock, w)
@@ -292,7 +292,7 @@ def _placed(own: ServoMotion, at: Evaluator, time: float, w: Array, x: Array) ->
         x = moved(place, x, step)
         if np.abs(step).max() < TOLERANCE:
             return x, evaluate(at, time, x, still)
-    raise SimulationError(
+    raise ComputationError(
         f"at t = {time:.6g} s no position belongs to the known motions: they are out of reach, or "
         f"{', '.join(own.names)} no longer describe what is free"
     )
@@ -326,7 +326,7 @@ def _check_determined(matrix: Array, time: float) -> None:
     size = np.sqrt(np.abs(matrix).max(axis=0) * np.abs(matrix).max(axis=1))
     scaled = matrix / np.sqrt(np.outer(size, size)) if (size > 0).all() else matrix
     if not np.linalg.cond(scaled) < SINGULAR:
-        raise SimulationError(
+        raise ComputationError(
             f"at t = {time:.6g} s the unknown forces no longer determine the known motions: the mechanism passes a position "
             "in which they do not move them; let another force be unknown, or keep away from it"
         )

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from ffr_dyn.drivers import Driver, PointDriver
-from ffr_dyn.joints import Joint
-from ffr_dyn.result import Result
-from ffr_dyn.scene import Body, Scene
-from ffr_dyn.timefunction import as_time_function, constant, evaluate
+from ffr_dyn.functions.time_functions import as_time_function, constant, evaluate
+from ffr_dyn.results.result import Result
+from ffr_dyn.scene.drivers import Driver, PointDriver
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Body, Scene
 
 
 def scene_at(scene: Scene, result: Result, row: int = -1) -> Scene:

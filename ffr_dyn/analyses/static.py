@@ -15,17 +15,17 @@ from pathlib import Path
 
 import numpy as np
 
-from ffr_dyn.analyses.assemble import Assembled, assemble, in_space
-from ffr_dyn.analyses.evaluation import Evaluator, evaluate, evaluator, record_states
 from ffr_dyn.analyses.forward import with_all_reactions
-from ffr_dyn.analyses.mobility import named_motion
 from ffr_dyn.analyses.outcome import result_of
 from ffr_dyn.analyses.states import held
-from ffr_dyn.analyses.tangent import Chart, chart, movement, rates, sizes, state, stiffness
-from ffr_dyn.errors import InputError, SimulationError
-from ffr_dyn.measure import selected
-from ffr_dyn.result import Result
-from ffr_dyn.scene import Scene
+from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
+from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator, record_states
+from ffr_dyn.consistency.mobility import named_motion
+from ffr_dyn.consistency.tangent import Chart, chart, movement, rates, sizes, state, stiffness
+from ffr_dyn.results.quantities import selected
+from ffr_dyn.results.result import Result
+from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray
 
@@ -56,7 +56,7 @@ def static(
     The attributes tell whether it is stable (the tangent stiffness of the free motions is positive definite) and its lowest
     stiffness per mass [1/s^2].
 
-    Raises InputError for a motion that nothing holds, with its name; SimulationError when no equilibrium is found.
+    Raises InputError for a motion that nothing holds, with its name; ComputationError when no equilibrium is found.
     """
     assembled = assemble(in_space(held(scene, time)), time=time)
     selected(assembled.system, outputs)
@@ -79,7 +79,7 @@ def _balanced(at: Evaluator, time: float, x: Array) -> _Balance:
         residual = rates(near, near.x, still)[d:]
         K, _ = stiffness(near)
         if not np.isfinite(K).all():
-            raise SimulationError("the forces are not finite near the equilibrium; check loads and springs")
+            raise ComputationError("the forces are not finite near the equilibrium; check loads and springs")
         step = _step(near, K, residual, radius)
         if movement(near, step) < TOLERANCE:
             return _Balance(near, residual, K, iteration + 1)

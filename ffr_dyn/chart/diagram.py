@@ -6,17 +6,17 @@ import statistics
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from ffr_dyn.analyses.assemble import assemble
 from ffr_dyn.chart.measures import Measure, default_measures, measure_of
 from ffr_dyn.chart.pareto import pareto_front
 from ffr_dyn.chart.reference import WANTED, Reference, distance, reference
 from ffr_dyn.chart.runner import REPEATS, Failure, Job, Outcome, Pool, Span, perform
 from ffr_dyn.chart.variants import ADAPTIVE, FULL, Model, Variant, grid
-from ffr_dyn.errors import InputError
+from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.integrators import METHODS
-from ffr_dyn.measure import catalogue
-from ffr_dyn.scene import Scene
-from ffr_dyn.stabilisation import Projection, Stabilisation
+from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
+from ffr_dyn.results.quantities import catalogue
+from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.errors import InputError
 
 CPU, WALL, EVALUATIONS = "cpu", "wall", "evaluations"
 COSTS = (CPU, WALL, EVALUATIONS)
@@ -132,7 +132,7 @@ def work_precision(
     wanted   : relative error that the reference should have, see `reference`
     tell     : told how the reference is found;  progress : told how many variants are done, of how many
 
-    Raises InputError for what cannot be compared, SimulationError where no reference can be verified.
+    Raises InputError for what cannot be compared, ComputationError where no reference can be verified.
     """
     measures = measures or measures_of(scene, (), span.start)
     variants = grid(

@@ -18,8 +18,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator
 
 from ffr_dyn.chart.diagram import CPU, EVALUATIONS, WALL, Diagram, Point
-from ffr_dyn.errors import InputError
-from ffr_dyn.plots import PALETTE
+from ffr_dyn.pictures.histories import PALETTE
+from ffr_prep.common.errors import InputError
 
 COST_WORDS = {
     CPU: "CPU time of the run [s]",

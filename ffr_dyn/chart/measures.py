@@ -13,11 +13,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ffr_dyn.errors import InputError
-from ffr_dyn.result import Result
-from ffr_dyn.scene import Body, Scene, marker_number
-from ffr_dyn.stress import nearest_point, stress_histories
+from ffr_dyn.results.result import Result
+from ffr_dyn.results.stress import stress_histories
+from ffr_dyn.scene.scene import Body, Scene, marker_number
+from ffr_dyn.scene.stress_sensors import nearest_point
 from ffr_prep.body import BodyError, Interface
+from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
 

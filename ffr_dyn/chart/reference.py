@@ -15,9 +15,9 @@ import numpy as np
 from ffr_dyn.chart.measures import Measure, Violation
 from ffr_dyn.chart.runner import Failure, Job, Outcome, Pool, Span, perform
 from ffr_dyn.chart.variants import FULL, Model, Variant, explicit_parts
-from ffr_dyn.errors import SimulationError
-from ffr_dyn.scene import Scene
-from ffr_dyn.stabilisation import Stabilisation
+from ffr_dyn.integrators.stabilisation import Stabilisation
+from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.errors import ComputationError
 
 Array = np.ndarray
 
@@ -77,7 +77,7 @@ def reference(
     limit   : wall time [s] that a single run may take
     wanted  : distance of two runs, relative to the scale of each measure, at which refinement may stop
 
-    Raises SimulationError when methods do not agree within `POOR`, or not two runs of one are possible.
+    Raises ComputationError when methods do not agree within `POOR`, or not two runs of one are possible.
     """
     story: list[str] = []
 
@@ -92,7 +92,7 @@ def reference(
         if refined is not None:
             found.append(refined)
     if len(found) < 2:
-        raise SimulationError(
+        raise ComputationError(
             "no verified reference: " + "; ".join(story) + ". Allow longer runs (--limit), or shorten the scene"
         )
     best, check = sorted(found, key=_badness)
@@ -103,7 +103,7 @@ def reference(
 def _agreed(
     best: _Refined, check: _Refined, measures: tuple[Measure, ...], say: Callable[[str], None]
 ) -> tuple[dict[str, Array], dict[str, float]]:
-    """Histories and the errors that they may have, by measure. SimulationError where two methods are too far apart."""
+    """Histories and the errors that they may have, by measure. ComputationError where two methods are too far apart."""
     between = distances(best.outcome, check.outcome)
     floors = {name: max(between[name], best.distance[name]) for name in between}
     values = dict(best.outcome.values)
@@ -113,7 +113,7 @@ def _agreed(
         scale = best.outcome.scales[name]
         say(f"{name}: reference right to about {floor:.1e}" + (f", {floor / scale:.1e} of its scale" if scale else ""))
         if scale and floor > POOR * scale:
-            raise SimulationError(
+            raise ComputationError(
                 f"no verified reference: {best.variant.label} and {check.variant.label} are {between[name]:.2g} apart in "
                 f"{name!r}, {floor / scale:.0%} of its scale; allow longer runs (--limit), or shorten the scene: a chaotic "
                 "or unstable motion has no long reference"

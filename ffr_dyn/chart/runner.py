@@ -25,18 +25,18 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from ffr_dyn.analyses.assemble import assemble
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.chart.measures import Measure
 from ffr_dyn.chart.variants import Variant
-from ffr_dyn.compilation import ensure_compiled
-from ffr_dyn.errors import InputError, SimulationError
-from ffr_dyn.measure import catalogue
-from ffr_dyn.result import Result
-from ffr_dyn.scene import Scene
-from ffr_dyn.stabilisation import Projection, Stabilisation
-from ffr_dyn.stopwatch import Stopwatch
+from ffr_dyn.compile.first_use import ensure_compiled
+from ffr_dyn.consistency.assemble import assemble
+from ffr_dyn.functions.stopwatch import Stopwatch
+from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
+from ffr_dyn.results.quantities import catalogue
+from ffr_dyn.results.result import Result
+from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import BodyError
+from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray
 Item = TypeVar("Item")
@@ -110,7 +110,7 @@ def perform(job: Job) -> Outcome | Failure:
         times = [(wall, cpu)]
         while _wants_more(times, job.repeats):
             times.append(_clocked(scene, method, job, outputs)[1:])
-    except (InputError, BodyError, SimulationError) as error:
+    except (InputError, BodyError, ComputationError) as error:
         return Failure(str(error))
     values = {measure.name: measure.values(result) for measure in job.measures}
     bad = next((name for name, history in values.items() if not np.isfinite(history).all()), None)
@@ -156,7 +156,7 @@ def _clocked(scene: Scene, method: Any, job: Job, outputs: tuple[str, ...]) -> t
 
     def watch(reached: float) -> None:
         if time.monotonic() - began > job.limit:
-            raise SimulationError(f"took longer than {job.limit:g} s; it had reached t = {reached:.6g} s")
+            raise ComputationError(f"took longer than {job.limit:g} s; it had reached t = {reached:.6g} s")
 
     result = forward(
         scene,

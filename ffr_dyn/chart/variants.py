@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.errors import InputError
 from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator, tolerances
-from ffr_dyn.scene import Scene
-from ffr_dyn.variant import Modes, vary
+from ffr_dyn.scene.scene import Scene
+from ffr_dyn.variants.variant import Modes, vary
 from ffr_prep.body import FlexibleBody
+from ffr_prep.common.errors import InputError
 
 STEP, TOLERANCE = "step", "tolerance"
 
@@ -33,7 +33,7 @@ EXPLICIT_REACH = 1.5  # step times highest circular frequency of a body at which
 
 @dataclass(frozen=True)
 class Model:
-    """What is simplified in a scene: the arguments of `ffr_dyn.variant.vary`, with the words for it."""
+    """What is simplified in a scene: the arguments of `ffr_dyn.variants.variant.vary`, with the words for it."""
 
     label: str = "full model"
     modes: Modes | Mapping[str, Modes] | None = None

@@ -14,19 +14,19 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ffr_dyn.analyses.assemble import assemble, close_positions, close_velocities
-from ffr_dyn.analyses.evaluation import moved, to_body_axes, to_global_axes
 from ffr_dyn.analyses.forward import geometry
-from ffr_dyn.economy.choice import Choice, Part, full
+from ffr_dyn.consistency.assemble import assemble, close_positions, close_velocities
+from ffr_dyn.consistency.evaluation import moved, to_body_axes, to_global_axes
 from ffr_dyn.economy.contributions import effects_of
-from ffr_dyn.economy.drive import Samples, driven, followed, samples
+from ffr_dyn.economy.model_choice import Choice, Part, full
 from ffr_dyn.economy.outputs import Output, Probe, as_output, limits, probe, ranges
-from ffr_dyn.economy.trial import Made, Span, Trial, make, run, states
-from ffr_dyn.errors import InputError
-from ffr_dyn.layout import Layout, initial_state
-from ffr_dyn.result import Axis, Quantity, Result
-from ffr_dyn.scene import Body, Scene
-from ffr_dyn.stabilisation import Projection, Stabilisation
+from ffr_dyn.economy.residual_estimate import Samples, driven, followed, samples
+from ffr_dyn.economy.run import Made, Span, Trial, make, run, states
+from ffr_dyn.equations.layout import Layout, initial_state
+from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
+from ffr_dyn.results.result import Axis, Quantity, Result
+from ffr_dyn.scene.scene import Body, Scene
+from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
 
@@ -86,7 +86,7 @@ def adaptive_forward(
     The result has the states, marker motions and energies of a forward run, and model.coordinates (elastic coordinates of
     each body), energy.switched (energy that switches have added since the start, negative where they took some away).
 
-    Raises InputError and SimulationError as `economise`.
+    Raises InputError and ComputationError as `economise`.
     """
     span = Span(start, end, output_step, stabilisation)
     of = probe(assemble(scene, time=start), [as_output(one, tolerance) for one in outputs])

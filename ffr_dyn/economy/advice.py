@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.economy.found import Economy
-from ffr_dyn.scene import Body
+from ffr_dyn.economy.result import Economy
+from ffr_dyn.scene.scene import Body
 
 MATTERS = 0.02  # of a tolerance: a mode that does less is not asked for
 ABOVE = 1.5  # times the highest frequency that matters: where the band ends (a rule of component mode synthesis)

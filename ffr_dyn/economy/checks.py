@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import LinAlgError, eigvalsh, null_space
 
-from ffr_dyn.analyses.evaluation import evaluate, evaluated_mass_matrix, evaluator
-from ffr_dyn.body_tables import of_coordinates
-from ffr_dyn.economy.choice import Choice
-from ffr_dyn.economy.drive import elastic_columns, lift
-from ffr_dyn.economy.trial import Made, Trial, states
-from ffr_dyn.equations import System
-from ffr_dyn.scene import Body, Scene
+from ffr_dyn.compile.body_tables import of_coordinates
+from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.consistency.evaluation import evaluate, evaluated_mass_matrix, evaluator
+from ffr_dyn.economy.model_choice import Choice
+from ffr_dyn.economy.residual_estimate import elastic_columns, lift
+from ffr_dyn.economy.run import Made, Trial, states
+from ffr_dyn.scene.scene import Body, Scene
 
 Array = np.ndarray
 

@@ -6,18 +6,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffr_dyn.analyses.evaluation import moved, record_states, to_body_axes, to_global_axes
-from ffr_dyn.body_tables import of_coordinates
-from ffr_dyn.economy.choice import Choice
-from ffr_dyn.economy.drive import Samples, driven, elastic_columns, followed, samples
-from ffr_dyn.economy.ledger import Ledger
+from ffr_dyn.compile.body_tables import of_coordinates
+from ffr_dyn.consistency.evaluation import moved, record_states, to_body_axes, to_global_axes
+from ffr_dyn.economy.cache import Ledger
+from ffr_dyn.economy.model_choice import Choice
 from ffr_dyn.economy.outputs import Probe, difference, histories, needed
-from ffr_dyn.economy.trial import Made, Trial, states
+from ffr_dyn.economy.residual_estimate import Samples, driven, elastic_columns, followed, samples
+from ffr_dyn.economy.run import Made, Trial, states
+from ffr_dyn.equations.layout import Layout
 from ffr_dyn.kernels.tables import Record
-from ffr_dyn.layout import Layout
-from ffr_dyn.measure import measure, selected
-from ffr_dyn.result import Result
-from ffr_dyn.scene import Scene
+from ffr_dyn.results.quantities import measure, selected
+from ffr_dyn.results.result import Result
+from ffr_dyn.scene.scene import Scene
 
 Array = np.ndarray
 

@@ -7,7 +7,7 @@ and I5 and I9: within 14 per cent (root mean square). Only ratios matter.
 
 from __future__ import annotations
 
-from ffr_dyn.economy.choice import Choice, Part
+from ffr_dyn.economy.model_choice import Choice, Part
 from ffr_dyn.integrators import METHODS
 
 BASE = 0.20  # an evaluation of nothing

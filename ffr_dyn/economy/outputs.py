@@ -8,12 +8,13 @@ from difflib import get_close_matches
 
 import numpy as np
 
-from ffr_dyn.analyses.assemble import Assembled
-from ffr_dyn.errors import InputError
-from ffr_dyn.measure import catalogue
-from ffr_dyn.result import Result
-from ffr_dyn.scene import Scene
-from ffr_dyn.stress import tensors, von_mises
+from ffr_dyn.consistency.assemble import Assembled
+from ffr_dyn.results.quantities import catalogue
+from ffr_dyn.results.result import Result
+from ffr_dyn.results.stress import tensors
+from ffr_dyn.scene.scene import Scene
+from ffr_dyn.scene.stress_sensors import von_mises
+from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
 

@@ -17,11 +17,11 @@ from ffr_dyn.chart.diagram import Diagram, Point, spread
 from ffr_dyn.chart.draw import draw as draw_diagram
 from ffr_dyn.chart.reference import Reference
 from ffr_dyn.chart.variants import STEP, TOLERANCE, Model, Variant
-from ffr_dyn.economy.choice import Choice
-from ffr_dyn.economy.found import Economy
-from ffr_dyn.economy.trial import Made, Span, make
-from ffr_dyn.result import Result
-from ffr_dyn.stopwatch import Stopwatch
+from ffr_dyn.economy.model_choice import Choice
+from ffr_dyn.economy.result import Economy
+from ffr_dyn.economy.run import Made, Span, make
+from ffr_dyn.functions.stopwatch import Stopwatch
+from ffr_dyn.results.result import Result
 
 Array = np.ndarray
 

@@ -14,12 +14,12 @@ import numpy as np
 
 from ffr_dyn.economy.advice import advice
 from ffr_dyn.economy.checks import load_names
-from ffr_dyn.economy.choice import Choice, kind
 from ffr_dyn.economy.contributions import Contributions
-from ffr_dyn.economy.found import Economy
-from ffr_dyn.economy.terms import TermEffect
-from ffr_dyn.errors import InputError
-from ffr_dyn.scene import INERTIA_TERMS, Body
+from ffr_dyn.economy.inertia_terms import TermEffect
+from ffr_dyn.economy.model_choice import Choice, kind
+from ffr_dyn.economy.result import Economy
+from ffr_dyn.scene.scene import INERTIA_TERMS, Body
+from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
 

@@ -21,24 +21,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffr_dyn.analyses.assemble import assemble
+from ffr_dyn.analyses.settings import Forward, Settings
+from ffr_dyn.consistency.assemble import assemble
+from ffr_dyn.economy.cache import Ledger, Tried
 from ffr_dyn.economy.checks import frequencies, stiffening_loads
-from ffr_dyn.economy.choice import Choice, applied
 from ffr_dyn.economy.contributions import Contributions, nothing, of_motion, of_omitted, own
 from ffr_dyn.economy.cost import of_run
-from ffr_dyn.economy.found import Economy, Verification
-from ffr_dyn.economy.ledger import Ledger, Tried
+from ffr_dyn.economy.inertia_terms import TermEffect
+from ffr_dyn.economy.model_choice import Choice, applied
 from ffr_dyn.economy.outputs import Output, Probe, as_output, difference, largest, probe, ranges, total
 from ffr_dyn.economy.outputs import limits as limits_of
+from ffr_dyn.economy.result import Economy, Verification
+from ffr_dyn.economy.rigid_start import PILOT, Ground, Rigid, started, unmoved
+from ffr_dyn.economy.run import Span, Trial, cost, rings
 from ffr_dyn.economy.selection import Insufficient, Selection, Shares, gap, selected_model, size_of
-from ffr_dyn.economy.start import PILOT, Ground, Rigid, started, unmoved
 from ffr_dyn.economy.steps import Stepped, chosen_step
-from ffr_dyn.economy.terms import TermEffect
-from ffr_dyn.economy.trial import Span, Trial, cost, rings
 from ffr_dyn.economy.verification import reference_cost, verified
-from ffr_dyn.scene import Scene
-from ffr_dyn.settings import Forward, Settings
-from ffr_dyn.stabilisation import Projection, Stabilisation
+from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
+from ffr_dyn.scene.scene import Scene
 
 Array = np.ndarray
 Histories = tuple[Array, ...]
@@ -97,7 +97,7 @@ def economise(
     tell      : called with the name of each stage
 
     Raises InputError for outputs that do not exist or stay zero and for tolerances that cannot be met or told;
-    SimulationError when no run of the scene comes to an end.
+    ComputationError when no run of the scene comes to an end.
     """
     span = Span(start, end, output_step, stabilisation)
     tell("assemble")

@@ -6,16 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffr_dyn.economy.choice import Choice, orthonormal, rigid
+from ffr_dyn.economy.cache import Ledger
 from ffr_dyn.economy.contributions import LEFT, Contributions, of_motion, of_shapes, own
 from ffr_dyn.economy.cost import per_evaluation
-from ffr_dyn.economy.ledger import Ledger
+from ffr_dyn.economy.inertia_terms import TermEffect, term_effects, without_minor
+from ffr_dyn.economy.model_choice import Choice, orthonormal, rigid
 from ffr_dyn.economy.outputs import difference, largest
-from ffr_dyn.economy.start import SCOUT, Ground
-from ffr_dyn.economy.terms import TermEffect, term_effects, without_minor
-from ffr_dyn.economy.trial import rings
-from ffr_dyn.errors import SimulationError
-from ffr_dyn.scene import Scene
+from ffr_dyn.economy.rigid_start import SCOUT, Ground
+from ffr_dyn.economy.run import rings
+from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.errors import ComputationError
 
 Array = np.ndarray
 
@@ -241,7 +241,7 @@ def gap(ledger: Ledger, ground: Ground, choice: Choice, what: str) -> Array:
     """(outputs,) how far a model is from everything with the same coarse step; infinite where its run fails."""
     try:
         trial = ledger.run(choice)
-    except SimulationError:
+    except ComputationError:
         return np.full(len(ground.limits), np.inf)
     error = largest(difference(trial.values, ground.pilot.values))
     ledger.note(trial, what, error)

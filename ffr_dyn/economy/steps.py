@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.economy.choice import Choice
+from ffr_dyn.economy.cache import Ledger
 from ffr_dyn.economy.cost import STAGES, per_row
-from ffr_dyn.economy.ledger import Ledger
+from ffr_dyn.economy.model_choice import Choice
 from ffr_dyn.economy.outputs import difference, largest
-from ffr_dyn.economy.trial import Span, Trial, cost, rings
-from ffr_dyn.errors import InputError, SimulationError
+from ffr_dyn.economy.run import Span, Trial, cost, rings
 from ffr_dyn.integrators import CONTROLLED, METHODS, RK4, Integrator
+from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray
 Histories = tuple[Array, ...]
@@ -68,7 +68,7 @@ def chosen_step(ledger: Ledger, choice: Choice, limit: Array) -> Stepped:
 
     choice : the model with the longest step that completes a run, by a method of the third order
 
-    Raises SimulationError when none is found.
+    Raises ComputationError when none is found.
     """
     ledger.tell("integrator and step")
     found = _rigid_in_two_stages(ledger, choice, limit)
@@ -130,7 +130,7 @@ def _from_two_rows(ledger: Ledger, trial: Trial) -> Histories | None:
         return None
     try:
         wide = ledger.over_two_rows(trial.choice)
-    except (SimulationError, InputError):
+    except (ComputationError, InputError):
         return None
     if wide is None:
         return None
@@ -196,7 +196,7 @@ def _cheapest(ledger: Ledger, coarse: Trial, needed: dict[str, int], limit: Arra
             return best
         needed[name] = int(np.clip(better if better != divisions else divisions + 1, 1, MOST))
     if best is None:
-        raise SimulationError(
+        raise ComputationError(
             f"no integrator reaches the tolerance with steps down to 1/{MOST} of the output step: errors stay above their "
             f"limits with {max(needed.values())} steps from row to row"
         )
@@ -283,7 +283,7 @@ def _controlled(ledger: Ledger, choice: Choice, truth: Histories, limit: Array, 
 def _attempt(ledger: Ledger, choice: Choice) -> Trial | None:
     try:
         return ledger.run(choice)
-    except (SimulationError, InputError):
+    except (ComputationError, InputError):
         return None
 
 

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.economy.choice import Choice
+from ffr_dyn.economy.cache import Ledger
 from ffr_dyn.economy.contributions import Contributions
 from ffr_dyn.economy.cost import of_run
-from ffr_dyn.economy.found import Verification
-from ffr_dyn.economy.ledger import Ledger
+from ffr_dyn.economy.model_choice import Choice
 from ffr_dyn.economy.outputs import Probe, difference, largest
+from ffr_dyn.economy.result import Verification
+from ffr_dyn.economy.rigid_start import PILOT, Ground
+from ffr_dyn.economy.run import Trial, cost
 from ffr_dyn.economy.selection import Insufficient, Shares, selected_model, size_of
-from ffr_dyn.economy.start import PILOT, Ground
 from ffr_dyn.economy.steps import error_of, order
-from ffr_dyn.economy.trial import Trial, cost
-from ffr_dyn.errors import InputError
+from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
 

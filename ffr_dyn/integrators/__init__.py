@@ -1,7 +1,7 @@
 """Time integration: one file per method, one protocol.
 
 A method is a frozen dataclass with its settings; its compiled unit does one step of a machine's state (see
-`ffr_dyn.kernels.units`).
+`ffr_dyn.kernels.entry_points`).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ffr_dyn.integrators.ros2 import ROS2
 from ffr_dyn.integrators.ros3 import ROS3, AdaptiveROS3
 from ffr_dyn.integrators.tolerances import Tolerances, tolerances
 from ffr_dyn.integrators.variational import Variational
-from ffr_dyn.kernels.units import Unit
+from ffr_dyn.kernels.entry_points import Unit
 
 __all__ = [
     "CONTROLLED",

@@ -27,18 +27,18 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ffr_dyn.errors import InputError
 from ffr_dyn.integrators.step import check_step
-from ffr_dyn.kernels.actions import keep_turns
 from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.calls import correct, evaluate, project, set_diagonal, settle, solve_again, solve_aside
-from ffr_dyn.kernels.motion import carry, converging, farthest, largest_motion, unconverged
+from ffr_dyn.kernels.entry_points import Unit
+from ffr_dyn.kernels.finite_motion import carry, converging, farthest, largest_motion, unconverged
+from ffr_dyn.kernels.forces.coordinate_forces import keep_turns
+from ffr_dyn.kernels.integrator_api import correct, evaluate, project, set_diagonal, settle, solve_again, solve_aside
 from ffr_dyn.kernels.options import inlined
-from ffr_dyn.kernels.packing import tables_at
+from ffr_dyn.kernels.simd.table_address import tables_at
 from ffr_dyn.kernels.system import finite, largest, to_velocity_rates
 from ffr_dyn.kernels.tables import NOT_FINITE, OK, USER_FAILED
-from ffr_dyn.kernels.units import Unit
 from ffr_dyn.kernels.vectors import add_scaled, copy, fill
+from ffr_prep.common.errors import InputError
 
 # Rows of stages.v: accelerations now, before, and in the making; the method's own a now and in the making; v in the making;
 # the step's motion; corrections.

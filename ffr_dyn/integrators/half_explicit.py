@@ -18,18 +18,18 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ffr_dyn.integrators.step import check_step
-from ffr_dyn.kernels.actions import keep_turns
 from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, solve, solve_again
-from ffr_dyn.kernels.motion import into_body_axes, largest_motion
+from ffr_dyn.kernels.entry_points import Unit
+from ffr_dyn.kernels.finite_motion import into_body_axes, largest_motion
+from ffr_dyn.kernels.forces.coordinate_forces import keep_turns
+from ffr_dyn.kernels.integrator_api import evaluate, look_ahead, set_diagonal, settle, solve, solve_again
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.packing import tables_at
+from ffr_dyn.kernels.simd.slices import part
+from ffr_dyn.kernels.simd.table_address import tables_at
 from ffr_dyn.kernels.solution import constraint_rates
 from ffr_dyn.kernels.system import finite, largest, to_velocity_rates
 from ffr_dyn.kernels.tables import NEAR, NOT_CONVERGED, NOT_FINITE, OK, TIGHTER
-from ffr_dyn.kernels.units import Unit
 from ffr_dyn.kernels.vectors import add_scaled, copy
-from ffr_dyn.kernels.views import part
 
 ROOT = 6.0**0.5
 STAGES = 5

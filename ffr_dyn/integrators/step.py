@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from numbers import Real
 
-from ffr_dyn.errors import InputError
+from ffr_prep.common.errors import InputError
 
 
 def check_step(method: object, step: object) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffr_dyn.errors import InputError
+from ffr_prep.common.errors import InputError
 
 
 @dataclass(frozen=True)

@@ -29,18 +29,18 @@ from typing import ClassVar
 
 from ffr_dyn.integrators.generalised_alpha import check_iterations
 from ffr_dyn.integrators.step import check_step
-from ffr_dyn.kernels.actions import keep_turns
 from ffr_dyn.kernels.bodies import mass_times, normalise, six_rows, three_rows
-from ffr_dyn.kernels.calls import evaluate, look_ahead, set_diagonal, settle, solve_again, solve_aside
-from ffr_dyn.kernels.motion import carry, converging, farthest, into_global_axes, largest_motion, unconverged
+from ffr_dyn.kernels.entry_points import Unit
+from ffr_dyn.kernels.finite_motion import carry, converging, farthest, into_global_axes, largest_motion, unconverged
+from ffr_dyn.kernels.forces.coordinate_forces import keep_turns
+from ffr_dyn.kernels.integrator_api import evaluate, look_ahead, set_diagonal, settle, solve_again, solve_aside
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.packing import tables_at
+from ffr_dyn.kernels.simd.slices import part
+from ffr_dyn.kernels.simd.table_address import tables_at
 from ffr_dyn.kernels.solution import add_reactions, constraint_rates
 from ffr_dyn.kernels.system import finite, largest, to_body_axes, to_velocity_rates
 from ffr_dyn.kernels.tables import NOT_FINITE, OK, USER_FAILED
-from ffr_dyn.kernels.units import Unit
 from ffr_dyn.kernels.vectors import add, add_scaled, copy, cross, dot, fill, get, scale, subtract
-from ffr_dyn.kernels.views import part
 
 # Rows of stages.v. MU: momenta at the start of the step; KICK: geometric stiffening there; MIDDLE: v_m; SHORT: what the
 # momenta of the start are short of; END: momenta at the end; REACTION: Phi_q^T lambda at the start; CHANGE: scratch.

@@ -1,7 +1,7 @@
 """Inertia of one body: mass matrix, quadratic velocity and elastic forces, Schur complement on the 6 x 6 rigid part.
 
 Equations: the mass matrix [[m I, -s~, I3], [s~, J, H], [I3^T, H^T, I]] in body axes depends on q alone (Shabana 2013,
-ch. 5, written for body-frame velocities); see `ffr_dyn.inertia` for the readable form of every term.
+ch. 5, written for body-frame velocities); see `ffr_dyn.equations.inertia` for the readable form of every term.
 """
 
 from ffr_dyn.kernels.options import inlined, kernel
@@ -14,6 +14,7 @@ from ffr_dyn.kernels.planar import (
     substitute_in_plane,
 )
 from ffr_dyn.kernels.products import contract
+from ffr_dyn.kernels.simd.slices import part, six_parts, three_parts
 from ffr_dyn.kernels.vectors import (
     cholesky_six,
     cholesky_three,
@@ -26,7 +27,6 @@ from ffr_dyn.kernels.vectors import (
     rigid_upper,
     to_body,
 )
-from ffr_dyn.kernels.views import part, six_parts, three_parts
 
 
 @kernel

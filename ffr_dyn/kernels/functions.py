@@ -1,4 +1,6 @@
-"""Functions of time and piecewise polynomials, compiled; declared in `ffr_dyn.timefunction` and `ffr_dyn.curve`."""
+"""Functions of time and piecewise polynomials, compiled; declared in `ffr_dyn.functions.time_functions` and
+`ffr_dyn.functions.curves`.
+"""
 
 import math
 

@@ -2,8 +2,8 @@
 
 from ffr_dyn.kernels.bodies import six_rows, weighted_product
 from ffr_dyn.kernels.options import inlined, kernel
+from ffr_dyn.kernels.simd.slices import part, six_parts
 from ffr_dyn.kernels.vectors import add, cross, get, in_plane, of_two, put, scale, to_global
-from ffr_dyn.kernels.views import part, six_parts
 
 
 @inlined

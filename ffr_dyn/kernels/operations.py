@@ -1,7 +1,7 @@
 """Operations on functions of time: value, first and second derivative by forward differentiation.
 
 A function of time that a formula describes is a row of the table of functions for each of its operations; the rows it works
-on come before it. Readable twin: `ffr_dyn.operations`.
+on come before it. Readable twin: `ffr_dyn.functions.operations`.
 """
 
 import math
@@ -9,7 +9,7 @@ import math
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.vectors import get
 
-# as in ffr_dyn.operations
+# as in ffr_dyn.functions.operations
 ADD, SUBTRACT, MULTIPLY, DIVIDE, MIN, MAX = 0, 1, 2, 3, 4, 5
 POWER, SIN, COS, EXP, LOG, SQRT, TANH, ATAN, ASIN, ACOS, ABS, SIGN, STEP = range(6, 19)
 

@@ -19,7 +19,7 @@ OPTIONS: dict[str, Any] = {
     "fastmath": {"contract", "reassoc", "nsz"},
 }
 
-# A kernel that is called from Python with tables of its own; time loops are units (see `ffr_dyn.kernels.units`).
+# A kernel that is called from Python with tables of its own; time loops are units (see `ffr_dyn.kernels.entry_points`).
 entry: Any = functools.partial(njit, cache=True, **OPTIONS)
 
 # A kernel that only other kernels call: without the wrappers for callers in Python and C it compiles in half the time.
@@ -33,7 +33,7 @@ _PACKAGE = Path(__file__).resolve().parent.parent
 
 
 def _sources() -> list[Path]:
-    return sorted([*_PACKAGE.glob("kernels/*.py"), *_PACKAGE.glob("integrators/*.py")])
+    return sorted([*_PACKAGE.glob("kernels/**/*.py"), *_PACKAGE.glob("integrators/*.py")])
 
 
 def _stamp() -> str:
@@ -41,7 +41,7 @@ def _stamp() -> str:
 
 
 def _compiled() -> list[Path]:
-    return [path for folder in ("kernels", "integrators") for path in (_PACKAGE / folder).glob("__pycache__/*.nb[ic]")]
+    return [path for folder in ("kernels", "integrators") for path in (_PACKAGE / folder).rglob("__pycache__/*.nb[ic]")]
 
 
 def discard_stale_kernels() -> None:

@@ -5,8 +5,8 @@
 
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.products import contract
+from ffr_dyn.kernels.simd.slices import part, three_parts
 from ffr_dyn.kernels.vectors import LEAST_PIVOT, copy, fill, in_plane, of_two
-from ffr_dyn.kernels.views import part, three_parts
 
 
 @kernel

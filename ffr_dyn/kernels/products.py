@@ -1,6 +1,6 @@
 """Sums over the elastic coordinates of a body of tables by coordinate: its quadratic terms.
 
-The tables are stored in blocks, as `ffr_dyn.decoupling` makes them.
+The tables are stored in blocks, as `ffr_dyn.compile.symmetry_blocks` makes them.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
-from ffr_dyn.kernels.intrinsics import (
+from ffr_dyn.kernels.options import kernel
+from ffr_dyn.kernels.simd.intrinsics import (
     LIBERTIES,
     POOLED,
     broadcast,
@@ -21,18 +22,17 @@ from ffr_dyn.kernels.intrinsics import (
     pooled_data,
     store_row,
 )
-from ffr_dyn.kernels.options import kernel
+from ffr_dyn.kernels.simd.slices import part, peek
 from ffr_dyn.kernels.tables import LANES, MOST_ROWS
 from ffr_dyn.kernels.vectors import copy, fill
-from ffr_dyn.kernels.views import part, peek
 
 
 @kernel
 def contract(table, start, plan, at, q, qd, width, last, scratch, base, g, l):  # noqa: E741
     """g (width,) = base + sum_i q_i table_i, l (last,) = sum_i q_dot_i (the last of table_i): the only O(n^2) work of a body.
 
-    Block by block, as the plan that begins at `at` says (see `ffr_dyn.decoupling`); a table that starts below zero vanishes.
-    g, l and the scratch are written beyond what is found, by less than a row of lanes.
+    Block by block, as the plan that begins at `at` says (see `ffr_dyn.compile.symmetry_blocks`); a table that starts below
+    zero vanishes. g, l and the scratch are written beyond what is found, by less than a row of lanes.
     """
     n = q.size
     if start < 0:

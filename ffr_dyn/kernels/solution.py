@@ -3,16 +3,16 @@
 M acc + Phi_q^T lam = f,  Phi_q acc = target, by elimination of the elastic coordinates of every body, then of its rigid ones.
 """
 
-from ffr_dyn.kernels.blocks import SIDE, solve_blocks
 from ffr_dyn.kernels.bodies import accelerate, reduce_forces, six_rows
-from ffr_dyn.kernels.lanes import combine_6, dot_narrow, dot_rows, narrow_3, narrow_6
 from ffr_dyn.kernels.markers import plane_rows, project, shapes
+from ffr_dyn.kernels.multiplier_solver import SIDE, solve_blocks
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.packing import call_unit
+from ffr_dyn.kernels.simd.simd_rows import combine_6, dot_narrow, dot_rows, narrow_3, narrow_6
+from ffr_dyn.kernels.simd.slices import part, six_parts
+from ffr_dyn.kernels.simd.table_address import call_unit
 from ffr_dyn.kernels.system import largest
 from ffr_dyn.kernels.tables import BACK, LANES, REGAIN
 from ffr_dyn.kernels.vectors import add, add_scaled, copy, fill, in_plane
-from ffr_dyn.kernels.views import part, six_parts
 
 
 @inlined

@@ -2,23 +2,16 @@
 
 Order of calls: `prepare` once per elastic diagonal; `evaluate_bodies`, `evaluate_markers`, the loads, the constraint rows,
 `evaluate_joints` at a state; then any number of solutions (`ffr_dyn.kernels.solution`) with its factors. Compiled as units in
-`ffr_dyn.kernels.units`, and called as such where more than one place does.
+`ffr_dyn.kernels.entry_points`, and called as such where more than one place does.
 """
 
-from ffr_dyn.kernels.blocks import (
-    SIDE,
-    clear_column,
-    factorise_block,
-    relax_block,
-)
 from ffr_dyn.kernels.bodies import coupling, factorise, inertia, normalise, prepare_body, rotation_matrix
-from ffr_dyn.kernels.lanes import add_scale
-from ffr_dyn.kernels.loads import count_loads
+from ffr_dyn.kernels.forces.loads import count_loads
 from ffr_dyn.kernels.markers import couple_marker, couple_pair, prepare_marker, shapes, update_marker
+from ffr_dyn.kernels.multiplier_solver import SIDE, clear_column, factorise_block, relax_block
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.packing import call_unit
 from ffr_dyn.kernels.rows import reaction
-from ffr_dyn.kernels.sides import (
+from ffr_dyn.kernels.simd.joint_elimination import (
     couple_flexible,
     couple_flexible_in_plane,
     couple_rigid,
@@ -28,9 +21,11 @@ from ffr_dyn.kernels.sides import (
     eliminate_rigid,
     eliminate_rigid_in_plane,
 )
+from ffr_dyn.kernels.simd.simd_rows import add_scale
+from ffr_dyn.kernels.simd.slices import part
+from ffr_dyn.kernels.simd.table_address import call_unit
 from ffr_dyn.kernels.tables import ALL, IN_USE, LANES, LOADS, LOOK, NOT_FINITE, OK, REGAIN, RELATION
 from ffr_dyn.kernels.vectors import add_scaled, cross, fill, get, in_plane, put, subtract, to_body, to_global
-from ffr_dyn.kernels.views import part
 
 
 @inlined

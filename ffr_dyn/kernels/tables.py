@@ -1,5 +1,5 @@
-"""What the kernels read (`Model`, constant, made by `ffr_dyn.equations`) and write (`Work` and others, made by
-`ffr_dyn.memory`); no objects inside.
+"""What the kernels read (`Model`, constant, made by `ffr_dyn.compile.scene_tables`) and write (`Work` and others, made by
+`ffr_dyn.compile.workspace`); no objects inside.
 
 Bodies are numbered 0 ... B-1; number B is the ground (identity rotation, no coordinates). Positions of a body are
 x = [R (3), p (4), q (n)], velocities v = [R_dot (3, global), omega_bar (3), q_dot (n)]; accelerations and generalised
@@ -31,7 +31,7 @@ AFFINE, GLOBAL = 0, 1
 
 OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED, NOT_CONVERGED, STEP_TOO_SMALL = range(7)
 
-LANES = 8  # rows of a joint side by side (see `ffr_dyn.kernels.lanes`)
+LANES = 8  # rows of a joint side by side (see `ffr_dyn.kernels.simd.simd_rows`)
 NARROW = 4  # of them are enough in the plane
 QUAD = 4  # rows of a symmetric matrix that are multiplied together
 MOST_ROWS = 6  # of a joint
@@ -78,7 +78,7 @@ class Bodies(NamedTuple):
     omega2: F1  # pooled, n of all bodies that differ
     two_zeta_omega: F1  # likewise
     stiffening: F1  # pooled; of each body the stiffness by each load, in blocks; empty without geometric stiffening
-    blocks: I1  # pooled; how PP_dm and stiffening are stored (see `ffr_dyn.decoupling`)
+    blocks: I1  # pooled; how PP_dm and stiffening are stored (see `ffr_dyn.compile.symmetry_blocks`)
 
 
 class Markers(NamedTuple):
@@ -321,7 +321,7 @@ STEP, NOW, BEFORE, ERROR, RELATIVE, ORDER, LEAST = range(7)
 class Tables(NamedTuple):
     """All that the compiled units read and write while a scene is integrated; they are given its address."""
 
-    address: int  # of these tables, packed (see `ffr_dyn.kernels.packing`)
+    address: int  # of these tables, packed (see `ffr_dyn.kernels.simd.table_address`)
     units: I1  # addresses of the compiled units, by number
     model: Model
     work: Work

@@ -10,18 +10,9 @@ coordinates q (n,) [m sqrt(kg)]. Integrals over the mass carry the suffix ``_dm`
 The numbered invariants I1...I9 and Shabana's S_bar family are read-only views of these integrals.
 """
 
+from ffr_prep.body.constructors import recombined, rigid_body, truncated, with_point
 from ffr_prep.body.file import content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
-from ffr_prep.body.making import recombined, rigid_body, truncated, with_point
-from ffr_prep.body.reduced import (
-    SECTION_FORCES,
-    TENSOR,
-    BeamForces,
-    BodyError,
-    FlexibleBody,
-    Interface,
-    Surface,
-    axial,
-)
+from ffr_prep.body.reduced import SECTION_FORCES, TENSOR, BeamForces, BodyError, FlexibleBody, Interface, Surface, axial
 
 __all__ = [
     "SECTION_FORCES",

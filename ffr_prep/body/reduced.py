@@ -194,16 +194,6 @@ class FlexibleBody:
         known = ", ".join(repr(i.name) for i in self.interfaces) or "none"
         raise BodyError(f"body {self.name!r} has no interface {name!r}; it has: {known}")
 
-    def with_reference(self, conditions: Any) -> FlexibleBody:
-        """The body in the frame of other reference conditions (`ffr_prep.reference`), without its finite-element model.
-
-        Raises InputError where they do not fit the body: see `ffr_prep.conversion.with_reference`, which does the work and
-        is loaded for it, since the rest of this module needs numpy only.
-        """
-        from ffr_prep.conversion import with_reference
-
-        return with_reference(self, conditions)
-
     # ---- the nine inertia invariants ------------------------------------------------------------------------------
     # Signs as in Rantalainen 2007, eqs. 3.50-3.67: J(q) = I7 - sum_j (I8_j + I8_j^T) q_j - sum_ij I9_ij q_i q_j.
     # Other sources (MBDyn among them) define I8 with the opposite sign.

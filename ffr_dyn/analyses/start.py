@@ -1,0 +1,76 @@
+"""Assembly as an analysis: the consistent start of a scene as a result of one row, and what was changed for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ffr_dyn.analyses.forward import with_all_reactions
+from ffr_dyn.analyses.outcome import result_of
+from ffr_dyn.consistency.assemble import Assembled, assemble
+from ffr_dyn.consistency.evaluation import evaluator, record_states
+from ffr_dyn.equations.layout import initial_state
+from ffr_dyn.functions.rotation import rotation_matrix
+from ffr_dyn.results.quantities import selected
+from ffr_dyn.results.result import Result
+from ffr_dyn.scene.scene import Scene
+
+Array = np.ndarray
+
+CHANGED = 1e-9  # m, rad, m/s, rad/s and elastic coordinates, from where a change is told
+
+
+def assembly(
+    scene: Scene, *, time: float = 0.0, outputs: Sequence[str] = ("default",), path: str | Path | None = None
+) -> Result:
+    """Positions and velocities of a scene at `time` [s] that meet its joints and drivers: one row, with all reactions.
+
+    outputs : names or patterns of the quantities to keep, as in `forward`
+
+    The notes tell what was changed of each body: by how much it was shifted and turned, and its velocities.
+
+    Raises InputError as `assemble` does, ComputationError when there are no accelerations.
+    """
+    assembled = assemble(scene, time=time)
+    selected(assembled.system, outputs)
+    at = evaluator(assembled.system)
+    record = record_states(at, np.array([time]), assembled.x[None], assembled.v[None])
+    notes = [note for note in assembled.notes if not note.startswith("assembly moved")]
+    attributes = {
+        "title": scene.name,
+        "analysis": "assembly",
+        "method": "smallest changes in the norm of the mass matrix",
+        "evaluations": int(at.work.info[1]),
+        "degrees_of_freedom": assembled.degrees_of_freedom,
+        "notes": [*changes(assembled), *notes],
+        "status": "complete",
+    }
+    return result_of(assembled.system, with_all_reactions(assembled, record), attributes, path, outputs)
+
+
+def changes(assembled: Assembled) -> list[str]:
+    """What assembly changed of each body, in words; one line where it changed nothing."""
+    scene, place = assembled.system.scene, assembled.system.layout
+    x, v = initial_state(scene, place)
+    found = []
+    for b, body in enumerate(scene.bodies):
+        A, A0 = rotation_matrix(assembled.x[place.p(b)]), rotation_matrix(x[place.p(b)])
+        turn = np.arccos(np.clip(0.5 * (np.trace(A @ A0.T) - 1), -1, 1)) if np.abs(A - A0).max() > CHANGED else 0.0
+        sizes = {
+            "position by {:.4g} m": _change(assembled.x, x, place.R(b)),
+            "attitude by {:.4g} rad": turn,
+            "elastic coordinates by {:.4g}": _change(assembled.x, x, place.q(b)),
+            "velocity by {:.4g} m/s": _change(assembled.v, v, place.R_dot(b)),
+            "angular velocity by {:.4g} rad/s": _change(assembled.v, v, place.omega(b)),
+            "elastic rates by {:.4g}": _change(assembled.v, v, place.q_dot(b)),
+        }
+        words = [text.format(size) for text, size in sizes.items() if size > CHANGED]
+        if words:
+            found.append(f"body {body.name!r} was changed: {', '.join(words)}")
+    return found or ["nothing was changed: the scene is assembled as it stands"]
+
+
+def _change(now: Array, before: Array, where: slice) -> float:
+    return float(np.linalg.norm(now[where] - before[where]))

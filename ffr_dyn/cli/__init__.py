@@ -1,0 +1,192 @@
+"""The command `ffr-dyn`. Heavy modules are imported inside the commands, so that help is immediate."""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ffr_dyn.cli.analyses import COMMANDS
+from ffr_dyn.cli.chart import chart
+from ffr_dyn.cli.economy import economise
+from ffr_dyn.cli.realtime import realtime
+from ffr_dyn.cli.run import forward, run
+from ffr_dyn.cli.stress import stress
+from ffr_prep.common.errors import ComputationError, InputError
+
+EXAMPLE = """\b
+Example:
+  ffr-prep reduce rod.geo --unit mm --material steel --interface big_eye --interface small_eye \\
+           --reference simply-supported:big_eye,small_eye -o rod.ffr
+  ffr-dyn run slider_crank.toml -o out/result.nc
+  ffr-dyn plot out/result.nc rod.small_eye.position.x -o out/slider.png
+  ffr-dyn animate out/result.nc -o out/motion.gif --scale auto
+  ffr-dyn stress out/result.nc -o out/stress
+"""
+
+PLOT_EXAMPLE = """\b
+Example:
+  ffr-dyn plot out/result.nc rod.tip.position hinge.force.y -o out/tip.png
+  ffr-dyn plot out/result.nc rod.tip --path xy -o out/path.png
+"""
+FILM_EXAMPLE = """\b
+Example:
+  ffr-dyn animate out/result.nc -o out/motion.gif --scale 50
+  ffr-dyn animate out/result.nc -o out/stress.html --colour von-mises --limit 60e6
+"""
+
+
+REGISTERED = "ffr_dyn.commands"
+CONTEXT: Any = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
+
+
+class Commands(click.Group):
+    """The commands of this package, and those that others register in the entry points "ffr_dyn.commands"."""
+
+    def list_commands(self, context: click.Context) -> list[str]:
+        return sorted({*super().list_commands(context), *entry_points(group=REGISTERED).names})
+
+    def get_command(self, context: click.Context, name: str) -> click.Command | None:
+        own = super().get_command(context, name)
+        return own or next((point.load() for point in entry_points(group=REGISTERED, name=name)), None)
+
+
+@click.group(cls=Commands, epilog=EXAMPLE, invoke_without_command=True, context_settings=CONTEXT)
+@click.version_option(package_name="ffr")
+@click.pass_context
+def cli(context: click.Context) -> None:
+    """Flexible multibody dynamics in the floating frame of reference: from reduced bodies to a moving machine.
+
+    A scene file (TOML) names the bodies (files from ffr-prep, or rigid ones), their joints, drivers and loads, and the
+    analysis. `run` does it and writes one result file; `info`, `plot` and `animate` show what is in it.
+    """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+@cli.command()
+def schema() -> None:
+    """The JSON schema of scene files, for editors and programs that write them."""
+    import json
+
+    from ffr_dyn.scene_file.schema import schema as made
+
+    click.echo(json.dumps(made(), indent=2))
+
+
+@cli.command()
+@click.argument("result", type=click.Path(path_type=Path))
+def info(result: Path) -> None:
+    """What RESULT holds: how it was made, notes, and every quantity with its unit."""
+    from ffr_dyn.results.file import load_result
+
+    loaded = load_result(result)
+    for key, value in sorted(loaded.attributes.items()):
+        for line in _attribute(key, value):
+            click.echo(f"{key:20} {line}")
+    click.echo(f"{'rows':20} {loaded.time.size}, from {loaded.time[0]:g} to {loaded.time[-1]:g} s\n")
+    for name, quantity in loaded.quantities.items():
+        axes = "".join(f".{{{','.join(axis.labels)}}}" for axis in quantity.axes)
+        click.echo(f"{name + axes:45} [{quantity.unit}] {quantity.description}")
+
+
+@cli.command(epilog=PLOT_EXAMPLE)
+@click.argument("result", type=click.Path(path_type=Path))
+@click.argument("names", nargs=-1, required=True)
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="Picture, .png or .svg.")
+@click.option("--title", help="Title of the picture.")
+@click.option("--path", "plane", metavar="PLANE", help="Draw the path of one marker, such as rod.tip, in xy, zx, ...")
+def plot(result: Path, names: tuple[str, ...], output: Path, title: str | None, plane: str | None) -> None:
+    """Draw the histories NAMES of RESULT, a panel per unit. `ffr-dyn info` lists the names.
+
+    With --path xy the path of a marker in that plane instead, coloured by time.
+    """
+    from ffr_dyn.pictures import histories as plots
+    from ffr_dyn.results.file import load_result
+
+    if plane is None:
+        plots.plot(load_result(result), names, output, title=title)
+    elif len(names) == 1:
+        plots.plot_path(load_result(result), names[0].removesuffix(".position"), output, plane=plane, title=title)
+    else:
+        raise InputError(f"--path {plane}: give one marker, not {len(names)} names")
+    click.echo(f"picture  {output}")
+
+
+@cli.command(epilog=FILM_EXAMPLE)
+@click.argument("result", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help=".gif, .mp4 or .html.")
+@click.option("--scale", default="auto", help="Factor on the deformation: a number, or auto.", show_default=True)
+@click.option("--duration", type=float, help="Length of the film [s]; default: chosen from the run.")
+@click.option(
+    "--colour", default="deformation", show_default=True, help="Of flexible bodies: deformation, body, von-mises, ..."
+)
+@click.option("--limit", type=float, help="End of the colour bar [m, Pa]; default: the largest value of the film.")
+def animate(result: Path, output: Path, scale: str, duration: float | None, colour: str, limit: float | None) -> None:
+    """A film of RESULT: deformed bodies, coloured by elastic displacement or stress, with the undeformed ghost.
+
+    Colours by stress need bodies with stress modes (`ffr-prep reduce --stress`); `ffr-dyn stress --help` lists the
+    quantities.
+
+    .html is one page that works offline and can be turned with the mouse.
+    """
+    from ffr_dyn.pictures import animate as animation
+    from ffr_dyn.results.file import load_result
+
+    factor: float | str = scale if scale == "auto" else _number(scale)
+    loaded = load_result(result)
+    animation.animate(loaded, output, scale=factor, duration=duration, colour=colour, limit=limit)
+    click.echo(f"film     {output}")
+
+
+for command in (run, forward, *COMMANDS, stress, chart, economise, realtime):
+    cli.add_command(command)
+
+
+def _attribute(key: str, value: Any) -> list[str]:
+    """An attribute in lines: numbers with their units on one, texts a line each."""
+    if key == "largest_drift":
+        return [f"{value[0]:.3g} of positions, {value[1]:.3g} of rates"]
+    if isinstance(value, list):
+        return [str(line) for line in value]
+    return [
+        f"{value:.10g}{' s' if key in ('start', 'end', 'output_step') else ''}"
+        if isinstance(value, float)
+        else str(value)
+    ]
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"--scale must be a number or auto, not {text!r}") from None
+
+
+def main() -> None:
+    """Entry point: exit code 2 for bad input, 1 for a failed computation, no traceback for either."""
+    from ffr_prep.body import BodyError
+
+    try:
+        cli(prog_name="ffr-dyn", standalone_mode=False)
+    except (InputError, BodyError) as error:
+        _leave(str(error), 2)
+    except ComputationError as error:
+        _leave(str(error), 1)
+    except click.UsageError as error:
+        where = error.ctx.command_path if error.ctx else "ffr-dyn"
+        _leave(f"{error.format_message()} ({where} --help tells more)", 2)
+    except click.ClickException as error:
+        _leave(error.format_message(), error.exit_code)
+    except OSError as error:
+        _leave(f"{error.filename2 or error.filename or 'file'}: {error.strerror or error}; choose another place", 2)
+    except (click.Abort, KeyboardInterrupt):
+        _leave("interrupted; the result file holds what was computed", 1)
+
+
+def _leave(message: str, code: int) -> None:
+    click.echo(f"ffr-dyn: {message}", err=True)
+    sys.exit(code)

@@ -1,0 +1,199 @@
+"""The command `ffr-dyn chart`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ffr_dyn.cli.run import assignments, parameter_option, require_after, require_file, scene_argument
+from ffr_prep.common.errors import InputError
+
+if TYPE_CHECKING:
+    from ffr_dyn.chart.diagram import Diagram
+    from ffr_dyn.chart.variants import Model
+    from ffr_dyn.scene.scene import Scene
+
+_NOTES = """\b
+Examples:
+  ffr-dyn chart crank.toml -m deflection:rod -m reaction:crankpin --modes 2,4,8,all --drop I5,I9 -o out/chart
+  ffr-dyn chart crank.toml --method ros3=1e-3,5e-4,1e-4 --method rk4 --cluster tcp://host:8786
+
+\b
+Measures:
+  position:rod.tip                 where a marker is
+  deflection:rod                   elastic displacement all over a body, root mean square
+  deflection:rod.tip               of an interface from the body's frame
+  deflection:rod.mid/left,right    of a point from the chord between two interfaces
+  reaction:hinge, moment:hinge     what a joint carries
+  stress:rod@0.3,0,0.01            von Mises stress at a place of the body (ffr-prep reduce --stress)
+  energy, constraint               total energy; violation of the constraints
+  rod.tip.velocity.x               any quantity of the scene (ffr-dyn info RESULT lists them)
+
+\b
+Terms that --drop leaves out: I3 I4 I5 I8 I9 (inertia integrals) and stiffening; docs/chart.md says what they do.
+"""
+
+
+@click.command(epilog=_NOTES)
+@scene_argument
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Name of the files without suffix; default: <scene>.chart"
+)
+@click.option("-m", "--measure", "measures", multiple=True, metavar="WHAT", help="What is compared; see below.")
+@click.option("--method", "methods", multiple=True, metavar="NAME[=NUMBER,...]",
+              help="A method, with its steps [s] or tolerances, or those that are chosen for it. Default: all.")  # fmt: skip
+@click.option("--modes", metavar="N,...|all", help="Elastic modes to keep of every flexible body: 2,4,8,all.")
+@click.option("--drop", "drops", multiple=True, metavar="TERM,...", help="Also run without these inertia terms.")
+@click.option("--body", "bodies", multiple=True, metavar="BODY=FILE,...",
+              help="Body files, from finer meshes say, that are tried for a body beside its own.")  # fmt: skip
+@click.option("--against", type=click.Choice(["cpu", "wall", "evaluations"]), default="cpu", show_default=True,
+              help="Cost on the axis of the picture; the page and the table have all.")  # fmt: skip
+@click.option("--end", type=float, help="End of the run [s], instead of the scene's.")
+@click.option(
+    "--repeats", default=5, show_default=True, type=click.IntRange(1), help="How often a run is timed, at least."
+)
+@click.option("--limit", default=60.0, show_default=True, type=click.FloatRange(0.0, min_open=True),
+              help="Wall time [s] that one run may take.")  # fmt: skip
+@click.option("--workers", type=click.IntRange(0), help="Local processes; default half the processors, 0: none, here.")
+@click.option("--cluster", metavar="ADDRESS", help="Scheduler of a Dask cluster that runs the variants instead.")
+@parameter_option
+def chart(
+    scene: Path,
+    output: Path | None,
+    measures: tuple[str, ...],
+    methods: tuple[str, ...],
+    modes: str | None,
+    drops: tuple[str, ...],
+    bodies: tuple[str, ...],
+    against: str,
+    end: float | None,
+    repeats: int,
+    limit: float,
+    workers: int | None,
+    cluster: str | None,
+    parameters: tuple[str, ...],
+) -> None:
+    """Speed against accuracy of SCENE: a work-precision diagram over methods, steps and models.
+
+    Runs every method with falling steps on every model (modes kept x terms dropped x body files) and measures its errors
+    against a reference that is computed and verified first: a method of high order refined until nothing changes, and
+    another one that agrees. Writes <output>.png, .svg, .html (interactive, works offline) and .csv. A variant that fails is
+    listed with its reason. Variants that no other beats, the Pareto front, are ringed.
+
+    Measures, methods, modes and terms may stand in the scene file, in [chart]; options go before them.
+
+    Times are those of the integrator alone on one thread, medians of several runs with bars for the spread. On a busy
+    machine trust CPU time.
+    """
+    from ffr_dyn.analyses.settings import Forward, Settings
+    from ffr_dyn.chart.diagram import measures_of, work_precision
+    from ffr_dyn.chart.runner import Span, pool
+    from ffr_dyn.cli.progress_bar import counted
+    from ffr_dyn.scene_file.read import load_scene
+
+    loaded, settings = load_scene(scene, assignments(parameters))
+    if not isinstance(settings, Settings) or not isinstance(settings.analysis, Forward):
+        raise InputError("a chart compares runs of forward dynamics; the scene file asks for another analysis")
+    require_after("--end", end, settings.start)
+    output = output or scene.with_suffix(".chart")
+    require_file("-o", output.with_name(f"{output.name}.png"))
+    span = Span(settings.end if end is None else end, settings.output_step, settings.start)
+    asked = settings.chart
+    wanted = _methods(methods) if methods else {name: numbers or None for name, numbers in asked.methods} or None
+    numbers = asked.modes if modes is None else _numbers(modes)
+    left_out = tuple(tuple(text.split(",")) for text in drops) or asked.drops
+    models = _models(loaded, numbers, left_out, bodies)
+    chosen = measures_of(loaded, measures or asked.measures, span.start)
+    with pool(workers, cluster) as where, counted(loaded.name) as update:
+        found = work_precision(
+            loaded, span, where, measures=chosen, methods=wanted, models=models, stabilisation=settings.stabilisation,
+            repeats=repeats, limit=limit, tell=lambda line: click.echo(f"reference    {line}"), progress=update,
+        )  # fmt: skip
+    for line in _report(found, against):
+        click.echo(line)
+    for path in _write(found, output, against):
+        click.echo(f"written      {path}")
+
+
+def _methods(given: Sequence[str]) -> Mapping[str, Sequence[float] | None]:
+    """Numbers by method, None where they are to be chosen."""
+    from ffr_dyn.chart.variants import maker
+
+    found: dict[str, Sequence[float] | None] = {}
+    for text in given:
+        name, _, numbers = text.partition("=")
+        maker(name)
+        found[name] = _listed(numbers, float, f"--method {text}", "NAME=NUMBER,...") if numbers else None
+        if any(not number > 0 for number in found[name] or ()):
+            raise InputError(f"--method {text}: steps and tolerances must be positive")
+    return found
+
+
+def _listed(text: str, of: Callable[[str], Any], what: str, form: str) -> list[Any]:
+    try:
+        return [of(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(f"{what}: write it as {form}") from None
+
+
+def _numbers(modes: str) -> list[int | None]:
+    return _listed(modes, lambda part: None if part == "all" else int(part), f"--modes {modes}", "2,4,8,all")
+
+
+def _models(
+    scene: Scene, numbers: Sequence[int | None], drops: Sequence[Sequence[str]], bodies: Sequence[str]
+) -> tuple[Model, ...]:
+    from ffr_dyn.chart.variants import models_of
+    from ffr_prep.body import load_body
+
+    meshes: dict[str, list[Any]] = {}
+    for text in bodies:
+        name, _, files = text.partition("=")
+        own = {body.name: body.model for body in scene.bodies}
+        if name not in own or not files:
+            raise InputError(f"--body {text}: write BODY=FILE,... with one of the bodies {', '.join(own)}")
+        others = [(f"{name} of {Path(file).stem}", load_body(file)) for file in files.split(",")]
+        meshes[name] = [(f"{name} of the scene", own[name]), *others]
+    return models_of(scene, numbers, [(), *drops], meshes)
+
+
+def _report(found: Diagram, against: str) -> list[str]:
+    """The Pareto front of every measure, and what failed."""
+    from ffr_dyn.chart.orders import orders
+    from ffr_dyn.chart.variants import FULL
+
+    lines = []
+    for measure in found.measures:
+        lines.append(f"\n{measure.words}: the front, cheapest first")
+        for point in found.front(measure.name, against):
+            error = point.errors[measure.name]
+            relative = (
+                f"  {error / found.scale(measure.name):8.1e} relative" if found.reference.scales[measure.name] else ""
+            )
+            cost = (
+                f"{point.evaluations:9d} evaluations" if against == "evaluations" else f"{point.cost(against):10.3e} s"
+            )
+            lines.append(f"  {cost}  error {error:8.1e} {measure.unit}{relative}  {point.label}")
+        shown = {method: order for (method, model), order in orders(found, measure.name).items() if model == FULL.label}
+        if any(order == order for order in shown.values()):
+            listed = ", ".join(f"{method} {order:.1f}" for method, order in shown.items() if order == order)
+            lines.append(f"  order at the finest steps: {listed}")
+    lines += [f"failed       {lost.label}: {lost.reason}" for lost in found.lost]
+    return [*lines, ""]
+
+
+def _write(found: Diagram, output: Path, against: str) -> list[Path]:
+    """Page, table and pictures; the table also where there is nothing to draw."""
+    from ffr_dyn.chart.draw import draw
+    from ffr_dyn.chart.page import write_page
+    from ffr_dyn.chart.table import write_table
+
+    def named(suffix: str) -> Path:
+        return output.with_name(output.name + suffix)
+
+    written = [write_table(found, named(".csv"))]
+    pictures = [draw(found, named(suffix), against=against) for suffix in (".png", ".svg")]
+    return [*pictures, write_page(found, named(".html")), *written]

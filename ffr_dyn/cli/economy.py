@@ -1,0 +1,89 @@
+"""The command `ffr-dyn economise`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ffr_dyn.cli.run import assignments, over_time, parameter_option, require_after, require_file, scene_argument
+
+EXAMPLE = """\b
+Example:
+  ffr-dyn economise machine.toml --tolerance 1e-3 --output tool.tip.position.x --output rod.stress=0.5% \\
+          -o out/economised.toml --report out/economised.html
+  ffr-dyn run out/economised.toml
+"""
+
+
+@click.command(epilog=EXAMPLE)
+@scene_argument
+@parameter_option
+@click.option(
+    "--output",
+    "outputs",
+    multiple=True,
+    required=True,
+    metavar="NAME[=TOLERANCE]",
+    help="What matters: a component (rod.tip.position.y), a quantity, or BODY.stress; =0.1% of its range, =1e6 absolute.",
+)
+@click.option("--tolerance", type=float, default=1e-3, show_default=True, help="Share of the range of other outputs.")
+@click.option("--end", type=float, help="End of the run [s], instead of the scene's.")
+@click.option(
+    "--verify/--no-verify", default=None, help="Run everything with a finer step to check; default: if short."
+)
+@click.option(
+    "-o", "target", type=click.Path(path_type=Path), help="Scene file to write; default: <scene>.economised.toml."
+)
+@click.option(
+    "--report", type=click.Path(path_type=Path), help="Report: .html (with chart), .md or .txt; default: .html."
+)
+@click.option("--chart", type=click.Path(path_type=Path), help="Picture of error over cost, .png or .svg.")
+def economise(
+    scene: Path,
+    parameters: tuple[str, ...],
+    outputs: tuple[str, ...],
+    tolerance: float,
+    end: float | None,
+    verify: bool | None,
+    target: Path | None,
+    report: Path | None,
+    chart: Path | None,
+) -> None:
+    """The cheapest model of SCENE that keeps the named outputs within their tolerances, as a scene file and a report.
+
+    SCENE is modelled with everything that could matter: flexible bodies with many modes, geometric stiffening, all terms.
+    What is not needed goes: bodies become rigid, modes, inertia terms and stiffening are left out, the computation is done in
+    the plane, the step is as long as it may be. Every error is estimated and, where that is quick, verified.
+    """
+    from ffr_dyn.analyses.settings import Forward
+    from ffr_dyn.economy.picture import draw
+    from ffr_dyn.economy.report import as_text, write_report
+    from ffr_dyn.economy.search import economise as search
+    from ffr_dyn.scene_file.read import load_scene
+    from ffr_dyn.scene_file.write import save_scene
+
+    loaded, given = load_scene(scene, assignments(parameters))
+    settings = over_time(given, Forward(), ())
+    target = target or scene.with_suffix(".economised.toml")
+    require_after("--end", end, settings.start)
+    require_file("-o", target)
+    require_file("--report", report, (".html", ".md", ".txt"))
+    require_file("--chart", chart, (".png", ".svg"))
+    found = search(
+        loaded,
+        outputs,
+        start=settings.start,
+        end=settings.end if end is None else end,
+        output_step=settings.output_step,
+        tolerance=tolerance,
+        verify=verify,
+        stabilisation=settings.stabilisation,
+        tell=lambda stage: click.echo(f"... {stage}", err=True),
+    )
+    save_scene(found.scene, found.settings, target)
+    write_report(found, report or target.with_suffix(".html"))
+    if chart is not None:
+        draw(found, chart)
+    click.echo(as_text(found))
+    click.echo(f"scene    {target}\nreport   {report or target.with_suffix('.html')}")

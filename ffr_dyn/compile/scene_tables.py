@@ -1,0 +1,299 @@
+"""Scene -> compiled tables. Declarations end here; the kernels read numbers only."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_dyn.compile.alignment import aligned
+from ffr_dyn.compile.body_tables import body_tables, once, starts, stiffness_of
+from ffr_dyn.compile.elimination import Elimination, eliminate
+from ffr_dyn.compile.force_tables import Callback, FunctionTable, base_functions, load_tables
+from ffr_dyn.equations.layout import Layout, layout
+from ffr_dyn.equations.state_view import StateView
+from ffr_dyn.kernels.tables import LANES, Markers, Model, Pattern, Rows
+from ffr_dyn.scene.applied_loads import marker_numbers
+from ffr_dyn.scene.couplings import Coupling, coupling_word
+from ffr_dyn.scene.drivers import Driver, PointDriver, driver_word, path_words
+from ffr_dyn.scene.joints import RELATION, Joint, Word, words
+from ffr_dyn.scene.scene import MarkerName, Scene, joint_of, joints_of, marker_number, markers
+from ffr_prep.common.errors import InputError
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Block:
+    """The rows of one joint, driver or coupling.
+
+    markers : numbers of markers i, j, or i, j of both joints of a relation
+    driver  : whether it prescribes a motion
+    """
+
+    name: str
+    markers: tuple[int, ...]
+    words: tuple[Word, ...]
+    driver: bool = False
+
+
+@dataclass(frozen=True)
+class System:
+    """A compiled scene: the tables, and what connects their numbers to the scene's names.
+
+    blocks : in elimination order, as the rows in the tables;  user : keeps the callback of the user's functions alive
+    inputs : where the numbers of a signal begin among those of the time functions, by its name
+    """
+
+    scene: Scene
+    layout: Layout
+    blocks: tuple[Block, ...]
+    elimination: Elimination
+    model: Model
+    user: UserFunctions
+    inputs: Mapping[str, tuple[int, ...]]
+
+
+def blocks_of(scene: Scene) -> list[Block]:
+    """Joints, then couplings, then drivers, as blocks of words."""
+    joints = [_joint_block(scene, joint) for joint in scene.joints]
+    couplings = [_coupling_block(scene, coupling) for coupling in scene.couplings]
+    return joints + couplings + [_driver_block(scene, driver) for driver in scene.drivers]
+
+
+def _ends(scene: Scene, joint: Joint | PointDriver) -> tuple[int, int]:
+    return marker_number(scene, joint.i), marker_number(scene, joint.j)
+
+
+def _joint_block(scene: Scene, joint: Joint) -> Block:
+    ends, said = _ends(scene, joint), tuple(words(joint))
+    related = any(word.kind == RELATION for word in said)
+    return Block(joint.name, ends + ends if related else ends, said)
+
+
+def _coupling_block(scene: Scene, coupling: Coupling) -> Block:
+    first, second = joints_of(scene, coupling)
+    word = coupling_word(coupling, first, second)
+    return Block(coupling.name, _ends(scene, first) + _ends(scene, second), (word,))
+
+
+def _driver_block(scene: Scene, driver: Driver | PointDriver) -> Block:
+    if isinstance(driver, PointDriver):
+        return Block(driver.name, _ends(scene, driver), tuple(path_words(driver)), driver=True)
+    joint = joint_of(scene, driver)
+    return Block(driver.name, _ends(scene, joint), (driver_word(driver, joint),), driver=True)
+
+
+def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: float = 0.0) -> System:
+    """Tables of a scene.
+
+    blocks     : the constraint rows to use; default all
+    relaxation : above zero where rows depend on one another (see `kernels.solution.refine_motion`)
+    """
+    chosen = blocks_of(scene) if blocks is None else blocks
+    place = layout(scene)
+    table = markers(scene)
+    ground = len(scene.bodies)
+    moving = [_moving(block, table, ground) for block in chosen]
+    elimination = eliminate([len(k.words) for k in chosen], moving)
+    ordered = tuple(chosen[k] for k in elimination.order)
+    functions = FunctionTable()
+    marked = _markers(scene, ordered)
+    equal = [
+        (id(body.model), np.asarray(body.damping).tobytes(), k)
+        for body, k in zip(scene.bodies, place.normals, strict=True)
+    ]
+    model = {
+        "gravity": np.array(scene.gravity),
+        "base": base_functions(scene, functions),
+        "relaxation": relaxation,
+        "bodies": body_tables(scene, place, marked),
+        "markers": marked,
+        "rows": _rows(ordered, functions),
+        "pattern": _pattern(ordered, [moving[k] for k in elimination.order], elimination, marked, equal),
+        "loads": load_tables(scene, functions),
+        "functions": functions.tables(),
+    }
+    user = UserFunctions(functions.callbacks, place, scene)
+    compiled = Model(**model, user_address=user.address, user_count=user.count)  # type: ignore[arg-type]
+    return System(scene, place, ordered, elimination, aligned(compiled), user, functions.inputs())
+
+
+def _moving(block: Block, table: tuple[MarkerName, ...], ground: int) -> tuple[int, ...]:
+    """The bodies that a block ties, each once."""
+    return tuple(dict.fromkeys(table[k][0] for k in block.markers if table[k][0] != ground))
+
+
+# ---- markers ------------------------------------------------------------------------------------------------------
+
+
+def _markers(scene: Scene, blocks: tuple[Block, ...]) -> Markers:
+    table = markers(scene)
+    ground = len(scene.bodies)
+    interfaces = [i for body in scene.bodies for i in body.model.interfaces]
+    shapes = [np.concatenate([i.phi_t, i.phi_r]) for i in interfaces] + [np.zeros((6, 0))] * len(scene.ground)
+    phi, start = once(shapes, [*(id(i) for i in interfaces), *("ground" for _ in scene.ground)])
+    joint = sorted({k for block in blocks for k in block.markers})
+    return Markers(
+        body=np.array([entry[0] for entry in table], dtype=np.int64),
+        u=np.array([i.position for i in interfaces] + list(scene.ground.values())).reshape(-1, 3),
+        phi=phi,
+        start=start,
+        load=np.array(_load_numbers(scene), dtype=np.int64),
+        active=np.array(sorted({*joint, *marker_numbers(scene)}), dtype=np.int64),
+        joint=np.array([k for k in joint if table[k][0] != ground], dtype=np.int64),
+    )
+
+
+def _load_numbers(scene: Scene) -> list[int]:
+    """Per marker, the number of its force in the stiffening loads of its body: twelve inertial ones come first."""
+    numbers: list[int] = []
+    for body in scene.bodies:
+        has = len(stiffness_of(body)) > 0
+        numbers += [12 + 6 * k if has else -1 for k in range(len(body.model.interfaces))]
+    return numbers + [-1] * len(scene.ground)
+
+
+# ---- constraints --------------------------------------------------------------------------------------------------
+
+
+def _rows(blocks: tuple[Block, ...], functions: FunctionTable) -> Rows:
+    said = [(block, word) for block in blocks for word in block.words]
+    function = [-1 if w.function is None else functions.add(w.function, f"{b.name!r}") for b, w in said]
+    listed = [word for _, word in said]
+    axes = np.zeros((len(listed), 6, 3))
+    for row, word in enumerate(listed):
+        axes[row, : len(word.axes)] = word.axes
+    sides = max((len(block.markers) for block in blocks), default=2)
+    marker = np.array([b.markers + (-1,) * (sides - len(b.markers)) for b in blocks], dtype=np.int64).reshape(-1, sides)
+    return Rows(
+        kind=np.array([word.kind for word in listed], dtype=np.int64),
+        axes=axes,
+        relation=np.array([word.relation for word in listed], dtype=float).reshape(-1, 5),
+        function=np.array(function, dtype=np.int64),
+        start=starts([len(b.words) for b in blocks]),
+        marker=marker,
+        first=_first_of_each(marker),
+    )
+
+
+def _first_of_each(numbers: Array) -> Array:
+    """Of numbers in any order, 1 where one is there for the first time."""
+    first = np.zeros(numbers.size, dtype=np.int64)
+    first[np.unique(numbers, return_index=True)[1]] = 1
+    return first.reshape(numbers.shape)
+
+
+def _pattern(
+    blocks: tuple[Block, ...],
+    moving: list[tuple[int, ...]],
+    elimination: Elimination,
+    marked: Markers,
+    equal: Sequence[Hashable],
+) -> Pattern:
+    """equal : per body, what two bodies have in common whose elastic coordinates couple equal markers equally"""
+    size = [len(b.words) for b in blocks]
+    offsets: dict[tuple[int, int], int] = {}
+    total = 0
+    for k, column in enumerate(elimination.columns):
+        for later in (k, *column):
+            offsets[later, k] = total
+            total += LANES * size[k]
+    sides = [[int(marked.body[marker]) for marker in block.markers] for block in blocks]
+    pairs = [
+        (b, later, side, earlier, other, offsets[later, earlier])
+        for earlier in range(len(blocks))
+        for later in (earlier, *elimination.columns[earlier])
+        for b in moving[earlier]
+        for side in _where(sides[later], b)
+        for other in _where(sides[earlier], b)
+    ]
+    listed = np.array(sorted(pairs, key=lambda pair: pair[1]), dtype=np.int64).reshape(-1, 6)
+    shared = _shared(listed, [block.markers for block in blocks], marked, equal)
+    reach = [max(column, default=k) for k, column in enumerate(elimination.columns)]
+    updates = [
+        [offsets[a, b] for at, a in enumerate(column) for b in column[: at + 1]] for column in elimination.columns
+    ]
+    stored = [(later, offsets[later, k]) for k, column in enumerate(elimination.columns) for later in column]
+    return Pattern(
+        pair_body=listed[:, 0].copy(),
+        pair=np.column_stack([listed[:, 1:], shared]),
+        sample=np.unique(shared, return_index=True)[1],
+        pair_start=starts(np.bincount(listed[:, 1], minlength=len(blocks)).tolist()),
+        reach=np.array(np.maximum.accumulate(reach), dtype=np.int64) if reach else np.zeros(0, dtype=np.int64),
+        diagonal=np.array([offsets[k, k] for k in range(len(blocks))], dtype=np.int64),
+        column_start=starts([len(column) for column in elimination.columns]),
+        column=np.array(stored, dtype=np.int64).reshape(-1, 2),
+        update_start=starts([len(column) for column in updates]),
+        update=np.array([offset for column in updates for offset in column], dtype=np.int64),
+    )
+
+
+def _shared(pairs: Array, of: list[tuple[int, ...]], marked: Markers, equal: Sequence[Hashable]) -> Array:
+    """(P,) numbers of pairs, the same for those of equal markers on equal bodies; `of`: the markers of each block."""
+    numbers: dict[Hashable, int] = {}
+    return np.array(
+        [
+            numbers.setdefault(
+                (equal[b], *(int(marked.start[of[k][side]]) for k, side in ((later, i), (earlier, j)))), len(numbers)
+            )
+            for b, later, i, earlier, j, _ in pairs.tolist()
+        ],
+        dtype=np.int64,
+    )
+
+
+def _where(sides: list[int], body: int) -> list[int]:
+    return [k for k, b in enumerate(sides) if b == body]
+
+
+# ---- the user's Python functions ----------------------------------------------------------------------------------
+
+_SIGNATURE = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
+
+
+class UserFunctions:
+    """One C callback through which the kernels reach all Python functions of a scene.
+
+    Python cannot raise through compiled code: the callback reports failure, and `failure` keeps what to tell the user.
+    """
+
+    def __init__(self, callbacks: list[Callback], place: Layout, scene: Scene) -> None:
+        self.callbacks = callbacks
+        self.place = place
+        self.scene = scene
+        self.count = sum(c.size for c in callbacks)
+        self.failure: str | None = None
+        self.cause: BaseException | None = None
+        self._c_function = _SIGNATURE(self._call)
+        self.address = ctypes.cast(self._c_function, ctypes.c_void_p).value or 0
+
+    def _call(self, t: float, x_address: int, v_address: int, out_address: int) -> int:
+        x = _at(x_address, self.place.x_size)
+        v = _at(v_address, self.place.v_size)
+        out = _at(out_address, self.count)
+        for callback in self.callbacks:
+            try:
+                out[callback.slot : callback.slot + callback.size] = self._values(callback, t, x, v)
+            except BaseException as error:
+                self.failure = f"{callback.what} at t = {t:.6g} s: {error or type(error).__name__}"
+                self.cause = error
+                return 1
+        return 0
+
+    def _values(self, callback: Callback, t: float, x: Array, v: Array) -> Array:
+        arguments = (t, StateView(self.scene, self.place, x, v)) if callback.with_state else (t,)
+        given = np.atleast_1d(np.asarray(callback.function(*arguments), dtype=float))
+        values = np.zeros(callback.size)
+        if given.ndim != 1 or given.size not in callback.sizes:
+            raise InputError(f"the function returned {given!r}, not numbers of the right count")
+        if not np.isfinite(given).all():
+            raise InputError(f"the function returned {given}; it must be finite")
+        values[: given.size] = given
+        return values
+
+
+def _at(address: int, size: int) -> Array:
+    return np.ctypeslib.as_array(ctypes.cast(address, ctypes.POINTER(ctypes.c_double)), (size,))

@@ -1,0 +1,192 @@
+"""Memory for a compiled scene: scratch of evaluations, what an integrator keeps, and rows of results."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ffr_dyn.compile.body_tables import starts
+from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.functions.rotation import skew
+from ffr_dyn.kernels.tables import (
+    LANES,
+    MEANS,
+    MOST_ROWS,
+    QUAD,
+    STAGES,
+    WATCH,
+    Bodies,
+    BodyWork,
+    LoadWork,
+    MarkerWork,
+    Model,
+    Record,
+    RowWork,
+    Stages,
+    Work,
+)
+from ffr_dyn.kernels.vectors import LEAST_PIVOT
+
+Array = np.ndarray
+
+
+def new_work(m: Model, *, keeps_terms: bool = False, looks_ahead: int = 0) -> Work:
+    """Scratch of evaluations; what depends on the elastic diagonal is made when that is set.
+
+    keeps_terms : whether the quadratic terms of all bodies are needed after an evaluation
+    looks_ahead : order to which geometric stiffening is extrapolated, 2 to 4, or 0
+    """
+    V, M, n = 6 * m.bodies.mass.size + int(m.bodies.where[-1, 3]), m.markers.body.size, m.bodies.where[:, 0]
+    bodies = _body_work(m, keeps_terms, looks_ahead)
+    vectors = _zeros(r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3), load=(M, 6))
+    return Work(
+        bodies=bodies,
+        markers=MarkerWork(body=m.markers.body, A=bodies.A, omega=bodies.omega, **vectors),
+        rows=_row_work(m),
+        loads=_load_work(m, V, M),
+        field=np.zeros(3),
+        diagonal=np.full(1, -1.0),
+        info=np.zeros(3, dtype=np.int64),
+        independence=np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
+        **_zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=2),
+    )
+
+
+def _zeros(**shapes: Any) -> dict[str, Array]:
+    return {key: np.zeros(shape) for key, shape in shapes.items()}
+
+
+def _body_work(m: Model, keeps_terms: bool, looks_ahead: int) -> BodyWork:
+    """Scratch of the bodies; the factors of rigid ones, which are constant, are in it."""
+    B, E, n = m.bodies.mass.size, int(m.bodies.where[-1, 3]), m.bodies.where[:, 0]
+    V, longest = 6 * B + E, int(n.max())
+    E_s = E if m.bodies.stiffening.size else 0
+    E_a, B_a = (E_s, B if E_s else 0) if looks_ahead else (0, 0)
+    spaced = n[:-1] + LANES  # sums in whole rows of lanes end beyond the terms
+    terms, loads = int(spaced.sum() if keeps_terms else spaced.max(initial=0)), int(m.markers.load.max(initial=6)) + 6
+    work = BodyWork(
+        A=_identities(B + 1),
+        dinv=np.ones(m.bodies.omega2.size),
+        terms=starts(spaced)[:-1] * keeps_terms,
+        **_zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), inverse=(B, 2), g=9 * terms, l=3 * terms),
+        sorted=np.zeros(2 * LANES * MOST_ROWS + 14 * longest + 3 * LANES * longest + loads),
+        **_zeros(H=3 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6)),
+        **_zeros(more=V, unstiffened=E, shift=V, load=(B, loads)),
+        **_zeros(stiff=E_s, last=E_s, steady=3, change=(3 * STAGES, E_s)),
+        K_sigma=np.zeros(int(m.bodies.where[:, 6].max()) + QUAD * LANES),
+        scratch=np.zeros(longest),
+        ahead=_ahead(looks_ahead),
+        **_zeros(stage=2, past=(8, E_a), diagonal=E_a, mean=(MEANS, B_a, loads), expected=(B_a, loads)),
+    )
+    work.inverse[:, 0] = [_inverse(mass) for mass in m.bodies.mass]
+    for b in np.flatnonzero(n[:-1] == 0):
+        work.s[b], work.J[b], work.L[b] = _rigid_inertia(m.bodies, int(b))
+        work.inverse[b, 1] = _inverse(np.trace(work.J[b]))
+    return work
+
+
+# By order: weights that give the value at the end of the last of some intervals by the means over them, polynomials; and half
+# of the feedback that the damping of ROS2, ROS3, RK4 bears (`tests/test_stiffening_ahead.py` derives both).
+_AT_END = {2: (3 / 2, -1 / 2, 0.0, 0.0), 3: (11 / 6, -7 / 6, 1 / 3, 0.0), 4: (25 / 12, -23 / 12, 13 / 12, -1 / 4)}
+_BEARABLE = {2: 0.003, 3: 0.008, 4: 0.007}
+
+
+def _ahead(order: int) -> Array:
+    """How geometric stiffening is extrapolated to an order, or not (see `ffr_dyn.kernels.stiffening.ahead`)."""
+    if order == 0:
+        return np.zeros(7 + MEANS)
+    return np.array(
+        [0.0, 0.0, WATCH / 2, 0.0, _BEARABLE[order] ** 2, 0.5 * (order > 2), (order > 3) / 6, *_AT_END[order]]
+    )
+
+
+def _row_work(m: Model) -> RowWork:
+    K, D = m.rows.marker.shape
+    C, M, pairs = m.rows.kind.size, m.markers.body.size, m.pattern.sample.size
+    size = np.diff(m.rows.start)
+    column = np.repeat(np.arange(K), np.diff(m.pattern.column_start))
+    stored = LANES * int(size.sum() + size[column].sum())
+    return RowWork(
+        **_zeros(Phi=C, nu=C, gamma=C, lam=C, left=C),
+        **_zeros(jac=(K * D, 9, LANES), kept=(K * D, 9, LANES), X=K * D * 12 * LANES, Y=12 * LANES),
+        **_zeros(scale=K * LANES, least=K * LANES, pivots=K * LANES, step=K * LANES),
+        **_zeros(wrench=6, P=(M, 36), phiphi=(pairs, 36), S=stored),
+    )
+
+
+def _inverse(number: float) -> float:
+    """Zero where there is none: such a body is found when it is factorised."""
+    return 1.0 / number if number > 0.0 else 0.0
+
+
+def _rigid_inertia(bodies: Bodies, b: int) -> tuple[Array, Array, Array]:
+    """(first moment, inertia tensor, factor as the kernels want it) of a rigid body; -1 for a factor that does not exist."""
+    first, normal = bodies.moments[b, :3], bodies.where[b, 7]
+    xx, yy, zz, xy, xz, yz = bodies.moments[b, 3:]
+    J = np.array([[yy + zz, -xy, -xz], [-xy, xx + zz, -yz], [-xz, -yz, xx + yy]])
+    M = np.block([[bodies.mass[b] * np.eye(3), -skew(first)], [skew(first), J]])
+    moving = np.arange(6) if normal < 0 else np.array([*np.delete(np.arange(3), normal), 3 + normal])
+    try:
+        factor = np.linalg.cholesky(M[np.ix_(moving, moving)])
+    except np.linalg.LinAlgError:
+        return first, J, np.full((6, 6), -1.0)
+    if (np.diag(factor) ** 2 <= LEAST_PIVOT * M[moving, moving]).any():
+        return first, J, np.full((6, 6), -1.0)
+    np.fill_diagonal(factor, 1.0 / np.diag(factor))
+    L = np.eye(6)
+    L[np.ix_(moving, moving)] = factor
+    return first, J, L
+
+
+def _load_work(m: Model, V: int, M: int) -> LoadWork:
+    return LoadWork(
+        reference=m.loads.turn.copy(),
+        action=np.zeros((m.loads.action.shape[0], 3)),
+        bushing=np.zeros((m.loads.bushing.shape[0], 18)),
+        axes=np.zeros((2, 3, 3, 3)),
+        turn=np.zeros((3, 3, 3)),
+        f=np.zeros(V),
+        load=np.zeros((M, 6)),
+    )
+
+
+def _identities(count: int) -> Array:
+    return np.repeat(np.eye(3)[None], count, axis=0)
+
+
+def new_stages(system: System, states: int, rows: int = 0, numbers: Sequence[float] = (), kept: int = 0) -> Stages:
+    """Memory of an integrator: states (x, v), constraint rows, single numbers, and states at the starts of steps."""
+    place, C = system.layout, system.model.rows.kind.size
+    return Stages(
+        np.zeros((states, place.x_size)),
+        np.zeros((states, place.v_size)),
+        np.zeros((rows, C)),
+        np.zeros(C),
+        np.zeros((kept, place.x_size)),
+        np.zeros((kept, place.v_size)),
+        np.array(numbers, dtype=float),
+    )
+
+
+def new_record(system: System, rows: int) -> Record:
+    """Room for `rows` output times."""
+    m, place = system.model, system.layout
+    M, K = m.markers.body.size, m.rows.marker.shape[0]
+    W, Z, Y, U = (table.shape[0] for table in (m.loads.wrench, m.loads.action, m.loads.bushing, m.loads.spread))
+    return Record(
+        np.zeros(rows),
+        np.zeros((rows, place.x_size)),
+        np.zeros((rows, place.v_size)),
+        np.zeros((rows, place.v_size)),
+        np.zeros((rows, M, 3)),
+        np.zeros((rows, M, 3)),
+        np.zeros((rows, K, 6)),
+        np.zeros((rows, Z, 3)),
+        np.zeros((rows, Y, 18)),
+        np.zeros((rows, m.functions.kind.size, 3)),
+        np.zeros((rows, W + Z + Y + U)),
+        np.zeros((rows, 3)),
+        np.zeros((rows, 2)),
+    )

@@ -1,0 +1,280 @@
+"""One evaluation of the compiled equations at a state, for the analyses that look at single states.
+
+A row of a record evaluates the scene; what it leaves in the scratch memory is read here as plain matrices. Small motions,
+Jacobians and null spaces are in the velocities [A^T R_dot, omega_bar, q_dot].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_dyn.compile.engine import Machine, new_machine, record_row
+from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.compile.workspace import new_record
+from ffr_dyn.consistency.failure import failure
+from ffr_dyn.equations.inertia import mass_matrix
+from ffr_dyn.equations.layout import Layout, initial_state
+from ffr_dyn.functions.rotation import G_bar, from_vector, rotation_matrix, skew
+from ffr_dyn.kernels.tables import OK, SINGULAR_CONSTRAINT, Record, Work
+from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.errors import ComputationError
+
+Array = np.ndarray
+
+RANK_TOLERANCE = 1e-9  # of a singular value of the mass-weighted Jacobian, relative to the largest
+
+
+@dataclass(frozen=True)
+class Evaluator:
+    """A compiled scene with the memory of one evaluation."""
+
+    machine: Machine
+    record: Record
+
+    @property
+    def system(self) -> System:
+        return self.machine.system
+
+    @property
+    def work(self) -> Work:
+        return self.machine.work
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """The equations at one state: rows in the order of the system's blocks, then one for each coordinate across the plane
+    of a planar scene (`locked`).
+
+    Phi, nu, gamma : (C,) constraint rows, their rates and right-hand sides;  jacobian : (C, V)
+    force          : (V,) all forces but those of the constraints, body axes
+    acceleration   : (V,) [A^T R_ddot, omega_bar_dot, q_ddot];  lam : (C,) multipliers
+    singular       : the rows depend on one another; acceleration and lam mean nothing then
+    """
+
+    Phi: Array
+    nu: Array
+    gamma: Array
+    jacobian: Array
+    force: Array
+    acceleration: Array
+    lam: Array
+    singular: bool
+
+
+def evaluator(system: System) -> Evaluator:
+    """Memory for evaluations of a compiled scene."""
+    return Evaluator(new_machine(system, *initial_state(system.scene, system.layout)), new_record(system, 1))
+
+
+def evaluate(at: Evaluator, time: float, x: Array, v: Array) -> Evaluation:
+    """The equations at (time, x, v). Raises ComputationError as a forward run would, except for dependent rows."""
+    system, work = at.system, at.work
+    status = _look(at, time, x, v)
+    rows, bodies, across = work.rows, work.bodies, locked(system.layout)
+    still = np.zeros(across.size)
+    return Evaluation(
+        np.concatenate([rows.Phi, still]),
+        np.concatenate([rows.nu, still]),
+        np.concatenate([rows.gamma, still]),
+        np.concatenate([_jacobian(system, work), unit_rows(across, system.layout.v_size)]),
+        bodies.f.copy(),
+        bodies.acc.copy(),
+        rows.lam.copy(),
+        status == SINGULAR_CONSTRAINT,
+    )
+
+
+def accelerations(at: Evaluator, time: float, x: Array, v: Array) -> Array:
+    """(V,) d/dt of v, global axes. Raises ComputationError as a forward run would."""
+    if _look(at, time, x, v) == SINGULAR_CONSTRAINT:
+        raise failure(at.system, at.work, SINGULAR_CONSTRAINT, time)
+    return at.record.vd[0].copy()
+
+
+def _look(at: Evaluator, time: float, x: Array, v: Array) -> int:
+    """Evaluate; a status, which is OK or that of dependent rows."""
+    at.machine.x[:], at.machine.v[:] = x, v
+    status = record_row(at.machine, time, at.record, 0)
+    if status not in (OK, SINGULAR_CONSTRAINT):
+        raise failure(at.system, at.work, status, time)
+    return int(status)
+
+
+def locked(place: Layout) -> Array:
+    """Numbers of the velocities that a planar scene does not have."""
+    return np.array([place.iv[b] + c for b in range(len(place.n)) for c in range(6) if c not in place.active(b)], int)
+
+
+def unit_rows(numbers: Array, size: int) -> Array:
+    """(K, size) rows with a one at the numbers (K,)."""
+    rows = np.zeros((numbers.size, size))
+    rows[np.arange(numbers.size), numbers] = 1.0
+    return rows
+
+
+def record_states(at: Evaluator, times: Array, xs: Array, vs: Array) -> Record:
+    """A row for every state. Raises ComputationError as a forward run would."""
+    rows = []
+    for time, x, v in zip(times, xs, vs, strict=True):
+        if evaluate(at, float(time), x, v).singular:
+            raise failure(at.system, at.work, SINGULAR_CONSTRAINT, float(time))
+        rows.append(copied(at.record))
+    return joined(rows)
+
+
+def copied(record: Record) -> Record:
+    """A record with its own memory."""
+    return Record(*(column.copy() for column in record))
+
+
+def joined(rows: list[Record]) -> Record:
+    """Records one after the other."""
+    return Record(*(np.concatenate(columns) for columns in zip(*rows, strict=True)))
+
+
+def _jacobian(system: System, work: Work) -> Array:
+    """(C, V) from the coefficients that the kernels keep for each row and side."""
+    place, rows, markers = system.layout, system.model.rows, system.model.markers
+    jacobian = np.zeros((rows.kind.size, place.v_size))
+    for block, ends in enumerate(rows.marker):
+        lines = slice(rows.start[block], rows.start[block + 1])
+        for side, marker in enumerate(ends):
+            b = markers.body[marker] if marker >= 0 else len(place.n)
+            if b == len(place.n):
+                continue
+            part = work.rows.jac[block * len(ends) + side, :, : rows.start[block + 1] - rows.start[block]].T
+            jacobian[lines, place.rigid(b)] += part[:, :6]
+            if place.n[b]:
+                phi = shapes(system, marker)
+                jacobian[lines, place.q_dot(b)] += part[:, :3] @ phi[:3] + part[:, 6:] @ phi[3:]
+    return jacobian
+
+
+def shapes(system: System, marker: int) -> Array:
+    """(6, n) phi_t and phi_r of a marker."""
+    markers = system.model.markers
+    n = system.model.bodies.where[markers.body[marker], 0]
+    return markers.phi[markers.start[marker] : markers.start[marker] + 6 * n].reshape(6, n)
+
+
+# ---- small motions --------------------------------------------------------------------------------------------------
+
+
+def moved(place: Layout, x: Array, step: Array) -> Array:
+    """x moved by a small motion (V,) in body axes; rotations are exact."""
+    out = x.copy()
+    for b in range(len(place.n)):
+        p = x[place.p(b)]
+        out[place.R(b)] += rotation_matrix(p) @ step[place.R_dot(b)]
+        out[place.p(b)] = product(p, from_vector(step[place.omega(b)]))
+        out[place.q(b)] += step[place.q_dot(b)]
+    return out
+
+
+def product(p: Array, r: Array) -> Array:
+    """Euler parameters of the rotation p after r, of length one."""
+    a, b, c, d = p.tolist()
+    e, f, g, h = r.tolist()
+    out = np.array([
+        a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g,
+        a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e,
+    ])  # fmt: skip
+    return out / np.sqrt(out @ out)
+
+
+def to_body_axes(place: Layout, x: Array, v: Array) -> Array:
+    """[R_dot, omega_bar, q_dot] -> [A^T R_dot, omega_bar, q_dot] for all bodies."""
+    out = v.copy()
+    for b in range(len(place.n)):
+        out[place.R_dot(b)] = rotation_matrix(x[place.p(b)]).T @ v[place.R_dot(b)]
+    return out
+
+
+def to_global_axes(place: Layout, x: Array, v: Array) -> Array:
+    """[A^T R_dot, omega_bar, q_dot] -> [R_dot, omega_bar, q_dot] for all bodies."""
+    out = v.copy()
+    for b in range(len(place.n)):
+        out[place.R_dot(b)] = rotation_matrix(x[place.p(b)]) @ v[place.R_dot(b)]
+    return out
+
+
+# ---- mass and free motions ------------------------------------------------------------------------------------------
+
+
+def total_mass_matrix(scene: Scene, place: Layout, x: Array) -> Array:
+    """(V, V) mass matrix of all bodies, body axes."""
+    M = np.zeros((place.v_size, place.v_size))
+    for b, body in enumerate(scene.bodies):
+        at = slice(place.iv[b], place.iv[b] + 6 + place.n[b])
+        M[at, at] = mass_matrix(body.model, x[place.q(b)])
+    return M
+
+
+def evaluated_mass_matrix(at: Evaluator) -> Array:
+    """(V, V) mass matrix at the state evaluated last, from what the kernels keep of it."""
+    place, bodies, work = at.system.layout, at.system.model.bodies, at.work.bodies
+    M = np.zeros((place.v_size, place.v_size))
+    for b, n in enumerate(place.n):
+        rigid, elastic, e = place.rigid(b), place.q_dot(b), int(bodies.where[b, 3])
+        block, s = M[rigid, rigid], skew(work.s[b])
+        block[[0, 1, 2], [0, 1, 2]] = bodies.mass[b]
+        block[3:, :3], block[:3, 3:], block[3:, 3:] = s, -s, work.J[b]
+        if n:
+            c = bodies.where[b, 8]
+            P, H = bodies.P_dm[3 * c : 3 * (c + n)], work.H[3 * e : 3 * (e + n)]
+            coupling = np.concatenate([P, H]).reshape(6, n)
+            M[rigid, elastic], M[elastic, rigid] = coupling, coupling.T
+            M[elastic, elastic] = np.eye(n)
+    return M
+
+
+def free_motions(jacobian: Array, M: Array) -> Array:
+    """(V, d) with jacobian Z = 0 and Z^T M Z = 1: all motions that the rows leave free."""
+    lower = np.linalg.cholesky(M)
+    if jacobian.shape[0] == 0:
+        return np.linalg.inv(lower).T
+    weighted = np.linalg.solve(lower, jacobian.T).T
+    length = np.linalg.norm(weighted, axis=1)
+    _, values, basis = np.linalg.svd(weighted / np.where(length > 0, length, 1.0)[:, None])
+    rank = int((values > RANK_TOLERANCE * values.max(initial=0.0)).sum())
+    return np.linalg.solve(lower.T, basis[rank:].T)
+
+
+def smallest_step(jacobian: Array, M: Array, target: Array) -> Array:
+    """The step (V,) with jacobian step = target that is smallest in the norm of the mass matrix."""
+    lower = np.linalg.cholesky(M)
+    weighted = np.linalg.solve(lower, jacobian.T).T
+    return np.linalg.solve(lower.T, np.linalg.lstsq(weighted, target, rcond=RANK_TOLERANCE)[0])
+
+
+CLOSED = 1e-12  # of Phi [m, -] after a projection
+
+
+CORRECTIONS = 10
+
+
+def position_rates(place: Layout, x: Array, v: Array) -> Array:
+    """x_dot = T(x) v."""
+    out = np.empty(place.x_size)
+    for b in range(len(place.n)):
+        out[place.R(b)], out[place.q(b)] = v[place.R_dot(b)], v[place.q_dot(b)]
+        out[place.p(b)] = 0.5 * G_bar(x[place.p(b)]).T @ v[place.omega(b)]
+    return out
+
+
+def closed(at: Evaluator, time: float, x: Array, v: Array) -> tuple[Array, Array]:
+    """(x, v) moved onto the constraints by the smallest motion in the norm of the mass matrix, Euler parameters of length
+    one. Raises ComputationError where that does not succeed."""
+    place = at.system.layout
+    x = moved(place, x, np.zeros(place.v_size))
+    for _ in range(CORRECTIONS):
+        now = evaluate(at, time, x, v)
+        if np.abs(now.Phi).max(initial=0.0) < CLOSED:
+            break
+        x = moved(place, x, smallest_step(now.jacobian, evaluated_mass_matrix(at), -now.Phi))
+    else:
+        raise ComputationError(f"at t = {time:.6g} s the state is too far off the constraints; use smaller tolerances")
+    inside = to_body_axes(place, x, v) + smallest_step(now.jacobian, evaluated_mass_matrix(at), -now.nu)
+    return x, to_global_axes(place, x, inside)

@@ -1,0 +1,135 @@
+"""What to tell of a run that failed: time, body or joint, the likely cause and what to change."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.kernels.tables import (
+    ACTUATOR,
+    AT,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    SINGULAR_BODY,
+    SINGULAR_CONSTRAINT,
+    STEP_TOO_SMALL,
+    Work,
+)
+from ffr_dyn.scene.applied_loads import actions_of
+from ffr_prep.common.errors import ComputationError
+
+OPEN, LOST = 1e-2, 1e2  # m, -: of constraints, more than drift, and what follows from a lost state
+HUGE = 1e12  # N, N m: no force of a machine; what made the state overflow
+
+
+def failure(system: System, work: Work, status: int, time: float, cause: str = "") -> BaseException:
+    """What to tell about a status of the kernels; `cause` of the settings, if one is known to lose any state."""
+    at, where = f"at t = {time:.6g} s", int(work.info[0])
+    if system.user.cause is not None:
+        if isinstance(system.user.cause, KeyboardInterrupt):
+            return system.user.cause
+        return ComputationError(f"the run stopped in a Python function of the scene: {system.user.failure}")
+    lost = not _sound(work)
+    if cause and (lost or status == NOT_FINITE):
+        return ComputationError(f"{at} the state of {_worst(system, work)} is no longer finite: {cause}")
+    if status == NOT_FINITE or (lost and (status == SINGULAR_BODY or not _largest(system, work)[1] <= HUGE)):
+        return ComputationError(
+            f"{at} the state of {_worst(system, work)} is no longer finite: {_overflow(system, work)}"
+        )
+    if status == SINGULAR_BODY:
+        name = system.scene.bodies[where].name
+        return ComputationError(
+            f"{at} the mass matrix of body {name!r} is not positive: it has no inertia left for rigid motion; "
+            "give it mass and inertia about all axes, or keep fewer modes"
+        )
+    if status == SINGULAR_CONSTRAINT:
+        row = int(np.searchsorted(system.model.rows.start, where, side="right")) - 1
+        block = system.blocks[row]
+        text = block.words[where - system.model.rows.start[row]].text
+        return ComputationError(
+            f"{at} the row '{text}' of {block.name!r} cannot be met by any motion: it ties bodies that cannot move there"
+            f"{', or the state is no longer finite' if lost else ''}"
+        )
+    if status == NOT_CONVERGED:
+        return ComputationError(f"{at} the iterations of the step do not converge, {_unconverged(system, where)}")
+    if status == STEP_TOO_SMALL:
+        return ComputationError(
+            f"{at} the step has become too small: the motion is not smooth there (an impact, a jump of a force or of a "
+            "driver), the mechanism locks (a dead point that a driver goes beyond), or the tolerances are below what "
+            "rounding allows; smooth the jump, end the run before it, keep driven motions within reach, or use larger "
+            "tolerances"
+        )
+    return ComputationError(f"{at} the run stopped: {system.user.failure or 'unknown cause'}")
+
+
+def _sound(work: Work) -> bool:
+    """Whether the state that was evaluated last was one: finite, and of a size whose square is."""
+    bodies = work.bodies
+    with np.errstate(over="ignore"):
+        return all(bool(np.isfinite(table * table).all()) for table in (bodies.A, bodies.omega, bodies.J, bodies.f))
+
+
+def _worst(system: System, work: Work) -> str:
+    """The first body whose inertia or right-hand side is not finite."""
+    for b, body in enumerate(system.scene.bodies):
+        at = slice(system.layout.iv[b], system.layout.iv[b] + 6 + system.layout.n[b])
+        if not all(np.isfinite(part).all() for part in (work.bodies.f[at], work.bodies.A[b], work.bodies.J[b])):
+            return f"body {body.name!r}"
+    return "the scene"
+
+
+def _overflow(system: System, work: Work) -> str:
+    """Why a state is not finite, and what to change."""
+    name, value = _largest(system, work)
+    if np.isnan(value):
+        return f"{name!r} has no value there; look at its formula, such as a root or a logarithm of what is negative"
+    if value > HUGE:
+        return f"{name!r} exerts {value:.3g} N or N m; look at its numbers and their units"
+    least, when = work.independence[1:3]
+    if (least < AT or work.drift[0] > OPEN) and work.drift[0] < LOST:
+        return (
+            f"its constraints came open by up to {work.drift[0]:.2g}, and were nearest to dependence at t = {when:.6g} s: "
+            "the mechanism locks there (a dead point that a driver goes beyond), or passes a singular position; keep driven "
+            "motions within reach, or use projection"
+        )
+    return (
+        "the step is too large for a mode (use ROS2), a stiff spring or stop, or a fast rotation (use a smaller step), or a "
+        "force is not finite"
+    )
+
+
+def _largest(system: System, work: Work) -> tuple[str, float]:
+    """The load or actuator with the largest component, and that; zero where there is none, NaN where it has no value."""
+    return max(_given(system, work), key=lambda found: np.nan_to_num(found[1], nan=np.inf), default=("", 0.0))
+
+
+def _given(system: System, work: Work) -> list[tuple[str, float]]:
+    """The largest component of each load and actuator, by name. Other forces follow the state, and are lost with it."""
+    scene, loads, found = system.scene, system.model.loads, []
+    factors = np.append(work.functions[:, 0], 1.0)[loads.function]
+    with np.errstate(invalid="ignore"):
+        values = loads.value * factors
+    for load, value, (*_, slot) in zip(scene.loads, values, loads.wrench, strict=True):
+        if np.isnan(value).any() and not np.isinf(value).any():  # of time alone: not lost with the state
+            return [(load.name, np.nan)]
+        found.append((load.name, value + work.user[slot : slot + 6] if slot >= 0 else value))
+    for action, (*_, law, _, _), value in zip(actions_of(scene), loads.action, work.loads.action[:, 2:], strict=True):
+        if law == ACTUATOR:
+            found.append((action.name, value))
+    return [(name, float(np.nanmax(np.abs(value), initial=0.0))) for name, value in found]
+
+
+def _unconverged(system: System, where: int) -> str:
+    """Of a body, or after the bodies a constraint row: where, the likely cause and what to change."""
+    bodies = system.scene.bodies
+    if where < len(bodies):
+        return (
+            f"worst in body {bodies[where].name!r}: the step is too large for its rotation or for a spring, damper, stop or "
+            "friction that acts on it; use a smaller step, ROS2, or a softer force"
+        )
+    block = system.blocks[int(np.searchsorted(system.model.rows.start, where - len(bodies), side="right")) - 1]
+    return (
+        f"worst in {block.name!r}: its constraint cannot be met, because the mechanism locks there (a dead point that a "
+        "driver goes beyond) or is singular, or because the step is too large; keep driven motions within reach, use a "
+        "smaller step, or pass a singular position with ROS2"
+    )

@@ -1,0 +1,191 @@
+"""What can move: degrees of freedom, redundant rows, and the free motions in words. The look before every analysis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ffr_dyn.compile.scene_tables import Block
+from ffr_dyn.consistency.assemble import assemble, flattened, in_space, rows_at
+from ffr_dyn.consistency.evaluation import free_motions, locked, total_mass_matrix, unit_rows
+from ffr_dyn.equations.constraints import evaluate_word
+from ffr_dyn.equations.layout import Layout, layout
+from ffr_dyn.scene.joints import COORDINATES, RELATION, F, G, H, Joint, Word, frames
+from ffr_dyn.scene.scene import Scene, marker_number
+from ffr_prep.common.errors import InputError
+
+Array = np.ndarray
+
+MOVES = 1e-6  # of a body's motion, relative to the largest
+ALONG = ("turn x", "turn y", "turn z", "shift x", "shift y", "shift z")
+
+
+@dataclass(frozen=True)
+class FreeMotion:
+    """One way in which the bodies can move as rigid ones, with the other ways at rest.
+
+    name      : the coordinate that leads it: "joint.angle", or "body shift x" in the body's axes
+    bodies    : those that move
+    direction : (6 B,) [A^T R_dot, omega_bar] of all bodies, for a rate of one
+    """
+
+    name: str
+    bodies: tuple[str, ...]
+    direction: Array
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """What the joints and drivers of a scene leave free at its assembled start.
+
+    degrees_of_freedom : rigid and elastic;  elastic : number of elastic coordinates
+    plane      : normal of a planar scene, "x", "y" or "z"; otherwise "none". A scene that declares no plane is looked at in
+                 space all the same: motions and redundant rows are those that it has there
+    free       : rigid motions with all bodies undeformed; at a singular position more than the mechanism has elsewhere
+    redundant  : (joint, row) pairs that follow from the other rows
+    overdriven : drivers whose motion the joints and the other drivers fix already
+    """
+
+    degrees_of_freedom: int
+    elastic: int
+    plane: str
+    free: tuple[FreeMotion, ...]
+    redundant: tuple[tuple[str, str], ...]
+    overdriven: tuple[str, ...]
+
+    def lines(self) -> list[str]:
+        """The report, a line each."""
+        rigid = self.degrees_of_freedom - self.elastic
+        about = f"{self.degrees_of_freedom} degrees of freedom" + (
+            f", {self.elastic} of them elastic coordinates" * bool(self.elastic)
+        )
+        said = [about if rigid >= 0 else f"{about}; joints and drivers deform bodies in {-rigid} ways"]
+        if self.plane != "none":
+            said.append(f"planar       normal {self.plane}: runs are computed in the plane, without rows across it")
+        said += [f"free         {motion.name}: moves {', '.join(motion.bodies)}" for motion in self.free]
+        said += [f"redundant    {joint}: {row}" for joint, row in self.redundant]
+        return said + [f"overdriven   {driver}" for driver in self.overdriven]
+
+
+def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobility:
+    """Mobility of a scene, assembled at `time` [s]; without its drivers if asked so.
+
+    Raises InputError when the scene cannot be assembled.
+    """
+    plane, scene = flattened(scene, time)[0].plane, in_space(scene)
+    over = overdriven(scene, time) if drivers else ()
+    bare = scene if drivers and not over else replace(scene, drivers=())
+    assembled = assemble(bare, time=time)
+    flat, blocks = flattened(bare, time)
+    place = assembled.system.layout
+    jacobian = _jacobian(flat, place, blocks, assembled.x, assembled.v, time)
+    rigid = np.concatenate([np.arange(place.iv[b], place.iv[b] + 6) for b in range(len(place.n))])
+    M = total_mass_matrix(flat, place, assembled.x)
+    Z = free_motions(jacobian[:, rigid], M[np.ix_(rigid, rigid)])
+    motions = tuple(_motions(flat, place, assembled.x, assembled.v, rigid, Z))
+    return Mobility(assembled.degrees_of_freedom, sum(place.n), plane, motions, assembled.redundant, over)
+
+
+def overdriven(scene: Scene, time: float = 0.0) -> tuple[str, ...]:
+    """Drivers that add nothing to the joints and the other drivers at the assembled start of the scene without them."""
+    flat, blocks = flattened(in_space(scene), time)
+    place = layout(flat)
+    assembled = assemble(replace(flat, drivers=()), time=time)
+    M = total_mass_matrix(flat, place, assembled.x)
+
+    def rank(chosen: list[Block]) -> int:
+        jacobian = _jacobian(flat, place, chosen, assembled.x, assembled.v, time)
+        return place.v_size - free_motions(jacobian, M).shape[1]
+
+    total = rank(blocks)
+    return tuple(
+        block.name
+        for block in blocks
+        if block.driver and total - rank([other for other in blocks if other is not block]) < len(block.words)
+    )
+
+
+def require_driven(scene: Scene, time: float, analysis: str) -> None:
+    """Raises InputError unless the drivers fix all rigid motion, and none of them twice."""
+    over = overdriven(scene, time)
+    if over:
+        raise InputError(
+            f"over-driven: {', '.join(map(repr, over))} prescribe a motion that the joints and other drivers already fix; "
+            "remove a driver"
+        )
+    free = mobility(scene, time=time).free
+    if free:
+        said = "; ".join(f"{motion.name} (moves {', '.join(motion.bodies)})" for motion in free)
+        raise InputError(f"{analysis} needs every rigid motion prescribed by a driver; free: {said}")
+
+
+def _jacobian(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> Array:
+    """Rows of the blocks, and of what a planar scene does not have."""
+    rows = [row.jacobian for row in rows_at(scene, place, blocks, x, v, time)]
+    return np.concatenate([np.array(rows).reshape(-1, place.v_size), unit_rows(locked(place), place.v_size)])
+
+
+# ---- free motions in words ------------------------------------------------------------------------------------------
+
+
+def coordinate_word(joint: Joint, coordinate: str) -> Word:
+    """A joint coordinate as a row of the readable form: its value is Phi, its gradient the Jacobian."""
+    i, j = frames(joint)
+    axes = [i[:, F], i[:, G], j[:, F]] if coordinate == "angle" else [i[:, H], np.zeros(3), np.zeros(3)]
+    kind = float(("angle", "stroke").index(coordinate))
+    return Word(RELATION, f"{joint.name}.{coordinate}", np.array(axes * 2), None, (1.0, kind, 0.0, kind, 0.0))
+
+
+def coordinate_gradients(scene: Scene, place: Layout, x: Array, v: Array) -> tuple[list[str], Array]:
+    """Names "joint.angle" of all joint coordinates and their gradients (K, V)."""
+    names, rows = [], []
+    for joint in scene.joints:
+        ends = (marker_number(scene, joint.i), marker_number(scene, joint.j))
+        for coordinate in COORDINATES[joint.kind]:
+            word = coordinate_word(joint, coordinate)
+            names.append(word.text)
+            rows.append(evaluate_word(scene, place, x, v, word, ends * 2, (0.0, 0.0, 0.0)).jacobian)
+    return names, np.array(rows).reshape(-1, place.v_size)
+
+
+def named_motion(scene: Scene, place: Layout, x: Array, direction: Array) -> str:
+    """The coordinate that leads a motion (V,): of a joint if one takes part, else of the body that moves most."""
+    names, gradients = coordinate_gradients(scene, place, x, np.zeros(place.v_size))
+    bodies = np.concatenate([np.roll(direction[place.rigid(b)], 3) for b in range(len(place.n))])
+    joints = gradients @ direction
+    if np.abs(joints).max(initial=0.0) > 0.1 * np.abs(bodies).max():
+        return names[int(np.argmax(np.abs(joints)))]
+    leading = int(np.argmax(np.abs(bodies)))
+    return f"{scene.bodies[leading // 6].name} {ALONG[leading % 6]}"
+
+
+def _motions(scene: Scene, place: Layout, x: Array, v: Array, rigid: Array, Z: Array) -> list[FreeMotion]:
+    """The free motions Z (6 B, d) in the coordinates that lead them: joint coordinates first, then shifts and turns."""
+    names, gradients = coordinate_gradients(scene, place, x, v)
+    names += [f"{body.name} {along}" for body in scene.bodies for along in ALONG]
+    turns_first = Z.reshape(len(scene.bodies), 2, 3, Z.shape[1])[:, ::-1].reshape(Z.shape)
+    rates = np.concatenate([gradients[:, rigid] @ Z, turns_first])
+    lead = _leading(rates)
+    basis = Z @ np.linalg.inv(rates[lead])
+    return [FreeMotion(names[k], _moving(scene, basis[:, at]), basis[:, at]) for at, k in enumerate(lead)]
+
+
+def _leading(rates: Array) -> list[int]:
+    """The first rows that are well independent, in order: Gram-Schmidt on rows of length one."""
+    length = np.linalg.norm(rates, axis=1)
+    rates = rates / np.where(length > MOVES * length.max(initial=0.0), length, np.inf)[:, None]
+    lead: list[int] = []
+    basis = np.zeros((0, rates.shape[1]))
+    for threshold in (0.1, 1e-6):
+        for k, row in enumerate(rates):
+            left = row - basis.T @ (basis @ row)
+            if len(lead) < rates.shape[1] and k not in lead and np.linalg.norm(left) > threshold:
+                lead.append(k)
+                basis = np.concatenate([basis, [left / np.linalg.norm(left)]])
+    return lead
+
+
+def _moving(scene: Scene, direction: Array) -> tuple[str, ...]:
+    size = np.abs(direction.reshape(-1, 6)).max(axis=1)
+    return tuple(body.name for body, moves in zip(scene.bodies, size, strict=True) if moves > MOVES * size.max())

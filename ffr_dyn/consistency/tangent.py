@@ -1,0 +1,157 @@
+"""Small deviations from a state in minimal coordinates: charts of the constraints, their rates, and checked differences.
+
+A deviation (y, z) (d,) each: with Z spanning the free motions (Phi_q Z = 0, Z^T M Z = 1) the positions are moved by Z y in
+body axes, the velocities [A^T R_dot, omega_bar, q_dot] changed by Z z, and both brought back to the constraints in the
+norm of the mass matrix. As the deviation is seen from axes that move with the bodies, a state of steady rotation has
+constant coefficients. Derivatives are central differences with steps h and h/2, extrapolated; their difference is the error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_dyn.consistency.evaluation import (
+    Evaluator,
+    evaluate,
+    free_motions,
+    moved,
+    smallest_step,
+    to_body_axes,
+    to_global_axes,
+    total_mass_matrix,
+)
+from ffr_dyn.functions.rotation import rotation_matrix
+
+Array = np.ndarray
+
+STEP = 2e-4  # largest relative movement [rad, or part of the scene's size] of a difference
+CORRECTIONS = 2  # onto the constraints, at a deviation of that size
+
+
+@dataclass(frozen=True)
+class Chart:
+    """The neighbourhood of a state at a time [s].
+
+    V : (V,) velocities in body axes;  Z : (V, d) free motions;  W : (V, d) = M Z, with W^T Z = 1
+    steps : (d,) deviations of the size STEP
+    """
+
+    at: Evaluator
+    time: float
+    x: Array
+    V: Array
+    M: Array
+    Z: Array
+    W: Array
+    steps: Array
+
+
+def chart(at: Evaluator, time: float, x: Array, v: Array) -> Chart:
+    """The chart around a state (x, v) that meets the constraints."""
+    scene, place = at.system.scene, at.system.layout
+    now = evaluate(at, time, x, v)
+    M = total_mass_matrix(scene, place, x)
+    Z = free_motions(now.jacobian, M)
+    movement = np.abs(Z / sizes(at)[:, None]).max(axis=0, initial=0.0)
+    return Chart(at, time, x, to_body_axes(place, x, v), M, Z, M @ Z, STEP / np.maximum(movement, 1e-300))
+
+
+def state(near: Chart, y: Array, z: Array) -> tuple[Array, Array]:
+    """(x, v) of a deviation, on the constraints."""
+    at, place = near.at, near.at.system.layout
+    x, V = moved(place, near.x, near.Z @ y), near.V + near.Z @ z
+    for _ in range(CORRECTIONS):
+        now = evaluate(at, near.time, x, to_global_axes(place, x, V))
+        if now.Phi.size == 0:
+            break
+        x = moved(place, x, smallest_step(now.jacobian, near.M, -now.Phi))
+        V = V + smallest_step(now.jacobian, near.M, -now.nu)
+    return x, to_global_axes(place, x, V)
+
+
+def rates(near: Chart, x: Array, v: Array) -> Array:
+    """(2 d,) rates of (y, z) at a state nearby, less those of the motion of the axes."""
+    place = near.at.system.layout
+    now = evaluate(near.at, near.time, x, v)
+    acceleration, V = now.acceleration.copy(), to_body_axes(place, x, v)
+    position = V - near.V
+    for b in range(len(place.n)):
+        A0, A = rotation_matrix(near.x[place.p(b)]), rotation_matrix(x[place.p(b)])
+        omega0, V0 = near.V[place.omega(b)], near.V[place.R_dot(b)]
+        shift = A0.T @ (x[place.R(b)] - near.x[place.R(b)])
+        relative = A0.T @ A
+        turn = 0.5 * np.array([
+            relative[2, 1] - relative[1, 2], relative[0, 2] - relative[2, 0], relative[1, 0] - relative[0, 1]
+        ])  # fmt: skip
+        position[place.R_dot(b)] = relative @ V[place.R_dot(b)] - V0 - np.cross(omega0, shift)
+        position[place.omega(b)] = V[place.omega(b)] - omega0 - np.cross(omega0, turn)
+        acceleration[place.R_dot(b)] -= np.cross(V[place.omega(b)], V[place.R_dot(b)])
+    return np.concatenate([near.W.T @ position, near.W.T @ acceleration])
+
+
+def derivative(function: Callable[[Array], Array], steps: Array) -> tuple[Array, float]:
+    """d function / d deviation at zero (K, len(steps)), and its error: the last change by halving the steps, relative."""
+    coarse, fine = (_central(function, factor * steps) for factor in (1.0, 0.5))
+    best = (4 * fine - coarse) / 3
+    scale = np.abs(best).max(initial=0.0)
+    return best, float(np.abs(fine - best).max(initial=0.0) / scale) if scale > 0 else 0.0
+
+
+def _central(function: Callable[[Array], Array], steps: Array) -> Array:
+    columns = []
+    for k, h in enumerate(steps):
+        deviation = np.zeros(steps.size)
+        deviation[k] = h
+        columns.append((function(deviation) - function(-deviation)) / (2 * h))
+    return np.array(columns).T
+
+
+def state_matrix(near: Chart) -> tuple[Array, float]:
+    """A (2 d, 2 d) with d/dt (y, z) = A (y, z), and its error, relative."""
+    d = near.steps.size
+
+    def at(deviation: Array) -> Array:
+        return rates(near, *state(near, deviation[:d], deviation[d:]))
+
+    return derivative(at, np.concatenate([near.steps, near.steps / _period(near)]))
+
+
+def stiffness(near: Chart) -> tuple[Array, float]:
+    """(d, d) reduced tangent stiffness at rest, in coordinates of unit mass [1/s^2], and its error, relative."""
+    d = near.steps.size
+
+    def at(deviation: Array) -> Array:
+        return rates(near, *state(near, deviation, np.zeros(d)))[d:]
+
+    K, error = derivative(at, near.steps)
+    return -K, error
+
+
+def _period(near: Chart) -> float:
+    """A time [s] to compare rates with: of the largest acceleration or spin at the state."""
+    now = evaluate(near.at, near.time, near.x, to_global_axes(near.at.system.layout, near.x, near.V))
+    size = sizes(near.at)
+    rate = max(np.abs(near.V / size).max(initial=0.0), np.sqrt(np.abs(now.acceleration / size).max(initial=0.0)))
+    return 1.0 / max(rate, 1.0)
+
+
+def movement(near: Chart, y: Array) -> float:
+    """How far a deviation moves anything: largest turn [rad] or shift, relative to the size of the scene."""
+    return float(np.abs(near.Z @ y / sizes(near.at)).max(initial=0.0))
+
+
+def sizes(at: Evaluator) -> Array:
+    """(V,) what counts as a movement of one: a radian, the size of the scene; of an elastic coordinate, that over sqrt(m)."""
+    place, scene = at.system.layout, at.system.scene
+    points = [i.position for body in scene.bodies for i in body.model.interfaces]
+    extent = max((float(np.linalg.norm(p)) for p in points), default=0.0)
+    inertia = [np.sqrt(np.trace(body.model.rr_dm) / body.model.mass) for body in scene.bodies]
+    length = max(extent, *map(float, inertia))
+    sizes = np.ones(place.v_size)
+    for b, body in enumerate(scene.bodies):
+        sizes[place.R_dot(b)] = length
+        sizes[place.q_dot(b)] = length * np.sqrt(body.model.mass)
+    return sizes

@@ -1,0 +1,94 @@
+"""What a search has made and run so far, and what that has cost: no model is assembled or run twice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ffr_dyn.economy.cost import per_evaluation
+from ffr_dyn.economy.model_choice import Choice, Part
+from ffr_dyn.economy.outputs import Probe
+from ffr_dyn.economy.run import Made, Span, Trial, cost, make, run
+from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.errors import ComputationError, InputError
+
+Array = np.ndarray
+
+PART = 8  # of the rows
+FEWEST = 8  # pairs of output rows: a run with steps of two rows says nothing about a shorter one
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A model that was run.
+
+    cost  : [us] of a whole run by the cost model
+    error : (outputs,) how far it is from the full model with the same step, or estimated error of the step; NaN unknown
+    """
+
+    choice: Choice
+    what: str
+    cost: float
+    error: Array
+
+
+@dataclass
+class Ledger:
+    """Runs by their choice; `spent` [us] by the cost model."""
+
+    scene: Scene
+    span: Span
+    of: Probe
+    tell: Callable[[str], None]
+    runs: dict[Choice, Trial] = field(default_factory=dict)
+    wide: dict[Choice, Trial] = field(default_factory=dict)
+    models: dict[tuple[tuple[Part, ...], str], Made] = field(default_factory=dict)
+    spent: float = 0.0
+    tried: list[Tried] = field(default_factory=list)
+
+    def made(self, choice: Choice) -> Made:
+        """The model, assembled."""
+        key = (choice.parts, choice.plane)
+        if key not in self.models:
+            self.models[key] = make(self.scene, choice, self.span)
+        return self.models[key]
+
+    def run(self, choice: Choice) -> Trial:
+        """A run of the model."""
+        if choice not in self.runs:
+            self.runs[choice] = run(self.made(choice), choice, self.span, self.of)
+            self.spent += cost(self.runs[choice], self.span)
+        return self.runs[choice]
+
+    def over_two_rows(self, choice: Choice) -> Trial | None:
+        """A run with every other output row, and steps twice as long; None where these rows are too few."""
+        pairs, odd = divmod(self.span.rows, 2)
+        if odd or pairs < FEWEST:
+            return None
+        if choice not in self.wide:
+            span = replace(self.span, output_step=2 * self.span.output_step)
+            self.wide[choice] = run(self.made(choice), choice, span, self.of)
+            self.spent += cost(self.wide[choice], span)
+        return self.wide[choice]
+
+    def first_part(self, choice: Choice) -> float:
+        """[us] of a whole run of a method that chooses its steps, by the cost of its first rows; infinite where they fail."""
+        rows = max(1, self.span.rows // PART)
+        span = replace(self.span, end=self.span.start + rows * self.span.output_step)
+        try:
+            trial = run(self.made(choice), choice, span, self.of)
+        except (ComputationError, InputError):
+            return float("inf")
+        spent = cost(trial, span)
+        self.spent += spent
+        return spent * self.span.rows / rows
+
+    def looked(self, choice: Choice, evaluations: int) -> None:
+        """Account for evaluations of a model in an estimate."""
+        self.spent += evaluations * per_evaluation(choice)
+
+    def note(self, trial: Trial, what: str, error: Array) -> None:
+        """Keep for the report how far a model is off."""
+        self.tried.append(Tried(trial.choice, what, cost(trial, self.span), error))

@@ -1,0 +1,81 @@
+"""What a search for the cheapest model finds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_dyn.analyses.settings import Settings
+from ffr_dyn.economy.cache import Tried
+from ffr_dyn.economy.checks import Frequency, StiffeningLoad
+from ffr_dyn.economy.contributions import Contributions
+from ffr_dyn.economy.inertia_terms import TermEffect
+from ffr_dyn.economy.model_choice import Choice
+from ffr_dyn.economy.outputs import Probe
+from ffr_dyn.scene.scene import Scene
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Verification:
+    """The errors of the chosen model against everything on and a finer step.
+
+    choice   : the reference;  error : (outputs,) of the chosen model;  own : (outputs,) of the reference, estimated
+    first    : (outputs,) error of the model that the estimates had chosen
+    attempts : how often that had to be refined
+    cost     : [us] of the reference and of the run that tells its own error, by the cost model
+    """
+
+    choice: Choice
+    error: Array
+    first: Array
+    own: Array
+    attempts: int
+    cost: float
+
+
+@dataclass(frozen=True)
+class Economy:
+    """What was found.
+
+    choice, scene, settings : the model;  scene is ready to run with `ffr_dyn.analyses.run.run(scene, settings)`
+    limits       : (outputs,) tolerances in the units of the outputs;  scales : (outputs,) their ranges
+    model_error, time_error, error : (outputs,) estimates: of what is left out, of the step, of both together
+    together     : whether one run beside everything told both errors, which stand as that of the step then
+    effects      : what each mode left out does to each output, driven one-way by the final model's motion
+    kept         : what each mode that stays does
+    terms        : what inertia terms and stiffening by each load do to each output, kept or not
+    before, cost : [us] of a run of everything with the same step, and of the chosen model
+    search_cost  : [us] of all runs and estimates beyond those of one verification, by the cost model
+    tried        : what was tried and how far it was from everything with the same step
+    runs         : all runs made, with their errors against the reference, or else the chosen run less its estimated error
+    unmoved      : names of outputs that no model changes
+    frequencies  : of the model beside those of everything;  stiffening : what stiffens bodies, and how much
+    """
+
+    original: Scene
+    choice: Choice
+    scene: Scene
+    settings: Settings
+    probe: Probe
+    limits: Array
+    scales: Array
+    model_error: Array
+    time_error: Array
+    together: bool
+    error: Array
+    effects: Contributions
+    kept: Contributions
+    terms: tuple[TermEffect, ...]
+    before: float
+    cost: float
+    search_cost: float
+    tried: tuple[Tried, ...]
+    runs: tuple[Tried, ...]
+    unmoved: tuple[str, ...]
+    frequencies: tuple[Frequency, ...]
+    stiffening: tuple[StiffeningLoad, ...]
+    notes: tuple[str, ...]
+    verification: Verification | None

@@ -1,0 +1,122 @@
+"""One run of one model of a scene, with what the estimates need of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.consistency.assemble import Assembled, assemble
+from ffr_dyn.economy.cost import of_evaluations, of_run
+from ffr_dyn.economy.model_choice import Choice, applied
+from ffr_dyn.economy.outputs import Probe, histories, needed
+from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
+from ffr_dyn.results.result import Result
+from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.errors import ComputationError
+
+Array = np.ndarray
+
+STATES = ("*.R", "*.p", "*.v", "*.omega_bar", "*.q", "*.q_dot")
+
+
+@dataclass(frozen=True)
+class Span:
+    """From `start` to `end` [s] with a row every `output_step` [s], and how drift is held."""
+
+    start: float
+    end: float
+    output_step: float
+    stabilisation: Stabilisation = Projection()  # noqa: RUF009 - frozen
+
+    @property
+    def rows(self) -> int:
+        """Output rows after the start."""
+        return round((self.end - self.start) / self.output_step)
+
+
+@dataclass(frozen=True)
+class Made:
+    """A model: the scene with it, and that scene assembled at the start of the run."""
+
+    scene: Scene
+    assembled: Assembled
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A run.
+
+    made   : the model;  values : per output (T, k);  evaluations : of the equations of motion
+    result : kept quantities, states among them, and notes
+    """
+
+    choice: Choice
+    made: Made
+    values: tuple[Array, ...]
+    evaluations: int
+    result: Result
+
+    @property
+    def scene(self) -> Scene:
+        """With the model applied."""
+        return self.made.scene
+
+
+def make(scene: Scene, choice: Choice, span: Span) -> Made:
+    """The model of a scene, assembled."""
+    applied_to = applied(scene, choice)
+    return Made(applied_to, assemble(applied_to, time=span.start))
+
+
+def cost(trial: Trial, span: Span) -> float:
+    """[us] of a run, by the cost model: from its steps, or from its evaluations where the method chooses its steps."""
+    if trial.choice.controlled:
+        return of_evaluations(trial.choice, trial.evaluations, span.rows)
+    return of_run(trial.choice, span.rows)
+
+
+def run(made: Made, choice: Choice, span: Span, of: Probe, outputs: tuple[str, ...] = ()) -> Trial:
+    """Run a model, keeping its states and what `outputs` name.
+
+    Raises ComputationError as `forward` does, and where the outputs are no longer finite.
+    """
+    result = forward(
+        made.scene,
+        start=span.start,
+        end=span.end,
+        output_step=span.output_step,
+        method=choice.integrator(span.output_step),
+        stabilisation=span.stabilisation,
+        outputs=(*needed(of, made.scene), *_states(made.scene), *outputs),
+        assembled=made.assembled,
+    )
+    values = histories(of, made.scene, result)
+    if not all(np.isfinite(one).all() for one in values):
+        raise ComputationError("an output of the run is no longer finite")
+    return Trial(choice, made, values, int(result.attributes["evaluations"]), result)
+
+
+def _states(scene: Scene) -> tuple[str, ...]:
+    return STATES if any(body.model.n for body in scene.bodies) else STATES[:4]
+
+
+def rings(trial: Trial) -> bool:
+    """Whether a body vibrates without damping: coarse runs damp that, and may agree on what is not so."""
+    return any(bool(body.model.n) and not body.damping.all() for body in trial.scene.bodies)
+
+
+def states(trial: Trial) -> tuple[Array, Array]:
+    """(T, X) positions and (T, V) velocities of a run."""
+    system, result = trial.made.assembled.system, trial.result
+    place, T = system.layout, result.time.size
+    x, v = np.zeros((T, place.x_size)), np.zeros((T, place.v_size))
+    for b, body in enumerate(system.scene.bodies):
+        kept = list(body.kept[0]) if body.kept else list(range(place.n[b]))
+        x[:, place.R(b)], x[:, place.p(b)] = result[f"{body.name}.R"], result[f"{body.name}.p"]
+        v[:, place.R_dot(b)], v[:, place.omega(b)] = result[f"{body.name}.v"], result[f"{body.name}.omega_bar"]
+        if place.n[b]:
+            x[:, place.q(b)] = result[f"{body.name}.q"][:, kept]
+            v[:, place.q_dot(b)] = result[f"{body.name}.q_dot"][:, kept]
+    return x, v

@@ -1,0 +1,186 @@
+"""The words in readable form: value, rate, right-hand side and Jacobian of every basic constraint row.
+
+Points and axes of markers come with value, rate, bias and Jacobian (`ffr_dyn.equations.kinematics`); a row is a difference
+or a dot product of two of them, and the product rule gives the rest:
+
+    coincidence  e_c . (r_j - r_i) = 0          dot-1  a_i . a_j = 0
+    dot-2        a_i . (r_j - r_i) = s(t)       driven angle  a_i(alpha(t)) . f_j = 0
+    distance     (|r_j - r_i|^2 - s(t)^2) / 2 s(t) = 0
+    relation     factor_1 coordinate_1 + factor_2 coordinate_2 = s(t), coordinates of two joints: an angle is
+                 atan2(g_i . f_j, f_i . f_j), a stroke h_i . (r_j - r_i)
+
+Jacobians map the velocities [A^T R_dot, omega_bar, q_dot] of all bodies. The compiled form, which the tests hold equal
+to this one, is `ffr_dyn.kernels.rows`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ffr_dyn.equations.kinematics import Motion, marker_axis, marker_point
+from ffr_dyn.equations.layout import Layout
+from ffr_dyn.scene.joints import COINCIDENCE, DISTANCE, DOT_1, DOT_2, RELATION, Word
+from ffr_dyn.scene.scene import Scene
+
+Array = np.ndarray
+Drive = tuple[float, float, float]
+
+
+Parts = dict[int, Array]  # by the first column of a body
+
+
+@dataclass(frozen=True)
+class Row:
+    """Phi, nu = dPhi/dt, gamma with Phi_q v_dot = gamma, and the Jacobian row.
+
+    parts : of the Jacobian row of `size` V what need not vanish, (6 + n,) numbers of each body
+    """
+
+    Phi: float
+    nu: float
+    gamma: float
+    parts: Parts
+    size: int
+
+    @property
+    def jacobian(self) -> Array:
+        """(V,) the whole row."""
+        whole = np.zeros(self.size)
+        for first, part in self.parts.items():
+            whole[first : first + part.size] = part
+        return whole
+
+
+def summed_parts(terms: Iterable[tuple[float, Row]]) -> Parts:
+    """Of the sum of rows, each times a number."""
+    total = Parts()
+    for factor, row in terms:
+        for first, part in row.parts.items():
+            total[first] = total[first] + factor * part if first in total else factor * part
+    return total
+
+
+def evaluate_word(
+    scene: Scene, place: Layout, x: Array, v: Array, word: Word, at: tuple[int, ...], drive: Drive
+) -> Row:
+    """One row on the markers `at` (numbers); drive: value and two derivatives of its time function (zeros without)."""
+    if word.kind == RELATION:
+        return _relation(scene, place, x, v, word, at, drive)
+    i, j = at[:2]
+    axis_i, axis_i2, axis_j = word.axes
+
+    def point(number: int) -> Motion:
+        return marker_point(scene, place, x, v, number)
+
+    def axis(number: int, a0: Array) -> Motion:
+        return marker_axis(scene, place, x, v, number, a0)
+
+    if word.kind == COINCIDENCE:
+        return _coincidence(place, point(i), point(j), drive, int(axis_i[0]))
+    if word.kind == DOT_1:
+        return _dot(place, axis(i, axis_i), [(axis(j, axis_j), 1.0)])
+    if word.kind == DOT_2:
+        return _driven(_dot(place, axis(i, axis_i), [(point(j), 1.0), (point(i), -1.0)]), drive)
+    if word.kind == DISTANCE:
+        return _distance(place, point(i), point(j), drive)
+    alpha, speed, second = drive
+    along = np.cos(alpha) * axis_i + np.sin(alpha) * axis_i2
+    across = -np.sin(alpha) * axis_i + np.cos(alpha) * axis_i2
+    turning = _turning(axis(i, across), axis(i, along), speed, second)
+    return _dot(place, turning, [(axis(j, axis_j), 1.0)])
+
+
+def _turning(across: Motion, along: Motion, speed: float, second: float) -> Motion:
+    """The axis `across` that turns in its marker with d(across)/dt = -speed along."""
+    return replace(
+        across,
+        r_dot=across.r_dot - speed * along.r,
+        bias=across.bias - second * along.r - speed**2 * across.r - 2 * speed * along.r_dot,
+    )
+
+
+def _driven(row: Row, drive: Drive) -> Row:
+    """The row less a function of time."""
+    return replace(row, Phi=row.Phi - drive[0], nu=row.nu - drive[1], gamma=row.gamma + drive[2])
+
+
+def _distance(place: Layout, at_i: Motion, at_j: Motion, drive: Drive) -> Row:
+    """Half of D / s - s, with D the square of the distance, and its derivatives by the quotient rule."""
+    s, speed, second = drive
+    parts = Parts()
+    d, d_dot, d_bias = at_j.r - at_i.r, at_j.r_dot - at_i.r_dot, at_j.bias - at_i.bias
+    add_part(place, parts, at_i, -d @ at_i.jacobian / s)
+    add_part(place, parts, at_j, d @ at_j.jacobian / s)
+    D, D_dot, D_bias = d @ d, 2 * d @ d_dot, 2 * (d_dot @ d_dot + d @ d_bias)
+    nu = (D_dot / s - D * speed / s**2 - speed) / 2
+    bias = (D_bias / s - 2 * D_dot * speed / s**2 - D * second / s**2 + 2 * D * speed**2 / s**3 - second) / 2
+    return Row(float(D / s - s) / 2, float(nu), float(-bias), parts, place.v_size)
+
+
+def _relation(scene: Scene, place: Layout, x: Array, v: Array, word: Word, at: tuple[int, ...], drive: Drive) -> Row:
+    total = Row(0.0, 0.0, 0.0, {}, place.v_size)
+    for k in range(2):
+        factor, kind = word.relation[2 * k : 2 * k + 2]
+        row = _coordinate(scene, place, x, v, int(kind), word.axes[3 * k : 3 * k + 3], at[2 * k : 2 * k + 2])
+        total = _sum(total, 1.0, row, factor)
+    driven = _driven(total, drive)
+    spacing = word.relation[4]
+    return driven if spacing == 0 else replace(driven, Phi=driven.Phi - spacing * round(driven.Phi / spacing))
+
+
+def _coordinate(scene: Scene, place: Layout, x: Array, v: Array, kind: int, axes: Array, at: tuple[int, ...]) -> Row:
+    """Value, rate and bias of an angle (0) or a stroke (1) as a row."""
+    i, j = at
+    first = marker_axis(scene, place, x, v, i, axes[0])
+    if kind == 1:
+        ends = [(marker_point(scene, place, x, v, j), 1.0), (marker_point(scene, place, x, v, i), -1.0)]
+        return _dot(place, first, ends)
+    f_j = marker_axis(scene, place, x, v, j, axes[2])
+    c = _dot(place, first, [(f_j, 1.0)])
+    s = _dot(place, marker_axis(scene, place, x, v, i, axes[1]), [(f_j, 1.0)])
+    square = c.Phi**2 + s.Phi**2
+    turn = _sum(s, c.Phi / square, c, -s.Phi / square)
+    swelling = 2 * (c.Phi * c.nu + s.Phi * s.nu) / square
+    return replace(turn, Phi=float(np.arctan2(s.Phi, c.Phi)), gamma=turn.gamma + turn.nu * swelling)
+
+
+def _sum(one: Row, a: float, other: Row, b: float) -> Row:
+    """a one + b other, for constant a and b."""
+    return Row(
+        a * one.Phi + b * other.Phi,
+        a * one.nu + b * other.nu,
+        a * one.gamma + b * other.gamma,
+        summed_parts([(a, one), (b, other)]),
+        one.size,
+    )
+
+
+def _coincidence(place: Layout, at_i: Motion, at_j: Motion, drive: Drive, c: int) -> Row:
+    parts = Parts()
+    add_part(place, parts, at_i, -at_i.jacobian[c])
+    add_part(place, parts, at_j, at_j.jacobian[c])
+    off, rate, bias = at_j.r - at_i.r, at_j.r_dot - at_i.r_dot, at_i.bias - at_j.bias
+    return _driven(Row(off[c], rate[c], bias[c], parts, place.v_size), drive)
+
+
+def _dot(place: Layout, a: Motion, sums: list[tuple[Motion, float]]) -> Row:
+    """a . d with d a signed sum of moving vectors."""
+    d = sum(sign * m.r for m, sign in sums)
+    d_dot = sum(sign * m.r_dot for m, sign in sums)
+    d_bias = sum(sign * m.bias for m, sign in sums)
+    parts = Parts()
+    add_part(place, parts, a, d @ a.jacobian)
+    for m, sign in sums:
+        add_part(place, parts, m, sign * (a.r @ m.jacobian))
+    gamma = -(a.bias @ d + 2 * a.r_dot @ d_dot + a.r @ d_bias)
+    return Row(float(a.r @ d), float(a.r_dot @ d + a.r @ d_dot), float(gamma), parts, place.v_size)
+
+
+def add_part(place: Layout, parts: Parts, motion: Motion, row: Array) -> None:
+    """Add the row (6 + n,) on the velocities of the body of a motion; nothing for the ground."""
+    if motion.body < len(place.n):
+        at = place.iv[motion.body]
+        parts[at] = parts[at] + row if at in parts else row

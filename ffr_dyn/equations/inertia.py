@@ -1,0 +1,76 @@
+"""Mass matrix and forces of one body from its inertia integrals, in the form one would write on paper.
+
+In body axes, for the accelerations [a = A^T R_ddot, omega_bar_dot, q_ddot] (Shabana 2013, ch. 5, with body-frame
+velocities, so that M depends on q alone):
+
+    s = I2 + I3 q                   first moment of the deformed body
+    G_j = int u phi_j^T dm          H_j = int u x phi_j dm
+    J = tr(W) I - W,  W = int u u^T dm
+    D = int u u_dot^T dm            L_j = int u_dot x phi_j dm
+
+The compiled form, which the tests hold equal to this one, is `ffr_dyn.kernels.bodies`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_dyn.functions.rotation import skew
+from ffr_prep.body import FlexibleBody, axial
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Moments:
+    """s (3,), G (3, 3, n), W (3, 3) of the deformed body."""
+
+    s: Array
+    G: Array
+    W: Array
+
+
+def moments(body: FlexibleBody, q: Array) -> Moments:
+    """Moments of the mass of the body deformed by q (n,)."""
+    G = body.rP_dm + np.einsum("klij,i->klj", body.PP_dm, q)
+    rest = np.einsum("klj,j->kl", body.rP_dm, q)
+    W = body.rr_dm + rest.T + np.einsum("klj,j->kl", G, q)  # int u u0^T + int u (Phi q)^T
+    return Moments(body.r_dm + body.P_dm @ q, G, W)
+
+
+def mass_matrix(body: FlexibleBody, q: Array) -> Array:
+    """(6 + n, 6 + n) mass matrix at q (n,), body axes."""
+    moment = moments(body, q)
+    J = np.trace(moment.W) * np.eye(3) - moment.W
+    H = axial(moment.G)
+    return np.block([
+        [body.mass * np.eye(3), -skew(moment.s), body.P_dm],
+        [skew(moment.s), J, H],
+        [body.P_dm.T, H.T, body.I6],
+    ])  # fmt: skip
+
+
+def quadratic_velocity(body: FlexibleBody, q: Array, omega: Array, q_dot: Array) -> Array:
+    """(6 + n,) quadratic velocity forces Q_v at q, omega (3,) in body axes, q_dot (n,)."""
+    moment = moments(body, q)
+    J = np.trace(moment.W) * np.eye(3) - moment.W
+    D = np.einsum("klj,j->kl", moment.G, q_dot)
+    L = np.einsum("cij,i->cj", body.I5, q_dot)
+    return np.concatenate([
+        -np.cross(omega, np.cross(omega, moment.s)) - 2 * np.cross(omega, body.P_dm @ q_dot),
+        -np.cross(omega, J @ omega) - 2 * (np.trace(D) * omega - D.T @ omega),
+        -np.einsum("k,klj,l->j", omega, moment.G, omega) + omega @ omega * np.einsum("kkj->j", moment.G) - 2 * omega @ L,
+    ])  # fmt: skip
+
+
+def elastic_force(body: FlexibleBody, damping: Array, q: Array, q_dot: Array) -> Array:
+    """(6 + n,) elastic and modal damping forces; damping (n,) ratios."""
+    return np.concatenate([np.zeros(6), -body.omega2 * q - 2 * damping * np.sqrt(body.omega2) * q_dot])
+
+
+def gravity_force(body: FlexibleBody, q: Array, A: Array, gravity: Array) -> Array:
+    """(6 + n,) force of a uniform field gravity (3,) [m/s^2], global."""
+    field = A.T @ gravity
+    return np.concatenate([body.mass * field, np.cross(body.r_dm + body.P_dm @ q, field), body.P_dm.T @ field])

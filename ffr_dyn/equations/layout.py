@@ -1,0 +1,72 @@
+"""Every slice of the state: positions x = [R, p, q] and velocities v = [R_dot, omega_bar, q_dot] of body after body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_dyn.scene.scene import Scene
+from ffr_dyn.variants.plane import AXES, body_normal
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where each body's coordinates begin in x and v, how many elastic coordinates it has, and what may move.
+
+    normals : per body, the body axis along the normal of a planar scene, or -1
+    """
+
+    n: tuple[int, ...]
+    ix: tuple[int, ...]
+    iv: tuple[int, ...]
+    x_size: int
+    v_size: int
+    normals: tuple[int, ...]
+
+    def R(self, b: int) -> slice:
+        return slice(self.ix[b], self.ix[b] + 3)
+
+    def p(self, b: int) -> slice:
+        return slice(self.ix[b] + 3, self.ix[b] + 7)
+
+    def q(self, b: int) -> slice:
+        return slice(self.ix[b] + 7, self.ix[b] + 7 + self.n[b])
+
+    def R_dot(self, b: int) -> slice:
+        return slice(self.iv[b], self.iv[b] + 3)
+
+    def omega(self, b: int) -> slice:
+        return slice(self.iv[b] + 3, self.iv[b] + 6)
+
+    def q_dot(self, b: int) -> slice:
+        return slice(self.iv[b] + 6, self.iv[b] + 6 + self.n[b])
+
+    def rigid(self, b: int) -> slice:
+        """R_dot and omega_bar together."""
+        return slice(self.iv[b], self.iv[b] + 6)
+
+    def active(self, b: int) -> list[int]:
+        """The rigid coordinates of body b that may move (body axes, among its velocities): all six, or three in a plane."""
+        k = self.normals[b]
+        return list(range(6)) if k < 0 else [c for c in range(3) if c != k] + [3 + k]
+
+
+def layout(scene: Scene) -> Layout:
+    """The slices of a scene."""
+    n = tuple(body.model.n for body in scene.bodies)
+    ix = tuple(int(k) for k in np.cumsum([0, *(7 + k for k in n)]))
+    iv = tuple(int(k) for k in np.cumsum([0, *(6 + k for k in n)]))
+    normals = [body_normal(b, AXES.index(scene.plane)) if scene.plane in AXES else -1 for b in scene.bodies]
+    return Layout(n, ix[:-1], iv[:-1], ix[-1], iv[-1], tuple(normals))
+
+
+def initial_state(scene: Scene, place: Layout) -> tuple[Array, Array]:
+    """(x, v) as the scene's bodies declare them, before assembly."""
+    x, v = np.zeros(place.x_size), np.zeros(place.v_size)
+    for b, body in enumerate(scene.bodies):
+        x[place.R(b)], x[place.p(b)], x[place.q(b)] = body.position, body.rotation, body.q
+        v[place.R_dot(b)], v[place.omega(b)], v[place.q_dot(b)] = body.velocity, body.omega_bar, body.q_dot
+    return x, v

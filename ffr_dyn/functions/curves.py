@@ -1,0 +1,68 @@
+"""Characteristics: a force tabulated over a displacement or a velocity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ffr_prep.common.errors import InputError
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Curve:
+    """values (P,) over at (P,), increasing: a smooth curve through the points, straight beyond them.
+
+    Between the points it is the monotone cubic of Fritsch and Carlson (1980), which does not overshoot; through two
+    points it is a line. Raises InputError unless there are two or more increasing places and as many values.
+    """
+
+    at: Any
+    values: Any
+
+    def __post_init__(self) -> None:
+        at, values = np.array(self.at, float), np.array(self.values, float)
+        if at.ndim != 1 or at.shape != values.shape or at.size < 2:
+            raise InputError(f"a curve needs two or more places and as many values, not {at.size} and {values.size}")
+        if not (np.isfinite(at).all() and np.isfinite(values).all()):
+            raise InputError("a curve holds values that are not finite")
+        if not (np.diff(at) > 0).all():
+            first = int(np.argmin(np.diff(at) > 0))
+            raise InputError(f"the places of a curve must increase; after {at[first]:g} comes {at[first + 1]:g}")
+        for key, array in (("at", at), ("values", values)):
+            array.setflags(write=False)
+            object.__setattr__(self, key, array)
+
+
+def pieces(curve: Curve) -> Array:
+    """The numbers of a curve as the kernels read them: pieces, 4, breaks, ascending coefficients piece by piece."""
+    from scipy.interpolate import PchipInterpolator
+
+    coefficients = PchipInterpolator(curve.at, curve.values).c[::-1].T
+    return np.concatenate([[curve.at.size - 1, 4], curve.at, coefficients.ravel()])
+
+
+def curve_value(curve: Curve, x: float) -> float:
+    """The curve at x; the readable twin of `ffr_dyn.kernels.forces.force_laws.curve_value`."""
+    from scipy.interpolate import PchipInterpolator
+
+    through = PchipInterpolator(curve.at, curve.values)
+    inside = float(np.clip(x, curve.at[0], curve.at[-1]))
+    return float(through(inside) + through(inside, 1) * (x - inside))
+
+
+def curve_integral(curve: Curve, x: Array) -> Array:
+    """Integral of the curve from 0 to x, of the shape of x: the energy that a spring of this curve stores."""
+    return _primitive(curve, np.asarray(x, float)) - _primitive(curve, np.zeros(()))
+
+
+def _primitive(curve: Curve, x: Array) -> Array:
+    from scipy.interpolate import PchipInterpolator
+
+    through = PchipInterpolator(curve.at, curve.values)
+    inside = np.clip(x, curve.at[0], curve.at[-1])
+    beyond = x - inside
+    return through.antiderivative()(inside) + beyond * (through(inside) + 0.5 * beyond * through(inside, 1))

@@ -1,0 +1,173 @@
+"""Functions of time for drivers and loads: each with two derivatives, compiled to numbers for the kernels.
+
+constant(5.0)   polynomial(0, 150)   harmonic(amplitude=.1, frequency=2)   table(times, values)   user(f)
+signal("torque") and, by `ffr_dyn.functions.formula`, formula("0.1 * sin(2 * pi * t)")
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_dyn.functions.operations import SUBTRACT, operate
+from ffr_prep.common.errors import InputError
+
+Array = np.ndarray
+
+# Kinds, as in ffr_dyn.kernels.functions (which must not be imported before it is needed: it loads the compiler).
+POLYNOMIAL, HARMONIC, PIECEWISE, USER, OPERATION = 0, 1, 2, 3, 4
+
+
+@dataclass(frozen=True)
+class TimeFunction:
+    """A function of time as the kernels read it: its kind and its numbers; `callback` for a Python function.
+
+    operands : what an operation of a formula (data: its number, its parameter) works on
+    name     : of an input of the scene, see `signal`
+    """
+
+    kind: int
+    data: tuple[float, ...]
+    callback: Callable[[float], object] | None = None
+    operands: tuple[TimeFunction, ...] = ()
+    name: str = ""
+
+
+def constant(value: float) -> TimeFunction:
+    """The same value at all times."""
+    return polynomial(value)
+
+
+def polynomial(*coefficients: float) -> TimeFunction:
+    """c0 + c1 t + c2 t^2 + ...; `polynomial(0, 150)` is a crank that turns at 150 rad/s."""
+    return TimeFunction(POLYNOMIAL, _numbers("polynomial", coefficients))
+
+
+def harmonic(*, amplitude: float, frequency: float, phase: float = 0.0, mean: float = 0.0) -> TimeFunction:
+    """mean + amplitude sin(2 pi frequency t + phase); frequency [Hz], phase [rad]."""
+    return TimeFunction(HARMONIC, _numbers("harmonic", (mean, amplitude, 2 * np.pi * frequency, phase)))
+
+
+def table(times: Array, values: Array) -> TimeFunction:
+    """Not-a-knot cubic spline through (times, values), twice differentiable; holds its end values outside.
+
+    Raises InputError unless there are two or more times, increasing, with as many values.
+    """
+    from scipy.interpolate import CubicSpline
+
+    t, y = np.asarray(times, float), np.asarray(values, float)
+    if t.ndim != 1 or t.shape != y.shape or t.size < 2 or not (np.diff(t) > 0).all():
+        raise InputError("a table needs two or more increasing times and as many values")
+    _numbers("table", (*t, *y))
+    return piecewise(t, CubicSpline(t, y).c[::-1].T)
+
+
+def piecewise(breaks: Array, coefficients: Array) -> TimeFunction:
+    """Piecewise polynomial: coefficients (pieces, k), ascending powers of (t - start of the piece)."""
+    pieces, count = np.shape(coefficients)
+    return TimeFunction(
+        PIECEWISE, (float(pieces), float(count), *map(float, breaks), *map(float, np.ravel(coefficients)))
+    )
+
+
+def user(function: Callable[[float], object]) -> TimeFunction:
+    """A Python function t -> value, or t -> (value, rate, second derivative) where it drives a joint coordinate."""
+    return TimeFunction(USER, (0.0,), function)
+
+
+def signal(name: str, value: float = 0.0) -> TimeFunction:
+    """An input of the scene, by name: it has its initial value until a `ffr_dyn.realtime.stepper.Stepper` sets another.
+
+    The same signal may stand in several places. Raises InputError for a name that is no word, or a value not finite.
+    """
+    if not name.isidentifier():
+        raise InputError(f"{name!r} cannot be the name of an input: use letters, digits and '_', a letter first")
+    return TimeFunction(PIECEWISE, (*SIGNAL, *_numbers(f"input {name!r}", (value, 0.0, 0.0))), name=name)
+
+
+# One piece of three coefficients from the time when it was set, for ever.
+SIGNAL = (1.0, 3.0, 0.0, 1e300)
+
+
+def signals_in(function: TimeFunction) -> Iterator[TimeFunction]:
+    """The signals of which a function is made."""
+    if function.name:
+        yield function
+    for operand in function.operands:
+        yield from signals_in(operand)
+
+
+def operation(op: int, *operands: TimeFunction, parameter: float = 0.0) -> TimeFunction:
+    """An operation of `ffr_dyn.functions.operations` on one or two functions of time."""
+    return TimeFunction(OPERATION, (float(op), parameter), None, operands)
+
+
+def less(a: TimeFunction, b: TimeFunction) -> TimeFunction:
+    """a - b, of the kind of b where a is zero, so that what is written as a table stays one."""
+    if not is_zero(a) or b.name or b.kind in (USER, OPERATION):
+        return operation(SUBTRACT, a, b)
+    kept = int(b.data[0]) + 3 if b.kind == PIECEWISE else 0  # counts and breaks
+    data = np.array(b.data)
+    data[kept:] *= -1
+    if b.kind == HARMONIC:
+        data[2:] *= -1  # speed and phase
+    return TimeFunction(b.kind, tuple(data.tolist()))
+
+
+def as_time_function(value: object, what: str) -> TimeFunction:
+    """A number, a Python function or a TimeFunction as a TimeFunction; InputError names `what` otherwise."""
+    if isinstance(value, TimeFunction):
+        return value
+    if callable(value):
+        return user(value)
+    if isinstance(value, (int, float, np.floating, np.integer)):
+        return constant(float(value))
+    raise InputError(f"{what} must be a number, a time function or a Python function of time, not {value!r}")
+
+
+def is_zero(function: TimeFunction) -> bool:
+    """Whether a function is the constant zero by its declaration."""
+    return function.kind == POLYNOMIAL and function.callback is None and not any(function.data)
+
+
+def _numbers(what: str, values: tuple[float, ...]) -> tuple[float, ...]:
+    if not values or not np.isfinite(values).all():
+        raise InputError(f"{what}: all numbers must be finite: {values}")
+    return tuple(float(v) for v in values)
+
+
+def evaluate(function: TimeFunction, t: float) -> tuple[float, float, float]:
+    """(value, rate, second derivative) at t; the readable twin of `ffr_dyn.kernels.functions.evaluate_functions`."""
+    if function.callback is not None:
+        returned = np.atleast_1d(np.asarray(function.callback(t), float))
+        return tuple(np.concatenate([returned, np.zeros(3)])[:3])  # type: ignore[return-value]
+    if function.kind == OPERATION:
+        given = [evaluate(operand, t) for operand in function.operands]
+        return operate(int(function.data[0]), function.data[1], given[0], given[-1])
+    data = np.array(function.data)
+    if function.kind == HARMONIC:
+        mean, amplitude, speed, phase = data
+        angle = speed * t + phase
+        wave = amplitude * np.sin(angle)
+        return mean + wave, amplitude * speed * np.cos(angle), -(speed**2) * wave
+    if function.kind == POLYNOMIAL:
+        return _derivatives(data, t)
+    pieces, count = int(data[0]), int(data[1])
+    breaks = data[2 : pieces + 3]
+    inside = min(max(t, breaks[0]), breaks[-1])
+    piece = min(int(np.searchsorted(breaks, inside, side="right")) - 1, pieces - 1)
+    coefficients = data[pieces + 3 :].reshape(pieces, count)[piece]
+    value, rate, second = _derivatives(coefficients, inside - breaks[piece])
+    return (value, rate, second) if inside == t else (value, 0.0, 0.0)
+
+
+def _derivatives(coefficients: Array, t: float) -> tuple[float, float, float]:
+    """Value and derivatives of a polynomial, lowest power first: Horner's rule, and its derivatives by the product rule."""
+    value = rate = half = 0.0
+    for c in reversed(coefficients.tolist()):
+        half = half * t + rate
+        rate = rate * t + value
+        value = value * t + c
+    return value, rate, 2 * half

@@ -1,0 +1,144 @@
+"""Bushings: six coordinates between two markers, three displacements in the axes of i and a rotation vector.
+
+With the axes a_k of i and b_l of j, B_kl = a_k . b_l is the relative rotation. Its axial vector z = sin(phi) axis and its
+trace 1 + 2 cos(phi) give the rotation vector psi = z phi / sin(phi). All are made of products of axes, whose gradients are
+those of the dot-1 and dot-2 rows; the chain rule gives the generalised forces. Readable twin: `ffr_dyn.equations.forces`.
+"""
+
+import math
+
+from ffr_dyn.kernels.forces.coordinate_forces import apply_side
+from ffr_dyn.kernels.forces.force_laws import curve_value
+from ffr_dyn.kernels.markers import axis_motion
+from ffr_dyn.kernels.options import kernel
+from ffr_dyn.kernels.rows import ZERO
+from ffr_dyn.kernels.vectors import add, cross, dot, get, put, scale, subtract, to_body
+
+
+@kernel
+def move_axes(frames, w, axes, i, j):
+    """axes (2, 3, 3, 3): by side, body axes value, global value and global rate of the three axes."""
+    for side in range(2):
+        marker = i if side == 0 else j
+        for c in range(3):
+            a, g, rate, _ = axis_motion(w, marker, get(frames[side], c))
+            put(axes[side, 0], c, a)
+            put(axes[side, 1], c, g)
+            put(axes[side, 2], c, rate)
+
+
+@kernel
+def relate(axes, B):
+    """B[0] = a_k . b_l and its rate B[1]."""
+    for k in range(3):
+        for l in range(3):  # noqa: E741
+            B[0, k, l] = dot(get(axes[0, 1], k), get(axes[1, 1], l))
+            B[1, k, l] = dot(get(axes[0, 2], k), get(axes[1, 1], l)) + dot(get(axes[0, 1], k), get(axes[1, 2], l))
+
+
+@kernel
+def half_axial(B):
+    return (0.5 * (B[2, 1] - B[1, 2]), 0.5 * (B[0, 2] - B[2, 0]), 0.5 * (B[1, 0] - B[0, 1]))
+
+
+@kernel
+def stretch(s, c):
+    """g = phi / s with phi = atan2(s, c), (dg/ds) / s and dg/dc."""
+    square = s * s + c * c
+    y = s / c
+    if c > 0.0 and y < 0.02:
+        y2 = y * y
+        g = (1.0 - y2 * (1.0 / 3.0 - y2 * (1.0 / 5.0 - y2 / 7.0))) / c
+        return g, -(2.0 / 3.0 - y2 * (4.0 / 5.0 - y2 * 6.0 / 7.0)) / (c * c * c), -1.0 / square
+    phi = math.atan2(s, c)
+    return phi / s, (s * c / square - phi) / (s * s * s), -1.0 / square
+
+
+@kernel
+def six_forces(loads, start, x):
+    """x = [displacement (6), rate (6), force (6)]: the force from the others.
+
+    Data: stiffness (36), damping (36), preload (6), start of the curve of each direction or -1 (6).
+    """
+    data = loads.data
+    for r in range(6):
+        force = data[start + 72 + r]
+        for c in range(6):
+            force -= data[start + 6 * r + c] * x[c] + data[start + 36 + 6 * r + c] * x[6 + c]
+        curve = int(data[start + 78 + r])
+        if curve >= 0:
+            force -= curve_value(data, curve, x[r])
+        x[12 + r] = force
+
+
+@kernel
+def measure_bushing(w, s, i, j, x):
+    """Displacement and rate into x; returns (z, g, dg/ds / s, dg/dc)."""
+    d, dd = subtract(get(w.r, j), get(w.r, i)), subtract(get(w.rd, j), get(w.rd, i))
+    for c in range(3):
+        x[c] = dot(get(s.axes[0, 1], c), d)
+        x[6 + c] = dot(get(s.axes[0, 2], c), d) + dot(get(s.axes[0, 1], c), dd)
+    B, rate = s.turn[0], s.turn[1]
+    z, z_rate = half_axial(B), half_axial(rate)
+    cosine, cosine_rate = 0.5 * (B[0, 0] + B[1, 1] + B[2, 2] - 1.0), 0.5 * (rate[0, 0] + rate[1, 1] + rate[2, 2])
+    g, g_s, g_c = stretch(dot(z, z) ** 0.5, cosine)
+    g_rate = g_s * dot(z, z_rate) + g_c * cosine_rate
+    for c in range(3):
+        x[3 + c] = g * z[c]
+        x[9 + c] = g * z_rate[c] + g_rate * z[c]
+    return z, g, g_s, g_c
+
+
+@kernel
+def weigh(z, g, g_s, g_c, moment, C):
+    """C (3, 3) with moment . d(psi) = sum C_kl dB_kl."""
+    power = dot(moment, z)
+    y = scale(0.5, add(scale(g, moment), scale(power * g_s, z)))
+    for c in range(3):
+        C[c, c] = 0.5 * power * g_c
+    C[2, 1], C[1, 2] = y[0], -y[0]
+    C[0, 2], C[2, 0] = y[1], -y[1]
+    C[1, 0], C[0, 1] = y[2], -y[2]
+
+
+@kernel
+def turning_side(A, axes, others, frame, C, transposed):
+    """The side of sum C_kl d(a_k . b_l) that moves `axes` (body axes), with the global axes `others` held."""
+    turning, twist = ZERO, ZERO
+    for k in range(3):
+        sum_k = ZERO
+        for l in range(3):  # noqa: E741
+            sum_k = add(sum_k, scale(C[l, k] if transposed else C[k, l], get(others, l)))
+        b = to_body(A, sum_k)
+        turning = add(turning, cross(get(axes, k), b))
+        twist = add(twist, cross(get(frame, k), b))
+    return ZERO, turning, twist
+
+
+@kernel
+def combine(frame, x):
+    """sum x_c frame_c."""
+    return add(scale(x[0], get(frame, 0)), add(scale(x[1], get(frame, 1)), scale(x[2], get(frame, 2))))
+
+
+@kernel
+def apply_bushing(where, markers, loads, w, s, f, load, k):
+    """Add bushing k to f and load (M, 6), and keep displacement, rate and force in s.bushing; w, s: Marker-, LoadWork."""
+    i, j, frames, x = loads.bushing[k, 0], loads.bushing[k, 1], loads.frames[k], s.bushing[k]
+    move_axes(frames, w, s.axes, i, j)
+    relate(s.axes, s.turn)
+    z, g, g_s, g_c = measure_bushing(w, s, i, j, x)
+    six_forces(loads, loads.bushing[k, 2], x)
+    weigh(z, g, g_s, g_c, (x[15], x[16], x[17]), s.turn[2])
+    ui, uj, C = get(w.u, i), get(w.u, j), s.turn[2]
+
+    force, a, a0 = (x[12], x[13], x[14]), s.axes[0, 0], frames[0]
+    d = to_body(w.A[w.body[i]], subtract(get(w.r, j), get(w.r, i)))
+    on_i, on_j = combine(a, force), to_body(w.A[w.body[j]], combine(s.axes[0, 1], force))
+    side_i = (scale(-1.0, on_i), add(cross(on_i, d), cross(on_i, ui)), cross(combine(a0, force), d))
+    apply_side(where, markers, ui, f, load[i], i, 1.0, side_i)
+    apply_side(where, markers, uj, f, load[j], j, 1.0, (on_j, cross(uj, on_j), ZERO))
+    side_i = turning_side(w.A[w.body[i]], a, s.axes[1, 1], a0, C, False)
+    side_j = turning_side(w.A[w.body[j]], s.axes[1, 0], s.axes[0, 1], frames[1], C, True)
+    apply_side(where, markers, ui, f, load[i], i, 1.0, side_i)
+    apply_side(where, markers, uj, f, load[j], j, 1.0, side_j)

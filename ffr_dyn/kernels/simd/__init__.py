@@ -1,0 +1,1 @@
+"""Code written for vector registers through private modules of numba."""

@@ -1,0 +1,158 @@
+"""Tables at an address: how a compiled unit, which is given one number, finds the arrays it works on.
+
+A unit that took the tables themselves would have to be compiled together with everything that calls it. So `pack` writes
+the addresses and shapes of all arrays into one array of integers, and compiled code reads them back where it uses them
+(`tables_at`, `record_at`). What a table holds, and in which order, is said once: by the annotations in `tables`.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import accumulate
+from typing import Any, get_type_hints
+
+import numpy as np
+from numba import types
+from numba.core import cgutils
+from numba.core.datamodel.models import OpaqueModel
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import infer_getattr, lower_getattr_generic, register_model
+
+from ffr_dyn.kernels.simd.intrinsics import call_of, intrinsic
+from ffr_dyn.kernels.simd.slices import array_at
+from ffr_dyn.kernels.tables import Record, Tables
+
+Array = np.ndarray
+
+
+@cache
+def _fields(kind: Any) -> dict[str, Any]:
+    return get_type_hints(kind, include_extras=True)
+
+
+def _is_table(kind: Any) -> bool:
+    """Whether a field holds another named tuple, not a number or an array."""
+    return isinstance(kind, type) and issubclass(kind, tuple)
+
+
+def _array(kind: Any) -> tuple[str, int]:
+    """(dtype, number of axes) of a field that holds an array."""
+    dtype, axes = kind.__metadata__[0]
+    return dtype, axes
+
+
+def pack(tables: Any) -> Array:
+    """Addresses and shapes of the arrays of nested named tuples, and their numbers (int64). The arrays must outlive it."""
+    return np.array(_packed(tables), dtype=np.int64)
+
+
+def _packed(tables: Any) -> list[int]:
+    found: list[int] = []
+    for value, (name, kind) in zip(tables, _fields(type(tables)).items(), strict=True):  # type: ignore[arg-type]
+        if kind is float:
+            found.append(int(np.float64(value).view(np.int64)))
+        elif kind is int:
+            found.append(value)
+        elif _is_table(kind):
+            found.extend(_packed(value))
+        else:
+            dtype, axes = _array(kind)
+            if value.dtype != dtype or value.ndim != axes or not value.flags.c_contiguous:
+                raise TypeError(f"table {name} is a {value.dtype} array of {value.ndim} axes, not {dtype} of {axes}")
+            found += [value.ctypes.data, *value.shape]
+    return found
+
+
+def _words(kind: Any) -> int:
+    """How many words `pack` writes for a field."""
+    if kind is float or kind is int:
+        return 1
+    if _is_table(kind):
+        return sum(_words(each) for each in _fields(kind).values())
+    return 1 + _array(kind)[1]
+
+
+@cache
+def _places(kind: Any) -> dict[str, int]:
+    """Field: its first word."""
+    sizes = [_words(each) for each in _fields(kind).values()]
+    return dict(zip(_fields(kind), accumulate(sizes, initial=0), strict=False))
+
+
+class Packed(types.Type):
+    """Compiled code's view of a packed table: its address, from which a field is read where it is used.
+
+    Handed from kernel to kernel it is one word; a tuple of all arrays would be some hundred, which LLVM takes long to see
+    through and the machine long to copy.
+    """
+
+    def __init__(self, table: Any) -> None:
+        self.table = table
+        super().__init__(f"Packed({table.__name__})")
+
+
+@register_model(Packed)
+class PackedModel(OpaqueModel):  # type: ignore[misc]
+    """An address."""
+
+
+def _numba_type(kind: Any) -> Any:
+    if kind is float:
+        return types.float64
+    if kind is int:
+        return types.int64
+    if _is_table(kind):
+        return Packed(kind)
+    dtype, axes = _array(kind)
+    return types.Array(getattr(types, dtype), axes, "C")
+
+
+@infer_getattr
+class PackedFields(AttributeTemplate):  # type: ignore[misc]
+    """Types of the fields."""
+
+    key = Packed
+
+    def generic_resolve(self, value, attr):  # type: ignore[no-untyped-def, override]
+        """None where the table has no such field."""
+        kind = _fields(value.table).get(attr)
+        return None if kind is None else _numba_type(kind)
+
+
+@lower_getattr_generic(Packed)
+def _read_field(context, builder, typ, value, attr):  # type: ignore[no-untyped-def]
+    field, at = _numba_type(_fields(typ.table)[attr]), _places(typ.table)[attr]
+    base = builder.bitcast(value, cgutils.intp_t.as_pointer())
+
+    def word(number: int) -> Any:
+        loaded = builder.load(builder.gep(base, [cgutils.intp_t(at + number)]))
+        loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
+        return loaded
+
+    if isinstance(field, Packed):
+        return builder.bitcast(builder.gep(base, [cgutils.intp_t(at)]), context.get_value_type(field))
+    if isinstance(field, types.Array):
+        data = builder.inttoptr(word(0), context.get_data_type(field.dtype).as_pointer())
+        return array_at(context, builder, field, data, [word(1 + axis) for axis in range(field.ndim)])
+    return builder.bitcast(word(0), context.get_value_type(field)) if field is types.float64 else word(0)
+
+
+def _view(table: type) -> Any:
+    """The compiled function that takes an address for that of such a table."""
+    result = Packed(table)
+
+    @intrinsic
+    def table_at(typing, address):  # type: ignore[no-untyped-def]
+        def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+            return builder.inttoptr(args[0], context.get_value_type(result))
+
+        return result(types.int64), generate
+
+    return table_at
+
+
+tables_at, record_at = _view(Tables), _view(Record)
+
+
+# call_unit(unit, address, t, first, second): the unit at address `unit` (see `ffr_dyn.kernels.entry_points`).
+call_unit = call_of(types.int64, types.float64, types.int64, types.int64)

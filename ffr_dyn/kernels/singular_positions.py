@@ -1,0 +1,92 @@
+"""Singular positions are stepped over.
+
+Where constraints become dependent the accelerations along what is about to be free are a quotient of two numbers that vanish
+with the distance, and a stage that is evaluated there takes rounding and its own error for motion: within 1e-5 of a step's
+length digits are lost, within 1e-8 the motion is thrown off. No distance is safe and none needs to be: a position is
+singular at a moment, and stages can lie on both sides of it. So a step with a stage beside one is undone together with the
+step before, and both are done again in three steps of other lengths, none of which is longer.
+"""
+
+from ffr_dyn.kernels.options import inlined
+from ffr_dyn.kernels.simd.table_address import call_unit
+from ffr_dyn.kernels.tables import OK
+from ffr_dyn.kernels.vectors import copy
+
+# A stage is beside a singular position when the independence of the rows there (the square of a distance) is below BESIDE,
+# and below CLOSER of what it was where the step began, or, for the start itself, the step before: at a tenth of the distance.
+BESIDE, CLOSER = 1e-4, 0.01
+# Of two steps in three, tried until all stages are farther off than a twentieth of the way from where they begin.
+LENGTHS = (
+    *(0.8, 0.8, 0.4),
+    *(0.5, 1.0, 0.5),
+    *(1.0, 0.7, 0.3),
+)
+ENOUGH = 0.25 * CLOSER
+STAGES_END = 0.95  # of a step: what lies behind belongs to the next one
+
+# Numbers of `Work.independence`.
+HERE, LEAST, WHEN, START, END, AT_START, CLOSEST, AT_LAST = range(8)
+
+
+@inlined
+def note_independence(share, t):
+    """Keep the independence of rows that have been evaluated at time t."""
+    if share[HERE] < share[LEAST]:
+        share[LEAST], share[WHEN] = share[HERE], t
+    if t == share[START]:
+        share[AT_START] = share[HERE]
+    if t <= share[END]:
+        share[CLOSEST] = min(share[CLOSEST], share[HERE])
+
+
+@inlined
+def is_beside(share, before):
+    return share < BESIDE and share < CLOSER * before
+
+
+@inlined
+def step_from(r, step, t, h):
+    """One step from time t. Returns a status."""
+    share = r.work.independence
+    share[START], share[END], r.clock.time[0] = t, t + STAGES_END * h, h
+    return call_unit(step, r.address, t, 0, 0)
+
+
+@inlined
+def numbered_step(r, step, t):
+    """The machine's next step, from time t; `step` is the address of a method's unit. Returns a status."""
+    share, h = r.work.independence, r.clock.time[1]
+    if r.stages.kept_x.shape[0] == 0 or r.clock.gains[2] == 0.0:
+        return call_unit(step, r.address, t, 0, 0)
+    own, before = r.clock.steps[0] % 2, share[AT_LAST]
+    copy(r.stages.kept_x[own], r.x)
+    copy(r.stages.kept_v[own], r.v)
+    share[AT_START], share[CLOSEST] = 0.0, 1.0
+    status = step_from(r, step, t, h)
+    share[AT_LAST] = share[AT_START]
+    if before > 0.0 and (is_beside(share[AT_START], before) or is_beside(share[CLOSEST], share[AT_START])):
+        share[AT_LAST] = 0.0
+        for first in range(0, 9, 3):
+            status = two_steps_again(r, step, t - h, h, 1 - own, first)
+            if status == OK and share[CLOSEST] > ENOUGH * before:
+                break
+        if status != OK:
+            copy(r.x, r.stages.kept_x[own])
+            copy(r.v, r.stages.kept_v[own])
+            status = step_from(r, step, t, h)
+    r.clock.time[0] = h
+    return status
+
+
+@inlined
+def two_steps_again(r, step, t, h, kept, first):
+    """Two steps of length h from time t and a kept state, in three of lengths from `first`. Returns a status."""
+    copy(r.x, r.stages.kept_x[kept])
+    copy(r.v, r.stages.kept_v[kept])
+    r.work.independence[CLOSEST] = 1.0
+    status = OK
+    for k in range(first, first + 3):
+        if status == OK:
+            status = step_from(r, step, t, LENGTHS[k] * h)
+        t += LENGTHS[k] * h
+    return status

@@ -1,0 +1,110 @@
+"""Steps chosen by their error, and the states between two of them.
+
+A method leaves an estimate of its error in `stages.x[0]`, `stages.v[0]`, and does its step again, shorter, when told so. The
+controller is proportional-integral (Gustafsson 1991; Hairer & Wanner 1996, IV.8).
+"""
+
+from ffr_dyn.kernels.bodies import normalise, position_rates
+from ffr_dyn.kernels.options import inlined, kernel
+from ffr_dyn.kernels.simd.table_address import call_unit
+from ffr_dyn.kernels.singular_positions import AT_LAST, HERE, is_beside
+from ffr_dyn.kernels.tables import BEFORE, ERROR, LEAST, NOW, OK, ORDER, RELATIVE, STEP, STEP_TOO_SMALL, USER_FAILED
+from ffr_dyn.kernels.vectors import copy
+
+SAFETY, SMALLEST, LARGEST = 0.9, 0.2, 5.0
+SHORTER = 0.8  # a step that would end beside a singular position
+
+
+@kernel
+def worst(error, before, after, weight, relative, h):
+    """The largest error relative to its tolerance; infinite when it is no number. A negative weight counts over a step."""
+    result = 0.0
+    for k in range(error.size):
+        size = max(abs(before[k]), abs(after[k]))
+        absolute = weight[k] if weight[k] > 0.0 else -weight[k] / h
+        share = abs(error[k]) / (absolute + relative * size)
+        if not share <= result:  # also NaN
+            result = share if share > result else 1e300
+    return result
+
+
+@inlined
+def controlled_step(r, step):
+    """One accepted step. Returns a status."""
+    c, stages = r.control, r.stages
+    numbers = c.numbers
+    copy(c.x, r.x)
+    copy(c.v, r.v)
+    again = 0
+    while True:
+        h = numbers[STEP]
+        r.clock.time[0] = h
+        status = call_unit(step, r.address, numbers[NOW], again, 0)
+        if status == USER_FAILED:
+            return status
+        error = 1e300
+        if status == OK:
+            position = worst(stages.x[0], c.x, r.x, c.weight_x, numbers[RELATIVE], h)
+            error = max(position, worst(stages.v[0], c.v, r.v, c.weight_v, numbers[RELATIVE], h))
+        power = 1.0 / numbers[ORDER]
+        share = r.work.independence
+        if error <= 1.0 and is_beside(share[HERE], share[AT_LAST]):
+            error = SHORTER ** -numbers[ORDER]  # the next step shall not begin there
+        elif error <= 1.0:
+            share[AT_LAST] = share[HERE]
+            error = max(error, 1e-8)
+            factor = SAFETY * error ** (-0.7 * power) * numbers[ERROR] ** (0.4 * power)
+            if again > 0:
+                factor = min(factor, 1.0)
+            numbers[ERROR] = max(error, 1e-4)
+            numbers[BEFORE], numbers[NOW] = numbers[NOW], numbers[NOW] + h
+            numbers[STEP] = h * min(LARGEST, max(SMALLEST, factor))
+            c.counts[0] += 1
+            return OK
+        copy(r.x, c.x)
+        copy(r.v, c.v)
+        again = 1
+        c.counts[1] += 1
+        numbers[STEP] = h * max(SMALLEST, SAFETY * min(error, 1e30) ** -power)
+        if numbers[STEP] < numbers[LEAST]:
+            return STEP_TOO_SMALL if status == OK else status
+
+
+@kernel
+def slopes_to_velocities(where, x, slope, v):
+    """v = [R_dot, omega_bar = 2 G_bar p_dot, q_dot] of positions that move with these slopes."""
+    for b in range(where.shape[0] - 1):
+        n, i, j = where[b, 0], where[b, 1], where[b, 2]
+        p0, p1, p2, p3 = x[i + 3], x[i + 4], x[i + 5], x[i + 6]
+        d0, d1, d2, d3 = slope[i + 3], slope[i + 4], slope[i + 5], slope[i + 6]
+        for c in range(3):
+            v[j + c] = slope[i + c]
+        v[j + 3] = 2.0 * (-p1 * d0 + p0 * d1 + p3 * d2 - p2 * d3)
+        v[j + 4] = 2.0 * (-p2 * d0 - p3 * d1 + p0 * d2 + p1 * d3)
+        v[j + 5] = 2.0 * (-p3 * d0 + p2 * d1 - p1 * d2 + p0 * d3)
+        for c in range(n):
+            v[j + 6 + c] = slope[i + 7 + c]
+
+
+@inlined
+def interpolate(r, t):
+    """The machine's state at a time t within the last step: on the cubic through positions and velocities at its ends."""
+    c = r.control
+    h = c.numbers[NOW] - c.numbers[BEFORE]
+    if not t < c.numbers[NOW] or not h > 0.0:
+        return
+    s = (t - c.numbers[BEFORE]) / h
+    before, after = r.stages.x[1], r.stages.x[2]
+    position_rates(r.model.bodies, c.x, c.v, before)
+    position_rates(r.model.bodies, r.x, r.v, after)
+    square, rest = s * s, 1.0 - s
+    for k in range(r.x.size):
+        first, last, d0, d1 = c.x[k], r.x[k], before[k], after[k]
+        r.x[k] = (
+            (1.0 + 2.0 * s) * rest * rest * first
+            + square * (3.0 - 2.0 * s) * last
+            + h * s * rest * (rest * d0 - s * d1)
+        )
+        before[k] = 6.0 * s * rest * (last - first) / h + rest * (1.0 - 3.0 * s) * d0 + s * (3.0 * s - 2.0) * d1
+    normalise(r.model.bodies, r.x)
+    slopes_to_velocities(r.model.bodies.where, r.x, before, r.v)

@@ -1,0 +1,1 @@
+"""Geometric stiffening by load, compiled."""

@@ -1,0 +1,160 @@
+"""Animations of a result: GIF and MP4 rendered off-screen by pyvista, or an interactive page by plotly.
+
+The pictures show the deformed bodies, flexible ones coloured by their elastic displacement beside the translucent
+undeformed body, rigid ones plain; time and scale of the deformation are written in the picture. pyvista and plotly are
+imported only when they are needed.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from ffr_dyn.pictures.film import Camera, Film, camera_for, film
+from ffr_dyn.results.result import Array, Result
+from ffr_prep.common.errors import InputError
+
+_SHORTEST, _LONGEST = 3.0, 6.0
+_PAGE_FRAMES = 80
+
+
+@dataclass(frozen=True)
+class _Show:
+    """A film and how it is shown: seconds per picture, camera, (width, height)."""
+
+    film: Film
+    seconds: float
+    camera: Camera
+    size: tuple[int, int]
+
+
+def animate(
+    result: Result,
+    path: str | Path,
+    *,
+    scale: float | str = 1.0,
+    fps: int = 25,
+    duration: float | None = None,
+    camera: Camera | None = None,
+    size: tuple[int, int] = (960, 640),
+    colour: str = "deformation",
+    limit: float | None = None,
+    traces: Iterable[str] = (),
+) -> Path:
+    """Animate the bodies of a result; the suffix of path decides: .gif, .mp4 (needs imageio-ffmpeg) or .html.
+
+    scale    : factor of the drawn deformation; "auto": a round one for deflections of about 5 % of a body
+    fps      : pictures per second of playing time; a page holds at most 80 pictures, whatever the rate
+    duration : playing time [s]; by default the simulated time, but at least 3 s and at most 6 s
+    camera   : by default chosen from the motion (`ffr_dyn.pictures.film.camera_for`); it does not move
+    size     : width and height of the picture [pixels], even numbers for .mp4; a page fills its window
+    colour   : "deformation": flexible bodies by elastic displacement; a measure of stress or strain such as "von-mises"
+               (`ffr_dyn.scene.stress_sensors.MEASURES`): bodies with stress modes by it; "body": every body in a colour of
+               its own
+    limit    : end of the colour bar [m, Pa or 1]; the largest value of the film when not given
+    traces   : markers ("rod.small_eye") whose paths are drawn
+
+    An existing file is replaced only by a complete new one. Raises InputError for settings or a result that cannot be
+    drawn, ComputationError when this machine cannot render.
+    """
+    path = Path(path)
+    write = _writer(path)
+    _check_settings(fps, duration, size)
+    playing, frames = _pace(result, fps, duration)
+    if write is _write_page:
+        frames = min(frames, _PAGE_FRAMES)
+    shown = film(result, frames, scale=scale, traces=traces, colour=colour, limit=limit)
+    show = _Show(shown, playing / frames, camera or camera_for(shown), size)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(path.name + ".part")
+    try:
+        write(show, temporary)
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return path
+
+
+def _writer(path: Path) -> Callable[[_Show, Path], None]:
+    writers = {".gif": _write_gif, ".mp4": _write_mp4, ".html": _write_page}
+    kind = path.suffix.lower()
+    if kind not in writers:
+        raise InputError(f"{path}: animations are written as {', '.join(writers)}, not {kind or 'without a suffix'}")
+    if kind == ".mp4" and importlib.util.find_spec("imageio_ffmpeg") is None:
+        raise InputError(
+            f"{path}: MP4 needs the package imageio-ffmpeg (pip install imageio-ffmpeg), or write .gif, .html"
+        )
+    return writers[kind]
+
+
+def _check_settings(fps: int, duration: float | None, size: tuple[int, int]) -> None:
+    if not 1 <= fps <= 50:
+        raise InputError(f"fps is {fps}; it must lie between 1 and 50, the most that players of GIF files show")
+    if duration is not None and not 0 < duration <= 3600:
+        raise InputError(f"duration is {duration} s; it must be positive and at most 3600 s")
+    if min(size) < 64 or max(size) > 4096:
+        raise InputError(f"size is {size}; width and height must lie between 64 and 4096 pixels")
+
+
+def _pace(result: Result, fps: int, duration: float | None) -> tuple[float, int]:
+    """Playing time [s] and number of pictures; one picture is enough for a result at one time."""
+    simulated = float(np.ptp(result.time)) if result.time.size else 0.0
+    playing = float(np.clip(simulated, _SHORTEST, _LONGEST)) if duration is None else duration
+    return playing, max(2, round(playing * fps)) if simulated > 0 else 1
+
+
+# ---- the three kinds of file --------------------------------------------------------------------------------------
+
+
+def _pictures(show: _Show) -> Iterator[Array]:
+    from ffr_dyn.pictures.render import pictures
+
+    return pictures(show.film, show.camera, show.size)
+
+
+def _write_gif(show: _Show, path: Path) -> None:
+    pictures = list(_pictures(show))
+    palette = _shared_palette(pictures)
+    indexed = [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    # GIF counts in hundredths of a second: round the ends of the pictures, not their lengths, to keep the speed.
+    ends = np.round(100 * show.seconds * np.arange(1, len(pictures) + 1))
+    delays = (10 * np.diff(ends, prepend=0.0)).astype(int).tolist()
+    indexed[0].save(path, "GIF", save_all=True, append_images=indexed[1:], duration=delays, loop=0, optimize=False)
+
+
+def _shared_palette(pictures: list[Array], samples: int = 8) -> Image.Image:
+    """White and 255 colours for the rest, from pictures spread over the film; one palette for all cannot flicker."""
+    chosen = np.concatenate(
+        [pictures[k].reshape(-1, 3) for k in np.linspace(0, len(pictures) - 1, samples).astype(int)]
+    )
+    # Pillow looks colours up in steps of four: without the near-white ones, white stays white.
+    ink = chosen[(chosen < 248).any(axis=1)]
+    rows = np.resize(ink, (-(-len(ink) // 256), 256, 3))
+    few = Image.fromarray(rows).quantize(255, method=Image.Quantize.MEDIANCUT, kmeans=1)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([255, 255, 255, *(few.getpalette() or [])])
+    return palette
+
+
+def _write_mp4(show: _Show, path: Path) -> None:
+    import imageio_ffmpeg
+
+    stream = imageio_ffmpeg.write_frames(
+        str(path), show.size, fps=1.0 / show.seconds, quality=8, macro_block_size=2, output_params=["-f", "mp4"]
+    )
+    stream.send(None)
+    for picture in _pictures(show):
+        stream.send(picture)
+    stream.close()
+
+
+def _write_page(show: _Show, path: Path) -> None:
+    from ffr_dyn.pictures.page import page
+
+    path.write_text(page(show.film, show.camera, show.seconds), encoding="utf-8")

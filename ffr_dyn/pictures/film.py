@@ -1,0 +1,400 @@
+"""What an animation shows, as arrays: poses and elastic coordinates of the bodies at the times of the pictures.
+
+A point with the undeformed position u_0 in the body frame is drawn at R + A(p) (u_0 + scale Phi q). The scale
+exaggerates the deformation only. Flexible bodies may be coloured by a field on their surface: the elastic displacement
+or a measure of stress or strain. Everything here comes from the result alone and is independent of how it is rendered.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from textwrap import wrap
+
+import numpy as np
+
+from ffr_dyn.functions.rotation import rotation_matrix
+from ffr_dyn.results.result import Array, Result
+from ffr_dyn.results.stress import values_at
+from ffr_dyn.scene.stress_sensors import MEASURES, Measure
+from ffr_prep.body import Surface
+from ffr_prep.common.errors import InputError
+from ffr_prep.common.units import readable
+
+# Muted Okabe-Ito colours for bodies, so that the deformation stays the loudest; full ones for paths.
+BODY_COLOURS = ("#8FB4D0", "#E0B48A", "#93C4B0", "#D9B3C8", "#C9BE86", "#A9CFE6", "#B0B0B0")
+TRACE_COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7")
+# What flexible bodies may be coloured by; "body" leaves every body plain, in a colour of its own.
+COLOURS = ("deformation", "body", *MEASURES)
+# For sizes, for stress and for values with a sign, by their names in matplotlib.
+_SEQUENTIAL, _STRESS, _DIVERGING = "viridis", "turbo", "coolwarm"
+
+# The share of its own size by which the automatic scale deflects the most flexible body.
+_AUTOMATIC_SHARE = 0.05
+_PLANAR_TOLERANCE = 1e-6
+_TITLE_WIDTH = 13
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A body with a surface. R (F, 3) [m], A (F, 3, 3), q (F, n) [m sqrt(kg)] at the F times; n = 0 if it is rigid."""
+
+    name: str
+    surface: Surface
+    R: Array
+    A: Array
+    q: Array
+
+    @property
+    def is_flexible(self) -> bool:
+        """Whether the body has elastic coordinates."""
+        return self.q.shape[1] > 0
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the undeformed body's box [m]."""
+        return float(np.linalg.norm(np.ptp(self.surface.points, axis=0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A body without a surface: the points (F, M, 3) [m] of its markers, and the pairs (E, 2) of them to be joined."""
+
+    name: str
+    points: Array
+    pairs: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Colouring:
+    """A field on the surfaces of some bodies, shown as colours.
+
+    words, unit : of the field, in SI symbols
+    low, high   : the range of the colour bar, in that unit
+    colour_map  : by its name in matplotlib
+    bodies      : the names of the bodies that have the field
+    values      : (solid, frame) -> (P,) the field at the surface points of a solid, in that unit
+    """
+
+    words: str
+    unit: str
+    low: float
+    high: float
+    colour_map: str
+    bodies: frozenset[str]
+    values: Callable[[Solid, int], Array]
+
+    def readable(self) -> tuple[float, str]:
+        """Factor and unit in which the range is read easily."""
+        return readable(self.unit, max(abs(self.low), abs(self.high)))
+
+    def title(self, line_break: str) -> str:
+        """The title of the colour bar in short lines: "elastic", "displacement", "[mm]"."""
+        _, unit = self.readable()
+        return line_break.join([*wrap(self.words, _TITLE_WIDTH), *([f"[{unit}]"] if unit else [])])
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """Bodies at the times (F,) [s] of the pictures.
+
+    scale      : factor of the drawn deformation
+    deflection : largest elastic displacement |Phi q| over bodies and times, not scaled [m]
+    traces     : by marker, its path over all rows of the result (T, 3) [m]
+    colouring  : what the colours of flexible bodies show; None leaves them plain
+    marks      : words at points (3,) [m] that do not move
+    heading    : words in the corner of the picture, instead of time and scale
+    low, high  : (3,) corners of a box that holds the whole motion [m]
+    """
+
+    times: Array
+    solids: tuple[Solid, ...]
+    links: tuple[Link, ...]
+    traces: dict[str, Array]
+    scale: float
+    deflection: float
+    low: Array
+    high: Array
+    colouring: Colouring | None = None
+    marks: dict[str, Array] = field(default_factory=dict)
+    heading: str = ""
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the box of the whole motion [m]."""
+        return float(np.linalg.norm(self.high - self.low))
+
+    @property
+    def centre(self) -> Array:
+        """(3,) middle of the box of the whole motion [m]."""
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def corners(self) -> Array:
+        """(8, 3) corners of the box of the whole motion [m]."""
+        return _corners(self.low, self.high)
+
+    def clock(self, frame: int) -> str:
+        """The time of a picture as it is written in it, with a fitting unit and number of digits: "25.0 ms"."""
+        factor, unit = readable("s", float(np.abs(self.times).max()))
+        span = factor * float(np.ptp(self.times)) or 1.0
+        return f"{self.times[frame] * factor:.{max(0, 2 - math.floor(math.log10(span)))}f} {unit}"
+
+    def caption(self, frame: int) -> str:
+        """What is written in the corner of a picture."""
+        return self.heading or f"t = {self.clock(frame)}     {self.scale_note()}"
+
+    def scale_note(self) -> str:
+        """The scale as it is written in the picture, "deformation × 20"; nothing when it is one or all is rigid."""
+        return f"deformation × {self.scale:g}" if self.deflection > 0 and self.scale != 1.0 else ""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A view: the direction (3,) from the scene towards the eye, and the direction (3,) that is up in the picture."""
+
+    direction: tuple[float, float, float]
+    up: tuple[float, float, float]
+
+    def axes(self) -> tuple[Array, Array, Array]:
+        """Unit vectors (3,): towards the eye, to the right, up. InputError if direction and up are parallel or zero."""
+        direction, right = np.asarray(self.direction, float), np.cross(self.up, self.direction)
+        if not np.linalg.norm(right) > 1e-9 * np.linalg.norm(direction) * np.linalg.norm(self.up):
+            raise InputError(f"camera: up {self.up} must not be parallel to the direction {self.direction}, nor zero")
+        direction, right = direction / np.linalg.norm(direction), right / np.linalg.norm(right)
+        return direction, right, np.cross(direction, right)
+
+
+def film(
+    result: Result,
+    frames: int,
+    *,
+    scale: float | str = 1.0,
+    traces: Iterable[str] = (),
+    colour: str = "deformation",
+    limit: float | None = None,
+) -> Film:
+    """The bodies of a result at ``frames`` equally spaced times; between rows, poses and coordinates are interpolated.
+
+    scale  : factor of the drawn deformation, not negative; "auto": a round one for deflections of about 5 % of a body
+    traces : markers ("rod.small_eye") whose paths are drawn
+    colour : one of COLOURS: what flexible bodies are coloured by
+    limit  : end of the colour bar [m, Pa or 1]; the largest value over bodies and pictures when not given
+
+    Raises InputError for no rows, no body, an unknown marker, a scale, colour or limit that cannot be used, infinite
+    values, and a colour by stress when no body has stress modes.
+    """
+    if result.time.size == 0:
+        raise InputError("nothing to animate: the result has no rows")
+    return film_at(
+        result,
+        np.linspace(result.time[0], result.time[-1], frames),
+        scale=scale,
+        traces=traces,
+        colour=colour,
+        limit=limit,
+    )
+
+
+def film_at(
+    result: Result,
+    times: Array,
+    *,
+    scale: float | str = 1.0,
+    traces: Iterable[str] = (),
+    colour: str = "deformation",
+    limit: float | None = None,
+) -> Film:
+    """As `film`, at the given times (F,) [s]."""
+    if not (scale == "auto" or (isinstance(scale, int | float) and 0 <= scale < math.inf)):
+        raise InputError(f"scale is {scale!r}; it must be a number that is not negative, or 'auto'")
+    if limit is not None and not 0 < limit < math.inf:
+        raise InputError(f"the end of the colour bar is {limit}; it must be a positive number")
+    solids = tuple(_solid(result, name, times) for name in result.geometry if f"{name}.R" in result.quantities)
+    links = tuple(_link(result, name, times) for name in _bodies(result) if name not in result.geometry)
+    if not solids and not links:
+        raise InputError("nothing to animate: the result has no body (quantities <body>.R and <body>.p)")
+    deflections = [float(max(displacements(solid, k).max() for k in range(len(times)))) for solid in solids]
+    factor = _automatic_scale(solids, deflections) if scale == "auto" else float(scale)
+    paths = {name: result[f"{name}.position"] for name in traces}
+    low, high = _box(solids, links, paths, [factor * deflection for deflection in deflections])
+    deflection = max(deflections, default=0.0)
+    shades = colouring(solids, len(times), colour, deflection, limit)
+    return Film(times, solids, links, paths, factor, deflection, low, high, shades)
+
+
+# ---- colours ------------------------------------------------------------------------------------------------------
+
+
+def colouring(
+    solids: Iterable[Solid], frames: int, colour: str, deflection: float, limit: float | None
+) -> Colouring | None:
+    """What the name of a colour means for these bodies; None where there is nothing to show.
+
+    Raises InputError for an unknown name, and for stress when no body has stress modes.
+    """
+    if colour not in COLOURS:
+        raise InputError(f"colour is {colour!r}; it must be one of: {', '.join(COLOURS)}")
+    flexible = [solid for solid in solids if solid.is_flexible]
+    if colour == "body" or not flexible:
+        return None
+    if colour == "deformation":
+        names = frozenset(solid.name for solid in flexible)
+        high = limit or deflection
+        return Colouring("elastic displacement", "m", 0.0, high, _SEQUENTIAL, names, displacements) if high else None
+    return _stress_colouring(flexible, frames, MEASURES[colour], limit)
+
+
+def _stress_colouring(flexible: list[Solid], frames: int, of: Measure, limit: float | None) -> Colouring | None:
+    stressed = [solid for solid in flexible if solid.surface.stress is not None]
+    if not stressed:
+        raise InputError(
+            f"no body can be coloured by {of.words}: none has stress modes; reduce one with them "
+            "(ffr-prep reduce --stress) and run again"
+        )
+
+    def values(solid: Solid, frame: int) -> Array:
+        return values_at(solid.surface, solid.q[frame : frame + 1], of)[:, 0]
+
+    largest = max(float(np.abs(values(solid, k)).max()) for solid in stressed for k in range(frames))
+    high = limit or largest
+    return measure_colours(of, high, frozenset(solid.name for solid in stressed), values) if high else None
+
+
+def measure_colours(
+    of: Measure, high: float, bodies: frozenset[str], values: Callable[[Solid, int], Array]
+) -> Colouring:
+    """A measure as colours from none to `high`, or for one with a sign from -high (blue) to high (red)."""
+    low, shades = (-high, _DIVERGING) if of.signed else (0.0, _STRESS)
+    return Colouring(of.words, of.unit, low, high, shades, bodies, values)
+
+
+def is_coloured(shown: Film, solid: Solid) -> bool:
+    """Whether the body is coloured by a field."""
+    return shown.colouring is not None and solid.name in shown.colouring.bodies
+
+
+# ---- points -------------------------------------------------------------------------------------------------------
+
+
+def body_points(solid: Solid, frame: int, scale: float) -> Array:
+    """(P, 3) deformed points in the body frame, u_0 + scale Phi q [m]."""
+    return solid.surface.points + scale * (solid.surface.Phi @ solid.q[frame])
+
+
+def drawn_points(solid: Solid, frame: int, scale: float) -> Array:
+    """(P, 3) points in the global frame, R + A (u_0 + scale Phi q) [m]."""
+    return solid.R[frame] + body_points(solid, frame, scale) @ solid.A[frame].T
+
+
+def displacements(solid: Solid, frame: int) -> Array:
+    """(P,) elastic displacements |Phi q|, not scaled [m]."""
+    return np.linalg.norm(solid.surface.Phi @ solid.q[frame], axis=1)
+
+
+def camera_for(shown: Film) -> Camera:
+    """Planar motion is seen nearly from its front, slightly from above and the right (x to the right in the planes xy
+    and xz, y or z up); spatial motion from a corner, z up."""
+    front = {
+        "z": Camera((0.20, 0.28, 1.0), (0.0, 1.0, 0.0)),
+        "y": Camera((0.20, -1.0, 0.28), (0.0, 0.0, 1.0)),
+        "x": Camera((1.0, 0.20, 0.28), (0.0, 0.0, 1.0)),
+    }
+    for axis, camera in front.items():
+        if _is_planar(shown, "xyz".index(axis)):
+            return camera
+    return Camera((0.75, -1.0, 0.6), (0.0, 0.0, 1.0))
+
+
+# ---- from the result to the times of the pictures -----------------------------------------------------------------
+
+
+def _bodies(result: Result) -> list[str]:
+    names = [name.removesuffix(".R") for name in result.quantities if name.endswith(".R")]
+    return [name for name in names if f"{name}.p" in result.quantities]
+
+
+def _solid(result: Result, name: str, times: Array) -> Solid:
+    surface = result.geometry[name]
+    n = surface.Phi.shape[2]
+    q = result[f"{name}.q"] if n else np.zeros((result.time.size, 0))
+    if q.shape[1] != n:
+        raise InputError(f"body {name!r} has {q.shape[1]} elastic coordinates, but its surface has {n} mode shapes")
+    R = _at(times, result.time, result[f"{name}.R"], name)
+    return Solid(name, surface, R, _rotations(times, result, name), _at(times, result.time, q, name))
+
+
+def _rotations(times: Array, result: Result, name: str) -> Array:
+    p = result[f"{name}.p"]
+    # p and -p are the same rotation: stay on one sheet, or the interpolation would pass through a wrong one.
+    flips = np.where(np.einsum("ti,ti->t", p[1:], p[:-1]) < 0, -1.0, 1.0)
+    p = _at(times, result.time, p * np.cumprod([1.0, *flips])[:, None], name)
+    return rotation_matrix(p / np.linalg.norm(p, axis=1, keepdims=True))
+
+
+def _at(times: Array, rows: Array, values: Array, name: str) -> Array:
+    if not np.isfinite(values).all():
+        raise InputError(f"body {name!r} has poses or elastic coordinates that are not finite; it cannot be drawn")
+    columns = values.reshape(len(values), -1).T
+    return np.array([np.interp(times, rows, column) for column in columns]).T.reshape(len(times), *values.shape[1:])
+
+
+def _link(result: Result, name: str, times: Array) -> Link:
+    ending = ".position"
+    markers = [key for key in result.quantities if key.startswith(f"{name}.") and key.endswith(ending)]
+    histories = [result[key] for key in markers]
+    if len(markers) < 2:
+        histories.insert(0, result[f"{name}.R"])
+    points = np.stack([_at(times, result.time, history, name) for history in histories], axis=1)
+    return Link(name, points, _spanning_tree(points[0]))
+
+
+def _spanning_tree(points: Array) -> Array:
+    """(M - 1, 2) the pairs that join all points with the least length (Prim 1957)."""
+    distance = np.linalg.norm(points[:, None] - points[None], axis=-1)
+    joined, left, pairs = [0], set(range(1, len(points))), []
+    while left:
+        _, a, b = min((distance[a, b], a, b) for a in joined for b in left)
+        pairs.append((a, b))
+        joined.append(b)
+        left.remove(b)
+    return np.array(pairs, dtype=int).reshape(-1, 2)
+
+
+# ---- scale, extent, plane -----------------------------------------------------------------------------------------
+
+
+def _automatic_scale(solids: Iterable[Solid], deflections: list[float]) -> float:
+    """The number 1, 2 or 5 times a power of ten nearest to the wanted factor, but never a reduction."""
+    shares = [deflection / solid.size for solid, deflection in zip(solids, deflections, strict=True) if solid.size > 0]
+    if max(shares, default=0.0) == 0.0:
+        return 1.0
+    wanted = _AUTOMATIC_SHARE / max(shares)
+    decade = 10.0 ** math.floor(math.log10(wanted))
+    nearest = min((1, 2, 5, 10), key=lambda digit: abs(math.log(digit * decade / wanted)))
+    return max(1.0, nearest * decade)
+
+
+def _box(
+    solids: Iterable[Solid], links: Iterable[Link], paths: dict[str, Array], margins: list[float]
+) -> tuple[Array, Array]:
+    clouds = [link.points.reshape(-1, 3) for link in links] + list(paths.values())
+    for solid, margin in zip(solids, margins, strict=True):
+        low, high = solid.surface.points.min(axis=0) - margin, solid.surface.points.max(axis=0) + margin
+        corners = _corners(low, high)
+        clouds.append((solid.R[:, None] + np.einsum("fij,cj->fci", solid.A, corners)).reshape(-1, 3))
+    points = np.concatenate(clouds)
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _corners(low: Array, high: Array) -> Array:
+    return np.stack(np.meshgrid(*np.stack([low, high], axis=1)), axis=-1).reshape(8, 3)
+
+
+def _is_planar(shown: Film, axis: int) -> bool:
+    """Whether all bodies move in planes normal to that axis of the global frame."""
+    heights = [solid.R[:, axis] for solid in shown.solids] + [link.points[..., axis] for link in shown.links]
+    turns = [np.einsum("fj,j->f", solid.A[:, axis], solid.A[0, axis]) for solid in shown.solids]
+    flat = all(np.ptp(height, axis=0).max() <= _PLANAR_TOLERANCE * shown.size for height in heights)
+    return flat and all((turn > 1.0 - _PLANAR_TOLERANCE).all() for turn in turns)

@@ -1,0 +1,1 @@
+"""Steps under the control of another program, and against a deadline."""

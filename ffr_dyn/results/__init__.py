@@ -1,0 +1,1 @@
+"""Labelled histories: quantities, files, stress, power."""

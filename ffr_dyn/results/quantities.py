@@ -1,0 +1,401 @@
+"""From recorded states to named quantities with units.
+
+Every quantity has a name, a unit and a way to compute it from the recorded rows (`catalogue`); only those that are wanted are
+computed and kept. `docs/scene_file.md` lists them.
+"""
+
+from __future__ import annotations
+
+import fnmatch
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass
+from difflib import get_close_matches
+
+import numpy as np
+
+from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.kernels.tables import Record
+from ffr_dyn.results.power import Worked, damping_power, power, reaction, spring_energy, springs_of, transmitted, work
+from ffr_dyn.results.recorded_motion import View, dot, shaped, times, to_axes
+from ffr_dyn.results.result import EULER_PARAMETERS, XYZ, Axis, Quantity, mode_axis
+from ffr_dyn.scene.applied_loads import Action, actions_of, bushings_of, loads_of
+from ffr_dyn.scene.couplings import Coupling
+from ffr_dyn.scene.forces import SpringDamper
+from ffr_dyn.scene.joints import COORDINATES, Joint
+from ffr_dyn.scene.scene import marker_names, markers, measured_body
+from ffr_dyn.scene.sensors import Measurement, SectionMeasurement, StressMeasurement
+from ffr_dyn.scene.stress_sensors import measured_modes
+from ffr_prep.common.errors import InputError
+
+Array = np.ndarray
+
+# What a result keeps unless told otherwise: enough to draw, to animate and to recover stress, and what joints carry.
+DEFAULT_OUTPUTS = (
+    *("*.R", "*.p", "*.v", "*.omega_bar", "*.q", "*.q_dot", "*.position", "*.velocity", "*.displacement", "*.rotation"),
+    *(
+        "*.force",
+        "*.moment",
+        "*.effort",
+        "*.torque",
+        "*.tension",
+        "*.angle",
+        "*.stroke",
+        "energy.*",
+        "constraint.*",
+        "measured.*",
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Unwound:
+    """The last joint angle [rad], its rate [rad/s] and time [s], from which the next angle is unwound."""
+
+    angle: float
+    rate: float
+    time: float
+
+
+Memory = Mapping[str, Unwound | Worked]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A quantity that can be had: unit, axes, description, and how to compute its values.
+
+    compute : (view, what the earlier rows left) -> (values (T, ...), what these rows leave)
+    """
+
+    unit: str
+    axes: tuple[Axis, ...]
+    text: str
+    compute: Callable[[View, Unwound | Worked | None], tuple[Array, Unwound | Worked | None]]
+
+
+def measure(
+    system: System, record: Record, last: Memory, wanted: Mapping[str, Entry] | None = None
+) -> tuple[dict[str, Quantity], Memory]:
+    """The wanted quantities of the recorded rows; by default those of `DEFAULT_OUTPUTS`.
+
+    wanted : entries of the catalogue by name; see `selected`
+    last   : what `measure` returned for the rows before these, {} at the start: angles and work go on from it
+    """
+    view, found, left = View(system, record), {}, dict(last)
+    for name, entry in (selected(system) if wanted is None else wanted).items():
+        values, memory = entry.compute(view, last.get(name))
+        found[name] = Quantity(values, entry.unit, entry.axes, entry.text)
+        if memory is not None:
+            left[name] = memory
+    return found, left
+
+
+def selected(system: System, outputs: Sequence[str] = ("default",)) -> dict[str, Entry]:
+    """The entries of the catalogue that names or patterns such as "rod.*.position" ask for, in its order.
+
+    "default" stands for `DEFAULT_OUTPUTS`. Raises InputError for a name or pattern that fits nothing.
+    """
+    if isinstance(outputs, str):
+        raise InputError(f"outputs must be a list of names, not the text {outputs!r}; write [{outputs!r}]")
+    everything = catalogue(system)
+    wanted: set[str] = set()
+    for pattern in outputs:
+        patterns = DEFAULT_OUTPUTS if pattern == "default" else (pattern,)
+        fitting = {name for name in everything for one in patterns if fnmatch.fnmatchcase(name, one)}
+        if not fitting:
+            close = get_close_matches(pattern, everything, 3)
+            known = f"did you mean {', '.join(close)}?" if close else f"there are: {', '.join(everything)}"
+            raise InputError(f"outputs: {pattern!r} is none of the scene's quantities; {known}")
+        wanted |= fitting
+    return {name: entry for name, entry in everything.items() if name in wanted}
+
+
+def needs_every_step(wanted: Iterable[str]) -> bool:
+    """Whether a wanted quantity adds up over the integrator's steps (work) rather than over output rows."""
+    return any(name.endswith(".work") for name in wanted)
+
+
+def catalogue(system: System) -> dict[str, Entry]:
+    """Every quantity that can be had of a scene, by name."""
+    parts = (_bodies, _markers, _reactions, _joint_coordinates, _forces, _powers, _totals, _measurements)
+    return {name: entry for part in parts for name, entry in part(system)}
+
+
+Named = Iterator[tuple[str, Entry]]
+
+
+def _entry(unit: str, axes: tuple[Axis, ...], text: str, values: Callable[[View], Array]) -> Entry:
+    """A quantity that needs nothing of earlier rows."""
+    return Entry(unit, axes, text, lambda view, _: (values(view), None))
+
+
+def _bodies(system: System) -> Named:
+    place = system.layout
+    for b, body in enumerate(system.scene.bodies):
+        n, R, omega = body.name, place.R_dot(b), place.omega(b)
+        yield f"{n}.R", _column("m", XYZ, "origin of the body frame, global axes", "x", place.R(b))
+        yield f"{n}.p", _column("1", EULER_PARAMETERS, "Euler parameters, body to global", "x", place.p(b))
+        yield f"{n}.v", _column("m/s", XYZ, "velocity of the origin, global axes", "v", R)
+        yield f"{n}.omega_bar", _column("rad/s", XYZ, "angular velocity, body axes", "v", omega)
+        yield f"{n}.a", _column("m/s^2", XYZ, "acceleration of the origin, global axes", "vd", R)
+        yield f"{n}.alpha_bar", _column("rad/s^2", XYZ, "angular acceleration, body axes", "vd", omega)
+        if place.n[b] or (body.kept and body.kept[1]):
+            yield from _elastic(system, b)
+
+
+def _elastic(system: System, b: int) -> Named:
+    place, body = system.layout, system.scene.bodies[b]
+    numbers, count = body.kept or (tuple(range(place.n[b])), place.n[b])
+    modes, unit, text = mode_axis(body.name, count), "m sqrt(kg)", "elastic coordinates (mass-normalised)"
+
+    def column(unit: str, text: str, of: str, at: slice) -> Entry:
+        return _entry(unit, (modes,), text, lambda view: _spread(getattr(view.record, of)[:, at], numbers, count))
+
+    yield f"{body.name}.q", column(unit, text, "x", place.q(b))
+    yield f"{body.name}.q_dot", column(f"{unit}/s", f"rates of the {text}", "v", place.q_dot(b))
+    yield f"{body.name}.q_ddot", column(f"{unit}/s^2", f"accelerations of the {text}", "vd", place.q_dot(b))
+
+
+def _spread(values: Array, numbers: Sequence[int], count: int) -> Array:
+    """(T, k) values of some coordinates among all `count` of them, zero for those that a planar scene leaves out."""
+    out = np.zeros((len(values), count))
+    out[:, list(numbers)] = values
+    return out
+
+
+def _column(unit: str, axis: Axis, text: str, of: str, at: slice) -> Entry:
+    return _entry(unit, (axis,), text, lambda view: getattr(view.record, of)[:, at])
+
+
+def _markers(system: System) -> Named:
+    ground = len(system.scene.bodies)
+    for k, (name, (b, _, _)) in enumerate(zip(marker_names(system.scene), markers(system.scene), strict=True)):
+        if b == ground:
+            continue
+        for what, entry in _marker(k).items():
+            if what != "displacement" or system.layout.n[b]:
+                yield f"{name}.{what}", entry
+
+
+def _marker(k: int) -> dict[str, Entry]:
+    def vector(unit: str, text: str, values: Callable[[View], Array]) -> Entry:
+        return _entry(unit, (XYZ,), text, values)
+
+    parameters = "Euler parameters of the marker's axes to global: its body's rotation and the elastic one"
+    return {
+        "position": vector("m", "position of the marker, global axes", lambda view: view.record.r[:, k]),
+        "velocity": vector("m/s", "velocity of the marker, global axes", lambda view: view.record.rd[:, k]),
+        "displacement": vector("m", "elastic displacement of the marker, body axes", lambda v: v.displacement(k)),
+        "acceleration": vector("m/s^2", "acceleration of the marker, global axes", lambda v: v.acceleration(k)),
+        "orientation": _entry("1", (EULER_PARAMETERS,), parameters, lambda view: view.orientation(k)),
+        "angular_velocity": vector("rad/s", "angular velocity of the marker, global axes", lambda view: view.spin(k)),
+    }
+
+
+def _reactions(system: System) -> Named:
+    joints = {joint.name: joint for joint in system.scene.joints}
+    couplings = {coupling.name: coupling for coupling in system.scene.couplings}
+    for number, block in enumerate(system.blocks):
+        if block.name in couplings:
+            yield f"{block.name}.effort", _coupling_effort(couplings[block.name], number)
+            continue
+        for k, (what, unit) in enumerate((("force", "N"), ("moment", "N m"))):
+            text = f"{what} that the first body exerts on the second at its marker"
+            for suffix, axes in (
+                ("", "global axes"),
+                ("_i", "axes of the first body"),
+                ("_joint", "joint axes f, g, h"),
+            ):
+                if suffix != "_joint" or block.name in joints:
+                    entry = _reaction(block.name, block.markers[0], joints.get(block.name), k, suffix)
+                    yield f"{block.name}.{what}{suffix}", _entry(unit, (XYZ,), f"{text}, {axes}", entry)
+
+
+def _coupling_effort(coupling: Coupling, number: int) -> Entry:
+    """What a coupling does to its second coordinate; to the first it does -ratio times as much."""
+    unit = "N m" if coupling.second.endswith(".angle") else "N"
+    text = f"effort of the coupling along {coupling.second}; along {coupling.first} it is -ratio times that"
+    return _entry(unit, (), text, lambda view: view.record.reaction[:, number, 0])
+
+
+def _reaction(name: str, marker: int, joint: Joint | None, k: int, suffix: str) -> Callable[[View], Array]:
+    def values(view: View) -> Array:
+        vector = reaction(view, name)[k]
+        if suffix == "_i":
+            return to_axes(view.axes(markers(view.system.scene)[marker][0]), vector)
+        if suffix == "_joint" and joint is not None:
+            return to_axes(view.joint_frames(joint)[0], vector)
+        return vector
+
+    return values
+
+
+def _forces(system: System) -> Named:
+    """What acts on coordinates and in bushings: where it stands and what it exerts."""
+    for k, action in enumerate(actions_of(system.scene)):
+        for what, unit, column, sign, text in _of_action(action):
+            entry = _entry(unit, (), text, lambda view, k=k, c=column, s=sign: s * view.record.action[:, k, c])  # type: ignore[misc]
+            yield f"{action.name}.{what}", entry
+    for k, bushing in enumerate(bushings_of(system.scene)):
+        for what, unit, first, text in BUSHING:
+            entry = _entry(unit, (XYZ,), text, lambda view, k=k, a=first: view.record.bushing[:, k, a : a + 3])  # type: ignore[misc]
+            yield f"{bushing.name}.{what}", entry
+
+
+# name, unit, first column of the record, text
+BUSHING = (
+    ("displacement", "m", 0, "displacement of j from i, axes of the bushing on i"),
+    ("rotation", "rad", 3, "rotation vector from the axes of i to those of j"),
+    ("force", "N", 12, "force of the bushing on j, axes of the bushing on i"),
+    ("moment", "N m", 15, "moment of the bushing on j, conjugate to the rotation vector"),
+)
+
+
+def _of_action(action: Action) -> tuple[tuple[str, str, int, float, str], ...]:
+    """Name, unit, column of the record, sign and text of force and coordinate."""
+    if isinstance(action, SpringDamper):
+        return (
+            ("tension", "N", 2, -1.0, "spring-damper force, tension positive"),
+            ("length", "m", 0, 1.0, "distance of the ends"),
+        )
+    if action.coordinate == "angle":
+        return (
+            ("torque", "N m", 2, 1.0, "torque that increases the joint angle"),
+            ("angle", "rad", 0, 1.0, "joint angle with whole turns, as the force counts them"),
+        )
+    return (
+        ("force", "N", 2, 1.0, "force that increases the joint stroke"),
+        ("stroke", "m", 0, 1.0, "joint stroke along its axis"),
+    )
+
+
+def _powers(system: System) -> Named:
+    scene = system.scene
+    distances = [joint for joint in scene.joints if joint.kind == "distance"]
+    for thing in (*loads_of(scene), *scene.drivers, *distances):
+        yield from _worked(thing.name, "put into the scene", lambda view, thing=thing: power(view, thing))  # type: ignore[misc]
+    for b, body in enumerate(scene.bodies):
+        if system.layout.n[b]:
+            yield from _worked(f"{body.name}.damping", "of modal damping", lambda view, b=b: damping_power(view, b))  # type: ignore[misc]
+    for joint in scene.joints:
+        text = "power that the first body gives to the second through the joint"
+        yield f"{joint.name}.transmitted", _entry("W", (), text, lambda view, joint=joint: transmitted(view, joint))  # type: ignore[misc]
+
+
+def _worked(name: str, text: str, values: Callable[[View], Array]) -> Named:
+    def done(view: View, last: Unwound | Worked | None) -> tuple[Array, Worked]:
+        before = last if isinstance(last, Worked) else None
+        return work(view.record.time, values(view), before)
+
+    yield f"{name}.power", _entry("W", (), f"power {text}", values)
+    yield f"{name}.work", Entry("J", (), f"work {text} since the start", done)
+
+
+def _totals(system: System) -> Named:
+    for k, name in enumerate(("kinetic", "strain", "gravity")):
+        yield f"energy.{name}", _entry("J", (), f"{name} energy", lambda view, k=k: view.record.energy[:, k])  # type: ignore[misc]
+    total = "kinetic, strain and gravity energy"
+    yield "energy.total", _entry("J", (), total, lambda view: _sum(view.record.energy))
+    if springs_of(system.scene):
+        text = "energy stored in springs and bushings, preload included"
+        yield "energy.springs", _entry("J", (), text, spring_energy)
+    texts = (("position", "m", "largest violation of a constraint row"), ("velocity", "m/s", "largest rate of a row"))
+    for k, (name, unit, text) in enumerate(texts):
+        yield f"constraint.{name}", _entry(unit, (), text, lambda view, k=k: view.record.violation[:, k])  # type: ignore[misc]
+
+
+def _sum(energy: Array) -> Array:
+    return energy[:, 0] + energy[:, 1] + energy[:, 2]
+
+
+# ---- measurements of the scene ------------------------------------------------------------------------------------
+
+
+def _measurements(system: System) -> Named:
+    units = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2", "distance": "m", "orientation": "1"}
+    axes = {"distance": (), "orientation": (EULER_PARAMETERS,)}
+    for m in system.scene.measurements:
+        if not isinstance(m, Measurement):
+            yield f"measured.{m.name}", _recovered(system, m)
+            continue
+        text = f"{m.what} of {m.j} from {m.i}" + ("" if m.what in axes else f", {m.axes} axes")
+        entry = _entry(units[m.what], axes.get(m.what, (XYZ,)), text, lambda view, m=m: _measured(view, m))  # type: ignore[misc]
+        yield f"measured.{m.name}", entry
+
+
+def _recovered(system: System, m: StressMeasurement | SectionMeasurement) -> Entry:
+    """Stress or section forces: modes times elastic coordinates, and what is made of them."""
+    b = measured_body(system.scene, m)
+    found = measured_modes(m, system.scene.bodies[b].model.surface)
+    axes = () if found.axis is None else (Axis(*found.axis),)
+    return _entry(found.unit, axes, found.text, lambda view: found.of(shaped(found.modes, view.q(b))))
+
+
+def _measured(view: View, m: Measurement) -> Array:
+    i, j = view.number(m.i), view.number(m.j)
+    if m.what == "orientation":
+        return times(view.orientation(i) * [1.0, -1.0, -1.0, -1.0], view.orientation(j))
+    if m.what == "velocity":
+        difference = view.record.rd[:, j] - view.record.rd[:, i]
+    elif m.what == "acceleration":
+        difference = view.acceleration(j) - view.acceleration(i)
+    else:
+        difference = view.record.r[:, j] - view.record.r[:, i]
+    if m.what == "distance":
+        return np.sqrt(dot(difference, difference))
+    if m.axes == "global":
+        return difference
+    return to_axes(view.axes([body.name for body in view.system.scene.bodies].index(m.axes)), difference)
+
+
+# ---- joint coordinates --------------------------------------------------------------------------------------------
+
+
+def _joint_coordinates(system: System) -> Named:
+    for joint in system.scene.joints:
+        if "angle" in COORDINATES[joint.kind]:
+            yield f"{joint.name}.angle", _unwound(joint)
+            rate = _entry("rad/s", (), "rate of the joint angle", lambda view, j=joint: angles(view, j)[1])  # type: ignore[misc]
+            yield f"{joint.name}.angle_rate", rate
+        if "stroke" in COORDINATES[joint.kind]:
+            for k, (name, unit) in enumerate((("stroke", "m"), ("stroke_rate", "m/s"))):
+                text = ("joint stroke along its axis", "rate of the joint stroke")[k]
+                yield (
+                    f"{joint.name}.{name}",
+                    _entry(unit, (), text, lambda view, j=joint, k=k: strokes(view, j)[k]),  # type: ignore[misc]
+                )
+
+
+def _unwound(joint: Joint) -> Entry:
+    def compute(view: View, last: Unwound | Worked | None) -> tuple[Array, Unwound]:
+        return unwind(view.record.time, *angles(view, joint), last if isinstance(last, Unwound) else None)
+
+    return Entry("rad", (), "joint angle, unwound", compute)
+
+
+def unwind(time: Array, angle: Array, rate: Array, last: Unwound | None) -> tuple[Array, Unwound]:
+    """Angles (T,) without jumps of a turn: each is the one nearest to what the rates (T,) predict."""
+    before = last or Unwound(float(angle[0]), float(rate[0]), float(time[0]))
+    earlier = [
+        np.append(first, values[:-1]) for first, values in zip(astuple(before), (angle, rate, time), strict=True)
+    ]
+    predicted = earlier[0] + 0.5 * (earlier[1] + rate) * (time - earlier[2])
+    out = angle + 2 * np.pi * np.cumsum(np.round((predicted - angle) / (2 * np.pi)))
+    return out, Unwound(float(out[-1]), float(rate[-1]), float(time[-1]))
+
+
+def angles(view: View, joint: Joint) -> tuple[Array, Array]:
+    """Joint angle [rad] within half a turn and its rate [rad/s], each (T,)."""
+    (frame_i, frame_j), (rate_i, rate_j) = view.joint_frames(joint), view.joint_frame_rates(joint)
+    f_j, f_j_dot = frame_j[:, :, 0], rate_j[:, :, 0]
+    cosine, sine = (dot(frame_i[:, :, k], f_j) for k in (0, 1))
+    cosine_dot, sine_dot = (dot(rate_i[:, :, k], f_j) + dot(frame_i[:, :, k], f_j_dot) for k in (0, 1))
+    rate = (cosine * sine_dot - sine * cosine_dot) / (cosine**2 + sine**2)
+    return np.arctan2(sine, cosine), rate
+
+
+def strokes(view: View, joint: Joint) -> tuple[Array, Array]:
+    """Joint stroke [m] and its rate [m/s], each (T,)."""
+    i, j = view.number(joint.i), view.number(joint.j)
+    h, h_dot = view.joint_frames(joint)[0][:, :, 2], view.joint_frame_rates(joint)[0][:, :, 2]
+    apart, rate = (values[:, j] - values[:, i] for values in (view.record.r, view.record.rd))
+    return dot(h, apart), dot(h, rate) + dot(h_dot, apart)

@@ -1,0 +1,206 @@
+"""Labelled histories: what every analysis returns, and how to name, tabulate and select them.
+
+A `Result` is time, quantities with units and named axes, the surfaces of the bodies, and attributes. Names are dotted,
+``body.quantity`` or ``body.marker.quantity``; one more part selects a component: ``rod.small_eye.position.x``.
+`ffr_dyn.results.file` keeps results in netCDF-4 files. This module needs numpy and the standard library only.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ffr_prep.body import Surface
+from ffr_prep.common.errors import InputError
+
+Array = np.ndarray
+
+# netCDF names: a letter, digit or underscore first, no "/", no control character, no blank at the end.
+_NAME = re.compile(r"\w(?:[^/\x00-\x1f\x7f]*[^/\x00-\x1f\x7f\s])?")
+
+
+def _check_name(kind: str, name: str) -> None:
+    if not _NAME.fullmatch(name) or name in ("time", "geometry"):
+        raise InputError(
+            f"{kind} name {name!r} cannot be used: start with a letter, digit or underscore, do not end with a blank, "
+            "avoid '/', control characters and the words 'time' and 'geometry'"
+        )
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A labelled axis of a quantity, such as x, y, z. Labels are unique, not empty, and contain no dot."""
+
+    name: str
+    labels: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "labels", tuple(self.labels))
+        _check_name("axis", self.name)
+        if not self.labels or len(set(self.labels)) < len(self.labels):
+            raise InputError(f"axis {self.name!r}: labels must be unique and at least one, not {self.labels}")
+        if any(not label or "." in label or "\0" in label for label in self.labels):
+            raise InputError(f"axis {self.name!r}: labels must not be empty or contain a dot: {self.labels}")
+
+
+XYZ = Axis("xyz", ("x", "y", "z"))
+EULER_PARAMETERS = Axis("euler_parameter", ("e0", "e1", "e2", "e3"))
+
+
+def mode_axis(body: str, n: int) -> Axis:
+    """The axis of the n elastic coordinates of a body, labelled 1 to n."""
+    return Axis(f"{body}.mode", tuple(str(k + 1) for k in range(n)))
+
+
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """A history: values (T, ...) with a unit and one axis for each dimension after time.
+
+    unit : in SI symbols, such as "m", "N m", "m/s", "m sqrt(kg)"; "1" for a number
+    """
+
+    values: Array
+    unit: str
+    axes: tuple[Axis, ...] = ()
+    description: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", read_only(self.values))
+        object.__setattr__(self, "axes", tuple(self.axes))
+        expected = tuple(len(axis.labels) for axis in self.axes)
+        if self.values.ndim < 1 or self.values.shape[1:] != expected:
+            raise InputError(f"a quantity has values of shape {self.values.shape}; its axes ask for (T, *{expected})")
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """Histories of one analysis.
+
+    time       : (T,) [s], finite, not decreasing
+    quantities : by dotted name; each has T rows
+    geometry   : by body name; the surface that is drawn, in the body frame
+    attributes : plain JSON values: title, status ("running", "complete", "stopped: reason"), scene text, settings
+
+    Raises InputError when lengths, names or axes contradict each other.
+    """
+
+    time: Array
+    quantities: Mapping[str, Quantity]
+    geometry: Mapping[str, Surface] = field(default_factory=dict)
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "time", read_only(self.time))
+        for key in ("quantities", "geometry", "attributes"):
+            object.__setattr__(self, key, dict(getattr(self, key)))
+        check_times(self.time)
+        _check_quantities(self)
+        _check_attributes(self.attributes)
+
+    def __getitem__(self, name: str) -> Array:
+        """The values of a quantity (T, ...), or of one component (T,). InputError suggests close names."""
+        return self.quantity(name).values
+
+    def quantity(self, name: str) -> Quantity:
+        """The quantity of that name, or one component of it as a quantity. InputError suggests close names."""
+        found = self._find(name)
+        if found is None:
+            close = get_close_matches(name, [*self.quantities, *self.components()], n=4, cutoff=0.5)
+            hint = f"did you mean {', '.join(close)}?" if close else f"there are: {', '.join(self.quantities)}"
+            raise InputError(f"the result has no quantity {name!r}; {hint}")
+        return found
+
+    def components(self, names: Iterable[str] | None = None) -> Iterator[str]:
+        """Names of all scalar histories within the named quantities (all quantities by default), in order."""
+        for name in self.quantities if names is None else names:
+            for labels in product(*(axis.labels for axis in self.quantity(name).axes)):
+                yield ".".join((name, *labels))
+
+    def _find(self, name: str) -> Quantity | None:
+        if name in self.quantities:
+            return self.quantities[name]
+        head, _, label = name.rpartition(".")
+        owner = self._find(head) if head else None
+        if owner is None or not owner.axes or label not in owner.axes[0].labels:
+            return None
+        index = owner.axes[0].labels.index(label)
+        return Quantity(owner.values[:, index], owner.unit, owner.axes[1:], owner.description)
+
+
+def table(result: Result, names: Iterable[str] | None = None) -> tuple[tuple[str, ...], Array]:
+    """Column headings with units and a table (T, 1 + K): time, then every component of the named quantities."""
+    columns = list(result.components(names))
+    quantities = [result.quantity(column) for column in columns]
+    headings = tuple(f"{name} [{quantity.unit}]" for name, quantity in zip(columns, quantities, strict=True))
+    return ("time [s]", *headings), np.column_stack([result.time, *(quantity.values for quantity in quantities)])
+
+
+def write_csv(result: Result, path: str | Path, names: Iterable[str] | None = None) -> Path:
+    """Write `table` as comma-separated values (RFC 4180, shortest digits that read back exactly), atomically."""
+    headings, rows = table(result, names)
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(path.name + ".part")
+    with open(temporary, "w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(headings)
+        writer.writerows(rows.tolist())
+    os.replace(temporary, path)
+    return path
+
+
+def read_only(values: Array) -> Array:
+    """The values as a float64 array that cannot be written to; copied unless they are that already."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.flags.writeable or array.base is not None:
+        array = array.copy()
+        array.setflags(write=False)
+    return array
+
+
+def check_times(time: Array) -> None:
+    """Raises InputError unless time is (T,), finite and not decreasing."""
+    if time.ndim != 1:
+        raise InputError(f"time has shape {time.shape}, not (T,)")
+    if not np.isfinite(time).all():
+        raise InputError("time holds values that are not finite")
+    if (np.diff(time) < 0).any():
+        k = int(np.argmax(np.diff(time) < 0))
+        raise InputError(f"time decreases from {time[k]:g} s to {time[k + 1]:g} s at row {k + 1}")
+
+
+# ---- guards -------------------------------------------------------------------------------------------------------
+
+
+def _check_quantities(result: Result) -> None:
+    axes: dict[str, Axis] = {}
+    for name, quantity in result.quantities.items():
+        _check_name("quantity", name)
+        if len(quantity.values) != result.time.size:
+            raise InputError(f"quantity {name!r} has {len(quantity.values)} rows, time has {result.time.size}")
+        for axis in quantity.axes:
+            if axes.setdefault(axis.name, axis) != axis:
+                raise InputError(f"quantity {name!r}: axis {axis.name!r} has other labels than in another quantity")
+    for name in axes.keys() & result.quantities.keys():
+        raise InputError(f"{name!r} names both a quantity and an axis; rename one")
+    for name in result.geometry:
+        _check_name("body", name)
+
+
+def _check_attributes(attributes: Mapping[str, Any]) -> None:
+    for name, value in attributes.items():
+        _check_name("attribute", name)
+        try:
+            json.dumps(value)
+        except (TypeError, ValueError):
+            raise InputError(f"attribute {name!r} is not a plain JSON value: {value!r}") from None

@@ -1,0 +1,376 @@
+"""Scenes: bodies, ground points, joints, drivers and loads, declared by name; names are resolved once, here.
+
+A marker is named "body.interface" or "ground.point".
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, get_args
+
+import numpy as np
+
+from ffr_dyn.functions.rotation import euler_parameters
+from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction, as_time_function, less
+from ffr_dyn.scene.couplings import Coupling, coupled, coupling_word
+from ffr_dyn.scene.drivers import Driver, PointDriver, driver_word
+from ffr_dyn.scene.forces import Bushing, Load, SpringDamper
+from ffr_dyn.scene.joint_forces import JointForce
+from ffr_dyn.scene.joints import COORDINATES, Joint
+from ffr_dyn.scene.sensors import AnyMeasurement, Measurement, SectionMeasurement, StressMeasurement
+from ffr_dyn.scene.stress_sensors import measured_modes
+from ffr_dyn.scene.surface_loads import SurfaceLoad, distributed
+from ffr_prep.body import FlexibleBody
+from ffr_prep.common.errors import InputError
+
+Array = np.ndarray
+
+Force = Bushing | JointForce | SurfaceLoad
+
+GROUND = "ground"
+# Groups of inertia integrals that a body can do without: I3 and the parts, skew and symmetric, of the other two.
+INERTIA_TERMS = ("I3", "I4", "I5", "I8", "I9")
+RESERVED = (GROUND, "energy", "constraint", "measured", "time", "geometry")
+
+
+@dataclass(frozen=True)
+class Body:
+    """A reduced (or rigid) body in the scene, with its pose and motion at the start.
+
+    position : (3,) [m] of the body frame's origin, global
+    rotation : rotation vector (3,) [rad], Euler parameters (4,) or matrix (3, 3), body -> global
+    velocity : (3,) [m/s] of the origin, global;  omega_bar : (3,) [rad/s] in body axes
+    q, q_dot : (n,) elastic coordinates and rates; default zero
+    damping  : modal damping ratio, one for all modes or (n,)
+    stiffening : use the geometric stiffening that the model has, if any
+    dropped  : names of the `INERTIA_TERMS` that the equations of motion leave out (see
+               `ffr_dyn.variants.variant.without_terms`)
+    kept     : set where a planar scene leaves modes out: the numbers of those that stay, and how many there were
+
+    Pose and motion are a first guess: assembly makes them meet the joints.
+    """
+
+    name: str
+    model: FlexibleBody
+    position: Any = (0.0, 0.0, 0.0)
+    rotation: Any = (0.0, 0.0, 0.0)
+    velocity: Any = (0.0, 0.0, 0.0)
+    omega_bar: Any = (0.0, 0.0, 0.0)
+    q: Any = None
+    q_dot: Any = None
+    damping: Any = 0.0
+    stiffening: bool = True
+    dropped: tuple[str, ...] = ()
+    kept: tuple[tuple[int, ...], int] | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.model, FlexibleBody):
+            raise InputError(f"body {self.name!r}: its model is {self.model!r}; give one of load_body or rigid_body")
+        n, who = self.model.n, f"body {self.name!r}"
+        for key in ("position", "velocity", "omega_bar"):
+            object.__setattr__(self, key, _vector(getattr(self, key), 3, f"{who}: {key}"))
+        object.__setattr__(self, "rotation", euler_parameters(self.rotation, f"{who}: rotation"))
+        for key in ("q", "q_dot"):
+            value = np.zeros(n) if getattr(self, key) is None else getattr(self, key)
+            object.__setattr__(self, key, _vector(value, n, f"{who}: {key}"))
+        damping = np.full(n, self.damping) if np.ndim(self.damping) == 0 else self.damping
+        object.__setattr__(self, "damping", _vector(damping, n, f"{who}: damping"))
+        if (self.damping < 0).any():
+            raise InputError(f"{who}: a modal damping ratio is negative: {self.damping.min():g}")
+        for term in self.dropped:
+            if term not in INERTIA_TERMS:
+                raise InputError(f"{who}: there is no inertia term {term!r} to drop; {_offer(term, INERTIA_TERMS)}")
+        object.__setattr__(self, "dropped", tuple(t for t in INERTIA_TERMS if t in self.dropped))
+
+
+MarkerName = tuple[int, str, str]  # number and name of the body, name of the point
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything an analysis needs. Raises InputError for names that do not exist, repeat or contradict each other.
+
+    ground  : name -> (3,) [m], points fixed in the global frame
+    forces  : bushings, forces on joint coordinates, loads on surfaces and modes
+    gravity : three components [m/s^2], global, each a number, a time function or a Python function of time. What varies is
+              kept as the base acceleration that acts in the same way, so that `gravity` is (3,), the constant components
+    base_acceleration : three components [m/s^2], global, each a number, a time function or a Python function of time: the
+              translational acceleration of the ground, whose frame all results refer to. It acts as gravity less this
+              acceleration; the energy of gravity is that of the constant components
+    plane   : "auto" finds out whether the scene is planar and then computes in the plane alone (see
+              `ffr_dyn.variants.plane`); "x", "y" or "z", its normal, declares it, so that modes mostly in the plane are
+              kept and the rest is left out even where it is small only; "none" computes in space
+    """
+
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...] = ()
+    drivers: tuple[Driver | PointDriver, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
+    loads: tuple[Load, ...] = ()
+    springs: tuple[SpringDamper, ...] = ()
+    forces: tuple[Force, ...] = ()
+    measurements: tuple[AnyMeasurement, ...] = ()
+    ground: Mapping[str, Any] = field(default_factory=dict)
+    gravity: Any = (0.0, 0.0, 0.0)
+    base_acceleration: Any = (0.0, 0.0, 0.0)
+    name: str = "scene"
+    plane: str = "auto"
+
+    @cached_property
+    def _markers(self) -> tuple[MarkerName, ...]:
+        listed = [(b, body.name, i.name) for b, body in enumerate(self.bodies) for i in body.model.interfaces]
+        return (*listed, *((len(self.bodies), GROUND, point) for point in self.ground))
+
+    @cached_property
+    def _numbers(self) -> dict[str, int]:
+        """Of markers, by name."""
+        return {f"{body}.{point}": k for k, (_, body, point) in enumerate(self._markers)}
+
+    def __post_init__(self) -> None:
+        for key, kinds in _DECLARATIONS.items():
+            object.__setattr__(self, key, _several(key, getattr(self, key), kinds))
+        points = {key: _vector(at, 3, f"ground point {key!r}") for key, at in self.ground.items()}
+        object.__setattr__(self, "ground", points)
+        steady, base = _split_gravity(self.gravity, _acceleration("base_acceleration", self.base_acceleration))
+        object.__setattr__(self, "gravity", _vector(steady, 3, "gravity"))
+        object.__setattr__(self, "base_acceleration", base)
+        if self.plane not in ("auto", "x", "y", "z", "none"):
+            raise InputError(f"plane is {self.plane!r}; it must be 'auto', 'none', or the normal 'x', 'y' or 'z'")
+        if not self.bodies:
+            raise InputError("a scene needs at least one body")
+        _check_names(self)
+        _check_joints(self)
+        for driver in self.drivers:
+            if isinstance(driver, Driver):
+                driver_word(driver, joint_of(self, driver))
+            else:
+                _check_point_driver(self, driver)
+        for coupling in self.couplings:
+            coupling_word(coupling, *joints_of(self, coupling))
+        for marker in [m for load in self.loads for m in (load.marker,)] + [
+            m for spring in self.springs for m in (spring.i, spring.j)
+        ]:
+            marker_number(self, marker)
+        for force in self.forces:
+            _check_force(self, force)
+        for measurement in self.measurements:
+            _check_measurement(self, measurement)
+
+
+_DECLARATIONS: dict[str, tuple[Any, ...]] = {
+    "bodies": (Body,),
+    "joints": (Joint,),
+    "drivers": (Driver, PointDriver),
+    "couplings": (Coupling,),
+    "loads": (Load,),
+    "springs": (SpringDamper,),
+    "forces": get_args(Force),
+    "measurements": get_args(AnyMeasurement),
+}
+
+
+def _several(key: str, given: Any, kinds: tuple[Any, ...]) -> tuple[Any, ...]:
+    """What is given as a tuple; InputError unless it is several things of these kinds."""
+    if isinstance(given, kinds):
+        raise InputError(
+            f"{key} of a scene is {type(given).__name__} {given.name!r} alone; give a tuple, such as (it,)"
+        )
+    if not isinstance(given, Iterable):
+        raise InputError(f"{key} of a scene is of the type {type(given).__name__}; give a tuple")
+    several = tuple(given)
+    for k, one in enumerate(several):
+        if not isinstance(one, kinds):
+            names = ", ".join(kind.__name__ for kind in kinds)
+            raise InputError(f"{key} of a scene: entry {k + 1} is of the type {type(one).__name__}; it takes: {names}")
+    return several
+
+
+def markers(scene: Scene) -> tuple[MarkerName, ...]:
+    """All markers as (body number, body name, point name): every interface of every body, then the ground's points."""
+    return scene._markers
+
+
+def marker_names(scene: Scene) -> tuple[str, ...]:
+    """Names "body.interface" in the order of `markers`."""
+    return tuple(scene._numbers)
+
+
+def marker_number(scene: Scene, name: str) -> int:
+    """Index of a marker; InputError says which body or interface does not exist and what there is."""
+    names = scene._numbers
+    if name in names:
+        return names[name]
+    body, _, point = name.partition(".")
+    bodies = [GROUND, *(b.name for b in scene.bodies)]
+    if body not in bodies:
+        raise InputError(f"marker {name!r}: there is no body {body!r}; {_offer(body, bodies)}")
+    if not point:
+        raise InputError(f"marker {name!r}: write BODY.POINT, as there may be several points of a body")
+    there = [n.partition(".")[2] for n in names if n.partition(".")[0] == body]
+    raise InputError(f"marker {name!r}: body {body!r} has no interface {point!r}; {_offer(point, there)}")
+
+
+def joint_of(scene: Scene, driver: Driver) -> Joint:
+    """The joint a driver acts on."""
+    return _joint(scene, driver.joint, f"driver {driver.name!r}")
+
+
+def joints_of(scene: Scene, coupling: Coupling) -> tuple[Joint, Joint]:
+    """Both joints of a coupling."""
+    (first, _), (second, _) = coupled(coupling)
+    who = f"coupling {coupling.name!r}"
+    return _joint(scene, first, who), _joint(scene, second, who)
+
+
+def joint_under(scene: Scene, force: JointForce) -> Joint:
+    """The joint on whose coordinate a force acts. Raises InputError when it has no such coordinate."""
+    who = f"force {force.name!r}"
+    joint = _joint(scene, force.joint, who)
+    if force.coordinate not in COORDINATES[joint.kind]:
+        has = ", ".join(COORDINATES[joint.kind]) or "none"
+        raise InputError(
+            f"{who}: the {joint.kind} joint {joint.name!r} has no coordinate {force.coordinate!r}; it has: {has}"
+        )
+    return joint
+
+
+def body_number(scene: Scene, load: SurfaceLoad) -> int:
+    """The body on which a surface load acts."""
+    names = [body.name for body in scene.bodies]
+    if load.body not in names:
+        raise InputError(f"force {load.name!r}: there is no body {load.body!r}; {_offer(load.body, names)}")
+    return names.index(load.body)
+
+
+def _check_force(scene: Scene, force: Force) -> None:
+    """What a force needs from the scene is there."""
+    if isinstance(force, Bushing):
+        i, j = (markers(scene)[marker_number(scene, name)] for name in (force.i, force.j))
+        if i[0] == j[0]:
+            raise InputError(f"bushing {force.name!r} ties {i[1]!r} to itself; it needs markers of two bodies")
+    elif isinstance(force, JointForce):
+        joint_under(scene, force)
+    else:
+        distributed(force, scene.bodies[body_number(scene, force)].model)
+
+
+def _joint(scene: Scene, name: str, who: str) -> Joint:
+    for joint in scene.joints:
+        if joint.name == name:
+            return joint
+    raise InputError(f"{who}: there is no joint {name!r}; {_offer(name, [j.name for j in scene.joints])}")
+
+
+def _check_point_driver(scene: Scene, driver: PointDriver) -> None:
+    i, j = (markers(scene)[marker_number(scene, name)] for name in (driver.i, driver.j))
+    if i[0] == j[0]:
+        raise InputError(f"driver {driver.name!r} drives {i[1]!r} against itself; it needs markers of two bodies")
+
+
+def measured_body(scene: Scene, measurement: StressMeasurement | SectionMeasurement) -> int:
+    """The body whose stress or section forces are measured."""
+    names = [body.name for body in scene.bodies]
+    if measurement.body not in names:
+        raise InputError(
+            f"measurement {measurement.name!r}: there is no body {measurement.body!r}; {_offer(measurement.body, names)}"
+        )
+    return names.index(measurement.body)
+
+
+def _check_measurement(scene: Scene, measurement: AnyMeasurement) -> None:
+    if not isinstance(measurement, Measurement):
+        _check_stress(measurement, scene.bodies[measured_body(scene, measurement)])
+        return
+    marker_number(scene, measurement.i), marker_number(scene, measurement.j)
+    known = ["global", *(body.name for body in scene.bodies)]
+    if measurement.axes not in known:
+        raise InputError(
+            f"measurement {measurement.name!r}: there are no axes {measurement.axes!r}; {_offer(measurement.axes, known)}"
+        )
+
+
+def _check_stress(measurement: StressMeasurement | SectionMeasurement, body: Body) -> None:
+    """The body has what is to be measured, near the place."""
+    try:
+        measured_modes(measurement, body.model.surface)
+    except InputError as error:
+        raise InputError(f"measurement {measurement.name!r}: {error}") from None
+
+
+def _offer(name: str, known: Iterable[str]) -> str:
+    known = list(known)
+    close = difflib.get_close_matches(name, known, 1)
+    hint = f"did you mean {close[0]!r}? " if close else ""
+    return f"{hint}there are: {', '.join(map(repr, known)) or 'none'}"
+
+
+def _check_names(scene: Scene) -> None:
+    """One name, one thing: results are named by them."""
+    things: tuple[Any, ...] = (
+        *scene.bodies,
+        *scene.joints,
+        *scene.drivers,
+        *scene.couplings,
+        *scene.loads,
+        *scene.springs,
+        *scene.forces,
+        *scene.measurements,
+    )
+    names = [thing.name for thing in things]
+    repeated = sorted(name for name, count in Counter(names).items() if count > 1)
+    if repeated:
+        raise InputError(f"the name {repeated[0]!r} is used more than once in the scene; every name must be its own")
+    for name in names:
+        if name in RESERVED or not name.replace("_", "a").replace("-", "a").isalnum():
+            raise InputError(
+                f"{name!r} cannot be a name: use letters, digits, '_' and '-'; {', '.join(map(repr, RESERVED))} are taken"
+            )
+
+
+def _check_joints(scene: Scene) -> None:
+    table = markers(scene)
+    for joint in scene.joints:
+        i, j = (marker_number(scene, name) for name in (joint.i, joint.j))
+        if table[i][0] == table[j][0]:
+            raise InputError(f"joint {joint.name!r} ties {table[i][1]!r} to itself; a joint needs two different bodies")
+
+
+Components = tuple[TimeFunction, TimeFunction, TimeFunction]
+
+
+def _acceleration(what: str, value: Any) -> Components:
+    if np.size(value) != 3 or len(value) != 3:
+        raise InputError(f"{what} needs three components, not {value!r}")
+    x, y, z = (as_time_function(component, what) for component in value)
+    return x, y, z
+
+
+def _split_gravity(gravity: Any, base: Components) -> tuple[Any, Components]:
+    """The constant components of gravity, and the base acceleration less those that vary."""
+    if all(isinstance(component, (int, float, np.floating, np.integer)) for component in gravity):
+        return gravity, base
+    given = _acceleration("gravity", gravity)
+    steady = [f.data[0] if _is_constant(f) else 0.0 for f in given]
+    x, y, z = (b if _is_constant(g) else less(b, g) for g, b in zip(given, base, strict=True))
+    return steady, (x, y, z)
+
+
+def _is_constant(function: TimeFunction) -> bool:
+    return function.kind == POLYNOMIAL and not any(function.data[1:])
+
+
+def _vector(value: Any, size: int, what: str) -> Array:
+    try:
+        vector = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{what} must be {size} numbers, not {value!r}") from None
+    if vector.shape != (size,):
+        raise InputError(f"{what} must be {size} numbers, not {value!r}")
+    if not np.isfinite(vector).all():
+        raise InputError(f"{what} holds values that are not finite: {value!r}")
+    vector.setflags(write=False)
+    return vector

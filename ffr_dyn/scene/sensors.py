@@ -1,0 +1,87 @@
+"""Measurements that a scene names: one marker seen from another, in chosen axes; stress at a place; forces in a beam."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from ffr_prep.common.errors import InputError
+
+Vector = tuple[float, float, float]
+
+WHAT = ("position", "velocity", "acceleration", "distance", "orientation")
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What marker `j` does, seen from marker `i` ("body.interface" or "ground.point").
+
+    what : position [m], velocity [m/s] or acceleration [m/s^2]: the difference of the two global vectors; distance [m];
+           orientation: Euler parameters of j's axes in those of i
+    axes : in which the difference is given: "global" or the name of a body
+    """
+
+    name: str
+    i: str
+    j: str
+    what: str = "position"
+    axes: str = "global"
+
+    def __post_init__(self) -> None:
+        if self.what not in WHAT:
+            raise InputError(f"measurement {self.name!r}: there is no {self.what!r}; there are {', '.join(WHAT)}")
+
+
+@dataclass(frozen=True)
+class StressMeasurement:
+    """Stress or strain at the surface point of a body that is nearest to `point` [m], in the body frame.
+
+    what : "stress" [Pa] or "strain", the six components in body axes; or one number made of them: "von-mises", "tresca",
+           "max-principal", "xx", "strain-xx", ... (`ffr_dyn.scene.stress_sensors.MEASURES`)
+
+    The body needs stress modes (`ffr-prep reduce --stress`).
+    """
+
+    name: str
+    body: str
+    point: Vector
+    what: str = "von-mises"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "point", _place(self.name, self.point))
+
+
+@dataclass(frozen=True)
+class SectionMeasurement:
+    """Section forces of the beam element nearest to `point` [m], in the body frame: what its part towards the last end exerts
+    on the other.
+
+    what  : "force": N, Qy, Qz [N], or "moment": Mx, My, Mz [N m], in element axes
+    place : in the element: "first" end, "middle" or "last" end
+
+    The body needs section forces (`ffr-prep reduce-structure` with stress = true).
+    """
+
+    name: str
+    body: str
+    point: Vector
+    what: str = "moment"
+    place: str = "middle"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "point", _place(self.name, self.point))
+        for key, known in (("what", ("force", "moment")), ("place", ("first", "middle", "last"))):
+            if getattr(self, key) not in known:
+                raise InputError(
+                    f"measurement {self.name!r}: {key} is {getattr(self, key)!r}; it must be one of {', '.join(known)}"
+                )
+
+
+def _place(name: str, point: Iterable[float]) -> Vector:
+    values = [float(value) for value in point]
+    if len(values) != 3:
+        raise InputError(f"measurement {name!r}: a point has three coordinates [m], not {len(values)}")
+    return values[0], values[1], values[2]
+
+
+AnyMeasurement = Measurement | StressMeasurement | SectionMeasurement

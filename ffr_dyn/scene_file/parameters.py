@@ -1,0 +1,120 @@
+"""Parameters of a scene file: numbers and texts by dotted name, which may be formulas of each other."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from ffr_dyn.functions.formula import CONSTANTS, number
+from ffr_dyn.functions.operations import FUNCTIONS
+from ffr_prep.common.errors import InputError
+from ffr_prep.common.units import split_quantity, to_si
+
+_REFERENCE = re.compile(r"\$\{\s*([^{}]*?)\s*\}")
+_NAME = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
+
+
+def flattened(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """{"crank": {"length": 0.15}} -> {"crank.length": 0.15}. Raises InputError for names that formulas cannot hold."""
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        name = f"{prefix}{key}"
+        if isinstance(value, dict):
+            found |= flattened(value, f"{name}.")
+            continue
+        if not _NAME.fullmatch(name) or name in ("t", *CONSTANTS, *FUNCTIONS):
+            raise InputError(
+                f"parameters.{name}: cannot be a parameter's name: use letters, digits and '_'; "
+                f"t, {', '.join((*CONSTANTS, *FUNCTIONS))} are taken"
+            )
+        found[name] = value
+    return found
+
+
+def overridden(parameters: Mapping[str, Any], assignments: Mapping[str, str]) -> dict[str, Any]:
+    """The parameters with those of a command line (by name, as text). Raises InputError for names that do not exist."""
+    for name in assignments:
+        if name not in parameters:
+            raise InputError(f"there is no parameter {name!r}; {nearest(name, parameters)}")
+    return {**parameters, **assignments}
+
+
+class Parameters(Mapping[str, Any]):
+    """Values by name, each worked out when it is first asked for, whatever the order in which they stand."""
+
+    def __init__(self, given: Mapping[str, Any]) -> None:
+        self._given = dict(given)
+        self._found: dict[str, Any] = {}
+        self._open: list[str] = []
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._found:
+            if name in self._open:
+                circle = " -> ".join([*self._open[self._open.index(name) :], name])
+                raise InputError(f"parameters.{name}: depends on itself: {circle}")
+            self._open.append(name)
+            self._found[name] = self._value(name, self._given[name])
+            self._open.pop()
+        return self._found[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._given)
+
+    def __len__(self) -> int:
+        return len(self._given)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._given
+
+    def _value(self, name: str, given: Any) -> Any:
+        if not isinstance(given, str):
+            return given
+        value = substituted(given, self, f"parameters.{name}")
+        if not isinstance(value, str):
+            return value
+        try:
+            return as_number(value, self, f"parameters.{name}")
+        except InputError as error:
+            if "depends on itself" in str(error):
+                raise
+            return value  # a text, such as the name of a file; where a number is needed, the formula is refused with reason
+
+
+def substituted(value: Any, parameters: Mapping[str, Any], where: str) -> Any:
+    """The value with "${name}" replaced, all through lists and tables; a text that is only "${name}" becomes its value.
+
+    Raises InputError for a name that does not exist, with the nearest one.
+    """
+    if isinstance(value, dict):
+        return {key: substituted(item, parameters, f"{where}.{key}".strip(".")) for key, item in value.items()}
+    if isinstance(value, list):
+        return [substituted(item, parameters, f"{where}.{k}") for k, item in enumerate(value)]
+    if not isinstance(value, str):
+        return value
+
+    def of(name: str) -> Any:
+        if name not in parameters:
+            raise InputError(f"{where}: there is no parameter {name!r}; {nearest(name, parameters)}")
+        return parameters[name]
+
+    whole = _REFERENCE.fullmatch(value.strip())
+    return of(whole[1]) if whole else _REFERENCE.sub(lambda found: str(of(found[1])), value)
+
+
+def as_number(text: str, parameters: Mapping[str, Any], what: str, unit: str | None = None) -> float:
+    """A number from a text: with a unit ("120 mm"), or a formula of parameters, in SI units."""
+    quantity = split_quantity(text)
+    if quantity is not None:
+        try:
+            return to_si(*quantity, unit)
+        except InputError as error:
+            raise InputError(f"{what}: {text!r}: {error}") from None
+    return number(text, parameters, what)
+
+
+def nearest(name: str, known: Mapping[str, Any]) -> str:
+    """A hint at the name that was meant."""
+    close = difflib.get_close_matches(name, list(known), 1)
+    return f"did you mean {close[0]!r}?" if close else f"there are: {', '.join(known) or 'none'}"

@@ -1,0 +1,343 @@
+"""Scenes as text: a TOML file, checked against a schema, becomes a `Scene` and the settings of a run.
+
+    name = "pendulum"
+    gravity = [0, -9.81, 0]
+    [analysis]
+    end = 2.0
+    output_step = 0.01
+    [ground]
+    hinge = [0, 0, 0]
+    [bodies.rod]
+    file = "pendulum.ffr"            # or mass, inertia, points of a rigid body
+    [joints.hinge]
+    kind = "revolute"
+    i = "ground.hinge"
+    j = "rod.hinge"
+    axis = [0, 0, 1]
+
+Paths are relative to the file. Angles in rad, everything in SI units unless a unit is written. The whole schema is in
+`ffr_dyn.scene_file.schema`; `ffr_dyn.scene_file.write` writes a scene as such a file. A scene file is data: nothing in it
+is run.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ValidationError
+
+from ffr_dyn.analyses.efforts import Effort
+from ffr_dyn.analyses.settings import (
+    Assemble,
+    Charted,
+    Forward,
+    Inverse,
+    Kinematic,
+    Linearise,
+    Mixed,
+    MomentSettings,
+    OverTime,
+    Settings,
+    Static,
+)
+from ffr_dyn.functions.formula import CONSTANTS, Expression, Operation, is_constant
+from ffr_dyn.functions.operations import FUNCTIONS
+from ffr_dyn.functions.time_functions import TimeFunction, constant, signal, signals_in
+from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator, Tolerances
+from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
+from ffr_dyn.scene.forces import Load
+from ffr_dyn.scene.joint_forces import Actuator
+from ffr_dyn.scene.scene import GROUND, Body, Scene
+from ffr_dyn.scene_file.parameters import Parameters, as_number, flattened, overridden, substituted
+from ffr_dyn.scene_file.schema import (
+    EFFORTS,
+    EVENTS,
+    SOLUTIONS,
+    TABLES,
+    BodyEntry,
+    ChartEntry,
+    Kind,
+    SceneEntry,
+    StabilisationEntry,
+    keys_of,
+)
+from ffr_dyn.scene_file.source import Source, origin, origin_of_name, read_source
+from ffr_dyn.scene_file.state_formula import StateFormula, check_names
+from ffr_prep.body import BodyError, FlexibleBody, load_body, rigid_body, truncated, with_point
+from ffr_prep.common.errors import InputError
+
+WHOLE = ("name", "gravity", "ground", "base_acceleration", "plane")  # fields of a scene that are no tables of entries
+
+
+def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Scene, Settings | MomentSettings]:
+    """Read a scene file.
+
+    parameters : values, as text, in place of those in the file, such as {"crank.length": "0.15"}
+
+    Raises InputError that names the file, the entry, its value and what is expected, with the nearest known name.
+    """
+    path = Path(path)
+    source = read_source(path)
+    try:
+        values = Parameters(overridden(flattened(source.tree.pop("parameters", {})), parameters))
+        tree = substituted(source.tree, values, "")
+        known = {name: values[name] for name in values} | _signals(tree.get("inputs", {}), values)
+    except InputError as error:
+        keys = tuple(str(error).partition(":")[0].split("."))
+        raise InputError(f"{origin(source, keys)}: {error}") from None
+    try:
+        entry = SceneEntry.model_validate(tree, context={"parameters": known})
+    except ValidationError as error:
+        raise InputError(_explained(error, source)) from None
+    settings = _settings(entry.analysis, entry.outputs, source)
+    return _scene(entry, source), _with_chart(settings, entry.chart, source)
+
+
+def _signals(table: Mapping[str, Any], parameters: Parameters) -> dict[str, TimeFunction]:
+    """The inputs of a file by name, with their initial values."""
+    for name in table:
+        if name in (*parameters, "t", *CONSTANTS, *FUNCTIONS):
+            raise InputError(f"inputs.{name}: formulas know that name already; give the input another")
+    start = {name: as_number(v, parameters, f"inputs.{name}") if isinstance(v, str) else v for name, v in table.items()}
+    return {name: signal(name, value) for name, value in start.items() if type(value) in (int, float)}
+
+
+def _explained(error: ValidationError, source: Source) -> str:
+    """All complaints: where, what, and the value."""
+    lines: dict[str, None] = {}
+    for item in _likeliest(error.errors()):
+        keys = tuple(str(part) for part in item["loc"])
+        plain = isinstance(item["input"], (str, int, float, bool, list))
+        value = f" (it is {item['input']!r})" if plain and item["type"] != "missing" else ""
+        text = _with_nearest(item, item["msg"].removeprefix("Value error, ").removeprefix("it: "))
+        where = tuple(key for key in keys if not key.startswith(("[", "list[", "function-")))
+        at = (*where, misspelt[1]) if (misspelt := re.match(r"'(.+?)' is not a known entry", text)) else where
+        lines[f"{origin(source, at)}: {'.'.join(where) or 'file'}: {text}{value}"] = None
+    return "; ".join(lines)
+
+
+def _likeliest(items: Sequence[Any]) -> list[Any]:
+    """Of the complaints about an entry that may be one list or another, those about the list with the fewest."""
+    counts: dict[tuple[Any, ...], dict[str, int]] = {}
+    for entry, form in filter(None, map(_form, items)):
+        forms = counts.setdefault(entry, {})
+        forms[form] = forms.get(form, 0) + 1
+    best = {entry: min(forms, key=lambda form: forms[form]) for entry, forms in counts.items()}
+    return [item for item in items if (found := _form(item)) is None or found[1] == best[found[0]]]
+
+
+def _form(item: Any) -> tuple[tuple[Any, ...], str] | None:
+    """The entry that a complaint is about and the form of a list that it was read as; None where there is one form."""
+    keys = item["loc"]
+    at = next((k for k, key in enumerate(keys) if str(key).startswith("list[")), None)
+    return None if at is None else (keys[:at], keys[at])
+
+
+def _with_nearest(item: Any, text: str) -> str:
+    """A complaint about a word that is not one of those that are known, with the nearest of them."""
+    if item["type"] == "kind" and isinstance(item["input"], dict):
+        given, known = item["input"].get("kind"), text.partition("there are ")[2].split(", ")
+        text = text.replace("no such kind", f"no kind {given!r}")
+    elif item["type"] == "literal_error":
+        given, known = item["input"], re.findall(r"'([^']*)'", text)
+    else:
+        return text
+    close = get_close_matches(str(given), known, 1)
+    return f"{text}; did you mean {close[0]!r}?" if close else text
+
+
+# ---- from entries to a scene --------------------------------------------------------------------------------------
+
+
+def _scene(entry: Any, source: Source) -> Scene:
+    tables: dict[str, Any] = {
+        table: tuple(_declared(kinds, (table, name), item, source) for name, item in getattr(entry, table).items())
+        for table, kinds in TABLES.items()
+    }
+    _put_markers(entry, source)
+    bodies = tuple(_body(name, body, source) for name, body in entry.bodies.items())
+    try:
+        scene = Scene(bodies=bodies, **{key: getattr(entry, key) for key in WHOLE}, **tables)
+        for force in (*scene.loads, *scene.forces):
+            if isinstance(force, (Load, Actuator)) and isinstance(force.function, StateFormula):
+                check_names(scene, force.function, f"force {force.name!r}")
+    except InputError as error:
+        raise InputError(f"{origin_of_name(source, str(error))}: {error}") from None
+    return scene
+
+
+def _put_markers(entry: Any, source: Source) -> None:
+    """Add the markers to the points of their bodies and of the ground."""
+    points = {GROUND: entry.ground, **{name: body.points for name, body in entry.bodies.items()}}
+    for name, marker in entry.markers.items():
+        where = f"{origin(source, ('markers', name))}: markers.{name}"
+        if marker.body not in points:
+            close = get_close_matches(marker.body, points, 1)
+            hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(points)}"
+            raise InputError(f"{where}: there is no body {marker.body!r}; {hint}")
+        if name in points[marker.body]:
+            raise InputError(f"{where}: {marker.body!r} has a point {name!r} already; give the marker another name")
+        points[marker.body][name] = marker.point
+
+
+def _declared(kinds: tuple[Kind, ...], keys: tuple[str, ...], entry: BaseModel, source: Source) -> Any:
+    try:
+        return _made(_kind(kinds, entry), keys[-1], entry)
+    except InputError as error:
+        raise InputError(f"{origin(source, keys)}: {error}") from None
+
+
+def _kind(kinds: tuple[Kind, ...], entry: BaseModel) -> Kind:
+    word = getattr(entry, "kind", "") if len(kinds) > 1 else kinds[0].word
+    return next(kind for kind in kinds if kind.word == word)
+
+
+def _made(kind: Kind, name: str, entry: BaseModel) -> Any:
+    """The declaration that an entry of the file means."""
+    given = {f.name: getattr(entry, f.name) for f in keys_of(kind)}
+    for f in keys_of(kind):
+        if given[f.name] is None and f.default is not None:
+            del given[f.name]
+    special: dict[type, Callable[..., Any]] = {Load: _load, Actuator: _actuator}
+    return special.get(kind.made, kind.made)(name=name, **given)
+
+
+def _load(force: list[Any], moment: list[Any], **given: Any) -> Load:
+    """Components that depend on the motion go to the load's function, the others stay functions of time."""
+    timed, moving = _separated((*force, *moment))
+    return Load(force=timed[:3], moment=timed[3:], function=moving, **given)
+
+
+def _actuator(force: Any = 0.0, **given: Any) -> Actuator:
+    """As `_load`."""
+    timed, moving = _separated((force,))
+    return Actuator(force=timed[0], function=moving, **given)
+
+
+def _separated(given: tuple[Any, ...]) -> tuple[list[float | TimeFunction], StateFormula | None]:
+    """Functions of time (zero where a component is none), and those that depend on the motion (zero likewise) if any does."""
+    components = [constant(c) if isinstance(c, float) else c for c in given]  # a default is a number
+    if any(not isinstance(c, TimeFunction) and any(_inputs_of(c)) for c in components):
+        raise InputError("a formula of the motion cannot use an input; add them as two forces")
+    timed = [_plain(c) if isinstance(c, TimeFunction) else 0.0 for c in components]
+    moving = tuple(constant(0.0) if isinstance(c, TimeFunction) else c for c in components)
+    follows = any(not isinstance(c, TimeFunction) for c in components)
+    return timed, StateFormula(moving) if follows else None
+
+
+def _inputs_of(expression: Expression) -> Iterator[TimeFunction]:
+    if isinstance(expression, TimeFunction):
+        yield from signals_in(expression)
+    elif isinstance(expression, Operation):
+        for operand in expression.operands:
+            yield from _inputs_of(operand)
+
+
+def _plain(function: TimeFunction) -> float | TimeFunction:
+    return function.data[0] if is_constant(function) else function
+
+
+def _body(name: str, entry: BodyEntry, source: Source) -> Body:
+    try:
+        return Body(
+            name,
+            _model(name, entry),
+            position=entry.position,
+            rotation=entry.rotation,
+            velocity=entry.velocity,
+            omega_bar=entry.omega_bar,
+            q=entry.q,
+            q_dot=entry.q_dot,
+            damping=entry.damping,
+            stiffening=entry.stiffening,
+            dropped=tuple(entry.drop),
+        )
+    except (InputError, BodyError) as error:
+        raise InputError(f"{origin(source, ('bodies', name))}: bodies.{name}: {error}") from None
+
+
+def _model(name: str, entry: BodyEntry) -> FlexibleBody:
+    points = {key: np.array(at) for key, at in entry.points.items()}
+    if entry.file is not None:
+        model = load_body(entry.file)
+        model = model if entry.modes is None else truncated(model, entry.modes)
+        for point, at in points.items():
+            model = with_point(model, point, at)
+        return model
+    rigid: dict[str, Any] = {"mass": entry.mass, "points": points}
+    if entry.inertia is not None:
+        return rigid_body(name, inertia=np.array(entry.inertia), centre_of_mass=np.array(entry.centre_of_mass), **rigid)
+    model = rigid_body(name, inertia=np.eye(3), **rigid)
+    return replace(model, r_dm=np.array(entry.r_dm), rr_dm=np.array(entry.rr_dm))
+
+
+# ---- the analysis -------------------------------------------------------------------------------------------------
+
+
+def _settings(entry: Any, outputs: list[str], source: Source) -> Settings | MomentSettings:
+    keep = tuple(outputs)
+    if entry.kind in ("assemble", "static"):
+        return MomentSettings(entry.time, keep, Assemble() if entry.kind == "assemble" else Static())
+    if entry.kind == "linearise":
+        inputs = (*_efforts("inputs", entry.inputs, source), *entry.loads)
+        return MomentSettings(entry.time, keep, Linearise(inputs, tuple(entry.quantities), entry.at_equilibrium))
+    method = _method(entry, source)
+    stabilisation = _stabilisation(getattr(entry, "stabilisation", StabilisationEntry()))
+    span = (entry.start, entry.end, entry.output_step)
+    return Settings(*span, method, stabilisation, keep, _over_time(entry, source))
+
+
+def _with_chart(settings: Settings | MomentSettings, entry: ChartEntry, source: Source) -> Settings | MomentSettings:
+    """The settings with what a chart compares. InputError for a chart of another analysis than forward dynamics."""
+    if not entry.model_fields_set:
+        return settings
+    if isinstance(settings, MomentSettings) or not isinstance(settings.analysis, Forward):
+        where = origin(source, ("chart",))
+        raise InputError(f"{where}: chart: it compares runs of forward dynamics; the file asks for another analysis")
+    methods = tuple((name, tuple(numbers)) for name, numbers in entry.methods.items())
+    modes = tuple(None if number == "all" else number for number in entry.modes)
+    drops = tuple(tuple(terms) for terms in entry.drop)
+    return replace(settings, chart=Charted(tuple(entry.measures), methods, modes, drops))
+
+
+def _method(entry: Any, source: Source) -> Integrator:
+    name, step = getattr(entry, "method", "ros2"), getattr(entry, "step", None)
+    if name in CONTROLLED:
+        given = entry.tolerances
+        return CONTROLLED[name](Tolerances() if given is None else Tolerances(**given.model_dump()))
+    try:
+        return METHODS[name](entry.output_step / 10 if step is None else step, **getattr(entry, "settings", {}))
+    except InputError as error:
+        raise InputError(f"{origin(source, ('analysis', 'settings'))}: analysis.settings: {error}") from None
+
+
+def _over_time(entry: Any, source: Source) -> OverTime:
+    if entry.kind == "kinematic":
+        return Kinematic()
+    if entry.kind == "inverse":
+        return Inverse(entry.elastic == "quasi-static")
+    if entry.kind == "mixed":
+        known = None if entry.known is None else tuple(entry.known)
+        solution = entry.solution and next(k.made for k in SOLUTIONS if k.word == entry.solution.kind)(
+            **entry.solution.model_dump(exclude={"kind"})
+        )
+        return Mixed(_efforts("unknown", entry.unknown, source), known, solution)
+    return Forward(
+        tuple(_declared(EVENTS, ("analysis", "events", name), e, source) for name, e in entry.events.items())
+    )
+
+
+def _efforts(key: str, entries: Mapping[str, BaseModel], source: Source) -> tuple[Effort, ...]:
+    return tuple(_declared(EFFORTS, ("analysis", key, name), entry, source) for name, entry in entries.items())
+
+
+def _stabilisation(entry: StabilisationEntry) -> Stabilisation:
+    if entry.alpha is not None and entry.beta is not None:
+        return Baumgarte(entry.alpha, entry.beta)
+    return Projection(entry.tolerance) if entry.kind == "projection" else Drifting()

@@ -1,0 +1,417 @@
+"""What a scene file may hold: models of its tables, made from the declarations of `ffr_dyn` themselves.
+
+A kind of joint, driver or force is a dataclass; its fields are the keys of its entry in the file. A new kind is an entry in
+`TABLES`, and an entry in `FIELDS` for each of its fields whose type the dataclass leaves open (Any).
+"""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, Field, dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import (
+    BaseModel,
+    Discriminator,
+    Tag,
+    create_model,
+    model_validator,
+)
+from pydantic import Field as Key
+
+from ffr_dyn.analyses.bounded import Bounded
+from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort
+from ffr_dyn.analyses.events import Event
+from ffr_dyn.analyses.mixed import Causal
+from ffr_dyn.analyses.settings import settings_of
+from ffr_dyn.functions.curves import Curve
+from ffr_dyn.integrators import CONTROLLED, METHODS
+from ffr_dyn.scene.couplings import Coupling
+from ffr_dyn.scene.drivers import Driver, PointDriver
+from ffr_dyn.scene.forces import Bushing, Load, SpringDamper
+from ffr_dyn.scene.joint_forces import Actuator, JointFriction, JointSpring, JointStop, Servo
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.sensors import Measurement, SectionMeasurement, StressMeasurement
+from ffr_dyn.scene.surface_loads import ModalForce, NodalForces, Pressure
+from ffr_dyn.scene_file.values import (
+    THREE,
+    In,
+    Inertia,
+    Metres,
+    Number,
+    OfTime,
+    Seconds,
+    Strict,
+    Vector,
+    of_motion,
+    of_time,
+    or_curve,
+)
+
+Direction = Vector | list[Vector]
+
+# ---- tables of the file from dataclasses --------------------------------------------------------------------------
+
+# Types of the fields that the dataclasses leave open, and units of those that are numbers; by "Class.field" or "field".
+FIELDS: dict[str, Any] = {
+    "axis": Direction,
+    "axis_j": Direction,
+    "Joint.length": of_time("m"),
+    "Joint.pitch": Annotated[float, In("m")],
+    "Driver.function": OfTime,
+    "PointDriver.x": of_time("m"),
+    "PointDriver.y": of_time("m"),
+    "PointDriver.z": of_time("m"),
+    "StressMeasurement.point": Metres,
+    "SectionMeasurement.point": Metres,
+    "Load.force": Annotated[list[of_motion("N")], THREE],  # type: ignore[misc]
+    "Load.moment": Annotated[list[of_motion("N m")], THREE],  # type: ignore[misc]
+    "SpringDamper.stiffness": or_curve("N/m"),
+    "SpringDamper.damping": or_curve("N s/m"),
+    "SpringDamper.free_length": Annotated[float, In("m")],
+    "SpringDamper.preload": Annotated[float, In("N")],
+    "Bushing.stiffness": list[or_curve()] | list[list[Number]],  # type: ignore[misc]
+    "Bushing.damping": list[Number] | list[list[Number]],
+    "Bushing.preload": list[Number],
+    "Bushing.axes": Direction,
+    "Bushing.axes_j": Direction,
+    "JointFriction.normal": of_time("N"),
+    "Actuator.force": of_motion(),
+    "Servo.target": OfTime,
+    "NodalForces.points": list[int],
+    "NodalForces.forces": list[Vector],
+    "NodalForces.function": OfTime,
+    "Pressure.pressure": Number | list[Number],
+    "Pressure.triangles": list[int],
+    "Pressure.function": OfTime,
+    "ModalForce.values": list[Number],
+    "ModalForce.function": OfTime,
+    "MarkerEffort.direction": Vector,
+    "Event.quantity": str,
+    "Event.direction": Literal["rising", "falling", "either"],
+}
+
+# Fields that a file cannot hold: Python functions, and the name, which is the key of the entry.
+NOT_IN_FILES = ("name", "function")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A dataclass whose instances are entries of a table; `word` is their `kind`, "" where a table has one kind only."""
+
+    word: str
+    made: type
+
+
+# Tables of the file are fields of `Scene`. The first kind is meant where an entry does not say.
+TABLES: dict[str, tuple[Kind, ...]] = {
+    "joints": (Kind("", Joint),),
+    "drivers": (Kind("joint", Driver), Kind("point", PointDriver)),
+    "couplings": (Kind("", Coupling),),
+    "loads": (Kind("", Load),),
+    "springs": (Kind("", SpringDamper),),
+    "forces": (
+        Kind("bushing", Bushing),
+        Kind("joint-spring", JointSpring),
+        Kind("joint-friction", JointFriction),
+        Kind("joint-stop", JointStop),
+        Kind("actuator", Actuator),
+        Kind("servo", Servo),
+        Kind("nodal-forces", NodalForces),
+        Kind("pressure", Pressure),
+        Kind("modal-force", ModalForce),
+    ),
+    "measurements": (
+        Kind("marker", Measurement),
+        Kind("stress", StressMeasurement),
+        Kind("section", SectionMeasurement),
+    ),
+}
+
+
+EFFORTS = (Kind("joint", JointEffort), Kind("marker", MarkerEffort))  # tables of an analysis
+EVENTS = (Kind("", Event),)
+SOLUTIONS = (Kind("causal", Causal), Kind("bounded", Bounded))
+
+
+def keys_of(kind: Kind) -> list[Field]:
+    """The fields of a kind that a file holds."""
+    return [f for f in fields(kind.made) if _named(kind, f) in FIELDS or f.name not in NOT_IN_FILES]
+
+
+def _named(kind: Kind, f: Field) -> str:
+    return f"{kind.made.__name__}.{f.name}"
+
+
+def _type(kind: Kind, f: Field, hints: Mapping[str, Any]) -> Any:
+    """The type of a key: from `FIELDS`, or from the dataclass, where numbers become `Number`."""
+    found = FIELDS.get(_named(kind, f), FIELDS.get(f.name))
+    if found is None:
+        found = _numbered(hints[f.name])
+    return found | None if _default(f) is None else found
+
+
+def _default(f: Field) -> Any:
+    """What stands for a key that is not given; None where the dataclass has no limit (JSON has no infinity)."""
+    if isinstance(f.default, tuple):
+        return list(f.default)
+    return None if f.default in (np.inf, -np.inf) else f.default
+
+
+def _numbered(hint: Any) -> Any:
+    if hint is float:
+        return Number
+    if typing.get_origin(hint) is None:
+        return hint
+    if Curve in typing.get_args(hint):
+        return or_curve()
+    inner = tuple(_numbered(part) for part in typing.get_args(hint))
+    return typing.Union[inner]  # noqa: UP007 - of types that are known now only
+
+
+def entry_model(kind: Kind) -> type[BaseModel]:
+    """The model of an entry of this kind."""
+    hints = typing.get_type_hints(kind.made)
+    keys: dict[str, Any] = {"kind": (Literal[kind.word], kind.word)} if kind.word else {}
+    for f in keys_of(kind):
+        keys[f.name] = (_type(kind, f, hints), ... if f.default is MISSING else _default(f))
+    return create_model(f"{kind.made.__name__}Entry", __base__=Strict, __doc__=kind.made.__doc__, **keys)
+
+
+def _table_model(kinds: tuple[Kind, ...]) -> Any:
+    """dict of entries, of one kind or of several that say which."""
+    models = [entry_model(kind) for kind in kinds]
+    if len(models) == 1:
+        return dict[str, models[0]]  # type: ignore[valid-type]
+    return dict[str, _one_of(models, [kind.word for kind in kinds])]  # type: ignore[misc]
+
+
+def _one_of(models: Sequence[type[BaseModel]], words: Sequence[str]) -> Any:
+    """An entry whose `kind` says which model it is of; without it, the first."""
+    tagged = tuple(Annotated[model, Tag(f"[{word}]")] for model, word in zip(models, words, strict=True))
+    which = Discriminator(
+        lambda given: f"[{given.get('kind', words[0]) if isinstance(given, dict) else getattr(given, 'kind', None)}]",
+        custom_error_type="kind",
+        custom_error_message=f"there is no such kind; there are {', '.join(words)}",
+    )
+    return Annotated[typing.Union[tagged], which]  # noqa: UP007
+
+
+# ---- bodies, analysis, the scene ----------------------------------------------------------------------------------
+
+
+class BodyEntry(Strict):
+    """A flexible body from a file, or a rigid one from its mass and named points.
+
+    inertia is about the centre of mass; instead of inertia and centre_of_mass, the integrals r_dm and rr_dm (first and second
+    moments about the origin) may be given. Points of a body from a file are put on its surface, at the nearest node. `drop`
+    names inertia terms that the equations of motion leave out (see `ffr_dyn.variants.variant`).
+    """
+
+    file: Path | None = None
+    modes: Annotated[int, Key(ge=0)] | None = None
+    mass: Annotated[float, In("kg")] | None = None
+    inertia: Inertia | list[Inertia] | None = None
+    centre_of_mass: Metres = [0.0, 0.0, 0.0]
+    r_dm: Annotated[list[Annotated[float, In("kg m")]], THREE] | None = None
+    rr_dm: list[Inertia] | None = None
+    points: dict[str, Metres] = {}
+    position: Metres = [0.0, 0.0, 0.0]
+    rotation: list[Annotated[float, In("rad")]] | list[Vector] = [0.0, 0.0, 0.0]
+    velocity: Annotated[list[Annotated[float, In("m/s")]], THREE] = [0.0, 0.0, 0.0]
+    omega_bar: Annotated[list[Annotated[float, In("rad/s")]], THREE] = [0.0, 0.0, 0.0]
+    q: list[Number] | None = None
+    q_dot: list[Number] | None = None
+    damping: Number | list[Number] = 0.0
+    stiffening: bool = True
+    drop: list[Literal["I3", "I4", "I5", "I8", "I9"]] = []
+
+    @model_validator(mode="after")
+    def _kind(self) -> BodyEntry:
+        if (self.file is None) == (self.mass is None):
+            raise ValueError("give either file (a body from ffr-prep) or mass and inertia (a rigid body)")
+        if self.mass is not None and (self.inertia is None) == (self.r_dm is None or self.rr_dm is None):
+            raise ValueError(
+                "a rigid body needs inertia, about its centre of mass: three principal values or 3 x 3 (or r_dm and rr_dm)"
+            )
+        return self
+
+
+class MarkerEntry(Strict):
+    """One more point of a body, or of the ground: joints, loads and measurements know it as "body.name"."""
+
+    body: str
+    point: Metres
+
+
+class StabilisationEntry(Strict):
+    """How the constraints are kept; see `ffr_dyn.integrators.stabilisation`."""
+
+    kind: Literal["projection", "baumgarte", "none"] = "projection"
+    tolerance: Annotated[Number, Key(gt=0)] = 1e-9
+    alpha: Annotated[float, In("1/s"), Key(gt=0)] | None = None
+    beta: Annotated[float, In("1/s"), Key(gt=0)] | None = None
+
+    @model_validator(mode="after")
+    def _with_its_gains(self) -> StabilisationEntry:
+        if (self.kind == "baumgarte") != (self.alpha is not None and self.beta is not None):
+            raise ValueError('"baumgarte" needs alpha and beta [1/s], such as 0.1 / step; the other kinds take none')
+        return self
+
+
+class TolerancesEntry(Strict):
+    """What the error of a step may be: absolute values, plus `relative` of each coordinate's size; see `Tolerances`."""
+
+    relative: Annotated[Number, Key(gt=0)] = 1e-6
+    position: Annotated[float, In("m"), Key(gt=0)] = 1e-7
+    velocity: Annotated[float, In("m/s"), Key(gt=0)] = 1e-6
+    elastic: Annotated[float, In("m"), Key(gt=0)] = 1e-8
+
+
+class _Span(Strict):
+    end: Seconds
+    output_step: Annotated[float, In("s"), Key(gt=0)]
+    start: Seconds = 0.0
+
+
+class _Integrated(_Span):
+    method: Literal[(*METHODS, *CONTROLLED)] = "ros2"  # type: ignore[valid-type]
+    step: Annotated[float, In("s"), Key(gt=0)] | None = None
+    tolerances: TolerancesEntry | None = None
+    settings: dict[str, bool | int | float | str] = {}
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> _Integrated:
+        controlled = self.method in CONTROLLED
+        if controlled and self.step is not None:
+            raise ValueError(f"{self.method} chooses its steps: give 'tolerances' in place of 'step'")
+        if not controlled and self.tolerances is not None:
+            raise ValueError(f"{self.method} takes steps of one length: give 'step' in place of 'tolerances'")
+        known = [] if controlled else settings_of(METHODS[self.method])
+        for name in self.settings:
+            if name not in known:
+                there = f"it has {', '.join(known)}" if known else "it has none"
+                raise ValueError(f"settings: {self.method} has no setting {name!r}; {there}")
+        return self
+
+
+class _ForwardBase(_Integrated):
+    kind: Literal["forward"] = "forward"
+    stabilisation: StabilisationEntry = StabilisationEntry()
+
+
+ForwardEntry = create_model(
+    "ForwardEntry",
+    __base__=_ForwardBase,
+    __doc__="Forward dynamics from start to end; step defaults to a tenth of output_step.",
+    events=(_table_model(EVENTS), {}),
+)
+
+
+class KinematicEntry(_Span):
+    """Positions, velocities, accelerations and reactions along the motion that the drivers prescribe."""
+
+    kind: Literal["kinematic"]
+
+
+class InverseEntry(_Integrated):
+    """The forces of the drivers; method, step and stabilisation are of dynamic elastic coordinates."""
+
+    kind: Literal["inverse"]
+    elastic: Literal["dynamic", "quasi-static"] = "dynamic"
+    stabilisation: StabilisationEntry = StabilisationEntry()
+
+
+class _MixedBase(_Integrated):
+    kind: Literal["mixed"]
+    known: Annotated[list[str], Key(min_length=1)] | None = None
+
+
+MixedEntry = create_model(
+    "MixedEntry",
+    __base__=_MixedBase,
+    __doc__="Known motions (drivers, by default all) and the unknown forces, by name, that realise them.",
+    unknown=(Annotated[_table_model(EFFORTS), Key(min_length=1)], ...),  # type: ignore[arg-type]
+    solution=(_one_of([entry_model(kind) for kind in SOLUTIONS], [kind.word for kind in SOLUTIONS]) | None, None),
+)
+
+
+class AssembleEntry(Strict):
+    """Positions and velocities that meet the joints and drivers at a time, and what was changed for it."""
+
+    kind: Literal["assemble"]
+    time: Seconds = 0.0
+
+
+class StaticEntry(Strict):
+    """The equilibrium at a time."""
+
+    kind: Literal["static"]
+    time: Seconds = 0.0
+
+
+class _LineariseBase(Strict):
+    kind: Literal["linearise"]
+    time: Seconds = 0.0
+    at_equilibrium: bool = False
+    loads: list[str] = []
+    quantities: list[str] = []
+
+
+LineariseEntry = create_model(
+    "LineariseEntry",
+    __base__=_LineariseBase,
+    __doc__="Small motions about the start or the equilibrium; inputs (forces by name) and loads feed, quantities come out.",
+    inputs=(_table_model(EFFORTS), {}),
+)
+
+ANALYSES: dict[str, Any] = {
+    "forward": ForwardEntry,
+    "kinematic": KinematicEntry,
+    "assemble": AssembleEntry,
+    "static": StaticEntry,
+    "inverse": InverseEntry,
+    "mixed": MixedEntry,
+    "linearise": LineariseEntry,
+}
+
+
+class ChartEntry(Strict):
+    """What `ffr-dyn chart` compares: steps [s] or tolerances by method, empty lists where they are to be chosen."""
+
+    measures: list[str] = []
+    methods: dict[Literal[(*METHODS, *CONTROLLED)], list[Annotated[Number, Key(gt=0)]]] = {}  # type: ignore[valid-type]
+    modes: Annotated[list[Annotated[int, Key(ge=0)] | Literal["all"]], Key(min_length=1)] = ["all"]
+    drop: list[list[Literal["I3", "I4", "I5", "I8", "I9", "stiffening"]]] = []
+
+
+class _SceneBase(Strict):
+    name: str = "scene"
+    include: list[str] = []
+    parameters: dict[str, Any] = {}
+    inputs: dict[str, Number] = {}
+    outputs: list[str] = ["default"]
+    gravity: Annotated[list[of_time("m/s^2")], THREE] = [0.0, 0.0, 0.0]  # type: ignore[valid-type]
+    base_acceleration: Annotated[list[of_time("m/s^2")], THREE] = [0.0, 0.0, 0.0]  # type: ignore[valid-type]
+    plane: Literal["auto", "none", "x", "y", "z"] = "auto"
+    analysis: _one_of(list(ANALYSES.values()), list(ANALYSES))  # type: ignore[valid-type]
+    chart: ChartEntry = ChartEntry()
+    ground: dict[str, Metres] = {}
+    bodies: dict[str, BodyEntry]
+    markers: dict[str, MarkerEntry] = {}
+
+
+SceneEntry: Any = create_model(
+    "SceneEntry",
+    __base__=_SceneBase,
+    __doc__="A scene file of ffr-dyn, after its includes are merged and its parameters put in.",
+    **{name: (_table_model(kinds), {}) for name, kinds in TABLES.items()},  # type: ignore[call-overload]
+)
+
+
+def schema() -> dict[str, Any]:
+    """The JSON schema of scene files (draft 2020-12)."""
+    return SceneEntry.model_json_schema()

@@ -1,0 +1,311 @@
+"""A scene as the text of a scene file, which reads back as the same scene to the bit (a constant function as its number)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, asdict, fields
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from ffr_dyn.analyses.efforts import Effort
+from ffr_dyn.analyses.settings import (
+    Charted,
+    Forward,
+    Inverse,
+    Kinematic,
+    Linearise,
+    Mixed,
+    MomentSettings,
+    OfMoment,
+    OverTime,
+    Settings,
+    settings_of,
+)
+from ffr_dyn.functions.curves import Curve
+from ffr_dyn.functions.formula import Measured, Operation, text_of
+from ffr_dyn.functions.time_functions import (
+    HARMONIC,
+    OPERATION,
+    PIECEWISE,
+    POLYNOMIAL,
+    TimeFunction,
+    constant,
+    signals_in,
+)
+from ffr_dyn.integrators import CONTROLLED, METHODS, Controlled, Integrator
+from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation
+from ffr_dyn.scene.forces import Load
+from ffr_dyn.scene.joint_forces import Actuator
+from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.scene_file.schema import EFFORTS, EVENTS, SOLUTIONS, TABLES, Kind, keys_of
+from ffr_dyn.scene_file.state_formula import StateFormula
+from ffr_prep.body import FlexibleBody, save_body
+from ffr_prep.common.errors import InputError
+
+_BARE = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
+
+
+def save_scene(scene: Scene, settings: Settings | MomentSettings, path: str | Path) -> Path:
+    """Write a scene file, and beside it a body file <file>.<body>.ffr for every flexible body."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    files = {body.name: f"{path.stem}.{body.name}.ffr" for body in scene.bodies if not _is_plain(body.model)}
+    text = to_toml(scene, settings, files)
+    for body in scene.bodies:
+        if body.name in files:
+            save_body(body.model, path.parent / files[body.name])
+    temporary = path.with_name(path.name + ".part")
+    temporary.write_text(text, encoding="utf-8")
+    temporary.replace(path)
+    return path
+
+
+def to_toml(scene: Scene, settings: Settings | MomentSettings, files: Mapping[str, str] = {}) -> str:
+    """The text of the scene file.
+
+    files : by name of a flexible body, the file in which it is kept
+
+    Raises InputError for what a file cannot hold: Python functions, and flexible bodies without a file.
+    """
+    top = {"name": scene.name, "gravity": scene.gravity, "base_acceleration": scene.base_acceleration}
+    top["plane"] = scene.plane
+    tree = {**top, "outputs": list(settings.outputs), "analysis": _analysis(settings), "ground": dict(scene.ground)}
+    tree["chart"] = _chart(settings.chart) if isinstance(settings, Settings) else {}
+    tree["inputs"] = _inputs(scene)
+    tree["bodies"] = {body.name: _body(body, files) for body in scene.bodies}
+    for table, kinds in TABLES.items():
+        tree[table] = {thing.name: _entry(_kind(kinds, thing), thing) for thing in getattr(scene, table)}
+    return "\n".join(_lines(_data(tree, "scene"), ())) + "\n"
+
+
+def _inputs(scene: Scene) -> dict[str, float]:
+    """Initial values of the scene's inputs by name."""
+    fields_of = [value for table in TABLES for thing in getattr(scene, table) for value in _given(thing).values()]
+    return {found.name: found.data[4] for found in _signals((*fields_of, scene.base_acceleration))}
+
+
+def _signals(value: Any) -> Iterator[TimeFunction]:
+    if isinstance(value, TimeFunction):
+        yield from signals_in(value)
+    elif isinstance(value, (list, tuple)):
+        for item in value:
+            yield from _signals(item)
+
+
+def _kind(kinds: tuple[Kind, ...], thing: Any) -> Kind:
+    return next(kind for kind in kinds if type(thing) is kind.made)
+
+
+# ---- entries ------------------------------------------------------------------------------------------------------
+
+
+def _analysis(settings: Settings | MomentSettings) -> dict[str, Any]:
+    analysis = settings.analysis
+    entry: dict[str, Any] = {"kind": type(analysis).__name__.lower()}
+    if isinstance(settings, Settings):
+        entry |= {"start": settings.start, "end": settings.end, "output_step": settings.output_step}
+    else:
+        entry["time"] = settings.time
+    if isinstance(settings, Settings) and not isinstance(analysis, Kinematic):
+        entry |= _method(settings.method)
+    if isinstance(settings, Settings) and isinstance(analysis, (Forward, Inverse)):
+        entry["stabilisation"] = _stabilisation(settings.stabilisation)
+    return entry | _particular(analysis)
+
+
+def _chart(chart: Charted) -> dict[str, Any]:
+    entry = {
+        "measures": list(chart.measures),
+        "methods": {name: list(numbers) for name, numbers in chart.methods},
+        "modes": ["all" if number is None else number for number in chart.modes],
+        "drop": [list(terms) for terms in chart.drops],
+    }
+    return {} if chart == Charted() else entry
+
+
+def _method(method: Integrator) -> dict[str, Any]:
+    name = next(word for word, made in {**METHODS, **CONTROLLED}.items() if type(method) is made)
+    if name in CONTROLLED:
+        return {"method": name, "tolerances": asdict(cast("Controlled", method).tolerances)}
+    given = {key: getattr(method, key) for key in settings_of(type(method))}
+    return {"method": name, "step": method.step, **({"settings": given} if given else {})}
+
+
+def _particular(analysis: OverTime | OfMoment) -> dict[str, Any]:
+    """The settings of one analysis only."""
+    if isinstance(analysis, Forward):
+        return {"events": {event.name: _entry(EVENTS[0], event) for event in analysis.events}}
+    if isinstance(analysis, Inverse):
+        return {"elastic": "quasi-static" if analysis.quasi_static else "dynamic"}
+    if isinstance(analysis, Mixed):
+        solution = analysis.solution
+        chosen = None if solution is None else {"kind": _kind(SOLUTIONS, solution).word, **_given(solution)}
+        return {"unknown": _efforts(analysis.unknown), "known": analysis.known, "solution": chosen}
+    if isinstance(analysis, Linearise):
+        efforts = tuple(item for item in analysis.inputs if not isinstance(item, str))
+        loads = tuple(item for item in analysis.inputs if isinstance(item, str))
+        if analysis.inputs != (*efforts, *loads):
+            raise InputError(
+                f"analysis: a scene file lists the names of loads {loads} after the other inputs; put them last"
+            )
+        wanted = {"loads": loads, "quantities": analysis.quantities, "at_equilibrium": analysis.at_equilibrium}
+        return {"inputs": _efforts(efforts), **wanted}
+    return {}
+
+
+def _efforts(efforts: tuple[Effort, ...]) -> dict[str, Any]:
+    return {effort.name: _entry(_kind(EFFORTS, effort), effort) for effort in efforts}
+
+
+def _stabilisation(keep: Stabilisation) -> dict[str, Any]:
+    if isinstance(keep, Projection):
+        return {"kind": "projection", "tolerance": keep.tolerance}
+    return (
+        {"kind": "baumgarte", "alpha": keep.alpha, "beta": keep.beta}
+        if isinstance(keep, Baumgarte)
+        else {"kind": "none"}
+    )
+
+
+def _body(body: Body, files: Mapping[str, str]) -> dict[str, Any]:
+    entry = _model(body, files)
+    for key in ("position", "velocity", "omega_bar"):
+        entry[key] = getattr(body, key)
+    entry["rotation"] = body.rotation
+    if body.model.n:
+        entry |= {"q": body.q, "q_dot": body.q_dot, "damping": body.damping, "stiffening": body.stiffening}
+    if body.dropped:
+        entry["drop"] = list(body.dropped)
+    return entry
+
+
+def _model(body: Body, files: Mapping[str, str]) -> dict[str, Any]:
+    if body.name in files:
+        return {"file": files[body.name]}
+    model = body.model
+    if not _is_plain(model):
+        raise InputError(
+            f"body {body.name!r} is flexible or has a surface: a scene file names its body file; save it and give its name"
+        )
+    points = {interface.name: interface.position for interface in model.interfaces}
+    return {"mass": model.mass, "r_dm": model.r_dm, "rr_dm": model.rr_dm, "points": points}
+
+
+def _is_plain(model: FlexibleBody) -> bool:
+    """Whether a body is all in its mass, moments and points."""
+    return model.n == 0 and model.surface is None
+
+
+def _entry(kind: Kind, thing: Any) -> dict[str, Any]:
+    """The keys of an entry that differ from their defaults."""
+    entry: dict[str, Any] = {"kind": kind.word} if kind.word else {}
+    given = _with_formulas(thing) if isinstance(thing, (Load, Actuator)) else _given(thing)
+    for f in fields(thing):
+        if callable(given[f.name]) and f.name not in [key.name for key in keys_of(kind)]:
+            raise InputError(
+                f"{thing.name!r}: {f.name} is a Python function, which a scene file cannot hold; use a formula or a table"
+            )
+    for f in keys_of(kind):
+        value = _data(given[f.name], f"{thing.name!r}: {f.name}")
+        if f.default is MISSING or value != _data(f.default, f.name):
+            entry[f.name] = value
+    return entry
+
+
+def _given(thing: Any) -> dict[str, Any]:
+    return {f.name: getattr(thing, f.name) for f in fields(thing)}
+
+
+def _with_formulas(force: Load | Actuator) -> dict[str, Any]:
+    """The fields of a force, with the formulas of the motion back in its components."""
+    given = _given(force)
+    if not isinstance(force.function, StateFormula):
+        return given
+    components = [force.force] if isinstance(force, Actuator) else [*force.force, *force.moment]
+    both = [c if e == constant(0.0) else e for c, e in zip(components, force.function.expressions, strict=True)]
+    wholes = {"force": both[0]} if isinstance(force, Actuator) else {"force": both[:3], "moment": both[3:]}
+    return given | wholes | {"function": None}
+
+
+# ---- values -------------------------------------------------------------------------------------------------------
+
+
+def _data(value: Any, what: str) -> Any:
+    """Numbers, texts, lists and tables only."""
+    if isinstance(value, (Measured, Operation)):
+        return text_of(value)
+    if isinstance(value, TimeFunction):
+        return _function(value, what)
+    if isinstance(value, Curve):
+        return {"at": value.at.tolist(), "values": value.values.tolist()}
+    if isinstance(value, Mapping):
+        return {key: _data(item, what) for key, item in value.items() if item is not None}
+    if isinstance(value, (np.ndarray, np.generic)):
+        return _data(value.tolist(), what)
+    if isinstance(value, (list, tuple)):
+        return [_data(item, what) for item in value]
+    if isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    if callable(value):
+        raise InputError(f"{what} is a Python function, which a scene file cannot hold; use a formula or a table")
+    return value
+
+
+def _function(function: TimeFunction, what: str) -> Any:
+    data = list(function.data)
+    if function.callback is not None:
+        raise InputError(f"{what} is a Python function, which a scene file cannot hold; use a formula or a table")
+    if function.kind == OPERATION or function.name:
+        return text_of(function)
+    if function.kind == POLYNOMIAL:
+        return data[0] if len(data) == 1 else {"polynomial": data}
+    if function.kind == HARMONIC:
+        return {"harmonic": dict(zip(("mean", "amplitude", "speed", "phase"), data, strict=True))}
+    if function.kind != PIECEWISE:
+        raise InputError(f"{what} is a function of a kind that a scene file cannot hold")
+    pieces, count = int(data[0]), int(data[1])
+    rows = np.reshape(data[pieces + 3 :], (pieces, count)).tolist()
+    return {"piecewise": {"breaks": data[2 : pieces + 3], "coefficients": rows}}
+
+
+# ---- TOML ---------------------------------------------------------------------------------------------------------
+
+
+def _lines(table: Mapping[str, Any], keys: tuple[str, ...]) -> Iterator[str]:
+    """A table of at most two levels with its header; deeper ones are written in line."""
+    inner = {key: item for key, item in table.items() if isinstance(item, dict) and len(keys) < _depth(keys)}
+    plain = {key: item for key, item in table.items() if key not in inner}
+    if keys and (plain or not inner):
+        yield f"\n[{'.'.join(map(_key, keys))}]"
+    for key, item in plain.items():
+        yield f"{_key(key)} = {_inline(item)}"
+    for key, item in inner.items():
+        if item:
+            yield from _lines(item, (*keys, key))
+
+
+def _depth(keys: tuple[str, ...]) -> int:
+    """How deep tables with headers go: entries of a table do, their own tables do not."""
+    return 2 if keys and keys[0] in ("bodies", *TABLES) else 1 if not keys else 0
+
+
+def _inline(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_key(key)} = {_inline(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_inline, value)) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return _text(value) if isinstance(value, str) else repr(value)
+
+
+def _key(key: str) -> str:
+    return key if key and set(key) <= _BARE else _text(key)
+
+
+def _text(text: str) -> str:
+    """A basic string: the escapes of JSON are those of TOML, which also wants the delete character escaped."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,0 +1,275 @@
+"""The command `ffr-prep`. Heavy modules are imported inside the commands, so that help is immediate."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ffr_prep.cli.conversion import convert
+from ffr_prep.cli.interchange import export_body, import_body
+from ffr_prep.cli.matrices import reduce_matrices_command
+from ffr_prep.cli.options import (
+    check_points,
+    check_writable,
+    interface_of,
+    material_of,
+    number_of,
+    numbers_of,
+    reference_of,
+)
+from ffr_prep.cli.reduction import NOTES as REDUCTION_NOTES
+from ffr_prep.cli.reduction import band_of, draw_quality, reduction_of, reduction_options
+from ffr_prep.cli.solver import solver_of, solver_options
+from ffr_prep.cli.structure import reduce_structure_command
+from ffr_prep.cli.terminal import closing, show, terminal_steps, written
+from ffr_prep.common.errors import ComputationError, InputError
+
+EXAMPLE = """\b
+Example:
+  ffr-prep reduce rod.geo --unit mm --material steel --interface big_eye --interface small_eye \\
+           --reference simply-supported:big_eye,small_eye --modes 10 -o rod.ffr
+  ffr-prep info rod.ffr
+  ffr-prep modes rod.ffr -o out/modes
+"""
+REDUCE_NOTES = """\b
+Interfaces: where the body meets joints and forces.
+  --interface big_eye            the surface "big_eye" moves as one piece, like a bore on a stiff pin (rigid, RBE2)
+  --interface face:mean          "face" stays soft and its mean motion counts, as where a load is spread (mean, RBE3)
+  --interface pin=surface_7      the interface is called "pin", the surface "surface_7"
+  --interface hook@0.1,0,0.02    its node is at this point [m] instead of the centroid of the surface
+  `ffr-prep mesh MESH` lists the surfaces and node sets there are.
+
+\b
+Reference conditions: how the body frame is attached to the deforming body.
+  fixed:NAME                     the frame moves with this interface: bodies clamped at one place, blades, robot links
+  simply-supported:PIN,ROLLER    the frame follows the line between two interfaces: rods with a pin at each end
+  mean-axis                      the frame follows the mean motion of the mass: free bodies, spacecraft, anything
+  FILE.toml                      your own choice, a table for each prevented motion:
+                                   [[support]]
+                                   interface = "big_eye"
+                                   motion = "translation"      # or "rotation"
+                                   direction = [1.0, 0.0, 0.0]
+With craig-bampton, choices that only remove the six rigid motions give the same answer up to second order in the
+strain. With eigenmodes the choice matters: take the one that looks like the joints.
+
+"""
+MATERIAL_NOTES = """\b
+Materials: a name (steel, aluminium, titanium, ...), or E=7e10,nu=0.3,rho=5540 in SI units; for several volumes
+  --material web=steel --material rim=E=7e10,nu=0.3,rho=2700, each with the name of a volume of the mesh.
+"""
+CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 120}
+
+
+@click.group(epilog=EXAMPLE, invoke_without_command=True, context_settings=CONTEXT)
+@click.version_option(package_name="ffr")
+@click.pass_context
+def cli(context: click.Context) -> None:
+    """From a mesh to a reduced flexible body for multibody dynamics in the floating frame of reference.
+
+    `reduce` computes a body file from a mesh or a CAD geometry; `mesh` shows what is in a mesh; `info` and `modes` show
+    what is in a body file, in numbers and in pictures.
+    """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+# ---- options that describe a mesh ---------------------------------------------------------------------------------
+
+_PATH = click.Path(path_type=Path)
+_UNIT = click.option(
+    "--unit",
+    type=click.Choice(["m", "cm", "mm", "in"]),
+    help="Unit of the numbers in MESH; default: what a STEP file declares, mm for IGES, m for others.",
+)
+_SIZE = click.option("--size", type=float, help="Largest element edge, in that unit, when geometry is meshed.")
+_SET = click.option(
+    "--set", "numbers", multiple=True, metavar="NAME=VALUE", help="Change a parameter of a .geo script."
+)
+_ORDER = click.option(
+    "--order", type=click.IntRange(1, 2), default=2, show_default=True, help="Of the elements, when geometry is meshed."
+)
+
+
+@cli.command()
+@click.argument("mesh", type=_PATH)
+@_UNIT
+@_SIZE
+@_SET
+@_ORDER
+def mesh(mesh: Path, unit: str | None, size: float | None, numbers: tuple[str, ...], order: int) -> None:
+    """What MESH holds: elements, extent, and the names of surfaces, node sets and volumes; and whether it is sound."""
+    from ffr_prep.mesh.mesh import check_mesh, read_mesh
+    from ffr_prep.report.text import mesh_lines
+
+    loaded = read_mesh(mesh, unit=unit, size=size, numbers=numbers_of(numbers), order=order)
+    show(mesh_lines(loaded))
+    check_mesh(loaded)
+
+
+@cli.command(epilog=f"{REDUCE_NOTES}{REDUCTION_NOTES}\n{MATERIAL_NOTES}")
+@click.argument("mesh", type=_PATH)
+@click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
+@click.option("--name", help="Name of the body; default: the name of the file.")
+@_UNIT
+@_SIZE
+@_SET
+@_ORDER
+@click.option("--material", "materials", multiple=True, required=True, metavar="MATERIAL", help="See below.")
+@click.option("--interface", "interfaces", multiple=True, metavar="INTERFACE", help="See below; may be repeated.")
+@click.option("--reference", default="mean-axis", show_default=True, metavar="CONDITIONS", help="See below.")
+@reduction_options
+@solver_options
+@click.option(
+    "--stiffening", is_flag=True, help="Also compute geometric stiffening: slender rods under load, fast blades."
+)
+@click.option(
+    "--stress", is_flag=True, help="Also keep the stress at the surface, which ffr-dyn stress and animate show."
+)
+def reduce(
+    mesh: Path,
+    output: Path,
+    name: str | None,
+    unit: str | None,
+    size: float | None,
+    numbers: tuple[str, ...],
+    order: int,
+    materials: tuple[str, ...],
+    interfaces: tuple[str, ...],
+    reference: str,
+    stiffening: bool,
+    stress: bool,
+    **options: Any,
+) -> None:
+    """Reduce MESH to a flexible body and write it to a file.
+
+    MESH is a geometry that is meshed here (.geo, .step, .iges, .brep) or a mesh of solids (.msh, .inp, .bdf, .vtu,
+    .med, ...). Everything in the body is in SI units.
+    """
+    from ffr_prep.mesh.mesh import read_mesh
+    from ffr_prep.pipelines.mesh import reduce_mesh
+    from ffr_prep.report.text import mesh_lines
+
+    material, regions = material_of(materials), [interface_of(text) for text in interfaces]
+    conditions, reduction, band = reference_of(reference), reduction_of(options), band_of(options)
+    solver = solver_of(options)
+    parameters = numbers_of(numbers)
+    check_writable(output)
+    steps = terminal_steps()
+    loaded = read_mesh(mesh, unit=unit, size=size, numbers=parameters, order=order, progress=steps)
+    steps.end()
+    show(mesh_lines(loaded))
+    check_points(regions, loaded)
+    source = {"file": mesh.name, "unit": unit, "size": size, "numbers": parameters, "order": order}
+    body = reduce_mesh(
+        loaded,
+        name=name or output.stem,
+        material=material,
+        interfaces=regions,
+        reference=conditions,
+        reduction=reduction,
+        stiffening=stiffening,
+        stress=stress,
+        quality=band,
+        solver=solver,
+        progress=steps,
+        advance=steps.advance,
+        provenance={"source": source, "notes": list(loaded.notes)},
+    )
+    written(body, output, steps)
+    draw_quality(body, options)
+    closing(output, steps)
+
+
+@cli.command()
+@click.argument("body", type=_PATH)
+def info(body: Path) -> None:
+    """What BODY is: mass, inertia, interfaces, frequencies, what it can represent, and how it was made.
+
+    The effective mass of a mode is the part of the mass that it sets in motion when the frame is shaken along an axis;
+    modes with little of it matter little for inertia loads. With the mean-axis frame all of them are zero.
+    """
+    from ffr_prep.body import load_body
+    from ffr_prep.report.text import body_lines
+
+    show(body_lines(load_body(body)))
+
+
+@cli.command()
+@click.argument("body", type=_PATH)
+@click.option("-o", "--output", type=_PATH, required=True, help="Folder for the pictures.")
+@click.option("--modes", "chosen", default="1-6", show_default=True, help="Numbers and ranges, such as 1-4,7; or all.")
+@click.option(
+    "--scale", default="auto", show_default=True, help="Factor on the mode shapes: a number [m sqrt(kg)], or auto."
+)
+def modes(body: Path, output: Path, chosen: str, scale: str) -> None:
+    """Draw the mode shapes of BODY: a picture for each and a sheet with all of them.
+
+    Shapes are coloured by displacement; the grey ghost is the undeformed body.
+    """
+    from ffr_prep.body import load_body
+    from ffr_prep.report.mode_pictures import mode_pictures
+
+    if output.exists() and not output.is_dir():
+        raise InputError(f"--output {output} is a file; name a folder for the pictures")
+    loaded = load_body(body)
+    numbers = _mode_numbers(chosen, loaded.n)
+    factor = "auto" if scale == "auto" else number_of("--scale", scale)
+    for path in mode_pictures(loaded, output, numbers, factor):
+        click.echo(f"picture     {path}")
+
+
+cli.add_command(convert)
+cli.add_command(export_body)
+cli.add_command(import_body)
+cli.add_command(reduce_matrices_command)
+cli.add_command(reduce_structure_command)
+
+
+# ---- arguments ----------------------------------------------------------------------------------------------------
+
+
+def _mode_numbers(text: str, count: int) -> list[int]:
+    """Mode numbers from 1 of "1-4,7" or "all"; ranges may end beyond the last mode."""
+    if not re.fullmatch(r"all|\d+(-\d+)?(,\d+(-\d+)?)*", text):
+        raise InputError(f"--modes {text}: write numbers and ranges such as 1-4,7, or all")
+    if text == "all":
+        return list(range(1, count + 1))
+    ends = [(int(first), int(last or first)) for first, _, last in (part.partition("-") for part in text.split(","))]
+    numbers = [k for first, last in ends for k in range(first, min(last, max(count, first)) + 1)]
+    if not numbers or min(numbers) < 1 or max(numbers) > count:
+        raise InputError(f"--modes {text}: the body has {count} modes, numbered from 1")
+    return list(dict.fromkeys(numbers))
+
+
+# ---- the door -----------------------------------------------------------------------------------------------------
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Entry point: exit code 2 for bad input, 1 for a failed computation, no traceback for either."""
+    from ffr_prep.body import BodyError
+
+    try:
+        cli.main(arguments, prog_name="ffr-prep", standalone_mode=False)
+    except (InputError, BodyError) as error:
+        _leave(str(error), 2)
+    except ComputationError as error:
+        _leave(str(error), 1)
+    except click.UsageError as error:
+        where = error.ctx.command_path if error.ctx else "ffr-prep"
+        _leave(f"{error.format_message()} ({where} --help tells more)", 2)
+    except OSError as error:
+        _leave(f"{error.filename2 or error.filename or 'file'}: {error.strerror or error}; choose another place", 2)
+    except MemoryError:
+        _leave("not enough memory: make the mesh coarser", 1)
+    except (click.Abort, KeyboardInterrupt):
+        _leave("interrupted; nothing was written", 1)
+
+
+def _leave(message: str, code: int) -> None:
+    click.echo(f"ffr-prep: {message}", err=True)
+    sys.exit(code)

@@ -1,0 +1,44 @@
+"""The sub-command `convert` of ffr-prep: other reference conditions for a body."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import click
+
+from ffr_prep.cli.options import check_writable, reference_of
+from ffr_prep.cli.terminal import show
+
+_PATH = click.Path(path_type=Path)
+
+
+_EXAMPLE = """\b
+Example:
+  ffr-prep convert rod.ffr --reference simply-supported:big_eye,small_eye -o rod_pinned.ffr
+"""
+
+
+@click.command("convert", epilog=_EXAMPLE)
+@click.argument("body", type=_PATH)
+@click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
+@click.option("--reference", required=True, metavar="CONDITIONS", help="As in reduce, on the interfaces of BODY.")
+@click.option(
+    "--without-stiffening", is_flag=True, help="Leave out the geometric stiffness, where it cannot come along."
+)
+def convert(body: Path, output: Path, reference: str, without_stiffening: bool) -> None:
+    """Attach the frame of BODY in another way, without its mesh: to an interface, between two, or to the mean axis.
+
+    The motions that the body can make stay the same. What it has lost before is said, and not brought back.
+    """
+    from ffr_prep.body import load_body, save_body
+    from ffr_prep.reduction.conversion import with_reference
+    from ffr_prep.report.text import short_lines
+
+    conditions = reference_of(reference)
+    check_writable(output)
+    loaded = load_body(body)
+    converted = with_reference(replace(loaded, stiffening=None) if without_stiffening else loaded, conditions)
+    save_body(converted, output)
+    show(short_lines(converted))
+    click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")

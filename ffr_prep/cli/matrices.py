@@ -1,0 +1,149 @@
+"""The sub-command `reduce-matrices` of ffr-prep: bodies from the stiffness and mass of another program."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ffr_prep.cli.options import check_writable, interface_of, reference_of
+from ffr_prep.cli.reduction import band_of, draw_quality, reduction_of, reduction_options
+from ffr_prep.cli.solver import solver_of, solver_options
+from ffr_prep.cli.terminal import closing, show, terminal_steps, written
+from ffr_prep.common.errors import InputError
+
+if TYPE_CHECKING:
+    from ffr_prep.matrices.model import MatrixModel
+
+_PATH = click.Path(path_type=Path)
+_UNITS = ("m-kg-s", "mm-t-s", "mm-kg-s", "mm-kg-ms", "cm-g-s", "in-lbf-s", "ft-lbf-s")
+_SHOWN = 20
+NOTES = """\b
+Files: what other programs write, always of the free body without supports.
+  MODEL.npz                      everything in one file: points, dofs, K, M, groups
+  K.mtx M.mtx DOFS.csv           Matrix Market (or scipy's save_npz) and a line node,component,x,y,z for each row
+  STIF.mtx MASS.mtx MODEL.inp    Abaqus, *MATRIX OUTPUT, STIFFNESS, MASS; the nodes and node sets of the input file
+  MATRICES.op4 MODEL.bdf         Nastran, KGG and MGG; or MODEL.op2 with BGPDT and EQEXIN (pip install 'ffr[nastran]')
+
+\b
+Groups: nodes get names in the files, or here.
+  --group tip=17                 the node with number 17
+  --group rim=100-120,207        several nodes
+  --group root@0,0,0.1           the node at this point [m]
+
+\b
+Interfaces: as in `ffr-prep reduce`, on groups of nodes.
+  --interface tip                one node with three rotations is an interface as it is; several follow rigidly (RBE2)
+  --interface rim:mean           the mean motion of the nodes counts (RBE3)
+  --interface pin=rim@0,0,0      the interface "pin" on group "rim", its node at this point [m]
+
+Reference conditions and methods are those of `ffr-prep reduce`. Geometric stiffening is not available.
+"""
+
+
+@click.command("reduce-matrices", epilog=NOTES)
+@click.argument("files", type=_PATH, nargs=-1, required=True)
+@click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
+@click.option("--name", help="Name of the body; default: the name of the file.")
+@click.option("--units", type=click.Choice(_UNITS), help="Of the numbers in FILES; default: as declared, or m-kg-s.")
+@click.option("--group", "groups", multiple=True, metavar="GROUP", help="See below; may be repeated.")
+@click.option("--interface", "interfaces", multiple=True, metavar="INTERFACE", help="See below; may be repeated.")
+@click.option("--reference", default="mean-axis", show_default=True, metavar="CONDITIONS", help="As in reduce.")
+@reduction_options
+@solver_options
+@click.option("--surface", type=_PATH, help="Mesh of the same solid, for drawing; in the length unit of FILES.")
+def reduce_matrices_command(
+    files: tuple[Path, ...],
+    output: Path,
+    name: str | None,
+    units: str | None,
+    groups: tuple[str, ...],
+    interfaces: tuple[str, ...],
+    reference: str,
+    surface: Path | None,
+    **options: Any,
+) -> None:
+    """Reduce stiffness and mass matrices in FILES to a flexible body and write it to a file.
+
+    The matrices come from any finite-element program; everything in the body is in SI units.
+    """
+    from ffr_prep.matrices.readers import read_matrices
+    from ffr_prep.pipelines.matrices import reduce_matrices
+
+    regions = [interface_of(text) for text in interfaces]
+    conditions, reduction, band = reference_of(reference), reduction_of(options), band_of(options)
+    solver = solver_of(options)
+    check_writable(output)
+    steps = terminal_steps()
+    steps("read the matrices")
+    model = _named(read_matrices(files, units=units), groups)
+    model = model if surface is None else _drawn(model, surface)
+    steps.end()
+    show(_lines(model))
+    body = reduce_matrices(
+        model,
+        name=name or output.stem,
+        interfaces=regions,
+        reference=conditions,
+        reduction=reduction,
+        quality=band,
+        solver=solver,
+        progress=steps,
+        advance=steps.advance,
+    )
+    written(body, output, steps)
+    draw_quality(body, options)
+    closing(output, steps)
+
+
+def _lines(model: MatrixModel) -> Iterator[str]:
+    """Size, extent and groups of a model."""
+    low, high = model.points.min(axis=0), model.points.max(axis=0)
+    names = list(model.groups)
+    yield f"matrices    {model.source['format']}, {len(model.points)} nodes, {len(model.nodes)} degrees of freedom"
+    yield f"extent      ({', '.join(f'{x:.5g}' for x in high - low)}) m"
+    yield f"groups      {', '.join(names[:_SHOWN]) or 'none named'}{', ...' if len(names) > _SHOWN else ''}"
+    for note in model.notes:
+        yield f"note        {note}"
+
+
+def _named(model: MatrixModel, groups: Sequence[str]) -> MatrixModel:
+    """The model with groups NAME=12,15-20 and NAME@x,y,z."""
+    from ffr_prep.matrices.model import with_group, with_node
+
+    for text in groups:
+        if by_number := re.fullmatch(r"([^=@]+)=(\d+(?:-\d+)?(?:,\d+(?:-\d+)?)*)", text):
+            model = with_group(model, by_number[1], _numbers(by_number[2]))
+        elif by_place := re.fullmatch(r"([^=@]+)@([^,]+),([^,]+),([^,]+)", text):
+            model = with_node(model, by_place[1], _place(text, by_place.groups()[1:]))
+        else:
+            raise InputError(f"--group {text}: write NAME=12,15-20 or NAME@x,y,z (see --help)")
+    return model
+
+
+def _numbers(text: str) -> list[int]:
+    ends = [(int(first), int(last or first)) for first, _, last in (part.partition("-") for part in text.split(","))]
+    return [number for first, last in ends for number in range(first, last + 1)]
+
+
+def _place(text: str, words: Sequence[str]) -> list[float]:
+    try:
+        return [float(word) for word in words]
+    except ValueError:
+        raise InputError(f"--group {text}: a point has three coordinates x,y,z in metres") from None
+
+
+def _drawn(model: MatrixModel, surface: Path) -> MatrixModel:
+    """The model with the boundary of a mesh to draw."""
+    from ffr_prep.matrices.model import with_surface
+    from ffr_prep.mesh.mesh import UNITS, read_mesh, surface_triangles
+
+    length = model.source["units"].partition("-")[0]
+    if length not in UNITS:
+        raise InputError(f"--surface {surface}: meshes in {length} cannot be read; they may be in {', '.join(UNITS)}")
+    mesh = read_mesh(surface, unit=length)
+    points, triangles = surface_triangles(mesh)
+    return with_surface(model, mesh.points[points], triangles)

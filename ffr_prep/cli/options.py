@@ -1,0 +1,132 @@
+"""What the arguments of ffr-prep say: numbers, materials, interfaces, reference conditions, files to write.
+
+Heavy modules are imported where they are needed, so that help is immediate. Every function raises InputError, naming the
+option and what it may be.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ffr_prep.common.errors import InputError
+
+if TYPE_CHECKING:
+    from ffr_prep.mesh.mesh import Mesh
+    from ffr_prep.model.coupled import InterfaceRegion
+    from ffr_prep.model.material import Material
+    from ffr_prep.model.reference import ReferenceConditions
+
+_FAR = 10.0
+
+
+def numbers_of(settings: Sequence[str]) -> dict[str, float]:
+    for text in settings:
+        if "=" not in text:
+            raise InputError(f"--set {text}: write it as NAME=VALUE")
+    pairs = [text.partition("=") for text in settings]
+    return {name.strip(): number_of(f"--set {name}", value) for name, _, value in pairs}
+
+
+def number_of(what: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{what}: {text!r} is not a number") from None
+
+
+def material_of(texts: Sequence[str]) -> Material | Mapping[str, Material]:
+    """One material, or materials by group where a text is GROUP=MATERIAL."""
+    from ffr_prep.model.material import parse_material
+
+    groups = [re.fullmatch(r"(?!(?:E|nu|rho|name)=)([^=,]+)=(.+)", text) for text in texts]
+    if len(texts) == 1 and groups[0] is None:
+        return parse_material(texts[0])
+    wrong = [text for text, group in zip(texts, groups, strict=True) if group is None]
+    if wrong:
+        raise InputError(f"--material {wrong[0]}: with several materials, each needs its volume: VOLUME={wrong[0]}")
+    names = [group[1] for group in groups if group]
+    if len(set(names)) < len(names):
+        raise InputError(f"--material: a volume is given twice: {', '.join(names)}")
+    return {group[1]: parse_material(group[2]) for group in groups if group}
+
+
+def interface_of(text: str) -> InterfaceRegion:
+    """NAME[=REGION][:rigid|mean][@x,y,z]."""
+    from ffr_prep.model.coupled import InterfaceRegion
+
+    parts = re.fullmatch(r"([^=:@]+)(?:=([^:@]+))?(?::(\w+))?(?:@([^@]+))?", text)
+    if parts is None:
+        raise InputError(f"--interface {text}: write NAME, NAME:mean, NAME=SURFACE or NAME@x,y,z (see --help)")
+    name, region, kind, point = parts.groups()
+    return InterfaceRegion(name, region, kind or "rigid", None if point is None else _point(text, point))
+
+
+def _point(text: str, point: str) -> tuple[float, float, float]:
+    values = [number_of(f"--interface {text}", value) for value in point.split(",")]
+    if len(values) != 3:
+        raise InputError(f"--interface {text}: a point has three coordinates x,y,z in metres, not {len(values)}")
+    return values[0], values[1], values[2]
+
+
+def reference_of(text: str) -> ReferenceConditions:
+    from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
+
+    kind, _, names = text.partition(":")
+    interfaces = [name.strip() for name in names.split(",") if name.strip()]
+    if text == "mean-axis":
+        return MeanAxis()
+    if kind == "fixed" and len(interfaces) == 1:
+        return FixedTo(interfaces[0])
+    if kind == "simply-supported" and len(interfaces) == 2:
+        return SimplySupported(interfaces[0], interfaces[1])
+    if text.endswith(".toml"):
+        return _supports(Path(text))
+    raise InputError(
+        f"--reference {text}: write fixed:NAME, simply-supported:PIN,ROLLER, mean-axis or a FILE.toml (see --help)"
+    )
+
+
+def _supports(path: Path) -> ReferenceConditions:
+    """Prevented motions from a file: tables [[support]] with interface, motion and direction."""
+    from ffr_prep.model.reference import Support, Supports
+
+    try:
+        content = tomllib.loads(path.read_text())
+        entries = content.pop("support")
+        supports = tuple(Support(e.pop("interface"), e.pop("motion"), tuple(e.pop("direction"))) for e in entries)
+    except FileNotFoundError:
+        raise InputError(f"reference conditions {path} do not exist") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except (tomllib.TOMLDecodeError, KeyError, TypeError, AttributeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} is not a list of supports ({error!r}); `ffr-prep reduce --help` shows one") from None
+    unknown = [*content, *(key for entry in entries for key in entry)]
+    if unknown:
+        raise InputError(f"{path}: {unknown[0]!r} is not known; a support has interface, motion and direction")
+    return Supports(supports)
+
+
+def check_points(interfaces: Sequence[InterfaceRegion], mesh: Mesh) -> None:
+    """A point far away is most likely given in millimetres."""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    reach = _FAR * max(high - low)
+    for interface in interfaces:
+        if interface.point is not None and any((interface.point < low - reach) | (interface.point > high + reach)):
+            raise InputError(
+                f"interface {interface.name!r}: its point {interface.point} is far from the body, which lies between "
+                f"({', '.join(f'{x:.4g}' for x in low)}) and ({', '.join(f'{x:.4g}' for x in high)}) m; give it in metres"
+            )
+
+
+def check_writable(output: Path) -> None:
+    """Before the work, not after it."""
+    if output.is_dir():
+        raise InputError(f"--output {output} is a folder; name the body file to write, such as {output / 'rod.ffr'}")
+    output.parent.mkdir(parents=True, exist_ok=True)
+    if not os.access(output.parent, os.W_OK):
+        raise InputError(f"--output {output}: the folder {output.parent} cannot be written to")

@@ -1,0 +1,82 @@
+"""The sub-command `reduce-structure` of ffr-prep: bodies from frames of beams and plates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ffr_prep.cli.options import check_writable
+from ffr_prep.cli.solver import solver_of, solver_options
+from ffr_prep.cli.terminal import closing, show, terminal_steps, written
+
+if TYPE_CHECKING:
+    from ffr_prep.structures.frame import Frame
+
+_PATH = click.Path(path_type=Path)
+NOTES = """\b
+Example of a STRUCTURE:
+  reference = {kind = "fixed", interface = "left_foot"}
+  reduction = {method = "craig-bampton", modes = 10}
+  [geometry]
+  file = "portal.geo"               # curves are beams, surfaces are plates
+  [members.columns]                 # a group of curves
+  section = {shape = "i", h = 0.2, b = 0.1, web = 0.006, flange = 0.009}
+  material = "steel"
+  orientation = [1, 0, 0]           # in the plane of the web
+  [shells.roof]                     # a group of surfaces
+  thickness = 0.003
+  material = "steel"
+  [interfaces.left_foot]            # a group of points, curves or surfaces
+
+\b
+Without a file: [[polylines]] with member, corners and elements, [[panels]] with shell, four corners and elements = [n, m];
+[nodes] gives names to places, such as tip = [1, 0, 0]. Sections: rectangle (b, h), circle (d), tube (d, t), i (h, b, web,
+flange), general (A, Iy, Iz, J, ky, kz). References: fixed, simply-supported (pin, roller), mean-axis, supports.
+
+\b
+Solids tied to the frame, and other reductions:
+  ties = [["frame.tip", "eye.bore"]]
+  reduction = [{method = "craig-bampton", modes = 10}, {method = "krylov", moments = 2, match = [0, 120]}]
+  [solids.eye]                      # a mesh or geometry of solids
+  file = "eye.step"
+  material = "steel"
+  interfaces = {bore = {}, pin = {kind = "mean"}}
+"""
+
+
+@click.command("reduce-structure", epilog=NOTES)
+@click.argument("structure", type=_PATH)
+@click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
+@solver_options
+def reduce_structure_command(structure: Path, output: Path, **options: Any) -> None:
+    """Reduce the beams and plates that STRUCTURE describes, a TOML file, to a flexible body and write it to a file."""
+    from ffr_prep.pipelines.structure_file import load_structure, reduce_structure
+
+    solver = solver_of(options)
+    check_writable(output)
+    steps = terminal_steps()
+    loaded = load_structure(structure, steps)
+    steps.end()
+    show(_lines(loaded.frame))
+    body = reduce_structure(
+        loaded,
+        solver=solver,
+        progress=steps,
+        advance=steps.advance,
+        provenance={"source": {"file": structure.name}},
+    )
+    written(body, output, steps)
+    closing(output, steps)
+
+
+def _lines(frame: Frame) -> Iterator[str]:
+    """Size, extent and groups of a frame."""
+    kinds = {"beams": frame.elements, "triangles": frame.triangles, "quadrilaterals": frame.quadrilaterals}
+    elements = ", ".join(f"{len(nodes)} {kind}" for kind, nodes in kinds.items() if len(nodes))
+    yield f"frame       {elements}; {len(frame.points)} nodes, {6 * len(frame.points)} degrees of freedom"
+    extent = frame.points.max(axis=0) - frame.points.min(axis=0)
+    yield f"extent      ({', '.join(f'{x:.5g}' for x in extent)}) m"
+    yield f"groups      {', '.join(frame.node_groups) or 'none named'}"

@@ -1,0 +1,1 @@
+"""What both packages share: errors, units, progress."""

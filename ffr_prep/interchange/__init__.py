@@ -1,0 +1,1 @@
+"""Reduced bodies in the formats of other programs."""

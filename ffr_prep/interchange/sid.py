@@ -1,0 +1,339 @@
+"""Standard input data of flexible bodies (SID): write and read `.SID_FEM` files.
+
+Source: O. Wallrapp, "Standardization of flexible body modeling in multibody system codes, Part I: Definition of
+standard input data", Mechanics of Structures and Machines 22 (1994) 283-304. The equations of motion there are
+Me q'' + Ct a + Cr alpha + Ge(omega) q' + Oe Omega + Ke q = ..., with Omega the six products of the angular velocity.
+
+How the blocks follow from the integrals of FlexibleBody, and back (r: position, phi_j: mode j):
+
+    mdCM  r_dm; m1 = P_dm                               Ct      P_dm
+    J     tr(rr) I - rr; m1 = the same of rP + rP^T     Cr      axial(rP); m1(k, l) = axial(PP)[:, l, k]
+    Gr_l  -2 (rP_l^T - tr(rP_l) I)                      Ge_l    2 Cr.m1(:, l)
+    Oe    xx: rP_xx - tr(rP), xy: rP_xy + rP_yx; m1 the same of PP
+
+The geometric stiffness K per load stands beside them: in Ct.m1, Cr.m1 (the part symmetric in the modes) and Oe.m1 for
+what multiplies them, and, with the opposite sign, in phi.m1 and psi.m1 of the nodes for the forces and moments there.
+
+J.m1 holds the symmetric part of rP_dm, Cr the other; Oe.m1 holds the symmetric part of PP_dm, Cr.m1 the other.
+Everything else repeats them and is checked on reading.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import get_args
+from urllib.parse import quote, unquote
+
+import numpy as np
+
+from ffr_prep.body import FlexibleBody, Interface, axial
+from ffr_prep.common.errors import InputError
+from ffr_prep.interchange.common_format import (
+    IDENTITY_TOLERANCE,
+    LUMPING_LIMIT,
+    MANY_MOMENTS,
+    Bounds,
+    Content,
+    body_from,
+    bounds,
+    from_inertia,
+    from_parts,
+    hold,
+    mended_trace,
+    moments,
+    nodal_masses,
+    nodes,
+    read_lines,
+    real,
+    relative,
+    skew,
+    write_lines,
+)
+from ffr_prep.interchange.sid_blocks import Section, Taylor, integer, only, part, sections, taylor, value
+from ffr_prep.interchange.sid_identities import (
+    OE_ORDER,
+    Layout,
+    centrifugal,
+    check_repeated,
+    laid_out,
+    lost_blocks,
+    lumped_mass,
+    of_accelerations,
+    of_mass,
+    six,
+    tensor,
+)
+from ffr_prep.interchange.sid_nodes import read_nodes
+
+Array = np.ndarray
+BLOCKS = ("mdCM", "J", "Ct", "Cr", "Me", "Gr", "Ge", "Oe", "ksigma", "Ke", "De")
+NAMES = "interfaces="
+_ENOUGH_NODES = 400
+# The products of the angular velocity that the columns of Oe belong to, among the loads of `FlexibleBody.stiffening`.
+PRODUCTS = [6, 7, 8, 9, 11, 10]
+
+
+def write_sid(body: FlexibleBody, path: str | Path, *, layout: Layout = "mode-major", surface: bool = False) -> Path:
+    """Write the body as standard input data, SI units, 17 significant digits.
+
+    layout  : of the matrices Gr (3, 3n) and Ge (n, 3n), which programs do not agree on: column 3(l-1)+a for mode l and
+              axis a ("mode-major") or (a-1)n+l ("axis-major"); line 1 of the file says which
+    surface : also write the points of the surface as nodes, after the interfaces. The format has no triangles, no
+              kinds of interfaces and no provenance
+
+    Source: Wallrapp 1994. Raises InputError for an unknown layout, a body without nodes, or a missing surface.
+    """
+    if layout not in get_args(Layout):
+        raise InputError(f"layout {layout!r} is not known; take mode-major or axis-major")
+    return write_lines(Path(path), list(_lines(body, layout, nodes(body, surface=surface))))
+
+
+def blocks(body: FlexibleBody, layout: Layout) -> dict[str, tuple[Array, Array | None]]:
+    """The Taylor blocks by name: m0 (rows, columns) and, of order 1, m1 (rows, n, columns)."""
+    n = body.n
+    K = np.zeros((12, n, n)) if body.stiffening is None else body.stiffening[:12]
+    first = np.einsum("klj->jkl", body.rP_dm + body.rP_dm.transpose(1, 0, 2))
+    J1 = np.trace(first, axis1=1, axis2=2)[:, None, None] * np.eye(3) - first
+    Cr1 = axial(body.PP_dm).transpose(2, 1, 0)
+    return {
+        "mdCM": (body.r_dm[:, None], body.P_dm[:, :, None]),
+        "J": (six(body.inertia)[:, None], six(J1).T[:, :, None]),
+        "Ct": (body.P_dm.T, None if body.stiffening is None else K[:3].transpose(1, 2, 0)),
+        "Cr": (axial(body.rP_dm).T, Cr1 + K[3:6].transpose(1, 2, 0)),
+        "Me": (np.eye(n), None),
+        "Gr": (laid_out(-2 * body.I8.transpose(1, 0, 2), layout), None),
+        "Ge": (laid_out(2 * Cr1, layout), None),
+        "Oe": (centrifugal(body.rP_dm).T, (centrifugal(body.PP_dm) + K[PRODUCTS]).transpose(1, 2, 0)),
+        "ksigma": (np.zeros((n, 1)), None),
+        "Ke": (np.diag(body.omega2), None),
+        "De": (np.zeros((n, n)), None),
+    }
+
+
+# ---- text ---------------------------------------------------------------------------------------------------------
+
+
+def label(name: str) -> str:
+    """A name without blanks and without the words at which simple readers of the format would stop."""
+    plain = quote(name, safe="+-")
+    for word in ("frame", "refmod"):
+        plain = plain.replace(word, f"%{ord(word[0]):02X}{word[1:]}")
+    return plain
+
+
+def _lines(body: FlexibleBody, layout: Layout, at: tuple[Interface, ...]) -> Iterator[str]:
+    named = ",".join(label(i.name) for i in body.interfaces)
+    yield f"{len(at):5d}{body.n:5d}   :No. nodes, No. modes: ffr-prep, SI, Gr,Ge={layout}, {NAMES}{named}"
+    yield "part "
+    yield f"  new modal = {label(body.name)}"
+    yield "    refmod "
+    yield _pair(6, "mass ", _number(body.mass))
+    yield _pair(6, "nelastq ", f"{body.n}")
+    for k, frequency in enumerate(body.frequencies, start=1):
+        yield _pair(6, f"ielastq ({k:4d}) ", f"Eigen Mode {k:5d} : {frequency:.9g} Hz")
+    yield "    end refmod "
+    yield "    frame "
+    for k, node in enumerate(at):
+        known = None if body.stiffening is None or k >= len(body.interfaces) else body.stiffening
+        yield from _node(k + 1, node, body.n, None if known is None else known[12 + 6 * k : 18 + 6 * k])
+    yield "    end frame "
+    for name, (m0, m1) in blocks(body, layout).items():
+        yield from _block(4, name, m0, m1, body.n)
+    yield "  end modal "
+    yield "end part "
+
+
+def _node(number: int, node: Interface, n: int, K: Array | None) -> Iterator[str]:
+    """A node, with the geometric stiffness (6, n, n) of unit forces and moments on it."""
+    by_force, by_moment = (None, None) if K is None else (-K[:3].transpose(0, 2, 1), -K[3:].transpose(0, 2, 1))
+    yield f"      new node = {number}"
+    yield _pair(8, "rframe ", "body ref")
+    yield from _block(8, "origin", node.position[:, None], node.phi_t[:, :, None], n)
+    yield from _block(8, "phi", node.phi_t, by_force, n)
+    yield from _block(8, "psi", node.phi_r, by_moment, n)
+    yield from _block(8, "AP", np.eye(3), skew(node.phi_r).transpose(0, 2, 1), n)
+    yield "      end node "
+
+
+def _block(indent: int, name: str, m0: Array, m1: Array | None, n: int) -> Iterator[str]:
+    """A Taylor block. Structure 3 (general) or 0 (zero) only: simple readers know no other."""
+    anything = m0.any() or (m1 is not None and m1.any())
+    head = {
+        "order": int(m1 is not None),
+        "nrow": m0.shape[0],
+        "ncol": m0.shape[1],
+        "nq": n,
+        "nqn": 0,
+        "structure": 3 if anything else 0,
+    }
+    yield f"{'':{indent}}{name} "
+    for key, number in head.items():
+        yield _pair(indent + 2, f"{key} ", f"{number}")
+    for i, j in np.argwhere(m0):
+        yield _pair(indent + 2, f"m0({i + 1:4d},{j + 1:4d}) ", _number(m0[i, j]))
+    if m1 is not None:
+        for i, q, j in np.argwhere(m1):
+            yield _pair(indent + 2, f"m1({i + 1:4d},{q + 1:4d},{j + 1:4d}) ", _number(m1[i, q, j]))
+    yield f"{'':{indent}}end {name} "
+
+
+def _pair(indent: int, key: str, value: str) -> str:
+    return f"{'':{indent}}{key:<{44 - indent}}= {value}"
+
+
+def _number(value: float) -> str:
+    return f"{value:23.16E}".replace("E", "D")
+
+
+# ---- reading ------------------------------------------------------------------------------------------------------
+
+
+def read_sid(path: str | Path) -> FlexibleBody:
+    """The body of a standard input data file; every node becomes an interface of the kind "node".
+
+    The numbers are taken to be in SI units. The layouts of Gr and Ge are those that satisfy Gr_l + Gr_l^T =
+    2 dJ/dq_l and Ge = 2 Cr.m1. Where Me is not the unit matrix or Ke not diagonal, the modes are combined. In Oe.m1
+    geometric stiffness and mass stand as a sum: the part of the mass is that of masses at the nodes which fit all other
+    integrals best, and the sum stays exact. Damping is left out. provenance: "layout", "notes" (what was changed),
+    "warnings" (what was lost or does not agree).
+
+    Source: Wallrapp 1994. Raises InputError for a file that does not exist, is damaged, truncated or foreign, or
+    whose blocks contradict each other, naming line, block or identity, and by how much.
+    """
+    path = Path(path)
+    lines = read_lines(path)
+    try:
+        return body_from(_content(lines, path))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _content(lines: list[str], path: Path) -> Content:
+    count, n, names = _first_line(lines)
+    modal = part(part(sections(lines, 1), "part"), "modal")
+    only(modal, ("refmod", "frame", *BLOCKS))
+    mass = _mass(part(modal, "refmod"), n)
+    found = {name: taylor(part(modal, name), *size, n) for name, size in _sizes(n).items()}
+    at = read_nodes(part(modal, "frame"), count, n, names)
+    r_dm, P_dm = found["mdCM"].m0[:, 0], found["mdCM"].m1[:, :, 0]
+    rr_dm = from_inertia(tensor(found["J"].m0[:, 0]))
+    limit = bounds(mass, rr_dm, found["Me"].m0)
+    rP_dm = from_parts(from_inertia(tensor(found["J"].m1[:, :, 0])), found["Cr"].m0.T)
+    layout = check_repeated(P_dm, rP_dm, found, limit)
+    K = np.concatenate([of_accelerations(found), np.zeros((6, n, n)), at.stiffening])
+    content = Content(
+        name=unquote(modal.label) or path.stem,
+        mass=mass,
+        r_dm=r_dm,
+        rr_dm=rr_dm,
+        P_dm=P_dm,
+        rP_dm=rP_dm,
+        PP_dm=_second_moments(found, limit),
+        M=found["Me"].m0,
+        K=found["Ke"].m0,
+        interfaces=at.interfaces,
+        facts={
+            "source": {"file": path.name, "format": "SID"},
+            "layout": layout,
+            "notes": ["every node became an interface of the kind 'node'", "the format has no surface to draw"],
+            "warnings": [*at.lost, *lost_blocks(found), *lumped_mass(rP_dm, found, layout, limit)],
+        },
+    )
+    return _trace_of_mass(content, K, found, limit)
+
+
+def _sizes(n: int) -> dict[str, tuple[int, int]]:
+    square, axes, wide = (n, n), (n, 3), 3 * n
+    sizes = ((3, 1), (6, 1), axes, axes, square, (3, wide), (n, wide), (n, 6), (n, 1), square, square)
+    return dict(zip(BLOCKS, sizes, strict=True))
+
+
+def _first_line(lines: list[str]) -> tuple[int, int, list[str]]:
+    """Numbers of nodes and modes, and the names of the nodes where this program wrote them."""
+    numbers = re.match(r"\s*([0-9]{1,7})\s+([0-9]{1,5})(?![0-9])(.*)", lines[0] if lines else "")
+    if numbers is None:
+        raise InputError("line 1 must begin with the numbers of nodes and modes: this is not a SID file, or damaged")
+    count, n, comment = int(numbers[1]), int(numbers[2]), numbers[3]
+    named = comment.partition(NAMES)[2].split(",") if NAMES in comment else []
+    return count, n, [unquote(name.strip()) for name in named if name.strip()]
+
+
+def _mass(refmod: Section, n: int) -> float:
+    if integer(refmod, "nelastq") != n:
+        raise InputError(f"{refmod} has nelastq = {integer(refmod, 'nelastq')}, but line 1 announces {n} modes")
+    return real(value(refmod, "mass"), f"{refmod}: mass")
+
+
+# ---- what repeats, what contradicts, what is lost -----------------------------------------------------------------
+
+
+def _second_moments(found: Mapping[str, Taylor], limit: Bounds) -> Array:
+    """(3, 3, n, n) PP_dm from Oe.m1, Me and Cr.m1. Raises InputError where Oe.m1 is not symmetric in the modes."""
+    Oe1, M = found["Oe"].m1, found["Me"].m0
+    hold("Oe.m1(k,l,c) = Oe.m1(l,k,c)", Oe1 - Oe1.transpose(1, 0, 2), limit.third[:, :, None])
+    both = np.zeros((3, 3, *M.shape))
+    for column, (k, l) in enumerate(OE_ORDER):  # noqa: E741
+        both[k, l] = both[l, k] = 2 * (Oe1[:, :, column] + M) if k == l else Oe1[:, :, column]
+    return from_parts(both, of_mass(found["Cr"].m1).transpose(2, 1, 0))
+
+
+def _trace_of_mass(content: Content, K: Array, found: Mapping[str, Taylor], limit: Bounds) -> Content:
+    """The content with a PP_dm whose trace is Me, as the sum of Oe.m1 over xx, yy, zz = -2 Me demands, and with the
+    geometric stiffness K (12 + 6 N, n, n) where the file has any, the part in Oe.m1 included.
+
+    Raises InputError where neither geometric stiffness nor lumping explains what is lacking.
+    """
+    stiffened = relative(K, limit.third) > IDENTITY_TOLERANCE
+    PP_dm, off = mended_trace(content.PP_dm, content.M)
+    if off <= IDENTITY_TOLERANCE:
+        return replace(content, PP_dm=PP_dm, stiffening=K if stiffened else None)
+    identity = f"the identity sum of Oe.m1 over xx, yy, zz = -2 Me fails by {off:.1e} (relative)"
+    if stiffened:
+        PP_dm, misfit = _at_nodes(content)
+        K[PRODUCTS] = found["Oe"].m1.transpose(2, 0, 1) - centrifugal(PP_dm)
+        warning = (
+            f"geometric stiffness in Oe.m1 ({identity}): its sum with mass is kept, the part of the mass is that of nodal "
+            f"masses, off by {misfit:.1e}"
+        )
+    elif off > LUMPING_LIMIT:
+        raise InputError(
+            f"{identity}: too much for a lumped mass; Oe is damaged, of order 0, or holds geometric stiffness alone"
+        )
+    else:
+        warning = f"lumped mass: {identity}; each axis of PP_dm took a third"
+    warnings = [*content.facts["warnings"], warning]
+    facts = {**content.facts, "warnings": warnings}
+    return replace(content, PP_dm=PP_dm, facts=facts, stiffening=K if stiffened else None)
+
+
+def _at_nodes(content: Content) -> tuple[Array, float]:
+    """PP_dm of the masses at the nodes that come closest to all other integrals, and their relative misfit.
+
+    However large the misfit, it spoils terms of second order in the elastic coordinates of J alone.
+    """
+    n, count = len(content.M), len(content.interfaces)
+    at = content.interfaces[:: 1 + max(count // _ENOUGH_NODES, 9 * n * n * count // MANY_MOMENTS)]
+    positions = np.array([i.position for i in at]).reshape(-1, 3)
+    shapes = np.array([i.phi_t for i in at]).reshape(-1, 3, n)
+    P, rP, PP = moments(positions, shapes)
+    rr = np.einsum("pk,pl->klp", positions, positions)
+    limit = bounds(content.mass, content.rr_dm, content.M)
+    arm = np.sqrt(np.trace(content.rr_dm) / content.mass)
+    known = (
+        (np.ones((1, len(at))), np.array([content.mass]), content.mass),
+        (positions.T, content.r_dm, content.mass * arm),
+        (rr, content.rr_dm, content.mass * arm**2),
+        (P, content.P_dm, limit.first[:, None]),
+        (rP, content.rP_dm, limit.second[:, None]),
+        (np.einsum("kkijp->ijp", PP), content.M, limit.third[:, :, None]),
+        (axial(PP), axial(content.PP_dm), limit.third[:, :, None]),
+    )
+    rows = np.vstack([(one / scale).reshape(np.size(all_), len(at)) for one, all_, scale in known])
+    target = np.concatenate([(sum_ / np.reshape(scale, np.shape(scale)[:-1])).ravel() for _, sum_, scale in known])
+    masses, misfit = nodal_masses(rows, target)
+    lumped = PP @ masses
+    mixed = from_parts(lumped + lumped.swapaxes(0, 1), axial(content.PP_dm))
+    return mended_trace(mixed, content.M)[0], misfit

@@ -1,0 +1,1 @@
+"""Models of which only stiffness and mass matrices of another program are known."""

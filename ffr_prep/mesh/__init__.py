@@ -1,0 +1,1 @@
+"""Meshes of solids: read, made by gmsh, checked, seen from outside."""

@@ -1,0 +1,81 @@
+"""The sides of volume elements: which are shared, which are outside, which belong to a named surface.
+
+Blocks are pairs (kind, nodes (E, k)) as in `elements`; element numbers count through them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from ffr_prep.mesh.cells import KINDS, face_corners
+
+Array = np.ndarray
+Blocks = Sequence[tuple[str, Array]]
+
+
+def outer_faces(blocks: Blocks) -> tuple[Array, ...]:
+    """The faces that only one element has, one array (F, k) per face size, outward."""
+    faces, _, face = _numbered(blocks, [])
+    return _chosen(faces, np.bincount(face)[face] == 1)
+
+
+def whole_faces(blocks: Blocks, corners: Sequence[Array]) -> tuple[Array, ...]:
+    """The faces of the elements that have these corners (F, 3) or (F, 4), each once; corners of no face are left out.
+
+    One array (F, k) per face size, outward where the face is outside.
+    """
+    faces, wanted, face = _numbered(blocks, corners)
+    _, first = np.unique(face, return_index=True)
+    keep = np.zeros(face.size, bool)
+    keep[first] = np.isin(face[first], wanted)
+    return _chosen(faces, keep)
+
+
+def joined_by_faces(blocks: Blocks) -> Array:
+    """(E,) number of the part that each element belongs to, parts being joined by whole faces."""
+    _, _, face = _numbered(blocks, [])
+    per_element = np.concatenate([np.full(len(nodes), len(KINDS[kind].faces)) for kind, nodes in blocks])
+    return _parts(np.repeat(np.arange(per_element.size), per_element), face)
+
+
+def joined_by_nodes(blocks: Blocks) -> Array:
+    """(E,) number of the part that each element belongs to, parts being joined by at least one node."""
+    sizes = np.concatenate([np.full(len(nodes), nodes.shape[1]) for _, nodes in blocks])
+    return _parts(np.repeat(np.arange(sizes.size), sizes), np.concatenate([nodes.ravel() for _, nodes in blocks]))
+
+
+def _parts(elements: Array, shared: Array) -> Array:
+    """(E,) connected components of elements through what they share."""
+    count = int(elements.max()) + 1
+    size = count + int(shared.max()) + 1
+    bonds = sp.coo_array((np.ones(elements.size, np.int8), (elements, count + shared)), shape=(size, size))
+    _, part = connected_components(bonds.tocsr(), directed=False)
+    return np.unique(part[:count], return_inverse=True)[1].ravel()
+
+
+def _numbered(blocks: Blocks, corners: Sequence[Array]) -> tuple[tuple[Array, ...], Array, Array]:
+    """The sides by block, the face number of the given corners, and the face number of every side."""
+    faces = tuple(nodes[:, KINDS[kind].faces].reshape(-1, KINDS[kind].faces.shape[1]) for kind, nodes in blocks)
+    of_sides = [_keys(side[:, : face_corners(side.shape[1])]) for side in faces]
+    keys = np.concatenate([*of_sides, *map(_keys, corners)])
+    _, number = np.unique(keys, axis=0, return_inverse=True)
+    count = sum(map(len, faces))
+    return faces, number.ravel()[count:], number.ravel()[:count]
+
+
+def _keys(corners: Array) -> Array:
+    """(F, 4) corners in ascending order, so that a face is the same from both sides; triangles padded by -1."""
+    padded = np.full((len(corners), 4), -1, dtype=np.int64)
+    padded[:, : corners.shape[1]] = corners
+    return np.sort(padded, axis=1)
+
+
+def _chosen(faces: Sequence[Array], keep: Array) -> tuple[Array, ...]:
+    """The sides that are kept, one array per face size."""
+    kept = [of[here] for of, here in zip(faces, np.split(keep, np.cumsum([len(f) for f in faces])[:-1]), strict=True)]
+    sizes = dict.fromkeys(part.shape[1] for part in kept if len(part))
+    return tuple(np.concatenate([part for part in kept if part.shape[1] == size]) for size in sizes)

@@ -1,0 +1,384 @@
+"""Meshes: volume elements with named regions, read from a file, checked, seen from outside.
+
+Everything is in metres: the unit of a file is converted once, on reading.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ffr_prep.body import content_hash
+from ffr_prep.common.errors import InputError
+from ffr_prep.common.progress import Stages, no_stages
+from ffr_prep.mesh.abaqus import from_abaqus
+from ffr_prep.mesh.boundary import joined_by_faces, joined_by_nodes, outer_faces, whole_faces
+from ffr_prep.mesh.cells import FACE_TRIANGLES, KINDS, jacobian_determinants
+from ffr_prep.mesh.gmsh_files import BY_GMSH, GEOMETRY, IGES, WITH_UNIT, declared_unit, from_gmsh
+from ffr_prep.mesh.source import Source
+
+Array = np.ndarray
+
+UNITS: Mapping[str, float] = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+
+_CHUNK = 4096
+_DEGENERATE = 1e-10
+_COINCIDENT = 1e-9
+_DOUBTFUL_LENGTH = 20.0
+_SHOWN = 20
+_SHOWN_PARTS = 5
+
+
+@dataclass(frozen=True)
+class Block:
+    """Volume elements of one kind: "tet4", "tet10", "hex8", "hex20" or "hex27".
+
+    nodes : (E, k) indices into Mesh.points, in the node order of meshio (VTK).
+    """
+
+    kind: str
+    nodes: Array
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A volume mesh with named regions; frozen, SI units.
+
+    points        : (N, 3) [m]
+    blocks        : volume elements; element numbers count through the blocks in order
+    volume_groups : name -> (m,) element numbers
+    face_groups   : name -> tuple of (F, k) face connectivities, k = 3, 6 (triangles), 4, 8, 9 (quadrilaterals)
+    node_groups   : name -> (m,) node indices
+    notes         : what was left out or changed on reading, in words
+    """
+
+    points: Array
+    blocks: tuple[Block, ...]
+    volume_groups: Mapping[str, Array]
+    face_groups: Mapping[str, tuple[Array, ...]]
+    node_groups: Mapping[str, Array]
+    notes: tuple[str, ...] = ()
+
+
+# ---- reading ------------------------------------------------------------------------------------------------------
+
+
+def read_mesh(
+    path: str | Path,
+    *,
+    unit: str | None = None,
+    size: float | None = None,
+    numbers: Mapping[str, float] | None = None,
+    order: int = 2,
+    progress: Stages = no_stages,
+) -> Mesh:
+    """A mesh from a file, in metres; geometry (.geo, .step, .iges, .brep) is meshed by gmsh first.
+
+    unit     : of the numbers in the file, "m", "cm", "mm" or "in"; without it the unit that a STEP file declares,
+               millimetres for IGES, which is converted to them, and metres for every other file
+    size     : largest element edge when geometry is meshed, in the unit of the file
+    numbers  : parameters of a .geo script to change, by name
+    order    : 1 or 2, of the elements when geometry is meshed; second-order elements follow curved surfaces
+    progress : called with the name of the stage as it begins
+
+    A .geo file is a program and may run others: open only what you trust. Faces and volumes of CAD files without
+    groups are named surface_1, volume_1, ... and by the names in the file.
+
+    Raises InputError for a file or an argument that cannot be used, ComputationError when meshing fails.
+    """
+    path, numbers = Path(path), dict(numbers or {})
+    check_request(path, unit, size, numbers, order)
+    progress("read the mesh")
+    source, file_unit = _read(path, unit, size, numbers, order)
+    if not source.blocks:
+        raise InputError(f"{path} has no volume elements; only solids can be reduced, not surfaces or beams")
+    mesh = _in_metres(source, UNITS[file_unit])
+    return replace(mesh, notes=(*mesh.notes, *_doubtful_unit(mesh, path, unit)))
+
+
+def check_request(path: Path, unit: str | None, size: float | None, numbers: Mapping[str, float], order: int) -> None:
+    """Raises InputError for a unit, size, parameter, order or file that cannot be used."""
+    if unit is not None and unit not in UNITS:
+        raise InputError(f"unit {unit!r} is not known; the units are {', '.join(UNITS)}")
+    if size is not None and not 0 < size < np.inf:
+        raise InputError(f"element size {size} cannot be used; it must be positive")
+    if order not in (1, 2):
+        raise InputError(f"element order {order} cannot be used; it must be 1 or 2")
+    if not path.is_file():
+        raise InputError(f"mesh file {path} {'is a folder' if path.is_dir() else 'does not exist'}")
+    if size is not None and path.suffix.lower() not in GEOMETRY:
+        raise InputError(f"{path} is meshed already, so an element size has no effect; leave it out")
+    if path.suffix.lower() in IGES and unit not in (None, "mm"):
+        raise InputError(f"{path} declares its unit and is converted to millimetres; leave out the unit {unit!r}")
+    if path.suffix.lower() == ".geo" and path.read_bytes().rpartition(b"\n")[2].strip():
+        raise InputError(f"the last line of {path} does not end with a line break, so gmsh would ignore it: add one")
+    if numbers:
+        _check_parameters(path, numbers)
+
+
+def _check_parameters(path: Path, numbers: Mapping[str, float]) -> None:
+    """Gmsh ignores a parameter that its script does not have."""
+    if path.suffix.lower() != ".geo":
+        raise InputError(f"{path} has no parameters to set ({', '.join(numbers)}); only .geo scripts have")
+    script = re.sub(r"//.*", "", path.read_text(errors="replace"))
+    if re.search(r"^\s*Include\b", script, re.MULTILINE):
+        return  # the parameter may be in the other file
+    declared = re.findall(r"DefineConstant\s*\[(.*?)\]\s*;", script, re.DOTALL)
+    known = dict.fromkeys(re.findall(r"(\w+)\s*=", "".join(declared)))
+    for name in numbers:
+        if not re.search(rf"\b{re.escape(name)}\b", script):
+            raise InputError(f"{path} has no parameter {name!r}; {choice(name, known)}")
+
+
+def _read(
+    path: Path, unit: str | None, size: float | None, numbers: Mapping[str, float], order: int
+) -> tuple[Source, str]:
+    """The mesh as in the file, and the unit of its numbers."""
+    suffix = path.suffix.lower()
+    if suffix == ".inp":
+        return from_abaqus(path), unit or "m"
+    if suffix not in BY_GMSH:
+        from ffr_prep.mesh.meshio_files import from_meshio  # here, because meshio is slow to load
+
+        return from_meshio(path), unit or "m"
+    declared = declared_unit(path) if suffix in WITH_UNIT else "m"
+    return from_gmsh(path, unit=declared, size=size, numbers=numbers, order=order), unit or declared
+
+
+def _in_metres(source: Source, scale: float) -> Mesh:
+    """The mesh of a source: without the nodes that no element uses, its faces completed from the volume elements."""
+    used = np.unique(np.concatenate([nodes.ravel() for _, nodes in source.blocks]))
+    new = np.full(len(source.points), -1)
+    new[used] = np.arange(used.size)
+    blocks = [(kind, new[nodes]) for kind, nodes in source.blocks]
+    faces = {name: whole_faces(blocks, [new[corners] for corners in parts]) for name, parts in source.faces.items()}
+    nodes = {name: np.unique(new[members][new[members] >= 0]) for name, members in source.nodes.items()}
+    return Mesh(
+        points=source.points[used] * scale,
+        blocks=tuple(Block(kind, nodes) for kind, nodes in blocks),
+        volume_groups=dict(source.volumes),
+        face_groups={name: parts for name, parts in faces.items() if parts},
+        node_groups={name: members for name, members in nodes.items() if members.size},
+        notes=(*source.notes, *_left_out(len(source.points) - used.size, faces, nodes)),
+    )
+
+
+def _left_out(unused: int, faces: Mapping[str, tuple[Array, ...]], nodes: Mapping[str, Array]) -> list[str]:
+    lost = [name for name, parts in faces.items() if not parts] + [name for name, of in nodes.items() if not of.size]
+    notes = [f"{unused} nodes that belong to no volume element are left out"] if unused else []
+    return notes + [f"group {name!r} is left out: nothing of it belongs to a volume element" for name in lost]
+
+
+def _doubtful_unit(mesh: Mesh, path: Path, unit: str | None) -> list[str]:
+    length = float(np.ptp(mesh.points, axis=0).max())
+    if unit is not None or path.suffix.lower() in WITH_UNIT or length < _DOUBTFUL_LENGTH:
+        return []
+    return [f"the mesh is {length:.4g} m long, read in metres as no unit was given; are its numbers millimetres?"]
+
+
+# ---- groups -------------------------------------------------------------------------------------------------------
+
+
+def face_group(mesh: Mesh, name: str) -> tuple[Array, ...]:
+    """The faces of a group, arrays (F, k); InputError lists the face groups there are."""
+    if name not in mesh.face_groups:
+        raise InputError(f"the mesh has no face group {name!r}; {choice(name, mesh.face_groups)}")
+    return mesh.face_groups[name]
+
+
+def region_nodes(mesh: Mesh, name: str) -> Array:
+    """(m,) nodes, ascending, of a face group or else a node group; InputError lists the groups there are."""
+    if name in mesh.face_groups:
+        return np.unique(np.concatenate([faces.ravel() for faces in mesh.face_groups[name]]))
+    if name in mesh.node_groups:
+        return np.unique(mesh.node_groups[name])
+    known = dict.fromkeys([*mesh.face_groups, *mesh.node_groups])
+    raise InputError(f"the mesh has no group of faces or nodes {name!r}; {choice(name, known)}")
+
+
+def choice(name: str, known: Mapping[str, object]) -> str:
+    """Names to choose from, the near ones first."""
+    near = get_close_matches(name, known, n=3, cutoff=0.5)
+    shown = [*near, *(other for other in known if other not in near)]
+    more = f" and {len(shown) - _SHOWN} more" if len(shown) > _SHOWN else ""
+    names = ", ".join(repr(one) for one in shown[:_SHOWN]) + more
+    return (f"did you mean {near[0]!r}? There" if near else "there") + f" are: {names or 'none'}"
+
+
+# ---- outside ------------------------------------------------------------------------------------------------------
+
+
+def boundary_faces(mesh: Mesh) -> tuple[Array, ...]:
+    """The outer faces, one array (F, k) per face size, nodes counter-clockwise seen from outside."""
+    return outer_faces(_pairs(mesh))
+
+
+def surface_triangles(mesh: Mesh) -> tuple[Array, Array]:
+    """The boundary as triangles: (P,) its points as indices into the mesh, (T, 3) triangles as indices into those.
+
+    Faces of second order are several triangles between their nodes.
+    """
+    parts = [faces[:, FACE_TRIANGLES[faces.shape[1]]].reshape(-1, 3) for faces in boundary_faces(mesh)]
+    points, triangles = np.unique(np.concatenate(parts), return_inverse=True)
+    return points, triangles.reshape(-1, 3)
+
+
+def _pairs(mesh: Mesh) -> list[tuple[str, Array]]:
+    return [(block.kind, block.nodes) for block in mesh.blocks]
+
+
+# ---- identity -----------------------------------------------------------------------------------------------------
+
+
+def mesh_hash(mesh: Mesh) -> str:
+    """A short hash of points, elements and groups."""
+    parts = [mesh.points]
+    for kind, nodes in _pairs(mesh):
+        parts += [_bytes(kind), np.asarray(nodes, np.int64)]
+    named: dict[str, tuple[Array, ...]] = {f"volume {name}": (of,) for name, of in mesh.volume_groups.items()}
+    named |= {f"face {name}": of for name, of in mesh.face_groups.items()}
+    named |= {f"node {name}": (of,) for name, of in mesh.node_groups.items()}
+    for name in sorted(named):
+        parts += [_bytes(name), *(np.asarray(of, np.int64) for of in named[name])]
+    return content_hash(*parts)
+
+
+def _bytes(text: str) -> Array:
+    return np.frombuffer(text.encode(), np.uint8)
+
+
+# ---- checks -------------------------------------------------------------------------------------------------------
+
+
+def check_mesh(mesh: Mesh) -> None:
+    """Raises InputError for a mesh that no computation should start from.
+
+    Guarded: no elements, indices and coordinates that are not valid, nodes that no element uses, groups that are empty,
+    coincident nodes, elements that are repeated, degenerate or inverted, and parts that are not connected or hang
+    together by nodes or edges only.
+    """
+    _check_numbers(mesh)
+    _check_groups(mesh)
+    _check_repeated(mesh)
+    _check_jacobians(mesh)
+    _check_coincident(mesh)
+    _check_connected(mesh)
+
+
+def _check_numbers(mesh: Mesh) -> None:
+    if not sum(len(block.nodes) for block in mesh.blocks):
+        raise InputError("the mesh has no volume elements; only solids can be reduced, not surfaces or beams")
+    for kind, nodes in _pairs(mesh):
+        if kind not in KINDS or nodes.shape[1:] != (KINDS[kind].size,):
+            raise InputError(f"a block of kind {kind!r} has nodes of shape {nodes.shape}; kinds are {', '.join(KINDS)}")
+    wrong = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
+    if wrong.size:
+        raise InputError(f"node {wrong[0]} has the coordinates {mesh.points[wrong[0]]}; they must be finite numbers")
+    used = np.unique(np.concatenate([block.nodes.ravel() for block in mesh.blocks]))
+    if used[0] < 0 or used[-1] >= len(mesh.points):
+        raise InputError(f"elements refer to nodes {used[0]} to {used[-1]}, but there are {len(mesh.points)} nodes")
+    unused = np.setdiff1d(np.arange(len(mesh.points)), used)
+    if unused.size:
+        raise InputError(f"{unused.size} nodes belong to no element, the first being node {unused[0]}; remove them")
+
+
+def _check_groups(mesh: Mesh) -> None:
+    sizes = {f"volume group {name!r}": len(of) for name, of in mesh.volume_groups.items()}
+    sizes |= {f"face group {name!r}": sum(map(len, of)) for name, of in mesh.face_groups.items()}
+    sizes |= {f"node group {name!r}": len(of) for name, of in mesh.node_groups.items()}
+    for name, size in sizes.items():
+        if size == 0:
+            raise InputError(f"{name} of the mesh is empty; fill it or remove it")
+
+
+def _check_repeated(mesh: Mesh) -> None:
+    first = 0
+    for kind, nodes in _pairs(mesh):
+        _, index, counts = np.unique(np.sort(nodes, axis=1), axis=0, return_index=True, return_counts=True)
+        if (counts > 1).any():
+            element = first + int(index[counts > 1].min())
+            raise InputError(
+                f"{np.sum(counts > 1)} elements are there more than once, the first being element {element} "
+                f"({kind}) at {_at(_centres(mesh)[element])}: remove the copies"
+            )
+        first += len(nodes)
+
+
+def _check_jacobians(mesh: Mesh) -> None:
+    worst = np.concatenate([_worst_jacobians(mesh.points[nodes], kind) for kind, nodes in _pairs(mesh)])
+    bad = np.flatnonzero(~(worst > _DEGENERATE))
+    if not bad.size:
+        return
+    kinds = np.repeat([block.kind for block in mesh.blocks], [len(block.nodes) for block in mesh.blocks])
+    state = "flat or collapsed" if abs(worst[bad[0]]) <= _DEGENERATE else "turned inside out, at least in part"
+    remedy = (
+        "no element is right, so the mesh is mirrored or has another node order"
+        if bad.size == worst.size
+        else "mesh finer there, smooth the mesh, or make its elements straight (first order)"
+    )
+    others = f", as are {bad.size - 1} of the {worst.size - 1} others" if worst.size > 1 else ""
+    raise InputError(
+        f"element {bad[0]} ({kinds[bad[0]]}) at {_at(_centres(mesh)[bad[0]])} is {state} (Jacobian "
+        f"{worst[bad[0]]:.2g} of its size cubed){others}: {remedy}"
+    )
+
+
+def _worst_jacobians(corners: Array, kind: str) -> Array:
+    """(E,) least Jacobian determinant of elements with nodes at (E, k, 3), over the cube of their size [-]."""
+    worst = np.empty(len(corners))
+    for start in range(0, len(corners), _CHUNK):
+        of = corners[start : start + _CHUNK]
+        size = np.linalg.norm(np.ptp(of, axis=1), axis=1)
+        determinants = jacobian_determinants(kind, of).min(axis=1)
+        worst[start : start + _CHUNK] = determinants / np.maximum(size, np.finfo(float).tiny ** 0.25) ** 3
+    return worst
+
+
+def _check_coincident(mesh: Mesh) -> None:
+    diagonal = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+    pairs = cKDTree(mesh.points).query_pairs(_COINCIDENT * diagonal, output_type="ndarray")
+    if len(pairs):
+        a, b = pairs[np.lexsort(pairs.T[::-1])][0]
+        raise InputError(
+            f"{len(pairs)} pairs of nodes coincide, the first being nodes {a} and {b} at {_at(mesh.points[a])}; the "
+            "mesh comes apart there: merge them in the program that made it (in gmsh: Coherence Mesh)"
+        )
+
+
+def _check_connected(mesh: Mesh) -> None:
+    """Elements must hang together by whole faces; a common node or edge is a hinge."""
+    by_nodes = joined_by_nodes(_pairs(mesh))
+    if by_nodes.max() > 0:
+        raise InputError(
+            f"the mesh has {by_nodes.max() + 1} unconnected parts: {_parts_in_words(mesh, by_nodes)}. A body is one "
+            "piece: join the parts (shared nodes), or make each a body of its own"
+        )
+    by_faces = joined_by_faces(_pairs(mesh))
+    if by_faces.max() > 0:
+        raise InputError(
+            f"the mesh has {by_faces.max() + 1} parts that touch at nodes or edges only, a hinge and not a joint of "
+            f"solids: {_parts_in_words(mesh, by_faces)}. Let them share whole element faces"
+        )
+
+
+def _parts_in_words(mesh: Mesh, part: Array) -> str:
+    """Size of each part and a point in it, the largest first."""
+    centres, sizes = _centres(mesh), np.bincount(part)
+    order = np.argsort(-sizes, kind="stable")
+    words = [f"{sizes[p]} elements with {_at(centres[np.argmax(part == p)])}" for p in order[:_SHOWN_PARTS]]
+    return ", ".join(words) + (", ..." if sizes.size > _SHOWN_PARTS else "")
+
+
+def _centres(mesh: Mesh) -> Array:
+    """(E, 3) mean of the nodes of every element [m]."""
+    return np.concatenate([mesh.points[block.nodes].mean(axis=1) for block in mesh.blocks])
+
+
+def _at(point: Array) -> str:
+    return "(" + ", ".join(f"{x:.4g}" for x in point) + ") m"

@@ -1,0 +1,141 @@
+"""Meshes of other programs (Nastran, VTK, ...) that meshio reads, brought to plain arrays."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import meshio
+import numpy as np
+
+from ffr_prep.common.errors import InputError
+from ffr_prep.mesh.source import Source, supported_kind
+
+Array = np.ndarray
+
+_VOLUMES = {"tetra": "tet4", "tetra10": "tet10", "hexahedron": "hex8", "hexahedron20": "hex20", "hexahedron27": "hex27"}
+_FACES = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4, "quad9": 4}
+_NASTRAN = (".bdf", ".nas", ".fem")
+_MOST_TAGS = 100
+_NO_NODE_TAGS = ("nastran:ref", "gmsh:dim_tags")
+
+Groups = Mapping[str, Sequence[Array]]
+
+
+def from_meshio(path: Path) -> Source:
+    """What meshio makes of a file. Raises InputError for a file that it cannot read and for other element kinds."""
+    read = _read(path)
+    _check_coordinate_systems(path, read)
+    volumes = [k for k, block in enumerate(read.cells) if block.dim == 3]
+    faces = [k for k, block in enumerate(read.cells) if block.type in _FACES]
+    groups = dict(_cell_sets(path, read)) | dict(_tagged_cells(read))
+    return Source(
+        points=_in_space(path, read.points),
+        blocks=tuple((_kind(read.cells[k].type), np.asarray(read.cells[k].data, np.int64)) for k in volumes),
+        volumes=_volume_groups(read, volumes, groups),
+        faces=_face_groups(read, faces, groups),
+        nodes=_node_groups(read),
+        notes=tuple(_ignored(read)),
+    )
+
+
+def _read(path: Path) -> meshio.Mesh:
+    """meshio's readers raise whatever comes, exit, and write to the terminal."""
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as said:
+        try:
+            return _read_bulk_data(path) if path.suffix.lower() in _NASTRAN else meshio.read(path)
+        except (Exception, SystemExit) as error:
+            words = " ".join([f"{type(error).__name__}: {error}", *said.getvalue().split()])
+    raise InputError(f"cannot read {path} as a mesh ({words}); is it complete, and does its ending name its format?")
+
+
+def _read_bulk_data(path: Path) -> meshio.Mesh:
+    """A Nastran file; the lines around the bulk data that meshio wants are ones that many programs leave out."""
+    text = path.read_text()
+    before = "" if re.search(r"^\s*BEGIN\s+BULK", text, re.MULTILINE) else "BEGIN BULK\n"
+    with tempfile.TemporaryDirectory(prefix="ffr-nastran-") as folder:
+        complete = Path(folder, "complete.bdf")
+        complete.write_text(before + text + "\nENDDATA\n")
+        return meshio.read(complete)
+
+
+def _check_coordinate_systems(path: Path, read: meshio.Mesh) -> None:
+    systems = np.unique(read.point_data.get("nastran:ref", [0]))
+    if systems.any():
+        raise InputError(
+            f"{path}: GRID points refer to coordinate system {systems[systems != 0][0]}; write the file with all "
+            "points in the basic coordinate system"
+        )
+
+
+def _in_space(path: Path, points: Array) -> Array:
+    if np.ndim(points) != 2 or np.shape(points)[1] != 3:
+        raise InputError(f"{path} has no points with x, y and z (their shape is {np.shape(points)}); is it complete?")
+    return np.asarray(points, np.float64)
+
+
+def _kind(cell_type: str) -> str:
+    return supported_kind(_VOLUMES.get(cell_type, cell_type), cell_type)
+
+
+def _ignored(read: meshio.Mesh) -> Iterator[str]:
+    for block in read.cells:
+        if block.dim != 3 and block.type not in _FACES and block.type != "vertex":
+            yield f"{len(block.data)} {block.type} elements are ignored; only solids are reduced"
+
+
+# ---- groups -------------------------------------------------------------------------------------------------------
+
+
+def _cell_sets(path: Path, read: meshio.Mesh) -> Iterator[tuple[str, Sequence[Array]]]:
+    """Named sets of cells: for each block the indices within it."""
+    for name, members in read.cell_sets.items():
+        if name.startswith("gmsh:"):
+            continue
+        if len(members) != len(read.cells):
+            raise InputError(f"{path}: the element set {name!r} cannot be resolved; list its elements by number")
+        yield name, [np.asarray([] if of is None else of, np.int64) for of in members]
+
+
+def _tagged_cells(read: meshio.Mesh) -> Iterator[tuple[str, Sequence[Array]]]:
+    """Groups by integer tags of cells, such as the property numbers of Nastran; many values are a numbering instead."""
+    for key, blocks in read.cell_data.items():
+        tags = [np.asarray(tag) for tag in blocks]
+        for value in _tag_values(tags):
+            yield f"{_short(key)}_{value}", [np.flatnonzero(tag == value) for tag in tags]
+
+
+def _node_groups(read: meshio.Mesh) -> dict[str, Array]:
+    groups = {name: np.unique(np.asarray(members, np.int64)) for name, members in read.point_sets.items()}
+    for key, tag in read.point_data.items():
+        if key in _NO_NODE_TAGS:
+            continue
+        groups |= {f"{_short(key)}_{value}": np.flatnonzero(tag == value) for value in _tag_values([tag])}
+    return groups
+
+
+def _tag_values(tags: Sequence[Array]) -> list[int]:
+    if not tags or any(tag.ndim != 1 or not np.issubdtype(tag.dtype, np.integer) for tag in tags):
+        return []
+    values = np.unique(np.concatenate(tags))
+    return values.tolist() if values.size <= _MOST_TAGS else []
+
+
+def _short(key: str) -> str:
+    return "property" if key == "nastran:ref" else key.rpartition(":")[2]
+
+
+def _volume_groups(read: meshio.Mesh, volumes: Sequence[int], groups: Groups) -> dict[str, Array]:
+    first = np.cumsum([0, *(len(read.cells[k].data) for k in volumes)])
+    found = {name: [of[k] + first[i] for i, k in enumerate(volumes)] for name, of in groups.items()}
+    return {name: np.concatenate(of) for name, of in found.items() if any(part.size for part in of)}
+
+
+def _face_groups(read: meshio.Mesh, faces: Sequence[int], groups: Groups) -> dict[str, tuple[Array, ...]]:
+    corners = {k: np.asarray(read.cells[k].data, np.int64)[:, : _FACES[read.cells[k].type]] for k in faces}
+    found = {name: tuple(corners[k][of[k]] for k in faces) for name, of in groups.items()}
+    return {name: of for name, of in found.items() if any(part.size for part in of)}

@@ -1,0 +1,68 @@
+"""A finite-element model of any kind, as far as a reduction needs it, and its reduction to a flexible body."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ffr_prep.body import BeamForces, Surface
+from ffr_prep.model.coupled import CoupledModel
+from ffr_prep.model.invariants import InertiaIntegrals
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Model:
+    """What a reduction needs of a model, whatever its elements are; z are the independent coordinates of `coupled`.
+
+    coupled    : stiffness, mass, interfaces and inertial loads
+    inertia    : inertia integrals of a basis (Z, n)
+    surface    : what is drawn, with the basis (Z, n) at its points
+    stressed   : the same with stress modes, and section forces where there are beams
+    stiffening : (r, n, n) geometric stiffness of a basis (Z, n) under r loads, of their static displacements (Z, r) and
+                 their amplitudes (12 + 6 I, r) of the known loads (`ffr_prep.model.reactions`), reactions included
+    recovery   : how the stress is recovered, in words
+    record     : what the model is; JSON values
+    packages   : whose versions are recorded
+    doubts     : what the integrals of a basis (Z, n) cannot be trusted with, in words
+    """
+
+    coupled: CoupledModel
+    inertia: Callable[[Array], InertiaIntegrals]
+    surface: Callable[[Array], Surface]
+    stressed: Callable[[Array], Surface]
+    stiffening: Callable[[Array, Array, Array], Array]
+    recovery: str
+    record: Mapping[str, Any]
+    packages: tuple[str, ...] = ("ffr", "numpy", "scipy", "scikit-fem")
+    doubts: Callable[[Array], list[str]] = lambda _: []
+
+
+def summed(parts: Sequence[InertiaIntegrals]) -> InertiaIntegrals:
+    """The integrals over several parts of a body."""
+    return InertiaIntegrals(**{key: sum(vars(part)[key] for part in parts) for key in vars(parts[0])})
+
+
+def merged(surfaces: Sequence[Surface]) -> Surface:
+    """One surface of several; with stress where all have it."""
+    first = np.cumsum([0, *(len(surface.points) for surface in surfaces)])
+    beams = [surface.beams for surface in surfaces if surface.beams is not None]
+    stress = [surface.stress for surface in surfaces if surface.stress is not None]
+    moduli = [surface.moduli for surface in surfaces if surface.moduli is not None]
+    whole = len(stress) == len(surfaces)
+    return Surface(
+        points=np.concatenate([surface.points for surface in surfaces]),
+        triangles=np.concatenate([s.triangles + start for s, start in zip(surfaces, first, strict=False)]),
+        Phi=np.concatenate([surface.Phi for surface in surfaces]),
+        stress=np.concatenate(stress) if whole else None,
+        moduli=np.concatenate(moduli) if whole else None,
+        beams=_merged_beams(beams) if beams else None,
+    )
+
+
+def _merged_beams(beams: Sequence[BeamForces]) -> BeamForces:
+    return BeamForces(**{key: np.concatenate([vars(one)[key] for one in beams]) for key in vars(beams[0])})

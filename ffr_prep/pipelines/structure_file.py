@@ -1,0 +1,302 @@
+"""Structural models as text: a TOML file becomes a frame of beams and plates with all that its reduction needs.
+
+    name = "portal"
+    reference = {kind = "fixed", interface = "left_foot"}
+    reduction = {method = "craig-bampton", modes = 10}
+
+    [geometry]                        # and/or [[polylines]] and [[panels]]
+    file = "portal.geo"
+    [members.brace]                   # what the group "brace" of curves is made of
+    section = {shape = "tube", d = 0.05, t = 0.004}
+    material = "steel"
+    [interfaces.left_foot]            # at a group of nodes of the same name
+
+Paths are relative to the file; SI units but for the numbers of the geometry, whose unit it names. The whole schema is
+`ffr_prep.pipelines.structure_schema`. Solids may be tied to the frame:
+
+    ties = [["frame.tip", "eye.bore"]]
+    [solids.eye]
+    file = "eye.step"
+    material = "steel"
+    interfaces = {bore = {}, pin = {kind = "mean"}}
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+from threadpoolctl import threadpool_limits
+
+from ffr_prep.body import FlexibleBody
+from ffr_prep.common.errors import InputError
+from ffr_prep.common.progress import Advance, Stages, no_advance, no_stages
+from ffr_prep.mesh.mesh import Mesh, read_mesh
+from ffr_prep.model.coupled import InterfaceRegion
+from ffr_prep.model.material import Material, material
+from ffr_prep.model.reference import FixedTo, MeanAxis, ReferenceConditions, SimplySupported, Support, Supports
+from ffr_prep.pipelines.reduce import reduce_model
+from ffr_prep.pipelines.structure_schema import (
+    FixedEntry,
+    InterfaceEntry,
+    MemberEntry,
+    PanelEntry,
+    ReductionEntry,
+    ReferenceEntry,
+    SimplySupportedEntry,
+    SolidEntry,
+    StructureEntry,
+    SupportsEntry,
+)
+from ffr_prep.pipelines.tied import tied
+from ffr_prep.reduction.component_modes import (
+    CharacteristicModes,
+    CraigBampton,
+    Eigenmodes,
+    Guyan,
+    Reduction,
+    Rubin,
+    Union,
+)
+from ffr_prep.reduction.krylov import Krylov
+from ffr_prep.reduction.selection import Accuracy, Band, Selection, UpTo
+from ffr_prep.reduction.static_shapes import AttachmentModes, InertiaRelief
+from ffr_prep.solids.assembly import Materials
+from ffr_prep.solids.model import solid_model
+from ffr_prep.solvers.factor import CHOLESKY, Solver
+from ffr_prep.structures.frame import Frame, Member, Shell, joined, named, panel, polyline, triangulated
+from ffr_prep.structures.frame_geometry import read_frame
+from ffr_prep.structures.model import frame_model
+from ffr_prep.structures.sections import Section, circle, general, i_section, rectangle, shear_rigid, shifted, tube
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What a structure file holds: a frame with its interfaces, solids tied to it, and how they are reduced together.
+
+    solids : by name, the mesh, its material or one for each volume, and its interfaces
+    ties   : pairs of interfaces "part.interface" that are joined; the frame is the part "frame"
+    """
+
+    name: str
+    frame: Frame
+    interfaces: tuple[InterfaceRegion, ...]
+    solids: Mapping[str, tuple[Mesh, Materials, tuple[InterfaceRegion, ...]]]
+    ties: tuple[tuple[str, str], ...]
+    reference: ReferenceConditions
+    reduction: Reduction
+    stiffening: bool
+    stress: bool
+    quality: Band | None
+
+
+def load_structure(path: str | Path, progress: Stages = no_stages) -> Structure:
+    """Read a structure file, and the geometry it names.
+
+    Raises InputError for a file that cannot be read, unknown or missing entries, and whatever the frame's parts refuse;
+    ComputationError when meshing fails.
+    """
+    path = Path(path)
+    entry = _read(path)
+    try:
+        members, shells = _members(entry), _shells(entry)
+        frame = named(_frame(entry, path.parent, members, shells, progress), **entry.nodes)
+        return Structure(
+            name=entry.name or path.stem,
+            frame=frame,
+            interfaces=_regions(entry.interfaces),
+            solids={name: _solid(entry, of, path.parent, progress) for name, of in entry.solids.items()},
+            ties=tuple(entry.ties),
+            reference=_reference(entry.reference),
+            reduction=_reduction(entry.reduction),
+            stiffening=entry.stiffening,
+            stress=entry.stress,
+            quality=None if entry.quality is None else Band(*entry.quality),
+        )
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def reduce_structure(
+    structure: Structure,
+    *,
+    solver: Solver = CHOLESKY,
+    progress: Stages = no_stages,
+    advance: Advance = no_advance,
+    provenance: Mapping[str, Any] | None = None,
+) -> FlexibleBody:
+    """The reduced flexible body of a structure; settings and errors as in `ffr_prep.pipelines.structures.reduce_frame`."""
+    with threadpool_limits(1):  # as for solids: small dense blocks, and reproducible
+        model = frame_model(structure.frame, structure.interfaces, progress)
+        if structure.solids:
+            solids = {name: solid_model(*parts, progress) for name, parts in structure.solids.items()}
+            model = tied({"frame": model, **solids}, structure.ties)
+        return reduce_model(
+            model,
+            name=structure.name,
+            reference=structure.reference,
+            reduction=structure.reduction,
+            stiffening=structure.stiffening,
+            stress=structure.stress,
+            quality=structure.quality,
+            solver=solver,
+            progress=progress,
+            advance=advance,
+            provenance=provenance,
+        )
+
+
+def _read(path: Path) -> StructureEntry:
+    try:
+        return StructureEntry.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except FileNotFoundError:
+        raise InputError(f"structure file {path} does not exist") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} is not TOML: {error}") from None
+    except ValidationError as error:
+        raise InputError(f"{path}: {'; '.join(map(_explained, error.errors()))}") from None
+
+
+def _explained(wrong: Mapping[str, Any]) -> str:
+    """Where, what, and the value."""
+    where = ".".join(str(part) for part in wrong["loc"]) or "the file"
+    value = "" if isinstance(wrong["input"], dict) else f" (it is {wrong['input']!r})"
+    return f"{where}: {wrong['msg'].removeprefix('Value error, ')}{value}"
+
+
+# ---- parts --------------------------------------------------------------------------------------------------------
+
+
+def _frame(
+    entry: StructureEntry,
+    folder: Path,
+    members: Mapping[str, Member],
+    shells: Mapping[str, Shell],
+    progress: Stages,
+) -> Frame:
+    made = [polyline(p.corners, _of(members, "member", p.member), elements=p.elements) for p in entry.polylines]
+    made += [_panel(p, shells) for p in entry.panels]
+    if entry.geometry is not None:
+        drawn_members = _without(members, [p.member for p in entry.polylines])
+        drawn_shells = _without(shells, [p.shell for p in entry.panels])
+        source = entry.geometry
+        made.append(
+            read_frame(
+                folder / source.file,
+                drawn_members,
+                shells=drawn_shells,
+                unit=source.unit,
+                size=source.size,
+                numbers=source.numbers,
+                progress=progress,
+            )
+        )
+    return joined(*made) if len(made) > 1 else made[0]
+
+
+def _regions(entries: Mapping[str, InterfaceEntry]) -> tuple[InterfaceRegion, ...]:
+    return tuple(InterfaceRegion(name, **vars(of)) for name, of in entries.items())
+
+
+def _solid(
+    entry: StructureEntry, of: SolidEntry, folder: Path, progress: Stages
+) -> tuple[Mesh, Materials, tuple[InterfaceRegion, ...]]:
+    mesh = read_mesh(
+        folder / of.file, unit=of.unit, size=of.size, numbers=of.numbers, order=of.order, progress=progress
+    )
+    if isinstance(of.material, str):
+        return mesh, _material(entry, of.material), _regions(of.interfaces)
+    return mesh, {volume: _material(entry, name) for volume, name in of.material.items()}, _regions(of.interfaces)
+
+
+def _panel(entry: PanelEntry, shells: Mapping[str, Shell]) -> Frame:
+    made = panel(entry.corners, _of(shells, "shell", entry.shell), elements=entry.elements)
+    return triangulated(made) if entry.triangles else made
+
+
+def _without(parts: Mapping[str, Any], used: list[str]) -> dict[str, Any]:
+    """Those that only the geometry can use."""
+    return {name: part for name, part in parts.items() if name not in used}
+
+
+def _of(parts: Mapping[str, Any], what: str, name: str) -> Any:
+    if name not in parts:
+        raise InputError(f"there is no {what} {name!r}; there are: {', '.join(map(repr, parts)) or 'none'}")
+    return parts[name]
+
+
+def _members(entry: StructureEntry) -> dict[str, Member]:
+    return {
+        name: Member(_section(of), _material(entry, of.material), of.orientation) for name, of in entry.members.items()
+    }
+
+
+def _shells(entry: StructureEntry) -> dict[str, Shell]:
+    return {
+        name: Shell(of.thickness, _material(entry, of.material), None if of.rotary_inertia else 0.0)
+        for name, of in entry.shells.items()
+    }
+
+
+def _material(entry: StructureEntry, name: str) -> Material:
+    if name in entry.materials:
+        return Material(name, **vars(entry.materials[name]))
+    return material(name)
+
+
+def _section(entry: MemberEntry) -> Section:
+    constants = {key: value for key, value in vars(entry.section).items() if key != "shape" and value is not None}
+    make: dict[str, Callable[..., Section]] = {
+        "rectangle": rectangle,
+        "circle": circle,
+        "tube": tube,
+        "i": i_section,
+        "general": lambda **given: general("general", **given),
+    }
+    section = make[entry.section.shape](**constants)
+    section = section if entry.shear else shear_rigid(section)
+    return shifted(section, *entry.offset) if any(entry.offset) else section
+
+
+def _reference(entry: ReferenceEntry) -> ReferenceConditions:
+    if isinstance(entry, FixedEntry):
+        return FixedTo(entry.interface)
+    if isinstance(entry, SimplySupportedEntry):
+        return SimplySupported(entry.pin, entry.roller)
+    if isinstance(entry, SupportsEntry):
+        return Supports(tuple(Support(**vars(support)) for support in entry.supports))
+    return MeanAxis()
+
+
+def _reduction(entries: Sequence[ReductionEntry]) -> Reduction:
+    """One, or the space of several."""
+    parts = tuple(_part(entry) for entry in entries)
+    return parts[0] if len(parts) == 1 else Union(parts)
+
+
+def _part(entry: ReductionEntry) -> Reduction:
+    selection = _selection(entry)
+    made: dict[str, Reduction] = {
+        "craig-bampton": CraigBampton(selection),
+        "eigenmodes": Eigenmodes(selection),
+        "rubin": Rubin(selection),
+        "guyan": Guyan(),
+        "characteristic": CharacteristicModes(selection, entry.interface_modes),
+        "attachment": AttachmentModes(),
+        "inertia-relief": InertiaRelief(),
+        "krylov": Krylov(entry.moments, tuple(entry.match)),
+    }
+    return made[entry.method]
+
+
+def _selection(entry: ReductionEntry) -> Selection:
+    if entry.accuracy is not None:
+        low, high, tolerance = entry.accuracy
+        return Accuracy(Band(low, high), tolerance)
+    if entry.frequency is not None:
+        return UpTo(entry.frequency)
+    return 10 if entry.modes is None else entry.modes

@@ -1,0 +1,258 @@
+"""The entries of a structure file (`ffr_prep.pipelines.structure_file`) and what each may hold."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+Vector = tuple[float, float, float]
+
+
+class _Strict(BaseModel):
+    """Unknown keys are mistakes; numbers must be finite."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known(cls, given: Any) -> Any:
+        known = list(cls.model_fields)
+        for key in given if isinstance(given, dict) else ():
+            if key not in known:
+                close = get_close_matches(str(key), known, 1)
+                hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(known)}"
+                raise ValueError(f"{key!r} is not a known entry here; {hint}")
+        return given
+
+
+class RectangleEntry(_Strict):
+    """Width b along z', height h along y' [m]."""
+
+    shape: Literal["rectangle"]
+    b: float
+    h: float
+
+
+class CircleEntry(_Strict):
+    """Diameter d [m]."""
+
+    shape: Literal["circle"]
+    d: float
+
+
+class TubeEntry(_Strict):
+    """Outer diameter d and wall t [m]."""
+
+    shape: Literal["tube"]
+    d: float
+    t: float
+
+
+class IEntry(_Strict):
+    """Height h, width b, web and flange thickness [m]."""
+
+    shape: Literal["i"]
+    h: float
+    b: float
+    web: float
+    flange: float
+
+
+class GeneralEntry(_Strict):
+    """A section by its constants, as in `ffr_prep.structures.sections.general`."""
+
+    shape: Literal["general"]
+    A: float
+    Iy: float
+    Iz: float
+    J: float
+    ky: float | None = None
+    kz: float | None = None
+
+
+SectionEntry = Annotated[RectangleEntry | CircleEntry | TubeEntry | IEntry | GeneralEntry, Field(discriminator="shape")]
+
+
+class MaterialEntry(_Strict):
+    """Young's modulus [Pa], Poisson's ratio, density [kg/m^3]."""
+
+    E: float
+    nu: float
+    rho: float
+
+
+class MemberEntry(_Strict):
+    """A beam; orientation lies in its x'y' plane, offset is (y, z) of the centroid [m]; shear = false: Euler-Bernoulli."""
+
+    section: SectionEntry
+    material: str
+    orientation: Vector | None = None
+    offset: tuple[float, float] = (0.0, 0.0)
+    shear: bool = True
+
+
+class ShellEntry(_Strict):
+    """A plate of a thickness [m]; rotary_inertia = false leaves out that of the thickness."""
+
+    thickness: float
+    material: str
+    rotary_inertia: bool = True
+
+
+class GeometryEntry(_Strict):
+    """A file as in `ffr_prep.structures.frame_geometry.read_frame`; size and numbers change how a geometry is meshed."""
+
+    file: Path
+    unit: Literal["m", "cm", "mm", "in"] | None = None
+    size: float | None = None
+    numbers: dict[str, float] = {}
+
+
+class PolylineEntry(_Strict):
+    """Beams from corner to corner [m], each of several elements."""
+
+    member: str
+    corners: list[Vector]
+    elements: int = 1
+
+
+class PanelEntry(_Strict):
+    """A plate between four corners [m] of n x m elements, or of twice as many triangles."""
+
+    shell: str
+    corners: list[Vector]
+    elements: tuple[int, int]
+    triangles: bool = False
+
+
+class InterfaceEntry(_Strict):
+    """At the nodes of a group, by default the one of the same name; point [m]: where its node is."""
+
+    region: str | None = None
+    kind: Literal["rigid", "mean"] = "rigid"
+    point: Vector | None = None
+
+
+class SupportEntry(_Strict):
+    """One prevented motion of an interface."""
+
+    interface: str
+    motion: Literal["translation", "rotation"]
+    direction: Vector
+
+
+class FixedEntry(_Strict):
+    """The frame moves with an interface."""
+
+    kind: Literal["fixed"]
+    interface: str
+
+
+class SimplySupportedEntry(_Strict):
+    """The x' axis of the elastic field passes through two interfaces."""
+
+    kind: Literal["simply-supported"]
+    pin: str
+    roller: str
+
+
+class MeanAxisEntry(_Strict):
+    """The frame follows the mean motion of the mass."""
+
+    kind: Literal["mean-axis"]
+
+
+class SupportsEntry(_Strict):
+    """Any choice of prevented motions."""
+
+    kind: Literal["supports"]
+    supports: list[SupportEntry]
+
+
+ReferenceEntry = Annotated[
+    FixedEntry | SimplySupportedEntry | MeanAxisEntry | SupportsEntry, Field(discriminator="kind")
+]
+
+
+class ReductionEntry(_Strict):
+    """A reduction (see `ffr_prep.reduction.component_modes`) with a number of normal modes, 10 when nothing is said, or all
+    up to a frequency [Hz], or as many as a relative accuracy of the receptances in a band [low, high, error] needs.
+
+    interface_modes : of characteristic; moments, match : of krylov, how many at which frequencies [Hz]
+    """
+
+    method: Literal[
+        "craig-bampton",
+        "eigenmodes",
+        "rubin",
+        "guyan",
+        "characteristic",
+        "attachment",
+        "inertia-relief",
+        "krylov",
+    ] = "craig-bampton"
+    modes: int | None = Field(default=None, ge=0)
+    frequency: float | None = None
+    accuracy: tuple[float, float, float] | None = None
+    interface_modes: int = Field(default=6, ge=0)
+    moments: int = Field(default=2, ge=1)
+    match: list[float] = [0.0]
+
+    @model_validator(mode="after")
+    def _one(self) -> ReductionEntry:
+        if sum(value is not None for value in (self.modes, self.frequency, self.accuracy)) > 1:
+            raise ValueError("modes, frequency and accuracy all say how many modes to keep: give one of them")
+        return self
+
+
+class SolidEntry(_Strict):
+    """A solid that is tied to the frame: a mesh or geometry as in `ffr_prep.mesh.mesh.read_mesh`, of one material or of one
+    for each volume, with interfaces of its own.
+    """
+
+    file: Path
+    material: str | dict[str, str]
+    interfaces: dict[str, InterfaceEntry] = Field(min_length=1)
+    unit: Literal["m", "cm", "mm", "in"] | None = None
+    size: float | None = None
+    numbers: dict[str, float] = {}
+    order: Literal[1, 2] = 2
+
+
+class StructureEntry(_Strict):
+    """The whole file."""
+
+    name: str | None = None
+    geometry: GeometryEntry | None = None
+    polylines: list[PolylineEntry] = []
+    panels: list[PanelEntry] = []
+    materials: dict[str, MaterialEntry] = {}
+    members: dict[str, MemberEntry] = {}
+    shells: dict[str, ShellEntry] = {}
+    nodes: dict[str, Vector] = {}
+    interfaces: dict[str, InterfaceEntry] = {}
+    solids: dict[str, SolidEntry] = {}
+    ties: list[tuple[str, str]] = []
+    reference: ReferenceEntry = MeanAxisEntry(kind="mean-axis")
+    reduction: list[ReductionEntry] = Field(default=[ReductionEntry()], min_length=1)
+    stiffening: bool = False
+    stress: bool = False
+    quality: tuple[float, float] | None = None
+
+    @field_validator("reduction", mode="before")
+    @classmethod
+    def _one_or_several(cls, value: Any) -> Any:
+        return [value] if isinstance(value, dict) else value
+
+    @model_validator(mode="after")
+    def _something(self) -> StructureEntry:
+        if self.geometry is None and not self.polylines and not self.panels:
+            raise ValueError("give a [geometry] file, [[polylines]] or [[panels]]")
+        if bool(self.solids) != bool(self.ties):
+            raise ValueError('solids and ties need each other: ties = [["frame.tip", "eye.bore"]] of a [solids.eye]')
+        if "frame" in self.solids:
+            raise ValueError("the part 'frame' is that of beams and plates: give the solid another name")
+        return self

@@ -1,0 +1,1 @@
+"""From a coupled model to a few elastic coordinates, and how good they are."""

@@ -1,0 +1,74 @@
+"""Normal modes and static shapes under supports: what most reductions are made of."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg
+
+from ffr_prep.common.errors import InputError
+from ffr_prep.model.coupled import CoupledModel
+from ffr_prep.solvers.factor import SupportedBody, solve_refined
+
+Array = np.ndarray
+
+_DENSE = 600
+_FIRST = 12
+
+
+def normal_modes(model: CoupledModel, held: SupportedBody, count: int) -> tuple[Array, Array]:
+    """The lowest `count` modes under the supports: omega2 (count,) and mass-orthonormal vectors (Z, count).
+
+    Raises InputError when the model has fewer, ComputationError when the iteration does not converge.
+    """
+    size = model.K.shape[0]
+    most = size - len(held.C)
+    if not 0 <= count <= most:
+        raise InputError(
+            f"asked for {count} normal modes of a model with {most} free degrees of freedom: ask for 0 to {most}, or "
+            "refine the mesh or raise its order"
+        )
+    if count == 0:
+        return np.zeros(0), np.zeros((size, 0))
+    if size <= _DENSE or 3 * count > size:
+        return _dense_modes(model, held.C, count)
+    return held.body.lowest(held, model.M, count)
+
+
+def modes_up_to(model: CoupledModel, held: SupportedBody, frequency: float) -> tuple[Array, Array]:
+    """All modes up to a frequency [Hz] under the supports, as `normal_modes` gives them.
+
+    Raises ComputationError when the iteration does not converge.
+    """
+    limit = (2 * np.pi * frequency) ** 2
+    most = model.K.shape[0] - len(held.C)
+    count = min(_FIRST, most)
+    omega2, vectors = normal_modes(model, held, count)
+    while count < most and omega2[-1] <= limit:
+        count = min(max(2 * count, _expected(omega2, limit)), most)
+        omega2, vectors = normal_modes(model, held, count)
+    kept = int(np.searchsorted(omega2, limit, side="right"))
+    return omega2[:kept], vectors[:, :kept]
+
+
+def _expected(omega2: Array, limit: float) -> int:
+    """A guess of the number of modes below a limit: as dense on the frequency axis as those that are known."""
+    return min(int(1.2 * omega2.size * np.sqrt(limit / omega2[-1])), 4 * omega2.size)
+
+
+def _dense_modes(model: CoupledModel, C: Array, count: int) -> tuple[Array, Array]:
+    null = scipy.linalg.null_space(C)
+    omega2, vectors = scipy.linalg.eigh(
+        null.T @ (model.K @ null), null.T @ (model.M @ null), subset_by_index=(0, count - 1)
+    )
+    return omega2, null @ vectors
+
+
+def constraint_modes(model: CoupledModel, fixed: SupportedBody) -> tuple[Array, Array]:
+    """Static shapes (Z, r) of unit values of each support coordinate, and their stiffness (r, r).
+
+    The stiffness is the reaction to the shapes; it is more accurate than a product with K, whose rounding errors
+    scale with the stiffest motion of the mesh.
+    """
+    count = len(fixed.C)
+    shapes, mu = solve_refined(fixed, np.zeros((model.K.shape[0], count)), np.eye(count))
+    return shapes, -(mu + mu.T) / 2

@@ -1,0 +1,1 @@
+"""What a body is: in words, numbers and pictures."""

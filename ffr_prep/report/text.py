@@ -1,0 +1,242 @@
+"""What a mesh or a reduced body is, in words and numbers for a reader at the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ffr_prep.body import FlexibleBody
+from ffr_prep.body.interface_freedom import interface_freedom
+from ffr_prep.reduction.quality import Quality, quality_of
+
+if TYPE_CHECKING:
+    from ffr_prep.mesh.mesh import Mesh
+
+Array = np.ndarray
+
+_MOST_MODES = 40
+_MOST_NAMES = 20
+_MOST_INTERFACES = 24
+_CLOSE = 0.01
+_NOISE = 1e-6
+
+
+def mesh_lines(mesh: Mesh) -> Iterator[str]:
+    """Size, elements and groups of a mesh."""
+    counts: dict[str, int] = {}
+    for block in mesh.blocks:
+        counts[block.kind] = counts.get(block.kind, 0) + len(block.nodes)
+    elements = ", ".join(f"{count} {kind}" for kind, count in counts.items())
+    yield f"mesh        {elements}; {len(mesh.points)} nodes, {3 * len(mesh.points)} degrees of freedom"
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    yield f"extent      {_vector(high - low)} m, from {_vector(low)} to {_vector(high)}"
+    yield f"surfaces    {_names(mesh.face_groups)}"
+    if mesh.node_groups:
+        yield f"node sets   {_names(mesh.node_groups)}"
+    yield f"volumes     {_names(mesh.volume_groups)}"
+    for note in mesh.notes:
+        yield f"note        {note}"
+
+
+def body_lines(body: FlexibleBody) -> Iterator[str]:
+    """Everything worth knowing of a body before it is used."""
+    yield f"body        {body.name}, {body.n} elastic coordinates"
+    yield from _mass_lines(body)
+    yield from _interface_lines(body)
+    yield from _choice_lines(body.provenance)
+    yield from mode_lines(body)
+    yield from ability_lines(body)
+    yield from quality_lines(body)
+    yield from _origin_lines(body.provenance)
+
+
+def short_lines(body: FlexibleBody) -> Iterator[str]:
+    """A body in a few lines."""
+    yield f"mass        {body.mass:.6g} kg, centre of mass {_vector(body.centre_of_mass)} m"
+    yield from _interface_lines(body)
+    if body.n:
+        shown = ", ".join(f"{f:.4g}" for f in body.frequencies[:6])
+        yield f"modes       {body.n}: {shown}{', ...' if body.n > 6 else ''} Hz"
+    yield from quality_lines(body)
+    for warning in body.provenance.get("warnings", []):
+        yield f"warning     {warning}"
+
+
+# ---- parts --------------------------------------------------------------------------------------------------------
+
+
+def _mass_lines(body: FlexibleBody) -> Iterator[str]:
+    principal, axes = np.linalg.eigh(body.central_inertia)
+    axes = axes * np.sign(axes[np.argmax(np.abs(axes), axis=0), range(3)])
+    yield f"mass        {body.mass:.6g} kg"
+    yield f"centre      {_vector(body.centre_of_mass)} m"
+    yield from _tensor_lines("inertia     about origin  ", body.inertia)
+    yield from _tensor_lines(f"{'':12}about centre  ", body.central_inertia)
+    for moment, axis in zip(principal, axes.T, strict=True):
+        yield f"{'':12}principal     {moment:12.5g} kg m^2 about {_vector(axis)}"
+
+
+def _tensor_lines(label: str, tensor: Array) -> Iterator[str]:
+    shown = np.where(np.abs(tensor) < _NOISE * np.abs(tensor).max(), 0.0, tensor) + 0.0
+    for k, row in enumerate(shown):
+        yield f"{label if k == 0 else '':26}" + " ".join(f"{x:12.5g}" for x in row) + (" kg m^2" if k == 0 else "")
+
+
+def _interface_lines(body: FlexibleBody) -> Iterator[str]:
+    width = max((len(i.name) for i in body.interfaces[:_MOST_INTERFACES]), default=0)
+    size = float(np.sqrt(np.trace(body.rr_dm) / body.mass)) if body.mass > 0 else 0.0
+    for k, interface in enumerate(body.interfaces[:_MOST_INTERFACES]):
+        label = "interfaces" if k == 0 else ""
+        yield f"{label:12}{interface.name:{width}}  {interface.kind:5}  at {_vector(interface.position, size)} m"
+    if len(body.interfaces) > _MOST_INTERFACES:
+        yield f"{'':12}{len(body.interfaces) - _MOST_INTERFACES} more"
+
+
+def mode_lines(body: FlexibleBody) -> Iterator[str]:
+    """A table of frequencies, effective masses P_dm^2 and effective inertias I4^2 about the origin."""
+    if not body.n:
+        return
+    yield "modes       frequency   effective mass along x, y, z, in % of the mass; effective inertia about them, in %"
+    whole = np.array([body.mass] * 3 + list(np.diag(body.inertia)))
+    shares = 100 * np.vstack([body.P_dm, body.I4]).T ** 2 / whole
+    for k in range(min(body.n, _MOST_MODES)):
+        yield f"{k + 1:7d}  {body.frequencies[k]:12.6g} Hz  " + " ".join(f"{share:7.2f}" for share in shares[k])
+    if body.n > _MOST_MODES:
+        yield f"{'':9}{body.n - _MOST_MODES} more up to {body.frequencies[-1]:.6g} Hz"
+    yield f"{'sum':>7}  {'':15}  " + " ".join(f"{total:7.2f}" for total in shares.sum(axis=0))
+
+
+def ability_lines(body: FlexibleBody) -> Iterator[str]:
+    """What the elastic coordinates can represent and what they cannot."""
+    if not body.n:
+        yield "ability     a rigid body: it does not deform"
+        return
+    yield f"ability     {_range_in_words(body)}"
+    if body.interfaces:
+        yield f"{'':12}{_interfaces_in_words(body)}"
+    yield f"{'':12}small strains and small elastic rotations; the motion of the body itself may be large"
+
+
+def _range_in_words(body: FlexibleBody) -> str:
+    """Modal truncation leaves little error up to about half the highest normal mode kept.
+
+    The rule of practice for component modes is to keep those up to 1.5 to 2 times the range of interest: R. R. Craig,
+    A. J. Kurdila, Fundamentals of Structural Dynamics, 2nd ed. (2006), chapter 17.
+    """
+    kept = _kept(body.provenance.get("reduction", {}), body.n)
+    if isinstance(kept, Mapping):
+        top = kept["frequency"] / 2 if kept["type"] == "UpTo" else kept["band"]["high"]
+        return f"vibration up to about {top:.3g} Hz, as its modes were chosen"
+    if not 0 < kept <= body.n:
+        return "slow deformation only: no normal mode was kept"
+    return f"vibration up to about {body.frequencies[kept - 1] / 2:.3g} Hz, half the frequency of mode {kept}"
+
+
+def _kept(reduction: Mapping[str, Any], n: int) -> Any:
+    """What was asked of the number of normal modes: by a reduction, or by the first part of a union that has any."""
+    parts = [part for part in reduction.get("parts", [reduction]) if "modes" in part]
+    return parts[0]["modes"] if parts else 0 if "type" in reduction else n
+
+
+def _interfaces_in_words(body: FlexibleBody) -> str:
+    possible, wanted = interface_freedom(body)
+    if possible == wanted:
+        return f"every motion of the interfaces: all {wanted} coordinates can move independently"
+    return (
+        f"only {possible} independent motions of the {wanted} interface coordinates: where joints or forces act, keep "
+        "more modes or use craig-bampton"
+    )
+
+
+def quality_lines(body: FlexibleBody) -> Iterator[str]:
+    """How far the body is from the full model, where that was found out."""
+    quality = quality_of(body.provenance)
+    if quality is None:
+        return
+    low, high = quality.band
+    yield f"quality     against the full model, {low:.4g} to {high:.4g} Hz"
+    yield f"{'':12}frequencies under the reference conditions: {_frequencies_in_words(quality)}"
+    if quality.points:
+        yield f"{'':12}static flexibility of the free body at the interfaces: {_percent(quality.flexibility_error)} off"
+        yield f"{'':12}receptances there: {_receptances_in_words(quality)}"
+    yield from _steady_lines(quality)
+
+
+def _frequencies_in_words(quality: Quality) -> str:
+    inside = quality.mode_frequencies[: quality.frequency_errors.size] <= quality.band[1]
+    missing = int(np.sum(quality.mode_frequencies <= quality.band[1])) - int(inside.sum())
+    lost = f"; {missing} of the full model are missing" if missing else ""
+    errors = quality.frequency_errors[inside]
+    if not errors.size:
+        return f"none within the band{lost}"
+    worst = int(np.argmax(errors))
+    return (
+        f"{errors.size} within the band, off by up to {_percent(errors[worst])} "
+        f"(at {quality.mode_frequencies[worst]:.4g} Hz){lost}"
+    )
+
+
+def _receptances_in_words(quality: Quality) -> str:
+    wrong = quality.receptance_errors > _CLOSE
+    worst = int(np.argmax(quality.receptance_errors))
+    off = f"off by up to {_percent(quality.receptance_errors[worst])} (at {quality.frequencies[worst]:.4g} Hz)"
+    if not wrong.any():
+        return off
+    first = int(np.argmax(wrong))
+    return f"within {_CLOSE:.0%} up to {quality.frequencies[first - 1]:.4g} Hz, {off}" if first else off
+
+
+def _steady_lines(quality: Quality) -> Iterator[str]:
+    yield f"{'':12}{'steady deformation by':24}{'displacement':>18}  {'stress, largest error':>21}"
+    parts = zip(("gravity", "angular acceleration", "spin"), (slice(0, 3), slice(3, 6), slice(6, 12)), strict=True)
+    for name, part in parts:
+        both = [_largest(errors[part]) for errors in (quality.displacement_errors, quality.stress_errors)]
+        yield f"{'':14}{name:22}{both[0]:>18}  {both[1]:>21}"
+
+
+def _largest(errors: Array) -> str:
+    return "no deformation" if np.isnan(errors).all() else _percent(float(np.nanmax(errors)))
+
+
+def _percent(error: float) -> str:
+    percent = 100 * abs(error)
+    if percent < 1e-4:
+        return "less than 0.0001 %"
+    return f"{percent:.0f} %" if percent >= 10 else f"{percent:.2g} %"
+
+
+def _choice_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
+    for key in ("reduction", "reference", "material"):
+        if key in provenance:
+            yield f"{key:12}{_settings(provenance[key])}"
+
+
+def _origin_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
+    for key, value in provenance.items():
+        if value and key not in ("reduction", "reference", "material", "interfaces", "warnings", "quality"):
+            yield f"{key:12}{_settings(value)}"
+    for warning in provenance.get("warnings", []):
+        yield f"warning     {warning}"
+
+
+def _settings(value: Any) -> str:
+    """Nested settings in one line."""
+    if isinstance(value, Mapping):
+        words = [f"{k} {_settings(v)}" for k, v in value.items() if k != "type" and v not in (None, {}, [])]
+        return " ".join([*([value["type"]] if "type" in value else []), ", ".join(words)]).strip()
+    if isinstance(value, list):
+        return "(" + ", ".join(map(_settings, value)) + ")"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _vector(vector: Array, size: float = 0.0) -> str:
+    shown = np.where(np.abs(vector) < _NOISE * max(np.abs(vector).max(), size), 0.0, vector) + 0.0
+    return "(" + ", ".join(f"{x:.5g}" for x in shown) + ")"
+
+
+def _names(groups: Mapping[str, object]) -> str:
+    names = list(groups)
+    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+    return ", ".join(names[:_MOST_NAMES]) + more if names else "none named"

@@ -1,0 +1,1 @@
+"""Solids: stiffness, consistent mass, interfaces, stress, geometric stiffness."""

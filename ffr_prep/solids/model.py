@@ -1,0 +1,105 @@
+"""A meshed solid as a model that can be tied to others (`ffr_prep.pipelines.tied`)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ffr_prep.body import Surface
+from ffr_prep.body.provenance import described
+from ffr_prep.common.progress import Stages, no_stages
+from ffr_prep.mesh.mesh import Mesh, check_mesh, mesh_hash, surface_triangles
+from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
+from ffr_prep.model.invariants import inertia_integrals
+from ffr_prep.model.model import Model
+from ffr_prep.model.region_rotations import region_stiffening
+from ffr_prep.reduction.basis import Basis
+from ffr_prep.reduction.mesh_resolution import element_edges
+from ffr_prep.solids.assembly import Materials, assemble
+from ffr_prep.solids.interfaces import couple, turning_regions
+from ffr_prep.solids.stiffening import inertial_loads, stiffening_of
+from ffr_prep.solids.stress_modes import AVERAGING, stressed_boundary
+
+Array = np.ndarray
+
+
+def solid_model(
+    mesh: Mesh,
+    material: Materials,
+    interfaces: Sequence[InterfaceRegion],
+    progress: Stages = no_stages,
+) -> Model:
+    """The solid with its interfaces, of one material or of one for each volume group.
+
+    Raises InputError for input that cannot be used.
+    """
+    progress("check the mesh")
+    check_mesh(mesh)
+    progress("assemble stiffness and mass")
+    matrices = assemble(mesh, material)
+    progress("tie the interfaces")
+    coupled = couple(mesh, matrices, interfaces)
+    loads = inertial_loads(mesh.points, matrices)
+    regions = turning_regions(mesh, matrices, interfaces, coupled, loads)
+    coupled = replace(coupled, inertial_loads=coupled.B.T @ loads, edges=element_edges(mesh))
+    m = matrices.m
+    del matrices, loads  # the stiffness takes as much memory as that of the model
+
+    def field(z: Array) -> Array:
+        return (coupled.B @ z).reshape(*mesh.points.shape, z.shape[1])
+
+    def stiffening(static: Array, amplitudes: Array, basis: Array) -> Array:
+        of_stress = stiffening_of(mesh, material, field(static), field(basis))
+        return of_stress + region_stiffening(regions, static, amplitudes, basis)
+
+    return Model(
+        coupled=coupled,
+        inertia=lambda basis: inertia_integrals(mesh.points, m, field(basis)),
+        surface=lambda basis: boundary(mesh, field(basis)),
+        stressed=lambda basis: stressed_boundary(mesh, material, field(basis)),
+        stiffening=stiffening,
+        recovery=AVERAGING,
+        record={
+            "mesh": {
+                "hash": mesh_hash(mesh),
+                "nodes": len(mesh.points),
+                "elements": element_counts(mesh),
+                "degrees_of_freedom": coupled.K.shape[0],
+            },
+            "material": described(material),
+            "interfaces": [described(interface) for interface in interfaces],
+            "warnings": mesh_warnings(mesh),
+        },
+    )
+
+
+def nodal_basis(model: CoupledModel, basis: Basis) -> Array:
+    """Phi (N, 3, n) [1/sqrt(kg)] at the nodes of the mesh."""
+    return (model.B @ basis.Z).reshape(*model.points.shape, basis.omega2.size)
+
+
+def boundary(mesh: Mesh, Phi: Array) -> Surface:
+    """The triangulated boundary of the mesh with the basis at its points."""
+    points, triangles = surface_triangles(mesh)
+    return Surface(mesh.points[points], triangles, Phi[points])
+
+
+def mesh_warnings(mesh: Mesh) -> list[str]:
+    """What makes the results of this mesh doubtful, in words."""
+    counts = element_counts(mesh)
+    if "tet4" not in counts:
+        return []
+    return [
+        f"{counts['tet4']} first-order tetrahedra (tet4): they are far too stiff in bending (locking); "
+        "use second-order elements (tet10)"
+    ]
+
+
+def element_counts(mesh: Mesh) -> dict[str, int]:
+    """Elements by kind."""
+    counts: dict[str, int] = {}
+    for block in mesh.blocks:
+        counts[block.kind] = counts.get(block.kind, 0) + len(block.nodes)
+    return counts

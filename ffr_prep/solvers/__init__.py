@@ -1,0 +1,1 @@
+"""Sparse factorisations and modes of large finite-element matrices."""

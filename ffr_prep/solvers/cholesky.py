@@ -1,0 +1,235 @@
+"""Sparse Cholesky factorisation of finite-element matrices: nested dissection and dense fronts.
+
+Independent branches of the elimination tree run on the threads there are; how the work is divided does not depend on
+their number, and every front is computed on one thread, so the result is the same to the bit with any number.
+
+Sources: A. George, SIAM J. Numer. Anal. 10 (1973) 345-363 (nested dissection); J. W. H. Liu, SIAM Review 34 (1992)
+82-109 (the multifrontal method).
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ffr_prep.common.progress import Advance, no_advance
+from ffr_prep.solvers.multifrontal import (
+    DONE,
+    Fronts,
+    Sorted,
+    add,
+    backward,
+    begin,
+    boundaries,
+    diagonal_tile,
+    eliminate_branch,
+    forward,
+    row_tile,
+    shape,
+    update_tile,
+)
+from ffr_prep.solvers.nested_dissection import elimination_tree
+from ffr_prep.solvers.threads import Map, threads
+
+Array = np.ndarray
+
+_BRANCHES = 24  # a branch has at most this part of the work
+_TILE = 384
+
+
+@dataclass(frozen=True)
+class Division:
+    """How the fronts are divided among threads.
+
+    branches : (t, 2) first and last front of the subtrees that are independent of each other, ascending
+    trunk    : the other fronts, in the order of elimination
+    below    : for each front those directly below it
+    """
+
+    branches: Array
+    trunk: list[int]
+    below: list[list[int]]
+
+
+@dataclass(frozen=True)
+class Factor:
+    """P A P^T = L L^T.
+
+    order   : (n,) the unknown at each place of the elimination
+    fronts  : the columns of L
+    targets : rows of the boundaries in a solution: a branch has copies of the rows outside it, after the n unknowns
+    copied  : (c,) the rows that these copy
+    """
+
+    order: Array
+    fronts: Fronts
+    division: Division
+    targets: Array
+    copied: Array
+
+
+def cholesky(A: sp.csr_array, positions: Array, advance: Advance = no_advance) -> Factor:
+    """Factorise the symmetric positive definite A (n, n).
+
+    positions : (n, 3) where each unknown is, to cut by; rows of NaN for unknowns that touch many others, such as the
+                coordinates of a rigid interface, which are eliminated last
+    advance   : called as the elimination proceeds, with the share of its operations
+
+    Raises numpy.linalg.LinAlgError when A is not positive definite.
+    """
+    pieces, below = elimination_tree(A, positions)
+    order = np.concatenate(pieces)
+    place = np.empty(len(order), np.int32)
+    place[order] = np.arange(len(order))
+    matrix = Sorted(A.indptr, A.indices, A.data, order, place)
+    fronts = _empty_fronts(matrix, np.cumsum([0, *map(len, pieces)]), np.array([len(of) for of in below]))
+    division = _division(fronts, below)
+    with threads() as each:
+        _eliminate_all(fronts, division, matrix, each, _Elimination(_work(fronts), advance))
+    return Factor(order, fronts, division, *_private_rows(fronts, division.branches))
+
+
+def solve_cholesky(factor: Factor, b: Array) -> Array:
+    """A^-1 b for b (n, r)."""
+    n = len(factor.order)
+    fronts, targets, trunk, branches = factor.fronts, factor.targets, factor.division.trunk, factor.division.branches
+    y = np.zeros((n + len(factor.copied), b.shape[1]))
+    y[:n] = b[factor.order]
+    with threads() as each:
+        _finish(each(lambda branch: forward(fronts, targets, branch[0], branch[1], y), branches))
+        np.add.at(y, factor.copied, y[n:])
+        for k in trunk:
+            forward(fronts, targets, k, k, y)
+        for k in reversed(trunk):
+            backward(fronts, targets, k, k, y)
+        y[n:] = y[factor.copied]
+        _finish(each(lambda branch: backward(fronts, targets, branch[0], branch[1], y), branches))
+    x = np.empty((n, b.shape[1]))
+    x[factor.order] = y[:n]
+    return x
+
+
+# ---- division of the work -----------------------------------------------------------------------------------------
+
+
+def _empty_fronts(matrix: Sorted, starts: Array, children: Array) -> Fronts:
+    ends, boundary = boundaries(starts, children, matrix)
+    own, rest = np.diff(starts), np.diff(ends)
+    offsets = np.concatenate([[0], np.cumsum(own * (own + rest))])
+    return Fronts(starts, ends, boundary, offsets, np.zeros(offsets[-1]), children)
+
+
+def _division(fronts: Fronts, below: list[list[int]]) -> Division:
+    """The tree is cut at its heaviest front until all branches are light."""
+    first, work = np.arange(len(below)), _work(fronts)
+    light = work.sum() / _BRANCHES
+    for k, of in enumerate(below):
+        first[k] = min([k, *first[of]])
+        work[k] += work[of].sum()
+    branches, trunk = [(-work[k], k) for k in set(range(len(below))).difference(*below)], []
+    heapq.heapify(branches)
+    while -branches[0][0] > light and below[branches[0][1]]:
+        _, heaviest = heapq.heappop(branches)
+        trunk.append(heaviest)
+        for k in below[heaviest]:
+            heapq.heappush(branches, (-work[k], k))
+    return Division(np.array(sorted((first[k], k) for _, k in branches)), sorted(trunk), below)
+
+
+def _work(fronts: Fronts) -> Array:
+    """(F,) operations of each front, up to a factor."""
+    own, rest = np.diff(fronts.starts), np.diff(fronts.ends)
+    return own * (own + rest) ** 2.0
+
+
+def _private_rows(fronts: Fronts, branches: Array) -> tuple[Array, Array]:
+    """The targets of all boundaries, and the rows that the branches have copies of."""
+    targets = fronts.boundary.astype(np.int64)
+    copied, count = [np.zeros(0, np.int64)], int(fronts.starts[-1])
+    for first, last in branches:
+        outside = fronts.boundary[fronts.ends[last] : fronts.ends[last + 1]].astype(np.int64)
+        of_branch = targets[fronts.ends[first] : fronts.ends[last + 1]]
+        leaving = of_branch >= fronts.starts[last + 1]
+        of_branch[leaving] = count + np.searchsorted(outside, of_branch[leaving])
+        copied.append(outside)
+        count += len(outside)
+    return targets, np.concatenate(copied)
+
+
+# ---- elimination --------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class _Elimination:
+    """How much of the work (F,) of the fronts is done."""
+
+    work: Array
+    advance: Advance
+    fronts: int = 0
+    done: float = 0.0
+
+    def add(self, first: int, last: int) -> None:
+        """The fronts first...last are eliminated."""
+        self.fronts += last - first + 1
+        self.done += self.work[first : last + 1].sum()
+        self.advance(self.done / self.work.sum(), f"{self.fronts} of {self.work.size} fronts")
+
+
+def _eliminate_all(fronts: Fronts, division: Division, matrix: Sorted, each: Map, elimination: _Elimination) -> None:
+    results = each(lambda branch: eliminate_branch(fronts, branch[0], branch[1], matrix), division.branches)
+    updates: dict[int, Array] = {}
+    for (first, last), (update, bad) in zip(division.branches, results, strict=True):
+        _check_pivot(bad)
+        rest = shape(fronts, last)[1]
+        updates[int(last)] = update.reshape(rest, rest)
+        elimination.add(int(first), int(last))
+    local = np.empty(len(matrix.order), np.int32)
+    for k in division.trunk:
+        rest = shape(fronts, k)[1]
+        update = np.zeros((rest, rest))
+        begin(fronts, k, matrix, update, local)
+        for child in division.below[k]:
+            _add_tiled(fronts, k, child, updates.pop(child), update, local, each)
+        _eliminate_tiled(fronts, k, update, each)
+        updates[k] = update
+        elimination.add(k, k)
+
+
+def _add_tiled(fronts: Fronts, k: int, child: int, of_child: Array, update: Array, local: Array, each: Map) -> None:
+    _finish(
+        each(
+            lambda columns: add(fronts, k, child, of_child, update, local, columns[0], columns[1]),
+            _tiles(0, len(of_child)),
+        )
+    )
+
+
+def _eliminate_tiled(fronts: Fronts, k: int, update: Array, each: Map) -> None:
+    """As `eliminate`, by tiles that do not depend on the number of threads."""
+    own, rest = shape(fronts, k)
+    size, panel = own + rest, fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]]
+    for first, last in _tiles(0, own):
+        bad = diagonal_tile(panel, size, first, last)
+        _check_pivot(fronts.starts[k] + first + bad - 1 if bad else DONE)
+        _finish(each(lambda rows, of=(first, last): row_tile(panel, size, *of, *rows), _tiles(last, size)))
+    pairs = [(columns, rows) for columns in _tiles(0, rest) for rows in _tiles(0, rest) if rows >= columns]
+    _finish(each(lambda pair: update_tile(panel, own, update, *pair[0], *pair[1]), pairs))
+
+
+def _tiles(start: int, stop: int) -> list[tuple[int, int]]:
+    return [(first, min(first + _TILE, stop)) for first in range(start, stop, _TILE)]
+
+
+def _finish(results: Iterable[None]) -> None:
+    """Wait for all, and raise what one of them raised."""
+    for _ in results:
+        pass
+
+
+def _check_pivot(bad: int) -> None:
+    if bad != DONE:
+        raise np.linalg.LinAlgError(f"pivot {bad + 1} is not positive")

@@ -1,0 +1,152 @@
+"""Block Lanczos iteration for the lowest modes of a supported structure.
+
+The flexibility G of the supports (loads to displacements) and the mass M have the modes as eigenvectors,
+G M u = u / omega^2. The space of some start vectors, G M times these, (G M)^2 times these ... holds the lowest modes
+first. Blocks let one pass over the factorisation serve several vectors, and find modes of equal frequency, as a square
+beam has them.
+
+Source: R. G. Grimes, J. G. Lewis, H. D. Simon, SIAM J. Matrix Anal. Appl. 15 (1994) 228-272; here with full
+orthogonalisation and without shifts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+
+from ffr_prep.common.errors import ComputationError
+from ffr_prep.common.progress import Advance, no_advance
+from ffr_prep.solvers.threads import Map, pieces, sparse_product, threads
+
+Array = np.ndarray
+
+_RESIDUAL = 1e-9
+_DEPENDENT = 1e-10
+_PANEL = 64
+
+
+def lowest_modes(
+    flexibility: Callable[[Array], Array],
+    M: sp.csr_array,
+    start: Array,
+    count: int,
+    most: int,
+    advance: Advance = no_advance,
+) -> tuple[Array, Array]:
+    """The `count` lowest omega2 (count,) [rad^2/s^2], ascending, and their M-orthonormal modes (Z, count).
+
+    flexibility : (Z, b) loads -> (Z, b) displacements, symmetric and semidefinite
+    start       : (Z, b) start vectors
+    most        : vectors that the search space may have
+    advance     : called after each pass, with the share of the modes that have converged
+
+    Raises ComputationError when the residual |G M u - u / omega2| of a mode, in the norm of the mass, is not below
+    1e-9 / omega2 by then. The error of omega2 is of second order in it.
+    """
+    Q = SearchSpace([])
+    T = np.zeros((0, 0))
+    block, momenta, _ = _orthonormal(flexibility(M @ start), Q, M)
+    while True:
+        _append(Q, block)
+        following = flexibility(momenta)
+        block, momenta, columns = _orthonormal(following, Q, M)
+        T = _bordered(T, columns)
+        values, vectors = scipy.linalg.eigh(T)
+        values, vectors = values[::-1][:count], vectors[:, ::-1][:, :count]
+        coupling = momenta.T @ following
+        residuals = np.linalg.norm(coupling @ vectors[-following.shape[1] :], axis=0)
+        converged = int(np.sum(residuals <= _RESIDUAL * values))
+        advance(converged / count, f"{converged} of {count} modes")
+        if converged == count:
+            return 1 / values, _combined(Q, vectors)
+        if len(T) + block.shape[1] > most or not block.size:
+            raise ComputationError(
+                f"only {converged} of {count} normal modes converged with {len(T)} vectors: ask for fewer modes"
+            )
+
+
+def _bordered(T: Array, columns: Array) -> Array:
+    """The symmetric matrix T (p, p) with b more rows and columns; columns : (p + b, b)."""
+    old = len(T)
+    corner = columns[old:]
+    return np.block([[T, columns[:old]], [columns[:old].T, (corner + corner.T) / 2]])
+
+
+def _orthonormal(vectors: Array, Q: SearchSpace, M: sp.csr_array) -> tuple[Array, Array, Array]:
+    """What the vectors (Z, b) add to Q: an M-orthonormal basis, M times it, and the coordinates Q^T M of the vectors.
+
+    A second pass removes the rounding of the first.
+    """
+    with threads() as each:
+        momenta = sparse_product(M, vectors, each)
+        coordinates = _coordinates(Q, momenta, each)
+        smallest = _DEPENDENT**2 * np.einsum("zi,zi->i", vectors, momenta).max(initial=0.0)
+        vectors, momenta = _normalised(_removed(vectors, Q, coordinates, each), M, smallest, each)
+        vectors = _removed(vectors, Q, _coordinates(Q, momenta, each), each)
+        vectors, momenta = _normalised(vectors, M, 0.5, each)
+    return vectors, momenta, coordinates
+
+
+def _normalised(vectors: Array, M: sp.csr_array, smallest: float, each: Map) -> tuple[Array, Array]:
+    """M-orthonormal basis of the vectors without directions of a smaller squared norm, and M times it."""
+    momenta = sparse_product(M, vectors, each)
+    squares, axes = scipy.linalg.eigh(vectors.T @ momenta)
+    kept = squares > smallest
+    combination = axes[:, kept] / np.sqrt(squares[kept])
+    return vectors @ combination, momenta @ combination
+
+
+# ---- the search space: rows of panels, which make large products of matrices --------------------------------------
+
+
+@dataclass
+class SearchSpace:
+    """M-orthonormal vectors, the first `size` rows of panels (_PANEL, Z)."""
+
+    panels: list[Array]
+    size: int = 0
+
+    @property
+    def used(self) -> list[Array]:
+        """The rows of the panels that are filled."""
+        return [panel[: self.size - k * _PANEL] for k, panel in enumerate(self.panels)]
+
+
+def _append(Q: SearchSpace, block: Array) -> None:
+    for vector in block.T:
+        if Q.size == _PANEL * len(Q.panels):
+            Q.panels.append(np.empty((_PANEL, len(vector))))
+        Q.panels[-1][Q.size % _PANEL] = vector
+        Q.size += 1
+
+
+def _coordinates(Q: SearchSpace, momenta: Array, each: Map) -> Array:
+    """(p, b) Q^T momenta."""
+
+    def of_rows(part: slice) -> Array:
+        return np.vstack([np.zeros((0, momenta.shape[1])), *(panel[:, part] @ momenta[part] for panel in Q.used)])
+
+    return np.sum(list(each(of_rows, pieces(len(momenta)))), axis=0)
+
+
+def _removed(vectors: Array, Q: SearchSpace, coordinates: Array, each: Map) -> Array:
+    """(Z, b) vectors - Q coordinates."""
+    left = np.array(vectors)
+
+    def from_rows(part: slice) -> None:
+        for k, panel in enumerate(Q.used):
+            left[part] -= panel[:, part].T @ coordinates[k * _PANEL : (k + 1) * _PANEL]
+
+    for _ in each(from_rows, pieces(len(vectors))):
+        pass
+    return left
+
+
+def _combined(Q: SearchSpace, coordinates: Array) -> Array:
+    """(Z, b) Q coordinates (p, b)."""
+    with threads() as each:
+        return -_removed(np.zeros((Q.panels[0].shape[1], coordinates.shape[1])), Q, coordinates, each)

@@ -1,0 +1,1 @@
+"""Beams, plates and flat shells with six coordinates a node."""

@@ -1,0 +1,99 @@
+"""Section forces of beams and the stress at the outlines of their sections, per elastic coordinate.
+
+The section forces are those of the elements' stiffness: the forces K e at the ends of an element follow from its nodal
+coordinates e, and between the ends they vary as in an element without loads of its own: tension, shear forces and torque
+are constant, bending moments linear. Static solutions of loads at the nodes are exact. Loads along the elements (inertia,
+weight) act through the nodes: they would add K e - f, so with elements of length l under a load p per length the tension
+at an end is off by p l / 2, the moment by p l^2 / 12, and both vanish as the mesh is refined; the values in the middle of
+an element are off by p l^2 / 24 only, and tension and shear there are exact to second order.
+
+Stress on the outline of a section, at (y, z) from its centroid:
+
+    sigma_xx = N / A + My z / Iy - Mz y / Iz,    tau_xy = -Mx z / J,    tau_xz = Mx y / J,
+
+the shear of the torque in round sections alone, where it holds (J = Iy + Iz). The corners of rectangles carry none of it.
+The shear of transverse forces, which vanishes at the fibres that bending stresses most, is left out. A section given by
+its constants has the outline of the rectangle with the same second moments.
+
+Source: S. P. Timoshenko, J. N. Goodier, Theory of Elasticity, 3rd ed. (1970), articles 102 and 109.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from ffr_prep.body import TENSOR, BeamForces, Surface
+from ffr_prep.structures.beam_surface import prisms, stations, swept_surface
+from ffr_prep.structures.beams import Beams, element_coordinates, stiffness, undeformed
+from ffr_prep.structures.frame import Frame, Member
+
+Array = np.ndarray
+
+SECTION_STRESS = "section forces K e of the elements; normal stress of tension and bending, shear of torque if round"
+_ROWS, _COLUMNS = np.array(TENSOR).T
+_MIDDLE = np.array([0.0, 0.5, 1.0])
+
+
+def stressed_sweep(frame: Frame, elements: Beams, nodal: Array) -> Surface:
+    """The swept surface of the frame with stress modes at its points and the section forces of its elements.
+
+    nodal : (E, 12, n) coordinates of every element, in body axes, per elastic coordinate
+    """
+    forces = beam_forces(elements, nodal)
+    stress, moduli = [], []
+    for own, outline in prisms(frame):
+        member = frame.members[frame.member_of[own[0]]]
+        xi, across = stations(outline, len(own))
+        at_stations = section_forces_at(forces.modes[own], xi)
+        stress.append(_outline_stress(member, elements.C[own], across, at_stations).reshape(-1, 6, nodal.shape[2]))
+        moduli.append(np.tile([member.material.E, member.material.nu], (len(stress[-1]), 1)))
+    swept = swept_surface(frame, elements, nodal)
+    return replace(swept, stress=np.concatenate(stress), moduli=np.concatenate(moduli), beams=forces)
+
+
+def beam_forces(elements: Beams, nodal: Array) -> BeamForces:
+    """Section forces at both ends and in the middle of every element."""
+    on_axis = np.zeros((len(elements.length), len(_MIDDLE), 2))
+    return BeamForces(
+        positions=undeformed(elements, _MIDDLE, on_axis), axes=elements.C, modes=section_forces(elements, nodal)
+    )
+
+
+def section_forces(elements: Beams, nodal: Array) -> Array:
+    """(E, 3, 6, n) N, Qy, Qz, Mx, My, Mz at the first end, the middle and the last end, in element axes.
+
+    They are what the part of the beam towards the last end exerts on the other part; N is tension.
+    """
+    f = end_forces(elements, nodal)
+    first, last = -f[:, :6], f[:, 6:]
+    return np.stack([first, (first + last) / 2, last], axis=1)
+
+
+def end_forces(elements: Beams, nodal: Array) -> Array:
+    """(E, 12, n) forces and moments on the ends of the centroid line, in element axes, that hold the element bent."""
+    to_element = element_coordinates(elements)
+    return np.linalg.solve(to_element.transpose(0, 2, 1), stiffness(elements) @ nodal)
+
+
+def section_forces_at(modes: Array, xi: Array) -> Array:
+    """(E, Q, 6, n) section forces at xi (Q,) in [0, 1] along the elements, from those at the ends (E, 3, 6, n)."""
+    first, last = modes[:, 0, None], modes[:, 2, None]
+    xi = xi[:, None, None]
+    return (1 - xi) * first + xi * last
+
+
+def _outline_stress(member: Member, C: Array, across: Array, forces: Array) -> Array:
+    """(E, Q, 6, n) stress in body axes at (y, z) = across (E, Q, 2) of sections with the forces (E, Q, 6, n)."""
+    section = member.section
+    N, _, _, Mx, My, Mz = np.moveaxis(forces, 2, 0)
+    y, z = across[..., 0, None], across[..., 1, None]
+    in_element_axes = np.zeros((*N.shape[:2], 3, 3, N.shape[2]))
+    in_element_axes[:, :, 0, 0] = N / section.A + My * z / section.Iy - Mz * y / section.Iz
+    if math.isclose(section.J, section.Iy + section.Iz, rel_tol=1e-9):
+        in_element_axes[:, :, 0, 1] = in_element_axes[:, :, 1, 0] = -Mx * z / section.J
+        in_element_axes[:, :, 0, 2] = in_element_axes[:, :, 2, 0] = Mx * y / section.J
+    tensor = np.einsum("eik,eqklj,eml->eqimj", C, in_element_axes, C, optimize=True)
+    return tensor[:, :, _ROWS, _COLUMNS]

@@ -1,0 +1,110 @@
+"""The families of structural elements, each in the same few arrays.
+
+A family delivers, for its elements, the stiffness of their nodal coordinates and *mass points*: points inside the
+elements that integrate every product of two displacement fields exactly, with the undeformed position, the mass and
+the field C S W C_bar there. Beams are one family, plates of three and of four nodes are two others; another family is one
+function here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from ffr_prep.body import Surface
+from ffr_prep.structures import beams, plates
+from ffr_prep.structures.beam_stiffening import beam_stiffening
+from ffr_prep.structures.beam_stress import SECTION_STRESS, stressed_sweep
+from ffr_prep.structures.beam_surface import swept_surface
+from ffr_prep.structures.frame import Frame, ends, orientations
+from ffr_prep.structures.plate_stiffening import plate_stiffening
+from ffr_prep.structures.plate_surface import FACE_STRESS, plate_faces, stressed_faces
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Family:
+    """E elements of one kind with k nodes, whose coordinates are in body axes.
+
+    name       : "beam", "triangle" or "quadrilateral"
+    nodes      : (E, k) nodes of the frame
+    stiffness  : (E, 6k, 6k)
+    positions  : (E, Q, 3) mass points of the undeformed elements [m]
+    mass       : (E, Q) their masses [kg]
+    field      : (E, Q, 3, 6k) their displacements
+    surface    : what is drawn, of the coordinates (E, 6k, n) per elastic coordinate
+    stressed   : the same with stress modes, and section forces of beams
+    recovery   : how the stress is recovered, in words
+    stiffening : (r, n, n) geometric stiffness, of the static coordinates (E, 6k, r) of r loads, their accelerations (12, r),
+                 which act inside the elements, and the basis (E, 6k, n)
+    """
+
+    name: str
+    nodes: Array
+    stiffness: Array
+    positions: Array
+    mass: Array
+    field: Array
+    surface: Callable[[Array], Surface]
+    stressed: Callable[[Array], Surface]
+    recovery: str
+    stiffening: Callable[[Array, Array, Array], Array]
+
+
+def families(frame: Frame) -> tuple[Family, ...]:
+    """Those of the frame that have elements; InputError for an element of a shape that cannot be used."""
+    made = []
+    if len(frame.elements):
+        made.append(beam_family(frame))
+    of_triangles, of_quadrilaterals = np.split(frame.shell_of, [len(frame.triangles)])
+    if len(frame.triangles):
+        made.append(plate_family("triangle", frame, frame.triangles, of_triangles))
+    if len(frame.quadrilaterals):
+        made.append(plate_family("quadrilateral", frame, frame.quadrilaterals, of_quadrilaterals))
+    return tuple(made)
+
+
+def beam_family(frame: Frame) -> Family:
+    """The beams of the frame."""
+    elements = beam_elements(frame)
+    xi, across, mass = beams.mass_points(elements)
+    return Family(
+        name="beam",
+        nodes=frame.elements,
+        stiffness=beams.stiffness(elements),
+        positions=beams.undeformed(elements, xi, across),
+        mass=mass,
+        field=beams.field(elements, xi, across),
+        surface=partial(swept_surface, frame, elements),
+        stressed=partial(stressed_sweep, frame, elements),
+        recovery=SECTION_STRESS,
+        stiffening=partial(beam_stiffening, elements),
+    )
+
+
+def beam_elements(frame: Frame) -> beams.Beams:
+    """The beam elements of the frame; InputError for one without length or a needed orientation."""
+    members = [frame.members[k] for k in frame.member_of]
+    return beams.beams(ends(frame), [m.section for m in members], [m.material for m in members], orientations(frame))
+
+
+def plate_family(name: str, frame: Frame, nodes: Array, shell_of: Array) -> Family:
+    """Plates of the same number of nodes (E, k), with the number of the shell of each."""
+    elements = plates.plates(frame.points[nodes], [frame.shells[k] for k in shell_of])
+    at, z, mass = plates.mass_points(elements)
+    return Family(
+        name=name,
+        nodes=nodes,
+        stiffness=plates.stiffness(elements),
+        positions=plates.undeformed(elements, at, z),
+        mass=mass,
+        field=plates.field(elements, at, z),
+        surface=partial(plate_faces, elements, nodes),
+        stressed=partial(stressed_faces, elements, nodes),
+        recovery=FACE_STRESS,
+        stiffening=partial(plate_stiffening, elements),
+    )

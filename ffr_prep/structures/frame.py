@@ -1,0 +1,369 @@
+"""Frames of beams and plates: nodes and what is between them, built from a few lines of Python, joined, named, checked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from itertools import pairwise
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from ffr_prep.body import content_hash
+from ffr_prep.common.errors import InputError
+from ffr_prep.model.material import Material
+from ffr_prep.structures.sections import Section
+
+Array = np.ndarray
+Vector = tuple[float, float, float]
+
+_SAME_PLACE = 1e-9
+
+
+@dataclass(frozen=True)
+class Member:
+    """What a beam is made of.
+
+    orientation : vector (body axes) that lies in the x'y' plane of the elements, so that y', the direction of the
+                  section's height, is its part across the beam; a round section needs none
+
+    Raises InputError for an orientation that is not a direction.
+    """
+
+    section: Section
+    material: Material
+    orientation: Vector | None = None
+
+    def __post_init__(self) -> None:
+        given = self.orientation
+        if given is not None and (np.shape(given) != (3,) or not 0 < np.linalg.norm(given) < np.inf):
+            raise InputError(f"member of {self.section.name!r}: orientation {given} is not a direction (x, y, z)")
+
+
+@dataclass(frozen=True)
+class Shell:
+    """What a plate is made of.
+
+    thickness : [m], half of it on either side of the nodes
+    gyration  : root mean square of the distance of the mass from the middle plane [m]; thickness/sqrt(12) when not given,
+                0 leaves the rotary inertia of the thickness out
+
+    Raises InputError for a thickness that is not positive and a negative gyration.
+    """
+
+    thickness: float
+    material: Material
+    gyration: float | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 < self.thickness < math.inf:
+            raise InputError(f"shell of {self.material.name}: the thickness is {self.thickness} m; it must be positive")
+        if self.gyration is None:
+            object.__setattr__(self, "gyration", self.thickness / math.sqrt(12))
+        if not 0 <= (self.gyration or 0.0) < math.inf:
+            raise InputError(f"shell of {self.material.name}: gyration is {self.gyration} m; it must not be negative")
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Nodes with six coordinates each, and straight beams and flat plates between them; frozen, SI units.
+
+    points         : (N, 3) [m]
+    elements       : (E, 2) nodes of each beam element, x' runs from the first to the second
+    members        : what the beams are made of
+    member_of      : (E,) index into members
+    node_groups    : name -> (m,) nodes, where interfaces attach
+    triangles      : (T, 3) nodes of the plate elements of three nodes, counter-clockwise about z'
+    quadrilaterals : (Q, 4) of those of four
+    shells         : what the plates are made of
+    shell_of       : (T + Q,) index into shells, triangles first
+
+    Raises InputError for arrays of other shapes and coordinates that are not finite.
+    """
+
+    points: Array
+    elements: Array
+    members: tuple[Member, ...]
+    member_of: Array
+    node_groups: Mapping[str, Array] = field(default_factory=dict)
+    triangles: Array = field(default_factory=lambda: np.zeros((0, 3), np.int64))
+    quadrilaterals: Array = field(default_factory=lambda: np.zeros((0, 4), np.int64))
+    shells: tuple[Shell, ...] = ()
+    shell_of: Array = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def __post_init__(self) -> None:
+        _freeze(self, "points", np.array(self.points, float), (-1, 3))
+        _freeze(self, "elements", np.array(self.elements, np.int64), (-1, 2))
+        _freeze(self, "member_of", np.array(self.member_of, np.int64), (len(self.elements),))
+        _freeze(self, "triangles", np.array(self.triangles, np.int64), (-1, 3))
+        _freeze(self, "quadrilaterals", np.array(self.quadrilaterals, np.int64), (-1, 4))
+        plates = len(self.triangles) + len(self.quadrilaterals)
+        _freeze(self, "shell_of", np.array(self.shell_of, np.int64), (plates,))
+        groups = {name: np.array(nodes, np.int64) for name, nodes in self.node_groups.items()}
+        object.__setattr__(self, "node_groups", groups)
+        wrong = np.flatnonzero(~np.isfinite(self.points).all(axis=1))
+        if wrong.size:
+            raise InputError(
+                f"node {wrong[0]} has the coordinates {self.points[wrong[0]]}; they must be finite numbers"
+            )
+
+
+def _freeze(frame: Frame, key: str, value: Array, shape: tuple[int, ...]) -> None:
+    if value.ndim != len(shape) or any(size not in (-1, given) for size, given in zip(shape, value.shape, strict=True)):
+        raise InputError(f"frame: {key} has the shape {value.shape}; it must be {str(shape).replace('-1', 'any')}")
+    value.setflags(write=False)
+    object.__setattr__(frame, key, value)
+
+
+# ---- building -----------------------------------------------------------------------------------------------------
+
+
+def polyline(corners: Sequence[Vector] | Array, member: Member, *, elements: int = 1) -> Frame:
+    """Straight beams from corner to corner (P, 3) [m], each of `elements` elements of equal length.
+
+    Raises InputError for fewer than two corners, one that is not finite, or no elements.
+    """
+    at = np.asarray(corners, float)
+    if at.ndim != 2 or at.shape[1] != 3 or len(at) < 2:
+        raise InputError(f"a polyline needs two or more corners (x, y, z); it has the shape {at.shape}")
+    if not np.isfinite(at).all():
+        wrong = at[~np.isfinite(at).all(axis=1)][0]
+        raise InputError(f"a polyline has the corner {wrong.tolist()}; it must be three finite numbers")
+    if elements < 1:
+        raise InputError(f"a polyline of {elements} elements a leg cannot be built; ask for one or more")
+    part = np.arange(elements)[:, None] / elements
+    points = np.vstack([*((1 - part) * a + part * b for a, b in pairwise(at)), at[-1:]])
+    pairs = np.stack([np.arange(len(points) - 1), np.arange(1, len(points))], axis=1)
+    if np.array_equal(at[0], at[-1]) and len(at) > 2:
+        points, pairs = points[:-1], pairs % (len(points) - 1)
+    return Frame(points, pairs, (member,), np.zeros(len(pairs), np.int64))
+
+
+def panel(corners: Sequence[Vector] | Array, shell: Shell, *, elements: tuple[int, int]) -> Frame:
+    """A flat plate between four corners (4, 3) [m] of n x m quadrilaterals: n along the first side, m along the second.
+
+    `triangulated` makes triangles of them. Raises InputError for other than four finite corners, or no elements.
+    """
+    at = np.asarray(corners, float)
+    if at.shape != (4, 3) or not np.isfinite(at).all():
+        raise InputError(f"a panel needs four finite corners (x, y, z); it has {at.tolist()}")
+    if len(elements) != 2 or min(elements) < 1:
+        raise InputError(f"a panel of {elements} elements cannot be built; ask for one or more along both sides")
+    x, y = (np.linspace(0.0, 1.0, count + 1) for count in elements)
+    weights = np.stack([np.outer(1 - x, 1 - y), np.outer(x, 1 - y), np.outer(x, y), np.outer(1 - x, y)], axis=-1)
+    number = np.arange(weights[..., 0].size).reshape(len(x), len(y))
+    sides = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
+    quadrilaterals = np.stack(sides, axis=-1).reshape(-1, 4)
+    return Frame(
+        points=(weights @ at).reshape(-1, 3),
+        elements=np.zeros((0, 2), np.int64),
+        members=(),
+        member_of=np.zeros(0, np.int64),
+        quadrilaterals=quadrilaterals,
+        shells=(shell,),
+        shell_of=np.zeros(len(quadrilaterals), np.int64),
+    )
+
+
+def triangulated(frame: Frame) -> Frame:
+    """The frame with every quadrilateral cut into two triangles along its shorter diagonal."""
+    a, b, c, d = frame.points[frame.quadrilaterals].transpose(1, 0, 2)
+    other = np.linalg.norm(b - d, axis=1) < (1 - _SAME_PLACE) * np.linalg.norm(a - c, axis=1)
+    cuts = np.where(other[:, None, None], [[(0, 1, 3), (1, 2, 3)]], [[(0, 1, 2), (0, 2, 3)]])
+    halves = np.take_along_axis(frame.quadrilaterals[:, None], cuts.reshape(len(cuts), 2, 3), axis=2)
+    of_triangles, of_quadrilaterals = np.split(frame.shell_of, [len(frame.triangles)])
+    return replace(
+        frame,
+        triangles=np.vstack([frame.triangles, halves.reshape(-1, 3)]),
+        quadrilaterals=np.zeros((0, 4), np.int64),
+        shell_of=np.concatenate([of_triangles, np.repeat(of_quadrilaterals, 2)]),
+    )
+
+
+def joined(*frames: Frame) -> Frame:
+    """One frame of several: nodes at the same place become one, and beams and plates meet there rigidly."""
+    points = np.vstack([frame.points for frame in frames])
+    first = np.cumsum([0, *(len(frame.points) for frame in frames)])
+    kept, new = _merged(points)
+    members = tuple(dict.fromkeys(member for frame in frames for member in frame.members))
+    shells = tuple(dict.fromkeys(shell for frame in frames for shell in frame.shells))
+    groups: dict[str, Array] = {}
+    for frame, start in zip(frames, first[:-1], strict=True):
+        for name, nodes in frame.node_groups.items():
+            groups[name] = np.union1d(groups.get(name, np.zeros(0, np.int64)), new[nodes + start])
+    starts = list(zip(frames, first[:-1], strict=True))
+    of_shells = [np.split(_renumbered(f.shells, shells, f.shell_of), [len(f.triangles)]) for f in frames]
+    return Frame(
+        points=points[kept],
+        elements=np.vstack([new[f.elements + start] for f, start in starts]),
+        members=members,
+        member_of=np.concatenate([_renumbered(f.members, members, f.member_of) for f in frames]),
+        node_groups=groups,
+        triangles=np.vstack([new[f.triangles + start] for f, start in starts]),
+        quadrilaterals=np.vstack([new[f.quadrilaterals + start] for f, start in starts]),
+        shells=shells,
+        shell_of=np.concatenate([*(own[0] for own in of_shells), *(own[1] for own in of_shells)]),
+    )
+
+
+def _renumbered(own: Sequence[object], known: Sequence[object], index: Array) -> Array:
+    return np.array([known.index(one) for one in own], np.int64)[index]
+
+
+def _merged(points: Array) -> tuple[Array, Array]:
+    """The nodes to keep, and the new number of every node, when those at the same place become one."""
+    pairs = cKDTree(points).query_pairs(_SAME_PLACE * _size(points), output_type="ndarray")
+    graph = sp.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
+    _, labels = connected_components(graph, directed=False)
+    _, kept, places = np.unique(labels, return_index=True, return_inverse=True)
+    order = np.argsort(kept)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return kept[order], rank[places]
+
+
+def named(frame: Frame, **positions: Vector) -> Frame:
+    """The frame with names for the nodes at these positions [m].
+
+    Raises InputError where there is no node.
+    """
+    groups = dict(frame.node_groups)
+    tree = cKDTree(frame.points)
+    for name, position in positions.items():
+        distance, node = tree.query(np.asarray(position, float))
+        if not distance <= _SAME_PLACE * _size(frame.points):
+            raise InputError(
+                f"there is no node at {tuple(position)} m to be called {name!r}; the nearest is node {node} at "
+                f"{frame.points[node].tolist()} m, {distance:.3g} m away"
+            )
+        groups[name] = np.array([node])
+    return replace(frame, node_groups=groups)
+
+
+def _size(points: Array) -> float:
+    return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+# ---- questions ----------------------------------------------------------------------------------------------------
+
+
+def group_nodes(frame: Frame, name: str) -> Array:
+    """(m,) nodes of a group, ascending; InputError lists the groups there are."""
+    if name not in frame.node_groups:
+        near = get_close_matches(name, frame.node_groups, n=1, cutoff=0.5)
+        known = ", ".join(repr(one) for one in frame.node_groups) or "none; name nodes with named(frame, ...)"
+        meant = f"did you mean {near[0]!r}? There" if near else "there"
+        raise InputError(f"the frame has no group of nodes {name!r}; {meant} are: {known}")
+    return np.unique(frame.node_groups[name])
+
+
+def ends(frame: Frame) -> Array:
+    """(E, 2, 3) positions of the ends of every element [m]."""
+    return frame.points[frame.elements]
+
+
+def orientations(frame: Frame) -> Array:
+    """(E, 3) orientation of every element; NaN where none is given."""
+    of_members = [(np.nan,) * 3 if m.orientation is None else m.orientation for m in frame.members]
+    return np.array(of_members, float).reshape(-1, 3)[frame.member_of]
+
+
+def frame_hash(frame: Frame) -> str:
+    """A short hash of nodes, elements and groups."""
+    parts = [frame.points, frame.elements, frame.member_of]
+    if frame.shell_of.size:
+        parts += [frame.triangles, frame.quadrilaterals, frame.shell_of]
+    for name in sorted(frame.node_groups):
+        parts += [np.frombuffer(name.encode(), np.uint8), np.asarray(frame.node_groups[name], np.int64)]
+    return content_hash(*parts)
+
+
+# ---- checks -------------------------------------------------------------------------------------------------------
+
+
+def check_frame(frame: Frame) -> None:
+    """Raises InputError for a frame that no computation should start from.
+
+    Guarded: no elements, numbers of nodes, members and shells that do not exist, nodes of no element, empty groups,
+    elements that are repeated, nodes at the same place and parts that nothing connects. The elements guard their own
+    shape and orientation.
+    """
+    _check_numbers(frame)
+    _check_groups(frame)
+    for nodes in (frame.elements, frame.triangles, frame.quadrilaterals):
+        _check_repeated(nodes)
+    _check_coincident(frame)
+    _check_connected(frame)
+
+
+def _pairs(frame: Frame) -> Array:
+    """(L, 2) nodes that an element connects, each with the first of it."""
+    of_plates = [
+        np.stack([np.broadcast_to(n[:, :1], n[:, 1:].shape), n[:, 1:]], -1).reshape(-1, 2) for n in _plates(frame)
+    ]
+    return np.vstack([frame.elements, *of_plates])
+
+
+def _plates(frame: Frame) -> tuple[Array, Array]:
+    return frame.triangles, frame.quadrilaterals
+
+
+def _check_numbers(frame: Frame) -> None:
+    count = len(frame.points)
+    used = np.concatenate([frame.elements.ravel(), *(nodes.ravel() for nodes in _plates(frame))])
+    if not used.size:
+        raise InputError("the frame has no elements; build one with polyline(...) or panel(...)")
+    if used.min() < 0 or used.max() >= count:
+        raise InputError(f"elements refer to nodes {used.min()} to {used.max()}, but there are {count} nodes")
+    if not np.isin(frame.member_of, range(len(frame.members))).all():
+        raise InputError(f"every element must have one of the {len(frame.members)} members of the frame")
+    if not np.isin(frame.shell_of, range(len(frame.shells))).all():
+        raise InputError(f"every plate must have one of the {len(frame.shells)} shells of the frame")
+    unused = np.setdiff1d(np.arange(count), used)
+    if unused.size:
+        raise InputError(f"{unused.size} nodes belong to no element, the first being node {unused[0]}; remove them")
+
+
+def _check_groups(frame: Frame) -> None:
+    for name, nodes in frame.node_groups.items():
+        if not len(nodes) or np.min(nodes) < 0 or np.max(nodes) >= len(frame.points):
+            raise InputError(f"node group {name!r} is empty or names nodes that the frame does not have")
+
+
+def _check_repeated(nodes: Array) -> None:
+    _, index, counts = np.unique(np.sort(nodes, axis=1), axis=0, return_index=True, return_counts=True)
+    if (counts > 1).any():
+        element = int(index[counts > 1].min())
+        raise InputError(
+            f"{np.sum(counts > 1)} elements are there more than once, the first being element {element} between nodes "
+            f"{nodes[element].tolist()}: remove the copies"
+        )
+
+
+def _check_coincident(frame: Frame) -> None:
+    """The nodes of one beam element at the same place are left to the element, which says more."""
+    pairs = cKDTree(frame.points).query_pairs(_SAME_PLACE * _size(frame.points), output_type="ndarray")
+    linked = {tuple(pair) for pair in np.sort(frame.elements, axis=1).tolist()}
+    apart = sorted(tuple(pair) for pair in pairs.tolist() if tuple(pair) not in linked)
+    if apart:
+        a, b = apart[0]
+        raise InputError(
+            f"{len(apart)} pairs of nodes are at the same place, the first being nodes {a} and {b} at "
+            f"{frame.points[a].tolist()} m; nothing holds them together: join the parts with joined(...)"
+        )
+
+
+def _check_connected(frame: Frame) -> None:
+    count, pairs = len(frame.points), _pairs(frame)
+    graph = sp.coo_array((np.ones(len(pairs)), tuple(pairs.T)), shape=(count, count))
+    parts, labels = connected_components(graph, directed=False)
+    if parts > 1:
+        places = ", ".join(str(frame.points[np.argmax(labels == part)].tolist()) for part in range(min(parts, 5)))
+        raise InputError(
+            f"the frame has {parts} parts that nothing connects, with nodes at {places} m: a body is one piece; let "
+            "members share nodes (joined(...) merges nodes at the same place), or make each part a body of its own"
+        )

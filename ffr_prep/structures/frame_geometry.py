@@ -1,0 +1,113 @@
+"""Frames from geometry: the curves and surfaces of a file that gmsh reads, with what each group of them is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from ffr_prep.common.errors import InputError
+from ffr_prep.common.progress import Stages, no_stages
+from ffr_prep.mesh.gmsh_files import WITH_UNIT, LinesAndFaces, declared_unit, faces_from_gmsh, lines_from_gmsh
+from ffr_prep.mesh.mesh import UNITS, check_request, choice
+from ffr_prep.structures.frame import Frame, Member, Shell
+
+Array = np.ndarray
+
+SUFFIXES = (".geo", ".msh", ".step", ".stp", ".brep", ".med", ".unv")
+
+
+def read_frame(
+    path: str | Path,
+    members: Mapping[str, Member] | None = None,
+    *,
+    shells: Mapping[str, Shell] | None = None,
+    unit: str | None = None,
+    size: float | None = None,
+    numbers: Mapping[str, float] | None = None,
+    progress: Stages = no_stages,
+) -> Frame:
+    """A frame of beams and plates from the curves and surfaces of a file, in metres; geometry is meshed by gmsh first.
+
+    members : what each group of curves is made of; curves without groups are named curve_1, curve_2, ... Where there are
+              shells, curves without a member are only edges
+    shells  : what each group of surfaces is made of, named likewise; without shells, surfaces count for nothing
+    unit, size, numbers, progress : as in `ffr_prep.mesh.mesh.read_mesh`; a curved bar becomes straight elements, a curved
+              surface flat ones
+
+    Groups of points, of curves and of surfaces become groups of nodes, to which interfaces attach.
+
+    Raises InputError for a file or an argument that cannot be used, curves without a member, surfaces without a shell,
+    and members and shells without anything; ComputationError when meshing fails.
+    """
+    path, numbers = Path(path), dict(numbers or {})
+    members, shells = dict(members or {}), dict(shells or {})
+    check_request(path, unit, size, numbers, 1)
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{path}: frames are read from {', '.join(SUFFIXES)}; convert it with gmsh -save to .msh")
+    progress("read the frame")
+    declared = declared_unit(path) if path.suffix.lower() in WITH_UNIT else "m"
+    if shells:
+        found = faces_from_gmsh(path, unit=declared, size=size, numbers=numbers)
+        _check_shells(path, found, shells)
+    else:
+        points, lines, nodes = lines_from_gmsh(path, unit=declared, size=size, numbers=numbers)
+        found = LinesAndFaces(points, lines, {}, nodes)
+    _check_members(path, found.lines, members, needed=not shells)
+    return _frame(found, UNITS[unit or declared], members, shells)
+
+
+def _frame(found: LinesAndFaces, scale: float, members: Mapping[str, Member], shells: Mapping[str, Shell]) -> Frame:
+    """Without the nodes that no element uses."""
+    elements = np.concatenate([np.zeros((0, 2), np.int64), *(found.lines[name] for name in members)])
+    triangles, quadrilaterals = (
+        np.concatenate([np.zeros((0, k + 3), np.int64), *(found.faces[name][k] for name in shells)]) for k in (0, 1)
+    )
+    used = np.unique(np.concatenate([elements.ravel(), triangles.ravel(), quadrilaterals.ravel()]))
+    new = np.full(len(found.points), -1)
+    new[used] = np.arange(used.size)
+    groups = {name: np.unique(new[of][new[of] >= 0]) for name, of in found.nodes.items()}
+    return Frame(
+        points=found.points[used] * scale,
+        elements=new[elements],
+        members=tuple(members.values()),
+        member_of=np.repeat(np.arange(len(members)), [len(found.lines[name]) for name in members]),
+        node_groups={name: of for name, of in groups.items() if of.size},
+        triangles=new[triangles],
+        quadrilaterals=new[quadrilaterals],
+        shells=tuple(shells.values()),
+        shell_of=np.concatenate(
+            [np.repeat(np.arange(len(shells)), [len(found.faces[name][k]) for name in shells]) for k in (0, 1)]
+        ),
+    )
+
+
+def _check_shells(path: Path, found: LinesAndFaces, shells: Mapping[str, Shell]) -> None:
+    filled = [name for name, parts in found.faces.items() if sum(map(len, parts))]
+    if not filled:
+        raise InputError(f"{path} has no surfaces with elements; draw the middle planes of the plates as surfaces")
+    unknown = [name for name in shells if name not in filled]
+    if unknown:
+        raise InputError(f"{path} has no group of surfaces {unknown[0]!r}; {choice(unknown[0], dict.fromkeys(filled))}")
+    bare = [name for name in filled if name not in shells]
+    if bare:
+        raise InputError(
+            f"{path}: the group of surfaces {bare[0]!r} has no shell; say what it is made of, for example "
+            f"shells={{{bare[0]!r}: Shell(0.002, material('steel'))}}"
+        )
+
+
+def _check_members(path: Path, lines: Mapping[str, Array], members: Mapping[str, Member], *, needed: bool) -> None:
+    filled = [name for name, of in lines.items() if len(of)]
+    if needed and not filled:
+        raise InputError(f"{path} has no curves with line elements; draw the axes of the beams as curves")
+    unknown = [name for name in members if name not in filled]
+    if unknown:
+        raise InputError(f"{path} has no group of curves {unknown[0]!r}; {choice(unknown[0], dict.fromkeys(filled))}")
+    bare = [name for name in filled if name not in members]
+    if needed and bare:
+        raise InputError(
+            f"{path}: the group of curves {bare[0]!r} has no member; say what it is made of, for example "
+            f"members={{{bare[0]!r}: Member(tube(0.03, 0.002), material('steel'))}}"
+        )

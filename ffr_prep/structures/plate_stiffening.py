@@ -1,0 +1,78 @@
+"""Geometric stiffening of plates and flat shells, by load.
+
+The forces per length N_ab that a load causes in the middle plane change its stiffness by
+
+    K_sigma,ij = integral of N_ab (d u_m,i / dx_a) (d u_m,j / dx_b) dA,      m = x, y, z,
+
+which is linear in the load: slopes of the deflection for buckling and stiffening of plates, gradients in the plane for
+strips that bend in it. One reduced matrix is stored for each unit load, as for solids (`ffr_prep.solids.stiffening`). What
+bending moments add, of the order of (thickness / wavelength)^2 beside it, is left out.
+
+Source: O. C. Zienkiewicz, R. L. Taylor, The Finite Element Method, vol. 2, 5th ed. (2000), section 11.2 (initial stress
+in plates).
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+
+from ffr_prep.structures.plate_functions import reference, rule
+from ffr_prep.structures.plates import Plates, displacement_gradient, element_coordinates, jacobian, membrane_strain
+
+Array = np.ndarray
+
+_ORDER = {3: 6, 4: 7}
+_CHUNK = 512
+
+
+def plate_stiffening(elements: Plates, static: Array, accelerations: Array, basis: Array) -> Array:
+    """(r, n, n) geometric stiffness of the shapes `basis` (E, 6k, n) under the loads with displacements (E, 6k, r).
+
+    Both are nodal coordinates in body axes. The forces in the plane follow from the displacements alone, whatever
+    `accelerations` (12, r) act inside the elements.
+    """
+    K = np.zeros((static.shape[2], basis.shape[2], basis.shape[2]))
+    at, _ = rule(elements.lift.shape[1], _ORDER[elements.lift.shape[1]])
+    for first in range(0, len(elements.lift), _CHUNK):
+        own = slice(first, first + _CHUNK)
+        part = _part(elements, own)
+        to_element = element_coordinates(part)
+        strain = membrane_strain(part, at) @ (to_element @ static[own])[:, None]
+        forces = part.membrane[:, None] @ strain
+        gradient, area = _gradient(part, to_element @ basis[own])
+        for load, stiffness in enumerate(K):
+            stiffness += _of_forces(gradient, area, forces[..., load])
+    return K
+
+
+def stiffness_of_forces(elements: Plates, forces: Array, e: Array) -> Array:
+    """(n, n) geometric stiffness of the shapes e (E, 6k, n), in element axes.
+
+    forces : (E, Q, 3) xx, yy, xy per length [N/m] at the Q points of the stiffness rule, or (E, 1, 3) where constant
+    """
+    return _of_forces(*_gradient(elements, e), forces)
+
+
+def _gradient(elements: Plates, e: Array) -> tuple[Array, Array]:
+    """(2, 3, E, Q, n) d u_m / d x_a at [a, m] of the shapes e (E, 6k, n), and the area (E, Q) of the points."""
+    k = elements.lift.shape[1]
+    at, weights = rule(k, _ORDER[k])
+    area = jacobian(elements, reference(k, at))[1] * weights
+    gradient = displacement_gradient(elements, at)
+    count, points, _, _, size = gradient.shape
+    fields = gradient.reshape(count, 6 * points, size) @ e
+    return np.ascontiguousarray(fields.reshape(count, points, 2, 3, -1).transpose(2, 3, 0, 1, 4)), area
+
+
+def _of_forces(gradient: Array, area: Array, forces: Array) -> Array:
+    n = gradient.shape[-1]
+    xx, yy, xy = np.moveaxis(forces * area[..., None], -1, 0)[..., None]
+    weighted = np.stack([xx * gradient[0] + xy * gradient[1], xy * gradient[0] + yy * gradient[1]])
+    K = gradient.reshape(-1, n).T @ weighted.reshape(-1, n)
+    return (K + K.T) / 2
+
+
+def _part(elements: Plates, own: slice) -> Plates:
+    return Plates(**{field.name: getattr(elements, field.name)[own] for field in fields(elements)})

@@ -1,0 +1,100 @@
+"""The surface that is drawn for plates: both faces, and the edges that only one element has; and the stress there.
+
+The stress of a face is that of the membrane strain and of the curvature at the height of half the thickness, without
+stress across the plate. The elements' own values in a corner are averaged over the elements that share the point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ffr_prep.body import TENSOR, Surface
+from ffr_prep.structures.plates import Plates, bending_strain, element_coordinates, field, membrane_strain, undeformed
+
+Array = np.ndarray
+
+_CORNERS = {3: np.array([(0, 0), (1, 0), (0, 1)], float), 4: np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float)}
+_FACE = {3: np.array([(0, 1, 2)]), 4: np.array([(0, 1, 2), (0, 2, 3)])}
+_DIGITS = 9
+_ROWS, _COLUMNS = np.array(TENSOR).T
+
+FACE_STRESS = "faces of plates: membrane and bending strain at the corners of the elements, averaged where they meet"
+
+
+def plate_faces(elements: Plates, nodes: Array, nodal: Array) -> Surface:
+    """The boundary of all elements with the basis at its points, which follow the middle plane and turn with the fibres.
+
+    nodes : (E, k); nodal : (E, 6k, n) coordinates of every element, in body axes, per elastic coordinate. Elements that
+    continue one another in the same plane share points.
+    """
+    count, k = nodes.shape
+    at = np.tile(_CORNERS[k], (2, 1))
+    half = _heights(elements)
+    points = undeformed(elements, at, half).reshape(-1, 3)
+    shapes = (field(elements, at, half) @ nodal[:, None]).reshape(len(points), 3, -1)
+    kept, place = _shared(nodes, elements, half)
+    triangles = place[np.vstack([_faces(count, k), _edges(nodes)])]
+    return Surface(points[kept], triangles, shapes[kept])
+
+
+def stressed_faces(elements: Plates, nodes: Array, nodal: Array) -> Surface:
+    """As `plate_faces`, with stress modes."""
+    kept, place = _shared(nodes, elements, _heights(elements))
+    stress = _corner_stress(elements, nodal).reshape(len(place), 6, -1)
+    total = np.zeros((len(kept), *stress.shape[1:]))
+    np.add.at(total, place, stress)
+    moduli = np.repeat(np.stack([elements.E, elements.nu], axis=1), 2 * nodes.shape[1], axis=0)
+    mean = total / np.bincount(place)[:, None, None]
+    return replace(plate_faces(elements, nodes, nodal), stress=mean, moduli=moduli[kept])
+
+
+def _corner_stress(elements: Plates, nodal: Array) -> Array:
+    """(E, 2k, 6, n) stress in body axes at the corners of the upper and then of the lower face."""
+    at = _CORNERS[nodal.shape[1] // 6]
+    e = (element_coordinates(elements) @ nodal)[:, None]
+    half = elements.thickness[:, None, None, None] / 2
+    membrane, bent = membrane_strain(elements, at) @ e, half * (bending_strain(elements, at) @ e)
+    elastic = (elements.membrane / elements.thickness[:, None, None])[:, None]
+    plane = elastic @ np.concatenate([membrane + bent, membrane - bent], axis=1)
+    tensor = np.zeros((*plane.shape[:2], 3, 3, plane.shape[3]))
+    tensor[:, :, :2, :2] = plane[:, :, [[0, 2], [2, 1]]]
+    in_body_axes = np.einsum("eik,eqklj,eml->eqimj", elements.C, tensor, elements.C, optimize=True)
+    return in_body_axes[:, :, _ROWS, _COLUMNS]
+
+
+def _heights(elements: Plates) -> Array:
+    """(E, 2k) of the points of both faces."""
+    return np.repeat([0.5, -0.5], elements.lift.shape[1]) * elements.thickness[:, None]
+
+
+def _shared(nodes: Array, elements: Plates, half: Array) -> tuple[Array, Array]:
+    """The points to keep, and the place of every point among them.
+
+    One for each node, material and offset from the node along the normal.
+    """
+    offset = np.round(half[..., None] * elements.C[:, None, :, 2] / np.abs(half).max(), _DIGITS) + 0.0
+    _, material = np.unique(np.stack([elements.E, elements.nu]), axis=1, return_inverse=True)
+    owner = np.broadcast_to(material.ravel()[:, None], half.shape)
+    key = np.concatenate([np.tile(nodes, (1, 2))[..., None], owner[..., None], offset], axis=-1).reshape(-1, 5)
+    _, kept, place = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    return kept, place.ravel()
+
+
+def _faces(count: int, k: int) -> Array:
+    """(T, 3) upper faces counter-clockwise about z', lower ones the other way round."""
+    first = 2 * k * np.arange(count)[:, None, None]
+    return np.vstack([(first + _FACE[k]).reshape(-1, 3), (first + k + _FACE[k][:, ::-1]).reshape(-1, 3)])
+
+
+def _edges(nodes: Array) -> Array:
+    """(T, 3) two triangles between upper and lower face along each side that only one element has."""
+    count, k = nodes.shape
+    following = np.roll(np.arange(k), -1)
+    sides = np.sort(np.stack([nodes, nodes[:, following]], axis=-1).reshape(-1, 2), axis=1)
+    _, number, uses = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+    free = uses[number.ravel()] == 1
+    first = 2 * k * np.arange(count)[:, None]
+    i, j = (first + np.arange(k)).ravel()[free], (first + following).ravel()[free]
+    return np.vstack([np.stack([i, i + k, j], axis=1), np.stack([j, i + k, j + k], axis=1)])

@@ -1,0 +1,197 @@
+"""Beam sections: the constants of a cross-section, in closed form for the usual shapes.
+
+A section lies in the y'z' plane of its element, x' runs along the beam. Its axes are principal axes through the
+centroid: the integral of y z over the section vanishes, and the shear centre is taken to be the centroid. The height h
+of a shape is measured along y', its width b along z', so  Iz = integral of y^2 dA  belongs to bending in the x'y' plane.
+
+Sources: S. P. Timoshenko, J. N. Goodier, Theory of Elasticity, 3rd ed. (1970), art. 109 (torsion of a rectangle) and
+112 (thin open sections); G. R. Cowper, J. Appl. Mech. 33 (1966) 335-340 (shear factors, here for nu = 0);
+W. C. Young, R. G. Budynas, Roark's Formulas for Stress and Strain, 7th ed. (2002), section 8.10 (shear of I-beams).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ffr_prep.common.errors import InputError
+
+Point = tuple[float, float]
+Polygon = tuple[Point, ...]
+
+_AROUND = 16
+_SERIES = np.arange(1, 200, 2)
+
+
+@dataclass(frozen=True)
+class Section:
+    """The constants of a cross-section.
+
+    A           : area [m^2]
+    Iy, Iz      : second moments, integrals of z^2 and of y^2 over the area [m^4]
+    J           : torsion constant of Saint-Venant [m^4]; at most Iy + Iz, reached by round sections
+    ky, kz      : shear factors along y' and z' [-]; math.inf makes the beam rigid in shear (Euler-Bernoulli)
+    offset      : (y, z) of the centroid from the line through the nodes, in element axes [m]
+    mass_moments: the second moments (Iy, Iz) that carry mass [m^4]; (Iy, Iz) when not given, which is the inertia of
+                  the whole section: rotary, polar and, of the undeformed body, its extent across the axis
+    outline     : convex polygons (y, z) that are drawn [m], counter-clockwise from y' to z'; a rectangle of the same
+                  second moments when not given
+
+    Raises InputError for constants that no section has.
+    """
+
+    name: str
+    A: float
+    Iy: float
+    Iz: float
+    J: float
+    ky: float = math.inf
+    kz: float = math.inf
+    offset: Point = (0.0, 0.0)
+    mass_moments: Point | None = None
+    outline: tuple[Polygon, ...] = ()
+
+    def __post_init__(self) -> None:
+        _check_constants(self)
+        if self.mass_moments is None:
+            object.__setattr__(self, "mass_moments", (self.Iy, self.Iz))
+        if not self.outline:
+            sides = (math.sqrt(12 * self.Iz / self.A), math.sqrt(12 * self.Iy / self.A))
+            object.__setattr__(self, "outline", (_corners(*sides),))
+        _check_mass_moments(self)
+
+    @property
+    def is_round(self) -> bool:
+        """Whether every direction across the axis is like every other, so that no orientation is needed."""
+        moments = self.mass_moments or (self.Iy, self.Iz)
+        equal = math.isclose(self.Iy, self.Iz, rel_tol=1e-12) and math.isclose(*moments, rel_tol=1e-12)
+        return equal and self.ky == self.kz and self.offset == (0.0, 0.0)
+
+
+# ---- shapes -------------------------------------------------------------------------------------------------------
+
+
+def rectangle(b: float, h: float) -> Section:
+    """Solid rectangle, width b along z', height h along y' [m]; torsion by the series of Timoshenko and Goodier."""
+    name = f"rectangle {b:g} x {h:g} m"
+    _check_lengths(name, b=b, h=h)
+    short, long = sorted((b, h))
+    terms = np.tanh(_SERIES * np.pi * long / (2 * short)) / _SERIES**5.0
+    J = long * short**3 / 3 * (1 - 192 / np.pi**5 * short / long * terms.sum())
+    return Section(name, b * h, h * b**3 / 12, b * h**3 / 12, float(J), 5 / 6, 5 / 6, outline=(_corners(h, b),))
+
+
+def circle(d: float) -> Section:
+    """Solid circle of diameter d [m]."""
+    name = f"circle {d:g} m"
+    _check_lengths(name, d=d)
+    second = math.pi * d**4 / 64
+    return Section(name, math.pi * d**2 / 4, second, second, 2 * second, 6 / 7, 6 / 7, outline=(_ring(d / 2),))
+
+
+def tube(d: float, t: float) -> Section:
+    """Round tube of outer diameter d and wall t [m]; drawn as a solid bar."""
+    name = f"tube {d:g} x {t:g} m"
+    _check_lengths(name, d=d, t=t)
+    if 2 * t >= d:
+        raise InputError(f"section {name}: the wall leaves no bore; t must be below {d / 2:g} m, or use circle(d)")
+    bore = d - 2 * t
+    second = math.pi * (d**4 - bore**4) / 64
+    ratio = (bore / d) ** 2
+    k = 6 * (1 + ratio) ** 2 / (7 * (1 + ratio) ** 2 + 20 * ratio)
+    return Section(name, math.pi * (d**2 - bore**2) / 4, second, second, 2 * second, k, k, outline=(_ring(d / 2),))
+
+
+def i_section(h: float, b: float, web: float, flange: float) -> Section:
+    """Doubly symmetric I of height h (along y'), width b (along z'), web and flange thickness [m], sharp corners.
+
+    Torsion as thin strips, the sum of s t^3 / 3; shear along y' is carried by the web, along z' by the flanges.
+    """
+    name = f"I {h:g} x {b:g} x {web:g} x {flange:g} m"
+    _check_lengths(name, h=h, b=b, web=web, flange=flange)
+    if 2 * flange >= h or web >= b:
+        raise InputError(f"section {name}: the flanges need 2 flange < h and web < b; use rectangle(b, h) for a solid")
+    inner = h - 2 * flange
+    A = 2 * b * flange + inner * web
+    Iz = (b * h**3 - (b - web) * inner**3) / 12
+    Iy = (2 * flange * b**3 + inner * web**3) / 12
+    J = (2 * b * flange**3 + (h - flange) * web**3) / 3
+    flanges = tuple(_corners(flange, b, side * (h - flange) / 2) for side in (-1, 1))
+    outline = (*flanges, _corners(inner, web))
+    return Section(name, A, Iy, Iz, J, inner * web / A, 5 / 6 * 2 * b * flange / A, outline=outline)
+
+
+def general(
+    name: str, *, A: float, Iy: float, Iz: float, J: float, ky: float = math.inf, kz: float = math.inf
+) -> Section:
+    """A section by its constants (see Section); without shear factors it is rigid in shear."""
+    return Section(name, A, Iy, Iz, J, ky, kz)
+
+
+# ---- changes ------------------------------------------------------------------------------------------------------
+
+
+def shear_rigid(section: Section) -> Section:
+    """The section of an Euler-Bernoulli beam: no shear deformation."""
+    return replace(section, ky=math.inf, kz=math.inf)
+
+
+def shifted(section: Section, y: float, z: float) -> Section:
+    """The section with its centroid at (y, z) from the line through the nodes, in element axes [m]."""
+    return replace(section, offset=(float(y), float(z)))
+
+
+def with_mass_moments(section: Section, Iy: float, Iz: float) -> Section:
+    """The section with other second moments of the mass; (x, 0) with a small x leaves bending without rotary inertia."""
+    return replace(section, mass_moments=(float(Iy), float(Iz)))
+
+
+# ---- outlines and guards ------------------------------------------------------------------------------------------
+
+
+def _corners(h: float, b: float, y: float = 0.0) -> Polygon:
+    """The rectangle of height h and width b about (y, 0)."""
+    return ((y - h / 2, -b / 2), (y + h / 2, -b / 2), (y + h / 2, b / 2), (y - h / 2, b / 2))
+
+
+def _ring(radius: float) -> Polygon:
+    angles = 2 * math.pi * np.arange(_AROUND) / _AROUND
+    return tuple((radius * math.cos(a), radius * math.sin(a)) for a in angles)
+
+
+def _check_lengths(name: str, **lengths: float) -> None:
+    for symbol, value in lengths.items():
+        if not 0 < value < math.inf:
+            raise InputError(f"section {name}: {symbol} is {value:g} m; it must be positive")
+
+
+def _check_constants(section: Section) -> None:
+    for symbol, unit in (("A", "m^2"), ("Iy", "m^4"), ("Iz", "m^4"), ("J", "m^4")):
+        value = getattr(section, symbol)
+        if not 0 < value < math.inf:
+            raise InputError(f"section {section.name!r}: {symbol} is {value:g} {unit}; it must be positive")
+    for symbol in ("ky", "kz"):
+        if not getattr(section, symbol) > 0:
+            raise InputError(
+                f"section {section.name!r}: shear factor {symbol} is {getattr(section, symbol):g}; it must be positive, "
+                "math.inf for no shear deformation"
+            )
+    most = (1 + 1e-9) * (section.Iy + section.Iz)
+    if most < section.J:
+        raise InputError(
+            f"section {section.name!r}: J is {section.J:g} m^4, but no section has more than Iy + Iz = "
+            f"{section.Iy + section.Iz:g} m^4; check the units of all three"
+        )
+    if np.shape(section.offset) != (2,) or not np.isfinite(section.offset).all():
+        raise InputError(f"section {section.name!r}: offset is {section.offset}; it must be two finite lengths (y, z)")
+
+
+def _check_mass_moments(section: Section) -> None:
+    moments = np.asarray(section.mass_moments, float)
+    if moments.shape != (2,) or not np.isfinite(moments).all() or moments.min() < 0 or moments.max() == 0:
+        raise InputError(
+            f"section {section.name!r}: mass moments are {section.mass_moments}; they must be two numbers of m^4, none "
+            "negative and not both zero, as torsion needs inertia"
+        )

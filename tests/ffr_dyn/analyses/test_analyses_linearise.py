@@ -1,0 +1,202 @@
+"""Linearised equations: closed forms, assembled eigenfrequencies, steady rotation, and agreement with a forward run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+from test_analyses_kinematic import slider_crank
+from test_analyses_static import flexible, hanging
+
+from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort, recorded, with_effort
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.linearise import as_result, linearise, table_of_modes
+from ffr_dyn.analyses.states import scene_at
+from ffr_dyn.analyses.static import static
+from ffr_dyn.consistency.assemble import assemble
+from ffr_dyn.consistency.evaluation import evaluate, evaluated_mass_matrix, evaluator, total_mass_matrix
+from ffr_dyn.functions.time_functions import polynomial
+from ffr_dyn.integrators import RK4
+from ffr_dyn.results.file import load_result, save_result
+from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.forces import Load, SpringDamper
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.scene.sensors import Measurement
+from ffr_prep.body import rigid_body
+from ffr_prep.common.errors import InputError
+
+
+def test_pendulum_up_and_down():
+    rate = np.sqrt(9.81 / (4 / 3))
+    down = linearise(hanging(-np.pi / 2))
+    np.testing.assert_allclose(down.eigenvalues, [-1j * rate, 1j * rate], atol=1e-8)
+    up = linearise(hanging(np.pi / 2))
+    assert up.stability_margin == pytest.approx(rate, rel=1e-8)
+    assert up.leading == ("A.angle", "A.angle")
+    assert up.error < 1e-6
+
+
+def test_oscillator_with_damper_and_its_state_space():
+    """m = 2, k = 50, c = 4: eigenvalues -1 +- i sqrt(24); force on the mass gives x(s) = 1 / (2 s^2 + 4 s + 50)."""
+    body = rigid_body("m", mass=2.0, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
+    scene = Scene(
+        (Body("m", body, position=(1, 0, 0)),),
+        (Joint("rail", "translational", "ground.O", "m.c", axis=(1, 0, 0)),),
+        springs=(SpringDamper("spring", "ground.O", "m.c", 50.0, 4.0, 1.0),),
+        ground={"O": (0, 0, 0)},
+    )
+    found = linearise(
+        scene, inputs=(JointEffort("push", "rail", "stroke"),), outputs=("m.R.x", "m.v.x", "spring.tension")
+    )
+    np.testing.assert_allclose(
+        sorted(found.eigenvalues, key=lambda z: z.imag), [-1 - 1j * 24**0.5, -1 + 1j * 24**0.5], atol=1e-7
+    )
+    np.testing.assert_allclose(found.damping_ratios, 0.2, atol=1e-8)
+    s = 2.0 + 3.0j
+    transfer = found.C @ np.linalg.solve(s * np.eye(2) - found.A, found.B) + found.D
+    expected = np.array([1, s, 50 + 4 * s]) / (2 * s**2 + 4 * s + 50)
+    np.testing.assert_allclose(transfer[:, 0], expected, rtol=1e-7)
+
+
+def test_free_vibration_has_the_assembled_eigenfrequencies():
+    """Without gravity, K is diag(omega^2) on all elastic coordinates: compared on the free motions of the joints."""
+    scene = replace(flexible(), springs=(), gravity=(0, 0, 0))
+    scene = replace(scene, bodies=tuple(replace(body, damping=0.0) for body in scene.bodies))
+    assembled = assemble(scene)
+    place = assembled.system.layout
+    K = np.zeros((place.v_size, place.v_size))
+    for b, body in enumerate(scene.bodies):
+        K[place.q_dot(b), place.q_dot(b)] = np.diag(body.model.omega2)
+    M = total_mass_matrix(scene, place, assembled.x)
+    jacobian = evaluate(evaluator(assembled.system), 0.0, assembled.x, assembled.v).jacobian
+    null = np.linalg.svd(jacobian)[2][np.linalg.matrix_rank(jacobian) :].T
+    expected = np.sqrt(np.abs(eigh(null.T @ K @ null, null.T @ M @ null, eigvals_only=True))) / 2 / np.pi
+    found = np.sort(linearise(scene).frequencies)[::2]
+    moving = expected > 1e-3
+    assert moving.sum() == 9
+    np.testing.assert_allclose(found[-9:], expected[moving], rtol=1e-7)
+    assert found[:-9].max() < 1e-2
+
+
+def test_a_damped_flexible_mechanism_decays():
+    scene = flexible()
+    found = linearise(scene_at(scene, static(scene)))
+    assert found.stability_margin < 0
+    assert found.notes == ()
+
+
+def test_a_closed_loop_swings_as_its_energy_says():
+    """A slider-crank hangs with its slide vertical: frequency from the curvature of the energy and the effective inertia."""
+    base = slider_crank(0.2, 0.7)
+    scene = replace(base, gravity=(9.81, 0, 0))
+    found = linearise(scene_at(scene, static(scene)))
+    near = lambda a: static(replace(scene, drivers=(Driver("motor", "main", polynomial(a)),)))  # noqa: E731
+    h = 1e-3
+    curvature = (near(h)["energy.total"][0] - 2 * near(0.0)["energy.total"][0] + near(-h)["energy.total"][0]) / h**2
+    # at the dead point the slider is at rest, the rod turns by -r/l
+    inertia = 0.2**2 / 3 + (0.2**2 * (1 / 2) ** 2 + (0.2 / 0.7) ** 2 * 0.7**2 / 12)
+    np.testing.assert_allclose(np.abs(found.eigenvalues), np.sqrt(curvature / inertia), rtol=1e-5)
+
+
+def test_steady_rotation_softens_the_vibration():
+    """A bead on a spring in the groove of a turntable: sqrt(k/m - Omega^2), and no note, since the rotation is steady."""
+    table = rigid_body("table", mass=1.0, inertia=(1, 1, 1), points={"c": (0, 0, 0), "s": (0, -1, 0)})
+    bead = rigid_body("bead", mass=0.5, inertia=(1e-3, 1e-3, 1e-3), points={"c": (0, 0, 0)})
+    spin = 7.0
+    turning = Scene(
+        (Body("table", table, omega_bar=(0, 0, spin)), Body("bead", bead, omega_bar=(0, 0, spin))),
+        (
+            Joint("axle", "revolute", "ground.O", "table.c"),
+            Joint("groove", "translational", "table.c", "bead.c", axis=(0, 1, 0)),
+        ),
+        (Driver("motor", "axle", polynomial(0.0, spin)),),
+        springs=(SpringDamper("spring", "table.s", "bead.c", 200.0, 0.0, 1.0),),
+        ground={"O": (0, 0, 0)},
+    )
+    found = linearise(turning)
+    np.testing.assert_allclose(np.abs(found.eigenvalues), np.sqrt(200 / 0.5 - spin**2), rtol=1e-7)
+    assert found.notes == ()
+
+
+def test_a_small_forward_run_is_what_the_matrices_say():
+    """Response of the flexible scene to a small moment on its hinge: from A, B and C by the matrix exponential."""
+    from scipy.linalg import expm
+
+    scene = flexible()
+    start = scene_at(scene, static(scene))
+    hinge = JointEffort("motor", "A")
+    outputs = ("two.a.position.x", "A.force.y")
+    found = linearise(start, inputs=(hinge,), outputs=outputs)
+    size, end = 1e-3, 0.2
+    whole = np.block([[found.A, found.B * size], [np.zeros((1, found.A.shape[0] + 1))]])
+    final = (expm(whole * end) @ np.eye(whole.shape[0])[-1])[:-1]
+    expected = found.C @ final + found.D[:, 0] * size
+    times = np.linspace(0, end, 11)
+    pushed = with_effort(start, hinge, times, np.full(11, size))
+    run, rest = (forward(s, end=end, output_step=end, method=RK4(5e-4)) for s in (pushed, start))
+    np.testing.assert_allclose([run[n][-1] - rest[n][-1] for n in outputs], expected, rtol=2e-4)
+
+
+def test_a_load_as_input_is_its_own_force():
+    scene = hanging(-np.pi / 2, Load("wind", "rod.b", (3.0, 0, 0)))
+    one = linearise(scene, inputs=("wind",)).B
+    other = linearise(scene, inputs=(MarkerEffort("wind2", "rod.b", (1, 0, 0)),)).B
+    np.testing.assert_allclose(one, 3 * other, rtol=1e-9)
+
+
+def test_the_result_can_be_kept(tmp_path):
+    found = linearise(hanging(-np.pi / 2), inputs=(JointEffort("motor", "A"),), outputs=("rod.b.position.x",))
+    kept = load_result(save_result(as_result(hanging(-np.pi / 2), found), tmp_path / "l.nc"))
+    np.testing.assert_array_equal(kept["A"][0], found.A)
+    np.testing.assert_array_equal(kept["D"][0], found.D)
+    assert len(table_of_modes(found)) == 1
+
+
+def test_any_quantity_may_be_an_output():
+    """Accelerations, powers and measurements, which no result keeps unless told: about the hanging pendulum at an angle y,
+    the tip accelerates by -(g/(4/3)) 2 y along x, and a force of 3 N along x has the power 3 (2 y_dot)."""
+    scene = hanging(-np.pi / 2, Load("wind", "rod.b", (3.0, 0, 0)))
+    scene = replace(scene, loads=(), measurements=(Measurement("far", "ground.O", "rod.b", "acceleration"),))
+    found = linearise(scene, outputs=("rod.b.acceleration.x", "rod.b.position.x", "measured.far.x"))
+    np.testing.assert_allclose(found.C[0], [-9.81 / (4 / 3) * found.C[1, 0], 0.0], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(found.C[2], found.C[0], atol=1e-12)
+    blown = replace(hanging(0.0), gravity=(0, 0, 0), loads=(Load("wind", "rod.b", (0, 3.0, 0)),))
+    power = linearise(blown, outputs=("wind.power", "rod.b.velocity.y"))
+    np.testing.assert_allclose(power.C[0], 3 * power.C[1], rtol=1e-6, atol=1e-6)
+    assert abs(power.C[0, 1]) > 1
+
+
+def test_a_state_in_motion_is_noted():
+    assert "no equilibrium" in linearise(hanging(0.3)).notes[-1]
+
+
+def test_bad_input():
+    with pytest.raises(InputError, match="nothing is free"):
+        linearise(slider_crank(0.2, 0.7, Driver("m", "main", polynomial(0.3))))
+    with pytest.raises(InputError, match="no such load"):
+        linearise(hanging(0.0), inputs=("wind",))
+    with pytest.raises(InputError, match="several components"):
+        linearise(hanging(0.0), outputs=("rod.R",))
+    with pytest.raises(InputError, match="adds up over time"):
+        linearise(hanging(0.0, Load("wind", "rod.b", (3.0, 0, 0))), outputs=("wind.work",))
+    with pytest.raises(InputError, match=r"rod\.b\.position"):
+        linearise(hanging(0.0), outputs=("rod.b.positio.x",))
+    with pytest.raises(InputError, match="no coordinate 'stroke'"):
+        linearise(hanging(0.0), inputs=(JointEffort("f", "A", "stroke"),))
+    with pytest.raises(InputError, match="three numbers"):
+        MarkerEffort("f", "rod.b", (0, 0, 0))
+    with pytest.raises(InputError, match="more than 5"):
+        recorded(np.arange(3.0), np.arange(3.0))
+    with pytest.raises(InputError, match="10 values has 9 rates"):
+        recorded(np.arange(10.0), np.arange(10.0), rates=np.arange(9.0))
+
+
+def test_the_mass_matrix_that_the_kernels_keep_is_the_readable_one():
+    assembled = assemble(flexible())
+    at = evaluator(assembled.system)
+    evaluate(at, 0.0, assembled.x, assembled.v)
+    readable = total_mass_matrix(flexible(), assembled.system.layout, assembled.x)
+    np.testing.assert_allclose(evaluated_mass_matrix(at), readable, atol=1e-13)

@@ -1,0 +1,53 @@
+"""Assembly where the vector between two points has no length: right for points that are held together, else refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_analyses_kinematic import bar
+
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.consistency.mobility import mobility
+from ffr_dyn.functions.formula import formula
+from ffr_dyn.integrators import RK4
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Body, Scene
+from ffr_prep.common.errors import ComputationError, InputError
+
+
+def tied(kind: str, place: float = 0.0, **more) -> Scene:
+    """A bar whose end is tied to the origin, at a distance from it."""
+    return Scene(
+        (Body("a", bar("a", 1.0), position=(place, 0, 0)),),
+        (Joint("tie", kind, "ground.O", "a.a", **more),),
+        ground={"O": (0, 0, 0)},
+        gravity=(0, -9.81, 0),
+    )
+
+
+@pytest.mark.parametrize(
+    ("kind", "held"), [("point-on-line", [0, 1]), ("point-on-plane", [2]), ("cylindrical", [0, 1]), ("planar", [2])]
+)
+def test_points_that_coincide_may_be_held_on_a_line_or_a_plane(kind, held):
+    """A dot-2 row keeps its direction, the axis, where the vector between the points is zero."""
+    scene = tied(kind)
+    assert not mobility(scene).redundant
+    result = forward(scene, end=0.2, output_step=0.1, method=RK4(1e-3))
+    np.testing.assert_allclose(result["a.a.position"][:, held], 0, atol=1e-12)
+
+
+def test_a_distance_of_points_that_coincide_has_no_direction():
+    with pytest.raises(InputError, match=r"the points of joint 'tie' coincide.* no length, has no direction; place"):
+        forward(tied("distance", length=0.5), end=0.1, output_step=0.1)
+
+
+@pytest.mark.parametrize("analysis", [mobility, lambda scene: forward(scene, end=0.1, output_step=0.1)])
+@pytest.mark.parametrize("length", ["t", "t - 0.5"])
+def test_a_distance_that_starts_at_zero_or_below_is_refused(analysis, length):
+    with pytest.raises(InputError, match=r"joint 'tie': length is -?0(\.5)? m at t = 0 s; it must be positive"):
+        analysis(tied("distance", 0.5, length=formula(length)))
+
+
+def test_a_distance_that_shrinks_to_zero_stops_the_run_there():
+    with pytest.raises(ComputationError, match=r"at t = 0\.49\d* s the row 'distance of the points' of 'tie'"):
+        forward(tied("distance", 0.5, length=formula("0.5 - t")), end=0.6, output_step=0.1, method=RK4(1e-3))

@@ -1,0 +1,91 @@
+"""Independence of sparse rows and smallest solutions, against dense decompositions; chains of many bodies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from test_analyses_kinematic import bar
+
+from ffr_dyn.compile.elimination import eliminate
+from ffr_dyn.consistency import assemble as assembly
+from ffr_dyn.consistency.assemble import assemble
+from ffr_dyn.consistency.row_space import independent, smallest_solution
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Body, Scene
+
+LINKS = 400
+
+
+def banded(rows: int, width: int = 9, shift: int = 4) -> np.ndarray:
+    """(rows, V) full numbers in overlapping bands, of very different sizes."""
+    rng = np.random.default_rng(3)
+    A = np.zeros((rows, shift * (rows - 1) + width))
+    for k in range(rows):
+        A[k, shift * k : shift * k + width] = rng.normal(size=width) * 10.0 ** rng.uniform(-4, 4)
+    return A
+
+
+def test_independent_rows_and_their_smallest_solution():
+    A = banded(30)
+    assert independent(sp.csr_array(A))
+    target = A @ np.random.default_rng(4).normal(size=A.shape[1])
+    found = smallest_solution(sp.csr_array(A), target)
+    np.testing.assert_allclose(found, np.linalg.lstsq(A, target, rcond=1e-14)[0], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("own", [0.0, 1e-12, 1e-8])
+def test_rows_that_depend_on_others_or_nearly_are_left_to_dense_decompositions(own):
+    A = banded(12)
+    extra = A[2] / np.linalg.norm(A[2]) + A[7] / np.linalg.norm(A[7])
+    A = np.vstack([A, extra + own * np.random.default_rng(5).normal(size=A.shape[1])])
+    assert not independent(sp.csr_array(A))
+    target = A @ np.random.default_rng(4).normal(size=A.shape[1])
+    found = smallest_solution(sp.csr_array(A), target)
+    np.testing.assert_array_equal(found, np.linalg.lstsq(A, target, rcond=1e-10)[0])
+
+
+def test_rows_that_vanish_or_are_too_many_are_dependent():
+    A = banded(5)
+    A[3] = 0.0
+    assert not independent(sp.csr_array(A))
+    assert not independent(sp.csr_array(np.eye(4)[:, :3]))
+    assert not independent(sp.csr_array((0, 3)))
+
+
+def hanging(links: int, off: float = 0.0) -> Scene:
+    """A chain of bars in spherical joints, every other one out of place by `off` [m]."""
+    bodies = tuple(Body(f"b{k}", bar(f"b{k}", 0.1), position=(0.1 * k, off * (k % 2), 0)) for k in range(links))
+    joints = tuple(
+        Joint(f"j{k}", "spherical", "ground.O" if k == 0 else f"b{k - 1}.b", f"b{k}.a") for k in range(links)
+    )
+    return Scene(bodies, joints, ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0), plane="none")
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-4])
+def test_long_chains_are_assembled_without_dense_decompositions(monkeypatch, off):
+    def dense(*given, **more):
+        raise AssertionError("a decomposition that takes the cube of the number of rows")
+
+    for name in ("lstsq", "svd", "matrix_rank"):
+        monkeypatch.setattr(np.linalg, name, dense)
+    monkeypatch.setattr(assembly, "qr", dense)
+    assembled = assemble(hanging(LINKS, off))
+    assert assembled.degrees_of_freedom == 3 * LINKS
+    assert assembled.redundant == ()
+
+
+def test_elimination_takes_the_least_degree_first_and_the_first_of_equals():
+    """A star of four chains, by the definition: at each step the block whose neighbours have the fewest rows."""
+    bodies = [(0, 1), (1, 2), (0, 3), (3, 4), (0, 5), (5, 6), (0,)]
+    sizes = [5, 5, 5, 5, 5, 3, 2]
+    neighbours = [{j for j in range(7) if j != i and set(bodies[i]) & set(bodies[j])} for i in range(7)]
+    order = []
+    while len(order) < 7:
+        left = [k for k in range(7) if k not in order]
+        best = min(left, key=lambda k: (sum(sizes[g] for g in neighbours[k]), k))
+        clique = neighbours[best]
+        for k in clique:
+            neighbours[k] = (neighbours[k] | clique) - {k, best}
+        order.append(best)
+    assert eliminate(sizes, bodies).order == tuple(order)

@@ -1,0 +1,612 @@
+"""The cheapest model of a scene: estimates against closed forms and full runs, the search, its report, bad input."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from benchmarks.scene_set import ALUMINIUM, GRAVITY, beam, case, pendulum, slider_crank, spin_up
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.settings import Settings
+from ffr_dyn.cli import cli
+from ffr_dyn.consistency.assemble import assemble
+from ffr_dyn.economy.adaptive import Adaptation, adaptive_forward
+from ffr_dyn.economy.advice import advice
+from ffr_dyn.economy.cache import Ledger
+from ffr_dyn.economy.contributions import of_motion, of_omitted, of_shapes, own
+from ffr_dyn.economy.cost import of_run, per_evaluation
+from ffr_dyn.economy.inertia_terms import TermEffect, _inertial, without_minor
+from ffr_dyn.economy.model_choice import Part, applied, full, kind, orthonormal, rigid
+from ffr_dyn.economy.outputs import Output, as_output, difference, largest, largest_stress, probe
+from ffr_dyn.economy.picture import diagram
+from ffr_dyn.economy.report import as_html, as_markdown, as_text, write_report
+from ffr_dyn.economy.residual_estimate import oscillators, samples
+from ffr_dyn.economy.rigid_start import least, started
+from ffr_dyn.economy.run import Span, make, states
+from ffr_dyn.economy.search import economise
+from ffr_dyn.economy.selection import Shares
+from ffr_dyn.economy.steps import _from_two_rows, _of_both, chosen_step, error_of
+from ffr_dyn.economy.verification import _better, _own
+from ffr_dyn.functions.formula import formula
+from ffr_dyn.functions.time_functions import TimeFunction
+from ffr_dyn.integrators import ROS2, ROS3
+from ffr_dyn.integrators.stabilisation import Projection
+from ffr_dyn.results.result import Result
+from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.scene_file.read import load_scene
+from ffr_dyn.scene_file.write import save_scene
+from ffr_dyn.variants.variant import STIFFENING, stiffening_by
+from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
+from ffr_prep.structures.sections import rectangle
+
+SLOW = case("slider-crank-10")
+TIP = ("rod.b.position.x", "rod.b.position.y")
+
+
+# ---- oscillators ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("omega", [3.0, 400.0])
+def test_an_oscillator_follows_a_force_that_is_linear_between_samples_exactly(omega):
+    """Closed form of an undamped oscillator under f = a + b t from rest."""
+    time, a, b = np.linspace(0, 2, 17), 2.0, -1.5
+    q, rate = oscillators(time, (a + b * time)[:, None], np.array([omega**2]), np.array([0.0]))
+    expected = (a * (1 - np.cos(omega * time)) + b * (time - np.sin(omega * time) / omega)) / omega**2
+    np.testing.assert_allclose(q[:, 0], expected, atol=1e-10 / omega)
+    speed = (a * omega * np.sin(omega * time) + b * (1 - np.cos(omega * time))) / omega**2
+    np.testing.assert_allclose(rate[:, 0], speed, atol=1e-9)
+
+
+def test_a_damped_oscillator_decays_from_where_it_starts():
+    """q = exp(-d t / 2) (cos w t + d / 2 w sin w t) of q(0) = 1, at rest; unequal samples."""
+    time, omega, d = np.array([0, 0.1, 0.3, 0.35, 1.0]), 7.0, 0.8
+    q, _ = oscillators(time, np.zeros((5, 1)), np.array([omega**2]), np.array([d]), np.array([1.0]), np.array([0.0]))
+    w = np.sqrt(omega**2 - d**2 / 4)
+    np.testing.assert_allclose(
+        q[:, 0], np.exp(-d * time / 2) * (np.cos(w * time) + d / (2 * w) * np.sin(w * time)), rtol=1e-10
+    )
+
+
+# ---- estimates ------------------------------------------------------------------------------------------------------
+
+
+def looked_at(scene: Scene, outputs, end: float, step: float, *, divisions: int = 2):
+    """Ledger, and choice of everything."""
+    of = probe(assemble(scene), [Output(name, 1e-3) for name in outputs])
+    return Ledger(scene, Span(0, end, step), of, lambda stage: None), full(scene, "ros3", divisions)
+
+
+def test_a_complete_model_leaves_no_residual_and_a_rigid_one_leaves_it_in_the_modes():
+    ledger, everything = looked_at(pendulum(7e9), TIP, 0.2, 0.01)
+    whole, stiff = ledger.run(everything), ledger.run(rigid(everything))
+    same = own(ledger, whole)
+    size = np.abs(same.M @ np.ones(20)).max()
+    assert np.abs(same.residual).max() < 1e-8 * size
+    few, many = stiff.made.assembled, whole.made.assembled
+    seen = samples(few, many, (np.zeros((14, 0)),), stiff.result.time, *states(stiff))
+    assert np.abs(seen.residual[:, :6]).max() < 1e-8 * size
+    assert np.abs(seen.residual[:, 6:]).max() > 0.01
+
+
+@pytest.mark.parametrize(
+    "reference", [SimplySupported("a", "b"), FixedTo("a"), MeanAxis()], ids=["simple", "fixed", "mean"]
+)
+def test_the_estimate_of_a_rigid_pendulum_is_right_whatever_its_frame(reference):
+    """What rigid motion forgets: estimated by driving the modes one-way, true by running them."""
+    rod = beam("rod", 1.2, rectangle(0.2, 0.009), replace(ALUMINIUM, E=7e9, rho=5540.0), 4, reference)
+    hinge = Joint("hinge", "revolute", "ground.O", "rod.a")
+    scene = Scene((Body("rod", rod),), (hinge,), ground={"O": rod.interface("a").position}, gravity=GRAVITY)
+    ledger, everything = looked_at(scene, TIP, 0.6, 0.01)
+    pilot, stiff = ledger.run(everything), ledger.run(rigid(everything))
+    true = largest(difference(stiff.values, pilot.values))
+    estimated = of_omitted(ledger, stiff, everything, 0.1 * true).effect.sum(axis=0)
+    assert (estimated > 0.5 * true).all()
+    assert (estimated < 2.5 * true).all()
+
+
+def test_modes_have_a_rank_and_principal_shapes_need_fewer():
+    """A rod that speeds up: bending first; two shapes hold what takes more modes."""
+    scene = slider_crank(150.0)
+    ledger, everything = looked_at(scene, ("rod.stress",), 0.03, 0.001)
+    pilot = ledger.run(everything)
+    modes, shapes = (of(ledger, pilot, np.array([1e3]), own(ledger, pilot)) for of in (of_motion, of_shapes))
+    lowest = int(np.argmin(scene.bodies[1].model.frequencies))
+    leading = int(np.argmax(modes.effect[:, 0]))
+    assert (modes.body[leading], modes.mode[leading]) == (1, lowest)
+    rest = [np.sort(one.effect[:, 0])[::-1][2:].sum() for one in (modes, shapes)]
+    assert rest[1] < 0.5 * rest[0]
+
+
+def test_a_body_in_all_its_shapes_moves_as_before():
+    scene = pendulum(7e9)
+    ledger, everything = looked_at(scene, TIP, 0.2, 0.01)
+    V = orthonormal(np.random.default_rng(1).normal(size=(14, 14)), scene.bodies[0].model.omega2)
+    turned = replace(everything, parts=(Part(tuple(range(14)), (), tuple(tuple(c) for c in V.T.tolist())),))
+    one, other = (ledger.run(choice) for choice in (everything, turned))
+    assert largest(difference(one.values, other.values)).max() < 1e-9
+
+
+def test_the_error_of_a_step_comes_with_its_sign():
+    ledger, everything = looked_at(pendulum(7e9), TIP, 0.4, 0.02)
+    coarse, fine, finest = (ledger.run(replace(rigid(everything), divisions=d)) for d in (2, 4, 32))
+    true = difference(fine.values, finest.values)
+    for estimated, wanted in zip(error_of(fine, coarse), true, strict=True):
+        assert np.abs(estimated - wanted).max() < 0.3 * np.abs(wanted).max()
+
+
+def test_the_least_run_takes_shorter_steps_until_it_comes_to_an_end():
+    def fails_below_eight(choice):
+        if choice.divisions < 8:
+            raise ComputationError("too long a step")
+        return choice
+
+    everything = full(pendulum(7e9), "ros3", 1)
+    assert least(fails_below_eight, everything, 1).divisions == 8
+    with pytest.raises(ComputationError, match="no step down to"):
+        least(lambda choice: fails_below_eight(replace(choice, divisions=1)), everything, 1)
+
+
+def test_cost_grows_with_what_is_modelled():
+    scene = slider_crank(50.0)
+    everything = full(scene, "ros2", 1)
+    flat = replace(everything, plane="z")
+    plain = replace(everything, parts=tuple(replace(part, dropped=(STIFFENING,)) for part in everything.parts))
+    assert (
+        per_evaluation(rigid(flat))
+        < per_evaluation(rigid(everything))
+        < per_evaluation(plain)
+        < per_evaluation(everything)
+    )
+    once, thrice, more = (of_run(replace(everything, divisions=d), 10) for d in (1, 3, 5))
+    assert thrice - once == pytest.approx(more - thrice)  # in the number of steps; rows cost something too
+
+
+# ---- terms ----------------------------------------------------------------------------------------------------------
+
+
+def seen_with(kept: tuple[str, ...], dropped: tuple[str, ...]):
+    """A run without the terms of `dropped`, seen by the model without those of `kept`."""
+    ledger, everything = looked_at(slider_crank(50.0), ("rod.stress",), 0.042, 0.0021)
+    few, many = (
+        replace(everything, parts=tuple(replace(part, dropped=terms) for part in everything.parts))
+        for terms in (dropped, kept)
+    )
+    trial = ledger.run(few)
+    same = tuple(np.eye(len(part.modes)) for part in everything.parts)
+    return samples(trial.made.assembled, ledger.made(many).assembled, same, trial.result.time, *states(trial))
+
+
+@pytest.mark.parametrize("term", ["I5", "I8", "I9"])
+def test_the_force_of_an_inertia_term_is_the_residual_without_it(term):
+    seen = seen_with((STIFFENING,), (STIFFENING, term))
+    force = sum(force for _, name, _, force in _inertial(seen) if name == term)
+    size = np.abs(seen.residual).max()
+    assert size > 1e-6
+    np.testing.assert_allclose(force, seen.residual, atol=1e-5 * size)
+
+
+def test_the_forces_of_all_stiffening_loads_are_the_residual_without_stiffening():
+    seen = seen_with((), (STIFFENING,))
+    size = np.abs(seen.residual).max()
+    assert size > 1e-6
+    np.testing.assert_allclose(seen.stiffening.sum(axis=2), seen.residual, atol=2e-3 * size)
+
+
+def test_terms_go_until_their_share_is_used_up_and_loads_one_by_one():
+    everything = full(slider_crank(50.0), "ros3", 1)
+    sizes = {("I5", None): 0.5, ("I8", None): 3.0, (STIFFENING, 0): 0.2, (STIFFENING, 8): 5.0, (STIFFENING, 12): 0.1}
+    effects = tuple(TermEffect(1, term, load, np.array([size])) for (term, load), size in sizes.items())
+    crank, rod, _ = without_minor(everything, effects, np.array([1.0])).parts
+    assert (rod.dropped, rod.loads) == (("I5",), (8,))
+    assert crank == everything.parts[0]
+    assert without_minor(everything, effects, np.array([10.0])).parts[1].dropped == ("I5", "I8", STIFFENING)
+    assert without_minor(rigid(everything), effects, np.array([10.0])) == rigid(everything)
+
+
+def test_a_body_is_stiffened_by_the_loads_that_are_kept():
+    body = slider_crank(50.0).bodies[1]
+    fewer = stiffening_by(body, (8,)).model.stiffening
+    np.testing.assert_array_equal(fewer[8], body.model.stiffening[8])
+    assert np.count_nonzero(np.abs(fewer).max(axis=(1, 2))) == 1
+    with pytest.raises(InputError, match="it has the loads 0 to 23"):
+        stiffening_by(body, (24,))
+
+
+# ---- steps ----------------------------------------------------------------------------------------------------------
+
+
+def test_steps_over_two_rows_tell_the_error_of_one_row():
+    ledger, everything = looked_at(pendulum(7e9), TIP, 0.4, 0.02)
+    stiff = rigid(replace(everything, divisions=1))
+    coarse, finest = ledger.run(stiff), ledger.run(replace(stiff, divisions=16))
+    estimated, true = largest(_from_two_rows(ledger, coarse)), largest(difference(coarse.values, finest.values))
+    assert (np.abs(estimated / true - 1) < 0.5).all()
+    short, _ = looked_at(pendulum(7e9), TIP, 0.1, 0.02)
+    assert short.over_two_rows(stiff) is None
+
+
+def test_the_step_found_is_fine_enough_and_not_twice_too_fine():
+    ledger, everything = looked_at(pendulum(7e9), TIP, 0.4, 0.02)
+    stiff = rigid(replace(everything, divisions=1))
+    limit = 1e-9 * np.ptp(ledger.run(stiff).values[0]) * np.ones(2)
+    found = chosen_step(ledger, stiff, limit)
+    truth = ledger.run(replace(stiff, method="rk4", divisions=64)).values
+    assert (largest(difference(found.trial.values, truth)) <= limit).all()
+    assert found.trial.choice.divisions > 1
+    coarser = replace(found.trial.choice, divisions=found.trial.choice.divisions // 2)
+    assert (largest(difference(ledger.run(coarser).values, truth)) > limit).any()
+
+
+# ---- outputs --------------------------------------------------------------------------------------------------------
+
+
+def test_outputs_are_written_with_their_own_tolerances():
+    assert as_output("rod.tip", 1e-3) == Output("rod.tip", 1e-3)
+    assert as_output("rod.stress = 2e6", 1e-3) == Output("rod.stress", 2e6, absolute=True)
+    assert as_output("rod.stress=0.5%", 1e-3) == Output("rod.stress", 0.005)
+    with pytest.raises(InputError, match="write NAME"):
+        as_output("rod.stress=little", 1e-3)
+
+
+def test_stress_is_the_largest_of_the_surface():
+    scene = slider_crank(50.0)
+    rod = scene.bodies[1].model
+    q = np.zeros((2, rod.n))
+    q[1, 0] = 1e-3
+    stress = np.abs(rod.surface.stress[:, 0, 0] * 1e-3).max()
+    np.testing.assert_allclose(largest_stress(scene, "rod", q), [0.0, stress], rtol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("outputs", "said"),
+    [
+        ((), "name at least one output"),
+        (("rod.tipp.position.x",), "did you mean"),
+        (("rood.stress",), "there is no body 'rood'"),
+        (("slider.stress",), "has no stress modes"),
+        (("slider.pin.position.x", "slider.pin.position.x"), "more than once"),
+        (("slider.pin.position.z",), "does not change over the run"),
+        (("slider.pin.position.x=-1",), "it must be positive"),
+        (("slider.pin.position.x=1e-10%",), "below the accuracy of any run"),
+    ],
+)
+def test_outputs_that_say_nothing_are_refused(outputs, said):
+    with pytest.raises(InputError, match=said):
+        economise(SLOW.scene(), outputs, end=0.14, output_step=0.014)
+
+
+# ---- the search -----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def slow():
+    return economise(
+        SLOW.scene(), SLOW.outputs, end=SLOW.end, output_step=SLOW.output_step, tolerance=1e-3, verify=True
+    )
+
+
+def test_a_slow_stiff_mechanism_is_rigid_throughout(slow):
+    assert all(part.count == 0 for part in slow.choice.parts)
+    assert slow.choice.plane == "z"
+    assert (slow.verification.error < slow.limits).all()
+    assert 0.3 < float(slow.error[0] / slow.verification.first[0]) < 5
+    assert slow.cost < slow.before / 3
+    assert [kind(slow.original, slow.choice, b, SLOW.output_step) for b in range(3)] == ["rigid"] * 3
+
+
+def test_the_same_scene_gives_the_same_model(slow):
+    again = economise(
+        SLOW.scene(), SLOW.outputs, end=SLOW.end, output_step=SLOW.output_step, tolerance=1e-3, verify=True
+    )
+    assert again.choice == slow.choice
+    np.testing.assert_array_equal(again.error, slow.error)
+    assert as_text(again) == as_text(slow)
+
+
+def test_an_output_that_no_model_changes_is_told():
+    found = economise(SLOW.scene(), ("bearing.angle",), end=0.28, output_step=0.014, verify=False)
+    assert found.unmoved == ("bearing.angle",)
+    assert "no model changes it" in as_text(found)
+
+
+@pytest.fixture(scope="module")
+def fast():
+    scene = slider_crank(150.0)
+    return economise(scene, ("slider.pin.position.x", "rod.stress=40%"), end=0.063, output_step=0.0007, tolerance=1e-2)
+
+
+@pytest.fixture(scope="module")
+def fine():
+    """The same where stress matters finely: steps shorter than an output row, and many modes."""
+    return economise(slider_crank(150.0), ("rod.stress",), end=0.063, output_step=0.0007, tolerance=1e-3, verify=True)
+
+
+def test_a_coarse_tolerance_is_met_by_two_stages_at_once(fast):
+    """The model is run with two stages only, beside everything with four, whose difference is the error."""
+    assert (fast.choice.method, fast.choice.divisions) == ("ros2", 1)
+    assert [one.what for one in fast.tried if one.choice.parts == fast.choice.parts] == [
+        f"{sum(part.count for part in fast.choice.parts)} elastic coordinates, two stages",
+        "chosen",
+        "verified",
+    ]
+    np.testing.assert_allclose(fast.error, fast.tried[-2].error)
+    assert "One run beside everything" in as_text(fast)
+    assert (fast.error / fast.verification.first > 0.3).all()
+
+
+def test_a_fine_tolerance_takes_shorter_steps_and_one_look_at_everything_with_them(fine):
+    assert fine.choice.divisions > 1
+    assert (fine.verification.error <= fine.limits).all()
+    assert 0.3 < float((fine.error / fine.verification.first)[0]) < 5
+
+
+def test_rigid_bodies_are_scouted_with_steps_over_two_rows_where_rows_are_even():
+    for end, wide in ((0.28, True), (0.266, False)):
+        ledger, _ = looked_at(SLOW.scene(), SLOW.outputs, end, 0.014)
+        stiff = started(ledger, assemble(SLOW.scene()).system.scene)
+        assert (len(ledger.wide), len(ledger.runs)) == ((1, 0) if wide else (0, 1))
+        assert stiff.trial.result.time.size == (11 if wide else 20)
+        assert stiff.everything.plane == "z"
+
+
+def test_longer_steps_tell_no_smaller_an_error_of_the_reference():
+    """From steps of twice the reference's to six times, it is not below the true error by much."""
+    ledger, everything = looked_at(slider_crank(50.0), ("rod.stress",), 0.042, 0.0021)
+    sharp, finest = (ledger.run(replace(everything, divisions=d)) for d in (6, 48))
+    true = largest(difference(sharp.values, finest.values))
+    for divisions in (1, 2, 3):
+        assert (_own(sharp, ledger.run(replace(everything, divisions=divisions))) > 0.5 * true).all()
+
+
+def test_where_something_rings_two_stages_and_four_must_agree_better():
+    """A difference that is taken for the error of two stages in a damped scene is taken for that of four in a ringing one."""
+    for damping, method in ((0.01, "ros2"), (0.0, "ros3")):
+        scene = slider_crank(50.0)
+        scene = replace(scene, bodies=tuple(replace(body, damping=damping) for body in scene.bodies))
+        ledger, everything = looked_at(scene, ("rod.stress",), 0.042, 0.0021, divisions=1)
+        two, four = (ledger.run(replace(everything, method=name)) for name in ("ros2", "ros3"))
+        limit = largest(difference(two.values, four.values)) / 0.8
+        assert _of_both(two, four, limit).trial.choice.method == method
+        assert _of_both(two, four, limit / 2) is None
+
+
+def test_a_fast_slender_rod_keeps_bending_and_drops_stretching(fast):
+    """Where stress matters coarsely: bending, and no stretching, which makes about a twentieth of it."""
+    rod = fast.original.bodies[1].model
+    V = fast.choice.parts[1].basis(rod.n)
+    stretching = np.abs(rod.interface("b").phi_t[0]) > 1e-3 * np.abs(rod.interface("b").phi_t).max()
+    assert V.shape[1] >= 1
+    assert np.abs(V[~stretching]).max() > 0.9
+    assert np.abs(V[stretching]).max() < 0.1
+    assert fast.choice.parts[0].count == 0
+    assert (fast.verification.error <= fast.limits).all()
+
+
+def test_stiffening_is_kept_above_the_critical_spin():
+    """The beam's first frequency is 3.8 rad/s; a third of the published run suffices to need it."""
+    found = economise(spin_up(6.0), ("blade.b.displacement.y",), end=12.0, output_step=0.1, tolerance=1e-2)
+    blade = found.choice.parts[1]
+    assert blade.count > 0
+    assert blade.stiffened
+    assert (found.verification.error <= found.limits).all()
+    assert {one.body for one in found.stiffening} == {"blade"}
+
+
+def test_a_model_is_refined_where_verification_finds_it_wrong(monkeypatch):
+    """Estimates that promise too much are found out: with all modes declared without effect the search would stay rigid."""
+    monkeypatch.setattr("ffr_dyn.economy.search.Shares", lambda: Shares(1e9, 1e9, 1e9, 1e9, 1e9))
+    found = economise(pendulum(7e9), TIP, end=0.4, output_step=0.02, tolerance=1e-3, verify=True)
+    assert found.verification.attempts > 0
+    assert (found.verification.first > found.limits).any()
+    assert (found.verification.error <= found.limits).all()
+
+
+def test_a_refined_model_takes_a_finer_step_too_where_what_is_left_out_does_not_explain_its_error():
+    ledger, everything = looked_at(pendulum(7e9), TIP, 0.4, 0.02)
+    final, coarse = ledger.run(rigid(everything)), ledger.run(everything)
+    gap = largest(difference(final.values, coarse.values))
+    limits = 0.8 * gap
+    omitted = of_omitted(ledger, final, everything, limits)
+    for unexplained, divisions in ((0.1, 2), (0.5, 4)):
+        better = _better(ledger, limits, final, coarse, omitted, [gap + unexplained * limits])
+        assert better.choice.divisions == divisions
+        assert better.choice.parts[0].count > 0
+
+
+def test_the_reference_must_be_better_than_the_tolerance(monkeypatch):
+    monkeypatch.setattr(
+        "ffr_dyn.economy.verification.error_of", lambda fine, coarse: tuple(v + 1.0 for v in fine.values)
+    )
+    with pytest.raises(InputError, match="below what the reference itself is known to"):
+        economise(SLOW.scene(), SLOW.outputs, end=0.28, output_step=0.014, verify=True)
+
+
+# ---- report, advice, chart, command ---------------------------------------------------------------------------------
+
+
+def test_the_report_says_it_all(fast, tmp_path):
+    text = as_text(fast)
+    for part in (
+        "CHOSEN MODEL",
+        "OUTPUTS",
+        "BODIES",
+        "NEAREST TO MATTERING",
+        "TERMS NEAREST",
+        "MODELS TRIED",
+        "MESH AND REDUCTION",
+    ):
+        assert part in text
+    assert "slider.pin.position.x" in text
+    assert "Verified" in text
+    frequencies = {body.name: body.model.frequencies for body in fast.original.bodies}
+    counted = re.findall(r"(\w+), mode (\d+) \((\S+) Hz\)", text)
+    assert counted
+    assert all(f"{frequencies[body][int(mode) - 1]:.4g}" == hertz for body, mode, hertz in counted)  # from 1
+    assert "| rod | flexible" in as_markdown(fast, "chart.png")
+    page = as_html(fast, b"png")
+    assert page.startswith("<!doctype html>")
+    assert "http" not in page
+    for suffix in (".txt", ".md", ".html"):
+        assert write_report(fast, tmp_path / f"r{suffix}").stat().st_size > 1000
+    with pytest.raises(InputError, match="written as"):
+        write_report(fast, tmp_path / "r.pdf")
+
+
+def test_advice_is_a_command_to_run(fast):
+    lines = advice(fast)
+    assert lines[0].startswith("crank: rigid is enough")
+    assert "ffr-prep reduce FILE --interface a --interface b --method craig-bampton --frequency" in lines[1]
+    assert "--stress" in lines[1]
+
+
+def test_the_chart_is_a_diagram_of_all_runs_with_the_chosen_one(fast):
+    """One star, on the chosen model; its points stand beside those of another diagram; the tolerance is drawn."""
+    chart = diagram(fast)
+    assert len(chart.points) == len(fast.runs)
+    assert len({point.label for point in chart.points}) == len(chart.points)
+    (star,) = [point for point in chart.points if point.label in chart.chosen]
+    for k, output in enumerate(fast.probe.outputs):
+        assert star.errors[output.name] == pytest.approx(fast.verification.error[k])
+        assert star.errors[output.name] <= chart.limits[output.name]
+    assert len(chart.with_points(chart.points[:1]).points) == len(chart.points) + 1
+
+
+def test_nothing_cheaper_that_was_run_would_have_done(fine):
+    costs = np.array([one.cost / fine.cost for one in fine.runs])
+    errors = np.array([float((one.error / fine.limits).max()) for one in fine.runs])
+    assert costs.size > 3
+    assert not ((costs < 0.999) & (errors <= 1)).any()
+
+
+def test_the_search_costs_a_few_runs_of_what_it_finds(slow, fast, fine):
+    """Beyond one verification, by the cost model."""
+    assert all(found.search_cost < 3 * found.cost for found in (slow, fast))
+    assert fine.search_cost < 4 * fine.cost
+
+
+def test_a_body_that_does_nothing_to_the_outputs_itself_is_found_where_more_modes_do_not_help(fine):
+    """The crank's bending changes how the rod is shaken, and nothing of the rod's stress by itself."""
+    gaps = [float(one.error[0]) for one in fine.tried if one.what.endswith("elastic coordinates")]
+    assert gaps[1] == pytest.approx(gaps[0], rel=0.1)
+    assert gaps[2] < 0.1 * gaps[1]
+    crank = fine.kept.body == 0
+    assert crank.any()
+    assert fine.kept.effect[crank].max() < 1e-6 * fine.limits[0]
+
+
+def test_the_command_writes_a_scene_that_runs(tmp_path):
+    scene = slider_crank(50.0)
+    settings = Settings(0.0, 0.1, 0.005, ROS2(0.0005), Projection())
+    save_scene(scene, settings, tmp_path / "in.toml")
+    arguments = ["economise", str(tmp_path / "in.toml"), "--output", "slider.pin.position.x", "--tolerance", "1e-4"]
+    done = CliRunner().invoke(cli, [*arguments, "-o", str(tmp_path / "out.toml"), "--chart", str(tmp_path / "c.png")])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "out.html").exists()
+    assert (tmp_path / "c.png").stat().st_size > 1000
+    made, how = load_scene(tmp_path / "out.toml")
+    assert sum(body.model.n for body in made.bodies) < 28
+    result = forward(made, end=how.end, output_step=how.output_step, method=how.method)
+    reference = forward(scene, end=0.1, output_step=0.005, method=ROS3(0.0005))
+    off = np.abs(result["slider.pin.position.x"] - reference["slider.pin.position.x"]).max()
+    assert off < 1e-4 * np.ptp(reference["slider.pin.position.x"])
+
+
+def test_the_command_answers_a_wrong_output(tmp_path):
+    save_scene(slider_crank(50.0), Settings(0.0, 0.1, 0.005, ROS2(0.0005), Projection()), tmp_path / "in.toml")
+    with pytest.raises(InputError, match="none of the scene's quantities"):
+        CliRunner().invoke(
+            cli,
+            ["economise", str(tmp_path / "in.toml"), "--output", "nothing.x"],
+            catch_exceptions=False,
+            standalone_mode=False,
+        )
+
+
+def test_a_model_of_another_scene_is_refused():
+    with pytest.raises(InputError, match="the scene has 1"):
+        applied(pendulum(7e9), full(slider_crank(10.0), "ros2", 1))
+
+
+# ---- adaptive order -------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def adaptive() -> tuple[Scene, Result]:
+    """A crank that speeds up and slows down again within 0.3 s, damped."""
+    scene = slider_crank(40.0)
+    bodies = tuple(replace(body, damping=0.05) for body in scene.bodies)
+    motor = Driver("motor", "bearing", _up_and_down(60.0, 0.3))
+    scene = replace(scene, bodies=bodies, drivers=(motor,))
+    outputs = ("slider.pin.position.x=5e-6",)
+    return scene, adaptive_forward(
+        scene, outputs, end=0.42, output_step=2e-3, divisions=4, adaptation=Adaptation(rows=15)
+    )
+
+
+def _up_and_down(speed: float, time: float) -> TimeFunction:
+    u = f"min(t, {time})"
+    return formula(f"{speed} * ({u} - sin(2 * pi * {u} / {time}) * {time} / (2 * pi)) / 2")
+
+
+def test_a_body_becomes_flexible_and_rigid_again(adaptive):
+    _, result = adaptive
+    count = result["model.coordinates"].sum(axis=1)
+    assert count[0] == 0
+    assert count.max() > 0
+    assert count[-1] == 0
+
+
+def test_outputs_stay_within_the_tolerance_and_continuous(adaptive):
+    scene, result = adaptive
+    reference = forward(scene, end=0.42, output_step=2e-3, method=ROS3(2.5e-4))
+    off = result["slider.pin.position.x"] - reference["slider.pin.position.x"]
+    assert np.abs(off).max() < 5e-6
+    np.testing.assert_allclose(result.time, reference.time, atol=1e-12)
+
+
+def test_the_ledger_holds_what_switches_did(adaptive):
+    _, result = adaptive
+    switched, count = result["energy.switched"], result["model.coordinates"].sum(axis=1)
+    changed = np.diff(count) != 0
+    jumps = np.abs(np.diff(switched))
+    assert jumps[changed].max() > 0
+    assert jumps[~changed].max() < 0.05 * jumps[changed].max()
+    assert np.abs(switched).max() < 1e-3 * np.ptp(result["energy.kinetic"])
+
+
+def test_a_model_is_compiled_once_however_often_the_run_switches(monkeypatch):
+    """Pieces are more than models, and each model of them is made once."""
+    made = []
+
+    def counted(scene, choice, span):
+        made.append(choice.parts)
+        return make(scene, choice, span)
+
+    monkeypatch.setattr("ffr_dyn.economy.adaptive.make", counted)
+    scene = slider_crank(40.0)
+    adaptive_forward(
+        scene, ("slider.pin.position.x=5e-6",), end=0.2, output_step=2e-3, divisions=2, adaptation=Adaptation(rows=10)
+    )
+    assert len(made) == len(set(made)) < 10
+
+
+def test_a_scene_that_is_assembled_already_runs_to_the_same_bits():
+    scene = slider_crank(40.0)
+    one, other = (
+        forward(scene, end=0.02, output_step=0.002, method=ROS3(0.002), assembled=given)
+        for given in (None, assemble(scene))
+    )
+    np.testing.assert_array_equal(one["slider.pin.position"], other["slider.pin.position"])
+
+
+@pytest.mark.parametrize("given", [{"enter": 0.1, "leave": 0.2}, {"enter": 2.0}, {"rows": 1}])
+def test_an_adaptation_that_cannot_work_is_refused(given):
+    with pytest.raises(InputError):
+        Adaptation(**given)

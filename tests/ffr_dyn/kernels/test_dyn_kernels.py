@@ -1,0 +1,460 @@
+"""The compiled kernels against their readable twins, and the twins against a Lagrangian differentiated numerically."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from ffr_gallery.bodies import beam
+from synthetic import cloud, mirrored
+
+from ffr_dyn.compile.body_tables import loads_that_stiffen, of_coordinates
+from ffr_dyn.compile.engine import evaluate_at, new_machine
+from ffr_dyn.compile.scene_tables import System, compile_scene
+from ffr_dyn.compile.symmetry_blocks import in_blocks
+from ffr_dyn.consistency.assemble import drive_of, rows_at
+from ffr_dyn.equations.constraints import evaluate_word
+from ffr_dyn.equations.inertia import elastic_force, gravity_force, mass_matrix, quadratic_velocity
+from ffr_dyn.equations.layout import layout
+from ffr_dyn.functions.rotation import G_bar, rotation_matrix, skew
+from ffr_dyn.functions.time_functions import evaluate, harmonic, polynomial, table
+from ffr_dyn.integrators import RK4
+from ffr_dyn.kernels.functions import evaluate_functions
+from ffr_dyn.kernels.tables import LANES, OK, Functions
+from ffr_dyn.scene.drivers import Driver, PointDriver
+from ffr_dyn.scene.forces import Load
+from ffr_dyn.scene.joints import KINDS, Joint
+from ffr_dyn.scene.scene import Body, Scene
+
+RNG = np.random.default_rng(7)
+
+
+def random_state(scene: Scene, seed: int = 3) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    place = layout(scene)
+    x, v = rng.normal(size=place.x_size), rng.normal(size=place.v_size)
+    for b in range(len(scene.bodies)):
+        x[place.p(b)] /= np.linalg.norm(x[place.p(b)])
+        x[place.q(b)] *= 0.05
+    return x, v
+
+
+def moved(scene: Scene, x: np.ndarray, v: np.ndarray, h: float) -> np.ndarray:
+    """x after the small time h at the constant velocity v: exact rotation about the body axes."""
+    place = layout(scene)
+    y = x.copy()
+    for b in range(len(scene.bodies)):
+        y[place.R(b)] += h * v[place.R_dot(b)]
+        y[place.q(b)] += h * v[place.q_dot(b)]
+        half = 0.5 * h * v[place.omega(b)]
+        angle = np.linalg.norm(half)
+        p = x[place.p(b)]
+        y[place.p(b)] = np.cos(angle) * p + np.sinc(angle / np.pi) * (G_bar(p).T @ half)
+    return y
+
+
+# ---- one body: mass matrix and forces from the Lagrangian ------------------------------------------------------------
+
+
+def kinetic_energy(body, R_dot, A, omega, q, q_dot) -> float:
+    """Sum over the mass points: no integral of the body is used."""
+    mass = np.array(body.provenance["masses"])
+    u = body.surface.points + body.surface.Phi @ q
+    velocity = R_dot + (np.cross(omega, u) + body.surface.Phi @ q_dot) @ A.T
+    return 0.5 * float(mass @ (velocity**2).sum(1))
+
+
+def test_mass_matrix_is_the_hessian_of_the_kinetic_energy():
+    body = cloud(4)
+    q, A = RNG.normal(size=4) * 0.1, np.eye(3)
+    M = mass_matrix(body, q)
+    for _ in range(5):
+        y = RNG.normal(size=10)
+        energy = kinetic_energy(body, y[:3], A, y[3:6], q, y[6:])
+        assert 0.5 * y @ M @ y == pytest.approx(energy, rel=1e-13)
+
+
+def lagrange_residual(body, R, p, q, v, acc, gravity) -> np.ndarray:
+    """d/dt (dL/d(velocity)) - dL/d(position) in the quasi-velocities (A^T R_dot, omega_bar, q_dot), by differences of L.
+
+    For quasi-velocities y the equations are Boltzmann-Hamel's; with the kinetic energy T(q, y) of a free body they are
+    d/dt T_v + omega x T_v, d/dt T_omega + omega x T_omega + v x T_v, d/dt T_qdot - T_q.
+    """
+    h = 1e-6
+
+    def momentum(qq, y):
+        return mass_matrix_by_differences(body, qq) @ y
+
+    y, rate = v, acc
+    A = rotation_matrix(p)
+    P = momentum(q, y)
+    dP = (momentum(q + h * y[6:], y + h * rate) - momentum(q - h * y[6:], y - h * rate)) / (2 * h)
+    dT = np.array([
+        (energy_of(body, q + h * e, y) - energy_of(body, q - h * e, y)) / (2 * h) for e in np.eye(q.size)
+    ])  # fmt: skip
+    field = A.T @ gravity
+    mass = np.array(body.provenance["masses"])
+    u = body.surface.points + body.surface.Phi @ q
+    weight = np.concatenate([
+        mass.sum() * field, np.cross(mass @ u, field), np.einsum("p,pkj,k->j", mass, body.surface.Phi, field)
+    ])  # fmt: skip
+    return np.concatenate([
+        dP[:3] + np.cross(y[3:6], P[:3]),
+        dP[3:6] + np.cross(y[3:6], P[3:6]) + np.cross(y[:3], P[:3]),
+        dP[6:] - dT + body.omega2 * q,
+    ]) - weight  # fmt: skip
+
+
+def energy_of(body, q, y) -> float:
+    return kinetic_energy(body, y[:3], np.eye(3), y[3:6], q, y[6:])
+
+
+def mass_matrix_by_differences(body, q) -> np.ndarray:
+    size = 6 + body.n
+    unit = np.eye(size)
+    T = [[energy_of(body, q, unit[i] + unit[j]) for j in range(size)] for i in range(size)]
+    own = np.array([energy_of(body, q, unit[i]) for i in range(size)])
+    return np.array(T) - own[:, None] - own[None, :]
+
+
+def test_accelerations_satisfy_the_lagrangian_differentiated_numerically():
+    body = cloud(5, stiffness=3.0)
+    gravity = np.array([0.3, -9.81, 1.0])
+    q, q_dot, omega, V = (RNG.normal(size=k) * 0.3 for k in (5, 5, 3, 3))
+    p = RNG.normal(size=4)
+    p /= np.linalg.norm(p)
+    A = rotation_matrix(p)
+    forces = (
+        quadratic_velocity(body, q, omega, q_dot)
+        + elastic_force(body, np.zeros(5), q, q_dot)
+        + gravity_force(body, q, A, gravity)
+    )
+    solution = np.linalg.solve(mass_matrix(body, q), forces)  # a = A^T R_ddot, omega_dot, q_ddot
+    y = np.concatenate([A.T @ V, omega, q_dot])
+    rate = solution.copy()
+    rate[:3] -= np.cross(omega, y[:3])  # d/dt (A^T R_dot) = a - omega x (A^T R_dot)
+    residual = lagrange_residual(body, np.zeros(3), p, q, y, rate, gravity)
+    assert np.abs(residual).max() < 1e-6 * np.abs(forces).max()
+
+
+# ---- kernels against twins ----------------------------------------------------------------------------------------
+
+
+SPECIAL = {"distance": {"length": harmonic(amplitude=0.3, frequency=0.8, phase=0.3, mean=2.0)}, "screw": {"pitch": 0.7}}
+
+
+def chain(n_first: int = 4, n_second: int = 3, kind: str = "revolute", **joint) -> Scene:
+    joint |= SPECIAL.get(kind, {})
+    first, second = cloud(n_first, seed=1), cloud(n_second, seed=2)
+    return Scene(
+        bodies=(Body("one", first, damping=0.02), Body("two", second, damping=0.01)),
+        joints=(
+            Joint("root", "spherical", "ground.O", "one.a"),
+            Joint("tie", kind, "one.b", "two.c", **joint),
+        ),
+        ground={"O": (0.1, 0.2, 0.3)},
+        gravity=(0.5, -9.81, 0.2),
+    )
+
+
+def dense(system: System, x, v):
+    """Twin: block-diagonal mass matrix, forces, constraint rows of the compiled blocks, all as dense arrays."""
+    scene, place = system.scene, system.layout
+    M, f = np.zeros((place.v_size, place.v_size)), np.zeros(place.v_size)
+    for b, body in enumerate(scene.bodies):
+        at = slice(place.iv[b], place.iv[b] + 6 + place.n[b])
+        q, q_dot, omega = x[place.q(b)], v[place.q_dot(b)], v[place.omega(b)]
+        M[at, at] = mass_matrix(body.model, q)
+        f[at] = (
+            quadratic_velocity(body.model, q, omega, q_dot)
+            + elastic_force(body.model, body.damping, q, q_dot)
+            + gravity_force(body.model, q, rotation_matrix(x[place.p(b)]), scene.gravity)
+        )
+    rows = [
+        evaluate_word(scene, place, x, v, word, block.markers, drive_of(word, 0.0))
+        for block in system.blocks
+        for word in block.words
+    ]
+    return M, f, rows
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("sizes", [(4, 3), (0, 5), (3, 0), (0, 0), (1, 2)])
+def test_compiled_accelerations_and_multipliers_equal_the_dense_solution(kind, sizes):
+    scene = chain(*sizes, kind=kind, axis=(0.2, 1.0, 0.3), axis_j=(1.0, -0.5, 0.4))
+    system = compile_scene(scene)
+    x, v = random_state(scene)
+    machine = new_machine(system, x, v)
+    assert evaluate_at(machine, 0.0, x, v) == OK
+    work = machine.work
+    M, f, rows = dense(system, x, v)
+    J = np.array([row.jacobian for row in rows])
+    gamma = np.array([row.gamma for row in rows])
+    size = gamma.size
+    K = np.block([[M, J.T], [J, np.zeros((size, size))]])
+    solution = np.linalg.solve(K, np.concatenate([f, gamma]))
+    np.testing.assert_allclose(work.rows.Phi, [row.Phi for row in rows], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(work.rows.nu, [row.nu for row in rows], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(work.rows.gamma, gamma, rtol=0, atol=1e-11)
+    scale = np.abs(solution).max()
+    np.testing.assert_allclose(work.bodies.acc, solution[: f.size], rtol=0, atol=1e-10 * scale)
+    np.testing.assert_allclose(work.rows.lam, solution[f.size :], rtol=0, atol=1e-9 * scale)
+
+
+# ---- products in blocks ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("planes", "blocks"), [(1, 2), (2, 4)])
+@pytest.mark.parametrize("rounding", [0.0, 1e-12])
+def test_a_symmetric_body_is_computed_in_blocks_and_equals_its_twin(planes, blocks, rounding):
+    body = mirrored(24, planes, rounding=rounding)
+    scene = Scene(
+        bodies=(Body("one", body, damping=0.02), Body("two", cloud(3))),
+        joints=(Joint("root", "spherical", "ground.O", "one.a"), Joint("tie", "fixed", "one.b", "two.c")),
+        ground={"O": (0.1, 0.2, 0.3)},
+        gravity=(0.5, -9.81, 0.2),
+    )
+    system = compile_scene(scene)
+    assert system.model.bodies.blocks[0] == blocks
+    assert system.model.bodies.PP_dm.size < 0.6 * 9 * 24**2
+    x, v = random_state(scene)
+    machine = new_machine(system, x, v)
+    assert evaluate_at(machine, 0.0, x, v) == OK
+    M, f, rows = dense(system, x, v)
+    J, gamma = np.array([row.jacobian for row in rows]), np.array([row.gamma for row in rows])
+    K = np.block([[M, J.T], [J, np.zeros((gamma.size, gamma.size))]])
+    solution = np.linalg.solve(K, np.concatenate([f, gamma]))
+    np.testing.assert_allclose(machine.work.bodies.acc, solution[: f.size], rtol=0, atol=1e-10 * np.abs(solution).max())
+
+
+def products_by_plan(pool, plan, q, count, last):
+    """sum_i q_i table_i of all components, and of the last, from their blocks."""
+    n = q.size
+    sizes = plan[1 : 1 + 3 * plan[0]].reshape(-1, 3)
+    order, place, late_place = np.split(plan[1 + sizes.size :], [n, n + count])
+    found, late, at, first = [], [], 0, 0
+    for inputs, outputs, of_last in sizes:
+        block = pool[at : at + inputs * outputs].reshape(inputs, outputs)
+        y = q[order[first : first + inputs]] @ block
+        found.append(y)
+        late.append(y[outputs - of_last :])
+        at, first = at + inputs * outputs, first + inputs
+    found, late = np.append(np.concatenate(found), 0.0), np.append(np.concatenate(late), 0.0)
+    return found[place], late[late_place[:last]]
+
+
+def test_blocks_give_the_products_of_the_whole_table():
+    """Also where components vanish, coordinates are in none, and a family's rounding is not zero."""
+    rng = np.random.default_rng(5)
+    n, families = 30, np.arange(30) % 3
+    table = np.zeros((n, 6, n))
+    table[:, 0] = rng.normal(size=(n, n)) * (families[:, None] == families)
+    table[:, 1] = rng.normal(size=(n, n)) * (families[:, None] + families == 3)
+    table[:, 3] = 1e-12
+    table[:, 5] = rng.normal(size=(n, n)) * (families[:, None] == families)
+    table[7], table[:, :, 7] = 0.0, 0.0
+    table[:, :4] += np.swapaxes(table[:, :4], 0, 2)
+    table[:, 4:] -= np.swapaxes(table[:, 4:], 0, 2)
+    pool, plan = in_blocks(table, 2, np.full(6, 1e-9))
+    assert plan[0] == 3  # component 1 couples two families, but each of its products belongs to one
+    q = rng.normal(size=n)
+    expected = np.einsum("i,icj->cj", q, np.where(np.abs(table) < 1e-9, 0.0, table))
+    every, last = products_by_plan(pool, plan, q, 6 * n, 2 * n)
+    np.testing.assert_allclose(every.reshape(6, n), expected, atol=1e-13)
+    np.testing.assert_allclose(last.reshape(2, n), expected[4:], atol=1e-13)
+
+
+@pytest.mark.parametrize("n", [1, 3, 8, 11, 30, 75])
+@pytest.mark.parametrize("families", [1, 4])
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_geometric_stiffness_in_blocks_is_the_sum_of_the_whole(n, families, symmetric):
+    """Each load couples a family of coordinates with one other, or, with one family, all with all; 18 loads act."""
+    rng = np.random.default_rng(n)
+    family = rng.permutation(n) % families
+    K = 1e-3 * rng.normal(size=(30, n, n))
+    for load, matrix in enumerate(K):
+        matrix += matrix.T * symmetric
+        matrix *= (family[:, None] ^ family) == load % families
+    body = replace(cloud(n, points=30), stiffening=K)
+    scene = Scene(
+        bodies=(Body("one", body), Body("rigid", cloud(0)), Body("two", body)),
+        joints=(Joint("root", "spherical", "ground.O", "two.a"), Joint("tie", "spherical", "two.a", "rigid.b")),
+        loads=(Load("push", "one.c", force=(1.0, 2.0, 3.0)),),
+        ground={"O": (0.1, 0.2, 0.3)},
+    )
+    system = compile_scene(scene)
+    x, v = random_state(scene)
+    machine = new_machine(system, x, v)
+    assert evaluate_at(machine, 0.0, x, v) == OK
+    work = machine.work.bodies
+    for b, at_marker in ((0, 24), (2, 12)):
+        loads, first = loads_that_stiffen(system.model.bodies, b), system.model.bodies.where[b, 3]
+        assert loads.tolist() == [k for k in (*range(12), *range(at_marker, at_marker + 6)) if K[k].any()]
+        expected = np.einsum("l,lij,j->i", work.load[b, loads], K[loads], x[system.layout.q(b)])
+        found = work.stiff[first : first + n]
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max(initial=1e-3))
+
+
+def test_tables_lie_at_the_starts_of_cache_lines():
+    system = compile_scene(Scene(bodies=(Body("one", cloud(5)), Body("two", cloud(3)))))
+    machine = new_machine(system, *random_state(system.scene), RK4(1e-3))
+    for tables in (system.model.bodies, machine.work.rows, machine.work.bodies, machine.tables.stages):
+        assert all(array.ctypes.data % 64 == 0 and array.flags.c_contiguous for array in tables if array.size)
+    assert machine.work.markers.A is machine.work.bodies.A
+    assert machine.tables.x.ctypes.data % 64 == 0
+
+
+def test_a_body_without_symmetry_and_one_of_few_modes_are_one_block():
+    for body in (cloud(20), mirrored(8, 2)):
+        bodies = compile_scene(Scene(bodies=(Body("one", body),))).model.bodies
+        assert bodies.blocks.tolist() == [0]
+        assert bodies.PP_dm.size == 9 * body.n**2 + LANES
+
+
+def test_equal_bodies_share_what_they_have_by_coordinate_unless_their_damping_differs():
+    model = cloud(4)
+    ratios = (0.01, 0.05, 0.01)
+    bodies = compile_scene(
+        Scene(bodies=tuple(Body(f"b{k}", model, damping=r) for k, r in enumerate(ratios)))
+    ).model.bodies
+    assert bodies.omega2.size == bodies.two_zeta_omega.size == 2 * model.n
+    np.testing.assert_array_equal(of_coordinates(bodies, bodies.omega2), np.tile(model.omega2, 3))
+    expected = np.concatenate([2 * r * np.sqrt(model.omega2) for r in ratios])
+    np.testing.assert_allclose(of_coordinates(bodies, bodies.two_zeta_omega), expected, rtol=1e-15)
+
+
+def test_loads_at_interfaces_that_nothing_acts_on_stiffen_nothing():
+    model = beam("one", 1.0, 1.0, 10.0, 3)
+    bar = Body("one", model)
+    ground = {"O": (0.0, 0.0, 0.0)}
+    held = Scene((bar,), (Joint("root", "revolute", "ground.O", "one.a", axis=(0, 0, 1)),), ground=ground)
+    pulled = replace(held, loads=(Load("pull", "one.b", force=(1.0, 0.0, 0.0)),))
+    first = 12 + 6 * [i.name for i in model.interfaces].index("b")
+    assert not any(first <= k < first + 6 for k in loads_that_stiffen(compile_scene(held).model.bodies, 0))
+    assert first in loads_that_stiffen(compile_scene(pulled).model.bodies, 0)
+
+
+# ---- constraints: finite differences ----------------------------------------------------------------------------------
+
+
+DRIVE = harmonic(amplitude=0.7, frequency=0.8, phase=0.3, mean=0.2)
+
+
+def constraint_cases():
+    return [
+        *((kind, sizes, None) for kind in KINDS for sizes in ((4, 3), (0, 0))),
+        ("revolute", (4, 3), "angle"),
+        ("cylindrical", (4, 3), "stroke"),
+        ("translational", (0, 2), "stroke"),
+        ("spherical", (3, 2), "path"),
+    ]
+
+
+@pytest.mark.parametrize(("kind", "sizes", "coordinate"), constraint_cases())
+def test_jacobian_rate_and_right_hand_side_equal_finite_differences(kind, sizes, coordinate):
+    scene = chain(*sizes, kind=kind, axis=(0.2, 1.0, 0.3), axis_j=(1.0, -0.5, 0.4))
+    if coordinate == "path":
+        scene = replace(scene, drivers=(PointDriver("drive", "one.a", "two.a", DRIVE, None, 0.3),))
+    elif coordinate:
+        scene = replace(scene, drivers=(Driver("drive", "tie", DRIVE, coordinate),))
+    system = compile_scene(scene)
+    x, v = random_state(scene)
+    place, h, t = system.layout, 1e-5, 0.37
+    acc = np.random.default_rng(5).normal(size=place.v_size)
+
+    def rows_at(s: float):
+        """Rows at time t + s along a motion with velocity v and body-axes acceleration acc at s = 0."""
+        xs = moved(scene, x, v + 0.5 * s * global_rates(acc), s)
+        vs = v + s * global_rates(acc)
+        return [
+            evaluate_word(scene, place, xs, vs, w, b.markers, drive_of(w, t + s))
+            for b in system.blocks
+            for w in b.words
+        ]
+
+    def global_rates(a):
+        out = a.copy()
+        for b in range(len(scene.bodies)):
+            out[place.R_dot(b)] = rotation_matrix(x[place.p(b)]) @ a[place.R_dot(b)]
+        return out
+
+    here, ahead, behind = rows_at(0.0), rows_at(h), rows_at(-h)
+    for row, plus, minus in zip(here, ahead, behind, strict=True):
+        assert row.nu == pytest.approx((plus.Phi - minus.Phi) / (2 * h), abs=2e-8)
+        nu_dot = (plus.nu - minus.nu) / (2 * h)
+        assert row.jacobian @ acc - row.gamma == pytest.approx(nu_dot, abs=2e-7)
+    # the Jacobian column by column, time held
+    for k in range(place.v_size):
+        unit = np.zeros(place.v_size)
+        unit[k] = 1.0
+        direction = global_rates(unit)
+
+        def value(s, direction=direction):
+            xs = moved(scene, x, direction, s)
+            return np.array([
+                evaluate_word(scene, place, xs, v, w, b.markers, drive_of(w, t)).Phi for b in system.blocks for w in b.words
+            ])  # fmt: skip
+
+        slope = (value(h) - value(-h)) / (2 * h)
+        np.testing.assert_allclose([row.jacobian[k] for row in here], slope, rtol=0, atol=2e-9)
+
+
+def test_skew_and_G_bar_conventions():
+    p = RNG.normal(size=4)
+    p /= np.linalg.norm(p)
+    omega = RNG.normal(size=3)
+    h = 1e-6
+    rate = 0.5 * G_bar(p).T @ omega
+    A_dot = (rotation_matrix(p + h * rate) - rotation_matrix(p - h * rate)) / (2 * h)
+    np.testing.assert_allclose(A_dot, rotation_matrix(p) @ skew(omega), atol=1e-8)
+    np.testing.assert_allclose(2 * G_bar(p) @ rate, omega, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("kind", "coordinate"), [("revolute", "angle"), ("cylindrical", "angle"), ("cylindrical", "stroke")]
+)
+def test_compiled_drivers_equal_the_readable_ones(kind, coordinate):
+    scene = replace(chain(kind=kind), drivers=(Driver("drive", "tie", DRIVE, coordinate),))
+    system = compile_scene(scene)
+    (x, v), t = random_state(scene), 0.37
+    machine = new_machine(system, x, v)
+    assert evaluate_at(machine, t, x, v) == OK
+    work = machine.work
+    rows = rows_at(scene, system.layout, list(system.blocks), x, v, t)
+    for name in ("Phi", "nu", "gamma"):
+        np.testing.assert_allclose(getattr(work.rows, name), [getattr(r, name) for r in rows], rtol=0, atol=1e-11)
+
+
+TIMES = np.array([0.0, 0.3, 0.7, 1.5, 2.0])
+FUNCTIONS = {
+    "polynomial": polynomial(1.0, -2.0, 0.5, 3.0),
+    "harmonic": DRIVE,
+    "table": table(TIMES, np.cos(3 * TIMES)),
+    "one piece": table(TIMES[:2], TIMES[:2] ** 2),
+}
+
+
+@pytest.mark.parametrize("function", FUNCTIONS.values(), ids=list(FUNCTIONS))
+@pytest.mark.parametrize("t", [-0.5, 0.0, 0.1, 0.3, 0.69, 1.9999, 2.0, 2.5])
+def test_compiled_time_functions_equal_the_readable_ones(function, t):
+    tables = Functions(
+        np.array([function.kind]), np.array([0, len(function.data)]), np.array(function.data, dtype=float)
+    )
+    out = np.zeros((1, 3))
+    evaluate_functions(tables, np.zeros(0), t, out)
+    np.testing.assert_allclose(out[0], evaluate(function, t), rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("function", FUNCTIONS.values(), ids=list(FUNCTIONS))
+def test_derivatives_of_time_functions_equal_finite_differences(function):
+    t, h = 0.11, 1e-5
+    _, rate, second = evaluate(function, t)
+    ahead, behind = evaluate(function, t + h), evaluate(function, t - h)
+    assert rate == pytest.approx((ahead[0] - behind[0]) / (2 * h), abs=1e-7)
+    assert second == pytest.approx((ahead[1] - behind[1]) / (2 * h), abs=1e-6)
+
+
+def test_a_table_passes_through_its_points():
+    for t, y in zip(TIMES, np.cos(3 * TIMES), strict=True):
+        assert evaluate(FUNCTIONS["table"], t)[0] == pytest.approx(y, abs=1e-12)

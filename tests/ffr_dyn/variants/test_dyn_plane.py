@@ -1,0 +1,239 @@
+"""Planar scenes: found, declared, and equal to the same scene computed in space."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.consistency.assemble import assemble, flattened
+from ffr_dyn.functions.rotation import euler_parameters, rotation_matrix
+from ffr_dyn.functions.time_functions import harmonic, polynomial
+from ffr_dyn.integrators import RK4, ROS2
+from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.forces import Load, SpringDamper
+from ffr_dyn.scene.joints import Joint, frames
+from ffr_dyn.scene.scene import Body, Scene
+from ffr_prep.body import rigid_body
+from ffr_prep.common.errors import InputError
+from ffr_prep.model.coupled import InterfaceRegion
+from ffr_prep.model.material import Material
+from ffr_prep.model.reference import SimplySupported
+from ffr_prep.pipelines.structures import reduce_frame
+from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.structures.frame import Member, named, polyline
+from ffr_prep.structures.sections import rectangle
+
+ALUMINIUM = Material("aluminium", E=7e10, nu=0.3, rho=2700.0)
+
+
+def rod(name: str, length: float, *, stiffening: bool = False):
+    """A flexible rod along x in the plane z = 0, higher than wide so that no frequencies coincide."""
+    member = Member(rectangle(0.013, 0.02), ALUMINIUM, orientation=(0, 1, 0))
+    frame = named(polyline([(0, 0, 0), (length, 0, 0)], member, elements=6), a=(0, 0, 0), b=(length, 0, 0))
+    return reduce_frame(
+        frame,
+        name=name,
+        interfaces=[InterfaceRegion("a"), InterfaceRegion("b")],
+        reference=SimplySupported("a", "b"),
+        reduction=CraigBampton(6),
+        stiffening=stiffening,
+    )
+
+
+def slider_crank(**changes) -> Scene:
+    crank = rigid_body(
+        "crank", mass=0.5, inertia=(1e-4, 5e-4, 5e-4), centre_of_mass=(0.05, 0, 0),
+        points={"o": (0, 0, 0), "pin": (0.1, 0, 0)},
+    )  # fmt: skip
+    block = rigid_body("block", mass=0.4, inertia=(1e-4, 1e-4, 1e-4), points={"pin": (0, 0, 0)})
+    parts = {
+        "bodies": (
+            Body("crank", crank),
+            Body("rod", rod("rod", 0.3, **changes.pop("rod", {})), (0.1, 0, 0), damping=0.01),
+            Body("block", block, (0.4, 0, 0)),
+        ),
+        "joints": (
+            Joint("main", "revolute", "ground.O", "crank.o"),
+            Joint("big", "revolute", "crank.pin", "rod.a"),
+            Joint("small", "revolute", "rod.b", "block.pin"),
+            Joint("guide", "translational", "ground.O", "block.pin", axis=(1.0, 0, 0)),
+        ),
+        "drivers": (Driver("motor", "main", polynomial(0.3, 40.0)),),
+        "loads": (Load("push", "block.pin", force=(harmonic(amplitude=30.0, frequency=9.0), 0, 0)),),
+        "springs": (SpringDamper("spring", "ground.P", "block.pin", stiffness=900.0, free_length=0.5),),
+        "ground": {"O": (0, 0, 0), "P": (1.0, 0, 0)},
+        "gravity": (0, -9.81, 0),
+    }
+    return Scene(**parts | changes)
+
+
+@pytest.mark.parametrize("method", [RK4(5e-6), ROS2(5e-5)])
+@pytest.mark.parametrize("stiffening", [False, True])
+def test_motion_and_reactions_equal_the_spatial_ones(method, stiffening):
+    scene = slider_crank(rod={"stiffening": stiffening})
+    runs = [
+        forward(replace(scene, plane=plane), end=0.02, output_step=0.001, method=method) for plane in ("auto", "none")
+    ]
+    planar, spatial = runs
+    assert any("planar" in note for note in planar.attributes["notes"])
+    assert not any("planar" in note for note in spatial.attributes["notes"])
+    across = ~planar["rod.q"].any(axis=0)
+    assert 0 < across.sum() < across.size
+    deflection = np.abs(spatial["rod.q"]).max()
+    np.testing.assert_allclose(planar["rod.q"], spatial["rod.q"], rtol=0, atol=1e-10 * deflection)
+    for name in ("rod.b.position", "block.R", "rod.a.displacement", "rod.omega_bar", "crank.p"):
+        np.testing.assert_allclose(planar[name], spatial[name], rtol=0, atol=1e-10 * np.abs(spatial[name]).max())
+    for name in ("motor.moment", "main.force", "big.force", "small.force", "guide.force", "guide.moment"):
+        np.testing.assert_allclose(planar[name], spatial[name], rtol=0, atol=1e-7 * np.abs(spatial["big.force"]).max())
+    np.testing.assert_allclose(planar["energy.total"], spatial["energy.total"], rtol=1e-9)
+
+
+def test_a_planar_body_has_three_coordinates_and_no_redundancy_is_invented():
+    """A loop of rigid bodies in revolute joints is three times redundant in space, and not in the plane."""
+    scene = slider_crank()
+    ends = {"a": np.zeros(3), "b": np.array([0.3, 0, 0])}
+    stiff = rigid_body("rod", mass=0.2, inertia=(1e-4, 2e-3, 2e-3), centre_of_mass=(0.15, 0, 0), points=ends)
+    bodies = (scene.bodies[0], Body("rod", stiff, (0.1, 0, 0)), scene.bodies[2])
+    planar, spatial = (assemble(replace(scene, bodies=bodies, plane=plane)) for plane in ("auto", "none"))
+    assert sum("redundant" in note for note in spatial.notes) == 3
+    assert not any("redundant" in note for note in planar.notes)
+    assert planar.degrees_of_freedom == spatial.degrees_of_freedom == 0
+    kept = {block.name: len(block.words) for block in planar.system.blocks}
+    assert kept == {"main": 2, "big": 2, "small": 2, "guide": 2, "motor": 1}
+
+
+@pytest.mark.parametrize("turn", [(0, 0, 0), (np.pi / 2, 0, 0), (0, np.pi / 2, 0)])
+def test_the_plane_may_be_any_of_the_three(turn):
+    """The scene turned as a whole, gravity too."""
+    A = rotation_matrix(euler_parameters(turn, "turn"))
+    scene = slider_crank(loads=(), springs=())
+    bodies = tuple(replace(b, position=A @ b.position, rotation=A) for b in scene.bodies)
+    joints = tuple(
+        replace(j, axis=A @ frames(j)[0], axis_j=frames(j)[1]) if j.i.startswith("ground") else j for j in scene.joints
+    )
+    ground = {name: A @ at for name, at in scene.ground.items()}
+    turned = replace(scene, bodies=bodies, joints=joints, ground=ground, gravity=A @ scene.gravity)
+    runs = [forward(s, end=0.01, output_step=0.001, method=ROS2(1e-4)) for s in (scene, turned)]
+    assert all(any("planar" in note for note in run.attributes["notes"]) for run in runs)
+    np.testing.assert_allclose(runs[1]["rod.b.position"] @ A, runs[0]["rod.b.position"], rtol=0, atol=1e-10)
+
+
+def heavy_below(**changes):
+    crank = rigid_body(
+        "crank", mass=0.5, inertia=(1e-4, 5e-4, 5e-4), centre_of_mass=(0.05, 0, 0.01),
+        points={"o": (0, 0, 0), "pin": (0.1, 0, 0)},
+    )  # fmt: skip
+    scene = slider_crank()
+    return replace(scene, bodies=(Body("crank", crank), *scene.bodies[1:]), **changes)
+
+
+SPATIAL = {
+    "gravity across": lambda: slider_crank(gravity=(0, -9.81, 1.0)),
+    "a force across": lambda: slider_crank(loads=(Load("push", "block.pin", force=(1.0, 0, 1.0)),)),
+    "a moment in the plane": lambda: slider_crank(loads=(Load("push", "block.pin", moment=(1.0, 0, 0)),)),
+    "a function of the user": lambda: slider_crank(loads=(Load("f", "block.pin", function=lambda t, s: (0, 0, 1)),)),
+    "mass beside the plane": heavy_below,
+    "a body that no joint holds": lambda: Scene(
+        (Body("top", rigid_body("top", mass=1.0, inertia=(1, 2, 3)), omega_bar=(0, 0, 1.0)),)
+    ),
+    "a rod that may turn about itself": lambda: slider_crank(
+        joints=tuple(replace(j, kind="spherical") if j.name in ("big", "small") else j for j in slider_crank().joints)
+    ),
+    "a spring aslant": lambda: slider_crank(ground={"O": (0, 0, 0), "P": (1.0, 0, 0.2)}),
+}
+
+
+@pytest.mark.parametrize("make", SPATIAL.values(), ids=list(SPATIAL))
+def test_what_reaches_across_the_plane_is_computed_in_space(make):
+    assert flattened(make(), 0.0)[0].plane == "none"
+
+
+def test_a_declared_plane_leaves_out_what_is_across_and_refuses_what_cannot_be():
+    assert flattened(heavy_below(plane="z"), 0.0)[0].plane == "z"
+    with pytest.raises(InputError, match="gravity has the component 1"):
+        flattened(slider_crank(gravity=(0, -9.81, 1.0), plane="z"), 0.0)
+    scene = slider_crank(plane="z")
+    leaning = [replace(body, rotation=(0.1, 0, 0)) if body.name == "rod" else body for body in scene.bodies]
+    with pytest.raises(InputError, match=r"no axis of body 'rod' is along it"):
+        flattened(replace(scene, bodies=tuple(leaning)), 0.0)
+    with pytest.raises(InputError, match="plane is 'w'"):
+        slider_crank(plane="w")
+
+
+def test_twists_of_a_tall_bar_are_across_a_declared_plane():
+    """A section taller than wide moves mostly in the plane when it is twisted, and still turns its ends across it."""
+    member = Member(rectangle(0.02, 0.06), ALUMINIUM, orientation=(0, 1, 0))
+    frame = named(polyline([(0, 0, 0), (1.0, 0, 0)], member, elements=12), a=(0, 0, 0), b=(1.0, 0, 0))
+    ends = [InterfaceRegion("a"), InterfaceRegion("b")]
+    tall = reduce_frame(
+        frame, name="link", interfaces=ends, reference=SimplySupported("a", "b"), reduction=CraigBampton(6)
+    )
+    found = flattened(double_pendulum(tall), 0.0)[0]
+    declared = flattened(double_pendulum(tall, plane="z"), 0.0)[0]
+    assert found.plane == declared.plane == "z"
+    assert [body.kept for body in found.bodies] == [body.kept for body in declared.bodies]
+
+
+# ---- bodies of many modes ---------------------------------------------------------------------------------------------
+
+
+def double_pendulum(link, **changes) -> Scene:
+    return Scene(
+        (Body("one", link, (0, 0, 0)), Body("two", link, (1.0, 0, 0))),
+        (Joint("hip", "revolute", "ground.O", "one.a"), Joint("knee", "revolute", "one.b", "two.a")),
+        ground={"O": (0, 0, 0)},
+        gravity=(0, -9.81, 0),
+        **changes,
+    )
+
+
+@pytest.fixture(scope="module")
+def link():
+    """32 modes, of which the highest turn their ends by a hundred times what the lowest do, with as much more rounding."""
+    member = Member(rectangle(0.013, 0.02), ALUMINIUM, orientation=(0, 1, 0))
+    frame = named(polyline([(0, 0, 0), (1.0, 0, 0)], member, elements=12), a=(0, 0, 0), b=(1.0, 0, 0))
+    return reduce_frame(
+        frame,
+        name="link",
+        interfaces=[InterfaceRegion("a"), InterfaceRegion("b")],
+        reference=SimplySupported("a", "b"),
+        reduction=CraigBampton(26),
+    )
+
+
+def turned_modes(body, angle: float):
+    """The body turned about its own axis, which mixes what stays in the plane with what leaves it."""
+    A = rotation_matrix(euler_parameters((angle, 0, 0), "turn"))
+    return replace(
+        body,
+        P_dm=A @ body.P_dm,
+        rP_dm=np.einsum("ka,lb,abj->klj", A, A, body.rP_dm),
+        PP_dm=np.einsum("ka,lb,abij->klij", A, A, body.PP_dm),
+        rr_dm=A @ body.rr_dm @ A.T,
+        interfaces=tuple(replace(i, phi_t=A @ i.phi_t, phi_r=A @ i.phi_r) for i in body.interfaces),
+    )
+
+
+def test_rounding_of_high_modes_does_not_make_a_scene_spatial(link):
+    scene = double_pendulum(link)
+    flat, _ = flattened(scene, 0.0)
+    assert flat.plane == "z"
+    assert link.n == 32
+    assert flat.bodies[0].model.n == 14  # the others bend across the plane or twist
+    for interface in flat.bodies[0].model.interfaces:
+        assert not interface.phi_t[2].any()
+        assert not interface.phi_r[:2].any()
+    runs = [
+        forward(replace(scene, plane=plane), end=0.02, output_step=0.005, method=ROS2(1e-5))
+        for plane in ("auto", "none")
+    ]
+    for name in ("two.b.position", "one.q"):
+        np.testing.assert_allclose(runs[0][name], runs[1][name], rtol=0, atol=1e-9 * np.abs(runs[1][name]).max())
+
+
+@pytest.mark.parametrize(("angle", "plane"), [(1e-12, "z"), (1e-7, "none"), (1e-3, "none")])
+def test_a_body_that_is_really_spatial_stays_so(link, angle, plane):
+    assert flattened(double_pendulum(turned_modes(link, angle)), 0.0)[0].plane == plane

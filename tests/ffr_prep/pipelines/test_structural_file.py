@@ -1,0 +1,255 @@
+"""Structure files, the command that reduces them, and every guard on the way."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from places import ROOT
+
+from ffr_prep.body import load_body
+from ffr_prep.cli import cli, main
+from ffr_prep.common.errors import InputError
+from ffr_prep.model.material import Material, material
+from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports
+from ffr_prep.pipelines.structure_file import load_structure, reduce_structure
+from ffr_prep.reduction.component_modes import CharacteristicModes, CraigBampton, Eigenmodes, Guyan, Rubin, Union
+from ffr_prep.reduction.krylov import Krylov
+from ffr_prep.reduction.selection import Accuracy, Band, UpTo
+from ffr_prep.reduction.static_shapes import AttachmentModes, InertiaRelief
+from ffr_prep.structures.frame import Member, Shell, check_frame
+from ffr_prep.structures.sections import circle, general, i_section, rectangle, shear_rigid, shifted, tube
+
+LINE = """
+[[polylines]]
+member = "bar"
+corners = [[0, 0, 0], [1, 0, 0]]
+elements = 2
+[members.bar]
+section = {shape = "circle", d = 0.01}
+material = "steel"
+[nodes]
+a = [0, 0, 0]
+b = [1, 0, 0]
+[interfaces.a]
+[interfaces.b]
+"""
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "bar.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def page(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", (ROOT / "docs/structural.md").read_text(encoding="utf-8"), re.S)
+
+
+def test_the_file_of_the_documentation(tmp_path):
+    loaded = load_structure(written(tmp_path, page("toml")[0]))
+    check_frame(loaded.frame)
+    assert loaded.name == "portal"
+    assert loaded.frame.shells == (Shell(0.004, material("steel")),)
+    profile = shifted(i_section(0.2, 0.1, 0.006, 0.009), 0.1, 0)
+    assert loaded.frame.members == (Member(profile, material("steel"), (1.0, 0.0, 0.0)),)
+    assert len(loaded.frame.points) == 45
+    body = reduce_structure(loaded)
+    assert body.stiffening is not None
+    assert body.surface.stress is not None
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_the_programs_of_the_documentation_run(which, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "meshes").symlink_to(ROOT / "meshes")
+    space: dict = {}
+    exec(compile(page("python")[which], "docs", "exec"), space)
+    assert space["body"].omega2[0] > 0
+
+
+def test_the_example_is_reduced_by_the_command(tmp_path):
+    output = tmp_path / "tray.ffr"
+    done = CliRunner().invoke(cli, ["reduce-structure", str(ROOT / "examples/tray.toml"), "-o", str(output)])
+    assert done.exception is None, done.output
+    assert "24 beams" in done.output
+    body = load_body(output)
+    sheet, floor = 7870 * 2 * 0.6 * 0.08 * 0.0015, 2700 * 0.6 * 0.3 * 0.002
+    assert body.mass == pytest.approx(sheet + floor + 7850 * 1.2 * tube(0.012, 0.001).A, rel=1e-9)
+    assert [(i.name, i.kind) for i in body.interfaces] == [("front", "rigid"), ("load", "mean")]
+    assert body.provenance["source"] == {"file": "tray.toml"}
+    assert body.frequencies[0] == pytest.approx(60.702, rel=1e-3)  # with elements of half the size
+
+
+@pytest.mark.parametrize(
+    ("text", "section"),
+    [
+        ('{shape = "rectangle", b = 0.02, h = 0.03}', rectangle(0.02, 0.03)),
+        ('{shape = "tube", d = 0.02, t = 0.003}', tube(0.02, 0.003)),
+        (
+            '{shape = "general", A = 1e-4, Iy = 1e-9, Iz = 1e-9, J = 2e-9}',
+            general("general", A=1e-4, Iy=1e-9, Iz=1e-9, J=2e-9),
+        ),
+        ('{shape = "circle", d = 0.02}\nshear = false', shear_rigid(circle(0.02))),
+    ],
+)
+def test_sections(tmp_path, text, section):
+    loaded = load_structure(written(tmp_path, LINE.replace('{shape = "circle", d = 0.01}', text)))
+    assert loaded.frame.members[0].section == section
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ('reference = {kind = "mean-axis"}', MeanAxis()),
+        ('reference = {kind = "fixed", interface = "a"}', FixedTo("a")),
+        ('reference = {kind = "simply-supported", pin = "a", roller = "b"}', SimplySupported("a", "b")),
+        (
+            'reference = {kind = "supports", supports = [{interface = "a", motion = "rotation", direction = [0, 0, 1]}]}',
+            Supports((Support("a", "rotation", (0.0, 0.0, 1.0)),)),
+        ),
+    ],
+)
+def test_references(tmp_path, text, expected):
+    assert load_structure(written(tmp_path, text + LINE)).reference == expected
+
+
+def test_reductions_materials_and_triangles(tmp_path):
+    text = """
+reduction = {method = "eigenmodes", modes = 3}
+panels = [{shell = "s", corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], elements = [2, 1], triangles = true}]
+shells.s = {thickness = 0.01, material = "own", rotary_inertia = false}
+materials.own = {E = 1e9, nu = 0.25, rho = 1200}
+"""
+    loaded = load_structure(written(tmp_path, text))
+    assert loaded.reduction == Eigenmodes(3)
+    assert loaded.frame.shells == (Shell(0.01, Material("own", 1e9, 0.25, 1200.0), 0.0),)
+    assert len(loaded.frame.triangles) == 4
+    assert loaded.name == "bar"
+    assert load_structure(written(tmp_path, LINE)).reduction == CraigBampton(10)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ('{method = "rubin", modes = 3}', Rubin(3)),
+        ('{method = "guyan"}', Guyan()),
+        ('{method = "attachment"}', AttachmentModes()),
+        ('{method = "characteristic", modes = 3, interface_modes = 4}', CharacteristicModes(3, 4)),
+        ('{method = "krylov", moments = 3, match = [0, 120]}', Krylov(3, (0.0, 120.0))),
+        ("{frequency = 500}", CraigBampton(UpTo(500.0))),
+        ("{accuracy = [10, 500, 0.05]}", CraigBampton(Accuracy(Band(10.0, 500.0), 0.05))),
+        ('[{modes = 2}, {method = "inertia-relief"}]', Union((CraigBampton(2), InertiaRelief()))),
+    ],
+)
+def test_reductions(tmp_path, text, expected):
+    assert load_structure(written(tmp_path, f"reduction = {text}" + LINE)).reduction == expected
+
+
+def test_the_quality_of_a_structure_is_reported(tmp_path):
+    text = "reduction = {modes = 2}\nquality = [5, 200]\n" + LINE.replace("elements = 2", "elements = 8")
+    body = reduce_structure(load_structure(written(tmp_path, text)))
+    assert body.provenance["quality"]["band"] == [5, 200]
+
+
+SOLID = """
+reference = {kind = "fixed", interface = "root"}
+reduction = {modes = 4}
+ties = [["frame.b", "block.left"]]
+polylines = [{member = "bar", corners = [[-0.5, 0.05, 0.05], [0, 0.05, 0.05]], elements = 8}]
+members.bar = {section = {shape = "rectangle", b = 0.1, h = 0.1}, material = "steel", orientation = [0, 1, 0]}
+nodes = {root = [-0.5, 0.05, 0.05], b = [0, 0.05, 0.05]}
+interfaces = {root = {}, b = {}}
+[solids.block]
+file = "box.geo"
+material = "steel"
+numbers = {nx = 6, ny = 1, nz = 1}
+interfaces = {left = {}, right = {kind = "mean"}}
+"""
+
+
+def test_a_solid_is_tied_to_a_frame(tmp_path):
+    """Half beam, half solid: mass, length and frequencies of the whole cantilever; by file, by command."""
+    (tmp_path / "box.geo").symlink_to(ROOT / "meshes" / "box.geo")
+    body = reduce_structure(load_structure(written(tmp_path, SOLID)))
+    assert body.mass == pytest.approx(material("steel").rho * 1.5 * 0.01, rel=1e-9)
+    assert [i.name for i in body.interfaces] == ["root", "right"]
+    assert body.provenance["ties"] == [["frame.b", "block.left"]]
+    steel, L = material("steel"), 1.5
+    slender = 1.8751040687**2 / (2 * np.pi * L**2) * np.sqrt(steel.E * 0.01**2 / 12 / (steel.rho * 0.01))
+    assert slender * 0.95 < body.frequencies[0] < slender
+    main(["reduce-structure", str(tmp_path / "bar.toml"), "-o", str(tmp_path / "b.ffr")])
+    np.testing.assert_array_equal(load_body(tmp_path / "b.ffr").PP_dm, body.PP_dm)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('ties = [["frame.b", "block.left"]]', "", "solids and ties need each other"),
+        ("[solids.block]", "[solids.frame]", "the part 'frame' is that of beams"),
+        ('"block.left"', '"block.lef"', "'lef'"),
+        ('interfaces = {left = {}, right = {kind = "mean"}}', "", "solids.block.interfaces: Field required"),
+        ('file = "box.geo"', 'file = "none.geo"', "none.geo does not exist"),
+    ],
+)
+def test_ties_that_cannot_be(tmp_path, old, new, says):
+    (tmp_path / "box.geo").symlink_to(ROOT / "meshes" / "box.geo")
+    assert old in SOLID
+    with pytest.raises(InputError, match=says):
+        reduce_structure(load_structure(written(tmp_path, SOLID.replace(old, new))))
+
+
+# ---- guards -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("x = 1\n" + LINE, "the file: 'x' is not a known entry here; known are name, "),
+        ("stres = true\n" + LINE, "'stres' is not a known entry here; did you mean 'stress'"),
+        (LINE + "knd = 'mean'", "interfaces.b: 'knd' is not a known entry here; did you mean 'kind'"),
+        ("stiffening = 3\n" + LINE, r"stiffening: Input should be a valid boolean.* \(it is 3\)"),
+        ("name = 'a'", "give a .geometry. file"),
+        ("name = ", "is not TOML"),
+        (LINE.replace('"circle"', '"round"'), "members.bar.section: .*'round'"),
+        (LINE.replace("d = 0.01", "d = nan"), "members.bar.section.circle.d: Input should be a finite number"),
+        (LINE.replace("d = 0.01", "d = -0.01"), "bar.toml: section circle -0.01 m: d is -0.01 m"),
+        (LINE.replace('member = "bar"', 'member = "rod"'), "there is no member 'rod'; there are: 'bar'"),
+        (LINE.replace('"steel"', '"stel"'), "no material 'stel' in the library; did you mean steel"),
+        (LINE.replace("b = [1, 0, 0]", "b = [1, 0, 1]"), "no node at .* to be called 'b'"),
+        (LINE + 'kind = "soft"', "interfaces.b.kind: Input should be 'rigid' or 'mean'"),
+        ("reduction = {modes = -1}\n" + LINE, "reduction.0.modes: Input should be greater than or equal to 0"),
+        ("reduction = {modes = 2, frequency = 5}\n" + LINE, "reduction.*modes, frequency and accuracy all say"),
+        ("geometry = {file = 'none.geo'}\n" + LINE, "none.geo does not exist"),
+    ],
+)
+def test_files_that_cannot_be_used(tmp_path, text, says):
+    with pytest.raises(InputError, match=says):
+        load_structure(written(tmp_path, text))
+
+
+def test_a_missing_file_ends_the_command_with_code_2_and_writes_nothing(tmp_path, capsys):
+    with pytest.raises(SystemExit) as left:
+        main(["reduce-structure", str(tmp_path / "none.toml"), "-o", str(tmp_path / "b.ffr")])
+    assert left.value.code == 2
+    assert "none.toml does not exist" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_failed_reduction_keeps_the_old_body(tmp_path):
+    output = tmp_path / "b.ffr"
+    output.write_bytes(b"old")
+    path = written(tmp_path, 'reference = {kind = "fixed", interface = "c"}\n' + LINE)
+    with pytest.raises(SystemExit) as left:
+        main(["reduce-structure", str(path), "-o", str(output)])
+    assert left.value.code == 2
+    assert output.read_bytes() == b"old"
+
+
+def test_the_same_file_gives_the_same_body(tmp_path):
+    path = written(tmp_path, "reduction = {modes = 4}" + LINE)
+    one, two = (reduce_structure(load_structure(path)) for _ in range(2))
+    np.testing.assert_array_equal(one.PP_dm, two.PP_dm)

@@ -1,0 +1,128 @@
+"""The sparse factorisation against dense ones, whatever the shape of the graph."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from boxes import STEEL, box_mesh, shaken
+
+from ffr_prep.solids.assembly import assemble
+from ffr_prep.solvers.cholesky import cholesky, solve_cholesky
+from ffr_prep.solvers.nested_dissection import _cut, elimination_tree
+
+
+def assert_solves(A, positions, columns=3, rel=1e-9):
+    b = np.random.default_rng(0).normal(size=(A.shape[0], columns))
+    x = solve_cholesky(cholesky(sp.csr_array(A), positions), b)
+    np.testing.assert_allclose(x, np.linalg.solve(A.toarray(), b), rtol=0, atol=rel * np.abs(x).max())
+
+
+def clamped(kind, cells):
+    mesh = shaken(box_mesh(kind, (1.0, 0.4, 0.3), cells), 0.01)
+    free = np.flatnonzero(np.repeat(mesh.points[:, 0] > 0, 3))
+    return sp.csr_array(assemble(mesh, STEEL).K[free][:, free]), np.repeat(mesh.points, 3, axis=0)[free]
+
+
+@pytest.mark.parametrize(
+    ("kind", "cells"), [("tet10", (6, 3, 2)), ("hex8", (8, 4, 3)), ("hex20", (4, 2, 2)), ("tet4", (1, 1, 1))]
+)
+def test_stiffness_matrices(kind, cells):
+    A, positions = clamped(kind, cells)
+    assert_solves(A, positions)
+
+
+def test_it_tells_how_far_it_is():
+    A, positions = clamped("tet10", (8, 4, 3))
+    told = []
+    factor = cholesky(A, positions, lambda share, words: told.append((share, words)))
+    shares, count = [share for share, _ in told], len(factor.fronts.children)
+    assert len(told) > 10
+    assert 0 < shares[0] < 0.2
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1)
+    assert told[-1][1] == f"{count} of {count} fronts"
+
+
+def test_unknowns_without_a_place_come_last():
+    """Six unknowns that touch everything, like those of a rigid interface."""
+    A, positions = clamped("tet10", (5, 2, 2))
+    rng = np.random.default_rng(1)
+    T = sp.hstack([sp.eye_array(A.shape[0]), sp.csr_array(rng.normal(size=(A.shape[0], 6)))], format="csr")
+    bordered = sp.csr_array(T.T @ A @ T + 1e9 * sp.eye_array(A.shape[0] + 6))
+    positions = np.vstack([positions, np.full((6, 3), np.nan)])
+    factor = cholesky(bordered, positions)
+    assert set(factor.order[-6:]) == set(range(A.shape[0], A.shape[0] + 6))
+    assert_solves(bordered, positions)
+
+
+def test_graphs_that_fall_apart_when_cut():
+    """A star of chains: cutting it leaves parts that do not touch, and cuts without points."""
+    rng = np.random.default_rng(2)
+    count = 400
+    parent = np.maximum(np.arange(count) - 8, 0)
+    edges = sp.coo_array((np.ones(count - 1), (np.arange(1, count), parent[1:])), shape=(count, count))
+    A = sp.csr_array(3 * sp.eye_array(count) + sp.diags_array(np.full(count, 9.0)) - edges - edges.T)
+    assert_solves(A, rng.normal(size=(count, 3)))
+    assert_solves(sp.csr_array(sp.diags_array(rng.uniform(1, 2, count))), rng.normal(size=(count, 3)))
+
+
+def test_points_that_coincide_or_lie_on_a_line():
+    A, positions = clamped("hex8", (5, 3, 3))
+    assert_solves(A, np.zeros_like(positions))
+    assert_solves(A, np.outer(np.arange(len(positions)), [1.0, 0.0, 0.0]))
+    assert_solves(A, np.full_like(positions, np.nan))
+
+
+def test_the_same_matrix_gives_the_same_bits_with_any_number_of_threads(monkeypatch):
+    A, positions = clamped("tet10", (12, 5, 4))
+    b = np.random.default_rng(0).normal(size=(A.shape[0], 5))
+    factor = cholesky(A, positions)
+    assert len(factor.division.branches) > 8
+    x = solve_cholesky(factor, b)
+    for threads in (1, 3):
+        monkeypatch.setattr("os.cpu_count", lambda threads=threads: threads)
+        again = cholesky(A, positions)
+        assert again.fronts.panels.tobytes() == factor.fronts.panels.tobytes()
+        assert solve_cholesky(again, b).tobytes() == x.tobytes()
+
+
+def test_large_fronts_are_eliminated_by_tiles(monkeypatch):
+    """The same numbers as in one piece, up to rounding."""
+    A, positions = clamped("tet10", (8, 4, 4))
+    monkeypatch.setattr("ffr_prep.solvers.cholesky._TILE", 50)
+    monkeypatch.setattr("ffr_prep.solvers.cholesky._BRANCHES", 200)
+    factor = cholesky(A, positions)
+    own = np.diff(factor.fronts.starts)[factor.division.trunk]
+    assert own.max() > 100
+    assert_solves(A, positions)
+
+
+def test_pieces_below_a_piece_precede_it_and_separate_its_halves():
+    A, positions = clamped("tet10", (8, 4, 3))
+    pieces, children = elimination_tree(A, positions)
+    np.testing.assert_array_equal(np.sort(np.concatenate(pieces)), np.arange(A.shape[0]))
+    first = list(range(len(pieces)))
+    for k, below in enumerate(children):
+        ends = [first[child] for child in below] + [k]
+        assert all(child + 1 == end for child, end in zip(below, ends[1:], strict=True))
+        first[k] = ends[0]
+        for one, other in combinations(below, 2):
+            rows, columns = (np.concatenate(pieces[first[side] : side + 1]) for side in (one, other))
+            assert A[rows][:, columns].nnz == 0
+
+
+def test_the_separator_is_a_smallest_one():
+    """A comb of 20 points on a line, each touching the ten on the other side of the cut: the spine alone separates."""
+    points = np.column_stack([np.arange(20.0), np.zeros((20, 2))])
+    edges = sp.lil_array((20, 20))
+    for spine, tooth in [(9, k) for k in range(10, 20)] + [(10, k) for k in range(9)]:
+        edges[spine, tooth] = edges[tooth, spine] = 1
+    _, _, separator = _cut(points, sp.csr_array(edges), np.arange(20), np.full(20, -1))
+    np.testing.assert_array_equal(separator, [9, 10])
+
+
+def test_a_matrix_that_is_not_positive_definite_is_refused():
+    A, positions = clamped("hex8", (5, 3, 3))
+    with pytest.raises(np.linalg.LinAlgError, match="not positive"):
+        cholesky(sp.csr_array(A - 1e12 * sp.eye_array(A.shape[0])), positions)

@@ -1,0 +1,173 @@
+"""Section forces and stress of beams: equilibrium, closed forms, invariance, the body file."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from boxes import rotation
+from test_structural import STEEL, regions, space_frame, straight
+
+from ffr_prep.body import SECTION_FORCES, BodyError, load_body, save_body, truncated
+from ffr_prep.model.reference import FixedTo
+from ffr_prep.pipelines.structures import reduce_frame
+from ffr_prep.reduction.component_modes import CraigBampton, Eigenmodes
+from ffr_prep.structures.beam_stress import section_forces_at
+from ffr_prep.structures.sections import circle, i_section, rectangle, shear_rigid, shifted, tube, with_mass_moments
+
+LENGTH = 1.2
+LOAD = np.array([2e4, 300.0, -500.0, 60.0, -70.0, 90.0])
+
+
+def reduced(frame, names=("root", "tip"), modes=0, reduction=CraigBampton):
+    return reduce_frame(
+        frame,
+        name="frame",
+        interfaces=regions(*names),
+        reference=FixedTo(names[0]),
+        reduction=reduction(modes),
+        stress=True,
+    )
+
+
+def static(body, interface, load):
+    """(n,) elastic coordinates under a force and moment (6,) at an interface, in body axes."""
+    at = body.interface(interface)
+    return np.vstack([at.phi_t, at.phi_r]).T @ load / body.omega2
+
+
+def moment_at(x, load):
+    """Internal moment at x of a cantilever along x under a load at its tip."""
+    return load[3:] + np.cross([LENGTH - x, 0.0, 0.0], load[:3])
+
+
+@pytest.mark.parametrize("section", [circle(0.05), rectangle(0.02, 0.06), i_section(0.1, 0.06, 0.005, 0.008)])
+@pytest.mark.parametrize("elements", [1, 3])
+def test_section_forces_of_a_cantilever_balance_its_load(section, elements):
+    body = reduced(straight(section, LENGTH, elements))
+    beams = body.surface.beams
+    found = beams.modes @ static(body, "tip", LOAD)
+    for place, forces in zip(beams.positions.reshape(-1, 3), found.reshape(-1, 6), strict=True):
+        np.testing.assert_allclose(forces[:3], LOAD[:3], rtol=1e-7)
+        np.testing.assert_allclose(forces[3:], moment_at(place[0], LOAD), rtol=1e-7, atol=1e-5)
+    np.testing.assert_allclose(beams.positions[0, 1], [LENGTH / elements / 2, 0, 0], atol=1e-15)
+    assert len(SECTION_FORCES) == beams.modes.shape[2]
+
+
+def test_nodes_of_a_space_frame_are_in_equilibrium():
+    """At a node without load the section forces of all members that meet there cancel, offsets included."""
+    frame = space_frame()
+    body = reduced(frame, ("a", "b"))
+    q = static(body, "b", LOAD)
+    beams = body.surface.beams
+    ends = (beams.modes @ q)[:, [0, 2]] * np.array([1.0, -1.0])[:, None]  # on the node, by the element
+    force = np.einsum("eij,enj->eni", beams.axes, ends[..., :3])
+    moment = np.einsum("eij,enj->eni", beams.axes, ends[..., 3:])
+    arms = beams.positions[:, [0, 2]] - frame.points[frame.elements]
+    moment = moment + np.cross(arms, force)
+    held = {int(frame.node_groups[name][0]) for name in ("a", "b")}
+    assert np.abs(arms).max() > 0.01
+    for node in set(range(len(frame.points))) - held:
+        here = frame.elements == node
+        assert here.sum() >= 2
+        np.testing.assert_allclose(force[here].sum(axis=0), 0.0, atol=1e-7 * np.abs(force).max())
+        np.testing.assert_allclose(moment[here].sum(axis=0), 0.0, atol=1e-7 * np.abs(moment).max())
+    loaded = frame.elements == frame.node_groups["b"][0]
+    np.testing.assert_allclose(-force[loaded].sum(axis=0), LOAD[:3], rtol=1e-7, atol=1e-3)
+    np.testing.assert_allclose(-moment[loaded].sum(axis=0), LOAD[3:], rtol=1e-7, atol=1e-3)
+
+
+def in_body_axes(beams, q):
+    """(E, 3, 2, 3) force and moment at the three places of each element."""
+    return np.einsum("eij,esmj->esmi", beams.axes, (beams.modes @ q).reshape(-1, 3, 2, 3))
+
+
+def test_a_turned_frame_has_turned_section_forces_and_stress():
+    R = rotation(5)
+    here, there = (reduced(space_frame(turned=T), ("a", "b")) for T in (np.eye(3), R))
+    q = static(here, "b", LOAD)
+    q_turned = static(there, "b", np.concatenate([R @ LOAD[:3], R @ LOAD[3:]]))
+    forces, turned = in_body_axes(here.surface.beams, q), in_body_axes(there.surface.beams, q_turned)
+    np.testing.assert_allclose(turned, forces @ R.T, atol=1e-7 * np.abs(forces).max())
+    # a round member chooses its own y', so its outline is elsewhere
+    same = np.isclose(there.surface.points, here.surface.points @ R.T, atol=1e-9).all(axis=1)
+    assert same.sum() > 50
+    one, other = full_tensor(here.surface.stress @ q)[same], full_tensor(there.surface.stress @ q_turned)[same]
+    np.testing.assert_allclose(other, R @ one @ R.T, atol=1e-7 * np.abs(one).max())
+
+
+def full_tensor(six):
+    return six[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
+
+
+def test_stress_of_a_round_bar():
+    """Tension, bending about both axes and torsion together: Timoshenko & Goodier (1970)."""
+    d = 0.05
+    body = reduced(straight(circle(d), LENGTH, 2))
+    stress = body.surface.stress @ static(body, "tip", LOAD)
+    second, area = np.pi * d**4 / 64, np.pi * d**2 / 4
+    for (x, y, z), found in zip(body.surface.points, stress, strict=True):
+        _, My, Mz = moment_at(x, LOAD)
+        sigma = LOAD[0] / area + My * z / second - Mz * y / second
+        expected = [sigma, 0, 0, -LOAD[3] * z / (2 * second), LOAD[3] * y / (2 * second), 0]
+        np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-7 * np.abs(stress).max())
+    np.testing.assert_array_equal(body.surface.moduli, np.tile([STEEL.E, STEEL.nu], (len(stress), 1)))
+
+
+def test_torque_stresses_no_corner_of_a_rectangle_and_the_offset_bends():
+    section = shifted(rectangle(0.02, 0.06), 0.05, 0.0)
+    body = reduced(straight(section, LENGTH, 1))
+    torque = body.surface.stress @ static(body, "tip", np.array([0, 0, 0, 50.0, 0, 0]))
+    assert np.abs(torque).max() < 1e-7 * 50.0 / (0.02 * 0.02 * 0.06)
+    tension = body.surface.stress @ static(body, "tip", np.array([1e4, 0, 0, 0, 0, 0]))
+    y = body.surface.points[:, 1] - 0.05
+    Mz = 1e4 * 0.05  # the force on the line of the nodes, about the centroid: -F * -offset
+    np.testing.assert_allclose(tension[:, 0], 1e4 / section.A - Mz * y / section.Iz, rtol=1e-6)
+
+
+def test_a_tube_under_torque_has_the_shear_of_its_outer_radius():
+    body = reduced(straight(tube(0.06, 0.004), LENGTH, 1))
+    stress = body.surface.stress @ static(body, "tip", np.array([0, 0, 0, 100.0, 0, 0]))
+    J = np.pi * (0.06**4 - 0.052**4) / 32
+    np.testing.assert_allclose(np.hypot(stress[:, 3], stress[:, 4]), 100.0 * 0.03 / J, rtol=1e-7)
+
+
+def test_a_load_along_the_beam_acts_through_the_nodes_as_stated():
+    """First mode of a cantilever: the moment at a node is off by p l^2 / 12, in the middle of elements by p l^2 / 24.
+
+    Exact mode: Young & Felgar (1949), w = cosh - cos - sigma (sinh - sin); its load per length is p = rho A omega^2 w.
+    """
+    k, section = 1.8751040687119611 / LENGTH, with_mass_moments(shear_rigid(rectangle(0.02, 0.03)), 1e-11, 1e-11)
+    sigma = (np.cosh(k * LENGTH) + np.cos(k * LENGTH)) / (np.sinh(k * LENGTH) + np.sin(k * LENGTH))
+
+    def mode(x, sign):
+        return np.cosh(k * x) + sign * np.cos(k * x) - sigma * (np.sinh(k * x) + sign * np.sin(k * x))
+
+    scale = STEEL.E * section.Iy * k**2 / np.sqrt(STEEL.rho * section.A * LENGTH)
+    for elements in (8, 32):
+        body = reduced(straight(section, LENGTH, elements), ("root",), modes=4, reduction=Eigenmodes)
+        beams, l = body.surface.beams, LENGTH / elements  # noqa: E741
+        x = beams.positions[elements // 2, :, 0]
+        moment = np.linalg.norm(beams.modes[elements // 2, :, 4:, 0], axis=1) / scale
+        off = (moment - mode(x, 1)) / ((k * l) ** 2 * mode(x, -1))
+        assert off[0] == pytest.approx(-1 / 12, rel=1.5 / elements)
+        assert off[1] == pytest.approx(1 / 24, rel=0.02)
+
+
+def test_forces_between_the_ends_are_linear():
+    modes = np.random.default_rng(0).normal(size=(2, 3, 6, 4))
+    at = section_forces_at(modes, np.array([0.0, 0.25, 1.0]))
+    np.testing.assert_allclose(at[:, 0], modes[:, 0])
+    np.testing.assert_allclose(at[:, 1], 0.75 * modes[:, 0] + 0.25 * modes[:, 2])
+    np.testing.assert_allclose(at[:, 2], modes[:, 2])
+
+
+def test_the_body_file_keeps_the_section_forces(tmp_path):
+    body = reduced(space_frame(), ("a", "b"), modes=2)
+    again = load_body(save_body(body, tmp_path / "frame.ffr"))
+    for key in ("positions", "axes", "modes"):
+        assert getattr(again.surface.beams, key).tobytes() == getattr(body.surface.beams, key).tobytes()
+    assert again.surface.stress.tobytes() == body.surface.stress.tobytes()
+    assert "section forces" in again.provenance["stress"]
+    np.testing.assert_array_equal(truncated(body, [1]).surface.beams.modes, body.surface.beams.modes[..., [1]])
+    with pytest.raises(BodyError, match="the section forces have 1 modes, the surface"):
+        replace(body.surface, beams=truncated(body, [1]).surface.beams)

@@ -1,0 +1,71 @@
+"""What the documentation shows must run."""
+
+from __future__ import annotations
+
+import re
+import runpy
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from places import ROOT
+from synthetic import cloud
+from test_dyn_stress import random_surface
+
+from ffr_dyn.results.file import load_result
+from ffr_dyn.results.quantities import DEFAULT_OUTPUTS
+from ffr_dyn.scene_file.read import load_scene
+from ffr_prep.body import load_body, save_body
+
+
+def code(page: str, language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", (ROOT / page).read_text(encoding="utf-8"), re.S)
+
+
+def test_the_scene_file_of_the_documentation_is_valid(tmp_path):
+    text = code("docs/scene_file.md", "toml")[0].replace("big_eye", "a").replace("small_eye", "b")
+    body = cloud(7)
+    surface = random_surface(np.random.default_rng(1), n=body.n)  # with stress and section forces
+    save_body(replace(body, surface=surface), tmp_path / "rod.ffr")
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    scene, settings = load_scene(tmp_path / "scene.toml")
+    assert [i.name for i in scene.bodies[1].model.interfaces][-2:] == ["middle", "pivot"]
+    assert [j.name for j in scene.joints] == ["main_bearing", "crank_pin", "slider_pin", "guide"]
+    assert scene.bodies[1].model.n == 6
+    assert settings.method.step == 1e-4
+
+
+def test_the_default_outputs_of_the_documentation_are_those_of_the_program():
+    marked = re.findall(r"^\| • (.*?) \|", (ROOT / "docs/scene_file.md").read_text(encoding="utf-8"), re.M)
+    names = [name for line in marked for name in re.findall(r"`\w*(\.?\w*(?:\.\w+)?)`", line)]
+    kept = {pattern.rpartition(".")[2] for pattern in DEFAULT_OUTPUTS}
+    listed = {name.rpartition(".")[2] for name in names}
+    assert kept - {"*"} <= listed
+
+
+def test_the_python_example_of_the_readme_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "meshes").symlink_to(ROOT / "meshes")
+    text = code("README.md", "python")[0].replace("end=2.0", "end=0.02")
+    space: dict = {}
+    exec(compile(text, "README", "exec"), space)
+    assert space["result"]["rod.tip.position"].shape == (3, 3)
+    assert (tmp_path / "pendulum.png").stat().st_size > 1000
+
+
+@pytest.mark.slow
+def test_the_main_job(tmp_path, monkeypatch):
+    """The connecting rod example leaves everything it promises, and its numbers stay."""
+    monkeypatch.setattr(sys, "argv", ["connecting_rod.py", str(tmp_path)])
+    runpy.run_path(str(ROOT / "examples" / "connecting_rod.py"), run_name="__main__")
+    made = {p.name for p in tmp_path.iterdir()}
+    plots = {"slider_motion.png", "mid_rod_deflection.png", "reactions.png"}
+    assert plots | {"rod.ffr", "result.nc", "motion.gif", "motion.html"} <= made
+    rod = load_body(tmp_path / "rod.ffr")
+    assert rod.mass == pytest.approx(0.688, abs=2e-3)
+    result = load_result(tmp_path / "result.nc")
+    last = result.time > 2 / 3 * result.time[-1]
+    assert np.abs(result["rod.middle.displacement.y"][last]).max() == pytest.approx(7.9e-6, rel=0.05)
+    assert np.abs(result["crank_pin.force"][last]).max() == pytest.approx(1.07e4, rel=0.03)
+    assert result["constraint.position"].max() < 1e-8
