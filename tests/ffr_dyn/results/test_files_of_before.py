@@ -19,8 +19,8 @@ def test_a_body_file_is_read():
     assert body.mass == pytest.approx(0.785, rel=1e-12)
     np.testing.assert_allclose(body.omega2[:6], OMEGA2, rtol=1e-8)
     assert [interface.name for interface in body.interfaces] == ["a", "b"]
-    assert body.stiffening is not None and body.stiffening.shape == (24, 9, 9)
-    assert body.surface is not None and body.surface.beams is not None
+    assert body.stiffening.shape == (24, 9, 9)
+    assert body.surface.beams is not None
     assert body.provenance["reference"]["type"] == "SimplySupported"
 
 
