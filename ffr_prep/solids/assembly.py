@@ -65,8 +65,8 @@ def assemble(mesh: Mesh, material: Materials) -> SolidMatrices:
 
 def stiffness_form(C: Array) -> skfem.BilinearForm:
     """The block K_ij of scalar shape functions: integral of C_kl d_k psi d_l phi dV with C_kl = C_ikjl (3, 3) [Pa]."""
-    constants = [(C[k, l], k, l) for k, l in zip(*np.nonzero(C), strict=True)]
-    return skfem.BilinearForm(lambda phi, psi, _: sum(c * (psi.grad[k] * phi.grad[l]) for c, k, l in constants))
+    terms = [(C[a, b], a, b) for a, b in zip(*np.nonzero(C), strict=True)]
+    return skfem.BilinearForm(lambda phi, psi, _: sum(c * (psi.grad[a] * phi.grad[b]) for c, a, b in terms))
 
 
 def mass_form(rho: float) -> skfem.BilinearForm:
