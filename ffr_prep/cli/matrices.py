@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ffr_prep.cli.options import check_writable, interface_of, reference_of
-from ffr_prep.cli.reduction import band_of, draw_quality, reduction_of, reduction_options
+from ffr_prep.cli.reduction import ReductionCommand, band_of, draw_quality, reduction_of, reduction_options
 from ffr_prep.cli.solver import solver_of, solver_options
 from ffr_prep.cli.terminal import closing, show, terminal_steps, written
 from ffr_prep.common.errors import InputError
@@ -44,7 +44,7 @@ Reference conditions and methods are those of `ffr-prep reduce`. Geometric stiff
 """
 
 
-@click.command("reduce-matrices", epilog=NOTES)
+@click.command("reduce-matrices", cls=ReductionCommand, epilog=NOTES)
 @click.argument("files", type=_PATH, nargs=-1, required=True)
 @click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
 @click.option("--name", help="Name of the body; default: the name of the file.")

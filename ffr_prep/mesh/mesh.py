@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ from scipy.spatial import cKDTree
 from ffr_prep.body import content_hash
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.progress import Stages, no_stages
+from ffr_prep.common.registry import choice
 from ffr_prep.mesh.abaqus import from_abaqus
 from ffr_prep.mesh.boundary import joined_by_faces, joined_by_nodes, outer_faces, whole_faces
 from ffr_prep.mesh.cells import FACE_TRIANGLES, KINDS, jacobian_determinants
@@ -31,7 +31,6 @@ _CHUNK = 4096
 _DEGENERATE = 1e-10
 _COINCIDENT = 1e-9
 _DOUBTFUL_LENGTH = 20.0
-_SHOWN = 20
 _SHOWN_PARTS = 5
 
 
@@ -200,15 +199,6 @@ def region_nodes(mesh: Mesh, name: str) -> Array:
         return np.unique(mesh.node_groups[name])
     known = dict.fromkeys([*mesh.face_groups, *mesh.node_groups])
     raise InputError(f"the mesh has no group of faces or nodes {name!r}; {choice(name, known)}")
-
-
-def choice(name: str, known: Mapping[str, object]) -> str:
-    """Names to choose from, the near ones first."""
-    near = get_close_matches(name, known, n=3, cutoff=0.5)
-    shown = [*near, *(other for other in known if other not in near)]
-    more = f" and {len(shown) - _SHOWN} more" if len(shown) > _SHOWN else ""
-    names = ", ".join(repr(one) for one in shown[:_SHOWN]) + more
-    return (f"did you mean {near[0]!r}? There" if near else "there") + f" are: {names or 'none'}"
 
 
 # ---- outside ------------------------------------------------------------------------------------------------------

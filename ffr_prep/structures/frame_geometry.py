@@ -9,8 +9,9 @@ import numpy as np
 
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.progress import Stages, no_stages
+from ffr_prep.common.registry import choice
 from ffr_prep.mesh.gmsh_files import WITH_UNIT, LinesAndFaces, declared_unit, faces_from_gmsh, lines_from_gmsh
-from ffr_prep.mesh.mesh import UNITS, check_request, choice
+from ffr_prep.mesh.mesh import UNITS, check_request
 from ffr_prep.structures.frame import Frame, Member, Shell
 
 Array = np.ndarray

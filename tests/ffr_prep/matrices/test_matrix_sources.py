@@ -26,7 +26,7 @@ from ffr_prep.matrices.readers import read_matrices
 from ffr_prep.mesh.abaqus import nodes_from_abaqus
 from ffr_prep.model.reference import MeanAxis
 from ffr_prep.pipelines.matrices import reduce_matrices
-from ffr_prep.reduction.component_modes import Eigenmodes
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.sections import rectangle
 
 
