@@ -23,12 +23,14 @@ from ffr_prep.cli.options import (
     reference_of,
 )
 from ffr_prep.cli.reduction import NOTES as REDUCTION_NOTES
-from ffr_prep.cli.reduction import ReductionCommand, band_of, draw_quality, reduction_of, reduction_options
+from ffr_prep.cli.reduction import band_of, draw_quality, reduction_of, reduction_options
+from ffr_prep.cli.settings import EntriesCommand
 from ffr_prep.cli.solver import solver_of, solver_options
 from ffr_prep.cli.structure import reduce_structure_command
 from ffr_prep.cli.terminal import closing, show, terminal_steps, written
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.registry import load_plugin
+from ffr_prep.reduction.registry import REDUCTIONS
 
 EXAMPLE = """\b
 Example:
@@ -122,7 +124,7 @@ def mesh(mesh: Path, unit: str | None, size: float | None, numbers: tuple[str, .
     check_mesh(loaded)
 
 
-@cli.command(cls=ReductionCommand, epilog=f"{REDUCE_NOTES}{REDUCTION_NOTES}\n{MATERIAL_NOTES}")
+@cli.command(cls=EntriesCommand, registries=(REDUCTIONS,), epilog=f"{REDUCE_NOTES}{REDUCTION_NOTES}\n{MATERIAL_NOTES}")
 @click.argument("mesh", type=_PATH)
 @click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
 @click.option("--name", help="Name of the body; default: the name of the file.")

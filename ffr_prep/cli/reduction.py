@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from ffr_prep.cli.settings import EntriesCommand, Numbers
+from ffr_prep.cli.settings import Numbers
 from ffr_prep.common.errors import InputError
 from ffr_prep.reduction.registry import MODES, REDUCTIONS
 from ffr_prep.reduction.registry import reduction_of as reduction_made
@@ -21,10 +20,9 @@ if TYPE_CHECKING:
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-_COLUMN, _WIDTH = 33, 118
 NOTES = """\b
 Reductions: --method may be repeated, and the space of all of them is taken.
-{entries}
+{reduction}
 Modes: a number (--modes), all up to a frequency (--frequency), or as many as make the receptances at the interfaces
 accurate (--accuracy 10,2000,0.05: from 10 to 2000 Hz to 5 per cent).
 """
@@ -57,13 +55,6 @@ _OPTIONS = (
         help="Frequencies [Hz] of that comparison; default: those of --accuracy.",
     ),
 )
-
-
-class ReductionCommand(EntriesCommand):
-    """A command with the settings of all reductions as options, and their help at "{entries}" in its notes."""
-
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, settings=REDUCTIONS.settings, notes=_notes, **kwargs)
 
 
 def reduction_options(command: Command) -> Command:
@@ -101,12 +92,3 @@ def draw_quality(body: FlexibleBody, options: Mapping[str, Any]) -> None:
 
         for path in quality_pictures(body, options["quality"]):
             click.echo(f"picture     {path}")
-
-
-def _notes() -> str:
-    """A name and what it does, line by line."""
-    lines = []
-    for entry in REDUCTIONS:
-        first, *rest = textwrap.wrap(entry.help, _WIDTH - _COLUMN)
-        lines += [f"  {entry.name:<{_COLUMN - 2}}{first}", *(" " * _COLUMN + line for line in rest)]
-    return "\n".join(lines)

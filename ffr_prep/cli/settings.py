@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import textwrap
+from collections.abc import Sequence
 from typing import Any
 
 import click
 
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.registry import Setting
+from ffr_prep.common.registry import Registry, Setting
+
+_COLUMN, _WIDTH = 33, 118
 
 
 class Numbers(click.ParamType):
@@ -31,29 +34,41 @@ class Numbers(click.ParamType):
         return values
 
 
-class EntriesCommand(click.Command):
-    """A command with an option for each setting of registered entries, in whose notes "{entries}" becomes their help.
+class NotesCommand(click.Command):
+    """A command in whose notes "{reduction}" becomes the names and help of the registry of reductions, and so on.
 
-    Both are made when the command runs, so that they hold what --plugin adds.
+    They are made when the command runs, so that they hold what --plugin adds.
     """
 
-    def __init__(
-        self, *args: Any, settings: Callable[[], Sequence[Setting]], notes: Callable[[], str] = str, **kwargs: Any
-    ) -> None:
+    def __init__(self, *args: Any, registries: Sequence[Registry[Any]], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        self.settings, self.notes = settings, notes
-
-    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        """The options of its own and those of the entries, before --help."""
-        *own, last = super().get_params(ctx)
-        return [*own, *map(option_of, self.settings()), last]
+        self.registries = registries
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The notes, with the help of the entries."""
         plain = self.epilog
-        self.epilog = (plain or "").replace("{entries}", self.notes())
+        for registry in self.registries:
+            self.epilog = (self.epilog or "").replace(f"{{{registry.what}}}", _help_of(registry))
         super().format_epilog(ctx, formatter)
         self.epilog = plain
+
+
+class EntriesCommand(NotesCommand):
+    """One with an option for each setting of the entries as well."""
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """The options of its own and those of the entries, before --help."""
+        *own, last = super().get_params(ctx)
+        return [*own, *(option_of(setting) for registry in self.registries for setting in registry.settings()), last]
+
+
+def _help_of(registry: Registry[Any]) -> str:
+    """A name and what it is for, line by line."""
+    lines = []
+    for entry in registry:
+        first, *rest = textwrap.wrap(entry.help, _WIDTH - _COLUMN)
+        lines += [f"  {entry.name:<{_COLUMN - 3}} {first}", *(" " * _COLUMN + line for line in rest)]
+    return "\n".join(lines)
 
 
 def option_of(setting: Setting) -> click.Option:

@@ -23,10 +23,13 @@ Target = str | Callable[..., Any]
 
 
 class Entry(Protocol):
-    """Whatever has a name by which it is asked for, and settings of its own."""
+    """Whatever has a name by which it is asked for, a help text, and settings of its own."""
 
     @property
     def name(self) -> str: ...
+
+    @property
+    def help(self) -> str: ...
 
     @property
     def settings(self) -> tuple[Setting, ...]: ...

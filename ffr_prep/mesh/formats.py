@@ -29,6 +29,7 @@ class MeshFormat:
     """
 
     name: str
+    help: str
     read: Target
     suffixes: tuple[str, ...]
     geometry: bool = False
@@ -40,11 +41,20 @@ _GMSH = "ffr_prep.mesh.gmsh_files:from_gmsh"
 MESH_FORMATS: Registry[MeshFormat] = Registry(
     "mesh format",
     (
-        MeshFormat("meshio", "ffr_prep.mesh.meshio_files:from_meshio", (_ANY,)),
-        MeshFormat("Abaqus", "ffr_prep.mesh.abaqus:from_abaqus", (".inp",)),
-        MeshFormat("gmsh", "ffr_prep.mesh.gmsh_files:mesh_from_gmsh", (".msh", ".med", ".unv")),
-        MeshFormat("CAD", _GMSH, (".step", ".stp", ".iges", ".igs", ".brep"), geometry=True),
-        MeshFormat("gmsh script", _GMSH, (".geo",), geometry=True, parameters=True),
+        MeshFormat(
+            "meshio", "Nastran, VTK and whatever else meshio reads", "ffr_prep.mesh.meshio_files:from_meshio", (_ANY,)
+        ),
+        MeshFormat("Abaqus", "input files, as CalculiX has them too", "ffr_prep.mesh.abaqus:from_abaqus", (".inp",)),
+        MeshFormat(
+            "gmsh",
+            "meshes of gmsh, Salome and I-deas",
+            "ffr_prep.mesh.gmsh_files:mesh_from_gmsh",
+            (".msh", ".med", ".unv"),
+        ),
+        MeshFormat("CAD", "solids that gmsh meshes", _GMSH, (".step", ".stp", ".iges", ".igs", ".brep"), geometry=True),
+        MeshFormat(
+            "gmsh script", "solids that gmsh meshes, with parameters", _GMSH, (".geo",), geometry=True, parameters=True
+        ),
     ),
 )
 
