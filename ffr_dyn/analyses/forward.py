@@ -71,14 +71,13 @@ def forward(
     outputs     : names or patterns of the quantities to keep (`ffr_dyn.results.quantities.selected`), such as "*.power"
     events      : moments to find (`ffr_dyn.analyses.events`), listed in the result's attribute "events"; one may end the run
     path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
-    resume      : a result file whose run goes on from its last rows as if it had never stopped, to the bit; `end` may be
-                  later than it was. A file that does not exist yet is a run from the start
+    resume      : a result file whose run goes on to the same bits; `end` may be later. A new file: a run from the start
     progress    : called with the time reached, a few times a second
     stopwatch   : takes the time of the integrator's compiled loop
     assembled   : what `assemble` made of the scene at `start`, for programs that run it more than once
 
-    Raises InputError for a scene or settings that cannot be used, ComputationError when the run fails: the message gives
-    the time, the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
+    Raises InputError for a scene or settings that cannot be used, ComputationError when the run fails: with the time,
+    the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
     if not 0 < output_step < np.inf:
         raise InputError(f"the output step is {output_step} s; it must be positive and finite")

@@ -558,7 +558,7 @@ def test_a_failed_factorisation_without_a_mechanism_stays_what_it_is(solid_model
     def fails(*_):
         raise ComputationError("the factorisation failed")
 
-    monkeypatch.setattr("ffr_prep.model.model.factorised", fails)
+    monkeypatch.setattr("ffr_prep.pipelines.reduce.factorised", fails)
     rejected(solid_model, "the factorisation failed", error=ComputationError)
 
 
