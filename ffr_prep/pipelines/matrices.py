@@ -27,8 +27,7 @@ from ffr_prep.matrices.part import checked, part_of
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
 from ffr_prep.model.reference import ReferenceConditions
 from ffr_prep.pipelines.reduce import reduce_model
-from ffr_prep.reduction.basis import Basis
-from ffr_prep.reduction.component_modes import Reduction
+from ffr_prep.reduction.basis import Basis, Reduction
 from ffr_prep.reduction.selection import Band
 from ffr_prep.solvers.factor import CHOLESKY, FreeBody, Solver
 
@@ -103,7 +102,7 @@ class _OfMatrices:
     singular: bool
 
     def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
-        """As those of `ffr_prep.reduction.component_modes`."""
+        """As those of `ffr_prep.reduction.methods`."""
         return (_shifted if self.singular else _basis)(self.reduction, model, body, L)
 
 

@@ -13,7 +13,7 @@ from ffr_prep.mesh.mesh import Mesh
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import ReferenceConditions
 from ffr_prep.pipelines.reduce import reduce_model
-from ffr_prep.reduction.component_modes import Reduction
+from ffr_prep.reduction.basis import Reduction
 from ffr_prep.reduction.selection import Band
 from ffr_prep.solids.assembly import Materials
 from ffr_prep.solids.model import solid_model

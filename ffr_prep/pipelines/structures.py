@@ -12,7 +12,7 @@ from ffr_prep.common.progress import Advance, Stages, no_advance, no_stages
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import ReferenceConditions
 from ffr_prep.pipelines.reduce import reduce_model
-from ffr_prep.reduction.component_modes import Reduction
+from ffr_prep.reduction.basis import Reduction
 from ffr_prep.reduction.selection import Band
 from ffr_prep.solvers.factor import CHOLESKY, Solver
 from ffr_prep.structures.frame import Frame

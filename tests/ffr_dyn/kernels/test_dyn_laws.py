@@ -23,7 +23,7 @@ from ffr_prep.body import rigid_body
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
 from ffr_prep.pipelines.mesh import reduce_mesh
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 
 GRAVITY = (0.0, -9.81, 0.0)
 

@@ -27,7 +27,7 @@ from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import SimplySupported
 from ffr_prep.pipelines.mesh import reduce_mesh
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 
 
 def two_interfaces(n: int = 16):

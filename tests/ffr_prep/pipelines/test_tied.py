@@ -18,7 +18,8 @@ from ffr_prep.pipelines.mesh import reduce_mesh
 from ffr_prep.pipelines.reduce import reduce_model
 from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.pipelines.tied import elimination, tied
-from ffr_prep.reduction.component_modes import CraigBampton, Eigenmodes
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.solids.model import solid_model
 from ffr_prep.structures.frame import Member, Shell, named, panel, polyline
 from ffr_prep.structures.model import frame_model

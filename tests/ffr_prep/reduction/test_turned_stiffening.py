@@ -22,8 +22,8 @@ from ffr_prep.pipelines.mesh import reduce_mesh
 from ffr_prep.pipelines.reduce import reduce_model
 from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.pipelines.tied import tied
-from ffr_prep.reduction.component_modes import CraigBampton
 from ffr_prep.reduction.conversion import with_reference
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.solids.model import solid_model
 from ffr_prep.structures.frame import Member, Shell, joined, named, panel, polyline
 from ffr_prep.structures.model import frame_model

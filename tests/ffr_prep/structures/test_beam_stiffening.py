@@ -22,7 +22,8 @@ from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
 from ffr_prep.pipelines.mesh import reduce_mesh
 from ffr_prep.pipelines.structures import reduce_frame
-from ffr_prep.reduction.component_modes import CraigBampton, Eigenmodes
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.frame import Member, named, polyline
 from ffr_prep.structures.sections import Section, circle, general, rectangle, shear_rigid, with_mass_moments
 
