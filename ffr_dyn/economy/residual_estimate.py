@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from ffr_dyn.compile.body_tables import loads_that_stiffen, of_coordinates, stiffness_of
+from ffr_dyn.compile.body_tables import loads_that_stiffen, of_coordinates
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.evaluation import (
@@ -37,6 +37,7 @@ from ffr_dyn.consistency.evaluation import (
     unit_rows,
 )
 from ffr_dyn.equations.layout import Layout
+from ffr_dyn.equations.stiffening import stiffness_of
 from ffr_dyn.kernels.tables import Record
 
 Array = np.ndarray
