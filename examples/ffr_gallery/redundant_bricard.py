@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.compile.scene_tables import blocks_of, compile_scene
+from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.evaluation import evaluate, evaluated_mass_matrix, evaluator
+from ffr_dyn.equations.constraint_rows import blocks_of
 from ffr_dyn.integrators import RK4
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene

@@ -22,9 +22,10 @@ from ffr_dyn.analyses.efforts import Effort, JointEffort, MarkerEffort, sized, u
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.outcome import efforts, needed, only, output_times, result_of, with_quantities
 from ffr_dyn.analyses.servo import Moment, ServoMotion, at_moment, internal_values, servo, slope, slope_matrix
-from ffr_dyn.compile.scene_tables import System, blocks_of, compile_scene
+from ffr_dyn.compile.scene_tables import System, compile_scene
 from ffr_dyn.consistency.assemble import assemble, flattened
 from ffr_dyn.consistency.evaluation import Evaluator, evaluator, joined, record_states
+from ffr_dyn.equations.constraint_rows import blocks_of
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.kernels.tables import Record

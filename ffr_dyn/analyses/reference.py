@@ -18,16 +18,9 @@ from ffr_dyn.analyses.forward import geometry, with_all_reactions
 from ffr_dyn.analyses.ida import by_ida
 from ffr_dyn.analyses.outcome import output_times
 from ffr_dyn.consistency.assemble import Assembled, assemble
-from ffr_dyn.consistency.evaluation import (
-    Evaluator,
-    accelerations,
-    closed,
-    copied,
-    evaluator,
-    joined,
-    position_rates,
-)
+from ffr_dyn.consistency.evaluation import Evaluator, accelerations, closed, copied, evaluator, joined
 from ffr_dyn.equations.layout import Layout
+from ffr_dyn.equations.motion import position_rates
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.quantities import measure, needs_every_step, selected

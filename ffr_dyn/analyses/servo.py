@@ -18,7 +18,7 @@ from scipy.linalg import qr
 
 from ffr_dyn.analyses.efforts import Effort, sized
 from ffr_dyn.compile.engine import with_model
-from ffr_dyn.compile.scene_tables import Block, compile_scene
+from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.evaluation import (
     Evaluation,
@@ -35,6 +35,7 @@ from ffr_dyn.consistency.evaluation import (
     unit_rows,
 )
 from ffr_dyn.consistency.mobility import coordinate_gradients, coordinate_word
+from ffr_dyn.equations.constraint_rows import Block
 from ffr_dyn.equations.constraints import evaluate_word
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.scene.drivers import Driver, driver_word

@@ -9,6 +9,7 @@ import numpy as np
 
 from ffr_dyn.compile.symmetry_blocks import in_blocks, symmetric_blocks
 from ffr_dyn.equations.layout import Layout
+from ffr_dyn.equations.stiffening import stiffness_of
 from ffr_dyn.kernels.tables import LANES, Bodies, Markers
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.variants.plane import stiffening_loads
@@ -193,11 +194,3 @@ def _used_markers(scene: Scene, marked: Markers) -> list[list[int]]:
 def _acting(firsts: list[int]) -> tuple[int, ...]:
     """Which loads a body may have: twelve inertial ones, and those at interfaces that anything acts on."""
     return (*range(12), *(first + c for first in firsts for c in range(6)))
-
-
-def stiffness_of(body: Body) -> Array:
-    """(loads, n, n) geometric stiffness of a body, none where it has none or the scene does without."""
-    n = body.model.n
-    if body.model.stiffening is None or not body.stiffening:
-        return np.zeros((0, n, n))
-    return body.model.stiffening

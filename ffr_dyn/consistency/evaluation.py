@@ -16,7 +16,7 @@ from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.failure import failure
 from ffr_dyn.equations.inertia import mass_matrix
 from ffr_dyn.equations.layout import Layout, initial_state
-from ffr_dyn.functions.rotation import G_bar, from_vector, rotation_matrix, skew
+from ffr_dyn.functions.rotation import from_vector, rotation_matrix, skew
 from ffr_dyn.kernels.tables import OK, SINGULAR_CONSTRAINT, Record, Work
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.errors import ComputationError
@@ -253,15 +253,6 @@ CLOSED = 1e-12  # of Phi [m, -] after a projection
 
 
 CORRECTIONS = 10
-
-
-def position_rates(place: Layout, x: Array, v: Array) -> Array:
-    """x_dot = T(x) v."""
-    out = np.empty(place.x_size)
-    for b in range(len(place.n)):
-        out[place.R(b)], out[place.q(b)] = v[place.R_dot(b)], v[place.q_dot(b)]
-        out[place.p(b)] = 0.5 * G_bar(x[place.p(b)]).T @ v[place.omega(b)]
-    return out
 
 
 def closed(at: Evaluator, time: float, x: Array, v: Array) -> tuple[Array, Array]:

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffr_dyn.compile.scene_tables import Block
-from ffr_dyn.consistency.assemble import assemble, flattened, in_space, rows_at
+from ffr_dyn.consistency.assemble import assemble, flattened, in_space
 from ffr_dyn.consistency.evaluation import free_motions, locked, total_mass_matrix, unit_rows
+from ffr_dyn.equations.constraint_rows import Block, rows_at
 from ffr_dyn.equations.constraints import evaluate_word
 from ffr_dyn.equations.layout import Layout, layout
 from ffr_dyn.scene.joints import COORDINATES, RELATION, F, G, H, Joint, Word, frames

@@ -25,8 +25,6 @@ from ffr_dyn.results.result import Result
 
 Array = np.ndarray
 
-REPEATS = 3  # of every run, whose median time is drawn
-
 
 @dataclass(frozen=True)
 class OutputMeasure:
@@ -104,17 +102,17 @@ def _variant(found: Economy, choice: Choice, words: str) -> Variant:
 def _point(found: Economy, choice: Choice, words: str, error: Array) -> Point:
     settings, variant = found.settings, _variant(found, choice, words)
     span = Span(settings.start, settings.end, settings.output_step, settings.stabilisation)
-    wall, cpu, evaluations = _timed(make(found.original, choice, span), choice, span)
+    wall, cpu, evaluations = _timed(make(found.original, choice, span), choice, span, found.policy.timing_repeats)
     errors = {output.name: float(e) for output, e in zip(found.probe.outputs, error, strict=True)}
     kind = TOLERANCE if choice.controlled else STEP
     label = variant.label
     return Point(choice.method, words, label, kind, variant.number, errors, spread(wall), spread(cpu), evaluations)
 
 
-def _timed(made: Made, choice: Choice, span: Span) -> tuple[list[float], list[float], int]:
+def _timed(made: Made, choice: Choice, span: Span, repeats: int) -> tuple[list[float], list[float], int]:
     """Wall and processor times [s] of the time loop of some repetitions, and evaluations."""
     wall, cpu, evaluations = [], [], 0
-    for _ in range(REPEATS):
+    for _ in range(repeats):
         watch = Stopwatch()
         result = forward(
             made.scene,

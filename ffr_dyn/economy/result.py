@@ -13,6 +13,7 @@ from ffr_dyn.economy.contributions import Contributions
 from ffr_dyn.economy.inertia_terms import TermEffect
 from ffr_dyn.economy.model_choice import Choice
 from ffr_dyn.economy.outputs import Probe
+from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.scene.scene import Scene
 
 Array = np.ndarray
@@ -53,6 +54,7 @@ class Economy:
     runs         : all runs made, with their errors against the reference, or else the chosen run less its estimated error
     unmoved      : names of outputs that no model changes
     frequencies  : of the model beside those of everything;  stiffening : what stiffens bodies, and how much
+    policy       : the numbers of the search
     """
 
     original: Scene
@@ -79,3 +81,4 @@ class Economy:
     stiffening: tuple[StiffeningLoad, ...]
     notes: tuple[str, ...]
     verification: Verification | None
+    policy: Policy = DEFAULT

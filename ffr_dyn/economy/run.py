@@ -11,6 +11,7 @@ from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.economy.cost import of_evaluations, of_run
 from ffr_dyn.economy.model_choice import Choice, applied
 from ffr_dyn.economy.outputs import Probe, histories, needed
+from ffr_dyn.economy.policy import DEFAULT, CostModel
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
@@ -70,11 +71,11 @@ def make(scene: Scene, choice: Choice, span: Span) -> Made:
     return Made(applied_to, assemble(applied_to, time=span.start))
 
 
-def cost(trial: Trial, span: Span) -> float:
+def cost(trial: Trial, span: Span, model: CostModel = DEFAULT.cost) -> float:
     """[us] of a run, by the cost model: from its steps, or from its evaluations where the method chooses its steps."""
     if trial.choice.controlled:
-        return of_evaluations(trial.choice, trial.evaluations, span.rows)
-    return of_run(trial.choice, span.rows)
+        return of_evaluations(trial.choice, trial.evaluations, span.rows, model)
+    return of_run(trial.choice, span.rows, model)
 
 
 def run(made: Made, choice: Choice, span: Span, of: Probe, outputs: tuple[str, ...] = ()) -> Trial:

@@ -11,7 +11,7 @@ from synthetic import cloud
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.compile.engine import evaluate_at, new_machine
 from ffr_dyn.compile.scene_tables import compile_scene
-from ffr_dyn.consistency.assemble import rows_at
+from ffr_dyn.equations.constraint_rows import rows_at
 from ffr_dyn.equations.layout import layout
 from ffr_dyn.functions.rotation import G_bar, rotation_matrix
 from ffr_dyn.functions.time_functions import polynomial

@@ -1,6 +1,6 @@
 """The benchmark set: thirteen scenes in which every body that can be flexible is, with the outputs that are asked of each.
 
-    python -m benchmarks.scene_set          # what is in it, and what building each scene takes
+    python -m examples.scene_set          # what is in it, and what building each scene takes
 
 Bodies are beams with Craig-Bampton modes, section stress and geometric stiffening, so that a scene is built in well under a
 second. Nothing is simplified in a scene: which bodies may be rigid, which modes and terms may go, is for others to find out.
