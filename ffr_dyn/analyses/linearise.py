@@ -24,6 +24,7 @@ from ffr_dyn.consistency.tangent import Chart, chart, derivative, rates, sizes, 
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
@@ -31,8 +32,8 @@ Array = np.ndarray
 STATIONARY = 1e-6  # of the accelerations in moving axes, relative to those of the applied forces
 
 
-@dataclass(frozen=True)
-class Linearisation:
+@dataclass(frozen=True, repr=False)
+class Linearisation(Brief):
     """A scene near a state, with d degrees of freedom.
 
     A (2d, 2d), B (2d, inputs), C (outputs, 2d), D (outputs, inputs);  inputs, outputs : names

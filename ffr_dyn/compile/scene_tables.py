@@ -20,13 +20,14 @@ from ffr_dyn.scene.couplings import Coupling, coupling_word
 from ffr_dyn.scene.drivers import Driver, PointDriver, driver_word, path_words
 from ffr_dyn.scene.joints import RELATION, Joint, Word, words
 from ffr_dyn.scene.scene import MarkerName, Scene, joint_of, joints_of, marker_number, markers
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
 
 
-@dataclass(frozen=True)
-class Block:
+@dataclass(frozen=True, repr=False)
+class Block(Brief):
     """The rows of one joint, driver or coupling.
 
     markers : numbers of markers i, j, or i, j of both joints of a relation
@@ -39,8 +40,8 @@ class Block:
     driver: bool = False
 
 
-@dataclass(frozen=True)
-class System:
+@dataclass(frozen=True, repr=False)
+class System(Brief):
     """A compiled scene: the tables, and what connects their numbers to the scene's names.
 
     blocks : in elimination order, as the rows in the tables;  user : keeps the callback of the user's functions alive

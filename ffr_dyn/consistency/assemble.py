@@ -23,6 +23,7 @@ from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction, evaluate
 from ffr_dyn.scene.joints import DISTANCE, Word
 from ffr_dyn.scene.scene import Scene
 from ffr_dyn.variants.plane import planar_forms
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
@@ -36,8 +37,8 @@ LARGEST_TURN = 0.5  # rad per iteration
 TORN = 0.5  # elastic displacement of an interface over the size of its body that no joint may ask for
 
 
-@dataclass(frozen=True)
-class Assembled:
+@dataclass(frozen=True, repr=False)
+class Assembled(Brief):
     """A consistent state and the compiled scene.
 
     system   : with independent constraint rows, for the motion

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.functions.operations import SUBTRACT, operate
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
@@ -20,8 +21,8 @@ Array = np.ndarray
 POLYNOMIAL, HARMONIC, PIECEWISE, USER, OPERATION = 0, 1, 2, 3, 4
 
 
-@dataclass(frozen=True)
-class TimeFunction:
+@dataclass(frozen=True, repr=False)
+class TimeFunction(Brief):
     """A function of time as the kernels read it: its kind and its numbers; `callback` for a Python function.
 
     operands : what an operation of a formula (data: its number, its parameter) works on

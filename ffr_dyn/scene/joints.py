@@ -16,6 +16,7 @@ import numpy as np
 
 from ffr_dyn.functions.rotation import triad
 from ffr_dyn.functions.time_functions import TimeFunction, as_time_function
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
@@ -29,8 +30,8 @@ _MOST_TEETH = 1000
 Term = tuple[float, str, Array, Array]
 
 
-@dataclass(frozen=True)
-class Word:
+@dataclass(frozen=True, repr=False)
+class Word(Brief):
     """One basic constraint row.
 
     axes     : (3, 3) in body axes: axis on i, second axis on i of an angle, axis on j; a coincidence row has its global

@@ -25,6 +25,7 @@ from ffr_dyn.scene.sensors import AnyMeasurement, Measurement, SectionMeasuremen
 from ffr_dyn.scene.stress_sensors import measured_modes
 from ffr_dyn.scene.surface_loads import SurfaceLoad, distributed
 from ffr_prep.body import FlexibleBody
+from ffr_prep.common.brief import Brief, Rows, listed, numbers
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
@@ -37,8 +38,8 @@ INERTIA_TERMS = ("I3", "I4", "I5", "I8", "I9")
 RESERVED = (GROUND, "energy", "constraint", "measured", "time", "geometry")
 
 
-@dataclass(frozen=True)
-class Body:
+@dataclass(frozen=True, repr=False)
+class Body(Brief):
     """A reduced (or rigid) body in the scene, with its pose and motion at the start.
 
     position : (3,) [m] of the body frame's origin, global
@@ -86,12 +87,32 @@ class Body:
                 raise InputError(f"{who}: there is no inertia term {term!r} to drop; {_offer(term, INERTIA_TERMS)}")
         object.__setattr__(self, "dropped", tuple(t for t in INERTIA_TERMS if t in self.dropped))
 
+    def _title(self) -> str:
+        n = self.model.n
+        return f"Body {self.name!r}: {f'flexible, {n} elastic coordinates' if n else 'rigid'}, {self.model.mass:.4g} kg"
+
+    def _rows(self) -> Rows:
+        model, poses = self.model, ("position", "rotation", "velocity", "omega_bar")
+        rows = [("points", listed(interface.name for interface in model.interfaces))]
+        rows += [(f"{key} [{unit}]", numbers(getattr(self, key))) for key, unit in zip(poses, _UNITS, strict=True)]
+        if model.n:
+            hertz = np.sqrt(model.omega2) / (2 * np.pi)
+            damping = sorted({f"{ratio:.4g}" for ratio in (self.damping.min(), self.damping.max())}, key=float)
+            rows += [("elastic", f"{hertz.min():.4g} to {hertz.max():.4g} Hz, damping ratio {' to '.join(damping)}")]
+            deformed = float(np.abs(self.q).max()), float(np.abs(self.q_dot).max())
+            rows += [("deformed", f"|q| up to {deformed[0]:.4g}, rates {deformed[1]:.4g}")] if any(deformed) else []
+        left_out = [*self.dropped, *(["geometric stiffening"] if not self.stiffening else [])]
+        return rows + ([("left out", listed(left_out))] if left_out else [])
+
+
+_UNITS = ("m", "e0..e3", "m/s", "rad/s")
+
 
 MarkerName = tuple[int, str, str]  # number and name of the body, name of the point
 
 
-@dataclass(frozen=True)
-class Scene:
+@dataclass(frozen=True, repr=False)
+class Scene(Brief):
     """Everything an analysis needs. Raises InputError for names that do not exist, repeat or contradict each other.
 
     ground  : name -> (3,) [m], points fixed in the global frame
@@ -159,6 +180,21 @@ class Scene:
             _check_force(self, force)
         for measurement in self.measurements:
             _check_measurement(self, measurement)
+
+    def _title(self) -> str:
+        elastic = sum(body.model.n for body in self.bodies)
+        bodies = "one body" if len(self.bodies) == 1 else f"{len(self.bodies)} bodies"
+        return f"Scene {self.name!r}: {bodies} with {elastic} elastic coordinates"
+
+    def _rows(self) -> Rows:
+        bodies = [f"{body.name} ({body.model.n} modes)" if body.model.n else body.name for body in self.bodies]
+        joints = [f"{joint.name} ({joint.kind})" for joint in self.joints]
+        others = {key: [thing.name for thing in getattr(self, key)] for key in ("drivers", "couplings")}
+        forces = [thing.name for thing in (*self.loads, *self.springs, *self.forces)]
+        named = {"bodies": bodies, "joints": joints, **others, "forces": forces}
+        named |= {"measurements": [m.name for m in self.measurements], "ground": list(self.ground)}
+        rows = [(key, listed(names)) for key, names in named.items() if names]
+        return [*rows, ("gravity [m/s^2]", f"{numbers(self.gravity)}, plane {self.plane!r}")]
 
 
 _DECLARATIONS: dict[str, tuple[Any, ...]] = {
