@@ -19,9 +19,11 @@ Everything a user needs is here, in `ffr_dyn.__all__`, and is loaded when it is 
 are private: they move and change without notice.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from ffr_prep.common.front_door import front_door
+
+# No name here is that of a room, whose import would put the room in its place.
 _BY_MODULE = {
     "ffr_prep.body": "FlexibleBody load_body rigid_body save_body truncated with_point",
     "ffr_prep.common.errors": "ComputationError InputError",
@@ -81,32 +83,7 @@ _BY_MODULE = {
     "ffr_dyn.economy.search": "economise",
     "ffr_dyn.cli.progress_bar": "progress",
 }
-# No name here is that of a room, whose import would put the room in its place.
-_HOME = {name: module for module, names in _BY_MODULE.items() for name in names.split()}
-
-__all__ = ["__version__", *_HOME]
-
-
-def __getattr__(name: str) -> Any:
-    if name == "__version__":
-        from importlib.metadata import version
-
-        value: Any = version("ffr")
-    elif name in _HOME:
-        value = getattr(import_module(_HOME[name]), name)
-    else:
-        from difflib import get_close_matches
-
-        close = get_close_matches(name, _HOME, 1)
-        hint = f"; did you mean {close[0]!r}?" if close else "; dir(ffr_dyn) lists what there is"
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{hint}", name=name, obj=None)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
-
+__all__, __getattr__, __dir__ = front_door(__name__, _BY_MODULE)
 
 if TYPE_CHECKING:  # the same names, for editors and checkers of types
     # fmt: off

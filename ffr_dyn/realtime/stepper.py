@@ -76,6 +76,8 @@ class Stepper(Brief):
         start: float = 0.0,
         stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
     ) -> None:
+        if isinstance(method, (str, type)):
+            raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
         if method.controlled:
             raise InputError(
                 f"{type(method).__name__} chooses its steps: their cost has no bound; use ROS2, ROS3 or RK4"

@@ -424,7 +424,11 @@ def test_a_browser_draws_the_page_and_its_menu_changes_it(diagram, tmp_path):
 @pytest.fixture
 def scene_file(tmp_path):
     scene = replace(swinging(), plane="auto")
-    return save_scene(scene, Settings(0.0, 0.2, 0.05, ROS2(0.0125), Projection()), tmp_path / "swing.toml")
+    return save_scene(
+        scene,
+        Settings(start=0.0, end=0.2, output_step=0.05, method=ROS2(0.0125), stabilisation=Projection()),
+        tmp_path / "swing.toml",
+    )
 
 
 def run(*arguments: object):
@@ -579,7 +583,9 @@ def test_numbers_beyond_what_a_body_has_are_what_it_has_and_run_once():
 
 
 def test_another_analysis_cannot_be_charted(tmp_path):
-    settings = Settings(0.0, 0.2, 0.05, ROS2(0.0125), Projection(), analysis=Kinematic())
+    settings = Settings(
+        start=0.0, end=0.2, output_step=0.05, method=ROS2(0.0125), stabilisation=Projection(), analysis=Kinematic()
+    )
     done = run(save_scene(rigid(), settings, tmp_path / "k.toml"))
     assert "a chart compares runs of forward dynamics" in str(done.exception)
 
