@@ -378,19 +378,22 @@ Components = tuple[TimeFunction, TimeFunction, TimeFunction]
 
 
 def _acceleration(what: str, value: Any) -> Components:
-    if not isinstance(value, (Sequence, np.ndarray)) or isinstance(value, str) or len(value) != 3:
-        raise InputError(
-            f"{what} needs three components, 3 numbers or functions of time such as (0, -9.81, 0), not {value!r}"
-        )
-    x, y, z = (as_time_function(component, what) for component in value)
+    x, y, z = (as_time_function(component, what) for component in _three(what, value))
     return x, y, z
+
+
+def _three(what: str, value: Any) -> Any:
+    if not isinstance(value, (Sequence, np.ndarray)) or isinstance(value, str) or len(value) != 3:
+        hint = "3 numbers or functions of time such as (0, -9.81, 0)"
+        raise InputError(f"{what} needs three components, {hint}, not {value!r}")
+    return value
 
 
 def _split_gravity(gravity: Any, base: Components) -> tuple[Any, Components]:
     """The constant components of gravity, and the base acceleration less those that vary."""
-    given = _acceleration("gravity", gravity)
-    if all(isinstance(component, (int, float, np.floating, np.integer)) for component in gravity):
+    if all(isinstance(component, (int, float, np.floating, np.integer)) for component in _three("gravity", gravity)):
         return gravity, base
+    given = _acceleration("gravity", gravity)
     steady = [f.data[0] if _is_constant(f) else 0.0 for f in given]
     x, y, z = (b if _is_constant(g) else less(b, g) for g, b in zip(given, base, strict=True))
     return steady, (x, y, z)
