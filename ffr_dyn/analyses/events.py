@@ -9,7 +9,7 @@ as the method, and lies on the constraints as it does.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from difflib import get_close_matches
 from typing import Any, Literal
 
@@ -48,6 +48,7 @@ class Event:
     name: str
     quantity: str | Callable[[float, StateView], float]
     value: float = 0.0
+    _: KW_ONLY
     direction: Literal["rising", "falling", "either"] = "either"
     stop: bool = False
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from ffr_dyn.kernels.tables import AT, NOW, OK, Record, Work
 from ffr_dyn.results.file import ResultWriter, load_checkpoint, load_result
 from ffr_dyn.results.quantities import Entry, Memory, measure, needs_every_step, selected
 from ffr_dyn.results.result import Quantity, Result
+from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import Surface
 from ffr_prep.common.errors import ComputationError, InputError
@@ -88,6 +89,7 @@ def forward(
     substeps, rows = _counts(end - start, output_step, spacing)
     _check_step(scene, method)
     _check_stabilisation(method, stabilisation)
+    events = several("events", events, (Event,))
     assembled = assemble(scene, time=start) if assembled is None else assembled
     wanted = selected(assembled.system, outputs)
     span = (start, end, output_step)
@@ -127,7 +129,9 @@ def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
 
 
 def _check_stabilisation(method: Integrator, stabilisation: Stabilisation) -> None:
-    """Refuse gains of accelerations for a method that keeps constraints in another way."""
+    """Refuse what is none, and gains of accelerations for a method that keeps constraints in another way."""
+    if not isinstance(stabilisation, get_args(Stabilisation)):
+        raise InputError(f"stabilisation is {stabilisation!r}; give Projection(), Baumgarte(alpha, beta) or Drifting()")
     if isinstance(stabilisation, Baumgarte) and not isinstance(method, _OF_ACCELERATIONS):
         raise InputError(
             f"Baumgarte's gains act on the accelerations of the constraints, and {type(method).__name__} holds positions or "

@@ -32,7 +32,7 @@ from ffr_dyn.consistency.mobility import named_motion, require_driven
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
-from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.scene.scene import Body, Scene, require_scene
 from ffr_prep.body import truncated
 from ffr_prep.common.errors import ComputationError
 
@@ -104,6 +104,7 @@ def kinematic(
 
 def undeformed(scene: Scene) -> Scene:
     """The scene with rigid bodies of the same inertia and interfaces."""
+    require_scene(scene)
     return replace(scene, bodies=tuple(_rigid(body) if body.model.n else body for body in scene.bodies))
 
 

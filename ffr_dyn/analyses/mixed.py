@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -31,8 +31,9 @@ from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.results.quantities import measure, selected
 from ffr_dyn.results.result import Quantity, Result
+from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.drivers import Driver, PointDriver
-from ffr_dyn.scene.scene import GROUND, Scene
+from ffr_dyn.scene.scene import GROUND, Scene, require_scene
 from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray
@@ -79,7 +80,8 @@ def mixed(
     Raises InputError when motions and forces do not fit (the combination that is undetermined is told), ComputationError when
     the run fails or a causal one is asked for and cannot be trusted.
     """
-    names = _known(scene, known)
+    require_scene(scene)
+    names, unknown = _known(scene, known), several("unknown", unknown, get_args(Effort))
     partners = _collocated(scene, names, unknown)
     if partners is not None and solution is None:
         result = forward(
@@ -92,7 +94,7 @@ def mixed(
 
 def _known(scene: Scene, known: tuple[str, ...] | None) -> tuple[str, ...]:
     drivers = [driver.name for driver in scene.drivers]
-    names = tuple(drivers if known is None else known)
+    names = several("known", drivers if known is None else known, (str,))
     missing = [name for name in names if name not in drivers]
     if not names:
         raise InputError("mixed dynamics needs known motions, drivers of the scene; it has none")

@@ -23,6 +23,7 @@ from ffr_dyn.kernels.entry_points import (
 )
 from ffr_dyn.kernels.simd.table_address import pack
 from ffr_dyn.kernels.tables import Clock, Control, Model, Record, Tables, Work
+from ffr_prep.common.brief import Brief
 
 if TYPE_CHECKING:
     from ffr_dyn.integrators import Controlled, Integrator
@@ -34,8 +35,8 @@ LEAST_STEP = 1e-9  # of a controlled method, relative to the spacing of its rows
 _CALL = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_int64, ctypes.c_int64)
 
 
-@dataclass(frozen=True)
-class Machine:
+@dataclass(frozen=True, repr=False)
+class Machine(Brief):
     """The tables of a scene, and where the compiled units find them (`words`, as `pack` wrote them)."""
 
     system: System

@@ -19,6 +19,7 @@ from ffr_dyn.equations.layout import Layout, initial_state
 from ffr_dyn.functions.rotation import from_vector, rotation_matrix, skew
 from ffr_dyn.kernels.tables import OK, SINGULAR_CONSTRAINT, Record, Work
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import ComputationError
 
 Array = np.ndarray
@@ -26,8 +27,8 @@ Array = np.ndarray
 RANK_TOLERANCE = 1e-9  # of a singular value of the mass-weighted Jacobian, relative to the largest
 
 
-@dataclass(frozen=True)
-class Evaluator:
+@dataclass(frozen=True, repr=False)
+class Evaluator(Brief):
     """A compiled scene with the memory of one evaluation."""
 
     machine: Machine
@@ -42,8 +43,8 @@ class Evaluator:
         return self.machine.work
 
 
-@dataclass(frozen=True)
-class Evaluation:
+@dataclass(frozen=True, repr=False)
+class Evaluation(Brief):
     """The equations at one state: rows in the order of the system's blocks, then one for each coordinate across the plane
     of a planar scene (`locked`).
 

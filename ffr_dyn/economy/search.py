@@ -280,7 +280,15 @@ def _all_runs(ledger: Ledger, found: Chosen, verification: Verification | None) 
 def _settings(span: Span, choice: Choice, of: Probe) -> Settings:
     outputs = tuple(dict.fromkeys(("default", *of.quantities)))
     method = choice.integrator(span.output_step)
-    return Settings(span.start, span.end, span.output_step, method, span.stabilisation, outputs, Forward())
+    return Settings(
+        start=span.start,
+        end=span.end,
+        output_step=span.output_step,
+        method=method,
+        stabilisation=span.stabilisation,
+        outputs=outputs,
+        analysis=Forward(),
+    )
 
 
 def _explained(ledger: Ledger, found: Chosen, final: Trial) -> tuple[Contributions, Contributions]:

@@ -15,6 +15,8 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from ffr_prep.common.brief import brief_tuple
+
 Array = np.ndarray
 # Arrays of numbers and of integers by their number of axes: compiled code is told here what it finds at an address.
 F1 = Annotated[np.ndarray, ("float64", 1)]
@@ -348,3 +350,7 @@ class Record(NamedTuple):
     power: F2  # (T, W + Z + Y + U)
     energy: F2  # (T, 3) kinetic, strain, gravity
     violation: F2  # (T, 2) largest |Phi|, |Phi_dot|
+
+
+for _table in [value for value in vars().values() if isinstance(value, type) and hasattr(value, "_fields")]:
+    _table.__repr__ = brief_tuple  # type: ignore[method-assign, assignment]  # instead of every number

@@ -38,6 +38,7 @@ from ffr_dyn.scene.applied_loads import actions_of
 from ffr_dyn.scene.joint_forces import Actuator
 from ffr_dyn.scene.joints import COORDINATES
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
@@ -45,8 +46,8 @@ Array = np.ndarray
 Input = float | tuple[float, float, float]
 
 
-@dataclass(frozen=True, eq=False)
-class State:
+@dataclass(frozen=True, eq=False, repr=False)
+class State(Brief):
     """All that a stepper remembers: `arrays` of numbers, and of which scene and settings it is a state."""
 
     fingerprint: str
@@ -54,7 +55,7 @@ class State:
     arrays: tuple[Array, ...]
 
 
-class Stepper:
+class Stepper(Brief):
     """A scene under way, from its assembled start.
 
     method        : with a fixed step, such as ROS2(1e-3)
@@ -75,6 +76,8 @@ class Stepper:
         start: float = 0.0,
         stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
     ) -> None:
+        if isinstance(method, (str, type)):
+            raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
         if method.controlled:
             raise InputError(
                 f"{type(method).__name__} chooses its steps: their cost has no bound; use ROS2, ROS3 or RK4"
@@ -94,6 +97,15 @@ class Stepper:
         self._set = {name: _Setting(self._loops, name) for name in self._system.inputs}
         self._outputs, self._computed = _outputs(self._loops[0], outputs, readers)
         self._advance(0)
+
+    def _title(self) -> str:
+        return f"Stepper of {self._system.scene.name!r} at t = {self.time:.9g} s, step {self._step:g} s"
+
+    def _rows(self) -> Rows:
+        return [
+            ("inputs", listed(f"{name} = {value:.6g}" for name, value in self.inputs.items())),
+            ("outputs", listed(self._outputs)),
+        ]
 
     @property
     def time(self) -> float:

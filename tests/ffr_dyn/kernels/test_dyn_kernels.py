@@ -329,9 +329,9 @@ def constraint_cases():
 def test_jacobian_rate_and_right_hand_side_equal_finite_differences(kind, sizes, coordinate):
     scene = chain(*sizes, kind=kind, axis=(0.2, 1.0, 0.3), axis_j=(1.0, -0.5, 0.4))
     if coordinate == "path":
-        scene = replace(scene, drivers=(PointDriver("drive", "one.a", "two.a", DRIVE, None, 0.3),))
+        scene = replace(scene, drivers=(PointDriver("drive", "one.a", "two.a", x=DRIVE, y=None, z=0.3),))
     elif coordinate:
-        scene = replace(scene, drivers=(Driver("drive", "tie", DRIVE, coordinate),))
+        scene = replace(scene, drivers=(Driver("drive", "tie", DRIVE, coordinate=coordinate),))
     system = compile_scene(scene)
     x, v = random_state(scene)
     place, h, t = system.layout, 1e-5, 0.37
@@ -389,7 +389,7 @@ def test_skew_and_G_bar_conventions():
     ("kind", "coordinate"), [("revolute", "angle"), ("cylindrical", "angle"), ("cylindrical", "stroke")]
 )
 def test_compiled_drivers_equal_the_readable_ones(kind, coordinate):
-    scene = replace(chain(kind=kind), drivers=(Driver("drive", "tie", DRIVE, coordinate),))
+    scene = replace(chain(kind=kind), drivers=(Driver("drive", "tie", DRIVE, coordinate=coordinate),))
     system = compile_scene(scene)
     (x, v), t = random_state(scene), 0.37
     machine = new_machine(system, x, v)
