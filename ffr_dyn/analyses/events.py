@@ -154,7 +154,7 @@ class Watcher:
         time, end = float(rows.time[k]), new_record(self._system, 1)
         machine = new_machine(self._system, rows.x[k], rows.v[k], method, self._gains, start=time, spacing=length)
         machine.work.loads.reference[:] = rows.action[k, :, 0]
-        if fill_rows(machine, method, end, time, 1) != OK:
+        if fill_rows(machine, end, time, 1) != OK:
             raise ComputationError(f"at t = {time:.6g} s an event cannot be located: a shorter step from there fails")
         return end
 

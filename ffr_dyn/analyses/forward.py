@@ -21,7 +21,22 @@ from ffr_dyn.consistency.validity import doubts, extremes, meaningless
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince, Integrator
 from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation, excess_of_gains, gains
-from ffr_dyn.kernels.tables import AT, NOW, OK, Record, Work
+from ffr_dyn.kernels.tables import (
+    AT,
+    EVALUATIONS,
+    FILLED,
+    LEAST,
+    NEXT,
+    NOW,
+    OK,
+    PHI,
+    PHI_DOT,
+    PROJECTIONS,
+    SPACING,
+    WHEN,
+    Record,
+    Work,
+)
 from ffr_dyn.results.file import ResultWriter, load_checkpoint, load_result
 from ffr_dyn.results.quantities import Entry, Memory, measure, needs_every_step, selected
 from ffr_dyn.results.result import Quantity, Result
@@ -207,8 +222,8 @@ def _advance(
     while run.done < rows * substeps:
         chunk = new_record(system, looks * min(count, rows - run.done // substeps))
         with watch:
-            status = fill_rows(run.machine, method, chunk, start, substeps // looks)
-        filled = int(steps[2]) - int(steps[2]) % looks
+            status = fill_rows(run.machine, chunk, start, substeps // looks)
+        filled = int(steps[FILLED]) - int(steps[FILLED]) % looks
         if filled:
             kept = with_all_reactions(assembled, Record(*(column[:filled] for column in chunk)))
             if watcher is not None:
@@ -261,7 +276,9 @@ def _watcher(
 def reached(machine: Machine, start: float) -> float:
     """Time of the machine's state [s], for a run from `start`."""
     clock, control = machine.tables.clock, machine.tables.control
-    return float(control.numbers[NOW]) if control.numbers.size else start + int(clock.steps[0]) * float(clock.time[1])
+    if control.numbers.size:
+        return float(control.numbers[NOW])
+    return start + int(clock.steps[NEXT]) * float(clock.time[SPACING])
 
 
 def with_all_reactions(assembled: Assembled, record: Record) -> Record:
@@ -376,10 +393,10 @@ def _account(scene: Scene, run: _Run, notes: list[str]) -> dict[str, Any]:
     """What only the end of a run can tell."""
     info, drift = run.machine.work.info, run.machine.work.drift
     return {
-        "evaluations": int(info[1]),
-        "projections": int(info[2]),
+        "evaluations": int(info[EVALUATIONS]),
+        "projections": int(info[PROJECTIONS]),
         **_steps(run.machine),
-        "largest_drift": [float(drift[0]), float(drift[1])],
+        "largest_drift": [float(drift[PHI]), float(drift[PHI_DOT])],
         "notes": [*notes, *_singular(run.machine.work), *doubts(scene, run.extremes)],
     }
 
@@ -391,7 +408,7 @@ def _steps(machine: Machine) -> dict[str, Any]:
 
 
 def _singular(work: Work) -> list[str]:
-    least, time = work.independence[1:3]
+    least, time = work.independence[[LEAST, WHEN]]
     if least >= AT:
         return []
     return [

@@ -28,7 +28,7 @@ from ffr_dyn.consistency.evaluation import Evaluator, evaluator, joined, record_
 from ffr_dyn.equations.constraint_rows import blocks_of
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection
-from ffr_dyn.kernels.tables import Record
+from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.quantities import measure, selected
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.checks import several
@@ -196,7 +196,7 @@ def _not_collocated(
         "title": scene.name,
         "analysis": f"mixed dynamics, {'bounded' if isinstance(chosen, Bounded) else 'causal'}",
         "method": f"{chosen!r}",
-        "evaluations": int(own.at.work.info[1]),
+        "evaluations": int(own.at.work.info[EVALUATIONS]),
         "degrees_of_freedom": own.size,
         "internal_coordinates": list(own.names),
         "notes": [*assembled.notes, *notes],

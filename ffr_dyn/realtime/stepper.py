@@ -31,7 +31,7 @@ from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.failure import failure
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation, gains
-from ffr_dyn.kernels.tables import OK
+from ffr_dyn.kernels.tables import NEXT, OK, PER_ROW
 from ffr_dyn.results.quantities import DEFAULT_OUTPUTS, Entry, catalogue, needs_every_step, selected
 from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.scene.applied_loads import actions_of
@@ -171,7 +171,7 @@ class Stepper(Brief):
         loop = self._loops[0]
         status = loop.run(self._start, self._steps, count)
         if status != OK:
-            reached = int(loop.machine.tables.clock.steps[0])
+            reached = int(loop.machine.tables.clock.steps[NEXT])
             raise failure(self._system, loop.work, status, self._start + reached * self._step)
         self._steps += count
         for other in self._loops[1:]:
@@ -191,11 +191,11 @@ class _Loop:
         self.record = new_record(system, 1)
         self.x, self.v, self.work = self.machine.x, self.machine.v, self.machine.work
         self._method = method
-        self._fill = row_filler(self.machine, method, self.record)
+        self._fill = row_filler(self.machine, self.record)
 
     def run(self, start: float, first: int, count: int) -> int:
         """`count` steps from step number `first`, and the record of where they end. Returns a status."""
-        self.machine.tables.clock.steps[0], self.machine.tables.clock.steps[1] = first, count
+        self.machine.tables.clock.steps[NEXT], self.machine.tables.clock.steps[PER_ROW] = first, count
         return self._fill(start)
 
     def arrays(self) -> list[Array]:
