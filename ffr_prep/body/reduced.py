@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
+from ffr_prep.common.in_brief import as_table, in_brief, listed, settings_in_words, vector_in_words
 
 _ORTHONORMAL_TOLERANCE = 1e-8
 
@@ -40,6 +41,9 @@ class Interface:
         _freeze(self, "phi_t", (3, n))
         _freeze(self, "phi_r", (3, n))
 
+    def __repr__(self) -> str:
+        return f"Interface({self.name!r}, {self.kind!r}, at {vector_in_words(self.position)} m, {self.phi_t.shape[1]} modes)"
+
 
 # The components of a symmetric tensor, in the order in which they are stored; shear strains are those of the tensor.
 TENSOR = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -66,6 +70,9 @@ class BeamForces:
         _freeze(self, "positions", (count, 3, 3))
         _freeze(self, "axes", (count, 3, 3))
         _freeze(self, "modes", (count, 3, 6, n))
+
+    def __repr__(self) -> str:
+        return f"BeamForces({len(self.positions)} elements, {self.modes.shape[-1]} modes)"
 
 
 @dataclass(frozen=True)
@@ -104,6 +111,11 @@ class Surface:
             raise BodyError(f"surface: a triangle refers to point {triangles.max()}, but there are {count} points")
         triangles.setflags(write=False)
         object.__setattr__(self, "triangles", triangles)
+
+    def __repr__(self) -> str:
+        held = [name for name in ("stress", "beams") if getattr(self, name) is not None]
+        sizes = f"{len(self.points)} points, {len(self.triangles)} triangles, {self.Phi.shape[-1]} modes"
+        return f"Surface({', '.join([sizes, *held])})"
 
 
 @dataclass(frozen=True)
@@ -149,6 +161,12 @@ class FlexibleBody:
         if self.stiffening is not None:
             _freeze(self, "stiffening", (12 + 6 * len(self.interfaces), n, n))
         _check(self)
+
+    def __repr__(self) -> str:
+        return in_brief(f"FlexibleBody {self.name!r}", _facts(self))
+
+    def _repr_html_(self) -> str:
+        return as_table(f"FlexibleBody {self.name!r}", _facts(self))
 
     # ---- sizes and rigid-body quantities -------------------------------------------------------------------------
 
@@ -269,6 +287,30 @@ class FlexibleBody:
 def axial(tensor: Array) -> Array:
     """(3, 3, ...) -> (3, ...): T_yz - T_zy, T_zx - T_xz, T_xy - T_yx, which is a x b for T = a b^T."""
     return np.stack([tensor[1, 2] - tensor[2, 1], tensor[2, 0] - tensor[0, 2], tensor[0, 1] - tensor[1, 0]])
+
+
+# ---- in words -----------------------------------------------------------------------------------------------------
+
+
+def _facts(body: FlexibleBody) -> dict[str, str]:
+    """What one wants to know of a body first."""
+    surface = body.surface
+    held = {
+        "geometric stiffening": body.stiffening is not None,
+        "surface": surface is not None,
+        "stress": surface is not None and surface.stress is not None,
+        "section forces": surface is not None and surface.beams is not None,
+    }
+    return {
+        "mass": f"{body.mass:.6g} kg, centre {vector_in_words(body.centre_of_mass, body.size)} m",
+        "size": f"{body.size:.5g} m",
+        "modes": f"{body.n}: {listed((f'{f:.4g}' for f in body.frequencies), 5)} Hz" if body.n else "none: rigid",
+        "interfaces": listed(f"{i.name} ({i.kind})" for i in body.interfaces),
+        "reference": settings_in_words(body.provenance.get("reference", "")),
+        "reduction": settings_in_words(body.provenance.get("reduction", "")),
+        "holds": ", ".join(what for what, there in held.items() if there),
+        "warnings": str(len(body.provenance.get("warnings", [])) or ""),
+    }
 
 
 # ---- guards -------------------------------------------------------------------------------------------------------

@@ -7,9 +7,11 @@ from typing import Literal
 
 import click
 
+from ffr_prep.cli.options import PATH
+from ffr_prep.cli.request import OUTPUT
+from ffr_prep.cli.terminal import filed, show
 from ffr_prep.common.errors import InputError
 
-_PATH = click.Path(path_type=Path)
 _SUFFIXES = {".sid_fem": "SID", ".sid": "SID", ".fem": "MBDyn"}
 
 
@@ -25,8 +27,8 @@ Example:
 
 
 @click.command("export", epilog=_EXPORT)
-@click.argument("body", type=_PATH)
-@click.option("-o", "--output", type=_PATH, required=True, help="File to write: .SID_FEM, or .fem for MBDyn.")
+@click.argument("body", type=PATH)
+@click.option("-o", "--output", type=PATH, required=True, help="File to write: .SID_FEM, or .fem for MBDyn.")
 @click.option("--surface", is_flag=True, help="Also write the points of the surface as nodes.")
 @click.option(
     "--layout",
@@ -66,12 +68,12 @@ def export_body(
         write_fem(loaded, output, kind=kind, surface=surface)
     if loaded.stiffening is not None and target != "SID" and kind == "legacy":
         click.echo("note        the geometric stiffness of the body was left out")
-    click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")
+    filed(output)
 
 
 @click.command("import", epilog=_IMPORT)
-@click.argument("file", type=_PATH)
-@click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
+@click.argument("file", type=PATH)
+@OUTPUT
 def import_body(file: Path, output: Path) -> None:
     """Read FILE (.SID_FEM, or .fem of MBDyn; SI units) and write it as a body file.
 
@@ -84,11 +86,10 @@ def import_body(file: Path, output: Path) -> None:
 
     body = read_sid(file) if _format("FILE", file) == "SID" else read_fem(file)
     save_body(body, output)
-    for line in short_lines(body):
-        click.echo(line)
+    show(short_lines(body))
     for note in body.provenance["notes"]:
         click.echo(f"note        {note}")
-    click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")
+    filed(output)
 
 
 def _format(what: str, path: Path) -> str:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from ffr_prep.cli.options import PATH, bundle
 from ffr_prep.common.errors import InputError
 
 if TYPE_CHECKING:
     from ffr_prep.body import FlexibleBody
     from ffr_prep.reduction.component_modes import Reduction
     from ffr_prep.reduction.selection import Band, Selection
-
-Command = TypeVar("Command", bound=Callable[..., Any])
 
 METHODS = (
     "craig-bampton",
@@ -45,7 +44,7 @@ Modes: a number (--modes), all up to a frequency (--frequency), or as many as ma
 accurate (--accuracy 10,2000,0.05: from 10 to 2000 Hz to 5 per cent).
 """
 
-_OPTIONS = (
+reduction_options = bundle(
     click.option(
         "--method",
         "methods",
@@ -63,20 +62,11 @@ _OPTIONS = (
     ),
     click.option("--moments", type=click.IntRange(min=1), default=2, show_default=True, help="Of krylov."),
     click.option("--match", default="0", show_default=True, metavar="F1,F2,...", help="Frequencies [Hz] of krylov."),
-    click.option(
-        "--quality", type=click.Path(path_type=Path), help="Compare with the full model; folder for the pictures of it."
-    ),
+    click.option("--quality", type=PATH, help="Compare with the full model; folder for the pictures of it."),
     click.option(
         "--band", metavar="LOW,HIGH", help="Frequencies [Hz] of that comparison; default: those of --accuracy."
     ),
 )
-
-
-def reduction_options(command: Command) -> Command:
-    """The command with the options of a reduction; their values are for `reduction_of` and `band_of`."""
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
 
 
 def reduction_of(options: Mapping[str, Any]) -> Reduction:
@@ -103,12 +93,12 @@ def band_of(options: Mapping[str, Any]) -> Band | None:
     return Band(*_numbers("--band", text, 2))
 
 
-def draw_quality(body: FlexibleBody, options: Mapping[str, Any]) -> None:
+def draw_quality(body: FlexibleBody, folder: Path | None) -> None:
     """Write the pictures of the quality report, if one was asked for."""
-    if options["quality"] is not None:
+    if folder is not None:
         from ffr_prep.report.quality_pictures import quality_pictures
 
-        for path in quality_pictures(body, options["quality"]):
+        for path in quality_pictures(body, folder):
             click.echo(f"picture     {path}")
 
 

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from ffr_prep.body import content_hash
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.in_brief import extent_in_words, in_brief, listed
 from ffr_prep.matrices.nodal_inertia import DofMap
 
 Array = np.ndarray
@@ -90,6 +91,17 @@ class MatrixModel:
             object.__setattr__(self, "triangles", np.array(self.triangles, np.int64).reshape(-1, 3))
         _check_shapes(self)
         _check_rows(self)
+
+    def __repr__(self) -> str:
+        facts = {
+            "rows": f"{len(self.nodes)}, {self.K.nnz} entries in K, {self.M.nnz} in M",
+            "nodes": str(len(self.points)),
+            "extent": extent_in_words(self.points),
+            "groups": listed(self.groups),
+            "source": str(self.source.get("format", "")),
+            "notes": "; ".join(self.notes),
+        }
+        return in_brief("MatrixModel", facts)
 
     @property
     def dofs(self) -> DofMap:

@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 
 from ffr_prep.body import content_hash
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.in_brief import extent_in_words, in_brief, listed
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.mesh.abaqus import from_abaqus
 from ffr_prep.mesh.boundary import joined_by_faces, joined_by_nodes, outer_faces, whole_faces
@@ -45,6 +46,9 @@ class Block:
     kind: str
     nodes: Array
 
+    def __repr__(self) -> str:
+        return f"Block({self.kind!r}, {len(self.nodes)} elements)"
+
 
 @dataclass(frozen=True)
 class Mesh:
@@ -64,6 +68,18 @@ class Mesh:
     face_groups: Mapping[str, tuple[Array, ...]]
     node_groups: Mapping[str, Array]
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        facts = {
+            "elements": ", ".join(f"{len(block.nodes)} {block.kind}" for block in self.blocks),
+            "nodes": str(len(self.points)),
+            "extent": extent_in_words(self.points),
+            "surfaces": listed(self.face_groups),
+            "node sets": listed(self.node_groups),
+            "volumes": listed(self.volume_groups),
+            "notes": "; ".join(self.notes),
+        }
+        return in_brief("Mesh", facts)
 
 
 # ---- reading ------------------------------------------------------------------------------------------------------

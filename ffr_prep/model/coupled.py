@@ -18,6 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.in_brief import extent_in_words, in_brief, listed
 
 Array = np.ndarray
 
@@ -81,6 +82,19 @@ class CoupledModel:
     inertial_loads: Array | None = None
     edges: Array | None = None
     dimension: int = 3
+
+    def __repr__(self) -> str:
+        return in_brief("CoupledModel", facts_of(self))
+
+
+def facts_of(model: CoupledModel) -> dict[str, str]:
+    """What one wants to know of a model first, in words."""
+    return {
+        "nodes": str(len(model.points)),
+        "extent": extent_in_words(model.points),
+        "coordinates": str(model.K.shape[0]),
+        "interfaces": listed(f"{name} ({kind})" for name, kind in zip(model.names, model.kinds, strict=True)),
+    }
 
 
 def interface_index(model: CoupledModel, name: str) -> int:

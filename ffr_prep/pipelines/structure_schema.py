@@ -2,33 +2,17 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
+
+from ffr_prep.common.strict import Strict
 
 Vector = tuple[float, float, float]
 
 
-class _Strict(BaseModel):
-    """Unknown keys are mistakes; numbers must be finite."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _known(cls, given: Any) -> Any:
-        known = list(cls.model_fields)
-        for key in given if isinstance(given, dict) else ():
-            if key not in known:
-                close = get_close_matches(str(key), known, 1)
-                hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(known)}"
-                raise ValueError(f"{key!r} is not a known entry here; {hint}")
-        return given
-
-
-class RectangleEntry(_Strict):
+class RectangleEntry(Strict):
     """Width b along z', height h along y' [m]."""
 
     shape: Literal["rectangle"]
@@ -36,14 +20,14 @@ class RectangleEntry(_Strict):
     h: float
 
 
-class CircleEntry(_Strict):
+class CircleEntry(Strict):
     """Diameter d [m]."""
 
     shape: Literal["circle"]
     d: float
 
 
-class TubeEntry(_Strict):
+class TubeEntry(Strict):
     """Outer diameter d and wall t [m]."""
 
     shape: Literal["tube"]
@@ -51,7 +35,7 @@ class TubeEntry(_Strict):
     t: float
 
 
-class IEntry(_Strict):
+class IEntry(Strict):
     """Height h, width b, web and flange thickness [m]."""
 
     shape: Literal["i"]
@@ -61,7 +45,7 @@ class IEntry(_Strict):
     flange: float
 
 
-class GeneralEntry(_Strict):
+class GeneralEntry(Strict):
     """A section by its constants, as in `ffr_prep.structures.sections.general`."""
 
     shape: Literal["general"]
@@ -76,7 +60,7 @@ class GeneralEntry(_Strict):
 SectionEntry = Annotated[RectangleEntry | CircleEntry | TubeEntry | IEntry | GeneralEntry, Field(discriminator="shape")]
 
 
-class MaterialEntry(_Strict):
+class MaterialEntry(Strict):
     """Young's modulus [Pa], Poisson's ratio, density [kg/m^3]."""
 
     E: float
@@ -84,7 +68,7 @@ class MaterialEntry(_Strict):
     rho: float
 
 
-class MemberEntry(_Strict):
+class MemberEntry(Strict):
     """A beam; orientation lies in its x'y' plane, offset is (y, z) of the centroid [m]; shear = false: Euler-Bernoulli."""
 
     section: SectionEntry
@@ -94,7 +78,7 @@ class MemberEntry(_Strict):
     shear: bool = True
 
 
-class ShellEntry(_Strict):
+class ShellEntry(Strict):
     """A plate of a thickness [m]; rotary_inertia = false leaves out that of the thickness."""
 
     thickness: float
@@ -102,7 +86,7 @@ class ShellEntry(_Strict):
     rotary_inertia: bool = True
 
 
-class GeometryEntry(_Strict):
+class GeometryEntry(Strict):
     """A file as in `ffr_prep.structures.frame_geometry.read_frame`; size and numbers change how a geometry is meshed."""
 
     file: Path
@@ -111,7 +95,7 @@ class GeometryEntry(_Strict):
     numbers: dict[str, float] = {}
 
 
-class PolylineEntry(_Strict):
+class PolylineEntry(Strict):
     """Beams from corner to corner [m], each of several elements."""
 
     member: str
@@ -119,7 +103,7 @@ class PolylineEntry(_Strict):
     elements: int = 1
 
 
-class PanelEntry(_Strict):
+class PanelEntry(Strict):
     """A plate between four corners [m] of n x m elements, or of twice as many triangles."""
 
     shell: str
@@ -128,7 +112,7 @@ class PanelEntry(_Strict):
     triangles: bool = False
 
 
-class InterfaceEntry(_Strict):
+class InterfaceEntry(Strict):
     """At the nodes of a group, by default the one of the same name; point [m]: where its node is."""
 
     region: str | None = None
@@ -136,7 +120,7 @@ class InterfaceEntry(_Strict):
     point: Vector | None = None
 
 
-class SupportEntry(_Strict):
+class SupportEntry(Strict):
     """One prevented motion of an interface."""
 
     interface: str
@@ -144,14 +128,14 @@ class SupportEntry(_Strict):
     direction: Vector
 
 
-class FixedEntry(_Strict):
+class FixedEntry(Strict):
     """The frame moves with an interface."""
 
     kind: Literal["fixed"]
     interface: str
 
 
-class SimplySupportedEntry(_Strict):
+class SimplySupportedEntry(Strict):
     """The x' axis of the elastic field passes through two interfaces."""
 
     kind: Literal["simply-supported"]
@@ -159,13 +143,13 @@ class SimplySupportedEntry(_Strict):
     roller: str
 
 
-class MeanAxisEntry(_Strict):
+class MeanAxisEntry(Strict):
     """The frame follows the mean motion of the mass."""
 
     kind: Literal["mean-axis"]
 
 
-class SupportsEntry(_Strict):
+class SupportsEntry(Strict):
     """Any choice of prevented motions."""
 
     kind: Literal["supports"]
@@ -177,7 +161,7 @@ ReferenceEntry = Annotated[
 ]
 
 
-class ReductionEntry(_Strict):
+class ReductionEntry(Strict):
     """A reduction (see `ffr_prep.reduction.component_modes`) with a number of normal modes, 10 when nothing is said, or all
     up to a frequency [Hz], or as many as a relative accuracy of the receptances in a band [low, high, error] needs.
 
@@ -208,7 +192,7 @@ class ReductionEntry(_Strict):
         return self
 
 
-class SolidEntry(_Strict):
+class SolidEntry(Strict):
     """A solid that is tied to the frame: a mesh or geometry as in `ffr_prep.mesh.mesh.read_mesh`, of one material or of one
     for each volume, with interfaces of its own.
     """
@@ -222,7 +206,7 @@ class SolidEntry(_Strict):
     order: Literal[1, 2] = 2
 
 
-class StructureEntry(_Strict):
+class StructureEntry(Strict):
     """The whole file."""
 
     name: str | None = None

@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from ffr_prep.body import content_hash
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.in_brief import extent_in_words, in_brief, listed
 from ffr_prep.model.material import Material
 from ffr_prep.structures.sections import Section
 
@@ -110,6 +111,18 @@ class Frame:
             raise InputError(
                 f"node {wrong[0]} has the coordinates {self.points[wrong[0]]}; they must be finite numbers"
             )
+
+    def __repr__(self) -> str:
+        kinds = {"beams": self.elements, "triangles": self.triangles, "quadrilaterals": self.quadrilaterals}
+        facts = {
+            "elements": ", ".join(f"{len(nodes)} {kind}" for kind, nodes in kinds.items() if len(nodes)),
+            "nodes": str(len(self.points)),
+            "extent": extent_in_words(self.points),
+            "members": listed((f"{of.section.name} of {of.material.name}" for of in self.members), 3),
+            "shells": listed((f"{of.thickness:.4g} m of {of.material.name}" for of in self.shells), 3),
+            "groups": listed(self.node_groups),
+        }
+        return in_brief("Frame", facts)
 
 
 def _freeze(frame: Frame, key: str, value: Array, shape: tuple[int, ...]) -> None:
