@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.in_brief import as_table, in_brief, listed, settings_in_words, vector_in_words
+from ffr_prep.common.brief import Brief, Rows, listed
+from ffr_prep.common.in_words import settings_in_words, vector_in_words
 
 _ORTHONORMAL_TOLERANCE = 1e-8
 
@@ -19,8 +20,8 @@ class BodyError(ValueError):
     """A body or a body file that cannot be used; the message says what is wrong and what to do."""
 
 
-@dataclass(frozen=True)
-class Interface:
+@dataclass(frozen=True, repr=False)
+class Interface(Brief):
     """A six-coordinate node to which joints, forces and sensors attach.
 
     position : (3,) [m], undeformed, in the body frame
@@ -41,9 +42,6 @@ class Interface:
         _freeze(self, "phi_t", (3, n))
         _freeze(self, "phi_r", (3, n))
 
-    def __repr__(self) -> str:
-        return f"Interface({self.name!r}, {self.kind!r}, at {vector_in_words(self.position)} m, {self.phi_t.shape[1]} modes)"
-
 
 # The components of a symmetric tensor, in the order in which they are stored; shear strains are those of the tensor.
 TENSOR = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -51,8 +49,8 @@ TENSOR = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 SECTION_FORCES = ("N", "Qy", "Qz", "Mx", "My", "Mz")
 
 
-@dataclass(frozen=True)
-class BeamForces:
+@dataclass(frozen=True, repr=False)
+class BeamForces(Brief):
     """Section forces of E beam elements per elastic coordinate, at the first end, the middle and the last end of each.
 
     positions : (E, 3, 3) undeformed places on the centroid line, in the body frame [m]
@@ -71,12 +69,9 @@ class BeamForces:
         _freeze(self, "axes", (count, 3, 3))
         _freeze(self, "modes", (count, 3, 6, n))
 
-    def __repr__(self) -> str:
-        return f"BeamForces({len(self.positions)} elements, {self.modes.shape[-1]} modes)"
 
-
-@dataclass(frozen=True)
-class Surface:
+@dataclass(frozen=True, repr=False)
+class Surface(Brief):
     """What is drawn and where fields are recovered: a triangulated boundary with the basis at its points.
 
     points : (P, 3) [m] undeformed; triangles : (T, 3) indices into points; Phi : (P, 3, n) [1/sqrt(kg)]
@@ -112,14 +107,9 @@ class Surface:
         triangles.setflags(write=False)
         object.__setattr__(self, "triangles", triangles)
 
-    def __repr__(self) -> str:
-        held = [name for name in ("stress", "beams") if getattr(self, name) is not None]
-        sizes = f"{len(self.points)} points, {len(self.triangles)} triangles, {self.Phi.shape[-1]} modes"
-        return f"Surface({', '.join([sizes, *held])})"
 
-
-@dataclass(frozen=True)
-class FlexibleBody:
+@dataclass(frozen=True, repr=False)
+class FlexibleBody(Brief):
     """A linear elastic body in the floating frame of reference; ``n = 0`` is a rigid body.
 
     mass      : I1, [kg]
@@ -162,11 +152,28 @@ class FlexibleBody:
             _freeze(self, "stiffening", (12 + 6 * len(self.interfaces), n, n))
         _check(self)
 
-    def __repr__(self) -> str:
-        return in_brief(f"FlexibleBody {self.name!r}", _facts(self))
+    def _title(self) -> str:
+        return f"FlexibleBody {self.name!r}"
 
-    def _repr_html_(self) -> str:
-        return as_table(f"FlexibleBody {self.name!r}", _facts(self))
+    def _rows(self) -> Rows:
+        surface = self.surface
+        holds = {
+            "geometric stiffening": self.stiffening,
+            "surface": surface,
+            "stress": surface and surface.stress,
+            "section forces": surface and surface.beams,
+        }
+        rows = {
+            "mass": f"{self.mass:.6g} kg, centre {vector_in_words(self.centre_of_mass, self.size)} m",
+            "size": f"{self.size:.5g} m",
+            "modes": f"{self.n}: {listed(f'{f:.4g}' for f in self.frequencies)} Hz" if self.n else "none: rigid",
+            "interfaces": listed(f"{i.name} ({i.kind})" for i in self.interfaces),
+            "reference": settings_in_words(self.provenance.get("reference", "")),
+            "reduction": settings_in_words(self.provenance.get("reduction", "")),
+            "holds": ", ".join(what for what, there in holds.items() if there is not None),
+            "warnings": "; ".join(self.provenance.get("warnings", [])),
+        }
+        return [(name, text) for name, text in rows.items() if text]
 
     # ---- sizes and rigid-body quantities -------------------------------------------------------------------------
 
@@ -287,30 +294,6 @@ class FlexibleBody:
 def axial(tensor: Array) -> Array:
     """(3, 3, ...) -> (3, ...): T_yz - T_zy, T_zx - T_xz, T_xy - T_yx, which is a x b for T = a b^T."""
     return np.stack([tensor[1, 2] - tensor[2, 1], tensor[2, 0] - tensor[0, 2], tensor[0, 1] - tensor[1, 0]])
-
-
-# ---- in words -----------------------------------------------------------------------------------------------------
-
-
-def _facts(body: FlexibleBody) -> dict[str, str]:
-    """What one wants to know of a body first."""
-    surface = body.surface
-    held = {
-        "geometric stiffening": body.stiffening is not None,
-        "surface": surface is not None,
-        "stress": surface is not None and surface.stress is not None,
-        "section forces": surface is not None and surface.beams is not None,
-    }
-    return {
-        "mass": f"{body.mass:.6g} kg, centre {vector_in_words(body.centre_of_mass, body.size)} m",
-        "size": f"{body.size:.5g} m",
-        "modes": f"{body.n}: {listed((f'{f:.4g}' for f in body.frequencies), 5)} Hz" if body.n else "none: rigid",
-        "interfaces": listed(f"{i.name} ({i.kind})" for i in body.interfaces),
-        "reference": settings_in_words(body.provenance.get("reference", "")),
-        "reduction": settings_in_words(body.provenance.get("reduction", "")),
-        "holds": ", ".join(what for what, there in held.items() if there),
-        "warnings": str(len(body.provenance.get("warnings", [])) or ""),
-    }
 
 
 # ---- guards -------------------------------------------------------------------------------------------------------

@@ -12,8 +12,9 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from ffr_prep.body import content_hash
+from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.in_brief import extent_in_words, in_brief, listed
+from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.matrices.nodal_inertia import DofMap
 
 Array = np.ndarray
@@ -50,8 +51,8 @@ UNIT_SYSTEMS: Mapping[str, UnitSystem] = {
 }
 
 
-@dataclass(frozen=True)
-class MatrixModel:
+@dataclass(frozen=True, repr=False)
+class MatrixModel(Brief):
     """Nodes, stiffness and mass of a free body, from outside; frozen, SI units.
 
     points     : (N, 3) nodes [m]
@@ -92,16 +93,15 @@ class MatrixModel:
         _check_shapes(self)
         _check_rows(self)
 
-    def __repr__(self) -> str:
-        facts = {
-            "rows": f"{len(self.nodes)}, {self.K.nnz} entries in K, {self.M.nnz} in M",
-            "nodes": str(len(self.points)),
-            "extent": extent_in_words(self.points),
-            "groups": listed(self.groups),
-            "source": str(self.source.get("format", "")),
-            "notes": "; ".join(self.notes),
-        }
-        return in_brief("MatrixModel", facts)
+    def _rows(self) -> Rows:
+        return [
+            ("rows", f"{len(self.nodes)}, {self.K.nnz} entries in K, {self.M.nnz} in M"),
+            ("nodes", str(len(self.points))),
+            ("extent", extent_in_words(self.points)),
+            ("groups", listed(self.groups)),
+            ("source", str(self.source.get("format", "unknown"))),
+            ("notes", listed(self.notes)),
+        ]
 
     @property
     def dofs(self) -> DofMap:

@@ -15,8 +15,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ffr_prep.body import content_hash
+from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.in_brief import extent_in_words, in_brief, listed
+from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.mesh.abaqus import from_abaqus
 from ffr_prep.mesh.boundary import joined_by_faces, joined_by_nodes, outer_faces, whole_faces
@@ -36,8 +37,8 @@ _SHOWN = 20
 _SHOWN_PARTS = 5
 
 
-@dataclass(frozen=True)
-class Block:
+@dataclass(frozen=True, repr=False)
+class Block(Brief):
     """Volume elements of one kind: "tet4", "tet10", "hex8", "hex20" or "hex27".
 
     nodes : (E, k) indices into Mesh.points, in the node order of meshio (VTK).
@@ -46,12 +47,9 @@ class Block:
     kind: str
     nodes: Array
 
-    def __repr__(self) -> str:
-        return f"Block({self.kind!r}, {len(self.nodes)} elements)"
 
-
-@dataclass(frozen=True)
-class Mesh:
+@dataclass(frozen=True, repr=False)
+class Mesh(Brief):
     """A volume mesh with named regions; frozen, SI units.
 
     points        : (N, 3) [m]
@@ -69,17 +67,16 @@ class Mesh:
     node_groups: Mapping[str, Array]
     notes: tuple[str, ...] = ()
 
-    def __repr__(self) -> str:
-        facts = {
-            "elements": ", ".join(f"{len(block.nodes)} {block.kind}" for block in self.blocks),
-            "nodes": str(len(self.points)),
-            "extent": extent_in_words(self.points),
-            "surfaces": listed(self.face_groups),
-            "node sets": listed(self.node_groups),
-            "volumes": listed(self.volume_groups),
-            "notes": "; ".join(self.notes),
-        }
-        return in_brief("Mesh", facts)
+    def _rows(self) -> Rows:
+        return [
+            ("elements", ", ".join(f"{len(block.nodes)} {block.kind}" for block in self.blocks)),
+            ("nodes", str(len(self.points))),
+            ("extent", extent_in_words(self.points)),
+            ("surfaces", listed(self.face_groups)),
+            ("node sets", listed(self.node_groups)),
+            ("volumes", listed(self.volume_groups)),
+            ("notes", listed(self.notes)),
+        ]
 
 
 # ---- reading ------------------------------------------------------------------------------------------------------

@@ -17,8 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.in_brief import extent_in_words, in_brief, listed
+from ffr_prep.common.in_words import extent_in_words
 
 Array = np.ndarray
 
@@ -50,8 +51,8 @@ class InterfaceRegion:
             raise InputError(f"interface {self.name!r}: point is {self.point}; it must be three finite numbers")
 
 
-@dataclass(frozen=True)
-class CoupledModel:
+@dataclass(frozen=True, repr=False)
+class CoupledModel(Brief):
     """The finite-element model in the independent coordinates z that the rigid interfaces leave.
 
     points  : (N, 3) nodes [m]
@@ -83,18 +84,13 @@ class CoupledModel:
     edges: Array | None = None
     dimension: int = 3
 
-    def __repr__(self) -> str:
-        return in_brief("CoupledModel", facts_of(self))
-
-
-def facts_of(model: CoupledModel) -> dict[str, str]:
-    """What one wants to know of a model first, in words."""
-    return {
-        "nodes": str(len(model.points)),
-        "extent": extent_in_words(model.points),
-        "coordinates": str(model.K.shape[0]),
-        "interfaces": listed(f"{name} ({kind})" for name, kind in zip(model.names, model.kinds, strict=True)),
-    }
+    def _rows(self) -> Rows:
+        return [
+            ("nodes", str(len(self.points))),
+            ("extent", extent_in_words(self.points)),
+            ("coordinates", str(self.K.shape[0])),
+            ("interfaces", listed(f"{name} ({kind})" for name, kind in zip(self.names, self.kinds, strict=True))),
+        ]
 
 
 def interface_index(model: CoupledModel, name: str) -> int:

@@ -10,13 +10,13 @@ import numpy as np
 
 from ffr_prep.body import BeamForces, Surface
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.in_brief import in_brief, listed
-from ffr_prep.model.coupled import CoupledModel, facts_of
+from ffr_prep.common.brief import Brief, Rows, listed
+from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.invariants import InertiaIntegrals
 
 
-@dataclass(frozen=True)
-class Model:
+@dataclass(frozen=True, repr=False)
+class Model(Brief):
     """What a reduction needs of a model, whatever its elements are; z are the independent coordinates of `coupled`.
 
     coupled    : stiffness, mass, interfaces and inertial loads
@@ -45,14 +45,13 @@ class Model:
     massless: bool = False
     diagnose: Callable[[], None] = lambda: None
 
-    def __repr__(self) -> str:
-        facts = {
-            "made of": ", ".join(key for key in ("mesh", "frame", "matrices") if key in self.record)
-            or listed(self.record.get("parts", ())),
-            **facts_of(self.coupled),
-            "warnings": "; ".join(self.record.get("warnings", [])),
-        }
-        return in_brief("Model", facts)
+    def _rows(self) -> Rows:
+        kind = [key for key in ("mesh", "frame", "matrices") if key in self.record]
+        return [
+            ("made of", listed(kind or self.record.get("parts", ()))),
+            *self.coupled._rows(),
+            ("warnings", listed(self.record.get("warnings", []))),
+        ]
 
 
 def summed(parts: Sequence[InertiaIntegrals]) -> InertiaIntegrals:

@@ -10,7 +10,7 @@ import numpy as np
 from ffr_prep.body import FlexibleBody
 from ffr_prep.body.interface_freedom import interface_freedom
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.in_brief import listed, settings_in_words, vector_in_words
+from ffr_prep.common.in_words import settings_in_words, vector_in_words
 from ffr_prep.reduction.quality import Quality, quality_of
 
 if TYPE_CHECKING:
@@ -222,4 +222,6 @@ def _origin_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _names(groups: Mapping[str, object]) -> str:
-    return listed(groups, _MOST_NAMES) or "none named"
+    names = list(groups)
+    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+    return ", ".join(names[:_MOST_NAMES]) + more if names else "none named"
