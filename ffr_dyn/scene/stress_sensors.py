@@ -144,7 +144,7 @@ def measured_modes(measurement: StressMeasurement | SectionMeasurement, surface:
     if surface is None or surface.stress is None or surface.moduli is None:
         raise InputError(
             f"body {measurement.body!r} has no stress modes; reduce it again with them (ffr-prep reduce --stress, "
-            "reduce_mesh(..., stress=True))"
+            "fp.Request(..., stress=True))"
         )
     point = nearest_point(surface, np.array(measurement.point), measurement.body)
     at, moduli = f"at {np.round(surface.points[point], 6).tolist()} m", surface.moduli[point]

@@ -44,12 +44,12 @@ from ffr_dyn.scene_file.values import (
     Number,
     OfTime,
     Seconds,
-    Strict,
     Vector,
     of_motion,
     of_time,
     or_curve,
 )
+from ffr_prep.common.strict import Strict
 
 Direction = Vector | list[Vector]
 

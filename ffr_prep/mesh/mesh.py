@@ -13,7 +13,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ffr_prep.body import content_hash
+from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.common.registry import choice, loaded
 from ffr_prep.mesh.boundary import joined_by_faces, joined_by_nodes, outer_faces, whole_faces
@@ -31,8 +33,8 @@ _DOUBTFUL_LENGTH = 20.0
 _SHOWN_PARTS = 5
 
 
-@dataclass(frozen=True)
-class Block:
+@dataclass(frozen=True, repr=False)
+class Block(Brief):
     """Volume elements of one kind: "tet4", "tet10", "hex8", "hex20" or "hex27".
 
     nodes : (E, k) indices into Mesh.points, in the node order of meshio (VTK).
@@ -42,8 +44,8 @@ class Block:
     nodes: Array
 
 
-@dataclass(frozen=True)
-class Mesh:
+@dataclass(frozen=True, repr=False)
+class Mesh(Brief):
     """A volume mesh with named regions; frozen, SI units.
 
     points        : (N, 3) [m]
@@ -60,6 +62,17 @@ class Mesh:
     face_groups: Mapping[str, tuple[Array, ...]]
     node_groups: Mapping[str, Array]
     notes: tuple[str, ...] = ()
+
+    def _rows(self) -> Rows:
+        return [
+            ("elements", ", ".join(f"{len(block.nodes)} {block.kind}" for block in self.blocks)),
+            ("nodes", str(len(self.points))),
+            ("extent", extent_in_words(self.points)),
+            ("surfaces", listed(self.face_groups)),
+            ("node sets", listed(self.node_groups)),
+            ("volumes", listed(self.volume_groups)),
+            ("notes", listed(self.notes)),
+        ]
 
 
 # ---- reading ------------------------------------------------------------------------------------------------------

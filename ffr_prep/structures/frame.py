@@ -14,7 +14,9 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ffr_prep.body import content_hash
+from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.model.material import Material
 from ffr_prep.structures.sections import Section
 
@@ -68,8 +70,8 @@ class Shell:
             raise InputError(f"shell of {self.material.name}: gyration is {self.gyration} m; it must not be negative")
 
 
-@dataclass(frozen=True)
-class Frame:
+@dataclass(frozen=True, repr=False)
+class Frame(Brief):
     """Nodes with six coordinates each, and straight beams and flat plates between them; frozen, SI units.
 
     points         : (N, 3) [m]
@@ -110,6 +112,17 @@ class Frame:
             raise InputError(
                 f"node {wrong[0]} has the coordinates {self.points[wrong[0]]}; they must be finite numbers"
             )
+
+    def _rows(self) -> Rows:
+        kinds = {"beams": self.elements, "triangles": self.triangles, "quadrilaterals": self.quadrilaterals}
+        return [
+            ("elements", listed(f"{len(nodes)} {kind}" for kind, nodes in kinds.items() if len(nodes))),
+            ("nodes", str(len(self.points))),
+            ("extent", extent_in_words(self.points)),
+            ("members", listed(f"{of.section.name} of {of.material.name}" for of in self.members)),
+            ("shells", listed(f"{of.thickness:.4g} m of {of.material.name}" for of in self.shells)),
+            ("groups", listed(self.node_groups)),
+        ]
 
 
 def _freeze(frame: Frame, key: str, value: Array, shape: tuple[int, ...]) -> None:

@@ -200,7 +200,7 @@ def graph() -> dict[str, set[str]]:
 
 
 def floor_of(module: str) -> tuple[str, int] | None:
-    """Package and floor of a module; None for the package itself, whose front door stands above all."""
+    """Package and floor of a module; None for the package itself, the front door, which stands above all."""
     package, _, rest = module.partition(".")
     return (package, FLOORS[package].index(top(rest))) if rest else None
 
@@ -208,6 +208,11 @@ def floor_of(module: str) -> tuple[str, int] | None:
 def test_every_room_has_its_floor():
     rooms = {package: {m.split(".")[1] for m in modules_of(package) if "." in m} for package in PACKAGES}
     assert {package: set(floors) for package, floors in FLOORS.items()} == rooms
+
+
+def test_no_room_uses_a_front_door():
+    """The doors stand above all rooms: what is inside imports where a thing is."""
+    assert {m: wanted & set(PACKAGES) for m, wanted in graph().items() if wanted & set(PACKAGES)} == {}
 
 
 def test_no_module_imports_another_that_imports_it():
@@ -348,10 +353,10 @@ def test_every_folder_of_modules_is_a_package_and_is_installed():
 
 
 def test_the_packages_hold_nothing_but_modules():
-    """Anything else would be missing from an installed copy, but the marks of typed packages, which are declared."""
+    """Anything else would be missing from an installed copy, but for the mark that says that types are given."""
     files = [path for package in PACKAGES for path in (ROOT / package).rglob("*") if path.is_file()]
-    others = [p for p in files if p.suffix != ".py" and "__pycache__" not in p.parts]
-    assert [str(p) for p in others if p.name != "py.typed"] == []
+    others = [p.relative_to(ROOT).as_posix() for p in files if p.suffix != ".py" and "__pycache__" not in p.parts]
+    assert set(others) <= {f"{package}/py.typed" for package in PACKAGES}
     assert PROJECT["tool"]["setuptools"]["package-data"] == {"*": ["py.typed"]}
 
 
