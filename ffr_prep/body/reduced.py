@@ -77,7 +77,8 @@ class Surface(Brief):
     points : (P, 3) [m] undeformed; triangles : (T, 3) indices into points; Phi : (P, 3, n) [1/sqrt(kg)]
     stress : (P, 6, n) components xx, yy, zz, xy, xz, yz of the stress per elastic coordinate, in body axes
              [Pa/(m sqrt(kg))]; None where it was not recovered
-    moduli : (P, 2) Young's modulus [Pa] and Poisson's ratio at the points, which give the strain; with the stress
+    moduli : (P, 2) Young's modulus [Pa] and Poisson's ratio at the points, which give the strain; with the stress. Zeros
+             where the material is anisotropic, of which strain is not recovered
     beams  : section forces of beam elements; None where there are none
     """
 

@@ -17,7 +17,7 @@ from ffr_prep.body import content_hash
 from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import extent_in_words
-from ffr_prep.model.material import Material
+from ffr_prep.model.material import Material, check_isotropic
 from ffr_prep.structures.sections import Section
 
 Array = np.ndarray
@@ -41,6 +41,7 @@ class Member:
     orientation: Vector | None = None
 
     def __post_init__(self) -> None:
+        check_isotropic(self.material, f"member of {self.section.name!r}")
         given = self.orientation
         if given is not None and (np.shape(given) != (3,) or not 0 < np.linalg.norm(given) < np.inf):
             raise InputError(f"member of {self.section.name!r}: orientation {given} is not a direction (x, y, z)")
@@ -62,6 +63,7 @@ class Shell:
     gyration: float | None = None
 
     def __post_init__(self) -> None:
+        check_isotropic(self.material, "shell")
         if not 0 < self.thickness < math.inf:
             raise InputError(f"shell of {self.material.name}: the thickness is {self.thickness} m; it must be positive")
         if self.gyration is None:
