@@ -17,7 +17,7 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.common.registry import choice, loaded
 from ffr_prep.mesh.boundary import joined_by_faces, joined_by_nodes, outer_faces, whole_faces
-from ffr_prep.mesh.cells import FACE_TRIANGLES, KINDS, jacobian_determinants
+from ffr_prep.mesh.cells import FACE_TRIANGLES, KINDS
 from ffr_prep.mesh.formats import FileMesh, format_of
 
 Array = np.ndarray
@@ -288,6 +288,8 @@ def _check_jacobians(mesh: Mesh) -> None:
 
 def _worst_jacobians(corners: Array, kind: str) -> Array:
     """(E,) least Jacobian determinant of elements with nodes at (E, k, 3), over the cube of their size [-]."""
+    from ffr_prep.mesh.shapes import jacobian_determinants  # here, because scikit-fem is slow to load
+
     worst = np.empty(len(corners))
     for start in range(0, len(corners), _CHUNK):
         of = corners[start : start + _CHUNK]

@@ -227,6 +227,11 @@ def test_arrows_run_down():
     assert up == []
 
 
+def test_no_room_imports_a_door():
+    """The doors `ffr_prep` and `ffr_dyn` stand above all rooms."""
+    assert {module for module, wanted in graph().items() if wanted & set(PACKAGES)} == set()
+
+
 def test_no_folder_is_a_warehouse():
     sizes = {path.parent: 0 for path in MODULES.values()}
     for path in MODULES.values():
@@ -343,9 +348,11 @@ def test_every_folder_of_modules_is_a_package_and_is_installed():
 
 
 def test_the_packages_hold_nothing_but_modules():
-    """Anything else would be missing from an installed copy."""
+    """Anything else would be missing from an installed copy, but the marks of typed packages, which are declared."""
     files = [path for package in PACKAGES for path in (ROOT / package).rglob("*") if path.is_file()]
-    assert [str(p) for p in files if p.suffix != ".py" and "__pycache__" not in p.parts] == []
+    others = [p for p in files if p.suffix != ".py" and "__pycache__" not in p.parts]
+    assert [str(p) for p in others if p.name != "py.typed"] == []
+    assert PROJECT["tool"]["setuptools"]["package-data"] == {"*": ["py.typed"]}
 
 
 MACHINE = re.compile(

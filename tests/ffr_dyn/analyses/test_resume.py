@@ -171,7 +171,7 @@ def test_measuring_in_parts_gives_the_same_bits():
 
     state, method = assemble(SCENE), ROS2(1e-3)
     system, record = state.system, new_record(state.system, 40)
-    fill_rows(new_machine(system, state.x, state.v, method, (0.0, 0.0, 1e-9)), method, record, 0.0, 1)
+    fill_rows(new_machine(system, state.x, state.v, method, (0.0, 0.0, 1e-9)), record, 0.0, 1)
     wanted = selected(system, ("*",))
     once, _ = measure(system, record, {}, wanted)
     for sizes in ([1] * 40, [3, 1, 13, 7, 16], [39, 1]):

@@ -246,7 +246,7 @@ def test_driven_stroke_of_a_slider():
     scene = Scene(
         (Body("block", block),),
         (Joint("guide", "translational", "ground.O", "block.c", axis=(1, 0, 0)),),
-        (Driver("push", "guide", polynomial(0, 1, 2), "stroke"),),
+        (Driver("push", "guide", polynomial(0, 1, 2), coordinate="stroke"),),
         ground={"O": (0, 0, 0)},
     )
     result = forward(scene, end=0.5, output_step=0.1, method=RK4(1e-2))
