@@ -6,13 +6,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, ClassVar, get_args
 
 import numpy as np
 
 from ffr_dyn.analyses.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
 from ffr_dyn.analyses.energy import EnergyWatch
 from ffr_dyn.analyses.events import Event, Watcher
+from ffr_dyn.analyses.registry import OverTime
+from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.compile.engine import Machine, fill_rows, new_machine, record_row
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import Assembled, assemble
@@ -35,6 +37,24 @@ Array = np.ndarray
 _OF_ACCELERATIONS = (RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince)  # methods on index-1 equations
 LOOKS = 10  # of a quantity that adds up, from row to row, where the method chooses its steps
 SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, file and keyboard
+
+
+@dataclass(frozen=True)
+class Forward(OverTime):
+    """From start to end; step defaults to a tenth of output_step. Events are moments to find."""
+
+    resumable: ClassVar[bool] = True
+    integrates: ClassVar[bool] = True
+    stabilised: ClassVar[bool] = True
+    events: tuple[Event, ...] = ()
+
+    def perform(self, scene: Scene, settings: Settings, **how: Any) -> Result:
+        own: dict[str, Any] = {
+            "events": self.events,
+            "method": settings.method,
+            "stabilisation": settings.stabilisation,
+        }
+        return forward(scene, **own, **settings.span, **how)
 
 
 @dataclass

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from numba.core.caching import FunctionCache
 
-from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator
+from ffr_dyn.integrators import Integrator, methods
 from ffr_dyn.kernels.entry_points import (
     CONTROL_UNITS,
     EXTRA_UNITS,
@@ -27,7 +27,6 @@ from ffr_dyn.kernels.entry_points import (
 )
 from ffr_dyn.kernels.tables import Model
 
-_METHODS = {**METHODS, **CONTROLLED}
 _AT_WORK: dict[str, subprocess.Popen[bytes]] = {}
 _ON_DISK: set[str] = set()  # units that were found there before: a program with many runs looks once
 
@@ -40,10 +39,10 @@ def begin_compiling(*kinds: type[Integrator], model: Model | None = None) -> Non
     model : tables of the scene; without them, of one with applied loads
     """
     controlled = CONTROL_UNITS if any(kind.controlled for kind in kinds) else {}
-    methods = {name: kind.unit for name, kind in _METHODS.items() if kind in kinds}
+    chosen = {name: kind.unit for name, kind in methods().items() if kind in kinds}
     extra = {name: EXTRA_UNITS[name] for kind in kinds for name in kind.calls}
     scene = units_of(model) if model else {**UNITS, **LOAD_UNITS}
-    units = {**scene, **controlled, **extra, **methods}
+    units = {**scene, **controlled, **extra, **chosen}
     _ON_DISK.update(name for name, unit in units.items() if name not in _ON_DISK and _is_on_disk(unit))
     missing = [name for name in units if name not in _AT_WORK and name not in _ON_DISK]
     if not missing:
@@ -83,7 +82,7 @@ def compile_units(names: Sequence[str]) -> None:
         **STIFFENED_UNITS,
         **CONTROL_UNITS,
         **EXTRA_UNITS,
-        **{name: kind.unit for name, kind in _METHODS.items()},
+        **{name: kind.unit for name, kind in methods().items()},
     }
     for name in names:
         unit = units[name]
