@@ -40,7 +40,7 @@ class Integrator(Protocol):
     controlled: ClassVar[bool]  # whether it chooses its steps (see `Controlled`)
     repeatable: ClassVar[bool]  # whether steps of a given length may be done again from an earlier state
     stage_count: ClassVar[int]  # states (x, v) of memory that it needs
-    row_stages: ClassVar[int]  # the same for constraint rows
+    row_stages: ClassVar[int]  # the same for constraint rows; zero where it works on accelerations alone
     keeps_terms: ClassVar[bool]  # whether it needs the quadratic terms of all bodies after an evaluation
     looks_ahead: ClassVar[int]  # order to which it takes geometric stiffening as a function of time, or 0: not
     calls: ClassVar[tuple[str, ...]]  # what its unit calls beside what all methods do, of `units.EXTRA_UNITS`
