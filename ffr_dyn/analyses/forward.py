@@ -6,20 +6,22 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, ClassVar, get_args
 
 import numpy as np
 
 from ffr_dyn.analyses.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
 from ffr_dyn.analyses.energy import EnergyWatch
 from ffr_dyn.analyses.events import Event, Watcher
+from ffr_dyn.analyses.registry import OverTime
+from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.compile.engine import Machine, fill_rows, new_machine, record_row
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.failure import failure
 from ffr_dyn.consistency.validity import doubts, extremes, meaningless
 from ffr_dyn.functions.stopwatch import Stopwatch
-from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince, Integrator
+from ffr_dyn.integrators import ROS2, Integrator, methods
 from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation, excess_of_gains, gains
 from ffr_dyn.kernels.tables import (
     AT,
@@ -47,9 +49,26 @@ from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray
 
-_OF_ACCELERATIONS = (RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince)  # methods on index-1 equations
 LOOKS = 10  # of a quantity that adds up, from row to row, where the method chooses its steps
 SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, file and keyboard
+
+
+@dataclass(frozen=True)
+class Forward(OverTime):
+    """From start to end; step defaults to a tenth of output_step. Events are moments to find."""
+
+    resumable: ClassVar[bool] = True
+    integrates: ClassVar[bool] = True
+    stabilised: ClassVar[bool] = True
+    events: tuple[Event, ...] = ()
+
+    def perform(self, scene: Scene, settings: Settings, **how: Any) -> Result:
+        own: dict[str, Any] = {
+            "events": self.events,
+            "method": settings.method,
+            "stabilisation": settings.stabilisation,
+        }
+        return forward(scene, **own, **settings.span, **how)
 
 
 @dataclass
@@ -95,11 +114,7 @@ def forward(
     Raises InputError for a scene or settings that cannot be used, ComputationError when the run fails: with the time,
     the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
-    if not 0 < output_step < np.inf:
-        raise InputError(f"the output step is {output_step} s; it must be positive and finite")
-    method = method if method is not None else ROS2(step=output_step / 10)
-    if isinstance(method, (str, type)):
-        raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
+    method = _method(method, output_step)
     spacing = output_step / LOOKS if method.controlled else method.step
     substeps, rows = _counts(end - start, output_step, spacing)
     _check_step(scene, method)
@@ -128,6 +143,14 @@ def forward(
     return _result(scene, run, header | account | {"status": "complete"})
 
 
+def _method(given: Integrator | None, output_step: float) -> Integrator:
+    if not 0 < output_step < np.inf:
+        raise InputError(f"the output step is {output_step} s; it must be positive and finite")
+    if isinstance(given, (str, type)):
+        raise InputError(f"method is {given!r}; give one with its step, such as ROS2(1e-3)")
+    return ROS2(step=output_step / 10) if given is None else given
+
+
 def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
     """(steps per output row, output rows)."""
     if not 0 < span < np.inf:
@@ -147,10 +170,11 @@ def _check_stabilisation(method: Integrator, stabilisation: Stabilisation) -> No
     """Refuse what is none, and gains of accelerations for a method that keeps constraints in another way."""
     if not isinstance(stabilisation, get_args(Stabilisation)):
         raise InputError(f"stabilisation is {stabilisation!r}; give Projection(), Baumgarte(alpha, beta) or Drifting()")
-    if isinstance(stabilisation, Baumgarte) and not isinstance(method, _OF_ACCELERATIONS):
+    if isinstance(stabilisation, Baumgarte) and method.row_stages:
+        others = [kind.__name__ for kind in methods().values() if not kind.row_stages]
         raise InputError(
             f"Baumgarte's gains act on the accelerations of the constraints, and {type(method).__name__} holds positions or "
-            f"rates themselves; leave them out, or use one of {', '.join(kind.__name__ for kind in _OF_ACCELERATIONS)}"
+            f"rates themselves; leave them out, or use one of {', '.join(others)}"
         )
 
 
