@@ -1,4 +1,7 @@
-"""What an integrator calls: the units by name, on the unpacked tables r."""
+"""What an integrator calls: the units by name, on the unpacked tables r.
+
+Twin: none, names of calls.
+"""
 
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.simd.table_address import call_unit

@@ -596,7 +596,7 @@ def timing_repeats(policy: Policy, patch: Any) -> Any:
     """Runs of a point of the chart."""
     ran: list[int] = []
     done = SimpleNamespace(attributes={"evaluations": 7})
-    patch.setattr(picture, "forward", lambda *a, **k: ran.append(1) or done)
+    patch.setattr(picture, "simulated", lambda *a, **k: ran.append(1) or done)
     patch.setattr(picture, "make", lambda *a: Made(SCENE, None))
     settings = SimpleNamespace(start=0.0, end=1.0, output_step=0.01, stabilisation=None)
     picture._point(found_by(policy, settings=settings), EVERYTHING, "all", ONE)
