@@ -241,12 +241,12 @@ class FlexibleBody(Brief):
 
     @property
     def I4(self) -> Array:
-        """(3, n) integral of u_0 x phi_j dm [m sqrt(kg)]."""
+        """(3, n) integral of u_0 x phi_j dm [m sqrt(kg)]. Equation (6) of docs/notation.md."""
         return axial(self.rP_dm)
 
     @property
     def I5(self) -> Array:
-        """(3, n, n) integral of phi_i x phi_j dm at [:, i, j] [-]."""
+        """(3, n, n) integral of phi_i x phi_j dm at [:, i, j] [-]. Equation (7) of docs/notation.md."""
         return axial(self.PP_dm)
 
     @property
@@ -261,13 +261,13 @@ class FlexibleBody(Brief):
 
     @property
     def I8(self) -> Array:
-        """(n, 3, 3) integral of u_0~ phi_j~ dm [m sqrt(kg)]."""
+        """(n, 3, 3) integral of u_0~ phi_j~ dm [m sqrt(kg)]. Equation (8) of docs/notation.md."""
         trace = np.einsum("kkj->j", self.rP_dm)
         return np.einsum("klj->jlk", self.rP_dm) - trace[:, None, None] * np.eye(3)
 
     @property
     def I9(self) -> Array:
-        """(n, n, 3, 3) integral of phi_i~ phi_j~ dm at [i, j] [-]."""
+        """(n, n, 3, 3) integral of phi_i~ phi_j~ dm at [i, j] [-]. Equation (9) of docs/notation.md."""
         trace = np.einsum("kkij->ij", self.PP_dm)
         return np.einsum("klij->ijlk", self.PP_dm) - trace[:, :, None, None] * np.eye(3)
 

@@ -260,6 +260,16 @@ def test_functions_are_short():
     assert sorted(lengths.values())[len(lengths) * 9 // 10] <= USUAL_FUNCTION
 
 
+# The comparison with another code, which the benchmarks' own libraries bring, is all that a test has of them.
+OF_BENCHMARKS = {"test_against_exudyn.py"}
+
+
+def test_tests_do_without_benchmarks():
+    sources = {path: path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("*.py")}
+    found = {path.name for path, text in sources.items() for i in imports(text, "tests") if top(i.name) == "benchmarks"}
+    assert found == OF_BENCHMARKS
+
+
 # ---- what a start loads ---------------------------------------------------------------------------------------------
 
 
