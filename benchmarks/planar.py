@@ -26,7 +26,7 @@ from ffr_prep.body import FlexibleBody, rigid_body
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import SimplySupported
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.structures.frame import Member, named, polyline
 from ffr_prep.structures.sections import rectangle
 
@@ -55,7 +55,7 @@ def chain(link: FlexibleBody) -> Scene:
     """Links of 1 m that hang one on the other in revolute joints, released from the horizontal."""
     ends = ["ground.O", *(f"l{k}.b" for k in range(LINKS - 1))]
     return Scene(
-        tuple(Body(f"l{k}", link, (k, 0, 0)) for k in range(LINKS)),
+        tuple(Body(f"l{k}", link, position=(k, 0, 0)) for k in range(LINKS)),
         tuple(Joint(f"j{k}", "revolute", ends[k], f"l{k}.a") for k in range(LINKS)),
         ground={"O": (0, 0, 0)},
         gravity=(0, -9.81, 0),
@@ -65,7 +65,11 @@ def chain(link: FlexibleBody) -> Scene:
 def slider_crank(rod: FlexibleBody) -> Scene:
     block = rigid_body("block", mass=0.4, inertia=np.eye(3) * 1e-4, points={"pin": np.zeros(3)})
     return Scene(
-        (Body("crank", rigid_link(0.1, 0.5)), Body("rod", rod, (0.1, 0, 0)), Body("block", block, (0.4, 0, 0))),
+        (
+            Body("crank", rigid_link(0.1, 0.5)),
+            Body("rod", rod, position=(0.1, 0, 0)),
+            Body("block", block, position=(0.4, 0, 0)),
+        ),
         (
             Joint("main", "revolute", "ground.O", "crank.a"),
             Joint("big", "revolute", "crank.b", "rod.a"),

@@ -15,9 +15,12 @@ from ffr_prep.mesh.mesh import Block, Mesh, read_mesh
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, ReferenceConditions, SimplySupported
-from ffr_prep.reduction.component_modes import CraigBampton, Eigenmodes, Guyan, Union
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
+from ffr_prep.reduction.methods.guyan import Guyan
+from ffr_prep.reduction.methods.inertia_relief import InertiaRelief
+from ffr_prep.reduction.methods.union import Union
 from ffr_prep.reduction.selection import Band
-from ffr_prep.reduction.static_shapes import InertiaRelief
 from ffr_prep.structures.frame import Member, Shell, joined, named, panel, polyline, triangulated
 from ffr_prep.structures.sections import Section, circle, general, rectangle, shear_rigid, with_mass_moments
 

@@ -25,7 +25,7 @@ from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import ReferenceConditions, SimplySupported, functionals
 from ffr_prep.reduction.basis import factorised
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.solids.assembly import assemble, vector_mass
 from ffr_prep.solids.interfaces import couple
 from ffr_prep.solids.model import nodal_basis

@@ -40,7 +40,7 @@ from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
 from ffr_prep.model.material import material
 from ffr_prep.model.reference import SimplySupported
 from ffr_prep.reduction.basis import Basis, diagonalised, restricted
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.solvers.factor import FreeBody, Solver
 
 Array = np.ndarray

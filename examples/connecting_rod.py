@@ -37,7 +37,7 @@ from ffr_prep.mesh.mesh import read_mesh
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import material
 from ffr_prep.model.reference import SimplySupported
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 
 GEOMETRY = Path(__file__).resolve().parent.parent / "meshes" / "connecting_rod.geo"
 THROW, ROD = 0.045, 0.150  # crank radius and distance of the eyes [m]

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.compile.scene_tables import blocks_of, compile_scene
+from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.evaluation import evaluate, evaluated_mass_matrix, evaluator
+from ffr_dyn.equations.constraint_rows import blocks_of
 from ffr_dyn.integrators import RK4
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
@@ -34,7 +35,7 @@ def bricard() -> Scene:
             f"r{k}", mass=1.0, inertia=np.array([1 / 600, 101 / 1200, 101 / 1200]), centre_of_mass=np.array([0.5, 0, 0]),
             points={"a": np.zeros(3), "b": np.array([1.0, 0, 0])},
         )  # fmt: skip
-        bodies.append(Body(f"r{k}", model, points[k], frames[-1]))
+        bodies.append(Body(f"r{k}", model, position=points[k], rotation=frames[-1]))
     frames.append(np.eye(3))
     ends = ["ground.p0", *(f"r{k}.b" for k in range(5))], [*(f"r{k}.a" for k in range(5)), "ground.p5"]
     joints = [

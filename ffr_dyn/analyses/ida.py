@@ -24,11 +24,11 @@ from ffr_dyn.consistency.evaluation import (
     evaluate,
     evaluated_mass_matrix,
     locked,
-    position_rates,
     to_body_axes,
     to_global_axes,
 )
 from ffr_dyn.equations.layout import Layout
+from ffr_dyn.equations.motion import position_rates
 from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray

@@ -21,6 +21,7 @@ from ffr_dyn.consistency.mobility import require_driven
 from ffr_dyn.consistency.validity import extremes, strained
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
+from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
@@ -108,7 +109,7 @@ def _quasi_static(
         "title": scene.name,
         "analysis": "inverse dynamics, quasi-static deformation",
         "method": "Newton-Raphson",
-        "evaluations": int(at.work.info[1]),
+        "evaluations": int(at.work.info[EVALUATIONS]),
         "degrees_of_freedom": assembled.degrees_of_freedom,
         "notes": [*assembled.notes, *strained(scene, turned, stretched)],
         "status": "complete",

@@ -29,10 +29,10 @@ from ffr_dyn.consistency.evaluation import (
     total_mass_matrix,
 )
 from ffr_dyn.consistency.mobility import named_motion, require_driven
-from ffr_dyn.kernels.tables import Record
+from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
-from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.scene.scene import Body, Scene, require_scene
 from ffr_prep.body import truncated
 from ffr_prep.common.errors import ComputationError
 
@@ -94,7 +94,7 @@ def kinematic(
         "title": scene.name,
         "analysis": "kinematic",
         "method": "Newton-Raphson",
-        "evaluations": int(at.work.info[1]),
+        "evaluations": int(at.work.info[EVALUATIONS]),
         "degrees_of_freedom": 0,
         "notes": notes,
         "status": "complete",
@@ -104,6 +104,7 @@ def kinematic(
 
 def undeformed(scene: Scene) -> Scene:
     """The scene with rigid bodies of the same inertia and interfaces."""
+    require_scene(scene)
     return replace(scene, bodies=tuple(_rigid(body) if body.model.n else body for body in scene.bodies))
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import get_args
 
 import numpy as np
 
@@ -23,7 +24,9 @@ from ffr_dyn.consistency.mobility import named_motion
 from ffr_dyn.consistency.tangent import Chart, chart, derivative, rates, sizes, state, state_matrix
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.result import Axis, Quantity, Result
+from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
@@ -31,8 +34,8 @@ Array = np.ndarray
 STATIONARY = 1e-6  # of the accelerations in moving axes, relative to those of the applied forces
 
 
-@dataclass(frozen=True)
-class Linearisation:
+@dataclass(frozen=True, repr=False)
+class Linearisation(Brief):
     """A scene near a state, with d degrees of freedom.
 
     A (2d, 2d), B (2d, inputs), C (outputs, 2d), D (outputs, inputs);  inputs, outputs : names
@@ -83,6 +86,7 @@ def linearise(
 
     Raises InputError when nothing is free to move, or for a name that does not exist.
     """
+    several("inputs", inputs, (*get_args(Effort), str)), several("outputs", outputs, (str,))
     fed = with_units(in_space(scene), _efforts(inputs))
     assembled = assemble(fed, time=time)
     at = _with_inputs(evaluator(assembled.system), scene, inputs, np.zeros(len(inputs)))

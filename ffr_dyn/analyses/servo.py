@@ -18,7 +18,7 @@ from scipy.linalg import qr
 
 from ffr_dyn.analyses.efforts import Effort, sized
 from ffr_dyn.compile.engine import with_model
-from ffr_dyn.compile.scene_tables import Block, compile_scene
+from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.evaluation import (
     Evaluation,
@@ -35,6 +35,7 @@ from ffr_dyn.consistency.evaluation import (
     unit_rows,
 )
 from ffr_dyn.consistency.mobility import coordinate_gradients, coordinate_word
+from ffr_dyn.equations.constraint_rows import Block
 from ffr_dyn.equations.constraints import evaluate_word
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.scene.drivers import Driver, driver_word
@@ -209,7 +210,9 @@ def _internal(
     for k in chosen[chosen < len(joints)]:
         joint, coordinate = joints[k]
         ends = marker_number(scene, joint.i), marker_number(scene, joint.j)
-        words.append((ends, driver_word(Driver("internal", joint.name, polynomial(0.0, 0.0), coordinate), joint)))
+        words.append(
+            (ends, driver_word(Driver("internal", joint.name, polynomial(0.0, 0.0), coordinate=coordinate), joint))
+        )
     rest = [int(k) - len(joints) for k in chosen[chosen >= len(joints)]]
     said = tuple([names[k] for k in chosen[chosen < len(joints)]] + [labels[k] for k in rest])
     return words, [elastic[k] for k in rest], said

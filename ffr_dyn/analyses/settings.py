@@ -4,7 +4,7 @@ what they say.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import KW_ONLY, dataclass, fields
 from typing import Any
 
 from ffr_dyn.analyses.bounded import Bounded
@@ -76,6 +76,7 @@ class Charted:
     drops    : terms to leave out, one set after the other, beside none
     """
 
+    _: KW_ONLY
     measures: tuple[str, ...] = ()
     methods: tuple[tuple[str, tuple[float, ...]], ...] = ()
     modes: tuple[int | None, ...] = (None,)
@@ -86,6 +87,7 @@ class Charted:
 class Settings:
     """An analysis over a time [s]; `method` and `stabilisation` are of those that integrate, `chart` of forward dynamics."""
 
+    _: KW_ONLY
     start: float
     end: float
     output_step: float
@@ -100,6 +102,7 @@ class Settings:
 class MomentSettings:
     """An analysis at one `time` [s]."""
 
+    _: KW_ONLY
     time: float = 0.0
     outputs: tuple[str, ...] = ("default",)
     analysis: OfMoment = Static()

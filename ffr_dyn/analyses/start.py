@@ -13,6 +13,7 @@ from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.evaluation import evaluator, record_states
 from ffr_dyn.equations.layout import initial_state
 from ffr_dyn.functions.rotation import rotation_matrix
+from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
@@ -42,7 +43,7 @@ def assembly(
         "title": scene.name,
         "analysis": "assembly",
         "method": "smallest changes in the norm of the mass matrix",
-        "evaluations": int(at.work.info[1]),
+        "evaluations": int(at.work.info[EVALUATIONS]),
         "degrees_of_freedom": assembled.degrees_of_freedom,
         "notes": [*changes(assembled), *notes],
         "status": "complete",

@@ -22,6 +22,7 @@ from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator, record_states
 from ffr_dyn.consistency.mobility import named_motion
 from ffr_dyn.consistency.tangent import Chart, chart, movement, rates, sizes, state, stiffness
+from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
@@ -152,7 +153,7 @@ def _result(
         "title": scene.name,
         "analysis": "static equilibrium",
         "method": f"Newton's method, {found.iterations} steps",
-        "evaluations": int(at.work.info[1]),
+        "evaluations": int(at.work.info[EVALUATIONS]),
         "degrees_of_freedom": assembled.degrees_of_freedom,
         "stable": int(stable),
         "lowest_stiffness": lowest if np.isfinite(lowest) else None,

@@ -192,7 +192,7 @@ def _at_moment(
     if time is not None and not math.isfinite(time):
         raise InputError(f"--time {time}: give a time in seconds")
     given = settings.time if isinstance(settings, MomentSettings) else 0.0
-    return MomentSettings(given if time is None else time, keep or settings.outputs, analysis)
+    return MomentSettings(time=given if time is None else time, outputs=keep or settings.outputs, analysis=analysis)
 
 
 def force_of(text: str) -> Effort:

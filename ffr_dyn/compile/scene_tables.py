@@ -9,38 +9,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.compile.alignment import aligned
-from ffr_dyn.compile.body_tables import body_tables, once, starts, stiffness_of
+from ffr_dyn.compile.body_tables import body_tables, once, starts
 from ffr_dyn.compile.elimination import Elimination, eliminate
 from ffr_dyn.compile.force_tables import Callback, FunctionTable, base_functions, load_tables
+from ffr_dyn.equations.constraint_rows import Block, blocks_of
 from ffr_dyn.equations.layout import Layout, layout
 from ffr_dyn.equations.state_view import StateView
+from ffr_dyn.equations.stiffening import stiffness_of
 from ffr_dyn.kernels.tables import LANES, Markers, Model, Pattern, Rows
 from ffr_dyn.scene.applied_loads import marker_numbers
-from ffr_dyn.scene.couplings import Coupling, coupling_word
-from ffr_dyn.scene.drivers import Driver, PointDriver, driver_word, path_words
-from ffr_dyn.scene.joints import RELATION, Joint, Word, words
-from ffr_dyn.scene.scene import MarkerName, Scene, joint_of, joints_of, marker_number, markers
+from ffr_dyn.scene.scene import MarkerName, Scene, markers
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
 
 
-@dataclass(frozen=True)
-class Block:
-    """The rows of one joint, driver or coupling.
-
-    markers : numbers of markers i, j, or i, j of both joints of a relation
-    driver  : whether it prescribes a motion
-    """
-
-    name: str
-    markers: tuple[int, ...]
-    words: tuple[Word, ...]
-    driver: bool = False
-
-
-@dataclass(frozen=True)
-class System:
+@dataclass(frozen=True, repr=False)
+class System(Brief):
     """A compiled scene: the tables, and what connects their numbers to the scene's names.
 
     blocks : in elimination order, as the rows in the tables;  user : keeps the callback of the user's functions alive
@@ -54,36 +40,6 @@ class System:
     model: Model
     user: UserFunctions
     inputs: Mapping[str, tuple[int, ...]]
-
-
-def blocks_of(scene: Scene) -> list[Block]:
-    """Joints, then couplings, then drivers, as blocks of words."""
-    joints = [_joint_block(scene, joint) for joint in scene.joints]
-    couplings = [_coupling_block(scene, coupling) for coupling in scene.couplings]
-    return joints + couplings + [_driver_block(scene, driver) for driver in scene.drivers]
-
-
-def _ends(scene: Scene, joint: Joint | PointDriver) -> tuple[int, int]:
-    return marker_number(scene, joint.i), marker_number(scene, joint.j)
-
-
-def _joint_block(scene: Scene, joint: Joint) -> Block:
-    ends, said = _ends(scene, joint), tuple(words(joint))
-    related = any(word.kind == RELATION for word in said)
-    return Block(joint.name, ends + ends if related else ends, said)
-
-
-def _coupling_block(scene: Scene, coupling: Coupling) -> Block:
-    first, second = joints_of(scene, coupling)
-    word = coupling_word(coupling, first, second)
-    return Block(coupling.name, _ends(scene, first) + _ends(scene, second), (word,))
-
-
-def _driver_block(scene: Scene, driver: Driver | PointDriver) -> Block:
-    if isinstance(driver, PointDriver):
-        return Block(driver.name, _ends(scene, driver), tuple(path_words(driver)), driver=True)
-    joint = joint_of(scene, driver)
-    return Block(driver.name, _ends(scene, joint), (driver_word(driver, joint),), driver=True)
 
 
 def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: float = 0.0) -> System:

@@ -12,17 +12,19 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.sparse import block_diag, csr_array
 
-from ffr_dyn.compile.scene_tables import Block, System, blocks_of, compile_scene
+from ffr_dyn.compile.scene_tables import System, compile_scene
 from ffr_dyn.consistency.row_space import independent, smallest_solution
 from ffr_dyn.consistency.validity import stretch
-from ffr_dyn.equations.constraints import Row, evaluate_word
+from ffr_dyn.equations.constraint_rows import Block, blocks_of, rows_at
+from ffr_dyn.equations.constraints import Row
 from ffr_dyn.equations.inertia import mass_matrix
 from ffr_dyn.equations.layout import Layout, initial_state, layout
 from ffr_dyn.functions.rotation import G_bar, rotation_matrix
-from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction, evaluate
-from ffr_dyn.scene.joints import DISTANCE, Word
-from ffr_dyn.scene.scene import Scene
+from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction
+from ffr_dyn.scene.joints import DISTANCE
+from ffr_dyn.scene.scene import Scene, require_scene
 from ffr_dyn.variants.plane import planar_forms
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
@@ -36,8 +38,8 @@ LARGEST_TURN = 0.5  # rad per iteration
 TORN = 0.5  # elastic displacement of an interface over the size of its body that no joint may ask for
 
 
-@dataclass(frozen=True)
-class Assembled:
+@dataclass(frozen=True, repr=False)
+class Assembled(Brief):
     """A consistent state and the compiled scene.
 
     system   : with independent constraint rows, for the motion
@@ -63,6 +65,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     Raises InputError when the joints cannot be closed, naming the joint that stays open furthest, or when a driver
     contradicts the joints.
     """
+    require_scene(scene)
     scene, blocks = flattened(scene, time)
     place = layout(scene)
     guess, v = initial_state(scene, place)
@@ -101,15 +104,6 @@ def _require_shape(scene: Scene, place: Layout, guess: Array, x: Array) -> None:
 def _movable(place: Layout) -> int:
     """How many velocities the scene has without its constraints."""
     return sum(len(place.active(b)) + n for b, n in enumerate(place.n))
-
-
-def rows_at(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> list[Row]:
-    """All rows of the blocks, readable form. InputError for a distance that is not positive at the time."""
-    return [
-        evaluate_word(scene, place, x, v, word, block.markers, _drive(block, word, time))
-        for block in blocks
-        for word in block.words
-    ]
 
 
 def flattened(scene: Scene, time: float) -> tuple[Scene, list[Block]]:
@@ -175,26 +169,6 @@ def _changes(function: TimeFunction | None) -> bool:
 def in_space(scene: Scene) -> Scene:
     """The scene without a search for a plane: what could leave it counts, even where nothing pushes it out."""
     return replace(scene, plane="none") if scene.plane == "auto" else scene
-
-
-def drive_of(word: Word, time: float) -> tuple[float, float, float]:
-    """Value, rate and second derivative of what a word prescribes; zeros where it prescribes nothing."""
-    if word.function is None:
-        return 0.0, 0.0, 0.0
-    try:
-        return evaluate(word.function, time)
-    except (ValueError, ZeroDivisionError, OverflowError) as error:
-        raise InputError(
-            f"the function of time in the row '{word.text}' has no value at t = {time:.6g} s ({error}); let the run start "
-            "where it has one, or write it another way"
-        ) from None
-
-
-def _drive(block: Block, word: Word, time: float) -> tuple[float, float, float]:
-    drive = drive_of(word, time)
-    if word.kind == DISTANCE and not drive[0] > 0:
-        raise InputError(f"joint {block.name!r}: length is {drive[0]:.4g} m at t = {time:.6g} s; it must be positive")
-    return drive
 
 
 def close_positions(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> Array:

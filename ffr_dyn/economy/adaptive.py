@@ -20,6 +20,7 @@ from ffr_dyn.consistency.evaluation import moved, to_body_axes, to_global_axes
 from ffr_dyn.economy.contributions import effects_of
 from ffr_dyn.economy.model_choice import Choice, Part, full
 from ffr_dyn.economy.outputs import Output, Probe, as_output, limits, probe, ranges
+from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.residual_estimate import Samples, driven, followed, samples
 from ffr_dyn.economy.run import Made, Span, Trial, make, run, states
 from ffr_dyn.equations.layout import Layout, initial_state
@@ -30,7 +31,6 @@ from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
 
-REPEATS = 3  # of a piece in which modes turn out to matter
 KEPT = ("*.R", "*.p", "*.v", "*.omega_bar", "*.position", "*.velocity", "energy.*", "constraint.*")
 
 
@@ -77,11 +77,13 @@ def adaptive_forward(
     start: float = 0.0,
     adaptation: Adaptation = Adaptation(),
     stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
+    policy: Policy = DEFAULT,
 ) -> Result:
     """Integrate a scene from `start` to `end` [s] with bodies rigid and modes absent while the outputs allow it.
 
     outputs   : as of `economise`; for relative tolerances their ranges are taken from one coarse run of everything
     divisions : steps from one output row to the next
+    policy    : numbers of the estimates
 
     The result has the states, marker motions and energies of a forward run, and model.coordinates (elastic coordinates of
     each body), energy.switched (energy that switches have added since the start, negative where they took some away).
@@ -89,18 +91,18 @@ def adaptive_forward(
     Raises InputError and ComputationError as `economise`.
     """
     span = Span(start, end, output_step, stabilisation)
-    of = probe(assemble(scene, time=start), [as_output(one, tolerance) for one in outputs])
+    of = probe(assemble(scene, time=start), [as_output(one, tolerance) for one in outputs], policy)
     everything = replace(full(scene, method, divisions), plane=scene.plane)
     models = _Models(span)
-    bound = _bound(scene, everything, models, of)
+    bound = _bound(scene, everything, models, of, policy)
     state = _State(start, scene.bodies, tuple(() for _ in scene.bodies))
     pieces: list[_Piece] = []
     first, repeats = 0, 0
     while first < span.rows:
         count = min(adaptation.rows, span.rows - first)
-        piece = _piece(scene, everything, state, models, of, bound, start + first * output_step, count)
+        piece = _piece(scene, everything, state, models, of, bound, start + first * output_step, count, policy)
         entering = _entering(piece, bound, adaptation)
-        if entering and repeats < REPEATS:
+        if entering and repeats < policy.piece_repeats:
             state, repeats = _entered(piece, state, entering), repeats + 1
             continue
         pieces.append(piece)
@@ -109,11 +111,11 @@ def adaptive_forward(
     return _result(scene, pieces, method, divisions, output_step)
 
 
-def _bound(scene: Scene, everything: Choice, models: _Models, of: Probe) -> Array:
+def _bound(scene: Scene, everything: Choice, models: _Models, of: Probe, policy: Policy) -> Array:
     if all(output.absolute for output in of.outputs):
         return np.array([output.tolerance for output in of.outputs])
     coarse = replace(everything, divisions=1)
-    return limits(of, ranges(run(models.at(scene, coarse, models.span.start), coarse, models.span, of).values))
+    return limits(of, ranges(run(models.at(scene, coarse, models.span.start), coarse, models.span, of).values), policy)
 
 
 @dataclass(frozen=True)
@@ -188,6 +190,7 @@ def _piece(
     bound: Array,
     start: float,
     count: int,
+    policy: Policy,
 ) -> _Piece:
     here = replace(scene, bodies=state.bodies)
     choice = replace(everything, parts=tuple(Part(modes) for modes in state.modes))
@@ -208,13 +211,13 @@ def _piece(
     inside = tuple(key for key in where if key[1] in state.modes[key[0]])
     outside = tuple(key for key in where if key not in inside)
     D = np.eye(seen.system.layout.v_size)[:, [where[key] for key in (*inside, *outside)]]
-    Z = followed(seen, D)
+    Z = followed(seen, D, policy)
     initial = [np.array([getattr(state.bodies[b], of_)[k] for b, k in outside]) for of_ in ("q", "q_dot")]
     q, q_dot = driven(seen, D[:, len(inside) :], Z[:, :, len(inside) :], *initial)
     own_q, own_rate = (_amplitudes(trial, scene, inside, name) for name in ("q", "q_dot"))
     sign = np.array([-1.0] * len(inside) + [1.0] * len(outside))
     amplitudes, rates = np.hstack([own_q, q]) * sign, np.hstack([own_rate, q_dot]) * sign
-    effects, _ = effects_of(large.scene, of, seen, Z, amplitudes, rates, bound)
+    effects, _ = effects_of(large.scene, of, seen, Z, amplitudes, rates, bound, policy)
     return _Piece(trial, seen, inside, outside, effects, Z, own_q, own_rate, q, q_dot)
 
 

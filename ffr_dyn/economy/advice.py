@@ -13,10 +13,6 @@ import numpy as np
 from ffr_dyn.economy.result import Economy
 from ffr_dyn.scene.scene import Body
 
-MATTERS = 0.02  # of a tolerance: a mode that does less is not asked for
-ABOVE = 1.5  # times the highest frequency that matters: where the band ends (a rule of component mode synthesis)
-PER_WAVE = 8  # elements of second order to a wave of the shortest mode that matters
-
 
 def advice(found: Economy) -> list[str]:
     """A line for each flexible body: the command `ffr-prep reduce` that gives what the scene needs of it, and why."""
@@ -30,10 +26,10 @@ def _line(found: Economy, b: int, body: Body) -> str:
             f"ffr-prep reduce FILE{_interfaces(body)} --method guyan -o {body.name}.ffr"
         )
     highest = _highest(found, b)
-    options = f"--method craig-bampton --frequency {_rounded(ABOVE * highest)}"
+    options = f"--method craig-bampton --frequency {_rounded(found.policy.band * highest)}"
     stiffening = " --stiffening" if found.choice.parts[b].stiffened and body.model.stiffening is not None else ""
     stress = " --stress" if any(output.name == f"{body.name}.stress" for output in found.probe.outputs) else ""
-    size = _mesh_size(body, highest)
+    size = _mesh_size(body, highest, found.policy.elements_per_wave)
     mesh = f"; elements of second order of at most {size:.2g} m along it" if size else ""
     return (
         f"{body.name}: matters up to {highest:.4g} Hz: ffr-prep reduce FILE{_interfaces(body)} {options}{stiffening}{stress} "
@@ -51,12 +47,12 @@ def _highest(found: Economy, b: int) -> float:
     V = part.basis(model.n)
     frequencies = list(np.sqrt(np.einsum("ia,i,ia->a", V, model.omega2, V)) / (2 * np.pi))
     shares = (found.effects.effect / found.limits).max(axis=1, initial=0.0)
-    omitted = np.flatnonzero((found.effects.body == b) & (shares > MATTERS))
+    omitted = np.flatnonzero((found.effects.body == b) & (shares > found.policy.advised_effect))
     frequencies += [float(model.frequencies[found.effects.mode[k]]) for k in omitted]
     return float(max(frequencies))
 
 
-def _mesh_size(body: Body, highest: float) -> float | None:
+def _mesh_size(body: Body, highest: float, per_wave: int) -> float | None:
     """[m] along the longest way between interfaces, taking the lowest mode for a half wave between them: bending waves
     shorten as the root of the frequency."""
     places = np.array([interface.position for interface in body.model.interfaces])
@@ -64,7 +60,7 @@ def _mesh_size(body: Body, highest: float) -> float | None:
         return None
     length = float(np.linalg.norm(places[:, None] - places, axis=2).max())
     lowest = float(body.model.frequencies.min())
-    return length * 2 * float(np.sqrt(lowest / max(highest, lowest))) / PER_WAVE if lowest > 0 and length > 0 else None
+    return length * 2 * float(np.sqrt(lowest / max(highest, lowest))) / per_wave if lowest > 0 and length > 0 else None
 
 
 def _rounded(value: float) -> str:

@@ -7,17 +7,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ffr_dyn.economy.cost import per_evaluation
+from ffr_dyn.economy.cost import of_run, per_evaluation
 from ffr_dyn.economy.model_choice import Choice, Part
 from ffr_dyn.economy.outputs import Probe
+from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.run import Made, Span, Trial, cost, make, run
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray
-
-PART = 8  # of the rows
-FEWEST = 8  # pairs of output rows: a run with steps of two rows says nothing about a shorter one
 
 
 @dataclass(frozen=True)
@@ -42,6 +40,7 @@ class Ledger:
     span: Span
     of: Probe
     tell: Callable[[str], None]
+    policy: Policy = DEFAULT
     runs: dict[Choice, Trial] = field(default_factory=dict)
     wide: dict[Choice, Trial] = field(default_factory=dict)
     models: dict[tuple[tuple[Part, ...], str], Made] = field(default_factory=dict)
@@ -55,40 +54,48 @@ class Ledger:
             self.models[key] = make(self.scene, choice, self.span)
         return self.models[key]
 
+    def cost(self, trial: Trial) -> float:
+        """[us] of a run, by the cost model."""
+        return cost(trial, self.span, self.policy.cost)
+
+    def cost_of(self, choice: Choice) -> float:
+        """[us] of a run of a model with steps of one length, by the cost model."""
+        return of_run(choice, self.span.rows, self.policy.cost)
+
     def run(self, choice: Choice) -> Trial:
         """A run of the model."""
         if choice not in self.runs:
             self.runs[choice] = run(self.made(choice), choice, self.span, self.of)
-            self.spent += cost(self.runs[choice], self.span)
+            self.spent += self.cost(self.runs[choice])
         return self.runs[choice]
 
     def over_two_rows(self, choice: Choice) -> Trial | None:
         """A run with every other output row, and steps twice as long; None where these rows are too few."""
         pairs, odd = divmod(self.span.rows, 2)
-        if odd or pairs < FEWEST:
+        if odd or pairs < self.policy.least_wide_pairs:
             return None
         if choice not in self.wide:
             span = replace(self.span, output_step=2 * self.span.output_step)
             self.wide[choice] = run(self.made(choice), choice, span, self.of)
-            self.spent += cost(self.wide[choice], span)
+            self.spent += cost(self.wide[choice], span, self.policy.cost)
         return self.wide[choice]
 
     def first_part(self, choice: Choice) -> float:
         """[us] of a whole run of a method that chooses its steps, by the cost of its first rows; infinite where they fail."""
-        rows = max(1, self.span.rows // PART)
+        rows = max(1, self.span.rows // self.policy.first_part)
         span = replace(self.span, end=self.span.start + rows * self.span.output_step)
         try:
             trial = run(self.made(choice), choice, span, self.of)
         except (ComputationError, InputError):
             return float("inf")
-        spent = cost(trial, span)
+        spent = cost(trial, span, self.policy.cost)
         self.spent += spent
         return spent * self.span.rows / rows
 
     def looked(self, choice: Choice, evaluations: int) -> None:
         """Account for evaluations of a model in an estimate."""
-        self.spent += evaluations * per_evaluation(choice)
+        self.spent += evaluations * per_evaluation(choice, self.policy.cost)
 
     def note(self, trial: Trial, what: str, error: Array) -> None:
         """Keep for the report how far a model is off."""
-        self.tried.append(Tried(trial.choice, what, cost(trial, self.span), error))
+        self.tried.append(Tried(trial.choice, what, self.cost(trial), error))

@@ -15,14 +15,13 @@ from ffr_dyn.compile.body_tables import of_coordinates
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.evaluation import evaluate, evaluated_mass_matrix, evaluator
 from ffr_dyn.economy.model_choice import Choice
+from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.residual_estimate import elastic_columns, lift
 from ffr_dyn.economy.run import Made, Trial, states
 from ffr_dyn.scene.scene import Body, Scene
 
 Array = np.ndarray
 
-LOWEST = 6  # frequencies that are compared
-LOOKED = 24  # states at which loads are looked at
 INERTIAL = (
     *(f"acceleration along {c}" for c in "xyz"),
     *(f"angular acceleration about {c}" for c in "xyz"),
@@ -43,7 +42,7 @@ class Frequency:
         return self.model / self.everything - 1.0
 
 
-def frequencies(final: Trial, made: Made, everything: Choice, original: Scene) -> tuple[Frequency, ...]:
+def frequencies(final: Trial, made: Made, everything: Choice, original: Scene, policy: Policy) -> tuple[Frequency, ...]:
     """The lowest vibrations of the model half-way through its run, beside everything in the same position; none for a model
     without vibration. Of small motions about that position, with the stiffness and the inertia there, without rates."""
     if not any(part.count for part in final.choice.parts):
@@ -56,14 +55,18 @@ def frequencies(final: Trial, made: Made, everything: Choice, original: Scene) -
         for body, few, many in zip(original.bodies, final.choice.parts, everything.parts, strict=True)
     )
     lifted = lift(small.layout, large.layout, bases, x[middle : middle + 1], v[middle : middle + 1])
-    own, whole = _vibrations(small, time, x[middle], v[middle]), _vibrations(large, time, *(one[0] for one in lifted))
+    own, whole = (
+        _vibrations(system, time, *at, policy.rigid_frequency)
+        for system, at in ((small, (x[middle], v[middle])), (large, (lifted[0][0], lifted[1][0])))
+    )
     if not own.size or not whole.size:
         return ()
     nearest = whole[np.abs(np.log(whole[None] / own[:, None])).argmin(axis=1)]
-    return tuple(Frequency(float(one), float(other)) for one, other in zip(own, nearest, strict=True))[:LOWEST]
+    shown = list(zip(own, nearest, strict=True))[: policy.shown_frequencies]
+    return tuple(Frequency(float(one), float(other)) for one, other in shown)
 
 
-def _vibrations(system: System, time: float, x: Array, v: Array) -> Array:
+def _vibrations(system: System, time: float, x: Array, v: Array, slow: float) -> Array:
     """Ascending frequencies [Hz] of small motions that keep the joints closed."""
     at, place = evaluator(system), system.layout
     now = evaluate(at, time, x, v)
@@ -74,7 +77,7 @@ def _vibrations(system: System, time: float, x: Array, v: Array) -> Array:
         squares = eigvalsh(stiffness, Z.T @ evaluated_mass_matrix(at) @ Z)
     except LinAlgError:  # an inertia that is not positive, with terms left out
         return np.zeros(0)
-    lowest = 1e-3 * float(np.sqrt(omega2.min(initial=np.inf)))
+    lowest = slow * float(np.sqrt(omega2.min(initial=np.inf)))
     return np.sqrt(squares[squares > lowest**2]) / (2 * np.pi)
 
 
@@ -87,14 +90,14 @@ class StiffeningLoad:
     share: float
 
 
-def stiffening_loads(trial: Trial) -> tuple[StiffeningLoad, ...]:
+def stiffening_loads(trial: Trial, policy: Policy = DEFAULT) -> tuple[StiffeningLoad, ...]:
     """The loads on bodies whose stiffening is in the model, the largest first: accelerations, spin, forces at interfaces."""
     (x, v), assembled = states(trial), trial.made.assembled
     bodies = [b for b, body in enumerate(assembled.system.scene.bodies) if _stiffened(body)]
     if not bodies:
         return ()
     at, time = evaluator(assembled.system), trial.result.time
-    rows = np.unique(np.linspace(0, len(time) - 1, LOOKED).round().astype(int))
+    rows = np.unique(np.linspace(0, len(time) - 1, policy.load_samples).round().astype(int))
     loads = []
     for row in rows:
         evaluate(at, float(time[row]), x[row], v[row])

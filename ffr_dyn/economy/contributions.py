@@ -11,6 +11,7 @@ from ffr_dyn.consistency.evaluation import moved, record_states, to_body_axes, t
 from ffr_dyn.economy.cache import Ledger
 from ffr_dyn.economy.model_choice import Choice
 from ffr_dyn.economy.outputs import Probe, difference, histories, needed
+from ffr_dyn.economy.policy import Policy
 from ffr_dyn.economy.residual_estimate import Samples, driven, elastic_columns, followed, samples
 from ffr_dyn.economy.run import Made, Trial, states
 from ffr_dyn.equations.layout import Layout
@@ -20,12 +21,6 @@ from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
 
 Array = np.ndarray
-
-FEWEST = 24  # states along the run at which residuals are formed, where it has so many rows
-SHARE = 8  # rows to a state, where that is more
-LEFT = 1e-6  # of a mode: a smaller rest is rounding
-LOOKED = 4  # states at which the effect of a coordinate on the outputs is looked at: where it is largest
-MINOR = 0.05  # of a tolerance: of coordinates that do less where they are largest, no more states are looked at
 
 
 @dataclass(frozen=True)
@@ -68,7 +63,7 @@ def nothing(of: Probe) -> Contributions:
 def own(ledger: Ledger, trial: Trial) -> Samples:
     """A run seen by its own model."""
     x, v = states(trial)
-    rows, system = _spaced(len(x)), trial.made.assembled.system
+    rows, system = _spaced(len(x), ledger.policy), trial.made.assembled.system
     same = tuple(np.eye(n) for n in system.layout.n)
     ledger.looked(trial.choice, len(rows))
     return samples(trial.made.assembled, trial.made.assembled, same, trial.result.time[rows], x[rows], v[rows])
@@ -78,7 +73,7 @@ def of_motion(ledger: Ledger, pilot: Trial, limit: Array, seen: Samples) -> Cont
     """Contributions of the coordinates that a run has, from its own motion, `seen` as by `own`."""
     columns = elastic_columns(seen.system.layout)
     D = np.eye(seen.system.layout.v_size)[:, columns]
-    looked = Looked(seen, D, followed(seen, D), -seen.x[:, _positions(seen)], -seen.v[:, columns])
+    looked = Looked(seen, D, followed(seen, D, ledger.policy), -seen.x[:, _positions(seen)], -seen.v[:, columns])
     return _contributions(ledger, looked, pilot.made, pilot.choice, limit)
 
 
@@ -107,7 +102,7 @@ def of_shapes(ledger: Ledger, pilot: Trial, limit: Array, seen: Samples) -> Cont
         amplitude.append((q[:, here] * stiffness) @ left)
         rate.append((q_dot[:, here] * stiffness) @ left)
     shapes = np.hstack(D)
-    looked = Looked(seen, shapes, followed(seen, shapes), -np.hstack(amplitude), -np.hstack(rate))
+    looked = Looked(seen, shapes, followed(seen, shapes, ledger.policy), -np.hstack(amplitude), -np.hstack(rate))
     return _contributions(ledger, looked, pilot.made, pilot.choice, limit)
 
 
@@ -120,29 +115,29 @@ def of_omitted(ledger: Ledger, trial: Trial, everything: Choice, limit: Array) -
     Of a body in shapes, the part of each mode that its shapes do not hold.
     """
     x, v = states(trial)
-    rows, large = _spaced(len(x)), ledger.made(everything)
+    rows, large = _spaced(len(x), ledger.policy), ledger.made(everything)
     bases = tuple(
         many.basis(body.model.n).T @ few.basis(body.model.n)
         for body, few, many in zip(ledger.scene.bodies, trial.choice.parts, everything.parts, strict=True)
     )
-    D, modes = _missing(large.assembled.system.layout, bases, everything)
+    D, modes = _missing(large.assembled.system.layout, bases, everything, ledger.policy.remainder)
     if not modes:
         return nothing(ledger.of)
     small = trial.made.assembled
     seen = samples(small, large.assembled, bases, trial.result.time[rows], x[rows], v[rows])
     ledger.looked(trial.choice, len(rows))
     ledger.looked(everything, len(rows))
-    Z = followed(seen, D)
+    Z = followed(seen, D, ledger.policy)
     found = _contributions(ledger, Looked(seen, D, Z, *driven(seen, D, Z)), large, everything, limit)
     return replace(found, mode=np.array(modes, int))
 
 
-def _missing(place: Layout, bases: tuple[Array, ...], choice: Choice) -> tuple[Array, list[int]]:
+def _missing(place: Layout, bases: tuple[Array, ...], choice: Choice, remainder: float) -> tuple[Array, list[int]]:
     """(V, c) what each coordinate of a model has beyond the bases, and (c,) its number in the body."""
     found, modes = [], []
     for b, V in enumerate(bases):
         rest = np.eye(len(V)) - V @ V.T
-        for k in np.flatnonzero(np.abs(rest).max(axis=0, initial=0.0) > LEFT):
+        for k in np.flatnonzero(np.abs(rest).max(axis=0, initial=0.0) > remainder):
             direction = np.zeros(place.v_size)
             direction[place.q_dot(b)] = rest[:, k]
             found.append(direction)
@@ -153,9 +148,10 @@ def _missing(place: Layout, bases: tuple[Array, ...], choice: Choice) -> tuple[A
 # ---- effects on outputs -----------------------------------------------------------------------------------------------
 
 
-def _spaced(rows: int) -> Array:
+def _spaced(rows: int, policy: Policy) -> Array:
     """Rows of a run at which its residuals are formed."""
-    return np.unique(np.linspace(0, rows - 1, min(rows, max(FEWEST, rows // SHARE))).round().astype(int))
+    count = min(rows, max(policy.least_samples, rows // policy.rows_per_sample))
+    return np.unique(np.linspace(0, rows - 1, count).round().astype(int))
 
 
 def _positions(seen: Samples) -> Array:
@@ -165,19 +161,21 @@ def _positions(seen: Samples) -> Array:
 
 
 def _contributions(ledger: Ledger, looked: Looked, large: Made, choice: Choice, limit: Array) -> Contributions:
-    effect, evaluations = effects_of(large.scene, ledger.of, looked.seen, looked.Z, looked.q, looked.q_dot, limit)
+    effect, evaluations = effects_of(
+        large.scene, ledger.of, looked.seen, looked.Z, looked.q, looked.q_dot, limit, ledger.policy
+    )
     ledger.looked(choice, evaluations)
     amplitude = np.abs(looked.q).max(axis=0, initial=0.0)
     return Contributions(*_named(choice, ledger.scene, looked.seen, looked.D), amplitude, effect)
 
 
 def effects_of(
-    scene: Scene, of: Probe, seen: Samples, Z: Array, q: Array, q_dot: Array, limit: Array
+    scene: Scene, of: Probe, seen: Samples, Z: Array, q: Array, q_dot: Array, limit: Array, policy: Policy
 ) -> tuple[Array, int]:
     """(c, outputs) largest change of an output by the motion Z (T, V, c) with amplitudes and rates (T, c), and the number of
     evaluations; all directions are looked at where they are largest, and at more states those that matter there."""
     effect, plain = np.zeros((Z.shape[2], len(of.outputs))), _outputs(seen, seen.record, scene, of)
-    order = np.argsort(-np.abs(q), axis=0, kind="stable")[:LOOKED]
+    order = np.argsort(-np.abs(q), axis=0, kind="stable")[: policy.looks_at_effect]
     pairs = [(int(order[0, c]), c) for c in range(Z.shape[2]) if order.size]
     count = 0
     for _ in range(2):
@@ -190,7 +188,7 @@ def effects_of(
         sizes = np.array([np.abs(one).max(axis=1, initial=0.0) for one in changes]).T
         np.maximum.at(effect, columns, sizes)
         count += len(pairs)
-        more = np.flatnonzero((effect > MINOR * limit).any(axis=1))
+        more = np.flatnonzero((effect > policy.minor_effect * limit).any(axis=1))
         pairs = [(int(row), int(c)) for c in more for row in order[1:, c]]
     return effect, count
 

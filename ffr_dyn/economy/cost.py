@@ -8,37 +8,33 @@ and I5 and I9: within 14 per cent (root mean square). Only ratios matter.
 from __future__ import annotations
 
 from ffr_dyn.economy.model_choice import Choice, Part
+from ffr_dyn.economy.policy import DEFAULT, BodyCost, CostModel
 from ffr_dyn.integrators import METHODS
 
-BASE = 0.20  # an evaluation of nothing
-# a rigid body; more for a flexible one, per mode, per mode squared with I5 or I9; for stiffening, per mode, per mode squared
-SPACE = (0.78, 0.32, 0.038, 0.001, 0.32, 0.048, 0.0)
-PLANE = (0.49, 0.15, 0.029, 0.002, 0.29, 0.0, 0.005)
 STAGES = {"rk4": 4, "ros2": 2, "ros3": 4}
-PROJECTION = 0.5  # evaluations per step that bring the state back to its constraints, about
-ROW = 4.6  # evaluations' time that an output row takes
-RECORDED = 1.7  # of them that are counted as evaluations
 QUADRATIC = {"I5", "I9"}  # without these two their integrals are not touched
 
 
-def per_evaluation(choice: Choice) -> float:
+def per_evaluation(choice: Choice, model: CostModel = DEFAULT.cost) -> float:
     """[us] of one evaluation of the equations of motion."""
-    return BASE + sum(_of_body(part, choice.plane != "none") for part in choice.parts)
+    return model.scene + sum(
+        _of_body(part, model.space if choice.plane == "none" else model.plane) for part in choice.parts
+    )
 
 
-def per_row(choice: Choice) -> float:
+def per_row(choice: Choice, model: CostModel = DEFAULT.cost) -> float:
     """[us] from one output row to the next."""
-    return per_evaluation(choice) * ((stages(choice.method) + PROJECTION) * choice.divisions + ROW)
+    return per_evaluation(choice, model) * ((stages(choice.method) + model.projection) * choice.divisions + model.row)
 
 
-def of_run(choice: Choice, rows: int) -> float:
+def of_run(choice: Choice, rows: int, model: CostModel = DEFAULT.cost) -> float:
     """[us] of a run."""
-    return rows * per_row(choice)
+    return rows * per_row(choice, model)
 
 
-def of_evaluations(choice: Choice, evaluations: int, rows: int) -> float:
+def of_evaluations(choice: Choice, evaluations: int, rows: int, model: CostModel = DEFAULT.cost) -> float:
     """[us] of a run with as many evaluations, those of its output rows among them."""
-    return (evaluations + (ROW - RECORDED) * rows) * per_evaluation(choice)
+    return (evaluations + (model.row - model.row_evaluations) * rows) * per_evaluation(choice, model)
 
 
 def stages(method: str) -> int:
@@ -46,10 +42,11 @@ def stages(method: str) -> int:
     return STAGES.get(method) or int(getattr(METHODS[method], "stage_count", 4))
 
 
-def _of_body(part: Part, planar: bool) -> float:
-    rigid, flexible, linear, square, stiff, stiff_linear, stiff_square = PLANE if planar else SPACE
+def _of_body(part: Part, cost: BodyCost) -> float:
     n = part.count
     if n == 0:
-        return rigid
-    cost = rigid + flexible + linear * n + (0.0 if set(part.dropped) >= QUADRATIC else square * n * n)
-    return cost + (stiff + stiff_linear * n + stiff_square * n * n if part.stiffened else 0.0)
+        return cost.rigid
+    pairs = 0.0 if set(part.dropped) >= QUADRATIC else cost.mode_pair * n * n
+    own = cost.rigid + cost.flexible + cost.mode * n + pairs
+    stiffened = cost.stiffened + cost.stiffened_mode * n + cost.stiffened_pair * n * n
+    return own + (stiffened if part.stiffened else 0.0)

@@ -14,6 +14,7 @@ import numpy as np
 
 from ffr_dyn.economy.contributions import Contributions
 from ffr_dyn.economy.model_choice import Choice, Part
+from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.residual_estimate import Samples, elastic_columns, followed, responses
 from ffr_dyn.variants.variant import STIFFENING
 from ffr_prep.body import FlexibleBody, axial
@@ -36,14 +37,14 @@ class TermEffect:
     effect: Array
 
 
-def term_effects(seen: Samples, sensitivity: Contributions) -> tuple[TermEffect, ...]:
+def term_effects(seen: Samples, sensitivity: Contributions, policy: Policy = DEFAULT) -> tuple[TermEffect, ...]:
     """Effects along a motion that its own model sees, where `sensitivity` tells what each of its modes does."""
     listed = [*_inertial(seen), *_stiffening(seen)]
     if not listed or not len(sensitivity.body):
         return ()
     D = np.eye(seen.system.layout.v_size)[:, elastic_columns(seen.system.layout)]
     forces = np.stack([force for _, _, _, force in listed], axis=2)
-    largest = np.abs(responses(seen, D, followed(seen, D), forces)).max(axis=0)
+    largest = np.abs(responses(seen, D, followed(seen, D, policy), forces)).max(axis=0)
     per_size = sensitivity.effect / np.maximum(sensitivity.amplitude, 1e-300)[:, None]
     effects = largest.T @ per_size
     return tuple(TermEffect(b, term, load, e) for (b, term, load, _), e in zip(listed, effects, strict=True))

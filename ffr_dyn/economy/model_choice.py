@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffr_dyn.consistency.assemble import in_space
+from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator, tolerances
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Body, Scene
@@ -17,7 +18,6 @@ from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
 
-IN_PLANE = 1e-7  # of the size of the scene and the largest rate: what counts as no motion across the plane
 RIGID, QUASI_STATIC, FLEXIBLE = "rigid", "quasi-static", "flexible"
 
 
@@ -105,7 +105,7 @@ def held_in_plane(choice: Choice, flat: Scene) -> Choice | None:
     return replace(choice, parts=parts, plane=flat.plane)
 
 
-def in_plane(scene: Scene, choice: Choice, moved: Result) -> Choice | None:
+def in_plane(scene: Scene, choice: Choice, moved: Result, policy: Policy = DEFAULT) -> Choice | None:
     """The choice with in-plane modes only, where symmetry and joints keep the scene to a plane; None where they do not.
 
     moved : a run in space with states; what is left out is never moved, so results are those in space
@@ -115,7 +115,7 @@ def in_plane(scene: Scene, choice: Choice, moved: Result) -> Choice | None:
     if scene.plane == "none":
         return None
     for form in planar_forms(scene):
-        if not _stays(form, moved):
+        if not _stays(form, moved, policy.in_plane):
             continue
         parts = tuple(
             replace(part, modes=tuple(k for k in part.modes if body.kept and k in body.kept[0]))
@@ -125,14 +125,14 @@ def in_plane(scene: Scene, choice: Choice, moved: Result) -> Choice | None:
     return None
 
 
-def _stays(form: Scene, moved: Result) -> bool:
+def _stays(form: Scene, moved: Result, share: float) -> bool:
     """Whether every body of a run in space stays in the plane of the form."""
     normal = AXES.index(form.plane)
     size = max(float(np.ptp(moved[f"{body.name}.R"])) for body in form.bodies) or 1.0
     for body in form.bodies:
         height, omega = moved[f"{body.name}.R"][:, normal], moved[f"{body.name}.omega_bar"]
         across = np.delete(omega, body_normal(body, normal), axis=1)
-        if np.ptp(height) > IN_PLANE * size or np.abs(across).max() > IN_PLANE * max(np.abs(omega).max(), 1e-3):
+        if np.ptp(height) > share * size or np.abs(across).max() > share * max(np.abs(omega).max(), 1e-3):
             return False
     return True
 

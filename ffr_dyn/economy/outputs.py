@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from typing import Any
 
 import numpy as np
 
 from ffr_dyn.consistency.assemble import Assembled
+from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.result import Result
 from ffr_dyn.results.stress import tensors
@@ -20,7 +22,6 @@ Array = np.ndarray
 
 STRESS = "stress"
 ELASTIC = ("displacement", "q", "q_dot", "q_ddot")  # quantities that a rigid body does not have: zero
-FINEST = 1e-10  # relative tolerance below which rounding and the projection on the constraints decide
 
 
 @dataclass(frozen=True)
@@ -40,11 +41,6 @@ class Output:
     def __post_init__(self) -> None:
         if not 0 < self.tolerance < np.inf:
             raise InputError(f"output {self.name!r}: the tolerance is {self.tolerance}; it must be positive")
-        if not self.absolute and self.tolerance < FINEST:
-            raise InputError(
-                f"output {self.name!r}: a relative tolerance of {self.tolerance:g} is below the accuracy of any run "
-                f"({FINEST:g}: rounding, and the projection on the constraints); ask for a larger one"
-            )
 
 
 def as_output(given: Output | str, tolerance: float) -> Output:
@@ -78,20 +74,27 @@ class Probe:
     units: tuple[str, ...]
 
 
-def probe(assembled: Assembled, outputs: Sequence[Output]) -> Probe:
-    """Find the outputs among the quantities of a scene. Raises InputError for names that do not exist or repeat."""
+def probe(assembled: Assembled, outputs: Sequence[Output], policy: Policy = DEFAULT) -> Probe:
+    """Find the outputs among the quantities of a scene. Raises InputError for names that do not exist or repeat, and for
+    tolerances that no run meets."""
     if not outputs:
         raise InputError("name at least one output, such as rod.tip.position.y: without it no model is good or bad")
     names = [output.name for output in outputs]
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"the output {name!r} is asked for more than once")
+    for output in outputs:
+        if not output.absolute and output.tolerance < policy.finest_tolerance:
+            raise InputError(
+                f"output {output.name!r}: a relative tolerance of {output.tolerance:g} is below the accuracy of any run "
+                f"({policy.finest_tolerance:g}: rounding, and the projection on the constraints); ask for a larger one"
+            )
     everything, scene = catalogue(assembled.system), assembled.system.scene
     found = [_found(everything, scene, output.name) for output in outputs]
     return Probe(tuple(outputs), tuple(f[0] for f in found), tuple(f[1] for f in found), tuple(f[2] for f in found))
 
 
-def _found(everything: dict, scene: Scene, name: str) -> tuple[str, tuple[int, ...], str]:
+def _found(everything: dict[str, Any], scene: Scene, name: str) -> tuple[str, tuple[int, ...], str]:
     if name in everything:
         return name, (), everything[name].unit
     head, _, label = name.rpartition(".")
@@ -158,21 +161,16 @@ def ranges(values: Sequence[Array]) -> Array:
     return np.array([float(np.ptp(one, axis=0).max(initial=0.0)) for one in values])
 
 
-def limits(of: Probe, scales: Array) -> Array:
+def limits(of: Probe, scales: Array, policy: Policy = DEFAULT) -> Array:
     """(outputs,) tolerances in the units of the outputs. Raises InputError where a share of nothing is asked for."""
     for output, scale, unit in zip(of.outputs, scales, of.units, strict=True):
-        if not output.absolute and scale <= _nothing(unit):
+        if not output.absolute and scale <= (policy.still_stress if unit == "Pa" else policy.still):
             raise InputError(
                 f"output {output.name!r} does not change over the run (its range is {scale:.2g} {unit}): a share of that "
                 f"says nothing; give an absolute tolerance, {output.name}=VALUE, or another output"
             )
     tolerances = np.array([output.tolerance for output in of.outputs])
     return np.where([output.absolute for output in of.outputs], tolerances, tolerances * scales)
-
-
-def _nothing(unit: str) -> float:
-    """A range that is rounding only."""
-    return 1e-3 if unit == "Pa" else 1e-12
 
 
 def largest(differences: Sequence[Array]) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.chart.diagram import Diagram, Point, spread
-from ffr_dyn.chart.draw import draw as draw_diagram
+from ffr_dyn.chart.draw import draw_chart
 from ffr_dyn.chart.reference import Reference
 from ffr_dyn.chart.variants import STEP, TOLERANCE, Model, Variant
 from ffr_dyn.economy.model_choice import Choice
@@ -24,8 +24,6 @@ from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.results.result import Result
 
 Array = np.ndarray
-
-REPEATS = 3  # of every run, whose median time is drawn
 
 
 @dataclass(frozen=True)
@@ -70,7 +68,7 @@ def diagram(found: Economy) -> Diagram:
 
 def draw(found: Economy, path: str | Path) -> Path:
     """Draw the runs of a search and the one it chose, .png or .svg, a panel for each output."""
-    return draw_diagram(diagram(found), path, title=f"{found.original.name}: what was tried, and chosen")
+    return draw_chart(diagram(found), path, title=f"{found.original.name}: what was tried, and chosen")
 
 
 def _reference(found: Economy) -> Reference:
@@ -104,17 +102,17 @@ def _variant(found: Economy, choice: Choice, words: str) -> Variant:
 def _point(found: Economy, choice: Choice, words: str, error: Array) -> Point:
     settings, variant = found.settings, _variant(found, choice, words)
     span = Span(settings.start, settings.end, settings.output_step, settings.stabilisation)
-    wall, cpu, evaluations = _timed(make(found.original, choice, span), choice, span)
+    wall, cpu, evaluations = _timed(make(found.original, choice, span), choice, span, found.policy.timing_repeats)
     errors = {output.name: float(e) for output, e in zip(found.probe.outputs, error, strict=True)}
     kind = TOLERANCE if choice.controlled else STEP
     label = variant.label
     return Point(choice.method, words, label, kind, variant.number, errors, spread(wall), spread(cpu), evaluations)
 
 
-def _timed(made: Made, choice: Choice, span: Span) -> tuple[list[float], list[float], int]:
+def _timed(made: Made, choice: Choice, span: Span, repeats: int) -> tuple[list[float], list[float], int]:
     """Wall and processor times [s] of the time loop of some repetitions, and evaluations."""
     wall, cpu, evaluations = [], [], 0
-    for _ in range(REPEATS):
+    for _ in range(repeats):
         watch = Stopwatch()
         result = forward(
             made.scene,

@@ -23,9 +23,7 @@ from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
 
-SHOWN = 6  # rows of what is nearest to mattering
 SEPARATOR = "  "
-NEGLIGIBLE = 1e-4  # share of a stiffness
 
 
 @dataclass(frozen=True)
@@ -172,8 +170,9 @@ def _terms(found: Economy) -> Table:
     def size(one: TermEffect) -> float:
         return float((one.effect / found.limits).max(initial=0.0))
 
-    listed = [("dropped", one) for one in sorted(out, key=size, reverse=True)[:SHOWN]]
-    listed += [("kept", one) for one in sorted((one for one in here if one not in out), key=size)[: SHOWN // 2]]
+    most = found.policy.shown_rows
+    listed = [("dropped", one) for one in sorted(out, key=size, reverse=True)[:most]]
+    listed += [("kept", one) for one in sorted((one for one in here if one not in out), key=size)[: most // 2]]
     rows = tuple((state, *_said(found, one)) for state, one in listed)
     text = (
         "What inertia terms and the stiffening by each load do along the motion of everything, by way of the modes. The "
@@ -202,7 +201,7 @@ def _leading(found: Economy, effects: Contributions, *, most: bool) -> Iterator[
         return
     shares = effects.effect / found.limits
     order = np.argsort(-shares.max(axis=1) if most else shares.max(axis=1), kind="stable")
-    for k in order[: SHOWN if most else SHOWN // 2]:
+    for k in order[: found.policy.shown_rows if most else found.policy.shown_rows // 2]:
         body = found.original.bodies[effects.body[k]]
         output = int(np.argmax(shares[k]))
         name = f"{body.name}, mode {effects.mode[k] + 1} ({body.model.frequencies[effects.mode[k]]:.4g} Hz)"
@@ -218,10 +217,9 @@ def _checks(found: Economy) -> Iterator[Table]:
         )
         yield Table("Frequencies [Hz]", text, ("model", "everything", "shift"), shifts)
     if found.stiffening:
-        listed = [one for one in found.stiffening if one.share > 0][: 2 * SHOWN]
-        rows = tuple(
-            (s.body, s.load, f"{s.share:.2g}", "needed" if s.share > NEGLIGIBLE else "could go") for s in listed
-        )
+        listed = [one for one in found.stiffening if one.share > 0][: 2 * found.policy.shown_rows]
+        least = found.policy.needed_stiffening
+        rows = tuple((s.body, s.load, f"{s.share:.2g}", "needed" if s.share > least else "could go") for s in listed)
         text = "Largest change of the stiffness of a mode by each load on bodies whose stiffening is kept, as a share of it."
         yield Table("Stiffening by load", text, ("body", "load", "share", ""), rows)
 

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from ffr_dyn.compile.body_tables import loads_that_stiffen, of_coordinates, stiffness_of
+from ffr_dyn.compile.body_tables import loads_that_stiffen, of_coordinates
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.evaluation import (
@@ -36,12 +36,12 @@ from ffr_dyn.consistency.evaluation import (
     locked,
     unit_rows,
 )
+from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.equations.layout import Layout
+from ffr_dyn.equations.stiffening import stiffness_of
 from ffr_dyn.kernels.tables import Record
 
 Array = np.ndarray
-
-STIFF = 1e10  # how much more a violation of a constraint weighs than the inertia of the motion
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ def stiffening_forces(at: Evaluator, numbers: tuple[tuple[int, int], ...]) -> Ar
 # ---- passive oscillators ----------------------------------------------------------------------------------------------
 
 
-def followed(seen: Samples, D: Array) -> Array:
+def followed(seen: Samples, D: Array, policy: Policy = DEFAULT) -> Array:
     """(T, V, c) Z: elastic directions D (V, c), among the velocities, with the motion of rigid coordinates that follows."""
     place = seen.system.layout
     rigid = np.array([k for b in range(len(place.n)) for k in range(place.rigid(b).start, place.rigid(b).stop)], int)
@@ -173,7 +173,7 @@ def followed(seen: Samples, D: Array) -> Array:
     J = np.concatenate([J, np.broadcast_to(held, (len(M), *held.shape))], axis=1)
     J_D = np.concatenate([seen.jacobian @ D, np.zeros((len(M), len(held), D.shape[1]))], axis=1)
     softness = np.einsum("tcr,tcr,tr->tc", J, J, 1 / np.einsum("tii->ti", M))  # J M^-1 J^T, its diagonal
-    weight = np.where(softness > 1e-200, STIFF / np.maximum(softness, 1e-200), 0.0)
+    weight = np.where(softness > 1e-200, policy.constraint_weight / np.maximum(softness, 1e-200), 0.0)
     left = M + np.einsum("tcr,tc,tcs->trs", J, weight, J, optimize=True)
     right = -(seen.M[:, rigid] @ D + np.einsum("tcr,tc,tce->tre", J, weight, J_D, optimize=True))
     Z = np.broadcast_to(D, (len(M), *D.shape)).copy()

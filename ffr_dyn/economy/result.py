@@ -13,13 +13,15 @@ from ffr_dyn.economy.contributions import Contributions
 from ffr_dyn.economy.inertia_terms import TermEffect
 from ffr_dyn.economy.model_choice import Choice
 from ffr_dyn.economy.outputs import Probe
+from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.brief import Brief
 
 Array = np.ndarray
 
 
-@dataclass(frozen=True)
-class Verification:
+@dataclass(frozen=True, repr=False)
+class Verification(Brief):
     """The errors of the chosen model against everything on and a finer step.
 
     choice   : the reference;  error : (outputs,) of the chosen model;  own : (outputs,) of the reference, estimated
@@ -36,8 +38,8 @@ class Verification:
     cost: float
 
 
-@dataclass(frozen=True)
-class Economy:
+@dataclass(frozen=True, repr=False)
+class Economy(Brief):
     """What was found.
 
     choice, scene, settings : the model;  scene is ready to run with `ffr_dyn.analyses.run.run(scene, settings)`
@@ -53,6 +55,7 @@ class Economy:
     runs         : all runs made, with their errors against the reference, or else the chosen run less its estimated error
     unmoved      : names of outputs that no model changes
     frequencies  : of the model beside those of everything;  stiffening : what stiffens bodies, and how much
+    policy       : the numbers of the search
     """
 
     original: Scene
@@ -79,3 +82,4 @@ class Economy:
     stiffening: tuple[StiffeningLoad, ...]
     notes: tuple[str, ...]
     verification: Verification | None
+    policy: Policy = DEFAULT

@@ -11,6 +11,7 @@ from ffr_dyn.economy.cache import Ledger
 from ffr_dyn.economy.contributions import Contributions, of_omitted
 from ffr_dyn.economy.model_choice import Choice, full, held_in_plane, in_plane, rigid
 from ffr_dyn.economy.outputs import limits, ranges
+from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.run import Trial
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.errors import ComputationError, InputError
@@ -18,8 +19,6 @@ from ffr_prep.common.errors import ComputationError, InputError
 Array = np.ndarray
 
 SCOUT, PILOT = "ros2", "ros3"  # methods of coarse runs of rigid bodies, and of everything
-MOST = 4096  # divisions of an output step
-UNMOVED = 1e-9  # of its range: an output that differs by less between rigid and flexible bodies is moved by no model
 
 
 @dataclass(frozen=True)
@@ -43,15 +42,15 @@ class Ground:
         return self.everything.divisions
 
 
-def least(run: Callable[[Choice], Trial], choice: Choice, divisions: int) -> Trial:
+def least(run: Callable[[Choice], Trial], choice: Choice, divisions: int, policy: Policy = DEFAULT) -> Trial:
     """The run with the fewest divisions, from `divisions` up by doubling, with which it comes to an end."""
     failed: Exception | None = None
-    while divisions <= MOST:
+    while divisions <= policy.most_divisions:
         try:
             return run(replace(choice, divisions=divisions))
         except (ComputationError, InputError) as error:
             failed, divisions = error, 2 * divisions
-    raise ComputationError(f"no step down to 1/{MOST} of the output step completes a run: {failed}")
+    raise ComputationError(f"no step down to 1/{policy.most_divisions} of the output step completes a run: {failed}")
 
 
 @dataclass(frozen=True)
@@ -76,16 +75,16 @@ class Rigid:
     def limits(self) -> Array | None:
         """(outputs,) tolerances in the units of the outputs; None where rigid bodies do not tell the range of one."""
         try:
-            return limits(self.ledger.of, ranges(self.trial.values))
+            return limits(self.ledger.of, ranges(self.trial.values), self.ledger.policy)
         except InputError:
             return None
 
     def ground(self) -> Ground:
         """With a run of everything beside that of rigid bodies."""
         self.ledger.tell("everything, coarse step")
-        pilot = least(self.ledger.run, self.everything, self.everything.divisions)
+        pilot = least(self.ledger.run, self.everything, self.everything.divisions, self.ledger.policy)
         scales = ranges(pilot.values)
-        bound = limits(self.ledger.of, scales)
+        bound = limits(self.ledger.of, scales, self.ledger.policy)
         self.ledger.note(pilot, "everything", np.zeros(len(bound)))
         return Ground(pilot.choice, self.spatial, pilot, bound, scales)
 
@@ -99,7 +98,7 @@ def started(ledger: Ledger, flat: Scene) -> Rigid:
     everything = spatial if held is None else held
     trial = _scouted(ledger, rigid(replace(everything, method=SCOUT)))
     everything = replace(everything, divisions=trial.choice.divisions)
-    free = None if held is not None else in_plane(ledger.scene, everything, trial.result)
+    free = None if held is not None else in_plane(ledger.scene, everything, trial.result, ledger.policy)
     if free is not None:
         everything, trial = free, _scouted(ledger, rigid(replace(free, method=SCOUT)))
     return Rigid(ledger, trial, everything, spatial)
@@ -111,10 +110,10 @@ def _scouted(ledger: Ledger, choice: Choice) -> Trial:
         wide = ledger.over_two_rows(choice)
     except (ComputationError, InputError):
         wide = None
-    return least(ledger.run, choice, 1) if wide is None else wide
+    return least(ledger.run, choice, 1, ledger.policy) if wide is None else wide
 
 
-def unmoved(omitted: Contributions, scales: Array, names: list[str]) -> tuple[str, ...]:
+def unmoved(omitted: Contributions, scales: Array, names: list[str], policy: Policy) -> tuple[str, ...]:
     """Names of the outputs that are the same with rigid bodies and with flexible ones, from what the modes do to them."""
-    still = omitted.effect.sum(axis=0) <= UNMOVED * np.maximum(scales, 1e-300)
+    still = omitted.effect.sum(axis=0) <= policy.unmoved * np.maximum(scales, 1e-300)
     return tuple(name for name, quiet in zip(names, still, strict=True) if quiet)

@@ -11,9 +11,11 @@ from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.economy.cost import of_evaluations, of_run
 from ffr_dyn.economy.model_choice import Choice, applied
 from ffr_dyn.economy.outputs import Probe, histories, needed
+from ffr_dyn.economy.policy import DEFAULT, CostModel
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import ComputationError
 
 Array = np.ndarray
@@ -36,16 +38,16 @@ class Span:
         return round((self.end - self.start) / self.output_step)
 
 
-@dataclass(frozen=True)
-class Made:
+@dataclass(frozen=True, repr=False)
+class Made(Brief):
     """A model: the scene with it, and that scene assembled at the start of the run."""
 
     scene: Scene
     assembled: Assembled
 
 
-@dataclass(frozen=True)
-class Trial:
+@dataclass(frozen=True, repr=False)
+class Trial(Brief):
     """A run.
 
     made   : the model;  values : per output (T, k);  evaluations : of the equations of motion
@@ -70,11 +72,11 @@ def make(scene: Scene, choice: Choice, span: Span) -> Made:
     return Made(applied_to, assemble(applied_to, time=span.start))
 
 
-def cost(trial: Trial, span: Span) -> float:
+def cost(trial: Trial, span: Span, model: CostModel = DEFAULT.cost) -> float:
     """[us] of a run, by the cost model: from its steps, or from its evaluations where the method chooses its steps."""
     if trial.choice.controlled:
-        return of_evaluations(trial.choice, trial.evaluations, span.rows)
-    return of_run(trial.choice, span.rows)
+        return of_evaluations(trial.choice, trial.evaluations, span.rows, model)
+    return of_run(trial.choice, span.rows, model)
 
 
 def run(made: Made, choice: Choice, span: Span, of: Probe, outputs: tuple[str, ...] = ()) -> Trial:

@@ -26,15 +26,15 @@ from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.economy.cache import Ledger, Tried
 from ffr_dyn.economy.checks import frequencies, stiffening_loads
 from ffr_dyn.economy.contributions import Contributions, nothing, of_motion, of_omitted, own
-from ffr_dyn.economy.cost import of_run
 from ffr_dyn.economy.inertia_terms import TermEffect
 from ffr_dyn.economy.model_choice import Choice, applied
 from ffr_dyn.economy.outputs import Output, Probe, as_output, difference, largest, probe, ranges, total
 from ffr_dyn.economy.outputs import limits as limits_of
+from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.result import Economy, Verification
 from ffr_dyn.economy.rigid_start import PILOT, Ground, Rigid, started, unmoved
-from ffr_dyn.economy.run import Span, Trial, cost, rings
-from ffr_dyn.economy.selection import Insufficient, Selection, Shares, gap, selected_model, size_of
+from ffr_dyn.economy.run import Span, Trial, rings
+from ffr_dyn.economy.selection import Insufficient, Selection, gap, selected_model, size_of
 from ffr_dyn.economy.steps import Stepped, chosen_step
 from ffr_dyn.economy.verification import reference_cost, verified
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
@@ -42,16 +42,6 @@ from ffr_dyn.scene.scene import Scene
 
 Array = np.ndarray
 Histories = tuple[Array, ...]
-
-OF_ALL = 0.85  # of the tolerance, for everything together
-LEAST = 0.2  # of the tolerance, that the step may take whatever else there is
-SURELY_RIGID = (
-    0.25  # of the tolerance: modes that do less by the estimate alone are left out without a run of everything
-)
-SHORT = 2e6  # [us] of a verification that is made without being asked for
-# another look with a finer step: from how many times the steps, and at what cost of a run of everything, in final runs
-DAMPED, UNDAMPED = (6, 1.0), (2, 1.3)
-FREE = 4  # times the steps, where a verification needs that run of everything anyway
 
 
 @dataclass(frozen=True)
@@ -85,6 +75,7 @@ def economise(
     start: float = 0.0,
     verify: bool | None = None,
     stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
+    policy: Policy = DEFAULT,
     tell: Callable[[str], None] = lambda stage: None,
 ) -> Economy:
     """The cheapest model found whose outputs stay within their tolerances over a forward run, with its estimated errors.
@@ -94,6 +85,7 @@ def economise(
                 written "rod.stress=1e6" (absolute) or "rod.stress=0.1%"
     tolerance : of outputs without their own: share of the range of the output over the run
     verify    : compare with a run of everything on and a finer step; by default where that takes some seconds only
+    policy    : the numbers that all decisions rest on
     tell      : called with the name of each stage
 
     Raises InputError for outputs that do not exist or stay zero and for tolerances that cannot be met or told;
@@ -102,8 +94,8 @@ def economise(
     span = Span(start, end, output_step, stabilisation)
     tell("assemble")
     assembled = assemble(scene, time=start)
-    of = probe(assembled, [as_output(one, tolerance) for one in outputs])
-    ledger = Ledger(scene, span, of, tell)
+    of = probe(assembled, [as_output(one, tolerance) for one in outputs], policy)
+    ledger = Ledger(scene, span, of, tell, policy)
     stiff = started(ledger, assembled.system.scene)
     limits = stiff.limits
     omitted = None if limits is None else stiff.contributions(limits)
@@ -117,7 +109,7 @@ def economise(
 def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chosen | None:
     """Rigid bodies, where the estimate of what they forget is far below the tolerances; None where it is not."""
     limits, model = stiff.limits, omitted.effect.sum(axis=0)
-    if limits is None or (model > SURELY_RIGID * limits).any():
+    if limits is None or (model > ledger.policy.surely_rigid * limits).any():
         return None
     stepped = _with_step(ledger, replace(stiff.trial.choice, method=PILOT), model, limits)
     scales = ranges(stepped.trial.values)
@@ -129,7 +121,7 @@ def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chose
         (),
         stiff.everything,
         stiff.spatial,
-        limits_of(ledger.of, scales),
+        limits_of(ledger.of, scales, ledger.policy),
         scales,
         omitted,
     )
@@ -137,7 +129,9 @@ def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chose
 
 def _with_step(ledger: Ledger, choice: Choice, model: Array, limits: Array) -> Stepped:
     """The model with the step for what its own error leaves of the tolerances."""
-    return chosen_step(ledger, choice, np.maximum(OF_ALL * limits - model, LEAST * limits))
+    policy = ledger.policy
+    limit = np.maximum(policy.whole_share * limits - model, policy.least_step_share * limits)
+    return chosen_step(ledger, choice, limit)
 
 
 # ---- beside everything ------------------------------------------------------------------------------------------------
@@ -148,7 +142,7 @@ def _beside_everything(ledger: Ledger, stiff: Rigid, omitted: Contributions | No
     turns out much finer, since a coarse step damps the vibration of fast modes, and with it what they do."""
     ground = stiff.ground()
     omitted = stiff.contributions(ground.limits) if omitted is None else omitted
-    selection = selected_model(ledger, ground, omitted, Shares())
+    selection = selected_model(ledger, ground, omitted)
     found = _stepped(ledger, ground, selection, omitted)
     finer = _finer_ground(ledger, ground, found.final, verify)
     if finer is None:
@@ -156,11 +150,11 @@ def _beside_everything(ledger: Ledger, stiff: Rigid, omitted: Contributions | No
     steps = {"method": PILOT, "divisions": finer.coarsest, "accuracy": 0.0}
     same = replace(found.final.choice, **steps)  # type: ignore[arg-type]
     error = gap(ledger, finer, same, "the same with a finer step")
-    if (error + largest(found.time) <= OF_ALL * ground.limits).all():
+    if (error + largest(found.time) <= ledger.policy.whole_share * ground.limits).all():
         model = difference(ledger.run(same).values, finer.pilot.values)
         return replace(found, model=largest(model), error=largest(total(model, found.time)))
     beyond = Insufficient(size_of(same), float((error / ground.limits).max()))
-    return _stepped(ledger, finer, selected_model(ledger, finer, omitted, Shares(), beyond), omitted, found)
+    return _stepped(ledger, finer, selected_model(ledger, finer, omitted, beyond), omitted, found)
 
 
 def _stepped(
@@ -204,14 +198,16 @@ def _as_like(ledger: Ledger, choice: Choice, like: Chosen) -> Stepped:
 def _finer_ground(ledger: Ledger, ground: Ground, final: Trial, verify: bool | None) -> Ground | None:
     """Everything with a finer step than before: that of the final run where a verification follows, which needs such a run
     anyway; or else one that costs a part of the final run, where that is much finer than before."""
-    least, most = UNDAMPED if rings(final) else DAMPED
-    divisions = final.choice.divisions
+    policy, divisions = ledger.policy, final.choice.divisions
+    least, most = policy.finer_damped, policy.finer_damped_cost
+    if rings(final):
+        least, most = policy.finer_ringing, policy.finer_ringing_cost
     if _is_verified(ledger, ground.everything, final, verify):
-        least = min(least, FREE)
+        least = min(least, policy.finer_verified)
     else:
         finer = [replace(ground.everything, divisions=d) for d in range(1, divisions + 1)]
-        allowed = most * cost(final, ledger.span)
-        divisions = max((one.divisions for one in finer if of_run(one, ledger.span.rows) <= allowed), default=1)
+        allowed = most * ledger.cost(final)
+        divisions = max((one.divisions for one in finer if ledger.cost_of(one) <= allowed), default=1)
     if divisions < least * ground.coarsest:
         return None
     ledger.tell("everything, finer step")
@@ -220,7 +216,9 @@ def _finer_ground(ledger: Ledger, ground: Ground, final: Trial, verify: bool | N
 
 
 def _is_verified(ledger: Ledger, everything: Choice, final: Trial, verify: bool | None) -> bool:
-    return bool(verify) or (verify is None and reference_cost(ledger, everything, final) <= SHORT)
+    return bool(verify) or (
+        verify is None and reference_cost(ledger, everything, final) <= ledger.policy.unasked_verification
+    )
 
 
 # ---- the end ----------------------------------------------------------------------------------------------------------
@@ -248,16 +246,17 @@ def _finished(ledger: Ledger, found: Chosen, verify: bool | None) -> Economy:
         effects=omitted,
         kept=kept,
         terms=found.terms,
-        before=of_run(_everything_in_space(found, final), ledger.span.rows),
-        cost=cost(final, ledger.span),
+        before=ledger.cost_of(_everything_in_space(found, final)),
+        cost=ledger.cost(final),
         search_cost=ledger.spent - (0.0 if verification is None else verification.cost),
         tried=tuple(ledger.tried),
         runs=_all_runs(ledger, found, verification),
-        unmoved=unmoved(found.omitted, found.scales, names),
-        frequencies=frequencies(final, ledger.made(found.everything), found.everything, ledger.scene),
-        stiffening=stiffening_loads(final),
+        unmoved=unmoved(found.omitted, found.scales, names, ledger.policy),
+        frequencies=frequencies(final, ledger.made(found.everything), found.everything, ledger.scene, ledger.policy),
+        stiffening=stiffening_loads(final, ledger.policy),
         notes=tuple(final.result.attributes["notes"]),
         verification=verification,
+        policy=ledger.policy,
     )
 
 
@@ -272,7 +271,7 @@ def _all_runs(ledger: Ledger, found: Chosen, verification: Verification | None) 
     truth = found.final.values if verification is None else ledger.runs[verification.choice].values
     own = largest(found.time) if verification is None else np.zeros(len(found.limits))
     return tuple(
-        Tried(choice, "run", cost(trial, ledger.span), np.maximum(largest(difference(trial.values, truth)), own))
+        Tried(choice, "run", ledger.cost(trial), np.maximum(largest(difference(trial.values, truth)), own))
         for choice, trial in ledger.runs.items()
         if verification is None or choice != verification.choice
     )
@@ -281,7 +280,15 @@ def _all_runs(ledger: Ledger, found: Chosen, verification: Verification | None) 
 def _settings(span: Span, choice: Choice, of: Probe) -> Settings:
     outputs = tuple(dict.fromkeys(("default", *of.quantities)))
     method = choice.integrator(span.output_step)
-    return Settings(span.start, span.end, span.output_step, method, span.stabilisation, outputs, Forward())
+    return Settings(
+        start=span.start,
+        end=span.end,
+        output_step=span.output_step,
+        method=method,
+        stabilisation=span.stabilisation,
+        outputs=outputs,
+        analysis=Forward(),
+    )
 
 
 def _explained(ledger: Ledger, found: Chosen, final: Trial) -> tuple[Contributions, Contributions]:

@@ -7,43 +7,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffr_dyn.economy.cache import Ledger
-from ffr_dyn.economy.contributions import LEFT, Contributions, of_motion, of_shapes, own
+from ffr_dyn.economy.contributions import Contributions, of_motion, of_shapes, own
 from ffr_dyn.economy.cost import per_evaluation
 from ffr_dyn.economy.inertia_terms import TermEffect, term_effects, without_minor
 from ffr_dyn.economy.model_choice import Choice, orthonormal, rigid
 from ffr_dyn.economy.outputs import difference, largest
+from ffr_dyn.economy.policy import Policy
 from ffr_dyn.economy.rigid_start import SCOUT, Ground
 from ffr_dyn.economy.run import rings
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.errors import ComputationError
 
 Array = np.ndarray
-
-NEARLY_ALL = 0.8  # of the modes: then those of the full motion are ranked instead
-ATTEMPTS = 5
-MORE = 1.2  # times as many directions, at least, after those that were not enough
-HOPE = 1.0  # times the tolerance: where modes do more by the estimate, rigid bodies are not tried
-STUCK = 0.9  # of the error before: more directions have not helped
-SAFELY = 0.6  # of what may be left out, when what was predicted turns out too much
-DIRECTLY = 0.75  # of the tolerance: a run of two stages that is as near everything is believed, step and all
-RINGING = 0.5  # the same where something vibrates undamped and tolerances are fine: everything errs by its step as well
-WITHIN_REACH = 2.5  # times what is believed: another run of two stages is worth it
-COARSE = 5e-3  # of the range: with tolerances that are no less, two stages are tried first
-NEARLY_RIGID = 10.0  # times the tolerance: where modes do no more, too
-
-
-@dataclass(frozen=True)
-class Shares:
-    """Shares of the tolerance that may be taken by modes left out, by terms, by rigid bodies, and by all that is left out.
-
-    modes are counted with a margin, since one more costs less than another run; bold : the same without
-    """
-
-    modes: float = 0.03
-    bold: float = 0.15
-    terms: float = 0.15
-    rigid: float = 0.5
-    all: float = 0.5
 
 
 @dataclass(frozen=True)
@@ -54,6 +29,7 @@ class Ranking:
     everything: Choice
     found: Contributions
     limits: Array
+    remainder: float
 
     @property
     def order(self) -> Array:
@@ -87,7 +63,7 @@ class Ranking:
             shapes = [self.found.shape[k] for k in chosen if self.found.body[k] == b]
             if not shapes:
                 parts[b] = replace(part, modes=(), dropped=())
-            elif all(np.count_nonzero(np.abs(shape) > LEFT) == 1 for shape in shapes):
+            elif all(np.count_nonzero(np.abs(shape) > self.remainder) == 1 for shape in shapes):
                 parts[b] = replace(
                     part, modes=tuple(sorted(int(self.found.mode[k]) for k in chosen if self.found.body[k] == b))
                 )
@@ -119,43 +95,43 @@ class Insufficient:
 
 
 def selected_model(
-    ledger: Ledger, ground: Ground, omitted: Contributions, shares: Shares, beyond: Insufficient | None = None
+    ledger: Ledger, ground: Ground, omitted: Contributions, beyond: Insufficient | None = None
 ) -> Selection:
     """The fewest modes, or shapes made of them, and the fewest terms whose absence leaves the outputs within their share.
 
     omitted : what modes do, driven by the rigid motion
     beyond  : a model that is known not to do
     """
-    all_modes = omitted.effect.sum(axis=0)
-    if beyond is None and (all_modes <= HOPE * ground.limits).all():
+    policy, all_modes = ledger.policy, omitted.effect.sum(axis=0)
+    if beyond is None and (all_modes <= policy.rigid_tried * ground.limits).all():
         stiff = rigid(ground.everything)
         if _directly(ledger, ground, stiff) <= 1:
             return Selection(replace(stiff, method=SCOUT), all_modes)
-        if (gap(ledger, ground, stiff, "all bodies rigid") <= shares.rigid * ground.limits).all():
+        if (gap(ledger, ground, stiff, "all bodies rigid") <= policy.rigid_share * ground.limits).all():
             return Selection(stiff, all_modes)
-    rankings, effects = _rankings(ledger, ground, omitted, shares)
-    predicted = [ranking.model(ranking.count(shares.modes)) for ranking in rankings]
-    best = rankings[min(range(len(rankings)), key=lambda k: (per_evaluation(predicted[k]), k))]
+    rankings, effects = _rankings(ledger, ground, omitted)
+    predicted = [ranking.model(ranking.count(policy.modes_share)) for ranking in rankings]
+    best = rankings[min(range(len(rankings)), key=lambda k: (per_evaluation(predicted[k], policy.cost), k))]
     choice = None
-    if beyond is None and (_is_coarse(ground) or (all_modes <= NEARLY_RIGID * ground.limits).all()):
-        choice = _in_two_stages(ledger, ground, best, effects, shares)
-    choice = _enough(ledger, ground, best, effects, shares, beyond) if choice is None else choice
+    if beyond is None and (_is_coarse(ledger, ground) or (all_modes <= policy.nearly_rigid * ground.limits).all()):
+        choice = _in_two_stages(ledger, ground, best, effects)
+    choice = _enough(ledger, ground, best, effects, beyond) if choice is None else choice
     return Selection(choice, best.left(size_of(choice)), effects)
 
 
-def _rankings(
-    ledger: Ledger, ground: Ground, omitted: Contributions, shares: Shares
-) -> tuple[list[Ranking], tuple[TermEffect, ...]]:
+def _rankings(ledger: Ledger, ground: Ground, omitted: Contributions) -> tuple[list[Ranking], tuple[TermEffect, ...]]:
     """What modes do, driven by the rigid motion or, where nearly all are needed, in the full one; principal shapes; terms."""
     ledger.tell("modes and terms along the motion of everything")
     seen = own(ledger, ground.pilot)
-    needed = (omitted.effect > shares.modes * ground.limits / max(1, len(omitted.body))).any(axis=1)
+    needed = (omitted.effect > ledger.policy.modes_share * ground.limits / max(1, len(omitted.body))).any(axis=1)
     found = omitted
-    if needed.mean() >= NEARLY_ALL or not np.isfinite(omitted.effect).all():
+    if needed.mean() >= ledger.policy.needed_modes or not np.isfinite(omitted.effect).all():
         found = of_motion(ledger, ground.pilot, ground.limits, seen)
     shapes = of_shapes(ledger, ground.pilot, ground.limits, seen)
-    rankings = [Ranking(ledger.scene, ground.everything, one, ground.limits) for one in (found, shapes)]
-    return rankings, term_effects(seen, found)
+    rankings = [
+        Ranking(ledger.scene, ground.everything, one, ground.limits, ledger.policy.remainder) for one in (found, shapes)
+    ]
+    return rankings, term_effects(seen, found, ledger.policy)
 
 
 def _enough(
@@ -163,33 +139,38 @@ def _enough(
     ground: Ground,
     ranking: Ranking,
     effects: tuple[TermEffect, ...],
-    shares: Shares,
     beyond: Insufficient | None,
 ) -> Choice:
     """The model that a run beside everything shows to be enough; everything where the number of attempts does not do."""
-    scale, count, terms = 1.0, 0, shares.terms
+    policy = ledger.policy
+    scale, count, terms = 1.0, 0, policy.terms_share
     before: float = np.inf
     also: tuple[int, ...] = ()
     if beyond is not None:
-        scale, count = min(1.0, SAFELY * shares.all / beyond.error), _more(ranking, beyond.count)
-    for _ in range(ATTEMPTS):
-        count = max(count, ranking.count(scale * shares.modes))
+        scale, count = (
+            min(1.0, policy.caution * policy.omitted_share / beyond.error),
+            _more(ranking, beyond.count, policy),
+        )
+    for _ in range(policy.model_attempts):
+        count = max(count, ranking.count(scale * policy.modes_share))
         model = ranking.model(count, also)
         if terms:
             model = without_minor(model, effects, scale * terms * ground.limits)
-        error = float((gap(ledger, ground, model, _said(model)) / (shares.all * ground.limits)).max())
+        error = float((gap(ledger, ground, model, _said(model)) / (policy.omitted_share * ground.limits)).max())
         if error <= 1:
             return model
         if model == ground.everything:
             break
-        if error > STUCK * before:  # what is missing comes by way of a body that does nothing to the outputs itself
+        if (
+            error > policy.stalled * before
+        ):  # what is missing comes by way of a body that does nothing to the outputs itself
             also = ranking.leaders(count)
         before = error
         if np.isfinite(error):
-            scale *= SAFELY / error
-            count = _more(ranking, count)
+            scale *= policy.caution / error
+            count = _more(ranking, count, policy)
         else:  # a run that fails may miss a term
-            count = count if terms else _more(ranking, count)
+            count = count if terms else _more(ranking, count, policy)
             terms = 0.0
     return ground.everything
 
@@ -197,16 +178,15 @@ def _enough(
 # ---- two stages -------------------------------------------------------------------------------------------------------
 
 
-def _in_two_stages(
-    ledger: Ledger, ground: Ground, ranking: Ranking, effects: tuple[TermEffect, ...], shares: Shares
-) -> Choice | None:
+def _in_two_stages(ledger: Ledger, ground: Ground, ranking: Ranking, effects: tuple[TermEffect, ...]) -> Choice | None:
     """A model in two stages: with few modes first, since they may do; with more where that is not far off."""
-    for count in dict.fromkeys(ranking.count(part) for part in (shares.bold, shares.modes)):
-        model = without_minor(ranking.model(count), effects, shares.terms * ground.limits)
+    policy = ledger.policy
+    for count in dict.fromkeys(ranking.count(part) for part in (policy.bold_modes_share, policy.modes_share)):
+        model = without_minor(ranking.model(count), effects, policy.terms_share * ground.limits)
         error = _directly(ledger, ground, model)
         if error <= 1:
             return replace(model, method=SCOUT)
-        if error > WITHIN_REACH:
+        if error > policy.two_stages_reach:
             break
     return None
 
@@ -215,17 +195,18 @@ def _directly(ledger: Ledger, ground: Ground, model: Choice) -> float:
     """How far the model in two stages is from everything in four, over what is believed: its step is told then with what is
     left out."""
     error = gap(ledger, ground, replace(model, method=SCOUT), f"{_said(model)}, two stages")
-    part = RINGING if rings(ground.pilot) and not _is_coarse(ground) else DIRECTLY
+    policy, careful = ledger.policy, rings(ground.pilot) and not _is_coarse(ledger, ground)
+    part = policy.two_stages_ringing if careful else policy.two_stages
     return float((error / (part * ground.limits)).max())
 
 
-def _is_coarse(ground: Ground) -> bool:
-    return bool((ground.limits >= COARSE * ground.scales).all())
+def _is_coarse(ledger: Ledger, ground: Ground) -> bool:
+    return bool((ground.limits >= ledger.policy.coarse_tolerance * ground.scales).all())
 
 
-def _more(ranking: Ranking, count: int) -> int:
+def _more(ranking: Ranking, count: int, policy: Policy) -> int:
     """A number of directions after one that is not enough."""
-    return min(max(count + 1, int(MORE * count)), ranking.order.size)
+    return min(max(count + 1, int(policy.more_modes * count)), ranking.order.size)
 
 
 def size_of(choice: Choice) -> int:

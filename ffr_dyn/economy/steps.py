@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.economy.cache import Ledger
-from ffr_dyn.economy.cost import STAGES, per_row
+from ffr_dyn.economy.cost import STAGES
 from ffr_dyn.economy.model_choice import Choice
 from ffr_dyn.economy.outputs import difference, largest
-from ffr_dyn.economy.run import Span, Trial, cost, rings
+from ffr_dyn.economy.policy import DEFAULT, Policy
+from ffr_dyn.economy.run import Span, Trial, rings
 from ffr_dyn.integrators import CONTROLLED, METHODS, RK4, Integrator
 from ffr_prep.common.errors import ComputationError, InputError
 
@@ -25,19 +26,6 @@ Array = np.ndarray
 Histories = tuple[Array, ...]
 
 TWO_STAGES, EXPLICIT = "ros2", "rk4"
-SURELY = 0.95  # of the limit: the difference of two coarse runs of different order that is taken for the error of one
-RINGING = 0.5  # the same where something vibrates without damping
-NEARLY = 0.8  # of the limit: an estimate from a run with steps over two rows
-HOPELESS = 8.0  # limits between coarse runs of two stages and of four: neither will do
-FAR = 0.1  # of the limit: steps longer than a row would do
-ACCURACIES = (1e-2, 1e-3)
-WORTH = 0.8  # of the cost: a method that chooses its steps pays
-MOST = 4096  # divisions of an output step
-ATTEMPTS = 10
-MARGIN = 1.6  # on an error from which the number of divisions is predicted
-RUNG = 3.0  # times the steps of the last run
-ONCE = 0.6  # a shorter run pays when it needs less than this share of the divisions
-NEAR = (1.25, 3.0)  # ratios of the steps of two runs whose difference tells their errors
 
 
 @dataclass(frozen=True)
@@ -94,23 +82,23 @@ def _rigid_in_two_stages(ledger: Ledger, choice: Choice, limit: Array) -> Steppe
 def _coarse(ledger: Ledger, coarse: Trial, limit: Array) -> Stepped | None:
     """The coarse run, or one of two stages, where steps over two rows show that this is enough."""
     simple = replace(coarse.choice, method=TWO_STAGES)
-    found = _of_both(ledger.runs[simple], coarse, limit) if simple in ledger.runs else None
+    found = _of_both(ledger.runs[simple], coarse, limit, ledger.policy) if simple in ledger.runs else None
     if found is not None or _far_off(ledger, coarse, limit):
         return found
     error = _from_two_rows(ledger, coarse)
-    if error is None or share(error, NEARLY * limit) > 1:
+    if error is None or share(error, ledger.policy.wide_step_share * limit) > 1:
         return None
-    if share(error, FAR * limit) > 1 or simple in ledger.runs:
+    if share(error, ledger.policy.far_below * limit) > 1 or simple in ledger.runs:
         return Stepped(coarse, error)
     trial = _attempt(ledger, simple)
-    return (None if trial is None else _of_both(trial, coarse, limit)) or Stepped(coarse, error)
+    return (None if trial is None else _of_both(trial, coarse, limit, ledger.policy)) or Stepped(coarse, error)
 
 
-def _of_both(simple: Trial, coarse: Trial, limit: Array) -> Stepped | None:
+def _of_both(simple: Trial, coarse: Trial, limit: Array, policy: Policy = DEFAULT) -> Stepped | None:
     """Two stages, where their difference from four is small. Where something rings, steps over two rows do not tell what
     the step does to that: four stages are taken for the error of two then."""
     off = difference(simple.values, coarse.values)
-    if share(off, (RINGING if rings(coarse) else SURELY) * limit) <= 1:
+    if share(off, (policy.agreement_ringing if rings(coarse) else policy.agreement) * limit) <= 1:
         return Stepped(simple, off)
     return Stepped(coarse, off) if rings(coarse) and share(off, limit) <= 1 else None
 
@@ -118,7 +106,7 @@ def _of_both(simple: Trial, coarse: Trial, limit: Array) -> Stepped | None:
 def _far_off(ledger: Ledger, coarse: Trial, limit: Array) -> bool:
     """Whether two stages, of this model or one of fewer modes, are so far from four that these will not do either."""
     return any(
-        share(difference(trial.values, coarse.values), limit) > HOPELESS
+        share(difference(trial.values, coarse.values), limit) > ledger.policy.hopeless
         for choice, trial in ledger.runs.items()
         if choice.method == TWO_STAGES and any(part.count for part in choice.parts)
     )
@@ -157,14 +145,14 @@ def _finer(ledger: Ledger, coarse: Trial, limit: Array) -> Stepped:
         if share(error, limit) <= 1:
             return Stepped(coarse, error)
     now = share(error, limit)
-    needed = {coarse.choice.method: _needed(coarse, MARGIN * max(now, 1.0))}
-    most = per_row(replace(coarse.choice, divisions=needed[coarse.choice.method]))
+    needed = {coarse.choice.method: _needed(coarse, max(now, 1.0), ledger.policy)}
+    most = ledger.cost_of(replace(coarse.choice, divisions=needed[coarse.choice.method]))
     explicit = replace(coarse.choice, method=EXPLICIT)
-    if EXPLICIT in methods(ledger.span) and per_row(explicit) <= most:
+    if EXPLICIT in methods(ledger.span) and ledger.cost_of(explicit) <= most:
         trial = _attempt(ledger, explicit)
         if trial is not None:
             truth = difference(coarse.values, error)
-            needed[EXPLICIT] = _needed(trial, MARGIN * share(difference(trial.values, truth), limit))
+            needed[EXPLICIT] = _needed(trial, share(difference(trial.values, truth), limit), ledger.policy)
     return _cheapest(ledger, coarse, needed, limit, now)
 
 
@@ -175,30 +163,32 @@ def _cheapest(ledger: Ledger, coarse: Trial, needed: dict[str, int], limit: Arra
     Every run corrects the prediction for its method. Far predictions are approached in rungs, each of which tells the error
     of the next.
     """
-    choice = coarse.choice
+    choice, policy = coarse.choice, ledger.policy
     before = {choice.method: (choice.divisions, now)}
     best: Stepped | None = None
-    for _ in range(ATTEMPTS):
-        name = min(needed, key=lambda name: (per_row(replace(choice, method=name, divisions=needed[name])), name))
+    for _ in range(policy.step_attempts):
+        name = min(
+            needed, key=lambda name: (ledger.cost_of(replace(choice, method=name, divisions=needed[name])), name)
+        )
         divisions = _rung(ledger, replace(choice, method=name), needed[name])
         trial = _attempt(ledger, replace(choice, method=name, divisions=divisions))
         if trial is None:
-            needed[name] = min(MOST, 2 * divisions)
+            needed[name] = min(policy.most_divisions, 2 * divisions)
             continue
         error = measured(ledger, trial)
         now = share(error, limit)
-        if now <= 1 and (best is None or cost(trial, ledger.span) < cost(best.trial, ledger.span)):
+        if now <= 1 and (best is None or ledger.cost(trial) < ledger.cost(best.trial)):
             best = Stepped(trial, error)
         power = 1 / _seen_order(trial, now, before.get(name))
         before[name] = divisions, now
-        better = int(np.ceil(divisions * (now * (MARGIN if now > 1 else 1.0)) ** power))
-        if best is not None and (now > 1 or better >= ONCE * divisions or divisions == 1):
+        better = int(np.ceil(divisions * (now * (policy.error_margin if now > 1 else 1.0)) ** power))
+        if best is not None and (now > 1 or better >= policy.fewer_divisions * divisions or divisions == 1):
             return best
-        needed[name] = int(np.clip(better if better != divisions else divisions + 1, 1, MOST))
+        needed[name] = int(np.clip(better if better != divisions else divisions + 1, 1, policy.most_divisions))
     if best is None:
         raise ComputationError(
-            f"no integrator reaches the tolerance with steps down to 1/{MOST} of the output step: errors stay above their "
-            f"limits with {max(needed.values())} steps from row to row"
+            f"no integrator reaches the tolerance with steps down to 1/{policy.most_divisions} of the output step: errors "
+            f"stay above their limits with {max(needed.values())} steps from row to row"
         )
     return best
 
@@ -207,7 +197,7 @@ def _rung(ledger: Ledger, choice: Choice, needed: int) -> int:
     """The divisions of the next run towards those needed."""
     there = [one.divisions for one in ledger.runs if replace(one, divisions=choice.divisions) == choice]
     finest = max((d for d in there if d < needed), default=needed)
-    return needed if needed <= NEAR[1] * finest else int(np.ceil(RUNG * finest))
+    return needed if needed <= ledger.policy.farthest_step * finest else int(np.ceil(ledger.policy.rung * finest))
 
 
 def _seen_order(trial: Trial, error: float, before: tuple[int, float] | None) -> float:
@@ -226,7 +216,8 @@ def measured(ledger: Ledger, trial: Trial) -> Histories:
         if replace(other.choice, divisions=trial.choice.divisions) == trial.choice and not trial.choice.controlled
     ]
     ratios = [trial.choice.divisions / other.choice.divisions for other in same]
-    near = [other for other, ratio in zip(same, ratios, strict=True) if NEAR[0] <= max(ratio, 1 / ratio) <= NEAR[1]]
+    least, most = ledger.policy.nearest_step, ledger.policy.farthest_step
+    near = [other for other, ratio in zip(same, ratios, strict=True) if least <= max(ratio, 1 / ratio) <= most]
     if near:
         return signed(trial, max(near, key=lambda other: other.choice.divisions))
     if trial.choice.divisions > 1:
@@ -244,14 +235,14 @@ def measured(ledger: Ledger, trial: Trial) -> Histories:
 
 def _longer(ledger: Ledger, fixed: Stepped, limit: Array) -> Stepped:
     """The run of a method that chooses its steps, where steps longer than an output row would do and that is cheaper."""
-    if fixed.trial.choice.divisions > 1 or share(fixed.error, FAR * limit) > 1:
+    if fixed.trial.choice.divisions > 1 or share(fixed.error, ledger.policy.far_below * limit) > 1:
         return fixed
     best, truth = fixed, difference(fixed.trial.values, fixed.error)
     for name in CONTROLLED:
         if not (CONTROLLED[name].implicit or _is_soft(ledger, fixed.trial)):
             continue
-        choice = replace(fixed.trial.choice, method=name, divisions=1, accuracy=ACCURACIES[0])
-        if ledger.first_part(choice) < cost(best.trial, ledger.span):
+        choice = replace(fixed.trial.choice, method=name, divisions=1, accuracy=ledger.policy.accuracies[0])
+        if ledger.first_part(choice) < ledger.cost(best.trial):
             found = _controlled(ledger, choice, truth, limit, best)
             best = best if found is None else found
     return best
@@ -265,11 +256,11 @@ def _is_soft(ledger: Ledger, trial: Trial) -> bool:
 
 def _controlled(ledger: Ledger, choice: Choice, truth: Histories, limit: Array, best: Stepped) -> Stepped | None:
     """The first accuracy of a method that meets the limit, while its runs are cheaper than the best one."""
-    for accuracy in ACCURACIES:
+    for accuracy in ledger.policy.accuracies:
         trial = _attempt(ledger, replace(choice, accuracy=accuracy))
         if trial is None:
             continue
-        if cost(trial, ledger.span) > WORTH * cost(best.trial, ledger.span):
+        if ledger.cost(trial) > ledger.policy.controlled_gain * ledger.cost(best.trial):
             return None
         error = difference(trial.values, truth)
         if share(error, limit) <= 1:
@@ -312,6 +303,9 @@ def share(error: Histories, limit: Array) -> float:
     return float((largest(error) / limit).max(initial=0.0))
 
 
-def _needed(trial: Trial, error: float) -> int:
-    """Divisions for an error of one, from a run with that `error`."""
-    return int(np.clip(np.ceil(trial.choice.divisions * error ** (1 / order(trial)) * (1 - 1e-9)), 1, MOST))
+def _needed(trial: Trial, error: float, policy: Policy) -> int:
+    """Divisions for an error of one, with a margin, from a run with that `error`."""
+    error = policy.error_margin * error
+    return int(
+        np.clip(np.ceil(trial.choice.divisions * error ** (1 / order(trial)) * (1 - 1e-9)), 1, policy.most_divisions)
+    )

@@ -9,21 +9,16 @@ import numpy as np
 
 from ffr_dyn.economy.cache import Ledger
 from ffr_dyn.economy.contributions import Contributions
-from ffr_dyn.economy.cost import of_run
 from ffr_dyn.economy.model_choice import Choice
 from ffr_dyn.economy.outputs import Probe, difference, largest
 from ffr_dyn.economy.result import Verification
 from ffr_dyn.economy.rigid_start import PILOT, Ground
-from ffr_dyn.economy.run import Trial, cost
-from ffr_dyn.economy.selection import Insufficient, Shares, selected_model, size_of
+from ffr_dyn.economy.run import Trial
+from ffr_dyn.economy.selection import Insufficient, selected_model, size_of
 from ffr_dyn.economy.steps import error_of, order
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
-
-ATTEMPTS = 4
-UNEXPLAINED = 0.25  # of the tolerance: an error beyond that of what is left out, which is the step's
-LONGEST = 6  # times the step of the reference: of a run that tells its error
 
 
 def reference(everything: Choice, final: Trial) -> Choice:
@@ -33,7 +28,7 @@ def reference(everything: Choice, final: Trial) -> Choice:
 
 def reference_cost(ledger: Ledger, everything: Choice, final: Trial) -> float:
     """[us] of the reference, by the cost model."""
-    return of_run(reference(everything, final), ledger.span.rows)
+    return ledger.cost_of(reference(everything, final))
 
 
 def verified(
@@ -57,8 +52,8 @@ def verified(
     while True:
         errors.append(largest(difference(final.values, sharp.values)))
         ledger.note(final, "verified", errors[-1])
-        if (errors[-1] <= limits).all() or len(errors) == ATTEMPTS:
-            spent = cost(sharp, ledger.span) + cost(coarse, ledger.span)
+        if (errors[-1] <= limits).all() or len(errors) == ledger.policy.verification_attempts:
+            spent = ledger.cost(sharp) + ledger.cost(coarse)
             return final, Verification(choice, errors[-1], errors[0], own, len(errors) - 1, spent)
         final = _better(ledger, limits, final, ledger.run(half(choice)), omitted, errors)
 
@@ -70,10 +65,11 @@ def half(choice: Choice) -> Choice:
 
 def _coarser(ledger: Ledger, choice: Choice) -> Trial:
     """A run that tells the error of the reference: one that is there with steps not much longer, or one of half the steps."""
+    longest = ledger.policy.longest_reference_step
     there = [
         trial
         for other, trial in ledger.runs.items()
-        if replace(other, divisions=choice.divisions) == choice and 2 <= choice.divisions / other.divisions <= LONGEST
+        if replace(other, divisions=choice.divisions) == choice and 2 <= choice.divisions / other.divisions <= longest
     ]
     return max(there, key=lambda trial: trial.choice.divisions) if there else ledger.run(half(choice))
 
@@ -100,9 +96,9 @@ def _better(
     of a finer step too where what is left out does not explain the error."""
     same = replace(final.choice, method=PILOT, divisions=coarse.choice.divisions, accuracy=0.0)
     gap = largest(difference(ledger.run(same).values, coarse.values))
-    if (gap <= Shares().all * limits).all():
+    if (gap <= ledger.policy.omitted_share * limits).all():
         return ledger.run(_shorter(final.choice))
-    stepped = _shorter(final.choice) if (errors[-1] - gap > UNEXPLAINED * limits).any() else final.choice
+    stepped = _shorter(final.choice) if (errors[-1] - gap > ledger.policy.unexplained * limits).any() else final.choice
     steps: dict[str, Any] = {key: getattr(stepped, key) for key in ("method", "divisions", "accuracy")}
     if not final.choice.integrator(ledger.span.output_step).implicit:  # its step is for the modes that it had
         steps = {"method": PILOT, "divisions": coarse.choice.divisions, "accuracy": 0.0}
@@ -110,7 +106,7 @@ def _better(
         return ledger.run(replace(coarse.choice, **steps))
     ground = Ground(coarse.choice, coarse.choice, coarse, limits, limits)
     beyond = Insufficient(size_of(final.choice), float((gap / limits).max()))
-    anew = selected_model(ledger, ground, omitted, Shares(), beyond).choice
+    anew = selected_model(ledger, ground, omitted, beyond).choice
     return ledger.run(replace(anew, **steps))
 
 

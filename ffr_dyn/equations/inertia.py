@@ -24,6 +24,32 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True)
+class Integrals:
+    """The integrals of a body as its equations have them, some terms left out; names as of `FlexibleBody`."""
+
+    mass: float
+    r_dm: Array
+    rr_dm: Array
+    P_dm: Array
+    rP_dm: Array
+    PP_dm: Array
+    omega2: Array
+    I5: Array
+    I6: Array
+
+
+def kept_integrals(body: FlexibleBody, dropped: tuple[str, ...]) -> Integrals:
+    """The integrals without the terms `dropped`: I4 and I5 are the skew parts of rP_dm and PP_dm, I8 and I9 the symmetric."""
+    kept = {term: float(term not in dropped) for term in ("I3", "I4", "I5", "I8", "I9")}
+    rP, PP = (
+        symmetric * 0.5 * (part + np.swapaxes(part, 0, 1)) + skewed * 0.5 * (part - np.swapaxes(part, 0, 1))
+        for part, symmetric, skewed in ((body.rP_dm, kept["I8"], kept["I4"]), (body.PP_dm, kept["I9"], kept["I5"]))
+    )
+    P = kept["I3"] * body.P_dm
+    return Integrals(body.mass, body.r_dm, body.rr_dm, P, rP, PP, body.omega2, kept["I5"] * body.I5, body.I6)
+
+
+@dataclass(frozen=True)
 class Moments:
     """s (3,), G (3, 3, n), W (3, 3) of the deformed body."""
 
@@ -32,7 +58,7 @@ class Moments:
     W: Array
 
 
-def moments(body: FlexibleBody, q: Array) -> Moments:
+def moments(body: FlexibleBody | Integrals, q: Array) -> Moments:
     """Moments of the mass of the body deformed by q (n,)."""
     G = body.rP_dm + np.einsum("klij,i->klj", body.PP_dm, q)
     rest = np.einsum("klj,j->kl", body.rP_dm, q)
@@ -40,7 +66,7 @@ def moments(body: FlexibleBody, q: Array) -> Moments:
     return Moments(body.r_dm + body.P_dm @ q, G, W)
 
 
-def mass_matrix(body: FlexibleBody, q: Array) -> Array:
+def mass_matrix(body: FlexibleBody | Integrals, q: Array) -> Array:
     """(6 + n, 6 + n) mass matrix at q (n,), body axes."""
     moment = moments(body, q)
     J = np.trace(moment.W) * np.eye(3) - moment.W
@@ -52,7 +78,7 @@ def mass_matrix(body: FlexibleBody, q: Array) -> Array:
     ])  # fmt: skip
 
 
-def quadratic_velocity(body: FlexibleBody, q: Array, omega: Array, q_dot: Array) -> Array:
+def quadratic_velocity(body: FlexibleBody | Integrals, q: Array, omega: Array, q_dot: Array) -> Array:
     """(6 + n,) quadratic velocity forces Q_v at q, omega (3,) in body axes, q_dot (n,)."""
     moment = moments(body, q)
     J = np.trace(moment.W) * np.eye(3) - moment.W
@@ -65,12 +91,12 @@ def quadratic_velocity(body: FlexibleBody, q: Array, omega: Array, q_dot: Array)
     ])  # fmt: skip
 
 
-def elastic_force(body: FlexibleBody, damping: Array, q: Array, q_dot: Array) -> Array:
+def elastic_force(body: FlexibleBody | Integrals, damping: Array, q: Array, q_dot: Array) -> Array:
     """(6 + n,) elastic and modal damping forces; damping (n,) ratios."""
     return np.concatenate([np.zeros(6), -body.omega2 * q - 2 * damping * np.sqrt(body.omega2) * q_dot])
 
 
-def gravity_force(body: FlexibleBody, q: Array, A: Array, gravity: Array) -> Array:
+def gravity_force(body: FlexibleBody | Integrals, q: Array, A: Array, gravity: Array) -> Array:
     """(6 + n,) force of a uniform field gravity (3,) [m/s^2], global."""
     field = A.T @ gravity
     return np.concatenate([body.mass * field, np.cross(body.r_dm + body.P_dm @ q, field), body.P_dm.T @ field])

@@ -1,7 +1,7 @@
 """Time integration: one file per method, one protocol.
 
-A method is a frozen dataclass with its settings; its compiled unit does one step of a machine's state (see
-`ffr_dyn.kernels.entry_points`).
+A method is a frozen dataclass with its settings; its compiled function does one step of an engine's state (see
+`ffr_dyn.kernels.integrator_api`, which tells how to write one).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ffr_dyn.integrators.ros2 import ROS2
 from ffr_dyn.integrators.ros3 import ROS3, AdaptiveROS3
 from ffr_dyn.integrators.tolerances import Tolerances, tolerances
 from ffr_dyn.integrators.variational import Variational
-from ffr_dyn.kernels.entry_points import Unit
+from ffr_dyn.kernels.integrator_api import CompiledFunction
 
 __all__ = [
     "CONTROLLED",
@@ -46,7 +46,7 @@ class Integrator(Protocol):
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """What the unit finds in `stages.numbers` at the start: settings, and room for what it keeps."""
+        """What the step finds in `stages.numbers` at the start: settings, and room for what it keeps."""
 
     order: ClassVar[int]
     implicit: ClassVar[bool]  # whether it treats the elastic forces implicitly
@@ -57,12 +57,11 @@ class Integrator(Protocol):
     row_stages: ClassVar[int]  # the same for constraint rows
     keeps_terms: ClassVar[bool]  # whether it needs the quadratic terms of all bodies after an evaluation
     looks_ahead: ClassVar[int]  # order to which it takes geometric stiffening as a function of time, or 0: not
-    calls: ClassVar[tuple[str, ...]]  # what its unit calls beside what all methods do, of `units.EXTRA_UNITS`
-    unit: ClassVar[Unit]
+    do_step: ClassVar[CompiledFunction]  # one step of the engine's state
 
 
 class Controlled(Integrator, Protocol):
-    """A method that chooses its steps; its unit leaves the error of the step in stages.x[0], stages.v[0]."""
+    """A method that chooses its steps; its step leaves the error of the step in stages.x[0], stages.v[0]."""
 
     @property
     def tolerances(self) -> Tolerances:

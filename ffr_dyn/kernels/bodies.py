@@ -15,6 +15,7 @@ from ffr_dyn.kernels.planar import (
 )
 from ffr_dyn.kernels.products import contract
 from ffr_dyn.kernels.simd.slices import part, six_parts, three_parts
+from ffr_dyn.kernels.tables import IN_PP_DM, IN_Q, IN_SHARED, IN_V, IN_X, NORMAL, PP_PLAN, N
 from ffr_dyn.kernels.vectors import (
     cholesky_six,
     cholesky_three,
@@ -46,7 +47,7 @@ def rotation_matrix(p0, p1, p2, p3, A):
 def position_rates(bodies, x, v, xd):
     """x_dot from (x, v): R_dot, p_dot = 1/2 G_bar^T omega_bar, q_dot."""
     for b in range(bodies.mass.size):
-        n, i, j = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 2]
+        n, i, j = bodies.where[b, N], bodies.where[b, IN_X], bodies.where[b, IN_V]
         for k in range(3):
             xd[i + k] = v[j + k]
         p0, p1, p2, p3 = x[i + 3], x[i + 4], x[i + 5], x[i + 6]
@@ -63,7 +64,7 @@ def position_rates(bodies, x, v, xd):
 def normalise(bodies, x):
     """Euler parameters back to unit length."""
     for b in range(bodies.mass.size):
-        i = bodies.where[b, 1] + 3
+        i = bodies.where[b, IN_X] + 3
         p0, p1, p2, p3 = x[i], x[i + 1], x[i + 2], x[i + 3]
         inverse = 1.0 / (p0 * p0 + p1 * p1 + p2 * p2 + p3 * p3) ** 0.5
         x[i], x[i + 1], x[i + 2], x[i + 3] = inverse * p0, inverse * p1, inverse * p2, inverse * p3
@@ -99,15 +100,15 @@ def six_rows(rows, q, n):
 @inlined
 def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s):
     """Elastic right-hand side; returns (first moment, I3 q_dot, second moment of mass, sym D, axial D) of the body."""
-    n, e, start, c = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4], bodies.where[b, 8]
+    n, e, start, c = bodies.where[b, N], bodies.where[b, IN_Q], bodies.where[b, IN_PP_DM], bodies.where[b, IN_SHARED]
     g, l = part(w.g, 9 * w.terms[b], 9 * n), part(w.l, 3 * w.terms[b], 3 * n)  # noqa: E741
     rP, P = part(bodies.rP_dm, 9 * c, 9 * n), part(bodies.P_dm, 3 * c, 3 * n)
-    contract(bodies.PP_dm, start, bodies.blocks, bodies.where[b, 9], q, qd, 9 * n, 3 * n, w.sorted, rP, g, l)
+    contract(bodies.PP_dm, start, bodies.blocks, bodies.where[b, PP_PLAN], q, qd, 9 * n, 3 * n, w.sorted, rP, g, l)
     copy(part(w.H, 3 * e, 3 * n), part(g, 6 * n, 3 * n))
     ox, oy, oz = omega
     xx, yy, zz = oy * oy + oz * oz, ox * ox + oz * oz, ox * ox + oy * oy
     xy, xz, yz = -2.0 * ox * oy, -2.0 * ox * oz, -2.0 * oy * oz
-    first = bodies.where[b, 2] + 6
+    first = bodies.where[b, IN_V] + 6
     f = part(w.f, first, n)
     omega2, damping = part(bodies.omega2, c, n), part(bodies.two_zeta_omega, c, n)
     g0, g1, g2, g3, g4, g5 = six_parts(g, n)
@@ -153,7 +154,7 @@ def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s):
 @inlined
 def inertia(gravity_field, bodies, w, x, v, b):
     """Rotation, first and second moments, right-hand side w.f (body axes) of body b, without markers' loads."""
-    n, i, j, normal = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 2], bodies.where[b, 7]
+    n, i, j, normal = bodies.where[b, N], bodies.where[b, IN_X], bodies.where[b, IN_V], bodies.where[b, NORMAL]
     A = w.A[b]
     rotation_matrix(x[i + 3], x[i + 4], x[i + 5], x[i + 6], A)
     omega = (v[j + 3], v[j + 4], v[j + 5])
@@ -225,13 +226,13 @@ def rotational_rows(s, J, M):
 def prepare_body(bodies, w, b):
     """What of the Schur complement of body b depends on the elastic diagonal alone: the factor T of the translational block
     m I - P_dm dinv P_dm^T."""
-    n, shared = bodies.where[b, 0], bodies.where[b, 8]
+    n, shared = bodies.where[b, N], bodies.where[b, IN_SHARED]
     P, dinv, T = part(bodies.P_dm, 3 * shared, 3 * n), part(w.dinv, shared, n), w.T[b]
     for r in range(3):
         for c in range(r + 1):
             product = weighted_product(part(P, r * n, n), part(P, c * n, n), dinv, n)
             T[r, c] = (bodies.mass[b] if r == c else 0.0) - product
-    i, j, k = bodies.where[b, 7], 0, 0
+    i, j, k = bodies.where[b, NORMAL], 0, 0
     if i >= 0:  # across the plane nothing moves
         j, k = (i + 1) % 3, (i + 2) % 3
         T[max(i, j), min(i, j)], T[max(i, k), min(i, k)], T[i, i] = 0.0, 0.0, bodies.mass[b]
@@ -245,9 +246,9 @@ def factorise(bodies, w, b):
 
     That of a rigid body is constant: it was there before.
     """
-    if bodies.where[b, 0] == 0:
+    if bodies.where[b, N] == 0:
         return w.L[b, 0, 0] > 0.0
-    n, normal = bodies.where[b, 0], bodies.where[b, 7]
+    n, normal = bodies.where[b, N], bodies.where[b, NORMAL]
     L, T = w.L[b], w.T[b]
     P, H, dinv = coupling(bodies, w, b)
     if normal >= 0:
@@ -260,7 +261,7 @@ def factorise(bodies, w, b):
 @inlined
 def coupling(bodies, w, b):
     """P_dm, H, dinv of body b: what couples its rigid and its elastic coordinates, and the inverse elastic diagonal."""
-    n, e, shared = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 8]
+    n, e, shared = bodies.where[b, N], bodies.where[b, IN_Q], bodies.where[b, IN_SHARED]
     return part(bodies.P_dm, 3 * shared, 3 * n), part(w.H, 3 * e, 3 * n), part(w.dinv, shared, n)
 
 
@@ -316,7 +317,7 @@ def weighted_product(left, right, weight, n):
 @inlined
 def reduce_forces(bodies, w, b):
     """w.rigid = L^-1 (f_rigid - C dinv f_elastic), and dinv f_elastic where the elastic accelerations of body b will be."""
-    n, j, normal = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 7]
+    n, j, normal = bodies.where[b, N], bodies.where[b, IN_V], bodies.where[b, NORMAL]
     f, z = part(w.f, j, 6 + n), w.rigid[b]
     for k in range(6):
         z[k] = f[k]
@@ -356,7 +357,7 @@ def reduce_in_space(P, H, dinv, d, n, z, elastic):
 def accelerate(bodies, w, b):
     """w.acc of body b from its reduced forces: the rigid part, L^-T w.rigid, and what is there of the elastic one less
     dinv C^T of it."""
-    n, j, normal = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 7]
+    n, j, normal = bodies.where[b, N], bodies.where[b, IN_V], bodies.where[b, NORMAL]
     z, acc = w.rigid[b], part(w.acc, j, 6 + n)
     rigid_upper(w.L[b], z, normal)
     for k in range(6):
@@ -381,16 +382,16 @@ def back_substitute(P, H, dinv, z, n, elastic):
 @kernel
 def mass_times(bodies, w, b, y, out):
     """out += M y for body b; y and out (6 + n,) in body axes; the true mass matrix (elastic block identity)."""
-    n, e = bodies.where[b, 0], bodies.where[b, 3]
+    n, e = bodies.where[b, N], bodies.where[b, IN_Q]
     s, linear, angular = get(w.s, b), (y[0], y[1], y[2]), (y[3], y[4], y[5])
     turn, lift = cross(angular, s), cross(s, linear)
     for k in range(3):
         out[k] += bodies.mass[b] * linear[k] + turn[k]
         out[3 + k] += lift[k] + dot(w.J[b, k], angular)
     if n > 0:
-        P, H = part(bodies.P_dm, 3 * bodies.where[b, 8], 3 * n), part(w.H, 3 * e, 3 * n)
-        if bodies.where[b, 7] >= 0:
-            mass_times_in_plane(P, H, y, n, bodies.where[b, 7], out)
+        P, H = part(bodies.P_dm, 3 * bodies.where[b, IN_SHARED], 3 * n), part(w.H, 3 * e, 3 * n)
+        if bodies.where[b, NORMAL] >= 0:
+            mass_times_in_plane(P, H, y, n, bodies.where[b, NORMAL], out)
             return
         momentum, spin = three_rows(P, part(y, 6, n), n), three_rows(H, part(y, 6, n), n)
         for k in range(3):
@@ -415,7 +416,7 @@ def energies(gravity, bodies, w, x, v, y, My):
     """(kinetic, strain, gravity) energy of all bodies; y, My scratch of the longest body. Needs `inertia` before."""
     kinetic, strain, potential = 0.0, 0.0, 0.0
     for b in range(bodies.mass.size):
-        n, i, j, shared = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 2], bodies.where[b, 8]
+        n, i, j, shared = bodies.where[b, N], bodies.where[b, IN_X], bodies.where[b, IN_V], bodies.where[b, IN_SHARED]
         linear = to_body(w.A[b], (v[j], v[j + 1], v[j + 2]))
         for k in range(3):
             y[k] = linear[k]

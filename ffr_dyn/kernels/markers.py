@@ -3,6 +3,7 @@
 from ffr_dyn.kernels.bodies import six_rows, weighted_product
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.simd.slices import part, six_parts
+from ffr_dyn.kernels.tables import IN_V, IN_X, NORMAL, N
 from ffr_dyn.kernels.vectors import add, cross, get, in_plane, of_two, put, scale, to_global
 
 
@@ -22,12 +23,12 @@ def update_marker(where, markers, w, x, v, k):
         put(w.r, k, u)
         put(w.u, k, u)
         return
-    n, i, j = where[b, 0], where[b, 1], where[b, 2]
+    n, i, j = where[b, N], where[b, IN_X], where[b, IN_V]
     ud = (0.0, 0.0, 0.0)
     if n > 0:
         phi = shapes(markers, k, n)
         q, qd = part(x, i + 7, n), part(v, j + 6, n)
-        normal = where[b, 7]
+        normal = where[b, NORMAL]
         if normal < 0:
             u0, u1, u2, t0, t1, t2 = six_rows(phi, q, n)
             u = (u[0] + u0, u[1] + u1, u[2] + u2)
@@ -153,7 +154,7 @@ def apply_wrench(where, markers, u, f, load, k, force, moment):
     b = markers.body[k]
     if b == where.shape[0] - 1:
         return
-    n, j = where[b, 0], where[b, 2]
+    n, j = where[b, N], where[b, IN_V]
     lever = cross(u, force)
     for c in range(3):
         f[j + c] += force[c]

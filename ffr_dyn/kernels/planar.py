@@ -6,6 +6,7 @@
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.products import contract
 from ffr_dyn.kernels.simd.slices import part, three_parts
+from ffr_dyn.kernels.tables import IN_PP_DM, IN_Q, IN_SHARED, IN_V, PP_PLAN, N
 from ffr_dyn.kernels.vectors import LEAST_PIVOT, copy, fill, in_plane, of_two
 
 
@@ -18,7 +19,7 @@ def sense(normal):
 @inlined
 def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, normal):
     """`flexible_terms` of a planar body that turns at the rate `omega`; without what acts across the plane."""
-    n, e, start, c = bodies.where[b, 0], bodies.where[b, 3], bodies.where[b, 4], bodies.where[b, 8]
+    n, e, start, c = bodies.where[b, N], bodies.where[b, IN_Q], bodies.where[b, IN_PP_DM], bodies.where[b, IN_SHARED]
     g, l = part(w.g, 9 * w.terms[b], 9 * n), part(w.l, 3 * w.terms[b], n)  # noqa: E741
     rP, P = part(bodies.rP_dm, 9 * c, 9 * n), part(bodies.P_dm, 3 * c, 3 * n)
     c0, c1, _ = in_plane(normal)
@@ -28,10 +29,10 @@ def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, norm
     copy(g0, r0)
     copy(g1, r1)
     copy(h, part(rP, turning * n, n))
-    terms, at = part(g, 0, 3 * n), bodies.where[b, 9]
+    terms, at = part(g, 0, 3 * n), bodies.where[b, PP_PLAN]
     contract(bodies.PP_dm, start, bodies.blocks, at, q, qd, 3 * n, n, w.sorted, terms, terms, l)
     copy(part(w.H, 3 * e + normal * n, n), h)
-    f = part(w.f, bodies.where[b, 2] + 6, n)
+    f = part(w.f, bodies.where[b, IN_V] + 6, n)
     omega2, damping = part(bodies.omega2, c, n), part(bodies.two_zeta_omega, c, n)
     P0, P1, square = part(P, c0 * n, n), part(P, c1 * n, n), omega * omega
     across, along = gravity[c0], gravity[c1]

@@ -23,17 +23,19 @@ Action = SpringDamper | JointForce
 AppliedLoad = Load | Action | Bushing | SurfaceLoad
 
 
+def markers_under(scene: Scene, load: AppliedLoad) -> tuple[int, ...]:
+    """The markers on which an applied load acts: one, two, or none where it is spread over a surface."""
+    if isinstance(load, Load):
+        return (marker_number(scene, load.marker),)
+    if isinstance(load, SurfaceLoad):
+        return ()
+    of: SpringDamper | Bushing | Joint = joint_under(scene, load) if isinstance(load, JointForce) else load
+    return marker_number(scene, of.i), marker_number(scene, of.j)
+
+
 def marker_numbers(scene: Scene) -> list[int]:
     """The markers on which applied loads act, in any order."""
-    names = [load.marker for load in scene.loads]
-    names += [end for spring in scene.springs for end in (spring.i, spring.j)]
-    for force in scene.forces:
-        if isinstance(force, Bushing):
-            names += [force.i, force.j]
-        elif isinstance(force, JointForce):
-            joint = joint_under(scene, force)
-            names += [joint.i, joint.j]
-    return [marker_number(scene, name) for name in names]
+    return [number for load in loads_of(scene) for number in markers_under(scene, load)]
 
 
 def actions_of(scene: Scene) -> list[Action]:
@@ -58,8 +60,8 @@ def loads_of(scene: Scene) -> list[AppliedLoad]:
 
 def coordinate_ends(scene: Scene, action: Action) -> tuple[int, int]:
     """Numbers of the markers i and j between which the coordinate of a force is."""
-    of: SpringDamper | Joint = action if isinstance(action, SpringDamper) else joint_under(scene, action)
-    return marker_number(scene, of.i), marker_number(scene, of.j)
+    i, j = markers_under(scene, action)
+    return i, j
 
 
 def coordinate_axes(scene: Scene, action: Action) -> Array:

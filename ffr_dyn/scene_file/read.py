@@ -283,14 +283,20 @@ def _model(name: str, entry: BodyEntry) -> FlexibleBody:
 def _settings(entry: Any, outputs: list[str], source: Source) -> Settings | MomentSettings:
     keep = tuple(outputs)
     if entry.kind in ("assemble", "static"):
-        return MomentSettings(entry.time, keep, Assemble() if entry.kind == "assemble" else Static())
+        return MomentSettings(
+            time=entry.time, outputs=keep, analysis=Assemble() if entry.kind == "assemble" else Static()
+        )
     if entry.kind == "linearise":
         inputs = (*_efforts("inputs", entry.inputs, source), *entry.loads)
-        return MomentSettings(entry.time, keep, Linearise(inputs, tuple(entry.quantities), entry.at_equilibrium))
+        return MomentSettings(
+            time=entry.time, outputs=keep, analysis=Linearise(inputs, tuple(entry.quantities), entry.at_equilibrium)
+        )
     method = _method(entry, source)
     stabilisation = _stabilisation(getattr(entry, "stabilisation", StabilisationEntry()))
-    span = (entry.start, entry.end, entry.output_step)
-    return Settings(*span, method, stabilisation, keep, _over_time(entry, source))
+    return Settings(
+        start=entry.start, end=entry.end, output_step=entry.output_step, method=method, stabilisation=stabilisation,
+        outputs=keep, analysis=_over_time(entry, source),
+    )  # fmt: skip
 
 
 def _with_chart(settings: Settings | MomentSettings, entry: ChartEntry, source: Source) -> Settings | MomentSettings:
@@ -303,7 +309,7 @@ def _with_chart(settings: Settings | MomentSettings, entry: ChartEntry, source: 
     methods = tuple((name, tuple(numbers)) for name, numbers in entry.methods.items())
     modes = tuple(None if number == "all" else number for number in entry.modes)
     drops = tuple(tuple(terms) for terms in entry.drop)
-    return replace(settings, chart=Charted(tuple(entry.measures), methods, modes, drops))
+    return replace(settings, chart=Charted(measures=tuple(entry.measures), methods=methods, modes=modes, drops=drops))
 
 
 def _method(entry: Any, source: Source) -> Integrator:

@@ -17,9 +17,12 @@ from ffr_prep.cli.matrices import reduce_matrices_command
 from ffr_prep.cli.options import PATH, bundle, check_points, check_writable, material_of, number_of, numbers_of
 from ffr_prep.cli.reduction import NOTES as REDUCTION_NOTES
 from ffr_prep.cli.request import REQUEST, reduce_to_file, request_of
+from ffr_prep.cli.settings import EntriesCommand
 from ffr_prep.cli.structure import reduce_structure_command
 from ffr_prep.cli.terminal import show, terminal_steps
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.registry import load_plugin
+from ffr_prep.reduction.registry import REDUCTIONS
 
 EXAMPLE = """\b
 Example:
@@ -54,18 +57,29 @@ MATERIAL_NOTES = """\b
 Materials: a name (steel, aluminium, titanium, ...), or E=7e10,nu=0.3,rho=5540 in SI units; for several volumes
   --material web=steel --material rim=E=7e10,nu=0.3,rho=2700, each with the name of a volume of the mesh.
 """
+_PATH = click.Path(path_type=Path)
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 120}
 
 
 @click.group(epilog=EXAMPLE, invoke_without_command=True, context_settings=CONTEXT)
 @click.version_option(package_name="ffr")
+@click.option(
+    "--plugin",
+    "plugins",
+    type=_PATH,
+    multiple=True,
+    metavar="FILE.py",
+    help="Run this Python first: it may register reductions and file formats; may be repeated.",
+)
 @click.pass_context
-def cli(context: click.Context) -> None:
+def cli(context: click.Context, plugins: tuple[Path, ...]) -> None:
     """From a mesh to a reduced flexible body for multibody dynamics in the floating frame of reference.
 
     `reduce` computes a body file from a mesh or a CAD geometry; `mesh` shows what is in a mesh; `info` and `modes` show
     what is in a body file, in numbers and in pictures.
     """
+    for plugin in plugins:
+        load_plugin(plugin)
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
 
@@ -107,7 +121,7 @@ def mesh(mesh: Path, **options: Any) -> None:
     check_mesh(loaded)
 
 
-@cli.command(epilog=f"{REDUCE_NOTES}{REDUCTION_NOTES}\n{MATERIAL_NOTES}")
+@cli.command(cls=EntriesCommand, registries=(REDUCTIONS,), epilog=f"{REDUCE_NOTES}{REDUCTION_NOTES}\n{MATERIAL_NOTES}")
 @_MESH
 @click.option("--material", "materials", multiple=True, required=True, metavar="MATERIAL", help="See below.")
 @REQUEST

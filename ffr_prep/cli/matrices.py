@@ -11,20 +11,20 @@ import click
 
 from ffr_prep.cli.options import PATH, check_writable
 from ffr_prep.cli.request import REQUEST, reduce_to_file, request_of
+from ffr_prep.cli.settings import EntriesCommand
 from ffr_prep.cli.terminal import show, terminal_steps
 from ffr_prep.common.errors import InputError
+from ffr_prep.matrices.formats import MATRIX_FORMATS
+from ffr_prep.matrices.unit_systems import UNIT_SYSTEMS
+from ffr_prep.reduction.registry import REDUCTIONS
 
 if TYPE_CHECKING:
     from ffr_prep.matrices.model import MatrixModel
 
-_UNITS = ("m-kg-s", "mm-t-s", "mm-kg-s", "mm-kg-ms", "cm-g-s", "in-lbf-s", "ft-lbf-s")
 _SHOWN = 20
 NOTES = """\b
 Files: what other programs write, always of the free body without supports.
-  MODEL.npz                      everything in one file: points, dofs, K, M, groups
-  K.mtx M.mtx DOFS.csv           Matrix Market (or scipy's save_npz) and a line node,component,x,y,z for each row
-  STIF.mtx MASS.mtx MODEL.inp    Abaqus, *MATRIX OUTPUT, STIFFNESS, MASS; the nodes and node sets of the input file
-  MATRICES.op4 MODEL.bdf         Nastran, KGG and MGG; or MODEL.op2 with BGPDT and EQEXIN (pip install 'ffr[nastran]')
+{matrix format}
 
 \b
 Groups: nodes get names in the files, or here.
@@ -42,9 +42,11 @@ Reference conditions and methods are those of `ffr-prep reduce`. Geometric stiff
 """
 
 
-@click.command("reduce-matrices", epilog=NOTES)
+@click.command("reduce-matrices", cls=EntriesCommand, registries=(REDUCTIONS, MATRIX_FORMATS), epilog=NOTES)
 @click.argument("files", type=PATH, nargs=-1, required=True)
-@click.option("--units", type=click.Choice(_UNITS), help="Of the numbers in FILES; default: as declared, or m-kg-s.")
+@click.option(
+    "--units", type=click.Choice(list(UNIT_SYSTEMS)), help="Of the numbers in FILES; default: as declared, or m-kg-s."
+)
 @click.option("--group", "groups", multiple=True, metavar="GROUP", help="See below; may be repeated.")
 @click.option("--surface", type=PATH, help="Mesh of the same solid, for drawing; in the length unit of FILES.")
 @REQUEST

@@ -20,7 +20,7 @@ from ffr_prep.common.errors import InputError
 if TYPE_CHECKING:
     from ffr_prep.mesh.mesh import Mesh
     from ffr_prep.model.coupled import InterfaceRegion
-    from ffr_prep.model.material import Material
+    from ffr_prep.model.material import Solid
     from ffr_prep.model.reference import ReferenceConditions
 
 PATH = click.Path(path_type=Path)
@@ -55,11 +55,13 @@ def number_of(what: str, text: str) -> float:
         raise InputError(f"{what}: {text!r} is not a number") from None
 
 
-def material_of(texts: Sequence[str]) -> Material | Mapping[str, Material]:
+def material_of(texts: Sequence[str]) -> Solid | Mapping[str, Solid]:
     """One material, or materials by group where a text is GROUP=MATERIAL."""
     from ffr_prep.model.material import parse_material
 
-    groups = [re.fullmatch(r"(?!(?:E|nu|rho|name)=)([^=,]+)=(.+)", text) for text in texts]
+    groups = [
+        re.fullmatch(r"(?!(?:E[123]?|nu(?:12|13|23)?|G(?:12|13|23)|rho|name)=)([^=,]+)=(.+)", text) for text in texts
+    ]
     if len(texts) == 1 and groups[0] is None:
         return parse_material(texts[0])
     wrong = [text for text, group in zip(texts, groups, strict=True) if group is None]

@@ -16,6 +16,7 @@ from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.matrices.nodal_inertia import DofMap
+from ffr_prep.matrices.unit_systems import UnitSystem
 
 Array = np.ndarray
 
@@ -29,26 +30,6 @@ _COMPONENTS = (
     "rotation about y",
     "rotation about z",
 )
-
-
-@dataclass(frozen=True)
-class UnitSystem:
-    """What the numbers of a file count: length [m], mass [kg], time [s]; forces follow from them."""
-
-    length: float
-    mass: float
-    time: float
-
-
-UNIT_SYSTEMS: Mapping[str, UnitSystem] = {
-    "m-kg-s": UnitSystem(1.0, 1.0, 1.0),
-    "mm-t-s": UnitSystem(1e-3, 1e3, 1.0),
-    "mm-kg-s": UnitSystem(1e-3, 1.0, 1.0),
-    "mm-kg-ms": UnitSystem(1e-3, 1.0, 1e-3),
-    "cm-g-s": UnitSystem(1e-2, 1e-3, 1.0),
-    "in-lbf-s": UnitSystem(0.0254, 4.4482216152605 / 0.0254, 1.0),
-    "ft-lbf-s": UnitSystem(0.3048, 4.4482216152605 / 0.3048, 1.0),
-}
 
 
 @dataclass(frozen=True, repr=False)

@@ -19,8 +19,7 @@ from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.model import Model
 from ffr_prep.model.reactions import in_equilibrium, known_loads
 from ffr_prep.model.reference import ReferenceConditions, functionals
-from ffr_prep.reduction.basis import Basis, check_basis, factorised
-from ffr_prep.reduction.component_modes import Reduction
+from ffr_prep.reduction.basis import Basis, Reduction, check_basis, factorised
 from ffr_prep.reduction.quality import assess, completed
 from ffr_prep.reduction.selection import Band
 from ffr_prep.solvers.factor import CHOLESKY, FreeBody, Solver, SupportedBody, solve_refined, supported

@@ -24,7 +24,7 @@ Paths are relative to the file; SI units but for the numbers of the geometry, wh
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -44,26 +44,16 @@ from ffr_prep.pipelines.structure_schema import (
     InterfaceEntry,
     MemberEntry,
     PanelEntry,
-    ReductionEntry,
     ReferenceEntry,
     SimplySupportedEntry,
     SolidEntry,
     StructureEntry,
     SupportsEntry,
+    structure_schema,
 )
 from ffr_prep.pipelines.tied import tied
-from ffr_prep.reduction.component_modes import (
-    CharacteristicModes,
-    CraigBampton,
-    Eigenmodes,
-    Guyan,
-    Reduction,
-    Rubin,
-    Union,
-)
-from ffr_prep.reduction.krylov import Krylov
-from ffr_prep.reduction.selection import Accuracy, Band, Selection, UpTo
-from ffr_prep.reduction.static_shapes import AttachmentModes, InertiaRelief
+from ffr_prep.reduction.registry import reduction_of
+from ffr_prep.reduction.selection import Band
 from ffr_prep.solids.assembly import Materials
 from ffr_prep.solids.model import from_mesh
 from ffr_prep.structures.frame import Frame, Member, Shell, joined, named, panel, polyline, triangulated
@@ -114,7 +104,7 @@ def read_structure(path: str | Path, progress: Stages = no_stages) -> Structure:
             request=Request(
                 name=entry.name or path.stem,
                 reference=_reference(entry.reference),
-                reduction=_reduction(entry.reduction),
+                reduction=reduction_of([vars(of) for of in entry.reduction], path.parent),
                 stiffening=entry.stiffening,
                 stress=entry.stress,
                 quality=None if entry.quality is None else Band(*entry.quality),
@@ -126,7 +116,7 @@ def read_structure(path: str | Path, progress: Stages = no_stages) -> Structure:
 
 def _read(path: Path) -> StructureEntry:
     try:
-        return StructureEntry.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+        return structure_schema().model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
     except FileNotFoundError:
         raise InputError(f"structure file {path} does not exist") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -244,33 +234,3 @@ def _reference(entry: ReferenceEntry) -> ReferenceConditions:
     if isinstance(entry, SupportsEntry):
         return Supports(tuple(Support(**vars(support)) for support in entry.supports))
     return MeanAxis()
-
-
-def _reduction(entries: Sequence[ReductionEntry]) -> Reduction:
-    """One, or the space of several."""
-    parts = tuple(_part(entry) for entry in entries)
-    return parts[0] if len(parts) == 1 else Union(parts)
-
-
-def _part(entry: ReductionEntry) -> Reduction:
-    selection = _selection(entry)
-    made: dict[str, Reduction] = {
-        "craig-bampton": CraigBampton(selection),
-        "eigenmodes": Eigenmodes(selection),
-        "rubin": Rubin(selection),
-        "guyan": Guyan(),
-        "characteristic": CharacteristicModes(selection, entry.interface_modes),
-        "attachment": AttachmentModes(),
-        "inertia-relief": InertiaRelief(),
-        "krylov": Krylov(entry.moments, tuple(entry.match)),
-    }
-    return made[entry.method]
-
-
-def _selection(entry: ReductionEntry) -> Selection:
-    if entry.accuracy is not None:
-        low, high, tolerance = entry.accuracy
-        return Accuracy(Band(low, high), tolerance)
-    if entry.frequency is not None:
-        return UpTo(entry.frequency)
-    return 10 if entry.modes is None else entry.modes

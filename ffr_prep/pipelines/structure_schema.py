@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, create_model, field_validator, model_validator
 
 from ffr_prep.common.strict import Strict
+from ffr_prep.reduction.registry import REDUCTIONS, method_of
 
 Vector = tuple[float, float, float]
 
@@ -162,28 +163,21 @@ ReferenceEntry = Annotated[
 
 
 class ReductionEntry(Strict):
-    """A reduction (see `ffr_prep.reduction.component_modes`) with a number of normal modes, 10 when nothing is said, or all
-    up to a frequency [Hz], or as many as a relative accuracy of the receptances in a band [low, high, error] needs.
-
-    interface_modes : of characteristic; moments, match : of krylov, how many at which frequencies [Hz]
+    """A reduction, of a method in `ffr_prep.reduction.registry` or a file of one's own vectors, with a number of normal
+    modes, 10 when nothing is said, or all up to a frequency [Hz], or as many as a relative accuracy of the receptances in
+    a band [low, high, error] needs. `structure_schema` adds the settings of the methods.
     """
 
-    method: Literal[
-        "craig-bampton",
-        "eigenmodes",
-        "rubin",
-        "guyan",
-        "characteristic",
-        "attachment",
-        "inertia-relief",
-        "krylov",
-    ] = "craig-bampton"
+    method: str = next(iter(REDUCTIONS)).name
     modes: int | None = Field(default=None, ge=0)
     frequency: float | None = None
     accuracy: tuple[float, float, float] | None = None
-    interface_modes: int = Field(default=6, ge=0)
-    moments: int = Field(default=2, ge=1)
-    match: list[float] = [0.0]
+
+    @field_validator("method")
+    @classmethod
+    def _registered(cls, method: str) -> str:
+        method_of(method)
+        return method
 
     @model_validator(mode="after")
     def _one(self) -> ReductionEntry:
@@ -221,7 +215,7 @@ class StructureEntry(Strict):
     solids: dict[str, SolidEntry] = {}
     ties: list[tuple[str, str]] = []
     reference: ReferenceEntry = MeanAxisEntry(kind="mean-axis")
-    reduction: list[ReductionEntry] = Field(default=[ReductionEntry()], min_length=1)
+    reduction: list[ReductionEntry]
     stiffening: bool = False
     stress: bool = False
     quality: tuple[float, float] | None = None
@@ -240,3 +234,13 @@ class StructureEntry(Strict):
         if "frame" in self.solids:
             raise ValueError("the part 'frame' is that of beams and plates: give the solid another name")
         return self
+
+
+def structure_schema() -> type[StructureEntry]:
+    """The schema of the whole file, with the settings of all registered reductions."""
+    settings: dict[str, Any] = {
+        s.name: (s.type, Field(default=s.default, ge=s.least, description=s.help)) for s in REDUCTIONS.settings()
+    }
+    entry = create_model("ReductionEntry", __base__=ReductionEntry, **settings)
+    several = (list[entry], Field(default=[entry()], min_length=1))  # type: ignore[valid-type]
+    return create_model("StructureEntry", __base__=StructureEntry, reduction=several)

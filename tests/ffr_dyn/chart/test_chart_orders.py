@@ -23,7 +23,7 @@ from ffr_prep.body import rigid_body
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import SimplySupported
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.structures.frame import Member, named, polyline
 from ffr_prep.structures.sections import circle, rectangle
 
@@ -79,7 +79,11 @@ def slider_crank() -> Scene:
         Joint("wrist", "revolute", "rod.b", "slider.pin"),
         Joint("guide", "translational", "ground.O", "slider.pin", axis=(1, 0, 0)),
     )
-    bodies = (Body("crank", crank), Body("rod", rod, (0.15, 0, 0)), Body("slider", slider, (0.45, 0, 0)))
+    bodies = (
+        Body("crank", crank),
+        Body("rod", rod, position=(0.15, 0, 0)),
+        Body("slider", slider, position=(0.45, 0, 0)),
+    )
     return Scene(bodies, joints, (Driver("motor", "bearing", polynomial(0.0, 150.0)),), ground={"O": (0, 0, 0)})
 
 

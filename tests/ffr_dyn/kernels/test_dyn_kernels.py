@@ -11,17 +11,18 @@ from synthetic import cloud, mirrored
 
 from ffr_dyn.compile.body_tables import loads_that_stiffen, of_coordinates
 from ffr_dyn.compile.engine import evaluate_at, new_machine
-from ffr_dyn.compile.scene_tables import System, compile_scene
+from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.compile.symmetry_blocks import in_blocks
-from ffr_dyn.consistency.assemble import drive_of, rows_at
+from ffr_dyn.equations.constraint_rows import drive_of, rows_at
 from ffr_dyn.equations.constraints import evaluate_word
 from ffr_dyn.equations.inertia import elastic_force, gravity_force, mass_matrix, quadratic_velocity
 from ffr_dyn.equations.layout import layout
+from ffr_dyn.equations.motion import equations_of_motion
 from ffr_dyn.functions.rotation import G_bar, rotation_matrix, skew
 from ffr_dyn.functions.time_functions import evaluate, harmonic, polynomial, table
 from ffr_dyn.integrators import RK4
 from ffr_dyn.kernels.functions import evaluate_functions
-from ffr_dyn.kernels.tables import LANES, OK, Functions
+from ffr_dyn.kernels.tables import IN_Q, LANES, OK, Functions
 from ffr_dyn.scene.drivers import Driver, PointDriver
 from ffr_dyn.scene.forces import Load
 from ffr_dyn.scene.joints import KINDS, Joint
@@ -158,27 +159,6 @@ def chain(n_first: int = 4, n_second: int = 3, kind: str = "revolute", **joint) 
     )
 
 
-def dense(system: System, x, v):
-    """Twin: block-diagonal mass matrix, forces, constraint rows of the compiled blocks, all as dense arrays."""
-    scene, place = system.scene, system.layout
-    M, f = np.zeros((place.v_size, place.v_size)), np.zeros(place.v_size)
-    for b, body in enumerate(scene.bodies):
-        at = slice(place.iv[b], place.iv[b] + 6 + place.n[b])
-        q, q_dot, omega = x[place.q(b)], v[place.q_dot(b)], v[place.omega(b)]
-        M[at, at] = mass_matrix(body.model, q)
-        f[at] = (
-            quadratic_velocity(body.model, q, omega, q_dot)
-            + elastic_force(body.model, body.damping, q, q_dot)
-            + gravity_force(body.model, q, rotation_matrix(x[place.p(b)]), scene.gravity)
-        )
-    rows = [
-        evaluate_word(scene, place, x, v, word, block.markers, drive_of(word, 0.0))
-        for block in system.blocks
-        for word in block.words
-    ]
-    return M, f, rows
-
-
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("sizes", [(4, 3), (0, 5), (3, 0), (0, 0), (1, 2)])
 def test_compiled_accelerations_and_multipliers_equal_the_dense_solution(kind, sizes):
@@ -187,19 +167,15 @@ def test_compiled_accelerations_and_multipliers_equal_the_dense_solution(kind, s
     x, v = random_state(scene)
     machine = new_machine(system, x, v)
     assert evaluate_at(machine, 0.0, x, v) == OK
-    work = machine.work
-    M, f, rows = dense(system, x, v)
-    J = np.array([row.jacobian for row in rows])
-    gamma = np.array([row.gamma for row in rows])
-    size = gamma.size
-    K = np.block([[M, J.T], [J, np.zeros((size, size))]])
-    solution = np.linalg.solve(K, np.concatenate([f, gamma]))
+    work, twin = machine.work, equations_of_motion(scene, 0.0, x, v, system.blocks)
+    rows, gamma = twin.rows, np.array([row.gamma for row in twin.rows])
+    solution, size = np.concatenate([twin.acceleration, twin.lam]), twin.Q.size
     np.testing.assert_allclose(work.rows.Phi, [row.Phi for row in rows], rtol=0, atol=1e-13)
     np.testing.assert_allclose(work.rows.nu, [row.nu for row in rows], rtol=0, atol=1e-12)
     np.testing.assert_allclose(work.rows.gamma, gamma, rtol=0, atol=1e-11)
     scale = np.abs(solution).max()
-    np.testing.assert_allclose(work.bodies.acc, solution[: f.size], rtol=0, atol=1e-10 * scale)
-    np.testing.assert_allclose(work.rows.lam, solution[f.size :], rtol=0, atol=1e-9 * scale)
+    np.testing.assert_allclose(work.bodies.acc, solution[:size], rtol=0, atol=1e-10 * scale)
+    np.testing.assert_allclose(work.rows.lam, solution[size:], rtol=0, atol=1e-9 * scale)
 
 
 # ---- products in blocks ------------------------------------------------------------------------------------------------
@@ -221,11 +197,9 @@ def test_a_symmetric_body_is_computed_in_blocks_and_equals_its_twin(planes, bloc
     x, v = random_state(scene)
     machine = new_machine(system, x, v)
     assert evaluate_at(machine, 0.0, x, v) == OK
-    M, f, rows = dense(system, x, v)
-    J, gamma = np.array([row.jacobian for row in rows]), np.array([row.gamma for row in rows])
-    K = np.block([[M, J.T], [J, np.zeros((gamma.size, gamma.size))]])
-    solution = np.linalg.solve(K, np.concatenate([f, gamma]))
-    np.testing.assert_allclose(machine.work.bodies.acc, solution[: f.size], rtol=0, atol=1e-10 * np.abs(solution).max())
+    twin = equations_of_motion(scene, 0.0, x, v, system.blocks)
+    scale = max(np.abs(twin.acceleration).max(), np.abs(twin.lam).max())
+    np.testing.assert_allclose(machine.work.bodies.acc, twin.acceleration, rtol=0, atol=1e-10 * scale)
 
 
 def products_by_plan(pool, plan, q, count, last):
@@ -289,7 +263,7 @@ def test_geometric_stiffness_in_blocks_is_the_sum_of_the_whole(n, families, symm
     assert evaluate_at(machine, 0.0, x, v) == OK
     work = machine.work.bodies
     for b, at_marker in ((0, 24), (2, 12)):
-        loads, first = loads_that_stiffen(system.model.bodies, b), system.model.bodies.where[b, 3]
+        loads, first = loads_that_stiffen(system.model.bodies, b), system.model.bodies.where[b, IN_Q]
         assert loads.tolist() == [k for k in (*range(12), *range(at_marker, at_marker + 6)) if K[k].any()]
         expected = np.einsum("l,lij,j->i", work.load[b, loads], K[loads], x[system.layout.q(b)])
         found = work.stiff[first : first + n]
@@ -355,9 +329,9 @@ def constraint_cases():
 def test_jacobian_rate_and_right_hand_side_equal_finite_differences(kind, sizes, coordinate):
     scene = chain(*sizes, kind=kind, axis=(0.2, 1.0, 0.3), axis_j=(1.0, -0.5, 0.4))
     if coordinate == "path":
-        scene = replace(scene, drivers=(PointDriver("drive", "one.a", "two.a", DRIVE, None, 0.3),))
+        scene = replace(scene, drivers=(PointDriver("drive", "one.a", "two.a", x=DRIVE, y=None, z=0.3),))
     elif coordinate:
-        scene = replace(scene, drivers=(Driver("drive", "tie", DRIVE, coordinate),))
+        scene = replace(scene, drivers=(Driver("drive", "tie", DRIVE, coordinate=coordinate),))
     system = compile_scene(scene)
     x, v = random_state(scene)
     place, h, t = system.layout, 1e-5, 0.37
@@ -415,7 +389,7 @@ def test_skew_and_G_bar_conventions():
     ("kind", "coordinate"), [("revolute", "angle"), ("cylindrical", "angle"), ("cylindrical", "stroke")]
 )
 def test_compiled_drivers_equal_the_readable_ones(kind, coordinate):
-    scene = replace(chain(kind=kind), drivers=(Driver("drive", "tie", DRIVE, coordinate),))
+    scene = replace(chain(kind=kind), drivers=(Driver("drive", "tie", DRIVE, coordinate=coordinate),))
     system = compile_scene(scene)
     (x, v), t = random_state(scene), 0.37
     machine = new_machine(system, x, v)

@@ -23,7 +23,7 @@ from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import rigid_body
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 
 GRAVITY = (0.0, -9.81, 0.0)
 
@@ -242,7 +242,7 @@ def test_driven_stroke_of_a_slider():
     scene = Scene(
         (Body("block", block),),
         (Joint("guide", "translational", "ground.O", "block.c", axis=(1, 0, 0)),),
-        (Driver("push", "guide", polynomial(0, 1, 2), "stroke"),),
+        (Driver("push", "guide", polynomial(0, 1, 2), coordinate="stroke"),),
         ground={"O": (0, 0, 0)},
     )
     result = forward(scene, end=0.5, output_step=0.1, method=RK4(1e-2))

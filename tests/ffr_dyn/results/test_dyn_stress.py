@@ -50,8 +50,10 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.mesh import Block
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo, MeanAxis
-from ffr_prep.reduction.component_modes import CraigBampton, Eigenmodes, Union
-from ffr_prep.reduction.static_shapes import InertiaRelief
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
+from ffr_prep.reduction.methods.inertia_relief import InertiaRelief
+from ffr_prep.reduction.methods.union import Union
 from ffr_prep.structures.frame import Member, named, polyline
 from ffr_prep.structures.sections import rectangle
 

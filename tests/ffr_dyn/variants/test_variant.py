@@ -27,7 +27,7 @@ from ffr_prep.body import BodyError, axial, rigid_body
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import SimplySupported
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 
 
 def two_interfaces(n: int = 16):
@@ -183,7 +183,11 @@ def test_dropping_the_stiffening_is_the_body_without_it():
 
 def test_a_scene_file_says_what_is_dropped(tmp_path):
     scene = vary(Scene((Body("b", cloud(3)),)), drop=("I9", "I5"))
-    save_scene(scene, Settings(0.0, 1.0, 0.1, RK4(0.01), Projection()), tmp_path / "s.toml")
+    save_scene(
+        scene,
+        Settings(start=0.0, end=1.0, output_step=0.1, method=RK4(0.01), stabilisation=Projection()),
+        tmp_path / "s.toml",
+    )
     assert load_scene(tmp_path / "s.toml")[0].bodies[0].dropped == ("I5", "I9")
 
 

@@ -19,7 +19,8 @@ from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.interchange.mbdyn import read_fem, write_fem
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo, MeanAxis
-from ffr_prep.reduction.component_modes import CraigBampton, Eigenmodes
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 
 INTEGRALS = ("mass", "r_dm", "rr_dm", "P_dm", "rP_dm", "PP_dm", "omega2")
 FULL = (1, 2, 5, 6, 7, 8, 9, 10, 12, 14, 15, 16, 17, 18)

@@ -18,7 +18,7 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.interchange.sid import blocks, read_sid, write_sid
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 
 LAYOUTS = ("mode-major", "axis-major")
 INTEGRALS = ("mass", "r_dm", "rr_dm", "P_dm", "rP_dm", "PP_dm", "omega2")

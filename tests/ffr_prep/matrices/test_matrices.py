@@ -18,9 +18,7 @@ from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.progress import no_stages
 from ffr_prep.matrices.interfaces import couple_matrices, tie_matrices
 from ffr_prep.matrices.model import (
-    UNIT_SYSTEMS,
     MatrixModel,
-    UnitSystem,
     group_nodes,
     in_si,
     with_group,
@@ -29,10 +27,12 @@ from ffr_prep.matrices.model import (
     without_empty_rows,
 )
 from ffr_prep.matrices.nodal_inertia import DofMap, nodal_integrals, rigid_motions, scalar_integrals, scalar_mass
+from ffr_prep.matrices.unit_systems import UNIT_SYSTEMS, UnitSystem
 from ffr_prep.mesh.mesh import Block, Mesh, surface_triangles
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, UserConditions
-from ffr_prep.reduction.component_modes import CraigBampton, Eigenmodes
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.sections import rectangle
 
 ENDS = (InterfaceRegion("root"), InterfaceRegion("tip"))

@@ -13,7 +13,7 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo
 from ffr_prep.pipelines.tied import tied
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.structures.frame import Member, Shell, named, panel, polyline
 from ffr_prep.structures.sections import rectangle
 

@@ -20,13 +20,14 @@ from ffr_prep.body import load_body
 from ffr_prep.cli import main
 from ffr_prep.cli.matrices import reduce_matrices_command
 from ffr_prep.common.errors import InputError
-from ffr_prep.matrices.model import UNIT_SYSTEMS, MatrixModel, row_in_words, with_group
+from ffr_prep.matrices.model import MatrixModel, row_in_words, with_group
 from ffr_prep.matrices.nastran import GridTable, grids_of_deck, grids_of_op2, model_of_nastran
 from ffr_prep.matrices.npz import save_matrices
 from ffr_prep.matrices.readers import read_matrices
+from ffr_prep.matrices.unit_systems import UNIT_SYSTEMS
 from ffr_prep.mesh.abaqus import nodes_from_abaqus
 from ffr_prep.model.reference import MeanAxis
-from ffr_prep.reduction.component_modes import Eigenmodes
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.sections import rectangle
 
 

@@ -5,6 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 from boxes import STEEL, box_mesh, moved, rotation, shaken
+from synthetic import cloud
 
 import ffr_prep as fp
 from ffr_prep.body import axial
@@ -13,7 +14,7 @@ from ffr_prep.model.invariants import inertia_integrals
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, functionals
 from ffr_prep.reduction.basis import factorised
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.solids.assembly import assemble
 from ffr_prep.solids.interfaces import couple
 
@@ -162,6 +163,16 @@ def test_I8_and_I9_are_products_of_skew_matrices(body):
     """Integral of u~ v~ = v u^T - (u . v) 1, so that I9_ij^T = I9_ji and the trace of I8_j is -2 tr rP_dm_j."""
     np.testing.assert_allclose(body.I9, body.I9.transpose(1, 0, 3, 2), atol=1e-14)
     np.testing.assert_allclose(np.einsum("jkk->j", body.I8), -2 * np.einsum("kkj->j", body.rP_dm), rtol=1e-12)
+    points = cloud(4)  # mass points, whose integrals are sums
+    mass, u, Phi = np.array(points.provenance["masses"]), points.surface.points, points.surface.Phi
+    u, Phi = (skew(vectors) for vectors in (u, np.moveaxis(Phi, 2, 0)))
+    np.testing.assert_allclose(points.I8, np.einsum("p,pkm,jpml->jkl", mass, u, Phi), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(points.I9, np.einsum("p,ipkm,jpml->ijkl", mass, Phi, Phi), rtol=0, atol=1e-13)
+
+
+def skew(vectors):
+    """(..., 3, 3) matrices a~ of vectors (..., 3): a~ b = a x b."""
+    return np.stack([np.cross(vectors, axis) for axis in np.eye(3)], axis=-1)
 
 
 @pytest.mark.parametrize("reference", [FixedTo("left"), MeanAxis()], ids=lambda r: type(r).__name__)

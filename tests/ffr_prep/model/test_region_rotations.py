@@ -23,8 +23,8 @@ from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, SimplySupported
 from ffr_prep.model.region_rotations import region_stiffening, second_order_turn
-from ffr_prep.reduction.component_modes import CraigBampton
 from ffr_prep.reduction.conversion import with_reference
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.solids.assembly import assemble
 from ffr_prep.solids.interfaces import couple, turning_regions
 from ffr_prep.structures.beam_stiffening import beam_stiffening, section_forces, strain_functions

@@ -17,10 +17,16 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.model.material import Material, material
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports
 from ffr_prep.pipelines.structure_file import read_structure
-from ffr_prep.reduction.component_modes import CharacteristicModes, CraigBampton, Eigenmodes, Guyan, Rubin, Union
-from ffr_prep.reduction.krylov import Krylov
+from ffr_prep.reduction.methods.attachment import AttachmentModes
+from ffr_prep.reduction.methods.characteristic import CharacteristicModes
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
+from ffr_prep.reduction.methods.guyan import Guyan
+from ffr_prep.reduction.methods.inertia_relief import InertiaRelief
+from ffr_prep.reduction.methods.krylov import Krylov
+from ffr_prep.reduction.methods.rubin import Rubin
+from ffr_prep.reduction.methods.union import Union
 from ffr_prep.reduction.selection import Accuracy, Band, UpTo
-from ffr_prep.reduction.static_shapes import AttachmentModes, InertiaRelief
 from ffr_prep.structures.frame import Member, Shell, check_frame
 from ffr_prep.structures.sections import circle, general, i_section, rectangle, shear_rigid, shifted, tube
 

@@ -19,9 +19,12 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports, UserConditions
-from ffr_prep.reduction.component_modes import CraigBampton, Eigenmodes, Rubin, Union
 from ffr_prep.reduction.conversion import with_reference
-from ffr_prep.reduction.static_shapes import InertiaRelief
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
+from ffr_prep.reduction.methods.inertia_relief import InertiaRelief
+from ffr_prep.reduction.methods.rubin import Rubin
+from ffr_prep.reduction.methods.union import Union
 
 SIZE = (1.0, 0.12, 0.07)
 BOTH = (InterfaceRegion("left"), InterfaceRegion("right", kind="mean"))

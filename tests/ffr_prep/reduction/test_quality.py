@@ -23,11 +23,15 @@ from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, functionals
 from ffr_prep.reduction.basis import factorised
-from ffr_prep.reduction.component_modes import CraigBampton, Eigenmodes, Guyan, Rubin, Union
 from ffr_prep.reduction.mesh_resolution import element_edges, elements_per_wavelength, resolution_warnings
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
+from ffr_prep.reduction.methods.guyan import Guyan
+from ffr_prep.reduction.methods.inertia_relief import InertiaRelief
+from ffr_prep.reduction.methods.rubin import Rubin
+from ffr_prep.reduction.methods.union import Union
 from ffr_prep.reduction.quality import assess, quality_of, steady_errors
 from ffr_prep.reduction.selection import Accuracy, Band, UpTo
-from ffr_prep.reduction.static_shapes import InertiaRelief
 from ffr_prep.report.quality_pictures import quality_pictures
 from ffr_prep.report.text import body_lines, quality_lines, short_lines
 from ffr_prep.solids.assembly import assemble

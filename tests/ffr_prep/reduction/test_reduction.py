@@ -16,7 +16,10 @@ from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports, functionals
 from ffr_prep.reduction.basis import Basis, check_basis, factorised
-from ffr_prep.reduction.component_modes import CharacteristicModes, CraigBampton, Eigenmodes, Rubin
+from ffr_prep.reduction.methods.characteristic import CharacteristicModes
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
+from ffr_prep.reduction.methods.rubin import Rubin
 from ffr_prep.reduction.selection import Accuracy, Band
 from ffr_prep.solids.assembly import assemble
 from ffr_prep.solids.interfaces import couple

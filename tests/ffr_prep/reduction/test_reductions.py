@@ -15,11 +15,18 @@ from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports, functionals
 from ffr_prep.reduction.basis import check_basis, factorised
-from ffr_prep.reduction.component_modes import CharacteristicModes, CraigBampton, Eigenmodes, Guyan, Rubin, Union
-from ffr_prep.reduction.krylov import Krylov, dynamic_solver
+from ffr_prep.reduction.methods.attachment import AttachmentModes
+from ffr_prep.reduction.methods.characteristic import CharacteristicModes
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
+from ffr_prep.reduction.methods.guyan import Guyan
+from ffr_prep.reduction.methods.inertia_relief import InertiaRelief
+from ffr_prep.reduction.methods.krylov import Krylov, dynamic_solver
+from ffr_prep.reduction.methods.rubin import Rubin
+from ffr_prep.reduction.methods.union import Union
+from ffr_prep.reduction.methods.user_vectors import UserVectors
 from ffr_prep.reduction.receptance import free_modes, receptance_error, receptances, reference_modes, static_flexibility
 from ffr_prep.reduction.selection import Accuracy, Band, UpTo
-from ffr_prep.reduction.static_shapes import AttachmentModes, InertiaRelief, UserVectors
 from ffr_prep.solids.assembly import assemble
 from ffr_prep.solids.interfaces import couple
 from ffr_prep.solids.stiffening import inertial_loads

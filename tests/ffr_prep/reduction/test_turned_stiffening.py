@@ -20,8 +20,8 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports
 from ffr_prep.pipelines.tied import tied
-from ffr_prep.reduction.component_modes import CraigBampton
 from ffr_prep.reduction.conversion import with_reference
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.structures.frame import Member, Shell, joined, named, panel, polyline
 from ffr_prep.structures.sections import circle, rectangle
 

@@ -17,7 +17,7 @@ from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, functionals
 from ffr_prep.reduction.basis import factorised
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.solids.assembly import STIFFNESS_ORDER, assemble
 from ffr_prep.solids.interfaces import couple
 from ffr_prep.solids.model import boundary

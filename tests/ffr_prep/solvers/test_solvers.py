@@ -18,7 +18,8 @@ from ffr_prep.body import load_body
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo, MeanAxis
-from ffr_prep.reduction.component_modes import CraigBampton, Eigenmodes
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.solvers import slepc
 from ffr_prep.solvers.factor import Solver, factorise
 from ffr_prep.solvers.slepc import mpi_solve, started

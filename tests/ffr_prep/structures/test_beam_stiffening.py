@@ -21,7 +21,8 @@ from ffr_prep.model.accelerations import unit_accelerations
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
-from ffr_prep.reduction.component_modes import CraigBampton, Eigenmodes
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.frame import Member, named, polyline
 from ffr_prep.structures.sections import Section, circle, general, rectangle, shear_rigid, with_mass_moments
 

@@ -10,7 +10,8 @@ from test_structural import STEEL, regions, space_frame, straight
 import ffr_prep as fp
 from ffr_prep.body import SECTION_FORCES, BodyError, load_body, save_body, truncated
 from ffr_prep.model.reference import FixedTo
-from ffr_prep.reduction.component_modes import CraigBampton, Eigenmodes
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.beam_stress import section_forces_at
 from ffr_prep.structures.sections import circle, i_section, rectangle, shear_rigid, shifted, tube, with_mass_moments
 

@@ -11,7 +11,7 @@ from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import material
 from ffr_prep.model.reference import FixedTo
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.structures.frame import Member, Shell, check_frame, joined, polyline
 from ffr_prep.structures.frame_geometry import read_frame
 from ffr_prep.structures.sections import i_section, rectangle, tube

@@ -14,7 +14,7 @@ from ffr_prep.body import FlexibleBody
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.structures.element_families import families
 from ffr_prep.structures.frame import Frame, Shell, panel, triangulated
 from ffr_prep.structures.model import assemble_frame, element_values

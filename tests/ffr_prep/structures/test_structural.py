@@ -22,7 +22,8 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports
-from ffr_prep.reduction.component_modes import CraigBampton, Eigenmodes
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.beams import axis_functions, beams, field, mass_points, stiffness, undeformed
 from ffr_prep.structures.element_families import beam_elements, families
 from ffr_prep.structures.frame import Frame, Member, check_frame, group_nodes, joined, named, polyline

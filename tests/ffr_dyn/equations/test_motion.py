@@ -1,0 +1,134 @@
+"""The equations of motion as on paper against the compiled ones: whole scenes, with all they may have."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_dyn_forces import PAIRS, SPREAD, loaded
+from test_dyn_kernels import DRIVE, chain, random_state
+from test_dyn_plane import slider_crank
+from test_dyn_singular import bricard
+
+from ffr_dyn.compile.engine import evaluate_at, new_machine
+from ffr_dyn.compile.scene_tables import System, compile_scene
+from ffr_dyn.consistency.assemble import RELAXATION, assemble
+from ffr_dyn.equations.constraint_rows import blocks_of
+from ffr_dyn.equations.motion import equations_of_motion, position_rates
+from ffr_dyn.functions.time_functions import harmonic
+from ffr_dyn.kernels.tables import OK
+from ffr_dyn.scene.couplings import Coupling
+from ffr_dyn.scene.drivers import Driver, PointDriver
+from ffr_dyn.scene.forces import Load
+from ffr_dyn.scene.joints import KINDS
+from ffr_dyn.scene.scene import INERTIA_TERMS, Scene
+
+T = 0.37
+FRAMES = {"axis": (0.2, 1.0, 0.3), "axis_j": (1.0, -0.5, 0.4)}
+
+
+def stiffened(body, seed: int = 4):
+    """The body with a geometric stiffness by every load, some hundredths of its own."""
+    K = np.random.default_rng(seed).normal(size=(12 + 6 * len(body.interfaces), body.n, body.n))
+    return replace(body, stiffening=1e-2 * (K + K.transpose(0, 2, 1)))
+
+
+def assert_twins(system: System, t: float, x, v, *, rtol: float = 1e-9) -> None:
+    """Rows, accelerations and multipliers of the compiled evaluation, against those on paper."""
+    machine = new_machine(system, x, v)
+    for _ in range(4):  # loads that stiffen begin with those of the last solution
+        assert evaluate_at(machine, t, x, v) == OK
+    work, twin = machine.work, equations_of_motion(system.scene, t, x, v, system.blocks)
+    for name in ("Phi", "nu", "gamma"):
+        given = np.array([getattr(row, name) for row in twin.rows])
+        np.testing.assert_allclose(
+            getattr(work.rows, name), given, rtol=0, atol=1e-11 * max(1.0, np.abs(given).max(initial=0))
+        )
+    for found, given in ((work.bodies.acc, twin.acceleration), (work.rows.lam, twin.lam)):
+        np.testing.assert_allclose(found, given, rtol=0, atol=rtol * np.abs(given).max(initial=1e-3))
+
+
+DRIVEN = {
+    "angle": ("revolute", Driver("drive", "tie", DRIVE, "angle")),
+    "stroke": ("translational", Driver("drive", "tie", DRIVE, "stroke")),
+    "path": ("spherical", PointDriver("drive", "one.a", "two.a", DRIVE, None, 0.3)),
+}
+LOADS = (
+    Load("global", "one.b", (1, harmonic(amplitude=2, frequency=1), 3), (0, 1, 2)),
+    Load("body", "two.b", (1, 2, 3), function=lambda t, state: [t, 1, 2, 3, 4, 5], axes="body"),
+)
+
+
+def cases() -> dict[str, Scene]:
+    """A scene of everything there is to a scene; all in states at random, far off their joints."""
+    found = {kind: chain(kind=kind, **FRAMES) for kind in KINDS}
+    found |= {f"driven {name}": replace(chain(kind=kind), drivers=(driver,)) for name, (kind, driver) in DRIVEN.items()}
+    found |= {name: loaded(force) for name, force in (PAIRS | SPREAD).items()}
+    arms = replace(
+        found["cylindrical"], joints=tuple(replace(j, kind="cylindrical") for j in found["cylindrical"].joints)
+    )
+    for first, second in (("root.angle", "tie.angle"), ("root.stroke", "tie.angle")):
+        found[f"coupled {first} {second}"] = replace(arms, couplings=(Coupling("gear", first, second, -1.5, 0.2),))
+    found["loads"] = replace(chain(), loads=LOADS)
+    shaken = (harmonic(amplitude=1, frequency=2), 0.0, 3.0)
+    found["shaken base"] = replace(chain(), base_acceleration=shaken)
+    found["no joint"] = replace(chain(), joints=())
+    bodies = chain().bodies
+    for term in INERTIA_TERMS:
+        found[f"without {term}"] = replace(chain(), bodies=tuple(replace(body, dropped=(term,)) for body in bodies))
+    return found
+
+
+@pytest.mark.parametrize("scene", cases().values(), ids=cases())
+def test_the_compiled_motion_is_the_one_on_paper(scene):
+    for seed in (3, 8):
+        assert_twins(compile_scene(scene), T, *random_state(scene, seed))
+
+
+STIFFENED = ("revolute", "screw", "distance", "driven angle", "coupled root.angle tie.angle", "loads", "bushing",
+             "curved spring", "servo", "pressure", "shaken base", "no joint")  # fmt: skip
+
+
+@pytest.mark.parametrize("name", STIFFENED)
+def test_with_geometric_stiffening_too(name):
+    """By the loads of the moment: of the frame, of what acts at interfaces, of joints, drivers and couplings."""
+    scene = cases()[name]
+    plain = scene
+    scene = replace(scene, bodies=tuple(replace(body, model=stiffened(body.model)) for body in scene.bodies))
+    x, v = random_state(scene)
+    assert_twins(compile_scene(scene), T, x, v, rtol=1e-7)
+    twins = [equations_of_motion(one, T, x, v).acceleration for one in (plain, scene)]
+    assert np.abs(twins[1] - twins[0]).max() > 1e-3 * np.abs(twins[0]).max()
+
+
+@pytest.mark.parametrize("plane", ["auto", "none"])
+@pytest.mark.parametrize("stiffening", [False, True])
+def test_in_the_plane_and_in_space(plane, stiffening):
+    """A slider-crank in its plane has three coordinates a body; in space three of its rows depend on others."""
+    assembled = assemble(replace(slider_crank(rod={"stiffening": stiffening}), plane=plane))
+    system = assembled.system
+    assert (system.scene.plane == "z") == (plane == "auto")
+    assert_twins(system, 0.0, assembled.x, assembled.v, rtol=1e-6)
+    if assembled.all_rows is not None:
+        assert_twins(assembled.all_rows, 0.0, assembled.x, assembled.v, rtol=1e-6)
+
+
+def test_of_dependent_rows_the_smallest_multipliers_are_given():
+    """Bricard's mechanism: a row too many in every position."""
+    assembled = assemble(bricard())
+    rows = sum(len(block.words) for block in blocks_of(assembled.system.scene))
+    assert assembled.all_rows is not None
+    assert assembled.all_rows.model.rows.kind.size == rows == assembled.system.model.rows.kind.size + 1
+    assert assembled.all_rows.model.relaxation == RELAXATION
+    assert_twins(assembled.all_rows, 0.0, assembled.x, assembled.v, rtol=1e-6)
+
+
+def test_euler_parameters_keep_their_length_and_turn_by_the_angular_velocity():
+    scene = chain(0, 2)
+    x, v = random_state(scene)
+    system = compile_scene(scene)
+    rates = position_rates(system.layout, x, v)
+    for b in range(2):
+        assert x[system.layout.p(b)] @ rates[system.layout.p(b)] == pytest.approx(0.0, abs=1e-14)
+        assert 2 * np.linalg.norm(rates[system.layout.p(b)]) == pytest.approx(np.linalg.norm(v[system.layout.omega(b)]))
