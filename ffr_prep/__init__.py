@@ -38,18 +38,25 @@ _BY_MODULE = {
     "ffr_prep.matrices.readers": "read_matrices",
     "ffr_prep.mesh.mesh": "Block Mesh check_mesh read_mesh",
     "ffr_prep.model.coupled": "InterfaceRegion",
-    "ffr_prep.model.material": "Material material",
+    "ffr_prep.model.material": "AnisotropicMaterial Material material orthotropic",
     "ffr_prep.model.model": "Model",
     "ffr_prep.model.reference": "FixedTo MeanAxis SimplySupported Support Supports UserConditions",
     "ffr_prep.pipelines.reduce": "Request reduce",
     "ffr_prep.pipelines.structure_file": "Structure read_structure",
     "ffr_prep.pipelines.tied": "tied",
-    "ffr_prep.reduction.component_modes": "CharacteristicModes CraigBampton Eigenmodes Guyan Rubin Union",
     "ffr_prep.reduction.conversion": "with_reference",
-    "ffr_prep.reduction.krylov": "Krylov",
+    "ffr_prep.reduction.methods.attachment": "AttachmentModes",
+    "ffr_prep.reduction.methods.characteristic": "CharacteristicModes",
+    "ffr_prep.reduction.methods.craig_bampton": "CraigBampton",
+    "ffr_prep.reduction.methods.eigenmodes": "Eigenmodes",
+    "ffr_prep.reduction.methods.guyan": "Guyan",
+    "ffr_prep.reduction.methods.inertia_relief": "InertiaRelief",
+    "ffr_prep.reduction.methods.krylov": "Krylov",
+    "ffr_prep.reduction.methods.rubin": "Rubin",
+    "ffr_prep.reduction.methods.union": "Union",
+    "ffr_prep.reduction.methods.user_vectors": "UserVectors",
     "ffr_prep.reduction.quality": "Quality quality_of",
     "ffr_prep.reduction.selection": "Accuracy Band UpTo",
-    "ffr_prep.reduction.static_shapes": "AttachmentModes InertiaRelief UserVectors",
     "ffr_prep.report.mode_pictures": "mode_pictures",
     "ffr_prep.report.quality_pictures": "quality_pictures",
     "ffr_prep.solids.model": "from_mesh",
@@ -57,7 +64,8 @@ _BY_MODULE = {
     "ffr_prep.structures.frame": "Frame Member Shell joined named panel polyline triangulated",
     "ffr_prep.structures.frame_geometry": "read_frame",
     "ffr_prep.structures.model": "from_frame",
-    "ffr_prep.structures.sections": "Section circle general i_section rectangle shear_rigid shifted tube with_mass_moments",
+    "ffr_prep.structures.sections": "Section circle general i_section rectangle shear_rigid shifted tube "
+    "with_mass_moments",
 }
 __all__, __getattr__, __dir__ = front_door(__name__, _BY_MODULE)
 
@@ -66,9 +74,9 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     # isort: off
     __version__: str
     from ffr_prep.body import (
-        BeamForces as BeamForces, BodyError as BodyError, FlexibleBody as FlexibleBody,
-        Interface as Interface, Surface as Surface, load_body as load_body, rigid_body as rigid_body,
-        save_body as save_body, truncated as truncated, with_point as with_point,
+        BeamForces as BeamForces, BodyError as BodyError, FlexibleBody as FlexibleBody, Interface as Interface,
+        Surface as Surface, load_body as load_body, rigid_body as rigid_body, save_body as save_body,
+        truncated as truncated, with_point as with_point,
     )
     from ffr_prep.common.errors import ComputationError as ComputationError, InputError as InputError
     from ffr_prep.interchange.mbdyn import read_fem as read_fem, write_fem as write_fem
@@ -82,7 +90,10 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_prep.matrices.readers import read_matrices as read_matrices
     from ffr_prep.mesh.mesh import Block as Block, Mesh as Mesh, check_mesh as check_mesh, read_mesh as read_mesh
     from ffr_prep.model.coupled import InterfaceRegion as InterfaceRegion
-    from ffr_prep.model.material import Material as Material, material as material
+    from ffr_prep.model.material import (
+        AnisotropicMaterial as AnisotropicMaterial, Material as Material, material as material,
+        orthotropic as orthotropic,
+    )
     from ffr_prep.model.model import Model as Model
     from ffr_prep.model.reference import (
         FixedTo as FixedTo, MeanAxis as MeanAxis, SimplySupported as SimplySupported, Support as Support,
@@ -91,19 +102,19 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_prep.pipelines.reduce import Request as Request, reduce as reduce
     from ffr_prep.pipelines.structure_file import Structure as Structure, read_structure as read_structure
     from ffr_prep.pipelines.tied import tied as tied
+    from ffr_prep.reduction.conversion import with_reference as with_reference
+    from ffr_prep.reduction.methods.attachment import AttachmentModes as AttachmentModes
     from ffr_prep.reduction.methods.characteristic import CharacteristicModes as CharacteristicModes
     from ffr_prep.reduction.methods.craig_bampton import CraigBampton as CraigBampton
     from ffr_prep.reduction.methods.eigenmodes import Eigenmodes as Eigenmodes
     from ffr_prep.reduction.methods.guyan import Guyan as Guyan
+    from ffr_prep.reduction.methods.inertia_relief import InertiaRelief as InertiaRelief
+    from ffr_prep.reduction.methods.krylov import Krylov as Krylov
     from ffr_prep.reduction.methods.rubin import Rubin as Rubin
     from ffr_prep.reduction.methods.union import Union as Union
-    from ffr_prep.reduction.conversion import with_reference as with_reference
-    from ffr_prep.reduction.methods.krylov import Krylov as Krylov
+    from ffr_prep.reduction.methods.user_vectors import UserVectors as UserVectors
     from ffr_prep.reduction.quality import Quality as Quality, quality_of as quality_of
     from ffr_prep.reduction.selection import Accuracy as Accuracy, Band as Band, UpTo as UpTo
-    from ffr_prep.reduction.methods.attachment import AttachmentModes as AttachmentModes
-    from ffr_prep.reduction.methods.inertia_relief import InertiaRelief as InertiaRelief
-    from ffr_prep.reduction.methods.user_vectors import UserVectors as UserVectors
     from ffr_prep.report.mode_pictures import mode_pictures as mode_pictures
     from ffr_prep.report.quality_pictures import quality_pictures as quality_pictures
     from ffr_prep.solids.model import from_mesh as from_mesh

@@ -32,7 +32,6 @@ _COMPONENTS = (
 )
 
 
-@dataclass(frozen=True)
 @dataclass(frozen=True, repr=False)
 class MatrixModel(Brief):
     """Nodes, stiffness and mass of a free body, from outside; frozen, SI units.

@@ -154,8 +154,10 @@ def test_a_plate_on_a_solid_and_a_beam_on_the_plate(tmp_path):
 
 def test_one_model_alone_is_the_body_of_its_kind():
     mesh = box_mesh("hex20", (0.3, B, H), (3, 1, 1))
-    model = fp.from_mesh(mesh, STEEL, [InterfaceRegion("root", "left")])
-    request = fp.Request(name="b", stiffening=True, **END)
+    model, request = (
+        fp.from_mesh(mesh, STEEL, [InterfaceRegion("root", "left")]),
+        fp.Request(name="b", stiffening=True, **END),
+    )
     whole = fp.reduce(model, request)
     part = fp.reduce(tied({"one": model}, []), request)
     for key in ("omega2", "rr_dm", "PP_dm", "rP_dm", "stiffening"):
