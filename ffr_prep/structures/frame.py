@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from itertools import pairwise
 
 import numpy as np
@@ -15,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from ffr_prep.body import content_hash
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.registry import choice
 from ffr_prep.model.material import Material
 from ffr_prep.structures.sections import Section
 
@@ -254,10 +254,8 @@ def _size(points: Array) -> float:
 def group_nodes(frame: Frame, name: str) -> Array:
     """(m,) nodes of a group, ascending; InputError lists the groups there are."""
     if name not in frame.node_groups:
-        near = get_close_matches(name, frame.node_groups, n=1, cutoff=0.5)
-        known = ", ".join(repr(one) for one in frame.node_groups) or "none; name nodes with named(frame, ...)"
-        meant = f"did you mean {near[0]!r}? There" if near else "there"
-        raise InputError(f"the frame has no group of nodes {name!r}; {meant} are: {known}")
+        hint = "" if frame.node_groups else "; name nodes with named(frame, ...)"
+        raise InputError(f"the frame has no group of nodes {name!r}; {choice(name, frame.node_groups)}{hint}")
     return np.unique(frame.node_groups[name])
 
 
