@@ -2,8 +2,6 @@
 
 A method is a frozen dataclass with its settings; its compiled unit does one step of a machine's state (see
 `ffr_dyn.kernels.entry_points`).
-
-Twin: none, declarations.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""How index-1 equations are kept on their constraints.
-
-Twin: none, data.
-"""
+"""How index-1 equations are kept on their constraints."""
 
 from __future__ import annotations
 

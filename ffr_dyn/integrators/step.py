@@ -1,7 +1,4 @@
-"""The step of methods that do not choose it.
-
-Twin: none, data.
-"""
+"""The step of methods that do not choose it."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What the error of a step may be, for methods that choose their steps.
-
-Twin: none, data.
-"""
+"""What the error of a step may be, for methods that choose their steps."""
 
 from __future__ import annotations
 

@@ -3,8 +3,6 @@
 A unit is given the address of the packed tables, a time and two more addresses, and returns a status. Units and integrators
 call one another through the addresses in `Tables.units`, so each is compiled alone: nothing is compiled twice, an
 integrator costs no more than its own few lines, and compilation can be shared among processes.
-
-Twin: `ffr_dyn.equations.motion.equations_of_motion`.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Finite motions of all bodies: rotations by rotation vectors, and how large a motion is.
-
-Twin: `ffr_dyn.consistency.evaluation.moved`.
-"""
+"""Finite motions of all bodies: rotations by rotation vectors, and how large a motion is."""
 
 import math
 

@@ -1,7 +1,4 @@
-"""What an integrator calls: the units by name, on the unpacked tables r.
-
-Twin: none, names of calls.
-"""
+"""What an integrator calls: the units by name, on the unpacked tables r."""
 
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.simd.table_address import call_unit

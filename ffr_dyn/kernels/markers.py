@@ -1,8 +1,4 @@
-"""Markers: points and small elastic rotations that move with the deformation; their velocities and bias accelerations.
-
-Twin: `ffr_dyn.equations.kinematics.point_motion`,
-`ffr_dyn.equations.kinematics.axis_motion`.
-"""
+"""Markers: points and small elastic rotations that move with the deformation; their velocities and bias accelerations."""
 
 from ffr_dyn.kernels.bodies import six_rows, weighted_product
 from ffr_dyn.kernels.options import inlined, kernel

@@ -1,7 +1,4 @@
-"""What is kept at an output time.
-
-Twin: `ffr_dyn.equations.inertia.energies`.
-"""
+"""What is kept at an output time."""
 
 from ffr_dyn.kernels.bodies import energies
 from ffr_dyn.kernels.options import inlined

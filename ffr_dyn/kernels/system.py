@@ -3,8 +3,6 @@
 Order of calls: `prepare` once per elastic diagonal; `evaluate_bodies`, `evaluate_markers`, the loads, the constraint rows,
 `evaluate_joints` at a state; then any number of solutions (`ffr_dyn.kernels.solution`) with its factors. Compiled as units in
 `ffr_dyn.kernels.entry_points`, and called as such where more than one place does.
-
-Twin: `ffr_dyn.equations.motion.equations_of_motion`.
 """
 
 from ffr_dyn.kernels.bodies import coupling, factorise, inertia, normalise, prepare_body, rotation_matrix

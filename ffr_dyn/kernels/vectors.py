@@ -1,8 +1,4 @@
-"""Vectors of three as tuples: they live in registers.
-
-Twin: `ffr_dyn.functions.rotation.cross`,
-`ffr_dyn.functions.rotation.skew`.
-"""
+"""Vectors of three as tuples: they live in registers."""
 
 from ffr_dyn.kernels.options import kernel
 

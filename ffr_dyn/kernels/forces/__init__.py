@@ -1,4 +1,1 @@
-"""Applied forces, compiled.
-
-Twin: `ffr_dyn.equations.forces.applied`.
-"""
+"""Applied forces, compiled."""

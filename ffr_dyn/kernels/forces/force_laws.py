@@ -1,6 +1,6 @@
 """Force laws of a joint coordinate or a length: what acts on it, positive where it increases it.
 
-Twin: `ffr_dyn.equations.forces.applied`.
+Readable twin: `ffr_dyn.equations.forces`.
 """
 
 import math

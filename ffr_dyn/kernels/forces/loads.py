@@ -1,7 +1,4 @@
-"""All applied loads: wrenches on markers, forces on coordinates, bushings, spread loads, values of Python functions.
-
-Twin: `ffr_dyn.equations.forces.applied`.
-"""
+"""All applied loads: wrenches on markers, forces on coordinates, bushings, spread loads, values of Python functions."""
 
 from numba import types
 

@@ -1,7 +1,4 @@
-"""Loads spread over a body: their integrals over its basis (`ffr_dyn.scene.surface_loads`) at the present q and rotation.
-
-Twin: `ffr_dyn.scene.surface_loads.distributed`.
-"""
+"""Loads spread over a body: their integrals over its basis (`ffr_dyn.scene.surface_loads`) at the present q and rotation."""
 
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.simd.slices import part

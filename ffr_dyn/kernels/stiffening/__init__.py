@@ -1,4 +1,1 @@
-"""Geometric stiffening by load, compiled.
-
-Twin: `ffr_dyn.equations.stiffening.geometric_stiffening`.
-"""
+"""Geometric stiffening by load, compiled."""
