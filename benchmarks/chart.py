@@ -44,7 +44,7 @@ from benchmarks.scenes import (  # noqa: E402
     with_middle,
 )
 from ffr_dyn.chart.diagram import CPU, Diagram, Lost, Point, spread, work_precision  # noqa: E402
-from ffr_dyn.chart.draw import draw  # noqa: E402
+from ffr_dyn.chart.draw import draw_chart  # noqa: E402
 from ffr_dyn.chart.measures import Measure, Quantity  # noqa: E402
 from ffr_dyn.chart.orders import orders  # noqa: E402
 from ffr_dyn.chart.page import write_page  # noqa: E402
@@ -286,11 +286,11 @@ def main() -> None:
             report(case, shown[-1])
             write_table(shown[-1], Path("out") / f"work_precision_{len(shown)}.csv")
             write_page(shown[-1], Path("out") / f"work_precision_{len(shown)}.html")
-    print(draw(shown, "out/work_precision_all.png", title="Work and precision"))
+    print(draw_chart(shown, "out/work_precision_all.png", title="Work and precision"))
     deflections = [replace(diagram, measures=diagram.measures[1:]) for diagram in shown]
     for suffix in (".png", ".svg"):
         picture = given.picture.with_name(given.picture.name + suffix)
-        print(draw(deflections, picture, title="Work and precision", columns=3))
+        print(draw_chart(deflections, picture, title="Work and precision", columns=3))
     print(f"load at the end {os.getloadavg()[0]:.1f}")
 
 

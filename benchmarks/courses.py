@@ -149,7 +149,7 @@ def drive(start: Assembled, course: Course, method: Integrator, stabilisation: S
     machine = new_machine(start.system, start.x, start.v, method, gains(stabilisation), spacing=spacing)
     record, watch = new_record(start.system, course.rows), Stopwatch()
     with watch:
-        status = fill_rows(machine, method, record, 0.0, substeps)
+        status = fill_rows(machine, record, 0.0, substeps)
     return Run(record.r, watch.cpu, int(machine.work.info[1])) if status == OK else None
 
 

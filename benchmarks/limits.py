@@ -74,7 +74,7 @@ def timer(scene: Scene, method: Integrator) -> Callable[[], float]:
     def run(steps: int) -> float:
         machine.x[:], machine.v[:], machine.tables.clock.steps[0], machine.work.info[1] = x, v, 0, 0
         began = time.process_time()
-        status = fill_rows(machine, method, out, 0.0, steps)
+        status = fill_rows(machine, out, 0.0, steps)
         if status != OK:
             raise RuntimeError(f"{method} stopped with status {status}")
         return time.process_time() - began

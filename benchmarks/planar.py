@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+import ffr_prep as fp
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import RK4, ROS2, Integrator
@@ -25,8 +26,7 @@ from ffr_prep.body import FlexibleBody, rigid_body
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import SimplySupported
-from ffr_prep.pipelines.structures import reduce_frame
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.structures.frame import Member, named, polyline
 from ffr_prep.structures.sections import rectangle
 
@@ -38,12 +38,9 @@ def flexible_link(length: float, modes: int) -> FlexibleBody:
     """An aluminium bar of 13 x 20 mm with `modes` normal modes and six more from its interfaces."""
     member = Member(rectangle(0.013, 0.02), Material("aluminium", 7e10, 0.3, 2700.0), orientation=(0, 1, 0))
     frame = named(polyline([(0, 0, 0), (length, 0, 0)], member, elements=12), a=(0, 0, 0), b=(length, 0, 0))
-    return reduce_frame(
-        frame,
-        name="link",
-        interfaces=[InterfaceRegion("a"), InterfaceRegion("b")],
-        reference=SimplySupported("a", "b"),
-        reduction=CraigBampton(modes),
+    return fp.reduce(
+        fp.from_frame(frame, [InterfaceRegion("a"), InterfaceRegion("b")]),
+        fp.Request(name="link", reference=SimplySupported("a", "b"), reduction=CraigBampton(modes)),
     )
 
 
@@ -58,7 +55,7 @@ def chain(link: FlexibleBody) -> Scene:
     """Links of 1 m that hang one on the other in revolute joints, released from the horizontal."""
     ends = ["ground.O", *(f"l{k}.b" for k in range(LINKS - 1))]
     return Scene(
-        tuple(Body(f"l{k}", link, (k, 0, 0)) for k in range(LINKS)),
+        tuple(Body(f"l{k}", link, position=(k, 0, 0)) for k in range(LINKS)),
         tuple(Joint(f"j{k}", "revolute", ends[k], f"l{k}.a") for k in range(LINKS)),
         ground={"O": (0, 0, 0)},
         gravity=(0, -9.81, 0),
@@ -68,7 +65,11 @@ def chain(link: FlexibleBody) -> Scene:
 def slider_crank(rod: FlexibleBody) -> Scene:
     block = rigid_body("block", mass=0.4, inertia=np.eye(3) * 1e-4, points={"pin": np.zeros(3)})
     return Scene(
-        (Body("crank", rigid_link(0.1, 0.5)), Body("rod", rod, (0.1, 0, 0)), Body("block", block, (0.4, 0, 0))),
+        (
+            Body("crank", rigid_link(0.1, 0.5)),
+            Body("rod", rod, position=(0.1, 0, 0)),
+            Body("block", block, position=(0.4, 0, 0)),
+        ),
         (
             Joint("main", "revolute", "ground.O", "crank.a"),
             Joint("big", "revolute", "crank.b", "rod.a"),

@@ -101,7 +101,7 @@ def ours(scene: Scene, method: Integrator, *, per_evaluation: bool) -> Runner:
         machine.x[:], machine.v[:] = start.x, start.v
         work.info[1] = 0
         began = time.process_time()
-        status = fill_rows(machine, method, out, 0.0, steps)
+        status = fill_rows(machine, out, 0.0, steps)
         took = time.process_time() - began
         if status != OK:
             raise RuntimeError(f"{method} on {len(scene.bodies)} bodies stopped with status {status}")

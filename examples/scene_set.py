@@ -17,6 +17,7 @@ from functools import cache, partial
 
 import numpy as np
 
+import ffr_prep as fp
 from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.time_functions import TimeFunction, harmonic
 from ffr_dyn.scene.drivers import Driver
@@ -27,8 +28,7 @@ from ffr_prep.body import FlexibleBody, rigid_body
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, ReferenceConditions, SimplySupported
-from ffr_prep.pipelines.structures import reduce_frame
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.structures.frame import Member, named, polyline
 from ffr_prep.structures.sections import Section, circle, general, rectangle, tube
 
@@ -64,14 +64,9 @@ def beam(
     """A straight beam along x' from interface "a" to "b", with `modes` normal modes and six of its interfaces."""
     member = Member(section, material, orientation=(0, 1, 0))
     frame = named(polyline([(0, 0, 0), (length, 0, 0)], member, elements=16), a=(0, 0, 0), b=(length, 0, 0))
-    return reduce_frame(
-        frame,
-        name=name,
-        interfaces=[InterfaceRegion("a"), InterfaceRegion("b")],
-        reference=reference,
-        reduction=CraigBampton(modes),
-        stiffening=True,
-        stress=True,
+    return fp.reduce(
+        fp.from_frame(frame, [InterfaceRegion("a"), InterfaceRegion("b")]),
+        fp.Request(name=name, reference=reference, reduction=CraigBampton(modes), stiffening=True, stress=True),
     )
 
 
@@ -99,7 +94,7 @@ def block(name: str, mass: float, size: float) -> FlexibleBody:
 def placed(name: str, model: FlexibleBody, start: tuple[float, float], end: tuple[float, float]) -> Body:
     """A body in the xy plane whose x' axis points from start to end [m]."""
     angle = float(np.arctan2(end[1] - start[1], end[0] - start[0]))
-    return Body(name, model, (*start, 0.0), (0, 0, angle), damping=DAMPING)
+    return Body(name, model, position=(*start, 0.0), rotation=(0, 0, angle), damping=DAMPING)
 
 
 def distance(start: tuple[float, float], end: tuple[float, float]) -> float:
@@ -115,7 +110,7 @@ def slider_crank(speed: float) -> Scene:
     bodies = (
         placed("crank", crank, (0, 0), (0.15, 0)),
         placed("rod", rod, (0.15, 0), (0.45, 0)),
-        Body("slider", block("slider", rod.mass / 2, 0.02), (0.45, 0, 0)),
+        Body("slider", block("slider", rod.mass / 2, 0.02), position=(0.45, 0, 0)),
     )
     joints = (
         Joint("bearing", "revolute", "ground.O", "crank.a"),
@@ -176,7 +171,7 @@ def six_bodies() -> Scene:
     bodies = (
         *base.bodies,
         placed("rod", rod, C, slider),
-        Body("slider", block("slider", 0.1, 0.02), (*slider, 0)),
+        Body("slider", block("slider", 0.1, 0.02), position=(*slider, 0)),
         placed("hanger", hanger, slider, (slider[0], slider[1] - 0.2)),
     )
     joints = (
@@ -194,7 +189,7 @@ def chain(count: int = 6) -> Scene:
     """Links of 0.3 m in a row, the first held by the ground, released from the horizontal."""
     link = bar("link", 0.3, rectangle(0.017, 0.005), ALUMINIUM)
     ends = ["ground.O", *(f"link{k}.b" for k in range(count - 1))]
-    bodies = tuple(Body(f"link{k}", link, (0.3 * k, 0, 0), damping=DAMPING) for k in range(count))
+    bodies = tuple(Body(f"link{k}", link, position=(0.3 * k, 0, 0), damping=DAMPING) for k in range(count))
     joints = tuple(Joint(f"joint{k}", "revolute", ends[k], f"link{k}.a") for k in range(count))
     return Scene(bodies, joints, ground={"O": (0, 0, 0)}, gravity=GRAVITY, name="chain")
 
@@ -205,10 +200,10 @@ def robot() -> Scene:
     fore = cantilever("fore", 0.8, tube(0.016, 0.001), ALUMINIUM)
     tool = block("tool", 0.1, 0.03)
     bodies = (
-        Body("column", column, (0, 0, 0), (0, 0, np.pi / 2), damping=DAMPING),
-        Body("upper", upper, (0, 0.4, 0), damping=DAMPING),
-        Body("fore", fore, (0.6, 0.4, 0), damping=DAMPING),
-        Body("tool", tool, (1.4, 0.4, 0)),
+        Body("column", column, position=(0, 0, 0), rotation=(0, 0, np.pi / 2), damping=DAMPING),
+        Body("upper", upper, position=(0, 0.4, 0), damping=DAMPING),
+        Body("fore", fore, position=(0.6, 0.4, 0), damping=DAMPING),
+        Body("tool", tool, position=(1.4, 0.4, 0)),
     )
     joints = (
         Joint("yaw", "revolute", "ground.O", "column.a", axis=(0, 1, 0), axis_j=(1, 0, 0)),
@@ -227,8 +222,8 @@ def appendage() -> Scene:
     boom = cantilever("boom", 2.0, tube(0.02, 0.001), ALUMINIUM)
     bodies = (
         Body("bus", bus, damping=DAMPING),
-        Body("boom", boom, (0.5, 0, 0), damping=DAMPING),
-        Body("mass", block("mass", 0.2, 0.05), (2.5, 0, 0)),
+        Body("boom", boom, position=(0.5, 0, 0), damping=DAMPING),
+        Body("mass", block("mass", 0.2, 0.05), position=(2.5, 0, 0)),
     )
     joints = (Joint("root", "fixed", "bus.b", "boom.a"), Joint("tip", "fixed", "boom.b", "mass.pin"))
     push = harmonic(amplitude=4.0, frequency=0.5)

@@ -97,7 +97,7 @@ def bar(name: str, length: float = 1.0, mass: float = 1.0, inertia: tuple[float,
 def pendulum(*models: FlexibleBody, **more: Any) -> Scene:
     """Bodies in a row, the first on a hinge at the origin, released from the horizontal."""
     starts = np.cumsum([0.0, *(model.interface("b").position[0] for model in models)])
-    bodies = tuple(Body(model.name, model, (x, 0, 0)) for model, x in zip(models, starts[:-1], strict=True))
+    bodies = tuple(Body(model.name, model, position=(x, 0, 0)) for model, x in zip(models, starts[:-1], strict=True))
     before = ["ground.O", *(f"{model.name}.b" for model in models[:-1])]
     joints = tuple(Joint(f"hinge{k}", "revolute", before[k], f"{m.name}.a") for k, m in enumerate(models))
     return Scene(bodies, joints, ground={"O": (0, 0, 0)}, **{"gravity": GRAVITY, "plane": "z"} | more)

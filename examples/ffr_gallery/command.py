@@ -28,8 +28,8 @@ def stability(names: tuple[str, ...], output: Path, quick: bool) -> None:
     explicit-limit, index3-conditioning, drift, baumgarte, euler-angles, singular-four-bar, redundant-bricard, spin-up,
     reference-conditions, large-deformation, numerical-damping, long-time-energy
     """
-    from ffr_gallery import EXHIBITS, SHORT
     from ffr_gallery.exhibit import draw, lines
+    from ffr_gallery.exhibits import EXHIBITS, SHORT
 
     unknown = [name for name in names if name not in EXHIBITS]
     if unknown:

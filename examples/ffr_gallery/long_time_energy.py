@@ -21,7 +21,10 @@ def orbit() -> Scene:
     spring = SpringDamper("spring", "ground.O", "ball.c", 2.0, free_length=0.5)
     held = Joint("table", "planar", "ground.O", "ball.c", axis=(0, 0, 1))
     return Scene(
-        (Body("ball", ball, (1, 0, 0), velocity=(0, 1, 0)),), (held,), springs=(spring,), ground={"O": (0, 0, 0)}
+        (Body("ball", ball, position=(1, 0, 0), velocity=(0, 1, 0)),),
+        (held,),
+        springs=(spring,),
+        ground={"O": (0, 0, 0)},
     )
 
 

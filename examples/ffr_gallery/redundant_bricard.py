@@ -35,7 +35,7 @@ def bricard() -> Scene:
             f"r{k}", mass=1.0, inertia=np.array([1 / 600, 101 / 1200, 101 / 1200]), centre_of_mass=np.array([0.5, 0, 0]),
             points={"a": np.zeros(3), "b": np.array([1.0, 0, 0])},
         )  # fmt: skip
-        bodies.append(Body(f"r{k}", model, points[k], frames[-1]))
+        bodies.append(Body(f"r{k}", model, position=points[k], rotation=frames[-1]))
     frames.append(np.eye(3))
     ends = ["ground.p0", *(f"r{k}.b" for k in range(5))], [*(f"r{k}.a" for k in range(5)), "ground.p5"]
     joints = [

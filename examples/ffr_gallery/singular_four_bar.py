@@ -23,8 +23,10 @@ BROKEN = 10.0  # J, what stands for a run that fails
 def four_bars(count: int) -> Scene:
     """`count` parallelograms side by side, upright, their tops moving at 1 m/s."""
     up = (0.0, 0.0, np.pi / 2)
-    standing = [Body(f"s{k}", bar(f"s{k}"), (k, 0, 0), up, omega_bar=(0, 0, -1.0)) for k in range(count + 1)]
-    lying = [Body(f"c{k}", bar(f"c{k}"), (k, 1, 0), velocity=(1.0, 0, 0)) for k in range(count)]
+    standing = [
+        Body(f"s{k}", bar(f"s{k}"), position=(k, 0, 0), rotation=up, omega_bar=(0, 0, -1.0)) for k in range(count + 1)
+    ]
+    lying = [Body(f"c{k}", bar(f"c{k}"), position=(k, 1, 0), velocity=(1.0, 0, 0)) for k in range(count)]
     feet = [Joint(f"foot{k}", "revolute", f"ground.f{k}", f"s{k}.a") for k in range(count + 1)]
     left = [Joint(f"left{k}", "revolute", f"s{k}.b", f"c{k}.a") for k in range(count)]
     right = [Joint(f"right{k}", "revolute", f"c{k}.b", f"s{k + 1}.b") for k in range(count)]
@@ -50,7 +52,7 @@ def singular_four_bar() -> Exhibit:
     plain = [max(change(steps, off, Drifting()) for off in (0.0, 1e-6)) for steps in STEPS]
     ours = [max(change(steps, off, Projection()) for off in (0.0, 1e-6)) for steps in STEPS]
     free, held = (np.array([change(STEPS[2], off, keep) for off in OFF]) for keep in (Drifting(), Projection()))
-    falling = Event("down", "s0.b.position.y", 0.0, "falling")
+    falling = Event("down", "s0.b.position.y", 0.0, direction="falling")
     passed = forward(scene, end=1.0, output_step=0.1, method=RK4(1e-3), events=(falling,)).attributes["events"][0][
         "time"
     ]

@@ -13,7 +13,7 @@ converges slowly. (Devasia, Chen & Paden, IEEE Transactions on Automatic Control
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 from scipy.linalg import schur
@@ -41,6 +41,7 @@ class Bounded:
     parts         : of an output step, for collocation
     """
 
+    _: KW_ONLY
     before: float | None = None
     after: float | None = None
     parts: int = 1

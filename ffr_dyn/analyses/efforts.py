@@ -15,6 +15,7 @@ from ffr_dyn.compile.engine import with_model
 from ffr_dyn.consistency.evaluation import Evaluator
 from ffr_dyn.functions.time_functions import TimeFunction, constant, piecewise
 from ffr_dyn.scene.applied_loads import actions_of
+from ffr_dyn.scene.checks import check_marker, check_name, check_own_name
 from ffr_dyn.scene.forces import Load
 from ffr_dyn.scene.joint_forces import Actuator
 from ffr_dyn.scene.joints import Joint
@@ -39,6 +40,8 @@ class JointEffort:
     coordinate: str = "angle"
 
     def __post_init__(self) -> None:
+        check_own_name("effort", self.name)
+        check_name(f"effort {self.name!r}", "joint", self.joint)
         if self.coordinate not in ("angle", "stroke"):
             raise InputError(f"effort {self.name!r}: coordinate must be 'angle' or 'stroke', not {self.coordinate!r}")
 
@@ -57,6 +60,8 @@ class MarkerEffort:
     moment: bool = False
 
     def __post_init__(self) -> None:
+        check_own_name("effort", self.name)
+        check_marker(f"effort {self.name!r}", "marker", self.marker)
         value = np.asarray(self.direction, float)
         if value.shape != (3,) or not np.isfinite(value).all() or not np.linalg.norm(value) > 0:
             raise InputError(f"effort {self.name!r}: direction must be three numbers, not all zero: {value}")

@@ -23,7 +23,7 @@ from ffr_dyn.equations.inertia import mass_matrix
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import excess_of_gains
-from ffr_dyn.kernels.tables import NOT_FINITE, OK, Record
+from ffr_dyn.kernels.tables import K_SIZE, NOT_FINITE, OK, Record
 from ffr_dyn.results.power import power
 from ffr_dyn.results.recorded_motion import View
 from ffr_prep.common.errors import ComputationError
@@ -136,12 +136,12 @@ class EnergyWatch:
         machine = new_machine(self.system, anchor.x, anchor.v, method, self.gains, start=anchor.time, spacing=spacing)
         machine.work.loads.reference[:] = anchor.reference
         record = new_record(self.system, rows)
-        return fill_rows(machine, method, record, anchor.time, 1 if method.controlled else substeps), record
+        return fill_rows(machine, record, anchor.time, 1 if method.controlled else substeps), record
 
     def _accountable(self) -> bool:
         """Whether the recorded powers are all there are."""
         model = self.system.model
-        return bool((model.base < 0).all() and (model.bodies.where[:-1, 6] == 0).all())
+        return bool((model.base < 0).all() and (model.bodies.where[:-1, K_SIZE] == 0).all())
 
     def _told(self, anchor: _Row, row: _Row, found: float) -> str:
         finer = f"it is {found:.3g} J" if found < row.energy else "it grows as well"

@@ -9,7 +9,7 @@ as the method, and lies on the constraints as it does.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from difflib import get_close_matches
 from typing import Any, Literal
 
@@ -48,6 +48,7 @@ class Event:
     name: str
     quantity: str | Callable[[float, StateView], float]
     value: float = 0.0
+    _: KW_ONLY
     direction: Literal["rising", "falling", "either"] = "either"
     stop: bool = False
 
@@ -153,7 +154,7 @@ class Watcher:
         time, end = float(rows.time[k]), new_record(self._system, 1)
         machine = new_machine(self._system, rows.x[k], rows.v[k], method, self._gains, start=time, spacing=length)
         machine.work.loads.reference[:] = rows.action[k, :, 0]
-        if fill_rows(machine, method, end, time, 1) != OK:
+        if fill_rows(machine, end, time, 1) != OK:
             raise ComputationError(f"at t = {time:.6g} s an event cannot be located: a shorter step from there fails")
         return end
 

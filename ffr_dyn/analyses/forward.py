@@ -6,34 +6,69 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, get_args
 
 import numpy as np
 
 from ffr_dyn.analyses.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
 from ffr_dyn.analyses.energy import EnergyWatch
 from ffr_dyn.analyses.events import Event, Watcher
+from ffr_dyn.analyses.registry import OverTime
+from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.compile.engine import Machine, fill_rows, new_machine, record_row
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.failure import failure
 from ffr_dyn.consistency.validity import doubts, extremes, meaningless
 from ffr_dyn.functions.stopwatch import Stopwatch
-from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince, Integrator
+from ffr_dyn.integrators import ROS2, Integrator, methods
 from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation, excess_of_gains, gains
-from ffr_dyn.kernels.tables import AT, NOW, OK, Record, Work
+from ffr_dyn.kernels.tables import (
+    AT,
+    EVALUATIONS,
+    FILLED,
+    LEAST,
+    NEXT,
+    NOW,
+    OK,
+    PHI,
+    PHI_DOT,
+    PROJECTIONS,
+    SPACING,
+    WHEN,
+    Record,
+    Work,
+)
 from ffr_dyn.results.file import ResultWriter, load_checkpoint, load_result
 from ffr_dyn.results.quantities import Entry, Memory, measure, needs_every_step, selected
 from ffr_dyn.results.result import Quantity, Result
+from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import Surface
 from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray
 
-_OF_ACCELERATIONS = (RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince)  # methods on index-1 equations
 LOOKS = 10  # of a quantity that adds up, from row to row, where the method chooses its steps
 SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, file and keyboard
+
+
+@dataclass(frozen=True)
+class Forward(OverTime):
+    """From start to end; step defaults to a tenth of output_step. Events are moments to find."""
+
+    resumable: ClassVar[bool] = True
+    integrates: ClassVar[bool] = True
+    stabilised: ClassVar[bool] = True
+    events: tuple[Event, ...] = ()
+
+    def perform(self, scene: Scene, settings: Settings, **how: Any) -> Result:
+        own: dict[str, Any] = {
+            "events": self.events,
+            "method": settings.method,
+            "stabilisation": settings.stabilisation,
+        }
+        return forward(scene, **own, **settings.span, **how)
 
 
 @dataclass
@@ -71,24 +106,20 @@ def forward(
     outputs     : names or patterns of the quantities to keep (`ffr_dyn.results.quantities.selected`), such as "*.power"
     events      : moments to find (`ffr_dyn.analyses.events`), listed in the result's attribute "events"; one may end the run
     path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
-    resume      : a result file whose run goes on from its last rows as if it had never stopped, to the bit; `end` may be
-                  later than it was. A file that does not exist yet is a run from the start
+    resume      : a result file whose run goes on to the same bits; `end` may be later. A new file: a run from the start
     progress    : called with the time reached, a few times a second
     stopwatch   : takes the time of the integrator's compiled loop
     assembled   : what `assemble` made of the scene at `start`, for programs that run it more than once
 
-    Raises InputError for a scene or settings that cannot be used, ComputationError when the run fails: the message gives
-    the time, the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
+    Raises InputError for a scene or settings that cannot be used, ComputationError when the run fails: with the time,
+    the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
-    if not 0 < output_step < np.inf:
-        raise InputError(f"the output step is {output_step} s; it must be positive and finite")
-    method = method if method is not None else ROS2(step=output_step / 10)
-    if isinstance(method, (str, type)):
-        raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
+    method = _method(method, output_step)
     spacing = output_step / LOOKS if method.controlled else method.step
     substeps, rows = _counts(end - start, output_step, spacing)
     _check_step(scene, method)
     _check_stabilisation(method, stabilisation)
+    events = several("events", events, (Event,))
     assembled = assemble(scene, time=start) if assembled is None else assembled
     wanted = selected(assembled.system, outputs)
     span = (start, end, output_step)
@@ -112,6 +143,14 @@ def forward(
     return _result(scene, run, header | account | {"status": "complete"})
 
 
+def _method(given: Integrator | None, output_step: float) -> Integrator:
+    if not 0 < output_step < np.inf:
+        raise InputError(f"the output step is {output_step} s; it must be positive and finite")
+    if isinstance(given, (str, type)):
+        raise InputError(f"method is {given!r}; give one with its step, such as ROS2(1e-3)")
+    return ROS2(step=output_step / 10) if given is None else given
+
+
 def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
     """(steps per output row, output rows)."""
     if not 0 < span < np.inf:
@@ -128,11 +167,14 @@ def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
 
 
 def _check_stabilisation(method: Integrator, stabilisation: Stabilisation) -> None:
-    """Refuse gains of accelerations for a method that keeps constraints in another way."""
-    if isinstance(stabilisation, Baumgarte) and not isinstance(method, _OF_ACCELERATIONS):
+    """Refuse what is none, and gains of accelerations for a method that keeps constraints in another way."""
+    if not isinstance(stabilisation, get_args(Stabilisation)):
+        raise InputError(f"stabilisation is {stabilisation!r}; give Projection(), Baumgarte(alpha, beta) or Drifting()")
+    if isinstance(stabilisation, Baumgarte) and method.row_stages:
+        others = [kind.__name__ for kind in methods().values() if not kind.row_stages]
         raise InputError(
             f"Baumgarte's gains act on the accelerations of the constraints, and {type(method).__name__} holds positions or "
-            f"rates themselves; leave them out, or use one of {', '.join(kind.__name__ for kind in _OF_ACCELERATIONS)}"
+            f"rates themselves; leave them out, or use one of {', '.join(others)}"
         )
 
 
@@ -204,8 +246,8 @@ def _advance(
     while run.done < rows * substeps:
         chunk = new_record(system, looks * min(count, rows - run.done // substeps))
         with watch:
-            status = fill_rows(run.machine, method, chunk, start, substeps // looks)
-        filled = int(steps[2]) - int(steps[2]) % looks
+            status = fill_rows(run.machine, chunk, start, substeps // looks)
+        filled = int(steps[FILLED]) - int(steps[FILLED]) % looks
         if filled:
             kept = with_all_reactions(assembled, Record(*(column[:filled] for column in chunk)))
             if watcher is not None:
@@ -258,7 +300,9 @@ def _watcher(
 def reached(machine: Machine, start: float) -> float:
     """Time of the machine's state [s], for a run from `start`."""
     clock, control = machine.tables.clock, machine.tables.control
-    return float(control.numbers[NOW]) if control.numbers.size else start + int(clock.steps[0]) * float(clock.time[1])
+    if control.numbers.size:
+        return float(control.numbers[NOW])
+    return start + int(clock.steps[NEXT]) * float(clock.time[SPACING])
 
 
 def with_all_reactions(assembled: Assembled, record: Record) -> Record:
@@ -373,10 +417,10 @@ def _account(scene: Scene, run: _Run, notes: list[str]) -> dict[str, Any]:
     """What only the end of a run can tell."""
     info, drift = run.machine.work.info, run.machine.work.drift
     return {
-        "evaluations": int(info[1]),
-        "projections": int(info[2]),
+        "evaluations": int(info[EVALUATIONS]),
+        "projections": int(info[PROJECTIONS]),
         **_steps(run.machine),
-        "largest_drift": [float(drift[0]), float(drift[1])],
+        "largest_drift": [float(drift[PHI]), float(drift[PHI_DOT])],
         "notes": [*notes, *_singular(run.machine.work), *doubts(scene, run.extremes)],
     }
 
@@ -388,7 +432,7 @@ def _steps(machine: Machine) -> dict[str, Any]:
 
 
 def _singular(work: Work) -> list[str]:
-    least, time = work.independence[1:3]
+    least, time = work.independence[[LEAST, WHEN]]
     if least >= AT:
         return []
     return [

@@ -11,11 +11,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ffr_dyn.analyses.forward import with_all_reactions
 from ffr_dyn.analyses.outcome import output_times, result_of
+from ffr_dyn.analyses.registry import OverTime
+from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.evaluation import (
     Evaluation,
@@ -29,10 +32,10 @@ from ffr_dyn.consistency.evaluation import (
     total_mass_matrix,
 )
 from ffr_dyn.consistency.mobility import named_motion, require_driven
-from ffr_dyn.kernels.tables import Record
+from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
-from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.scene.scene import Body, Scene, require_scene
 from ffr_prep.body import truncated
 from ffr_prep.common.errors import ComputationError
 
@@ -56,6 +59,14 @@ class _Pose:
     conditioning: float
     sign: float
     joint: str
+
+
+@dataclass(frozen=True)
+class Kinematic(OverTime):
+    """With the reactions that the motion needs."""
+
+    def perform(self, scene: Scene, settings: Settings, **how: Any) -> Result:
+        return kinematic(scene, **settings.span, **how)
 
 
 def kinematic(
@@ -94,7 +105,7 @@ def kinematic(
         "title": scene.name,
         "analysis": "kinematic",
         "method": "Newton-Raphson",
-        "evaluations": int(at.work.info[1]),
+        "evaluations": int(at.work.info[EVALUATIONS]),
         "degrees_of_freedom": 0,
         "notes": notes,
         "status": "complete",
@@ -104,6 +115,7 @@ def kinematic(
 
 def undeformed(scene: Scene) -> Scene:
     """The scene with rigid bodies of the same inertia and interfaces."""
+    require_scene(scene)
     return replace(scene, bodies=tuple(_rigid(body) if body.model.n else body for body in scene.bodies))
 
 

@@ -10,10 +10,10 @@ times at once: it starts at rest before the known motion does, and ends at rest 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, get_args
 
 import numpy as np
 
@@ -21,18 +21,21 @@ from ffr_dyn.analyses.bounded import Bounded, bounded_solution
 from ffr_dyn.analyses.efforts import Effort, JointEffort, MarkerEffort, sized, unit, with_units
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.outcome import efforts, needed, only, output_times, result_of, with_quantities
+from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.servo import Moment, ServoMotion, at_moment, internal_values, servo, slope, slope_matrix
+from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.compile.scene_tables import System, compile_scene
 from ffr_dyn.consistency.assemble import assemble, flattened
 from ffr_dyn.consistency.evaluation import Evaluator, evaluator, joined, record_states
 from ffr_dyn.equations.constraint_rows import blocks_of
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection
-from ffr_dyn.kernels.tables import Record
+from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.quantities import measure, selected
 from ffr_dyn.results.result import Quantity, Result
+from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.drivers import Driver, PointDriver
-from ffr_dyn.scene.scene import GROUND, Scene
+from ffr_dyn.scene.scene import GROUND, Scene, require_scene
 from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray
@@ -48,6 +51,34 @@ class Causal:
 
     tolerance: float = 1e-10
     growth: float = 1e4
+
+
+@dataclass(frozen=True)
+class Mixed(OverTime):
+    """Forces away from the known motions are found by integration where that is stable, else as the bounded solution, which
+    adds times before and after the run. Unknown forces are given by name; see `mixed`.
+    """
+
+    integrates: ClassVar[bool] = True
+    example: ClassVar[str] = "ffr-dyn mixed arm.toml --unknown torque=hinge.angle --known path -o out/arm.nc"
+    unknown: tuple[Effort, ...] = field(
+        default=(),
+        metadata=option("--unknown", "Force to find, instead of the scene's; repeat.", metavar="FORCE", required=True),
+    )
+    known: tuple[str, ...] | None = field(
+        default=None, metadata=option("--known", "Driver that is a known motion, not a true driver; default: all.")
+    )
+    solution: Causal | Bounded | None = None
+
+    def __post_init__(self) -> None:
+        if not self.unknown:
+            raise InputError(
+                'mixed dynamics needs forces to find: --unknown, or kind = "mixed" with [analysis.unknown.NAME]'
+            )
+
+    def perform(self, scene: Scene, settings: Settings, **how: Any) -> Result:
+        own: dict[str, Any] = {"unknown": self.unknown, "known": self.known, "solution": self.solution}
+        return mixed(scene, method=settings.method, **own, **settings.span, **how)
 
 
 def mixed(
@@ -79,7 +110,8 @@ def mixed(
     Raises InputError when motions and forces do not fit (the combination that is undetermined is told), ComputationError when
     the run fails or a causal one is asked for and cannot be trusted.
     """
-    names = _known(scene, known)
+    require_scene(scene)
+    names, unknown = _known(scene, known), several("unknown", unknown, get_args(Effort))
     partners = _collocated(scene, names, unknown)
     if partners is not None and solution is None:
         result = forward(
@@ -92,7 +124,7 @@ def mixed(
 
 def _known(scene: Scene, known: tuple[str, ...] | None) -> tuple[str, ...]:
     drivers = [driver.name for driver in scene.drivers]
-    names = tuple(drivers if known is None else known)
+    names = several("known", drivers if known is None else known, (str,))
     missing = [name for name in names if name not in drivers]
     if not names:
         raise InputError("mixed dynamics needs known motions, drivers of the scene; it has none")
@@ -194,7 +226,7 @@ def _not_collocated(
         "title": scene.name,
         "analysis": f"mixed dynamics, {'bounded' if isinstance(chosen, Bounded) else 'causal'}",
         "method": f"{chosen!r}",
-        "evaluations": int(own.at.work.info[1]),
+        "evaluations": int(own.at.work.info[EVALUATIONS]),
         "degrees_of_freedom": own.size,
         "internal_coordinates": list(own.names),
         "notes": [*assembled.notes, *notes],

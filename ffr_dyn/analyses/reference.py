@@ -21,7 +21,7 @@ from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.evaluation import Evaluator, accelerations, closed, copied, evaluator, joined
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.equations.motion import position_rates
-from ffr_dyn.kernels.tables import Record
+from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.quantities import measure, needs_every_step, selected
 from ffr_dyn.results.result import Result
@@ -117,7 +117,7 @@ def reference(
         "end": end,
         "output_step": output_step,
         "degrees_of_freedom": assembled.degrees_of_freedom,
-        "evaluations": int(at.work.info[1]),
+        "evaluations": int(at.work.info[EVALUATIONS]),
         "notes": list(assembled.notes),
         "status": "complete",
     }

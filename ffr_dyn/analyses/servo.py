@@ -210,7 +210,9 @@ def _internal(
     for k in chosen[chosen < len(joints)]:
         joint, coordinate = joints[k]
         ends = marker_number(scene, joint.i), marker_number(scene, joint.j)
-        words.append((ends, driver_word(Driver("internal", joint.name, polynomial(0.0, 0.0), coordinate), joint)))
+        words.append(
+            (ends, driver_word(Driver("internal", joint.name, polynomial(0.0, 0.0), coordinate=coordinate), joint))
+        )
     rest = [int(k) - len(joints) for k in chosen[chosen >= len(joints)]]
     said = tuple([names[k] for k in chosen[chosen < len(joints)]] + [labels[k] for k in rest])
     return words, [elastic[k] for k in rest], said

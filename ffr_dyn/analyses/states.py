@@ -9,7 +9,7 @@ from ffr_dyn.functions.time_functions import as_time_function, constant, evaluat
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.drivers import Driver, PointDriver
 from ffr_dyn.scene.joints import Joint
-from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.scene.scene import Body, Scene, require_scene
 
 
 def scene_at(scene: Scene, result: Result, row: int = -1) -> Scene:
@@ -28,6 +28,7 @@ _HISTORIES = {"position": "R", "rotation": "p", "velocity": "v", "omega_bar": "o
 
 def held(scene: Scene, time: float) -> Scene:
     """The scene with every driver and every length that is a function of time held at its value at `time` [s], at rest."""
+    require_scene(scene)
     at_rest = replace(
         scene,
         joints=tuple(_held_joint(joint, time) for joint in scene.joints),

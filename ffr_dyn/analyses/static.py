@@ -12,16 +12,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ffr_dyn.analyses.forward import with_all_reactions
 from ffr_dyn.analyses.outcome import result_of
+from ffr_dyn.analyses.registry import OfMoment
+from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import held
 from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator, record_states
 from ffr_dyn.consistency.mobility import named_motion
 from ffr_dyn.consistency.tangent import Chart, chart, movement, rates, sizes, state, stiffness
+from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
@@ -34,6 +38,14 @@ LARGEST_STEP = 0.3  # rad, or part of the scene's size
 TOLERANCE = 1e-12  # of the last step, the same
 NEUTRAL = 1e-7  # of a stiffness, relative to that of the applied forces
 ROUNDING = 1e-13  # of a stiffness, relative to the largest
+
+
+@dataclass(frozen=True)
+class Static(OfMoment):
+    """The drivers are held still, and so is what depends on the time."""
+
+    def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
+        return static(scene, **settings.span, **how)
 
 
 @dataclass(frozen=True)
@@ -152,7 +164,7 @@ def _result(
         "title": scene.name,
         "analysis": "static equilibrium",
         "method": f"Newton's method, {found.iterations} steps",
-        "evaluations": int(at.work.info[1]),
+        "evaluations": int(at.work.info[EVALUATIONS]),
         "degrees_of_freedom": assembled.degrees_of_freedom,
         "stable": int(stable),
         "lowest_stiffness": lowest if np.isfinite(lowest) else None,

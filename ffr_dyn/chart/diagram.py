@@ -16,6 +16,7 @@ from ffr_dyn.integrators import METHODS
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 CPU, WALL, EVALUATIONS = "cpu", "wall", "evaluations"
@@ -61,8 +62,8 @@ class Lost:
     reason: str
 
 
-@dataclass(frozen=True)
-class Diagram:
+@dataclass(frozen=True, repr=False)
+class Diagram(Brief):
     """The points of a scene, those lost, and the reference that errors are measured from."""
 
     title: str

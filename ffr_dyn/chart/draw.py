@@ -59,7 +59,7 @@ def look(diagrams: Sequence[Diagram]) -> dict[tuple[str, str], tuple[str, str]]:
     return {line: (colours[line[0]], markers[line[1]]) for line in lines}
 
 
-def draw(
+def draw_chart(
     diagrams: Diagram | Sequence[Diagram], path: str | Path, *, against: str = CPU, title: str = "", columns: int = 2
 ) -> Path:
     """Draw errors over a cost ("cpu", "wall" or "evaluations"): a panel for every measure of every diagram, in columns.

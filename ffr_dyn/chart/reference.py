@@ -17,6 +17,7 @@ from ffr_dyn.chart.runner import Failure, Job, Outcome, Pool, Span, perform
 from ffr_dyn.chart.variants import FULL, Model, Variant, explicit_parts
 from ffr_dyn.integrators.stabilisation import Stabilisation
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import ComputationError
 
 Array = np.ndarray
@@ -27,8 +28,8 @@ POOR = 1e-2  # relative floor above which a reference is none
 FIRST_PARTS = 16  # steps per output step with which an implicit method starts
 
 
-@dataclass(frozen=True)
-class Reference:
+@dataclass(frozen=True, repr=False)
+class Reference(Brief):
     """The converged histories (T, k), their scales and floors by measure, and how they were found, a line each."""
 
     values: Mapping[str, Array]

@@ -88,7 +88,8 @@ def chart(
     Times are those of the integrator alone on one thread, medians of several runs with bars for the spread. On a busy
     machine trust CPU time.
     """
-    from ffr_dyn.analyses.settings import Forward, Settings
+    from ffr_dyn.analyses.forward import Forward
+    from ffr_dyn.analyses.settings import Settings
     from ffr_dyn.chart.diagram import measures_of, work_precision
     from ffr_dyn.chart.runner import Span, pool
     from ffr_dyn.cli.progress_bar import counted
@@ -187,7 +188,7 @@ def _report(found: Diagram, against: str) -> list[str]:
 
 def _write(found: Diagram, output: Path, against: str) -> list[Path]:
     """Page, table and pictures; the table also where there is nothing to draw."""
-    from ffr_dyn.chart.draw import draw
+    from ffr_dyn.chart.draw import draw_chart
     from ffr_dyn.chart.page import write_page
     from ffr_dyn.chart.table import write_table
 
@@ -195,5 +196,5 @@ def _write(found: Diagram, output: Path, against: str) -> list[Path]:
         return output.with_name(output.name + suffix)
 
     written = [write_table(found, named(".csv"))]
-    pictures = [draw(found, named(suffix), against=against) for suffix in (".png", ".svg")]
+    pictures = [draw_chart(found, named(suffix), against=against) for suffix in (".png", ".svg")]
     return [*pictures, write_page(found, named(".html")), *written]

@@ -10,7 +10,22 @@ import numpy as np
 from ffr_dyn.compile.symmetry_blocks import in_blocks, symmetric_blocks
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.equations.stiffening import stiffness_of
-from ffr_dyn.kernels.tables import LANES, Bodies, Markers
+from ffr_dyn.kernels.tables import (
+    IN_PP_DM,
+    IN_Q,
+    IN_SHARED,
+    IN_STIFFENING,
+    IN_V,
+    IN_X,
+    K_PLAN,
+    K_SIZE,
+    LANES,
+    NORMAL,
+    PP_PLAN,
+    Bodies,
+    Markers,
+    N,
+)
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.variants.plane import stiffening_loads
 from ffr_prep.body import axial
@@ -111,12 +126,13 @@ def body_tables(scene: Scene, place: Layout, marked: Markers) -> Bodies:
     P, _ = once([b.model.P_dm * ("I3" not in b.dropped) for b in scene.bodies], owners)
     rP, _ = once([_rP_parts(b) for b in scene.bodies], owners)
     K, sizes = _stiffness(scene, marked)
-    where = np.full((len(n) + 1, 11), -1, dtype=np.int64)
-    where[-1, [*range(7), *range(8, 11)]] = 0
-    where[:-1, :7] = np.column_stack([n, place.ix, place.iv, starts(n)[:-1], PP.start, K.start, sizes])
-    where[:-1, 8:] = np.column_stack([column, PP.first, len(PP.plans) + K.first])
-    where[:-1, 7] = place.normals
-    where[-1, 3] = sum(n)
+    where = np.zeros((len(n) + 1, 11), dtype=np.int64)
+    where[-1, NORMAL] = -1
+    where[:-1, [N, IN_X, IN_V, IN_Q]] = np.column_stack([n, place.ix, place.iv, starts(n)[:-1]])
+    where[:-1, [IN_PP_DM, PP_PLAN]] = np.column_stack([PP.start, PP.first])
+    where[:-1, [IN_STIFFENING, K_PLAN, K_SIZE]] = np.column_stack([K.start, len(PP.plans) + K.first, sizes])
+    where[:-1, [NORMAL, IN_SHARED]] = np.column_stack([place.normals, column])
+    where[-1, IN_Q] = sum(n)
     return Bodies(
         where=where,
         mass=np.array([m.mass for m in models]),
@@ -138,7 +154,7 @@ def _owner(body: Body) -> tuple[Hashable, ...]:
 
 def of_coordinates(bodies: Bodies, table: Array) -> Array:
     """(E,) of all elastic coordinates, one body after another, from a table of which equal bodies share their part."""
-    return _pool([table[where[8] : where[8] + where[0]] for where in bodies.where[:-1]])
+    return _pool([table[first : first + n] for first, n in bodies.where[:-1, [IN_SHARED, N]]])
 
 
 def _second_moments(scene: Scene, place: Layout) -> _Blocks:
@@ -175,10 +191,10 @@ def _kept(blocks: _Blocks, b: int) -> int:
 
 def loads_that_stiffen(bodies: Bodies, b: int) -> Array:
     """Numbers of the loads of body b that its stiffness depends on."""
-    if bodies.where[b, 6] == 0:
+    if bodies.where[b, K_SIZE] == 0:
         return np.zeros(0, dtype=np.int64)
-    plan = bodies.blocks[bodies.where[b, 10] :]
-    first = 3 + 2 * plan[0] + 2 * bodies.where[b, 0]
+    plan = bodies.blocks[bodies.where[b, K_PLAN] :]
+    first = 3 + 2 * plan[0] + 2 * bodies.where[b, N]
     return np.sort(plan[first : first + plan[3 : 3 + 2 * plan[0] : 2].sum()])
 
 

@@ -9,9 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
 
+from ffr_prep.common.brief import Brief
 
-@dataclass(frozen=True)
-class Elimination:
+
+@dataclass(frozen=True, repr=False)
+class Elimination(Brief):
     """order: block numbers in the order of elimination; columns[k]: positions > k that are coupled to position k."""
 
     order: tuple[int, ...]

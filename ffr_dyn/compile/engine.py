@@ -1,8 +1,7 @@
-"""A compiled scene with its memory, ready to be evaluated and integrated: the door from Python to the compiled units."""
+"""A compiled scene with its memory, ready to be evaluated and integrated: the door from Python to the entry points."""
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, cast
@@ -13,16 +12,11 @@ from ffr_dyn.compile.alignment import aligned
 from ffr_dyn.compile.first_use import ensure_compiled
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_stages, new_work
-from ffr_dyn.kernels.entry_points import (
-    applied_unit,
-    controlled_rows_unit,
-    record_unit,
-    rows_unit,
-    truly_unit,
-    unit_addresses,
-)
+from ffr_dyn.kernels.entry_points import evaluate_exact, evaluate_loads, record_state, run, run_controlled, step
+from ffr_dyn.kernels.simd.entry_point import ENTRY_POINTS
 from ffr_dyn.kernels.simd.table_address import pack
-from ffr_dyn.kernels.tables import Clock, Control, Model, Record, Tables, Work
+from ffr_dyn.kernels.tables import PER_ROW, Clock, Control, Model, Record, Tables, Work
+from ffr_prep.common.brief import Brief
 
 if TYPE_CHECKING:
     from ffr_dyn.integrators import Controlled, Integrator
@@ -31,12 +25,10 @@ Array = np.ndarray
 
 LEAST_STEP = 1e-9  # of a controlled method, relative to the spacing of its rows
 
-_CALL = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_int64, ctypes.c_int64)
 
-
-@dataclass(frozen=True)
-class Machine:
-    """The tables of a scene, and where the compiled units find them (`words`, as `pack` wrote them)."""
+@dataclass(frozen=True, repr=False)
+class Machine(Brief):
+    """The tables of a scene, and where the entry points find them (`words`, as `pack` wrote them)."""
 
     system: System
     tables: Tables
@@ -84,13 +76,20 @@ def new_machine(
         stages = new_stages(system, method.stage_count, method.row_stages, method.numbers, kept)
     clock = Clock(np.array([h, h or spacing]), np.zeros(3, dtype=np.int64), np.array(gains))
     control = _control(system, method, start, spacing)
-    calls = () if method is None else method.calls
     keeps_terms, looks_ahead = (False, 0) if method is None else (method.keeps_terms, method.looks_ahead)
     work = new_work(system.model, keeps_terms=keeps_terms, looks_ahead=looks_ahead)
-    units = np.array(unit_addresses(system.model, calls), dtype=np.int64)
+    places = _addresses(system.model, method)
     own = np.array(x, dtype=float), np.array(v, dtype=float)
-    units, work, stages, clock, control, own = aligned((units, work, stages, clock, control, own))
-    return _packed(system, Tables(0, units, system.model, work, stages, clock, control, *own))
+    places, work, stages, clock, control, own = aligned((places, work, stages, clock, control, own))
+    return _packed(system, Tables(0, places, system.model, work, stages, clock, control, *own))
+
+
+def _addresses(model: Model, method: Integrator | None) -> Array:
+    """Of the entry points, by number; zero for those that are not called."""
+    places = [entry.chosen(model).address if entry.needed(model) else 0 for entry in ENTRY_POINTS.values()]
+    if method is not None:
+        places[step.number] = method.do_step.address
+    return np.array(places, dtype=np.int64)
 
 
 def _control(system: System, method: Integrator | None, start: float, spacing: float) -> Control:
@@ -122,39 +121,36 @@ def with_model(machine: Machine, model: Model) -> Machine:
 
 def evaluate_at(machine: Machine, t: float, x: Array, v: Array) -> int:
     """Accelerations and multipliers at (t, x, v) with the true mass matrix, in the machine's work tables. A status."""
-    x, v = np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(v, dtype=float)
-    return _CALL(truly_unit.address)(machine.address, t, x.ctypes.data, v.ctypes.data)
+    return evaluate_exact(machine.tables, t, np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(v, dtype=float))
 
 
 def load_at(machine: Machine, t: float, x: Array, v: Array) -> int:
     """Right-hand sides of the applied loads alone at (t, x, v), in the machine's work tables. A status."""
-    x, v = np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(v, dtype=float)
-    return _CALL(applied_unit.address)(machine.address, t, x.ctypes.data, v.ctypes.data)
+    return evaluate_loads(machine.tables, t, np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(v, dtype=float))
 
 
 def record_row(machine: Machine, t: float, record: Record, row: int) -> int:
     """Evaluate the machine's state at time t as `evaluate_at` and keep it as a row. A status."""
-    words = pack(record)
-    return _CALL(record_unit.address)(machine.address, t, words.ctypes.data, row)
+    return record_state(machine.tables, t, record, row)
 
 
-def fill_rows(machine: Machine, method: Integrator, record: Record, start: float, substeps: int) -> int:
-    """Go on by `substeps` steps of the method per row of the record, from step number clock.steps[0]. A status.
+def fill_rows(machine: Machine, record: Record, start: float, substeps: int) -> int:
+    """Go on by `substeps` steps of the engine's method per row of the record, from step number clock.steps[NEXT]. A status.
 
     start : time of step number 0 [s]
-    clock.steps[2] tells how many rows were filled.
+    clock.steps[FILLED] tells how many rows were filled.
     """
-    machine.tables.clock.steps[1] = substeps
-    return row_filler(machine, method, record)(start)
+    machine.tables.clock.steps[PER_ROW] = substeps
+    return row_filler(machine, record)(start)
 
 
-def row_filler(machine: Machine, method: Integrator, record: Record) -> Callable[[float], int]:
+def row_filler(machine: Machine, record: Record) -> Callable[[float], int]:
     """`fill_rows` for one record, again and again at the least cost: of the time of step number 0, a status."""
-    unit = controlled_rows_unit if method.controlled else rows_unit
-    call, words, step = _CALL(unit.address), pack(record), method.unit.address
+    entry = run_controlled if machine.tables.control.numbers.size else run
+    call, words = entry.general.c_function, pack(record)
     address, place = machine.address, words.ctypes.data
 
     def fill(start: float, kept: Array = words) -> int:  # the numbers at `place` live as long as this function
-        return call(address, start, place, step)
+        return call(address, start, place)
 
     return fill

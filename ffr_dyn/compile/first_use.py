@@ -1,4 +1,4 @@
-"""The first use of a method: the units it needs are compiled by two processes of their own, and read from disk ever after.
+"""The first use of a method: what it needs is compiled by two processes of their own, and read from disk ever after.
 
 What a process compiles for itself may differ in the last bits from what it reads from disk. So no run uses what it has just
 compiled: the first one equals all later ones to the bit.
@@ -14,38 +14,27 @@ from pathlib import Path
 
 from numba.core.caching import FunctionCache
 
-from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator
-from ffr_dyn.kernels.entry_points import (
-    CONTROL_UNITS,
-    EXTRA_UNITS,
-    LOAD_UNITS,
-    RELAXED_UNITS,
-    STIFFENED_UNITS,
-    UNITS,
-    Unit,
-    units_of,
-)
+from ffr_dyn.integrators import Integrator, methods
+from ffr_dyn.kernels.entry_points import add_loads, load_powers, run_controlled
+from ffr_dyn.kernels.simd.entry_point import ENTRY_POINTS, CompiledFunction, always
 from ffr_dyn.kernels.tables import Model
 
-_METHODS = {**METHODS, **CONTROLLED}
 _AT_WORK: dict[str, subprocess.Popen[bytes]] = {}
-_ON_DISK: set[str] = set()  # units that were found there before: a program with many runs looks once
+_ON_DISK: set[str] = set()  # functions that were found there before: a program with many runs looks once
 
 
 def begin_compiling(*kinds: type[Integrator], model: Model | None = None) -> None:
-    """Start to compile the units of some methods where they are not on disk, and go on with something else meanwhile.
+    """Start to compile what some methods need where it is not on disk, and go on with something else meanwhile.
 
-    For programs that mesh and reduce bodies first: a run that needs the units waits for them.
+    For programs that mesh and reduce bodies first: a run that needs it waits.
 
     model : tables of the scene; without them, of one with applied loads
     """
-    controlled = CONTROL_UNITS if any(kind.controlled for kind in kinds) else {}
-    methods = {name: kind.unit for name, kind in _METHODS.items() if kind in kinds}
-    extra = {name: EXTRA_UNITS[name] for kind in kinds for name in kind.calls}
-    scene = units_of(model) if model else {**UNITS, **LOAD_UNITS}
-    units = {**scene, **controlled, **extra, **methods}
-    _ON_DISK.update(name for name, unit in units.items() if name not in _ON_DISK and _is_on_disk(unit))
-    missing = [name for name in units if name not in _AT_WORK and name not in _ON_DISK]
+    functions = _of_scene(model) + [step for step in _steps() if any(kind.do_step is step for kind in kinds)]
+    if any(kind.controlled for kind in kinds):
+        functions.append(run_controlled.general)
+    _ON_DISK.update(each.name for each in functions if each.name not in _ON_DISK and _is_on_disk(each))
+    missing = [each.name for each in functions if each.name not in _AT_WORK and each.name not in _ON_DISK]
     if not missing:
         return
     print("ffr-dyn: compiling the kernels, once (some twenty seconds) ...", file=sys.stderr, flush=True)
@@ -55,8 +44,16 @@ def begin_compiling(*kinds: type[Integrator], model: Model | None = None) -> Non
         _AT_WORK.update(dict.fromkeys(share, process))
 
 
+def _of_scene(model: Model | None) -> list[CompiledFunction]:
+    """What a scene needs whatever the method."""
+    if model is None:
+        usual = [entry.general for entry in ENTRY_POINTS.values() if entry.needed is always]
+        return [*usual, add_loads.general, load_powers.general]
+    return [entry.chosen(model) for entry in ENTRY_POINTS.values() if entry.needed(model)]
+
+
 def ensure_compiled(*kinds: type[Integrator], model: Model | None = None) -> None:
-    """Have the units of some methods on disk; where that fails, the run compiles them itself."""
+    """Have what some methods need on disk; where that fails, the run compiles them itself."""
     begin_compiling(*kinds, model=model)
     for process in set(_AT_WORK.values()):
         process.wait()
@@ -64,32 +61,28 @@ def ensure_compiled(*kinds: type[Integrator], model: Model | None = None) -> Non
 
 
 def _shares(names: Sequence[str]) -> list[list[str]]:
-    """Two parts that take about as long; `UNITS` lists the long ones first."""
+    """Two parts that take about as long; those that take long come first."""
     return [share for share in ([*names[::4], *names[3::4]], [*names[1::4], *names[2::4]]) if share]
 
 
-def _is_on_disk(unit: Unit) -> bool:
-    """Whether numba has stored a compiled form of the unit."""
-    folder = Path(FunctionCache(unit.function).cache_path)
-    return any(folder.glob(f"*.{unit.function.__name__}-*.nbi"))
+def _is_on_disk(compiled: CompiledFunction) -> bool:
+    """Whether numba has stored a compiled form of the function."""
+    folder = Path(FunctionCache(compiled.function).cache_path)
+    return any(folder.glob(f"*.{compiled.name}-*.nbi"))
 
 
-def compile_units(names: Sequence[str]) -> None:
-    """Compile units and methods by their names."""
-    units = {
-        **UNITS,
-        **LOAD_UNITS,
-        **RELAXED_UNITS,
-        **STIFFENED_UNITS,
-        **CONTROL_UNITS,
-        **EXTRA_UNITS,
-        **{name: kind.unit for name, kind in _METHODS.items()},
-    }
-    for name in names:
-        unit = units[name]
-        if not unit.address:
-            raise RuntimeError(f"unit {name} has no address")
+def _steps() -> list[CompiledFunction]:
+    """The compiled steps of all methods."""
+    return list(dict.fromkeys(kind.do_step for kind in methods().values()))
+
+
+def compile_functions(names: Sequence[str]) -> None:
+    """Compile functions by their names."""
+    forms = [form for entry in ENTRY_POINTS.values() for form in (entry.general, *(form for _, form in entry.forms))]
+    for compiled in (*forms, *_steps()):
+        if compiled.name in names and not compiled.address:
+            raise RuntimeError(f"entry point {compiled.name} has no address")
 
 
 if __name__ == "__main__":
-    compile_units(sys.argv[1:])
+    compile_functions(sys.argv[1:])

@@ -19,13 +19,14 @@ from ffr_dyn.equations.stiffening import stiffness_of
 from ffr_dyn.kernels.tables import LANES, Markers, Model, Pattern, Rows
 from ffr_dyn.scene.applied_loads import marker_numbers
 from ffr_dyn.scene.scene import MarkerName, Scene, markers
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
 
 
-@dataclass(frozen=True)
-class System:
+@dataclass(frozen=True, repr=False)
+class System(Brief):
     """A compiled scene: the tables, and what connects their numbers to the scene's names.
 
     blocks : in elimination order, as the rows in the tables;  user : keeps the callback of the user's functions alive

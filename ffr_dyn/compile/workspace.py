@@ -11,9 +11,12 @@ from ffr_dyn.compile.body_tables import starts
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.functions.rotation import skew
 from ffr_dyn.kernels.tables import (
+    IN_Q,
+    K_SIZE,
     LANES,
     MEANS,
     MOST_ROWS,
+    NORMAL,
     QUAD,
     STAGES,
     WATCH,
@@ -22,6 +25,7 @@ from ffr_dyn.kernels.tables import (
     LoadWork,
     MarkerWork,
     Model,
+    N,
     Record,
     RowWork,
     Stages,
@@ -38,7 +42,7 @@ def new_work(m: Model, *, keeps_terms: bool = False, looks_ahead: int = 0) -> Wo
     keeps_terms : whether the quadratic terms of all bodies are needed after an evaluation
     looks_ahead : order to which geometric stiffening is extrapolated, 2 to 4, or 0
     """
-    V, M, n = 6 * m.bodies.mass.size + int(m.bodies.where[-1, 3]), m.markers.body.size, m.bodies.where[:, 0]
+    V, M, n = 6 * m.bodies.mass.size + int(m.bodies.where[-1, IN_Q]), m.markers.body.size, m.bodies.where[:, N]
     bodies = _body_work(m, keeps_terms, looks_ahead)
     vectors = _zeros(r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3), load=(M, 6))
     return Work(
@@ -60,7 +64,7 @@ def _zeros(**shapes: Any) -> dict[str, Array]:
 
 def _body_work(m: Model, keeps_terms: bool, looks_ahead: int) -> BodyWork:
     """Scratch of the bodies; the factors of rigid ones, which are constant, are in it."""
-    B, E, n = m.bodies.mass.size, int(m.bodies.where[-1, 3]), m.bodies.where[:, 0]
+    B, E, n = m.bodies.mass.size, int(m.bodies.where[-1, IN_Q]), m.bodies.where[:, N]
     V, longest = 6 * B + E, int(n.max())
     E_s = E if m.bodies.stiffening.size else 0
     E_a, B_a = (E_s, B if E_s else 0) if looks_ahead else (0, 0)
@@ -75,7 +79,7 @@ def _body_work(m: Model, keeps_terms: bool, looks_ahead: int) -> BodyWork:
         **_zeros(H=3 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6)),
         **_zeros(more=V, unstiffened=E, shift=V, load=(B, loads)),
         **_zeros(stiff=E_s, last=E_s, steady=3, change=(3 * STAGES, E_s)),
-        K_sigma=np.zeros(int(m.bodies.where[:, 6].max()) + QUAD * LANES),
+        K_sigma=np.zeros(int(m.bodies.where[:, K_SIZE].max()) + QUAD * LANES),
         scratch=np.zeros(longest),
         ahead=_ahead(looks_ahead),
         **_zeros(stage=2, past=(8, E_a), diagonal=E_a, mean=(MEANS, B_a, loads), expected=(B_a, loads)),
@@ -123,7 +127,7 @@ def _inverse(number: float) -> float:
 
 def _rigid_inertia(bodies: Bodies, b: int) -> tuple[Array, Array, Array]:
     """(first moment, inertia tensor, factor as the kernels want it) of a rigid body; -1 for a factor that does not exist."""
-    first, normal = bodies.moments[b, :3], bodies.where[b, 7]
+    first, normal = bodies.moments[b, :3], bodies.where[b, NORMAL]
     xx, yy, zz, xy, xz, yz = bodies.moments[b, 3:]
     J = np.array([[yy + zz, -xy, -xz], [-xy, xx + zz, -yz], [-xz, -yz, xx + yy]])
     M = np.block([[bodies.mass[b] * np.eye(3), -skew(first)], [skew(first), J]])

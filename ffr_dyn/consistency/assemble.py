@@ -22,8 +22,9 @@ from ffr_dyn.equations.layout import Layout, initial_state, layout
 from ffr_dyn.functions.rotation import G_bar, rotation_matrix
 from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction
 from ffr_dyn.scene.joints import DISTANCE
-from ffr_dyn.scene.scene import Scene
+from ffr_dyn.scene.scene import Scene, require_scene
 from ffr_dyn.variants.plane import planar_forms
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
@@ -37,8 +38,8 @@ LARGEST_TURN = 0.5  # rad per iteration
 TORN = 0.5  # elastic displacement of an interface over the size of its body that no joint may ask for
 
 
-@dataclass(frozen=True)
-class Assembled:
+@dataclass(frozen=True, repr=False)
+class Assembled(Brief):
     """A consistent state and the compiled scene.
 
     system   : with independent constraint rows, for the motion
@@ -64,6 +65,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     Raises InputError when the joints cannot be closed, naming the joint that stays open furthest, or when a driver
     contradicts the joints.
     """
+    require_scene(scene)
     scene, blocks = flattened(scene, time)
     place = layout(scene)
     guess, v = initial_state(scene, place)

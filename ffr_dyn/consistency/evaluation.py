@@ -17,8 +17,9 @@ from ffr_dyn.consistency.failure import failure
 from ffr_dyn.equations.inertia import mass_matrix
 from ffr_dyn.equations.layout import Layout, initial_state
 from ffr_dyn.functions.rotation import from_vector, rotation_matrix, skew
-from ffr_dyn.kernels.tables import OK, SINGULAR_CONSTRAINT, Record, Work
+from ffr_dyn.kernels.tables import IN_Q, IN_SHARED, OK, SINGULAR_CONSTRAINT, Record, Work
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import ComputationError
 
 Array = np.ndarray
@@ -26,8 +27,8 @@ Array = np.ndarray
 RANK_TOLERANCE = 1e-9  # of a singular value of the mass-weighted Jacobian, relative to the largest
 
 
-@dataclass(frozen=True)
-class Evaluator:
+@dataclass(frozen=True, repr=False)
+class Evaluator(Brief):
     """A compiled scene with the memory of one evaluation."""
 
     machine: Machine
@@ -42,8 +43,8 @@ class Evaluator:
         return self.machine.work
 
 
-@dataclass(frozen=True)
-class Evaluation:
+@dataclass(frozen=True, repr=False)
+class Evaluation(Brief):
     """The equations at one state: rows in the order of the system's blocks, then one for each coordinate across the plane
     of a planar scene (`locked`).
 
@@ -217,12 +218,12 @@ def evaluated_mass_matrix(at: Evaluator) -> Array:
     place, bodies, work = at.system.layout, at.system.model.bodies, at.work.bodies
     M = np.zeros((place.v_size, place.v_size))
     for b, n in enumerate(place.n):
-        rigid, elastic, e = place.rigid(b), place.q_dot(b), int(bodies.where[b, 3])
+        rigid, elastic, e = place.rigid(b), place.q_dot(b), int(bodies.where[b, IN_Q])
         block, s = M[rigid, rigid], skew(work.s[b])
         block[[0, 1, 2], [0, 1, 2]] = bodies.mass[b]
         block[3:, :3], block[:3, 3:], block[3:, 3:] = s, -s, work.J[b]
         if n:
-            c = bodies.where[b, 8]
+            c = bodies.where[b, IN_SHARED]
             P, H = bodies.P_dm[3 * c : 3 * (c + n)], work.H[3 * e : 3 * (e + n)]
             coupling = np.concatenate([P, H]).reshape(6, n)
             M[rigid, elastic], M[elastic, rigid] = coupling, coupling.T

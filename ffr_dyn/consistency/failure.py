@@ -8,11 +8,15 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.kernels.tables import (
     ACTUATOR,
     AT,
+    FAILED,
+    LEAST,
     NOT_CONVERGED,
     NOT_FINITE,
+    PHI,
     SINGULAR_BODY,
     SINGULAR_CONSTRAINT,
     STEP_TOO_SMALL,
+    WHEN,
     Work,
 )
 from ffr_dyn.scene.applied_loads import actions_of
@@ -24,7 +28,7 @@ HUGE = 1e12  # N, N m: no force of a machine; what made the state overflow
 
 def failure(system: System, work: Work, status: int, time: float, cause: str = "") -> BaseException:
     """What to tell about a status of the kernels; `cause` of the settings, if one is known to lose any state."""
-    at, where = f"at t = {time:.6g} s", int(work.info[0])
+    at, where = f"at t = {time:.6g} s", int(work.info[FAILED])
     if system.user.cause is not None:
         if isinstance(system.user.cause, KeyboardInterrupt):
             return system.user.cause
@@ -85,10 +89,10 @@ def _overflow(system: System, work: Work) -> str:
         return f"{name!r} has no value there; look at its formula, such as a root or a logarithm of what is negative"
     if value > HUGE:
         return f"{name!r} exerts {value:.3g} N or N m; look at its numbers and their units"
-    least, when = work.independence[1:3]
-    if (least < AT or work.drift[0] > OPEN) and work.drift[0] < LOST:
+    least, when = work.independence[[LEAST, WHEN]]
+    if (least < AT or work.drift[PHI] > OPEN) and work.drift[PHI] < LOST:
         return (
-            f"its constraints came open by up to {work.drift[0]:.2g}, and were nearest to dependence at t = {when:.6g} s: "
+            f"its constraints came open by up to {work.drift[PHI]:.2g}, and were nearest to dependence at t = {when:.6g} s: "
             "the mechanism locks there (a dead point that a driver goes beyond), or passes a singular position; keep driven "
             "motions within reach, or use projection"
         )

@@ -13,6 +13,7 @@ from ffr_dyn.equations.constraints import evaluate_word
 from ffr_dyn.equations.layout import Layout, layout
 from ffr_dyn.scene.joints import COORDINATES, RELATION, F, G, H, Joint, Word, frames
 from ffr_dyn.scene.scene import Scene, marker_number
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
@@ -21,8 +22,8 @@ MOVES = 1e-6  # of a body's motion, relative to the largest
 ALONG = ("turn x", "turn y", "turn z", "shift x", "shift y", "shift z")
 
 
-@dataclass(frozen=True)
-class FreeMotion:
+@dataclass(frozen=True, repr=False)
+class FreeMotion(Brief):
     """One way in which the bodies can move as rigid ones, with the other ways at rest.
 
     name      : the coordinate that leads it: "joint.angle", or "body shift x" in the body's axes
@@ -35,8 +36,8 @@ class FreeMotion:
     direction: Array
 
 
-@dataclass(frozen=True)
-class Mobility:
+@dataclass(frozen=True, repr=False)
+class Mobility(Brief):
     """What the joints and drivers of a scene leave free at its assembled start.
 
     degrees_of_freedom : rigid and elastic;  elastic : number of elastic coordinates

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ffr_dyn.chart.diagram import Diagram, Point, spread
-from ffr_dyn.chart.draw import draw as draw_diagram
+from ffr_dyn.chart.draw import draw_chart
 from ffr_dyn.chart.reference import Reference
 from ffr_dyn.chart.variants import STEP, TOLERANCE, Model, Variant
 from ffr_dyn.economy.model_choice import Choice
@@ -67,7 +67,7 @@ def diagram(found: Economy) -> Diagram:
 
 def draw(found: Economy, path: str | Path) -> Path:
     """Draw the runs of a search and the one it chose, .png or .svg, a panel for each output."""
-    return draw_diagram(diagram(found), path, title=f"{found.original.name}: what was tried, and chosen")
+    return draw_chart(diagram(found), path, title=f"{found.original.name}: what was tried, and chosen")
 
 
 def _reference(found: Economy) -> Reference:

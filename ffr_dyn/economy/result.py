@@ -15,12 +15,13 @@ from ffr_dyn.economy.model_choice import Choice
 from ffr_dyn.economy.outputs import Probe
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.brief import Brief
 
 Array = np.ndarray
 
 
-@dataclass(frozen=True)
-class Verification:
+@dataclass(frozen=True, repr=False)
+class Verification(Brief):
     """The errors of the chosen model against everything on and a finer step.
 
     choice   : the reference;  error : (outputs,) of the chosen model;  own : (outputs,) of the reference, estimated
@@ -37,8 +38,8 @@ class Verification:
     cost: float
 
 
-@dataclass(frozen=True)
-class Economy:
+@dataclass(frozen=True, repr=False)
+class Economy(Brief):
     """What was found.
 
     choice, scene, settings : the model;  scene is ready to run with `ffr_dyn.analyses.run.run(scene, settings)`

@@ -16,6 +16,7 @@ from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import ComputationError
 
 Array = np.ndarray
@@ -38,16 +39,16 @@ class Span:
         return round((self.end - self.start) / self.output_step)
 
 
-@dataclass(frozen=True)
-class Made:
+@dataclass(frozen=True, repr=False)
+class Made(Brief):
     """A model: the scene with it, and that scene assembled at the start of the run."""
 
     scene: Scene
     assembled: Assembled
 
 
-@dataclass(frozen=True)
-class Trial:
+@dataclass(frozen=True, repr=False)
+class Trial(Brief):
     """A run.
 
     made   : the model;  values : per output (T, k);  evaluations : of the equations of motion

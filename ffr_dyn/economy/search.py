@@ -21,7 +21,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffr_dyn.analyses.settings import Forward, Settings
+from ffr_dyn.analyses.forward import Forward
+from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.economy.cache import Ledger, Tried
 from ffr_dyn.economy.checks import frequencies, stiffening_loads
@@ -280,7 +281,15 @@ def _all_runs(ledger: Ledger, found: Chosen, verification: Verification | None) 
 def _settings(span: Span, choice: Choice, of: Probe) -> Settings:
     outputs = tuple(dict.fromkeys(("default", *of.quantities)))
     method = choice.integrator(span.output_step)
-    return Settings(span.start, span.end, span.output_step, method, span.stabilisation, outputs, Forward())
+    return Settings(
+        start=span.start,
+        end=span.end,
+        output_step=span.output_step,
+        method=method,
+        stabilisation=span.stabilisation,
+        outputs=outputs,
+        analysis=Forward(),
+    )
 
 
 def _explained(ledger: Ledger, found: Chosen, final: Trial) -> tuple[Contributions, Contributions]:

@@ -13,13 +13,14 @@ from ffr_dyn.scene.couplings import Coupling, coupling_word
 from ffr_dyn.scene.drivers import Driver, PointDriver, driver_word, path_words
 from ffr_dyn.scene.joints import DISTANCE, RELATION, Joint, Word, words
 from ffr_dyn.scene.scene import Scene, joint_of, joints_of, marker_number
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
 
 
-@dataclass(frozen=True)
-class Block:
+@dataclass(frozen=True, repr=False)
+class Block(Brief):
     """The rows of one joint, driver or coupling.
 
     markers : numbers of markers i, j, or i, j of both joints of a relation

@@ -8,12 +8,13 @@ import numpy as np
 
 from ffr_dyn.scene.scene import Scene
 from ffr_dyn.variants.plane import AXES, body_normal
+from ffr_prep.common.brief import Brief
 
 Array = np.ndarray
 
 
-@dataclass(frozen=True)
-class Layout:
+@dataclass(frozen=True, repr=False)
+class Layout(Brief):
     """Where each body's coordinates begin in x and v, how many elastic coordinates it has, and what may move.
 
     normals : per body, the body axis along the normal of a planar scene, or -1

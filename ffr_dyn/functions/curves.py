@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
 
 
-@dataclass(frozen=True)
-class Curve:
+@dataclass(frozen=True, repr=False)
+class Curve(Brief):
     """values (P,) over at (P,), increasing: a smooth curve through the points, straight beyond them.
 
     Between the points it is the monotone cubic of Fritsch and Carlson (1980), which does not overshoot; through two

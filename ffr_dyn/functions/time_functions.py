@@ -8,10 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import wraps
+from inspect import signature
+from numbers import Real
+from typing import ParamSpec
 
 import numpy as np
 
 from ffr_dyn.functions.operations import SUBTRACT, operate
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
@@ -20,8 +25,8 @@ Array = np.ndarray
 POLYNOMIAL, HARMONIC, PIECEWISE, USER, OPERATION = 0, 1, 2, 3, 4
 
 
-@dataclass(frozen=True)
-class TimeFunction:
+@dataclass(frozen=True, repr=False)
+class TimeFunction(Brief):
     """A function of time as the kernels read it: its kind and its numbers; `callback` for a Python function.
 
     operands : what an operation of a formula (data: its number, its parameter) works on
@@ -45,6 +50,27 @@ def polynomial(*coefficients: float) -> TimeFunction:
     return TimeFunction(POLYNOMIAL, _numbers("polynomial", coefficients))
 
 
+P = ParamSpec("P")
+
+
+def _by_name(function: Callable[P, TimeFunction]) -> Callable[P, TimeFunction]:
+    """The function, which answers numbers that are missing or without their names by an InputError with the names."""
+
+    @wraps(function)
+    def named(*args: P.args, **kwargs: P.kwargs) -> TimeFunction:
+        try:
+            signature(function).bind(*args, **kwargs)
+        except TypeError as error:
+            given = ", ".join([*map(repr, args), *(f"{name}={value!r}" for name, value in kwargs.items())])
+            names = ", ".join(f"{name}=..." for name in signature(function).parameters)
+            name = function.__name__
+            raise InputError(f"{name}({given}): {error}; its numbers have names: {name}({names})") from None
+        return function(*args, **kwargs)
+
+    return named
+
+
+@_by_name
 def harmonic(*, amplitude: float, frequency: float, phase: float = 0.0, mean: float = 0.0) -> TimeFunction:
     """mean + amplitude sin(2 pi frequency t + phase); frequency [Hz], phase [rad]."""
     return TimeFunction(HARMONIC, _numbers("harmonic", (mean, amplitude, 2 * np.pi * frequency, phase)))
@@ -82,7 +108,7 @@ def signal(name: str, value: float = 0.0) -> TimeFunction:
 
     The same signal may stand in several places. Raises InputError for a name that is no word, or a value not finite.
     """
-    if not name.isidentifier():
+    if not isinstance(name, str) or not name.isidentifier():
         raise InputError(f"{name!r} cannot be the name of an input: use letters, digits and '_', a letter first")
     return TimeFunction(PIECEWISE, (*SIGNAL, *_numbers(f"input {name!r}", (value, 0.0, 0.0))), name=name)
 
@@ -133,8 +159,8 @@ def is_zero(function: TimeFunction) -> bool:
 
 
 def _numbers(what: str, values: tuple[float, ...]) -> tuple[float, ...]:
-    if not values or not np.isfinite(values).all():
-        raise InputError(f"{what}: all numbers must be finite: {values}")
+    if not values or not all(isinstance(value, Real) and np.isfinite(value) for value in values):
+        raise InputError(f"{what}: all of these must be finite numbers: {values}")
     return tuple(float(v) for v in values)
 
 

@@ -9,14 +9,26 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ffr_dyn.integrators.tolerances import Tolerances
-from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.entry_points import Unit
-from ffr_dyn.kernels.integrator_api import evaluate, set_diagonal, settle, solve
-from ffr_dyn.kernels.options import inlined
-from ffr_dyn.kernels.simd.table_address import tables_at
-from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
-from ffr_dyn.kernels.tables import OK
-from ffr_dyn.kernels.vectors import add_scaled, copy, fill
+from ffr_dyn.kernels.integrator_api import (
+    OK,
+    CompiledFunction,
+    H,
+    Tables,
+    acceleration_target,
+    add_scaled,
+    copy,
+    evaluate,
+    fill,
+    finite,
+    inlined,
+    method_step,
+    normalise,
+    position_rates,
+    set_diagonal,
+    solve,
+    stabilise,
+    velocity_rates,
+)
 
 # Rows of the lower triangle, six to a row; the last are the weights of order five.
 STAGES = (
@@ -40,17 +52,16 @@ def slopes(r, x, v, k):
     acceleration_target(r.work.rows, r.clock.gains, r.stages.target)
     solve(r, x, r.stages.target, k)
     position_rates(r.model.bodies, x, v, r.stages.x[FIRST + k])
-    to_velocity_rates(r.model.bodies.where, r.work.bodies.A, r.work.bodies.acc, r.stages.v[FIRST + k])
+    velocity_rates(r, r.stages.v[FIRST + k])
 
 
-@Unit
-def dopri5_step(at, t, again, unused):
-    """One step of the machine's state from time t; `again` tells that the last one was refused. Returns a status."""
-    r = tables_at(at)
-    h, stages = r.clock.time[0], r.stages
+@method_step
+def dopri5_step(r: Tables, t: float, again: int) -> int:
+    """One step of the engine's state from time t; `again` tells that the last one was refused. Returns a status."""
+    h, stages = r.clock.time[H], r.stages
     set_diagonal(r, 0.0)
     if stages.numbers[0] == 0.0:
-        status = settle(r, t)
+        status = stabilise(r, t, r.x, r.v)
         if status != OK:
             return status
         slopes(r, r.x, r.v, 0)
@@ -73,7 +84,7 @@ def dopri5_step(at, t, again, unused):
         add_scaled(r.x, r.x, h * STAGES[36 + j], stages.x[FIRST + j])
         add_scaled(r.v, r.v, h * STAGES[36 + j], stages.v[FIRST + j])
     normalise(r.model.bodies, r.x)
-    status = settle(r, t + h)
+    status = stabilise(r, t + h, r.x, r.v)
     if status != OK:
         return status
     slopes(r, r.x, r.v, 6)
@@ -107,5 +118,4 @@ class DormandPrince:
     keeps_terms: ClassVar[bool] = False
     looks_ahead: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = (0.0,)
-    calls: ClassVar[tuple[str, ...]] = ()
-    unit: ClassVar[Unit] = dopri5_step
+    do_step: ClassVar[CompiledFunction] = dopri5_step

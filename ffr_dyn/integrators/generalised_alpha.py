@@ -28,16 +28,40 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ffr_dyn.integrators.step import check_step
-from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.entry_points import Unit
-from ffr_dyn.kernels.finite_motion import carry, converging, farthest, largest_motion, unconverged
-from ffr_dyn.kernels.forces.coordinate_forces import keep_turns
-from ffr_dyn.kernels.integrator_api import correct, evaluate, project, set_diagonal, settle, solve_again, solve_aside
-from ffr_dyn.kernels.options import inlined
-from ffr_dyn.kernels.simd.table_address import tables_at
-from ffr_dyn.kernels.system import finite, largest, to_velocity_rates
-from ffr_dyn.kernels.tables import NOT_FINITE, OK, USER_FAILED
-from ffr_dyn.kernels.vectors import add_scaled, copy, fill
+from ffr_dyn.kernels.integrator_api import (
+    AGAIN,
+    ASIDE,
+    NOT_FINITE,
+    OK,
+    PHI,
+    PHI_DOT,
+    USER_FAILED,
+    CompiledFunction,
+    H,
+    Tables,
+    add_scaled,
+    carry,
+    converging,
+    copy,
+    correct,
+    evaluate,
+    farthest,
+    fill,
+    finite,
+    inlined,
+    keep_turns,
+    largest,
+    largest_motion,
+    method_step,
+    normalise,
+    position_rates,
+    project,
+    set_diagonal,
+    solve,
+    stabilise,
+    unconverged,
+    velocity_rates,
+)
 from ffr_prep.common.errors import InputError
 
 # Rows of stages.v: accelerations now, before, and in the making; the method's own a now and in the making; v in the making;
@@ -55,13 +79,13 @@ def start(r, t, h, lag):
     """Accelerations at the start, and a = v_dot(t + lag): what makes the method of second order from its first step."""
     s, bodies = r.stages, r.model.bodies
     set_diagonal(r, 0.0)
-    status = settle(r, t)
+    status = stabilise(r, t, r.x, r.v)
     for attempt in range(2):
         if status == OK:
             fill(r.work.bodies.shift, 0.0)
             copy(s.target, r.work.rows.gamma)
-            solve_aside(r, r.x if attempt == 0 else s.x[0], s.target)
-            to_velocity_rates(bodies.where, r.work.bodies.A, r.work.bodies.acc, s.v[NOW if attempt == 0 else A_NOW])
+            solve(r, r.x if attempt == 0 else s.x[0], s.target, ASIDE)
+            velocity_rates(r, s.v[NOW if attempt == 0 else A_NOW])
         if status == OK and attempt == 0:
             position_rates(bodies, r.x, r.v, s.x[1])
             add_scaled(s.x[0], r.x, lag, s.x[1])
@@ -97,14 +121,15 @@ def newton(r, h, square, single):
     stabilised = s.numbers[STABILISED] > 0.0
     for k in range(s.target.size):
         s.target[k] = -rows.nu[k] / single if stabilised else -rows.Phi[k] / square
-    solve_again(r, s.x[0], s.target)
-    to_velocity_rates(r.model.bodies.where, r.work.bodies.A, r.work.bodies.acc, s.v[CORRECTION])
+    solve(r, s.x[0], s.target, AGAIN)
+    velocity_rates(r, s.v[CORRECTION])
     add_scaled(s.v[NEXT], s.v[NEXT], 1.0, s.v[CORRECTION])
     if stabilised:
         copy(s.rows[ETA], rows.lam)
         for k in range(s.target.size):
             s.target[k] = rows.Phi[k] + square * s.target[k]
-        project(r, s.target, s.v[MOTION])
+        project(r, s.target)
+        velocity_rates(r, s.v[MOTION])
         add_scaled(s.v[SHIFT], s.v[SHIFT], 1.0, s.v[MOTION])
         add_scaled(s.v[CORRECTION], s.v[CORRECTION], 1.0 / square, s.v[MOTION])
         copy(rows.lam, s.rows[ETA])
@@ -151,11 +176,10 @@ def iterate(r, t, h, square, single):
     return OK if converged else unconverged(r, worst, h * change)
 
 
-@Unit
-def generalised_alpha_step(at, t, unused, unused_too):
-    """One step of the machine's state from time t. Returns a status."""
-    r = tables_at(at)
-    h, s, bodies, number = r.clock.time[0], r.stages, r.model.bodies, r.stages.numbers
+@method_step
+def generalised_alpha_step(r: Tables, t: float, again: int) -> int:
+    """One step of the engine's state from time t. Returns a status."""
+    h, s, bodies, number = r.clock.time[H], r.stages, r.model.bodies, r.stages.numbers
     share = (1.0 - number[ALPHA_F]) / (1.0 - number[ALPHA_M])
     square, single = share * number[BETA] * h * h, share * number[GAMMA] * h
     if number[STARTED] == 0.0:
@@ -171,8 +195,8 @@ def generalised_alpha_step(at, t, unused, unused_too):
     if status != OK:
         return status
     keep_turns(r.model.loads, r.work.loads)
-    r.work.drift[0] = max(r.work.drift[0], largest(r.work.rows.Phi))
-    r.work.drift[1] = max(r.work.drift[1], largest(r.work.rows.nu))
+    r.work.drift[PHI] = max(r.work.drift[PHI], largest(r.work.rows.Phi))
+    r.work.drift[PHI_DOT] = max(r.work.drift[PHI_DOT], largest(r.work.rows.nu))
     copy(s.v[BEFORE], s.v[NOW])
     copy(s.v[NOW], s.v[NEXT])
     copy(s.v[A_NOW], s.v[A_NEXT])
@@ -211,8 +235,7 @@ class GeneralisedAlpha:
     keeps_terms: ClassVar[bool] = False
     looks_ahead: ClassVar[int] = 0
     controlled: ClassVar[bool] = False
-    calls: ClassVar[tuple[str, ...]] = ("project",)
-    unit: ClassVar[Unit] = generalised_alpha_step
+    do_step: ClassVar[CompiledFunction] = generalised_alpha_step
 
     def __post_init__(self) -> None:
         check_step(self, self.step)
@@ -252,8 +275,7 @@ class HHT:
     keeps_terms: ClassVar[bool] = False
     looks_ahead: ClassVar[int] = 0
     controlled: ClassVar[bool] = False
-    calls: ClassVar[tuple[str, ...]] = ("project",)
-    unit: ClassVar[Unit] = generalised_alpha_step
+    do_step: ClassVar[CompiledFunction] = generalised_alpha_step
 
     def __post_init__(self) -> None:
         check_step(self, self.step)
@@ -281,7 +303,7 @@ def check_iterations(tolerance: float, iterations: int) -> None:
 def newmark(
     alpha_m: float, alpha_f: float, tolerance: float, iterations: int, stabilised: bool, scaled: bool
 ) -> tuple[float, ...]:
-    """What the unit finds in stages.numbers; gamma for order two, beta for the most damping (Chung & Hulbert 1993)."""
+    """What the step finds in stages.numbers; gamma for order two, beta for the most damping (Chung & Hulbert 1993)."""
     gamma = 0.5 + alpha_f - alpha_m
     beta = 0.25 * (gamma + 0.5) ** 2
     settings = (alpha_m, alpha_f, beta, gamma, tolerance, iterations, stabilised, scaled)

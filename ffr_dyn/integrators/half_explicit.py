@@ -18,18 +18,45 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ffr_dyn.integrators.step import check_step
-from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.entry_points import Unit
-from ffr_dyn.kernels.finite_motion import into_body_axes, largest_motion
-from ffr_dyn.kernels.forces.coordinate_forces import keep_turns
-from ffr_dyn.kernels.integrator_api import evaluate, look_ahead, set_diagonal, settle, solve, solve_again
-from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.simd.slices import part
-from ffr_dyn.kernels.simd.table_address import tables_at
-from ffr_dyn.kernels.solution import constraint_rates
-from ffr_dyn.kernels.system import finite, largest, to_velocity_rates
-from ffr_dyn.kernels.tables import NEAR, NOT_CONVERGED, NOT_FINITE, OK, TIGHTER
-from ffr_dyn.kernels.vectors import add_scaled, copy
+from ffr_dyn.kernels.integrator_api import (
+    AGAIN,
+    FAILED,
+    HERE,
+    IN_Q,
+    IN_V,
+    K_SIZE,
+    NEAR,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    OK,
+    PHI,
+    TIGHTER,
+    TOLERANCE,
+    CompiledFunction,
+    H,
+    N,
+    Tables,
+    add_scaled,
+    constraint_rates,
+    copy,
+    evaluate,
+    evaluate_rows_at,
+    finite,
+    inlined,
+    into_body_axes,
+    keep_turns,
+    kernel,
+    largest,
+    largest_motion,
+    method_step,
+    normalise,
+    part,
+    position_rates,
+    set_diagonal,
+    solve,
+    stabilise,
+    velocity_rates,
+)
 
 ROOT = 6.0**0.5
 STAGES = 5
@@ -48,7 +75,7 @@ PATIENCE = 2  # sweeps that need not halve what is left: near-massless bodies ga
 LOST = 1e-6  # relative error of a velocity with which the iteration has failed
 
 # Rows of stages.x and stages.v after those of the stages: this stage's state, the next one's, scratch.
-HERE, AHEAD, SCRATCH = STAGES, STAGES + 1, STAGES + 2
+STAGE, AHEAD, SCRATCH = STAGES, STAGES + 1, STAGES + 2
 # Rows of stages.rows: rates ahead and what they are short of.
 NU, SHORT = 0, 1
 
@@ -64,7 +91,7 @@ def rates_ahead(r, u, out):
 
 @inlined
 def keep_rows_ahead(r):
-    """Keep what `look_ahead` found."""
+    """Keep what `evaluate_rows_at` found."""
     s, rows = r.stages, r.work.rows
     copy(s.rows[NU], rows.nu)
     copy(part(rows.kept, 0, rows.kept.size), part(rows.jac, 0, rows.jac.size))
@@ -72,23 +99,23 @@ def keep_rows_ahead(r):
 
 @inlined
 def violation_allowed(r):
-    return r.clock.gains[2] * (TIGHTER if r.work.independence[0] < NEAR else 1.0)
+    return r.clock.gains[TOLERANCE] * (TIGHTER if r.work.independence[HERE] < NEAR else 1.0)
 
 
 @kernel
 def take_stiffening_out(bodies, w):
     """The right-hand sides as they were evaluated: `solve` adds the forces of geometric stiffening to them."""
     for b in range(bodies.mass.size):
-        if bodies.where[b, 6] > 0:
-            n, j, e = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3]
+        if bodies.where[b, K_SIZE] > 0:
+            n, j, e = bodies.where[b, N], bodies.where[b, IN_V], bodies.where[b, IN_Q]
             copy(part(w.f, j + 6, n), part(w.unstiffened, e, n))
 
 
 @inlined
 def accelerate(r, k, ha):
-    """v_dot of stage k, evaluated at HERE, such that v[AHEAD] + ha v_dot obeys the constraints there. Returns a status."""
+    """v_dot of stage k, evaluated at STAGE, such that v[AHEAD] + ha v_dot obeys the constraints there. Returns a status."""
     s, bw, rows = r.stages, r.work.bodies, r.work.rows
-    here, base, rate, short = s.v[HERE], s.v[AHEAD], s.v[k], s.rows[SHORT]
+    here, base, rate, short = s.v[STAGE], s.v[AHEAD], s.v[k], s.rows[SHORT]
     for j in range(here.size):
         rate[j] = base[j] - here[j]
     rates_ahead(r, rate, short)
@@ -98,10 +125,10 @@ def accelerate(r, k, ha):
     exact = EXACT / abs(ha) * largest_motion(r.model.bodies, bw.J, here)[0]
     for sweep in range(SWEEPS):
         if sweep == 0:
-            solve(r, s.x[HERE], s.target, k)
+            solve(r, s.x[STAGE], s.target, k)
         else:
-            solve_again(r, s.x[HERE], s.target)
-        to_velocity_rates(r.model.bodies.where, bw.A, bw.acc, rate)
+            solve(r, s.x[STAGE], s.target, AGAIN)
+        velocity_rates(r, rate)
         rates_ahead(r, rate, short)
         for c in range(short.size):
             short[c] = -s.rows[NU, c] / ha - short[c]
@@ -121,24 +148,23 @@ def accelerate(r, k, ha):
         return NOT_FINITE
     for c in range(short.size):
         if abs(short[c]) == left:
-            r.work.info[0] = r.model.bodies.mass.size + c
+            r.work.info[FAILED] = r.model.bodies.mass.size + c
     return NOT_CONVERGED
 
 
-@Unit
-def half_explicit_step(at, t, unused, unused_too):
-    """One step of the machine's state from time t. Returns a status."""
-    r = tables_at(at)
-    h, s, bodies, number = r.clock.time[0], r.stages, r.model.bodies, r.stages.numbers
+@method_step
+def half_explicit_step(r: Tables, t: float, again: int) -> int:
+    """One step of the engine's state from time t. Returns a status."""
+    h, s, bodies, number = r.clock.time[H], r.stages, r.model.bodies, r.stages.numbers
     set_diagonal(r, 0.0)
     if number[0] == 0.0:
-        status = settle(r, t)
+        status = stabilise(r, t, r.x, r.v)
         if status != OK:
             return status
-    copy(s.x[HERE], r.x)
-    copy(s.v[HERE], r.v)
+    copy(s.x[STAGE], r.x)
+    copy(s.v[STAGE], r.v)
     for k in range(STAGES):
-        position_rates(bodies, s.x[HERE], s.v[HERE], s.x[k])
+        position_rates(bodies, s.x[STAGE], s.v[STAGE], s.x[k])
         copy(s.x[AHEAD], r.x)
         copy(s.v[AHEAD], r.v)
         for j in range(k + 1):
@@ -146,11 +172,11 @@ def half_explicit_step(at, t, unused, unused_too):
         for j in range(k):
             add_scaled(s.v[AHEAD], s.v[AHEAD], h * A[STAGES * k + j], s.v[j])
         normalise(bodies, s.x[AHEAD])
-        status = look_ahead(r, t + C[k + 1] * h, s.x[AHEAD], s.v[HERE])
+        status = evaluate_rows_at(r, t + C[k + 1] * h, s.x[AHEAD], s.v[STAGE])
         if status == OK:
             keep_rows_ahead(r)
             position = largest(r.work.rows.Phi)
-            status = evaluate(r, t + C[k] * h, s.x[HERE], s.v[HERE])
+            status = evaluate(r, t + C[k] * h, s.x[STAGE], s.v[STAGE])
         if status == OK:
             if k == 0:
                 keep_turns(r.model.loads, r.work.loads)
@@ -158,12 +184,12 @@ def half_explicit_step(at, t, unused, unused_too):
         if status != OK:
             return status
         add_scaled(s.v[AHEAD], s.v[AHEAD], h * A[(STAGES + 1) * k], s.v[k])
-        copy(s.x[HERE], s.x[AHEAD])
-        copy(s.v[HERE], s.v[AHEAD])
-    r.work.drift[0] = max(r.work.drift[0], position)
-    number[0] = 1.0 if position <= violation_allowed(r) or r.clock.gains[2] == 0.0 else 0.0
-    copy(r.x, s.x[HERE])
-    copy(r.v, s.v[HERE])
+        copy(s.x[STAGE], s.x[AHEAD])
+        copy(s.v[STAGE], s.v[AHEAD])
+    r.work.drift[PHI] = max(r.work.drift[PHI], position)
+    number[0] = 1.0 if position <= violation_allowed(r) or r.clock.gains[TOLERANCE] == 0.0 else 0.0
+    copy(r.x, s.x[STAGE])
+    copy(r.v, s.v[STAGE])
     return finite(r.x, r.v)
 
 
@@ -187,8 +213,7 @@ class HalfExplicit:
     looks_ahead: ClassVar[int] = 0
     controlled: ClassVar[bool] = False
     numbers: ClassVar[tuple[float, ...]] = (0.0,)
-    calls: ClassVar[tuple[str, ...]] = ("look_ahead",)
-    unit: ClassVar[Unit] = half_explicit_step
+    do_step: ClassVar[CompiledFunction] = half_explicit_step
 
     def __post_init__(self) -> None:
         check_step(self, self.step)

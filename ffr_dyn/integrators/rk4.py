@@ -6,28 +6,39 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ffr_dyn.integrators.step import check_step
-from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.entry_points import Unit
-from ffr_dyn.kernels.integrator_api import evaluate, set_diagonal, settle, solve_stage
-from ffr_dyn.kernels.simd.table_address import tables_at
-from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
-from ffr_dyn.kernels.tables import OK
-from ffr_dyn.kernels.vectors import add_four, add_scaled, copy
+from ffr_dyn.kernels.integrator_api import (
+    OK,
+    CompiledFunction,
+    H,
+    Tables,
+    acceleration_target,
+    add_four,
+    add_scaled,
+    copy,
+    evaluate,
+    finite,
+    method_step,
+    normalise,
+    position_rates,
+    set_diagonal,
+    solve_stage,
+    stabilise,
+    velocity_rates,
+)
 
 AT, WEIGHTS = (0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 
 
-@Unit
-def rk4_step(at, t, unused, unused_too):
-    """One step of the machine's state from time t. Returns a status."""
-    r = tables_at(at)
-    h = r.clock.time[0]
+@method_step
+def rk4_step(r: Tables, t: float, again: int) -> int:
+    """One step of the engine's state from time t. Returns a status."""
+    h = r.clock.time[H]
     stages, xs, vs = r.stages, r.stages.x[4], r.stages.v[4]
     set_diagonal(r, 0.0)
     for k in range(4):
         a = AT[k] * h
         if k == 0:
-            status = settle(r, t)
+            status = stabilise(r, t, r.x, r.v)
             copy(xs, r.x)
             copy(vs, r.v)
         else:
@@ -39,7 +50,7 @@ def rk4_step(at, t, unused, unused_too):
         acceleration_target(r.work.rows, r.clock.gains, stages.target)
         solve_stage(r, xs, stages.target, k, AT[k], WEIGHTS[k])
         position_rates(r.model.bodies, xs, vs, stages.x[k])
-        to_velocity_rates(r.model.bodies.where, r.work.bodies.A, r.work.bodies.acc, stages.v[k])
+        velocity_rates(r, stages.v[k])
     outer, inner = h / 6.0, h / 3.0
     add_four(r.x, outer, stages.x[0], inner, stages.x[1], inner, stages.x[2], outer, stages.x[3])
     add_four(r.v, outer, stages.v[0], inner, stages.v[1], inner, stages.v[2], outer, stages.v[3])
@@ -66,8 +77,7 @@ class RK4:
     keeps_terms: ClassVar[bool] = False
     looks_ahead: ClassVar[int] = 4
     numbers: ClassVar[tuple[float, ...]] = ()
-    calls: ClassVar[tuple[str, ...]] = ()
-    unit: ClassVar[Unit] = rk4_step
+    do_step: ClassVar[CompiledFunction] = rk4_step
 
     def __post_init__(self) -> None:
         check_step(self, self.step)

@@ -24,29 +24,44 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ffr_dyn.integrators.step import check_step
-from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.entry_points import Unit
-from ffr_dyn.kernels.integrator_api import add_elastic_part, correct, evaluate, set_diagonal, settle, solve_stage
-from ffr_dyn.kernels.simd.table_address import tables_at
-from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
-from ffr_dyn.kernels.tables import OK
-from ffr_dyn.kernels.vectors import add_both, add_scaled, copy, fill, multiple
+from ffr_dyn.kernels.integrator_api import (
+    OK,
+    CompiledFunction,
+    H,
+    Tables,
+    acceleration_target,
+    add_both,
+    add_elastic_part,
+    add_scaled,
+    copy,
+    correct,
+    evaluate,
+    fill,
+    finite,
+    method_step,
+    multiple,
+    normalise,
+    position_rates,
+    set_diagonal,
+    solve_stage,
+    stabilise,
+    velocity_rates,
+)
 
 GAMMA = 1.0 - 0.5**0.5
 
 
-@Unit
-def ros2_step(at, t, unused, unused_too):
-    """One step of the machine's state from time t. Returns a status."""
-    r = tables_at(at)
-    h = r.clock.time[0]
+@method_step
+def ros2_step(r: Tables, t: float, again: int) -> int:
+    """One step of the engine's state from time t. Returns a status."""
+    h = r.clock.time[H]
     bodies, stages = r.model.bodies, r.stages
     gh = GAMMA * h
     set_diagonal(r, gh)
     xs, vs, r_x, r_v = stages.x[2], stages.v[2], stages.x[3], stages.v[3]
     for k in range(2):
         if k == 0:
-            status = settle(r, t)
+            status = stabilise(r, t, r.x, r.v)
             copy(xs, r.x)
             copy(vs, r.v)
             fill(r_x, 0.0)
@@ -65,7 +80,7 @@ def ros2_step(at, t, unused, unused_too):
         if k == 1:
             correct(r, r_v, stages.target)
         solve_stage(r, xs, stages.target, k, float(k), 0.5)
-        to_velocity_rates(bodies.where, r.work.bodies.A, r.work.bodies.acc, stages.v[k])
+        velocity_rates(r, stages.v[k])
         add_scaled(vs, vs, gh, stages.v[k])
         position_rates(bodies, xs, vs, stages.x[k])
     add_scaled(stages.x[1], stages.x[1], 1.0, r_x)
@@ -95,8 +110,7 @@ class ROS2:
     keeps_terms: ClassVar[bool] = False
     looks_ahead: ClassVar[int] = 2
     numbers: ClassVar[tuple[float, ...]] = ()
-    calls: ClassVar[tuple[str, ...]] = ()
-    unit: ClassVar[Unit] = ros2_step
+    do_step: ClassVar[CompiledFunction] = ros2_step
 
     def __post_init__(self) -> None:
         check_step(self, self.step)

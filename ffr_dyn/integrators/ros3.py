@@ -25,13 +25,30 @@ from typing import ClassVar
 
 from ffr_dyn.integrators.step import check_step
 from ffr_dyn.integrators.tolerances import Tolerances
-from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.entry_points import Unit
-from ffr_dyn.kernels.integrator_api import add_elastic_part, correct, evaluate, set_diagonal, settle, solve_stage
-from ffr_dyn.kernels.simd.table_address import tables_at
-from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
-from ffr_dyn.kernels.tables import OK
-from ffr_dyn.kernels.vectors import add_four, add_scaled, combine_three, copy, fill, weigh_four
+from ffr_dyn.kernels.integrator_api import (
+    OK,
+    CompiledFunction,
+    H,
+    Tables,
+    acceleration_target,
+    add_elastic_part,
+    add_four,
+    add_scaled,
+    combine_three,
+    copy,
+    correct,
+    evaluate,
+    fill,
+    finite,
+    method_step,
+    normalise,
+    position_rates,
+    set_diagonal,
+    solve_stage,
+    stabilise,
+    velocity_rates,
+    weigh_four,
+)
 
 GAMMA = 0.43586652150845900
 # Rows of both lower triangles, four to a row.
@@ -53,18 +70,17 @@ ERRORS = (-0.07173852763110697, -0.5890830943268753, 0.5469231340669933, 0.11389
 AT = (0.0, 0.8599004143760887, 0.7179332607542298, 1.0)
 
 
-@Unit
-def ros3_step(at, t, unused, unused_too):
-    """One step of the machine's state from time t. Returns a status."""
-    r = tables_at(at)
-    h = r.clock.time[0]
+@method_step
+def ros3_step(r: Tables, t: float, again: int) -> int:
+    """One step of the engine's state from time t. Returns a status."""
+    h = r.clock.time[H]
     bodies, stages = r.model.bodies, r.stages
     gh = GAMMA * h
     set_diagonal(r, gh)
     xs, vs, r_x, r_v = stages.x[4], stages.v[4], stages.x[5], stages.v[5]
     for k in range(4):
         if k == 0:
-            status = settle(r, t)
+            status = stabilise(r, t, r.x, r.v)
             fill(r.work.bodies.shift, 0.0)
             copy(xs, r.x)
             copy(vs, r.v)
@@ -88,7 +104,7 @@ def ros3_step(at, t, unused, unused_too):
         if k > 0:
             correct(r, r_v, stages.target)
         solve_stage(r, xs, stages.target, k, AT[k], WEIGHTS[k])
-        to_velocity_rates(bodies.where, r.work.bodies.A, r.work.bodies.acc, stages.v[k])
+        velocity_rates(r, stages.v[k])
         add_scaled(vs, vs, gh, stages.v[k])
         position_rates(bodies, xs, vs, stages.x[k])
         add_scaled(stages.v[k], stages.v[k], -1.0, r_v)
@@ -123,8 +139,7 @@ class ROS3:
     keeps_terms: ClassVar[bool] = False
     looks_ahead: ClassVar[int] = 3
     numbers: ClassVar[tuple[float, ...]] = ()
-    calls: ClassVar[tuple[str, ...]] = ()
-    unit: ClassVar[Unit] = ros3_step
+    do_step: ClassVar[CompiledFunction] = ros3_step
 
     def __post_init__(self) -> None:
         check_step(self, self.step)
@@ -150,5 +165,4 @@ class AdaptiveROS3:
     keeps_terms: ClassVar[bool] = False
     looks_ahead: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = ()
-    calls: ClassVar[tuple[str, ...]] = ()
-    unit: ClassVar[Unit] = ros3_step
+    do_step: ClassVar[CompiledFunction] = ros3_step

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 
@@ -22,6 +22,7 @@ class Tolerances:
     """
 
     relative: float = 1e-6
+    _: KW_ONLY
     position: float = 1e-7
     velocity: float = 1e-6
     elastic: float = 1e-8
@@ -35,4 +36,4 @@ class Tolerances:
 
 def tolerances(relative: float) -> Tolerances:
     """All tolerances in the proportions of the default ones."""
-    return Tolerances(relative, 0.1 * relative, relative, 0.01 * relative)
+    return Tolerances(relative, position=0.1 * relative, velocity=relative, elastic=0.01 * relative)

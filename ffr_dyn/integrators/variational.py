@@ -29,18 +29,59 @@ from typing import ClassVar
 
 from ffr_dyn.integrators.generalised_alpha import check_iterations
 from ffr_dyn.integrators.step import check_step
-from ffr_dyn.kernels.bodies import mass_times, normalise, six_rows, three_rows
-from ffr_dyn.kernels.entry_points import Unit
-from ffr_dyn.kernels.finite_motion import carry, converging, farthest, into_global_axes, largest_motion, unconverged
-from ffr_dyn.kernels.forces.coordinate_forces import keep_turns
-from ffr_dyn.kernels.integrator_api import evaluate, look_ahead, set_diagonal, settle, solve_again, solve_aside
-from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.simd.slices import part
-from ffr_dyn.kernels.simd.table_address import tables_at
-from ffr_dyn.kernels.solution import add_reactions, constraint_rates
-from ffr_dyn.kernels.system import finite, largest, to_body_axes, to_velocity_rates
-from ffr_dyn.kernels.tables import NOT_FINITE, OK, USER_FAILED
-from ffr_dyn.kernels.vectors import add, add_scaled, copy, cross, dot, fill, get, scale, subtract
+from ffr_dyn.kernels.integrator_api import (
+    AGAIN,
+    ASIDE,
+    IN_Q,
+    IN_SHARED,
+    IN_V,
+    K_SIZE,
+    NORMAL,
+    NOT_FINITE,
+    OK,
+    PHI,
+    USER_FAILED,
+    CompiledFunction,
+    H,
+    N,
+    Tables,
+    add,
+    add_reactions,
+    add_scaled,
+    carry,
+    constraint_rates,
+    converging,
+    copy,
+    cross,
+    dot,
+    evaluate,
+    evaluate_rows_at,
+    farthest,
+    fill,
+    finite,
+    get,
+    inlined,
+    into_global_axes,
+    keep_turns,
+    kernel,
+    largest,
+    largest_motion,
+    mass_times,
+    method_step,
+    normalise,
+    part,
+    scale,
+    set_diagonal,
+    six_rows,
+    solve,
+    stabilise,
+    subtract,
+    three_rows,
+    to_body_axes,
+    to_velocity_rates,
+    unconverged,
+    velocity_rates,
+)
 
 # Rows of stages.v. MU: momenta at the start of the step; KICK: geometric stiffening there; MIDDLE: v_m; SHORT: what the
 # momenta of the start are short of; END: momenta at the end; REACTION: Phi_q^T lambda at the start; CHANGE: scratch.
@@ -75,7 +116,7 @@ def lagrangian_forces(bodies, w, b, y, p, Q):
     Of the right-hand sides of M acc = f these are what is left without the change of the mass matrix and of the frame:
     dL/dR = the applied force, dL/dtheta = the applied moment + p_1 x a, dL/dq_j = f_j + omega . l_j + I3_j . (a x omega).
     """
-    n, j, normal, terms = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 7], w.terms[b]
+    n, j, normal, terms = bodies.where[b, N], bodies.where[b, IN_V], bodies.where[b, NORMAL], w.terms[b]
     f = part(w.f, j, 6 + n)
     a, omega, s = (y[0], y[1], y[2]), (y[3], y[4], y[5]), get(w.s, b)
     force = add((f[0], f[1], f[2]), cross(omega, cross(omega, s)))
@@ -84,7 +125,7 @@ def lagrangian_forces(bodies, w, b, y, p, Q):
                dot((J[2, 0], J[2, 1], J[2, 2]), omega))  # fmt: skip
     moment = add((f[3], f[4], f[5]), cross(omega, J_omega))
     if n > 0:
-        P = part(bodies.P_dm, 3 * bodies.where[b, 8], 3 * n)
+        P = part(bodies.P_dm, 3 * bodies.where[b, IN_SHARED], 3 * n)
         g, l = part(w.g, 9 * terms, 9 * n), part(w.l, 3 * terms, 3 * n)  # noqa: E741
         q_dot = part(y, 6, n)
         force = add(force, scale(2.0, cross(omega, three_rows(P, q_dot, n))))
@@ -116,7 +157,7 @@ def lagrangian_forces(bodies, w, b, y, p, Q):
 @kernel
 def momentum(bodies, w, b, y, p):
     """p (6 + n,) = M y of body b in body axes."""
-    normal = bodies.where[b, 7]
+    normal = bodies.where[b, NORMAL]
     fill(p, 0.0)
     mass_times(bodies, w, b, y, p)
     force, moment = in_body_plane((p[0], p[1], p[2]), normal), about_normal((p[3], p[4], p[5]), normal)
@@ -145,7 +186,7 @@ def end_momenta(r, h):
     copy(y, s.v[MIDDLE])
     to_body_axes(bodies.where, bw.A, y)
     for b in range(bodies.mass.size):
-        n, j = bodies.where[b, 0], bodies.where[b, 2]
+        n, j = bodies.where[b, N], bodies.where[b, IN_V]
         momentum(bodies, bw, b, part(y, j, 6 + n), part(p, j, 6 + n))
         lagrangian_forces(bodies, bw, b, part(y, j, 6 + n), part(p, j, 6 + n), part(Q, j, 6 + n))
         theta = (h * y[j + 3], h * y[j + 4], h * y[j + 5])
@@ -178,7 +219,7 @@ def keep_node(r, h):
     copy(bw.acc, r.v)
     to_body_axes(bodies.where, bw.A, bw.acc)
     for b in range(bodies.mass.size):
-        n, j = bodies.where[b, 0], bodies.where[b, 2]
+        n, j = bodies.where[b, N], bodies.where[b, IN_V]
         momentum(bodies, bw, b, part(bw.acc, j, 6 + n), part(s.v[MU], j, 6 + n))
     to_velocity_rates(bodies.where, bw.A, s.v[MU], s.v[MU])
     rows = r.work.rows
@@ -193,11 +234,11 @@ def stiffen_node(r, t, v):
     if status == OK:
         fill(bw.shift, 0.0)
         copy(s.target, r.work.rows.gamma)
-        solve_aside(r, r.x, s.target)
+        solve(r, r.x, s.target, ASIDE)
         fill(s.v[KICK], 0.0)
         for b in range(bodies.mass.size):
-            n, j, e = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 3]
-            if bodies.where[b, 6] > 0:
+            n, j, e = bodies.where[b, N], bodies.where[b, IN_V], bodies.where[b, IN_Q]
+            if bodies.where[b, K_SIZE] > 0:
                 for k in range(n):
                     s.v[KICK, j + 6 + k] = bw.f[j + 6 + k] - bw.unstiffened[e + k]
     return status
@@ -213,15 +254,15 @@ def close(r, h):
     add_scaled(s.target, s.target, -1.0, rows.nu)
     add_scaled(bw.f, s.v[END], 0.5 * h, s.v[KICK])
     to_body_axes(bodies.where, bw.A, bw.f)
-    solve_again(r, s.x[NOTHING], s.target)
-    to_velocity_rates(bodies.where, bw.A, bw.acc, r.v)
+    solve(r, s.x[NOTHING], s.target, AGAIN)
+    velocity_rates(r, r.v)
 
 
 @inlined
 def begin(r, t, h, stiffened):
     """Momenta, rows and geometric stiffening of the first node. Returns a status."""
     set_diagonal(r, 0.0)
-    status = settle(r, t)
+    status = stabilise(r, t, r.x, r.v)
     if status == OK and stiffened:
         status = stiffen_node(r, t, r.v)
     if status == OK:
@@ -251,17 +292,17 @@ def newton(r, h):
     to_body_axes(bodies.where, bw.A, bw.f)
     add_reactions(bodies.where, r.model.markers, r.model.rows, r.work.rows.jac, s.rows[LAM], bw.f)
     fill(bw.shift, 0.0)
-    solve_again(r, s.x[NOTHING], s.target)
+    solve(r, s.x[NOTHING], s.target, AGAIN)
     copy(s.rows[LAM], r.work.rows.lam)
     fill(bw.more, 0.0)
     for b in range(bodies.mass.size):  # the momenta at the end of what is corrected
-        n, j, shared = bodies.where[b, 0], bodies.where[b, 2], bodies.where[b, 8]
+        n, j, shared = bodies.where[b, N], bodies.where[b, IN_V], bodies.where[b, IN_SHARED]
         mass_times(bodies, bw, b, part(bw.acc, j, 6 + n), part(bw.more, j, 6 + n))
         for k in range(n):
             bw.more[j + 6 + k] -= (1.0 / bw.dinv[shared + k] - 1.0) * bw.acc[j + 6 + k]
     to_velocity_rates(bodies.where, bw.A, bw.more, bw.more)
     add_scaled(s.v[END], s.v[END], 0.5 * h, bw.more)
-    to_velocity_rates(bodies.where, bw.A, bw.acc, s.v[CHANGE])
+    velocity_rates(r, s.v[CHANGE])
     add_scaled(s.v[MIDDLE], s.v[MIDDLE], 0.5 * h, s.v[CHANGE])
 
 
@@ -273,7 +314,7 @@ def iterate(r, t, h):
     for attempt in range(int(s.numbers[LIMIT])):
         move_by(r, h, s.x[WHOLE])
         move_by(r, 0.5 * h, s.x[HALF])
-        status = look_ahead(r, t + h, s.x[WHOLE], s.v[MIDDLE])
+        status = evaluate_rows_at(r, t + h, s.x[WHOLE], s.v[MIDDLE])
         if status != OK:
             return status
         for k in range(s.target.size):
@@ -294,11 +335,10 @@ def iterate(r, t, h):
     return unconverged(r, worst, h * change)
 
 
-@Unit
-def variational_step(at, t, unused, unused_too):
-    """One step of the machine's state from time t. Returns a status."""
-    r = tables_at(at)
-    h, s = r.clock.time[0], r.stages
+@method_step
+def variational_step(r: Tables, t: float, again: int) -> int:
+    """One step of the engine's state from time t. Returns a status."""
+    h, s = r.clock.time[H], r.stages
     stiffened = r.model.bodies.stiffening.size > 0
     if s.numbers[STARTED] == 0.0:
         status = begin(r, t, h, stiffened)
@@ -317,7 +357,7 @@ def variational_step(at, t, unused, unused_too):
     status = evaluate(r, t + h, r.x, s.v[MIDDLE])
     if status != OK:
         return status
-    r.work.drift[0] = max(r.work.drift[0], largest(r.work.rows.Phi))
+    r.work.drift[PHI] = max(r.work.drift[PHI], largest(r.work.rows.Phi))
     keep_turns(r.model.loads, r.work.loads)
     close(r, h)
     if stiffened:
@@ -355,8 +395,7 @@ class Variational:
     keeps_terms: ClassVar[bool] = True
     looks_ahead: ClassVar[int] = 0
     controlled: ClassVar[bool] = False
-    calls: ClassVar[tuple[str, ...]] = ("look_ahead",)
-    unit: ClassVar[Unit] = variational_step
+    do_step: ClassVar[CompiledFunction] = variational_step
 
     def __post_init__(self) -> None:
         check_step(self, self.step)

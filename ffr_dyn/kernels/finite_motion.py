@@ -5,7 +5,7 @@ import math
 from ffr_dyn.kernels.bodies import rotation_matrix
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.system import largest
-from ffr_dyn.kernels.tables import NOT_CONVERGED
+from ffr_dyn.kernels.tables import FAILED, IN_V, IN_X, NOT_CONVERGED, N
 from ffr_dyn.kernels.vectors import to_body, to_global
 
 
@@ -16,7 +16,7 @@ def carry(bodies, x0, step, x):
     p = p0 (cos |theta|/2, sin |theta|/2 theta/|theta|): the exponential map of R^3 x S^3 x R^n.
     """
     for b in range(bodies.mass.size):
-        n, i, j = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 2]
+        n, i, j = bodies.where[b, N], bodies.where[b, IN_X], bodies.where[b, IN_V]
         for k in range(3):
             x[i + k] = x0[i + k] + step[j + k]
         tx, ty, tz = 0.5 * step[j + 3], 0.5 * step[j + 4], 0.5 * step[j + 5]
@@ -39,7 +39,7 @@ def largest_motion(bodies, J, y):
     """(largest length in y, shaped like v; its body): rotations times the radius of gyration, elastic over sqrt(mass)."""
     worst, where = 0.0, 0
     for b in range(bodies.mass.size):
-        n, j, mass = bodies.where[b, 0], bodies.where[b, 2], bodies.mass[b]
+        n, j, mass = bodies.where[b, N], bodies.where[b, IN_V], bodies.mass[b]
         radius = ((J[b, 0, 0] + J[b, 1, 1] + J[b, 2, 2]) / (2.0 * mass)) ** 0.5
         shape = 1.0 / mass**0.5
         for k in range(6 + n):
@@ -54,7 +54,7 @@ def farthest(bodies, x):
     """The largest coordinate of an origin of a body [m], and the largest elastic one over sqrt(mass)."""
     result = 0.0
     for b in range(bodies.mass.size):
-        n, i, mass = bodies.where[b, 0], bodies.where[b, 1], bodies.mass[b]
+        n, i, mass = bodies.where[b, N], bodies.where[b, IN_X], bodies.mass[b]
         for k in range(3):
             result = max(result, abs(x[i + k]))
         for k in range(n):
@@ -66,7 +66,7 @@ def farthest(bodies, x):
 def into_body_axes(bodies, x, y, A):
     """In place: the linear parts of y, shaped like v, from global to body axes at x; A (3, 3) is scratch."""
     for b in range(bodies.mass.size):
-        i, j = bodies.where[b, 1], bodies.where[b, 2]
+        i, j = bodies.where[b, IN_X], bodies.where[b, IN_V]
         rotation_matrix(x[i + 3], x[i + 4], x[i + 5], x[i + 6], A)
         y[j], y[j + 1], y[j + 2] = to_body(A, (y[j], y[j + 1], y[j + 2]))
 
@@ -75,7 +75,7 @@ def into_body_axes(bodies, x, y, A):
 def into_global_axes(bodies, x, y, A):
     """In place: the linear parts of y, shaped like v, from body axes at x to global ones; A (3, 3) is scratch."""
     for b in range(bodies.mass.size):
-        i, j = bodies.where[b, 1], bodies.where[b, 2]
+        i, j = bodies.where[b, IN_X], bodies.where[b, IN_V]
         rotation_matrix(x[i + 3], x[i + 4], x[i + 5], x[i + 6], A)
         y[j], y[j + 1], y[j + 2] = to_global(A, (y[j], y[j + 1], y[j + 2]))
 
@@ -89,14 +89,14 @@ def converging(change, before, rate, allowed):
 
 @inlined
 def unconverged(r, worst, motion):
-    """The status of a step whose iterations fail. info[0] = the body, or the number of bodies plus the row, that is worst.
+    """The status of a step whose iterations fail. info[FAILED]: the worst body, or the number of bodies plus the row.
 
     motion : the largest correction [m]
     """
     violation = largest(r.work.rows.Phi)
-    r.work.info[0] = worst
+    r.work.info[FAILED] = worst
     if violation > 0.1 * motion:
         for row in range(r.work.rows.Phi.size):
             if abs(r.work.rows.Phi[row]) == violation:
-                r.work.info[0] = r.model.bodies.mass.size + row
+                r.work.info[FAILED] = r.model.bodies.mass.size + row
     return NOT_CONVERGED

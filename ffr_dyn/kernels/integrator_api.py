@@ -1,85 +1,196 @@
-"""What an integrator calls: the units by name, on the unpacked tables r."""
+"""All that an integrator needs of the engine.
 
-from ffr_dyn.kernels.options import inlined
-from ffr_dyn.kernels.simd.table_address import call_unit
-from ffr_dyn.kernels.tables import AGAIN, ASIDE, CORRECT, EVALUATE, LOOK_AHEAD, PREPARE, PROJECT, SETTLE, SOLVE
+A method is a file in `ffr_dyn.integrators`: a frozen dataclass with its settings (see `ffr_dyn.integrators.Integrator`) and
+one compiled function, which does one step of the engine's state r.x, r.v from time t and returns a status:
 
+    @method_step
+    def euler_step(r: Tables, t: float, again: int) -> int:
+        h, stages = r.clock.time[H], r.stages
+        set_diagonal(r, 0.0)                                             # explicit: the true mass matrix
+        status = stabilise(r, t, r.x, r.v)                               # right-hand sides, rows, factors at (t, x, v)
+        if status != OK:
+            return status
+        acceleration_target(r.work.rows, r.clock.gains, stages.target)   # Phi_q v_dot = target
+        solve(r, r.x, stages.target, 0)                                  # M acc + Phi_q^T lam = f
+        position_rates(r.model.bodies, r.x, r.v, stages.x[0])            # x_dot = T(x) v
+        velocity_rates(r, stages.v[0])                                   # v_dot = acc, in global axes
+        add_scaled(r.x, r.x, h, stages.x[0])
+        add_scaled(r.v, r.v, h, stages.v[0])
+        normalise(r.model.bodies, r.x)
+        return finite(r.x, r.v)
 
-@inlined
-def evaluate(r, t, x, v):
-    """Right-hand sides, rows and factors at (t, x, v). Returns a status."""
-    return call_unit(r.units[EVALUATE], r.address, t, x.ctypes.data, v.ctypes.data)
+The state is x = [R, p, q], v = [R_dot, omega_bar, q_dot] body by body; accelerations and right-hand sides are in body axes
+(see `ffr_dyn.kernels.tables`). `r.stages` is the method's own memory: as many rows of x, v and constraint rows as its class
+asks for, and its numbers. What an evaluation left stands in `r.work` until the next: `work.rows` Phi, nu, gamma and lam,
+`work.bodies` the right-hand sides f and the accelerations acc. No function allocates; a step is compiled alone and calls the
+engine by address (`ffr_dyn.kernels.entry_points`).
 
+evaluate(r, t, x, v)            right-hand sides, rows and factors there; `stabilise` projects (x, v) first where it must
+solve(r, x, target, stage)      acc and lam, with the factors of the last evaluation; `solve_stage` says when the stage is
+project(r, value)               acc: the smallest motion with Phi_q acc = -value
+correct(r, r_v, target)         f += M r_v, target += Phi_q r_v
+evaluate_rows_at(r, t, x, v)    constraint rows elsewhere, with the factors left as they are
+set_diagonal(r, gamma_h)        the elastic diagonal of a linearly implicit method
+"""
 
-@inlined
-def settle(r, t):
-    """`evaluate` at the machine's state, brought back onto the constraints before. Returns a status."""
-    return call_unit(r.units[SETTLE], r.address, t, r.x.ctypes.data, r.v.ctypes.data)
+from ffr_dyn.kernels.bodies import mass_times, normalise, position_rates
+from ffr_dyn.kernels.entry_points import correct, evaluate, evaluate_rows_at, project, set_diagonal, solve, stabilise
+from ffr_dyn.kernels.finite_motion import (
+    carry,
+    converging,
+    farthest,
+    into_body_axes,
+    into_global_axes,
+    largest_motion,
+    unconverged,
+)
+from ffr_dyn.kernels.forces.coordinate_forces import keep_turns
+from ffr_dyn.kernels.options import inlined, kernel
+from ffr_dyn.kernels.simd.entry_point import CompiledFunction
+from ffr_dyn.kernels.simd.slices import part
+from ffr_dyn.kernels.solution import add_reactions, constraint_rates
+from ffr_dyn.kernels.stiffening.ahead import AT, WEIGHT
+from ffr_dyn.kernels.system import acceleration_target, finite, largest, to_body_axes, to_velocity_rates
+from ffr_dyn.kernels.tables import (
+    AGAIN,
+    ASIDE,
+    FAILED,
+    HERE,
+    IN_Q,
+    IN_SHARED,
+    IN_V,
+    IN_X,
+    K_SIZE,
+    NEAR,
+    NORMAL,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    OK,
+    PHI,
+    PHI_DOT,
+    TIGHTER,
+    TOLERANCE,
+    USER_FAILED,
+    H,
+    N,
+    Tables,
+)
+from ffr_dyn.kernels.vectors import (
+    add,
+    add_both,
+    add_four,
+    add_scaled,
+    combine_three,
+    copy,
+    cross,
+    dot,
+    fill,
+    get,
+    multiple,
+    scale,
+    six_rows,
+    subtract,
+    three_rows,
+    weigh_four,
+)
 
+__all__ = [
+    "AGAIN",
+    "ASIDE",
+    "FAILED",
+    "HERE",
+    "IN_Q",
+    "IN_SHARED",
+    "IN_V",
+    "K_SIZE",
+    "NEAR",
+    "NORMAL",
+    "NOT_CONVERGED",
+    "NOT_FINITE",
+    "OK",
+    "PHI",
+    "PHI_DOT",
+    "TIGHTER",
+    "TOLERANCE",
+    "USER_FAILED",
+    "CompiledFunction",
+    "H",
+    "N",
+    "Tables",
+    "acceleration_target",
+    "add",
+    "add_both",
+    "add_elastic_part",
+    "add_four",
+    "add_reactions",
+    "add_scaled",
+    "carry",
+    "combine_three",
+    "constraint_rates",
+    "converging",
+    "copy",
+    "correct",
+    "cross",
+    "dot",
+    "evaluate",
+    "evaluate_rows_at",
+    "farthest",
+    "fill",
+    "finite",
+    "get",
+    "inlined",
+    "into_body_axes",
+    "into_global_axes",
+    "keep_turns",
+    "kernel",
+    "largest",
+    "largest_motion",
+    "mass_times",
+    "method_step",
+    "multiple",
+    "normalise",
+    "part",
+    "position_rates",
+    "project",
+    "scale",
+    "set_diagonal",
+    "six_rows",
+    "solve",
+    "solve_stage",
+    "stabilise",
+    "subtract",
+    "three_rows",
+    "to_body_axes",
+    "to_velocity_rates",
+    "unconverged",
+    "velocity_rates",
+    "weigh_four",
+]  # fmt: skip
 
-@inlined
-def solve(r, x, target, stage):
-    """Accelerations (bodies.acc) and multipliers (rows.lam) of what was evaluated last at x, in stage number `stage`."""
-    call_unit(r.units[SOLVE], r.address, float(stage), x.ctypes.data, target.ctypes.data)
+method_step = CompiledFunction  # the decorator of a method's step
 
 
 @inlined
 def solve_stage(r, x, target, stage, at, weight):
-    """`solve` in a method that looks ahead.
+    """`solve` in a method that takes geometric stiffening as a function of time.
 
     at, weight : what part of the step after its start, from 0 in the first stage; of the stage in what the step adds
     """
     place = r.work.bodies.stage
-    place[0], place[1] = at, weight
+    place[AT], place[WEIGHT] = at, weight
     solve(r, x, target, stage)
 
 
 @inlined
-def solve_again(r, x, target):
-    """`solve` near what was solved last."""
-    call_unit(r.units[SOLVE], r.address, AGAIN, x.ctypes.data, target.ctypes.data)
-
-
-@inlined
-def solve_aside(r, x, target):
-    """`solve` aside from the steps, which do not go on from it."""
-    call_unit(r.units[SOLVE], r.address, ASIDE, x.ctypes.data, target.ctypes.data)
-
-
-@inlined
-def correct(r, r_v, target):
-    """f += M r_v, target += Phi_q r_v."""
-    call_unit(r.units[CORRECT], r.address, 0.0, r_v.ctypes.data, target.ctypes.data)
-
-
-@inlined
-def look_ahead(r, t, x, v):
-    """Constraint rows at (t, x, v); the factors of the last evaluation stay. Returns a status."""
-    return call_unit(r.units[LOOK_AHEAD], r.address, t, x.ctypes.data, v.ctypes.data)
-
-
-@inlined
-def project(r, value, out):
-    """out, shaped like v: the smallest motion with Phi_q out = -value, by the factors of the last evaluation."""
-    call_unit(r.units[PROJECT], r.address, 0.0, value.ctypes.data, out.ctypes.data)
-
-
-@inlined
-def set_diagonal(r, gh):
-    """The elastic diagonal 1 + (gamma h)^2 Omega^2 + gamma h 2 zeta Omega of a linearly implicit method; gh = 0: explicit."""
-    if r.work.diagonal[0] == gh:
-        return
-    r.work.diagonal[0] = gh
-    bodies, dinv = r.model.bodies, r.work.bodies.dinv
-    for k in range(dinv.size):
-        dinv[k] = 1.0 / (1.0 + gh * gh * bodies.omega2[k] + gh * bodies.two_zeta_omega[k])
-    call_unit(r.units[PREPARE], r.address, 0.0, 0, 0)
+def velocity_rates(r, out):
+    """out = v_dot of what was solved last."""
+    to_velocity_rates(r.model.bodies.where, r.work.bodies.A, r.work.bodies.acc, out)
 
 
 @inlined
 def add_elastic_part(bodies, f, v, r_x, gh):
     """f -= gamma h Omega^2 (q_dot + r_q)."""
     for b in range(bodies.mass.size):
-        n, i, j, shared = bodies.where[b, 0], bodies.where[b, 1], bodies.where[b, 2], bodies.where[b, 8]
+        n, i, j, shared = bodies.where[b, N], bodies.where[b, IN_X], bodies.where[b, IN_V], bodies.where[b, IN_SHARED]
         for k in range(n):
             f[j + 6 + k] -= gh * bodies.omega2[shared + k] * (v[j + 6 + k] + r_x[i + 7 + k])

@@ -19,7 +19,7 @@ from ffr_dyn.kernels.simd.simd_rows import (
     subtract_product,
 )
 from ffr_dyn.kernels.simd.slices import part
-from ffr_dyn.kernels.tables import LANES
+from ffr_dyn.kernels.tables import HERE, LANES
 from ffr_dyn.kernels.vectors import fill
 
 # The least share of a row that other rows do not contain (the square of a sine). In a singular position it is zero; with
@@ -58,7 +58,7 @@ def factorise_block(starts, pattern, S, rw, independence, k):
         share, scale = rw.Y[c] / rw.scale[own + c], rw.scale[own + c]
         if not scale > 0.0 or share != share:
             return starts[k] + c
-        independence[0] = min(independence[0], share)
+        independence[HERE] = min(independence[HERE], share)
     eliminate_block(starts, pattern, S, k, size, rw.pivots, rw.Y)
     return -1
 

@@ -8,8 +8,21 @@ step before, and both are done again in three steps of other lengths, none of wh
 """
 
 from ffr_dyn.kernels.options import inlined
-from ffr_dyn.kernels.simd.table_address import call_unit
-from ffr_dyn.kernels.tables import OK
+from ffr_dyn.kernels.tables import (
+    AT_LAST,
+    AT_START,
+    CLOSEST,
+    END,
+    HERE,
+    LEAST,
+    NEXT,
+    OK,
+    SPACING,
+    START,
+    TOLERANCE,
+    WHEN,
+    H,
+)
 from ffr_dyn.kernels.vectors import copy
 
 # A stage is beside a singular position when the independence of the rows there (the square of a distance) is below BESIDE,
@@ -23,9 +36,6 @@ LENGTHS = (
 )
 ENOUGH = 0.25 * CLOSER
 STAGES_END = 0.95  # of a step: what lies behind belongs to the next one
-
-# Numbers of `Work.independence`.
-HERE, LEAST, WHEN, START, END, AT_START, CLOSEST, AT_LAST = range(8)
 
 
 @inlined
@@ -48,17 +58,17 @@ def is_beside(share, before):
 def step_from(r, step, t, h):
     """One step from time t. Returns a status."""
     share = r.work.independence
-    share[START], share[END], r.clock.time[0] = t, t + STAGES_END * h, h
-    return call_unit(step, r.address, t, 0, 0)
+    share[START], share[END], r.clock.time[H] = t, t + STAGES_END * h, h
+    return step(r, t, 0)
 
 
 @inlined
 def numbered_step(r, step, t):
-    """The machine's next step, from time t; `step` is the address of a method's unit. Returns a status."""
-    share, h = r.work.independence, r.clock.time[1]
-    if r.stages.kept_x.shape[0] == 0 or r.clock.gains[2] == 0.0:
-        return call_unit(step, r.address, t, 0, 0)
-    own, before = r.clock.steps[0] % 2, share[AT_LAST]
+    """The engine's next step, from time t; `step` is the entry point. Returns a status."""
+    share, h = r.work.independence, r.clock.time[SPACING]
+    if r.stages.kept_x.shape[0] == 0 or r.clock.gains[TOLERANCE] == 0.0:
+        return step(r, t, 0)
+    own, before = r.clock.steps[NEXT] % 2, share[AT_LAST]
     copy(r.stages.kept_x[own], r.x)
     copy(r.stages.kept_v[own], r.v)
     share[AT_START], share[CLOSEST] = 0.0, 1.0
@@ -74,7 +84,7 @@ def numbered_step(r, step, t):
             copy(r.x, r.stages.kept_x[own])
             copy(r.v, r.stages.kept_v[own])
             status = step_from(r, step, t, h)
-    r.clock.time[0] = h
+    r.clock.time[H] = h
     return status
 
 

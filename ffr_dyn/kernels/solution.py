@@ -3,50 +3,15 @@
 M acc + Phi_q^T lam = f,  Phi_q acc = target, by elimination of the elastic coordinates of every body, then of its rigid ones.
 """
 
-from ffr_dyn.kernels.bodies import accelerate, reduce_forces, six_rows
-from ffr_dyn.kernels.markers import plane_rows, project, shapes
+from ffr_dyn.kernels.bodies import accelerate
+from ffr_dyn.kernels.markers import project, shapes
 from ffr_dyn.kernels.multiplier_solver import SIDE, solve_blocks
 from ffr_dyn.kernels.options import inlined, kernel
+from ffr_dyn.kernels.planar import plane_rows
 from ffr_dyn.kernels.simd.simd_rows import combine_6, dot_narrow, dot_rows, narrow_3, narrow_6
 from ffr_dyn.kernels.simd.slices import part, six_parts
-from ffr_dyn.kernels.simd.table_address import call_unit
-from ffr_dyn.kernels.system import largest
-from ffr_dyn.kernels.tables import BACK, LANES, REGAIN
-from ffr_dyn.kernels.vectors import add, add_scaled, copy, fill, in_plane
-
-
-@inlined
-def solve_motion(r, target):
-    """acc, lam from  M acc + Phi_q^T lam = f,  Phi_q acc = target (C,)."""
-    m, w = r.model, r.work
-    for b in range(m.bodies.mass.size):
-        reduce_forces(m.bodies, w.bodies, b)
-    reduced_rates(m.bodies, m.markers, m.rows, w.bodies, w.rows, target)
-    call_unit(r.units[BACK], r.address, 0.0, 0, 0)
-    gather_rows(m.rows.start, w.rows.step, w.rows.lam)
-
-
-@inlined
-def refine_motion(r, target, passes):
-    """What relaxation of the multiplier matrix does to the motion, taken out again.
-
-    Of the multipliers that dependent rows leave open, the smallest are found (method of multipliers; Bayo & Ledesma,
-    Nonlinear Dynamics 9 (1996) 113-130).
-    """
-    m, bw, rw = r.model, r.work.bodies, r.work.rows
-    before = 0.0
-    for number in range(1, passes):
-        constraint_rates(m.bodies.where, m.markers, m.rows, rw.jac, bw.acc, rw.left)
-        add_scaled(rw.left, rw.left, -1.0, target)
-        left = largest(rw.left)
-        if number > 1 and not left < 0.5 * before:
-            break
-        before = left
-        copy(bw.more, bw.acc)
-        call_unit(r.units[REGAIN], r.address, 0.0, rw.left.ctypes.data, 0)
-        add_scaled(bw.acc, bw.more, 1.0, bw.acc)
-        gather_rows(m.rows.start, rw.step, rw.left)
-        add_scaled(rw.lam, rw.lam, 1.0, rw.left)
+from ffr_dyn.kernels.tables import IN_SHARED, IN_V, LANES, NORMAL, N
+from ffr_dyn.kernels.vectors import add, fill, in_plane, six_rows
 
 
 @inlined
@@ -85,8 +50,8 @@ def reduced_rates(bodies, markers, rows, bw, rw, target):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
-                n, normal, at = where[b, 0], where[b, 7], (k * sides + side) * SIDE
-                z, moved, elastic = bw.rigid[b], rw.wrench, part(bw.acc, where[b, 2] + 6, n)
+                n, normal, at = where[b, N], where[b, NORMAL], (k * sides + side) * SIDE
+                z, moved, elastic = bw.rigid[b], rw.wrench, part(bw.acc, where[b, IN_V] + 6, n)
                 if normal >= 0:
                     c0, c1, c2 = in_plane(normal)
                     moved[0], moved[1], moved[2] = z[c0], z[c1], z[c2]
@@ -113,11 +78,11 @@ def constraint_rates(where, markers, rows, jac, acc, out):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
-                n, j, own = where[b, 0], where[b, 2], jac[k * sides + side]
+                n, j, own = where[b, N], where[b, IN_V], jac[k * sides + side]
                 phi = shapes(markers, marker, n)
                 first, last, moved = rows.start[k], rows.start[k + 1], part(acc, j, 6 + n)
-                if where[b, 7] >= 0:
-                    add_side_rates_in_plane(phi, own, moved, first, last, n, where[b, 7], out)
+                if where[b, NORMAL] >= 0:
+                    add_side_rates_in_plane(phi, own, moved, first, last, n, where[b, NORMAL], out)
                 else:
                     add_side_rates(phi, own, moved, first, last, n, out)
 
@@ -156,7 +121,7 @@ def add_reactions(where, markers, rows, jac, lam, out):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
-                n, j, own = where[b, 0], where[b, 2], jac[k * sides + side]
+                n, j, own = where[b, N], where[b, IN_V], jac[k * sides + side]
                 phi = shapes(markers, marker, n)
                 add_side_reactions(phi, own, lam, rows.start[k], rows.start[k + 1], n, part(out, j, 6 + n))
 
@@ -185,12 +150,12 @@ def react(bodies, markers, rows, bw, rw):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
-                n, at, z = where[b, 0], (k * sides + side) * SIDE, bw.rigid[b]
-                normal, wrench = where[b, 7], rw.wrench
+                n, at, z = where[b, N], (k * sides + side) * SIDE, bw.rigid[b]
+                normal, wrench = where[b, NORMAL], rw.wrench
                 react_rigid(rw.X, at, rw.step, LANES * k, normal, z)
                 if n > 0:
-                    phi, elastic = shapes(markers, marker, n), part(bw.acc, where[b, 2] + 6, n)
-                    dinv = part(bw.dinv, where[b, 8], n)
+                    phi, elastic = shapes(markers, marker, n), part(bw.acc, where[b, IN_V] + 6, n)
+                    dinv = part(bw.dinv, where[b, IN_SHARED], n)
                     if normal >= 0:
                         for c in range(3):
                             wrench[c] = dot_narrow(rw.X, at + LANES * (3 + c), rw.step, LANES * k)

@@ -6,9 +6,25 @@ controller is proportional-integral (Gustafsson 1991; Hairer & Wanner 1996, IV.8
 
 from ffr_dyn.kernels.bodies import normalise, position_rates
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.simd.table_address import call_unit
-from ffr_dyn.kernels.singular_positions import AT_LAST, HERE, is_beside
-from ffr_dyn.kernels.tables import BEFORE, ERROR, LEAST, NOW, OK, ORDER, RELATIVE, STEP, STEP_TOO_SMALL, USER_FAILED
+from ffr_dyn.kernels.singular_positions import is_beside
+from ffr_dyn.kernels.tables import (
+    AT_LAST,
+    BEFORE,
+    ERROR,
+    HERE,
+    IN_V,
+    IN_X,
+    NOW,
+    OK,
+    ORDER,
+    RELATIVE,
+    SHORTEST,
+    STEP,
+    STEP_TOO_SMALL,
+    USER_FAILED,
+    H,
+    N,
+)
 from ffr_dyn.kernels.vectors import copy
 
 SAFETY, SMALLEST, LARGEST = 0.9, 0.2, 5.0
@@ -30,7 +46,7 @@ def worst(error, before, after, weight, relative, h):
 
 @inlined
 def controlled_step(r, step):
-    """One accepted step. Returns a status."""
+    """One accepted step, of those that `step` does. Returns a status."""
     c, stages = r.control, r.stages
     numbers = c.numbers
     copy(c.x, r.x)
@@ -38,8 +54,8 @@ def controlled_step(r, step):
     again = 0
     while True:
         h = numbers[STEP]
-        r.clock.time[0] = h
-        status = call_unit(step, r.address, numbers[NOW], again, 0)
+        r.clock.time[H] = h
+        status = step(r, numbers[NOW], again)
         if status == USER_FAILED:
             return status
         error = 1e300
@@ -66,7 +82,7 @@ def controlled_step(r, step):
         again = 1
         c.counts[1] += 1
         numbers[STEP] = h * max(SMALLEST, SAFETY * min(error, 1e30) ** -power)
-        if numbers[STEP] < numbers[LEAST]:
+        if numbers[STEP] < numbers[SHORTEST]:
             return STEP_TOO_SMALL if status == OK else status
 
 
@@ -74,7 +90,7 @@ def controlled_step(r, step):
 def slopes_to_velocities(where, x, slope, v):
     """v = [R_dot, omega_bar = 2 G_bar p_dot, q_dot] of positions that move with these slopes."""
     for b in range(where.shape[0] - 1):
-        n, i, j = where[b, 0], where[b, 1], where[b, 2]
+        n, i, j = where[b, N], where[b, IN_X], where[b, IN_V]
         p0, p1, p2, p3 = x[i + 3], x[i + 4], x[i + 5], x[i + 6]
         d0, d1, d2, d3 = slope[i + 3], slope[i + 4], slope[i + 5], slope[i + 6]
         for c in range(3):

@@ -1,12 +1,11 @@
 """One evaluation of the equations of motion of a scene; everything an integrator or an analysis calls.
 
-Order of calls: `prepare` once per elastic diagonal; `evaluate_bodies`, `evaluate_markers`, the loads, the constraint rows,
-`evaluate_joints` at a state; then any number of solutions (`ffr_dyn.kernels.solution`) with its factors. Compiled as units in
-`ffr_dyn.kernels.entry_points`, and called as such where more than one place does.
+Order of calls: `prepare` once per elastic diagonal; `factorise_bodies`, `update_markers`, the loads, the constraint rows,
+`evaluate_joints` at a state; then any number of solutions (`ffr_dyn.kernels.solution`) with its factors. Called from
+`ffr_dyn.kernels.entry_points` alone.
 """
 
-from ffr_dyn.kernels.bodies import coupling, factorise, inertia, normalise, prepare_body, rotation_matrix
-from ffr_dyn.kernels.forces.loads import count_loads
+from ffr_dyn.kernels.bodies import factorise, inertia, prepare_body, rotation_matrix
 from ffr_dyn.kernels.markers import couple_marker, couple_pair, prepare_marker, shapes, update_marker
 from ffr_dyn.kernels.multiplier_solver import SIDE, clear_column, factorise_block, relax_block
 from ffr_dyn.kernels.options import inlined, kernel
@@ -23,9 +22,30 @@ from ffr_dyn.kernels.simd.joint_elimination import (
 )
 from ffr_dyn.kernels.simd.simd_rows import add_scale
 from ffr_dyn.kernels.simd.slices import part
-from ffr_dyn.kernels.simd.table_address import call_unit
-from ffr_dyn.kernels.tables import ALL, IN_USE, LANES, LOADS, LOOK, NOT_FINITE, OK, REGAIN, RELATION
-from ffr_dyn.kernels.vectors import add_scaled, cross, fill, get, in_plane, put, subtract, to_body, to_global
+from ffr_dyn.kernels.spatial import coupling
+from ffr_dyn.kernels.tables import (
+    ALL,
+    ALPHA,
+    BETA,
+    EARLIER,
+    EARLIER_SIDE,
+    HERE,
+    IN_SHARED,
+    IN_USE,
+    IN_V,
+    IN_X,
+    LANES,
+    LATER,
+    LATER_SIDE,
+    NORMAL,
+    NOT_FINITE,
+    OK,
+    PHIPHI,
+    RELATION,
+    TARGET,
+    N,
+)
+from ffr_dyn.kernels.vectors import cross, fill, get, in_plane, put, subtract, to_body, to_global
 
 
 @inlined
@@ -36,29 +56,29 @@ def prepare(bodies, markers, rows, pattern, bw, rw):
         prepare_body(bodies, bw, b)
     for k in markers.joint:
         b = markers.body[k]
-        n, shared = where[b, 0], where[b, 8]
+        n, shared = where[b, N], where[b, IN_SHARED]
         if n > 0:
             P_dm, dinv = part(bodies.P_dm, 3 * shared, 3 * n), part(bw.dinv, shared, n)
-            prepare_marker(shapes(markers, k, n), P_dm, dinv, n, where[b, 7], rw.P[k])
+            prepare_marker(shapes(markers, k, n), P_dm, dinv, n, where[b, NORMAL], rw.P[k])
     for number in range(pattern.sample.size):
         p = pattern.sample[number]
         b = pattern.pair_body[p]
-        n = where[b, 0]
+        n = where[b, N]
         if n > 0:
-            left = rows.marker[pattern.pair[p, 0], pattern.pair[p, 1]]
-            right = rows.marker[pattern.pair[p, 2], pattern.pair[p, 3]]
+            left = rows.marker[pattern.pair[p, LATER], pattern.pair[p, LATER_SIDE]]
+            right = rows.marker[pattern.pair[p, EARLIER], pattern.pair[p, EARLIER_SIDE]]
             couple_pair(
                 shapes(markers, left, n),
                 shapes(markers, right, n),
-                part(bw.dinv, where[b, 8], n),
+                part(bw.dinv, where[b, IN_SHARED], n),
                 n,
-                where[b, 7],
+                where[b, NORMAL],
                 rw.phiphi[number],
             )
 
 
 @inlined
-def evaluate_bodies(gravity, bodies, w, x, v):
+def factorise_bodies(gravity, bodies, w, x, v):
     """Inertia, forces and factors of all bodies. Returns the number of a body without a positive mass matrix, or -1."""
     for b in range(bodies.mass.size):
         inertia(gravity, bodies, w, x, v, b)
@@ -77,9 +97,9 @@ def couple_joint(bodies, markers, rows, pattern, bw, rw, k):
         marker = rows.marker[k, side]
         b = markers.body[marker] if marker >= 0 else ground
         if b != ground:
-            number, n = k * sides + side, where[b, 0]
+            number, n = k * sides + side, where[b, N]
             at, jac = number * SIDE, part(rw.jac, 9 * LANES * number, 9 * LANES)
-            flexible, normal, L, P = n > 0, where[b, 7], part(bw.L, 36 * b, 36), rw.P[marker]
+            flexible, normal, L, P = n > 0, where[b, NORMAL], part(bw.L, 36 * b, 36), rw.P[marker]
             if flexible and rows.first[k, side] == 1:
                 _, H, dinv = coupling(bodies, bw, b)
                 couple_marker(shapes(markers, marker, n), H, dinv, n, normal, P)
@@ -96,12 +116,12 @@ def couple_joint(bodies, markers, rows, pattern, bw, rw, k):
             add_scale(jac, bw.inverse[b, 0], bw.inverse[b, 1], rw.scale, LANES * k)
     clear_column(pattern, rw.S, k)
     for p in range(pattern.pair_start[k], pattern.pair_start[k + 1]):
-        b, earlier = pattern.pair_body[p], pattern.pair[p, 2]
-        first = (k * sides + pattern.pair[p, 1]) * SIDE
-        second = (earlier * sides + pattern.pair[p, 3]) * SIDE
-        flexible, size = where[b, 0] > 0, rows.start[earlier + 1] - rows.start[earlier]
-        at, phiphi = pattern.pair[p, 4], rw.phiphi[pattern.pair[p, 5]]
-        if where[b, 7] >= 0:
+        b, earlier = pattern.pair_body[p], pattern.pair[p, EARLIER]
+        first = (k * sides + pattern.pair[p, LATER_SIDE]) * SIDE
+        second = (earlier * sides + pattern.pair[p, EARLIER_SIDE]) * SIDE
+        flexible, size = where[b, N] > 0, rows.start[earlier + 1] - rows.start[earlier]
+        at, phiphi = pattern.pair[p, TARGET], rw.phiphi[pattern.pair[p, PHIPHI]]
+        if where[b, NORMAL] >= 0:
             if flexible:
                 couple_flexible_in_plane(rw.X, first, second, size, phiphi, rw.S, at)
             else:
@@ -113,8 +133,8 @@ def couple_joint(bodies, markers, rows, pattern, bw, rw, k):
 
 
 @inlined
-def evaluate_markers(m, w, which, x, v):
-    """Markers in use, of joints, or all (see `tables`), from what `evaluate_bodies` left."""
+def update_markers(m, w, which, x, v):
+    """Markers in use, of joints, or all (see `tables`), from what `factorise_bodies` left."""
     some = m.markers.active if which == IN_USE else m.markers.joint
     for number in range(m.markers.body.size if which == ALL else some.size):
         k = number if which == ALL else some[number]
@@ -125,18 +145,9 @@ def evaluate_markers(m, w, which, x, v):
 def turn_bodies(where, w, x, v):
     """Rotation and angular velocity of all bodies."""
     for b in range(where.shape[0] - 1):
-        i, j = where[b, 1], where[b, 2]
+        i, j = where[b, IN_X], where[b, IN_V]
         rotation_matrix(x[i + 3], x[i + 4], x[i + 5], x[i + 6], w.A[b])
         put(w.omega, b, (v[j + 3], v[j + 4], v[j + 5]))
-
-
-@inlined
-def clear_and_load(r, x):
-    """All applied loads at the address x of positions, also by marker."""
-    if count_loads(r.model.loads) > 0:
-        load = r.work.markers.load
-        fill(part(load, 0, load.size), 0.0)
-        call_unit(r.units[LOADS], r.address, -1.0, x, 0)
 
 
 @inlined
@@ -145,7 +156,7 @@ def evaluate_joints(m, w):
 
     A joint is eliminated as soon as all that its column reaches is there, while what it needs is still near at hand.
     """
-    w.independence[0] = 1.0
+    w.independence[HERE] = 1.0
     done = 0
     for k in range(m.rows.marker.shape[0]):
         couple_joint(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, k)
@@ -181,7 +192,7 @@ def row_of_largest(values):
 def apply_motion(where, A, x, step):
     """x <- x moved by the small motion `step` (body axes, as acc)."""
     for b in range(where.shape[0] - 1):
-        n, i, j = where[b, 0], where[b, 1], where[b, 2]
+        n, i, j = where[b, N], where[b, IN_X], where[b, IN_V]
         shift = to_global(A[b], (step[j], step[j + 1], step[j + 2]))
         for c in range(3):
             x[i + c] += shift[c]
@@ -199,11 +210,11 @@ def apply_motion(where, A, x, step):
 def to_velocity_rates(where, A, acc, vd):
     """vd = d/dt of v = [R_dot (global), omega_bar, q_dot] from acc (body axes)."""
     for b in range(where.shape[0] - 1):
-        j = where[b, 2]
+        j = where[b, IN_V]
         linear = to_global(A[b], (acc[j], acc[j + 1], acc[j + 2]))
         for c in range(3):
             vd[j + c] = linear[c]
-        for c in range(3, 6 + where[b, 0]):
+        for c in range(3, 6 + where[b, N]):
             vd[j + c] = acc[j + c]
 
 
@@ -211,7 +222,7 @@ def to_velocity_rates(where, A, acc, vd):
 def to_body_axes(where, A, r):
     """In place: a vector shaped like v from global to body axes in its R_dot parts."""
     for b in range(where.shape[0] - 1):
-        j = where[b, 2]
+        j = where[b, IN_V]
         linear = to_body(A[b], (r[j], r[j + 1], r[j + 2]))
         for c in range(3):
             r[j + c] = linear[c]
@@ -220,23 +231,9 @@ def to_body_axes(where, A, r):
 @inlined
 def acceleration_target(w, gains, target):
     """target = gamma - 2 alpha Phi_dot - beta^2 Phi (Baumgarte 1972; alpha = beta = 0: plain index 1)."""
-    alpha, beta = gains[0], gains[1]
+    alpha, beta = gains[ALPHA], gains[BETA]
     for row in range(target.size):
         target[row] = w.gamma[row] - 2.0 * alpha * w.nu[row] - beta * beta * w.Phi[row]
-
-
-@inlined
-def move_back(r, t, x, v):
-    """One projection of (x, v) onto the constraints, smallest in the norm of the mass matrix: of the positions first,
-    then of the velocities onto the rows that hold there."""
-    bodies, w = r.model.bodies, r.work
-    call_unit(r.units[REGAIN], r.address, 0.0, w.rows.Phi.ctypes.data, 0)
-    apply_motion(bodies.where, w.bodies.A, x, w.bodies.acc)
-    normalise(bodies, x)
-    call_unit(r.units[LOOK], r.address, t, x.ctypes.data, v.ctypes.data)
-    call_unit(r.units[REGAIN], r.address, 0.0, w.rows.nu.ctypes.data, 0)
-    to_velocity_rates(bodies.where, w.bodies.A, w.bodies.acc, w.vd)
-    add_scaled(v, v, 1.0, w.vd)
 
 
 @inlined

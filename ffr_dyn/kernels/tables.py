@@ -15,7 +15,10 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from ffr_prep.common.brief import brief_tuple
+
 Array = np.ndarray
+Vector = np.ndarray  # of numbers, as an argument of an entry point: its size follows from the tables
 # Arrays of numbers and of integers by their number of axes: compiled code is told here what it finds at an address.
 F1 = Annotated[np.ndarray, ("float64", 1)]
 F2 = Annotated[np.ndarray, ("float64", 2)]
@@ -40,17 +43,13 @@ MEANS = 4  # over so many steps, of the loads that stiffen
 WATCH = 32  # steps from one look at their feedback to the next
 RATES, INERTIAL = 6, 12  # of these the first by angular velocities, the first at an interface
 
-# Numbers of the compiled units in `Tables.units`.
-(
-    EVALUATE, BODIES, MARKERS, CONSTRAINTS, JOINTS, BACK, REGAIN, PLAIN, MOTION, SOLVE, PREPARE, LOOK, SETTLE, MOVE_BACK,
-    CORRECT, TRULY, RECORD, LOOK_AHEAD, PROJECT, LOADS, POWERS, START,
-) = range(22)  # fmt: skip
-
-# A solution of a step's stage is called by its number; near the last one, or aside from the steps:
+# A solution at a stage of a step is asked for by the stage's number; near the last one, or aside from the steps:
 AGAIN, ASIDE = -1, -2
 
 # Which markers are brought up to date: those that joints or loads use, those of joints, all.
-IN_USE, OF_JOINTS, ALL = 0.0, 1.0, 2.0
+IN_USE, OF_JOINTS, ALL = 0, 1, 2
+
+EVERY_LOAD = -1  # in place of the number of one
 
 # Near a singular position (which steps pass as `passing` tells) the rows become dependent, and a violation eta of the
 # constraints throws the motion from its branch when it comes closer than about eta^(1/3). So on the approach (`independence`
@@ -60,14 +59,22 @@ NEAR, AT = 1e-2, 1e-6
 TIGHTER = 1e-4
 
 
+# Columns of `Bodies.where`.
+N = 0  # number of elastic coordinates
+IN_X, IN_V, IN_Q = 1, 2, 3  # first of the body in x, in v, among all elastic coordinates
+IN_PP_DM, IN_STIFFENING = 4, 5  # in PP_dm and in stiffening, or -1 where that vanishes
+K_SIZE = 6  # how many numbers its K_sigma has; 0 without geometric stiffening
+NORMAL = 7  # the body axis along the normal of a planar scene, or -1
+IN_SHARED = (
+    8  # in omega2 and the other rows by coordinate; equal bodies share them, so that many stay in the processor's cache
+)
+PP_PLAN, K_PLAN = 9, 10  # in `blocks`, for PP_dm and for stiffening
+
+
 class Bodies(NamedTuple):
     """B bodies, E elastic coordinates in all."""
 
-    # (B + 1, 11) n, first of the body in: x, v, elastic coordinates, PP_dm, stiffening (or -1); how many numbers its
-    # K_sigma has, 0 without geometric stiffening; the body axis along the normal of a planar scene, or -1; its first in
-    # omega2 and the other rows by coordinate, which equal bodies share, so that many of them stay in the processor's cache;
-    # its first of `blocks` for PP_dm and for stiffening
-    where: I2
+    where: I2  # (B + 1, 11) sizes of a body and where its parts begin, by the columns above
     mass: F1  # (B,)
     moments: F2  # (B, 9) first moment r_dm (3), second moment rr_dm (6)
     P_dm: F1  # pooled; per body 3 rows of n
@@ -106,14 +113,17 @@ class Rows(NamedTuple):
     first: I2  # likewise: whether no block before has the marker
 
 
+# Columns of `Pattern.pair`: a block and its side, an earlier block and its side, the start of the block of S that they make,
+# and the number in `phiphi` of what elastic coordinates couple.
+LATER, LATER_SIDE, EARLIER, EARLIER_SIDE, TARGET, PHIPHI = range(6)
+
+
 class Pattern(NamedTuple):
     """Assembly and factorisation of the multiplier matrix, fixed per topology."""
 
     pair_body: I1  # (P,) the body that couples two block sides
-    # (P, 6) later block, its side, earlier block, its side, start of the target block, number in `phiphi`, which equal pairs
-    # share; in order of the later
-    pair: I2
-    sample: I1  # a pair of each number
+    pair: I2  # (P, 6) in order of the later block
+    sample: I1  # a pair of each number in `phiphi`, which equal pairs share
     pair_start: I1  # (K + 1,) the first pair of each later block
     reach: I1  # (K,) last block that the columns of a block and of those before it reach
     diagonal: I1  # (K,) start of the diagonal block in S
@@ -257,6 +267,14 @@ class RowWork(NamedTuple):
     S: F1  # pooled blocks, rows of lanes (see `blocks`)
 
 
+# Numbers of `Work.info`.
+FAILED, EVALUATIONS, PROJECTIONS = range(3)
+# Numbers of `Work.drift`.
+PHI, PHI_DOT = range(2)
+# Numbers of `Work.independence` (see `ffr_dyn.kernels.singular_positions`).
+HERE, LEAST, WHEN, START, END, AT_START, CLOSEST, AT_LAST = range(8)
+
+
 class Work(NamedTuple):
     """Scratch of one evaluation; nothing in it is read before it is written, except what `prepare` makes."""
 
@@ -269,8 +287,8 @@ class Work(NamedTuple):
     y: F2  # (2, longest body)
     functions: F2  # (F, 3) value, first and second time derivative
     user: F1  # (user_count,)
-    diagonal: F1  # (1,) gamma h of the elastic diagonal that is in place (see `calls.set_diagonal`), or -1
-    info: I1  # (3,) integers: body or row that failed, evaluations, projections
+    diagonal: F1  # (1,) gamma h of the elastic diagonal that is in place (see `entry_points.set_diagonal`), or -1
+    info: I1  # (3,) body or row that failed, how many evaluations, how many projections
     drift: F1  # (2,) largest |Phi| and |Phi_dot| met
     # (8,) least share of a row that others do not contain: now, least so far, and when; of a step its start and end [s],
     # the share at its start, the least of its stages, and that at the start of the step before (see `passing`)
@@ -287,6 +305,12 @@ class Stages(NamedTuple):
     kept_x: F2  # (2, X) states at the starts of this step and of the one before; no rows where none is done again
     kept_v: F2  # (2, V)
     numbers: F1  # the method's own settings, and what it keeps in single numbers
+
+
+# Numbers of `Clock.time`, `Clock.steps`, `Clock.gains`.
+H, SPACING = range(2)
+NEXT, PER_ROW, FILLED = range(3)
+ALPHA, BETA, TOLERANCE = range(3)
 
 
 class Clock(NamedTuple):
@@ -315,14 +339,14 @@ class Control(NamedTuple):
 
 
 # Numbers of `Control.numbers`.
-STEP, NOW, BEFORE, ERROR, RELATIVE, ORDER, LEAST = range(7)
+STEP, NOW, BEFORE, ERROR, RELATIVE, ORDER, SHORTEST = range(7)
 
 
 class Tables(NamedTuple):
-    """All that the compiled units read and write while a scene is integrated; they are given its address."""
+    """All that entry points read and write while a scene is integrated; they are given its address."""
 
     address: int  # of these tables, packed (see `ffr_dyn.kernels.simd.table_address`)
-    units: I1  # addresses of the compiled units, by number
+    entry_points: I1  # their addresses, by number (see `ffr_dyn.kernels.simd.entry_point`)
     model: Model
     work: Work
     stages: Stages
@@ -348,3 +372,7 @@ class Record(NamedTuple):
     power: F2  # (T, W + Z + Y + U)
     energy: F2  # (T, 3) kinetic, strain, gravity
     violation: F2  # (T, 2) largest |Phi|, |Phi_dot|
+
+
+for _table in [value for value in vars().values() if isinstance(value, type) and hasattr(value, "_fields")]:
+    _table.__repr__ = brief_tuple  # type: ignore[method-assign, assignment]  # instead of every number

@@ -16,6 +16,7 @@ from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.realtime.stepper import Stepper
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
@@ -25,8 +26,8 @@ WARMING = 100  # steps before the measurement: caches, branch prediction, first 
 REPORTS = 50  # calls of `progress` in all
 
 
-@dataclass(frozen=True, eq=False)
-class Timing:
+@dataclass(frozen=True, eq=False, repr=False)
+class Timing(Brief):
     """Times of steps.
 
     seconds  : (N,) [s] of each: set inputs, step, outputs

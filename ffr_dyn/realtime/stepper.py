@@ -31,13 +31,14 @@ from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.failure import failure
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation, gains
-from ffr_dyn.kernels.tables import OK
+from ffr_dyn.kernels.tables import NEXT, OK, PER_ROW
 from ffr_dyn.results.quantities import DEFAULT_OUTPUTS, Entry, catalogue, needs_every_step, selected
 from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.scene.applied_loads import actions_of
 from ffr_dyn.scene.joint_forces import Actuator
 from ffr_dyn.scene.joints import COORDINATES
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
@@ -45,8 +46,8 @@ Array = np.ndarray
 Input = float | tuple[float, float, float]
 
 
-@dataclass(frozen=True, eq=False)
-class State:
+@dataclass(frozen=True, eq=False, repr=False)
+class State(Brief):
     """All that a stepper remembers: `arrays` of numbers, and of which scene and settings it is a state."""
 
     fingerprint: str
@@ -54,7 +55,7 @@ class State:
     arrays: tuple[Array, ...]
 
 
-class Stepper:
+class Stepper(Brief):
     """A scene under way, from its assembled start.
 
     method        : with a fixed step, such as ROS2(1e-3)
@@ -75,6 +76,8 @@ class Stepper:
         start: float = 0.0,
         stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
     ) -> None:
+        if isinstance(method, (str, type)):
+            raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
         if method.controlled:
             raise InputError(
                 f"{type(method).__name__} chooses its steps: their cost has no bound; use ROS2, ROS3 or RK4"
@@ -94,6 +97,15 @@ class Stepper:
         self._set = {name: _Setting(self._loops, name) for name in self._system.inputs}
         self._outputs, self._computed = _outputs(self._loops[0], outputs, readers)
         self._advance(0)
+
+    def _title(self) -> str:
+        return f"Stepper of {self._system.scene.name!r} at t = {self.time:.9g} s, step {self._step:g} s"
+
+    def _rows(self) -> Rows:
+        return [
+            ("inputs", listed(f"{name} = {value:.6g}" for name, value in self.inputs.items())),
+            ("outputs", listed(self._outputs)),
+        ]
 
     @property
     def time(self) -> float:
@@ -159,7 +171,7 @@ class Stepper:
         loop = self._loops[0]
         status = loop.run(self._start, self._steps, count)
         if status != OK:
-            reached = int(loop.machine.tables.clock.steps[0])
+            reached = int(loop.machine.tables.clock.steps[NEXT])
             raise failure(self._system, loop.work, status, self._start + reached * self._step)
         self._steps += count
         for other in self._loops[1:]:
@@ -179,11 +191,11 @@ class _Loop:
         self.record = new_record(system, 1)
         self.x, self.v, self.work = self.machine.x, self.machine.v, self.machine.work
         self._method = method
-        self._fill = row_filler(self.machine, method, self.record)
+        self._fill = row_filler(self.machine, self.record)
 
     def run(self, start: float, first: int, count: int) -> int:
         """`count` steps from step number `first`, and the record of where they end. Returns a status."""
-        self.machine.tables.clock.steps[0], self.machine.tables.clock.steps[1] = first, count
+        self.machine.tables.clock.steps[NEXT], self.machine.tables.clock.steps[PER_ROW] = first, count
         return self._fill(start)
 
     def arrays(self) -> list[Array]:

@@ -15,6 +15,7 @@ from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.scene.joints import Joint, frames
 from ffr_dyn.scene.scene import marker_number, markers
+from ffr_prep.common.brief import Brief
 
 Array = np.ndarray
 
@@ -60,8 +61,8 @@ def times(p: Array, r: Array) -> Array:
     return np.stack(rows, axis=1)
 
 
-@dataclass(frozen=True)
-class View:
+@dataclass(frozen=True, repr=False)
+class View(Brief):
     """Recorded rows of a compiled scene."""
 
     system: System

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from ffr_prep.body import Surface
+from ffr_prep.common.brief import Brief, Rows, cut, listed
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
@@ -37,8 +38,8 @@ def _check_name(kind: str, name: str) -> None:
         )
 
 
-@dataclass(frozen=True)
-class Axis:
+@dataclass(frozen=True, repr=False)
+class Axis(Brief):
     """A labelled axis of a quantity, such as x, y, z. Labels are unique, not empty, and contain no dot."""
 
     name: str
@@ -62,8 +63,8 @@ def mode_axis(body: str, n: int) -> Axis:
     return Axis(f"{body}.mode", tuple(str(k + 1) for k in range(n)))
 
 
-@dataclass(frozen=True, eq=False)
-class Quantity:
+@dataclass(frozen=True, eq=False, repr=False)
+class Quantity(Brief):
     """A history: values (T, ...) with a unit and one axis for each dimension after time.
 
     unit : in SI symbols, such as "m", "N m", "m/s", "m sqrt(kg)"; "1" for a number
@@ -82,8 +83,8 @@ class Quantity:
             raise InputError(f"a quantity has values of shape {self.values.shape}; its axes ask for (T, *{expected})")
 
 
-@dataclass(frozen=True, eq=False)
-class Result:
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(Brief):
     """Histories of one analysis.
 
     time       : (T,) [s], finite, not decreasing
@@ -106,6 +107,19 @@ class Result:
         check_times(self.time)
         _check_quantities(self)
         _check_attributes(self.attributes)
+
+    def _title(self) -> str:
+        about = [self.attributes[key] for key in ("analysis", "status") if key in self.attributes]
+        return f"Result {self.attributes.get('title', '')!r}: {', '.join([*map(str, about), f'{self.time.size} rows'])}"
+
+    def _rows(self) -> Rows:
+        known, notes = self.attributes, self.attributes.get("notes") or []
+        rows = [("time", f"{self.time[0]:.6g} to {self.time[-1]:.6g} s")] if self.time.size else []
+        rows += [
+            (key.replace("_", " "), cut(str(known[key]))) for key in ("method", "degrees_of_freedom") if key in known
+        ]
+        rows += [("quantities", listed(self.quantities)), ("drawn", listed(self.geometry))]
+        return rows + [("note", note) for note in notes[:2]] + [("more notes", str(len(notes) - 2))] * (len(notes) > 2)
 
     def __getitem__(self, name: str) -> Array:
         """The values of a quantity (T, ...), or of one component (T,). InputError suggests close names."""

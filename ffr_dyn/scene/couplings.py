@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 
 from ffr_dyn.functions.time_functions import constant
+from ffr_dyn.scene.checks import check_name, check_own_name
 from ffr_dyn.scene.joints import COORDINATES, Joint, Word, frames, relation
 from ffr_prep.common.errors import InputError
 
@@ -25,9 +26,13 @@ class Coupling:
     first: str
     second: str
     ratio: float
+    _: KW_ONLY
     offset: float = 0.0
 
     def __post_init__(self) -> None:
+        check_own_name("coupling", self.name)
+        for key in ("first", "second"):
+            check_name(f"coupling {self.name!r}", key, getattr(self, key))
         if not (np.isfinite([self.ratio, self.offset]).all() and self.ratio != 0):
             raise InputError(
                 f"coupling {self.name!r}: ratio {self.ratio} and offset {self.offset} must be finite, the ratio not zero"

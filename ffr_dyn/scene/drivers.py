@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 import numpy as np
 
 from ffr_dyn.functions.time_functions import as_time_function
+from ffr_dyn.scene.checks import check_markers, check_name, check_own_name
 from ffr_dyn.scene.joints import COINCIDENCE, COORDINATES, DOT_2, DRIVEN_ANGLE, Joint, Word, frames, word
 from ffr_prep.common.errors import InputError
 
@@ -26,9 +27,12 @@ class Driver:
     name: str
     joint: str
     function: Any
+    _: KW_ONLY
     coordinate: str = "angle"
 
     def __post_init__(self) -> None:
+        check_own_name("driver", self.name)
+        check_name(f"driver {self.name!r}", "joint", self.joint)
         made = as_time_function(self.function, f"driver {self.name!r}: its function")
         object.__setattr__(self, "function", made)
 
@@ -46,11 +50,14 @@ class PointDriver:
     name: str
     i: str
     j: str
+    _: KW_ONLY
     x: Any = None
     y: Any = None
     z: Any = None
 
     def __post_init__(self) -> None:
+        check_own_name("driver", self.name)
+        check_markers(self, f"driver {self.name!r}")
         if self.x is None and self.y is None and self.z is None:
             raise InputError(f"driver {self.name!r} prescribes nothing: give x, y or z as a function of time")
 

@@ -8,7 +8,7 @@ coincide. (Haug 1989, ch. 9; Rantalainen 2007, eqs. 3.90-3.95.)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -16,6 +16,8 @@ import numpy as np
 
 from ffr_dyn.functions.rotation import triad
 from ffr_dyn.functions.time_functions import TimeFunction, as_time_function
+from ffr_dyn.scene.checks import check_markers, check_own_name
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
@@ -29,8 +31,8 @@ _MOST_TEETH = 1000
 Term = tuple[float, str, Array, Array]
 
 
-@dataclass(frozen=True)
-class Word:
+@dataclass(frozen=True, repr=False)
+class Word(Brief):
     """One basic constraint row.
 
     axes     : (3, 3) in body axes: axis on i, second axis on i of an angle, axis on j; a coincidence row has its global
@@ -225,12 +227,15 @@ class Joint:
     kind: str
     i: str
     j: str
+    _: KW_ONLY
     axis: Any = (0.0, 0.0, 1.0)
     axis_j: Any = None
     length: Any = None
     pitch: Any = None
 
     def __post_init__(self) -> None:
+        check_own_name("joint", self.name)
+        check_markers(self, f"joint {self.name!r}")
         if self.kind not in KINDS:
             raise InputError(f"joint {self.name!r}: there is no kind {self.kind!r}; there are {', '.join(KINDS)}")
         if self.kind == "universal" and self.axis_j is None:

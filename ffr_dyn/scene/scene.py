@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import difflib
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property
 from typing import Any, get_args
 
@@ -16,6 +16,7 @@ import numpy as np
 
 from ffr_dyn.functions.rotation import euler_parameters
 from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction, as_time_function, less
+from ffr_dyn.scene.checks import check_name, check_own_name, several
 from ffr_dyn.scene.couplings import Coupling, coupled, coupling_word
 from ffr_dyn.scene.drivers import Driver, PointDriver, driver_word
 from ffr_dyn.scene.forces import Bushing, Load, SpringDamper
@@ -25,6 +26,7 @@ from ffr_dyn.scene.sensors import AnyMeasurement, Measurement, SectionMeasuremen
 from ffr_dyn.scene.stress_sensors import measured_modes
 from ffr_dyn.scene.surface_loads import SurfaceLoad, distributed
 from ffr_prep.body import FlexibleBody
+from ffr_prep.common.brief import Brief, Rows, in_short, listed, numbers
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
@@ -37,8 +39,8 @@ INERTIA_TERMS = ("I3", "I4", "I5", "I8", "I9")
 RESERVED = (GROUND, "energy", "constraint", "measured", "time", "geometry")
 
 
-@dataclass(frozen=True)
-class Body:
+@dataclass(frozen=True, repr=False)
+class Body(Brief):
     """A reduced (or rigid) body in the scene, with its pose and motion at the start.
 
     position : (3,) [m] of the body frame's origin, global
@@ -56,6 +58,7 @@ class Body:
 
     name: str
     model: FlexibleBody
+    _: KW_ONLY
     position: Any = (0.0, 0.0, 0.0)
     rotation: Any = (0.0, 0.0, 0.0)
     velocity: Any = (0.0, 0.0, 0.0)
@@ -68,6 +71,7 @@ class Body:
     kept: tuple[tuple[int, ...], int] | None = None
 
     def __post_init__(self) -> None:
+        check_own_name("body", self.name)
         if not isinstance(self.model, FlexibleBody):
             raise InputError(f"body {self.name!r}: its model is {self.model!r}; give one of load_body or rigid_body")
         n, who = self.model.n, f"body {self.name!r}"
@@ -86,12 +90,32 @@ class Body:
                 raise InputError(f"{who}: there is no inertia term {term!r} to drop; {_offer(term, INERTIA_TERMS)}")
         object.__setattr__(self, "dropped", tuple(t for t in INERTIA_TERMS if t in self.dropped))
 
+    def _title(self) -> str:
+        n = self.model.n
+        return f"Body {self.name!r}: {f'flexible, {n} elastic coordinates' if n else 'rigid'}, {self.model.mass:.4g} kg"
+
+    def _rows(self) -> Rows:
+        model, poses = self.model, ("position", "rotation", "velocity", "omega_bar")
+        rows = [("points", listed(interface.name for interface in model.interfaces))]
+        rows += [(f"{key} [{unit}]", numbers(getattr(self, key))) for key, unit in zip(poses, _UNITS, strict=True)]
+        if model.n:
+            hertz = np.sqrt(model.omega2) / (2 * np.pi)
+            damping = sorted({f"{ratio:.4g}" for ratio in (self.damping.min(), self.damping.max())}, key=float)
+            rows += [("elastic", f"{hertz.min():.4g} to {hertz.max():.4g} Hz, damping ratio {' to '.join(damping)}")]
+            deformed = float(np.abs(self.q).max()), float(np.abs(self.q_dot).max())
+            rows += [("deformed", f"|q| up to {deformed[0]:.4g}, rates {deformed[1]:.4g}")] if any(deformed) else []
+        left_out = [*self.dropped, *(["geometric stiffening"] if not self.stiffening else [])]
+        return rows + ([("left out", listed(left_out))] if left_out else [])
+
+
+_UNITS = ("m", "e0..e3", "m/s", "rad/s")
+
 
 MarkerName = tuple[int, str, str]  # number and name of the body, name of the point
 
 
-@dataclass(frozen=True)
-class Scene:
+@dataclass(frozen=True, repr=False)
+class Scene(Brief):
     """Everything an analysis needs. Raises InputError for names that do not exist, repeat or contradict each other.
 
     ground  : name -> (3,) [m], points fixed in the global frame
@@ -109,6 +133,7 @@ class Scene:
     bodies: tuple[Body, ...]
     joints: tuple[Joint, ...] = ()
     drivers: tuple[Driver | PointDriver, ...] = ()
+    _: KW_ONLY
     couplings: tuple[Coupling, ...] = ()
     loads: tuple[Load, ...] = ()
     springs: tuple[SpringDamper, ...] = ()
@@ -132,7 +157,9 @@ class Scene:
 
     def __post_init__(self) -> None:
         for key, kinds in _DECLARATIONS.items():
-            object.__setattr__(self, key, _several(key, getattr(self, key), kinds))
+            object.__setattr__(self, key, several(f"{key} of a scene", getattr(self, key), kinds))
+        if not isinstance(self.ground, Mapping):
+            raise InputError(f"ground is {self.ground!r}; give points by name, such as {{'wall': (0, 0, 0)}}")
         points = {key: _vector(at, 3, f"ground point {key!r}") for key, at in self.ground.items()}
         object.__setattr__(self, "ground", points)
         steady, base = _split_gravity(self.gravity, _acceleration("base_acceleration", self.base_acceleration))
@@ -160,6 +187,21 @@ class Scene:
         for measurement in self.measurements:
             _check_measurement(self, measurement)
 
+    def _title(self) -> str:
+        elastic = sum(body.model.n for body in self.bodies)
+        bodies = "one body" if len(self.bodies) == 1 else f"{len(self.bodies)} bodies"
+        return f"Scene {self.name!r}: {bodies} with {elastic} elastic coordinates"
+
+    def _rows(self) -> Rows:
+        bodies = [f"{body.name} ({body.model.n} modes)" if body.model.n else body.name for body in self.bodies]
+        joints = [f"{joint.name} ({joint.kind})" for joint in self.joints]
+        others = {key: [thing.name for thing in getattr(self, key)] for key in ("drivers", "couplings")}
+        forces = [thing.name for thing in (*self.loads, *self.springs, *self.forces)]
+        named = {"bodies": bodies, "joints": joints, **others, "forces": forces}
+        named |= {"measurements": [m.name for m in self.measurements], "ground": list(self.ground)}
+        rows = [(key, listed(names)) for key, names in named.items() if names]
+        return [*rows, ("gravity [m/s^2]", f"{numbers(self.gravity)}, plane {self.plane!r}")]
+
 
 _DECLARATIONS: dict[str, tuple[Any, ...]] = {
     "bodies": (Body,),
@@ -173,20 +215,10 @@ _DECLARATIONS: dict[str, tuple[Any, ...]] = {
 }
 
 
-def _several(key: str, given: Any, kinds: tuple[Any, ...]) -> tuple[Any, ...]:
-    """What is given as a tuple; InputError unless it is several things of these kinds."""
-    if isinstance(given, kinds):
-        raise InputError(
-            f"{key} of a scene is {type(given).__name__} {given.name!r} alone; give a tuple, such as (it,)"
-        )
-    if not isinstance(given, Iterable):
-        raise InputError(f"{key} of a scene is of the type {type(given).__name__}; give a tuple")
-    several = tuple(given)
-    for k, one in enumerate(several):
-        if not isinstance(one, kinds):
-            names = ", ".join(kind.__name__ for kind in kinds)
-            raise InputError(f"{key} of a scene: entry {k + 1} is of the type {type(one).__name__}; it takes: {names}")
-    return several
+def require_scene(given: Any) -> None:
+    """InputError for what is no scene, such as the name of a file."""
+    if not isinstance(given, Scene):
+        raise InputError(f"the scene is {in_short(given)}, not a Scene; load_scene(path)[0] is that of a scene file")
 
 
 def markers(scene: Scene) -> tuple[MarkerName, ...]:
@@ -202,6 +234,7 @@ def marker_names(scene: Scene) -> tuple[str, ...]:
 def marker_number(scene: Scene, name: str) -> int:
     """Index of a marker; InputError says which body or interface does not exist and what there is."""
     names = scene._numbers
+    check_name("marker", "name", name)
     if name in names:
         return names[name]
     body, _, point = name.partition(".")
@@ -321,6 +354,8 @@ def _check_names(scene: Scene) -> None:
         *scene.measurements,
     )
     names = [thing.name for thing in things]
+    for thing in things:
+        check_own_name(type(thing).__name__, thing.name)
     repeated = sorted(name for name, count in Counter(names).items() if count > 1)
     if repeated:
         raise InputError(f"the name {repeated[0]!r} is used more than once in the scene; every name must be its own")
@@ -343,15 +378,20 @@ Components = tuple[TimeFunction, TimeFunction, TimeFunction]
 
 
 def _acceleration(what: str, value: Any) -> Components:
-    if np.size(value) != 3 or len(value) != 3:
-        raise InputError(f"{what} needs three components, not {value!r}")
-    x, y, z = (as_time_function(component, what) for component in value)
+    x, y, z = (as_time_function(component, what) for component in _three(what, value))
     return x, y, z
+
+
+def _three(what: str, value: Any) -> Any:
+    if not isinstance(value, (Sequence, np.ndarray)) or isinstance(value, str) or len(value) != 3:
+        hint = "3 numbers or functions of time such as (0, -9.81, 0)"
+        raise InputError(f"{what} needs three components, {hint}, not {value!r}")
+    return value
 
 
 def _split_gravity(gravity: Any, base: Components) -> tuple[Any, Components]:
     """The constant components of gravity, and the base acceleration less those that vary."""
-    if all(isinstance(component, (int, float, np.floating, np.integer)) for component in gravity):
+    if all(isinstance(component, (int, float, np.floating, np.integer)) for component in _three("gravity", gravity)):
         return gravity, base
     given = _acceleration("gravity", gravity)
     steady = [f.data[0] if _is_constant(f) else 0.0 for f in given]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
+from ffr_dyn.scene.checks import check_marker, check_name, check_own_name
 from ffr_prep.common.errors import InputError
 
 Vector = tuple[float, float, float]
@@ -25,9 +26,13 @@ class Measurement:
     i: str
     j: str
     what: str = "position"
+    _: KW_ONLY
     axes: str = "global"
 
     def __post_init__(self) -> None:
+        check_own_name("measurement", self.name)
+        for key in ("i", "j"):
+            check_marker(f"measurement {self.name!r}", key, getattr(self, key))
         if self.what not in WHAT:
             raise InputError(f"measurement {self.name!r}: there is no {self.what!r}; there are {', '.join(WHAT)}")
 
@@ -45,9 +50,11 @@ class StressMeasurement:
     name: str
     body: str
     point: Vector
+    _: KW_ONLY
     what: str = "von-mises"
 
     def __post_init__(self) -> None:
+        _check_body(self)
         object.__setattr__(self, "point", _place(self.name, self.point))
 
 
@@ -65,10 +72,12 @@ class SectionMeasurement:
     name: str
     body: str
     point: Vector
+    _: KW_ONLY
     what: str = "moment"
     place: str = "middle"
 
     def __post_init__(self) -> None:
+        _check_body(self)
         object.__setattr__(self, "point", _place(self.name, self.point))
         for key, known in (("what", ("force", "moment")), ("place", ("first", "middle", "last"))):
             if getattr(self, key) not in known:
@@ -77,8 +86,16 @@ class SectionMeasurement:
                 )
 
 
+def _check_body(measurement: StressMeasurement | SectionMeasurement) -> None:
+    check_own_name("measurement", measurement.name)
+    check_name(f"measurement {measurement.name!r}", "body", measurement.body)
+
+
 def _place(name: str, point: Iterable[float]) -> Vector:
-    values = [float(value) for value in point]
+    try:
+        values = [float(value) for value in point]
+    except (TypeError, ValueError):
+        raise InputError(f"measurement {name!r}: a point is three coordinates [m], not {point!r}") from None
     if len(values) != 3:
         raise InputError(f"measurement {name!r}: a point has three coordinates [m], not {len(values)}")
     return values[0], values[1], values[2]

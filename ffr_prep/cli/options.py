@@ -9,19 +9,35 @@ from __future__ import annotations
 import os
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import click
 
 from ffr_prep.common.errors import InputError
 
 if TYPE_CHECKING:
     from ffr_prep.mesh.mesh import Mesh
     from ffr_prep.model.coupled import InterfaceRegion
-    from ffr_prep.model.material import Material
+    from ffr_prep.model.material import Solid
     from ffr_prep.model.reference import ReferenceConditions
 
+PATH = click.Path(path_type=Path)
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
 _FAR = 10.0
+
+
+def bundle(*options: Decorator) -> Decorator:
+    """Several options as one, in this order in the help."""
+
+    def added(command: Callable[..., Any]) -> Callable[..., Any]:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return added
 
 
 def numbers_of(settings: Sequence[str]) -> dict[str, float]:
@@ -39,11 +55,13 @@ def number_of(what: str, text: str) -> float:
         raise InputError(f"{what}: {text!r} is not a number") from None
 
 
-def material_of(texts: Sequence[str]) -> Material | Mapping[str, Material]:
+def material_of(texts: Sequence[str]) -> Solid | Mapping[str, Solid]:
     """One material, or materials by group where a text is GROUP=MATERIAL."""
     from ffr_prep.model.material import parse_material
 
-    groups = [re.fullmatch(r"(?!(?:E|nu|rho|name)=)([^=,]+)=(.+)", text) for text in texts]
+    groups = [
+        re.fullmatch(r"(?!(?:E[123]?|nu(?:12|13|23)?|G(?:12|13|23)|rho|name)=)([^=,]+)=(.+)", text) for text in texts
+    ]
     if len(texts) == 1 and groups[0] is None:
         return parse_material(texts[0])
     wrong = [text for text, group in zip(texts, groups, strict=True) if group is None]

@@ -107,6 +107,12 @@ def write_fem(body: FlexibleBody, path: str | Path, *, kind: Kind = "legacy", su
     return write_lines(Path(path), [*_head(body, at), *_texts(content)])
 
 
+def left_out(body: FlexibleBody, *, kind: Kind = "legacy") -> tuple[str, ...]:
+    """What a file of this kind will not hold, in words."""
+    lost = kind == "legacy" and body.stiffening is not None
+    return ("the geometric stiffness of the body was left out",) if lost else ()
+
+
 def _finite_elements(body: FlexibleBody, at: tuple[Interface, ...]) -> dict[int, Array]:
     positions = np.array([i.position for i in at])
     motions = np.array([np.vstack([i.phi_t, i.phi_r]) for i in at])

@@ -19,7 +19,7 @@ import scipy.sparse as sp
 
 from ffr_prep.common.errors import InputError
 from ffr_prep.matrices.model import MatrixModel
-from ffr_prep.matrices.source import NodeTable, model_of
+from ffr_prep.matrices.node_table import NodeTable, model_of
 from ffr_prep.mesh.abaqus import nodes_from_abaqus
 
 Array = np.ndarray

@@ -21,8 +21,8 @@ import scipy.sparse as sp
 
 from ffr_prep.common.errors import InputError
 from ffr_prep.matrices.model import MatrixModel
+from ffr_prep.matrices.node_table import NodeTable, model_of
 from ffr_prep.matrices.npz import arrays_of, sparse_of
-from ffr_prep.matrices.source import NodeTable, model_of
 
 Array = np.ndarray
 

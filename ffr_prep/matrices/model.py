@@ -12,8 +12,11 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from ffr_prep.body import content_hash
+from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.matrices.nodal_inertia import DofMap
+from ffr_prep.matrices.unit_systems import UnitSystem
 
 Array = np.ndarray
 
@@ -30,27 +33,8 @@ _COMPONENTS = (
 
 
 @dataclass(frozen=True)
-class UnitSystem:
-    """What the numbers of a file count: length [m], mass [kg], time [s]; forces follow from them."""
-
-    length: float
-    mass: float
-    time: float
-
-
-UNIT_SYSTEMS: Mapping[str, UnitSystem] = {
-    "m-kg-s": UnitSystem(1.0, 1.0, 1.0),
-    "mm-t-s": UnitSystem(1e-3, 1e3, 1.0),
-    "mm-kg-s": UnitSystem(1e-3, 1.0, 1.0),
-    "mm-kg-ms": UnitSystem(1e-3, 1.0, 1e-3),
-    "cm-g-s": UnitSystem(1e-2, 1e-3, 1.0),
-    "in-lbf-s": UnitSystem(0.0254, 4.4482216152605 / 0.0254, 1.0),
-    "ft-lbf-s": UnitSystem(0.3048, 4.4482216152605 / 0.3048, 1.0),
-}
-
-
-@dataclass(frozen=True)
-class MatrixModel:
+@dataclass(frozen=True, repr=False)
+class MatrixModel(Brief):
     """Nodes, stiffness and mass of a free body, from outside; frozen, SI units.
 
     points     : (N, 3) nodes [m]
@@ -90,6 +74,16 @@ class MatrixModel:
             object.__setattr__(self, "triangles", np.array(self.triangles, np.int64).reshape(-1, 3))
         _check_shapes(self)
         _check_rows(self)
+
+    def _rows(self) -> Rows:
+        return [
+            ("rows", f"{len(self.nodes)}, {self.K.nnz} entries in K, {self.M.nnz} in M"),
+            ("nodes", str(len(self.points))),
+            ("extent", extent_in_words(self.points)),
+            ("groups", listed(self.groups)),
+            ("source", str(self.source.get("format", "unknown"))),
+            ("notes", listed(self.notes)),
+        ]
 
     @property
     def dofs(self) -> DofMap:

@@ -22,7 +22,7 @@ import scipy.sparse as sp
 
 from ffr_prep.common.errors import InputError
 from ffr_prep.matrices.model import MatrixModel
-from ffr_prep.matrices.source import NodeTable, mirrored, model_of
+from ffr_prep.matrices.node_table import NodeTable, mirrored, model_of
 
 Array = np.ndarray
 

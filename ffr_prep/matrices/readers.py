@@ -1,10 +1,4 @@
-"""Reading matrix models: which reader takes which files.
-
-MODEL.npz                          everything in one file (`ffr_prep.matrices.npz`)
-K.mtx M.mtx DOFS.csv               Matrix Market, or scipy.sparse.save_npz (`ffr_prep.matrices.matrix_market`)
-STIF.mtx MASS.mtx MODEL.inp        Abaqus (`ffr_prep.matrices.abaqus`)
-MATRICES.op4 MODEL.bdf, MODEL.op2  Nastran (`ffr_prep.matrices.nastran`)
-"""
+"""Reading matrix models."""
 
 from __future__ import annotations
 
@@ -13,12 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from ffr_prep.common.errors import InputError
-from ffr_prep.matrices.model import UNIT_SYSTEMS, MatrixModel, in_si
-
-_NASTRAN_DECKS = (".bdf", ".dat", ".nas")
-
-
-FILES = "MODEL.npz; K.mtx M.mtx DOFS.csv; STIF.mtx MASS.mtx MODEL.inp; MATRICES.op4 MODEL.bdf; or MODEL.op2"
+from ffr_prep.common.registry import loaded
+from ffr_prep.matrices.formats import format_of
+from ffr_prep.matrices.model import MatrixModel, in_si
+from ffr_prep.matrices.unit_systems import UNIT_SYSTEMS
 
 
 def read_matrices(files: Sequence[str | Path], *, units: str | None = None) -> MatrixModel:
@@ -34,34 +26,9 @@ def read_matrices(files: Sequence[str | Path], *, units: str | None = None) -> M
             raise InputError(f"matrix file {path} does not exist")
     if units is not None and units not in UNIT_SYSTEMS:
         raise InputError(f"units {units!r} are not known; they are {', '.join(UNIT_SYSTEMS)}")
-    model = _read(paths)
+    model: MatrixModel = loaded(format_of(paths).read)(*paths)
     declared = units or model.source.get("units") or "m-kg-s"
     if declared not in UNIT_SYSTEMS:
         raise InputError(f"{paths[0]} declares the units {declared!r}; they must be one of {', '.join(UNIT_SYSTEMS)}")
     source = {**model.source, "files": [path.name for path in paths], "units": declared}
     return in_si(replace(model, source=source), UNIT_SYSTEMS[declared])
-
-
-def _read(paths: Sequence[Path]) -> MatrixModel:
-    kinds = tuple(path.suffix.lower() for path in paths)
-    if kinds == (".npz",):
-        from ffr_prep.matrices.npz import from_npz
-
-        return from_npz(paths[0])
-    if len(kinds) == 3 and set(kinds[:2]) <= {".mtx", ".npz"} and kinds[2] == ".csv":
-        from ffr_prep.matrices.matrix_market import from_matrix_market
-
-        return from_matrix_market(*paths)
-    if len(kinds) == 3 and set(kinds[:2]) == {".mtx"} and kinds[2] == ".inp":
-        from ffr_prep.matrices.abaqus import from_abaqus_matrices
-
-        return from_abaqus_matrices(*paths)
-    if kinds == (".op2",):
-        from ffr_prep.matrices.nastran import from_op2
-
-        return from_op2(paths[0])
-    if len(kinds) == 2 and kinds[0] == ".op4" and kinds[1] in _NASTRAN_DECKS:
-        from ffr_prep.matrices.nastran import from_op4
-
-        return from_op4(*paths)
-    raise InputError(f"these are not files of a matrix model: {', '.join(map(str, paths))}; give {FILES}")

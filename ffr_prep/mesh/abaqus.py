@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from ffr_prep.common.errors import InputError
-from ffr_prep.mesh.source import Source, supported_kind
+from ffr_prep.mesh.formats import FileMesh, supported_kind
 
 Array = np.ndarray
 Row = list[str]
@@ -47,11 +47,11 @@ class _Deck:
     instances: int = 0
 
 
-def from_abaqus(path: Path) -> Source:
+def from_abaqus(path: Path) -> FileMesh:
     """The mesh of an Abaqus input file. Raises InputError for a file that cannot be read and for several parts."""
     deck = _deck(path, _READERS)
     try:
-        return _source(deck)
+        return _file_mesh(deck)
     except KeyError as error:
         raise InputError(f"{path} refers to {error.args[0]}, which it does not define; is it complete?") from None
 
@@ -202,7 +202,7 @@ def _extend(deck: _Deck, sets: dict[str, list[str]], name: str, members: list[st
 # ---- to arrays ----------------------------------------------------------------------------------------------------
 
 
-def _source(deck: _Deck) -> Source:
+def _file_mesh(deck: _Deck) -> FileMesh:
     index = {number: k for k, number in enumerate(deck.nodes)}
     solids = {kind: elements for kind, elements in deck.solids.items() if elements}
     number_of = {n: k for k, n in enumerate(n for elements in solids.values() for n in elements)}
@@ -212,7 +212,7 @@ def _source(deck: _Deck) -> Source:
     sides = {name: _sides(deck, rows) for name, rows in deck.surfaces.items()}
     corners = {name: [face[: _CORNERS[len(face)]] for face in faces] for name, faces in (planes | sides).items()}
     nodes = {name: _resolved(name, deck.node_sets) for name in deck.node_sets}
-    return Source(
+    return FileMesh(
         points=np.array(list(deck.nodes.values()), float).reshape(-1, 3),
         blocks=tuple((kind, _indices(index, list(elements.values()))) for kind, elements in solids.items()),
         volumes={deck.spelling[name]: np.unique(of) for name, of in volumes.items() if of},

@@ -1,4 +1,4 @@
-"""Volume elements: node order, edges, faces, shape functions.
+"""Volume elements: node order, edges, faces.
 
 Nodes are ordered as in VTK and meshio: corners, then mid-edge nodes, then face centres, then the centre. Faces are
 listed with their corners first, counter-clockwise seen from outside, then their mid-edge nodes, then their centre.
@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
@@ -95,22 +94,3 @@ def node_order(kind: str, positions: Array) -> Array:
     """
     distance = np.linalg.norm(KINDS[kind].nodes[:, None] - positions[None], axis=-1)
     return np.argmin(distance, axis=1)
-
-
-@cache
-def sampled_gradients(kind: str) -> Array:
-    """(Q, k, 3) gradients of the shape functions at the nodes of the reference element and at quadrature points."""
-    import skfem  # here, because it is slow to load and most commands do without it
-    from skfem.quadrature import get_quadrature
-
-    element = getattr(skfem, KINDS[kind].shapes)()
-    quadrature, _ = get_quadrature(element.refdom, 5)
-    X = np.hstack([KINDS[kind].nodes.T, quadrature])
-    gradients = [np.broadcast_to(element.lbasis(X, i)[1], X.shape) for i in node_order(kind, element.doflocs)]
-    return np.ascontiguousarray(np.stack(gradients, axis=-1).transpose(1, 2, 0))
-
-
-def jacobian_determinants(kind: str, points: Array) -> Array:
-    """(E, Q) volume ratio [m^3] of elements with nodes at `points` (E, k, 3), at the nodes and inside."""
-    J = np.einsum("ekc,qkd->eqcd", points, sampled_gradients(kind), optimize=True)
-    return np.linalg.det(J)

@@ -18,18 +18,18 @@ from pathlib import Path
 import numpy as np
 
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.registry import choice
 from ffr_prep.mesh import gmsh_process
 from ffr_prep.mesh.cells import node_order
-from ffr_prep.mesh.source import Source, supported_kind
+from ffr_prep.mesh.formats import FileMesh, supported_kind
 
 Array = np.ndarray
 
 CAD_UNITS = {"m": "M", "cm": "CM", "mm": "MM", "in": "INCH"}
-GEOMETRY = (".geo", ".step", ".stp", ".iges", ".igs", ".brep")
-BY_GMSH = (*GEOMETRY, ".msh", ".med", ".unv")
-IGES = (".iges", ".igs")
-WITH_UNIT = (".step", ".stp", *IGES)
 
+_MESHES = (".msh", ".med", ".unv")
+_IGES = (".iges", ".igs")
+_WITH_UNIT = (".step", ".stp", *_IGES)
 _TIMEOUT = 3600.0
 _LIBRARIES = "libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1"
 
@@ -37,62 +37,65 @@ _LIBRARIES = "libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1"
 # ---- the mesh -------------------------------------------------------------------------------------------------------
 
 
-def from_gmsh(path: Path, *, unit: str, size: float | None, numbers: Mapping[str, float], order: int) -> Source:
+def from_gmsh(
+    path: Path, *, unit: str | None, size: float | None, numbers: Mapping[str, float], order: int
+) -> FileMesh:
     """What gmsh makes of a file, in a process of its own.
 
-    unit : for CAD files that declare a unit, the unit to convert to; size : largest element edge
-    Raises InputError for a file that gmsh cannot read, ComputationError when meshing fails.
+    unit : of the numbers, where the file declares none or another is meant; size : largest element edge
+
+    Raises InputError for a file that gmsh cannot read, for parameters that a script does not have and for a unit of a file
+    that is converted to another; ComputationError when meshing fails.
     """
-    return _source(_arrays(path, dimension=3, unit=unit, size=size, numbers=numbers, order=order))
+    stored, unit = _arrays(path, dimension=3, unit=unit, size=size, numbers=numbers, order=order)
+    return _file_mesh(stored, unit)
 
 
-def lines_from_gmsh(
-    path: Path, *, unit: str, size: float | None, numbers: Mapping[str, float]
-) -> tuple[Array, dict[str, Array], dict[str, Array]]:
-    """The curves of a file as straight lines: points (N, 3), the lines (L, 2) of each group and the nodes of each group.
-
-    Arguments and errors as in `from_gmsh`.
-    """
-    stored = _arrays(path, dimension=1, unit=unit, size=size, numbers=numbers, order=1)
-    names = json.loads(stored["names"].tobytes())
-    lines = {name: stored[f"line_{g}"] for g, name in enumerate(names["lines"])}
-    return stored["points"], lines, {name: stored[f"node_{g}"] for g, name in enumerate(names["nodes"])}
+def mesh_from_gmsh(path: Path) -> FileMesh:
+    """A mesh that gmsh reads; errors as in `from_gmsh`."""
+    return from_gmsh(path, unit=None, size=None, numbers={}, order=1)
 
 
 @dataclass(frozen=True)
 class LinesAndFaces:
-    """points (N, 3); by group: lines (L, 2), the corners of faces (T, 3) and (Q, 4), and nodes."""
+    """points (N, 3); by group: lines (L, 2), the corners of faces (T, 3) and (Q, 4), and nodes; the unit, if declared."""
 
     points: Array
     lines: Mapping[str, Array]
     faces: Mapping[str, tuple[Array, Array]]
     nodes: Mapping[str, Array]
+    unit: str | None
 
 
-def faces_from_gmsh(path: Path, *, unit: str, size: float | None, numbers: Mapping[str, float]) -> LinesAndFaces:
-    """The surfaces of a file as flat triangles and quadrilaterals, and its curves as straight lines.
+def lines_and_faces(
+    path: Path, *, faces: bool, unit: str | None, size: float | None, numbers: Mapping[str, float]
+) -> LinesAndFaces:
+    """The curves of a file as straight lines, and if asked for its surfaces as flat triangles and quadrilaterals.
 
-    Arguments and errors as in `from_gmsh`.
+    Other arguments and errors as in `from_gmsh`.
     """
-    stored = _arrays(path, dimension=2, unit=unit, size=size, numbers=numbers, order=1)
+    stored, unit = _arrays(path, dimension=2 if faces else 1, unit=unit, size=size, numbers=numbers, order=1)
     names = json.loads(stored["names"].tobytes())
     return LinesAndFaces(
         points=stored["points"],
         lines={name: stored[f"line_{g}"] for g, name in enumerate(names["lines"])},
-        faces={name: (stored[f"face_{g}_3"], stored[f"face_{g}_4"]) for g, name in enumerate(names["faces"])},
-        nodes={name: stored[f"node_{g}"] for g, name in enumerate(names["nodes"])},
+        faces=_faces(stored, names) if faces else {},
+        nodes=_nodes(stored, names),
+        unit=unit,
     )
 
 
 def _arrays(
-    path: Path, *, dimension: int, unit: str, size: float | None, numbers: Mapping[str, float], order: int
-) -> dict[str, Array]:
-    """The arrays that the process writes."""
+    path: Path, *, dimension: int, unit: str | None, size: float | None, numbers: Mapping[str, float], order: int
+) -> tuple[dict[str, Array], str | None]:
+    """The arrays that the process writes, and the unit of their numbers, where it is known."""
+    _check_geometry(path, unit, numbers)
+    declared = declared_unit(path) if path.suffix.lower() in _WITH_UNIT else None
     job = {
         "path": str(path.resolve()),
         "dimension": dimension,
-        "generate": path.suffix.lower() in GEOMETRY,
-        "unit": CAD_UNITS[unit],
+        "generate": path.suffix.lower() not in _MESHES,
+        "unit": CAD_UNITS[declared or "m"],
         "size": size,
         "numbers": dict(numbers),
         "order": order,
@@ -102,7 +105,31 @@ def _arrays(
         job_file.write_text(json.dumps(job))
         _run_gmsh(path, job_file, result)
         with np.load(result) as stored:
-            return dict(stored)
+            return dict(stored), unit or declared
+
+
+def _check_geometry(path: Path, unit: str | None, numbers: Mapping[str, float]) -> None:
+    suffix = path.suffix.lower()
+    if suffix in _IGES and unit not in (None, "mm"):
+        raise InputError(f"{path} declares its unit and is converted to millimetres; leave out the unit {unit!r}")
+    if suffix == ".geo":
+        if path.read_bytes().rpartition(b"\n")[2].strip():
+            raise InputError(
+                f"the last line of {path} does not end with a line break, so gmsh would ignore it: add one"
+            )
+        _check_parameters(path, numbers)
+
+
+def _check_parameters(path: Path, numbers: Mapping[str, float]) -> None:
+    """Gmsh ignores a parameter that its script does not have."""
+    script = re.sub(r"//.*", "", path.read_text(errors="replace"))
+    if re.search(r"^\s*Include\b", script, re.MULTILINE):
+        return  # the parameter may be in the other file
+    declared = re.findall(r"DefineConstant\s*\[(.*?)\]\s*;", script, re.DOTALL)
+    known = dict.fromkeys(re.findall(r"(\w+)\s*=", "".join(declared)))
+    for name in numbers:
+        if not re.search(rf"\b{re.escape(name)}\b", script):
+            raise InputError(f"{path} has no parameter {name!r}; {choice(name, known)}")
 
 
 def _run_gmsh(path: Path, job_file: Path, result: Path) -> None:
@@ -141,12 +168,12 @@ def _last_words(log: str) -> str:
     return " | ".join(dict.fromkeys((errors or lines)[-3:]))
 
 
-def _source(stored: dict[str, Array]) -> Source:
+def _file_mesh(stored: dict[str, Array], unit: str | None) -> FileMesh:
     names = json.loads(stored["names"].tobytes())
     kinds = [_gmsh_kind(name, stored[f"cells_{k}"].shape[1]) for k, name in enumerate(names["kinds"])]
     blocks = [_gmsh_block(kind, stored, k) for k, kind in enumerate(kinds)]
     first = np.cumsum([0, *(len(nodes) for _, nodes in blocks)])
-    return Source(
+    return FileMesh(
         points=stored["points"],
         blocks=tuple(blocks),
         volumes={
@@ -154,10 +181,19 @@ def _source(stored: dict[str, Array]) -> Source:
             for g, name in enumerate(names["volumes"])
             if kinds
         },
-        faces={name: (stored[f"face_{g}_3"], stored[f"face_{g}_4"]) for g, name in enumerate(names["faces"])},
-        nodes={name: stored[f"node_{g}"] for g, name in enumerate(names["nodes"])},
+        faces=_faces(stored, names),
+        nodes=_nodes(stored, names),
         notes=tuple(names["notes"]),
+        unit=unit,
     )
+
+
+def _faces(stored: Mapping[str, Array], names: Mapping[str, list[str]]) -> dict[str, tuple[Array, Array]]:
+    return {name: (stored[f"face_{g}_3"], stored[f"face_{g}_4"]) for g, name in enumerate(names["faces"])}
+
+
+def _nodes(stored: Mapping[str, Array], names: Mapping[str, list[str]]) -> dict[str, Array]:
+    return {name: stored[f"node_{g}"] for g, name in enumerate(names["nodes"])}
 
 
 def _gmsh_kind(name: str, size: int) -> str:
@@ -179,7 +215,7 @@ def declared_unit(path: Path) -> str:
 
     OpenCASCADE converts to the unit it is asked for, except that it gives IGES in millimetres whatever they declare.
     """
-    if path.suffix.lower() in IGES:
+    if path.suffix.lower() in _IGES:
         return "mm"
     text = path.read_text(errors="replace")
     context = re.search(r"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\s*\(([^)]*)\)", text)

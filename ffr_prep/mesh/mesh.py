@@ -5,23 +5,22 @@ Everything is in metres: the unit of a file is converted once, on reading.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ffr_prep.body import content_hash
+from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.common.progress import Stages, no_stages
-from ffr_prep.mesh.abaqus import from_abaqus
+from ffr_prep.common.registry import choice, loaded
 from ffr_prep.mesh.boundary import joined_by_faces, joined_by_nodes, outer_faces, whole_faces
-from ffr_prep.mesh.cells import FACE_TRIANGLES, KINDS, jacobian_determinants
-from ffr_prep.mesh.gmsh_files import BY_GMSH, GEOMETRY, IGES, WITH_UNIT, declared_unit, from_gmsh
-from ffr_prep.mesh.source import Source
+from ffr_prep.mesh.cells import FACE_TRIANGLES, KINDS
+from ffr_prep.mesh.formats import FileMesh, format_of
 
 Array = np.ndarray
 
@@ -31,12 +30,11 @@ _CHUNK = 4096
 _DEGENERATE = 1e-10
 _COINCIDENT = 1e-9
 _DOUBTFUL_LENGTH = 20.0
-_SHOWN = 20
 _SHOWN_PARTS = 5
 
 
-@dataclass(frozen=True)
-class Block:
+@dataclass(frozen=True, repr=False)
+class Block(Brief):
     """Volume elements of one kind: "tet4", "tet10", "hex8", "hex20" or "hex27".
 
     nodes : (E, k) indices into Mesh.points, in the node order of meshio (VTK).
@@ -46,8 +44,8 @@ class Block:
     nodes: Array
 
 
-@dataclass(frozen=True)
-class Mesh:
+@dataclass(frozen=True, repr=False)
+class Mesh(Brief):
     """A volume mesh with named regions; frozen, SI units.
 
     points        : (N, 3) [m]
@@ -64,6 +62,17 @@ class Mesh:
     face_groups: Mapping[str, tuple[Array, ...]]
     node_groups: Mapping[str, Array]
     notes: tuple[str, ...] = ()
+
+    def _rows(self) -> Rows:
+        return [
+            ("elements", ", ".join(f"{len(block.nodes)} {block.kind}" for block in self.blocks)),
+            ("nodes", str(len(self.points))),
+            ("extent", extent_in_words(self.points)),
+            ("surfaces", listed(self.face_groups)),
+            ("node sets", listed(self.node_groups)),
+            ("volumes", listed(self.volume_groups)),
+            ("notes", listed(self.notes)),
+        ]
 
 
 # ---- reading ------------------------------------------------------------------------------------------------------
@@ -95,11 +104,14 @@ def read_mesh(
     path, numbers = Path(path), dict(numbers or {})
     check_request(path, unit, size, numbers, order)
     progress("read the mesh")
-    source, file_unit = _read(path, unit, size, numbers, order)
-    if not source.blocks:
+    entry = format_of(path)
+    of_geometry = {"unit": unit, "size": size, "numbers": numbers, "order": order} if entry.geometry else {}
+    read: FileMesh = loaded(entry.read)(path, **of_geometry)
+    if not read.blocks:
         raise InputError(f"{path} has no volume elements; only solids can be reduced, not surfaces or beams")
-    mesh = _in_metres(source, UNITS[file_unit])
-    return replace(mesh, notes=(*mesh.notes, *_doubtful_unit(mesh, path, unit)))
+    known = unit or read.unit
+    mesh = _in_metres(read, UNITS[known or "m"])
+    return mesh if known else replace(mesh, notes=(*mesh.notes, *_doubtful_unit(mesh)))
 
 
 def check_request(path: Path, unit: str | None, size: float | None, numbers: Mapping[str, float], order: int) -> None:
@@ -112,60 +124,27 @@ def check_request(path: Path, unit: str | None, size: float | None, numbers: Map
         raise InputError(f"element order {order} cannot be used; it must be 1 or 2")
     if not path.is_file():
         raise InputError(f"mesh file {path} {'is a folder' if path.is_dir() else 'does not exist'}")
-    if size is not None and path.suffix.lower() not in GEOMETRY:
+    if size is not None and not format_of(path).geometry:
         raise InputError(f"{path} is meshed already, so an element size has no effect; leave it out")
-    if path.suffix.lower() in IGES and unit not in (None, "mm"):
-        raise InputError(f"{path} declares its unit and is converted to millimetres; leave out the unit {unit!r}")
-    if path.suffix.lower() == ".geo" and path.read_bytes().rpartition(b"\n")[2].strip():
-        raise InputError(f"the last line of {path} does not end with a line break, so gmsh would ignore it: add one")
-    if numbers:
-        _check_parameters(path, numbers)
-
-
-def _check_parameters(path: Path, numbers: Mapping[str, float]) -> None:
-    """Gmsh ignores a parameter that its script does not have."""
-    if path.suffix.lower() != ".geo":
+    if numbers and not format_of(path).parameters:
         raise InputError(f"{path} has no parameters to set ({', '.join(numbers)}); only .geo scripts have")
-    script = re.sub(r"//.*", "", path.read_text(errors="replace"))
-    if re.search(r"^\s*Include\b", script, re.MULTILINE):
-        return  # the parameter may be in the other file
-    declared = re.findall(r"DefineConstant\s*\[(.*?)\]\s*;", script, re.DOTALL)
-    known = dict.fromkeys(re.findall(r"(\w+)\s*=", "".join(declared)))
-    for name in numbers:
-        if not re.search(rf"\b{re.escape(name)}\b", script):
-            raise InputError(f"{path} has no parameter {name!r}; {choice(name, known)}")
 
 
-def _read(
-    path: Path, unit: str | None, size: float | None, numbers: Mapping[str, float], order: int
-) -> tuple[Source, str]:
-    """The mesh as in the file, and the unit of its numbers."""
-    suffix = path.suffix.lower()
-    if suffix == ".inp":
-        return from_abaqus(path), unit or "m"
-    if suffix not in BY_GMSH:
-        from ffr_prep.mesh.meshio_files import from_meshio  # here, because meshio is slow to load
-
-        return from_meshio(path), unit or "m"
-    declared = declared_unit(path) if suffix in WITH_UNIT else "m"
-    return from_gmsh(path, unit=declared, size=size, numbers=numbers, order=order), unit or declared
-
-
-def _in_metres(source: Source, scale: float) -> Mesh:
-    """The mesh of a source: without the nodes that no element uses, its faces completed from the volume elements."""
-    used = np.unique(np.concatenate([nodes.ravel() for _, nodes in source.blocks]))
-    new = np.full(len(source.points), -1)
+def _in_metres(read: FileMesh, scale: float) -> Mesh:
+    """The mesh without the nodes that no element uses, its faces completed from the volume elements."""
+    used = np.unique(np.concatenate([nodes.ravel() for _, nodes in read.blocks]))
+    new = np.full(len(read.points), -1)
     new[used] = np.arange(used.size)
-    blocks = [(kind, new[nodes]) for kind, nodes in source.blocks]
-    faces = {name: whole_faces(blocks, [new[corners] for corners in parts]) for name, parts in source.faces.items()}
-    nodes = {name: np.unique(new[members][new[members] >= 0]) for name, members in source.nodes.items()}
+    blocks = [(kind, new[nodes]) for kind, nodes in read.blocks]
+    faces = {name: whole_faces(blocks, [new[corners] for corners in parts]) for name, parts in read.faces.items()}
+    nodes = {name: np.unique(new[members][new[members] >= 0]) for name, members in read.nodes.items()}
     return Mesh(
-        points=source.points[used] * scale,
+        points=read.points[used] * scale,
         blocks=tuple(Block(kind, nodes) for kind, nodes in blocks),
-        volume_groups=dict(source.volumes),
+        volume_groups=dict(read.volumes),
         face_groups={name: parts for name, parts in faces.items() if parts},
         node_groups={name: members for name, members in nodes.items() if members.size},
-        notes=(*source.notes, *_left_out(len(source.points) - used.size, faces, nodes)),
+        notes=(*read.notes, *_left_out(len(read.points) - used.size, faces, nodes)),
     )
 
 
@@ -175,9 +154,9 @@ def _left_out(unused: int, faces: Mapping[str, tuple[Array, ...]], nodes: Mappin
     return notes + [f"group {name!r} is left out: nothing of it belongs to a volume element" for name in lost]
 
 
-def _doubtful_unit(mesh: Mesh, path: Path, unit: str | None) -> list[str]:
+def _doubtful_unit(mesh: Mesh) -> list[str]:
     length = float(np.ptp(mesh.points, axis=0).max())
-    if unit is not None or path.suffix.lower() in WITH_UNIT or length < _DOUBTFUL_LENGTH:
+    if length < _DOUBTFUL_LENGTH:
         return []
     return [f"the mesh is {length:.4g} m long, read in metres as no unit was given; are its numbers millimetres?"]
 
@@ -200,15 +179,6 @@ def region_nodes(mesh: Mesh, name: str) -> Array:
         return np.unique(mesh.node_groups[name])
     known = dict.fromkeys([*mesh.face_groups, *mesh.node_groups])
     raise InputError(f"the mesh has no group of faces or nodes {name!r}; {choice(name, known)}")
-
-
-def choice(name: str, known: Mapping[str, object]) -> str:
-    """Names to choose from, the near ones first."""
-    near = get_close_matches(name, known, n=3, cutoff=0.5)
-    shown = [*near, *(other for other in known if other not in near)]
-    more = f" and {len(shown) - _SHOWN} more" if len(shown) > _SHOWN else ""
-    names = ", ".join(repr(one) for one in shown[:_SHOWN]) + more
-    return (f"did you mean {near[0]!r}? There" if near else "there") + f" are: {names or 'none'}"
 
 
 # ---- outside ------------------------------------------------------------------------------------------------------
@@ -331,6 +301,8 @@ def _check_jacobians(mesh: Mesh) -> None:
 
 def _worst_jacobians(corners: Array, kind: str) -> Array:
     """(E,) least Jacobian determinant of elements with nodes at (E, k, 3), over the cube of their size [-]."""
+    from ffr_prep.mesh.shapes import jacobian_determinants  # here, because scikit-fem is slow to load
+
     worst = np.empty(len(corners))
     for start in range(0, len(corners), _CHUNK):
         of = corners[start : start + _CHUNK]

@@ -13,7 +13,7 @@ import meshio
 import numpy as np
 
 from ffr_prep.common.errors import InputError
-from ffr_prep.mesh.source import Source, supported_kind
+from ffr_prep.mesh.formats import FileMesh, supported_kind
 
 Array = np.ndarray
 
@@ -26,14 +26,14 @@ _NO_NODE_TAGS = ("nastran:ref", "gmsh:dim_tags")
 Groups = Mapping[str, Sequence[Array]]
 
 
-def from_meshio(path: Path) -> Source:
+def from_meshio(path: Path) -> FileMesh:
     """What meshio makes of a file. Raises InputError for a file that it cannot read and for other element kinds."""
     read = _read(path)
     _check_coordinate_systems(path, read)
     volumes = [k for k, block in enumerate(read.cells) if block.dim == 3]
     faces = [k for k, block in enumerate(read.cells) if block.type in _FACES]
     groups = dict(_cell_sets(path, read)) | dict(_tagged_cells(read))
-    return Source(
+    return FileMesh(
         points=_in_space(path, read.points),
         blocks=tuple((_kind(read.cells[k].type), np.asarray(read.cells[k].data, np.int64)) for k in volumes),
         volumes=_volume_groups(read, volumes, groups),

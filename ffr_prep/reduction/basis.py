@@ -13,6 +13,7 @@ stay.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import scipy.linalg
@@ -46,6 +47,13 @@ class Basis:
     omega2: Array
     dropped: int = 0
     warnings: tuple[str, ...] = ()
+
+
+class Reduction(Protocol):
+    """The one method of every reduction, which is a frozen dataclass of its settings."""
+
+    def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
+        """The basis under the reference conditions L (r, Z), with the factorised stiffness of the model."""
 
 
 def factorised(model: CoupledModel, solver: Solver = CHOLESKY, advance: Advance = no_advance) -> FreeBody:
@@ -152,6 +160,12 @@ def _signs(Z: Array) -> Array:
 
 
 # ---- guards -------------------------------------------------------------------------------------------------------
+
+
+def check_interfaces(model: CoupledModel, name: str) -> None:
+    """Raises InputError for a model without interfaces, where the named reduction needs some."""
+    if not model.names:
+        raise InputError(f"{name} needs at least one interface; without any, reduce by Eigenmodes")
 
 
 def check_basis(model: CoupledModel, L: Array, basis: Basis) -> None:

@@ -20,7 +20,6 @@ import numpy as np
 
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.reduction.basis import Basis, in_frame
-from ffr_prep.reduction.krylov import mean_motion, static_solver
 from ffr_prep.reduction.mesh_resolution import resolution_warnings
 from ffr_prep.reduction.modes import modes_up_to
 from ffr_prep.reduction.receptance import (
@@ -31,8 +30,8 @@ from ffr_prep.reduction.receptance import (
     reference_modes,
     static_flexibility,
 )
+from ffr_prep.reduction.responses import inertial_loads, mean_motion, static_solver
 from ffr_prep.reduction.selection import Band
-from ffr_prep.reduction.static_shapes import inertial_loads
 from ffr_prep.solvers.factor import FreeBody, supported
 
 Array = np.ndarray

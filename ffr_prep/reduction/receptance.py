@@ -22,8 +22,8 @@ import scipy.linalg
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.reduction.basis import Basis, basis_of
-from ffr_prep.reduction.krylov import krylov_blocks, mean_motion, static_solver
 from ffr_prep.reduction.modes import modes_up_to
+from ffr_prep.reduction.responses import krylov_blocks, mean_motion, static_solver
 from ffr_prep.reduction.selection import Band
 from ffr_prep.solvers.factor import FreeBody, supported
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Integral
+from typing import Any
 
 import numpy as np
 
@@ -76,3 +78,16 @@ def check_selection(name: str, given: object, kinds: tuple[type, ...] = (UpTo, A
     if not isinstance(given, (Integral, *kinds)):
         others = " or ".join(f"{kind.__name__}(...)" for kind in kinds)
         raise InputError(f"{name} is {given!r}; give a whole number, or {others}")
+
+
+def selection_of(given: Mapping[str, Any], default: int) -> Selection:
+    """The selection that `modes`, `frequency` [Hz] or `accuracy` (low, high, error) says; InputError where two are given."""
+    named = [name for name in ("modes", "frequency", "accuracy") if given.get(name) is not None]
+    if len(named) > 1:
+        raise InputError(f"{named[0]} and {named[1]} both say how many modes to keep: give one of them")
+    if named == ["frequency"]:
+        return UpTo(given["frequency"])
+    if named == ["accuracy"]:
+        low, high, tolerance = given["accuracy"]
+        return Accuracy(Band(low, high), tolerance)
+    return int(given["modes"]) if named else default

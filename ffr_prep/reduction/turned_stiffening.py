@@ -42,7 +42,7 @@ from ffr_prep.model.reference import ReferenceConditions
 
 Array = np.ndarray
 
-_CARRIED = 1e-9
+_ROUNDING = 1e-9  # beside one: of what a support carries, and of how a held place moves
 _LEAVE_OUT = "or leave the stiffness out (replace(body, stiffening=None) in Python, --without-stiffening)"
 
 
@@ -140,15 +140,21 @@ def _check_determinate(body: FlexibleBody) -> None:
 
 
 def _idle(body: FlexibleBody) -> Array:
-    """(12 + 6 I,) the loads that do not stiffen although what they act on moves: points added after the reduction."""
+    """(12 + 6 I,) the loads that do not stiffen although what they act on moves: points added after the reduction.
+
+    A place where the body is held moves by rounding. Against that stand the motions of the modes, of unit norm in the mass:
+    about 1 / sqrt(mass), and for rotations 1 / sqrt(second moment of mass).
+    """
     assert body.stiffening is not None
     six = body.stiffening[INERTIAL:].reshape(len(body.interfaces), -1)
-    moving = np.array([np.any(i.phi_t) or np.any(i.phi_r) for i in body.interfaces], bool)
+    shift, turn = np.sqrt(body.mass), np.sqrt(np.trace(body.rr_dm) - body.r_dm @ body.r_dm / body.mass)
+    motions = [np.stack([shift * i.phi_t, turn * i.phi_r]) for i in body.interfaces]
+    moving = np.array([np.abs(of).max(initial=0.0) > _ROUNDING for of in motions], bool)
     return np.concatenate([np.zeros(INERTIAL, bool), np.repeat(moving & ~six.any(axis=1), 6)])
 
 
 def _check_known(body: FlexibleBody, idle: Array, held: Array) -> None:
-    lost = np.flatnonzero((idle & (np.abs(held) > _CARRIED).any(axis=0))[INERTIAL:])
+    lost = np.flatnonzero((idle & (np.abs(held) > _ROUNDING).any(axis=0))[INERTIAL:])
     if lost.size:
         name = body.interfaces[lost[0] // 6].name
         raise InputError(

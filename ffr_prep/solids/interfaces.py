@@ -11,10 +11,11 @@ from scipy.sparse.csgraph import connected_components
 
 from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.mesh import Mesh, face_group, region_nodes
+from ffr_prep.mesh.shapes import face_mass
 from ffr_prep.model.accelerations import INERTIAL
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion, check_independent, in_words, rigid_field, skew_columns
 from ffr_prep.model.region_rotations import MeanRegion, RigidRegion, force_moments
-from ffr_prep.solids.assembly import SolidMatrices, face_mass, vector_mass
+from ffr_prep.solids.assembly import SolidMatrices, vector_mass
 
 Array = np.ndarray
 

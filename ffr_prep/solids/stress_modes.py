@@ -24,14 +24,21 @@ from functools import cache
 
 import numpy as np
 import scipy.sparse as sp
-import skfem
 from skfem.quadrature import get_quadrature
 
 from ffr_prep.body import TENSOR, Surface
 from ffr_prep.mesh.boundary import outer_faces
-from ffr_prep.mesh.cells import FACE_TRIANGLES, KINDS, node_order
+from ffr_prep.mesh.cells import FACE_TRIANGLES, KINDS
 from ffr_prep.mesh.mesh import Block, Mesh, surface_triangles
-from ffr_prep.solids.assembly import STIFFNESS_ORDER, GradientChunk, Materials, displacement_gradients
+from ffr_prep.mesh.shapes import local_order, shape_functions
+from ffr_prep.solids.assembly import (
+    STIFFNESS_ORDER,
+    Chunk,
+    Materials,
+    chunks,
+    displacement_gradients,
+    element_materials,
+)
 
 Array = np.ndarray
 
@@ -39,7 +46,6 @@ AVERAGING = (
     "per element a least-squares fit through the integration points, extended to the nodes; there the plain mean over "
     "the elements of one material"
 )
-_KIND_OF_SIZE = {kind.size: name for name, kind in KINDS.items()}
 _ROWS, _COLUMNS = np.array(TENSOR).T
 
 
@@ -51,8 +57,8 @@ def stressed_boundary(mesh: Mesh, material: Materials, Phi: Array) -> Surface:
     """
     outside = surface_triangles(mesh)
     near = _near_surface(mesh, outside[0])
-    elastic, of_element = _materials(near, material)
-    parts = [_material_boundary(near, outside, of_element == k) for k in range(len(elastic))]
+    moduli, of_element = _materials(near, material)
+    parts = [_material_boundary(near, outside, of_element == k) for k in range(len(moduli))]
     points = np.concatenate([nodes for nodes, _ in parts])
     owner = np.repeat(np.arange(len(parts)), [len(nodes) for nodes, _ in parts])
     first = np.cumsum([0, *(len(nodes) for nodes, _ in parts)])
@@ -62,7 +68,7 @@ def stressed_boundary(mesh: Mesh, material: Materials, Phi: Array) -> Surface:
         triangles=np.concatenate(triangles),
         Phi=Phi[points],
         stress=nodal_stress(near, material, Phi, of_element, points, owner),
-        moduli=elastic[owner],
+        moduli=moduli[owner],
     )
 
 
@@ -75,25 +81,21 @@ def nodal_stress(mesh: Mesh, material: Materials, field: Array, of_element: Arra
     count = np.zeros(len(nodes))
     place = np.full((owner.max(initial=0) + 1, len(mesh.points)), -1)
     place[owner, nodes] = np.arange(len(nodes))
-    first = 0
-    for chunk in displacement_gradients(mesh, material):
-        elements, k = chunk.nodes.shape
-        target = place[of_element[first : first + elements, None], chunk.nodes].ravel()
+    for chunk in chunks(mesh, material):
+        target = place[of_element[chunk.elements, None], chunk.nodes].ravel()
         wanted = np.flatnonzero(target >= 0)
-        shape = (len(nodes), elements * k)
-        gather = sp.csr_array((np.ones(len(wanted)), (target[wanted], wanted)), shape=shape)
-        total += (gather @ _at_element_nodes(chunk, field).reshape(elements * k, -1)).reshape(total.shape)
+        gather = sp.csr_array((np.ones(len(wanted)), (target[wanted], wanted)), shape=(len(nodes), len(target)))
+        total += (gather @ _at_element_nodes(mesh.points, chunk, field).reshape(len(target), -1)).reshape(total.shape)
         count += gather.sum(axis=1)
-        first += elements
     return total / count[:, None, None]
 
 
-def _at_element_nodes(chunk: GradientChunk, field: Array) -> Array:
+def _at_element_nodes(points: Array, chunk: Chunk, field: Array) -> Array:
     """(e, k, 6, r) stress of each element extended to its own nodes."""
-    stress = chunk.stress(field)[:, _ROWS, _COLUMNS]
+    stress = displacement_gradients(points, chunk).stress(field)[:, _ROWS, _COLUMNS]
     elements, k = chunk.nodes.shape
     at_points = stress.reshape(elements, -1, 6 * field.shape[2])
-    return np.matmul(extrapolation(_KIND_OF_SIZE[k]), at_points).reshape(elements, k, 6, -1)
+    return np.matmul(extrapolation(chunk.kind), at_points).reshape(elements, k, 6, -1)
 
 
 @cache
@@ -102,7 +104,7 @@ def extrapolation(kind: str) -> Array:
 
     Hinton & Campbell (1974): least squares of the corners' shape functions, with the weights of the rule.
     """
-    X, weights = get_quadrature(getattr(skfem, KINDS[kind].shapes)().refdom, STIFFNESS_ORDER[kind])
+    X, weights = get_quadrature(shape_functions(kind).refdom, STIFFNESS_ORDER[kind])
     if weights.size == 1:
         return np.ones((KINDS[kind].size, 1))
     at_points, at_nodes = _corner_functions(kind, X), _corner_functions(kind, KINDS[kind].nodes.T)
@@ -113,9 +115,8 @@ def extrapolation(kind: str) -> Array:
 def _corner_functions(kind: str, X: Array) -> Array:
     """(p, c) shape functions of the corners at X (3, p) of the reference element."""
     linear = "tet4" if KINDS[kind].corners == 4 else "hex8"
-    element = getattr(skfem, KINDS[linear].shapes)()
-    order = node_order(linear, element.doflocs)
-    return np.stack([np.broadcast_to(element.lbasis(X, i)[0], X.shape[1]) for i in order], axis=-1)
+    element = shape_functions(linear)
+    return np.stack([np.broadcast_to(element.lbasis(X, i)[0], X.shape[1]) for i in local_order(linear)], axis=-1)
 
 
 # ---- which elements, which materials ------------------------------------------------------------------------------
@@ -138,14 +139,15 @@ def _picked(mesh: Mesh, keep: Array) -> Mesh:
 
 
 def _materials(mesh: Mesh, material: Materials) -> tuple[Array, Array]:
-    """(m, 2) Young's modulus [Pa] and Poisson's ratio of the materials that differ, and their number for each element."""
-    lame = [
-        np.stack([chunk.lam, chunk.mu], axis=1)[:: chunk.shapes.shape[1]]
-        for chunk in displacement_gradients(mesh, material)
-    ]
-    different, of_element = np.unique(np.concatenate(lame), axis=0, return_inverse=True)
-    lam, mu = different.T
-    return np.stack([mu * (3 * lam + 2 * mu) / (lam + mu), lam / (2 * (lam + mu))], axis=1), of_element.ravel()
+    """(m, 2) engineering constants of the materials that differ elastically, and their number for each element.
+
+    The constants are Young's modulus [Pa] and Poisson's ratio, zeros where the material is anisotropic.
+    """
+    materials, of_element = element_materials(mesh, material)
+    used, of_element = np.unique(of_element, return_inverse=True)
+    tensors = [materials[k].elasticity_tensor().ravel() for k in used]
+    _, first, same = np.unique(tensors, axis=0, return_index=True, return_inverse=True)
+    return np.array([materials[used[k]].engineering_constants() for k in first]), same.ravel()[of_element]
 
 
 def _material_boundary(near: Mesh, outside: tuple[Array, Array], own: Array) -> tuple[Array, Array]:

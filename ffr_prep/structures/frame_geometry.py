@@ -9,8 +9,9 @@ import numpy as np
 
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.progress import Stages, no_stages
-from ffr_prep.mesh.gmsh_files import WITH_UNIT, LinesAndFaces, declared_unit, faces_from_gmsh, lines_from_gmsh
-from ffr_prep.mesh.mesh import UNITS, check_request, choice
+from ffr_prep.common.registry import choice
+from ffr_prep.mesh.gmsh_files import LinesAndFaces, lines_and_faces
+from ffr_prep.mesh.mesh import UNITS, check_request
 from ffr_prep.structures.frame import Frame, Member, Shell
 
 Array = np.ndarray
@@ -47,15 +48,11 @@ def read_frame(
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"{path}: frames are read from {', '.join(SUFFIXES)}; convert it with gmsh -save to .msh")
     progress("read the frame")
-    declared = declared_unit(path) if path.suffix.lower() in WITH_UNIT else "m"
+    found = lines_and_faces(path, faces=bool(shells), unit=unit, size=size, numbers=numbers)
     if shells:
-        found = faces_from_gmsh(path, unit=declared, size=size, numbers=numbers)
         _check_shells(path, found, shells)
-    else:
-        points, lines, nodes = lines_from_gmsh(path, unit=declared, size=size, numbers=numbers)
-        found = LinesAndFaces(points, lines, {}, nodes)
     _check_members(path, found.lines, members, needed=not shells)
-    return _frame(found, UNITS[unit or declared], members, shells)
+    return _frame(found, UNITS[found.unit or "m"], members, shells)
 
 
 def _frame(found: LinesAndFaces, scale: float, members: Mapping[str, Member], shells: Mapping[str, Shell]) -> Frame:

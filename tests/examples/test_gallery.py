@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ffr_gallery import EXHIBITS, SHORT
 from ffr_gallery.bodies import beam
 from ffr_gallery.exhibit import Claim, Curve, Exhibit, Panel, Proof, boundary, draw, lines
+from ffr_gallery.exhibits import EXHIBITS, SHORT
 from ffr_gallery.index3_conditioning import index3_conditioning
 
 from ffr_dyn import cli

@@ -11,7 +11,7 @@ from ffr_dyn.kernels.markers import project, shapes
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.rows import ZERO, coordinate
 from ffr_dyn.kernels.simd.slices import part
-from ffr_dyn.kernels.tables import ANGLE, LENGTH
+from ffr_dyn.kernels.tables import ANGLE, IN_V, LENGTH, N
 from ffr_dyn.kernels.vectors import cross, dot, get, scale, subtract, to_body
 
 
@@ -53,7 +53,7 @@ def apply_side(where, markers, u, f, load, k, amount, side):
     b = markers.body[k]
     if b == where.shape[0] - 1:
         return
-    n, j = where[b, 0], where[b, 2]
+    n, j = where[b, N], where[b, IN_V]
     force, turning, twist = scale(amount, side[0]), scale(amount, side[1]), scale(amount, side[2])
     moment = subtract(turning, cross(u, force))
     for c in range(3):

@@ -8,6 +8,7 @@ from ffr_dyn.kernels.forces.surface_loads import apply_spread
 from ffr_dyn.kernels.markers import apply_wrench
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.simd.intrinsics import call_of
+from ffr_dyn.kernels.tables import IN_V, N
 from ffr_dyn.kernels.vectors import get, to_body, to_global
 
 # int function(double t, double *x, double *v, double *out) at a machine address
@@ -90,7 +91,7 @@ def power(where, A, f, v):
     """f . v for right-hand sides f in body axes; A (B + 1, 3, 3)."""
     result = 0.0
     for b in range(where.shape[0] - 1):
-        n, j = where[b, 0], where[b, 2]
+        n, j = where[b, N], where[b, IN_V]
         force = to_global(A[b], (f[j], f[j + 1], f[j + 2]))
         for c in range(3):
             result += force[c] * v[j + c]

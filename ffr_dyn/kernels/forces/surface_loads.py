@@ -2,7 +2,7 @@
 
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.simd.slices import part
-from ffr_dyn.kernels.tables import AFFINE
+from ffr_dyn.kernels.tables import AFFINE, IN_V, IN_X, N
 
 
 @kernel
@@ -47,7 +47,7 @@ def add_global(data, start, factor, A, q, n, f):
 def apply_spread(where, loads, A, functions, x, f, k):
     """Add spread load k to f; A (B + 1, 3, 3)."""
     b, kind, start, function = loads.spread[k, 0], loads.spread[k, 1], loads.spread[k, 2], loads.spread[k, 3]
-    n, i, j = where[b, 0], where[b, 1], where[b, 2]
+    n, i, j = where[b, N], where[b, IN_X], where[b, IN_V]
     q, own = part(x, i + 7, n), part(f, j, 6 + n)
     if kind == AFFINE:
         add_affine(loads.data, start, functions[function, 0], q, n, own)

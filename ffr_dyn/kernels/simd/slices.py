@@ -30,13 +30,12 @@ def array_at(context: Any, builder: Any, kind: Any, data: Any, shape: list[Any])
 
 @intrinsic
 def vector_at(typing, address, size):  # type: ignore[no-untyped-def]
-    """The array of `size` numbers at an address."""
+    """The array of `size` numbers at an address, as an entry point is given it."""
 
     def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-        data = builder.inttoptr(args[0], context.get_data_type(types.float64).as_pointer())
-        return array_at(context, builder, _VECTOR, data, [args[1]])
+        return array_at(context, builder, _VECTOR, args[0], [args[1]])
 
-    return _VECTOR(types.int64, types.int64), generate
+    return _VECTOR(types.CPointer(types.float64), types.int64), generate
 
 
 @intrinsic

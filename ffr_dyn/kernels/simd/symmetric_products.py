@@ -58,12 +58,9 @@ def _sums(builder: Any, rows: list[Any]) -> Any:
 
 @intrinsic
 def multiply_blocks(typing, parts, plan, at, K, x, y, z):  # type: ignore[no-untyped-def]
-    """y + z = K x, for blocks of K and the plan of `ffr_dyn.compile.symmetry_blocks.symmetric_blocks`, whose parts begin at
-    `at`.
+    """y + z = K x, for blocks of K and the plan of `ffr_dyn.compile.symmetry_blocks` whose parts begin at `at`.
 
-    Four rows at a time meet all blocks that they have, at most eight columns wide: some serve them alone, the others what
-    lies across the diagonal, too.
-
+    Four rows at a time meet all blocks that they have, at most eight columns wide: some serve them alone, others both sides.
     z : set;  y : was zero;  x : zero between a part and the next row of lanes. What y and z have there is not used.
     """
 

@@ -1,8 +1,8 @@
-"""Tables at an address: how a compiled unit, which is given one number, finds the arrays it works on.
+"""Tables at an address: how compiled code that is given one address finds the arrays it works on.
 
-A unit that took the tables themselves would have to be compiled together with everything that calls it. So `pack` writes
-the addresses and shapes of all arrays into one array of integers, and compiled code reads them back where it uses them
-(`tables_at`, `record_at`). What a table holds, and in which order, is said once: by the annotations in `tables`.
+`pack` writes the addresses and shapes of all arrays of a table into one array of integers. Compiled code is given the address
+of that and reads a field where it uses it. What a table holds, and in which order, is said once: by the annotations in
+`ffr_dyn.kernels.tables`.
 """
 
 from __future__ import annotations
@@ -18,9 +18,7 @@ from numba.core.datamodel.models import OpaqueModel
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, lower_getattr_generic, register_model
 
-from ffr_dyn.kernels.simd.intrinsics import call_of, intrinsic
 from ffr_dyn.kernels.simd.slices import array_at
-from ffr_dyn.kernels.tables import Record, Tables
 
 Array = np.ndarray
 
@@ -79,6 +77,11 @@ def _places(kind: Any) -> dict[str, int]:
     return dict(zip(_fields(kind), accumulate(sizes, initial=0), strict=False))
 
 
+def place_of(kind: Any, field: str) -> int:
+    """The number of a field's first word in a packed table."""
+    return _places(kind)[field]
+
+
 class Packed(types.Type):
     """Compiled code's view of a packed table: its address, from which a field is read where it is used.
 
@@ -135,24 +138,3 @@ def _read_field(context, builder, typ, value, attr):  # type: ignore[no-untyped-
         data = builder.inttoptr(word(0), context.get_data_type(field.dtype).as_pointer())
         return array_at(context, builder, field, data, [word(1 + axis) for axis in range(field.ndim)])
     return builder.bitcast(word(0), context.get_value_type(field)) if field is types.float64 else word(0)
-
-
-def _view(table: type) -> Any:
-    """The compiled function that takes an address for that of such a table."""
-    result = Packed(table)
-
-    @intrinsic
-    def table_at(typing, address):  # type: ignore[no-untyped-def]
-        def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-            return builder.inttoptr(args[0], context.get_value_type(result))
-
-        return result(types.int64), generate
-
-    return table_at
-
-
-tables_at, record_at = _view(Tables), _view(Record)
-
-
-# call_unit(unit, address, t, first, second): the unit at address `unit` (see `ffr_dyn.kernels.entry_points`).
-call_unit = call_of(types.int64, types.float64, types.int64, types.int64)

@@ -23,7 +23,7 @@ frequency, and is looked at from time to time, as are the forces; else, and wher
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.simd.slices import part
 from ffr_dyn.kernels.stiffening.stiffness import multiply_stiffness, rate_loads, sum_stiffness, take_diagonal
-from ffr_dyn.kernels.tables import INERTIAL, MEANS
+from ffr_dyn.kernels.tables import IN_Q, IN_V, IN_X, INERTIAL, K_SIZE, MEANS, H, N
 from ffr_dyn.kernels.vectors import add_scaled, fill, get
 
 SETTLED = MEANS + 3  # steps of equal length before F and Q are known; before the loads at the start of one are, MEANS
@@ -40,7 +40,7 @@ COORDINATES = 4  # first row of `w.past` with those of q
 @inlined
 def begin_step(r, w):
     """Loads at the start of a step (w.expected), from the means. Returns whether they are known."""
-    ahead, h = w.ahead, r.clock.time[0]
+    ahead, h = w.ahead, r.clock.time[H]
     ahead[IN_USE] = 0.0
     if ahead[COUNT] < 0.0:
         ahead[COUNT] -= 1.0
@@ -64,7 +64,7 @@ def give_up(w):
     """Go on by sweeps for a while, twice as long as the time before; each look that finds nothing wrong halves that again."""
     w.ahead[COUNT], w.ahead[PAUSE] = -1.0, 2.0 * w.ahead[PAUSE]
     fill(part(w.change, 0, w.change.size), 0.0)
-    w.steady[1] = -1.0
+    w.steady[COUNT] = -1.0
 
 
 @kernel
@@ -80,11 +80,11 @@ def take_up(w, feedback):
 def stiffen_by_expected(bodies, w, x):
     """w.stiff of all stiffened bodies at the start of a step, and the diagonal of K_sigma."""
     for b in range(bodies.mass.size):
-        if bodies.where[b, 6] > 0:
-            n, e = bodies.where[b, 0], bodies.where[b, 3]
+        if bodies.where[b, K_SIZE] > 0:
+            n, e = bodies.where[b, N], bodies.where[b, IN_Q]
             rate_loads(get(w.omega, b), w.expected[b])
             sum_stiffness(bodies, w, w.expected[b], b)
-            multiply_stiffness(bodies, w, b, part(x, bodies.where[b, 1] + 7, n), part(w.stiff, e, n))
+            multiply_stiffness(bodies, w, b, part(x, bodies.where[b, IN_X] + 7, n), part(w.stiff, e, n))
             take_diagonal(bodies, w, b, part(w.diagonal, e, n))
 
 
@@ -103,10 +103,10 @@ def four_rows(past, row, first, n):
 def keep_start(bodies, w, x):
     """w.past."""
     for b in range(bodies.mass.size):
-        if bodies.where[b, 6] > 0:
-            n, e = bodies.where[b, 0], bodies.where[b, 3]
+        if bodies.where[b, K_SIZE] > 0:
+            n, e = bodies.where[b, N], bodies.where[b, IN_Q]
             keep_differences(part(w.stiff, e, n), w.past, 0, e, n)
-            keep_differences(part(x, bodies.where[b, 1] + 7, n), w.past, COORDINATES, e, n)
+            keep_differences(part(x, bodies.where[b, IN_X] + 7, n), w.past, COORDINATES, e, n)
 
 
 @kernel
@@ -135,9 +135,9 @@ def stiffen_ahead(bodies, w, x):
     at = w.stage[AT]
     second, third = w.ahead[SECOND] * at * (at + 1.0), w.ahead[THIRD] * at * (at + 1.0) * (at + 2.0)
     for b in range(bodies.mass.size):
-        n, e = bodies.where[b, 0], bodies.where[b, 3]
-        if bodies.where[b, 6] > 0:
-            f, q = part(w.f, bodies.where[b, 2] + 6, n), part(x, bodies.where[b, 1] + 7, n)
+        n, e = bodies.where[b, N], bodies.where[b, IN_Q]
+        if bodies.where[b, K_SIZE] > 0:
+            f, q = part(w.f, bodies.where[b, IN_V] + 6, n), part(x, bodies.where[b, IN_X] + 7, n)
             (f0, f1, f2, f3), (q0, q1, q2, q3) = four_rows(w.past, 0, e, n), four_rows(w.past, COORDINATES, e, n)
             diagonal = part(w.diagonal, e, n)
             for k in range(n):
@@ -152,7 +152,7 @@ def loads_as_expected(bodies, w):
     Moments count as forces at the radius of inertia, accelerations as the forces that they take: alike in plane and space.
     """
     for b in range(bodies.mass.size):
-        if bodies.where[b, 6] > 0:
+        if bodies.where[b, K_SIZE] > 0:
             mass, inverse = bodies.mass[b], w.inverse[b, 1]
             size, missed = 0.0, 0.0
             for k in range(w.load.shape[1]):
@@ -171,5 +171,5 @@ def loads_as_expected(bodies, w):
 def add_to_means(bodies, w):
     """The loads of a stage, to their means over the step."""
     for b in range(bodies.mass.size):
-        if bodies.where[b, 6] > 0:
+        if bodies.where[b, K_SIZE] > 0:
             add_scaled(w.mean[0, b], w.mean[0, b], w.stage[WEIGHT], w.load[b])

@@ -12,11 +12,11 @@ stage: see `ffr_dyn.kernels.stiffening.ahead`.
 
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.simd.slices import part
-from ffr_dyn.kernels.simd.table_address import call_unit
 from ffr_dyn.kernels.stiffening.ahead import (
     BEARABLE,
     COUNT,
     IN_USE,
+    LENGTH,
     PAUSE,
     SETTLED,
     add_to_means,
@@ -26,10 +26,11 @@ from ffr_dyn.kernels.stiffening.ahead import (
     take_up,
 )
 from ffr_dyn.kernels.stiffening.stiffness import find_loads, multiply_stiffness, rate_loads, sum_stiffness
-from ffr_dyn.kernels.tables import ASIDE, MOTION, RELATIVE, STAGES, START, WATCH
+from ffr_dyn.kernels.tables import ASIDE, IN_Q, IN_V, IN_X, K_SIZE, RELATIVE, STAGES, WATCH, H, N
 from ffr_dyn.kernels.vectors import add_scaled, copy, get
 
 SWEEPS = 4  # at most
+LAST_STAGE = 2  # number of `w.steady`, after LENGTH and COUNT
 # By what the forces may change in a sweep, relative to those of the body with most, for it to be the last: one that begins
 # with a guess after steps of equal length, and any other.
 ENOUGH, STRICT = 3e-2, 1e-8
@@ -41,19 +42,19 @@ REPEATED = 4  # steps of equal length before a guess is one of third order
 def keep_unstiffened(bodies, w):
     """Elastic right-hand sides without stiffening, and the loads by the rates of all stiffened bodies; w: BodyWork."""
     for b in range(bodies.mass.size):
-        n, e = bodies.where[b, 0], bodies.where[b, 3]
-        if bodies.where[b, 6] > 0:
-            copy(part(w.unstiffened, e, n), part(w.f, bodies.where[b, 2] + 6, n))
+        n, e = bodies.where[b, N], bodies.where[b, IN_Q]
+        if bodies.where[b, K_SIZE] > 0:
+            copy(part(w.unstiffened, e, n), part(w.f, bodies.where[b, IN_V] + 6, n))
             rate_loads(get(w.omega, b), w.load[b])
 
 
 @kernel
 def renew_stiffness(bodies, w, x, b):
     """w.stiff of body b by its loads. Returns the squares of its length and of its change."""
-    n = bodies.where[b, 0]
-    stiff, found, force, change = part(w.stiff, bodies.where[b, 3], n), part(w.scratch, 0, n), 0.0, 0.0
+    n = bodies.where[b, N]
+    stiff, found, force, change = part(w.stiff, bodies.where[b, IN_Q], n), part(w.scratch, 0, n), 0.0, 0.0
     sum_stiffness(bodies, w, w.load[b], b)
-    multiply_stiffness(bodies, w, b, part(x, bodies.where[b, 1] + 7, n), found)
+    multiply_stiffness(bodies, w, b, part(x, bodies.where[b, IN_X] + 7, n), found)
     for k in range(n):
         force += found[k] * found[k]
         change += (found[k] - stiff[k]) * (found[k] - stiff[k])
@@ -65,9 +66,9 @@ def renew_stiffness(bodies, w, x, b):
 def stiffen(bodies, w):
     """f = unstiffened - K_sigma q, elastic rows of all stiffened bodies."""
     for b in range(bodies.mass.size):
-        n, e = bodies.where[b, 0], bodies.where[b, 3]
-        if bodies.where[b, 6] > 0:
-            add_scaled(part(w.f, bodies.where[b, 2] + 6, n), part(w.unstiffened, e, n), -1.0, part(w.stiff, e, n))
+        n, e = bodies.where[b, N], bodies.where[b, IN_Q]
+        if bodies.where[b, K_SIZE] > 0:
+            add_scaled(part(w.f, bodies.where[b, IN_V] + 6, n), part(w.unstiffened, e, n), -1.0, part(w.stiff, e, n))
 
 
 @inlined
@@ -90,13 +91,13 @@ def keep_change(w, stage):
 @inlined
 def is_settled(r, w, stage):
     """Whether the last steps were of the length of this one."""
-    h, steady = r.clock.time[0], w.steady
-    if steady[0] != h:
-        steady[0], steady[1] = h, -1.0
-    if steady[1] < 0.0 or stage <= steady[2]:
-        steady[1] += 1.0
-    steady[2] = stage
-    return steady[1] >= REPEATED
+    h, steady = r.clock.time[H], w.steady
+    if steady[LENGTH] != h:
+        steady[LENGTH], steady[COUNT] = h, -1.0
+    if steady[COUNT] < 0.0 or stage <= steady[LAST_STAGE]:
+        steady[COUNT] += 1.0
+    steady[LAST_STAGE] = stage
+    return steady[COUNT] >= REPEATED
 
 
 @inlined
@@ -116,33 +117,30 @@ def renew_all(bodies, w, x):
     """w.stiff by the loads. Returns the squares of its length and of its change, of the body with most."""
     greatest, change = 0.0, 0.0
     for b in range(bodies.mass.size):
-        if bodies.where[b, 6] > 0:
+        if bodies.where[b, K_SIZE] > 0:
             force, moved = renew_stiffness(bodies, w, x, b)
             greatest, change = max(greatest, force), max(change, moved)
     return greatest, change
 
 
 @inlined
-def move(r, w, x, target):
+def move(r, w, target, solve_motion):
     """Motion and multipliers, and the loads that they make."""
-    call_unit(r.units[MOTION], r.address, 0.0, x.ctypes.data, target.ctypes.data)
+    solve_motion(r, target)
     find_loads(r, w)
 
 
 @inlined
-def solve_stiffened(r, x, target, stage):
-    """`solve_motion` with the geometric stiffening of the bodies that have it.
-
-    stage : number of a step's stage, from 0; AGAIN: near the last solution; ASIDE: so, and nothing is kept of it
-    """
+def solve_stiffened(r, x, target, stage, solve_motion, start_stiffening):
+    """`solve_motion` with the geometric stiffening of the bodies that have it; the last two are the entry points."""
     bodies, w, ahead = r.model.bodies, r.work.bodies, r.work.bodies.ahead
     if stage > 0 and ahead[IN_USE] > 0.0:
         stiffen_ahead(bodies, w, x)
-        move(r, w, x, target)
+        move(r, w, target, solve_motion)
         add_to_means(bodies, w)
         return
     keep_unstiffened(bodies, w)
-    expected = stage == 0 and ahead[BEARABLE] > 0.0 and call_unit(r.units[START], r.address, 0.0, x.ctypes.data, 0) == 1
+    expected = stage == 0 and ahead[BEARABLE] > 0.0 and start_stiffening(r, x) == 1
     looked = (ahead[COUNT] - SETTLED) % WATCH > 0.0
     waited, enough = False, STRICT
     if not expected:
@@ -152,7 +150,7 @@ def solve_stiffened(r, x, target, stage):
     sweeps, before, feedback, rough = 0, 0.0, 0.0, False
     while True:
         stiffen(bodies, w)
-        move(r, w, x, target)
+        move(r, w, target, solve_motion)
         if expected and not loads_as_expected(bodies, w):
             give_up(w)
             expected = False
@@ -177,7 +175,7 @@ def solve_stiffened(r, x, target, stage):
                 looked = True
                 ahead[PAUSE] = max(0.5 * ahead[PAUSE], WATCH / 2)
     if expected:
-        ahead[IN_USE], w.steady[1] = 1.0, -1.0
+        ahead[IN_USE], w.steady[COUNT] = 1.0, -1.0
     elif stage >= 0:
         keep_change(w, stage)
     if waited:

@@ -4,16 +4,16 @@ from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.rows import reaction
 from ffr_dyn.kernels.simd.slices import part, peek
 from ffr_dyn.kernels.simd.symmetric_products import multiply_blocks, weighted_sum
-from ffr_dyn.kernels.tables import LANES, QUAD, RATES
+from ffr_dyn.kernels.tables import IN_STIFFENING, IN_V, K_PLAN, K_SIZE, LANES, QUAD, RATES, N
 from ffr_dyn.kernels.vectors import cross, fill, get, subtract, to_body
 
 
 @kernel
 def sum_stiffness(bodies, w, load, b):
     """w.K_sigma of body b, in blocks: the sum of load * K_load."""
-    plan, at = bodies.blocks, bodies.where[b, 10]
+    plan, at = bodies.blocks, bodies.where[b, K_PLAN]
     groups, size = plan[at], plan[at + 2]
-    number, start, out = at + 3 + 2 * groups + 2 * bodies.where[b, 0], bodies.where[b, 5], 0
+    number, start, out = at + 3 + 2 * groups + 2 * bodies.where[b, N], bodies.where[b, IN_STIFFENING], 0
     weights = part(w.sorted, 3 * size, load.size)
     for group in range(groups):
         count, entries = plan[at + 3 + 2 * group], plan[at + 4 + 2 * group]
@@ -27,7 +27,7 @@ def sum_stiffness(bodies, w, load, b):
 @kernel
 def multiply_stiffness(bodies, w, b, q, found):
     """found (n,) = K_sigma q, with that of body b in place."""
-    plan, at, n = bodies.blocks, bodies.where[b, 10], bodies.where[b, 0]
+    plan, at, n = bodies.blocks, bodies.where[b, K_PLAN], bodies.where[b, N]
     groups, parts, size = plan[at], plan[at + 1], plan[at + 2]
     place = at + 3 + 2 * groups
     blocks = place + 2 * n
@@ -45,7 +45,7 @@ def multiply_stiffness(bodies, w, b, q, found):
 @kernel
 def take_diagonal(bodies, w, b, diagonal):
     """That of K_sigma (n,), with that of body b in place."""
-    plan, at, n = bodies.blocks, bodies.where[b, 10], bodies.where[b, 0]
+    plan, at, n = bodies.blocks, bodies.where[b, K_PLAN], bodies.where[b, N]
     place = at + 3 + 2 * plan[at] + n
     for k in range(n):
         diagonal[k] = peek(w.K_sigma, peek(plan, place + k))
@@ -54,7 +54,7 @@ def take_diagonal(bodies, w, b, diagonal):
 @kernel
 def frame_loads(bodies, w, field, b):
     """Acceleration less gravity, angular acceleration: the first six of the loads of body b."""
-    j, load = bodies.where[b, 2], w.load[b]
+    j, load = bodies.where[b, IN_V], w.load[b]
     gravity = to_body(w.A[b], field)
     for c in range(3):
         load[c] = w.acc[j + c] - w.shift[j + c] - gravity[c]
@@ -98,6 +98,6 @@ def find_loads(r, w):
     """Loads of all stiffened bodies from what was solved; those by the rates are there."""
     m = r.model
     for b in range(m.bodies.mass.size):
-        if m.bodies.where[b, 6] > 0:
+        if m.bodies.where[b, K_SIZE] > 0:
             frame_loads(m.bodies, w, r.work.field, b)
     marker_loads(m.markers, m.rows, r.work.markers, r.work.rows, w.load)

@@ -39,7 +39,7 @@ def arm(*kinds: str) -> Scene:
         bodies.append(Body(f"body{k}", link, position=k * np.array([0.8, 0.2, 0.1])))
         before = "ground.O" if k == 0 else f"body{k - 1}.b"
         joints.append(Joint(f"joint{k}", kind, before, f"body{k}.a", axis=(0.2, 0.5, 1.0)))
-        drivers += [Driver(f"{c}{k}", f"joint{k}", MOTION, c) for c in COORDINATES[kind]]
+        drivers += [Driver(f"{c}{k}", f"joint{k}", MOTION, coordinate=c) for c in COORDINATES[kind]]
     return Scene(tuple(bodies), tuple(joints), tuple(drivers), ground={"O": (0, 0, 0)}, gravity=G)
 
 

@@ -37,8 +37,8 @@ def slider_crank(r: float, length: float, *drivers, offset: float = 0.3) -> Scen
     return Scene(
         (
             Body("crank", bar("crank", r), rotation=(0, 0, offset)),
-            Body("rod", bar("rod", length), pin, (0, 0, lean)),
-            Body("slider", slider, end),
+            Body("rod", bar("rod", length), position=pin, rotation=(0, 0, lean)),
+            Body("slider", slider, position=end),
         ),
         (
             Joint("main", "revolute", "ground.O", "crank.a"),
@@ -121,7 +121,7 @@ def test_flexible_bodies_are_undeformed():
 
 def test_a_mechanism_driven_twice_is_refused():
     """Consistent at the start, but each driver fixes all motion alone."""
-    scene = slider_crank(0.2, 0.7, MOTOR, Driver("second", "guide", polynomial(0.0), "stroke"))
+    scene = slider_crank(0.2, 0.7, MOTOR, Driver("second", "guide", polynomial(0.0), coordinate="stroke"))
     with pytest.raises(InputError, match=r"over-driven.*motor.*second"):
         kinematic(scene, end=1.0, output_step=0.1)
 
@@ -132,7 +132,7 @@ def test_a_free_motion_is_named():
 
 
 def test_a_driver_that_the_loop_cannot_follow_at_the_start():
-    scene = slider_crank(0.2, 0.7, Driver("push", "guide", polynomial(2.0), "stroke"))
+    scene = slider_crank(0.2, 0.7, Driver("push", "guide", polynomial(2.0), coordinate="stroke"))
     with pytest.raises(InputError, match="cannot be assembled"):
         kinematic(scene, end=1.0, output_step=0.1)
 
@@ -140,7 +140,7 @@ def test_a_driver_that_the_loop_cannot_follow_at_the_start():
 def test_lock_up_at_the_dead_point():
     """The slider is pushed towards and beyond its outer dead point r + l = 0.9 at t = 0.0143 s/0.1 m/s."""
     start = 0.2 * np.cos(0.3) + np.sqrt(0.49 - (0.2 * np.sin(0.3)) ** 2)
-    scene = slider_crank(0.2, 0.7, Driver("push", "guide", polynomial(start, 0.1), "stroke"))
+    scene = slider_crank(0.2, 0.7, Driver("push", "guide", polynomial(start, 0.1), coordinate="stroke"))
     with pytest.raises(ComputationError, match=r"at t = (0\.1\d*) s the mechanism locks: (main|pin|wrist)") as caught:
         kinematic(scene, end=1.0, output_step=0.05)
     assert f"{(0.9 - start) / 0.1:.3f}" in str(caught.value)
@@ -158,7 +158,7 @@ def test_driven_point():
     """Two links whose end is led along a circle: two prescribed components fix both angles."""
     links = (
         Body("one", bar("one", 1.0), rotation=(0, 0, 0.5)),
-        Body("two", bar("two", 0.8), (np.cos(0.5), np.sin(0.5), 0), (0, 0, -0.6)),
+        Body("two", bar("two", 0.8), position=(np.cos(0.5), np.sin(0.5), 0), rotation=(0, 0, -0.6)),
     )
     joints = (Joint("A", "revolute", "ground.O", "one.a"), Joint("B", "revolute", "one.b", "two.a"))
     path = PointDriver(

@@ -49,12 +49,19 @@ def chain(*loads: Load, drivers=(), third=None) -> Scene:
     B = 50 * np.array([0.5, -np.sqrt(3) / 2, 0])
     C = B + np.array([0, 50, 0])
     bodies = (
-        Body("b2", link("b2", 0.1233, 25.786, a=(-25, 0, 0), b=(25, 0, 0)), B / 2, (0, 0, -np.pi / 3)),
         Body(
-            "b3", third or link("b3", 0.1233, 25.786, root=(-25, 0, 0), tip=(25, 0, 0)), (B + C) / 2, (0, 0, np.pi / 2)
+            "b2", link("b2", 0.1233, 25.786, a=(-25, 0, 0), b=(25, 0, 0)), position=B / 2, rotation=(0, 0, -np.pi / 3)
         ),
-        Body("b4", link("b4", 0.1233, 25.786, c1=(-12.5, 1.656, 0), d=(12.5, 1.656, 0)), C - [-12.5, 1.656, 0]),
-        Body("b5", link("b5", 0.63, 212.0, d=(-25, 0, 0)), (75, slide, 0)),
+        Body(
+            "b3",
+            third or link("b3", 0.1233, 25.786, root=(-25, 0, 0), tip=(25, 0, 0)),
+            position=(B + C) / 2,
+            rotation=(0, 0, np.pi / 2),
+        ),
+        Body(
+            "b4", link("b4", 0.1233, 25.786, c1=(-12.5, 1.656, 0), d=(12.5, 1.656, 0)), position=C - [-12.5, 1.656, 0]
+        ),
+        Body("b5", link("b5", 0.63, 212.0, d=(-25, 0, 0)), position=(75, slide, 0)),
     )
     joints = (
         Joint("A", "revolute", "ground.O", "b2.a"),
@@ -264,7 +271,7 @@ def two_carts(*drivers) -> Scene:
 
 
 def test_a_force_without_influence_is_named():
-    scene = two_carts(Driver("go", "rail1", polynomial(0, 0, 1.0), "stroke"))
+    scene = two_carts(Driver("go", "rail1", polynomial(0, 0, 1.0), coordinate="stroke"))
     with pytest.raises(
         InputError, match=r"no force changes the acceleration .*go: stroke.*, and .*\(push2\) changes none"
     ):
@@ -272,7 +279,7 @@ def test_a_force_without_influence_is_named():
 
 
 def test_the_force_that_determines_the_motion_is_chosen():
-    scene = two_carts(Driver("go", "rail1", polynomial(0, 0, 1.0), "stroke"))
+    scene = two_carts(Driver("go", "rail1", polynomial(0, 0, 1.0), coordinate="stroke"))
     forces = JointEffort("push2", "rail2", "stroke"), MarkerEffort("push1", "one.c", (1, 0, 0))
     found = mixed(scene, unknown=forces, end=1.0, output_step=0.1)
     np.testing.assert_allclose(found["push1.effort"], 2.0, atol=1e-9)
@@ -281,7 +288,7 @@ def test_the_force_that_determines_the_motion_is_chosen():
 
 
 def test_bad_input():
-    scene = two_carts(Driver("go", "rail1", polynomial(0, 0, 1.0), "stroke"))
+    scene = two_carts(Driver("go", "rail1", polynomial(0, 0, 1.0), coordinate="stroke"))
     with pytest.raises(InputError, match="only 0 forces"):
         mixed(scene, unknown=(), end=1.0, output_step=0.1)
     with pytest.raises(InputError, match=r"known motion .stop. is no driver of the scene; there are: go"):
@@ -301,7 +308,7 @@ def test_servo_constraints_refuse_geometric_stiffening():
 
 def test_a_motion_without_coordinates_is_refused():
     """Known: the cart; what its load on a ball joint does is described by no joint coordinate."""
-    base = two_carts(Driver("go", "rail1", polynomial(0, 0, 1.0), "stroke"))
+    base = two_carts(Driver("go", "rail1", polynomial(0, 0, 1.0), coordinate="stroke"))
     ball = Joint("ball", "spherical", "one.c", "two.c")
     hung = replace(
         base, bodies=(base.bodies[0], replace(base.bodies[1], position=(0, 0, 0))), joints=(base.joints[0], ball)
@@ -339,7 +346,7 @@ def cart_with_rod(height: float, angle: float, *loads: Load, **more) -> Scene:
             Joint("rail", "translational", "ground.O", "cart.c", axis=(1, 0, 0)),
             Joint("hinge", "revolute", "cart.c", "rod.o"),
         ),
-        (Driver("go", "rail", rest_to_rest(height, 0.3), "stroke"),),
+        (Driver("go", "rail", rest_to_rest(height, 0.3), coordinate="stroke"),),
         loads=loads,
         ground={"O": (0, 0, 0)},
         **more,
@@ -347,7 +354,7 @@ def cart_with_rod(height: float, angle: float, *loads: Load, **more) -> Scene:
 
 
 def bounded(scene: Scene, output_step: float = 0.1):
-    return mixed(scene, unknown=(PUSH,), end=0.3, output_step=output_step, solution=Bounded(0.5, 0.5))
+    return mixed(scene, unknown=(PUSH,), end=0.3, output_step=output_step, solution=Bounded(before=0.5, after=0.5))
 
 
 def test_an_inverted_rod_is_carried_by_leaning_first():
@@ -392,7 +399,7 @@ def test_a_tip_path_out_of_reach_is_refused():
     """An arm of 1 m whose tip is to go 1.5 m aside."""
     far = replace(TIP, y=rest_to_rest(1.5, 0.6))
     with pytest.raises(ComputationError, match="no position belongs to the known motions: they are out of reach"):
-        mixed(one_link(far), unknown=(MOTOR,), end=0.6, output_step=0.05, solution=Bounded(0.1, 0.1))
+        mixed(one_link(far), unknown=(MOTOR,), end=0.6, output_step=0.05, solution=Bounded(before=0.1, after=0.1))
 
 
 def cart_with_pendulum(*drivers) -> Scene:
@@ -403,7 +410,7 @@ def cart_with_pendulum(*drivers) -> Scene:
         Joint("rail", "translational", "ground.O", "cart.c", axis=(1, 0, 0)),
         Joint("pin", "revolute", "cart.c", "rod.pivot"),
     )
-    bodies = (Body("cart", cart), Body("rod", rod, (0, -0.5, 0), (0, 0, -np.pi / 2)))
+    bodies = (Body("cart", cart), Body("rod", rod, position=(0, -0.5, 0), rotation=(0, 0, -np.pi / 2)))
     return Scene(bodies, joints, drivers, ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0))
 
 

@@ -78,7 +78,7 @@ def andrews() -> Scene:
         Body(f"k{k + 1}", rigid_body(
             f"k{k + 1}", mass=MASS[k], inertia=(INERTIA[k],) * 3, centre_of_mass=(*local[k][0], 0),
             points={name: (*xy, 0) for name, xy in local[k][1].items()},
-        ), (*origins[k], 0), (0, 0, total[k]))
+        ), position=(*origins[k], 0), rotation=(0, 0, total[k]))
         for k in range(7)
     )  # fmt: skip
     ends = {

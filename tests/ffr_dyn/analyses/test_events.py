@@ -49,8 +49,8 @@ def test_free_fall_to_the_last_digits(method):
     """y = 3 t - 5 t^2, which both methods integrate exactly, passes 0.35 at 0.2 -+ sqrt(0.02): up, and down again."""
     root = 0.3 - np.sqrt(0.09 - 0.07), 0.3 + np.sqrt(0.09 - 0.07)
     events = (
-        Event("up", "ball.c.position.y", 0.35, "rising"),
-        Event("down", "ball.c.position.y", 0.35, "falling"),
+        Event("up", "ball.c.position.y", 0.35, direction="rising"),
+        Event("down", "ball.c.position.y", 0.35, direction="falling"),
         Event("both", "ball.c.position.y", 0.35),
         Event("top", "ball.v.y"),
         Event("never", "ball.c.position.y", 0.46),
@@ -68,8 +68,8 @@ def test_free_fall_to_the_last_digits(method):
 
 
 def test_a_run_ends_at_an_event(tmp_path):
-    ground = Event("ground", "ball.c.position.y", -1.0, "falling", stop=True)
-    after = Event("after", "ball.c.position.y", -1.001, "falling")
+    ground = Event("ground", "ball.c.position.y", -1.0, direction="falling", stop=True)
+    after = Event("after", "ball.c.position.y", -1.001, direction="falling")
     before = Event("before", "ball.c.position.x", 0.2)
     path = tmp_path / "fall.nc"
     result = forward(THROWN, end=3, output_step=0.1, method=RK4(0.05), events=(after, ground, before), path=path)
@@ -84,8 +84,8 @@ def test_a_run_ends_at_an_event(tmp_path):
 
 def test_a_python_function_and_a_quantity_give_the_same_moment():
     events = (
-        Event("quantity", "arm.b.position.y", -0.3, "falling"),
-        Event("function", lambda t, state: state.position("arm.b")[1] + 0.3, 0.0, "falling"),
+        Event("quantity", "arm.b.position.y", -0.3, direction="falling"),
+        Event("function", lambda t, state: state.position("arm.b")[1] + 0.3, 0.0, direction="falling"),
     )
     result = forward(swinging(), end=0.6, output_step=0.1, method=ROS2(2e-3), events=events)
     one, two = times(result, "quantity"), times(result, "function")
@@ -105,7 +105,7 @@ def test_events_converge_with_the_order_of_the_method():
     assert 12 < errors[0] / errors[1] < 24
 
 
-EVENT = Event("low", "arm.b.position.y", -0.3, "falling")
+EVENT = Event("low", "arm.b.position.y", -0.3, direction="falling")
 
 
 def test_events_of_a_method_that_chooses_its_steps():

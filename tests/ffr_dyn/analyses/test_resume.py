@@ -171,7 +171,7 @@ def test_measuring_in_parts_gives_the_same_bits():
 
     state, method = assemble(SCENE), ROS2(1e-3)
     system, record = state.system, new_record(state.system, 40)
-    fill_rows(new_machine(system, state.x, state.v, method, (0.0, 0.0, 1e-9)), method, record, 0.0, 1)
+    fill_rows(new_machine(system, state.x, state.v, method, (0.0, 0.0, 1e-9)), record, 0.0, 1)
     wanted = selected(system, ("*",))
     once, _ = measure(system, record, {}, wanted)
     for sizes in ([1] * 40, [3, 1, 13, 7, 16], [39, 1]):
@@ -205,7 +205,7 @@ def test_a_checkpoint_survives_its_bytes():
 RUN = """
 import sys, time
 import test_resume as t
-from ffr_dyn import result_file
+from ffr_dyn.results import file as result_file
 from ffr_dyn.analyses import forward as f
 start = result_file.ResultWriter.__init__
 result_file.ResultWriter.__init__ = lambda *a, **k: start(*a, **(k | {"interval": 0.0, "share": 1e9}))

@@ -19,9 +19,10 @@ from places import ROOT
 from synthetic import cloud
 
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.analyses.settings import Kinematic, Settings
+from ffr_dyn.analyses.kinematic import Kinematic
+from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.chart.diagram import COSTS, Diagram, Lost, Point, measures_of, quantities_of, run_variants, work_precision
-from ffr_dyn.chart.draw import draw
+from ffr_dyn.chart.draw import draw_chart
 from ffr_dyn.chart.measures import Deflection, measure_of
 from ffr_dyn.chart.page import page, write_page
 from ffr_dyn.chart.pareto import pareto_front
@@ -359,15 +360,15 @@ def test_local_workers_leave_processors_free():
 @pytest.mark.parametrize("against", COSTS)
 def test_pictures_show_something(small, tmp_path, against):
     chosen = replace(small, chosen=(small.points[3].label,), lost=(Lost("rk4", "m", "l", "step", 1.0, "why"),))
-    picture = np.asarray(Image.open(draw(chosen, tmp_path / "c.png", against=against)).convert("RGB")).astype(int)
+    picture = np.asarray(Image.open(draw_chart(chosen, tmp_path / "c.png", against=against)).convert("RGB")).astype(int)
     assert (np.ptp(picture, axis=-1) > 60).sum() > 1500
-    text = draw([small, chosen], tmp_path / "c.svg", against=against, title="two").read_text(encoding="utf-8")
+    text = draw_chart([small, chosen], tmp_path / "c.svg", against=against, title="two").read_text(encoding="utf-8")
     assert text.count("<svg") == 1
 
 
 def test_the_same_diagram_gives_the_same_bytes(diagram, small, tmp_path):
     for suffix in (".png", ".svg"):
-        once, again = (draw(small, tmp_path / f"{k}{suffix}").read_bytes() for k in (1, 2))
+        once, again = (draw_chart(small, tmp_path / f"{k}{suffix}").read_bytes() for k in (1, 2))
         assert once == again
     assert page(diagram) == page(diagram)
 
@@ -424,7 +425,11 @@ def test_a_browser_draws_the_page_and_its_menu_changes_it(diagram, tmp_path):
 @pytest.fixture
 def scene_file(tmp_path):
     scene = replace(swinging(), plane="auto")
-    return save_scene(scene, Settings(0.0, 0.2, 0.05, ROS2(0.0125), Projection()), tmp_path / "swing.toml")
+    return save_scene(
+        scene,
+        Settings(start=0.0, end=0.2, output_step=0.05, method=ROS2(0.0125), stabilisation=Projection()),
+        tmp_path / "swing.toml",
+    )
 
 
 def run(*arguments: object):
@@ -579,7 +584,9 @@ def test_numbers_beyond_what_a_body_has_are_what_it_has_and_run_once():
 
 
 def test_another_analysis_cannot_be_charted(tmp_path):
-    settings = Settings(0.0, 0.2, 0.05, ROS2(0.0125), Projection(), analysis=Kinematic())
+    settings = Settings(
+        start=0.0, end=0.2, output_step=0.05, method=ROS2(0.0125), stabilisation=Projection(), analysis=Kinematic()
+    )
     done = run(save_scene(rigid(), settings, tmp_path / "k.toml"))
     assert "a chart compares runs of forward dynamics" in str(done.exception)
 
@@ -594,10 +601,10 @@ def test_a_body_without_surface_has_no_shape():
 def test_nothing_to_draw_is_said(diagram, tmp_path):
     empty = replace(diagram, points=(), lost=(Lost("rk4", "m", "the label", "step", 1.0, "the reason"),))
     with pytest.raises(InputError, match=r"no variant ran .the label: the reason"):
-        draw(empty, tmp_path / "c.png")
+        draw_chart(empty, tmp_path / "c.png")
     for path, against, message in (("c.pdf", "cpu", "drawn as"), ("c.png", "money", "cost 'money'")):
         with pytest.raises(InputError, match=message):
-            draw(diagram, tmp_path / path, against=against)
+            draw_chart(diagram, tmp_path / path, against=against)
     with pytest.raises(InputError, match="no measure 'x'"):
         diagram.measure("x")
     with pytest.raises(InputError, match="cannot be -1 workers"), pool(-1):

@@ -55,7 +55,10 @@ HINGED = Scene((Body("bar", bar()),), (Joint("hinge", "revolute", "ground.O", "b
         ({"gravity": (0, np.nan, 0)}, ["gravity", "not finite"]),
         ({"loads": (Load("push", "bar.x"),)}, ["'bar.x'", "no interface"]),
         ({"drivers": (Driver("m", "hing", polynomial(0, 1)),)}, ["no joint 'hing'", "did you mean 'hinge'"]),
-        ({"drivers": (Driver("m", "hinge", polynomial(0, 1), "stroke"),)}, ["no coordinate 'stroke'", "angle"]),
+        (
+            {"drivers": (Driver("m", "hinge", polynomial(0, 1), coordinate="stroke"),)},
+            ["no coordinate 'stroke'", "angle"],
+        ),
     ],
 )
 def test_a_scene_that_contradicts_itself_says_where(change, words):

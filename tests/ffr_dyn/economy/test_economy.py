@@ -503,7 +503,7 @@ def test_a_body_that_does_nothing_to_the_outputs_itself_is_found_where_more_mode
 
 def test_the_command_writes_a_scene_that_runs(tmp_path):
     scene = slider_crank(50.0)
-    settings = Settings(0.0, 0.1, 0.005, ROS2(0.0005), Projection())
+    settings = Settings(start=0.0, end=0.1, output_step=0.005, method=ROS2(0.0005), stabilisation=Projection())
     save_scene(scene, settings, tmp_path / "in.toml")
     arguments = ["economise", str(tmp_path / "in.toml"), "--output", "slider.pin.position.x", "--tolerance", "1e-4"]
     done = CliRunner().invoke(cli, [*arguments, "-o", str(tmp_path / "out.toml"), "--chart", str(tmp_path / "c.png")])
@@ -519,7 +519,11 @@ def test_the_command_writes_a_scene_that_runs(tmp_path):
 
 
 def test_the_command_answers_a_wrong_output(tmp_path):
-    save_scene(slider_crank(50.0), Settings(0.0, 0.1, 0.005, ROS2(0.0005), Projection()), tmp_path / "in.toml")
+    save_scene(
+        slider_crank(50.0),
+        Settings(start=0.0, end=0.1, output_step=0.005, method=ROS2(0.0005), stabilisation=Projection()),
+        tmp_path / "in.toml",
+    )
     with pytest.raises(InputError, match="none of the scene's quantities"):
         CliRunner().invoke(
             cli,

@@ -126,8 +126,8 @@ def test_tolerances_must_be_positive():
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_scene_files_keep_them(kind, tmp_path):
-    wanted = kind(Tolerances(1e-5, 1e-6, 2e-6, 3e-9))
-    settings = Settings(0.0, 1.0, 0.01, wanted, Projection())
+    wanted = kind(Tolerances(1e-5, position=1e-6, velocity=2e-6, elastic=3e-9))
+    settings = Settings(start=0.0, end=1.0, output_step=0.01, method=wanted, stabilisation=Projection())
     assert load_scene(save_scene(pendulum(), settings, tmp_path / "a.toml"))[1].method == wanted
     text = (tmp_path / "a.toml").read_text()
     for extra, words in (("step = 0.001", "chooses its steps"), ("tolerances.relative = 0", "relative")):

@@ -22,7 +22,7 @@ from ffr_dyn.functions.rotation import G_bar, rotation_matrix, skew
 from ffr_dyn.functions.time_functions import evaluate, harmonic, polynomial, table
 from ffr_dyn.integrators import RK4
 from ffr_dyn.kernels.functions import evaluate_functions
-from ffr_dyn.kernels.tables import LANES, OK, Functions
+from ffr_dyn.kernels.tables import IN_Q, LANES, OK, Functions
 from ffr_dyn.scene.drivers import Driver, PointDriver
 from ffr_dyn.scene.forces import Load
 from ffr_dyn.scene.joints import KINDS, Joint
@@ -263,7 +263,7 @@ def test_geometric_stiffness_in_blocks_is_the_sum_of_the_whole(n, families, symm
     assert evaluate_at(machine, 0.0, x, v) == OK
     work = machine.work.bodies
     for b, at_marker in ((0, 24), (2, 12)):
-        loads, first = loads_that_stiffen(system.model.bodies, b), system.model.bodies.where[b, 3]
+        loads, first = loads_that_stiffen(system.model.bodies, b), system.model.bodies.where[b, IN_Q]
         assert loads.tolist() == [k for k in (*range(12), *range(at_marker, at_marker + 6)) if K[k].any()]
         expected = np.einsum("l,lij,j->i", work.load[b, loads], K[loads], x[system.layout.q(b)])
         found = work.stiff[first : first + n]
@@ -329,9 +329,9 @@ def constraint_cases():
 def test_jacobian_rate_and_right_hand_side_equal_finite_differences(kind, sizes, coordinate):
     scene = chain(*sizes, kind=kind, axis=(0.2, 1.0, 0.3), axis_j=(1.0, -0.5, 0.4))
     if coordinate == "path":
-        scene = replace(scene, drivers=(PointDriver("drive", "one.a", "two.a", DRIVE, None, 0.3),))
+        scene = replace(scene, drivers=(PointDriver("drive", "one.a", "two.a", x=DRIVE, y=None, z=0.3),))
     elif coordinate:
-        scene = replace(scene, drivers=(Driver("drive", "tie", DRIVE, coordinate),))
+        scene = replace(scene, drivers=(Driver("drive", "tie", DRIVE, coordinate=coordinate),))
     system = compile_scene(scene)
     x, v = random_state(scene)
     place, h, t = system.layout, 1e-5, 0.37
@@ -389,7 +389,7 @@ def test_skew_and_G_bar_conventions():
     ("kind", "coordinate"), [("revolute", "angle"), ("cylindrical", "angle"), ("cylindrical", "stroke")]
 )
 def test_compiled_drivers_equal_the_readable_ones(kind, coordinate):
-    scene = replace(chain(kind=kind), drivers=(Driver("drive", "tie", DRIVE, coordinate),))
+    scene = replace(chain(kind=kind), drivers=(Driver("drive", "tie", DRIVE, coordinate=coordinate),))
     system = compile_scene(scene)
     (x, v), t = random_state(scene), 0.37
     machine = new_machine(system, x, v)

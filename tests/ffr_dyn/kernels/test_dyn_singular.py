@@ -37,9 +37,9 @@ def n_four_bar(count: int) -> Scene:
     """N + 1 rods stand on the ground, N connect their tops; the tops move at 1 m/s along x."""
     up = (0.0, 0.0, np.pi / 2)
     standing = [
-        Body(f"s{k}", rod(f"s{k}"), (k, 0, 0), up, omega_bar=(0, 0, -1.0)) for k in range(count + 1)
+        Body(f"s{k}", rod(f"s{k}"), position=(k, 0, 0), rotation=up, omega_bar=(0, 0, -1.0)) for k in range(count + 1)
     ]  # fmt: skip
-    lying = [Body(f"c{k}", rod(f"c{k}"), (k, 1, 0), velocity=(1.0, 0, 0)) for k in range(count)]
+    lying = [Body(f"c{k}", rod(f"c{k}"), position=(k, 1, 0), velocity=(1.0, 0, 0)) for k in range(count)]
     feet = [Joint(f"foot{k}", "revolute", f"ground.f{k}", f"s{k}.a") for k in range(count + 1)]
     left = [Joint(f"left{k}", "revolute", f"s{k}.b", f"c{k}.a") for k in range(count)]
     right = [Joint(f"right{k}", "revolute", f"c{k}.b", f"s{k + 1}.b") for k in range(count)]
@@ -143,7 +143,7 @@ def bricard() -> Scene:
             centre_of_mass=(0.5, 0, 0),
             points={"a": np.zeros(3), "b": np.array([1.0, 0, 0])},
         )
-        bodies.append((Body(f"r{k}", model, points[k], A), A))
+        bodies.append((Body(f"r{k}", model, position=points[k], rotation=A), A))
     names = ["ground.p0", *(f"r{k}.b" for k in range(5))]
     others = [*(f"r{k}.a" for k in range(5)), "ground.p5"]
     frames = [np.eye(3), *(A for _, A in bodies), np.eye(3)]

@@ -114,7 +114,7 @@ def machine_of(scene: Scene, method):
     record = new_record(made.system, 1)
 
     def go(steps: int) -> None:
-        assert fill_rows(machine, method, record, 0.0, steps) == 0
+        assert fill_rows(machine, record, 0.0, steps) == 0
 
     return machine, go
 

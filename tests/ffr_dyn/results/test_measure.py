@@ -165,7 +165,7 @@ def slider_crank() -> Scene:
     "drivers",
     [
         (Driver("motor", "bearing", polynomial(0.6, 20.0, 15.0)),),
-        (Driver("ram", "guide", harmonic(amplitude=0.02, frequency=3.0, mean=0.41), "stroke"),),
+        (Driver("ram", "guide", harmonic(amplitude=0.02, frequency=3.0, mean=0.41), coordinate="stroke"),),
         (PointDriver("pull", "ground.O", "slider.pin", x=harmonic(amplitude=0.02, frequency=3.0, mean=0.41)),),
     ],
 )

@@ -14,6 +14,7 @@ import h5netcdf
 import h5py
 import numpy as np
 import pytest
+from places import ROOT, TESTS
 
 from ffr_dyn.results import file as result_file
 from ffr_dyn.results.file import ResultWriter, load_result, save_result
@@ -454,7 +455,12 @@ def test_a_kill_before_the_first_flush_leaves_the_old_file(tmp_path):
         "for times in t.chunks([5000] * 40): writer.append(times, t.rows(times))\n"
         "os.kill(os.getpid(), signal.SIGKILL)"
     )
-    done = subprocess.run([sys.executable, "-c", code, path], cwd=Path(__file__).parent, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code, path],
+        cwd=Path(__file__).parent,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join((str(ROOT), str(TESTS)))},
+        check=False,
+    )
     assert done.returncode == -9
     assert_same(sample(), load_result(path))
     with ResultWriter(path, header()) as writer:

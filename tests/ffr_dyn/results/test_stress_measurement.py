@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import ffr_prep as fp
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import flattened
@@ -26,19 +27,18 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo
-from ffr_prep.pipelines.structures import reduce_frame
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.structures.frame import Member, named, polyline
 from ffr_prep.structures.sections import rectangle
 
 EDGE, MIDDLE = (0.0, 0.01, 0.0065), (0.5, 0.0, 0.0)
 MEASUREMENTS = (
     StressMeasurement("notch", "boom", EDGE),
-    StressMeasurement("tensor", "boom", EDGE, "stress"),
-    StressMeasurement("strains", "boom", EDGE, "strain"),
-    StressMeasurement("stretch", "boom", EDGE, "strain-max-principal"),
+    StressMeasurement("tensor", "boom", EDGE, what="stress"),
+    StressMeasurement("strains", "boom", EDGE, what="strain"),
+    StressMeasurement("stretch", "boom", EDGE, what="strain-max-principal"),
     SectionMeasurement("bending", "boom", MIDDLE),
-    SectionMeasurement("shear", "boom", (0.0, 0.0, 0.0), "force", "first"),
+    SectionMeasurement("shear", "boom", (0.0, 0.0, 0.0), what="force", place="first"),
 )
 
 
@@ -46,13 +46,9 @@ MEASUREMENTS = (
 def boom():
     member = Member(rectangle(0.013, 0.02), Material("aluminium", 7e10, 0.3, 2700.0), orientation=(0, 1, 0))
     frame = named(polyline([(0, 0, 0), (1.0, 0, 0)], member, elements=8), root=(0, 0, 0), tip=(1.0, 0, 0))
-    return reduce_frame(
-        frame,
-        name="boom",
-        interfaces=[InterfaceRegion("root"), InterfaceRegion("tip")],
-        reference=FixedTo("root"),
-        reduction=CraigBampton(2),
-        stress=True,
+    return fp.reduce(
+        fp.from_frame(frame, [InterfaceRegion("root"), InterfaceRegion("tip")]),
+        fp.Request(name="boom", reference=FixedTo("root"), reduction=CraigBampton(2), stress=True),
     )
 
 
@@ -119,7 +115,7 @@ def test_only_what_is_wanted_is_kept(boom):
 
 def test_they_survive_a_scene_file(boom, tmp_path):
     path = save_body(boom, tmp_path / "boom.ffr")
-    settings = Settings(0.0, 0.1, 0.01, ROS2(1e-4), Projection())
+    settings = Settings(start=0.0, end=0.1, output_step=0.01, method=ROS2(1e-4), stabilisation=Projection())
     (tmp_path / "scene.toml").write_text(to_toml(swinging(boom), settings, {"boom": str(path)}))
     scene, _ = load_scene(tmp_path / "scene.toml")
     assert repr(scene.measurements) == repr(swinging(boom).measurements)
@@ -130,7 +126,7 @@ def test_they_survive_a_scene_file(boom, tmp_path):
     [
         (StressMeasurement("m", "bom", EDGE), "measurement 'm': there is no body 'bom'; did you mean 'boom'"),
         (StressMeasurement("m", "ball", EDGE), "body 'ball' has no stress modes; reduce it again"),
-        (StressMeasurement("m", "boom", EDGE, "mises"), "'mises' is not known; there are: von-mises"),
+        (StressMeasurement("m", "boom", EDGE, what="mises"), "'mises' is not known; there are: von-mises"),
         (StressMeasurement("m", "boom", (0.0, 500.0, 0.0)), "m from body 'boom'.*give it in metres"),
         (SectionMeasurement("m", "ball", EDGE), "body 'ball' has no section forces"),
         (SectionMeasurement("m", "boom", (0.0, 500.0, 0.0)), "m from body 'boom'.*give it in metres"),

@@ -65,7 +65,7 @@ PAIRS = [(a, b) for a in ("root.angle", "root.stroke") for b in ("tie.angle", "t
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
 def test_jacobian_and_right_hand_side_of_a_coupling_equal_differences(first, second):
-    scene = replace(arm(), couplings=(Coupling("gear", first, second, -1.5, 0.2),))
+    scene = replace(arm(), couplings=(Coupling("gear", first, second, -1.5, offset=0.2),))
     place, x, v = state(scene)
     block = [b for b in compile_scene(scene).blocks if b.name == "gear"]
     acc, h = np.random.default_rng(5).normal(size=place.v_size), 1e-5
@@ -83,7 +83,7 @@ def test_jacobian_and_right_hand_side_of_a_coupling_equal_differences(first, sec
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
 def test_compiled_couplings_equal_the_readable_ones_and_the_dense_solution(first, second):
-    scene = replace(arm(), couplings=(Coupling("gear", first, second, -1.5, 0.2),))
+    scene = replace(arm(), couplings=(Coupling("gear", first, second, -1.5, offset=0.2),))
     system = compile_scene(scene)
     place, x, v = state(scene)
     machine = new_machine(system, x, v)
@@ -103,7 +103,7 @@ def wheel(name: str, inertia: float):
 
 def train(ratio: float) -> Scene:
     return Scene(
-        (Body("a", wheel("a", 0.02)), Body("b", wheel("b", 0.05), (0.3, 0.1, 0))),
+        (Body("a", wheel("a", 0.02)), Body("b", wheel("b", 0.05), position=(0.3, 0.1, 0))),
         (Joint("ja", "revolute", "ground.O", "a.o"), Joint("jb", "revolute", "ground.P", "b.o")),
         couplings=(Coupling("gear", "ja.angle", "jb.angle", ratio),),
         ground=GROUND,
@@ -127,7 +127,7 @@ def test_a_gear_train_runs_up_over_many_turns_as_its_reduced_inertia_says():
 def test_a_rack_moves_by_the_pitch_radius_times_the_angle():
     slide = rigid_body("rack", mass=2.0, inertia=(1, 1, 1), points={"o": np.zeros(3)})
     scene = Scene(
-        (Body("pinion", wheel("pinion", 0.02)), Body("rack", slide, (0.3, 0.1, 0))),
+        (Body("pinion", wheel("pinion", 0.02)), Body("rack", slide, position=(0.3, 0.1, 0))),
         (
             Joint("turn", "revolute", "ground.O", "pinion.o"),
             Joint("slide", "translational", "ground.P", "rack.o", axis=(1.0, 0, 0)),

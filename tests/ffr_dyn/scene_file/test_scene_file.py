@@ -13,22 +13,17 @@ from places import ROOT
 from synthetic import cloud
 
 from ffr_dyn import cli
+from ffr_dyn.analyses.assemble import Assemble
 from ffr_dyn.analyses.bounded import Bounded
 from ffr_dyn.analyses.checkpoint import fingerprint
 from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.analyses.mixed import Causal
-from ffr_dyn.analyses.settings import (
-    Assemble,
-    Charted,
-    Inverse,
-    Kinematic,
-    Linearise,
-    Mixed,
-    MomentSettings,
-    Settings,
-    Static,
-)
+from ffr_dyn.analyses.inverse import Inverse
+from ffr_dyn.analyses.kinematic import Kinematic
+from ffr_dyn.analyses.linearise import Linearise
+from ffr_dyn.analyses.mixed import Causal, Mixed
+from ffr_dyn.analyses.settings import Charted, MomentSettings, Settings
+from ffr_dyn.analyses.static import Static
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.functions.curves import Curve
 from ffr_dyn.functions.formula import formula
@@ -397,11 +392,11 @@ def rich(one: FlexibleBody) -> Scene:
         joints,
         drivers=(
             Driver("d1", "j1", harmonic(amplitude=0.1, frequency=1 / 3, phase=2.0, mean=-0.0)),
-            Driver("d2", "j3", table(np.array([0.0, 0.1, 0.7]), np.array([1.0, 1 / 3, 0.0])), "stroke"),
-            Driver("d3", "j2", polynomial(1.0, 2.0), "stroke"),
+            Driver("d2", "j3", table(np.array([0.0, 0.1, 0.7]), np.array([1.0, 1 / 3, 0.0])), coordinate="stroke"),
+            Driver("d3", "j2", polynomial(1.0, 2.0), coordinate="stroke"),
             PointDriver("d4", "ground.O", "two.a", y=2.0, z=formula("-3 * exp(-t / a) ** 2", {"a": 0.3})),
         ),
-        couplings=(Coupling("gear", "j1.angle", "j2.angle", -1 / 3, 1e-300),),
+        couplings=(Coupling("gear", "j1.angle", "j2.angle", -1 / 3, offset=1e-300),),
         loads=(
             Load("push", "two.a", force=(1.0, formula("smooth(t)"), 0.0), moment=(0, 0, 3.0), axes="body"),
             Load("pull", "one.a"),
@@ -422,14 +417,21 @@ def rich(one: FlexibleBody) -> Scene:
             Pressure("gas", "one", 1e5, triangles=(1,), follower=True),
         ),
         base_acceleration=(0.0, formula("t"), 1 / 3),
-        measurements=(Measurement("gap", "ground.O", "two.a", "velocity", "one"),),
+        measurements=(Measurement("gap", "ground.O", "two.a", "velocity", axes="one"),),
         ground={"O": (0, 0, 1 / 3)},
         gravity=(0, -9.81, 0),
         name='a "quoted"\n\ttäble \\ \x7f',
     )
 
 
-SETTINGS = Settings(0.1, 1.1, 0.1, RK4(1e-3), Baumgarte(1 / 3, 2.0), ("default", "*.work"))
+SETTINGS = Settings(
+    start=0.1,
+    end=1.1,
+    output_step=0.1,
+    method=RK4(1e-3),
+    stabilisation=Baumgarte(1 / 3, 2.0),
+    outputs=("default", "*.work"),
+)
 
 
 def same(a: Scene, b: Scene) -> bool:
@@ -458,27 +460,41 @@ def test_a_scene_survives_its_file_to_the_bit(tmp_path, stabilisation):
 
 
 EFFORTS = (JointEffort("m", "j1"), MarkerEffort("pull", "two.a", (0, 1, 0), axes="body", moment=True))
-METHOD = (0.1, 1.1, 0.1, RK4(1e-3))
+METHOD = {"start": 0.1, "end": 1.1, "output_step": 0.1, "method": RK4(1e-3)}
 
 
 @pytest.mark.parametrize(
     "settings",
     [
-        Settings(0.1, 1.1, 0.1, ROS2(0.01), Projection(), ("two.R",), Kinematic()),
         Settings(
-            *METHOD,
-            Projection(),
-            chart=Charted(("energy",), (("ros2", (0.1, 1 / 3)), ("hht", ())), (2, None), (("I5",),)),
+            start=0.1,
+            end=1.1,
+            output_step=0.1,
+            method=ROS2(0.01),
+            stabilisation=Projection(),
+            outputs=("two.R",),
+            analysis=Kinematic(),
         ),
-        Settings(*METHOD, Projection(1e-7), analysis=Inverse()),
-        Settings(*METHOD, Drifting(), analysis=Inverse(quasi_static=True)),
-        Settings(*METHOD, Projection(), analysis=Mixed(EFFORTS)),
-        Settings(*METHOD, Projection(), analysis=Mixed(EFFORTS[:1], ("d1",), Causal(1e-8, 10.0))),
-        Settings(*METHOD, Projection(), analysis=Mixed(EFFORTS[1:], ("d1", "d2"), Bounded(after=0.3, parts=2))),
-        MomentSettings(0.2, ("default", "*.power"), Static()),
-        MomentSettings(0.1, ("default",), Assemble()),
-        MomentSettings(0.0, ("default",), Linearise()),
-        MomentSettings(0.1, ("default",), Linearise((*EFFORTS, "push"), ("two.a.position.y",), True)),
+        Settings(
+            **METHOD,
+            stabilisation=Projection(),
+            chart=Charted(
+                measures=("energy",), methods=(("ros2", (0.1, 1 / 3)), ("hht", ())), modes=(2, None), drops=(("I5",),)
+            ),
+        ),
+        Settings(**METHOD, stabilisation=Projection(1e-7), analysis=Inverse()),
+        Settings(**METHOD, stabilisation=Drifting(), analysis=Inverse(elastic="quasi-static")),
+        Settings(**METHOD, stabilisation=Projection(), analysis=Mixed(EFFORTS)),
+        Settings(**METHOD, stabilisation=Projection(), analysis=Mixed(EFFORTS[:1], ("d1",), Causal(1e-8, 10.0))),
+        Settings(
+            **METHOD, stabilisation=Projection(), analysis=Mixed(EFFORTS[1:], ("d1", "d2"), Bounded(after=0.3, parts=2))
+        ),
+        MomentSettings(time=0.2, outputs=("default", "*.power"), analysis=Static()),
+        MomentSettings(time=0.1, outputs=("default",), analysis=Assemble()),
+        MomentSettings(time=0.0, outputs=("default",), analysis=Linearise()),
+        MomentSettings(
+            time=0.1, outputs=("default",), analysis=Linearise((*EFFORTS, "push"), ("two.a.position.y",), True)
+        ),
     ],
     ids=lambda settings: type(settings.analysis).__name__,
 )

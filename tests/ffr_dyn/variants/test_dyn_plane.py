@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import ffr_prep as fp
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.consistency.assemble import assemble, flattened
 from ffr_dyn.functions.rotation import euler_parameters, rotation_matrix
@@ -21,8 +22,7 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import SimplySupported
-from ffr_prep.pipelines.structures import reduce_frame
-from ffr_prep.reduction.component_modes import CraigBampton
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.structures.frame import Member, named, polyline
 from ffr_prep.structures.sections import rectangle
 
@@ -33,13 +33,9 @@ def rod(name: str, length: float, *, stiffening: bool = False):
     """A flexible rod along x in the plane z = 0, higher than wide so that no frequencies coincide."""
     member = Member(rectangle(0.013, 0.02), ALUMINIUM, orientation=(0, 1, 0))
     frame = named(polyline([(0, 0, 0), (length, 0, 0)], member, elements=6), a=(0, 0, 0), b=(length, 0, 0))
-    return reduce_frame(
-        frame,
-        name=name,
-        interfaces=[InterfaceRegion("a"), InterfaceRegion("b")],
-        reference=SimplySupported("a", "b"),
-        reduction=CraigBampton(6),
-        stiffening=stiffening,
+    return fp.reduce(
+        fp.from_frame(frame, [InterfaceRegion("a"), InterfaceRegion("b")]),
+        fp.Request(name=name, reference=SimplySupported("a", "b"), reduction=CraigBampton(6), stiffening=stiffening),
     )
 
 
@@ -52,8 +48,8 @@ def slider_crank(**changes) -> Scene:
     parts = {
         "bodies": (
             Body("crank", crank),
-            Body("rod", rod("rod", 0.3, **changes.pop("rod", {})), (0.1, 0, 0), damping=0.01),
-            Body("block", block, (0.4, 0, 0)),
+            Body("rod", rod("rod", 0.3, **changes.pop("rod", {})), position=(0.1, 0, 0), damping=0.01),
+            Body("block", block, position=(0.4, 0, 0)),
         ),
         "joints": (
             Joint("main", "revolute", "ground.O", "crank.o"),
@@ -96,7 +92,7 @@ def test_a_planar_body_has_three_coordinates_and_no_redundancy_is_invented():
     scene = slider_crank()
     ends = {"a": np.zeros(3), "b": np.array([0.3, 0, 0])}
     stiff = rigid_body("rod", mass=0.2, inertia=(1e-4, 2e-3, 2e-3), centre_of_mass=(0.15, 0, 0), points=ends)
-    bodies = (scene.bodies[0], Body("rod", stiff, (0.1, 0, 0)), scene.bodies[2])
+    bodies = (scene.bodies[0], Body("rod", stiff, position=(0.1, 0, 0)), scene.bodies[2])
     planar, spatial = (assemble(replace(scene, bodies=bodies, plane=plane)) for plane in ("auto", "none"))
     assert sum("redundant" in note for note in spatial.notes) == 3
     assert not any("redundant" in note for note in planar.notes)
@@ -168,8 +164,9 @@ def test_twists_of_a_tall_bar_are_across_a_declared_plane():
     member = Member(rectangle(0.02, 0.06), ALUMINIUM, orientation=(0, 1, 0))
     frame = named(polyline([(0, 0, 0), (1.0, 0, 0)], member, elements=12), a=(0, 0, 0), b=(1.0, 0, 0))
     ends = [InterfaceRegion("a"), InterfaceRegion("b")]
-    tall = reduce_frame(
-        frame, name="link", interfaces=ends, reference=SimplySupported("a", "b"), reduction=CraigBampton(6)
+    tall = fp.reduce(
+        fp.from_frame(frame, ends),
+        fp.Request(name="link", reference=SimplySupported("a", "b"), reduction=CraigBampton(6)),
     )
     found = flattened(double_pendulum(tall), 0.0)[0]
     declared = flattened(double_pendulum(tall, plane="z"), 0.0)[0]
@@ -182,7 +179,7 @@ def test_twists_of_a_tall_bar_are_across_a_declared_plane():
 
 def double_pendulum(link, **changes) -> Scene:
     return Scene(
-        (Body("one", link, (0, 0, 0)), Body("two", link, (1.0, 0, 0))),
+        (Body("one", link, position=(0, 0, 0)), Body("two", link, position=(1.0, 0, 0))),
         (Joint("hip", "revolute", "ground.O", "one.a"), Joint("knee", "revolute", "one.b", "two.a")),
         ground={"O": (0, 0, 0)},
         gravity=(0, -9.81, 0),
@@ -195,12 +192,9 @@ def link():
     """32 modes, of which the highest turn their ends by a hundred times what the lowest do, with as much more rounding."""
     member = Member(rectangle(0.013, 0.02), ALUMINIUM, orientation=(0, 1, 0))
     frame = named(polyline([(0, 0, 0), (1.0, 0, 0)], member, elements=12), a=(0, 0, 0), b=(1.0, 0, 0))
-    return reduce_frame(
-        frame,
-        name="link",
-        interfaces=[InterfaceRegion("a"), InterfaceRegion("b")],
-        reference=SimplySupported("a", "b"),
-        reduction=CraigBampton(26),
+    return fp.reduce(
+        fp.from_frame(frame, [InterfaceRegion("a"), InterfaceRegion("b")]),
+        fp.Request(name="link", reference=SimplySupported("a", "b"), reduction=CraigBampton(26)),
     )
 
 

@@ -12,7 +12,7 @@ from places import MESHES
 
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.mesh import gmsh_files as gmsh_source
-from ffr_prep.mesh.cells import FACE_TRIANGLES, jacobian_determinants, node_order
+from ffr_prep.mesh.cells import FACE_TRIANGLES, node_order
 from ffr_prep.mesh.cells import KINDS as TABLE
 from ffr_prep.mesh.mesh import (
     Block,
@@ -25,6 +25,7 @@ from ffr_prep.mesh.mesh import (
     region_nodes,
     surface_triangles,
 )
+from ffr_prep.mesh.shapes import jacobian_determinants
 from ffr_prep.solids.assembly import assemble
 
 SIZE = np.array([2.0, 0.3, 0.2])

@@ -10,20 +10,27 @@ import scipy.linalg
 from boxes import STEEL, box_mesh, moved, rotation, shaken
 from test_structural import regions, space_frame, straight
 
+import ffr_prep as fp
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports, functionals
 from ffr_prep.reduction.basis import check_basis, factorised
-from ffr_prep.reduction.component_modes import CharacteristicModes, CraigBampton, Eigenmodes, Guyan, Rubin, Union
-from ffr_prep.reduction.krylov import Krylov, dynamic_solver
+from ffr_prep.reduction.methods.attachment import AttachmentModes
+from ffr_prep.reduction.methods.characteristic import CharacteristicModes
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
+from ffr_prep.reduction.methods.guyan import Guyan
+from ffr_prep.reduction.methods.inertia_relief import InertiaRelief
+from ffr_prep.reduction.methods.krylov import Krylov, dynamic_solver
+from ffr_prep.reduction.methods.rubin import Rubin
+from ffr_prep.reduction.methods.union import Union
+from ffr_prep.reduction.methods.user_vectors import UserVectors
 from ffr_prep.reduction.receptance import free_modes, receptance_error, receptances, reference_modes, static_flexibility
 from ffr_prep.reduction.selection import Accuracy, Band, UpTo
-from ffr_prep.reduction.static_shapes import AttachmentModes, InertiaRelief, UserVectors
 from ffr_prep.solids.assembly import assemble
 from ffr_prep.solids.interfaces import couple
 from ffr_prep.solids.stiffening import inertial_loads
 from ffr_prep.solvers.factor import solve_refined, supported
-from ffr_prep.structures.model import frame_model
 from ffr_prep.structures.sections import general, with_mass_moments
 
 SIZE = (1.0, 0.1, 0.1)
@@ -77,7 +84,7 @@ def body(model):
 
 @pytest.fixture(scope="module")
 def frame():
-    return frame_model(space_frame(), regions("a", "b")).coupled
+    return fp.from_frame(space_frame(), regions("a", "b")).coupled
 
 
 def static(model, supports, loads):
@@ -263,7 +270,7 @@ def test_unions_drop_and_count_what_they_have(model, body):
 def test_craig_bampton_converges_on_a_fine_bar(modes, error):
     """Clamped-free bar with its interface at the tip, exact components: relative error of the first frequency."""
     section = with_mass_moments(general("bar", A=1e-4, Iy=1e-3, Iz=1e-3, J=1e-3), 1e-12, 1e-12)  # axial modes first
-    bar = frame_model(straight(section, 1.0, 200), regions("root", "tip")).coupled
+    bar = fp.from_frame(straight(section, 1.0, 200), regions("root", "tip")).coupled
     body, L = factorised(bar), functionals(FixedTo("root"), bar)
     full = Eigenmodes(1).basis(bar, body, L).omega2[0]
     found = CraigBampton(modes).basis(bar, body, L).omega2[0]

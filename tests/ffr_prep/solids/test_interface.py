@@ -8,8 +8,9 @@ from boxes import KINDS, STEEL, box_mesh, moved, rigid_motions, rotation
 
 from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.mesh import Block, Mesh
+from ffr_prep.mesh.shapes import face_mass
 from ffr_prep.model.coupled import InterfaceRegion
-from ffr_prep.solids.assembly import assemble, face_mass
+from ffr_prep.solids.assembly import assemble
 from ffr_prep.solids.interfaces import couple
 
 SIZE = (1.0, 0.3, 0.2)

@@ -12,9 +12,10 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.mesh import Block, Mesh
+from ffr_prep.mesh.shapes import face_mass
 from ffr_prep.model.invariants import inertia_integrals
 from ffr_prep.model.material import Material
-from ffr_prep.solids.assembly import MASS_ORDER, STIFFNESS_ORDER, assemble, face_mass, vector_mass
+from ffr_prep.solids.assembly import MASS_ORDER, STIFFNESS_ORDER, assemble, vector_mass
 
 SIZE = np.array([2.0, 0.3, 0.2])
 ELEMENTS = {

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ffr_dyn.analyses.forward import with_all_reactions
 from ffr_dyn.analyses.outcome import result_of
+from ffr_dyn.analyses.registry import OfMoment
+from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.evaluation import evaluator, record_states
 from ffr_dyn.equations.layout import initial_state
 from ffr_dyn.functions.rotation import rotation_matrix
+from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
@@ -20,6 +25,14 @@ from ffr_dyn.scene.scene import Scene
 Array = np.ndarray
 
 CHANGED = 1e-9  # m, rad, m/s, rad/s and elastic coordinates, from where a change is told
+
+
+@dataclass(frozen=True)
+class Assemble(OfMoment):
+    """Corrections are the smallest in the norm of the mass matrix: heavy bodies move least."""
+
+    def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
+        return assembly(scene, **settings.span, **how)
 
 
 def assembly(
@@ -42,7 +55,7 @@ def assembly(
         "title": scene.name,
         "analysis": "assembly",
         "method": "smallest changes in the norm of the mass matrix",
-        "evaluations": int(at.work.info[1]),
+        "evaluations": int(at.work.info[EVALUATIONS]),
         "degrees_of_freedom": assembled.degrees_of_freedom,
         "notes": [*changes(assembled), *notes],
         "status": "complete",

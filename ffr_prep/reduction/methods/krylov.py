@@ -23,8 +23,9 @@ import scipy.sparse.linalg
 
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.coupled import CoupledModel
-from ffr_prep.reduction.basis import Basis, basis_of
-from ffr_prep.solvers.factor import FreeBody, solve_refined, supported
+from ffr_prep.reduction.basis import Basis, basis_of, check_interfaces
+from ffr_prep.reduction.responses import free_supports, krylov_blocks, static_solver
+from ffr_prep.solvers.factor import FreeBody
 
 Array = np.ndarray
 
@@ -52,43 +53,14 @@ class Krylov:
 
     def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
         """Raises InputError without interfaces, ComputationError where a frequency is a natural frequency of the body."""
-        if not model.names:
-            raise InputError("Krylov vectors are responses to interface loads: give the body at least one interface")
+        check_interfaces(model, "a basis of Krylov vectors")
         solvers = [_solver(model, body, L, frequency) for frequency in self.frequencies]
         return basis_of(model, L, *(block for solve in solvers for block in krylov_blocks(model, solve, self.moments)))
 
 
-def krylov_blocks(model: CoupledModel, solve: Callable[[Array], Array], count: int) -> list[Array]:
-    """Response (Z, 6I) to the interface loads, response to the inertia of that response, and so on; of unit length."""
-    blocks: list[Array] = []
-    loads = model.C.toarray().T
-    for _ in range(count):
-        response = solve(loads)
-        response = response / np.sqrt(np.einsum("zi,zi->i", response, model.M @ response))
-        blocks.append(response)
-        loads = model.M @ response
-    return blocks
-
-
-def static_solver(model: CoupledModel, body: FreeBody, supports: Array) -> Callable[[Array], Array]:
-    """Loads (Z, r) -> static displacements (Z, r) under the supports (s, Z)."""
-    held = supported(body, supports)
-
-    def solve(loads: Array) -> Array:
-        return solve_refined(held, loads, np.zeros((len(supports), loads.shape[1])))[0]
-
-    return solve
-
-
-def mean_motion(model: CoupledModel) -> Array:
-    """(6, Z) mean motion over the mass, rows of unit length: supports under which inertia balances every load."""
-    rows = (model.M @ model.T).T
-    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
-
-
 def _solver(model: CoupledModel, body: FreeBody, L: Array, frequency: float) -> Callable[[Array], Array]:
     if frequency == 0:
-        return static_solver(model, body, L if len(L) > 6 else mean_motion(model))
+        return static_solver(model, body, free_supports(model, L))
     return dynamic_solver(model, frequency)
 
 

@@ -1,0 +1,106 @@
+"""The formats in which other programs take and give flexible bodies, one entry each; writing and reading by suffix."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ffr_prep.common.errors import InputError
+from ffr_prep.common.registry import Registry, Setting, Target, arguments, loaded
+
+if TYPE_CHECKING:
+    from ffr_prep.body import FlexibleBody
+
+
+@dataclass(frozen=True)
+class ExchangeFormat:
+    """A format of another program.
+
+    help     : suffixes and whose format it is
+    suffixes : with the dot, as one writes them
+    write    : function, or "package.module:function", of body, path, `surface` (whether to add its points as nodes) and the
+               settings; None where the format can only be read
+    read     : of a path, returns the body; None where the format can only be written
+    left_out : of body and settings, returns in words what the file will not hold; None where there is nothing to say
+    settings : of writing
+    """
+
+    name: str
+    help: str
+    suffixes: tuple[str, ...]
+    write: Target | None
+    read: Target | None
+    left_out: Target | None = None
+    settings: tuple[Setting, ...] = ()
+
+
+_ROOM = "ffr_prep.interchange"
+EXCHANGE_FORMATS: Registry[ExchangeFormat] = Registry(
+    "exchange format",
+    (
+        ExchangeFormat(
+            "SID",
+            ".SID_FEM: standard input data of flexible bodies",
+            (".SID_FEM", ".sid"),
+            f"{_ROOM}.sid:write_sid",
+            f"{_ROOM}.sid:read_sid",
+            settings=(
+                Setting(
+                    "layout",
+                    ("mode-major", "axis-major"),
+                    "mode-major",
+                    "Of the matrices Gr and Ge in a SID file; programs differ.",
+                ),
+            ),
+        ),
+        ExchangeFormat(
+            "MBDyn",
+            ".fem: data of MBDyn's modal joint",
+            (".fem",),
+            f"{_ROOM}.mbdyn:write_fem",
+            f"{_ROOM}.mbdyn:read_fem",
+            f"{_ROOM}.mbdyn:left_out",
+            settings=(
+                Setting(
+                    "kind",
+                    ("legacy", "full"),
+                    "legacy",
+                    "Of a .fem file: lumped masses, or the inertia integrals, which a recent MBDyn reads.",
+                ),
+            ),
+        ),
+    ),
+)
+
+
+def export_body(body: FlexibleBody, path: Path, surface: bool, settings: Mapping[str, Any]) -> tuple[str, ...]:
+    """Write a body in the format of the suffix; what was left out, in words.
+
+    Raises InputError for an unknown suffix, and what the format refuses.
+    """
+    entry = _format_of(path)
+    if entry.write is None:
+        raise InputError(f"{path}: {entry.name} can be read only")
+    given = arguments(entry, settings)
+    loaded(entry.write)(body, path, surface=surface, **given)
+    return () if entry.left_out is None else tuple(loaded(entry.left_out)(body, **given))
+
+
+def import_body(path: Path) -> FlexibleBody:
+    """The body of a file, in the format of its suffix. Raises InputError for an unknown one, and what the format refuses."""
+    entry = _format_of(path)
+    if entry.read is None:
+        raise InputError(f"{path}: {entry.name} can be written only")
+    body: FlexibleBody = loaded(entry.read)(path)
+    return body
+
+
+def _format_of(path: Path) -> ExchangeFormat:
+    suffix = path.suffix.lower()
+    found = [entry for entry in EXCHANGE_FORMATS if suffix in map(str.lower, entry.suffixes)]
+    if not found:
+        known = ", ".join(entry.suffixes[0] for entry in EXCHANGE_FORMATS)
+        raise InputError(f"{path}: the format {path.suffix!r} is not known; write one of {known}")
+    return found[-1]

@@ -1,0 +1,120 @@
+"""Elements as scikit-fem reads them: its shape functions, mappings and bases on the nodes of a mesh.
+
+scikit-fem numbers the degrees of freedom of a second-order element by corner, edge and face, and sorts corners. A basis
+here has the elements as they are: the number of a degree of freedom is that of its node, and the geometry is
+isoparametric, so curved and distorted elements are integrated as they are and one turned inside out is noticed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import skfem
+from skfem.quadrature import get_quadrature
+
+from ffr_prep.mesh.cells import KINDS, node_order
+
+Array = np.ndarray
+
+_TRIANGLE = np.array([(0, 0), (1, 0), (0, 1), (0.5, 0), (0.5, 0.5), (0, 0.5)])
+_SQUARE = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5), (0.5, 0.5)])
+# Faces by their number of nodes: shape functions, nodes of the reference face in VTK's order, order of the mass rule.
+_FACES = {
+    3: (skfem.ElementTriP1, _TRIANGLE[:3], 2),
+    6: (skfem.ElementTriP2, _TRIANGLE, 7),
+    4: (skfem.ElementQuad1, _SQUARE[:4], 5),
+    8: (skfem.ElementQuadS2, _SQUARE[:8], 9),
+    9: (skfem.ElementQuad2, _SQUARE, 9),
+}
+
+
+@dataclass(frozen=True)
+class _NodeNumbers:
+    """Degrees of freedom that are nodes: element_dofs (k, E) in scikit-fem's local order, N in all."""
+
+    element_dofs: Array
+    N: int
+    edge_dofs: tuple[()] = ()
+    facet_dofs: tuple[()] = ()
+
+
+@dataclass(frozen=True)
+class _Elements:
+    """What scikit-fem's bases and mappings ask of a mesh, for elements (or faces) of one kind; doflocs (3, N) [m]."""
+
+    doflocs: Array
+    dofs: _NodeNumbers
+    elem: skfem.Element
+
+    @property
+    def refdom(self) -> type:
+        """The reference element."""
+        return self.elem.refdom  # type: ignore[no-any-return]
+
+    @property
+    def nelements(self) -> int:
+        """How many elements."""
+        return self.dofs.element_dofs.shape[1]
+
+    @property
+    def facets(self) -> Array:
+        """(k, E) nodes of the elements, where these are faces."""
+        return self.dofs.element_dofs
+
+    def dim(self) -> int:
+        """Of the space."""
+        return 3
+
+
+@cache
+def shape_functions(kind: str) -> skfem.Element:
+    """scikit-fem's element of that kind."""
+    return getattr(skfem, KINDS[kind].shapes)()
+
+
+@cache
+def local_order(kind: str) -> Array:
+    """(k,) for each node in the order of `KINDS`, its number in scikit-fem's element."""
+    return node_order(kind, shape_functions(kind).doflocs)
+
+
+def mapping(kind: str, points: Array, nodes: Array) -> skfem.MappingIsoparametric:
+    """From the reference element to the elements with these nodes (E, k) of the points (N, 3) [m]."""
+    theirs = _NodeNumbers(np.ascontiguousarray(nodes.T[np.argsort(local_order(kind))]), len(points))
+    return skfem.MappingIsoparametric(_Elements(points.T, theirs, shape_functions(kind)), shape_functions(kind))
+
+
+def determinants(geometry: skfem.MappingIsoparametric, X: Array) -> Array:
+    """(E, Q) determinants of dx/dX [m^3] at X (3, Q) of the reference element, which scikit-fem refuses to give if 0."""
+    return np.linalg.det(geometry.DF(X).transpose(2, 3, 0, 1))
+
+
+def scalar_basis(geometry: skfem.MappingIsoparametric, quadrature: tuple[Array, Array]) -> skfem.CellBasis:
+    """The shape functions of the elements at points and weights of the reference element; degree of freedom = node."""
+    mesh = geometry.mesh
+    return skfem.CellBasis(mesh, mesh.elem, geometry, quadrature=quadrature, dofs=mesh.dofs, disable_doflocs=True)
+
+
+def jacobian_determinants(kind: str, points: Array) -> Array:
+    """(E, Q) volume ratio [m^3] of elements with nodes at `points` (E, k, 3), at the nodes and inside."""
+    inside, _ = get_quadrature(shape_functions(kind).refdom, 5)
+    nodes = np.arange(points.shape[0] * points.shape[1]).reshape(points.shape[:2])
+    return determinants(mapping(kind, points.reshape(-1, 3), nodes), np.hstack([KINDS[kind].nodes.T, inside]))
+
+
+def face_mass(points: Array, faces: Array) -> Array:
+    """(F, k, k) integral of N_a N_b dA [m^2] over faces (F, k) of 3, 6, 4, 8 or 9 nodes.
+
+    scikit-fem's basis on facets would look for the elements behind them and, by Newton's method, for the points in these;
+    a face knows its own shape.
+    """
+    shapes, nodes, order = _FACES[faces.shape[1]]
+    element = shapes()
+    theirs = np.linalg.norm(nodes[:, None] - element.doflocs[None], axis=-1).argmin(axis=1)
+    mesh = _Elements(points.T, _NodeNumbers(faces.T[np.argsort(theirs)], len(points)), element)
+    X, weights = get_quadrature(element.refdom, order)
+    area = skfem.MappingIsoparametric(mesh, element, element).detDG(X) * weights
+    N = np.stack([np.broadcast_to(element.lbasis(X, i)[0], weights.shape) for i in theirs])
+    return np.einsum("fq,aq,bq->fab", area, N, N, optimize=True)

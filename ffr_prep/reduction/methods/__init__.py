@@ -1,0 +1,1 @@
+"""The reductions, a file for each; `ffr_prep.reduction.registry` lists them."""

@@ -1,0 +1,61 @@
+"""Characteristic constraint modes: Craig-Bampton with fewer static shapes.
+
+Source: M. P. Castanier, Y.-C. Tan, C. Pierre, AIAA Journal 39 (2001) 1182-1187.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from ffr_prep.common.errors import InputError
+from ffr_prep.model.coupled import CoupledModel
+from ffr_prep.reduction.basis import Basis, check_interfaces
+from ffr_prep.reduction.methods.craig_bampton import with_fixed_interfaces
+from ffr_prep.reduction.modes import constraint_modes
+from ffr_prep.reduction.selection import Selection, UpTo, check_selection
+from ffr_prep.solvers.factor import FreeBody, supported
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class CharacteristicModes:
+    """Craig-Bampton with fewer static shapes: only the lowest vibration modes of the body as condensed to its interfaces.
+
+    modes           : with the interfaces fixed: a number, `UpTo` a frequency or to an `Accuracy`
+    interface_modes : elastic modes of the condensed stiffness and mass: a number, or `UpTo` a frequency
+
+    For many interfaces. Forces at the interfaces then bend the body less than they should, the more the fewer are kept.
+    """
+
+    modes: Selection
+    interface_modes: int | UpTo
+
+    def __post_init__(self) -> None:
+        check_selection("modes", self.modes)
+        check_selection("interface_modes", self.interface_modes, (UpTo,))
+
+    def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
+        """Raises InputError without interfaces and for more modes than there are."""
+        check_interfaces(model, "a reduction of the interfaces")
+        fixed = supported(body, model.C.toarray())
+        shapes, stiffness = constraint_modes(model, fixed)
+        kept = _condensed_modes(stiffness, shapes.T @ (model.M @ shapes), self.interface_modes)
+        return with_fixed_interfaces(model, body, L, fixed, self.modes, shapes @ kept, kept.T @ stiffness @ kept)
+
+
+def _condensed_modes(K: Array, M: Array, selection: int | UpTo) -> Array:
+    """(6I, 6 + count) the six rigid motions and the lowest elastic modes of the condensed body."""
+    scale = 1 / np.sqrt(np.diag(M))
+    omega2, V = scipy.linalg.eigh(K * np.outer(scale, scale), M * np.outer(scale, scale))
+    elastic = len(omega2) - 6
+    if isinstance(selection, UpTo):
+        count = int(np.searchsorted(omega2[6:], (2 * np.pi * selection.frequency) ** 2, side="right"))
+    else:
+        count = selection
+    if not 0 <= count <= elastic:
+        raise InputError(f"asked for {count} interface modes; the interfaces have {elastic}: ask for 0 to {elastic}")
+    return scale[:, None] * V[:, : 6 + count]

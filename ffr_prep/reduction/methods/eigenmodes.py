@@ -1,0 +1,36 @@
+"""Normal modes under the reference conditions alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_prep.model.coupled import CoupledModel
+from ffr_prep.reduction.basis import Basis, diagonalised
+from ffr_prep.reduction.selected_modes import selected
+from ffr_prep.reduction.selection import Selection, check_selection
+from ffr_prep.solvers.factor import FreeBody, supported
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Eigenmodes:
+    """Normal modes of the body under its reference conditions; free-free modes for the mean axis.
+
+    modes : a number, `UpTo` a frequency or to an `Accuracy`
+    """
+
+    modes: Selection
+
+    def __post_init__(self) -> None:
+        check_selection("modes", self.modes)
+
+    def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
+        """Raises InputError for more modes than the model has."""
+
+        def with_modes(omega2: Array, modes: Array) -> Basis:
+            return diagonalised(model, modes, np.diag(omega2))
+
+        return selected(model, body, supported(body, L), self.modes, with_modes)

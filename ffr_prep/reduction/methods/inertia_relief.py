@@ -1,0 +1,30 @@
+"""Inertia relief: static response to the accelerations of the body, which makes steady deformation exact.
+
+Source: R. M. Hintz, AIAA Journal 13 (1975) 1007-1016.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_prep.model.coupled import CoupledModel
+from ffr_prep.reduction.basis import Basis, basis_of
+from ffr_prep.reduction.responses import inertial_loads, static_response
+from ffr_prep.solvers.factor import FreeBody
+
+
+@dataclass(frozen=True)
+class InertiaRelief:
+    """Static response to unit accelerations of the body: three of translation, three of rotation, six of spin.
+
+    The interfaces are held, so with the static shapes of the interfaces (`CraigBampton`, `Rubin`, `Guyan`) every steady
+    deformation under gravity, acceleration and spin is exact, whichever interfaces carry the load. A body without
+    interfaces is free. Loads that nothing but the supports carry give no vector.
+    """
+
+    def basis(self, model: CoupledModel, body: FreeBody, L: np.ndarray) -> Basis:
+        """Raises InputError for a model that does not know its inertial loads."""
+        held = L if len(L) > 6 or not model.names else model.C.toarray()
+        return basis_of(model, L, static_response(model, body, held, inertial_loads(model)))

@@ -1,0 +1,136 @@
+"""The reductions that the command line and structure files offer; one entry each.
+
+Nothing else lists them: options, keys, help and messages are made from these entries.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ffr_prep.common.errors import InputError
+from ffr_prep.common.registry import Registry, Setting, Target, arguments, loaded
+
+if TYPE_CHECKING:
+    from ffr_prep.reduction.basis import Reduction
+
+MODES = 10  # of what keeps normal modes, when nothing is said
+OF_FILES = "FILE"
+
+
+@dataclass(frozen=True)
+class Method:
+    """A reduction by its name.
+
+    name     : the word of --method and of `method` in a structure file; "FILE.xyz" stands for all files of a suffix
+    target   : class, or "package.module:Class", of a `Reduction`, called with its settings (of a file, with its path)
+    help     : what it keeps, and what it is for
+    selects  : whether its argument `modes` says how many normal modes it keeps: --modes, --frequency or --accuracy
+    settings : what else it can be given
+    """
+
+    name: str
+    target: Target
+    help: str
+    selects: bool = False
+    settings: tuple[Setting, ...] = ()
+
+
+_FOLDER = "ffr_prep.reduction.methods"
+REDUCTIONS: Registry[Method] = Registry(
+    "reduction",
+    (
+        Method(
+            "craig-bampton",
+            f"{_FOLDER}.craig_bampton:CraigBampton",
+            "static shapes of every interface coordinate and N modes with all interfaces fixed: for bodies that joints load, "
+            "the safe choice",
+            selects=True,
+        ),
+        Method(
+            "eigenmodes",
+            f"{_FOLDER}.eigenmodes:Eigenmodes",
+            "N modes under the reference conditions: for bodies without interface loads",
+            selects=True,
+        ),
+        Method(
+            "rubin",
+            f"{_FOLDER}.rubin:Rubin",
+            "N modes of the free body and the static response to interface loads: few modes suffice where joints leave the "
+            "interfaces nearly free",
+            selects=True,
+        ),
+        Method(
+            "guyan",
+            f"{_FOLDER}.guyan:Guyan",
+            "static shapes of the interfaces alone: slow motion of light bodies",
+        ),
+        Method(
+            "characteristic",
+            f"{_FOLDER}.characteristic:CharacteristicModes",
+            "craig-bampton with only the --interface-modes lowest shapes of the interfaces: for many interfaces",
+            selects=True,
+            settings=(Setting("interface_modes", int, 6, "Of characteristic.", least=0),),
+        ),
+        Method(
+            "attachment",
+            f"{_FOLDER}.attachment:AttachmentModes",
+            "static response to forces and moments at the interfaces",
+        ),
+        Method(
+            "inertia-relief",
+            f"{_FOLDER}.inertia_relief:InertiaRelief",
+            "static response to acceleration and spin: exact sag, exact growth, exact stress under them",
+        ),
+        Method(
+            "krylov",
+            f"{_FOLDER}.krylov:Krylov",
+            "response to interface loads, matched to --moments derivatives at the frequencies --match",
+            settings=(
+                Setting("moments", int, 2, "Of krylov.", least=1),
+                Setting("match", "numbers", (0.0,), "Frequencies [Hz] of krylov.", argument="frequencies"),
+            ),
+        ),
+        Method(
+            f"{OF_FILES}.npy",
+            f"{_FOLDER}.user_vectors:read_user_vectors",
+            "displacement fields of your own, an array (nodes, 3, fields)",
+        ),
+    ),
+)
+
+
+def method_of(word: str) -> Method:
+    """The entry that a word or the name of a file stands for; InputError lists what there is."""
+    known = REDUCTIONS.entries
+    found = known.get(word) or known.get(OF_FILES + Path(word).suffix)
+    if found is None or word.startswith(f"{OF_FILES}."):
+        raise InputError(f"the method {word} is not known: write one of {', '.join(known)}")
+    return found
+
+
+def reduction_of(requests: Sequence[Mapping[str, Any]], folder: Path = Path()) -> Reduction:
+    """One reduction, or the union of several, from the values of settings by name and the `method` of each.
+
+    folder : what names of files are relative to
+
+    Raises InputError for an unknown method, and for settings that cannot be used or say the same twice.
+    """
+    from ffr_prep.reduction.methods.union import Union
+
+    parts = tuple(_made(method_of(request["method"]), request, folder) for request in requests)
+    return parts[0] if len(parts) == 1 else Union(parts)
+
+
+def _made(entry: Method, given: Mapping[str, Any], folder: Path) -> Reduction:
+    from ffr_prep.reduction.selection import selection_of
+
+    made: Reduction
+    if entry.name.startswith(f"{OF_FILES}."):
+        made = loaded(entry.target)(folder / given["method"])
+    else:
+        modes = {"modes": selection_of(given, MODES)} if entry.selects else {}
+        made = loaded(entry.target)(**modes, **arguments(entry, given))
+    return made

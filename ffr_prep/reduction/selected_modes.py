@@ -1,0 +1,78 @@
+"""As many normal modes as a selection asks for: by number, up to a frequency, or by the accuracy that they give."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ffr_prep.common.errors import ComputationError
+from ffr_prep.model.coupled import CoupledModel
+from ffr_prep.reduction.basis import Basis
+from ffr_prep.reduction.mesh_resolution import resolution_warnings
+from ffr_prep.reduction.modes import modes_up_to, normal_modes
+from ffr_prep.reduction.receptance import free_modes, receptance_error, reference_modes
+from ffr_prep.reduction.selection import Accuracy, Selection, UpTo
+from ffr_prep.solvers.factor import FreeBody, SupportedBody
+
+Array = np.ndarray
+
+_RICHER = (2.0, 4.0, 8.0, 16.0)  # times the band: where modes are looked for
+
+
+def selected(
+    model: CoupledModel,
+    body: FreeBody,
+    held: SupportedBody,
+    selection: Selection,
+    with_modes: Callable[[Array, Array], Basis],
+) -> Basis:
+    """The basis that `with_modes` makes of omega2 (p,) and the p normal modes (Z, p) under the supports.
+
+    Raises InputError for more modes than the model has, ComputationError when no number of modes is accurate enough.
+    """
+    if isinstance(selection, UpTo):
+        omega2, modes = modes_up_to(model, held, selection.frequency)
+        warnings = resolution_warnings(model, omega2, modes, selection.frequency)
+        return replace(with_modes(omega2, modes), warnings=warnings)
+    if isinstance(selection, Accuracy):
+        return _accurate(model, body, held, selection, with_modes)
+    return with_modes(*normal_modes(model, held, selection))
+
+
+def _accurate(
+    model: CoupledModel,
+    body: FreeBody,
+    held: SupportedBody,
+    wanted: Accuracy,
+    with_modes: Callable[[Array, Array], Basis],
+) -> Basis:
+    reference, _ = reference_modes(model, body, wanted.band)
+    frequencies = wanted.band.frequencies()
+
+    def error(basis: Basis) -> float:
+        return float(receptance_error(free_modes(model, basis), reference, frequencies).max())
+
+    few = -1
+    for richer in _RICHER:
+        omega2, modes = modes_up_to(model, held, richer * wanted.band.high)
+        best = with_modes(omega2, modes)
+        if best.omega2.size and error(best) <= wanted.tolerance:
+            break
+        few = omega2.size
+    else:
+        raise ComputationError(
+            f"with all {omega2.size} modes up to {_RICHER[-1] * wanted.band.high:.4g} Hz the receptances at the interfaces "
+            f"are still more than {wanted.tolerance:g} off: use craig-bampton or rubin, which also carry static shapes, or "
+            "allow a larger error"
+        )
+    enough = omega2.size
+    while enough - few > 1:
+        count = (few + enough) // 2
+        basis = with_modes(omega2[:count], modes[:, :count])
+        if basis.omega2.size and error(basis) <= wanted.tolerance:
+            enough, best = count, basis
+        else:
+            few = count
+    return replace(best, warnings=resolution_warnings(model, omega2, modes, wanted.band.high))
