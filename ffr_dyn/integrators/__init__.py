@@ -2,6 +2,8 @@
 
 A method is a frozen dataclass with its settings; its compiled function does one step of an engine's state (see
 `ffr_dyn.kernels.integrator_api`, which tells how to write one).
+
+Twin: none, declarations.
 """
 
 from __future__ import annotations

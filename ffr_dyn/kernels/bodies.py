@@ -1,5 +1,10 @@
 """The operations on one body, each by the equations in space (`spatial`) or in the plane (`planar`): the only place, but for
-the markers and sides of joints on it, where its form is asked for."""
+the markers and sides of joints on it, where its form is asked for.
+
+Twin: `ffr_dyn.equations.inertia.mass_matrix`,
+`ffr_dyn.equations.inertia.quadratic_velocity`,
+`ffr_dyn.equations.inertia.energies`.
+"""
 
 from ffr_dyn.kernels import planar, spatial
 from ffr_dyn.kernels.options import inlined, kernel

@@ -31,6 +31,8 @@ project(r, value)               acc: the smallest motion with Phi_q acc = -value
 correct(r, r_v, target)         f += M r_v, target += Phi_q r_v
 evaluate_rows_at(r, t, x, v)    constraint rows elsewhere, with the factors left as they are
 set_diagonal(r, gamma_h)        the elastic diagonal of a linearly implicit method
+
+Twin: none, names of calls.
 """
 
 from ffr_dyn.kernels.bodies import mass_times, normalise, position_rates

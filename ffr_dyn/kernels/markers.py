@@ -1,4 +1,8 @@
-"""Markers: points and small elastic rotations that move with the deformation; their velocities and bias accelerations."""
+"""Markers: points and small elastic rotations that move with the deformation; their velocities and bias accelerations.
+
+Twin: `ffr_dyn.equations.kinematics.point_motion`,
+`ffr_dyn.equations.kinematics.axis_motion`.
+"""
 
 from ffr_dyn.kernels import planar, spatial
 from ffr_dyn.kernels.options import inlined, kernel

@@ -1,6 +1,9 @@
 """Bodies in the plane: what `spatial` does, by the same names, for the three rigid coordinates that move.
 
 `normal` is the body axis across the plane, `in_plane(normal)` the rigid coordinates i, j, k that move; the others stay zero.
+
+Twin: `ffr_dyn.equations.inertia.mass_matrix`,
+`ffr_dyn.equations.inertia.quadratic_velocity`.
 """
 
 from ffr_dyn.kernels.options import inlined, kernel

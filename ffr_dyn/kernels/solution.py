@@ -1,6 +1,8 @@
 """Accelerations and multipliers from what an evaluation left: reduced forces, the multiplier system, the way back.
 
 M acc + Phi_q^T lam = f,  Phi_q acc = target, by elimination of the elastic coordinates of every body, then of its rigid ones.
+
+Twin: `ffr_dyn.equations.motion.solve`.
 """
 
 from ffr_dyn.kernels.bodies import accelerate

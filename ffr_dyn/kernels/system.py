@@ -3,6 +3,8 @@
 Order of calls: `prepare` once per elastic diagonal; `factorise_bodies`, `update_markers`, the loads, the constraint rows,
 `evaluate_joints` at a state; then any number of solutions (`ffr_dyn.kernels.solution`) with its factors. Called from
 `ffr_dyn.kernels.entry_points` alone.
+
+Twin: `ffr_dyn.equations.motion.equations_of_motion`.
 """
 
 from ffr_dyn.kernels.bodies import factorise, inertia, prepare_body, rotation_matrix

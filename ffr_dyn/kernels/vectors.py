@@ -1,4 +1,8 @@
-"""Vectors of three as tuples: they live in registers."""
+"""Vectors of three as tuples: they live in registers.
+
+Twin: `ffr_dyn.functions.rotation.cross`,
+`ffr_dyn.functions.rotation.skew`.
+"""
 
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.simd.slices import six_parts, three_parts
