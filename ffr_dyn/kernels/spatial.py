@@ -2,6 +2,9 @@
 
 The mass matrix [[m I, -s~, I3], [s~, J, H], [I3^T, H^T, I]] in body axes depends on q alone (Shabana 2013, ch. 5, written for
 body-frame velocities); see `ffr_dyn.equations.inertia` for the readable form of every term.
+
+Twin: `ffr_dyn.equations.inertia.mass_matrix`,
+`ffr_dyn.equations.inertia.quadratic_velocity`.
 """
 
 from ffr_dyn.kernels.options import inlined, kernel
