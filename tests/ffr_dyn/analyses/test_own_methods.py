@@ -1,13 +1,15 @@
-"""A method and an analysis of one's own, from a module that the project does not know: one file and one call each."""
+"""A method and analyses of one's own, as CONTRIBUTING.md shows them: modules that the project does not know."""
 
 from __future__ import annotations
 
 import json
+import re
 import sys
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from places import ROOT
 
 import ffr_dyn as fd
 from ffr_dyn.analyses import registry
@@ -15,99 +17,10 @@ from ffr_dyn.cli import cli
 from ffr_dyn.integrators import METHODS
 from ffr_dyn.scene_file.schema import schema
 
-METHOD = '''
-"""Symplectic Euler: velocities first, then positions by them."""
-from dataclasses import dataclass
-from typing import ClassVar
-
-import ffr_dyn as fd
-from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.entry_points import Unit
-from ffr_dyn.kernels.integrator_api import set_diagonal, settle, solve
-from ffr_dyn.kernels.simd.table_address import tables_at
-from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
-from ffr_dyn.kernels.tables import OK
-from ffr_dyn.kernels.vectors import add_scaled
-
-
-@Unit
-def symplectic_euler_step(at, t, unused, unused_too):
-    r = tables_at(at)
-    h, rates = r.clock.time[0], r.stages
-    set_diagonal(r, 0.0)
-    status = settle(r, t)
-    if status != OK:
-        return status
-    acceleration_target(r.work.rows, r.clock.gains, rates.target)
-    solve(r, r.x, rates.target, 0)
-    to_velocity_rates(r.model.bodies.where, r.work.bodies.A, r.work.bodies.acc, rates.v[0])
-    add_scaled(r.v, r.v, h, rates.v[0])
-    position_rates(r.model.bodies, r.x, r.v, rates.x[0])
-    add_scaled(r.x, r.x, h, rates.x[0])
-    normalise(r.model.bodies, r.x)
-    return finite(r.x, r.v)
-
-
-@dataclass(frozen=True)
-class SymplecticEuler:
-    """Symplectic Euler."""
-
-    step: float
-    order: ClassVar[int] = 1
-    implicit: ClassVar[bool] = False
-    reach: ClassVar[float] = 2.0
-    controlled: ClassVar[bool] = False
-    repeatable: ClassVar[bool] = True
-    stage_count: ClassVar[int] = 1
-    row_stages: ClassVar[int] = 0
-    keeps_terms: ClassVar[bool] = False
-    looks_ahead: ClassVar[int] = 0
-    numbers: ClassVar[tuple[float, ...]] = ()
-    calls: ClassVar[tuple[str, ...]] = ()
-    unit: ClassVar[Unit] = symplectic_euler_step
-
-
-fd.register_integrator("symplectic-euler", SymplecticEuler)
-'''
-
-ANALYSES = '''
-"""How far a point sinks under its own weight; and a run from which every second row is kept."""
-from dataclasses import dataclass, field, replace
-from typing import ClassVar
-
-import ffr_dyn as fd
-
-
-@fd.register_analysis
-@dataclass(frozen=True)
-class Sag(fd.OfMoment):
-    """How far a point of SCENE sinks, from its assembled position to the equilibrium."""
-
-    example: ClassVar[str] = "ffr-dyn sag crane.toml --point rod.tip"
-    point: str = field(default="rod.tip", metadata=fd.option("--point", "Marker that sinks."))
-
-    def perform(self, scene, settings, *, path=None):
-        before = fd.assembly(scene, **settings.span)
-        after = fd.static(scene, path=path, **settings.span)
-        sag = float(before[f"{self.point}.position.y"][0] - after[f"{self.point}.position.y"][0])
-        return replace(after, attributes={**after.attributes, "sag": sag})
-
-    def report(self, result):
-        return [f"sag          {result.attributes['sag']:.6f} m"]
-
-
-@fd.register_analysis
-@dataclass(frozen=True)
-class Sparse(fd.OverTime):
-    """Forward dynamics of SCENE with a row every `every` output steps."""
-
-    integrates: ClassVar[bool] = True
-    every: int = field(default=2, metadata=fd.option("--every", "Output steps from row to row."))
-
-    def perform(self, scene, settings, **how):
-        span = settings.span | {"output_step": self.every * settings.output_step}
-        return fd.forward(scene, method=settings.method, **span, **how)
-'''
+PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+METHOD, ANALYSES = (
+    re.search(rf"<!-- {name} -->\n```python\n(.*?)```", PAGE, re.S).group(1) for name in ("euler.py", "sag.py")
+)
 
 SCENE = """
 name = "rod"
@@ -184,7 +97,7 @@ def test_a_method_of_ones_own_runs_from_a_file_a_command_and_python(write, tmp_p
 
 def test_a_method_of_ones_own_is_in_schema_commands_and_written_files(write, tmp_path):
     file = write(METHOD, "end = 0.2\noutput_step = 0.02")
-    scene, settings = fd.load_scene(file)
+    scene = fd.load_scene(file)[0]
     assert "symplectic-euler" in json.dumps(schema())
     assert "symplectic-euler   order 1, steps of one length, explicit" in command("methods")
     said = command("run", file, "--method", "symplectic-euler", "--step", "1e-3", "-o", tmp_path / "a.nc")
