@@ -72,10 +72,11 @@ _BY_MODULE = {
     "ffr_dyn.scene_file.write": "save_scene to_toml",
     "ffr_dyn.chart.diagram": "Diagram measures_of work_precision",
     "ffr_dyn.chart.draw": "draw_chart",
+    "ffr_dyn.chart.orders": "orders",
     "ffr_dyn.chart.page": "write_page",
     "ffr_dyn.chart.runner": "Span pool",
     "ffr_dyn.chart.table": "write_table",
-    "ffr_dyn.chart.variants": "models_of",
+    "ffr_dyn.chart.variants": "Model models_of",
     "ffr_dyn.economy.adaptive": "Adaptation adaptive_forward",
     "ffr_dyn.economy.outputs": "Output",
     "ffr_dyn.economy.picture": "diagram",
@@ -164,10 +165,11 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_dyn.scene_file.write import save_scene as save_scene, to_toml as to_toml
     from ffr_dyn.chart.diagram import Diagram as Diagram, measures_of as measures_of, work_precision as work_precision
     from ffr_dyn.chart.draw import draw_chart as draw_chart
+    from ffr_dyn.chart.orders import orders as orders
     from ffr_dyn.chart.page import write_page as write_page
     from ffr_dyn.chart.runner import Span as Span, pool as pool
     from ffr_dyn.chart.table import write_table as write_table
-    from ffr_dyn.chart.variants import models_of as models_of
+    from ffr_dyn.chart.variants import Model as Model, models_of as models_of
     from ffr_dyn.economy.adaptive import Adaptation as Adaptation, adaptive_forward as adaptive_forward
     from ffr_dyn.economy.outputs import Output as Output
     from ffr_dyn.economy.picture import diagram as diagram

@@ -157,7 +157,7 @@ def _method(settings: Settings, given: Mapping[str, Any]) -> Integrator:
     from ffr_dyn.integrators import method_named, tolerances
 
     named = given.get("method")
-    kind: Any = type(settings.method) if named is None else method_named(named, "--method")
+    kind: Any = type(settings.method) if named is None else method_named(named)
     if kind.controlled:
         if "step" in given:
             raise InputError(f"--step: {kind.__name__} chooses its steps; give --tolerance")

@@ -8,6 +8,7 @@ Twin: none, declarations.
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from typing import Any, ClassVar, Protocol
 
 from ffr_dyn.integrators.dopri5 import DormandPrince as DormandPrince
@@ -94,8 +95,10 @@ def register_integrator(name: str, method: type[Any]) -> None:
     (CONTROLLED if method.controlled else METHODS)[name] = method
 
 
-def method_named(name: str, what: str = "method") -> type[Any]:
-    """The class of a method. Raises InputError for a name that is none."""
+def method_named(name: str) -> type[Any]:
+    """The class of a method. Raises InputError for a name that is none, with the nearest."""
     if name not in methods():
-        raise InputError(f"{what} {name}: there is no such method; there are {', '.join(methods())}")
+        close = get_close_matches(name, methods(), 1)
+        hint = f"did you mean {close[0]!r}? " if close else ""
+        raise InputError(f"{name!r}: there is no such method; {hint}there are: {', '.join(methods())}")
     return methods()[name]

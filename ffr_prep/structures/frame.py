@@ -16,9 +16,8 @@ from ffr_prep.body import content_hash
 from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import extent_in_words
-from ffr_prep.model.material import Material, check_isotropic
 from ffr_prep.common.registry import choice
-from ffr_prep.model.material import Material
+from ffr_prep.model.material import Material, check_isotropic
 from ffr_prep.structures.sections import Section
 
 Array = np.ndarray

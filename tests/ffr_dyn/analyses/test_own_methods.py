@@ -1,13 +1,15 @@
-"""A method and an analysis of one's own, from a module that the project does not know: one file and one call each."""
+"""A method and analyses of one's own, as CONTRIBUTING.md shows them: modules that the project does not know."""
 
 from __future__ import annotations
 
 import json
+import re
 import sys
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from places import ROOT
 
 import ffr_dyn as fd
 from ffr_dyn.analyses import registry
@@ -15,92 +17,10 @@ from ffr_dyn.cli import cli
 from ffr_dyn.integrators import METHODS
 from ffr_dyn.scene_file.schema import schema
 
-METHOD = '''
-"""Symplectic Euler: velocities first, then positions by them."""
-from dataclasses import dataclass
-from typing import ClassVar
-
-import ffr_dyn as fd
-from ffr_dyn.kernels import integrator_api as api
-from ffr_dyn.kernels.integrator_api import H, OK, method_step
-
-
-@method_step
-def symplectic_euler_step(r: api.Tables, t: float, again: int) -> int:
-    h, rates = r.clock.time[H], r.stages
-    api.set_diagonal(r, 0.0)
-    status = api.stabilise(r, t, r.x, r.v)
-    if status != OK:
-        return status
-    api.acceleration_target(r.work.rows, r.clock.gains, rates.target)
-    api.solve_stage(r, r.x, rates.target, 0, 0.0, 1.0)
-    api.velocity_rates(r, rates.v[0])
-    api.add_scaled(r.v, r.v, h, rates.v[0])
-    api.position_rates(r.model.bodies, r.x, r.v, rates.x[0])
-    api.add_scaled(r.x, r.x, h, rates.x[0])
-    api.normalise(r.model.bodies, r.x)
-    return api.finite(r.x, r.v)
-
-
-@dataclass(frozen=True)
-class SymplecticEuler:
-    """Symplectic Euler."""
-
-    step: float
-    order: ClassVar[int] = 1
-    implicit: ClassVar[bool] = False
-    reach: ClassVar[float] = 2.0
-    controlled: ClassVar[bool] = False
-    repeatable: ClassVar[bool] = True
-    stage_count: ClassVar[int] = 1
-    row_stages: ClassVar[int] = 0
-    keeps_terms: ClassVar[bool] = False
-    looks_ahead: ClassVar[int] = 0
-    numbers: ClassVar[tuple[float, ...]] = ()
-    do_step: ClassVar[api.CompiledFunction] = symplectic_euler_step
-
-
-fd.register_integrator("symplectic-euler", SymplecticEuler)
-'''
-
-ANALYSES = '''
-"""How far a point sinks under its own weight; and a run from which every second row is kept."""
-from dataclasses import dataclass, field, replace
-from typing import ClassVar
-
-import ffr_dyn as fd
-
-
-@fd.register_analysis
-@dataclass(frozen=True)
-class Sag(fd.OfMoment):
-    """How far a point of SCENE sinks, from its assembled position to the equilibrium."""
-
-    example: ClassVar[str] = "ffr-dyn sag crane.toml --point rod.tip"
-    point: str = field(default="rod.tip", metadata=fd.option("--point", "Marker that sinks."))
-
-    def perform(self, scene, settings, *, path=None):
-        before = fd.assembly(scene, **settings.span)
-        after = fd.static(scene, path=path, **settings.span)
-        sag = float(before[f"{self.point}.position.y"][0] - after[f"{self.point}.position.y"][0])
-        return replace(after, attributes={**after.attributes, "sag": sag})
-
-    def report(self, result):
-        return [f"sag          {result.attributes['sag']:.6f} m"]
-
-
-@fd.register_analysis
-@dataclass(frozen=True)
-class Sparse(fd.OverTime):
-    """Forward dynamics of SCENE with a row every `every` output steps."""
-
-    integrates: ClassVar[bool] = True
-    every: int = field(default=2, metadata=fd.option("--every", "Output steps from row to row."))
-
-    def perform(self, scene, settings, **how):
-        span = settings.span | {"output_step": self.every * settings.output_step}
-        return fd.forward(scene, method=settings.method, **span, **how)
-'''
+PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+METHOD, ANALYSES = (
+    re.search(rf"<!-- {name} -->\n```python\n(.*?)```", PAGE, re.S).group(1) for name in ("euler.py", "sag.py")
+)
 
 SCENE = """
 name = "rod"
@@ -177,7 +97,11 @@ def test_a_method_of_ones_own_runs_from_a_file_a_command_and_python(write, tmp_p
 
 def test_a_method_of_ones_own_is_in_schema_commands_and_written_files(write, tmp_path):
     file = write(METHOD, "end = 0.2\noutput_step = 0.02")
+<<<<<<< HEAD
     scene, _ = fd.load_scene(file)
+=======
+    scene = fd.load_scene(file)[0]
+>>>>>>> h_b
     assert "symplectic-euler" in json.dumps(schema())
     assert "symplectic-euler   order 1, steps of one length, explicit" in command("methods")
     said = command("run", file, "--method", "symplectic-euler", "--step", "1e-3", "-o", tmp_path / "a.nc")
