@@ -189,7 +189,7 @@ def _with_inputs(at: Evaluator, scene: Scene, inputs: tuple[Effort | str, ...], 
     for item, amount in zip(inputs, u, strict=True):
         if isinstance(item, str):
             value[_load_number(scene, item)] *= 1.0 + amount
-    fed = replace(at, machine=with_model(at.machine, model._replace(loads=model.loads._replace(value=value))))
+    fed = replace(at, engine=with_model(at.engine, model._replace(loads=model.loads._replace(value=value))))
     sizes = [amount for item, amount in zip(inputs, u, strict=True) if not isinstance(item, str)]
     return sized(fed, _efforts(inputs), np.array(sizes))
 

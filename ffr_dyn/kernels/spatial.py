@@ -268,7 +268,7 @@ def substitute(P, H, dinv, z, n, elastic):
         elastic[k] -= dinv[k] * (p0[k] * z0 + p1[k] * z1 + p2[k] * z2 + h0[k] * z3 + h1[k] * z4 + h2[k] * z5)
 
 
-@kernel
+@inlined
 def couple_motions(P, H, y, n, out):
     """out += what couples the rigid coordinates of a body with its elastic ones, and these with themselves, times y."""
     linear, angular = (y[0], y[1], y[2]), (y[3], y[4], y[5])

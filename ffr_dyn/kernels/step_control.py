@@ -107,7 +107,7 @@ def slopes_to_velocities(where, x, slope, v):
 
 @inlined
 def interpolate(r, t):
-    """The machine's state at a time t within the last step: on the cubic through positions and velocities at its ends."""
+    """The engine's state at a time t within the last step: on the cubic through positions and velocities at its ends."""
     c = r.control
     h = c.numbers[NOW] - c.numbers[BEFORE]
     if not t < c.numbers[NOW] or not h > 0.0:

@@ -97,11 +97,7 @@ def test_a_method_of_ones_own_runs_from_a_file_a_command_and_python(write, tmp_p
 
 def test_a_method_of_ones_own_is_in_schema_commands_and_written_files(write, tmp_path):
     file = write(METHOD, "end = 0.2\noutput_step = 0.02")
-<<<<<<< HEAD
-    scene, _ = fd.load_scene(file)
-=======
     scene = fd.load_scene(file)[0]
->>>>>>> h_b
     assert "symplectic-euler" in json.dumps(schema())
     assert "symplectic-euler   order 1, steps of one length, explicit" in command("methods")
     said = command("run", file, "--method", "symplectic-euler", "--step", "1e-3", "-o", tmp_path / "a.nc")
