@@ -4,7 +4,7 @@ Timing. Clocked is the integrator's compiled loop alone: assembly, output files 
 has one thread, so that nothing runs beside a run in its process; CPU time is that of the thread which runs it, wall time is
 the clock's. Both are taken several times, and the diagram shows the median with the least and the greatest. Locally there are
 half as many workers as processors: they do not share a core's pipelines, and neither is the machine saturated. With a busy
-engine, trust CPU time.
+machine, trust CPU time.
 
 Failures. A variant that its method cannot do, or that runs too long, has failed for good and says why. One that is lost,
 with its worker or by an unforeseen error, is tried again, `RETRIES` times, and then recorded as failed. Neither stops the
