@@ -5,7 +5,6 @@ import sys
 
 import numpy as np
 import pytest
-from ffr_prep.pipelines.mesh import reduce_mesh
 from matrix_models import bar
 from places import MESHES, ROOT
 
@@ -20,8 +19,10 @@ from ffr_prep.mesh.formats import MESH_FORMATS
 from ffr_prep.mesh.mesh import check_mesh, read_mesh
 from ffr_prep.model.material import material
 from ffr_prep.model.reference import MeanAxis
-from ffr_prep.pipelines.structure_file import load_structure
+from ffr_prep.pipelines.reduce import Request, reduce
+from ffr_prep.pipelines.structure_file import read_structure
 from ffr_prep.reduction.registry import REDUCTIONS, Method
+from ffr_prep.solids.model import from_mesh
 
 BOX = [str(MESHES / "box.geo"), "--set", "nx=4", "--set", "ny=2", "--set", "nz=2", "--material", "steel"]
 REGISTRIES = (REDUCTIONS, MESH_FORMATS, MATRIX_FORMATS, EXCHANGE_FORMATS)
@@ -108,14 +109,8 @@ def test_a_reduction_of_ones_own_by_command_and_in_python(tmp_path, polynomials)
     body = load_body(tmp_path / "b.ffr")
     numbers = {"nx": 4, "ny": 2, "nz": 2}
     made = sys.modules[f"ffr_plugin:{polynomials.resolve()}"].Polynomials(3)
-    same = reduce_mesh(
-        read_mesh(MESHES / "box.geo", numbers=numbers),
-        name="b",
-        material=material("steel"),
-        interfaces=(),
-        reference=MeanAxis(),
-        reduction=made,
-    )
+    box = from_mesh(read_mesh(MESHES / "box.geo", numbers=numbers), material("steel"))
+    same = reduce(box, Request(name="b", reference=MeanAxis(), reduction=made))
     np.testing.assert_array_equal(body.omega2, same.omega2)
     assert body.provenance["reduction"] == {"type": "Polynomials", "degree": 3}
     assert body.n == 3 * 19 - 3  # 19 monomials for each axis, without three rotations
@@ -140,7 +135,7 @@ interfaces = {a = {}}
     assert parts[0] == {"type": "Polynomials", "degree": 4}
     (tmp_path / "bar.toml").write_text(text.replace("degree = 4", "degree = 0"))
     with pytest.raises(InputError, match=r"reduction\.0\.degree: .*greater than or equal to 1"):
-        load_structure(tmp_path / "bar.toml")
+        read_structure(tmp_path / "bar.toml")
 
 
 def test_help_and_messages_know_it(polynomials, capsys):

@@ -7,18 +7,19 @@ import pytest
 import scipy.sparse as sp
 import skfem
 from boxes import KINDS, STEEL, box_mesh, shaken
-from ffr_prep.pipelines.matrices import reduce_matrices
-from ffr_prep.pipelines.mesh import reduce_mesh
-from ffr_prep.reduction.component_modes import CraigBampton
 from skfem.helpers import dot
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from ffr_prep.body import FlexibleBody
 from ffr_prep.common.errors import InputError
+from ffr_prep.matrices.part import from_matrices
 from ffr_prep.matrices.skfem_model import from_skfem
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo
+from ffr_prep.pipelines.reduce import Request, reduce
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.solids.assembly import MASS_ORDER, STIFFNESS_ORDER
+from ffr_prep.solids.model import from_mesh
 
 SIZE = (1.0, 0.2, 0.1)
 ELEMENTS = {
@@ -53,10 +54,11 @@ def bar(element=None):
 
 # With their points: the mean of the nodes is not the centroid of the area.
 ENDS = [InterfaceRegion("left", point=(0, 0.1, 0.05)), InterfaceRegion("right", point=(1, 0.1, 0.05))]
+REQUEST = Request(name="bar", reference=FixedTo("left"), reduction=CraigBampton(4))
 
 
 def reduced(model) -> FlexibleBody:
-    return reduce_matrices(model, name="bar", interfaces=ENDS, reference=FixedTo("left"), reduction=CraigBampton(4))
+    return reduce(from_matrices(model, ENDS), REQUEST)
 
 
 # ---- the same body ------------------------------------------------------------------------------------------------
@@ -67,9 +69,7 @@ def test_the_body_is_that_of_the_mesh(kind):
     mesh = shaken(box_mesh(kind, SIZE, (3, 2, 2)), 0.005)
     basis, K, M = matrices(skfem_mesh(mesh, kind), ELEMENTS[kind][1](), (STIFFNESS_ORDER[kind], MASS_ORDER[kind]))
     found = reduced(from_skfem(basis, K, M))
-    expected = reduce_mesh(
-        mesh, name="bar", material=STEEL, interfaces=ENDS, reference=FixedTo("left"), reduction=CraigBampton(4)
-    )
+    expected = reduce(from_mesh(mesh, STEEL, ENDS), REQUEST)
     np.testing.assert_allclose(found.omega2, expected.omega2, rtol=1e-10)
     assert found.mass == pytest.approx(expected.mass, rel=1e-13)
     np.testing.assert_allclose(found.rr_dm, expected.rr_dm, rtol=0, atol=1e-12 * expected.rr_dm.max())

@@ -5,8 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from boxes import KINDS, STEEL, box_mesh, moved, rotation, shaken
-from ffr_prep.pipelines.mesh import reduce_mesh
-from ffr_prep.reduction.component_modes import CraigBampton
 
 from ffr_dyn.scene.stress_sensors import StressMeasurement, measured_modes
 from ffr_prep.body import load_body, save_body
@@ -15,7 +13,10 @@ from ffr_prep.mesh.mesh import Block
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import AnisotropicMaterial, Material, orthotropic, parse_material
 from ffr_prep.model.reference import FixedTo
+from ffr_prep.pipelines.reduce import Request, reduce
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.solids.assembly import assemble
+from ffr_prep.solids.model import from_mesh
 from ffr_prep.structures.frame import Shell
 
 # Carbon fibres in epoxy, AS4/3501-6: I. M. Daniel, O. Ishai, Engineering Mechanics of Composite Materials (2006), table A.4.
@@ -36,17 +37,9 @@ def plane_turned(degrees):
 
 
 def reduced(mesh, material, **options):
-    return reduce_mesh(
-        mesh,
-        name="beam",
-        material=material,
-        interfaces=[InterfaceRegion("left"), InterfaceRegion("right")],
-        reference=FixedTo("left"),
-        reduction=CraigBampton(4),
-        stiffening=True,
-        stress=True,
-        **options,
-    )
+    model = from_mesh(mesh, material, [InterfaceRegion("left"), InterfaceRegion("right")])
+    settings = {"reference": FixedTo("left"), "reduction": CraigBampton(4), "stiffening": True, "stress": True}
+    return reduce(model, Request(name="beam", **settings | options))
 
 
 # ---- laws ---------------------------------------------------------------------------------------------------------
@@ -153,9 +146,9 @@ def test_stress_of_a_stretched_bar_is_force_over_area(tmp_path):
 
 def test_strain_of_an_anisotropic_body_is_refused_and_stress_is_not():
     surface = reduced(box_mesh("hex8", (1.0, 0.1, 0.1), (3, 1, 1)), PLY).surface
-    assert measured_modes(StressMeasurement("s", "beam", (0.5, 0.0, 0.0), "von-mises"), surface).unit == "Pa"
+    assert measured_modes(StressMeasurement("s", "beam", (0.5, 0.0, 0.0), what="von-mises"), surface).unit == "Pa"
     with pytest.raises(InputError, match=r"isotropic materials only.*take the stress"):
-        measured_modes(StressMeasurement("s", "beam", (0.5, 0.0, 0.0), "strain-xx"), surface)
+        measured_modes(StressMeasurement("s", "beam", (0.5, 0.0, 0.0), what="strain-xx"), surface)
 
 
 def test_a_plate_of_an_anisotropic_material_is_refused():
