@@ -8,17 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from ffr_prep.body.reduced import BodyError, FlexibleBody, Interface, Surface, axial
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array, ArrayLike
 
 
 def rigid_body(
     name: str,
     *,
     mass: float,
-    inertia: Array,
-    centre_of_mass: Array = (0.0, 0.0, 0.0),  # type: ignore[assignment]
-    points: Mapping[str, Array] | None = None,
+    inertia: ArrayLike,
+    centre_of_mass: ArrayLike = (0.0, 0.0, 0.0),
+    points: Mapping[str, ArrayLike] | None = None,
     surface: Surface | None = None,
 ) -> FlexibleBody:
     """A body without elastic coordinates.
@@ -45,7 +44,7 @@ def rigid_body(
         rP_dm=np.zeros((3, 3, 0)),
         PP_dm=np.zeros((3, 3, 0, 0)),
         omega2=np.zeros(0),
-        interfaces=tuple(Interface(key, at, nothing, nothing) for key, at in (points or {}).items()),
+        interfaces=tuple(Interface(key, np.asarray(at, float), nothing, nothing) for key, at in (points or {}).items()),
         surface=surface,
         provenance={"kind": "rigid"},
     )
@@ -101,7 +100,7 @@ def _nearest(body: FlexibleBody, name: str, points: Array, position: Array) -> i
     return node
 
 
-def with_point(body: FlexibleBody, name: str, position: Array) -> FlexibleBody:
+def with_point(body: FlexibleBody, name: str, position: ArrayLike) -> FlexibleBody:
     """The body with one more interface, at the surface node nearest to `position` (3,) [m], body frame.
 
     Joints, forces and sensors can then attach there. Its rotation is the least-squares rotation of the node's

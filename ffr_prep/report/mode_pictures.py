@@ -210,7 +210,7 @@ def _picture(body: FlexibleBody, k: int, shape: Array, factor: float, image: Arr
     bar = figure.colorbar(colours, cax=figure.add_axes((0.895, 0.27, 0.02, 0.55)))
     bar.set_label("displacement per elastic coordinate [1/√kg]", fontsize=11, color=_INK)
     bar.ax.tick_params(labelsize=11)
-    bar.outline.set_visible(False)  # type: ignore[operator]
+    bar.outline.set_visible(False)
     return figure
 
 
