@@ -24,12 +24,13 @@ from ffr_prep.cli.options import (
 )
 from ffr_prep.cli.reduction import NOTES as REDUCTION_NOTES
 from ffr_prep.cli.reduction import band_of, draw_quality, reduction_of, reduction_options
-from ffr_prep.cli.settings import EntriesCommand
+from ffr_prep.cli.settings import EntriesCommand, NotesCommand
 from ffr_prep.cli.solver import solver_of, solver_options
 from ffr_prep.cli.structure import reduce_structure_command
 from ffr_prep.cli.terminal import closing, show, terminal_steps, written
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.registry import load_plugin
+from ffr_prep.mesh.formats import MESH_FORMATS
 from ffr_prep.reduction.registry import REDUCTIONS
 
 EXAMPLE = """\b
@@ -108,7 +109,7 @@ _ORDER = click.option(
 )
 
 
-@cli.command()
+@cli.command(cls=NotesCommand, registries=(MESH_FORMATS,), epilog="\b\nFormats:\n{mesh format}")
 @click.argument("mesh", type=_PATH)
 @_UNIT
 @_SIZE
