@@ -40,7 +40,12 @@ MESH_FORMATS: Registry[MeshFormat] = Registry(
             "ffr_prep.mesh.meshio_files:from_meshio",
             (_ANY,),
         ),
-        MeshFormat("Abaqus", ".inp: input files, of CalculiX as well", "ffr_prep.mesh.abaqus:from_abaqus", (".inp",)),
+        MeshFormat(
+            "Abaqus",
+            ".inp: input files, of CalculiX as well",
+            "ffr_prep.mesh.abaqus:from_abaqus",
+            (".inp",),
+        ),
         MeshFormat(
             "gmsh",
             ".msh, .med, .unv: meshes of gmsh, Salome, I-deas",
