@@ -17,11 +17,12 @@ from ffr_prep.cli.matrices import reduce_matrices_command
 from ffr_prep.cli.options import PATH, bundle, check_points, check_writable, material_of, number_of, numbers_of
 from ffr_prep.cli.reduction import NOTES as REDUCTION_NOTES
 from ffr_prep.cli.request import REQUEST, reduce_to_file, request_of
-from ffr_prep.cli.settings import EntriesCommand
+from ffr_prep.cli.settings import EntriesCommand, NotesCommand
 from ffr_prep.cli.structure import reduce_structure_command
 from ffr_prep.cli.terminal import show, terminal_steps
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.registry import load_plugin
+from ffr_prep.mesh.formats import MESH_FORMATS
 from ffr_prep.reduction.registry import REDUCTIONS
 
 EXAMPLE = """\b
@@ -111,7 +112,7 @@ def _mesh_settings(options: Mapping[str, Any]) -> dict[str, Any]:
     return {key: options[key] for key in ("unit", "size", "order")} | {"numbers": numbers_of(options["numbers"])}
 
 
-@cli.command()
+@cli.command(cls=NotesCommand, registries=(MESH_FORMATS,), epilog="\b\nFormats:\n{mesh format}")
 @_MESH
 def mesh(mesh: Path, **options: Any) -> None:
     """What MESH holds: elements, extent, and the names of surfaces, node sets and volumes; and whether it is sound."""

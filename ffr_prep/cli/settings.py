@@ -15,7 +15,7 @@ _COLUMN, _WIDTH = 33, 118
 
 
 def numbers(count: int | None = None) -> Callable[[click.Context, click.Parameter, str | None], Any]:
-    """What reads an option of numbers with commas between them, as a tuple, of a given count, if there is one."""
+    """A callback that reads an option of numbers with commas between them, of a given count, if there is one."""
 
     def read(_: click.Context, option: click.Parameter, text: str | None) -> tuple[float, ...] | None:
         if text is None:

@@ -1,4 +1,4 @@
-"""What the exchange formats of reduced bodies share: coordinates, nodes, lumped masses and text files.
+"""Shared by the exchange formats of reduced bodies: coordinates, nodes, lumped masses and text files.
 
 A foreign file has its own elastic coordinates, with a modal mass M and a modal stiffness K. A FlexibleBody has
 mass-orthonormal coordinates with a diagonal stiffness; `body_from` changes from one to the other.
@@ -35,7 +35,7 @@ _REAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([DEde][+-]?[0-9]+)?")
 
 @dataclass(frozen=True)
 class Content:
-    """What a file says about a body, in the elastic coordinates of the file.
+    """The body of a file, in the elastic coordinates of the file.
 
     mass [kg], r_dm (3,) [kg m], rr_dm (3, 3) [kg m^2] as in FlexibleBody; P_dm (3, n), rP_dm (3, 3, n),
     PP_dm (3, 3, n, n) likewise but not yet mass-orthonormal; M, K (n, n) modal mass and stiffness;
@@ -169,7 +169,7 @@ def mended_trace(PP_dm: Array, M: Array) -> tuple[Array, float]:
 
 @dataclass(frozen=True)
 class Bounds:
-    """What no integral can exceed (Cauchy-Schwarz): residuals of identities are measured by it.
+    """Upper bounds of the integrals (Cauchy-Schwarz): residuals of identities are measured by it.
 
     first : (n,) of P_dm; second : (n,) of rP_dm; third : (n, n) of PP_dm
     """

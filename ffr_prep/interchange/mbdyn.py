@@ -107,7 +107,7 @@ def write_fem(body: FlexibleBody, path: str | Path, *, kind: Kind = "legacy", su
 
 
 def left_out(body: FlexibleBody, *, kind: Kind = "legacy") -> tuple[str, ...]:
-    """What a file of this kind will not hold, in words."""
+    """The losses of a file of this kind, in words."""
     lost = kind == "legacy" and body.stiffening is not None
     return ("the geometric stiffness of the body was left out",) if lost else ()
 

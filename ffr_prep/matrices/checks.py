@@ -1,4 +1,4 @@
-"""What matrices from outside must be: symmetric, of a free body in one piece, with a mass that is one."""
+"""Checks of matrices from outside: symmetric, of a free body in one piece, with a mass that is one."""
 
 from __future__ import annotations
 

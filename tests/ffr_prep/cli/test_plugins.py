@@ -30,7 +30,8 @@ REGISTRIES = (REDUCTIONS, MESH_FORMATS, MATRIX_FORMATS, EXCHANGE_FORMATS)
 BRICKS = '''
 """Bricks: a file of six numbers, the sides of a box and the elements along them."""
 import numpy as np
-from ffr_prep.mesh.formats import MESH_FORMATS, FileMesh, MeshFormat
+from ffr_prep.mesh.file_mesh import FileMesh
+from ffr_prep.mesh.formats import MESH_FORMATS, MeshFormat
 
 CORNERS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
 
@@ -163,11 +164,13 @@ def test_every_file_of_a_method_has_its_entry():
 # ---- formats ------------------------------------------------------------------------------------------------------
 
 
-def test_a_mesh_format_of_ones_own(tmp_path):
+def test_a_mesh_format_of_ones_own(tmp_path, capsys):
     (tmp_path / "bricks.py").write_text(BRICKS)
     (tmp_path / "box.bricks").write_text("100 20 10 5 2 1")
     plugin = ["--plugin", tmp_path / "bricks.py"]
     run(*plugin, "mesh", tmp_path / "box.bricks")
+    run(*plugin, "mesh", "--help")
+    assert "boxes of bricks" in capsys.readouterr().out
     options = ["--material", "steel", "--interface", "left", "--reference", "fixed:left", "--modes", 2]
     run(*plugin, "reduce", tmp_path / "box.bricks", *options, "-o", tmp_path / "b.ffr")
     assert load_body(tmp_path / "b.ffr").mass == pytest.approx(0.1 * 0.02 * 0.01 * material("steel").rho)
