@@ -105,7 +105,8 @@ class EnergyWatch:
         work = self.work + np.cumsum(steps * means, axis=0)
         height = np.maximum.accumulate(np.append(self.highest, rows.energy[:, 2]))[1:]
         self.time, self.powers, self.work, self.highest = float(rows.time[-1]), powers[-1], work[-1], float(height[-1])
-        return self.begun + np.maximum(work, 0.0).sum(axis=1) + height - rows.energy[:, 2]
+        found: Array = self.begun + np.maximum(work, 0.0).sum(axis=1) + height - rows.energy[:, 2]
+        return found
 
     def _looked_into(self, row: _Row) -> _Row:
         """The row. Raises ComputationError when a quarter of the step tells that its energy has no source."""

@@ -172,7 +172,8 @@ def _pose(at: Evaluator, places: tuple[Array, Array], time: float, x: Array, q: 
             break
     v = still.copy()
     v[rigid] = np.linalg.solve(now.jacobian[:, rigid], -now.nu)
-    return evaluate(at, time, x, to_global_axes(place, x, v)).acceleration[elastic]
+    found: Array = evaluate(at, time, x, to_global_axes(place, x, v)).acceleration[elastic]
+    return found
 
 
 def _deformed(

@@ -66,7 +66,8 @@ class Linearisation(Brief):
     @property
     def frequencies(self) -> Array:
         """(2d,) [Hz] of the damped vibration."""
-        return np.abs(self.eigenvalues.imag) / (2 * np.pi)
+        found: Array = np.abs(self.eigenvalues.imag) / (2 * np.pi)
+        return found
 
     @property
     def damping_ratios(self) -> Array:

@@ -142,7 +142,8 @@ def effort_columns(
 def _responses(J: Array, M: Array, B: Array) -> Array:
     """(V, U) accelerations that columns B of force give on the joints' rows J."""
     Z = free_motions(J, M)
-    return Z @ (Z.T @ B)
+    found: Array = Z @ (Z.T @ B)
+    return found
 
 
 def _fitting(

@@ -162,7 +162,8 @@ def _method(settings: Settings, given: Mapping[str, Any]) -> Integrator:
         if "step" in given:
             raise InputError(f"--step: {kind.__name__} chooses its steps; give --tolerance")
         if "tolerance" in given:
-            return kind(tolerances(given["tolerance"]))
+            found: Integrator = kind(tolerances(given["tolerance"]))
+            return found
         return settings.method if named is None else kind()
     if "tolerance" in given:
         raise InputError(f"--tolerance: {kind.__name__} takes steps of one length; give --step")

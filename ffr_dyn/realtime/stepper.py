@@ -241,7 +241,7 @@ class _Setting:
 
     def value(self, now: float) -> float:
         since, _, value, rate, half = self._numbers[0].tolist()
-        return value + (now - since) * (rate + (now - since) * half)
+        return float(value + (now - since) * (rate + (now - since) * half))
 
 
 # ---- outputs ------------------------------------------------------------------------------------------------------

@@ -38,7 +38,7 @@ from ffr_dyn.analyses.settings import Charted, MomentSettings, Settings
 from ffr_dyn.functions.formula import CONSTANTS, Expression, Operation, is_constant
 from ffr_dyn.functions.operations import FUNCTIONS
 from ffr_dyn.functions.time_functions import TimeFunction, constant, signal, signals_in
-from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator, Tolerances
+from ffr_dyn.integrators import Integrator, Tolerances, method_named
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
 from ffr_dyn.scene.forces import Load
 from ffr_dyn.scene.joint_forces import Actuator
@@ -312,14 +312,15 @@ def _with_chart(settings: Settings | MomentSettings, entry: Any, source: Source)
 
 
 def _method(entry: Any, source: Source) -> Integrator:
-    name, step = getattr(entry, "method", "ros2"), getattr(entry, "step", None)
-    if name in CONTROLLED:
-        given = entry.tolerances
-        return CONTROLLED[name](Tolerances() if given is None else Tolerances(**given.model_dump()))
+    kind, step = method_named(getattr(entry, "method", "ros2")), getattr(entry, "step", None)
     try:
-        return METHODS[name](entry.output_step / 10 if step is None else step, **getattr(entry, "settings", {}))
+        if kind.controlled:
+            found: Integrator = kind(Tolerances(**(entry.tolerances.model_dump() if entry.tolerances else {})))
+        else:
+            found = kind(entry.output_step / 10 if step is None else step, **getattr(entry, "settings", {}))
     except InputError as error:
         raise InputError(f"{origin(source, ('analysis', 'settings'))}: analysis.settings: {error}") from None
+    return found
 
 
 def _stabilisation(entry: StabilisationEntry) -> Stabilisation:

@@ -139,16 +139,16 @@ EVENTS = (Kind("", Event),)
 SOLUTIONS = (Kind("causal", Causal), Kind("bounded", Bounded))
 
 
-def keys_of(kind: Kind) -> list[Field]:
+def keys_of(kind: Kind) -> list[Field[Any]]:
     """The fields of a kind that a file holds."""
     return [f for f in fields(kind.made) if _named(kind, f) in FIELDS or f.name not in NOT_IN_FILES]
 
 
-def _named(kind: Kind, f: Field) -> str:
+def _named(kind: Kind, f: Field[Any]) -> str:
     return f"{kind.made.__name__}.{f.name}"
 
 
-def _type(kind: Kind, f: Field, hints: Mapping[str, Any]) -> Any:
+def _type(kind: Kind, f: Field[Any], hints: Mapping[str, Any]) -> Any:
     """The type of a key: from `FIELDS`, or from the dataclass, where numbers become `Number`."""
     found = FIELDS.get(_named(kind, f), FIELDS.get(f.name))
     if found is None:
@@ -156,7 +156,7 @@ def _type(kind: Kind, f: Field, hints: Mapping[str, Any]) -> Any:
     return found | None if _default(f) is None else found
 
 
-def _default(f: Field) -> Any:
+def _default(f: Field[Any]) -> Any:
     """What stands for a key that is not given; None where the dataclass has no limit (JSON has no infinity)."""
     if isinstance(f.default, tuple):
         return list(f.default)
@@ -331,7 +331,7 @@ def _analysis_model(word: str, made: Any) -> type[BaseModel]:
     return create_model(f"{made.__name__}Entry", __base__=base, __doc__=made.__doc__, **keys)
 
 
-def _own_key(f: Field, hint: Any) -> tuple[Any, Any]:
+def _own_key(f: Field[Any], hint: Any) -> tuple[Any, Any]:
     """Type and default of the key for a field of an analysis."""
     default = ... if f.default is MISSING or f.metadata.get("required") else f.default
     if kinds := nested_kinds(hint):
