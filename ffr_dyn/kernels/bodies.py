@@ -57,15 +57,37 @@ def normalise(bodies, x):
 @inlined
 def inertia(gravity_field, bodies, w, x, v, b):
     """Rotation, first and second moments, right-hand side w.f (body axes) of body b, without markers' loads."""
-    i, j, A = bodies.where[b, IN_X], bodies.where[b, IN_V], w.A[b]
+    n, i, j, normal = bodies.where[b, N], bodies.where[b, IN_X], bodies.where[b, IN_V], bodies.where[b, NORMAL]
+    A = w.A[b]
     rotation_matrix(x[i + 3], x[i + 4], x[i + 5], x[i + 6], A)
     omega = (v[j + 3], v[j + 4], v[j + 5])
     put(w.omega, b, omega)
     gravity = to_body(A, gravity_field)
-    if bodies.where[b, NORMAL] >= 0:
-        planar.inertia(bodies, w, x, v, b, omega, gravity)
+    s, pd, D, D_axial = get(w.s, b), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    if n > 0:
+        q, qd, moments = part(x, i + 7, n), part(v, j + 6, n), bodies.moments[b]
+        s = (moments[0], moments[1], moments[2])
+        W = (moments[3], moments[4], moments[5], moments[6], moments[7], moments[8])
+        if normal >= 0:
+            s, pd, W, D = planar.flexible_terms(bodies, w, b, q, qd, omega[normal], gravity, W, s, normal)
+        else:
+            s, pd, W, D, D_axial = spatial.flexible_terms(bodies, w, b, q, qd, omega, gravity, W, s)
+        put(w.s, b, s)
+        fill_tensor(w.J[b], W)
+        w.inverse[b, 1] = 0.5 / (W[0] + W[1] + W[2])
+    if normal >= 0:
+        planar.forces(part(w.f, j, 6), bodies.mass[b], s, pd, D[0] + D[1], omega, gravity, normal)
     else:
-        spatial.inertia(bodies, w, x, v, b, omega, gravity)
+        spatial.forces(part(w.f, j, 6), bodies.mass[b], s, w.J[b], pd, D, D_axial, omega, gravity)
+
+
+@kernel
+def fill_tensor(J, W):
+    """The inertia tensor from the second moments of mass."""
+    J[0, 0], J[1, 1], J[2, 2] = W[1] + W[2], W[0] + W[2], W[0] + W[1]
+    J[0, 1] = J[1, 0] = -W[3]
+    J[0, 2] = J[2, 0] = -W[4]
+    J[1, 2] = J[2, 1] = -W[5]
 
 
 @inlined

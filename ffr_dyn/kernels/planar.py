@@ -9,8 +9,8 @@ Twin: `ffr_dyn.equations.inertia.mass_matrix`,
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.products import contract
 from ffr_dyn.kernels.simd.slices import part, three_parts
-from ffr_dyn.kernels.spatial import coupling, keep_moments, undeformed
-from ffr_dyn.kernels.tables import IN_PP_DM, IN_Q, IN_SHARED, IN_V, IN_X, NORMAL, PP_PLAN, N
+from ffr_dyn.kernels.spatial import coupling
+from ffr_dyn.kernels.tables import IN_PP_DM, IN_Q, IN_SHARED, IN_V, NORMAL, PP_PLAN, N
 from ffr_dyn.kernels.vectors import LEAST_PIVOT, copy, fill, get, in_plane, of_two, weighted_product
 
 
@@ -62,20 +62,6 @@ def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s, normal):
     )  # fmt: skip
     D = (of_two(0, c0, 3, growing, 0.0), of_two(1, c0, 3, growing, 0.0), 0.0, 0.0, 0.0, 0.0)
     return s, pd, W, D
-
-
-@inlined
-def inertia(bodies, w, x, v, b, omega, gravity):
-    """First and second moments, right-hand side w.f (body axes) of body b; gravity in body axes."""
-    n, i, j, normal = bodies.where[b, N], bodies.where[b, IN_X], bodies.where[b, IN_V], bodies.where[b, NORMAL]
-    s, pd, growing = get(w.s, b), (0.0, 0.0, 0.0), 0.0
-    if n > 0:
-        s, W = undeformed(bodies.moments[b])
-        q, qd = part(x, i + 7, n), part(v, j + 6, n)
-        s, pd, W, D = flexible_terms(bodies, w, b, q, qd, omega[normal], gravity, W, s, normal)
-        growing = D[0] + D[1]
-        keep_moments(w, b, s, W)
-    forces(part(w.f, j, 6), bodies.mass[b], s, pd, growing, omega, gravity, normal)
 
 
 @kernel

@@ -10,15 +10,13 @@ Twin: `ffr_dyn.equations.inertia.mass_matrix`,
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.products import contract
 from ffr_dyn.kernels.simd.slices import part, six_parts, three_parts
-from ffr_dyn.kernels.tables import IN_PP_DM, IN_Q, IN_SHARED, IN_V, IN_X, PP_PLAN, N
+from ffr_dyn.kernels.tables import IN_PP_DM, IN_Q, IN_SHARED, IN_V, PP_PLAN, N
 from ffr_dyn.kernels.vectors import (
     cholesky_six,
     copy,
     cross,
     dot,
-    get,
     lower_six,
-    put,
     six_rows,
     three_rows,
     upper_six,
@@ -85,49 +83,6 @@ def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s):
             - omega2[j] * x - damping[j] * y
         )  # fmt: skip
     return (s0, s1, s2), (p0, p1, p2), (w0, w1, w2, w3, w4, w5), (d0, d1, d2, d3, d4, d5), (a0, a1, a2)
-
-
-@inlined
-def inertia(bodies, w, x, v, b, omega, gravity):
-    """First and second moments, right-hand side w.f (body axes) of body b; gravity in body axes."""
-    n, i, j = bodies.where[b, N], bodies.where[b, IN_X], bodies.where[b, IN_V]
-    s, pd, D, D_axial = get(w.s, b), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    if n > 0:
-        s, W = undeformed(bodies.moments[b])
-        q, qd = part(x, i + 7, n), part(v, j + 6, n)
-        s, pd, W, D, D_axial = flexible_terms(bodies, w, b, q, qd, omega, gravity, W, s)
-        keep_moments(w, b, s, W)
-    forces(part(w.f, j, 6), bodies.mass[b], s, w.J[b], pd, D, D_axial, omega, gravity)
-
-
-@kernel
-def undeformed(moments):
-    """(first moment, second moment of mass) of a body where q = 0."""
-    return (moments[0], moments[1], moments[2]), (
-        moments[3],
-        moments[4],
-        moments[5],
-        moments[6],
-        moments[7],
-        moments[8],
-    )
-
-
-@inlined
-def keep_moments(w, b, s, W):
-    """Those of mass of a deformed body, as the first moment, the inertia tensor, and one over its trace."""
-    put(w.s, b, s)
-    fill_tensor(w.J[b], W)
-    w.inverse[b, 1] = 0.5 / (W[0] + W[1] + W[2])
-
-
-@kernel
-def fill_tensor(J, W):
-    """The inertia tensor from the second moments of mass."""
-    J[0, 0], J[1, 1], J[2, 2] = W[1] + W[2], W[0] + W[2], W[0] + W[1]
-    J[0, 1] = J[1, 0] = -W[3]
-    J[0, 2] = J[2, 0] = -W[4]
-    J[1, 2] = J[2, 1] = -W[5]
 
 
 @kernel
