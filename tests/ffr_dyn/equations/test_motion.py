@@ -55,9 +55,9 @@ def assert_twins(system: System, t: float, x, v, *, rtol: float = 1e-9) -> None:
 
 
 DRIVEN = {
-    "angle": ("revolute", Driver("drive", "tie", DRIVE, "angle")),
-    "stroke": ("translational", Driver("drive", "tie", DRIVE, "stroke")),
-    "path": ("spherical", PointDriver("drive", "one.a", "two.a", DRIVE, None, 0.3)),
+    "angle": ("revolute", Driver("drive", "tie", DRIVE)),
+    "stroke": ("translational", Driver("drive", "tie", DRIVE, coordinate="stroke")),
+    "path": ("spherical", PointDriver("drive", "one.a", "two.a", x=DRIVE, y=None, z=0.3)),
 }
 LOADS = (
     Load("global", "one.b", (1, harmonic(amplitude=2, frequency=1), 3), (0, 1, 2)),
@@ -74,7 +74,7 @@ def cases() -> dict[str, Scene]:
         found["cylindrical"], joints=tuple(replace(j, kind="cylindrical") for j in found["cylindrical"].joints)
     )
     for first, second in (("root.angle", "tie.angle"), ("root.stroke", "tie.angle")):
-        found[f"coupled {first} {second}"] = replace(arms, couplings=(Coupling("gear", first, second, -1.5, 0.2),))
+        found[f"coupled {first} {second}"] = replace(arms, couplings=(Coupling("gear", first, second, -1.5, offset=0.2),))
     found["loads"] = replace(chain(), loads=LOADS)
     shaken = (harmonic(amplitude=1, frequency=2), 0.0, 3.0)
     found["shaken base"] = replace(chain(), base_acceleration=shaken)
