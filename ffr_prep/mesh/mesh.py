@@ -43,7 +43,9 @@ class Block(NamedTuple):
 
     kind: str
     nodes: Array
-    __repr__ = brief_tuple
+
+    def __repr__(self) -> str:
+        return brief_tuple(self)
 
 
 @dataclass(frozen=True, repr=False)
