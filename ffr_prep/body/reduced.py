@@ -11,12 +11,13 @@ import numpy as np
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, listed
+from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import settings_in_words, vector_in_words
 
 _ORTHONORMAL_TOLERANCE = 1e-8
 
 
-class BodyError(ValueError):
+class BodyError(InputError):
     """A body or a body file that cannot be used; the message says what is wrong and what to do."""
 
 

@@ -229,11 +229,9 @@ def _mode_numbers(text: str, count: int) -> list[int]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Entry point: exit code 2 for bad input, 1 for a failed computation, no traceback for either."""
-    from ffr_prep.body import BodyError
-
     try:
         cli.main(arguments, prog_name="ffr-prep", standalone_mode=False)
-    except (InputError, BodyError) as error:
+    except InputError as error:
         _leave(str(error), 2)
     except ComputationError as error:
         _leave(str(error), 1)

@@ -40,12 +40,10 @@ from ffr_prep.model.model import Model
 from ffr_prep.model.reference import FixedTo, MeanAxis, ReferenceConditions, SimplySupported, Support, Supports
 from ffr_prep.pipelines.reduce import Request
 from ffr_prep.pipelines.structure_schema import (
-    FixedEntry,
     InterfaceEntry,
     MemberEntry,
     PanelEntry,
     ReferenceEntry,
-    SimplySupportedEntry,
     SolidEntry,
     StructureEntry,
     SupportsEntry,
@@ -227,10 +225,7 @@ def _section(entry: MemberEntry) -> Section:
 
 
 def _reference(entry: ReferenceEntry) -> ReferenceConditions:
-    if isinstance(entry, FixedEntry):
-        return FixedTo(entry.interface)
-    if isinstance(entry, SimplySupportedEntry):
-        return SimplySupported(entry.pin, entry.roller)
     if isinstance(entry, SupportsEntry):
         return Supports(tuple(Support(**vars(support)) for support in entry.supports))
-    return MeanAxis()
+    make = {"fixed": FixedTo, "simply-supported": SimplySupported, "mean-axis": MeanAxis}
+    return make[entry.kind](**{key: value for key, value in vars(entry).items() if key != "kind"})
