@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+import ffr_prep as fp
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import RK4, ROS2, Integrator
@@ -25,7 +26,6 @@ from ffr_prep.body import FlexibleBody, rigid_body
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import SimplySupported
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.structures.frame import Member, named, polyline
 from ffr_prep.structures.sections import rectangle
@@ -38,12 +38,9 @@ def flexible_link(length: float, modes: int) -> FlexibleBody:
     """An aluminium bar of 13 x 20 mm with `modes` normal modes and six more from its interfaces."""
     member = Member(rectangle(0.013, 0.02), Material("aluminium", 7e10, 0.3, 2700.0), orientation=(0, 1, 0))
     frame = named(polyline([(0, 0, 0), (length, 0, 0)], member, elements=12), a=(0, 0, 0), b=(length, 0, 0))
-    return reduce_frame(
-        frame,
-        name="link",
-        interfaces=[InterfaceRegion("a"), InterfaceRegion("b")],
-        reference=SimplySupported("a", "b"),
-        reduction=CraigBampton(modes),
+    return fp.reduce(
+        fp.from_frame(frame, [InterfaceRegion("a"), InterfaceRegion("b")]),
+        fp.Request(name="link", reference=SimplySupported("a", "b"), reduction=CraigBampton(modes)),
     )
 
 

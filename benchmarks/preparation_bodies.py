@@ -8,14 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+import ffr_prep as fp
 from ffr_prep.body import FlexibleBody, truncated
 from ffr_prep.body.planar import in_plane
 from ffr_prep.mesh.mesh import Block, Mesh, read_mesh
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, ReferenceConditions, SimplySupported
-from ffr_prep.pipelines.mesh import reduce_mesh
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.reduction.methods.guyan import Guyan
@@ -64,7 +63,9 @@ def tree() -> tuple[FlexibleBody, float, Array, Array]:
         parts.append(polyline([tuple(end) for end in ends], Member(section, STEEL, tuple(across)), elements=3))
         m, centre, spread = _prism(np.array(ends), section, across)
         mass, first, second = mass + m, first + m * centre, second + m * (spread + np.outer(centre, centre))
-    body = reduce_frame(joined(*parts), name="tree", interfaces=[], reference=MeanAxis(), reduction=Eigenmodes(6))
+    body = fp.reduce(
+        fp.from_frame(joined(*parts), []), fp.Request(name="tree", reference=MeanAxis(), reduction=Eigenmodes(6))
+    )
     return body, mass, first, second
 
 
@@ -89,7 +90,9 @@ def ring_of_beams(elements: int) -> FlexibleBody:
         polyline([tuple(a), tuple(b)], Member(section, STEEL, tuple((a + b) / 2)), elements=1)
         for a, b in pairwise(corners)
     ]
-    body = reduce_frame(joined(*sides), name="ring", interfaces=[], reference=MeanAxis(), reduction=Eigenmodes(6))
+    body = fp.reduce(
+        fp.from_frame(joined(*sides), []), fp.Request(name="ring", reference=MeanAxis(), reduction=Eigenmodes(6))
+    )
     return in_plane(body)
 
 
@@ -102,10 +105,10 @@ def rod_of_beams(modes: int, *, axial: bool) -> float:
         section = with_mass_moments(general("beam", A=1e-4, Iy=1e-6, Iz=1e-9, J=1e-8), 1e-12, 0.0)
         unit = np.sqrt(STEEL.E * section.Iz / (STEEL.rho * section.A))
     frame = polyline([(0, 0, 0), (1.0, 0, 0)], Member(section, STEEL, (0, 1.0, 0)), elements=300 if axial else 60)
-    body = reduce_frame(
-        named(frame, root=(0, 0, 0), tip=(1.0, 0, 0)), name="rod", interfaces=ENDS, reference=FixedTo("root"),
-        reduction=CraigBampton(modes),
-    )  # fmt: skip
+    body = fp.reduce(
+        fp.from_frame(named(frame, root=(0, 0, 0), tip=(1.0, 0, 0)), ENDS),
+        fp.Request(name="rod", reference=FixedTo("root"), reduction=CraigBampton(modes)),
+    )
     return float(np.sqrt(body.omega2[0]) / unit)
 
 
@@ -114,11 +117,15 @@ def slider_crank_rod(elements: int, modes: int) -> FlexibleBody:
     frame = polyline(
         [(0, 0, 0), (0.3, 0, 0)], Member(slider_crank_section(), ROD_STEEL, (0, 1.0, 0)), elements=elements
     )
-    return reduce_frame(
-        named(frame, crankpin=(0, 0, 0), slider=(0.3, 0, 0)), name="rod",
-        interfaces=[InterfaceRegion("crankpin"), InterfaceRegion("slider")],
-        reference=SimplySupported("crankpin", "slider"), reduction=CraigBampton(modes), stiffening=True,
-    )  # fmt: skip
+    return fp.reduce(
+        fp.from_frame(
+            named(frame, crankpin=(0, 0, 0), slider=(0.3, 0, 0)),
+            [InterfaceRegion("crankpin"), InterfaceRegion("slider")],
+        ),
+        fp.Request(
+            name="rod", reference=SimplySupported("crankpin", "slider"), reduction=CraigBampton(modes), stiffening=True
+        ),
+    )
 
 
 def slider_crank_section() -> Section:
@@ -130,10 +137,10 @@ def pendulum_rod() -> FlexibleBody:
     """The rod of the flexible pendulum, 1.2 m x 0.2 m x 9 mm, with stiffening."""
     member = Member(thin(rectangle(0.2, 0.009)), Material("metal", 7e10, 0.3, 5540.0), (0, 1.0, 0))
     frame = polyline([(0, 0, 0), (1.2, 0, 0)], member, elements=40)
-    return reduce_frame(
-        named(frame, root=(0, 0, 0), tip=(1.2, 0, 0)), name="rod", interfaces=ENDS,
-        reference=SimplySupported("root", "tip"), reduction=CraigBampton(20), stiffening=True,
-    )  # fmt: skip
+    return fp.reduce(
+        fp.from_frame(named(frame, root=(0, 0, 0), tip=(1.2, 0, 0)), ENDS),
+        fp.Request(name="rod", reference=SimplySupported("root", "tip"), reduction=CraigBampton(20), stiffening=True),
+    )
 
 
 def spin_up_beam() -> FlexibleBody:
@@ -142,10 +149,10 @@ def spin_up_beam() -> FlexibleBody:
     frame = polyline(
         [(0, 0, 0), (10.0, 0, 0)], Member(section, Material("beam", 2.8e7, 0.3, 1.2), (0, 1.0, 0)), elements=30
     )
-    return reduce_frame(
-        named(frame, root=(0, 0, 0), tip=(10.0, 0, 0)), name="beam", interfaces=ENDS, reference=FixedTo("root"),
-        reduction=Eigenmodes(12), stiffening=True,
-    )  # fmt: skip
+    return fp.reduce(
+        fp.from_frame(named(frame, root=(0, 0, 0), tip=(10.0, 0, 0)), ENDS),
+        fp.Request(name="beam", reference=FixedTo("root"), reduction=Eigenmodes(12), stiffening=True),
+    )
 
 
 # ---- beams, plates and solids ----------------------------------------------------------------------------------------
@@ -156,18 +163,18 @@ def rotating(kind: str) -> tuple[FlexibleBody, float]:
     if kind == "beams":
         section = with_mass_moments(general("rod", A=1.0, Iy=1e-6, Iz=1.1e-6, J=1e-6), 1e-9, 0.0)
         frame = polyline([(0, 0, 0), (1.0, 0, 0)], Member(section, STEEL, (0, 1.0, 0)), elements=45)
-        body = reduce_frame(
-            named(frame, root=(0, 0, 0)), name="beam", interfaces=ENDS[:1], reference=FixedTo("root"),
-            reduction=Eigenmodes(10), stiffening=True,
-        )  # fmt: skip
+        body = fp.reduce(
+            fp.from_frame(named(frame, root=(0, 0, 0)), ENDS[:1]),
+            fp.Request(name="beam", reference=FixedTo("root"), reduction=Eigenmodes(10), stiffening=True),
+        )
         unit = STEEL.E * 1e-6 / STEEL.rho
     else:
         mesh = box((1.0, 0.0101, 0.01), (24, 1, 1))
         mesh = replace(mesh, points=mesh.points - (0, 0.00505, 0.005))
-        body = reduce_mesh(
-            mesh, name="bar", material=UNCONTRACTED, interfaces=[InterfaceRegion("left")], reference=FixedTo("left"),
-            reduction=Eigenmodes(10), stiffening=True,
-        )  # fmt: skip
+        body = fp.reduce(
+            fp.from_mesh(mesh, UNCONTRACTED, [InterfaceRegion("left")]),
+            fp.Request(name="bar", reference=FixedTo("left"), reduction=Eigenmodes(10), stiffening=True),
+        )
         unit = UNCONTRACTED.E * 0.01**2 / 12 / UNCONTRACTED.rho
     chosen = [np.flatnonzero(body.PP_dm[c, c].diagonal() > 0.9)[:3] for c in (1, 2)]
     return truncated(body, np.sort(np.concatenate(chosen))), unit
@@ -184,24 +191,27 @@ def three_theories() -> list[tuple[FlexibleBody, Array]]:
     mesh = box((L, B, H), (20, 1, 1))
     root = {"name": "b", "reference": FixedTo("root"), "reduction": Eigenmodes(6)}
     bodies = [
-        reduce_frame(named(beam, root=(0, 0, 0)), interfaces=ENDS[:1], **root),
-        reduce_frame(sheet, interfaces=ENDS[:1], **root),
-        reduce_frame(triangulated(sheet), interfaces=ENDS[:1], **root),
-        reduce_mesh(
-            replace(mesh, points=mesh.points - (0, B / 2, H / 2)), material=UNCONTRACTED,
-            interfaces=[InterfaceRegion("root", "left")], **root,
+        fp.reduce(fp.from_frame(named(beam, root=(0, 0, 0)), ENDS[:1]), fp.Request(**root)),
+        fp.reduce(fp.from_frame(sheet, ENDS[:1]), fp.Request(**root)),
+        fp.reduce(fp.from_frame(triangulated(sheet), ENDS[:1]), fp.Request(**root)),
+        fp.reduce(
+            fp.from_mesh(
+                replace(mesh, points=mesh.points - (0, B / 2, H / 2)), UNCONTRACTED, [InterfaceRegion("root", "left")]
+            ),
+            fp.Request(**root),
         ),
-    ]  # fmt: skip
+    ]
     return [(body, np.flatnonzero(body.PP_dm[2, 2].diagonal() > 0.9)[:2]) for body in bodies]
 
 
 def bar() -> tuple[FlexibleBody, float]:
     """A solid cantilever of 1 m x 20 mm x 20 mm and its sag under gravity along -y, by closed form."""
-    body = reduce_mesh(
-        box((1.0, 0.02, 0.02), (20, 1, 1)), name="bar", material=UNCONTRACTED,
-        interfaces=[InterfaceRegion("left"), InterfaceRegion("right")], reference=FixedTo("left"),
-        reduction=Union((Guyan(), InertiaRelief())),
-    )  # fmt: skip
+    body = fp.reduce(
+        fp.from_mesh(
+            box((1.0, 0.02, 0.02), (20, 1, 1)), UNCONTRACTED, [InterfaceRegion("left"), InterfaceRegion("right")]
+        ),
+        fp.Request(name="bar", reference=FixedTo("left"), reduction=Union((Guyan(), InertiaRelief()))),
+    )
     return body, UNCONTRACTED.rho * 9.81 / (8 * UNCONTRACTED.E * 0.02**2 / 12)
 
 
@@ -213,11 +223,15 @@ def thin_ring(rich: bool) -> tuple[FlexibleBody, float]:
     points = np.stack([r * np.cos(angle), r * np.sin(angle), flat.points[:, 2]], axis=1)
     _, first, index = np.unique(points.round(9) + 0.0, axis=0, return_index=True, return_inverse=True)
     blocks = tuple(Block(block.kind, index.ravel()[block.nodes]) for block in flat.blocks)
-    body = reduce_mesh(
-        Mesh(points[first], blocks, {"ring": np.arange(cells)}, {}, {}), name="ring", material=STEEL, interfaces=(),
-        reference=MeanAxis(), reduction=Union((Eigenmodes(4), InertiaRelief())) if rich else Eigenmodes(4),
-        quality=Band(1.0, 50.0),
-    )  # fmt: skip
+    body = fp.reduce(
+        fp.from_mesh(Mesh(points[first], blocks, {"ring": np.arange(cells)}, {}, {}), STEEL, ()),
+        fp.Request(
+            name="ring",
+            reference=MeanAxis(),
+            reduction=Union((Eigenmodes(4), InertiaRelief())) if rich else Eigenmodes(4),
+            quality=Band(1.0, 50.0),
+        ),
+    )
     return body, STEEL.rho / STEEL.E
 
 
@@ -228,8 +242,8 @@ def strip(kind: str, reference: ReferenceConditions) -> FlexibleBody:
         section = shear_rigid(general("strip", A=1e-3, Iy=1e-9, Iz=1e-4, J=4e-9))
         frame = polyline([(0, 0, 0), (1.0, 0, 0)], Member(section, STEEL, (0, 1.0, 0)), elements=40)
         frame = named(frame, root=(0, 0, 0), tip=(1.0, 0, 0))
-        return reduce_frame(frame, interfaces=ENDS, reduction=CraigBampton(24), **make)
+        return fp.reduce(fp.from_frame(frame, ENDS), fp.Request(reduction=CraigBampton(24), **make))
     mesh = box((1.0, 0.06, 0.005), (20, 2, 1))
     ends = [InterfaceRegion("root", "left"), InterfaceRegion("tip", "right")]
     mesh = replace(mesh, points=mesh.points - (0, 0.03, 0.0025))
-    return reduce_mesh(mesh, material=UNCONTRACTED, interfaces=ends, reduction=CraigBampton(16), **make)
+    return fp.reduce(fp.from_mesh(mesh, UNCONTRACTED, ends), fp.Request(reduction=CraigBampton(16), **make))

@@ -16,6 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
+import ffr_prep as fp
 from benchmarks.courses import FIXED_INTERFACE_MODES, chained
 from benchmarks.scenes import MESHES, pendulum, slider_crank, with_middle
 from ffr_dyn.analyses.forward import forward
@@ -27,7 +28,6 @@ from ffr_prep.mesh.mesh import read_mesh
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import SimplySupported
-from ffr_prep.pipelines.mesh import reduce_mesh
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 
 EXACT = 4.6592e-3  # m
@@ -36,10 +36,10 @@ GOAL = 1.3
 
 def stiffened(mesh: str, material: Material, ends: tuple[str, str], modes: int) -> FlexibleBody:
     """A rod as in `benchmarks.scenes`, with its geometric stiffness by load."""
-    return reduce_mesh(
-        read_mesh(MESHES / mesh), name="rod", material=material, interfaces=[InterfaceRegion(end) for end in ends],
-        reference=SimplySupported(*ends), reduction=CraigBampton(modes), stiffening=True,
-    )  # fmt: skip
+    return fp.reduce(
+        fp.from_mesh(read_mesh(MESHES / mesh), material, [InterfaceRegion(end) for end in ends]),
+        fp.Request(name="rod", reference=SimplySupported(*ends), reduction=CraigBampton(modes), stiffening=True),
+    )
 
 
 def linear(scene: Scene) -> Scene:

@@ -14,6 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 from threadpoolctl import threadpool_limits
 
+import ffr_prep as fp
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.joints import Joint
@@ -23,7 +24,6 @@ from ffr_prep.mesh.mesh import read_mesh
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import ReferenceConditions, SimplySupported, functionals
-from ffr_prep.pipelines.mesh import reduce_mesh
 from ffr_prep.reduction.basis import factorised
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.solids.assembly import assemble, vector_mass
@@ -57,8 +57,10 @@ def meshed_body(
     regions = [InterfaceRegion(end, kind=kind) for end in ends]
     conditions = SimplySupported(*ends) if reference is None else reference
     method = CraigBampton(modes)
-    body = reduce_mesh(mesh, name=name, material=material, interfaces=regions, reference=conditions, reduction=method)
-    with threadpool_limits(1):  # as reduce_mesh: bit for bit the same modes, also where frequencies are double
+    body = fp.reduce(
+        fp.from_mesh(mesh, material, regions), fp.Request(name=name, reference=conditions, reduction=method)
+    )
+    with threadpool_limits(1):  # as fp.reduce: bit for bit the same modes, also where frequencies are double
         matrices = assemble(mesh, material)
         model = couple(mesh, matrices, regions)
         Phi = nodal_basis(model, method.basis(model, factorised(model), functionals(conditions, model)))

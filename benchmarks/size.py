@@ -33,12 +33,12 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse.linalg as spl
 
+import ffr_prep as fp
 from ffr_prep.body import FlexibleBody, save_body
 from ffr_prep.mesh.mesh import read_mesh
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
 from ffr_prep.model.material import material
 from ffr_prep.model.reference import SimplySupported
-from ffr_prep.pipelines.mesh import reduce_mesh
 from ffr_prep.reduction.basis import Basis, diagonalised, restricted
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.solvers.factor import FreeBody, Solver
@@ -110,15 +110,15 @@ def _reduced(mesh: Any, solver: str, ranks: int, clock: Clock) -> FlexibleBody:
         import ffr_prep.model.model
 
         ffr_prep.model.model.factorised = lambda *_: None  # type: ignore[assignment]  # its work is the peer's own
-    return reduce_mesh(
-        mesh,
-        name="rod",
-        material=material("steel"),
-        interfaces=[InterfaceRegion(eye) for eye in EYES],
-        reference=SimplySupported(*EYES),
-        reduction=ByEigsh(MODES) if solver == "eigsh" else CraigBampton(MODES),
+    return fp.reduce(
+        fp.from_mesh(mesh, material("steel"), [InterfaceRegion(eye) for eye in EYES]),
+        fp.Request(
+            name="rod",
+            reference=SimplySupported(*EYES),
+            reduction=ByEigsh(MODES) if solver == "eigsh" else CraigBampton(MODES),
+            **own,
+        ),
         progress=clock,
-        **own,
     )
 
 

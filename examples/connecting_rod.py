@@ -13,6 +13,7 @@ import sys
 import time
 from pathlib import Path
 
+import ffr_prep as fp
 from ffr_dyn.compile.first_use import begin_compiling
 from ffr_dyn.integrators import ROS2
 
@@ -36,7 +37,6 @@ from ffr_prep.mesh.mesh import read_mesh
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import material
 from ffr_prep.model.reference import SimplySupported
-from ffr_prep.pipelines.mesh import reduce_mesh
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 
 GEOMETRY = Path(__file__).resolve().parent.parent / "meshes" / "connecting_rod.geo"
@@ -49,14 +49,11 @@ STRESS = 60e6  # [Pa], end of the colour bar: above what is left when the vibrat
 def reduced_rod() -> FlexibleBody:
     """The rod with eight fixed-interface modes and the static modes of both eyes."""
     mesh = read_mesh(GEOMETRY, unit="mm", size=8)
-    rod = reduce_mesh(
-        mesh,
-        name="rod",
-        material=material("steel"),
-        interfaces=[InterfaceRegion("big_eye"), InterfaceRegion("small_eye")],
-        reference=SimplySupported("big_eye", "small_eye"),
-        reduction=CraigBampton(8),
-        stress=True,
+    rod = fp.reduce(
+        fp.from_mesh(mesh, material("steel"), [InterfaceRegion("big_eye"), InterfaceRegion("small_eye")]),
+        fp.Request(
+            name="rod", reference=SimplySupported("big_eye", "small_eye"), reduction=CraigBampton(8), stress=True
+        ),
     )
     return with_point(rod, "middle", np.array([ROD / 2, 0.013, 0.0]))
 

@@ -17,6 +17,7 @@ from functools import cache, partial
 
 import numpy as np
 
+import ffr_prep as fp
 from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.time_functions import TimeFunction, harmonic
 from ffr_dyn.scene.drivers import Driver
@@ -27,7 +28,6 @@ from ffr_prep.body import FlexibleBody, rigid_body
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, ReferenceConditions, SimplySupported
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.structures.frame import Member, named, polyline
 from ffr_prep.structures.sections import Section, circle, general, rectangle, tube
@@ -64,14 +64,9 @@ def beam(
     """A straight beam along x' from interface "a" to "b", with `modes` normal modes and six of its interfaces."""
     member = Member(section, material, orientation=(0, 1, 0))
     frame = named(polyline([(0, 0, 0), (length, 0, 0)], member, elements=16), a=(0, 0, 0), b=(length, 0, 0))
-    return reduce_frame(
-        frame,
-        name=name,
-        interfaces=[InterfaceRegion("a"), InterfaceRegion("b")],
-        reference=reference,
-        reduction=CraigBampton(modes),
-        stiffening=True,
-        stress=True,
+    return fp.reduce(
+        fp.from_frame(frame, [InterfaceRegion("a"), InterfaceRegion("b")]),
+        fp.Request(name=name, reference=reference, reduction=CraigBampton(modes), stiffening=True, stress=True),
     )
 
 

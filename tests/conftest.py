@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 # Tests borrow scenes and bodies from each other across the folders.
 sys.path += sorted(str(folder) for folder in Path(__file__).parent.rglob("[!_.]*") if folder.is_dir())
 
-# One BLAS thread: as `reduce_mesh` has it, so that what a test computes beside it is equal bit by bit.
+# One BLAS thread: as `fp.reduce` has it, so that what a test computes beside it is equal bit by bit.
 threadpool_limits(1)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.compile.engine import fill_rows, new_machine
+from ffr_dyn.compile.engine import fill_rows, new_engine
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.evaluation import evaluator
@@ -133,10 +133,10 @@ class EnergyWatch:
         step = span / (rows * substeps)
         method = _finer(self.method, step)
         spacing = step * substeps if method.controlled else step
-        machine = new_machine(self.system, anchor.x, anchor.v, method, self.gains, start=anchor.time, spacing=spacing)
-        machine.work.loads.reference[:] = anchor.reference
+        engine = new_engine(self.system, anchor.x, anchor.v, method, self.gains, start=anchor.time, spacing=spacing)
+        engine.work.loads.reference[:] = anchor.reference
         record = new_record(self.system, rows)
-        return fill_rows(machine, record, anchor.time, 1 if method.controlled else substeps), record
+        return fill_rows(engine, record, anchor.time, 1 if method.controlled else substeps), record
 
     def _accountable(self) -> bool:
         """Whether the recorded powers are all there are."""

@@ -255,7 +255,7 @@ def _guided(own: ServoMotion, time: float, w: Array) -> Evaluator:
     y, rate = w[: own.inner.size], w[d : d + own.inner.size]
     data[own.data], data[own.data + 1] = y - rate * time, rate
     guided = model._replace(functions=model.functions._replace(data=data))
-    return replace(own.at, machine=with_model(own.at.machine, guided))
+    return replace(own.at, engine=with_model(own.at.engine, guided))
 
 
 def at_moment(own: ServoMotion, time: float, w: Array, near: Array) -> Moment:

@@ -49,7 +49,7 @@ def stressed_bodies(result: Result) -> tuple[str, ...]:
     if not names:
         raise InputError(
             "no body of the result has stress modes; reduce it again with them (ffr-prep reduce --stress, "
-            "reduce_mesh(..., stress=True)) and run again"
+            "fp.Request(..., stress=True)) and run again"
         )
     return names
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,8 +10,6 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import (
     AfterValidator,
-    BaseModel,
-    ConfigDict,
     Discriminator,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
@@ -28,6 +25,7 @@ from ffr_dyn.functions.formula import Expression, is_constant, parse
 from ffr_dyn.functions.time_functions import HARMONIC, TimeFunction, constant, harmonic, piecewise, polynomial, table
 from ffr_dyn.scene_file.parameters import as_number
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.strict import Strict
 from ffr_prep.common.units import split_quantity
 
 
@@ -61,23 +59,6 @@ Seconds = Annotated[float, In("s")]
 Vector = Annotated[list[Number], THREE]
 Metres = Annotated[list[Annotated[float, In("m")]], THREE]
 Inertia = Annotated[list[Annotated[float, In("kg m^2")]], THREE]
-
-
-class Strict(BaseModel):
-    """Unknown keys are mistakes; numbers must be finite."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _known(cls, given: Any) -> Any:
-        known = list(cls.model_fields)
-        for key in given if isinstance(given, dict) else ():
-            if key not in known:
-                close = difflib.get_close_matches(str(key), known, 1)
-                hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(known)}"
-                raise ValueError(f"{key!r} is not a known entry here; {hint}")
-        return given
 
 
 class HarmonicEntry(Strict):

@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
+from ffr_prep.common.brief import Brief, Rows, listed
+from ffr_prep.common.in_words import settings_in_words, vector_in_words
 
 _ORTHONORMAL_TOLERANCE = 1e-8
 
@@ -18,8 +20,8 @@ class BodyError(ValueError):
     """A body or a body file that cannot be used; the message says what is wrong and what to do."""
 
 
-@dataclass(frozen=True)
-class Interface:
+@dataclass(frozen=True, repr=False)
+class Interface(Brief):
     """A six-coordinate node to which joints, forces and sensors attach.
 
     position : (3,) [m], undeformed, in the body frame
@@ -47,8 +49,8 @@ TENSOR = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 SECTION_FORCES = ("N", "Qy", "Qz", "Mx", "My", "Mz")
 
 
-@dataclass(frozen=True)
-class BeamForces:
+@dataclass(frozen=True, repr=False)
+class BeamForces(Brief):
     """Section forces of E beam elements per elastic coordinate, at the first end, the middle and the last end of each.
 
     positions : (E, 3, 3) undeformed places on the centroid line, in the body frame [m]
@@ -68,14 +70,15 @@ class BeamForces:
         _freeze(self, "modes", (count, 3, 6, n))
 
 
-@dataclass(frozen=True)
-class Surface:
+@dataclass(frozen=True, repr=False)
+class Surface(Brief):
     """What is drawn and where fields are recovered: a triangulated boundary with the basis at its points.
 
     points : (P, 3) [m] undeformed; triangles : (T, 3) indices into points; Phi : (P, 3, n) [1/sqrt(kg)]
     stress : (P, 6, n) components xx, yy, zz, xy, xz, yz of the stress per elastic coordinate, in body axes
              [Pa/(m sqrt(kg))]; None where it was not recovered
-    moduli : (P, 2) Young's modulus [Pa] and Poisson's ratio at the points, which give the strain; with the stress
+    moduli : (P, 2) Young's modulus [Pa] and Poisson's ratio at the points, which give the strain; with the stress. Zeros
+             where the material is anisotropic, of which strain is not recovered
     beams  : section forces of beam elements; None where there are none
     """
 
@@ -106,8 +109,8 @@ class Surface:
         object.__setattr__(self, "triangles", triangles)
 
 
-@dataclass(frozen=True)
-class FlexibleBody:
+@dataclass(frozen=True, repr=False)
+class FlexibleBody(Brief):
     """A linear elastic body in the floating frame of reference; ``n = 0`` is a rigid body.
 
     mass      : I1, [kg]
@@ -149,6 +152,29 @@ class FlexibleBody:
         if self.stiffening is not None:
             _freeze(self, "stiffening", (12 + 6 * len(self.interfaces), n, n))
         _check(self)
+
+    def _title(self) -> str:
+        return f"FlexibleBody {self.name!r}"
+
+    def _rows(self) -> Rows:
+        surface = self.surface
+        holds = {
+            "geometric stiffening": self.stiffening,
+            "surface": surface,
+            "stress": surface and surface.stress,
+            "section forces": surface and surface.beams,
+        }
+        rows = {
+            "mass": f"{self.mass:.6g} kg, centre {vector_in_words(self.centre_of_mass, self.size)} m",
+            "size": f"{self.size:.5g} m",
+            "modes": f"{self.n}: {listed(f'{f:.4g}' for f in self.frequencies)} Hz" if self.n else "none: rigid",
+            "interfaces": listed(f"{i.name} ({i.kind})" for i in self.interfaces),
+            "reference": settings_in_words(self.provenance.get("reference", "")),
+            "reduction": settings_in_words(self.provenance.get("reduction", "")),
+            "holds": ", ".join(what for what, there in holds.items() if there is not None),
+            "warnings": "; ".join(self.provenance.get("warnings", [])),
+        }
+        return [(name, text) for name, text in rows.items() if text]
 
     # ---- sizes and rigid-body quantities -------------------------------------------------------------------------
 
@@ -215,12 +241,12 @@ class FlexibleBody:
 
     @property
     def I4(self) -> Array:
-        """(3, n) integral of u_0 x phi_j dm [m sqrt(kg)]."""
+        """(3, n) integral of u_0 x phi_j dm [m sqrt(kg)]. Equation (6) of docs/notation.md."""
         return axial(self.rP_dm)
 
     @property
     def I5(self) -> Array:
-        """(3, n, n) integral of phi_i x phi_j dm at [:, i, j] [-]."""
+        """(3, n, n) integral of phi_i x phi_j dm at [:, i, j] [-]. Equation (7) of docs/notation.md."""
         return axial(self.PP_dm)
 
     @property
@@ -235,13 +261,13 @@ class FlexibleBody:
 
     @property
     def I8(self) -> Array:
-        """(n, 3, 3) integral of u_0~ phi_j~ dm [m sqrt(kg)]."""
+        """(n, 3, 3) integral of u_0~ phi_j~ dm [m sqrt(kg)]. Equation (8) of docs/notation.md."""
         trace = np.einsum("kkj->j", self.rP_dm)
         return np.einsum("klj->jlk", self.rP_dm) - trace[:, None, None] * np.eye(3)
 
     @property
     def I9(self) -> Array:
-        """(n, n, 3, 3) integral of phi_i~ phi_j~ dm at [i, j] [-]."""
+        """(n, n, 3, 3) integral of phi_i~ phi_j~ dm at [i, j] [-]. Equation (9) of docs/notation.md."""
         trace = np.einsum("kkij->ij", self.PP_dm)
         return np.einsum("klij->ijlk", self.PP_dm) - trace[:, :, None, None] * np.eye(3)
 

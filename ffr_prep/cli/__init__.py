@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,21 +14,12 @@ import click
 from ffr_prep.cli.conversion import convert
 from ffr_prep.cli.interchange import export_body, import_body
 from ffr_prep.cli.matrices import reduce_matrices_command
-from ffr_prep.cli.options import (
-    check_points,
-    check_writable,
-    interface_of,
-    material_of,
-    number_of,
-    numbers_of,
-    reference_of,
-)
+from ffr_prep.cli.options import PATH, bundle, check_points, check_writable, material_of, number_of, numbers_of
 from ffr_prep.cli.reduction import NOTES as REDUCTION_NOTES
-from ffr_prep.cli.reduction import band_of, draw_quality, reduction_of, reduction_options
+from ffr_prep.cli.request import REQUEST, reduce_to_file, request_of
 from ffr_prep.cli.settings import EntriesCommand, NotesCommand
-from ffr_prep.cli.solver import solver_of, solver_options
 from ffr_prep.cli.structure import reduce_structure_command
-from ffr_prep.cli.terminal import closing, show, terminal_steps, written
+from ffr_prep.cli.terminal import show, terminal_steps
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.registry import load_plugin
 from ffr_prep.mesh.formats import MESH_FORMATS
@@ -65,6 +57,8 @@ strain. With eigenmodes the choice matters: take the one that looks like the joi
 MATERIAL_NOTES = """\b
 Materials: a name (steel, aluminium, titanium, ...), or E=7e10,nu=0.3,rho=5540 in SI units; for several volumes
   --material web=steel --material rim=E=7e10,nu=0.3,rho=2700, each with the name of a volume of the mesh.
+Orthotropic ones by E1,E2,E3,nu12,nu13,nu23,G12,G13,G23,rho in the axes of the mesh, or by a file ply.toml with the same
+  keys, or `elasticity` (6 x 6, components xx, yy, zz, xy, xz, yz) and `rho`, and `axes` where the material is turned.
 """
 _PATH = click.Path(path_type=Path)
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 120}
@@ -95,112 +89,82 @@ def cli(context: click.Context, plugins: tuple[Path, ...]) -> None:
 
 # ---- options that describe a mesh ---------------------------------------------------------------------------------
 
-_UNIT = click.option(
-    "--unit",
-    type=click.Choice(["m", "cm", "mm", "in"]),
-    help="Unit of the numbers in MESH; default: what a STEP file declares, mm for IGES, m for others.",
+_MESH = bundle(
+    click.argument("mesh", type=PATH),
+    click.option(
+        "--unit",
+        type=click.Choice(["m", "cm", "mm", "in"]),
+        help="Unit of the numbers in MESH; default: what a STEP file declares, mm for IGES, m for others.",
+    ),
+    click.option("--size", type=float, help="Largest element edge, in that unit, when geometry is meshed."),
+    click.option("--set", "numbers", multiple=True, metavar="NAME=VALUE", help="Change a parameter of a .geo script."),
+    click.option(
+        "--order",
+        type=click.IntRange(1, 2),
+        default=2,
+        show_default=True,
+        help="Of the elements, when geometry is meshed.",
+    ),
 )
-_SIZE = click.option("--size", type=float, help="Largest element edge, in that unit, when geometry is meshed.")
-_SET = click.option(
-    "--set", "numbers", multiple=True, metavar="NAME=VALUE", help="Change a parameter of a .geo script."
-)
-_ORDER = click.option(
-    "--order", type=click.IntRange(1, 2), default=2, show_default=True, help="Of the elements, when geometry is meshed."
-)
+
+
+def _mesh_settings(options: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: options[key] for key in ("unit", "size", "order")} | {"numbers": numbers_of(options["numbers"])}
 
 
 @cli.command(cls=NotesCommand, registries=(MESH_FORMATS,), epilog="\b\nFormats:\n{mesh format}")
-@click.argument("mesh", type=_PATH)
-@_UNIT
-@_SIZE
-@_SET
-@_ORDER
-def mesh(mesh: Path, unit: str | None, size: float | None, numbers: tuple[str, ...], order: int) -> None:
+@_MESH
+def mesh(mesh: Path, **options: Any) -> None:
     """What MESH holds: elements, extent, and the names of surfaces, node sets and volumes; and whether it is sound."""
     from ffr_prep.mesh.mesh import check_mesh, read_mesh
     from ffr_prep.report.text import mesh_lines
 
-    loaded = read_mesh(mesh, unit=unit, size=size, numbers=numbers_of(numbers), order=order)
+    loaded = read_mesh(mesh, **_mesh_settings(options))
     show(mesh_lines(loaded))
     check_mesh(loaded)
 
 
 @cli.command(cls=EntriesCommand, registries=(REDUCTIONS,), epilog=f"{REDUCE_NOTES}{REDUCTION_NOTES}\n{MATERIAL_NOTES}")
-@click.argument("mesh", type=_PATH)
-@click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
-@click.option("--name", help="Name of the body; default: the name of the file.")
-@_UNIT
-@_SIZE
-@_SET
-@_ORDER
+@_MESH
 @click.option("--material", "materials", multiple=True, required=True, metavar="MATERIAL", help="See below.")
-@click.option("--interface", "interfaces", multiple=True, metavar="INTERFACE", help="See below; may be repeated.")
-@click.option("--reference", default="mean-axis", show_default=True, metavar="CONDITIONS", help="See below.")
-@reduction_options
-@solver_options
+@REQUEST
 @click.option(
     "--stiffening", is_flag=True, help="Also compute geometric stiffening: slender rods under load, fast blades."
 )
 @click.option(
     "--stress", is_flag=True, help="Also keep the stress at the surface, which ffr-dyn stress and animate show."
 )
-def reduce(
-    mesh: Path,
-    output: Path,
-    name: str | None,
-    unit: str | None,
-    size: float | None,
-    numbers: tuple[str, ...],
-    order: int,
-    materials: tuple[str, ...],
-    interfaces: tuple[str, ...],
-    reference: str,
-    stiffening: bool,
-    stress: bool,
-    **options: Any,
-) -> None:
+def reduce(mesh: Path, materials: tuple[str, ...], **options: Any) -> None:
     """Reduce MESH to a flexible body and write it to a file.
 
     MESH is a geometry that is meshed here (.geo, .step, .iges, .brep) or a mesh of solids (.msh, .inp, .bdf, .vtu,
     .med, ...). Everything in the body is in SI units.
     """
     from ffr_prep.mesh.mesh import read_mesh
-    from ffr_prep.pipelines.mesh import reduce_mesh
     from ffr_prep.report.text import mesh_lines
+    from ffr_prep.solids.model import from_mesh
 
-    material, regions = material_of(materials), [interface_of(text) for text in interfaces]
-    conditions, reduction, band = reference_of(reference), reduction_of(options), band_of(options)
-    solver = solver_of(options)
-    parameters = numbers_of(numbers)
-    check_writable(output)
+    material, (interfaces, request) = material_of(materials), request_of(options)
+    settings = _mesh_settings(options)
+    check_writable(options["output"])
     steps = terminal_steps()
-    loaded = read_mesh(mesh, unit=unit, size=size, numbers=parameters, order=order, progress=steps)
+    loaded = read_mesh(mesh, **settings, progress=steps)
     steps.end()
     show(mesh_lines(loaded))
-    check_points(regions, loaded)
-    source = {"file": mesh.name, "unit": unit, "size": size, "numbers": parameters, "order": order}
-    body = reduce_mesh(
-        loaded,
-        name=name or output.stem,
-        material=material,
-        interfaces=regions,
-        reference=conditions,
-        reduction=reduction,
-        stiffening=stiffening,
-        stress=stress,
-        quality=band,
-        solver=solver,
-        progress=steps,
-        advance=steps.advance,
-        provenance={"source": source, "notes": list(loaded.notes)},
+    check_points(interfaces, loaded)
+    source = {"file": mesh.name, **{key: settings[key] for key in ("unit", "size", "numbers", "order")}}
+    request = replace(request, provenance={"source": source, "notes": list(loaded.notes)})
+    reduce_to_file(
+        lambda: from_mesh(loaded, material, interfaces, progress=steps),
+        request,
+        options["output"],
+        steps,
+        options["quality"],
     )
-    written(body, output, steps)
-    draw_quality(body, options)
-    closing(output, steps)
 
 
 @cli.command()
-@click.argument("body", type=_PATH)
+@click.argument("body", type=PATH)
 def info(body: Path) -> None:
     """What BODY is: mass, inertia, interfaces, frequencies, what it can represent, and how it was made.
 
@@ -214,8 +178,8 @@ def info(body: Path) -> None:
 
 
 @cli.command()
-@click.argument("body", type=_PATH)
-@click.option("-o", "--output", type=_PATH, required=True, help="Folder for the pictures.")
+@click.argument("body", type=PATH)
+@click.option("-o", "--output", type=PATH, required=True, help="Folder for the pictures.")
 @click.option("--modes", "chosen", default="1-6", show_default=True, help="Numbers and ranges, such as 1-4,7; or all.")
 @click.option(
     "--scale", default="auto", show_default=True, help="Factor on the mode shapes: a number [m sqrt(kg)], or auto."

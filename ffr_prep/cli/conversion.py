@@ -7,11 +7,9 @@ from pathlib import Path
 
 import click
 
-from ffr_prep.cli.options import check_writable, reference_of
-from ffr_prep.cli.terminal import show
-
-_PATH = click.Path(path_type=Path)
-
+from ffr_prep.cli.options import PATH, check_writable, reference_of
+from ffr_prep.cli.request import OUTPUT
+from ffr_prep.cli.terminal import filed, show
 
 _EXAMPLE = """\b
 Example:
@@ -20,8 +18,8 @@ Example:
 
 
 @click.command("convert", epilog=_EXAMPLE)
-@click.argument("body", type=_PATH)
-@click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
+@click.argument("body", type=PATH)
+@OUTPUT
 @click.option("--reference", required=True, metavar="CONDITIONS", help="As in reduce, on the interfaces of BODY.")
 @click.option(
     "--without-stiffening", is_flag=True, help="Leave out the geometric stiffness, where it cannot come along."
@@ -41,4 +39,4 @@ def convert(body: Path, output: Path, reference: str, without_stiffening: bool) 
     converted = with_reference(replace(loaded, stiffening=None) if without_stiffening else loaded, conditions)
     save_body(converted, output)
     show(short_lines(converted))
-    click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")
+    filed(output)

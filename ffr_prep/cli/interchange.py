@@ -7,10 +7,12 @@ from typing import Any
 
 import click
 
+from ffr_prep.cli.options import PATH
+from ffr_prep.cli.request import OUTPUT
 from ffr_prep.cli.settings import EntriesCommand, NotesCommand
+from ffr_prep.cli.terminal import filed, show
 from ffr_prep.interchange import formats
 
-_PATH = click.Path(path_type=Path)
 _EXPORT = """\b
 Formats:
 {exchange format}
@@ -31,8 +33,8 @@ Example:
 
 
 @click.command("export", cls=EntriesCommand, registries=(formats.EXCHANGE_FORMATS,), epilog=_EXPORT)
-@click.argument("body", type=_PATH)
-@click.option("-o", "--output", type=_PATH, required=True, help="File to write; its suffix is that of a format below.")
+@click.argument("body", type=PATH)
+@click.option("-o", "--output", type=PATH, required=True, help="File to write; its suffix is that of a format below.")
 @click.option("--surface", is_flag=True, help="Also write the points of the surface as nodes.")
 def export_body(body: Path, output: Path, surface: bool, **settings: Any) -> None:
     """Write BODY in the format of another program, by the suffix of the file.
@@ -44,12 +46,12 @@ def export_body(body: Path, output: Path, surface: bool, **settings: Any) -> Non
 
     for lost in formats.export_body(load_body(body), output, surface, settings):
         click.echo(f"note        {lost}")
-    click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")
+    filed(output)
 
 
 @click.command("import", cls=NotesCommand, registries=(formats.EXCHANGE_FORMATS,), epilog=_IMPORT)
-@click.argument("file", type=_PATH)
-@click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
+@click.argument("file", type=PATH)
+@OUTPUT
 def import_body(file: Path, output: Path) -> None:
     """Read FILE, of another program and in SI units, and write it as a body file.
 
@@ -60,8 +62,7 @@ def import_body(file: Path, output: Path) -> None:
 
     body = formats.import_body(file)
     save_body(body, output)
-    for line in short_lines(body):
-        click.echo(line)
+    show(short_lines(body))
     for note in body.provenance["notes"]:
         click.echo(f"note        {note}")
-    click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")
+    filed(output)

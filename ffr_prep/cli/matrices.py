@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffr_prep.cli.options import check_writable, interface_of, reference_of
-from ffr_prep.cli.reduction import band_of, draw_quality, reduction_of, reduction_options
+from ffr_prep.cli.options import PATH, check_writable
+from ffr_prep.cli.request import REQUEST, reduce_to_file, request_of
 from ffr_prep.cli.settings import EntriesCommand
-from ffr_prep.cli.solver import solver_of, solver_options
-from ffr_prep.cli.terminal import closing, show, terminal_steps, written
+from ffr_prep.cli.terminal import show, terminal_steps
 from ffr_prep.common.errors import InputError
 from ffr_prep.matrices.formats import MATRIX_FORMATS
 from ffr_prep.matrices.unit_systems import UNIT_SYSTEMS
@@ -22,7 +21,6 @@ from ffr_prep.reduction.registry import REDUCTIONS
 if TYPE_CHECKING:
     from ffr_prep.matrices.model import MatrixModel
 
-_PATH = click.Path(path_type=Path)
 _SHOWN = 20
 NOTES = """\b
 Files: what other programs write, always of the free body without supports.
@@ -45,60 +43,34 @@ Reference conditions and methods are those of `ffr-prep reduce`. Geometric stiff
 
 
 @click.command("reduce-matrices", cls=EntriesCommand, registries=(REDUCTIONS, MATRIX_FORMATS), epilog=NOTES)
-@click.argument("files", type=_PATH, nargs=-1, required=True)
-@click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
-@click.option("--name", help="Name of the body; default: the name of the file.")
+@click.argument("files", type=PATH, nargs=-1, required=True)
 @click.option(
     "--units", type=click.Choice(list(UNIT_SYSTEMS)), help="Of the numbers in FILES; default: as declared, or m-kg-s."
 )
 @click.option("--group", "groups", multiple=True, metavar="GROUP", help="See below; may be repeated.")
-@click.option("--interface", "interfaces", multiple=True, metavar="INTERFACE", help="See below; may be repeated.")
-@click.option("--reference", default="mean-axis", show_default=True, metavar="CONDITIONS", help="As in reduce.")
-@reduction_options
-@solver_options
-@click.option("--surface", type=_PATH, help="Mesh of the same solid, for drawing; in the length unit of FILES.")
+@click.option("--surface", type=PATH, help="Mesh of the same solid, for drawing; in the length unit of FILES.")
+@REQUEST
 def reduce_matrices_command(
-    files: tuple[Path, ...],
-    output: Path,
-    name: str | None,
-    units: str | None,
-    groups: tuple[str, ...],
-    interfaces: tuple[str, ...],
-    reference: str,
-    surface: Path | None,
-    **options: Any,
+    files: tuple[Path, ...], units: str | None, groups: tuple[str, ...], surface: Path | None, **options: Any
 ) -> None:
     """Reduce stiffness and mass matrices in FILES to a flexible body and write it to a file.
 
     The matrices come from any finite-element program; everything in the body is in SI units.
     """
+    from ffr_prep.matrices.part import from_matrices
     from ffr_prep.matrices.readers import read_matrices
-    from ffr_prep.pipelines.matrices import reduce_matrices
 
-    regions = [interface_of(text) for text in interfaces]
-    conditions, reduction, band = reference_of(reference), reduction_of(options), band_of(options)
-    solver = solver_of(options)
-    check_writable(output)
+    interfaces, request = request_of(options)
+    check_writable(options["output"])
     steps = terminal_steps()
     steps("read the matrices")
     model = _named(read_matrices(files, units=units), groups)
     model = model if surface is None else _drawn(model, surface)
     steps.end()
     show(_lines(model))
-    body = reduce_matrices(
-        model,
-        name=name or output.stem,
-        interfaces=regions,
-        reference=conditions,
-        reduction=reduction,
-        quality=band,
-        solver=solver,
-        progress=steps,
-        advance=steps.advance,
+    reduce_to_file(
+        lambda: from_matrices(model, interfaces, progress=steps), request, options["output"], steps, options["quality"]
     )
-    written(body, output, steps)
-    draw_quality(body, options)
-    closing(output, steps)
 
 
 def _lines(model: MatrixModel) -> Iterator[str]:

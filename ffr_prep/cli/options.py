@@ -9,9 +9,11 @@ from __future__ import annotations
 import os
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import click
 
 from ffr_prep.common.errors import InputError
 
@@ -21,7 +23,21 @@ if TYPE_CHECKING:
     from ffr_prep.model.material import Solid
     from ffr_prep.model.reference import ReferenceConditions
 
+PATH = click.Path(path_type=Path)
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
 _FAR = 10.0
+
+
+def bundle(*options: Decorator) -> Decorator:
+    """Several options as one, in this order in the help."""
+
+    def added(command: Callable[..., Any]) -> Callable[..., Any]:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return added
 
 
 def numbers_of(settings: Sequence[str]) -> dict[str, float]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from ffr_prep.cli.options import PATH, bundle
 from ffr_prep.cli.settings import numbers
 from ffr_prep.common.errors import InputError
 from ffr_prep.reduction.registry import MODES, REDUCTIONS
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from ffr_prep.reduction.basis import Reduction
     from ffr_prep.reduction.selection import Band
 
-Command = TypeVar("Command", bound=Callable[..., Any])
-
 NOTES = """\b
 Reductions: --method may be repeated, and the space of all of them is taken.
 {reduction}
@@ -27,7 +26,7 @@ Modes: a number (--modes), all up to a frequency (--frequency), or as many as ma
 accurate (--accuracy 10,2000,0.05: from 10 to 2000 Hz to 5 per cent).
 """
 
-_OPTIONS = (
+reduction_options = bundle(
     click.option(
         "--method",
         "methods",
@@ -45,9 +44,7 @@ _OPTIONS = (
         metavar="LOW,HIGH,ERROR",
         help="Keep as many as the receptances in a band [Hz] need.",
     ),
-    click.option(
-        "--quality", type=click.Path(path_type=Path), help="Compare with the full model; folder for the pictures of it."
-    ),
+    click.option("--quality", type=PATH, help="Compare with the full model; folder for the pictures of it."),
     click.option(
         "--band",
         callback=numbers(2),
@@ -55,13 +52,6 @@ _OPTIONS = (
         help="Frequencies [Hz] of that comparison; default: those of --accuracy.",
     ),
 )
-
-
-def reduction_options(command: Command) -> Command:
-    """The command with the options of a reduction; their values are for `reduction_of` and `band_of`."""
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
 
 
 def reduction_of(options: Mapping[str, Any]) -> Reduction:
@@ -85,10 +75,10 @@ def band_of(options: Mapping[str, Any]) -> Band | None:
     return Band(*ends)
 
 
-def draw_quality(body: FlexibleBody, options: Mapping[str, Any]) -> None:
+def draw_quality(body: FlexibleBody, folder: Path | None) -> None:
     """Write the pictures of the quality report, if one was asked for."""
-    if options["quality"] is not None:
+    if folder is not None:
         from ffr_prep.report.quality_pictures import quality_pictures
 
-        for path in quality_pictures(body, options["quality"]):
+        for path in quality_pictures(body, folder):
             click.echo(f"picture     {path}")

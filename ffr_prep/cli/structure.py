@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffr_prep.cli.options import check_writable
-from ffr_prep.cli.solver import solver_of, solver_options
-from ffr_prep.cli.terminal import closing, show, terminal_steps, written
+from ffr_prep.cli.options import PATH, check_writable
+from ffr_prep.cli.request import OUTPUT, SOLVER, reduce_to_file, solver_of
+from ffr_prep.cli.terminal import show, terminal_steps
 
 if TYPE_CHECKING:
     from ffr_prep.structures.frame import Frame
 
-_PATH = click.Path(path_type=Path)
 NOTES = """\b
 Example of a STRUCTURE:
   reference = {kind = "fixed", interface = "left_foot"}
@@ -48,28 +48,21 @@ Solids tied to the frame, and other reductions:
 
 
 @click.command("reduce-structure", epilog=NOTES)
-@click.argument("structure", type=_PATH)
-@click.option("-o", "--output", type=_PATH, required=True, help="Body file to write.")
-@solver_options
+@click.argument("structure", type=PATH)
+@OUTPUT
+@SOLVER
 def reduce_structure_command(structure: Path, output: Path, **options: Any) -> None:
     """Reduce the beams and plates that STRUCTURE describes, a TOML file, to a flexible body and write it to a file."""
-    from ffr_prep.pipelines.structure_file import load_structure, reduce_structure
+    from ffr_prep.pipelines.structure_file import read_structure
 
     solver = solver_of(options)
     check_writable(output)
     steps = terminal_steps()
-    loaded = load_structure(structure, steps)
+    loaded = read_structure(structure, steps)
     steps.end()
     show(_lines(loaded.frame))
-    body = reduce_structure(
-        loaded,
-        solver=solver,
-        progress=steps,
-        advance=steps.advance,
-        provenance={"source": {"file": structure.name}},
-    )
-    written(body, output, steps)
-    closing(output, steps)
+    request = replace(loaded.request, solver=solver, provenance={"source": {"file": structure.name}})
+    reduce_to_file(lambda: loaded.model(steps), request, output, steps)
 
 
 def _lines(frame: Frame) -> Iterator[str]:

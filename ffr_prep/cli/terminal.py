@@ -7,14 +7,10 @@ import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from ffr_prep.common.process_memory import begin_peak, in_words, peak
-
-if TYPE_CHECKING:
-    from ffr_prep.body import FlexibleBody
 
 _PAUSE = 0.2  # seconds between two looks at how far a step is
 
@@ -93,18 +89,6 @@ def show(lines: Iterable[str]) -> None:
         click.echo(line)
 
 
-def written(body: FlexibleBody, output: Path, steps: Steps) -> None:
-    """Write the body file and say what is in it."""
-    from ffr_prep.body import save_body
-    from ffr_prep.report.text import short_lines
-
-    steps("write the body file")
-    save_body(body, output)
-    steps.end()
-    show(short_lines(body))
-
-
-def closing(output: Path, steps: Steps) -> None:
-    """What the work took, and where its result is."""
-    show(steps.lines())
+def filed(output: Path) -> None:
+    """Where the result is."""
     click.echo(f"file        {output}, {output.stat().st_size / 1024:.0f} kB")

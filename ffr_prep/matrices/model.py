@@ -11,7 +11,9 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from ffr_prep.body import content_hash
+from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.common.registry import choice
 from ffr_prep.matrices.nodal_inertia import DofMap
 from ffr_prep.matrices.unit_systems import UnitSystem
@@ -30,8 +32,8 @@ _COMPONENTS = (
 )
 
 
-@dataclass(frozen=True)
-class MatrixModel:
+@dataclass(frozen=True, repr=False)
+class MatrixModel(Brief):
     """Nodes, stiffness and mass of a free body, from outside; frozen, SI units.
 
     points     : (N, 3) nodes [m]
@@ -71,6 +73,16 @@ class MatrixModel:
             object.__setattr__(self, "triangles", np.array(self.triangles, np.int64).reshape(-1, 3))
         _check_shapes(self)
         _check_rows(self)
+
+    def _rows(self) -> Rows:
+        return [
+            ("rows", f"{len(self.nodes)}, {self.K.nnz} entries in K, {self.M.nnz} in M"),
+            ("nodes", str(len(self.points))),
+            ("extent", extent_in_words(self.points)),
+            ("groups", listed(self.groups)),
+            ("source", str(self.source.get("format", "unknown"))),
+            ("notes", listed(self.notes)),
+        ]
 
     @property
     def dofs(self) -> DofMap:

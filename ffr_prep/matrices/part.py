@@ -1,7 +1,9 @@
-"""Matrices from outside as a part of a body that is tied to others (`ffr_prep.pipelines.tied`).
+"""Bodies from outside matrices: stiffness and mass of another finite-element program, with its nodes.
 
-What matrices give is stiffness, mass and the places of the nodes: inertia integrals and triangles to draw, if there are any.
-They know no stress, so a body with such a part has no geometric stiffening.
+A `MatrixModel` is nodes, K, M and the map that says which row is which of the six coordinates of which node; nodes of
+solids have three coordinates, those of shells and beams five or six. From there the way is the one of meshes:
+interfaces, reference conditions, reduction, inertia integrals (see `ffr_prep.matrices.nodal_inertia` for what M alone can
+say). Matrices know no stress, so a body with such a part has no geometric stiffening.
 """
 
 from __future__ import annotations
@@ -14,44 +16,42 @@ from ffr_prep.body import Surface
 from ffr_prep.body.provenance import described
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.progress import Stages, no_stages
-from ffr_prep.matrices.checks import check_connected, check_matrices, mass_is_singular, precision_warnings
+from ffr_prep.matrices.checks import (
+    check_connected,
+    check_matrices,
+    check_mechanisms,
+    mass_is_singular,
+    precision_warnings,
+)
 from ffr_prep.matrices.interfaces import couple_matrices, tie_matrices
 from ffr_prep.matrices.model import MatrixModel, model_hash, without_empty_rows
 from ffr_prep.matrices.nodal_inertia import nodal_integrals, scalar_integrals, scalar_mass
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.invariants import InertiaIntegrals
 from ffr_prep.model.model import Model
+from ffr_prep.solvers.threads import on_one_thread
 
 Array = np.ndarray
 
 _DOUBTFUL = 0.1
 
 
-def matrix_part(given: MatrixModel, interfaces: Sequence[InterfaceRegion], progress: Stages = no_stages) -> Model:
-    """The matrices with their interfaces, ready to be tied to other models or reduced with
-    `ffr_prep.pipelines.reduce.reduce_model`.
+@on_one_thread
+def from_matrices(
+    given: MatrixModel, interfaces: Sequence[InterfaceRegion] = (), *, progress: Stages = no_stages
+) -> Model:
+    """The model of matrices from outside, ready to be reduced or to be tied to others.
 
-    Raises InputError for matrices that are not those of a free body, and for coordinates without mass, which only a body of
-    matrices alone may have (`ffr_prep.pipelines.matrices.reduce_matrices`).
+    interfaces : at groups of nodes; one node gives its six coordinates, several follow rigidly or in the mean
+    progress   : called with the name of each stage as it begins
+
+    Consistent and lumped masses are both fine; coordinates without mass only in a body of matrices alone.
+
+    Raises InputError for matrices that are not those of a free body.
     """
-    model = checked(given, progress)
-    if mass_is_singular(model):
-        raise InputError(
-            "some coordinates of the matrices have no mass: give them a little rotary inertia, or reduce the matrices alone"
-        )
-    return part_of(model, interfaces, progress)
-
-
-def checked(given: MatrixModel, progress: Stages) -> MatrixModel:
-    """The model without empty rows; InputError where its matrices are not those of a free body."""
     progress("check the matrices")
     model = without_empty_rows(given)
     check_matrices(model)
-    return model
-
-
-def part_of(model: MatrixModel, interfaces: Sequence[InterfaceRegion], progress: Stages) -> Model:
-    """The `checked` matrices with their interfaces."""
     progress("tie the interfaces")
     ties = tie_matrices(model, interfaces)
     coupled = couple_matrices(model, interfaces, ties)
@@ -70,7 +70,7 @@ def part_of(model: MatrixModel, interfaces: Sequence[InterfaceRegion], progress:
         coupled=coupled,
         inertia=inertia,
         surface=lambda basis: surface_of_nodes(model, ties @ basis),
-        stressed=lambda basis: _nothing(basis.shape[1]),
+        stressed=lambda basis: None,
         stiffening=_unstressed,
         recovery="none of matrices from outside",
         record={
@@ -87,13 +87,15 @@ def part_of(model: MatrixModel, interfaces: Sequence[InterfaceRegion], progress:
         },
         packages=("ffr", "numpy", "scipy"),
         doubts=doubts,
+        massless=mass_is_singular(model),
+        diagnose=lambda: check_mechanisms(model, coupled, ties),
     )
 
 
-def surface_of_nodes(model: MatrixModel, Phi: Array) -> Surface:
-    """The triangles with the translations of their nodes."""
+def surface_of_nodes(model: MatrixModel, Phi: Array) -> Surface | None:
+    """The triangles with the translations of their nodes; None where there are none."""
     if model.triangles is None:
-        return _nothing(Phi.shape[1])
+        return None
     used, triangles = np.unique(model.triangles, return_inverse=True)
     return Surface(model.points[used], triangles.reshape(-1, 3), model.dofs.on_nodes(Phi)[used, :3])
 
@@ -108,13 +110,6 @@ def _doubts(defect: Array) -> list[str]:
         "(terms projected away beside 1); such as torsion of thin bars and waves as short as the elements. Mass, inertia "
         "and momenta are exact"
     ]
-
-
-def _nothing(modes: int) -> Surface:
-    """A surface without points, to which the stress of other parts can be joined."""
-    return Surface(
-        np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros((0, 3, modes)), np.zeros((0, 6, modes)), np.zeros((0, 2))
-    )
 
 
 def _unstressed(static: Array, loads: Array, basis: Array) -> Array:

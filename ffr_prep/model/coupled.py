@@ -17,7 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.in_words import extent_in_words
 
 Array = np.ndarray
 
@@ -49,8 +51,8 @@ class InterfaceRegion:
             raise InputError(f"interface {self.name!r}: point is {self.point}; it must be three finite numbers")
 
 
-@dataclass(frozen=True)
-class CoupledModel:
+@dataclass(frozen=True, repr=False)
+class CoupledModel(Brief):
     """The finite-element model in the independent coordinates z that the rigid interfaces leave.
 
     points  : (N, 3) nodes [m]
@@ -81,6 +83,14 @@ class CoupledModel:
     inertial_loads: Array | None = None
     edges: Array | None = None
     dimension: int = 3
+
+    def _rows(self) -> Rows:
+        return [
+            ("nodes", str(len(self.points))),
+            ("extent", extent_in_words(self.points)),
+            ("coordinates", str(self.K.shape[0])),
+            ("interfaces", listed(f"{name} ({kind})" for name, kind in zip(self.names, self.kinds, strict=True))),
+        ]
 
 
 def interface_index(model: CoupledModel, name: str) -> int:

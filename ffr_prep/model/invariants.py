@@ -31,7 +31,10 @@ class InertiaIntegrals:
 
 
 def inertia_integrals(points: Array, m: sp.sparray, Phi: Array) -> InertiaIntegrals:
-    """The integrals of nodal positions (N, 3) [m] and a basis Phi (N, 3, n) with the scalar mass m (N, N) [kg]."""
+    """The integrals of nodal positions (N, 3) [m] and a basis Phi (N, 3, n) with the scalar mass m (N, N) [kg].
+
+    Equation (5) of docs/notation.md.
+    """
     count, _, n = Phi.shape
     of_nodes = m @ np.ones(count)
     momenta = m @ points

@@ -9,37 +9,49 @@ from typing import Any
 import numpy as np
 
 from ffr_prep.body import BeamForces, Surface
+from ffr_prep.common.arrays import Array
+from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.invariants import InertiaIntegrals
 
-Array = np.ndarray
 
-
-@dataclass(frozen=True)
-class Model:
+@dataclass(frozen=True, repr=False)
+class Model(Brief):
     """What a reduction needs of a model, whatever its elements are; z are the independent coordinates of `coupled`.
 
     coupled    : stiffness, mass, interfaces and inertial loads
     inertia    : inertia integrals of a basis (Z, n)
-    surface    : what is drawn, with the basis (Z, n) at its points
-    stressed   : the same with stress modes, and section forces where there are beams
+    surface    : what is drawn, with the basis (Z, n) at its points; None of nothing
+    stressed   : the same with stress modes, and section forces where there are beams; None where no stress is known
     stiffening : (r, n, n) geometric stiffness of a basis (Z, n) under r loads, of their static displacements (Z, r) and
                  their amplitudes (12 + 6 I, r) of the known loads (`ffr_prep.model.reactions`), reactions included
     recovery   : how the stress is recovered, in words
     record     : what the model is; JSON values
     packages   : whose versions are recorded
     doubts     : what the integrals of a basis (Z, n) cannot be trusted with, in words
+    massless   : some coordinates have no mass
+    diagnose   : called when a computation has failed; raises InputError where the model is found to be the cause
     """
 
     coupled: CoupledModel
     inertia: Callable[[Array], InertiaIntegrals]
-    surface: Callable[[Array], Surface]
-    stressed: Callable[[Array], Surface]
+    surface: Callable[[Array], Surface | None]
+    stressed: Callable[[Array], Surface | None]
     stiffening: Callable[[Array, Array, Array], Array]
     recovery: str
     record: Mapping[str, Any]
     packages: tuple[str, ...] = ("ffr", "numpy", "scipy", "scikit-fem")
     doubts: Callable[[Array], list[str]] = lambda _: []
+    massless: bool = False
+    diagnose: Callable[[], None] = lambda: None
+
+    def _rows(self) -> Rows:
+        kind = [key for key in ("mesh", "frame", "matrices") if key in self.record]
+        return [
+            ("made of", listed(kind or self.record.get("parts", ()))),
+            *self.coupled._rows(),
+            ("warnings", listed(self.record.get("warnings", []))),
+        ]
 
 
 def summed(parts: Sequence[InertiaIntegrals]) -> InertiaIntegrals:
@@ -47,8 +59,11 @@ def summed(parts: Sequence[InertiaIntegrals]) -> InertiaIntegrals:
     return InertiaIntegrals(**{key: sum(vars(part)[key] for part in parts) for key in vars(parts[0])})
 
 
-def merged(surfaces: Sequence[Surface]) -> Surface:
-    """One surface of several; with stress where all have it."""
+def merged(parts: Sequence[Surface | None]) -> Surface | None:
+    """One surface of several; with stress where all have it. None of none."""
+    surfaces = [surface for surface in parts if surface is not None]
+    if not surfaces:
+        return None
     first = np.cumsum([0, *(len(surface.points) for surface in surfaces)])
     beams = [surface.beams for surface in surfaces if surface.beams is not None]
     stress = [surface.stress for surface in surfaces if surface.stress is not None]

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from ffr_prep.body import FlexibleBody, Interface
 from ffr_prep.body.provenance import described
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.progress import Advance, Stages, no_advance, no_stages
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.model import Model
@@ -19,71 +22,135 @@ from ffr_prep.model.reference import ReferenceConditions, functionals
 from ffr_prep.reduction.basis import Basis, Reduction, check_basis, factorised
 from ffr_prep.reduction.quality import assess, completed
 from ffr_prep.reduction.selection import Band
-from ffr_prep.solvers.factor import CHOLESKY, Solver, SupportedBody, solve_refined, supported
+from ffr_prep.solvers.factor import CHOLESKY, FreeBody, Solver, SupportedBody, solve_refined, supported
+from ffr_prep.solvers.threads import on_one_thread
 
-Array = np.ndarray
+_MASSLESS = 1e-9
 
 
-def reduce_model(
-    model: Model,
-    *,
-    name: str,
-    reference: ReferenceConditions,
-    reduction: Reduction,
-    stiffening: bool = False,
-    stress: bool = False,
-    quality: Band | None = None,
-    solver: Solver = CHOLESKY,
-    progress: Stages = no_stages,
-    advance: Advance = no_advance,
-    provenance: Mapping[str, Any] | None = None,
-) -> FlexibleBody:
-    """The reduced flexible body of a model.
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What is wanted of a model.
 
+    name       : of the body
+    reference  : how its frame is attached, such as FixedTo("root") or MeanAxis()
+    reduction  : which deformation shapes it keeps, such as CraigBampton(10)
     stiffening : also compute the geometric stiffness by load, which a simulation then uses
     stress     : also keep section forces of beams and the stress at the surface per elastic coordinate
     quality    : compare the body with the full model over this band of frequencies, and keep what was found
     solver     : what factorises the stiffness and finds the modes
-    progress   : called with the name of each stage as it begins
-    advance    : called within long stages with the share that is done and with how far that is in words
     provenance : JSON values kept with the body, beside what is recorded anyway
+
+    Raises InputError for a reference or reduction that is a name and not an object.
+    """
+
+    name: str
+    reference: ReferenceConditions
+    reduction: Reduction
+    stiffening: bool = False
+    stress: bool = False
+    quality: Band | None = None
+    solver: Solver = CHOLESKY
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for what, given, such in (
+            ("reference", self.reference, 'FixedTo("root")'),
+            ("reduction", self.reduction, "CraigBampton(10)"),
+        ):
+            if isinstance(given, (str, type)):
+                raise InputError(f"{what} is {given!r}; give one such as {such}")
+
+
+@on_one_thread
+def reduce(
+    model: Model, request: Request, *, progress: Stages = no_stages, advance: Advance = no_advance
+) -> FlexibleBody:
+    """The reduced flexible body of a model, in the coordinates of its nodes.
+
+    progress : called with the name of each stage as it begins
+    advance  : called within long stages with the share that is done and with how far that is in words
 
     Raises InputError for input that cannot be used and ComputationError for a computation that failed.
     """
-    for what, given, such in (
-        ("reference", reference, 'FixedTo("root")'),
-        ("reduction", reduction, "CraigBampton(10)"),
-    ):
-        if isinstance(given, (str, type)):
-            raise InputError(f"{what} is {given!r}; give one such as {such}")
+    if model.massless and request.quality:
+        raise InputError(
+            "the quality of a reduction needs a mass for every coordinate, and some have none: leave out the quality report"
+        )
+    try:
+        return _reduced(model, request, progress, advance)
+    except ComputationError:
+        model.diagnose()
+        raise
+
+
+def _reduced(model: Model, request: Request, progress: Stages, advance: Advance) -> FlexibleBody:
     coupled = model.coupled
-    L = functionals(reference, coupled)
+    L = functionals(request.reference, coupled)
     progress("factorise the stiffness")
-    body = factorised(coupled, solver, advance)
+    body = factorised(coupled, request.solver, advance)
     progress("reduce")
-    basis = reduction.basis(coupled, body, L)
+    basis = (_shifted_basis if model.massless else _basis)(request.reduction, coupled, body, L)
     check_basis(coupled, L, basis)
-    if quality:
+    if request.quality:
         progress("compare with the full model")
-    assessed = assess(coupled, body, L, basis, quality) if quality else None
+    assessed = assess(coupled, body, L, basis, request.quality) if request.quality else None
     progress("integrate the inertia")
     integrals = model.inertia(basis.Z)
-    if stress:
+    if request.stress:
         progress("recover the stress")
-    surface = (model.stressed if stress else model.surface)(basis.Z)
-    if stiffening:
+    surface = (model.stressed if request.stress else model.surface)(basis.Z)
+    if request.stress and surface is None:
+        raise InputError("no part of this model knows its stress: reduce it without")
+    if request.stiffening:
         progress("compute the geometric stiffness")
-    recorded = record(model, reference, reduction, model.doubts(basis.Z)) | {"solver": described(solver)}
-    recovered = {"stress": model.recovery} if stress else {}
     return FlexibleBody(
-        name=name,
+        name=request.name,
         omega2=basis.omega2,
         interfaces=interface_shapes(coupled, basis),
         surface=surface,
-        stiffening=stiffening_matrices(model, reference, supported(body, L), basis) if stiffening else None,
-        provenance=completed(recorded | recovered | dict(provenance or {}), basis, assessed),
+        stiffening=stiffening_matrices(model, request, supported(body, L), basis) if request.stiffening else None,
+        provenance=completed(record(model, request, model.doubts(basis.Z)), basis, assessed),
         **vars(integrals),
     )
+
+
+# ---- basis --------------------------------------------------------------------------------------------------------
+
+
+def _basis(reduction: Reduction, coupled: CoupledModel, body: FreeBody, L: Array) -> Basis:
+    try:
+        return reduction.basis(coupled, body, L)
+    except np.linalg.LinAlgError as error:
+        raise ComputationError(f"the eigenproblem of K and M failed ({error}): is M nearly singular?") from None
+
+
+def _shifted_basis(reduction: Reduction, coupled: CoupledModel, body: FreeBody, L: Array) -> Basis:
+    """The basis where M is singular, found with the definite M + epsilon K in its place, which changes no shape.
+
+    K v = lam M v and K v = mu (M + epsilon K) v have the same vectors, with lam = mu / (1 - epsilon mu); rigid motions and
+    static shapes do not depend on M; and of massless motions lam is infinite, but mu = 1 / epsilon.
+    """
+    epsilon = _epsilon(coupled)
+    found = _basis(reduction, replace(coupled, M=sp.csr_array(coupled.M + epsilon * coupled.K)), body, L)
+    share = 1 - epsilon * found.omega2
+    massless = int(np.sum(share < _MASSLESS))
+    if massless:
+        raise InputError(
+            f"{massless} of the {len(share)} shapes move no mass: M is zero for rotations or nodes that they consist of; ask "
+            "for fewer modes, or give the interface nodes a mass"
+        )
+    return replace(found, Z=found.Z / np.sqrt(share), omega2=found.omega2 / share)
+
+
+def _epsilon(coupled: CoupledModel) -> float:
+    """A time squared [s^2] in the upper middle of the spectrum: the median ratio of the diagonals."""
+    mass, stiffness = coupled.M.diagonal(), coupled.K.diagonal()
+    massive = mass > 1e-12 * mass.max()
+    return float(np.median(mass[massive] / stiffness[massive]))
+
+
+# ---- parts of the body --------------------------------------------------------------------------------------------
 
 
 def interface_shapes(model: CoupledModel, basis: Basis) -> tuple[Interface, ...]:
@@ -93,7 +160,7 @@ def interface_shapes(model: CoupledModel, basis: Basis) -> tuple[Interface, ...]
     return tuple(Interface(name, at, six[:3], six[3:], kind) for name, at, six, kind in attached)
 
 
-def stiffening_matrices(model: Model, reference: ReferenceConditions, held: SupportedBody, basis: Basis) -> Array:
+def stiffening_matrices(model: Model, request: Request, held: SupportedBody, basis: Basis) -> Array:
     """(12 + 6 I, n, n) reduced geometric stiffness per unit load, in the order of `FlexibleBody.stiffening`.
 
     held : the body under its reference conditions
@@ -102,15 +169,18 @@ def stiffening_matrices(model: Model, reference: ReferenceConditions, held: Supp
     """
     loads = known_loads(model.coupled)
     static = solve_refined(held, loads, np.zeros((len(held.C), loads.shape[1])))[0]
-    K = model.stiffening(static, in_equilibrium(model.coupled, reference, static), basis.Z)
+    K = model.stiffening(static, in_equilibrium(model.coupled, request.reference, static), basis.Z)
     return (K + K.transpose(0, 2, 1)) / 2
 
 
-def record(model: Model, reference: ReferenceConditions, reduction: Reduction, doubts: Sequence[str]) -> dict[str, Any]:
+def record(model: Model, request: Request, doubts: Sequence[str]) -> dict[str, Any]:
     """Provenance as JSON values: model, settings, versions. No time and no path, so it is reproducible."""
-    return dict(model.record) | {
-        "reference": described(reference),
-        "reduction": described(reduction),
+    of_model = dict(model.record) | {
+        "reference": described(request.reference),
+        "reduction": described(request.reduction),
         "versions": {package: version(package) for package in model.packages},
         "warnings": [*model.record.get("warnings", []), *doubts],
+        "solver": described(request.solver),
     }
+    recovered = {"stress": model.recovery} if request.stress else {}
+    return of_model | recovered | dict(request.provenance)

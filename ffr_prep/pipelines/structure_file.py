@@ -30,16 +30,15 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
-from threadpoolctl import threadpool_limits
 
-from ffr_prep.body import FlexibleBody
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.progress import Advance, Stages, no_advance, no_stages
+from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.mesh.mesh import Mesh, read_mesh
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material, material
+from ffr_prep.model.model import Model
 from ffr_prep.model.reference import FixedTo, MeanAxis, ReferenceConditions, SimplySupported, Support, Supports
-from ffr_prep.pipelines.reduce import reduce_model
+from ffr_prep.pipelines.reduce import Request
 from ffr_prep.pipelines.structure_schema import (
     FixedEntry,
     InterfaceEntry,
@@ -53,15 +52,13 @@ from ffr_prep.pipelines.structure_schema import (
     structure_schema,
 )
 from ffr_prep.pipelines.tied import tied
-from ffr_prep.reduction.basis import Reduction
 from ffr_prep.reduction.registry import reduction_of
 from ffr_prep.reduction.selection import Band
 from ffr_prep.solids.assembly import Materials
-from ffr_prep.solids.model import solid_model
-from ffr_prep.solvers.factor import CHOLESKY, Solver
+from ffr_prep.solids.model import from_mesh
 from ffr_prep.structures.frame import Frame, Member, Shell, joined, named, panel, polyline, triangulated
 from ffr_prep.structures.frame_geometry import read_frame
-from ffr_prep.structures.model import frame_model
+from ffr_prep.structures.model import from_frame
 from ffr_prep.structures.sections import Section, circle, general, i_section, rectangle, shear_rigid, shifted, tube
 
 
@@ -73,19 +70,22 @@ class Structure:
     ties   : pairs of interfaces "part.interface" that are joined; the frame is the part "frame"
     """
 
-    name: str
     frame: Frame
     interfaces: tuple[InterfaceRegion, ...]
     solids: Mapping[str, tuple[Mesh, Materials, tuple[InterfaceRegion, ...]]]
     ties: tuple[tuple[str, str], ...]
-    reference: ReferenceConditions
-    reduction: Reduction
-    stiffening: bool
-    stress: bool
-    quality: Band | None
+    request: Request
+
+    def model(self, progress: Stages = no_stages) -> Model:
+        """The frame with the solids that are tied to it; errors as of `from_frame`, `from_mesh` and `tied`."""
+        frame = from_frame(self.frame, self.interfaces, progress=progress)
+        if not self.solids:
+            return frame
+        solids = {name: from_mesh(*parts, progress=progress) for name, parts in self.solids.items()}
+        return tied({"frame": frame, **solids}, self.ties)
 
 
-def load_structure(path: str | Path, progress: Stages = no_stages) -> Structure:
+def read_structure(path: str | Path, progress: Stages = no_stages) -> Structure:
     """Read a structure file, and the geometry it names.
 
     Raises InputError for a file that cannot be read, unknown or missing entries, and whatever the frame's parts refuse;
@@ -97,48 +97,21 @@ def load_structure(path: str | Path, progress: Stages = no_stages) -> Structure:
         members, shells = _members(entry), _shells(entry)
         frame = named(_frame(entry, path.parent, members, shells, progress), **entry.nodes)
         return Structure(
-            name=entry.name or path.stem,
             frame=frame,
             interfaces=_regions(entry.interfaces),
             solids={name: _solid(entry, of, path.parent, progress) for name, of in entry.solids.items()},
             ties=tuple(entry.ties),
-            reference=_reference(entry.reference),
-            reduction=reduction_of([vars(of) for of in entry.reduction], path.parent),
-            stiffening=entry.stiffening,
-            stress=entry.stress,
-            quality=None if entry.quality is None else Band(*entry.quality),
+            request=Request(
+                name=entry.name or path.stem,
+                reference=_reference(entry.reference),
+                reduction=reduction_of([vars(of) for of in entry.reduction], path.parent),
+                stiffening=entry.stiffening,
+                stress=entry.stress,
+                quality=None if entry.quality is None else Band(*entry.quality),
+            ),
         )
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-
-
-def reduce_structure(
-    structure: Structure,
-    *,
-    solver: Solver = CHOLESKY,
-    progress: Stages = no_stages,
-    advance: Advance = no_advance,
-    provenance: Mapping[str, Any] | None = None,
-) -> FlexibleBody:
-    """The reduced flexible body of a structure; settings and errors as in `ffr_prep.pipelines.structures.reduce_frame`."""
-    with threadpool_limits(1):  # as for solids: small dense blocks, and reproducible
-        model = frame_model(structure.frame, structure.interfaces, progress)
-        if structure.solids:
-            solids = {name: solid_model(*parts, progress) for name, parts in structure.solids.items()}
-            model = tied({"frame": model, **solids}, structure.ties)
-        return reduce_model(
-            model,
-            name=structure.name,
-            reference=structure.reference,
-            reduction=structure.reduction,
-            stiffening=structure.stiffening,
-            stress=structure.stress,
-            quality=structure.quality,
-            solver=solver,
-            progress=progress,
-            advance=advance,
-            provenance=provenance,
-        )
 
 
 def _read(path: Path) -> StructureEntry:

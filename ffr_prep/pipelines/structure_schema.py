@@ -2,35 +2,18 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator, model_validator
+from pydantic import Field, create_model, field_validator, model_validator
 
+from ffr_prep.common.strict import Strict
 from ffr_prep.reduction.registry import REDUCTIONS, method_of
 
 Vector = tuple[float, float, float]
 
 
-class _Strict(BaseModel):
-    """Unknown keys are mistakes; numbers must be finite."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _known(cls, given: Any) -> Any:
-        known = list(cls.model_fields)
-        for key in given if isinstance(given, dict) else ():
-            if key not in known:
-                close = get_close_matches(str(key), known, 1)
-                hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(known)}"
-                raise ValueError(f"{key!r} is not a known entry here; {hint}")
-        return given
-
-
-class RectangleEntry(_Strict):
+class RectangleEntry(Strict):
     """Width b along z', height h along y' [m]."""
 
     shape: Literal["rectangle"]
@@ -38,14 +21,14 @@ class RectangleEntry(_Strict):
     h: float
 
 
-class CircleEntry(_Strict):
+class CircleEntry(Strict):
     """Diameter d [m]."""
 
     shape: Literal["circle"]
     d: float
 
 
-class TubeEntry(_Strict):
+class TubeEntry(Strict):
     """Outer diameter d and wall t [m]."""
 
     shape: Literal["tube"]
@@ -53,7 +36,7 @@ class TubeEntry(_Strict):
     t: float
 
 
-class IEntry(_Strict):
+class IEntry(Strict):
     """Height h, width b, web and flange thickness [m]."""
 
     shape: Literal["i"]
@@ -63,7 +46,7 @@ class IEntry(_Strict):
     flange: float
 
 
-class GeneralEntry(_Strict):
+class GeneralEntry(Strict):
     """A section by its constants, as in `ffr_prep.structures.sections.general`."""
 
     shape: Literal["general"]
@@ -78,7 +61,7 @@ class GeneralEntry(_Strict):
 SectionEntry = Annotated[RectangleEntry | CircleEntry | TubeEntry | IEntry | GeneralEntry, Field(discriminator="shape")]
 
 
-class MaterialEntry(_Strict):
+class MaterialEntry(Strict):
     """Young's modulus [Pa], Poisson's ratio, density [kg/m^3]."""
 
     E: float
@@ -86,7 +69,7 @@ class MaterialEntry(_Strict):
     rho: float
 
 
-class MemberEntry(_Strict):
+class MemberEntry(Strict):
     """A beam; orientation lies in its x'y' plane, offset is (y, z) of the centroid [m]; shear = false: Euler-Bernoulli."""
 
     section: SectionEntry
@@ -96,7 +79,7 @@ class MemberEntry(_Strict):
     shear: bool = True
 
 
-class ShellEntry(_Strict):
+class ShellEntry(Strict):
     """A plate of a thickness [m]; rotary_inertia = false leaves out that of the thickness."""
 
     thickness: float
@@ -104,7 +87,7 @@ class ShellEntry(_Strict):
     rotary_inertia: bool = True
 
 
-class GeometryEntry(_Strict):
+class GeometryEntry(Strict):
     """A file as in `ffr_prep.structures.frame_geometry.read_frame`; size and numbers change how a geometry is meshed."""
 
     file: Path
@@ -113,7 +96,7 @@ class GeometryEntry(_Strict):
     numbers: dict[str, float] = {}
 
 
-class PolylineEntry(_Strict):
+class PolylineEntry(Strict):
     """Beams from corner to corner [m], each of several elements."""
 
     member: str
@@ -121,7 +104,7 @@ class PolylineEntry(_Strict):
     elements: int = 1
 
 
-class PanelEntry(_Strict):
+class PanelEntry(Strict):
     """A plate between four corners [m] of n x m elements, or of twice as many triangles."""
 
     shell: str
@@ -130,7 +113,7 @@ class PanelEntry(_Strict):
     triangles: bool = False
 
 
-class InterfaceEntry(_Strict):
+class InterfaceEntry(Strict):
     """At the nodes of a group, by default the one of the same name; point [m]: where its node is."""
 
     region: str | None = None
@@ -138,7 +121,7 @@ class InterfaceEntry(_Strict):
     point: Vector | None = None
 
 
-class SupportEntry(_Strict):
+class SupportEntry(Strict):
     """One prevented motion of an interface."""
 
     interface: str
@@ -146,14 +129,14 @@ class SupportEntry(_Strict):
     direction: Vector
 
 
-class FixedEntry(_Strict):
+class FixedEntry(Strict):
     """The frame moves with an interface."""
 
     kind: Literal["fixed"]
     interface: str
 
 
-class SimplySupportedEntry(_Strict):
+class SimplySupportedEntry(Strict):
     """The x' axis of the elastic field passes through two interfaces."""
 
     kind: Literal["simply-supported"]
@@ -161,13 +144,13 @@ class SimplySupportedEntry(_Strict):
     roller: str
 
 
-class MeanAxisEntry(_Strict):
+class MeanAxisEntry(Strict):
     """The frame follows the mean motion of the mass."""
 
     kind: Literal["mean-axis"]
 
 
-class SupportsEntry(_Strict):
+class SupportsEntry(Strict):
     """Any choice of prevented motions."""
 
     kind: Literal["supports"]
@@ -179,7 +162,7 @@ ReferenceEntry = Annotated[
 ]
 
 
-class ReductionEntry(_Strict):
+class ReductionEntry(Strict):
     """A reduction, of a method in `ffr_prep.reduction.registry` or a file of one's own vectors, with a number of normal
     modes, 10 when nothing is said, or all up to a frequency [Hz], or as many as a relative accuracy of the receptances in
     a band [low, high, error] needs. `structure_schema` adds the settings of the methods.
@@ -203,7 +186,7 @@ class ReductionEntry(_Strict):
         return self
 
 
-class SolidEntry(_Strict):
+class SolidEntry(Strict):
     """A solid that is tied to the frame: a mesh or geometry as in `ffr_prep.mesh.mesh.read_mesh`, of one material or of one
     for each volume, with interfaces of its own.
     """
@@ -217,7 +200,7 @@ class SolidEntry(_Strict):
     order: Literal[1, 2] = 2
 
 
-class StructureEntry(_Strict):
+class StructureEntry(Strict):
     """The whole file."""
 
     name: str | None = None

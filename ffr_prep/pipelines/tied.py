@@ -21,6 +21,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from ffr_prep.body import Surface
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.accelerations import INERTIAL
 from ffr_prep.model.coupled import CoupledModel, interface_index
@@ -28,9 +29,8 @@ from ffr_prep.model.invariants import InertiaIntegrals
 from ffr_prep.model.model import Model, merged, summed
 from ffr_prep.model.reactions import known_loads
 from ffr_prep.model.region_rotations import second_order_turn
+from ffr_prep.solvers.threads import on_one_thread
 from ffr_prep.structures.interfaces import rigid_coordinates
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)
@@ -43,13 +43,14 @@ class _End:
     own: Array | None
 
 
+@on_one_thread
 def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
     """One model of several, joined at pairs of interfaces named "part.interface".
 
     Of each pair one must be rigid or a node; the other may be mean, which leaves its region soft.
 
-    Raises InputError for an unknown name, an interface in two ties, a tie of two mean interfaces, parts that nothing joins
-    and names of interfaces that repeat.
+    Raises InputError for an unknown name, an interface in two ties, a tie of two mean interfaces, parts that nothing joins,
+    parts with coordinates that have no mass, and names of interfaces that repeat.
     """
     models = list(parts.values())
     _check_ties(parts, ties)
@@ -59,10 +60,10 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
     rows = np.split(np.arange(X.shape[0]), np.cumsum([m.coupled.K.shape[0] for m in models])[:-1])
     own = [X[of] for of in rows]
 
-    def surfaces(basis: Array) -> Surface:
+    def surfaces(basis: Array) -> Surface | None:
         return merged([m.surface(x @ basis) for m, x in zip(models, own, strict=True)])
 
-    def stressed(basis: Array) -> Surface:
+    def stressed(basis: Array) -> Surface | None:
         return merged([m.stressed(x @ basis) for m, x in zip(models, own, strict=True)])
 
     def inertia(basis: Array) -> InertiaIntegrals:
@@ -268,6 +269,12 @@ def _check_ties(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> 
     twice = [name for name, count in uses.items() if count > 1]
     if twice:
         raise InputError(f"interface {twice[0]!r} is in {uses[twice[0]]} ties: give each tie an interface of its own")
+    massless = [name for name, part in parts.items() if part.massless]
+    if massless:
+        raise InputError(
+            f"some coordinates of the part {massless[0]!r} have no mass: give them a little rotary inertia, or reduce it "
+            "alone"
+        )
     left = [n for part, m in parts.items() for n in m.coupled.names if f"{part}.{n}" not in uses]
     repeated = sorted({name for name in left if left.count(name) > 1})
     if repeated:

@@ -9,12 +9,12 @@ import numpy as np
 
 from ffr_prep.body import FlexibleBody
 from ffr_prep.body.interface_freedom import interface_freedom
+from ffr_prep.common.arrays import Array
+from ffr_prep.common.in_words import settings_in_words, vector_in_words
 from ffr_prep.reduction.quality import Quality, quality_of
 
 if TYPE_CHECKING:
     from ffr_prep.mesh.mesh import Mesh
-
-Array = np.ndarray
 
 _MOST_MODES = 40
 _MOST_NAMES = 20
@@ -31,7 +31,7 @@ def mesh_lines(mesh: Mesh) -> Iterator[str]:
     elements = ", ".join(f"{count} {kind}" for kind, count in counts.items())
     yield f"mesh        {elements}; {len(mesh.points)} nodes, {3 * len(mesh.points)} degrees of freedom"
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    yield f"extent      {_vector(high - low)} m, from {_vector(low)} to {_vector(high)}"
+    yield f"extent      {vector_in_words(high - low)} m, from {vector_in_words(low)} to {vector_in_words(high)}"
     yield f"surfaces    {_names(mesh.face_groups)}"
     if mesh.node_groups:
         yield f"node sets   {_names(mesh.node_groups)}"
@@ -54,7 +54,7 @@ def body_lines(body: FlexibleBody) -> Iterator[str]:
 
 def short_lines(body: FlexibleBody) -> Iterator[str]:
     """A body in a few lines."""
-    yield f"mass        {body.mass:.6g} kg, centre of mass {_vector(body.centre_of_mass)} m"
+    yield f"mass        {body.mass:.6g} kg, centre of mass {vector_in_words(body.centre_of_mass)} m"
     yield from _interface_lines(body)
     if body.n:
         shown = ", ".join(f"{f:.4g}" for f in body.frequencies[:6])
@@ -71,11 +71,11 @@ def _mass_lines(body: FlexibleBody) -> Iterator[str]:
     principal, axes = np.linalg.eigh(body.central_inertia)
     axes = axes * np.sign(axes[np.argmax(np.abs(axes), axis=0), range(3)])
     yield f"mass        {body.mass:.6g} kg"
-    yield f"centre      {_vector(body.centre_of_mass)} m"
+    yield f"centre      {vector_in_words(body.centre_of_mass)} m"
     yield from _tensor_lines("inertia     about origin  ", body.inertia)
     yield from _tensor_lines(f"{'':12}about centre  ", body.central_inertia)
     for moment, axis in zip(principal, axes.T, strict=True):
-        yield f"{'':12}principal     {moment:12.5g} kg m^2 about {_vector(axis)}"
+        yield f"{'':12}principal     {moment:12.5g} kg m^2 about {vector_in_words(axis)}"
 
 
 def _tensor_lines(label: str, tensor: Array) -> Iterator[str]:
@@ -89,7 +89,7 @@ def _interface_lines(body: FlexibleBody) -> Iterator[str]:
     size = float(np.sqrt(np.trace(body.rr_dm) / body.mass)) if body.mass > 0 else 0.0
     for k, interface in enumerate(body.interfaces[:_MOST_INTERFACES]):
         label = "interfaces" if k == 0 else ""
-        yield f"{label:12}{interface.name:{width}}  {interface.kind:5}  at {_vector(interface.position, size)} m"
+        yield f"{label:12}{interface.name:{width}}  {interface.kind:5}  at {vector_in_words(interface.position, size)} m"
     if len(body.interfaces) > _MOST_INTERFACES:
         yield f"{'':12}{len(body.interfaces) - _MOST_INTERFACES} more"
 
@@ -210,30 +210,15 @@ def _percent(error: float) -> str:
 def _choice_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
     for key in ("reduction", "reference", "material"):
         if key in provenance:
-            yield f"{key:12}{_settings(provenance[key])}"
+            yield f"{key:12}{settings_in_words(provenance[key])}"
 
 
 def _origin_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
     for key, value in provenance.items():
         if value and key not in ("reduction", "reference", "material", "interfaces", "warnings", "quality"):
-            yield f"{key:12}{_settings(value)}"
+            yield f"{key:12}{settings_in_words(value)}"
     for warning in provenance.get("warnings", []):
         yield f"warning     {warning}"
-
-
-def _settings(value: Any) -> str:
-    """Nested settings in one line."""
-    if isinstance(value, Mapping):
-        words = [f"{k} {_settings(v)}" for k, v in value.items() if k != "type" and v not in (None, {}, [])]
-        return " ".join([*([value["type"]] if "type" in value else []), ", ".join(words)]).strip()
-    if isinstance(value, list):
-        return "(" + ", ".join(map(_settings, value)) + ")"
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _vector(vector: Array, size: float = 0.0) -> str:
-    shown = np.where(np.abs(vector) < _NOISE * max(np.abs(vector).max(), size), 0.0, vector) + 0.0
-    return "(" + ", ".join(f"{x:.5g}" for x in shown) + ")"
 
 
 def _names(groups: Mapping[str, object]) -> str:

@@ -21,17 +21,20 @@ from ffr_prep.solids.assembly import Materials, assemble
 from ffr_prep.solids.interfaces import couple, turning_regions
 from ffr_prep.solids.stiffening import inertial_loads, stiffening_of
 from ffr_prep.solids.stress_modes import AVERAGING, stressed_boundary
+from ffr_prep.solvers.threads import on_one_thread
 
 Array = np.ndarray
 
 
-def solid_model(
-    mesh: Mesh,
-    material: Materials,
-    interfaces: Sequence[InterfaceRegion],
-    progress: Stages = no_stages,
+@on_one_thread
+def from_mesh(
+    mesh: Mesh, material: Materials, interfaces: Sequence[InterfaceRegion] = (), *, progress: Stages = no_stages
 ) -> Model:
-    """The solid with its interfaces, of one material or of one for each volume group.
+    """The model of a meshed solid, ready to be reduced or to be tied to others.
+
+    material   : one, or one for each volume group
+    interfaces : at face or node groups of the mesh
+    progress   : called with the name of each stage as it begins
 
     Raises InputError for input that cannot be used.
     """

@@ -9,16 +9,19 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import wraps
 from itertools import pairwise
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 import numba
 import numpy as np
 import scipy.sparse as sp
-from threadpoolctl import ThreadpoolController
+from threadpoolctl import ThreadpoolController, threadpool_limits
 
 Array = np.ndarray
 Map = Callable[[Callable[..., Any], Iterable[Any]], Iterable[Any]]
+Given = ParamSpec("Given")
+Made = TypeVar("Made")
 
 _BLAS = ThreadpoolController()
 _PIECES = 16
@@ -29,6 +32,17 @@ def threads() -> Iterator[Map]:
     """A map that runs on all threads there are; each calls BLAS on its own."""
     with _BLAS.limit(limits=1), ThreadPoolExecutor(os.cpu_count()) as pool:
         yield pool.map
+
+
+def on_one_thread(function: Callable[Given, Made]) -> Callable[Given, Made]:
+    """The function with one thread of BLAS: for small dense blocks threads that wait are slower, and one is reproducible."""
+
+    @wraps(function)
+    def alone(*args: Given.args, **kwargs: Given.kwargs) -> Made:
+        with threadpool_limits(1):
+            return function(*args, **kwargs)
+
+    return alone
 
 
 def pieces(size: int) -> list[slice]:

@@ -13,9 +13,11 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ffr_prep.body import content_hash
+from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.common.registry import choice
-from ffr_prep.model.material import Material
+from ffr_prep.model.material import Material, check_isotropic
 from ffr_prep.structures.sections import Section
 
 Array = np.ndarray
@@ -39,6 +41,7 @@ class Member:
     orientation: Vector | None = None
 
     def __post_init__(self) -> None:
+        check_isotropic(self.material, f"member of {self.section.name!r}")
         given = self.orientation
         if given is not None and (np.shape(given) != (3,) or not 0 < np.linalg.norm(given) < np.inf):
             raise InputError(f"member of {self.section.name!r}: orientation {given} is not a direction (x, y, z)")
@@ -60,6 +63,7 @@ class Shell:
     gyration: float | None = None
 
     def __post_init__(self) -> None:
+        check_isotropic(self.material, "shell")
         if not 0 < self.thickness < math.inf:
             raise InputError(f"shell of {self.material.name}: the thickness is {self.thickness} m; it must be positive")
         if self.gyration is None:
@@ -68,8 +72,8 @@ class Shell:
             raise InputError(f"shell of {self.material.name}: gyration is {self.gyration} m; it must not be negative")
 
 
-@dataclass(frozen=True)
-class Frame:
+@dataclass(frozen=True, repr=False)
+class Frame(Brief):
     """Nodes with six coordinates each, and straight beams and flat plates between them; frozen, SI units.
 
     points         : (N, 3) [m]
@@ -110,6 +114,17 @@ class Frame:
             raise InputError(
                 f"node {wrong[0]} has the coordinates {self.points[wrong[0]]}; they must be finite numbers"
             )
+
+    def _rows(self) -> Rows:
+        kinds = {"beams": self.elements, "triangles": self.triangles, "quadrilaterals": self.quadrilaterals}
+        return [
+            ("elements", listed(f"{len(nodes)} {kind}" for kind, nodes in kinds.items() if len(nodes))),
+            ("nodes", str(len(self.points))),
+            ("extent", extent_in_words(self.points)),
+            ("members", listed(f"{of.section.name} of {of.material.name}" for of in self.members)),
+            ("shells", listed(f"{of.thickness:.4g} m of {of.material.name}" for of in self.shells)),
+            ("groups", listed(self.node_groups)),
+        ]
 
 
 def _freeze(frame: Frame, key: str, value: Array, shape: tuple[int, ...]) -> None:

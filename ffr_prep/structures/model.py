@@ -26,6 +26,7 @@ from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
 from ffr_prep.model.invariants import InertiaIntegrals, inertia_integrals
 from ffr_prep.model.model import Model, merged, summed
 from ffr_prep.model.region_rotations import region_stiffening
+from ffr_prep.solvers.threads import on_one_thread
 from ffr_prep.structures.element_families import Family, families
 from ffr_prep.structures.frame import Frame, check_frame, frame_hash
 from ffr_prep.structures.interfaces import couple_frame, tie, turning_regions
@@ -48,8 +49,16 @@ class StructuralMatrices:
     loads: Array
 
 
-def frame_model(frame: Frame, interfaces: Sequence[InterfaceRegion], progress: Stages = no_stages) -> Model:
-    """The frame, ready to be reduced or to be tied to other models. Errors and arguments as in `reduce_frame`."""
+@on_one_thread
+def from_frame(frame: Frame, interfaces: Sequence[InterfaceRegion] = (), *, progress: Stages = no_stages) -> Model:
+    """The model of a frame of beams and plates, ready to be reduced or to be tied to others.
+
+    interfaces : at groups of nodes. Rigid ones: one node gives its six coordinates, several follow the interface. Mean
+                 ones leave their nodes free and move with them in the mean
+    progress   : called with the name of each stage as it begins
+
+    Raises InputError for input that cannot be used.
+    """
     progress("check the frame")
     check_frame(frame)
     progress("assemble stiffness and mass")
@@ -73,10 +82,10 @@ def frame_model(frame: Frame, interfaces: Sequence[InterfaceRegion], progress: S
         of_elements = [part.stiffening(nodal(part, static), inside, nodal(part, basis)) for part in parts]
         return np.sum(of_elements, axis=0) + region_stiffening(regions, static, amplitudes, basis)
 
-    def surface(basis: Array) -> Surface:
+    def surface(basis: Array) -> Surface | None:
         return merged([part.surface(nodal(part, basis)) for part in parts])
 
-    def stressed(basis: Array) -> Surface:
+    def stressed(basis: Array) -> Surface | None:
         return merged([part.stressed(nodal(part, basis)) for part in parts])
 
     return Model(

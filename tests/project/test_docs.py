@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import runpy
 import sys
@@ -18,9 +19,29 @@ from ffr_dyn.results.quantities import DEFAULT_OUTPUTS
 from ffr_dyn.scene_file.read import load_scene
 from ffr_prep.body import load_body, save_body
 
+DOORS = ("ffr_prep", "ffr_dyn")
+
 
 def code(page: str, language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", (ROOT / page).read_text(encoding="utf-8"), re.S)
+
+
+@pytest.mark.parametrize("page", ["README.md", *(f"docs/{path.name}" for path in sorted((ROOT / "docs").glob("*.md")))])
+def test_programs_use_the_front_doors_alone(page):
+    """Everything else in the packages is private."""
+    imports = [
+        node
+        for text in code(page, "python")
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Import | ast.ImportFrom)
+    ]
+    named = [
+        name
+        for node in imports
+        for name in ([node.module or ""] if isinstance(node, ast.ImportFrom) else [alias.name for alias in node.names])
+    ]
+    assert [name for name in named if name.partition(".")[0] in DOORS and name not in DOORS] == []
+    assert [node for node in imports if isinstance(node, ast.ImportFrom) and node.module in DOORS] == []
 
 
 def test_the_scene_file_of_the_documentation_is_valid(tmp_path):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from places import ROOT
 
+import ffr_prep as fp
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.scene.scene import Scene
@@ -19,7 +20,6 @@ from ffr_prep.mesh.mesh import read_mesh
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import SimplySupported
-from ffr_prep.pipelines.mesh import reduce_mesh
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 
 EXAMPLES = ROOT / "examples"
@@ -37,13 +37,13 @@ def connecting_rod(folder: Path) -> tuple[Scene, float]:
 
 def pendulum(folder: Path) -> tuple[Scene, float]:
     """The scene file, with the body that its heading makes."""
-    body = reduce_mesh(
-        read_mesh(ROOT / "meshes" / "pendulum.geo"),
-        name="pendulum",
-        material=Material("strip", E=7e10, nu=0.3, rho=5540),
-        interfaces=[InterfaceRegion("hinge"), InterfaceRegion("tip")],
-        reference=SimplySupported("hinge", "tip"),
-        reduction=CraigBampton(8),
+    body = fp.reduce(
+        fp.from_mesh(
+            read_mesh(ROOT / "meshes" / "pendulum.geo"),
+            Material("strip", E=7e10, nu=0.3, rho=5540),
+            [InterfaceRegion("hinge"), InterfaceRegion("tip")],
+        ),
+        fp.Request(name="pendulum", reference=SimplySupported("hinge", "tip"), reduction=CraigBampton(8)),
     )
     (folder / "out" / "pendulum").mkdir(parents=True)
     (folder / "examples").mkdir()

@@ -9,6 +9,7 @@ import pytest
 from test_analyses_references import END, andrews
 from test_dyn_references import GRAVITY, mass_point
 
+import ffr_prep as fp
 from ffr_dyn.chart.diagram import Diagram, measures_of, work_precision
 from ffr_dyn.chart.orders import observed_order, orders
 from ffr_dyn.chart.runner import Here, Span
@@ -22,7 +23,6 @@ from ffr_prep.body import rigid_body
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import SimplySupported
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.structures.frame import Member, named, polyline
 from ffr_prep.structures.sections import circle, rectangle
@@ -53,10 +53,10 @@ def beam(length: float, section, material: Material):
     """Four elastic coordinates in the plane at most, so that steps resolve all of them."""
     member = Member(section, material, orientation=(0, 1, 0))
     frame = named(polyline([(0, 0, 0), (length, 0, 0)], member, elements=8), a=(0, 0, 0), b=(length, 0, 0))
-    return reduce_frame(
-        frame, name="rod", interfaces=[InterfaceRegion("a"), InterfaceRegion("b")],
-        reference=SimplySupported("a", "b"), reduction=CraigBampton(0),
-    )  # fmt: skip
+    return fp.reduce(
+        fp.from_frame(frame, [InterfaceRegion("a"), InterfaceRegion("b")]),
+        fp.Request(name="rod", reference=SimplySupported("a", "b"), reduction=CraigBampton(0)),
+    )
 
 
 def flexible_pendulum() -> Scene:

@@ -9,6 +9,7 @@ import pytest
 from boxes import STEEL, box_mesh
 from synthetic import cloud
 
+import ffr_prep as fp
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.equations.inertia import mass_matrix
 from ffr_dyn.functions.rotation import rotation_matrix
@@ -22,7 +23,6 @@ from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import rigid_body
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
-from ffr_prep.pipelines.mesh import reduce_mesh
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 
 GRAVITY = (0.0, -9.81, 0.0)
@@ -155,13 +155,9 @@ def test_a_very_stiff_body_moves_as_the_rigid_one():
 def beam_in_three_frames():
     mesh = box_mesh("hex20", (1.0, 0.05, 0.1), (5, 1, 1))
     return [
-        reduce_mesh(
-            mesh,
-            name="beam",
-            material=STEEL,
-            interfaces=[InterfaceRegion("left"), InterfaceRegion("right")],
-            reference=reference,
-            reduction=CraigBampton(3),
+        fp.reduce(
+            fp.from_mesh(mesh, STEEL, [InterfaceRegion("left"), InterfaceRegion("right")]),
+            fp.Request(name="beam", reference=reference, reduction=CraigBampton(3)),
         )
         for reference in (FixedTo("left"), SimplySupported("left", "right"), MeanAxis())
     ]

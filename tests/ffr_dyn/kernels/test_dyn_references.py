@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from places import MESHES, REFERENCE
 
+import ffr_prep as fp
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.equations.inertia import quadratic_velocity
 from ffr_dyn.functions.time_functions import polynomial
@@ -20,8 +21,6 @@ from ffr_prep.mesh.mesh import read_mesh
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
-from ffr_prep.pipelines.mesh import reduce_mesh
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.frame import Member, named, polyline
@@ -97,13 +96,9 @@ def test_stiff_spring_pendulum():
 
 
 def solid(mesh: str, material: Material, ends: tuple[str, str], kind: str, reference, modes: int = 8) -> FlexibleBody:
-    return reduce_mesh(
-        read_mesh(MESHES / mesh),
-        name="rod",
-        material=material,
-        interfaces=[InterfaceRegion(end, kind=kind) for end in ends],
-        reference=reference,
-        reduction=CraigBampton(modes),
+    return fp.reduce(
+        fp.from_mesh(read_mesh(MESHES / mesh), material, [InterfaceRegion(end, kind=kind) for end in ends]),
+        fp.Request(name="rod", reference=reference, reduction=CraigBampton(modes)),
     )
 
 
@@ -172,7 +167,9 @@ def test_a_radial_rod_stretches_under_spin_as_its_quadratic_inertia_says(kL, str
         polyline([(0, 0, 0), (1.0, 0, 0)], Member(circle(0.01), metal), elements=40), root=(0, 0, 0), tip=(1, 0, 0)
     )
     ends = [InterfaceRegion("root"), InterfaceRegion("tip")]
-    whole = reduce_frame(frame, name="rod", interfaces=ends, reference=FixedTo("root"), reduction=Eigenmodes(240))
+    whole = fp.reduce(
+        fp.from_frame(frame, ends), fp.Request(name="rod", reference=FixedTo("root"), reduction=Eigenmodes(240))
+    )
     body = truncated(whole, np.flatnonzero(np.einsum("jj->j", whole.PP_dm[0, 0]) > 0.99))
     assert body.n == 40
     omega = np.array([0.0, 0.0, kL * np.sqrt(metal.E / metal.rho)])

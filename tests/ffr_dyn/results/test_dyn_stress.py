@@ -14,6 +14,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 from test_animate import rotating_box
 
+import ffr_prep as fp
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.cli import cli
 from ffr_dyn.functions.time_functions import polynomial
@@ -49,8 +50,6 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.mesh import Block
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo, MeanAxis
-from ffr_prep.pipelines.mesh import reduce_mesh
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.reduction.methods.inertia_relief import InertiaRelief
@@ -273,14 +272,18 @@ def test_a_rotating_bar_has_the_tension_of_the_mass_beyond(relief, smallest, lar
     Fixed-interface modes alone, the first ones being bending, carry none of it: inertia needs shapes of its own.
     """
     material = replace(STEEL, nu=0.0)
-    bar = reduce_mesh(
-        box_mesh("hex20", (1.0, 0.02, 0.02), (10, 1, 1), origin=(0, -0.01, -0.01)),
-        name="bar",
-        material=material,
-        interfaces=[InterfaceRegion("left")],
-        reference=FixedTo("left"),
-        reduction=Union((CraigBampton(2), InertiaRelief())) if relief else CraigBampton(2),
-        stress=True,
+    bar = fp.reduce(
+        fp.from_mesh(
+            box_mesh("hex20", (1.0, 0.02, 0.02), (10, 1, 1), origin=(0, -0.01, -0.01)),
+            material,
+            [InterfaceRegion("left")],
+        ),
+        fp.Request(
+            name="bar",
+            reference=FixedTo("left"),
+            reduction=Union((CraigBampton(2), InertiaRelief())) if relief else CraigBampton(2),
+            stress=True,
+        ),
     )
     hinge = (Joint("hinge", "revolute", "ground.O", "body.left"),)
     result = settled(bar, hinge, (Driver("motor", "hinge", polynomial(0, SPIN)),))
@@ -306,14 +309,9 @@ def ring(elements, radius, thickness):
 def test_a_spinning_ring_has_its_hoop_stress():
     """sigma = rho Omega^2 R^2 of a thin ring, within 1 % at every node; free, with inertia relief."""
     radius = 0.5
-    body = reduce_mesh(
-        ring(60, radius, 0.005),
-        name="ring",
-        material=STEEL,
-        interfaces=[],
-        reference=MeanAxis(),
-        reduction=Union((Eigenmodes(2), InertiaRelief())),
-        stress=True,
+    body = fp.reduce(
+        fp.from_mesh(ring(60, radius, 0.005), STEEL, []),
+        fp.Request(name="ring", reference=MeanAxis(), reduction=Union((Eigenmodes(2), InertiaRelief())), stress=True),
     )
     result = settled(body)
     stress = tensors(body.surface, result["body.q"][-1:])[:, 0]
@@ -327,13 +325,11 @@ def test_section_forces_of_a_sagging_cantilever_and_the_reaction_of_its_joint(tm
     """Weight p per length on n elements of length l: root shear p (L - l / 2), root moment p (L^2 / 2 - l^2 / 12)."""
     section, length, elements = rectangle(0.02, 0.04), 2.0, 5
     frame = polyline([(0, 0, 0), (length, 0, 0)], Member(section, STEEL, (0, 1, 0)), elements=elements)
-    beam = reduce_frame(
-        named(frame, root=(0, 0, 0)),
-        name="beam",
-        interfaces=[InterfaceRegion("root")],
-        reference=FixedTo("root"),
-        reduction=Union((CraigBampton(0), InertiaRelief())),
-        stress=True,
+    beam = fp.reduce(
+        fp.from_frame(named(frame, root=(0, 0, 0)), [InterfaceRegion("root")]),
+        fp.Request(
+            name="beam", reference=FixedTo("root"), reduction=Union((CraigBampton(0), InertiaRelief())), stress=True
+        ),
     )
     clamp = (Joint("clamp", "fixed", "ground.O", "beam.root"),)
     scene = Scene((Body("beam", beam, damping=1.0),), clamp, ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0))

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import ffr_prep as fp
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import flattened
@@ -26,7 +27,6 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.structures.frame import Member, named, polyline
 from ffr_prep.structures.sections import rectangle
@@ -46,13 +46,9 @@ MEASUREMENTS = (
 def boom():
     member = Member(rectangle(0.013, 0.02), Material("aluminium", 7e10, 0.3, 2700.0), orientation=(0, 1, 0))
     frame = named(polyline([(0, 0, 0), (1.0, 0, 0)], member, elements=8), root=(0, 0, 0), tip=(1.0, 0, 0))
-    return reduce_frame(
-        frame,
-        name="boom",
-        interfaces=[InterfaceRegion("root"), InterfaceRegion("tip")],
-        reference=FixedTo("root"),
-        reduction=CraigBampton(2),
-        stress=True,
+    return fp.reduce(
+        fp.from_frame(frame, [InterfaceRegion("root"), InterfaceRegion("tip")]),
+        fp.Request(name="boom", reference=FixedTo("root"), reduction=CraigBampton(2), stress=True),
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import ffr_prep as fp
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.consistency.assemble import assemble, flattened
 from ffr_dyn.functions.rotation import euler_parameters, rotation_matrix
@@ -21,7 +22,6 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import SimplySupported
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.structures.frame import Member, named, polyline
 from ffr_prep.structures.sections import rectangle
@@ -33,13 +33,9 @@ def rod(name: str, length: float, *, stiffening: bool = False):
     """A flexible rod along x in the plane z = 0, higher than wide so that no frequencies coincide."""
     member = Member(rectangle(0.013, 0.02), ALUMINIUM, orientation=(0, 1, 0))
     frame = named(polyline([(0, 0, 0), (length, 0, 0)], member, elements=6), a=(0, 0, 0), b=(length, 0, 0))
-    return reduce_frame(
-        frame,
-        name=name,
-        interfaces=[InterfaceRegion("a"), InterfaceRegion("b")],
-        reference=SimplySupported("a", "b"),
-        reduction=CraigBampton(6),
-        stiffening=stiffening,
+    return fp.reduce(
+        fp.from_frame(frame, [InterfaceRegion("a"), InterfaceRegion("b")]),
+        fp.Request(name=name, reference=SimplySupported("a", "b"), reduction=CraigBampton(6), stiffening=stiffening),
     )
 
 
@@ -168,8 +164,9 @@ def test_twists_of_a_tall_bar_are_across_a_declared_plane():
     member = Member(rectangle(0.02, 0.06), ALUMINIUM, orientation=(0, 1, 0))
     frame = named(polyline([(0, 0, 0), (1.0, 0, 0)], member, elements=12), a=(0, 0, 0), b=(1.0, 0, 0))
     ends = [InterfaceRegion("a"), InterfaceRegion("b")]
-    tall = reduce_frame(
-        frame, name="link", interfaces=ends, reference=SimplySupported("a", "b"), reduction=CraigBampton(6)
+    tall = fp.reduce(
+        fp.from_frame(frame, ends),
+        fp.Request(name="link", reference=SimplySupported("a", "b"), reduction=CraigBampton(6)),
     )
     found = flattened(double_pendulum(tall), 0.0)[0]
     declared = flattened(double_pendulum(tall, plane="z"), 0.0)[0]
@@ -195,12 +192,9 @@ def link():
     """32 modes, of which the highest turn their ends by a hundred times what the lowest do, with as much more rounding."""
     member = Member(rectangle(0.013, 0.02), ALUMINIUM, orientation=(0, 1, 0))
     frame = named(polyline([(0, 0, 0), (1.0, 0, 0)], member, elements=12), a=(0, 0, 0), b=(1.0, 0, 0))
-    return reduce_frame(
-        frame,
-        name="link",
-        interfaces=[InterfaceRegion("a"), InterfaceRegion("b")],
-        reference=SimplySupported("a", "b"),
-        reduction=CraigBampton(26),
+    return fp.reduce(
+        fp.from_frame(frame, [InterfaceRegion("a"), InterfaceRegion("b")]),
+        fp.Request(name="link", reference=SimplySupported("a", "b"), reduction=CraigBampton(26)),
     )
 
 

@@ -10,6 +10,7 @@ import pytest
 from boxes import STEEL, box_mesh
 from synthetic import cloud
 
+import ffr_prep as fp
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import assemble
@@ -26,7 +27,6 @@ from ffr_prep.body import BodyError, axial, rigid_body
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import SimplySupported
-from ffr_prep.pipelines.mesh import reduce_mesh
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 
 
@@ -105,10 +105,10 @@ def test_the_start_and_the_damping_come_along():
 def test_bending_in_two_planes_stays_apart():
     """A planar scene with fewer modes is planar still."""
     mesh = box_mesh("hex20", (0.4, 0.02, 0.03), (4, 1, 1), origin=(0, -0.01, -0.015))
-    rod = reduce_mesh(
-        mesh, name="rod", material=STEEL, interfaces=[InterfaceRegion("left"), InterfaceRegion("right")],
-        reference=SimplySupported("left", "right"), reduction=CraigBampton(6),
-    )  # fmt: skip
+    rod = fp.reduce(
+        fp.from_mesh(mesh, STEEL, [InterfaceRegion("left"), InterfaceRegion("right")]),
+        fp.Request(name="rod", reference=SimplySupported("left", "right"), reduction=CraigBampton(6)),
+    )
     place = tuple(rod.interface("left").position)
     hinge = Joint("hinge", "revolute", "ground.O", "rod.left")
     scene = Scene((Body("rod", rod),), (hinge,), ground={"O": place}, gravity=(0, -9.81, 0))

@@ -11,6 +11,7 @@ from boxes import STEEL, box_mesh
 from nodal_field import Field, field, in_coordinates, integrals, of_body, orthonormal, tilde
 from synthetic import cloud
 
+import ffr_prep as fp
 import ffr_prep.interchange.common_format
 from ffr_prep.body import FlexibleBody, axial, load_body, rigid_body, save_body
 from ffr_prep.cli import main
@@ -18,7 +19,6 @@ from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.interchange.mbdyn import read_fem, write_fem
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo, MeanAxis
-from ffr_prep.pipelines.mesh import reduce_mesh
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 
@@ -104,13 +104,13 @@ MODAL = (14, 15, 16, 17, 18)
 
 
 def beam_with(reference, reduction):
-    return reduce_mesh(
-        box_mesh("hex8", (1.0, 0.1, 0.06), (6, 2, 2)),
-        name="a beam",
-        material=STEEL,
-        interfaces=(InterfaceRegion("left"), InterfaceRegion("right", kind="mean")),
-        reference=reference,
-        reduction=reduction,
+    return fp.reduce(
+        fp.from_mesh(
+            box_mesh("hex8", (1.0, 0.1, 0.06), (6, 2, 2)),
+            STEEL,
+            (InterfaceRegion("left"), InterfaceRegion("right", kind="mean")),
+        ),
+        fp.Request(name="a beam", reference=reference, reduction=reduction),
     )
 
 

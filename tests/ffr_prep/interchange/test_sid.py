@@ -11,13 +11,13 @@ from boxes import STEEL, box_mesh
 from nodal_field import Field, field, in_coordinates, integrals, of_body, orthonormal, tilde
 from synthetic import cloud
 
+import ffr_prep as fp
 from ffr_prep.body import FlexibleBody, axial, load_body, rigid_body, save_body
 from ffr_prep.cli import main
 from ffr_prep.common.errors import InputError
 from ffr_prep.interchange.sid import blocks, read_sid, write_sid
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo
-from ffr_prep.pipelines.mesh import reduce_mesh
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 
 LAYOUTS = ("mode-major", "axis-major")
@@ -168,13 +168,13 @@ def foreign(path, given: Field, *, Gr="axis-major", Ge="axis-major", at=NODES, c
 
 @pytest.fixture(scope="module")
 def beam() -> FlexibleBody:
-    return reduce_mesh(
-        box_mesh("hex8", (1.0, 0.1, 0.06), (6, 2, 2)),
-        name="a beam",
-        material=STEEL,
-        interfaces=(InterfaceRegion("left"), InterfaceRegion("right", kind="mean")),
-        reference=FixedTo("left"),
-        reduction=CraigBampton(4),
+    return fp.reduce(
+        fp.from_mesh(
+            box_mesh("hex8", (1.0, 0.1, 0.06), (6, 2, 2)),
+            STEEL,
+            (InterfaceRegion("left"), InterfaceRegion("right", kind="mean")),
+        ),
+        fp.Request(name="a beam", reference=FixedTo("left"), reduction=CraigBampton(4)),
     )
 
 

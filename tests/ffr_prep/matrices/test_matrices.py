@@ -12,8 +12,10 @@ import scipy.sparse as sp
 from boxes import STEEL, box_mesh, rotation
 from matrix_models import bar, lumped, of_frame, of_solid, rod, space_frame
 
+import ffr_prep as fp
 from ffr_prep.body import FlexibleBody, axial, load_body, save_body
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.progress import no_stages
 from ffr_prep.matrices.interfaces import couple_matrices, tie_matrices
 from ffr_prep.matrices.model import (
     MatrixModel,
@@ -29,9 +31,6 @@ from ffr_prep.matrices.unit_systems import UNIT_SYSTEMS, UnitSystem
 from ffr_prep.mesh.mesh import Block, Mesh, surface_triangles
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, UserConditions
-from ffr_prep.pipelines.matrices import reduce_matrices
-from ffr_prep.pipelines.mesh import reduce_mesh
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.sections import rectangle
@@ -41,14 +40,11 @@ SIDES = (InterfaceRegion("left"), InterfaceRegion("right", kind="mean"))
 EXACT = ("mass", "r_dm", "rr_dm", "P_dm", "I4", "omega2")
 
 
-def reduced(model, interfaces=(), reference=None, reduction=None, **settings) -> FlexibleBody:
-    return reduce_matrices(
-        model,
-        name="body",
-        interfaces=interfaces,
-        reference=reference or MeanAxis(),
-        reduction=reduction or Eigenmodes(3),
-        **settings,
+def reduced(model, interfaces=(), reference=None, reduction=None, progress=no_stages, **settings) -> FlexibleBody:
+    return fp.reduce(
+        fp.from_matrices(model, interfaces, progress=progress),
+        fp.Request(name="body", reference=reference or MeanAxis(), reduction=reduction or Eigenmodes(3), **settings),
+        progress=progress,
     )
 
 
@@ -153,9 +149,12 @@ def test_point_masses_with_rotary_inertia():
 
 @pytest.mark.parametrize("reference", [FixedTo("a"), SimplySupported("a", "b"), MeanAxis()])
 def test_a_frame_from_its_matrices(frame_model, reference):
-    settings = {"interfaces": [InterfaceRegion("a"), InterfaceRegion("b")], "reference": reference}
-    own = reduce_frame(space_frame(), name="body", reduction=CraigBampton(4), **settings)
-    body = reduced(frame_model, reduction=CraigBampton(4), **settings)
+    interfaces, settings = (
+        [InterfaceRegion("a"), InterfaceRegion("b")],
+        {"reference": reference, "reduction": CraigBampton(4)},
+    )
+    own = fp.reduce(fp.from_frame(space_frame(), interfaces), fp.Request(name="body", **settings))
+    body = reduced(frame_model, interfaces, **settings)
     scale = {"P_dm": np.sqrt(own.mass), "I4": np.sqrt(np.trace(own.rr_dm))}
     for name in EXACT:
         value = getattr(own, name)
@@ -173,8 +172,11 @@ def test_what_a_frame_mass_does_not_say_is_small_for_slender_beams():
     In the planes of the axes; in planes between them the same error is spread over more entries.
     """
     frame = rod(rectangle(0.005, 0.005), 1.0, 32)
-    settings = {"interfaces": ENDS[:1], "reference": FixedTo("root"), "reduction": Eigenmodes(6)}
-    own, body = reduce_frame(frame, name="body", **settings), reduced(of_frame(frame), **settings)
+    settings = {"reference": FixedTo("root"), "reduction": Eigenmodes(6)}
+    own, body = (
+        fp.reduce(fp.from_frame(frame, ENDS[:1]), fp.Request(name="body", **settings)),
+        reduced(of_frame(frame), ENDS[:1], **settings),
+    )
     assert np.abs(own.rP_dm - body.rP_dm).max() < 1e-6
     assert np.abs(own.PP_dm - body.PP_dm).max() < 6e-3
     assert body.provenance["warnings"] == []
@@ -184,8 +186,11 @@ def test_the_error_of_the_frame_falls_with_the_elements():
     errors = []
     for elements in (8, 16, 32):
         frame = rod(rectangle(0.005, 0.005), 1.0, elements)
-        settings = {"interfaces": ENDS[:1], "reference": FixedTo("root"), "reduction": Eigenmodes(4)}
-        own, body = reduce_frame(frame, name="body", **settings), reduced(of_frame(frame), **settings)
+        settings = {"reference": FixedTo("root"), "reduction": Eigenmodes(4)}
+        own, body = (
+            fp.reduce(fp.from_frame(frame, ENDS[:1]), fp.Request(name="body", **settings)),
+            reduced(of_frame(frame), ENDS[:1], **settings),
+        )
         errors.append(np.abs(own.PP_dm - body.PP_dm).max())
     assert errors[1] < errors[0] / 2.5
     assert errors[2] < errors[1] / 2.5
@@ -204,10 +209,10 @@ def test_a_solid_from_its_matrices(reference):
     mesh = box_mesh("hex20", (1.0, 0.1, 0.06), (4, 1, 1))
     model = of_solid(mesh)
     by_nodes = replace(mesh, face_groups={}, node_groups=dict(model.groups))
-    settings = {"interfaces": SIDES, "reference": reference, "reduction": CraigBampton(4)}
-    own = reduce_mesh(by_nodes, name="body", material=STEEL, **settings)
+    settings = {"reference": reference, "reduction": CraigBampton(4)}
+    own = fp.reduce(fp.from_mesh(by_nodes, STEEL, SIDES), fp.Request(name="body", **settings))
     points, triangles = surface_triangles(mesh)
-    body = reduced(with_surface(model, mesh.points[points], triangles), **settings)
+    body = reduced(with_surface(model, mesh.points[points], triangles), SIDES, **settings)
     for name in (*EXACT, "rP_dm", "PP_dm"):
         scale = np.sqrt(own.mass) if name in ("P_dm", "I4") else np.abs(getattr(own, name)).max()
         np.testing.assert_allclose(getattr(body, name), getattr(own, name), rtol=0, atol=1e-8 * scale, err_msg=name)

@@ -15,6 +15,7 @@ from matrix_models import bar, of_frame, rod, space_frame
 from nastran_files import write_op2
 from places import ROOT
 
+import ffr_prep as fp
 from ffr_prep.body import load_body
 from ffr_prep.cli import main
 from ffr_prep.cli.matrices import reduce_matrices_command
@@ -26,7 +27,6 @@ from ffr_prep.matrices.readers import read_matrices
 from ffr_prep.matrices.unit_systems import UNIT_SYSTEMS
 from ffr_prep.mesh.abaqus import nodes_from_abaqus
 from ffr_prep.model.reference import MeanAxis
-from ffr_prep.pipelines.matrices import reduce_matrices
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.sections import rectangle
 
@@ -484,8 +484,8 @@ def test_op4_file(model, tmp_path, control, sparse):
     np.testing.assert_allclose(back.points, model.points, atol=1e-9)
     np.testing.assert_allclose(back.K.toarray(), model.K.toarray(), rtol=1e-14, atol=1e-3)
     assert list(back.groups) == ["set_10"]
-    body = reduce_matrices(back, name="body", interfaces=(), reference=MeanAxis(), reduction=Eigenmodes(2))
-    own = reduce_matrices(model, name="body", interfaces=(), reference=MeanAxis(), reduction=Eigenmodes(2))
+    body = fp.reduce(fp.from_matrices(back, ()), fp.Request(name="body", reference=MeanAxis(), reduction=Eigenmodes(2)))
+    own = fp.reduce(fp.from_matrices(model, ()), fp.Request(name="body", reference=MeanAxis(), reduction=Eigenmodes(2)))
     np.testing.assert_allclose(body.omega2, own.omega2, rtol=1e-5)
 
 
@@ -498,8 +498,8 @@ def test_op2_file(model, tmp_path, wide):
     assert back.labels.tolist() == sorted(model.labels.tolist())
     np.testing.assert_allclose(back.points, model.points, rtol=0, atol=0 if wide else 1e-7)
     assert_same(replace(back, points=model.points), replace(model, groups={}, triangles=None))
-    body = reduce_matrices(back, name="body", interfaces=(), reference=MeanAxis(), reduction=Eigenmodes(2))
-    own = reduce_matrices(model, name="body", interfaces=(), reference=MeanAxis(), reduction=Eigenmodes(2))
+    body = fp.reduce(fp.from_matrices(back, ()), fp.Request(name="body", reference=MeanAxis(), reduction=Eigenmodes(2)))
+    own = fp.reduce(fp.from_matrices(model, ()), fp.Request(name="body", reference=MeanAxis(), reduction=Eigenmodes(2)))
     np.testing.assert_allclose(body.omega2, own.omega2, rtol=1e-12 if wide else 1e-5)
 
 

@@ -7,12 +7,12 @@ import pytest
 from boxes import STEEL, box_mesh, moved, rotation, shaken
 from synthetic import cloud
 
+import ffr_prep as fp
 from ffr_prep.body import axial
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.invariants import inertia_integrals
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, functionals
-from ffr_prep.pipelines.mesh import reduce_mesh
 from ffr_prep.reduction.basis import factorised
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.solids.assembly import assemble
@@ -107,8 +107,8 @@ MESH = shaken(box_mesh("tet10", (0.8, 0.2, 0.1), (4, 2, 1), origin=(0.1, -0.3, 0
 
 
 def reduced(mesh, reference):
-    return reduce_mesh(
-        mesh, name="b", material=STEEL, interfaces=INTERFACES, reference=reference, reduction=CraigBampton(4)
+    return fp.reduce(
+        fp.from_mesh(mesh, STEEL, INTERFACES), fp.Request(name="b", reference=reference, reduction=CraigBampton(4))
     )
 
 

@@ -11,6 +11,7 @@ import scipy.optimize
 import scipy.sparse as sp
 from boxes import STEEL, box_mesh, moved, rotation
 
+import ffr_prep as fp
 from ffr_dyn.analyses.linearise import linearise
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
@@ -22,8 +23,6 @@ from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, SimplySupported
 from ffr_prep.model.region_rotations import region_stiffening, second_order_turn
-from ffr_prep.pipelines.mesh import reduce_mesh
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.conversion import with_reference
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.solids.assembly import assemble
@@ -33,7 +32,6 @@ from ffr_prep.structures.beam_stress import end_forces
 from ffr_prep.structures.beams import beams, element_coordinates
 from ffr_prep.structures.frame import Member, Shell, named, panel, polyline
 from ffr_prep.structures.interfaces import turning_regions as turning_nodes
-from ffr_prep.structures.model import frame_model
 from ffr_prep.structures.sections import circle, general, rectangle, shear_rigid
 
 FORCE, MOMENT = 12 + 6, 12 + 9  # at the second interface
@@ -98,7 +96,7 @@ def test_the_work_of_a_mean_interface_of_nodes_that_turn():
     frame = polyline(corners, Member(circle(0.02), STEEL), elements=1)
     frame = replace(frame, node_groups={"all": np.arange(3)})
     interface = InterfaceRegion("all", kind="mean", point=(0.6, 0.1, -0.1))
-    model = frame_model(frame, [interface]).coupled
+    model = fp.from_frame(frame, [interface]).coupled
     rng = np.random.default_rng(5)
     shapes, wrench = 0.3 * rng.normal(size=(18, 4)), rng.normal(size=6)
     loads = np.concatenate([np.zeros(12), wrench])[:, None]
@@ -141,10 +139,10 @@ def test_a_mean_interface_holds_a_sheet_whatever_its_mesh():
         sheet = panel([(0, 0, 0), (L, 0, 0), (L, h, 0), (0, h, 0)], Shell(t, METAL), elements=elements)
         x = sheet.points[:, 0]
         sheet = replace(sheet, node_groups={"left": np.flatnonzero(x < 1e-9), "right": np.flatnonzero(x > L - 1e-9)})
-        body = reduce_frame(
-            sheet, name="s", interfaces=[ENDS[0], InterfaceRegion("right", kind="mean")], reference=FixedTo("left"),
-            reduction=CraigBampton(1),
-        )  # fmt: skip
+        body = fp.reduce(
+            fp.from_frame(sheet, [ENDS[0], InterfaceRegion("right", kind="mean")]),
+            fp.Request(name="s", reference=FixedTo("left"), reduction=CraigBampton(1)),
+        )
         turned.append(body.interface("right").phi_r[2] ** 2 @ (1 / body.omega2))
     np.testing.assert_allclose(turned, L / (METAL.E * t * h**3 / 12), rtol=0.05)
 
@@ -194,26 +192,30 @@ def critical_load(body: FlexibleBody, of_unit_load: np.ndarray) -> float:
 def strip_of_beams() -> FlexibleBody:
     section = shear_rigid(general("strip", A=1e-3, Iy=1e-9, Iz=1e-4, J=4e-9))
     frame = named(polyline([(0, 0, 0), (1, 0, 0)], Member(section, STEEL, (0, 1, 0)), elements=40), left=(0, 0, 0))
-    return reduce_frame(
-        named(frame, right=(1, 0, 0)), name="b", interfaces=ENDS, reference=FixedTo("left"),
-        reduction=CraigBampton(24), stiffening=True,
-    )  # fmt: skip
+    return fp.reduce(
+        fp.from_frame(named(frame, right=(1, 0, 0)), ENDS),
+        fp.Request(name="b", reference=FixedTo("left"), reduction=CraigBampton(24), stiffening=True),
+    )
 
 
 def strip_of_solids(kind: str = "rigid") -> FlexibleBody:
-    return reduce_mesh(
-        box_mesh("hex20", (1.0, 0.06, 0.005), (20, 2, 1), (0, -0.03, -0.0025)),
-        name="b", material=METAL, interfaces=[ENDS[0], InterfaceRegion("right", kind=kind)],
-        reference=FixedTo("left"), reduction=CraigBampton(16), stiffening=True,
-    )  # fmt: skip
+    return fp.reduce(
+        fp.from_mesh(
+            box_mesh("hex20", (1.0, 0.06, 0.005), (20, 2, 1), (0, -0.03, -0.0025)),
+            METAL,
+            [ENDS[0], InterfaceRegion("right", kind=kind)],
+        ),
+        fp.Request(name="b", reference=FixedTo("left"), reduction=CraigBampton(16), stiffening=True),
+    )
 
 
 def strip_of_plates() -> FlexibleBody:
     frame = panel([(0, 0, 0), (1, 0, 0), (1, 0.06, 0), (0, 0.06, 0)], Shell(0.005, METAL), elements=(16, 2))
     x = frame.points[:, 0]
     frame = replace(frame, node_groups={"left": np.flatnonzero(x < 1e-9), "right": np.flatnonzero(x > 1 - 1e-9)})
-    return reduce_frame(
-        frame, name="b", interfaces=ENDS, reference=FixedTo("left"), reduction=CraigBampton(16), stiffening=True
+    return fp.reduce(
+        fp.from_frame(frame, ENDS),
+        fp.Request(name="b", reference=FixedTo("left"), reduction=CraigBampton(16), stiffening=True),
     )
 
 
@@ -244,8 +246,9 @@ def test_buckling_of_a_shaft_by_torque():
     frame = named(
         polyline([(0, 0, 0), (1, 0, 0)], Member(section, STEEL), elements=40), left=(0, 0, 0), right=(1, 0, 0)
     )
-    body = reduce_frame(
-        frame, name="b", interfaces=ENDS, reference=FixedTo("left"), reduction=CraigBampton(16), stiffening=True
+    body = fp.reduce(
+        fp.from_frame(frame, ENDS),
+        fp.Request(name="b", reference=FixedTo("left"), reduction=CraigBampton(16), stiffening=True),
     )
     critical = critical_load(body, body.stiffening[MOMENT])
     assert critical == pytest.approx(np.pi * STEEL.E * section.Iz, rel=2e-3)
@@ -257,11 +260,10 @@ def test_buckling_of_a_column_with_a_rigid_end(kind, arm):
     """A force along the column at an arm a beyond its end (or before it): tan(k L) = 1/(k a), P = k^2 EI."""
     if kind in ("solid", "solid-mean"):
         right = InterfaceRegion("right", kind="mean" if "mean" in kind else "rigid", point=(1.0 + arm, 0, 0))
-        body = reduce_mesh(
-            box_mesh("hex20", (1.0, 0.02, 0.03), (20, 1, 1), (0, -0.01, -0.015)),
-            name="c", material=METAL, interfaces=[ENDS[0], right], reference=FixedTo("left"),
-            reduction=CraigBampton(8), stiffening=True,
-        )  # fmt: skip
+        body = fp.reduce(
+            fp.from_mesh(box_mesh("hex20", (1.0, 0.02, 0.03), (20, 1, 1), (0, -0.01, -0.015)), METAL, [ENDS[0], right]),
+            fp.Request(name="c", reference=FixedTo("left"), reduction=CraigBampton(8), stiffening=True),
+        )
         EI = METAL.E * 0.03 * 0.02**3 / 12
     else:
         section = shear_rigid(circle(0.02))
@@ -270,8 +272,9 @@ def test_buckling_of_a_column_with_a_rigid_end(kind, arm):
         frame = named(frame, left=(0, 0, 0), right=(1, 0, 0))
         offset = (0, 0.3, 0.1) if kind == "offset-section" else (0, 0, 0)
         ends = [InterfaceRegion(n, point=(x, *offset[1:])) for n, x in (("left", 0.0), ("right", 1.0 + arm))]
-        body = reduce_frame(
-            frame, name="c", interfaces=ends, reference=FixedTo("left"), reduction=CraigBampton(8), stiffening=True
+        body = fp.reduce(
+            fp.from_frame(frame, ends),
+            fp.Request(name="c", reference=FixedTo("left"), reduction=CraigBampton(8), stiffening=True),
         )
         EI = STEEL.E * section.Iz
     interval = (1e-3, np.pi / 2) if arm > 0 else (np.pi / 2, np.pi - 1e-3)

@@ -10,12 +10,13 @@ import pytest
 from click.testing import CliRunner
 from places import ROOT
 
+import ffr_prep as fp
 from ffr_prep.body import load_body
 from ffr_prep.cli import cli, main
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.material import Material, material
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports
-from ffr_prep.pipelines.structure_file import load_structure, reduce_structure
+from ffr_prep.pipelines.structure_file import read_structure
 from ffr_prep.reduction.methods.attachment import AttachmentModes
 from ffr_prep.reduction.methods.characteristic import CharacteristicModes
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
@@ -55,15 +56,20 @@ def page(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", (ROOT / "docs/structural.md").read_text(encoding="utf-8"), re.S)
 
 
+def body_of(path: Path) -> fp.FlexibleBody:
+    structure = read_structure(path)
+    return fp.reduce(structure.model(), structure.request)
+
+
 def test_the_file_of_the_documentation(tmp_path):
-    loaded = load_structure(written(tmp_path, page("toml")[0]))
+    loaded = read_structure(written(tmp_path, page("toml")[0]))
     check_frame(loaded.frame)
-    assert loaded.name == "portal"
+    assert loaded.request.name == "portal"
     assert loaded.frame.shells == (Shell(0.004, material("steel")),)
     profile = shifted(i_section(0.2, 0.1, 0.006, 0.009), 0.1, 0)
     assert loaded.frame.members == (Member(profile, material("steel"), (1.0, 0.0, 0.0)),)
     assert len(loaded.frame.points) == 45
-    body = reduce_structure(loaded)
+    body = fp.reduce(loaded.model(), loaded.request)
     assert body.stiffening is not None
     assert body.surface.stress is not None
 
@@ -103,7 +109,7 @@ def test_the_example_is_reduced_by_the_command(tmp_path):
     ],
 )
 def test_sections(tmp_path, text, section):
-    loaded = load_structure(written(tmp_path, LINE.replace('{shape = "circle", d = 0.01}', text)))
+    loaded = read_structure(written(tmp_path, LINE.replace('{shape = "circle", d = 0.01}', text)))
     assert loaded.frame.members[0].section == section
 
 
@@ -120,7 +126,7 @@ def test_sections(tmp_path, text, section):
     ],
 )
 def test_references(tmp_path, text, expected):
-    assert load_structure(written(tmp_path, text + LINE)).reference == expected
+    assert read_structure(written(tmp_path, text + LINE)).request.reference == expected
 
 
 def test_reductions_materials_and_triangles(tmp_path):
@@ -130,12 +136,12 @@ panels = [{shell = "s", corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], 
 shells.s = {thickness = 0.01, material = "own", rotary_inertia = false}
 materials.own = {E = 1e9, nu = 0.25, rho = 1200}
 """
-    loaded = load_structure(written(tmp_path, text))
-    assert loaded.reduction == Eigenmodes(3)
+    loaded = read_structure(written(tmp_path, text))
+    assert loaded.request.reduction == Eigenmodes(3)
     assert loaded.frame.shells == (Shell(0.01, Material("own", 1e9, 0.25, 1200.0), 0.0),)
     assert len(loaded.frame.triangles) == 4
-    assert loaded.name == "bar"
-    assert load_structure(written(tmp_path, LINE)).reduction == CraigBampton(10)
+    assert loaded.request.name == "bar"
+    assert read_structure(written(tmp_path, LINE)).request.reduction == CraigBampton(10)
 
 
 @pytest.mark.parametrize(
@@ -152,12 +158,12 @@ materials.own = {E = 1e9, nu = 0.25, rho = 1200}
     ],
 )
 def test_reductions(tmp_path, text, expected):
-    assert load_structure(written(tmp_path, f"reduction = {text}" + LINE)).reduction == expected
+    assert read_structure(written(tmp_path, f"reduction = {text}" + LINE)).request.reduction == expected
 
 
 def test_the_quality_of_a_structure_is_reported(tmp_path):
     text = "reduction = {modes = 2}\nquality = [5, 200]\n" + LINE.replace("elements = 2", "elements = 8")
-    body = reduce_structure(load_structure(written(tmp_path, text)))
+    body = body_of(written(tmp_path, text))
     assert body.provenance["quality"]["band"] == [5, 200]
 
 
@@ -180,7 +186,7 @@ interfaces = {left = {}, right = {kind = "mean"}}
 def test_a_solid_is_tied_to_a_frame(tmp_path):
     """Half beam, half solid: mass, length and frequencies of the whole cantilever; by file, by command."""
     (tmp_path / "box.geo").symlink_to(ROOT / "meshes" / "box.geo")
-    body = reduce_structure(load_structure(written(tmp_path, SOLID)))
+    body = body_of(written(tmp_path, SOLID))
     assert body.mass == pytest.approx(material("steel").rho * 1.5 * 0.01, rel=1e-9)
     assert [i.name for i in body.interfaces] == ["root", "right"]
     assert body.provenance["ties"] == [["frame.b", "block.left"]]
@@ -205,7 +211,7 @@ def test_ties_that_cannot_be(tmp_path, old, new, says):
     (tmp_path / "box.geo").symlink_to(ROOT / "meshes" / "box.geo")
     assert old in SOLID
     with pytest.raises(InputError, match=says):
-        reduce_structure(load_structure(written(tmp_path, SOLID.replace(old, new))))
+        body_of(written(tmp_path, SOLID.replace(old, new)))
 
 
 # ---- guards -----------------------------------------------------------------------------------------------------------
@@ -234,7 +240,7 @@ def test_ties_that_cannot_be(tmp_path, old, new, says):
 )
 def test_files_that_cannot_be_used(tmp_path, text, says):
     with pytest.raises(InputError, match=says):
-        load_structure(written(tmp_path, text))
+        read_structure(written(tmp_path, text))
 
 
 def test_a_missing_file_ends_the_command_with_code_2_and_writes_nothing(tmp_path, capsys):
@@ -257,5 +263,5 @@ def test_a_failed_reduction_keeps_the_old_body(tmp_path):
 
 def test_the_same_file_gives_the_same_body(tmp_path):
     path = written(tmp_path, "reduction = {modes = 4}" + LINE)
-    one, two = (reduce_structure(load_structure(path)) for _ in range(2))
+    one, two = (body_of(path) for _ in range(2))
     np.testing.assert_array_equal(one.PP_dm, two.PP_dm)

@@ -9,20 +9,16 @@ import pytest
 import scipy.linalg
 from boxes import box_mesh, moved, rotation
 
+import ffr_prep as fp
 from ffr_prep.body import load_body, save_body
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis
-from ffr_prep.pipelines.mesh import reduce_mesh
-from ffr_prep.pipelines.reduce import reduce_model
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.pipelines.tied import elimination, tied
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
-from ffr_prep.solids.model import solid_model
 from ffr_prep.structures.frame import Member, Shell, named, panel, polyline
-from ffr_prep.structures.model import frame_model
 from ffr_prep.structures.sections import rectangle
 
 L, B, H = 1.0, 0.04, 0.03  # a bar along x, width along y, height along z
@@ -35,7 +31,7 @@ def solid_half(x: float, length: float, cells: int, *, left: str, right: str, R=
     mesh = box_mesh("hex20", (length, B, H), (cells, 1, 1), (x, -B / 2, -H / 2))
     mesh = mesh if R is None else moved(mesh, R, np.zeros(3))
     ends = [InterfaceRegion(left, "left"), InterfaceRegion(right, "right", kind)]
-    return solid_model(mesh, STEEL, ends)
+    return fp.from_mesh(mesh, STEEL, ends)
 
 
 def beam_half(x: float, length: float, elements: int, *, left: str, right: str, R=None):
@@ -43,7 +39,7 @@ def beam_half(x: float, length: float, elements: int, *, left: str, right: str, 
     a, b = tuple(R @ (x, 0, 0)), tuple(R @ (x + length, 0, 0))
     member = Member(rectangle(B, H), STEEL, tuple(R @ (0, 0, 1.0)))
     frame = named(polyline([a, b], member, elements=elements), **{left: a, right: b})
-    return frame_model(frame, [InterfaceRegion(left), InterfaceRegion(right)])
+    return fp.from_frame(frame, [InterfaceRegion(left), InterfaceRegion(right)])
 
 
 def half_and_half(R=None, kind: str = "rigid"):
@@ -56,7 +52,7 @@ def half_and_half(R=None, kind: str = "rigid"):
 @pytest.mark.parametrize("kind", ["rigid", "mean"])
 def test_rigid_inertia_of_half_a_solid_and_half_a_beam_is_that_of_the_bar(seed, kind):
     R = np.eye(3) if seed is None else rotation(seed)
-    body = reduce_model(half_and_half(R, kind), name="bar", **END)
+    body = fp.reduce(half_and_half(R, kind), fp.Request(name="bar", **END))
     mass = STEEL.rho * L * B * H
     centre = R @ (L / 2, 0, 0)
     second = R @ np.diag([L**2, B**2, H**2]) @ R.T / 12 + np.outer(centre, centre)
@@ -69,9 +65,9 @@ def test_rigid_inertia_of_half_a_solid_and_half_a_beam_is_that_of_the_bar(seed, 
 @pytest.mark.parametrize("kind", ["rigid", "mean"])
 def test_half_and_half_vibrates_as_one_bar(kind):
     """Bending both ways: between all beam and all solid, which agree to 2e-3 at this slenderness."""
-    half = reduce_model(half_and_half(kind=kind), name="bar", **END).frequencies
-    beam = reduce_model(beam_half(0, L, 24, left="root", right="tip"), name="bar", **END).frequencies
-    solid = reduce_model(solid_half(0, L, 20, left="root", right="tip"), name="bar", **END).frequencies
+    half = fp.reduce(half_and_half(kind=kind), fp.Request(name="bar", **END)).frequencies
+    beam = fp.reduce(beam_half(0, L, 24, left="root", right="tip"), fp.Request(name="bar", **END)).frequencies
+    solid = fp.reduce(solid_half(0, L, 20, left="root", right="tip"), fp.Request(name="bar", **END)).frequencies
     np.testing.assert_allclose(beam[:4], solid[:4], rtol=2e-3)
     np.testing.assert_allclose(half[:4], solid[:4], rtol=2e-3)
 
@@ -82,7 +78,7 @@ def test_a_beam_cut_in_two_is_the_beam():
     second = beam_half(0.4, 0.6, 6, left="joint", right="tip")
     model = tied({"first": first, "second": second}, [("first.joint", "second.joint")])
     whole = beam_half(0, 1.0, 10, left="root", right="tip")
-    one, two = (reduce_model(m, name="b", stiffening=True, stress=True, **END) for m in (whole, model))
+    one, two = (fp.reduce(m, fp.Request(name="b", stiffening=True, stress=True, **END)) for m in (whole, model))
     np.testing.assert_allclose(two.omega2, one.omega2, rtol=1e-8)
     np.testing.assert_allclose(np.abs(two.P_dm), np.abs(one.P_dm), atol=1e-7)
     sign = np.sign(np.einsum("kj,kj->j", one.interface("tip").phi_t, two.interface("tip").phi_t))
@@ -101,7 +97,7 @@ def test_a_solid_cut_in_two_keeps_its_rigid_motions():
     assert np.linalg.matrix_rank(T) == 6
     inertia = T.T @ (M @ T)
     np.testing.assert_allclose(np.diag(inertia)[:3], STEEL.rho * L * B * H, rtol=1e-12)
-    free = reduce_model(model, name="b", reference=MeanAxis(), reduction=Eigenmodes(6))
+    free = fp.reduce(model, fp.Request(name="b", reference=MeanAxis(), reduction=Eigenmodes(6)))
     assert free.frequencies[0] > 100
 
 
@@ -111,7 +107,7 @@ def test_a_tie_between_points_that_differ_is_a_rigid_arm():
     frame = named(
         polyline([(0.5, 0, 0.2), (0.8, 0, 0.2)], Member(rectangle(B, H), STEEL, (0, 0, 1.0))), a=(0.5, 0, 0.2)
     )
-    second = frame_model(named(frame, tip=(0.8, 0, 0.2)), [InterfaceRegion("a"), InterfaceRegion("tip")])
+    second = fp.from_frame(named(frame, tip=(0.8, 0, 0.2)), [InterfaceRegion("a"), InterfaceRegion("tip")])
     parts = {"first": first, "second": second}
     X = elimination(parts, [("first.end", "second.a")])
     model = tied(parts, [("first.end", "second.a")])
@@ -135,13 +131,13 @@ def test_a_plate_on_a_solid_and_a_beam_on_the_plate(tmp_path):
     shell = replace(shell, node_groups={"a": np.flatnonzero(x < 0.5 + 1e-9), "b": np.flatnonzero(x > 1 - 1e-9)})
     parts = {
         "solid": solid_half(0, L / 2, 6, left="root", right="joint"),
-        "plate": frame_model(shell, [InterfaceRegion("a"), InterfaceRegion("b")]),
+        "plate": fp.from_frame(shell, [InterfaceRegion("a"), InterfaceRegion("b")]),
         "beam": beam_half(L, L / 2, 4, left="a", right="tip"),
     }
     model = tied(parts, [("solid.joint", "plate.a"), ("plate.b", "beam.a")])
-    body = reduce_model(model, name="rod", stress=True, stiffening=True, **END)
+    body = fp.reduce(model, fp.Request(name="rod", stress=True, stiffening=True, **END))
     assert body.mass == pytest.approx(STEEL.rho * 1.5 * L * B * H, rel=1e-12)
-    beam = reduce_model(beam_half(0, 1.5 * L, 24, left="root", right="tip"), name="rod", **END)
+    beam = fp.reduce(beam_half(0, 1.5 * L, 24, left="root", right="tip"), fp.Request(name="rod", **END))
     np.testing.assert_allclose(body.frequencies[0], beam.frequencies[0], rtol=0.01)
     assert body.surface.stress.shape[0] == len(body.surface.points)
     corners = body.surface.points[body.surface.triangles]
@@ -158,18 +154,21 @@ def test_a_plate_on_a_solid_and_a_beam_on_the_plate(tmp_path):
 
 def test_one_model_alone_is_the_body_of_its_kind():
     mesh = box_mesh("hex20", (0.3, B, H), (3, 1, 1))
-    make = {"name": "b", "interfaces": [InterfaceRegion("root", "left")], **END}
-    whole = reduce_mesh(mesh, material=STEEL, stiffening=True, **make)
-    part = reduce_model(solid_model(mesh, STEEL, make["interfaces"]), name="b", stiffening=True, **END)
+    model, request = (
+        fp.from_mesh(mesh, STEEL, [InterfaceRegion("root", "left")]),
+        fp.Request(name="b", stiffening=True, **END),
+    )
+    whole = fp.reduce(model, request)
+    part = fp.reduce(tied({"one": model}, []), request)
     for key in ("omega2", "rr_dm", "PP_dm", "rP_dm", "stiffening"):
         np.testing.assert_array_equal(getattr(part, key), getattr(whole, key))
     np.testing.assert_array_equal(part.surface.Phi, whole.surface.Phi)
-    assert part.provenance["mesh"] == whole.provenance["mesh"]
+    assert part.provenance["parts"]["one"]["mesh"] == whole.provenance["mesh"]
 
 
 def test_warnings_of_the_parts_are_kept():
     mesh = box_mesh("tet4", (0.3, B, H), (3, 1, 1))
-    solid = solid_model(mesh, STEEL, [InterfaceRegion("root", "left"), InterfaceRegion("end", "right")])
+    solid = fp.from_mesh(mesh, STEEL, [InterfaceRegion("root", "left"), InterfaceRegion("end", "right")])
     model = tied({"block": solid, "beam": beam_half(0.3, 0.3, 2, left="a", right="b")}, [("block.end", "beam.a")])
     assert model.record["warnings"][0].startswith("block: 18 first-order tetrahedra")
 
@@ -218,7 +217,7 @@ def test_interface_names_are_of_one_part():
 def test_an_interface_cannot_be_tied_to_one_that_it_moves():
     """A mean interface over a face that has nodes of the rigid one."""
     mesh = box_mesh("hex8", (0.3, B, H), (3, 1, 1))
-    part = solid_model(mesh, STEEL, [InterfaceRegion("end", "right"), InterfaceRegion("top", kind="mean")])
+    part = fp.from_mesh(mesh, STEEL, [InterfaceRegion("end", "right"), InterfaceRegion("top", kind="mean")])
     with pytest.raises(InputError, match=r"'one\.end' and 'one\.top' move one another"):
         tied({"one": part}, [("one.end", "one.top")])
 
@@ -226,6 +225,6 @@ def test_an_interface_cannot_be_tied_to_one_that_it_moves():
 def test_reduced_frames_and_models_are_the_same_body():
     frame = named(polyline([(0, 0, 0), (1, 0, 0)], Member(rectangle(B, H), STEEL, (0, 0, 1.0))), root=(0, 0, 0))
     ends = [InterfaceRegion("root")]
-    one = reduce_frame(frame, name="b", interfaces=ends, **END)
-    two = reduce_model(frame_model(frame, ends), name="b", **END)
+    one = fp.reduce(fp.from_frame(frame, ends), fp.Request(name="b", **END))
+    two = fp.reduce(fp.from_frame(frame, ends), fp.Request(name="b", **END))
     np.testing.assert_allclose(two.omega2, one.omega2, rtol=1e-12)

@@ -9,6 +9,7 @@ from test_docs import ROOT, code
 from test_prep_cli import assert_fails, run
 from test_structural import regions, space_frame
 
+import ffr_prep as fp
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.scene.joints import Joint
@@ -18,8 +19,6 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports, UserConditions
-from ffr_prep.pipelines.mesh import reduce_mesh
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.conversion import with_reference
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
@@ -35,14 +34,9 @@ INTEGRALS = ("P_dm", "rP_dm", "PP_dm")
 
 def reduced(reference, reduction=None, **options):
     mesh = moved(box_mesh("hex20", SIZE, (5, 1, 1)), rotation(8), np.array([0.1, 0.2, -0.3]))
-    return reduce_mesh(
-        mesh,
-        name="b",
-        material=STEEL,
-        interfaces=BOTH,
-        reference=reference,
-        reduction=reduction or CraigBampton(5),
-        **options,
+    return fp.reduce(
+        fp.from_mesh(mesh, STEEL, BOTH),
+        fp.Request(name="b", reference=reference, reduction=reduction or CraigBampton(5), **options),
     )
 
 
@@ -109,13 +103,9 @@ def test_other_reductions_convert_as_well(reduction):
 
 def test_frames_of_beams_convert_with_their_section_forces():
     def made(reference):
-        return reduce_frame(
-            space_frame(),
-            name="f",
-            interfaces=regions("a", "b"),
-            reference=reference,
-            reduction=CraigBampton(4),
-            stress=True,
+        return fp.reduce(
+            fp.from_frame(space_frame(), regions("a", "b")),
+            fp.Request(name="f", reference=reference, reduction=CraigBampton(4), stress=True),
         )
 
     converted, direct = with_reference(made(FixedTo("a")), SimplySupported("a", "b")), made(SimplySupported("a", "b"))
@@ -156,13 +146,13 @@ def test_eigenmodes_say_what_they_lose():
 
 def test_the_motion_is_the_same(bodies):
     """A soft pendulum in three frames: the hinge point falls on the same path to second order in the strain."""
-    rod = reduce_mesh(
-        box_mesh("hex20", (1.0, 0.02, 0.02), (6, 1, 1)),
-        name="rod",
-        material=Material("soft", 7e10, 0.3, 2700.0),
-        interfaces=[InterfaceRegion("left", kind="mean"), InterfaceRegion("right", kind="mean")],
-        reference=FixedTo("left"),
-        reduction=CraigBampton(2),
+    rod = fp.reduce(
+        fp.from_mesh(
+            box_mesh("hex20", (1.0, 0.02, 0.02), (6, 1, 1)),
+            Material("soft", 7e10, 0.3, 2700.0),
+            [InterfaceRegion("left", kind="mean"), InterfaceRegion("right", kind="mean")],
+        ),
+        fp.Request(name="rod", reference=FixedTo("left"), reduction=CraigBampton(2)),
     )
 
     def tip(body):

@@ -15,15 +15,13 @@ from PIL import Image
 from test_prep_cli import BAR, INTERFACES, assert_fails, run
 from test_structural import regions, straight
 
+import ffr_prep as fp
 from ffr_prep.body import load_body, save_body
 from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.mesh import Block, Mesh
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, functionals
-from ffr_prep.pipelines.matrices import reduce_matrices
-from ffr_prep.pipelines.mesh import reduce_mesh
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.basis import factorised
 from ffr_prep.reduction.mesh_resolution import element_edges, elements_per_wavelength, resolution_warnings
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
@@ -40,7 +38,6 @@ from ffr_prep.solids.assembly import assemble
 from ffr_prep.solids.interfaces import couple
 from ffr_prep.solids.stiffening import inertial_loads
 from ffr_prep.structures.frame import Member, polyline
-from ffr_prep.structures.model import frame_model
 from ffr_prep.structures.sections import rectangle
 
 SIZE = (1.0, 0.1, 0.1)
@@ -56,14 +53,9 @@ def coupled(mesh, interfaces=BOTH):
 
 
 def reduced(mesh, reference, reduction, interfaces=BOTH, quality=None):
-    return reduce_mesh(
-        mesh,
-        name="b",
-        material=STEEL,
-        interfaces=interfaces,
-        reference=reference,
-        reduction=reduction,
-        quality=quality,
+    return fp.reduce(
+        fp.from_mesh(mesh, STEEL, interfaces),
+        fp.Request(name="b", reference=reference, reduction=reduction, quality=quality),
     )
 
 
@@ -162,14 +154,11 @@ def steady_tip(body, force):
 def test_a_cantilever_sags_under_gravity():
     """q L^4 / 8 E I, through the integral of the modes alone; without Poisson's ratio, which the clamp would hinder."""
     size, material = (1.0, 0.02, 0.02), Material("beam", 2.1e11, 0.0, 7850.0)
-    body = reduce_mesh(
-        box_mesh("hex20", size, (20, 1, 1)),
-        name="b",
-        material=material,
-        interfaces=BOTH,
-        reference=FixedTo("left"),
-        reduction=Union((Guyan(), InertiaRelief())),
-        quality=Band(5.0, 100.0),
+    body = fp.reduce(
+        fp.from_mesh(box_mesh("hex20", size, (20, 1, 1)), material, BOTH),
+        fp.Request(
+            name="b", reference=FixedTo("left"), reduction=Union((Guyan(), InertiaRelief())), quality=Band(5.0, 100.0)
+        ),
     )
     sag = material.rho * G * size[0] ** 4 / (8 * material.E * size[1] ** 2 / 12)
     assert steady_tip(body, body.P_dm.T @ (0, -G, 0))[1] == pytest.approx(-sag, rel=5e-3)
@@ -230,8 +219,9 @@ def test_a_ring_of_beams_grows_under_spin():
     corners = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     corners[-1] = corners[0]
     frame = polyline(corners, Member(section, STEEL, (0, 0, 1)))
-    body = reduce_frame(
-        frame, name="ring", interfaces=(), reference=MeanAxis(), reduction=Union((Eigenmodes(2), InertiaRelief()))
+    body = fp.reduce(
+        fp.from_frame(frame, ()),
+        fp.Request(name="ring", reference=MeanAxis(), reduction=Union((Eigenmodes(2), InertiaRelief()))),
     )
     assert spin_growth(body, 1.0) == pytest.approx(STEEL.rho / STEEL.E, rel=1e-2)
 
@@ -264,7 +254,7 @@ def test_coarse_meshes_are_named():
 
 
 def test_beams_know_their_elements():
-    model = frame_model(straight(rectangle(0.02, 0.02), 1.0, 12), regions("root", "tip")).coupled
+    model = fp.from_frame(straight(rectangle(0.02, 0.02), 1.0, 12), regions("root", "tip")).coupled
     L = functionals(MeanAxis(), model)
     found = elements_per_wavelength(model, Eigenmodes(5).basis(model, factorised(model), L).Z)
     assert 15 < found[0] < 30
@@ -412,10 +402,16 @@ def test_options_that_do_not_fit(options, message, tmp_path, capsys):
 
 def test_matrices_from_outside_are_assessed_like_the_model_they_come_from():
     frame = of_frame(matrix_frame())
-    settings = {"name": "b", "interfaces": regions("a", "b"), "reference": FixedTo("a"), "quality": Band(5.0, 100.0)}
-    body = reduce_matrices(frame, **settings, reduction=Union((CraigBampton(2), InertiaRelief())))
+    settings = {"name": "b", "reference": FixedTo("a"), "quality": Band(5.0, 100.0)}
+    body = fp.reduce(
+        fp.from_matrices(frame, regions("a", "b")),
+        fp.Request(**settings, reduction=Union((CraigBampton(2), InertiaRelief()))),
+    )
     quality = quality_of(body.provenance)
     assert np.nanmax(quality.displacement_errors) < 1e-6
     assert quality.flexibility_error < 1e-8
     with pytest.raises(InputError, match="needs a mass for every coordinate"):
-        reduce_matrices(replace(frame, M=lumped(frame)), **settings, reduction=Eigenmodes(2))
+        fp.reduce(
+            fp.from_matrices(replace(frame, M=lumped(frame)), regions("a", "b")),
+            fp.Request(**settings, reduction=Eigenmodes(2)),
+        )

@@ -9,12 +9,12 @@ import scipy.sparse as sp
 import scipy.sparse.linalg
 from boxes import STEEL, box_mesh, moved, rotation, shaken
 
+import ffr_prep as fp
 import ffr_prep.reduction.modes as modes_module
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports, functionals
-from ffr_prep.pipelines.mesh import reduce_mesh
 from ffr_prep.reduction.basis import Basis, check_basis, factorised
 from ffr_prep.reduction.methods.characteristic import CharacteristicModes
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
@@ -37,8 +37,8 @@ def coupled(mesh, interfaces=BOTH, material=STEEL):
 
 
 def reduced(mesh, reference, reduction, interfaces=BOTH, material=STEEL):
-    return reduce_mesh(
-        mesh, name="b", material=material, interfaces=interfaces, reference=reference, reduction=reduction
+    return fp.reduce(
+        fp.from_mesh(mesh, material, interfaces), fp.Request(name="b", reference=reference, reduction=reduction)
     )
 
 
@@ -337,16 +337,13 @@ def test_interface_shapes_and_surface_are_those_of_the_field(beam):
 
 def test_stages_and_settings_are_recorded(beam):
     stages, told = [], []
-    body = reduce_mesh(
-        beam,
-        name="rod",
-        material=STEEL,
-        interfaces=BOTH,
-        reference=SimplySupported("left", "right"),
-        reduction=CraigBampton(2),
+    body = fp.reduce(
+        fp.from_mesh(beam, STEEL, BOTH, progress=stages.append),
+        fp.Request(
+            name="rod", reference=SimplySupported("left", "right"), reduction=CraigBampton(2), provenance={"order": 7}
+        ),
         progress=stages.append,
         advance=lambda share, words: told.append((stages[-1], words)),
-        provenance={"order": 7},
     )
     assert {stage for stage, _ in told} <= {"factorise the stiffness", "reduce"}
     assert any(words.endswith("fronts") for _, words in told)

@@ -10,6 +10,7 @@ import scipy.linalg
 from boxes import STEEL, box_mesh, moved, rotation, shaken
 from test_structural import regions, space_frame, straight
 
+import ffr_prep as fp
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports, functionals
@@ -30,7 +31,6 @@ from ffr_prep.solids.assembly import assemble
 from ffr_prep.solids.interfaces import couple
 from ffr_prep.solids.stiffening import inertial_loads
 from ffr_prep.solvers.factor import solve_refined, supported
-from ffr_prep.structures.model import frame_model
 from ffr_prep.structures.sections import general, with_mass_moments
 
 SIZE = (1.0, 0.1, 0.1)
@@ -84,7 +84,7 @@ def body(model):
 
 @pytest.fixture(scope="module")
 def frame():
-    return frame_model(space_frame(), regions("a", "b")).coupled
+    return fp.from_frame(space_frame(), regions("a", "b")).coupled
 
 
 def static(model, supports, loads):
@@ -270,7 +270,7 @@ def test_unions_drop_and_count_what_they_have(model, body):
 def test_craig_bampton_converges_on_a_fine_bar(modes, error):
     """Clamped-free bar with its interface at the tip, exact components: relative error of the first frequency."""
     section = with_mass_moments(general("bar", A=1e-4, Iy=1e-3, Iz=1e-3, J=1e-3), 1e-12, 1e-12)  # axial modes first
-    bar = frame_model(straight(section, 1.0, 200), regions("root", "tip")).coupled
+    bar = fp.from_frame(straight(section, 1.0, 200), regions("root", "tip")).coupled
     body, L = factorised(bar), functionals(FixedTo("root"), bar)
     full = Eigenmodes(1).basis(bar, body, L).omega2[0]
     found = CraigBampton(modes).basis(bar, body, L).omega2[0]

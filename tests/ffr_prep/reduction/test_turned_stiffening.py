@@ -11,6 +11,7 @@ from test_beam_stiffening import thin
 from test_dyn_references import slider_crank
 from test_prep_cli import assert_fails, run
 
+import ffr_prep as fp
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.integrators import ROS2
 from ffr_prep.body import FlexibleBody, load_body, save_body, with_point
@@ -18,15 +19,10 @@ from ffr_prep.body.planar import in_plane
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports
-from ffr_prep.pipelines.mesh import reduce_mesh
-from ffr_prep.pipelines.reduce import reduce_model
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.pipelines.tied import tied
 from ffr_prep.reduction.conversion import with_reference
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
-from ffr_prep.solids.model import solid_model
 from ffr_prep.structures.frame import Member, Shell, joined, named, panel, polyline
-from ffr_prep.structures.model import frame_model
 from ffr_prep.structures.sections import circle, rectangle
 
 FIXED, CHORD, MEAN = FixedTo("left"), SimplySupported("left", "right"), MeanAxis()
@@ -43,31 +39,32 @@ BOTH_ENDS = Supports(
 
 def block(reference, kind="mean") -> FlexibleBody:
     """A solid bar in oblique axes."""
-    return reduce_mesh(
-        moved(box_mesh("hex20", (1.0, 0.12, 0.16), (4, 1, 1)), rotation(5), np.array([0.2, -0.1, 0.4])),
-        name="b",
-        material=STEEL,
-        interfaces=[InterfaceRegion("left", kind=kind), InterfaceRegion("right", kind=kind)],
-        reference=reference,
-        reduction=CraigBampton(4),
-        stiffening=True,
+    return fp.reduce(
+        fp.from_mesh(
+            moved(box_mesh("hex20", (1.0, 0.12, 0.16), (4, 1, 1)), rotation(5), np.array([0.2, -0.1, 0.4])),
+            STEEL,
+            [InterfaceRegion("left", kind=kind), InterfaceRegion("right", kind=kind)],
+        ),
+        fp.Request(name="b", reference=reference, reduction=CraigBampton(4), stiffening=True),
     )
 
 
 def rod(reference, modes=6, section=None, length=1.0) -> FlexibleBody:
     """A straight beam along x."""
     member = Member(section or rectangle(0.05, 0.065), STEEL, (0, 1.0, 0))
-    return reduce_frame(
-        named(
-            polyline([(0, 0, 0), (length, 0, 0)], member, elements=16),
-            left=(0, 0, 0), right=(length, 0, 0), crankpin=(0, 0, 0), slider=(length, 0, 0),
+    return fp.reduce(
+        fp.from_frame(
+            named(
+                polyline([(0, 0, 0), (length, 0, 0)], member, elements=16),
+                left=(0, 0, 0),
+                right=(length, 0, 0),
+                crankpin=(0, 0, 0),
+                slider=(length, 0, 0),
+            ),
+            [InterfaceRegion("left"), InterfaceRegion("right")],
         ),
-        name="rod",
-        interfaces=[InterfaceRegion("left"), InterfaceRegion("right")],
-        reference=reference,
-        reduction=CraigBampton(modes),
-        stiffening=True,
-    )  # fmt: skip
+        fp.Request(name="rod", reference=reference, reduction=CraigBampton(modes), stiffening=True),
+    )
 
 
 def tied_pair(reference, kind) -> FlexibleBody:
@@ -77,13 +74,13 @@ def tied_pair(reference, kind) -> FlexibleBody:
     ends = [tuple(R @ point + at) for point in ((0.7, 0.05, 0.1), (1.2, 0.05, 0.1))]
     beam = polyline(ends, Member(rectangle(0.05, 0.065), STEEL, tuple(R[:, 1])), elements=4)
     parts = {
-        "bar": solid_model(bar, STEEL, [InterfaceRegion("left"), InterfaceRegion("face", "right", kind)]),
-        "beam": frame_model(
+        "bar": fp.from_mesh(bar, STEEL, [InterfaceRegion("left"), InterfaceRegion("face", "right", kind)]),
+        "beam": fp.from_frame(
             named(beam, start=ends[0], right=ends[1]), [InterfaceRegion("start"), InterfaceRegion("right")]
         ),
     }
     model = tied(parts, [("bar.face", "beam.start")])
-    return reduce_model(model, name="b", reference=reference, reduction=CraigBampton(4), stiffening=True)
+    return fp.reduce(model, fp.Request(name="b", reference=reference, reduction=CraigBampton(4), stiffening=True))
 
 
 def comb(reference) -> FlexibleBody:
@@ -95,10 +92,10 @@ def comb(reference) -> FlexibleBody:
     )
     last = [node for node, x in enumerate(beam.points) if x[0] > 0.69]
     beam = replace(named(beam, left=(0, 0, 0)), node_groups={"left": np.array([0]), "right": np.array(last)})
-    return reduce_frame(
-        beam, name="comb", interfaces=[InterfaceRegion("left"), InterfaceRegion("right", kind="mean")],
-        reference=reference, reduction=CraigBampton(6), stiffening=True,
-    )  # fmt: skip
+    return fp.reduce(
+        fp.from_frame(beam, [InterfaceRegion("left"), InterfaceRegion("right", kind="mean")]),
+        fp.Request(name="comb", reference=reference, reduction=CraigBampton(6), stiffening=True),
+    )
 
 
 def plate(reference) -> FlexibleBody:
@@ -106,13 +103,9 @@ def plate(reference) -> FlexibleBody:
     strip = panel([(0, 0, 0), (1, 0, 0), (1, 0.1, 0), (0, 0.1, 0)], Shell(0.005, STEEL), elements=(32, 4))
     x = strip.points[:, 0]
     strip = replace(strip, node_groups={"left": np.flatnonzero(x < 1e-9), "right": np.flatnonzero(x > 1 - 1e-9)})
-    return reduce_frame(
-        strip,
-        name="b",
-        interfaces=[InterfaceRegion("left"), InterfaceRegion("right")],
-        reference=reference,
-        reduction=CraigBampton(6),
-        stiffening=True,
+    return fp.reduce(
+        fp.from_frame(strip, [InterfaceRegion("left"), InterfaceRegion("right")]),
+        fp.Request(name="b", reference=reference, reduction=CraigBampton(6), stiffening=True),
     )
 
 

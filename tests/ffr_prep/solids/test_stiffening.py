@@ -9,6 +9,7 @@ import pytest
 from boxes import STEEL, box_mesh
 from test_dyn_references import MESHES, slider_crank
 
+import ffr_prep as fp
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.consistency.assemble import flattened
 from ffr_dyn.functions.time_functions import user
@@ -21,7 +22,6 @@ from ffr_prep.mesh.mesh import read_mesh
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
-from ffr_prep.pipelines.mesh import reduce_mesh
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 
@@ -31,14 +31,15 @@ INERTIAL = 12
 @pytest.fixture(scope="module")
 def rod():
     """The rod of the flexible slider-crank, pinned at both ends."""
-    return reduce_mesh(
-        read_mesh(MESHES / "slidercrank_rod.geo"),
-        name="rod",
-        material=Material("steel", 2e11, 0.3, 7870.0),
-        interfaces=[InterfaceRegion("crankpin", kind="mean"), InterfaceRegion("slider", kind="mean")],
-        reference=SimplySupported("crankpin", "slider"),
-        reduction=CraigBampton(8),
-        stiffening=True,
+    return fp.reduce(
+        fp.from_mesh(
+            read_mesh(MESHES / "slidercrank_rod.geo"),
+            Material("steel", 2e11, 0.3, 7870.0),
+            [InterfaceRegion("crankpin", kind="mean"), InterfaceRegion("slider", kind="mean")],
+        ),
+        fp.Request(
+            name="rod", reference=SimplySupported("crankpin", "slider"), reduction=CraigBampton(8), stiffening=True
+        ),
     )
 
 
@@ -63,14 +64,9 @@ def test_loads_on_the_support_stress_nothing(rod):
 
 
 def test_in_the_mean_axis_frame_a_uniform_acceleration_stresses_nothing():
-    body = reduce_mesh(
-        box_mesh("hex20", (1.0, 0.1, 0.1), (4, 1, 1)),
-        name="beam",
-        material=STEEL,
-        interfaces=[InterfaceRegion("left")],
-        reference=MeanAxis(),
-        reduction=Eigenmodes(4),
-        stiffening=True,
+    body = fp.reduce(
+        fp.from_mesh(box_mesh("hex20", (1.0, 0.1, 0.1), (4, 1, 1)), STEEL, [InterfaceRegion("left")]),
+        fp.Request(name="beam", reference=MeanAxis(), reduction=Eigenmodes(4), stiffening=True),
     )
     largest = np.abs(body.stiffening[6:12]).max()
     assert np.abs(body.stiffening[:6]).max() < 1e-8 * largest
@@ -161,14 +157,13 @@ def blade():
     width = 0.2
     E = 2.8e7 / (width * height)
     nu = 5 / 6 * 2.8e7 / 1e7 / 2 - 1
-    body = reduce_mesh(
-        box_mesh("hex27", (10.0, height, width), (20, 1, 1), origin=(0.0, -height / 2, -width / 2)),
-        name="blade",
-        material=Material("blade", E, nu, 1.2 / (width * height)),
-        interfaces=[InterfaceRegion("left", kind="mean")],
-        reference=FixedTo("left"),
-        reduction=Eigenmodes(7),
-        stiffening=True,
+    body = fp.reduce(
+        fp.from_mesh(
+            box_mesh("hex27", (10.0, height, width), (20, 1, 1), origin=(0.0, -height / 2, -width / 2)),
+            Material("blade", E, nu, 1.2 / (width * height)),
+            [InterfaceRegion("left", kind="mean")],
+        ),
+        fp.Request(name="blade", reference=FixedTo("left"), reduction=Eigenmodes(7), stiffening=True),
     )
     return with_point(body, "tip", np.array([10.0, height / 2, 0.0]))
 

@@ -9,13 +9,13 @@ import skfem
 from boxes import KINDS, STEEL, box_mesh, moved, rotation, shaken
 from skfem.quadrature import get_quadrature
 
+import ffr_prep as fp
 from ffr_prep.body import TENSOR, BodyError, load_body, save_body, truncated, with_point
 from ffr_prep.mesh.cells import KINDS as ELEMENTS
 from ffr_prep.mesh.mesh import surface_triangles
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, functionals
-from ffr_prep.pipelines.mesh import reduce_mesh
 from ffr_prep.reduction.basis import factorised
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.solids.assembly import STIFFNESS_ORDER, assemble
@@ -40,14 +40,9 @@ def six(tensor):
 
 
 def cantilever(kind="tet10", modes=2, stress=True, cells=(6, 1, 1)):
-    return reduce_mesh(
-        box_mesh(kind, BAR, cells),
-        name="bar",
-        material=STEEL,
-        interfaces=[InterfaceRegion("left"), InterfaceRegion("right")],
-        reference=FixedTo("left"),
-        reduction=CraigBampton(modes),
-        stress=stress,
+    return fp.reduce(
+        fp.from_mesh(box_mesh(kind, BAR, cells), STEEL, [InterfaceRegion("left"), InterfaceRegion("right")]),
+        fp.Request(name="bar", reference=FixedTo("left"), reduction=CraigBampton(modes), stress=stress),
     )
 
 
@@ -241,14 +236,9 @@ def test_a_point_where_materials_meet_turns_with_both_sides():
     mesh = box_mesh("hex8", BAR, (4, 1, 1))
     mesh = replace(mesh, volume_groups={"left": np.array([0, 1]), "right": np.array([2, 3])})
     bodies = [
-        reduce_mesh(
-            mesh,
-            name="bar",
-            material={"left": STEEL, "right": SOFT},
-            interfaces=[InterfaceRegion("left"), InterfaceRegion("right")],
-            reference=FixedTo("left"),
-            reduction=CraigBampton(1),
-            stress=stress,
+        fp.reduce(
+            fp.from_mesh(mesh, {"left": STEEL, "right": SOFT}, [InterfaceRegion("left"), InterfaceRegion("right")]),
+            fp.Request(name="bar", reference=FixedTo("left"), reduction=CraigBampton(1), stress=stress),
         )
         for stress in (False, True)
     ]

@@ -12,12 +12,12 @@ import scipy.sparse as sp
 from boxes import STEEL, box_mesh
 from places import MESHES
 
+import ffr_prep as fp
 from ffr_prep import cli
 from ffr_prep.body import load_body
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo, MeanAxis
-from ffr_prep.pipelines.mesh import reduce_mesh
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.solvers import slepc
@@ -56,10 +56,10 @@ OTHERS = [
 
 
 def reduced(solver, reduction=KEPT, reference=CLAMPED):
-    return reduce_mesh(
-        MESH, name="bar", material=STEEL, interfaces=ENDS, reference=reference, reduction=reduction,
-        stiffening=True, solver=solver,
-    )  # fmt: skip
+    return fp.reduce(
+        fp.from_mesh(MESH, STEEL, ENDS),
+        fp.Request(name="bar", reference=reference, reduction=reduction, stiffening=True, solver=solver),
+    )
 
 
 @pytest.fixture(scope="module")

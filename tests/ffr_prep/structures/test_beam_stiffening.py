@@ -8,6 +8,7 @@ import scipy.linalg
 from boxes import box_mesh, rotation
 from test_dyn_references import slider_crank
 
+import ffr_prep as fp
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.functions.time_functions import user
 from ffr_dyn.integrators import ROS2
@@ -20,8 +21,6 @@ from ffr_prep.model.accelerations import unit_accelerations
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
-from ffr_prep.pipelines.mesh import reduce_mesh
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.frame import Member, named, polyline
@@ -40,13 +39,9 @@ def rod(section, length, elements, modes, reference, material=STEEL, turned=None
     R = np.eye(3) if turned is None else turned
     tip = tuple(R @ (length, 0, 0))
     frame = polyline([(0, 0, 0), tip], Member(section, material, tuple(R[:, 1])), elements=elements)
-    return reduce_frame(
-        named(frame, root=(0, 0, 0), tip=tip),
-        name="rod",
-        interfaces=[InterfaceRegion("root"), InterfaceRegion("tip")],
-        reference=reference,
-        reduction=CraigBampton(modes),
-        stiffening=True,
+    return fp.reduce(
+        fp.from_frame(named(frame, root=(0, 0, 0), tip=tip), [InterfaceRegion("root"), InterfaceRegion("tip")]),
+        fp.Request(name="rod", reference=reference, reduction=CraigBampton(modes), stiffening=True),
     )
 
 
@@ -131,13 +126,14 @@ def test_pendulum_against_the_exact_beam(reference):
 def test_slider_crank_with_a_rod_under_pressure():
     """Mid-rod deflection at 0.02, 0.04, 0.05 and 0.08 s: independent planar beam with stiffening by load."""
     frame = polyline([(0, 0, 0), (0.3, 0, 0)], Member(thin(circle(0.006)), STEEL, (0, 1.0, 0)), elements=24)
-    body = reduce_frame(
-        named(frame, crankpin=(0, 0, 0), slider=(0.3, 0, 0)),
-        name="rod",
-        interfaces=[InterfaceRegion("crankpin"), InterfaceRegion("slider")],
-        reference=SimplySupported("crankpin", "slider"),
-        reduction=CraigBampton(10),
-        stiffening=True,
+    body = fp.reduce(
+        fp.from_frame(
+            named(frame, crankpin=(0, 0, 0), slider=(0.3, 0, 0)),
+            [InterfaceRegion("crankpin"), InterfaceRegion("slider")],
+        ),
+        fp.Request(
+            name="rod", reference=SimplySupported("crankpin", "slider"), reduction=CraigBampton(10), stiffening=True
+        ),
     )
     result = forward(slider_crank(body), end=0.084, output_step=4e-4, method=ROS2(5e-6))
     middle = np.abs(body.surface.points[:, 0] - 0.15) < 1e-9
@@ -196,10 +192,10 @@ def slender_beam() -> tuple[FlexibleBody, float]:
     """A cantilever, and its unit of frequency squared for deflection across the plane of rotation."""
     section = with_mass_moments(general("rod", A=1.0, Iy=1e-6, Iz=1.1e-6, J=1e-6), 1e-9, 0.0)
     frame = named(polyline([(0, 0, 0), (1.0, 0, 0)], Member(section, STEEL, (0, 1, 0)), elements=45), root=(0, 0, 0))
-    body = reduce_frame(
-        frame, name="beam", interfaces=[InterfaceRegion("root")], reference=FixedTo("root"), reduction=Eigenmodes(10),
-        stiffening=True,
-    )  # fmt: skip
+    body = fp.reduce(
+        fp.from_frame(frame, [InterfaceRegion("root")]),
+        fp.Request(name="beam", reference=FixedTo("root"), reduction=Eigenmodes(10), stiffening=True),
+    )
     return body, STEEL.E * 1e-6 / STEEL.rho
 
 
@@ -207,10 +203,10 @@ def slender_solid() -> tuple[FlexibleBody, float]:
     """A bar of 10 x 10.1 mm without lateral contraction."""
     material, height, width = Material("bar", 2.1e11, 0.0, 7850.0), 0.0101, 0.01
     mesh = box_mesh("hex27", (1.0, height, width), (24, 1, 1), origin=(0.0, -height / 2, -width / 2))
-    body = reduce_mesh(
-        mesh, name="bar", material=material, interfaces=[InterfaceRegion("left")], reference=FixedTo("left"),
-        reduction=Eigenmodes(10), stiffening=True,
-    )  # fmt: skip
+    body = fp.reduce(
+        fp.from_mesh(mesh, material, [InterfaceRegion("left")]),
+        fp.Request(name="bar", reference=FixedTo("left"), reduction=Eigenmodes(10), stiffening=True),
+    )
     return body, material.E * width**2 / 12 / material.rho
 
 
@@ -240,10 +236,10 @@ def test_spin_up_with_three_bending_modes():
     section = Section("beam", A=1.0, Iy=5e-4, Iz=5e-4, J=1e-3, ky=1e7 * 2.6 / 2.8e7, kz=1e7 * 2.6 / 2.8e7)
     member = Member(section, Material("beam", 2.8e7, 0.3, 1.2), (0, 1.0, 0))
     frame = named(polyline([(0, 0, 0), (10.0, 0, 0)], member, elements=30), root=(0, 0, 0), tip=(10.0, 0, 0))
-    free = reduce_frame(
-        frame, name="beam", interfaces=[InterfaceRegion("root"), InterfaceRegion("tip")], reference=FixedTo("root"),
-        reduction=Eigenmodes(12), stiffening=True,
-    )  # fmt: skip
+    free = fp.reduce(
+        fp.from_frame(frame, [InterfaceRegion("root"), InterfaceRegion("tip")]),
+        fp.Request(name="beam", reference=FixedTo("root"), reduction=Eigenmodes(12), stiffening=True),
+    )
     body = truncated(in_plane(free), 3)
     assert np.einsum("jj->j", body.PP_dm[1, 1]).min() > 0.9
     scene = Scene(

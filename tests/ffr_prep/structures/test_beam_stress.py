@@ -7,9 +7,9 @@ import pytest
 from boxes import rotation
 from test_structural import STEEL, regions, space_frame, straight
 
+import ffr_prep as fp
 from ffr_prep.body import SECTION_FORCES, BodyError, load_body, save_body, truncated
 from ffr_prep.model.reference import FixedTo
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.beam_stress import section_forces_at
@@ -20,13 +20,9 @@ LOAD = np.array([2e4, 300.0, -500.0, 60.0, -70.0, 90.0])
 
 
 def reduced(frame, names=("root", "tip"), modes=0, reduction=CraigBampton):
-    return reduce_frame(
-        frame,
-        name="frame",
-        interfaces=regions(*names),
-        reference=FixedTo(names[0]),
-        reduction=reduction(modes),
-        stress=True,
+    return fp.reduce(
+        fp.from_frame(frame, regions(*names)),
+        fp.Request(name="frame", reference=FixedTo(names[0]), reduction=reduction(modes), stress=True),
     )
 
 

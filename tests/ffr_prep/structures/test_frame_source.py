@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from places import MESHES
 
+import ffr_prep as fp
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import material
 from ffr_prep.model.reference import FixedTo
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.structures.frame import Member, Shell, check_frame, joined, polyline
 from ffr_prep.structures.frame_geometry import read_frame
@@ -28,7 +28,9 @@ FEET = [InterfaceRegion("left_foot"), InterfaceRegion("right_foot")]
 
 
 def reduced(frame):
-    return reduce_frame(frame, name="p", interfaces=FEET, reference=FixedTo("left_foot"), reduction=CraigBampton(4))
+    return fp.reduce(
+        fp.from_frame(frame, FEET), fp.Request(name="p", reference=FixedTo("left_foot"), reduction=CraigBampton(4))
+    )
 
 
 def test_portal_from_a_file_is_the_portal_of_a_few_lines():
@@ -129,12 +131,9 @@ def test_tray_of_sheet_with_beams_along_its_rims():
     assert len(frame.triangles) > 100
     assert len(frame.quadrilaterals) == 2 * 12 * 2
     assert len(frame.elements) == 2 * 12
-    body = reduce_frame(
-        frame,
-        name="tray",
-        interfaces=[InterfaceRegion("front"), InterfaceRegion("rear", kind="mean")],
-        reference=FixedTo("front"),
-        reduction=CraigBampton(4),
+    body = fp.reduce(
+        fp.from_frame(frame, [InterfaceRegion("front"), InterfaceRegion("rear", kind="mean")]),
+        fp.Request(name="tray", reference=FixedTo("front"), reduction=CraigBampton(4)),
     )
     floor, walls = 7850 * 0.6 * 0.3 * 0.002, 7850 * 2 * 0.6 * 0.1 * 0.003
     rims = 7850 * 2 * 0.6 * RIMS["rims"].section.A

@@ -9,11 +9,11 @@ import pytest
 import scipy.linalg
 from boxes import rotation
 
+import ffr_prep as fp
 from ffr_prep.body import FlexibleBody
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.structures.element_families import families
 from ffr_prep.structures.frame import Frame, Shell, panel, triangulated
@@ -76,13 +76,9 @@ def strip(cut, modes: int, *, turned=None, elements=(24, 1), material=None, widt
     frame = cut(panel(corners, Shell(0.004, material, gyration=0.0), elements=elements))
     x = frame.points @ R[:, 0]
     frame = replace(frame, node_groups={"root": np.flatnonzero(x < 1e-9), "tip": np.flatnonzero(x > 1 - 1e-9)})
-    return reduce_frame(
-        frame,
-        name="strip",
-        interfaces=[InterfaceRegion("root"), InterfaceRegion("tip")],
-        reference=FixedTo("root"),
-        reduction=CraigBampton(modes),
-        stiffening=True,
+    return fp.reduce(
+        fp.from_frame(frame, [InterfaceRegion("root"), InterfaceRegion("tip")]),
+        fp.Request(name="strip", reference=FixedTo("root"), reduction=CraigBampton(modes), stiffening=True),
     )
 
 

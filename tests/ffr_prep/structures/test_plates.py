@@ -10,12 +10,12 @@ import scipy.linalg
 import scipy.sparse.linalg
 from boxes import rotation
 
+import ffr_prep as fp
 from ffr_prep.body import Surface
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.element_families import families
@@ -232,12 +232,9 @@ def _flat_motions(elements) -> np.ndarray:
 def test_rigid_inertia_of_a_turned_plate_is_exact(cut, seed):
     R, by = rotation(seed), np.array([0.5, -0.7, 0.2])
     frame = named(cut(patch(R, by)), corner=tuple(by))
-    body = reduce_frame(
-        frame,
-        name="p",
-        interfaces=[InterfaceRegion("corner")],
-        reference=FixedTo("corner"),
-        reduction=CraigBampton(2),
+    body = fp.reduce(
+        fp.from_frame(frame, [InterfaceRegion("corner")]),
+        fp.Request(name="p", reference=FixedTo("corner"), reduction=CraigBampton(2)),
     )
     mass = STEEL.rho * 0.24 * 0.12 * 0.001
     centre = R @ (0.12, 0.06, 0) + by
@@ -249,7 +246,7 @@ def test_rigid_inertia_of_a_turned_plate_is_exact(cut, seed):
 
 def test_mean_axis_leaves_no_momentum_in_the_elastic_field():
     frame = folded()
-    body = reduce_frame(frame, name="f", interfaces=[], reference=MeanAxis(), reduction=Eigenmodes(8))
+    body = fp.reduce(fp.from_frame(frame, []), fp.Request(name="f", reference=MeanAxis(), reduction=Eigenmodes(8)))
     about_centre = body.rP_dm - np.einsum("k,lj->klj", body.centre_of_mass, body.P_dm)
     np.testing.assert_allclose(body.P_dm, 0, atol=1e-9 * np.sqrt(body.mass))
     np.testing.assert_allclose(about_centre - about_centre.transpose(1, 0, 2), 0, atol=1e-9 * np.sqrt(body.mass))
@@ -273,15 +270,9 @@ def folded(R=None) -> Frame:
 
 def test_beams_and_plates_turn_together():
     R = rotation(5)
-    make = {
-        "name": "f",
-        "interfaces": [InterfaceRegion("a"), InterfaceRegion("b")],
-        "reference": FixedTo("a"),
-        "reduction": CraigBampton(3),
-        "stiffening": True,
-        "stress": True,
-    }
-    body, turned = reduce_frame(folded(), **make), reduce_frame(folded(R), **make)
+    ends = [InterfaceRegion("a"), InterfaceRegion("b")]
+    request = fp.Request(name="f", reference=FixedTo("a"), reduction=CraigBampton(3), stiffening=True, stress=True)
+    body, turned = (fp.reduce(fp.from_frame(frame, ends), request) for frame in (folded(), folded(R)))
     np.testing.assert_allclose(turned.omega2, body.omega2, rtol=1e-7)
     np.testing.assert_allclose(turned.inertia, R @ body.inertia @ R.T, atol=1e-12 * np.trace(body.inertia))
     sign = np.sign(np.einsum("kj,kj->j", R @ body.P_dm, turned.P_dm))
@@ -365,7 +356,9 @@ def test_square_plates(edges, published, off, cut):
 
 @CUT
 def test_faces_enclose_the_plate(cut):
-    body = reduce_frame(cut(patch(rotation(2))), name="p", interfaces=[], reference=MeanAxis(), reduction=Eigenmodes(2))
+    body = fp.reduce(
+        fp.from_frame(cut(patch(rotation(2))), []), fp.Request(name="p", reference=MeanAxis(), reduction=Eigenmodes(2))
+    )
     assert volume(body.surface) == pytest.approx(0.24 * 0.12 * 0.001, rel=1e-12)
     assert len(body.surface.points) == 16
 
@@ -383,13 +376,9 @@ def test_stress_of_a_strip(cut):
     frame = cut(panel(corners, Shell(t, material), elements=(6, 2)))
     along = frame.points @ R[:, 0]
     groups = {"root": np.flatnonzero(along < 1e-9), "tip": np.flatnonzero(along > L - 1e-9)}
-    body = reduce_frame(
-        replace(frame, node_groups=groups),
-        name="strip",
-        interfaces=[InterfaceRegion("root"), InterfaceRegion("tip")],
-        reference=FixedTo("root"),
-        reduction=CraigBampton(0),
-        stress=True,
+    body = fp.reduce(
+        fp.from_frame(replace(frame, node_groups=groups), [InterfaceRegion("root"), InterfaceRegion("tip")]),
+        fp.Request(name="strip", reference=FixedTo("root"), reduction=CraigBampton(0), stress=True),
     )
     tip, F, M = body.interface("tip"), 800.0, 3.0
     q = (tip.phi_t.T @ (F * R[:, 0]) + tip.phi_r.T @ (M * R[:, 1])) / body.omega2

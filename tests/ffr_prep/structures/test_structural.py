@@ -12,6 +12,7 @@ from boxes import rotation
 from places import REFERENCE
 from test_dyn_references import slider_crank
 
+import ffr_prep as fp
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.scene.joints import Joint
@@ -21,7 +22,6 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.beams import axis_functions, beams, field, mass_points, stiffness, undeformed
@@ -190,7 +190,9 @@ def box_inertia(ends: np.ndarray, section, rho: float, orientation) -> tuple[flo
 def test_rigid_inertia_of_a_turned_frame_is_exact(seed):
     R = rotation(seed)
     frame = space_frame(R, moved=(0.5, -0.7, 0.2))
-    body = reduce_frame(frame, name="f", interfaces=regions("a"), reference=FixedTo("a"), reduction=CraigBampton(2))
+    body = fp.reduce(
+        fp.from_frame(frame, regions("a")), fp.Request(name="f", reference=FixedTo("a"), reduction=CraigBampton(2))
+    )
     parts = [
         box_inertia(frame.points[pair], frame.members[k].section, STEEL.rho, R @ (0.3, -0.4, 0.8))
         for pair, k in zip(frame.elements, frame.member_of, strict=True)
@@ -204,8 +206,10 @@ def test_rigid_inertia_of_a_turned_frame_is_exact(seed):
 def test_the_body_turns_with_its_frame():
     R, by = rotation(5), np.array([0.3, 1.0, -2.0])
     interfaces, reference, reduction = regions("a", "b"), SimplySupported("a", "b"), CraigBampton(3)
-    make = {"name": "f", "interfaces": interfaces, "reference": reference, "reduction": reduction}
-    body, turned = reduce_frame(space_frame(), **make), reduce_frame(space_frame(R, by), **make)
+    request = fp.Request(name="f", reference=reference, reduction=reduction)
+    body, turned = (
+        fp.reduce(fp.from_frame(frame, interfaces), request) for frame in (space_frame(), space_frame(R, by))
+    )
     np.testing.assert_allclose(turned.omega2, body.omega2, rtol=1e-8)
     sign = np.sign(np.einsum("kj,kj->j", R @ body.P_dm, turned.P_dm))
     np.testing.assert_allclose(turned.P_dm * sign, R @ body.P_dm, atol=1e-8 * np.sqrt(body.mass))
@@ -216,7 +220,9 @@ def test_the_body_turns_with_its_frame():
 
 def test_mean_axis_leaves_no_momentum_in_the_elastic_field():
     """Translation and rotation of the sections take part in the inertia alike, or this could not hold."""
-    body = reduce_frame(space_frame(), name="f", interfaces=[], reference=MeanAxis(), reduction=Eigenmodes(8))
+    body = fp.reduce(
+        fp.from_frame(space_frame(), []), fp.Request(name="f", reference=MeanAxis(), reduction=Eigenmodes(8))
+    )
     about_centre = body.rP_dm - np.einsum("k,lj->klj", body.centre_of_mass, body.P_dm)
     np.testing.assert_allclose(body.P_dm, 0, atol=1e-9 * np.sqrt(body.mass))
     np.testing.assert_allclose(about_centre - about_centre.transpose(1, 0, 2), 0, atol=1e-9 * np.sqrt(body.mass))
@@ -286,12 +292,9 @@ def test_offset_load_bends_the_beam():
 def test_sag_under_gravity_comes_from_the_integral_of_the_modes(section):
     """Tip of a cantilever under its weight w: w L^4/(8 E I) + w L^2/(2 k G A), exact with one element and no modes."""
     L = 0.8
-    body = reduce_frame(
-        straight(section, L, 1),
-        name="b",
-        interfaces=regions("root", "tip"),
-        reference=FixedTo("root"),
-        reduction=CraigBampton(0),
+    body = fp.reduce(
+        fp.from_frame(straight(section, L, 1), regions("root", "tip")),
+        fp.Request(name="b", reference=FixedTo("root"), reduction=CraigBampton(0)),
     )
     q = body.P_dm.T @ (0, -9.81, 0) / body.omega2
     w = STEEL.rho * BAR.A * 9.81
@@ -311,7 +314,9 @@ def test_timoshenko_cantilever(h, published):
 
     def first_two(elements):
         frame = straight(rectangle(h, h), 1.0, elements)
-        body = reduce_frame(frame, name="b", interfaces=interfaces, reference=reference, reduction=CraigBampton(4))
+        body = fp.reduce(
+            fp.from_frame(frame, interfaces), fp.Request(name="b", reference=reference, reduction=CraigBampton(4))
+        )
         return body.frequencies[[0, 2]]
 
     coarse, fine = first_two(40), first_two(80)
@@ -328,8 +333,9 @@ def test_euler_bernoulli_elements_are_of_fourth_order():
 
     def errors(elements):
         frame = straight(section, 1.0, elements)
-        body = reduce_frame(
-            frame, name="b", interfaces=regions("root"), reference=FixedTo("root"), reduction=CraigBampton(2)
+        body = fp.reduce(
+            fp.from_frame(frame, regions("root")),
+            fp.Request(name="b", reference=FixedTo("root"), reduction=CraigBampton(2)),
         )
         return np.sqrt(body.omega2) / exact - 1
 
@@ -353,8 +359,9 @@ PINNED = Supports(
 def test_simply_supported_beam():
     """omega_k = (k pi/L)^2 sqrt(E I/(rho A)), modes sqrt(2/m) sin(k pi x/L) with integral sqrt(2 m) (1 - cos k pi)/(k pi)."""
     section, L = thin(rectangle(0.05, 0.004)), 1.3
-    body = reduce_frame(
-        straight(section, L, 40), name="b", interfaces=regions("root", "tip"), reference=PINNED, reduction=Eigenmodes(3)
+    body = fp.reduce(
+        fp.from_frame(straight(section, L, 40), regions("root", "tip")),
+        fp.Request(name="b", reference=PINNED, reduction=Eigenmodes(3)),
     )
     k = np.arange(1, 4)
     omega = (k * np.pi / L) ** 2 * np.sqrt(STEEL.E * section.Iz / (STEEL.rho * section.A))
@@ -365,12 +372,9 @@ def test_simply_supported_beam():
 
 def test_inertia_integrals_of_cantilever_modes():
     """Mass-normalised Euler-Bernoulli cantilever: integrals of phi are 2 sigma/lambda, of x phi 2/lambda^2."""
-    body = reduce_frame(
-        straight(thin(rectangle(0.1, 0.004)), 1.0, 60),
-        name="b",
-        interfaces=regions("root"),
-        reference=FixedTo("root"),
-        reduction=CraigBampton(3),
+    body = fp.reduce(
+        fp.from_frame(straight(thin(rectangle(0.1, 0.004)), 1.0, 60), regions("root")),
+        fp.Request(name="b", reference=FixedTo("root"), reduction=CraigBampton(3)),
     )
     scale = np.sqrt(body.mass)
     expected = [0.7829917560396257, 0.4339358951107193, 0.2544252968661057]
@@ -388,12 +392,9 @@ def test_connecting_rod_of_two_elements():
     """
     section, l = thin(rectangle(0.03, 0.008)), 0.15  # noqa: E741
     EI, m = STEEL.E * section.Iz, STEEL.rho * section.A
-    rod = reduce_frame(
-        straight(section, 2 * l, 2),
-        name="rod",
-        interfaces=regions("root", "tip"),
-        reference=SimplySupported("root", "tip"),
-        reduction=CraigBampton(6),
+    rod = fp.reduce(
+        fp.from_frame(straight(section, 2 * l, 2), regions("root", "tip")),
+        fp.Request(name="rod", reference=SimplySupported("root", "tip"), reduction=CraigBampton(6)),
     )
     symmetric = scipy.linalg.eigvalsh(
         EI / l**3 * np.array([[4 * l**2, -6 * l], [-6 * l, 12]]),
@@ -413,8 +414,9 @@ def test_craig_bampton_of_a_bar(modes, error):
     """Clamped-free bar, interface at the tip: first frequency against (pi/2) c/L, exact continuous component."""
     bar = with_mass_moments(general("bar", A=1e-4, Iy=1e-3, Iz=1e-3, J=1e-3), 1e-12, 1e-12)  # axial modes first
     frame = straight(bar, 1.0, 300)
-    body = reduce_frame(
-        frame, name="b", interfaces=regions("root", "tip"), reference=FixedTo("root"), reduction=CraigBampton(modes)
+    body = fp.reduce(
+        fp.from_frame(frame, regions("root", "tip")),
+        fp.Request(name="b", reference=FixedTo("root"), reduction=CraigBampton(modes)),
     )
     exact = np.pi / 2 * np.sqrt(STEEL.E / STEEL.rho)
     assert np.sqrt(body.omega2[0]) / exact - 1 == pytest.approx(error, abs=4e-6)
@@ -426,12 +428,9 @@ def test_craig_bampton_of_a_bar(modes, error):
 def test_craig_bampton_of_a_beam(modes, error):
     """Clamped-free beam, interface (w, w') at the tip: first frequency against 1.8751^2 sqrt(E I/(rho A L^4))."""
     section = with_mass_moments(general("beam", A=1e-4, Iy=1e-6, Iz=1e-9, J=1e-8), 1e-12, 0.0)  # its modes first
-    body = reduce_frame(
-        straight(section, 1.0, 60),
-        name="b",
-        interfaces=regions("root", "tip"),
-        reference=FixedTo("root"),
-        reduction=CraigBampton(modes),
+    body = fp.reduce(
+        fp.from_frame(straight(section, 1.0, 60), regions("root", "tip")),
+        fp.Request(name="b", reference=FixedTo("root"), reduction=CraigBampton(modes)),
     )
     exact = 1.8751040687119611**2 * np.sqrt(STEEL.E * section.Iz / (STEEL.rho * section.A))
     assert np.sqrt(body.omega2[0]) / exact - 1 == pytest.approx(error, abs=1e-7, rel=1e-3)
@@ -444,12 +443,9 @@ def test_flexible_pendulum_of_beams():
     """Against the linear floating-frame beam in the chord frame (see the data file), which is right to 4e-6 m."""
     section = thin(rectangle(0.2, 0.009))
     frame = straight(section, 1.2, 40, Material("metal", 7e10, 0.3, 5540.0))
-    rod = reduce_frame(
-        frame,
-        name="rod",
-        interfaces=regions("root", "tip"),
-        reference=SimplySupported("root", "tip"),
-        reduction=CraigBampton(20),
+    rod = fp.reduce(
+        fp.from_frame(frame, regions("root", "tip")),
+        fp.Request(name="rod", reference=SimplySupported("root", "tip"), reduction=CraigBampton(20)),
     )
     scene = Scene(
         (Body("rod", rod),),
@@ -470,7 +466,7 @@ def test_flexible_slider_crank_of_beams():
     frame = straight(section, 0.3, 24, Material("steel", 2e11, 0.3, 7870.0))
     ends = [InterfaceRegion("crankpin", "root"), InterfaceRegion("slider", "tip")]
     reference = SimplySupported("crankpin", "slider")
-    rod = reduce_frame(frame, name="rod", interfaces=ends, reference=reference, reduction=CraigBampton(10))
+    rod = fp.reduce(fp.from_frame(frame, ends), fp.Request(name="rod", reference=reference, reduction=CraigBampton(10)))
     result = forward(slider_crank(rod), end=0.084, output_step=4e-4, method=ROS2(5e-6))
     expected = np.loadtxt(REFERENCE / "slider_crank_linear.csv", delimiter=",")
     assert np.abs(middle(rod, result, 0.15) - expected[:, 1]).max() < 3e-6
@@ -507,10 +503,10 @@ def test_a_group_of_nodes_moves_as_one():
 def test_complete_reduction_does_not_depend_on_its_interfaces():
     """All fixed-interface modes and static shapes span the model: the modes of the free body, however it is reduced."""
     frame = space_frame()
-    free = reduce_frame(frame, name="f", interfaces=[], reference=MeanAxis(), reduction=Eigenmodes(20))
+    free = fp.reduce(fp.from_frame(frame, []), fp.Request(name="f", reference=MeanAxis(), reduction=Eigenmodes(20)))
     size = 6 * len(frame.points)
     make = {"name": "f", "reference": MeanAxis()}
-    complete = reduce_frame(frame, interfaces=regions("a", "b"), reduction=CraigBampton(size - 12), **make)
+    complete = fp.reduce(fp.from_frame(frame, regions("a", "b")), fp.Request(reduction=CraigBampton(size - 12), **make))
     assert complete.n == size - 6
     np.testing.assert_allclose(complete.omega2[:20], free.omega2, rtol=1e-7)
 
@@ -537,12 +533,9 @@ def test_closed_polyline():
 @pytest.mark.parametrize("section", [rectangle(0.02, 0.05), i_section(0.05, 0.04, 0.004, 0.006)], ids=["box", "I"])
 def test_drawn_surface_encloses_the_beam(section):
     """The triangles look outward and enclose A L; a rigid shift in the basis would show in every point alike."""
-    body = reduce_frame(
-        straight(section, 0.5, 3, turned=rotation(9)),
-        name="b",
-        interfaces=regions("root", "tip"),
-        reference=FixedTo("root"),
-        reduction=CraigBampton(2),
+    body = fp.reduce(
+        fp.from_frame(straight(section, 0.5, 3, turned=rotation(9)), regions("root", "tip")),
+        fp.Request(name="b", reference=FixedTo("root"), reduction=CraigBampton(2)),
     )
     a, b, c = np.moveaxis(body.surface.points[body.surface.triangles], 1, 0)
     assert np.einsum("tk,tk->", a, np.cross(b, c)) / 6 == pytest.approx(section.A * 0.5, rel=1e-12)
@@ -554,8 +547,8 @@ def test_drawn_surface_encloses_the_beam(section):
 
 
 def test_a_frame_is_reduced_to_the_same_bits_twice():
-    make = {"name": "f", "interfaces": regions("a"), "reference": FixedTo("a"), "reduction": CraigBampton(4)}
-    one, two = reduce_frame(space_frame(), **make), reduce_frame(space_frame(), **make)
+    request = fp.Request(name="f", reference=FixedTo("a"), reduction=CraigBampton(4))
+    one, two = (fp.reduce(fp.from_frame(space_frame(), regions("a")), request) for _ in range(2))
     assert np.array_equal(one.PP_dm, two.PP_dm)
     assert np.array_equal(one.surface.Phi, two.surface.Phi)
     assert one.provenance == two.provenance
@@ -565,8 +558,11 @@ def test_a_frame_is_reduced_to_the_same_bits_twice():
 
 def test_the_body_file_holds_a_frame(tmp_path):
     frame = straight(thin(circle(0.01)), 0.3, 2)
-    make = {"interfaces": regions("root"), "reference": FixedTo("root"), "reduction": CraigBampton(2)}
-    body = reduce_frame(frame, name="rod", stiffening=True, provenance={"drawing": 7}, **make)
+    make = {"reference": FixedTo("root"), "reduction": CraigBampton(2)}
+    body = fp.reduce(
+        fp.from_frame(frame, regions("root")),
+        fp.Request(name="rod", stiffening=True, provenance={"drawing": 7}, **make),
+    )
     again = load_body(save_body(body, tmp_path / "rod.ffr"))
     assert again.provenance == body.provenance
     assert json.loads(json.dumps(again.provenance, allow_nan=False))["members"][0]["section"]["ky"] == "inf"
@@ -576,12 +572,9 @@ def test_the_body_file_holds_a_frame(tmp_path):
 
 def test_stages_are_told():
     stages: list[str] = []
-    reduce_frame(
-        straight(BAR, 1.0, 2),
-        name="b",
-        interfaces=regions("root"),
-        reference=FixedTo("root"),
-        reduction=CraigBampton(2),
+    fp.reduce(
+        fp.from_frame(straight(BAR, 1.0, 2), regions("root"), progress=stages.append),
+        fp.Request(name="b", reference=FixedTo("root"), reduction=CraigBampton(2)),
         progress=stages.append,
     )
     assert stages[0] == "check the frame"
@@ -652,4 +645,7 @@ def test_frames_that_cannot_be_used(make, says):
 )
 def test_interfaces_that_cannot_be_used(interfaces, says):
     with pytest.raises(InputError, match=says):
-        reduce_frame(space_frame(), name="f", interfaces=interfaces, reference=FixedTo("a"), reduction=CraigBampton(1))
+        fp.reduce(
+            fp.from_frame(space_frame(), interfaces),
+            fp.Request(name="f", reference=FixedTo("a"), reduction=CraigBampton(1)),
+        )

@@ -13,6 +13,7 @@ from numpy.polynomial import Polynomial
 from places import REFERENCE
 from test_plates import rigid_coordinates, solved
 
+import ffr_prep as fp
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.scene.joints import Joint
@@ -23,13 +24,11 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
-from ffr_prep.pipelines.mesh import reduce_mesh
-from ffr_prep.pipelines.structures import reduce_frame
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.element_families import families
 from ffr_prep.structures.frame import Frame, Member, Shell, named, panel, polyline, triangulated
-from ffr_prep.structures.model import assemble_frame, frame_model
+from ffr_prep.structures.model import assemble_frame
 from ffr_prep.structures.sections import circle, rectangle, shear_rigid, with_mass_moments
 
 STEEL = Material("steel", 2.1e11, 0.3, 7850.0)
@@ -85,14 +84,11 @@ def test_planar_connecting_rod_of_two_elements(section):
     B_2 = np.delete(np.eye(9), [0, 1, 7], axis=1)  # axial and transverse at A, transverse at B
     expected = scipy.linalg.eigvalsh(B_2.T @ K @ B_2, B_2.T @ M @ B_2)
     frame = polyline([(0, 0, 0), (2 * l, 0, 0)], Member(thin, STEEL, (0, 1.0, 0)), elements=2)
-    rod = reduce_frame(
-        named(frame, A=(0, 0, 0), B=(2 * l, 0, 0)),
-        name="rod",
-        interfaces=[InterfaceRegion("A"), InterfaceRegion("B")],
-        reference=SimplySupported("A", "B"),
-        reduction=CraigBampton(6),
-        stiffening=True,
-        stress=True,
+    rod = fp.reduce(
+        fp.from_frame(named(frame, A=(0, 0, 0), B=(2 * l, 0, 0)), [InterfaceRegion("A"), InterfaceRegion("B")]),
+        fp.Request(
+            name="rod", reference=SimplySupported("A", "B"), reduction=CraigBampton(6), stiffening=True, stress=True
+        ),
     )
     planar = in_plane(rod)
     assert planar.n == 6
@@ -108,11 +104,11 @@ def test_in_plane_needs_a_plane():
     out = polyline(
         [(0, 0, 0), (1, 0, 0), (1, 0.3, 0.4)], Member(rectangle(0.02, 0.03), STEEL, (0.2, 1, 1.0)), elements=2
     )
-    make = {"name": "b", "interfaces": [], "reference": MeanAxis(), "reduction": Eigenmodes(6)}
+    request = fp.Request(name="b", reference=MeanAxis(), reduction=Eigenmodes(6))
     with pytest.raises(InputError, match=r"in the plane and along its normal .* are coupled|no elastic coordinate"):
-        in_plane(reduce_frame(out, **make))
+        in_plane(fp.reduce(fp.from_frame(out), request))
     straight = polyline([(0, 0, 0), (1, 0, 0)], Member(rectangle(0.01, 0.03), STEEL, (0, 1.0, 0)), elements=4)
-    one = reduce_frame(straight, **make | {"reduction": Eigenmodes(1)})
+    one = fp.reduce(fp.from_frame(straight), replace(request, reduction=Eigenmodes(1)))
     with pytest.raises(InputError, match="no elastic coordinate in the plane: keep more modes"):
         in_plane(one)
     with pytest.raises(InputError, match="is not a direction"):
@@ -144,7 +140,9 @@ def test_ring_of_straight_beams():
     exact = k * (k**2 - 1) / np.sqrt(k**2 + 1) * np.sqrt(STEEL.E * 0.002**2 / 12 / STEEL.rho)
 
     def first(elements):
-        body = reduce_frame(ring(elements), name="r", interfaces=[], reference=MeanAxis(), reduction=Eigenmodes(6))
+        body = fp.reduce(
+            fp.from_frame(ring(elements), []), fp.Request(name="r", reference=MeanAxis(), reduction=Eigenmodes(6))
+        )
         flat = in_plane(body, rotation(0)[:, 2])
         return np.sqrt(flat.omega2[[0, 1, 2, 3]])
 
@@ -190,19 +188,18 @@ L, B, H = 1.0, 0.06, 0.02
 
 
 def cantilever(kind: str) -> FlexibleBody:
-    make = {"name": kind, "interfaces": [InterfaceRegion("root")], "reference": FixedTo("root")}
-    make |= {"reduction": Eigenmodes(6), "stiffening": True}
+    request = fp.Request(name=kind, reference=FixedTo("root"), reduction=Eigenmodes(6), stiffening=True)
     if kind == "solid":
         mesh = box_mesh("hex20", (L, B, H), (20, 1, 1), (0, -B / 2, -H / 2))
-        make["interfaces"] = [InterfaceRegion("root", "left")]
-        return reduce_mesh(mesh, material=STIFF_ACROSS, **make)
+        return fp.reduce(fp.from_mesh(mesh, STIFF_ACROSS, [InterfaceRegion("root", "left")]), request)
     if kind == "beam":
         frame = polyline([(0, 0, 0), (L, 0, 0)], Member(rectangle(H, B), STIFF_ACROSS, (0, 1.0, 0)), elements=30)
-        return reduce_frame(named(frame, root=(0, 0, 0)), **make)
+        return fp.reduce(fp.from_frame(named(frame, root=(0, 0, 0)), [InterfaceRegion("root")]), request)
     corners = [(0, -B / 2, 0), (L, -B / 2, 0), (L, B / 2, 0), (0, B / 2, 0)]
     frame = panel(corners, Shell(H, STIFF_ACROSS), elements=(30, 2))
     frame = replace(frame, node_groups={"root": np.flatnonzero(frame.points[:, 0] < 1e-9)})
-    return reduce_frame(frame if kind == "quadrilaterals" else triangulated(frame), **make)
+    frame = frame if kind == "quadrilaterals" else triangulated(frame)
+    return fp.reduce(fp.from_frame(frame, [InterfaceRegion("root")]), request)
 
 
 @pytest.mark.parametrize("kind", ["quadrilaterals", "triangles", "solid"])
@@ -230,12 +227,9 @@ def test_flexible_pendulum_of_plates(cut):
     frame = cut(panel(corners, Shell(0.009, Material("metal", 7e10, 0.0, 5540.0), gyration=0.0), elements=(30, 2)))
     x = frame.points[:, 0]
     frame = replace(frame, node_groups={"root": np.flatnonzero(x < 1e-9), "tip": np.flatnonzero(x > 1.2 - 1e-9)})
-    rod = reduce_frame(
-        frame,
-        name="rod",
-        interfaces=[InterfaceRegion("root"), InterfaceRegion("tip")],
-        reference=SimplySupported("root", "tip"),
-        reduction=CraigBampton(6),
+    rod = fp.reduce(
+        fp.from_frame(frame, [InterfaceRegion("root"), InterfaceRegion("tip")]),
+        fp.Request(name="rod", reference=SimplySupported("root", "tip"), reduction=CraigBampton(6)),
     )
     scene = Scene(
         (Body("rod", with_point(rod, "middle", np.array((0.6, 0.0045, 0)))),),
@@ -269,7 +263,7 @@ def sheet(R=None) -> Frame:
 def test_mean_interfaces_follow_rigid_motions_exactly(point):
     """Nodes on one line determine all six coordinates, the turn about the line too."""
     interfaces = [InterfaceRegion("root"), InterfaceRegion("edge", kind="mean", point=point)]
-    model = frame_model(sheet(rotation(4)), interfaces).coupled
+    model = fp.from_frame(sheet(rotation(4)), interfaces).coupled
     at = model.positions[1] - model.centre
     np.testing.assert_allclose(model.C[6:] @ model.T, rigid_coordinates(at[None])[0], atol=1e-12)
     assert model.kinds == ("rigid", "mean")
@@ -277,7 +271,7 @@ def test_mean_interfaces_follow_rigid_motions_exactly(point):
 
 def test_a_load_on_a_mean_interface_is_its_resultant_on_the_nodes():
     frame = sheet()
-    model = frame_model(frame, [InterfaceRegion("edge", kind="mean")]).coupled
+    model = fp.from_frame(frame, [InterfaceRegion("edge", kind="mean")]).coupled
     load = np.array([1.0, -2, 3, 0.4, 0.5, -0.6])
     on_nodes = model.C.T @ load
     np.testing.assert_allclose(model.T.T @ on_nodes, _about(model.positions[0] - model.centre, load), atol=1e-12)
@@ -291,7 +285,7 @@ def _about(arm: np.ndarray, load: np.ndarray) -> np.ndarray:
 
 def test_a_mean_interface_of_one_node_is_the_node():
     frame = named(sheet(), corner=(0.6, 0.3, 0))
-    one, mean = (frame_model(frame, [InterfaceRegion("corner", kind=kind)]).coupled for kind in ("rigid", "mean"))
+    one, mean = (fp.from_frame(frame, [InterfaceRegion("corner", kind=kind)]).coupled for kind in ("rigid", "mean"))
     at_node = mean.C.toarray()[:, 6 * frame.node_groups["corner"][0] :][:, :6]
     np.testing.assert_allclose(at_node, np.eye(6), atol=1e-14)
     assert one.kinds == mean.kinds == ("node",)
@@ -299,8 +293,8 @@ def test_a_mean_interface_of_one_node_is_the_node():
 
 def test_a_mean_interface_stiffens_nothing():
     make = {"name": "s", "reference": MeanAxis(), "reduction": Eigenmodes(5)}
-    free = reduce_frame(sheet(), interfaces=[], **make)
-    soft = reduce_frame(sheet(), interfaces=[InterfaceRegion("edge", kind="mean")], **make)
-    stiff = reduce_frame(sheet(), interfaces=[InterfaceRegion("edge")], **make)
+    free = fp.reduce(fp.from_frame(sheet(), []), fp.Request(**make))
+    soft = fp.reduce(fp.from_frame(sheet(), [InterfaceRegion("edge", kind="mean")]), fp.Request(**make))
+    stiff = fp.reduce(fp.from_frame(sheet(), [InterfaceRegion("edge")]), fp.Request(**make))
     np.testing.assert_allclose(soft.omega2, free.omega2, rtol=1e-8)
     assert stiff.omega2[0] > 1.005 * free.omega2[0]

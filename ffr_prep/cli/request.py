@@ -1,0 +1,87 @@
+"""The options of ffr-prep that ask for a body, each declared once, and the way from a model to the body's file.
+
+Heavy modules are imported where they are needed, so that help is immediate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ffr_prep.cli.options import PATH, bundle, interface_of, reference_of
+from ffr_prep.cli.reduction import band_of, draw_quality, reduction_of, reduction_options
+from ffr_prep.cli.terminal import Steps, filed, show
+
+if TYPE_CHECKING:
+    from ffr_prep.model.coupled import InterfaceRegion
+    from ffr_prep.model.model import Model
+    from ffr_prep.pipelines.reduce import Request
+    from ffr_prep.solvers.factor import Solver
+
+OUTPUT = click.option("-o", "--output", type=PATH, required=True, help="Body file to write.")
+SOLVER = bundle(
+    click.option(
+        "--solver",
+        type=click.Choice(["cholesky", "superlu", "pardiso", "slepc"]),
+        default="cholesky",
+        show_default=True,
+        help="What factorises and finds modes: docs/size.md tells when another than our own serves.",
+    ),
+    click.option("--ranks", type=int, default=1, show_default=True, help="MPI processes of the solver slepc."),
+)
+REQUEST = bundle(
+    OUTPUT,
+    click.option("--name", help="Name of the body; default: the name of the file."),
+    click.option("--interface", "interfaces", multiple=True, metavar="INTERFACE", help="See below; may be repeated."),
+    click.option("--reference", default="mean-axis", show_default=True, metavar="CONDITIONS", help="See below."),
+    reduction_options,
+    SOLVER,
+)
+
+
+def solver_of(options: Mapping[str, Any]) -> Solver:
+    """The solver of the options SOLVER; InputError for ranks that cannot be."""
+    from ffr_prep.solvers.factor import Solver
+
+    return Solver(options["solver"], options["ranks"])
+
+
+def request_of(options: Mapping[str, Any]) -> tuple[Sequence[InterfaceRegion], Request]:
+    """The interfaces and the request of the options REQUEST, and of --stiffening and --stress where a command has them;
+    InputError for options that cannot be used.
+    """
+    from ffr_prep.pipelines.reduce import Request
+
+    return [interface_of(text) for text in options["interfaces"]], Request(
+        name=options["name"] or options["output"].stem,
+        reference=reference_of(options["reference"]),
+        reduction=reduction_of(options),
+        quality=band_of(options),
+        solver=solver_of(options),
+        stiffening=options.get("stiffening", False),
+        stress=options.get("stress", False),
+    )
+
+
+def reduce_to_file(
+    model: Callable[[], Model], request: Request, output: Path, steps: Steps, pictures: Path | None = None
+) -> None:
+    """Make the model, reduce it, write the body file, and say what is in it and what it took.
+
+    pictures : folder for those of the quality report
+    """
+    from ffr_prep.body import save_body
+    from ffr_prep.pipelines.reduce import reduce
+    from ffr_prep.report.text import short_lines
+
+    body = reduce(model(), request, progress=steps, advance=steps.advance)
+    steps("write the body file")
+    save_body(body, output)
+    steps.end()
+    show(short_lines(body))
+    draw_quality(body, pictures)
+    show(steps.lines())
+    filed(output)

@@ -1,0 +1,33 @@
+"""Vectors, extents and settings as a reader sees them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ffr_prep.common.arrays import Array
+
+_NOISE = 1e-6
+
+
+def vector_in_words(vector: Array, size: float = 0.0) -> str:
+    """(x, y, z) to five digits; parts below a millionth of the largest, or of a size, are zero."""
+    shown = np.where(np.abs(vector) < _NOISE * max(np.abs(vector).max(), size), 0.0, vector) + 0.0
+    return "(" + ", ".join(f"{x:.5g}" for x in shown) + ")"
+
+
+def extent_in_words(points: Array) -> str:
+    """The lengths of the box around points (N, 3) [m]."""
+    return f"{vector_in_words(np.ptp(points, axis=0))} m" if len(points) else ""
+
+
+def settings_in_words(value: Any) -> str:
+    """Nested settings in one line."""
+    if isinstance(value, Mapping):
+        words = [f"{k} {settings_in_words(v)}" for k, v in value.items() if k != "type" and v not in (None, {}, [])]
+        return " ".join([*([value["type"]] if "type" in value else []), ", ".join(words)]).strip()
+    if isinstance(value, list):
+        return "(" + ", ".join(map(settings_in_words, value)) + ")"
+    return f"{value:g}" if isinstance(value, float) else str(value)
