@@ -16,9 +16,11 @@ file. `reduce(model, request)` makes a *body* of it. A `Request` says how: refer
 chooses its shapes; a number, `UpTo` or `Accuracy` says how many modes. Bodies are immutable: `truncated`, `with_point`,
 `with_reference` return others.
 
-`dir(ffr_prep)` lists all names; `help(ffr_prep.reduce)` and the like explain them. Each is loaded when it is first used, with
-what it needs. What is not listed here is private: the modules of this package may change at any time. Quantities are in SI
-units; what cannot be used raises `InputError`, what cannot be computed `ComputationError`.
+`register_reduction`, `register_mesh_format`, `register_matrix_format` and `register_exchange_format` add to what command
+line and files offer (CONTRIBUTING.md shows how). `dir(ffr_prep)` lists all names; `help(ffr_prep.reduce)` and the like
+explain them. Each is loaded when it is first used, with what it needs. What is not listed here is private: the modules of
+this package may change at any time. Quantities are in SI units; what cannot be used raises `InputError`, what cannot be
+computed `ComputationError`.
 """
 
 from typing import TYPE_CHECKING
@@ -30,12 +32,17 @@ _BY_MODULE = {
     "ffr_prep.body": "BeamForces BodyError FlexibleBody Interface Surface load_body rigid_body save_body truncated "
     "with_point",
     "ffr_prep.common.errors": "ComputationError InputError",
+    "ffr_prep.common.registry": "Setting",
+    "ffr_prep.interchange.formats": "register_exchange_format ExchangeFormat",
     "ffr_prep.interchange.mbdyn": "read_fem write_fem",
     "ffr_prep.interchange.sid": "read_sid write_sid",
+    "ffr_prep.matrices.formats": "register_matrix_format MatrixFormat",
     "ffr_prep.matrices.model": "MatrixModel with_group with_node with_surface",
     "ffr_prep.matrices.npz": "save_matrices",
     "ffr_prep.matrices.part": "from_matrices",
     "ffr_prep.matrices.readers": "read_matrices",
+    "ffr_prep.mesh.file_mesh": "FileMesh",
+    "ffr_prep.mesh.formats": "register_mesh_format MeshFormat",
     "ffr_prep.mesh.mesh": "Block Mesh check_mesh read_mesh",
     "ffr_prep.model.coupled": "InterfaceRegion",
     "ffr_prep.model.material": "AnisotropicMaterial Material material orthotropic",
@@ -44,6 +51,7 @@ _BY_MODULE = {
     "ffr_prep.pipelines.reduce": "Request reduce",
     "ffr_prep.pipelines.structure_file": "Structure read_structure",
     "ffr_prep.pipelines.tied": "tied",
+    "ffr_prep.reduction.basis": "Basis Reduction basis_of",
     "ffr_prep.reduction.conversion": "with_reference",
     "ffr_prep.reduction.methods.attachment": "AttachmentModes",
     "ffr_prep.reduction.methods.characteristic": "CharacteristicModes",
@@ -56,6 +64,7 @@ _BY_MODULE = {
     "ffr_prep.reduction.methods.union": "Union",
     "ffr_prep.reduction.methods.user_vectors": "UserVectors",
     "ffr_prep.reduction.quality": "Quality quality_of",
+    "ffr_prep.reduction.registry": "register_reduction ReductionMethod",
     "ffr_prep.reduction.selection": "Accuracy Band UpTo",
     "ffr_prep.report.mode_pictures": "mode_pictures",
     "ffr_prep.report.quality_pictures": "quality_pictures",
@@ -79,8 +88,13 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
         truncated as truncated, with_point as with_point,
     )
     from ffr_prep.common.errors import ComputationError as ComputationError, InputError as InputError
+    from ffr_prep.common.registry import Setting as Setting
+    from ffr_prep.interchange.formats import (
+        register_exchange_format as register_exchange_format, ExchangeFormat as ExchangeFormat,
+    )
     from ffr_prep.interchange.mbdyn import read_fem as read_fem, write_fem as write_fem
     from ffr_prep.interchange.sid import read_sid as read_sid, write_sid as write_sid
+    from ffr_prep.matrices.formats import register_matrix_format as register_matrix_format, MatrixFormat as MatrixFormat
     from ffr_prep.matrices.model import (
         MatrixModel as MatrixModel, with_group as with_group, with_node as with_node,
         with_surface as with_surface,
@@ -88,6 +102,8 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_prep.matrices.npz import save_matrices as save_matrices
     from ffr_prep.matrices.part import from_matrices as from_matrices
     from ffr_prep.matrices.readers import read_matrices as read_matrices
+    from ffr_prep.mesh.file_mesh import FileMesh as FileMesh
+    from ffr_prep.mesh.formats import register_mesh_format as register_mesh_format, MeshFormat as MeshFormat
     from ffr_prep.mesh.mesh import Block as Block, Mesh as Mesh, check_mesh as check_mesh, read_mesh as read_mesh
     from ffr_prep.model.coupled import InterfaceRegion as InterfaceRegion
     from ffr_prep.model.material import (
@@ -102,6 +118,7 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_prep.pipelines.reduce import Request as Request, reduce as reduce
     from ffr_prep.pipelines.structure_file import Structure as Structure, read_structure as read_structure
     from ffr_prep.pipelines.tied import tied as tied
+    from ffr_prep.reduction.basis import Basis as Basis, Reduction as Reduction, basis_of as basis_of
     from ffr_prep.reduction.conversion import with_reference as with_reference
     from ffr_prep.reduction.methods.attachment import AttachmentModes as AttachmentModes
     from ffr_prep.reduction.methods.characteristic import CharacteristicModes as CharacteristicModes
@@ -114,6 +131,7 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_prep.reduction.methods.union import Union as Union
     from ffr_prep.reduction.methods.user_vectors import UserVectors as UserVectors
     from ffr_prep.reduction.quality import Quality as Quality, quality_of as quality_of
+    from ffr_prep.reduction.registry import register_reduction as register_reduction, ReductionMethod as ReductionMethod
     from ffr_prep.reduction.selection import Accuracy as Accuracy, Band as Band, UpTo as UpTo
     from ffr_prep.report.mode_pictures import mode_pictures as mode_pictures
     from ffr_prep.report.quality_pictures import quality_pictures as quality_pictures

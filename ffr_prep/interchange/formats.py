@@ -75,6 +75,11 @@ EXCHANGE_FORMATS: Registry[ExchangeFormat] = Registry(
 )
 
 
+def register_exchange_format(entry: ExchangeFormat) -> None:
+    """Offer a format to `ffr-prep export` and `import`. Raises InputError for a name that is taken."""
+    EXCHANGE_FORMATS.register(entry)
+
+
 def export_body(body: FlexibleBody, path: Path, surface: bool, settings: Mapping[str, Any]) -> tuple[str, ...]:
     """Write a body in the format of the suffix; what was left out, in words.
 

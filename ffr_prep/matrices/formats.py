@@ -61,6 +61,11 @@ MATRIX_FORMATS: Registry[MatrixFormat] = Registry(
 )
 
 
+def register_matrix_format(entry: MatrixFormat) -> None:
+    """Offer a format to `read_matrices`, and so to the command line. Raises InputError for a name that is taken."""
+    MATRIX_FORMATS.register(entry)
+
+
 def format_of(paths: Sequence[Path]) -> MatrixFormat:
     """The format of these files by their suffixes, the last that takes them; InputError lists what there is."""
     given = [path.suffix.lower() for path in paths]

@@ -71,6 +71,11 @@ MESH_FORMATS: Registry[MeshFormat] = Registry(
 )
 
 
+def register_mesh_format(entry: MeshFormat) -> None:
+    """Offer a format to `read_mesh`, command line and structure files. Raises InputError for a name that is taken."""
+    MESH_FORMATS.register(entry)
+
+
 def format_of(path: Path) -> MeshFormat:
     """The format of a file by its suffix: the last that takes it; meshio takes any."""
     suffix = path.suffix.lower()

@@ -8,13 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ffr_prep.body import content_hash
-from ffr_prep.common.brief import Brief, Rows, brief_tuple, listed
+from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.common.progress import Stages, no_stages
@@ -35,7 +34,8 @@ _DOUBTFUL_LENGTH = 20.0
 _SHOWN_PARTS = 5
 
 
-class Block(NamedTuple):
+@dataclass(frozen=True, repr=False)
+class Block(Brief):
     """Volume elements of one kind: "tet4", "tet10", "hex8", "hex20" or "hex27".
 
     nodes : (E, k) indices into Mesh.points, in the node order of meshio (VTK).
@@ -43,9 +43,6 @@ class Block(NamedTuple):
 
     kind: str
     nodes: Array
-
-    def __repr__(self) -> str:
-        return brief_tuple(self)
 
 
 @dataclass(frozen=True, repr=False)
@@ -139,12 +136,12 @@ def _in_metres(read: FileMesh, scale: float) -> Mesh:
     used = np.unique(np.concatenate([nodes.ravel() for _, nodes in read.blocks]))
     new = np.full(len(read.points), -1)
     new[used] = np.arange(used.size)
-    blocks = tuple(Block(kind, new[nodes]) for kind, nodes in read.blocks)
+    blocks = [(kind, new[nodes]) for kind, nodes in read.blocks]
     faces = {name: whole_faces(blocks, [new[corners] for corners in parts]) for name, parts in read.faces.items()}
     nodes = {name: np.unique(new[members][new[members] >= 0]) for name, members in read.nodes.items()}
     return Mesh(
         points=read.points[used] * scale,
-        blocks=blocks,
+        blocks=tuple(Block(kind, nodes) for kind, nodes in blocks),
         volume_groups=dict(read.volumes),
         face_groups={name: parts for name, parts in faces.items() if parts},
         node_groups={name: members for name, members in nodes.items() if members.size},
@@ -190,7 +187,7 @@ def region_nodes(mesh: Mesh, name: str) -> Array:
 
 def boundary_faces(mesh: Mesh) -> tuple[Array, ...]:
     """The outer faces, one array (F, k) per face size, nodes counter-clockwise seen from outside."""
-    return outer_faces(mesh.blocks)
+    return outer_faces(_pairs(mesh))
 
 
 def surface_triangles(mesh: Mesh) -> tuple[Array, Array]:
@@ -203,13 +200,17 @@ def surface_triangles(mesh: Mesh) -> tuple[Array, Array]:
     return points, triangles.reshape(-1, 3)
 
 
+def _pairs(mesh: Mesh) -> list[tuple[str, Array]]:
+    return [(block.kind, block.nodes) for block in mesh.blocks]
+
+
 # ---- identity -----------------------------------------------------------------------------------------------------
 
 
 def mesh_hash(mesh: Mesh) -> str:
     """A short hash of points, elements and groups."""
     parts = [mesh.points]
-    for kind, nodes in mesh.blocks:
+    for kind, nodes in _pairs(mesh):
         parts += [_bytes(kind), np.asarray(nodes, np.int64)]
     named: dict[str, tuple[Array, ...]] = {f"volume {name}": (of,) for name, of in mesh.volume_groups.items()}
     named |= {f"face {name}": of for name, of in mesh.face_groups.items()}
@@ -244,7 +245,7 @@ def check_mesh(mesh: Mesh) -> None:
 def _check_numbers(mesh: Mesh) -> None:
     if not sum(len(block.nodes) for block in mesh.blocks):
         raise InputError("the mesh has no volume elements; only solids can be reduced, not surfaces or beams")
-    for kind, nodes in mesh.blocks:
+    for kind, nodes in _pairs(mesh):
         if kind not in KINDS or nodes.shape[1:] != (KINDS[kind].size,):
             raise InputError(f"a block of kind {kind!r} has nodes of shape {nodes.shape}; kinds are {', '.join(KINDS)}")
     wrong = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
@@ -269,7 +270,7 @@ def _check_groups(mesh: Mesh) -> None:
 
 def _check_repeated(mesh: Mesh) -> None:
     first = 0
-    for kind, nodes in mesh.blocks:
+    for kind, nodes in _pairs(mesh):
         _, index, counts = np.unique(np.sort(nodes, axis=1), axis=0, return_index=True, return_counts=True)
         if (counts > 1).any():
             element = first + int(index[counts > 1].min())
@@ -281,7 +282,7 @@ def _check_repeated(mesh: Mesh) -> None:
 
 
 def _check_jacobians(mesh: Mesh) -> None:
-    worst = np.concatenate([_worst_jacobians(mesh.points[nodes], kind) for kind, nodes in mesh.blocks])
+    worst = np.concatenate([_worst_jacobians(mesh.points[nodes], kind) for kind, nodes in _pairs(mesh)])
     bad = np.flatnonzero(~(worst > _DEGENERATE))
     if not bad.size:
         return
@@ -325,13 +326,13 @@ def _check_coincident(mesh: Mesh) -> None:
 
 def _check_connected(mesh: Mesh) -> None:
     """Elements must hang together by whole faces; a common node or edge is a hinge."""
-    by_nodes = joined_by_nodes(mesh.blocks)
+    by_nodes = joined_by_nodes(_pairs(mesh))
     if by_nodes.max() > 0:
         raise InputError(
             f"the mesh has {by_nodes.max() + 1} unconnected parts: {_parts_in_words(mesh, by_nodes)}. A body is one "
             "piece: join the parts (shared nodes), or make each a body of its own"
         )
-    by_faces = joined_by_faces(mesh.blocks)
+    by_faces = joined_by_faces(_pairs(mesh))
     if by_faces.max() > 0:
         raise InputError(
             f"the mesh has {by_faces.max() + 1} parts that touch at nodes or edges only, a hinge and not a joint of "

@@ -21,7 +21,7 @@ OF_FILES = "FILE"
 
 
 @dataclass(frozen=True)
-class Method:
+class ReductionMethod:
     """A reduction by its name.
 
     name     : the word of --method and of `method` in a structure file; "FILE.xyz" stands for all files of a suffix
@@ -39,52 +39,52 @@ class Method:
 
 
 _FOLDER = "ffr_prep.reduction.methods"
-REDUCTIONS: Registry[Method] = Registry(
+REDUCTIONS: Registry[ReductionMethod] = Registry(
     "reduction",
     (
-        Method(
+        ReductionMethod(
             "craig-bampton",
             f"{_FOLDER}.craig_bampton:CraigBampton",
             "static shapes of every interface coordinate and N modes with all interfaces fixed: for bodies that joints load, "
             "the safe choice",
             selects=True,
         ),
-        Method(
+        ReductionMethod(
             "eigenmodes",
             f"{_FOLDER}.eigenmodes:Eigenmodes",
             "N modes under the reference conditions: for bodies without interface loads",
             selects=True,
         ),
-        Method(
+        ReductionMethod(
             "rubin",
             f"{_FOLDER}.rubin:Rubin",
             "N modes of the free body and the static response to interface loads: few modes suffice where joints leave the "
             "interfaces nearly free",
             selects=True,
         ),
-        Method(
+        ReductionMethod(
             "guyan",
             f"{_FOLDER}.guyan:Guyan",
             "static shapes of the interfaces alone: slow motion of light bodies",
         ),
-        Method(
+        ReductionMethod(
             "characteristic",
             f"{_FOLDER}.characteristic:CharacteristicModes",
             "craig-bampton with only the --interface-modes lowest shapes of the interfaces: for many interfaces",
             selects=True,
             settings=(Setting("interface_modes", int, 6, "Of characteristic.", least=0),),
         ),
-        Method(
+        ReductionMethod(
             "attachment",
             f"{_FOLDER}.attachment:AttachmentModes",
             "static response to forces and moments at the interfaces",
         ),
-        Method(
+        ReductionMethod(
             "inertia-relief",
             f"{_FOLDER}.inertia_relief:InertiaRelief",
             "static response to acceleration and spin: exact sag, exact growth, exact stress under them",
         ),
-        Method(
+        ReductionMethod(
             "krylov",
             f"{_FOLDER}.krylov:Krylov",
             "response to interface loads, matched to --moments derivatives at the frequencies --match",
@@ -93,7 +93,7 @@ REDUCTIONS: Registry[Method] = Registry(
                 Setting("match", "numbers", (0.0,), "Frequencies [Hz] of krylov.", argument="frequencies"),
             ),
         ),
-        Method(
+        ReductionMethod(
             f"{OF_FILES}.npy",
             f"{_FOLDER}.user_vectors:read_user_vectors",
             "displacement fields of your own, an array (nodes, 3, fields)",
@@ -102,7 +102,12 @@ REDUCTIONS: Registry[Method] = Registry(
 )
 
 
-def method_of(word: str) -> Method:
+def register_reduction(entry: ReductionMethod) -> None:
+    """Offer a reduction to command line and structure files. Raises InputError for a name that is taken."""
+    REDUCTIONS.register(entry)
+
+
+def method_of(word: str) -> ReductionMethod:
     """The entry that a word or the name of a file stands for; InputError lists what there is."""
     known = REDUCTIONS.entries
     found = known.get(word) or known.get(OF_FILES + Path(word).suffix)
@@ -124,7 +129,7 @@ def reduction_of(requests: Sequence[Mapping[str, Any]], folder: Path = Path()) -
     return parts[0] if len(parts) == 1 else Union(parts)
 
 
-def _made(entry: Method, given: Mapping[str, Any], folder: Path) -> Reduction:
+def _made(entry: ReductionMethod, given: Mapping[str, Any], folder: Path) -> Reduction:
     from ffr_prep.reduction.selection import selection_of
 
     made: Reduction

@@ -8,6 +8,7 @@ import pytest
 from matrix_models import bar
 from places import MESHES, ROOT
 
+import ffr_prep as fp
 from ffr_prep import cli
 from ffr_prep.body import load_body
 from ffr_prep.common.errors import InputError
@@ -18,11 +19,7 @@ from ffr_prep.matrices.npz import save_matrices
 from ffr_prep.mesh.formats import MESH_FORMATS
 from ffr_prep.mesh.mesh import check_mesh, read_mesh
 from ffr_prep.model.material import material
-from ffr_prep.model.reference import MeanAxis
-from ffr_prep.pipelines.reduce import Request, reduce
-from ffr_prep.pipelines.structure_file import read_structure
-from ffr_prep.reduction.registry import REDUCTIONS, Method
-from ffr_prep.solids.model import from_mesh
+from ffr_prep.reduction.registry import REDUCTIONS, ReductionMethod
 
 BOX = [str(MESHES / "box.geo"), "--set", "nx=4", "--set", "ny=2", "--set", "nz=2", "--material", "steel"]
 REGISTRIES = (REDUCTIONS, MESH_FORMATS, MATRIX_FORMATS, EXCHANGE_FORMATS)
@@ -110,8 +107,8 @@ def test_a_reduction_of_ones_own_by_command_and_in_python(tmp_path, polynomials)
     body = load_body(tmp_path / "b.ffr")
     numbers = {"nx": 4, "ny": 2, "nz": 2}
     made = sys.modules[f"ffr_plugin:{polynomials.resolve()}"].Polynomials(3)
-    box = from_mesh(read_mesh(MESHES / "box.geo", numbers=numbers), material("steel"))
-    same = reduce(box, Request(name="b", reference=MeanAxis(), reduction=made))
+    model = fp.from_mesh(read_mesh(MESHES / "box.geo", numbers=numbers), material("steel"))
+    same = fp.reduce(model, fp.Request(name="b", reference=fp.MeanAxis(), reduction=made))
     np.testing.assert_array_equal(body.omega2, same.omega2)
     assert body.provenance["reduction"] == {"type": "Polynomials", "degree": 3}
     assert body.n == 3 * 19 - 3  # 19 monomials for each axis, without three rotations
@@ -136,7 +133,7 @@ interfaces = {a = {}}
     assert parts[0] == {"type": "Polynomials", "degree": 4}
     (tmp_path / "bar.toml").write_text(text.replace("degree = 4", "degree = 0"))
     with pytest.raises(InputError, match=r"reduction\.0\.degree: .*greater than or equal to 1"):
-        read_structure(tmp_path / "bar.toml")
+        fp.read_structure(tmp_path / "bar.toml")
 
 
 def test_help_and_messages_know_it(polynomials, capsys):
@@ -153,6 +150,11 @@ def test_help_and_messages_know_it(polynomials, capsys):
 def test_every_entry_is_a_documented_class(entry):
     assert loaded(entry.target).__doc__
     assert entry.help
+
+
+def test_the_front_door_has_every_reduction():
+    classes = {loaded(entry.target).__name__ for entry in REDUCTIONS if not entry.name.startswith("FILE.")}
+    assert classes <= set(dir(fp))
 
 
 def test_every_file_of_a_method_has_its_entry():
@@ -202,9 +204,9 @@ def test_names_and_settings_have_one_meaning(polynomials):
     load_plugin(polynomials)
     load_plugin(polynomials)  # once only
     with pytest.raises(InputError, match="there is a reduction 'krylov' already"):
-        REDUCTIONS.register(Method("krylov", dict, "another"))
+        REDUCTIONS.register(ReductionMethod("krylov", dict, "another"))
     with pytest.raises(InputError, match="its setting 'moments' means something else"):
-        REDUCTIONS.register(Method("mine", dict, "mine", settings=(Setting("moments", float, 1.0, "Mine."),)))
+        REDUCTIONS.register(ReductionMethod("mine", dict, "mine", settings=(Setting("moments", float, 1.0, "Mine."),)))
 
 
 @pytest.mark.parametrize(("text", "message"), [(None, "that exists"), ("1 / 0", "fails with ZeroDivisionError")])
