@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from importlib.metadata import version
@@ -11,6 +12,8 @@ import pytest
 from places import ROOT
 
 import ffr_dyn as fd
+from ffr_dyn.analyses.registry import LISTED
+from ffr_dyn.integrators import methods
 
 HOME = {name: module for module, names in fd._BY_MODULE.items() for name in names.split()}
 SOURCE = ast.parse((ROOT / "ffr_dyn" / "__init__.py").read_text(encoding="utf-8"))
@@ -60,3 +63,23 @@ def test_a_name_loads_its_room_alone():
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False"] * 3
+
+
+# ---- the pages use the door alone -----------------------------------------------------------------------------------
+
+PAGES = ("analyses", "chart", "economy", "forces", "integrators", "realtime", "scene_file", "stress")
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_pages_use_the_door_alone(page):
+    text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    for block in re.findall(r"```python\n(.*?)```", text, re.S):
+        imported = [node for node in ast.walk(ast.parse(block)) if isinstance(node, ast.Import | ast.ImportFrom)]
+        assert {ast.unparse(node) for node in imported} <= {"import ffr_dyn as fd", "import ffr_prep as fp"}
+    assert {name for name in re.findall(r"\bfd\.(\w+)", text) if name not in fd.__all__} == set()
+
+
+def test_pages_name_every_analysis_and_method():
+    analysed, integrated = ((ROOT / "docs" / f"{page}.md").read_text() for page in ("analyses", "integrators"))
+    assert [word for word in LISTED if f"`ffr-dyn {word}`" not in analysed] == []
+    assert [name for name, made in methods().items() if f"| `{name}` `{made.__name__}` |" not in integrated] == []
