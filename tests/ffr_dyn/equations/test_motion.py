@@ -74,7 +74,9 @@ def cases() -> dict[str, Scene]:
         found["cylindrical"], joints=tuple(replace(j, kind="cylindrical") for j in found["cylindrical"].joints)
     )
     for first, second in (("root.angle", "tie.angle"), ("root.stroke", "tie.angle")):
-        found[f"coupled {first} {second}"] = replace(arms, couplings=(Coupling("gear", first, second, -1.5, offset=0.2),))
+        found[f"coupled {first} {second}"] = replace(
+            arms, couplings=(Coupling("gear", first, second, -1.5, offset=0.2),)
+        )
     found["loads"] = replace(chain(), loads=LOADS)
     shaken = (harmonic(amplitude=1, frequency=2), 0.0, 3.0)
     found["shaken base"] = replace(chain(), base_acceleration=shaken)
