@@ -14,7 +14,7 @@ from scipy.linalg import LinAlgError, eigvalsh, null_space
 from ffr_dyn.compile.body_tables import of_coordinates
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.evaluation import evaluate, evaluated_mass_matrix, evaluator
-from ffr_dyn.economy.model_choice import Choice
+from ffr_dyn.economy.model_choice import Choice, bases_between
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.residual_estimate import elastic_columns, lift
 from ffr_dyn.economy.run import Made, Trial, states
@@ -45,15 +45,12 @@ class Frequency:
 def frequencies(final: Trial, made: Made, everything: Choice, original: Scene, policy: Policy) -> tuple[Frequency, ...]:
     """The lowest vibrations of the model half-way through its run, beside everything in the same position; none for a model
     without vibration. Of small motions about that position, with the stiffness and the inertia there, without rates."""
-    if not any(part.count for part in final.choice.parts):
+    if not final.choice.count:
         return ()
     x, v = states(final)
     middle = len(x) // 2
     time, small, large = float(final.result.time[middle]), final.made.assembled.system, made.assembled.system
-    bases = tuple(
-        many.basis(body.model.n).T @ few.basis(body.model.n)
-        for body, few, many in zip(original.bodies, final.choice.parts, everything.parts, strict=True)
-    )
+    bases = bases_between(original, final.choice, everything)
     lifted = lift(small.layout, large.layout, bases, x[middle : middle + 1], v[middle : middle + 1])
     own, whole = (
         _vibrations(system, time, *at, policy.rigid_frequency)

@@ -9,7 +9,7 @@ import numpy as np
 from ffr_dyn.compile.body_tables import of_coordinates
 from ffr_dyn.consistency.evaluation import moved, record_states, to_body_axes, to_global_axes
 from ffr_dyn.economy.cache import Ledger
-from ffr_dyn.economy.model_choice import Choice
+from ffr_dyn.economy.model_choice import Choice, bases_between
 from ffr_dyn.economy.outputs import Probe, difference, histories, needed
 from ffr_dyn.economy.policy import Policy
 from ffr_dyn.economy.residual_estimate import Samples, driven, elastic_columns, followed, samples
@@ -116,10 +116,7 @@ def of_omitted(ledger: Ledger, trial: Trial, everything: Choice, limit: Array) -
     """
     x, v = states(trial)
     rows, large = _spaced(len(x), ledger.policy), ledger.made(everything)
-    bases = tuple(
-        many.basis(body.model.n).T @ few.basis(body.model.n)
-        for body, few, many in zip(ledger.scene.bodies, trial.choice.parts, everything.parts, strict=True)
-    )
+    bases = bases_between(ledger.scene, trial.choice, everything)
     D, modes = _missing(large.assembled.system.layout, bases, everything, ledger.policy.remainder)
     if not modes:
         return nothing(ledger.of)

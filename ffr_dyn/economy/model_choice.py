@@ -72,6 +72,15 @@ class Choice:
     accuracy: float = 0.0
 
     @property
+    def count(self) -> int:
+        """How many elastic coordinates the model has."""
+        return sum(part.count for part in self.parts)
+
+    def stepped_as(self, other: Choice) -> Choice:
+        """The model with the method and the step of another."""
+        return replace(self, method=other.method, divisions=other.divisions, accuracy=other.accuracy)
+
+    @property
     def controlled(self) -> bool:
         """Whether the integrator chooses its steps."""
         return self.method in CONTROLLED
@@ -138,6 +147,14 @@ def _stays(form: Scene, moved: Result, share: float) -> bool:
         if np.ptp(height) > share * size or np.abs(across).max() > share * max(np.abs(omega).max(), 1e-3):
             return False
     return True
+
+
+def bases_between(scene: Scene, few: Choice, many: Choice) -> tuple[Array, ...]:
+    """Of each body the coordinates of one model in those of another, (count of many, count of few)."""
+    return tuple(
+        large.basis(body.model.n).T @ small.basis(body.model.n)
+        for body, small, large in zip(scene.bodies, few.parts, many.parts, strict=True)
+    )
 
 
 def applied(scene: Scene, choice: Choice) -> Scene:

@@ -52,7 +52,7 @@ def _summary(found: Economy) -> Table:
         ("computed", "in space" if choice.plane == "none" else f"in the plane across {choice.plane}"),
         ("integrator", _integrator(choice, settings.method.step)),
         ("stabilisation", repr(settings.stabilisation)),
-        ("elastic coordinates", f"{_coordinates(choice)} of {sum(b.model.n for b in found.original.bodies)}"),
+        ("elastic coordinates", f"{choice.count} of {sum(b.model.n for b in found.original.bodies)}"),
         ("cost of a run", f"{found.cost / 1e6:.3g} s, everything with the same step {found.before / 1e6:.3g} s: "
                           f"{found.before / found.cost:.1f} times as much (cost model)"),
         ("cost of the search", f"{found.search_cost / found.cost:.1f} runs of the chosen model"),
@@ -76,10 +76,6 @@ def _verdict(found: Economy) -> str:
         return f"NOT within its tolerances: the verification finds {worst:.2g} times the tolerance of an output."
     again = f" after {verified.attempts} refinements of what the estimates had chosen" if verified.attempts else ""
     return f"Verified{again}: all outputs are within their tolerances; the nearest takes {worst:.2g} of its own."
-
-
-def _coordinates(choice: Choice) -> int:
-    return sum(part.count for part in choice.parts)
 
 
 def _outputs(found: Economy) -> Table:

@@ -35,7 +35,7 @@ from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.result import Economy, Verification
 from ffr_dyn.economy.rigid_start import PILOT, Ground, Rigid, started, unmoved
 from ffr_dyn.economy.run import Span, Trial, rings
-from ffr_dyn.economy.selection import Insufficient, Selection, gap, selected_model, size_of
+from ffr_dyn.economy.selection import Insufficient, Selection, gap, selected_model
 from ffr_dyn.economy.steps import Stepped, chosen_step
 from ffr_dyn.economy.verification import reference_cost, verified
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
@@ -148,13 +148,12 @@ def _beside_everything(ledger: Ledger, stiff: Rigid, omitted: Contributions | No
     finer = _finer_ground(ledger, ground, found.final, verify)
     if finer is None:
         return found
-    steps = {"method": PILOT, "divisions": finer.coarsest, "accuracy": 0.0}
-    same = replace(found.final.choice, **steps)  # type: ignore[arg-type]
+    same = found.final.choice.stepped_as(finer.everything)
     error = gap(ledger, finer, same, "the same with a finer step")
     if (error + largest(found.time) <= ledger.policy.whole_share * ground.limits).all():
         model = difference(ledger.run(same).values, finer.pilot.values)
         return replace(found, model=largest(model), error=largest(total(model, found.time)))
-    beyond = Insufficient(size_of(same), float((error / ground.limits).max()))
+    beyond = Insufficient(same.count, float((error / ground.limits).max()))
     return _stepped(ledger, finer, selected_model(ledger, finer, omitted, beyond), omitted, found)
 
 
@@ -174,7 +173,7 @@ def _stepped(
     elif like is None:
         stepped = _with_step(ledger, choice, largest(apart), ground.limits)
     else:
-        stepped = _as_like(ledger, choice, like)
+        stepped = Stepped(ledger.run(choice.stepped_as(like.final.choice)), like.time)
     return Chosen(
         stepped.trial,
         selection.left if together else largest(apart),
@@ -188,12 +187,6 @@ def _stepped(
         omitted,
         together,
     )
-
-
-def _as_like(ledger: Ledger, choice: Choice, like: Chosen) -> Stepped:
-    given = like.final.choice
-    own = replace(choice, method=given.method, divisions=given.divisions, accuracy=given.accuracy)
-    return Stepped(ledger.run(own), like.time)
 
 
 def _finer_ground(ledger: Ledger, ground: Ground, final: Trial, verify: bool | None) -> Ground | None:

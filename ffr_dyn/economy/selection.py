@@ -117,7 +117,7 @@ def selected_model(
     if beyond is None and (_is_coarse(ledger, ground) or (all_modes <= policy.nearly_rigid * ground.limits).all()):
         choice = _in_two_stages(ledger, ground, best, effects)
     choice = _enough(ledger, ground, best, effects, beyond) if choice is None else choice
-    return Selection(choice, best.left(size_of(choice)), effects)
+    return Selection(choice, best.left(choice.count), effects)
 
 
 def _rankings(ledger: Ledger, ground: Ground, omitted: Contributions) -> tuple[list[Ranking], tuple[TermEffect, ...]]:
@@ -208,13 +208,8 @@ def _more(ranking: Ranking, count: int, policy: Policy) -> int:
     return min(max(count + 1, int(policy.more_modes * count)), ranking.order.size)
 
 
-def size_of(choice: Choice) -> int:
-    """How many elastic coordinates a model has."""
-    return sum(part.count for part in choice.parts)
-
-
 def _said(model: Choice) -> str:
-    return f"{size_of(model)} elastic coordinates" if size_of(model) else "all bodies rigid"
+    return f"{model.count} elastic coordinates" if model.count else "all bodies rigid"
 
 
 def gap(ledger: Ledger, ground: Ground, choice: Choice, what: str) -> Array:

@@ -72,7 +72,7 @@ def chosen_step(ledger: Ledger, choice: Choice, limit: Array) -> Stepped:
 def _rigid_in_two_stages(ledger: Ledger, choice: Choice, limit: Array) -> Stepped | None:
     """The coarse run of rigid bodies with two stages, of which steps over two rows are there already, where it is good
     enough."""
-    if any(part.count for part in choice.parts):
+    if choice.count:
         return None
     trial = _attempt(ledger, replace(choice, method=TWO_STAGES))
     error = None if trial is None else _from_two_rows(ledger, trial)
@@ -108,7 +108,7 @@ def _far_off(ledger: Ledger, coarse: Trial, limit: Array) -> bool:
     return any(
         share(difference(trial.values, coarse.values), limit) > ledger.policy.hopeless
         for choice, trial in ledger.runs.items()
-        if choice.method == TWO_STAGES and any(part.count for part in choice.parts)
+        if choice.method == TWO_STAGES and choice.count
     )
 
 

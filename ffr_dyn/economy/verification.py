@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from ffr_dyn.economy.outputs import Probe, difference, largest
 from ffr_dyn.economy.result import Verification
 from ffr_dyn.economy.rigid_start import PILOT, Ground
 from ffr_dyn.economy.run import Trial
-from ffr_dyn.economy.selection import Insufficient, selected_model, size_of
+from ffr_dyn.economy.selection import Insufficient, selected_model
 from ffr_dyn.economy.steps import error_of, order
 from ffr_prep.common.errors import InputError
 
@@ -94,20 +93,19 @@ def _better(
 ) -> Trial:
     """A better model: of a finer step where that is what is wrong, or else chosen anew beside everything with that step, and
     of a finer step too where what is left out does not explain the error."""
-    same = replace(final.choice, method=PILOT, divisions=coarse.choice.divisions, accuracy=0.0)
+    same = final.choice.stepped_as(coarse.choice)
     gap = largest(difference(ledger.run(same).values, coarse.values))
     if (gap <= ledger.policy.omitted_share * limits).all():
         return ledger.run(_shorter(final.choice))
     stepped = _shorter(final.choice) if (errors[-1] - gap > ledger.policy.unexplained * limits).any() else final.choice
-    steps: dict[str, Any] = {key: getattr(stepped, key) for key in ("method", "divisions", "accuracy")}
     if not final.choice.integrator(ledger.span.output_step).implicit:  # its step is for the modes that it had
-        steps = {"method": PILOT, "divisions": coarse.choice.divisions, "accuracy": 0.0}
+        stepped = coarse.choice
     if len(errors) > 1:
-        return ledger.run(replace(coarse.choice, **steps))
+        return ledger.run(coarse.choice.stepped_as(stepped))
     ground = Ground(coarse.choice, coarse.choice, coarse, limits, limits)
-    beyond = Insufficient(size_of(final.choice), float((gap / limits).max()))
+    beyond = Insufficient(final.choice.count, float((gap / limits).max()))
     anew = selected_model(ledger, ground, omitted, beyond).choice
-    return ledger.run(replace(anew, **steps))
+    return ledger.run(anew.stepped_as(stepped))
 
 
 def _shorter(choice: Choice) -> Choice:

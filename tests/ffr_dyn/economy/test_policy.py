@@ -190,7 +190,7 @@ def two_stage_sizes(policy: Policy, patch: Any) -> Any:
     """Elastic coordinates of the models tried in two stages."""
     ledger = runs(policy, lambda choice: 1.2 * (choice.method == "ros2"))
     selection._in_two_stages(ledger, ground(ledger), ranking(policy, effects(*SIZES)), ())
-    return [selection.size_of(choice) for choice in ledger.runs if choice.method == "ros2"]
+    return [choice.count for choice in ledger.runs if choice.method == "ros2"]
 
 
 def terms_share(policy: Policy, patch: Any) -> Any:
@@ -237,7 +237,7 @@ def caution(policy: Policy, patch: Any) -> Any:
     error = iter([0.0, 1.0, 0.0])
     ledger = runs(replace(policy, modes_share=5.5, terms_share=0.0), lambda choice: next(error))
     selection._enough(ledger, ground(ledger), ranking(policy, found), (), None)
-    return [selection.size_of(choice) for choice in ledger.runs]
+    return [choice.count for choice in ledger.runs]
 
 
 def more_modes(policy: Policy, patch: Any) -> Any:
