@@ -21,7 +21,7 @@ OPTIONS: dict[str, Any] = {
     "fastmath": {"contract", "reassoc", "nsz"},
 }
 
-# A kernel that is called from Python with tables of its own; time loops are units (see `ffr_dyn.kernels.entry_points`).
+# A kernel that is called from Python with tables of its own; time loops are in `ffr_dyn.kernels.entry_points`.
 entry: Any = functools.partial(njit, cache=True, **OPTIONS)
 
 # A kernel that only other kernels call: without the wrappers for callers in Python and C it compiles in half the time.

@@ -12,7 +12,7 @@ from ffr_dyn.kernels.vectors import copy, get, put
 
 @inlined
 def keep(m, w, t, x, v, out, k):
-    """Write row k of `out` from an evaluated state with all its markers; the powers of loads are left to another unit."""
+    """Write row k of `out` from an evaluated state with all its markers; the powers of loads are left to `load_powers`."""
     F = m.functions.kind.size
     out.time[k] = t
     copy(out.x[k], x)
