@@ -11,7 +11,7 @@ from test_dyn_kernels import DRIVE, chain, random_state
 from test_dyn_plane import slider_crank
 from test_dyn_singular import bricard
 
-from ffr_dyn.compile.engine import evaluate_at, new_machine, record_row
+from ffr_dyn.compile.engine import evaluate_at, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System, compile_scene
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import RELAXATION, assemble
@@ -41,10 +41,10 @@ def stiffened(body, seed: int = 4):
 
 def assert_twins(system: System, t: float, x, v, *, rtol: float = 1e-9) -> None:
     """Rows, accelerations and multipliers of the compiled evaluation, against those on paper."""
-    machine = new_machine(system, x, v)
+    engine = new_engine(system, x, v)
     for _ in range(4):  # loads that stiffen begin with those of the last solution
-        assert evaluate_at(machine, t, x, v) == OK
-    work, twin = machine.work, equations_of_motion(system.scene, t, x, v, system.blocks)
+        assert evaluate_at(engine, t, x, v) == OK
+    work, twin = engine.work, equations_of_motion(system.scene, t, x, v, system.blocks)
     for name in ("Phi", "nu", "gamma"):
         given = np.array([getattr(row, name) for row in twin.rows])
         np.testing.assert_allclose(
@@ -146,8 +146,8 @@ def test_recorded_energies_are_those_on_paper(name):
     scene = cases()[name]
     x, v = random_state(scene)
     system = compile_scene(scene)
-    place, machine, record = system.layout, new_machine(system, x, v), new_record(system, 1)
-    assert record_row(machine, T, record, 0) == OK
+    place, engine, record = system.layout, new_engine(system, x, v), new_record(system, 1)
+    assert record_row(engine, T, record, 0) == OK
     y, total = to_body_axes(place, x, v), np.zeros(3)
     for b, body in enumerate(scene.bodies):
         own = np.concatenate([y[place.rigid(b)], y[place.q_dot(b)]])
