@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from benchmarks.scenes import chain, connecting_rod, pendulum, pendulum_rod, slider_crank, with_middle
-from ffr_dyn.compile.engine import fill_rows, new_machine
+from ffr_dyn.compile.engine import fill_rows, new_engine
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.functions.stopwatch import Stopwatch
@@ -146,11 +146,11 @@ def drive(start: Assembled, course: Course, method: Integrator, stabilisation: S
     """The compiled loop over a course, None where the method fails."""
     substeps = LOOKS if method.controlled else round(course.output_step / method.step)
     spacing = course.output_step / substeps
-    machine = new_machine(start.system, start.x, start.v, method, gains(stabilisation), spacing=spacing)
+    engine = new_engine(start.system, start.x, start.v, method, gains(stabilisation), spacing=spacing)
     record, watch = new_record(start.system, course.rows), Stopwatch()
     with watch:
-        status = fill_rows(machine, record, 0.0, substeps)
-    return Run(record.r, watch.cpu, int(machine.work.info[1])) if status == OK else None
+        status = fill_rows(engine, record, 0.0, substeps)
+    return Run(record.r, watch.cpu, int(engine.work.info[1])) if status == OK else None
 
 
 def ours(course: Course, method: Integrator, stabilisation: Stabilisation = STANDARD) -> tuple[Motion, float] | None:

@@ -30,7 +30,7 @@ import numpy as np
 
 from benchmarks.scenes import chain, pendulum_rod
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.compile.engine import fill_rows, new_machine
+from ffr_dyn.compile.engine import fill_rows, new_engine
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import assemble
@@ -69,12 +69,12 @@ def timer(scene: Scene, method: Integrator) -> Callable[[], float]:
     """Microseconds per evaluation of the scene, whenever it is called."""
     system = compile_scene(scene)
     x, v = initial_state(scene, system.layout)
-    machine, out = new_machine(system, x, v, method, (0.0, 0.0, 1e-9)), new_record(system, 1)
+    engine, out = new_engine(system, x, v, method, (0.0, 0.0, 1e-9)), new_record(system, 1)
 
     def run(steps: int) -> float:
-        machine.x[:], machine.v[:], machine.tables.clock.steps[0], machine.work.info[1] = x, v, 0, 0
+        engine.x[:], engine.v[:], engine.tables.clock.steps[0], engine.work.info[1] = x, v, 0, 0
         began = time.process_time()
-        status = fill_rows(machine, out, 0.0, steps)
+        status = fill_rows(engine, out, 0.0, steps)
         if status != OK:
             raise RuntimeError(f"{method} stopped with status {status}")
         return time.process_time() - began
@@ -83,7 +83,7 @@ def timer(scene: Scene, method: Integrator) -> Callable[[], float]:
     steps = max(2, int(2 * SECONDS / max(run(2), 1e-7)))
 
     def per_evaluation() -> float:
-        return 1e6 * run(steps) / int(machine.work.info[1])
+        return 1e6 * run(steps) / int(engine.work.info[1])
 
     return per_evaluation
 

@@ -54,7 +54,7 @@ from benchmarks.exudyn_twin import (  # noqa: E402
     twin,
 )
 from benchmarks.scenes import chain, free_body, pendulum_rod  # noqa: E402
-from ffr_dyn.compile.engine import fill_rows, new_machine  # noqa: E402
+from ffr_dyn.compile.engine import fill_rows, new_engine  # noqa: E402
 from ffr_dyn.compile.workspace import new_record  # noqa: E402
 from ffr_dyn.consistency.assemble import assemble  # noqa: E402
 from ffr_dyn.integrators import RK4, ROS2, Integrator  # noqa: E402
@@ -94,14 +94,14 @@ def last_tip(scene: Scene) -> str:
 def ours(scene: Scene, method: Integrator, *, per_evaluation: bool) -> Runner:
     """The compiled loop with the default stabilisation; units: bodies times evaluations or steps."""
     start = assemble(scene)
-    machine = new_machine(start.system, start.x, start.v, method, gains(Projection()))
-    out, work = new_record(start.system, 1), machine.work
+    engine = new_engine(start.system, start.x, start.v, method, gains(Projection()))
+    out, work = new_record(start.system, 1), engine.work
 
     def run(steps: int) -> tuple[float, int]:
-        machine.x[:], machine.v[:] = start.x, start.v
+        engine.x[:], engine.v[:] = start.x, start.v
         work.info[1] = 0
         began = time.process_time()
-        status = fill_rows(machine, out, 0.0, steps)
+        status = fill_rows(engine, out, 0.0, steps)
         took = time.process_time() - began
         if status != OK:
             raise RuntimeError(f"{method} on {len(scene.bodies)} bodies stopped with status {status}")

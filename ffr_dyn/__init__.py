@@ -40,7 +40,7 @@ _BY_MODULE = {
     "ffr_dyn.scene.surface_loads": "ModalForce NodalForces Pressure",
     "ffr_dyn.variants.variant": "vary with_modes without_terms",
     "ffr_dyn.integrators": "AdaptiveROS3 DormandPrince GeneralisedAlpha HHT HalfExplicit Integrator RK4 ROS2 ROS3 Tolerances "
-    "Variational tolerances",
+    "Variational register_integrator tolerances",
     "ffr_dyn.integrators.stabilisation": "Baumgarte Drifting Projection",
     "ffr_dyn.compile.first_use": "begin_compiling",
     "ffr_dyn.results.file": "load_result save_result",
@@ -54,27 +54,29 @@ _BY_MODULE = {
     "ffr_dyn.analyses.bounded": "Bounded",
     "ffr_dyn.analyses.efforts": "JointEffort MarkerEffort recorded with_effort",
     "ffr_dyn.analyses.events": "Event",
-    "ffr_dyn.analyses.forward": "forward",
-    "ffr_dyn.analyses.inverse": "Dynamic QuasiStatic inverse",
-    "ffr_dyn.analyses.kinematic": "kinematic",
-    "ffr_dyn.analyses.linearise": "Linearisation linearise",
-    "ffr_dyn.analyses.mixed": "Causal mixed",
+    "ffr_dyn.analyses.forward": "Forward forward",
+    "ffr_dyn.analyses.inverse": "Dynamic Inverse QuasiStatic inverse",
+    "ffr_dyn.analyses.kinematic": "Kinematic kinematic",
+    "ffr_dyn.analyses.linearise": "Linearisation Linearise linearise",
+    "ffr_dyn.analyses.mixed": "Causal Mixed mixed",
     "ffr_dyn.analyses.reference": "IDA SciPy reference",
+    "ffr_dyn.analyses.registry": "OfMoment OverTime option register_analysis",
     "ffr_dyn.analyses.run": "run",
-    "ffr_dyn.analyses.settings": "Assemble Charted Forward Inverse Kinematic Linearise Mixed MomentSettings Settings Static",
-    "ffr_dyn.analyses.start": "assembly",
+    "ffr_dyn.analyses.settings": "Charted MomentSettings Settings",
+    "ffr_dyn.analyses.assemble": "Assemble assembly",
     "ffr_dyn.analyses.states": "held scene_at",
-    "ffr_dyn.analyses.static": "static",
+    "ffr_dyn.analyses.static": "Static static",
     "ffr_dyn.realtime.deadline": "Timing measure_steps",
     "ffr_dyn.realtime.stepper": "Stepper",
     "ffr_dyn.scene_file.read": "load_scene",
     "ffr_dyn.scene_file.write": "save_scene to_toml",
     "ffr_dyn.chart.diagram": "Diagram measures_of work_precision",
     "ffr_dyn.chart.draw": "draw_chart",
+    "ffr_dyn.chart.orders": "orders",
     "ffr_dyn.chart.page": "write_page",
     "ffr_dyn.chart.runner": "Span pool",
     "ffr_dyn.chart.table": "write_table",
-    "ffr_dyn.chart.variants": "models_of",
+    "ffr_dyn.chart.variants": "Model models_of",
     "ffr_dyn.economy.adaptive": "Adaptation adaptive_forward",
     "ffr_dyn.economy.outputs": "Output",
     "ffr_dyn.economy.picture": "diagram",
@@ -84,6 +86,7 @@ _BY_MODULE = {
     "ffr_dyn.cli.progress_bar": "progress",
 }
 __all__, __getattr__, __dir__ = front_door(__name__, _BY_MODULE)
+
 
 if TYPE_CHECKING:  # the same names, for editors and checkers of types
     # fmt: off
@@ -117,7 +120,8 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_dyn.integrators import (
         AdaptiveROS3 as AdaptiveROS3, DormandPrince as DormandPrince, GeneralisedAlpha as GeneralisedAlpha, HHT as
         HHT, HalfExplicit as HalfExplicit, Integrator as Integrator, RK4 as RK4, ROS2 as ROS2, ROS3 as ROS3,
-        Tolerances as Tolerances, Variational as Variational, tolerances as tolerances
+        Tolerances as Tolerances, Variational as Variational, register_integrator as register_integrator, tolerances
+        as tolerances
     )
     from ffr_dyn.integrators.stabilisation import Baumgarte as Baumgarte, Drifting as Drifting, Projection as Projection
     from ffr_dyn.compile.first_use import begin_compiling as begin_compiling
@@ -137,31 +141,35 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
         JointEffort as JointEffort, MarkerEffort as MarkerEffort, recorded as recorded, with_effort as with_effort
     )
     from ffr_dyn.analyses.events import Event as Event
-    from ffr_dyn.analyses.forward import forward as forward
-    from ffr_dyn.analyses.inverse import Dynamic as Dynamic, QuasiStatic as QuasiStatic, inverse as inverse
-    from ffr_dyn.analyses.kinematic import kinematic as kinematic
-    from ffr_dyn.analyses.linearise import Linearisation as Linearisation, linearise as linearise
-    from ffr_dyn.analyses.mixed import Causal as Causal, mixed as mixed
-    from ffr_dyn.analyses.reference import IDA as IDA, SciPy as SciPy, reference as reference
-    from ffr_dyn.analyses.run import run as run
-    from ffr_dyn.analyses.settings import (
-        Assemble as Assemble, Charted as Charted, Forward as Forward, Inverse as Inverse, Kinematic as Kinematic,
-        Linearise as Linearise, Mixed as Mixed, MomentSettings as MomentSettings, Settings as Settings, Static as
-        Static
+    from ffr_dyn.analyses.forward import Forward as Forward, forward as forward
+    from ffr_dyn.analyses.inverse import (
+        Dynamic as Dynamic, Inverse as Inverse, QuasiStatic as QuasiStatic, inverse as inverse
     )
-    from ffr_dyn.analyses.start import assembly as assembly
+    from ffr_dyn.analyses.kinematic import Kinematic as Kinematic, kinematic as kinematic
+    from ffr_dyn.analyses.linearise import (
+        Linearisation as Linearisation, Linearise as Linearise, linearise as linearise
+    )
+    from ffr_dyn.analyses.mixed import Causal as Causal, Mixed as Mixed, mixed as mixed
+    from ffr_dyn.analyses.reference import IDA as IDA, SciPy as SciPy, reference as reference
+    from ffr_dyn.analyses.registry import (
+        OfMoment as OfMoment, OverTime as OverTime, option as option, register_analysis as register_analysis
+    )
+    from ffr_dyn.analyses.run import run as run
+    from ffr_dyn.analyses.settings import Charted as Charted, MomentSettings as MomentSettings, Settings as Settings
+    from ffr_dyn.analyses.assemble import Assemble as Assemble, assembly as assembly
     from ffr_dyn.analyses.states import held as held, scene_at as scene_at
-    from ffr_dyn.analyses.static import static as static
+    from ffr_dyn.analyses.static import Static as Static, static as static
     from ffr_dyn.realtime.deadline import Timing as Timing, measure_steps as measure_steps
     from ffr_dyn.realtime.stepper import Stepper as Stepper
     from ffr_dyn.scene_file.read import load_scene as load_scene
     from ffr_dyn.scene_file.write import save_scene as save_scene, to_toml as to_toml
     from ffr_dyn.chart.diagram import Diagram as Diagram, measures_of as measures_of, work_precision as work_precision
     from ffr_dyn.chart.draw import draw_chart as draw_chart
+    from ffr_dyn.chart.orders import orders as orders
     from ffr_dyn.chart.page import write_page as write_page
     from ffr_dyn.chart.runner import Span as Span, pool as pool
     from ffr_dyn.chart.table import write_table as write_table
-    from ffr_dyn.chart.variants import models_of as models_of
+    from ffr_dyn.chart.variants import Model as Model, models_of as models_of
     from ffr_dyn.economy.adaptive import Adaptation as Adaptation, adaptive_forward as adaptive_forward
     from ffr_dyn.economy.outputs import Output as Output
     from ffr_dyn.economy.picture import diagram as diagram

@@ -210,4 +210,5 @@ def _linear(times: Array, A: Array, first: _End, last: _End) -> Callable[[Array]
         put((k + 1) * size, k * size, -one - h / 6 * (left + 4 * middle @ (0.5 * one + h / 8 * left)))
         put((k + 1) * size, (k + 1) * size, one - h / 6 * (right + 4 * middle @ (0.5 * one - h / 8 * right)))
     entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-    return splu(csc_matrix(entries, shape=(count * size, count * size))).solve
+    found: Callable[[Array], Array] = splu(csc_matrix(entries, shape=(count * size, count * size))).solve
+    return found

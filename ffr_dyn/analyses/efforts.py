@@ -131,7 +131,7 @@ def sized(at: Evaluator, efforts: tuple[Effort, ...], sizes: Array) -> Evaluator
             direction = np.array(effort.direction)
             value[loads.index(effort.name), 3 * effort.moment : 3 * effort.moment + 3] = size * direction
     tables = model._replace(loads=model.loads._replace(value=value), functions=model.functions._replace(data=data))
-    return replace(at, machine=with_model(at.machine, tables))
+    return replace(at, engine=with_model(at.engine, tables))
 
 
 def recorded(times: Array, values: Array, *, rates: Array | None = None, degree: int = 5) -> TimeFunction:

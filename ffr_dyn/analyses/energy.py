@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.compile.engine import fill_rows, new_machine
+from ffr_dyn.compile.engine import fill_rows, new_engine
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.evaluation import evaluator
@@ -105,7 +105,8 @@ class EnergyWatch:
         work = self.work + np.cumsum(steps * means, axis=0)
         height = np.maximum.accumulate(np.append(self.highest, rows.energy[:, 2]))[1:]
         self.time, self.powers, self.work, self.highest = float(rows.time[-1]), powers[-1], work[-1], float(height[-1])
-        return self.begun + np.maximum(work, 0.0).sum(axis=1) + height - rows.energy[:, 2]
+        found: Array = self.begun + np.maximum(work, 0.0).sum(axis=1) + height - rows.energy[:, 2]
+        return found
 
     def _looked_into(self, row: _Row) -> _Row:
         """The row. Raises ComputationError when a quarter of the step tells that its energy has no source."""
@@ -133,10 +134,10 @@ class EnergyWatch:
         step = span / (rows * substeps)
         method = _finer(self.method, step)
         spacing = step * substeps if method.controlled else step
-        machine = new_machine(self.system, anchor.x, anchor.v, method, self.gains, start=anchor.time, spacing=spacing)
-        machine.work.loads.reference[:] = anchor.reference
+        engine = new_engine(self.system, anchor.x, anchor.v, method, self.gains, start=anchor.time, spacing=spacing)
+        engine.work.loads.reference[:] = anchor.reference
         record = new_record(self.system, rows)
-        return fill_rows(machine, record, anchor.time, 1 if method.controlled else substeps), record
+        return fill_rows(engine, record, anchor.time, 1 if method.controlled else substeps), record
 
     def _accountable(self) -> bool:
         """Whether the recorded powers are all there are."""

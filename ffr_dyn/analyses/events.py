@@ -16,7 +16,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.optimize import brentq
 
-from ffr_dyn.compile.engine import Machine, fill_rows, new_machine, record_row
+from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import Assembled
@@ -91,10 +91,10 @@ class Watcher:
         self._memory: list[Any] = [None] * len(self.events)
         self._last: Record | None = None
 
-    def begin(self, machine: Machine, time: float) -> None:
-        """Take the state of a run's machine as what comes before the first row."""
+    def begin(self, engine: Engine, time: float) -> None:
+        """Take the state of a run's engine as what comes before the first row."""
         first = new_record(self._system, 1)
-        if record_row(machine, time, first, 0) != OK:
+        if record_row(engine, time, first, 0) != OK:
             raise ComputationError(f"at t = {time:.6g} s the start has no accelerations")
         self._memory = [seen(first, None)[1] for seen in self._seen]
         self._last = first
@@ -152,9 +152,9 @@ class Watcher:
         """A row at the end of one step of this length, or of a run where the method chooses its steps, from row k."""
         method: Any = self._method if self._method.controlled else replace(self._method, step=length)  # type: ignore[type-var]
         time, end = float(rows.time[k]), new_record(self._system, 1)
-        machine = new_machine(self._system, rows.x[k], rows.v[k], method, self._gains, start=time, spacing=length)
-        machine.work.loads.reference[:] = rows.action[k, :, 0]
-        if fill_rows(machine, end, time, 1) != OK:
+        engine = new_engine(self._system, rows.x[k], rows.v[k], method, self._gains, start=time, spacing=length)
+        engine.work.loads.reference[:] = rows.action[k, :, 0]
+        if fill_rows(engine, end, time, 1) != OK:
             raise ComputationError(f"at t = {time:.6g} s an event cannot be located: a shorter step from there fails")
         return end
 

@@ -6,20 +6,22 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, ClassVar, get_args
 
 import numpy as np
 
 from ffr_dyn.analyses.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
 from ffr_dyn.analyses.energy import EnergyWatch
 from ffr_dyn.analyses.events import Event, Watcher
-from ffr_dyn.compile.engine import Machine, fill_rows, new_machine, record_row
+from ffr_dyn.analyses.registry import OverTime
+from ffr_dyn.analyses.settings import Settings
+from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.failure import failure
 from ffr_dyn.consistency.validity import doubts, extremes, meaningless
 from ffr_dyn.functions.stopwatch import Stopwatch
-from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince, Integrator
+from ffr_dyn.integrators import ROS2, Integrator, methods
 from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation, excess_of_gains, gains
 from ffr_dyn.kernels.tables import (
     AT,
@@ -47,16 +49,33 @@ from ffr_prep.common.errors import ComputationError, InputError
 
 Array = np.ndarray
 
-_OF_ACCELERATIONS = (RK4, ROS2, ROS3, AdaptiveROS3, DormandPrince)  # methods on index-1 equations
 LOOKS = 10  # of a quantity that adds up, from row to row, where the method chooses its steps
 SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, file and keyboard
+
+
+@dataclass(frozen=True)
+class Forward(OverTime):
+    """From start to end; step defaults to a tenth of output_step. Events are moments to find."""
+
+    resumable: ClassVar[bool] = True
+    integrates: ClassVar[bool] = True
+    stabilised: ClassVar[bool] = True
+    events: tuple[Event, ...] = ()
+
+    def perform(self, scene: Scene, settings: Settings, **how: Any) -> Result:
+        own: dict[str, Any] = {
+            "events": self.events,
+            "method": settings.method,
+            "stabilisation": settings.stabilisation,
+        }
+        return forward(scene, **own, **settings.span, **how)
 
 
 @dataclass
 class _Run:
     """What changes while a run goes on; `done` counts the steps."""
 
-    machine: Machine
+    engine: Engine
     energy: EnergyWatch
     memory: Memory
     parts: list[dict[str, Quantity]]
@@ -95,11 +114,7 @@ def forward(
     Raises InputError for a scene or settings that cannot be used, ComputationError when the run fails: with the time,
     the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
-    if not 0 < output_step < np.inf:
-        raise InputError(f"the output step is {output_step} s; it must be positive and finite")
-    method = method if method is not None else ROS2(step=output_step / 10)
-    if isinstance(method, (str, type)):
-        raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
+    method = _method(method, output_step)
     spacing = output_step / LOOKS if method.controlled else method.step
     substeps, rows = _counts(end - start, output_step, spacing)
     _check_step(scene, method)
@@ -128,6 +143,14 @@ def forward(
     return _result(scene, run, header | account | {"status": "complete"})
 
 
+def _method(given: Integrator | None, output_step: float) -> Integrator:
+    if not 0 < output_step < np.inf:
+        raise InputError(f"the output step is {output_step} s; it must be positive and finite")
+    if isinstance(given, (str, type)):
+        raise InputError(f"method is {given!r}; give one with its step, such as ROS2(1e-3)")
+    return ROS2(step=output_step / 10) if given is None else given
+
+
 def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
     """(steps per output row, output rows)."""
     if not 0 < span < np.inf:
@@ -147,10 +170,11 @@ def _check_stabilisation(method: Integrator, stabilisation: Stabilisation) -> No
     """Refuse what is none, and gains of accelerations for a method that keeps constraints in another way."""
     if not isinstance(stabilisation, get_args(Stabilisation)):
         raise InputError(f"stabilisation is {stabilisation!r}; give Projection(), Baumgarte(alpha, beta) or Drifting()")
-    if isinstance(stabilisation, Baumgarte) and not isinstance(method, _OF_ACCELERATIONS):
+    if isinstance(stabilisation, Baumgarte) and method.row_stages:
+        others = [kind.__name__ for kind in methods().values() if not kind.row_stages]
         raise InputError(
             f"Baumgarte's gains act on the accelerations of the constraints, and {type(method).__name__} holds positions or "
-            f"rates themselves; leave them out, or use one of {', '.join(kind.__name__ for kind in _OF_ACCELERATIONS)}"
+            f"rates themselves; leave them out, or use one of {', '.join(others)}"
         )
 
 
@@ -178,25 +202,25 @@ def _begun(
 ) -> _Run:
     """The run at its start, or where the file to resume left it."""
     system = assembled.system
-    machine = new_machine(system, assembled.x, assembled.v, method, gained, start=start, spacing=spacing)
+    engine = new_engine(system, assembled.x, assembled.v, method, gained, start=start, spacing=spacing)
     energy = EnergyWatch(system, method, gained, spacing, lambda rows: with_all_reactions(assembled, rows))
     if resume is not None and Path(resume).exists():
-        return _resumed(Path(resume), mark, machine, energy)
-    return _started(assembled, machine, energy, start, wanted)
+        return _resumed(Path(resume), mark, engine, energy)
+    return _started(assembled, engine, energy, start, wanted)
 
 
 def _started(
-    assembled: Assembled, machine: Machine, energy: EnergyWatch, start: float, wanted: Mapping[str, Entry]
+    assembled: Assembled, engine: Engine, energy: EnergyWatch, start: float, wanted: Mapping[str, Entry]
 ) -> _Run:
     """The run with its first row."""
     first = new_record(assembled.system, 1)
-    status = record_row(machine, start, first, 0)
+    status = record_row(engine, start, first, 0)
     if status != OK:
-        raise failure(assembled.system, machine.work, status, start)
+        raise failure(assembled.system, engine.work, status, start)
     first = with_all_reactions(assembled, first)
     energy.look(first)
     parts, memory = measure(assembled.system, first, {}, wanted)
-    return _Run(machine, energy, memory, [parts], [first.time], extremes(assembled.system, first), 0)
+    return _Run(engine, energy, memory, [parts], [first.time], extremes(assembled.system, first), 0)
 
 
 def _advance(
@@ -215,14 +239,14 @@ def _advance(
     Where a quantity adds up over the steps, or events are looked for, every step is looked at and only the output rows are
     kept.
     """
-    system, steps = assembled.system, run.machine.tables.clock.steps
+    system, steps = assembled.system, run.engine.tables.clock.steps
     looks = substeps if needs_every_step(wanted) or watcher is not None else 1
     ends = False
     count = 1
     while run.done < rows * substeps:
         chunk = new_record(system, looks * min(count, rows - run.done // substeps))
         with watch:
-            status = fill_rows(run.machine, chunk, start, substeps // looks)
+            status = fill_rows(run.engine, chunk, start, substeps // looks)
         filled = int(steps[FILLED]) - int(steps[FILLED]) % looks
         if filled:
             kept = with_all_reactions(assembled, Record(*(column[:filled] for column in chunk)))
@@ -244,7 +268,7 @@ def _advance(
             return
         if status != OK:
             cause = excess_of_gains(run.energy.gains, run.energy.spacing)
-            raise failure(system, run.machine.work, status, reached(run.machine, start), cause)
+            raise failure(system, run.engine.work, status, reached(run.engine, start), cause)
         count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
 
 
@@ -269,13 +293,13 @@ def _watcher(
             "a run with events cannot be resumed: those of its first part are not in the file; run the whole"
         )
     watcher = Watcher(assembled, method, gains(stabilisation), spacing, events)
-    watcher.begin(run.machine, float(run.times[0][0]))
+    watcher.begin(run.engine, float(run.times[0][0]))
     return watcher
 
 
-def reached(machine: Machine, start: float) -> float:
-    """Time of the machine's state [s], for a run from `start`."""
-    clock, control = machine.tables.clock, machine.tables.control
+def reached(engine: Engine, start: float) -> float:
+    """Time of the engine's state [s], for a run from `start`."""
+    clock, control = engine.tables.clock, engine.tables.control
     if control.numbers.size:
         return float(control.numbers[NOW])
     return start + int(clock.steps[NEXT]) * float(clock.time[SPACING])
@@ -286,14 +310,14 @@ def with_all_reactions(assembled: Assembled, record: Record) -> Record:
     if assembled.all_rows is None:
         return record
     system = assembled.all_rows
-    machine, one = new_machine(system, record.x[0], record.v[0]), new_record(system, 1)
+    engine, one = new_engine(system, record.x[0], record.v[0]), new_record(system, 1)
     names = [block.name for block in system.blocks]
     numbers = [names.index(block.name) for block in assembled.system.blocks]
     reaction = np.empty_like(record.reaction)
     for row, moment in enumerate(record.time):
-        machine.x[:], machine.v[:] = record.x[row], record.v[row]
-        machine.work.loads.reference[:] = record.action[row, :, 0]
-        record_row(machine, moment, one, 0)
+        engine.x[:], engine.v[:] = record.x[row], record.v[row]
+        engine.work.loads.reference[:] = record.action[row, :, 0]
+        record_row(engine, moment, one, 0)
         reaction[row] = one.reaction[0, numbers]
     return record._replace(reaction=reaction)
 
@@ -313,19 +337,22 @@ def _fingerprint(
     return fingerprint(assembled.system.model, *state, method, stabilisation, start, output_step, list(wanted))
 
 
+KEY = "engine."  # before the names of an engine's tables in result files
+
+
 def _checkpoint(run: _Run, mark: str) -> Array:
-    arrays = {"extremes": run.extremes, **{f"machine.{key}": array for key, array in _changing(run.machine)}}
+    arrays = {"extremes": run.extremes, **{KEY + key: array for key, array in _changing(run.engine)}}
     return encode(Checkpoint(mark, run.done, arrays, run.memory))
 
 
-def _changing(machine: Machine) -> Iterator[tuple[str, Array]]:
-    """What of a machine's tables a run changes."""
+def _changing(engine: Engine) -> Iterator[tuple[str, Array]]:
+    """What of an engine's tables a run changes."""
     for name in ("work", "stages", "clock", "control", "x", "v"):
-        yield from leaves(getattr(machine.tables, name), name)
+        yield from leaves(getattr(engine.tables, name), name)
 
 
-def _resumed(path: Path, mark: str, machine: Machine, energy: EnergyWatch) -> _Run:
-    """The run that a result file holds, ready to go on in the machine."""
+def _resumed(path: Path, mark: str, engine: Engine, energy: EnergyWatch) -> _Run:
+    """The run that a result file holds, ready to go on in the engine."""
     content = load_checkpoint(path)
     if content is None:
         raise InputError(f"{path} has no checkpoint: it is not the result of a forward run; run from the start")
@@ -335,7 +362,7 @@ def _resumed(path: Path, mark: str, machine: Machine, energy: EnergyWatch) -> _R
             f"{path} is the result of another scene or of other settings (step, method, start, output step, outputs): its "
             "run cannot be continued with these; run from the start, to another file if that one is still wanted"
         )
-    changing = {f"machine.{name}": array for name, array in _changing(machine)}
+    changing = {KEY + name: array for name, array in _changing(engine)}
     if any(name not in saved.arrays or saved.arrays[name].shape != array.shape for name, array in changing.items()):
         raise InputError(
             f"{path} was written by another version of ffr_dyn, whose runs this one cannot continue; run from the start, to "
@@ -344,7 +371,7 @@ def _resumed(path: Path, mark: str, machine: Machine, energy: EnergyWatch) -> _R
     for name, array in changing.items():
         array[...] = saved.arrays[name]
     extremes_then = saved.arrays["extremes"].copy()
-    return _Run(machine, energy, saved.memory, [dict(earlier.quantities)], [earlier.time], extremes_then, saved.steps)
+    return _Run(engine, energy, saved.memory, [dict(earlier.quantities)], [earlier.time], extremes_then, saved.steps)
 
 
 def _check_resumed(run: _Run, steps: int, step: float) -> None:
@@ -391,19 +418,19 @@ def _result(scene: Scene, run: _Run, attributes: dict[str, Any]) -> Result:
 
 def _account(scene: Scene, run: _Run, notes: list[str]) -> dict[str, Any]:
     """What only the end of a run can tell."""
-    info, drift = run.machine.work.info, run.machine.work.drift
+    info, drift = run.engine.work.info, run.engine.work.drift
     return {
         "evaluations": int(info[EVALUATIONS]),
         "projections": int(info[PROJECTIONS]),
-        **_steps(run.machine),
+        **_steps(run.engine),
         "largest_drift": [float(drift[PHI]), float(drift[PHI_DOT])],
-        "notes": [*notes, *_singular(run.machine.work), *doubts(scene, run.extremes)],
+        "notes": [*notes, *_singular(run.engine.work), *doubts(scene, run.extremes)],
     }
 
 
-def _steps(machine: Machine) -> dict[str, Any]:
+def _steps(engine: Engine) -> dict[str, Any]:
     """Steps that the method chose."""
-    control = machine.tables.control
+    control = engine.tables.control
     return {"steps": int(control.counts[0]), "refused_steps": int(control.counts[1])} if control.numbers.size else {}
 
 

@@ -7,14 +7,17 @@ time they take the values at which they would stay, q_dot = q_ddot = 0, under th
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.kinematic import kinematic, undeformed
 from ffr_dyn.analyses.outcome import efforts, needed, only, result_of, with_quantities
+from ffr_dyn.analyses.registry import OverTime, option
+from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
 from ffr_dyn.consistency.evaluation import Evaluator, copied, evaluate, evaluator, joined, locked, moved, to_global_axes
 from ffr_dyn.consistency.mobility import require_driven
@@ -45,6 +48,23 @@ class Dynamic:
 @dataclass(frozen=True)
 class QuasiStatic:
     """Elastic coordinates follow the motion without vibration."""
+
+
+@dataclass(frozen=True)
+class Inverse(OverTime):
+    """Method, step and stabilisation are of dynamic elastic coordinates."""
+
+    integrates: ClassVar[bool] = True
+    stabilised: ClassVar[bool] = True
+    elastic: Literal["dynamic", "quasi-static"] = field(
+        default="dynamic",
+        metadata=option("--quasi-static/--dynamic", "Elastic coordinates follow without vibration; default: dynamic."),
+    )
+
+    def perform(self, scene: Scene, settings: Settings, **how: Any) -> Result:
+        quasi_static = self.elastic == "quasi-static"
+        elastic = QuasiStatic() if quasi_static else Dynamic(settings.method, settings.stabilisation)
+        return inverse(scene, elastic=elastic, **settings.span, **how)
 
 
 def inverse(
@@ -152,7 +172,8 @@ def _pose(at: Evaluator, places: tuple[Array, Array], time: float, x: Array, q: 
             break
     v = still.copy()
     v[rigid] = np.linalg.solve(now.jacobian[:, rigid], -now.nu)
-    return evaluate(at, time, x, to_global_axes(place, x, v)).acceleration[elastic]
+    found: Array = evaluate(at, time, x, to_global_axes(place, x, v)).acceleration[elastic]
+    return found
 
 
 def _deformed(

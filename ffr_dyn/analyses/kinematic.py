@@ -11,11 +11,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ffr_dyn.analyses.forward import with_all_reactions
 from ffr_dyn.analyses.outcome import output_times, result_of
+from ffr_dyn.analyses.registry import OverTime
+from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.evaluation import (
     Evaluation,
@@ -56,6 +59,14 @@ class _Pose:
     conditioning: float
     sign: float
     joint: str
+
+
+@dataclass(frozen=True)
+class Kinematic(OverTime):
+    """With the reactions that the motion needs."""
+
+    def perform(self, scene: Scene, settings: Settings, **how: Any) -> Result:
+        return kinematic(scene, **settings.span, **how)
 
 
 def kinematic(

@@ -9,19 +9,24 @@ moment only; a note says so.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import get_args
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, get_args
 
 import numpy as np
 
 from ffr_dyn.analyses.efforts import Effort, sized, with_units
 from ffr_dyn.analyses.outcome import result_of
+from ffr_dyn.analyses.registry import OfMoment, option
+from ffr_dyn.analyses.settings import MomentSettings
+from ffr_dyn.analyses.states import scene_at
+from ffr_dyn.analyses.static import static
 from ffr_dyn.compile.engine import with_model
 from ffr_dyn.consistency.assemble import assemble, in_space
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator, to_global_axes
 from ffr_dyn.consistency.mobility import named_motion
 from ffr_dyn.consistency.tangent import Chart, chart, derivative, rates, sizes, state, state_matrix
+from ffr_dyn.results.file import save_result
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.checks import several
@@ -61,7 +66,8 @@ class Linearisation(Brief):
     @property
     def frequencies(self) -> Array:
         """(2d,) [Hz] of the damped vibration."""
-        return np.abs(self.eigenvalues.imag) / (2 * np.pi)
+        found: Array = np.abs(self.eigenvalues.imag) / (2 * np.pi)
+        return found
 
     @property
     def damping_ratios(self) -> Array:
@@ -73,6 +79,40 @@ class Linearisation(Brief):
     def stability_margin(self) -> float:
         """Largest real part of an eigenvalue [1/s]: negative where all small motions decay."""
         return float(self.eigenvalues.real.max())
+
+
+@dataclass(frozen=True)
+class Linearise(OfMoment):
+    """Inputs are efforts and names of loads; quantities such as "rod.tip.position.y" are what comes out."""
+
+    keeps: ClassVar[bool] = False
+    example: ClassVar[str] = (
+        "ffr-dyn linearise crane.toml --at-equilibrium --input push=trolley.hook:1,0,0 --quantity load.pin.position.x"
+    )
+    inputs: tuple[Effort | str, ...] = field(
+        default=(),
+        metadata=option("--input", "Input: a force, or the name of a load; repeat.", metavar="FORCE", names="loads"),
+    )
+    quantities: tuple[str, ...] = field(
+        default=(), metadata=option("--quantity", "Output: a component, such as rod.tip.position.y; repeat.")
+    )
+    at_equilibrium: bool = field(
+        default=False,
+        metadata=option("--at-equilibrium/--at-start", "About the static equilibrium, or (default) the start."),
+    )
+
+    def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
+        time, path = settings.time, how["path"]
+        at = scene_at(scene, static(scene, time=time)) if self.at_equilibrium else scene
+        result = as_result(scene, linearise(at, time=time, inputs=self.inputs, outputs=self.quantities), time)
+        if path is not None:
+            save_result(result, path)
+        return result
+
+    def report(self, result: Result) -> list[str]:
+        values = result["eigenvalues"][0]
+        columns = values, result["frequencies"][0], result["damping_ratios"][0], result.attributes["leading"]
+        return [*_lines_of_modes(*columns), *(f"note         {note}" for note in result.attributes["notes"])]
 
 
 def linearise(
@@ -150,7 +190,7 @@ def _with_inputs(at: Evaluator, scene: Scene, inputs: tuple[Effort | str, ...], 
     for item, amount in zip(inputs, u, strict=True):
         if isinstance(item, str):
             value[_load_number(scene, item)] *= 1.0 + amount
-    fed = replace(at, machine=with_model(at.machine, model._replace(loads=model.loads._replace(value=value))))
+    fed = replace(at, engine=with_model(at.engine, model._replace(loads=model.loads._replace(value=value))))
     sizes = [amount for item, amount in zip(inputs, u, strict=True) if not isinstance(item, str)]
     return sized(fed, _efforts(inputs), np.array(sizes))
 
@@ -261,10 +301,13 @@ def _labels(names: tuple[str, ...]) -> tuple[str, ...]:
 
 def table_of_modes(found: Linearisation) -> list[str]:
     """A line for each mode: frequency, damping ratio, real part, and what moves most; one of each conjugate pair."""
-    lines = []
-    for value, frequency, ratio, leading in zip(
-        found.eigenvalues, found.frequencies, found.damping_ratios, found.leading, strict=True
-    ):
-        if value.imag >= 0:
-            lines.append(f"{frequency:12.6g} Hz   damping {ratio:9.3g}   real part {value.real:11.4g} 1/s   {leading}")
-    return lines
+    parts = np.column_stack([found.eigenvalues.real, found.eigenvalues.imag])
+    return _lines_of_modes(parts, found.frequencies, found.damping_ratios, found.leading)
+
+
+def _lines_of_modes(parts: Array, frequencies: Array, ratios: Array, leading: Sequence[str]) -> list[str]:
+    return [
+        f"{frequency:12.6g} Hz   damping {ratio:9.3g}   real part {real:11.4g} 1/s   {name}"
+        for (real, imag), frequency, ratio, name in zip(parts, frequencies, ratios, leading, strict=True)
+        if imag >= 0
+    ]

@@ -10,10 +10,10 @@ times at once: it starts at rest before the known motion does, and ends at rest 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, ClassVar, get_args
 
 import numpy as np
 
@@ -21,7 +21,9 @@ from ffr_dyn.analyses.bounded import Bounded, bounded_solution
 from ffr_dyn.analyses.efforts import Effort, JointEffort, MarkerEffort, sized, unit, with_units
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.outcome import efforts, needed, only, output_times, result_of, with_quantities
+from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.servo import Moment, ServoMotion, at_moment, internal_values, servo, slope, slope_matrix
+from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.compile.scene_tables import System, compile_scene
 from ffr_dyn.consistency.assemble import assemble, flattened
 from ffr_dyn.consistency.evaluation import Evaluator, evaluator, joined, record_states
@@ -49,6 +51,34 @@ class Causal:
 
     tolerance: float = 1e-10
     growth: float = 1e4
+
+
+@dataclass(frozen=True)
+class Mixed(OverTime):
+    """Forces away from the known motions are found by integration where that is stable, else as the bounded solution, which
+    adds times before and after the run. Unknown forces are given by name; see `mixed`.
+    """
+
+    integrates: ClassVar[bool] = True
+    example: ClassVar[str] = "ffr-dyn mixed arm.toml --unknown torque=hinge.angle --known path -o out/arm.nc"
+    unknown: tuple[Effort, ...] = field(
+        default=(),
+        metadata=option("--unknown", "Force to find, instead of the scene's; repeat.", metavar="FORCE", required=True),
+    )
+    known: tuple[str, ...] | None = field(
+        default=None, metadata=option("--known", "Driver that is a known motion, not a true driver; default: all.")
+    )
+    solution: Causal | Bounded | None = None
+
+    def __post_init__(self) -> None:
+        if not self.unknown:
+            raise InputError(
+                'mixed dynamics needs forces to find: --unknown, or kind = "mixed" with [analysis.unknown.NAME]'
+            )
+
+    def perform(self, scene: Scene, settings: Settings, **how: Any) -> Result:
+        own: dict[str, Any] = {"unknown": self.unknown, "known": self.known, "solution": self.solution}
+        return mixed(scene, method=settings.method, **own, **settings.span, **how)
 
 
 def mixed(

@@ -98,7 +98,8 @@ def axis_history(scene: Scene, result: Result, marker: str, axis: Array) -> Arra
     if name == GROUND:
         return np.broadcast_to(axis, (result.time.size, 3))
     A, theta = rotation_matrix(result[f"{name}.p"]), _elastic_turn(scene, result, name, point)
-    return np.einsum("tkl,tl->tk", A, axis + np.cross(theta, axis))
+    found: Array = np.einsum("tkl,tl->tk", A, axis + np.cross(theta, axis))
+    return found
 
 
 def _elastic_turn(scene: Scene, result: Result, name: str, point: str) -> Array:
@@ -106,4 +107,5 @@ def _elastic_turn(scene: Scene, result: Result, name: str, point: str) -> Array:
     model = next(body.model for body in scene.bodies if body.name == name)
     if model.n == 0:
         return np.zeros((result.time.size, 3))
-    return result[f"{name}.q"] @ model.interface(point).phi_r.T
+    found: Array = result[f"{name}.q"] @ model.interface(point).phi_r.T
+    return found

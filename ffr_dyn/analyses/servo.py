@@ -142,7 +142,8 @@ def effort_columns(
 def _responses(J: Array, M: Array, B: Array) -> Array:
     """(V, U) accelerations that columns B of force give on the joints' rows J."""
     Z = free_motions(J, M)
-    return Z @ (Z.T @ B)
+    found: Array = Z @ (Z.T @ B)
+    return found
 
 
 def _fitting(
@@ -255,7 +256,7 @@ def _guided(own: ServoMotion, time: float, w: Array) -> Evaluator:
     y, rate = w[: own.inner.size], w[d : d + own.inner.size]
     data[own.data], data[own.data + 1] = y - rate * time, rate
     guided = model._replace(functions=model.functions._replace(data=data))
-    return replace(own.at, machine=with_model(own.at.machine, guided))
+    return replace(own.at, engine=with_model(own.at.engine, guided))
 
 
 def at_moment(own: ServoMotion, time: float, w: Array, near: Array) -> Moment:

@@ -4,66 +4,12 @@ what they say.
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass, fields
+from dataclasses import KW_ONLY, dataclass, field, fields
 from typing import Any
 
-from ffr_dyn.analyses.bounded import Bounded
-from ffr_dyn.analyses.efforts import Effort
-from ffr_dyn.analyses.events import Event
-from ffr_dyn.analyses.mixed import Causal
+from ffr_dyn.analyses.registry import OfMoment, OverTime, analysis
 from ffr_dyn.integrators import Integrator
-from ffr_dyn.integrators.stabilisation import Stabilisation
-
-
-@dataclass(frozen=True)
-class Forward:
-    """Forward dynamics, with events to find."""
-
-    events: tuple[Event, ...] = ()
-
-
-@dataclass(frozen=True)
-class Kinematic:
-    """Positions, velocities and accelerations of a driven scene."""
-
-
-@dataclass(frozen=True)
-class Inverse:
-    """Inverse dynamics; elastic coordinates are dynamic, or quasi-static."""
-
-    quasi_static: bool = False
-
-
-@dataclass(frozen=True)
-class Mixed:
-    """Mixed dynamics; see `ffr_dyn.analyses.mixed.mixed`."""
-
-    unknown: tuple[Effort, ...]
-    known: tuple[str, ...] | None = None
-    solution: Causal | Bounded | None = None
-
-
-@dataclass(frozen=True)
-class Assemble:
-    """Consistent positions and velocities."""
-
-
-@dataclass(frozen=True)
-class Static:
-    """Static equilibrium."""
-
-
-@dataclass(frozen=True)
-class Linearise:
-    """Linearised equations; inputs are efforts and names of loads, quantities such as "rod.tip.position.y" their outputs."""
-
-    inputs: tuple[Effort | str, ...] = ()
-    quantities: tuple[str, ...] = ()
-    at_equilibrium: bool = False
-
-
-OverTime = Forward | Kinematic | Inverse | Mixed
-OfMoment = Assemble | Static | Linearise
+from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 
 
 @dataclass(frozen=True)
@@ -92,10 +38,15 @@ class Settings:
     end: float
     output_step: float
     method: Integrator
-    stabilisation: Stabilisation
+    stabilisation: Stabilisation = Projection()  # noqa: RUF009 - frozen
     outputs: tuple[str, ...] = ("default",)
-    analysis: OverTime = Forward()
+    analysis: OverTime = field(default_factory=lambda: analysis("forward")())
     chart: Charted = Charted()
+
+    @property
+    def span(self) -> dict[str, Any]:
+        """The times and what to keep, as the functions of analyses take them."""
+        return {key: getattr(self, key) for key in ("start", "end", "output_step", "outputs")}
 
 
 @dataclass(frozen=True)
@@ -105,7 +56,12 @@ class MomentSettings:
     _: KW_ONLY
     time: float = 0.0
     outputs: tuple[str, ...] = ("default",)
-    analysis: OfMoment = Static()
+    analysis: OfMoment = field(default_factory=lambda: analysis("static")())
+
+    @property
+    def span(self) -> dict[str, Any]:
+        """The time and what to keep, as the functions of analyses take them."""
+        return {"time": self.time, "outputs": self.outputs}
 
 
 def settings_of(method: type[Any]) -> list[str]:

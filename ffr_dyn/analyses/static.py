@@ -12,11 +12,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ffr_dyn.analyses.forward import with_all_reactions
 from ffr_dyn.analyses.outcome import result_of
+from ffr_dyn.analyses.registry import OfMoment
+from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import held
 from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator, record_states
@@ -35,6 +38,14 @@ LARGEST_STEP = 0.3  # rad, or part of the scene's size
 TOLERANCE = 1e-12  # of the last step, the same
 NEUTRAL = 1e-7  # of a stiffness, relative to that of the applied forces
 ROUNDING = 1e-13  # of a stiffness, relative to the largest
+
+
+@dataclass(frozen=True)
+class Static(OfMoment):
+    """The drivers are held still, and so is what depends on the time."""
+
+    def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
+        return static(scene, **settings.span, **how)
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from ffr_dyn.chart.measures import Measure, default_measures, measure_of
 from ffr_dyn.chart.pareto import pareto_front
 from ffr_dyn.chart.reference import WANTED, Reference, distance, reference
 from ffr_dyn.chart.runner import REPEATS, Failure, Job, Outcome, Pool, Span, perform
-from ffr_dyn.chart.variants import ADAPTIVE, FULL, Model, Variant, grid
+from ffr_dyn.chart.variants import FULL, Model, Variant, grid
 from ffr_dyn.consistency.assemble import assemble
-from ffr_dyn.integrators import METHODS
+from ffr_dyn.integrators import methods as known_methods
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.scene.scene import Scene
@@ -136,9 +136,7 @@ def work_precision(
     Raises InputError for what cannot be compared, ComputationError where no reference can be verified.
     """
     measures = measures or measures_of(scene, (), span.start)
-    variants = grid(
-        scene, models, dict.fromkeys([*METHODS, *ADAPTIVE]) if methods is None else methods, span.output_step
-    )
+    variants = grid(scene, models, dict.fromkeys(known_methods()) if methods is None else methods, span.output_step)
     found = reference(scene, span, measures, stabilisation, pool, limit=limit, wanted=wanted, tell=tell)
     jobs = [Job(scene, variant, span, measures, stabilisation, repeats, limit) for variant in variants]
     outcomes = run_variants(jobs, pool, progress)

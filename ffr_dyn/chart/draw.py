@@ -201,6 +201,6 @@ def _written(figure: Figure, path: Path) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(path.name + ".part")
     kind = path.suffix.lower()
-    figure.savefig(temporary, format=kind[1:], dpi=130, metadata=_METADATA[kind])  # type: ignore[arg-type]
+    figure.savefig(temporary, format=kind[1:], dpi=130, metadata=_METADATA[kind])
     os.replace(temporary, path)
     return path

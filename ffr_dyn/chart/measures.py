@@ -139,7 +139,8 @@ class Shape:
         surface = result.geometry[self.body]
         near = [nearest_point(surface, np.array(place), self.body) for place in self.places]
         u = np.einsum("pcj,tj->tpc", surface.Phi[near], result[f"{self.body}.q"]) / len(self.places) ** 0.5
-        return u.reshape(result.time.size, -1)
+        found: Array = u.reshape(result.time.size, -1)
+        return found
 
     def scale(self, result: Result) -> float:
         return _largest(self.values(result))

@@ -211,7 +211,7 @@ class Distributed:
         from dask.distributed import as_completed
 
         futures = {self._client.submit(function, item, retries=RETRIES, pure=False): k for k, item in enumerate(items)}
-        for future in as_completed(list(futures), loop=self._client.loop):
+        for future in as_completed(list(futures), loop=self._client.loop):  # type: ignore[no-untyped-call]
             if future.status == "finished":
                 yield futures[future], future.result()
             else:
@@ -262,13 +262,13 @@ def _client(workers: int | None, cluster: str | None) -> Iterator[Any]:
         if cluster is None:
             count = default_workers() if workers is None else workers
             with (
-                LocalCluster(n_workers=count, threads_per_worker=1, dashboard_address=None, silence_logs=50) as local,
-                Client(local) as client,
+                LocalCluster(n_workers=count, threads_per_worker=1, dashboard_address=None, silence_logs=50) as local,  # type: ignore[no-untyped-call]
+                Client(local) as client,  # type: ignore[no-untyped-call]
             ):
                 yield client
             return
         try:
-            client = Client(cluster, timeout=_CONNECT, set_as_default=False)
+            client = Client(cluster, timeout=_CONNECT, set_as_default=False)  # type: ignore[no-untyped-call]
         except (OSError, ValueError) as error:
             raise InputError(
                 f"no scheduler answers at {cluster!r} ({error}); start one with `dask scheduler` and workers with "

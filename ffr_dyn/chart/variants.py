@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator, tolerances
+from ffr_dyn.integrators import CONTROLLED, Integrator, method_named, tolerances
 from ffr_dyn.scene.scene import Scene
 from ffr_dyn.variants.variant import Modes, vary
 from ffr_prep.body import FlexibleBody
@@ -18,13 +17,6 @@ from ffr_prep.common.errors import InputError
 
 STEP, TOLERANCE = "step", "tolerance"
 
-
-def _by_tolerance(kind: type[Any]) -> Callable[[float], Integrator]:
-    return lambda relative: kind(tolerances(relative))
-
-
-# Methods that take a tolerance instead of a step, by name: what makes one from its tolerance.
-ADAPTIVE: dict[str, Callable[[float], Integrator]] = {name: _by_tolerance(kind) for name, kind in CONTROLLED.items()}
 
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 LEVELS = {True: 7, False: 4}  # steps of a ladder, each half the one before: implicit methods, explicit ones
@@ -60,7 +52,7 @@ class Variant:
     @property
     def kind(self) -> str:
         """What the number is: "step" or "tolerance"."""
-        return TOLERANCE if self.method in ADAPTIVE else STEP
+        return TOLERANCE if self.method in CONTROLLED else STEP
 
     @property
     def label(self) -> str:
@@ -75,12 +67,8 @@ class Variant:
 
 def maker(method: str) -> Callable[[float], Integrator]:
     """What makes a method from its number. Raises InputError for an unknown one."""
-    known: dict[str, Callable[[float], Integrator]] = {**METHODS, **ADAPTIVE}
-    if method not in known:
-        close = get_close_matches(method, known, 1)
-        hint = f"did you mean {close[0]!r}? " if close else ""
-        raise InputError(f"there is no method {method!r}; {hint}there are: {', '.join(known)}")
-    return known[method]
+    kind = method_named(method)
+    return (lambda relative: kind(tolerances(relative))) if kind.controlled else kind
 
 
 # ---- the grid -----------------------------------------------------------------------------------------------------
@@ -128,7 +116,7 @@ def grid(
         make = maker(method)
         chosen = numbers
         if chosen is None:
-            chosen = TOLERANCES if method in ADAPTIVE else ladder(model.of(scene), make, output_step)
+            chosen = TOLERANCES if method in CONTROLLED else ladder(model.of(scene), make, output_step)
         found += [Variant(method, float(number), model) for number in chosen]
     return tuple(found)
 

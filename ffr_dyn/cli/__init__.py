@@ -9,13 +9,14 @@ from typing import Any
 
 import click
 
-from ffr_dyn.cli.analyses import COMMANDS
+from ffr_dyn.cli.analyses import check, commands, list_methods
 from ffr_dyn.cli.chart import chart
 from ffr_dyn.cli.economy import economise
 from ffr_dyn.cli.realtime import realtime
-from ffr_dyn.cli.run import forward, run
+from ffr_dyn.cli.run import run
 from ffr_dyn.cli.stress import stress
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.registry import load_plugin
 
 EXAMPLE = """\b
 Example:
@@ -44,18 +45,34 @@ CONTEXT: Any = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
 
 
 class Commands(click.Group):
-    """The commands of this package, and those that others register in the entry points "ffr_dyn.commands"."""
+    """The commands of this package, those of the analyses, and others from the entry points "ffr_dyn.commands"."""
 
     def list_commands(self, context: click.Context) -> list[str]:
-        return sorted({*super().list_commands(context), *entry_points(group=REGISTERED).names})
+        return sorted({*super().list_commands(context), *commands(), *entry_points(group=REGISTERED).names})
 
     def get_command(self, context: click.Context, name: str) -> click.Command | None:
-        own = super().get_command(context, name)
+        own = super().get_command(context, name) or commands().get(name)
         return own or next((point.load() for point in entry_points(group=REGISTERED, name=name)), None)
+
+
+def _load_plugins(context: click.Context, option: click.Parameter, paths: tuple[Path, ...]) -> None:
+    """Before the command is looked for, which may be one of theirs."""
+    for path in paths:
+        load_plugin(path)
 
 
 @click.group(cls=Commands, epilog=EXAMPLE, invoke_without_command=True, context_settings=CONTEXT)
 @click.version_option(package_name="ffr")
+@click.option(
+    "--plugin",
+    type=click.Path(path_type=Path),
+    multiple=True,
+    metavar="FILE.py",
+    is_eager=True,
+    expose_value=False,
+    callback=_load_plugins,
+    help="Run this Python first: it may register analyses, integrators, forces and joints; may be repeated.",
+)
 @click.pass_context
 def cli(context: click.Context) -> None:
     """Flexible multibody dynamics in the floating frame of reference: from reduced bodies to a moving machine.
@@ -142,7 +159,7 @@ def animate(result: Path, output: Path, scale: str, duration: float | None, colo
     click.echo(f"film     {output}")
 
 
-for command in (run, forward, *COMMANDS, stress, chart, economise, realtime):
+for command in (run, check, list_methods, stress, chart, economise, realtime):
     cli.add_command(command)
 
 

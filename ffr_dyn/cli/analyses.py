@@ -1,28 +1,35 @@
-"""The commands `ffr-dyn check`, `assemble`, `kinematic`, `static`, `inverse`, `mixed` and `linearise`."""
+"""The command of every analysis, made of its declaration (`ffr_dyn.analyses.registry`), and `ffr-dyn check` and `methods`."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from dataclasses import Field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, get_type_hints
 
 import click
 
 from ffr_dyn.cli.run import (
+    INTEGRATION,
     assignments,
+    at_moment,
+    changed,
+    end_option,
+    keep_option,
+    method_options,
     output_option,
     over_time,
     parameter_option,
     perform,
+    resume_option,
     scene_argument,
-    scene_options,
+    time_option,
+    with_options,
 )
 from ffr_prep.common.errors import InputError
 
 if TYPE_CHECKING:
     from ffr_dyn.analyses.efforts import Effort
-    from ffr_dyn.analyses.settings import MomentSettings, OfMoment, Settings
 
 _FORCES = """\b
 Forces are written as
@@ -30,13 +37,6 @@ Forces are written as
   name=body.interface:x,y,z              at a marker, along a global direction
 
 """
-_MIXED = "\b\nExample:\n  ffr-dyn mixed arm.toml --unknown torque=hinge.angle --known path -o out/arm.nc\n"
-_LINEARISE = (
-    "\b\nExample:\n"
-    "  ffr-dyn linearise crane.toml --at-equilibrium --input push=trolley.hook:1,0,0 --quantity load.pin.position.x\n"
-)
-
-time_option = click.option("--time", type=float, help="[s], for what depends on time; default: the scene's, or 0.")
 
 
 @click.command()
@@ -45,154 +45,105 @@ time_option = click.option("--time", type=float, help="[s], for what depends on 
 @time_option
 def check(scene: Path, parameters: tuple[str, ...], time: float | None) -> None:
     """What SCENE can do: degrees of freedom, free motions, redundant rows of joints, drivers that contradict."""
-    from ffr_dyn.analyses.settings import Static
+    from ffr_dyn.analyses.static import Static
     from ffr_dyn.consistency.mobility import mobility
     from ffr_dyn.scene_file.read import load_scene
 
     loaded, settings = load_scene(scene, assignments(parameters))
-    for line in mobility(loaded, time=_at_moment(settings, Static(), time, ()).time).lines():
+    for line in mobility(loaded, time=at_moment(settings, Static(), time, ()).time).lines():
         click.echo(line)
 
 
-@click.command()
-@scene_options
-@time_option
-def assemble(
-    scene: Path, output: Path | None, parameters: tuple[str, ...], keep: tuple[str, ...], time: float | None
-) -> None:
-    """Positions and velocities of SCENE that meet its joints and drivers, and what was changed of each body for it."""
-    from ffr_dyn.analyses.settings import Assemble
+@click.command("methods")
+def list_methods() -> None:
+    """The integrators by name, with their orders and what they do to stiff modes."""
+    from ffr_dyn.integrators import methods
+
+    for name, method in methods().items():
+        steps = "chooses its steps" if method.controlled else "steps of one length"
+        elastic = "elastic forces implicit" if method.implicit else "explicit"
+        click.echo(f"{name:18} order {method.order}, {steps}, {elastic}")
+
+
+# ---- from declarations ----------------------------------------------------------------------------------------------
+
+
+class Later(click.Command):
+    """The command of an analysis, which is imported when the command is used: the list of all needs its help alone."""
+
+    def make_context(self, info_name: Any, args: Any, parent: Any = None, **extra: Any) -> click.Context:
+        return analysis_command(str(self.name)).make_context(info_name, args, parent=parent, **extra)
+
+
+def commands() -> dict[str, click.Command]:
+    """A command for each analysis that is known now."""
+    from ffr_dyn.analyses.registry import analyses
+
+    return {word: Later(word, short_help=text.partition("; see ")[0], help=text) for word, text in analyses().items()}
+
+
+def analysis_command(word: str) -> click.Command:
+    """The command of an analysis: options from what it needs and from its fields."""
+    from ffr_dyn.analyses.registry import OverTime, analyses, analysis
+
+    made = analysis(word)
+    options = [scene_argument, output_option, parameter_option, *([keep_option] if made.keeps else [])]
+    if issubclass(made, OverTime):
+        options += [end_option, *(method_options if made.integrates else [])]
+    else:
+        options.append(time_option)
+    options += [resume_option] * made.resumable
+    forces = _FORCES if any(_is_force(made, f) for f in fields(made)) else ""
+    example = f"\b\nExample:\n  {made.example}\n" if made.example else ""
+
+    @click.command(word, help=f"{analyses()[word]}\n\n{made.__doc__}", epilog=forces + example)
+    @with_options(*options, *_own_options(made))
+    def command(scene: Path, **given: Any) -> None:
+        _analyse(made, scene, given)
+
+    return command
+
+
+def _own_options(made: Any) -> Iterator[Any]:
+    for f in fields(made):
+        if "flag" in f.metadata:
+            several = "/" not in f.metadata["flag"] and get_type_hints(made)[f.name] not in (int, float, str)
+            kind = None if several or "/" in f.metadata["flag"] else get_type_hints(made)[f.name]
+            yield click.option(
+                f.metadata["flag"], f.name, help=f.metadata["help"], metavar=f.metadata["metavar"], multiple=several,
+                type=kind, default=None,
+            )  # fmt: skip
+
+
+def _is_force(made: Any, f: Field[Any]) -> bool:
+    return f.metadata.get("metavar") == "FORCE"
+
+
+def _analyse(made: Any, scene: Path, given: Mapping[str, Any]) -> None:
+    """Perform the analysis of a command on a scene file; its own settings of that analysis hold where no option is given."""
+    from ffr_dyn.analyses.registry import OverTime
     from ffr_dyn.scene_file.read import load_scene
 
-    loaded, settings = load_scene(scene, assignments(parameters))
-    perform(loaded, _at_moment(settings, Assemble(), time, keep), output or scene.with_suffix(".nc"))
+    loaded, settings = load_scene(scene, assignments(given["parameters"]))
+    own = {f.name: _value(made, f, given[f.name]) for f in fields(made) if given.get(f.name) not in (None, ())}
+    analysis = replace(settings.analysis, **own) if isinstance(settings.analysis, made) else made(**own)
+    keep = given.get("keep", ())
+    if issubclass(made, OverTime):
+        found: Any = over_time(settings, analysis, keep)
+    else:
+        found = at_moment(settings, analysis, given["time"], keep)
+    changes = {key: given[key] for key in INTEGRATION if key in given}
+    perform(loaded, changed(found, changes), given["output"] or scene.with_suffix(".nc"), given.get("resume", False))
 
 
-@click.command()
-@scene_options
-def kinematic(scene: Path, output: Path | None, parameters: tuple[str, ...], keep: tuple[str, ...]) -> None:
-    """Positions, velocities and accelerations of SCENE, whose drivers prescribe all motion; bodies undeformed."""
-    from ffr_dyn.analyses.settings import Kinematic
-    from ffr_dyn.scene_file.read import load_scene
-
-    loaded, settings = load_scene(scene, assignments(parameters))
-    perform(loaded, over_time(settings, Kinematic(), keep), output or scene.with_suffix(".nc"))
-
-
-@click.command()
-@scene_options
-@click.option(
-    "--quasi-static/--dynamic", default=None, help="Elastic coordinates follow without vibration; default: dynamic."
-)
-def inverse(
-    scene: Path, output: Path | None, parameters: tuple[str, ...], keep: tuple[str, ...], quasi_static: bool | None
-) -> None:
-    """Forces that drive SCENE along its prescribed motion, and all reactions."""
-    from ffr_dyn.analyses.settings import Inverse
-    from ffr_dyn.scene_file.read import load_scene
-
-    loaded, settings = load_scene(scene, assignments(parameters))
-    given = settings.analysis if isinstance(settings.analysis, Inverse) else Inverse()
-    analysis = given if quasi_static is None else Inverse(quasi_static)
-    perform(loaded, over_time(settings, analysis, keep), output or scene.with_suffix(".nc"))
-
-
-@click.command(epilog=_FORCES + _MIXED)
-@scene_options
-@click.option(
-    "--unknown", "forces", multiple=True, metavar="FORCE", help="Force to find, instead of the scene's; repeat."
-)
-@click.option("--known", multiple=True, help="Driver that is a known motion, not a true driver; default: all.")
-def mixed(
-    scene: Path,
-    output: Path | None,
-    parameters: tuple[str, ...],
-    keep: tuple[str, ...],
-    forces: tuple[str, ...],
-    known: tuple[str, ...],
-) -> None:
-    """Motion and unknown forces of SCENE, some motions of which are known.
-
-    Forces away from the known motions are found by integration where that is stable, else as the bounded solution, which
-    adds times before and after the run.
-    """
-    from ffr_dyn.analyses.settings import Mixed
-    from ffr_dyn.scene_file.read import load_scene
-
-    loaded, settings = load_scene(scene, assignments(parameters))
-    analysis = settings.analysis if isinstance(settings.analysis, Mixed) else Mixed(())
-    if forces:
-        analysis = replace(analysis, unknown=tuple(force_of(text) for text in forces))
-    if not analysis.unknown:
-        raise InputError(
-            'mixed dynamics needs forces to find: --unknown, or kind = "mixed" with [analysis.unknown.NAME]'
-        )
-    analysis = replace(analysis, known=known or analysis.known)
-    perform(loaded, over_time(settings, analysis, keep), output or scene.with_suffix(".nc"))
-
-
-@click.command()
-@scene_options
-@time_option
-def static(
-    scene: Path, output: Path | None, parameters: tuple[str, ...], keep: tuple[str, ...], time: float | None
-) -> None:
-    """Static equilibrium of SCENE, downhill from its start, with reactions and stability."""
-    from ffr_dyn.analyses.settings import Static
-    from ffr_dyn.scene_file.read import load_scene
-
-    loaded, settings = load_scene(scene, assignments(parameters))
-    perform(loaded, _at_moment(settings, Static(), time, keep), output or scene.with_suffix(".nc"))
-
-
-@click.command(epilog=_FORCES + _LINEARISE)
-@scene_argument
-@output_option
-@parameter_option
-@time_option
-@click.option("--at-equilibrium/--at-start", default=None, help="About the static equilibrium, or (default) the start.")
-@click.option(
-    "--input", "forces", multiple=True, metavar="FORCE", help="Input: a force, or the name of a load; repeat."
-)
-@click.option(
-    "--quantity", "quantities", multiple=True, help="Output: a component, such as rod.tip.position.y; repeat."
-)
-def linearise(
-    scene: Path,
-    output: Path | None,
-    parameters: tuple[str, ...],
-    time: float | None,
-    at_equilibrium: bool | None,
-    forces: tuple[str, ...],
-    quantities: tuple[str, ...],
-) -> None:
-    """Eigenvalues and state-space matrices of SCENE about its start or its equilibrium."""
-    from ffr_dyn.analyses.settings import Linearise
-    from ffr_dyn.scene_file.read import load_scene
-
-    loaded, settings = load_scene(scene, assignments(parameters))
-    given = settings.analysis if isinstance(settings.analysis, Linearise) else Linearise()
-    analysis = Linearise(
-        tuple(force_of(text) if "=" in text else text for text in forces) or given.inputs,
-        quantities or given.quantities,
-        given.at_equilibrium if at_equilibrium is None else at_equilibrium,
-    )
-    perform(loaded, _at_moment(settings, analysis, time, ()), output or scene.with_suffix(".nc"))
-
-
-COMMANDS = (check, assemble, kinematic, static, inverse, mixed, linearise)
-
-
-def _at_moment(
-    settings: Settings | MomentSettings, analysis: OfMoment, time: float | None, keep: tuple[str, ...]
-) -> MomentSettings:
-    """The settings of a file with another analysis, at another time if one is given."""
-    from ffr_dyn.analyses.settings import MomentSettings
-
-    if time is not None and not math.isfinite(time):
-        raise InputError(f"--time {time}: give a time in seconds")
-    given = settings.time if isinstance(settings, MomentSettings) else 0.0
-    return MomentSettings(time=given if time is None else time, outputs=keep or settings.outputs, analysis=analysis)
+def _value(made: Any, f: Field[Any], given: Any) -> Any:
+    """The value of a field from what its option gives."""
+    if isinstance(given, bool):
+        words = [word.lstrip("-") for word in f.metadata["flag"].split("/")]
+        return given if isinstance(f.default, bool) else words[not given]
+    if not _is_force(made, f):
+        return given
+    return tuple(force_of(text) if "=" in text or not f.metadata.get("names") else text for text in given)
 
 
 def force_of(text: str) -> Effort:

@@ -88,7 +88,8 @@ def chart(
     Times are those of the integrator alone on one thread, medians of several runs with bars for the spread. On a busy
     machine trust CPU time.
     """
-    from ffr_dyn.analyses.settings import Forward, Settings
+    from ffr_dyn.analyses.forward import Forward
+    from ffr_dyn.analyses.settings import Settings
     from ffr_dyn.chart.diagram import measures_of, work_precision
     from ffr_dyn.chart.runner import Span, pool
     from ffr_dyn.cli.progress_bar import counted

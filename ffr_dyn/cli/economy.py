@@ -56,7 +56,7 @@ def economise(
     What is not needed goes: bodies become rigid, modes, inertia terms and stiffening are left out, the computation is done in
     the plane, the step is as long as it may be. Every error is estimated and, where that is quick, verified.
     """
-    from ffr_dyn.analyses.settings import Forward
+    from ffr_dyn.analyses.forward import Forward
     from ffr_dyn.economy.picture import draw
     from ffr_dyn.economy.report import as_text, write_report
     from ffr_dyn.economy.search import economise as search

@@ -50,18 +50,18 @@ def realtime(
     """
     from ffr_dyn.analyses.settings import Settings
     from ffr_dyn.cli.progress_bar import progress
-    from ffr_dyn.integrators import METHODS
+    from ffr_dyn.integrators import ROS2, method_named
     from ffr_dyn.integrators.stabilisation import Projection
     from ffr_dyn.realtime.deadline import as_json, lines, measure_steps, plot_times
     from ffr_dyn.scene_file.read import load_scene
 
     loaded, settings = load_scene(scene, assignments(parameters))
-    given: Any = METHODS["ros2"](1e-3)
+    given: Any = ROS2(1e-3)
     if isinstance(settings, Settings) and not settings.method.controlled:
         given = settings.method
-    if method is not None and method not in METHODS:
-        raise InputError(f"--method {method}: there is no such method; there are {', '.join(METHODS)}")
-    kind: Any = type(given) if method is None else METHODS[method]
+    kind: Any = type(given) if method is None else method_named(method)
+    if kind.controlled:
+        raise InputError(f"--method {method}: it chooses its steps, whose cost has no bound; take one of fixed steps")
     require_file("--plot", plot, (".png", ".svg", ".pdf"))
     with progress(loaded.name, duration) as update:
         timing = measure_steps(

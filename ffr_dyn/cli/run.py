@@ -14,11 +14,10 @@ import click
 from ffr_prep.common.errors import InputError
 
 if TYPE_CHECKING:
-    from ffr_dyn.analyses.settings import MomentSettings, OverTime, Settings
+    from ffr_dyn.analyses.registry import OfMoment, OverTime
+    from ffr_dyn.analyses.settings import MomentSettings, Settings
     from ffr_dyn.integrators import Integrator
     from ffr_dyn.scene.scene import Scene
-
-EVENTS_SHOWN = 20
 
 scene_argument = click.argument("scene", type=click.Path(path_type=Path))
 output_option = click.option(
@@ -30,16 +29,22 @@ parameter_option = click.option(
 keep_option = click.option(
     "--keep", multiple=True, metavar="NAME", help="Quantities to keep, instead of the scene's; * and ? match."
 )
-_INTEGRATION = (
-    click.option("--end", type=float, help="End of the run [s], instead of the scene's."),
+time_option = click.option("--time", type=float, help="[s], for what depends on time; default: the scene's, or 0.")
+end_option = click.option("--end", type=float, help="End of the run [s], instead of the scene's.")
+method_options = (
     click.option("--step", type=float, help="Time step [s], instead of the scene's."),
     click.option("--tolerance", type=float, help="Relative tolerance of a method that chooses its steps."),
-    click.option("--method", metavar="NAME", help="Integrator, instead of the scene's: ros2, ros3-adaptive, rk4, ..."),
-    click.option("--resume", is_flag=True, help="Go on where the result file ends, as if the run had never stopped."),
+    click.option("--method", metavar="NAME", help="Integrator, instead of the scene's; `ffr-dyn methods` lists them."),
 )
+resume_option = click.option(
+    "--resume", is_flag=True, help="Go on where the result file ends, as if the run had never stopped."
+)
+INTEGRATION = ("end", "step", "tolerance", "method")
 
 
-def _all_of(*options: Callable[..., Any]) -> Callable[..., Any]:
+def with_options(*options: Callable[..., Any]) -> Callable[..., Any]:
+    """Several options as one decorator."""
+
     def decorate(function: Any) -> Any:
         for option in reversed(options):
             function = option(function)
@@ -47,9 +52,6 @@ def _all_of(*options: Callable[..., Any]) -> Callable[..., Any]:
 
     return decorate
 
-
-scene_options = _all_of(scene_argument, output_option, parameter_option, keep_option)
-integration_options = _all_of(*_INTEGRATION)
 
 RUN_EXAMPLE = """\b
 Example:
@@ -59,8 +61,7 @@ Example:
 
 
 @click.command(epilog=RUN_EXAMPLE)
-@scene_options
-@integration_options
+@with_options(scene_argument, output_option, parameter_option, keep_option, end_option, *method_options, resume_option)
 def run(
     scene: Path, output: Path | None, parameters: tuple[str, ...], keep: tuple[str, ...], resume: bool, **changes: Any
 ) -> None:
@@ -76,21 +77,7 @@ def run(
 
     loaded, settings = load_scene(scene, assignments(parameters))
     settings = replace(settings, outputs=keep or settings.outputs)
-    perform(loaded, _changed(settings, changes), output or scene.with_suffix(".nc"), resume)
-
-
-@click.command()
-@scene_options
-@integration_options
-def forward(
-    scene: Path, output: Path | None, parameters: tuple[str, ...], keep: tuple[str, ...], resume: bool, **changes: Any
-) -> None:
-    """Forward dynamics of SCENE, whatever analysis its file asks for; see `ffr-dyn run --help`."""
-    from ffr_dyn.analyses.settings import Forward
-    from ffr_dyn.scene_file.read import load_scene
-
-    loaded, settings = load_scene(scene, assignments(parameters))
-    perform(loaded, _changed(over_time(settings, Forward(), keep), changes), output or scene.with_suffix(".nc"), resume)
+    perform(loaded, changed(settings, changes), output or scene.with_suffix(".nc"), resume)
 
 
 def assignments(parameters: tuple[str, ...]) -> dict[str, str]:
@@ -125,44 +112,58 @@ def require_after(option: str, end: float | None, start: float) -> None:
 
 def over_time(settings: Settings | MomentSettings, analysis: OverTime, keep: tuple[str, ...]) -> Settings:
     """The settings of a file with another analysis. InputError where the file's own has no times."""
+    from ffr_dyn.analyses.registry import word_of
     from ffr_dyn.analyses.settings import MomentSettings
 
     if isinstance(settings, MomentSettings):
         raise InputError(
-            f"the scene file asks for a {type(settings.analysis).__name__.lower()} analysis, which has no times; "
-            f"{type(analysis).__name__.lower()} analysis needs an [analysis] with end and output_step"
+            f"the scene file asks for a {word_of(type(settings.analysis))} analysis, which has no times; "
+            f"{word_of(type(analysis))} analysis needs an [analysis] with end and output_step"
         )
     return replace(settings, analysis=analysis, outputs=keep or settings.outputs)
 
 
-def _changed(settings: Settings | MomentSettings, changes: Mapping[str, Any]) -> Settings | MomentSettings:
+def at_moment(
+    settings: Settings | MomentSettings, analysis: OfMoment, time: float | None, keep: tuple[str, ...]
+) -> MomentSettings:
+    """The settings of a file with another analysis, at another time if one is given."""
+    from ffr_dyn.analyses.settings import MomentSettings
+
+    if time is not None and not math.isfinite(time):
+        raise InputError(f"--time {time}: give a time in seconds")
+    given = settings.time if isinstance(settings, MomentSettings) else 0.0
+    return MomentSettings(time=given if time is None else time, outputs=keep or settings.outputs, analysis=analysis)
+
+
+def changed(settings: Settings | MomentSettings, changes: Mapping[str, Any]) -> Settings | MomentSettings:
     """Another end, step or method than the file's. InputError for an analysis that has none."""
-    from ffr_dyn.analyses.settings import Kinematic, MomentSettings
+    from ffr_dyn.analyses.registry import word_of
+    from ffr_dyn.analyses.settings import Settings
 
     given = {key: value for key, value in changes.items() if value is not None}
-    if isinstance(settings, MomentSettings) or isinstance(settings.analysis, Kinematic):
-        known = () if isinstance(settings, MomentSettings) else ("end",)
-        for key in given:
-            if key not in known:
-                raise InputError(f"--{key}: there is no {key} of a {type(settings.analysis).__name__.lower()} analysis")
-        return replace(settings, **given)
-    return replace(settings, end=given.get("end", settings.end), method=_method(settings, given))
+    integrates = isinstance(settings, Settings) and settings.analysis.integrates
+    known = INTEGRATION if integrates else ("end",) if isinstance(settings, Settings) else ()
+    for key in given:
+        if key not in known:
+            raise InputError(f"--{key}: there is no {key} of a {word_of(type(settings.analysis))} analysis")
+    if not isinstance(settings, Settings):
+        return settings
+    method = _method(settings, given) if integrates else settings.method
+    return replace(settings, end=given.get("end", settings.end), method=method)
 
 
 def _method(settings: Settings, given: Mapping[str, Any]) -> Integrator:
     """The method of the file, or the one that was asked for, with the step or the tolerance that was asked for."""
-    from ffr_dyn.integrators import CONTROLLED, METHODS, tolerances
+    from ffr_dyn.integrators import method_named, tolerances
 
     named = given.get("method")
-    known = {**METHODS, **CONTROLLED}
-    if named is not None and named not in known:
-        raise InputError(f"--method {named}: there is no such method; there are {', '.join(known)}")
-    kind: Any = type(settings.method) if named is None else known[named]
+    kind: Any = type(settings.method) if named is None else method_named(named)
     if kind.controlled:
         if "step" in given:
             raise InputError(f"--step: {kind.__name__} chooses its steps; give --tolerance")
         if "tolerance" in given:
-            return kind(tolerances(given["tolerance"]))
+            found: Integrator = kind(tolerances(given["tolerance"]))
+            return found
         return settings.method if named is None else kind()
     if "tolerance" in given:
         raise InputError(f"--tolerance: {kind.__name__} takes steps of one length; give --step")
@@ -175,7 +176,7 @@ def perform(scene: Scene, settings: Settings | MomentSettings, output: Path, res
     """Analyse a scene, with progress where that takes its time, and tell what came of it."""
     from ffr_dyn.analyses.run import require_resumable
     from ffr_dyn.analyses.run import run as analyse
-    from ffr_dyn.analyses.settings import Linearise, Settings
+    from ffr_dyn.analyses.settings import Settings
     from ffr_dyn.cli.progress_bar import progress
 
     if resume:
@@ -183,41 +184,8 @@ def perform(scene: Scene, settings: Settings | MomentSettings, output: Path, res
     if isinstance(settings, Settings):
         with progress(scene.name, settings.end, start=settings.start) as update:
             result = analyse(scene, settings, path=output, resume=output if resume else None, progress=update)
-        lines = summary(result.attributes)
-    elif isinstance(settings.analysis, Linearise):
-        lines = _linearised(scene, settings.analysis, settings.time, output)
     else:
-        lines = summary(analyse(scene, settings, path=output).attributes)
-    for line in lines:
+        result = analyse(scene, settings, path=output)
+    for line in settings.analysis.report(result):
         click.echo(line)
     click.echo(f"result       {output}")
-
-
-def _linearised(scene: Scene, analysis: Any, time: float, output: Path) -> list[str]:
-    """The modes, a line each, and notes."""
-    from ffr_dyn.analyses.linearise import as_result, table_of_modes
-    from ffr_dyn.analyses.run import linearised
-    from ffr_dyn.results.file import save_result
-
-    found = linearised(scene, analysis, time)
-    save_result(as_result(scene, found, time), output)
-    return [*table_of_modes(found), *(f"note         {note}" for note in found.notes)]
-
-
-def summary(attributes: Mapping[str, Any]) -> list[str]:
-    """What an analysis reports, a line each."""
-    a = attributes
-    lines = [
-        f"scene        {a['title']}: {a['analysis']}, {a['degrees_of_freedom']} degrees of freedom",
-        f"method       {a['method']}, {a.get('evaluations', 0)} evaluations of the equations of motion",
-    ]
-    if "largest_drift" in a:
-        position, velocity = a["largest_drift"]
-        lines.append(
-            f"constraints  left by at most {position:.1e} (rate {velocity:.1e}); {a['projections']} projections"
-        )
-    if "stable" in a:
-        lines.append(f"equilibrium  {'stable' if a['stable'] else 'unstable'}")
-    passed = [f"event        {e['event']} at t = {e['time']:.9g} s" for e in a.get("events", [])]
-    more = [f"event        ... and {len(passed) - EVENTS_SHOWN} more"] if len(passed) > EVENTS_SHOWN else []
-    return lines + passed[:EVENTS_SHOWN] + more + [f"note         {note}" for note in a["notes"]]

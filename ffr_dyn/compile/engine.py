@@ -27,7 +27,7 @@ LEAST_STEP = 1e-9  # of a controlled method, relative to the spacing of its rows
 
 
 @dataclass(frozen=True, repr=False)
-class Machine(Brief):
+class Engine(Brief):
     """The tables of a scene, and where the entry points find them (`words`, as `pack` wrote them)."""
 
     system: System
@@ -51,7 +51,7 @@ class Machine(Brief):
         return self.tables.v
 
 
-def new_machine(
+def new_engine(
     system: System,
     x: Array,
     v: Array,
@@ -60,13 +60,13 @@ def new_machine(
     *,
     start: float = 0.0,
     spacing: float = 0.0,
-) -> Machine:
+) -> Engine:
     """Memory for a scene at the state (x, v), which it owns, and for a method (none: evaluations alone).
 
     start   : time of step number 0 [s]
     spacing : of the numbered steps of a method that chooses its own [s]
 
-    The first machine of a kind waits until what it needs is compiled.
+    The first engine of a kind waits until what it needs is compiled.
     """
     ensure_compiled(*(() if method is None else (type(method),)), model=system.model)
     if method is None:
@@ -108,47 +108,47 @@ def _control(system: System, method: Integrator | None, start: float, spacing: f
     return Control(np.array(numbers), np.zeros(2, dtype=np.int64), x, v, *(np.zeros(size) for size in sizes))
 
 
-def _packed(system: System, tables: Tables) -> Machine:
+def _packed(system: System, tables: Tables) -> Engine:
     words = pack(tables)
     words[0] = words.ctypes.data
-    return Machine(system, tables._replace(address=words.ctypes.data), words)
+    return Engine(system, tables._replace(address=words.ctypes.data), words)
 
 
-def with_model(machine: Machine, model: Model) -> Machine:
+def with_model(engine: Engine, model: Model) -> Engine:
     """The same memory for other constant tables of the same shapes."""
-    return _packed(replace(machine.system, model=model), machine.tables._replace(model=model))
+    return _packed(replace(engine.system, model=model), engine.tables._replace(model=model))
 
 
-def evaluate_at(machine: Machine, t: float, x: Array, v: Array) -> int:
-    """Accelerations and multipliers at (t, x, v) with the true mass matrix, in the machine's work tables. A status."""
-    return evaluate_exact(machine.tables, t, np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(v, dtype=float))
+def evaluate_at(engine: Engine, t: float, x: Array, v: Array) -> int:
+    """Accelerations and multipliers at (t, x, v) with the true mass matrix, in the engine's work tables. A status."""
+    return evaluate_exact(engine.tables, t, np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(v, dtype=float))
 
 
-def load_at(machine: Machine, t: float, x: Array, v: Array) -> int:
-    """Right-hand sides of the applied loads alone at (t, x, v), in the machine's work tables. A status."""
-    return evaluate_loads(machine.tables, t, np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(v, dtype=float))
+def load_at(engine: Engine, t: float, x: Array, v: Array) -> int:
+    """Right-hand sides of the applied loads alone at (t, x, v), in the engine's work tables. A status."""
+    return evaluate_loads(engine.tables, t, np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(v, dtype=float))
 
 
-def record_row(machine: Machine, t: float, record: Record, row: int) -> int:
-    """Evaluate the machine's state at time t as `evaluate_at` and keep it as a row. A status."""
-    return record_state(machine.tables, t, record, row)
+def record_row(engine: Engine, t: float, record: Record, row: int) -> int:
+    """Evaluate the engine's state at time t as `evaluate_at` and keep it as a row. A status."""
+    return record_state(engine.tables, t, record, row)
 
 
-def fill_rows(machine: Machine, record: Record, start: float, substeps: int) -> int:
+def fill_rows(engine: Engine, record: Record, start: float, substeps: int) -> int:
     """Go on by `substeps` steps of the engine's method per row of the record, from step number clock.steps[NEXT]. A status.
 
     start : time of step number 0 [s]
     clock.steps[FILLED] tells how many rows were filled.
     """
-    machine.tables.clock.steps[PER_ROW] = substeps
-    return row_filler(machine, record)(start)
+    engine.tables.clock.steps[PER_ROW] = substeps
+    return row_filler(engine, record)(start)
 
 
-def row_filler(machine: Machine, record: Record) -> Callable[[float], int]:
+def row_filler(engine: Engine, record: Record) -> Callable[[float], int]:
     """`fill_rows` for one record, again and again at the least cost: of the time of step number 0, a status."""
-    entry = run_controlled if machine.tables.control.numbers.size else run
+    entry = run_controlled if engine.tables.control.numbers.size else run
     call, words = entry.general.c_function, pack(record)
-    address, place = machine.address, words.ctypes.data
+    address, place = engine.address, words.ctypes.data
 
     def fill(start: float, kept: Array = words) -> int:  # the numbers at `place` live as long as this function
         return call(address, start, place)

@@ -14,12 +14,11 @@ from pathlib import Path
 
 from numba.core.caching import FunctionCache
 
-from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator
+from ffr_dyn.integrators import Integrator, methods
 from ffr_dyn.kernels.entry_points import add_loads, load_powers, run_controlled
 from ffr_dyn.kernels.simd.entry_point import ENTRY_POINTS, CompiledFunction, always
 from ffr_dyn.kernels.tables import Model
 
-_STEPS = list(dict.fromkeys(kind.do_step for kind in (*METHODS.values(), *CONTROLLED.values())))
 _AT_WORK: dict[str, subprocess.Popen[bytes]] = {}
 _ON_DISK: set[str] = set()  # functions that were found there before: a program with many runs looks once
 
@@ -31,7 +30,7 @@ def begin_compiling(*kinds: type[Integrator], model: Model | None = None) -> Non
 
     model : tables of the scene; without them, of one with applied loads
     """
-    functions = _of_scene(model) + [step for step in _STEPS if any(kind.do_step is step for kind in kinds)]
+    functions = _of_scene(model) + [step for step in _steps() if any(kind.do_step is step for kind in kinds)]
     if any(kind.controlled for kind in kinds):
         functions.append(run_controlled.general)
     _ON_DISK.update(each.name for each in functions if each.name not in _ON_DISK and _is_on_disk(each))
@@ -72,10 +71,15 @@ def _is_on_disk(compiled: CompiledFunction) -> bool:
     return any(folder.glob(f"*.{compiled.name}-*.nbi"))
 
 
+def _steps() -> list[CompiledFunction]:
+    """The compiled steps of all methods."""
+    return list(dict.fromkeys(kind.do_step for kind in methods().values()))
+
+
 def compile_functions(names: Sequence[str]) -> None:
     """Compile functions by their names."""
     forms = [form for entry in ENTRY_POINTS.values() for form in (entry.general, *(form for _, form in entry.forms))]
-    for compiled in (*forms, *_STEPS):
+    for compiled in (*forms, *_steps()):
         if compiled.name in names and not compiled.address:
             raise RuntimeError(f"entry point {compiled.name} has no address")
 

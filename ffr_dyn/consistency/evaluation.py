@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffr_dyn.compile.engine import Machine, new_machine, record_row
+from ffr_dyn.compile.engine import Engine, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.failure import failure
@@ -31,16 +31,16 @@ RANK_TOLERANCE = 1e-9  # of a singular value of the mass-weighted Jacobian, rela
 class Evaluator(Brief):
     """A compiled scene with the memory of one evaluation."""
 
-    machine: Machine
+    engine: Engine
     record: Record
 
     @property
     def system(self) -> System:
-        return self.machine.system
+        return self.engine.system
 
     @property
     def work(self) -> Work:
-        return self.machine.work
+        return self.engine.work
 
 
 @dataclass(frozen=True, repr=False)
@@ -66,7 +66,7 @@ class Evaluation(Brief):
 
 def evaluator(system: System) -> Evaluator:
     """Memory for evaluations of a compiled scene."""
-    return Evaluator(new_machine(system, *initial_state(system.scene, system.layout)), new_record(system, 1))
+    return Evaluator(new_engine(system, *initial_state(system.scene, system.layout)), new_record(system, 1))
 
 
 def evaluate(at: Evaluator, time: float, x: Array, v: Array) -> Evaluation:
@@ -96,8 +96,8 @@ def accelerations(at: Evaluator, time: float, x: Array, v: Array) -> Array:
 
 def _look(at: Evaluator, time: float, x: Array, v: Array) -> int:
     """Evaluate; a status, which is OK or that of dependent rows."""
-    at.machine.x[:], at.machine.v[:] = x, v
-    status = record_row(at.machine, time, at.record, 0)
+    at.engine.x[:], at.engine.v[:] = x, v
+    status = record_row(at.engine, time, at.record, 0)
     if status not in (OK, SINGULAR_CONSTRAINT):
         raise failure(at.system, at.work, status, time)
     return int(status)

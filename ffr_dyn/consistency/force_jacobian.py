@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffr_dyn.compile.engine import Machine, load_at, new_machine
+from ffr_dyn.compile.engine import Engine, load_at, new_engine
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.equations.forces import gravity_forces
 from ffr_dyn.functions.rotation import G_bar, rotation_matrix
@@ -36,16 +36,16 @@ class ForceJacobian:
     error: Array
 
 
-def applied_forces(system: System, t: float, x: Array, v: Array, machine: Machine | None = None) -> Array:
+def applied_forces(system: System, t: float, x: Array, v: Array, engine: Engine | None = None) -> Array:
     """(V,) generalised forces of all applied loads and gravity at (t, x, v), in body axes.
 
-    machine : carries the turns of angles that forces count; by default those of the start
+    engine : carries the turns of angles that forces count; by default those of the start
     Raises ComputationError when a Python function of the scene fails.
     """
-    machine = new_machine(system, x, v) if machine is None else machine
-    if load_at(machine, t, x, v) != OK:
+    engine = new_engine(system, x, v) if engine is None else engine
+    if load_at(engine, t, x, v) != OK:
         raise ComputationError(f"the forces stopped in a Python function of the scene: {system.user.failure}")
-    return machine.work.bodies.f + gravity_forces(system.scene, system.layout, t, x)
+    return engine.work.bodies.f + gravity_forces(system.scene, system.layout, t, x)
 
 
 def force_jacobian(system: System, t: float, x: Array, v: Array) -> ForceJacobian:
@@ -53,18 +53,18 @@ def force_jacobian(system: System, t: float, x: Array, v: Array) -> ForceJacobia
 
     A large `error` tells of a kink of the forces nearby: the edge of a stop, the end of a curve or a limit.
     """
-    machine = new_machine(system, x, v)
+    engine = new_engine(system, x, v)
 
     def moved(direction: Array, h: float) -> Array:
-        return applied_forces(system, t, small_motion(system, x, h * direction), v, machine)
+        return applied_forces(system, t, small_motion(system, x, h * direction), v, engine)
 
     def faster(direction: Array, h: float) -> Array:
-        return applied_forces(system, t, x, v + h * to_global(system, x, direction), machine)
+        return applied_forces(system, t, x, v + h * to_global(system, x, direction), engine)
 
     steps = _steps(system)
     position, off = _derivative(moved, STEP * steps)
     velocity, rate_off = _derivative(faster, RATE_STEP * steps)
-    return ForceJacobian(applied_forces(system, t, x, v, machine), position, velocity, np.array([off, rate_off]))
+    return ForceJacobian(applied_forces(system, t, x, v, engine), position, velocity, np.array([off, rate_off]))
 
 
 def _derivative(function: Callable[[Array, float], Array], steps: Array) -> tuple[Array, float]:

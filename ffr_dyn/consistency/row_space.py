@@ -51,4 +51,6 @@ def _factor(rows: csr_array) -> SuperLU | None:
         )
     except RuntimeError:  # exactly singular
         return None
+    if (factor.perm_r != factor.perm_c).any():  # a pivot was zero, and SuperLU took one beside the diagonal
+        return None
     return factor if np.abs(factor.U.diagonal()).min() > CLEARLY else None

@@ -78,7 +78,8 @@ def _vibrations(system: System, time: float, x: Array, v: Array, slow: float) ->
     except LinAlgError:  # an inertia that is not positive, with terms left out
         return np.zeros(0)
     lowest = slow * float(np.sqrt(omega2.min(initial=np.inf)))
-    return np.sqrt(squares[squares > lowest**2]) / (2 * np.pi)
+    found: Array = np.sqrt(squares[squares > lowest**2]) / (2 * np.pi)
+    return found
 
 
 @dataclass(frozen=True)

@@ -78,9 +78,12 @@ class Choice:
 
     def integrator(self, output_step: float) -> Integrator:
         """The method with its step or its tolerances."""
+        made: Integrator
         if self.controlled:
-            return CONTROLLED[self.method](tolerances(self.accuracy))
-        return METHODS[self.method](output_step / self.divisions)
+            made = CONTROLLED[self.method](tolerances(self.accuracy))
+        else:
+            made = METHODS[self.method](output_step / self.divisions)
+        return made
 
 
 def full(scene: Scene, method: str, divisions: int) -> Choice:
@@ -181,8 +184,9 @@ def orthonormal(shapes: Array, omega2: Array) -> Array:
     left, values, _ = np.linalg.svd(shapes / np.linalg.norm(shapes, axis=0), full_matrices=False)
     Q = left[:, values > 1e-9 * values.max()]
     _, vectors = np.linalg.eigh(Q.T @ (omega2[:, None] * Q))
-    V = Q @ vectors
-    return V * np.sign(V[np.abs(V).argmax(axis=0), np.arange(V.shape[1])])
+    V: Array = Q @ vectors
+    V *= np.sign(V[np.abs(V).argmax(axis=0), np.arange(V.shape[1])])
+    return V
 
 
 def kind(scene: Scene, choice: Choice, number: int, output_step: float) -> str:

@@ -12,14 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import forward
 from ffr_dyn.chart.diagram import Diagram, Point, spread
 from ffr_dyn.chart.draw import draw_chart
 from ffr_dyn.chart.reference import Reference
 from ffr_dyn.chart.variants import STEP, TOLERANCE, Model, Variant
 from ffr_dyn.economy.model_choice import Choice
 from ffr_dyn.economy.result import Economy
-from ffr_dyn.economy.run import Made, Span, make
+from ffr_dyn.economy.run import Made, Span, make, simulated
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.results.result import Result
 
@@ -114,17 +113,7 @@ def _timed(made: Made, choice: Choice, span: Span, repeats: int) -> tuple[list[f
     wall, cpu, evaluations = [], [], 0
     for _ in range(repeats):
         watch = Stopwatch()
-        result = forward(
-            made.scene,
-            start=span.start,
-            end=span.end,
-            output_step=span.output_step,
-            method=choice.integrator(span.output_step),
-            stabilisation=span.stabilisation,
-            outputs=("constraint.position",),
-            stopwatch=watch,
-            assembled=made.assembled,
-        )
+        result = simulated(made, choice, span, ("constraint.position",), watch)
         wall.append(watch.wall)
         cpu.append(watch.cpu)
         evaluations = int(result.attributes["evaluations"])

@@ -12,6 +12,7 @@ from ffr_dyn.economy.cost import of_evaluations, of_run
 from ffr_dyn.economy.model_choice import Choice, applied
 from ffr_dyn.economy.outputs import Probe, histories, needed
 from ffr_dyn.economy.policy import DEFAULT, CostModel
+from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
@@ -79,21 +80,29 @@ def cost(trial: Trial, span: Span, model: CostModel = DEFAULT.cost) -> float:
     return of_run(trial.choice, span.rows, model)
 
 
-def run(made: Made, choice: Choice, span: Span, of: Probe, outputs: tuple[str, ...] = ()) -> Trial:
-    """Run a model, keeping its states and what `outputs` name.
-
-    Raises ComputationError as `forward` does, and where the outputs are no longer finite.
-    """
-    result = forward(
+def simulated(
+    made: Made, choice: Choice, span: Span, outputs: tuple[str, ...], stopwatch: Stopwatch | None = None
+) -> Result:
+    """A forward run of a model. Raises ComputationError as `forward` does."""
+    return forward(
         made.scene,
         start=span.start,
         end=span.end,
         output_step=span.output_step,
         method=choice.integrator(span.output_step),
         stabilisation=span.stabilisation,
-        outputs=(*needed(of, made.scene), *_states(made.scene), *outputs),
+        outputs=outputs,
+        stopwatch=stopwatch,
         assembled=made.assembled,
     )
+
+
+def run(made: Made, choice: Choice, span: Span, of: Probe, outputs: tuple[str, ...] = ()) -> Trial:
+    """Run a model, keeping its states and what `outputs` name.
+
+    Raises ComputationError as `forward` does, and where the outputs are no longer finite.
+    """
+    result = simulated(made, choice, span, (*needed(of, made.scene), *_states(made.scene), *outputs))
     values = histories(of, made.scene, result)
     if not all(np.isfinite(one).all() for one in values):
         raise ComputationError("an output of the run is no longer finite")

@@ -21,7 +21,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffr_dyn.analyses.settings import Forward, Settings
+from ffr_dyn.analyses.forward import Forward
+from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.economy.cache import Ledger, Tried
 from ffr_dyn.economy.checks import frequencies, stiffening_loads

@@ -43,7 +43,8 @@ class Ranking:
 
     def left(self, count: int) -> Array:
         """(outputs,) what all directions but the first do."""
-        return self.found.effect[self.order[count:]].sum(axis=0)
+        rest: Array = self.found.effect[self.order[count:]].sum(axis=0)
+        return rest
 
     def leaders(self, count: int) -> tuple[int, ...]:
         """The direction with most strain energy of every body that has none among the first."""
@@ -147,10 +148,8 @@ def _enough(
     before: float = np.inf
     also: tuple[int, ...] = ()
     if beyond is not None:
-        scale, count = (
-            min(1.0, policy.caution * policy.omitted_share / beyond.error),
-            _more(ranking, beyond.count, policy),
-        )
+        scale = min(1.0, policy.caution * policy.omitted_share / beyond.error)
+        count = _more(ranking, beyond.count, policy)
     for _ in range(policy.model_attempts):
         count = max(count, ranking.count(scale * policy.modes_share))
         model = ranking.model(count, also)

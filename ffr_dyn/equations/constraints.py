@@ -94,7 +94,10 @@ def evaluate_word(
 
 
 def _turning(across: Motion, along: Motion, speed: float, second: float) -> Motion:
-    """The axis `across` that turns in its marker with d(across)/dt = -speed along."""
+    """The axis `across` that turns in its marker with d(across)/dt = -speed along.
+
+    Equation (19) of docs/notation.md.
+    """
     return replace(
         across,
         r_dot=across.r_dot - speed * along.r,
@@ -108,7 +111,10 @@ def _driven(row: Row, drive: Drive) -> Row:
 
 
 def _distance(place: Layout, at_i: Motion, at_j: Motion, drive: Drive) -> Row:
-    """Half of D / s - s, with D the square of the distance, and its derivatives by the quotient rule."""
+    """Half of D / s - s, with D the square of the distance, and its derivatives by the quotient rule.
+
+    Equation (20) of docs/notation.md.
+    """
     s, speed, second = drive
     parts = Parts()
     d, d_dot, d_bias = at_j.r - at_i.r, at_j.r_dot - at_i.r_dot, at_j.bias - at_i.bias
@@ -121,6 +127,10 @@ def _distance(place: Layout, at_i: Motion, at_j: Motion, drive: Drive) -> Row:
 
 
 def _relation(scene: Scene, place: Layout, x: Array, v: Array, word: Word, at: tuple[int, ...], drive: Drive) -> Row:
+    """factor_1 coordinate_1 + factor_2 coordinate_2 less a function of time, coordinates of two joints.
+
+    Equation (22) of docs/notation.md.
+    """
     total = Row(0.0, 0.0, 0.0, {}, place.v_size)
     for k in range(2):
         factor, kind = word.relation[2 * k : 2 * k + 2]
@@ -132,7 +142,7 @@ def _relation(scene: Scene, place: Layout, x: Array, v: Array, word: Word, at: t
 
 
 def _coordinate(scene: Scene, place: Layout, x: Array, v: Array, kind: int, axes: Array, at: tuple[int, ...]) -> Row:
-    """Value, rate and bias of an angle (0) or a stroke (1) as a row."""
+    """Value, rate and bias of an angle (0) or a stroke (1) as a row. Equation (21) of docs/notation.md."""
     i, j = at
     first = marker_axis(scene, place, x, v, i, axes[0])
     if kind == 1:
@@ -159,6 +169,7 @@ def _sum(one: Row, a: float, other: Row, b: float) -> Row:
 
 
 def _coincidence(place: Layout, at_i: Motion, at_j: Motion, drive: Drive, c: int) -> Row:
+    """One component of r_j - r_i less a function of time. Equation (17) of docs/notation.md."""
     parts = Parts()
     add_part(place, parts, at_i, -at_i.jacobian[c])
     add_part(place, parts, at_j, at_j.jacobian[c])
@@ -167,7 +178,7 @@ def _coincidence(place: Layout, at_i: Motion, at_j: Motion, drive: Drive, c: int
 
 
 def _dot(place: Layout, a: Motion, sums: list[tuple[Motion, float]]) -> Row:
-    """a . d with d a signed sum of moving vectors."""
+    """a . d with d a signed sum of moving vectors. Equation (18) of docs/notation.md."""
     d = sum(sign * m.r for m, sign in sums)
     d_dot = sum(sign * m.r_dot for m, sign in sums)
     d_bias = sum(sign * m.bias for m, sign in sums)

@@ -73,7 +73,10 @@ class Applied:
 
 
 def applied(scene: Scene, place: Layout, t: float, x: Array, v: Array) -> list[Applied]:
-    """Every applied load of the scene but gravity; angles counted from the turns at the start."""
+    """Every applied load of the scene but gravity; angles counted from the turns at the start.
+
+    Equation (23) of docs/notation.md.
+    """
     now = Moment(scene, place, t, x, v)
     return [*(_load(now, load) for load in scene.loads), *_on_coordinates(now), *_others(now)]
 

@@ -59,18 +59,22 @@ class Moments:
 
 
 def moments(body: FlexibleBody | Integrals, q: Array) -> Moments:
-    """Moments of the mass of the body deformed by q (n,)."""
+    """Moments of the mass of the body deformed by q (n,). Equation (10) of docs/notation.md."""
     G = body.rP_dm + np.einsum("klij,i->klj", body.PP_dm, q)
     rest = np.einsum("klj,j->kl", body.rP_dm, q)
     W = body.rr_dm + rest.T + np.einsum("klj,j->kl", G, q)  # int u u0^T + int u (Phi q)^T
     return Moments(body.r_dm + body.P_dm @ q, G, W)
 
 
+def inertia_tensor(moment: Moments) -> Array:
+    """(3, 3) J of the deformed body about the origin of its frame. Equation (11) of docs/notation.md."""
+    return np.trace(moment.W) * np.eye(3) - moment.W
+
+
 def mass_matrix(body: FlexibleBody | Integrals, q: Array) -> Array:
-    """(6 + n, 6 + n) mass matrix at q (n,), body axes."""
+    """(6 + n, 6 + n) mass matrix at q (n,), body axes. Equation (12) of docs/notation.md."""
     moment = moments(body, q)
-    J = np.trace(moment.W) * np.eye(3) - moment.W
-    H = axial(moment.G)
+    J, H = inertia_tensor(moment), axial(moment.G)
     return np.block([
         [body.mass * np.eye(3), -skew(moment.s), body.P_dm],
         [skew(moment.s), J, H],
@@ -79,9 +83,12 @@ def mass_matrix(body: FlexibleBody | Integrals, q: Array) -> Array:
 
 
 def quadratic_velocity(body: FlexibleBody | Integrals, q: Array, omega: Array, q_dot: Array) -> Array:
-    """(6 + n,) quadratic velocity forces Q_v at q, omega (3,) in body axes, q_dot (n,)."""
+    """(6 + n,) quadratic velocity forces Q_v at q, omega (3,) in body axes, q_dot (n,).
+
+    Equation (13) of docs/notation.md.
+    """
     moment = moments(body, q)
-    J = np.trace(moment.W) * np.eye(3) - moment.W
+    J = inertia_tensor(moment)
     D = np.einsum("klj,j->kl", moment.G, q_dot)
     L = np.einsum("cij,i->cj", body.I5, q_dot)
     return np.concatenate([
@@ -92,11 +99,25 @@ def quadratic_velocity(body: FlexibleBody | Integrals, q: Array, omega: Array, q
 
 
 def elastic_force(body: FlexibleBody | Integrals, damping: Array, q: Array, q_dot: Array) -> Array:
-    """(6 + n,) elastic and modal damping forces; damping (n,) ratios."""
+    """(6 + n,) elastic and modal damping forces; damping (n,) ratios. Equation (14) of docs/notation.md."""
     return np.concatenate([np.zeros(6), -body.omega2 * q - 2 * damping * np.sqrt(body.omega2) * q_dot])
 
 
 def gravity_force(body: FlexibleBody | Integrals, q: Array, A: Array, gravity: Array) -> Array:
-    """(6 + n,) force of a uniform field gravity (3,) [m/s^2], global."""
+    """(6 + n,) force of a uniform field gravity (3,) [m/s^2], global. Equation (15) of docs/notation.md."""
     field = A.T @ gravity
     return np.concatenate([body.mass * field, np.cross(body.r_dm + body.P_dm @ q, field), body.P_dm.T @ field])
+
+
+def energies(
+    body: FlexibleBody | Integrals, R: Array, A: Array, q: Array, y: Array, gravity: Array
+) -> tuple[float, float, float]:
+    """Kinetic, strain and gravity energy [J] at R (3,), A (3, 3), q (n,), y (6 + n,) = [A^T R_dot, omega_bar, q_dot].
+
+    Equation (16) of docs/notation.md.
+
+    gravity : (3,) [m/s^2], global; its energy is zero where the mass is in the origin
+    """
+    s = body.r_dm + body.P_dm @ q
+    kinetic, strain = 0.5 * y @ mass_matrix(body, q) @ y, 0.5 * body.omega2 @ q**2
+    return float(kinetic), float(strain), float(-gravity @ (body.mass * R + A @ s))

@@ -58,7 +58,7 @@ def body_state(place: Layout, x: Array, v: Array, b: int) -> BodyState:
 
 
 def point_motion(state: BodyState, u0: Array, phi_t: Array, b: int) -> Motion:
-    """A point at u0 (3,) with translational shapes phi_t (3, n)."""
+    """A point at u0 (3,) with translational shapes phi_t (3, n). Equation (3) of docs/notation.md."""
     u, u_dot = u0 + phi_t @ state.q, phi_t @ state.q_dot
     spin = cross(state.omega, u)
     return Motion(
@@ -71,7 +71,7 @@ def point_motion(state: BodyState, u0: Array, phi_t: Array, b: int) -> Motion:
 
 
 def axis_motion(state: BodyState, a0: Array, phi_r: Array, b: int) -> Motion:
-    """An axis a0 (3,) on a marker with rotational shapes phi_r (3, n)."""
+    """An axis a0 (3,) on a marker with rotational shapes phi_r (3, n). Equation (4) of docs/notation.md."""
     a = a0 + cross(phi_r @ state.q, a0)
     twist = cross(phi_r @ state.q_dot, a0)
     rate = cross(state.omega, a) + twist

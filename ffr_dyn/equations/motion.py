@@ -58,7 +58,7 @@ class EquationsOfMotion:
 
 
 def position_rates(place: Layout, x: Array, v: Array) -> Array:
-    """x_dot = T(x) v, with p_dot = G_bar(p)^T omega_bar / 2 of Euler parameters."""
+    """x_dot = T(x) v, with p_dot = G_bar(p)^T omega_bar / 2 of Euler parameters. Equation (2) of docs/notation.md."""
     out = np.empty(place.x_size)
     for b in range(len(place.n)):
         out[place.R(b)], out[place.q(b)] = v[place.R_dot(b)], v[place.q_dot(b)]
@@ -69,7 +69,10 @@ def position_rates(place: Layout, x: Array, v: Array) -> Array:
 def equations_of_motion(
     scene: Scene, t: float, x: Array, v: Array, blocks: tuple[Block, ...] | None = None
 ) -> EquationsOfMotion:
-    """The equations of a scene at the time t [s] and the state x (X,), v (V,); of the rows of `blocks`, by default all."""
+    """The equations of a scene at the time t [s] and the state x (X,), v (V,); of the rows of `blocks`, by default all.
+
+    Equation (27) of docs/notation.md.
+    """
     now = Instant(scene, layout(scene), tuple(blocks_of(scene)) if blocks is None else blocks, t, x, v)
     M, Q = _inertia_and_forces(now)
     rows = tuple(rows_at(scene, now.place, list(now.blocks), x, v, t))
@@ -86,6 +89,8 @@ def equations_of_motion(
 
 def solve(place: Layout, M: Array, J: Array, Q: Array, gamma: Array) -> tuple[Array, Array]:
     """v_dot (V,) and lam (C,) of M v_dot + J^T lam = Q, J v_dot = gamma.
+
+    Equation (28) of docs/notation.md.
 
     In the plane, coordinates across it stay zero. Where rows depend on one another the smallest multipliers are taken, each
     times the root of what its row yields to a unit of it, J M^-1 J^T.

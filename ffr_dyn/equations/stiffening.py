@@ -32,6 +32,8 @@ def frame_loads(acceleration: Array, omega: Array, gravity: Array) -> Array:
     """(12,) the loads of the moving frame, body axes: acceleration less gravity, angular acceleration, and the products xx,
     yy, zz, xy, xz, yz of the angular velocity.
 
+    Equation (24) of docs/notation.md.
+
     acceleration (6 + n,) of the body [a, omega_bar_dot, q_ddot];  omega, gravity (3,) in body axes
     """
     products = np.outer(omega, omega)
@@ -40,12 +42,18 @@ def frame_loads(acceleration: Array, omega: Array, gravity: Array) -> Array:
 
 
 def wrench_at(force: Array, u: Array) -> Array:
-    """(6,) force and moment about the point u (3,) of a body of generalised forces (6 + n,) that act there, body axes."""
+    """(6,) force and moment about the point u (3,) of a body of generalised forces (6 + n,) that act there, body axes.
+
+    Equation (25) of docs/notation.md.
+    """
     return np.concatenate([force[:3], force[3:6] - np.cross(u, force[:3])])
 
 
 def stiffening_force(stiffness: Array, loads: Array, q: Array) -> Array:
-    """(n,) elastic forces -K_sigma q, K_sigma the sum of stiffness (L, n, n) times loads (L,)."""
+    """(n,) elastic forces -K_sigma q, K_sigma the sum of stiffness (L, n, n) times loads (L,).
+
+    Equation (26) of docs/notation.md.
+    """
     return -np.asarray(np.einsum("l,lij,j->i", loads, stiffness, q))
 
 

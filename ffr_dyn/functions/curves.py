@@ -57,7 +57,8 @@ def curve_value(curve: Curve, x: float) -> float:
 
 def curve_integral(curve: Curve, x: Array) -> Array:
     """Integral of the curve from 0 to x, of the shape of x: the energy that a spring of this curve stores."""
-    return _primitive(curve, np.asarray(x, float)) - _primitive(curve, np.zeros(()))
+    found: Array = _primitive(curve, np.asarray(x, float)) - _primitive(curve, np.zeros(()))
+    return found
 
 
 def _primitive(curve: Curve, x: Array) -> Array:
@@ -66,4 +67,5 @@ def _primitive(curve: Curve, x: Array) -> Array:
     through = PchipInterpolator(curve.at, curve.values)
     inside = np.clip(x, curve.at[0], curve.at[-1])
     beyond = x - inside
-    return through.antiderivative()(inside) + beyond * (through(inside) + 0.5 * beyond * through(inside, 1))
+    found: Array = through.antiderivative()(inside) + beyond * (through(inside) + 0.5 * beyond * through(inside, 1))
+    return found

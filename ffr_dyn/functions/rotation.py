@@ -27,7 +27,7 @@ def cross(a: Array, b: Array) -> Array:
 
 
 def rotation_matrix(p: Array) -> Array:
-    """(..., 4) Euler parameters -> (..., 3, 3) A, body to global."""
+    """(..., 4) Euler parameters -> (..., 3, 3) A, body to global. Equation (1) of docs/notation.md."""
     p = np.asarray(p, float)
     if p.ndim == 1:
         return np.array(_rotation_rows(*p.tolist()))

@@ -168,7 +168,7 @@ def evaluate(function: TimeFunction, t: float) -> tuple[float, float, float]:
     """(value, rate, second derivative) at t; the readable twin of `ffr_dyn.kernels.functions.evaluate_functions`."""
     if function.callback is not None:
         returned = np.atleast_1d(np.asarray(function.callback(t), float))
-        return tuple(np.concatenate([returned, np.zeros(3)])[:3])  # type: ignore[return-value]
+        return tuple(np.concatenate([returned, np.zeros(3)])[:3])
     if function.kind == OPERATION:
         given = [evaluate(operand, t) for operand in function.operands]
         return operate(int(function.data[0]), function.data[1], given[0], given[-1])

@@ -1,6 +1,9 @@
 """The explicit Runge-Kutta pair of orders 5 and 4 of Dormand & Prince (1980), on the index-1 equations.
 
 Seven stages, the last of which is the first of the next step. Coefficients: Hairer, Norsett & Wanner 1993, table II.5.2.
+
+Twin: the statement above, held by
+`tests/ffr_dyn/integrators/test_integrators_adaptive.py::test_the_error_follows_the_tolerance`.
 """
 
 from __future__ import annotations

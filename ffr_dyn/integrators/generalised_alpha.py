@@ -19,6 +19,9 @@ lambda is eliminated first and corrections are judged as motions, no power of h 
 
 The stabilised form (Gear, Gupta & Leimkuhler 1985) determines lambda+ from the constraints on velocities, Phi_q v+ + Phi_t
 = 0, and moves x+ onto Phi = 0 by the smallest motion M^-1 Phi_q^T eta: then both hold.
+
+Twin: the statement above, held by
+`tests/ffr_dyn/integrators/test_integrators_implicit.py::test_motion_rates_and_reactions_converge_at_the_order`.
 """
 
 from __future__ import annotations

@@ -9,6 +9,9 @@ proof for multibody systems in Hairer & Wanner 1996, VII.6 (HEM4, five stages; i
 No second derivative of a constraint enters. The matrix Phi_q(X_{i+1}) M^-1 Phi_q^T(X_i) is not symmetric; it is solved by
 iteration with the factors at X_i, which gains a factor of the angle turned in a stage each time and costs a back
 substitution. Positions drift off their constraints with the error of the method alone, and are projected.
+
+Twin: the statement above, held by
+`tests/ffr_dyn/integrators/test_integrators_implicit.py::test_motion_rates_and_reactions_converge_at_the_order`.
 """
 
 from __future__ import annotations

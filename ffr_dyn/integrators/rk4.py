@@ -1,4 +1,8 @@
-"""The classical explicit Runge-Kutta method of order four on the index-1 equations."""
+"""The classical explicit Runge-Kutta method of order four on the index-1 equations.
+
+Twin: the statement above, held by
+`tests/ffr_dyn/kernels/test_dyn_laws.py::test_motion_converges_at_the_order_of_the_method`.
+"""
 
 from __future__ import annotations
 

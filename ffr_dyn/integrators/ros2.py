@@ -15,6 +15,9 @@ L-stable in the elastic part. Since Omega^2 and 2 zeta Omega are diagonal, a sta
 
 All positions move with v + gamma h k_v, not the elastic ones alone: otherwise a joint that stiff modes move would be left by
 its two sides at different rates, and drift.
+
+Twin: the statement above, held by
+`tests/ffr_dyn/kernels/test_dyn_laws.py::test_motion_converges_at_the_order_of_the_method`.
 """
 
 from __future__ import annotations

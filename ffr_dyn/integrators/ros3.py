@@ -15,6 +15,9 @@ stage i is
 and y+ = y + h sum_i b_i k_i. A stage costs an explicit evaluation.
 
 The weights of order two that it is compared with, to choose steps, are those whose stability function is -1/4 at infinity.
+
+Twin: the statement above, held by
+`tests/ffr_dyn/kernels/test_dyn_laws.py::test_motion_converges_at_the_order_of_the_method`.
 """
 
 from __future__ import annotations

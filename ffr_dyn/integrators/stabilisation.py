@@ -1,4 +1,7 @@
-"""How index-1 equations are kept on their constraints."""
+"""How index-1 equations are kept on their constraints.
+
+Twin: none, data.
+"""
 
 from __future__ import annotations
 

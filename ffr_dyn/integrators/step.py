@@ -1,4 +1,7 @@
-"""The step of methods that do not choose it."""
+"""The step of methods that do not choose it.
+
+Twin: none, data.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""What the error of a step may be, for methods that choose their steps."""
+"""What the error of a step may be, for methods that choose their steps.
+
+Twin: none, data.
+"""
 
 from __future__ import annotations
 

@@ -19,6 +19,9 @@ not grow. Applied forces that have no potential enter with F (the discrete princ
 
 The equations are solved by Newton corrections with the elastic diagonal 1 + h^2/4 Omega^2 + h/2 2 zeta Omega, as
 `ffr_dyn.integrators.generalised_alpha`. Geometric stiffening, which has no potential here, acts at the nodes.
+
+Twin: the statement above, held by
+`tests/ffr_dyn/integrators/test_integrators_implicit.py::test_the_variational_method_conserves_momenta_to_rounding`.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 Each is compiled alone and called by address, `name(r, ...)` with the tables r, so that nothing is compiled twice and an
 integrator costs no more than its own few lines (see `ffr_dyn.kernels.simd.entry_point`). All return a status, OK unless it
 says otherwise; where something failed `work.info[FAILED]` says where. Those that take long to compile come first.
+
+Twin: `ffr_dyn.equations.motion.equations_of_motion`.
 """
 
 from ffr_dyn.kernels.bodies import mass_times, normalise, reduce_forces

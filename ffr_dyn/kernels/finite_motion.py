@@ -1,4 +1,7 @@
-"""Finite motions of all bodies: rotations by rotation vectors, and how large a motion is."""
+"""Finite motions of all bodies: rotations by rotation vectors, and how large a motion is.
+
+Twin: `ffr_dyn.consistency.evaluation.moved`.
+"""
 
 import math
 

@@ -1,5 +1,7 @@
 """Functions of time and piecewise polynomials, compiled; declared in `ffr_dyn.functions.time_functions` and
 `ffr_dyn.functions.curves`.
+
+Twin: `ffr_dyn.functions.time_functions.evaluate`.
 """
 
 import math

@@ -31,9 +31,11 @@ project(r, value)               acc: the smallest motion with Phi_q acc = -value
 correct(r, r_v, target)         f += M r_v, target += Phi_q r_v
 evaluate_rows_at(r, t, x, v)    constraint rows elsewhere, with the factors left as they are
 set_diagonal(r, gamma_h)        the elastic diagonal of a linearly implicit method
+
+Twin: none, names of calls.
 """
 
-from ffr_dyn.kernels.bodies import mass_times, normalise, position_rates, six_rows, three_rows
+from ffr_dyn.kernels.bodies import mass_times, normalise, position_rates
 from ffr_dyn.kernels.entry_points import correct, evaluate, evaluate_rows_at, project, set_diagonal, solve, stabilise
 from ffr_dyn.kernels.finite_motion import (
     carry,
@@ -88,7 +90,9 @@ from ffr_dyn.kernels.vectors import (
     get,
     multiple,
     scale,
+    six_rows,
     subtract,
+    three_rows,
     weigh_four,
 )
 

@@ -5,6 +5,8 @@ linear in the number of bodies (Baraff 1996), for a few loops there is little fi
 
 A block of S couples the rows of an earlier joint with those of a later one: a row of eight numbers (see `lanes`) for each row
 of the earlier, with the rows of the later side by side in it. The factor is S = U^T D U, with ones on the diagonal of U.
+
+Twin: `ffr_dyn.equations.motion.solve`.
 """
 
 from ffr_dyn.kernels.options import inlined, kernel

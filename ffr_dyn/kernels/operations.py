@@ -1,7 +1,9 @@
 """Operations on functions of time: value, first and second derivative by forward differentiation.
 
 A function of time that a formula describes is a row of the table of functions for each of its operations; the rows it works
-on come before it. Readable twin: `ffr_dyn.functions.operations`.
+on come before it.
+
+Twin: `ffr_dyn.functions.operations`.
 """
 
 import math

@@ -2,6 +2,8 @@
 
 NaN must survive (it is how a bad force is noticed), so the floating-point liberties are limited to contraction and
 re-association. Results are reproducible bit by bit on one machine.
+
+Twin: none, how things are compiled.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""What is kept at an output time."""
+"""What is kept at an output time.
+
+Twin: `ffr_dyn.equations.inertia.energies`.
+"""
 
 from ffr_dyn.kernels.bodies import energies
 from ffr_dyn.kernels.options import inlined

@@ -1,13 +1,17 @@
-"""Bodies of planar scenes: what `bodies` does, for the three rigid coordinates that move.
+"""Bodies in the plane: what `spatial` does, by the same names, for the three rigid coordinates that move.
 
 `normal` is the body axis across the plane, `in_plane(normal)` the rigid coordinates i, j, k that move; the others stay zero.
+
+Twin: `ffr_dyn.equations.inertia.mass_matrix`,
+`ffr_dyn.equations.inertia.quadratic_velocity`.
 """
 
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.products import contract
 from ffr_dyn.kernels.simd.slices import part, three_parts
-from ffr_dyn.kernels.tables import IN_PP_DM, IN_Q, IN_SHARED, IN_V, PP_PLAN, N
-from ffr_dyn.kernels.vectors import LEAST_PIVOT, copy, fill, in_plane, of_two
+from ffr_dyn.kernels.spatial import coupling
+from ffr_dyn.kernels.tables import IN_PP_DM, IN_Q, IN_SHARED, IN_V, NORMAL, PP_PLAN, N
+from ffr_dyn.kernels.vectors import LEAST_PIVOT, copy, fill, get, in_plane, of_two, weighted_product
 
 
 @kernel
@@ -17,7 +21,7 @@ def sense(normal):
 
 
 @inlined
-def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, normal):
+def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s, normal):
     """`flexible_terms` of a planar body that turns at the rate `omega`; without what acts across the plane."""
     n, e, start, c = bodies.where[b, N], bodies.where[b, IN_Q], bodies.where[b, IN_PP_DM], bodies.where[b, IN_SHARED]
     g, l = part(w.g, 9 * w.terms[b], 9 * n), part(w.l, 3 * w.terms[b], n)  # noqa: E741
@@ -61,7 +65,7 @@ def flexible_terms_in_plane(bodies, w, b, q, qd, omega, gravity, second, s, norm
 
 
 @kernel
-def forces_in_plane(f, mass, s, pd, growing, omega, gravity, normal):
+def forces(f, mass, s, pd, growing, omega, gravity, normal):
     """f (6,) of a planar body: what acts in the plane and about its normal; the rest is zero.
 
     pd, growing : rates of the first moment and, half, of the second about the normal
@@ -75,8 +79,23 @@ def forces_in_plane(f, mass, s, pd, growing, omega, gravity, normal):
 
 
 @kernel
-def factorise_in_plane(T, s, inertia, P, H, dinv, L, n, normal):
-    """`factorise` for the three rigid coordinates i, j, k of a planar body."""
+def hold_across(T, mass, i):
+    """The translational block of a body of which nothing moves along the normal i."""
+    j, k = (i + 1) % 3, (i + 2) % 3
+    T[max(i, j), min(i, j)], T[max(i, k), min(i, k)], T[i, i] = 0.0, 0.0, mass
+
+
+@inlined
+def factorise(bodies, w, b):
+    """Cholesky factor w.L of the Schur complement of body b on its elastic block. Returns True when it is positive."""
+    normal = bodies.where[b, NORMAL]
+    P, H, dinv = coupling(bodies, w, b)
+    return factor(w.T[b], get(w.s, b), w.J[b, normal, normal], P, H, dinv, w.L[b], bodies.where[b, N], normal)
+
+
+@kernel
+def factor(T, s, inertia, P, H, dinv, L, n, normal):
+    """The factor for the three rigid coordinates i, j, k that move. Returns True when it is positive."""
     i, j, k = in_plane(normal)
     ki, kj, kk = -sense(normal) * s[j], sense(normal) * s[i], inertia
     first, second, turn = part(P, i * n, n), part(P, j * n, n), part(H, normal * n, n)
@@ -93,8 +112,18 @@ def factorise_in_plane(T, s, inertia, P, H, dinv, L, n, normal):
     return T[0, 0] > 0.0 and kk > LEAST_PIVOT * inertia
 
 
+@inlined
+def reduce_forces(bodies, w, b, f, z):
+    """z = L^-1 (z - C dinv f_elastic), and dinv f_elastic where the elastic accelerations of body b will be."""
+    n, normal = bodies.where[b, N], bodies.where[b, NORMAL]
+    if n > 0:
+        P, H, dinv = coupling(bodies, w, b)
+        reduce_elastic(P, H, dinv, part(f, 6, n), n, normal, z, part(w.acc, bodies.where[b, IN_V] + 6, n))
+    lower(w.L[b], z, normal)
+
+
 @kernel
-def reduce_in_plane(P, H, dinv, d, n, normal, z, elastic):
+def reduce_elastic(P, H, dinv, d, n, normal, z, elastic):
     """elastic = dinv d, z -= C elastic for the rigid coordinates that move."""
     i, j, k = in_plane(normal)
     first, second, third = part(P, i * n, n), part(P, j * n, n), part(H, normal * n, n)
@@ -111,8 +140,20 @@ def reduce_in_plane(P, H, dinv, d, n, normal, z, elastic):
 
 
 @inlined
-def substitute_in_plane(P, H, dinv, z, n, normal, elastic):
-    """`back_substitute` for the rigid coordinates that move."""
+def accelerate(bodies, w, b, z, acc):
+    """z = L^-T z, which is the rigid part of acc; its elastic part, less dinv C^T z."""
+    n, normal = bodies.where[b, N], bodies.where[b, NORMAL]
+    upper(w.L[b], z, normal)
+    for k in range(6):
+        acc[k] = z[k]
+    if n > 0:
+        P, H, dinv = coupling(bodies, w, b)
+        substitute(P, H, dinv, z, n, normal, part(acc, 6, n))
+
+
+@inlined
+def substitute(P, H, dinv, z, n, normal, elastic):
+    """elastic -= dinv C^T z for the rigid coordinates that move."""
     i, j, k = in_plane(normal)
     first, second, third = part(P, i * n, n), part(P, j * n, n), part(H, normal * n, n)
     for c in range(n):
@@ -120,7 +161,27 @@ def substitute_in_plane(P, H, dinv, z, n, normal, elastic):
 
 
 @kernel
-def mass_times_in_plane(P, H, y, n, normal, out):
+def lower(factor, b, normal):
+    """In place b <- L^-1 b for the rigid coordinates (6,): three of them, and zeros."""
+    i, j, k = in_plane(normal)
+    first = b[i] * factor[i, i]
+    second = (b[j] - factor[j, i] * first) * factor[j, j]
+    third = (b[k] - factor[k, i] * first - factor[k, j] * second) * factor[k, k]
+    b[normal], b[3 + (normal + 1) % 3], b[3 + (normal + 2) % 3] = 0.0, 0.0, 0.0
+    b[i], b[j], b[k] = first, second, third
+
+
+@kernel
+def upper(factor, b, normal):
+    """In place b <- L^-T b, as `lower`."""
+    i, j, k = in_plane(normal)
+    b[k] = b[k] * factor[k, k]
+    b[j] = (b[j] - factor[k, j] * b[k]) * factor[j, j]
+    b[i] = (b[i] - factor[j, i] * b[j] - factor[k, i] * b[k]) * factor[i, i]
+
+
+@kernel
+def couple_motions(P, H, y, n, normal, out):
     """What couples the three rigid coordinates of a planar body with its elastic ones, and these with themselves."""
     i, j, k = in_plane(normal)
     first, second, turn = part(P, i * n, n), part(P, j * n, n), part(H, normal * n, n)
@@ -134,3 +195,60 @@ def mass_times_in_plane(P, H, y, n, normal, out):
     out[i] += ti
     out[j] += tj
     out[k] += tk
+
+
+# ---- markers -------------------------------------------------------------------------------------------------------------
+
+
+@kernel
+def plane_rows(phi, normal, q, n):
+    """The two displacements and the rotation of a marker that keep to the plane, of its six pooled rows, times q."""
+    i, j, _ = in_plane(normal)
+    r0, r1, r2 = part(phi, i * n, n), part(phi, j * n, n), part(phi, (3 + normal) * n, n)
+    t0, t1, t2 = 0.0, 0.0, 0.0
+    for c in range(n):
+        t0 += r0[c] * q[c]
+        t1 += r1[c] * q[c]
+        t2 += r2[c] * q[c]
+    return t0, t1, t2
+
+
+@kernel
+def marker_motion(phi, normal, q, n):
+    """(displacement, rotation) of a marker by its six pooled rows."""
+    i, j, _ = in_plane(normal)
+    u0, u1, t = plane_rows(phi, normal, q, n)
+    u = (of_two(0, i, j, u0, u1), of_two(1, i, j, u0, u1), of_two(2, i, j, u0, u1))
+    return u, (of_two(0, normal, 3, t, 0.0), of_two(1, normal, 3, t, 0.0), of_two(2, normal, 3, t, 0.0))
+
+
+@kernel
+def prepare_marker(phi, P_dm, dinv, n, normal, P):
+    """Rows of the translations of P = [P_dm; H] dinv phi^T, 3 x 3, which depend on the elastic diagonal alone."""
+    i, j, k = in_plane(normal)
+    for r, a in enumerate((i, j)):
+        for c, b in enumerate((i, j, k)):
+            P[3 * r + c] = weighted_product(part(P_dm, a * n, n), part(phi, b * n, n), dinv, n)
+
+
+@kernel
+def couple_marker(phi, H, dinv, n, normal, P):
+    """Rows of the rotations of P: what a unit wrench on a marker does to them through the elastic coordinates."""
+    i, j, k = in_plane(normal)
+    p0, p1, p2, turn = part(phi, i * n, n), part(phi, j * n, n), part(phi, k * n, n), part(H, normal * n, n)
+    t0, t1, t2 = 0.0, 0.0, 0.0
+    for c in range(n):
+        y = dinv[c] * turn[c]
+        t0 += p0[c] * y
+        t1 += p1[c] * y
+        t2 += p2[c] * y
+    P[6], P[7], P[8] = t0, t1, t2
+
+
+@kernel
+def couple_pair(left, right, dinv, n, normal, out):
+    """out, 3 x 3, = phi_left dinv phi_right^T of two markers on one body."""
+    i, j, k = in_plane(normal)
+    for r, a in enumerate((i, j, k)):
+        for c, b in enumerate((i, j, k)):
+            out[3 * r + c] = weighted_product(part(left, a * n, n), part(right, b * n, n), dinv, n)

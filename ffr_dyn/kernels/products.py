@@ -1,6 +1,8 @@
 """Sums over the elastic coordinates of a body of tables by coordinate: its quadratic terms.
 
 The tables are stored in blocks, as `ffr_dyn.compile.symmetry_blocks` makes them.
+
+Twin: `ffr_dyn.equations.inertia.moments`.
 """
 
 from __future__ import annotations

@@ -2,7 +2,9 @@
 two joint coordinates, on the markers of both joints.
 
 Each returns Phi, nu = dPhi/dt, gamma (Phi_q v_dot = gamma) and, per side, the coefficients of the point's velocity, of
-omega_bar and of the elastic rotation rate (all in body axes). Readable twin: `ffr_dyn.equations.constraints`.
+omega_bar and of the elastic rotation rate (all in body axes).
+
+Twin: `ffr_dyn.equations.constraints.evaluate_word`.
 """
 
 import math

@@ -5,6 +5,9 @@ with the distance, and a stage that is evaluated there takes rounding and its ow
 length digits are lost, within 1e-8 the motion is thrown off. No distance is safe and none needs to be: a position is
 singular at a moment, and stages can lie on both sides of it. So a step with a stage beside one is undone together with the
 step before, and both are done again in three steps of other lengths, none of which is longer.
+
+Twin: the statement above, held by
+`tests/ffr_dyn/kernels/test_dyn_singular.py::test_steps_that_end_or_have_a_stage_beside_a_singular_position_keep_branch_and_energy`.
 """
 
 from ffr_dyn.kernels.options import inlined

@@ -1,16 +1,19 @@
 """Accelerations and multipliers from what an evaluation left: reduced forces, the multiplier system, the way back.
 
 M acc + Phi_q^T lam = f,  Phi_q acc = target, by elimination of the elastic coordinates of every body, then of its rigid ones.
+
+Twin: `ffr_dyn.equations.motion.solve`.
 """
 
-from ffr_dyn.kernels.bodies import accelerate, six_rows
-from ffr_dyn.kernels.markers import plane_rows, project, shapes
+from ffr_dyn.kernels.bodies import accelerate
+from ffr_dyn.kernels.markers import project, shapes
 from ffr_dyn.kernels.multiplier_solver import SIDE, solve_blocks
 from ffr_dyn.kernels.options import inlined, kernel
+from ffr_dyn.kernels.planar import plane_rows
 from ffr_dyn.kernels.simd.simd_rows import combine_6, dot_narrow, dot_rows, narrow_3, narrow_6
 from ffr_dyn.kernels.simd.slices import part, six_parts
 from ffr_dyn.kernels.tables import IN_SHARED, IN_V, LANES, NORMAL, N
-from ffr_dyn.kernels.vectors import add, fill, in_plane
+from ffr_dyn.kernels.vectors import add, fill, in_plane, six_rows
 
 
 @inlined

@@ -2,6 +2,9 @@
 
 A method leaves an estimate of its error in `stages.x[0]`, `stages.v[0]`, and does its step again, shorter, when told so. The
 controller is proportional-integral (Gustafsson 1991; Hairer & Wanner 1996, IV.8).
+
+Twin: the statement above, held by
+`tests/ffr_dyn/integrators/test_integrators_adaptive.py::test_the_error_follows_the_tolerance`.
 """
 
 from ffr_dyn.kernels.bodies import normalise, position_rates
@@ -104,7 +107,7 @@ def slopes_to_velocities(where, x, slope, v):
 
 @inlined
 def interpolate(r, t):
-    """The machine's state at a time t within the last step: on the cubic through positions and velocities at its ends."""
+    """The engine's state at a time t within the last step: on the cubic through positions and velocities at its ends."""
     c = r.control
     h = c.numbers[NOW] - c.numbers[BEFORE]
     if not t < c.numbers[NOW] or not h > 0.0:

@@ -3,9 +3,11 @@
 Order of calls: `prepare` once per elastic diagonal; `factorise_bodies`, `update_markers`, the loads, the constraint rows,
 `evaluate_joints` at a state; then any number of solutions (`ffr_dyn.kernels.solution`) with its factors. Called from
 `ffr_dyn.kernels.entry_points` alone.
+
+Twin: `ffr_dyn.equations.motion.equations_of_motion`.
 """
 
-from ffr_dyn.kernels.bodies import coupling, factorise, inertia, prepare_body, rotation_matrix
+from ffr_dyn.kernels.bodies import factorise, inertia, prepare_body, rotation_matrix
 from ffr_dyn.kernels.markers import couple_marker, couple_pair, prepare_marker, shapes, update_marker
 from ffr_dyn.kernels.multiplier_solver import SIDE, clear_column, factorise_block, relax_block
 from ffr_dyn.kernels.options import inlined, kernel
@@ -22,6 +24,7 @@ from ffr_dyn.kernels.simd.joint_elimination import (
 )
 from ffr_dyn.kernels.simd.simd_rows import add_scale
 from ffr_dyn.kernels.simd.slices import part
+from ffr_dyn.kernels.spatial import coupling
 from ffr_dyn.kernels.tables import (
     ALL,
     ALPHA,

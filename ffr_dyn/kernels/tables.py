@@ -7,6 +7,8 @@ forces are [a (3, body axes: a = A^T R_ddot), omega_bar_dot (3), q_ddot (n)].
 
 Symmetric 3 x 3 tensors are stored as xx, yy, zz, xy, xz, yz; six of them and the axial vector make nine numbers.
 Tables are grouped so that a kernel is handed only the group it works on (which also keeps compilation short).
+
+Twin: none, data.
 """
 
 from __future__ import annotations

@@ -1,6 +1,11 @@
-"""Vectors of three as tuples: they live in registers."""
+"""Vectors of three as tuples: they live in registers.
+
+Twin: `ffr_dyn.functions.rotation.cross`,
+`ffr_dyn.functions.rotation.skew`.
+"""
 
 from ffr_dyn.kernels.options import kernel
+from ffr_dyn.kernels.simd.slices import six_parts, three_parts
 
 
 @kernel
@@ -135,32 +140,6 @@ def upper_six(L, b):
 
 
 @kernel
-def rigid_lower(factor, b, normal):
-    """In place b <- L^-1 b for the rigid coordinates (6,) of a body; of a planar one, three of them and zeros."""
-    if normal < 0:
-        lower_six(factor, b)
-        return
-    i, j, k = in_plane(normal)
-    first = b[i] * factor[i, i]
-    second = (b[j] - factor[j, i] * first) * factor[j, j]
-    third = (b[k] - factor[k, i] * first - factor[k, j] * second) * factor[k, k]
-    b[normal], b[3 + (normal + 1) % 3], b[3 + (normal + 2) % 3] = 0.0, 0.0, 0.0
-    b[i], b[j], b[k] = first, second, third
-
-
-@kernel
-def rigid_upper(factor, b, normal):
-    """In place b <- L^-T b, as `rigid_lower`."""
-    if normal < 0:
-        upper_six(factor, b)
-        return
-    i, j, k = in_plane(normal)
-    b[k] = b[k] * factor[k, k]
-    b[j] = (b[j] - factor[k, j] * b[k]) * factor[j, j]
-    b[i] = (b[i] - factor[j, i] * b[j] - factor[k, i] * b[k]) * factor[i, i]
-
-
-@kernel
 def in_plane(normal):
     """The rigid coordinates, ascending, that move in the plane across body axis `normal`."""
     return 1 if normal == 0 else 0, 1 if normal == 2 else 2, 3 + normal
@@ -226,3 +205,39 @@ def add_four(target, f0, d0, f1, d1, f2, d2, f3, d3):
     """target += f0 d0 + f1 d1 + f2 d2 + f3 d3, in one pass."""
     for k in range(target.size):
         target[k] += f0 * d0[k] + f1 * d1[k] + f2 * d2[k] + f3 * d3[k]
+
+
+@kernel
+def three_rows(rows, q, n):
+    """The first three of a pooled array of rows of n, times q: in one loop, which is three times as fast as three."""
+    r0, r1, r2 = three_parts(rows, n)
+    t0, t1, t2 = 0.0, 0.0, 0.0
+    for j in range(n):
+        t0 += r0[j] * q[j]
+        t1 += r1[j] * q[j]
+        t2 += r2[j] * q[j]
+    return t0, t1, t2
+
+
+@kernel
+def six_rows(rows, q, n):
+    """The first six rows, as `three_rows`."""
+    r0, r1, r2, r3, r4, r5 = six_parts(rows, n)
+    t0, t1, t2, t3, t4, t5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(n):
+        t0 += r0[j] * q[j]
+        t1 += r1[j] * q[j]
+        t2 += r2[j] * q[j]
+        t3 += r3[j] * q[j]
+        t4 += r4[j] * q[j]
+        t5 += r5[j] * q[j]
+    return t0, t1, t2, t3, t4, t5
+
+
+@kernel
+def weighted_product(left, right, weight, n):
+    """sum_k left[k] weight[k] right[k]."""
+    total = 0.0
+    for k in range(n):
+        total += left[k] * weight[k] * right[k]
+    return total

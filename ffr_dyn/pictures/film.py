@@ -49,7 +49,7 @@ class Solid:
     @property
     def is_flexible(self) -> bool:
         """Whether the body has elastic coordinates."""
-        return self.q.shape[1] > 0
+        return bool(self.q.shape[1] > 0)
 
     @property
     def size(self) -> float:
@@ -128,7 +128,8 @@ class Film:
     @property
     def centre(self) -> Array:
         """(3,) middle of the box of the whole motion [m]."""
-        return 0.5 * (self.low + self.high)
+        found: Array = 0.5 * (self.low + self.high)
+        return found
 
     @property
     def corners(self) -> Array:
@@ -280,17 +281,20 @@ def is_coloured(shown: Film, solid: Solid) -> bool:
 
 def body_points(solid: Solid, frame: int, scale: float) -> Array:
     """(P, 3) deformed points in the body frame, u_0 + scale Phi q [m]."""
-    return solid.surface.points + scale * (solid.surface.Phi @ solid.q[frame])
+    found: Array = solid.surface.points + scale * (solid.surface.Phi @ solid.q[frame])
+    return found
 
 
 def drawn_points(solid: Solid, frame: int, scale: float) -> Array:
     """(P, 3) points in the global frame, R + A (u_0 + scale Phi q) [m]."""
-    return solid.R[frame] + body_points(solid, frame, scale) @ solid.A[frame].T
+    found: Array = solid.R[frame] + body_points(solid, frame, scale) @ solid.A[frame].T
+    return found
 
 
 def displacements(solid: Solid, frame: int) -> Array:
     """(P,) elastic displacements |Phi q|, not scaled [m]."""
-    return np.linalg.norm(solid.surface.Phi @ solid.q[frame], axis=1)
+    found: Array = np.linalg.norm(solid.surface.Phi @ solid.q[frame], axis=1)
+    return found
 
 
 def camera_for(shown: Film) -> Camera:

@@ -92,7 +92,7 @@ def _grab(plotter: Any, size: tuple[int, int]) -> Array:
     pixels = vtkUnsignedCharArray()
     plotter.render_window.Render()
     plotter.render_window.GetPixelData(0, 0, width - 1, height - 1, 0, pixels, 0)
-    return np.ascontiguousarray(vtk_to_numpy(pixels).reshape(height, width, 3)[::-1])
+    return np.ascontiguousarray(vtk_to_numpy(pixels).reshape(height, width, 3)[::-1])  # type: ignore[no-untyped-call]
 
 
 def _aim(plotter: Any, shown: Film, camera: Camera, size: tuple[int, int]) -> None:

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.checkpoint import fingerprint, leaves
-from ffr_dyn.compile.engine import new_machine, row_filler
+from ffr_dyn.compile.engine import new_engine, row_filler
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import Assembled, assemble
@@ -171,7 +171,7 @@ class Stepper(Brief):
         loop = self._loops[0]
         status = loop.run(self._start, self._steps, count)
         if status != OK:
-            reached = int(loop.machine.tables.clock.steps[NEXT])
+            reached = int(loop.engine.tables.clock.steps[NEXT])
             raise failure(self._system, loop.work, status, self._start + reached * self._step)
         self._steps += count
         for other in self._loops[1:]:
@@ -187,20 +187,20 @@ class _Loop:
     def __init__(
         self, system: System, method: Integrator, x: Array, v: Array, stabilised: tuple[float, float, float]
     ) -> None:
-        self.system, self.machine = system, new_machine(system, x, v, method, stabilised)
+        self.system, self.engine = system, new_engine(system, x, v, method, stabilised)
         self.record = new_record(system, 1)
-        self.x, self.v, self.work = self.machine.x, self.machine.v, self.machine.work
+        self.x, self.v, self.work = self.engine.x, self.engine.v, self.engine.work
         self._method = method
-        self._fill = row_filler(self.machine, self.record)
+        self._fill = row_filler(self.engine, self.record)
 
     def run(self, start: float, first: int, count: int) -> int:
         """`count` steps from step number `first`, and the record of where they end. Returns a status."""
-        self.machine.tables.clock.steps[NEXT], self.machine.tables.clock.steps[PER_ROW] = first, count
+        self.engine.tables.clock.steps[NEXT], self.engine.tables.clock.steps[PER_ROW] = first, count
         return self._fill(start)
 
     def arrays(self) -> list[Array]:
         """Everything that changes."""
-        tables = (self.work, self.machine.tables.stages, self.machine.tables.clock, self.record)
+        tables = (self.work, self.engine.tables.stages, self.engine.tables.clock, self.record)
         changing = [array for table in tables for _, array in leaves(table)]
         return [self.x, self.v, self.system.model.functions.data, *changing]
 
@@ -241,7 +241,7 @@ class _Setting:
 
     def value(self, now: float) -> float:
         since, _, value, rate, half = self._numbers[0].tolist()
-        return value + (now - since) * (rate + (now - since) * half)
+        return float(value + (now - since) * (rate + (now - since) * half))
 
 
 # ---- outputs ------------------------------------------------------------------------------------------------------

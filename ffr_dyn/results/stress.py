@@ -150,22 +150,21 @@ def _spots(result: Result, body: str, quantity: str, count: int) -> Iterator[Hot
 def stress_histories(result: Result, body: str, places: Mapping[str, Array], quantity: str = "von-mises") -> Result:
     """Histories at named places (3,) [m] in the body frame, each at the nearest point of the surface.
 
-    For each place: <body>.<place>.stress and .strain (tensors in body axes) and .<quantity>. Raises InputError for an
-    unknown body or measure, and a place far from the body.
+    For each place: <body>.<place>.stress and .strain (tensors in body axes; no strain of anisotropic materials) and
+    .<quantity>. Raises InputError for an unknown body or measure, and a place far from the body.
     """
     surface, q, of = stressed_surface(result, body), _coordinates(result, body), measure(quantity)
     found: dict[str, Quantity] = {}
     for name, position in places.items():
         point = nearest_point(surface, position, body)
         at = f"at {np.round(surface.points[point], 6).tolist()} m"
-        stress, strain = (
-            tensors(surface, q, slice(point, point + 1), strain=of_strain)[0] for of_strain in (False, True)
-        )
-        found[f"{body}.{name}.stress"] = Quantity(stress, "Pa", (TENSOR_AXIS,), f"stress {at}, body axes")
-        found[f"{body}.{name}.strain"] = Quantity(strain, "1", (TENSOR_AXIS,), f"strain {at}, body axes")
-        found[f"{body}.{name}.{quantity}"] = Quantity(
-            of.of(strain if of.strain else stress), of.unit, (), f"{of.words} {at}"
-        )
+        tensor = tensors(surface, q, slice(point, point + 1))[0]
+        found[f"{body}.{name}.stress"] = Quantity(tensor, "Pa", (TENSOR_AXIS,), f"stress {at}, body axes")
+        if of.strain or (surface.moduli is not None and surface.moduli[point].any()):
+            strain = tensors(surface, q, slice(point, point + 1), strain=True)[0]
+            found[f"{body}.{name}.strain"] = Quantity(strain, "1", (TENSOR_AXIS,), f"strain {at}, body axes")
+            tensor = strain if of.strain else tensor
+        found[f"{body}.{name}.{quantity}"] = Quantity(of.of(tensor), of.unit, (), f"{of.words} {at}")
     return Result(result.time, found, {}, {"title": result.attributes.get("title", "")})
 
 

@@ -93,11 +93,22 @@ def measure(name: str) -> Measure:
 
 
 def strain_of(stress: Array, moduli: Array) -> Array:
-    """(..., 6) strain of the stress (..., 6) [Pa] in a material of moduli (..., 2): E [Pa] and nu."""
+    """(..., 6) strain of the stress (..., 6) [Pa] in a material of moduli (..., 2): E [Pa] and nu.
+
+    Raises InputError where the moduli are zeros, as bodies have them at anisotropic materials.
+    """
+    _check_isotropic(moduli)
     E, nu = moduli[..., 0, None], moduli[..., 1, None]
     volume = np.zeros_like(stress)
     volume[..., :3] = stress[..., :3].sum(axis=-1, keepdims=True)
     return ((1 + nu) * stress - nu * volume) / E
+
+
+def _check_isotropic(moduli: Array) -> None:
+    if not moduli[..., 0].all():
+        raise InputError(
+            "strain is recovered of isotropic materials only, and the material here is anisotropic: take the stress"
+        )
 
 
 def nearest_point(surface: Surface, position: Array, body: str) -> int:
@@ -151,6 +162,8 @@ def measured_modes(measurement: StressMeasurement | SectionMeasurement, surface:
     modes = surface.stress[point]
     if measurement.what == "stress":
         return MeasuredModes(modes, lambda tensor: tensor, "Pa", ("tensor", TENSOR), f"stress {at}, body axes")
+    if measurement.what.startswith("strain"):
+        _check_isotropic(moduli)
     if measurement.what == "strain":
         return MeasuredModes(modes, lambda t: strain_of(t, moduli), "1", ("tensor", TENSOR), f"strain {at}, body axes")
     of = measure(measurement.what)

@@ -24,53 +24,40 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from ffr_dyn.analyses.efforts import Effort
-from ffr_dyn.analyses.settings import (
-    Assemble,
-    Charted,
-    Forward,
-    Inverse,
-    Kinematic,
-    Linearise,
-    Mixed,
-    MomentSettings,
-    OverTime,
-    Settings,
-    Static,
-)
+from ffr_dyn.analyses.forward import Forward
+from ffr_dyn.analyses.registry import OfMoment, analysis
+from ffr_dyn.analyses.settings import Charted, MomentSettings, Settings
 from ffr_dyn.functions.formula import CONSTANTS, Expression, Operation, is_constant
 from ffr_dyn.functions.operations import FUNCTIONS
 from ffr_dyn.functions.time_functions import TimeFunction, constant, signal, signals_in
-from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator, Tolerances
+from ffr_dyn.integrators import Integrator, Tolerances, method_named
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
 from ffr_dyn.scene.forces import Load
 from ffr_dyn.scene.joint_forces import Actuator
 from ffr_dyn.scene.scene import GROUND, Body, Scene
 from ffr_dyn.scene_file.parameters import Parameters, as_number, flattened, overridden, substituted
 from ffr_dyn.scene_file.schema import (
-    EFFORTS,
-    EVENTS,
-    SOLUTIONS,
     TABLES,
     BodyEntry,
-    ChartEntry,
     Kind,
-    SceneEntry,
     StabilisationEntry,
     keys_of,
+    nested_kinds,
+    scene_entry,
 )
 from ffr_dyn.scene_file.source import Source, origin, origin_of_name, read_source
 from ffr_dyn.scene_file.state_formula import StateFormula, check_names
 from ffr_prep.body import BodyError, FlexibleBody, load_body, rigid_body, truncated, with_point
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.registry import load_plugin
 
 WHOLE = ("name", "gravity", "ground", "base_acceleration", "plane")  # fields of a scene that are no tables of entries
 
@@ -84,6 +71,8 @@ def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Sc
     """
     path = Path(path)
     source = read_source(path)
+    for name in source.tree.get("plugins", ()):
+        load_plugin(path.parent / str(name))
     try:
         values = Parameters(overridden(flattened(source.tree.pop("parameters", {})), parameters))
         tree = substituted(source.tree, values, "")
@@ -92,7 +81,7 @@ def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Sc
         keys = tuple(str(error).partition(":")[0].split("."))
         raise InputError(f"{origin(source, keys)}: {error}") from None
     try:
-        entry = SceneEntry.model_validate(tree, context={"parameters": known})
+        entry = scene_entry().model_validate(tree, context={"parameters": known})
     except ValidationError as error:
         raise InputError(_explained(error, source)) from None
     settings = _settings(entry.analysis, entry.outputs, source)
@@ -281,25 +270,35 @@ def _model(name: str, entry: BodyEntry) -> FlexibleBody:
 
 
 def _settings(entry: Any, outputs: list[str], source: Source) -> Settings | MomentSettings:
-    keep = tuple(outputs)
-    if entry.kind in ("assemble", "static"):
-        return MomentSettings(
-            time=entry.time, outputs=keep, analysis=Assemble() if entry.kind == "assemble" else Static()
-        )
-    if entry.kind == "linearise":
-        inputs = (*_efforts("inputs", entry.inputs, source), *entry.loads)
-        return MomentSettings(
-            time=entry.time, outputs=keep, analysis=Linearise(inputs, tuple(entry.quantities), entry.at_equilibrium)
-        )
-    method = _method(entry, source)
+    made = analysis(entry.kind)
+    hints, given = get_type_hints(made), {}
+    for f in fields(made):
+        value = getattr(entry, f.name)
+        if kinds := nested_kinds(hints[f.name]):
+            value = _nested(kinds, f.name, value, source)
+        names = getattr(entry, f.metadata["names"]) if f.metadata.get("names") else ()
+        given[f.name] = (*value, *names) if isinstance(value, (list, tuple)) else value
+    try:
+        found = made(**given)
+    except InputError as error:
+        raise InputError(f"{origin(source, ('analysis',))}: analysis: {error}") from None
+    if issubclass(made, OfMoment):
+        return MomentSettings(time=entry.time, outputs=tuple(outputs), analysis=found)
     stabilisation = _stabilisation(getattr(entry, "stabilisation", StabilisationEntry()))
     return Settings(
-        start=entry.start, end=entry.end, output_step=entry.output_step, method=method, stabilisation=stabilisation,
-        outputs=keep, analysis=_over_time(entry, source),
+        start=entry.start, end=entry.end, output_step=entry.output_step, method=_method(entry, source),
+        stabilisation=stabilisation, outputs=tuple(outputs), analysis=found,
     )  # fmt: skip
 
 
-def _with_chart(settings: Settings | MomentSettings, entry: ChartEntry, source: Source) -> Settings | MomentSettings:
+def _nested(kinds: tuple[Kind, ...], key: str, given: Any, source: Source) -> Any:
+    """The declarations that a field of the analysis holds: several from a table, or one that has no name, or None."""
+    if isinstance(given, Mapping):
+        return tuple(_declared(kinds, ("analysis", key, name), entry, source) for name, entry in given.items())
+    return given and _kind(kinds, given).made(**given.model_dump(exclude={"kind"}))
+
+
+def _with_chart(settings: Settings | MomentSettings, entry: Any, source: Source) -> Settings | MomentSettings:
     """The settings with what a chart compares. InputError for a chart of another analysis than forward dynamics."""
     if not entry.model_fields_set:
         return settings
@@ -313,34 +312,15 @@ def _with_chart(settings: Settings | MomentSettings, entry: ChartEntry, source: 
 
 
 def _method(entry: Any, source: Source) -> Integrator:
-    name, step = getattr(entry, "method", "ros2"), getattr(entry, "step", None)
-    if name in CONTROLLED:
-        given = entry.tolerances
-        return CONTROLLED[name](Tolerances() if given is None else Tolerances(**given.model_dump()))
+    kind, step = method_named(getattr(entry, "method", "ros2")), getattr(entry, "step", None)
     try:
-        return METHODS[name](entry.output_step / 10 if step is None else step, **getattr(entry, "settings", {}))
+        if kind.controlled:
+            found: Integrator = kind(Tolerances(**(entry.tolerances.model_dump() if entry.tolerances else {})))
+        else:
+            found = kind(entry.output_step / 10 if step is None else step, **getattr(entry, "settings", {}))
     except InputError as error:
         raise InputError(f"{origin(source, ('analysis', 'settings'))}: analysis.settings: {error}") from None
-
-
-def _over_time(entry: Any, source: Source) -> OverTime:
-    if entry.kind == "kinematic":
-        return Kinematic()
-    if entry.kind == "inverse":
-        return Inverse(entry.elastic == "quasi-static")
-    if entry.kind == "mixed":
-        known = None if entry.known is None else tuple(entry.known)
-        solution = entry.solution and next(k.made for k in SOLUTIONS if k.word == entry.solution.kind)(
-            **entry.solution.model_dump(exclude={"kind"})
-        )
-        return Mixed(_efforts("unknown", entry.unknown, source), known, solution)
-    return Forward(
-        tuple(_declared(EVENTS, ("analysis", "events", name), e, source) for name, e in entry.events.items())
-    )
-
-
-def _efforts(key: str, entries: Mapping[str, BaseModel], source: Source) -> tuple[Effort, ...]:
-    return tuple(_declared(EFFORTS, ("analysis", key, name), entry, source) for name, entry in entries.items())
+    return found
 
 
 def _stabilisation(entry: StabilisationEntry) -> Stabilisation:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import typing
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, fields
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -26,9 +27,10 @@ from ffr_dyn.analyses.bounded import Bounded
 from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort
 from ffr_dyn.analyses.events import Event
 from ffr_dyn.analyses.mixed import Causal
+from ffr_dyn.analyses.registry import OverTime, analyses, analysis
 from ffr_dyn.analyses.settings import settings_of
 from ffr_dyn.functions.curves import Curve
-from ffr_dyn.integrators import CONTROLLED, METHODS
+from ffr_dyn.integrators import CONTROLLED, METHODS, methods
 from ffr_dyn.scene.couplings import Coupling
 from ffr_dyn.scene.drivers import Driver, PointDriver
 from ffr_dyn.scene.forces import Bushing, Load, SpringDamper
@@ -137,16 +139,16 @@ EVENTS = (Kind("", Event),)
 SOLUTIONS = (Kind("causal", Causal), Kind("bounded", Bounded))
 
 
-def keys_of(kind: Kind) -> list[Field]:
+def keys_of(kind: Kind) -> list[Field[Any]]:
     """The fields of a kind that a file holds."""
     return [f for f in fields(kind.made) if _named(kind, f) in FIELDS or f.name not in NOT_IN_FILES]
 
 
-def _named(kind: Kind, f: Field) -> str:
+def _named(kind: Kind, f: Field[Any]) -> str:
     return f"{kind.made.__name__}.{f.name}"
 
 
-def _type(kind: Kind, f: Field, hints: Mapping[str, Any]) -> Any:
+def _type(kind: Kind, f: Field[Any], hints: Mapping[str, Any]) -> Any:
     """The type of a key: from `FIELDS`, or from the dataclass, where numbers become `Number`."""
     found = FIELDS.get(_named(kind, f), FIELDS.get(f.name))
     if found is None:
@@ -154,7 +156,7 @@ def _type(kind: Kind, f: Field, hints: Mapping[str, Any]) -> Any:
     return found | None if _default(f) is None else found
 
 
-def _default(f: Field) -> Any:
+def _default(f: Field[Any]) -> Any:
     """What stands for a key that is not given; None where the dataclass has no limit (JSON has no infinity)."""
     if isinstance(f.default, tuple):
         return list(f.default)
@@ -277,8 +279,12 @@ class _Span(Strict):
     start: Seconds = 0.0
 
 
+class _Moment(Strict):
+    time: Seconds = 0.0
+
+
 class _Integrated(_Span):
-    method: Literal[(*METHODS, *CONTROLLED)] = "ros2"  # type: ignore[valid-type]
+    method: str = "ros2"
     step: Annotated[float, In("s"), Key(gt=0)] | None = None
     tolerances: TolerancesEntry | None = None
     settings: dict[str, bool | int | float | str] = {}
@@ -298,92 +304,54 @@ class _Integrated(_Span):
         return self
 
 
-class _ForwardBase(_Integrated):
-    kind: Literal["forward"] = "forward"
-    stabilisation: StabilisationEntry = StabilisationEntry()
+def nested_kinds(hint: Any) -> tuple[Kind, ...]:
+    """The kinds of the declarations that the field of an analysis holds, several or one; () where it holds none."""
+    held = {part for outer in (hint, *typing.get_args(hint)) for part in (outer, *typing.get_args(outer))}
+    return next((kinds for kinds in (EFFORTS, EVENTS, SOLUTIONS) if {kind.made for kind in kinds} <= held), ())
 
 
-ForwardEntry = create_model(
-    "ForwardEntry",
-    __base__=_ForwardBase,
-    __doc__="Forward dynamics from start to end; step defaults to a tenth of output_step.",
-    events=(_table_model(EVENTS), {}),
-)
+def holds_several(hint: Any) -> bool:
+    """Whether a field holds a tuple of declarations, which are a table of the file."""
+    return typing.get_origin(hint) is tuple
 
 
-class KinematicEntry(_Span):
-    """Positions, velocities, accelerations and reactions along the motion that the drivers prescribe."""
-
-    kind: Literal["kinematic"]
-
-
-class InverseEntry(_Integrated):
-    """The forces of the drivers; method, step and stabilisation are of dynamic elastic coordinates."""
-
-    kind: Literal["inverse"]
-    elastic: Literal["dynamic", "quasi-static"] = "dynamic"
-    stabilisation: StabilisationEntry = StabilisationEntry()
-
-
-class _MixedBase(_Integrated):
-    kind: Literal["mixed"]
-    known: Annotated[list[str], Key(min_length=1)] | None = None
+def _analysis_model(word: str, made: Any) -> type[BaseModel]:
+    """The model of the table [analysis] of one kind: times, what it needs to integrate, and its own fields."""
+    over_time, hints = issubclass(made, OverTime), typing.get_type_hints(made)
+    base: Any = (_Integrated if made.integrates else _Span) if over_time else _Moment
+    keys: dict[str, Any] = {"kind": (Literal[word], "forward" if word == "forward" else ...)}
+    if over_time and made.integrates:
+        keys["method"] = (Literal[tuple(methods())], "ros2")
+    if over_time and made.stabilised:
+        keys["stabilisation"] = (StabilisationEntry, StabilisationEntry())
+    for f in fields(made):
+        keys[f.name] = _own_key(f, hints[f.name])
+        if names := f.metadata.get("names"):
+            keys[names] = (list[str], [])
+    return create_model(f"{made.__name__}Entry", __base__=base, __doc__=made.__doc__, **keys)
 
 
-MixedEntry = create_model(
-    "MixedEntry",
-    __base__=_MixedBase,
-    __doc__="Known motions (drivers, by default all) and the unknown forces, by name, that realise them.",
-    unknown=(Annotated[_table_model(EFFORTS), Key(min_length=1)], ...),  # type: ignore[arg-type]
-    solution=(_one_of([entry_model(kind) for kind in SOLUTIONS], [kind.word for kind in SOLUTIONS]) | None, None),
-)
+def _own_key(f: Field[Any], hint: Any) -> tuple[Any, Any]:
+    """Type and default of the key for a field of an analysis."""
+    default = ... if f.default is MISSING or f.metadata.get("required") else f.default
+    if kinds := nested_kinds(hint):
+        if holds_several(hint):
+            table = _table_model(kinds)
+            return (Annotated[table, Key(min_length=1)], ...) if default is ... else (table, {})
+        return _one_of([entry_model(kind) for kind in kinds], [kind.word for kind in kinds]) | None, default
+    names = tuple[str, ...]
+    if hint == names or hint == names | None:
+        return (list[str], []) if default == () else (Annotated[list[str], Key(min_length=1)] | None, default)
+    if typing.get_origin(hint) is Literal:
+        return hint, default
+    return _numbered(hint), list(default) if isinstance(default, tuple) else default
 
 
-class AssembleEntry(Strict):
-    """Positions and velocities that meet the joints and drivers at a time, and what was changed for it."""
-
-    kind: Literal["assemble"]
-    time: Seconds = 0.0
-
-
-class StaticEntry(Strict):
-    """The equilibrium at a time."""
-
-    kind: Literal["static"]
-    time: Seconds = 0.0
-
-
-class _LineariseBase(Strict):
-    kind: Literal["linearise"]
-    time: Seconds = 0.0
-    at_equilibrium: bool = False
-    loads: list[str] = []
-    quantities: list[str] = []
-
-
-LineariseEntry = create_model(
-    "LineariseEntry",
-    __base__=_LineariseBase,
-    __doc__="Small motions about the start or the equilibrium; inputs (forces by name) and loads feed, quantities come out.",
-    inputs=(_table_model(EFFORTS), {}),
-)
-
-ANALYSES: dict[str, Any] = {
-    "forward": ForwardEntry,
-    "kinematic": KinematicEntry,
-    "assemble": AssembleEntry,
-    "static": StaticEntry,
-    "inverse": InverseEntry,
-    "mixed": MixedEntry,
-    "linearise": LineariseEntry,
-}
-
-
-class ChartEntry(Strict):
+class _ChartEntry(Strict):
     """What `ffr-dyn chart` compares: steps [s] or tolerances by method, empty lists where they are to be chosen."""
 
     measures: list[str] = []
-    methods: dict[Literal[(*METHODS, *CONTROLLED)], list[Annotated[Number, Key(gt=0)]]] = {}  # type: ignore[valid-type]
+    methods: dict[str, list[Annotated[Number, Key(gt=0)]]] = {}
     modes: Annotated[list[Annotated[int, Key(ge=0)] | Literal["all"]], Key(min_length=1)] = ["all"]
     drop: list[list[Literal["I3", "I4", "I5", "I8", "I9", "stiffening"]]] = []
 
@@ -397,21 +365,33 @@ class _SceneBase(Strict):
     gravity: Annotated[list[of_time("m/s^2")], THREE] = [0.0, 0.0, 0.0]  # type: ignore[valid-type]
     base_acceleration: Annotated[list[of_time("m/s^2")], THREE] = [0.0, 0.0, 0.0]  # type: ignore[valid-type]
     plane: Literal["auto", "none", "x", "y", "z"] = "auto"
-    analysis: _one_of(list(ANALYSES.values()), list(ANALYSES))  # type: ignore[valid-type]
-    chart: ChartEntry = ChartEntry()
+    plugins: list[str] = []
     ground: dict[str, Metres] = {}
     bodies: dict[str, BodyEntry]
     markers: dict[str, MarkerEntry] = {}
 
 
-SceneEntry: Any = create_model(
-    "SceneEntry",
-    __base__=_SceneBase,
-    __doc__="A scene file of ffr-dyn, after its includes are merged and its parameters put in.",
-    **{name: (_table_model(kinds), {}) for name, kinds in TABLES.items()},  # type: ignore[call-overload]
-)
+def scene_entry() -> Any:
+    """The model of a scene file, with all analyses and methods that are known now."""
+    return _scene_entry(tuple(analyses()), tuple(methods()))
+
+
+@cache
+def _scene_entry(words: tuple[str, ...], method_names: tuple[str, ...]) -> Any:
+    steps = dict[Literal[method_names], list[Annotated[Number, Key(gt=0)]]]  # type: ignore[valid-type]
+    chart: Any = create_model("ChartEntry", __base__=_ChartEntry, __doc__=_ChartEntry.__doc__, methods=(steps, {}))
+    one = _one_of([_analysis_model(word, analysis(word)) for word in words], words)
+    return create_model(
+        "SceneEntry",
+        __base__=_SceneBase,
+        __doc__="A scene file of ffr-dyn, after its includes are merged and its parameters put in.",
+        analysis=(one, ...),
+        chart=(chart, chart()),
+        **{name: (_table_model(kinds), {}) for name, kinds in TABLES.items()},  # type: ignore[call-overload]
+    )
 
 
 def schema() -> dict[str, Any]:
     """The JSON schema of scene files (draft 2020-12)."""
-    return SceneEntry.model_json_schema()
+    found: dict[str, Any] = scene_entry().model_json_schema()
+    return found

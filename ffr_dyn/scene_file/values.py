@@ -49,7 +49,8 @@ class In:
 
 
 def parameters_of(info: ValidationInfo) -> Mapping[str, Any]:
-    return (info.context or {}).get("parameters", {})
+    found: Mapping[str, Any] = (info.context or {}).get("parameters", {})
+    return found
 
 
 THREE = Key(min_length=3, max_length=3)
@@ -105,7 +106,7 @@ def _form(value: Any) -> str | None:
     if isinstance(value, bool):
         return None
     kinds = ((str, "[text]"), ((dict, FunctionEntry), "[table]"), ((int, float), "[number]"))
-    return next((name for kind, name in kinds if isinstance(value, kind)), None)  # type: ignore[arg-type]
+    return next((name for kind, name in kinds if isinstance(value, kind)), None)
 
 
 def _expression(value: float | str | FunctionEntry, info: ValidationInfo) -> Expression:

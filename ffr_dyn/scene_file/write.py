@@ -6,24 +6,12 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, asdict, fields
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, cast, get_type_hints
 
 import numpy as np
 
-from ffr_dyn.analyses.efforts import Effort
-from ffr_dyn.analyses.settings import (
-    Charted,
-    Forward,
-    Inverse,
-    Kinematic,
-    Linearise,
-    Mixed,
-    MomentSettings,
-    OfMoment,
-    OverTime,
-    Settings,
-    settings_of,
-)
+from ffr_dyn.analyses.registry import OfMoment, OverTime, word_of
+from ffr_dyn.analyses.settings import Charted, MomentSettings, Settings, settings_of
 from ffr_dyn.functions.curves import Curve
 from ffr_dyn.functions.formula import Measured, Operation, text_of
 from ffr_dyn.functions.time_functions import (
@@ -35,12 +23,12 @@ from ffr_dyn.functions.time_functions import (
     constant,
     signals_in,
 )
-from ffr_dyn.integrators import CONTROLLED, METHODS, Controlled, Integrator
+from ffr_dyn.integrators import CONTROLLED, Controlled, Integrator, methods
 from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation
 from ffr_dyn.scene.forces import Load
 from ffr_dyn.scene.joint_forces import Actuator
 from ffr_dyn.scene.scene import Body, Scene
-from ffr_dyn.scene_file.schema import EFFORTS, EVENTS, SOLUTIONS, TABLES, Kind, keys_of
+from ffr_dyn.scene_file.schema import TABLES, Kind, keys_of, nested_kinds
 from ffr_dyn.scene_file.state_formula import StateFormula
 from ffr_prep.body import FlexibleBody, save_body
 from ffr_prep.common.errors import InputError
@@ -104,14 +92,11 @@ def _kind(kinds: tuple[Kind, ...], thing: Any) -> Kind:
 
 def _analysis(settings: Settings | MomentSettings) -> dict[str, Any]:
     analysis = settings.analysis
-    entry: dict[str, Any] = {"kind": type(analysis).__name__.lower()}
-    if isinstance(settings, Settings):
-        entry |= {"start": settings.start, "end": settings.end, "output_step": settings.output_step}
-    else:
-        entry["time"] = settings.time
-    if isinstance(settings, Settings) and not isinstance(analysis, Kinematic):
+    entry: dict[str, Any] = {"kind": word_of(type(analysis)), **settings.span}
+    del entry["outputs"]
+    if isinstance(settings, Settings) and settings.analysis.integrates:
         entry |= _method(settings.method)
-    if isinstance(settings, Settings) and isinstance(analysis, (Forward, Inverse)):
+    if isinstance(settings, Settings) and settings.analysis.stabilised:
         entry["stabilisation"] = _stabilisation(settings.stabilisation)
     return entry | _particular(analysis)
 
@@ -127,7 +112,7 @@ def _chart(chart: Charted) -> dict[str, Any]:
 
 
 def _method(method: Integrator) -> dict[str, Any]:
-    name = next(word for word, made in {**METHODS, **CONTROLLED}.items() if type(method) is made)
+    name = next(word for word, made in methods().items() if type(method) is made)
     if name in CONTROLLED:
         return {"method": name, "tolerances": asdict(cast("Controlled", method).tolerances)}
     given = {key: getattr(method, key) for key in settings_of(type(method))}
@@ -136,28 +121,28 @@ def _method(method: Integrator) -> dict[str, Any]:
 
 def _particular(analysis: OverTime | OfMoment) -> dict[str, Any]:
     """The settings of one analysis only."""
-    if isinstance(analysis, Forward):
-        return {"events": {event.name: _entry(EVENTS[0], event) for event in analysis.events}}
-    if isinstance(analysis, Inverse):
-        return {"elastic": "quasi-static" if analysis.quasi_static else "dynamic"}
-    if isinstance(analysis, Mixed):
-        solution = analysis.solution
-        chosen = None if solution is None else {"kind": _kind(SOLUTIONS, solution).word, **_given(solution)}
-        return {"unknown": _efforts(analysis.unknown), "known": analysis.known, "solution": chosen}
-    if isinstance(analysis, Linearise):
-        efforts = tuple(item for item in analysis.inputs if not isinstance(item, str))
-        loads = tuple(item for item in analysis.inputs if isinstance(item, str))
-        if analysis.inputs != (*efforts, *loads):
-            raise InputError(
-                f"analysis: a scene file lists the names of loads {loads} after the other inputs; put them last"
-            )
-        wanted = {"loads": loads, "quantities": analysis.quantities, "at_equilibrium": analysis.at_equilibrium}
-        return {"inputs": _efforts(efforts), **wanted}
-    return {}
+    hints, entry = get_type_hints(type(analysis)), {}
+    for f in fields(analysis):
+        value = getattr(analysis, f.name)
+        if names_key := f.metadata.get("names"):
+            names = tuple(item for item in value if isinstance(item, str))
+            others = tuple(item for item in value if not isinstance(item, str))
+            if value != (*others, *names):
+                raise InputError(
+                    f"analysis: a scene file lists the names of {names_key} {names} after the other {f.name}; put them last"
+                )
+            value, entry[names_key] = others, names
+        if kinds := nested_kinds(hints[f.name]):
+            value = _nested(kinds, value)
+        entry[f.name] = value
+    return entry
 
 
-def _efforts(efforts: tuple[Effort, ...]) -> dict[str, Any]:
-    return {effort.name: _entry(_kind(EFFORTS, effort), effort) for effort in efforts}
+def _nested(kinds: tuple[Kind, ...], value: Any) -> Any:
+    """The declarations that a field of an analysis holds: several as a table, one with its kind, or None."""
+    if isinstance(value, tuple):
+        return {one.name: _entry(_kind(kinds, one), one) for one in value}
+    return None if value is None else {"kind": _kind(kinds, value).word, **_given(value)}
 
 
 def _stabilisation(keep: Stabilisation) -> dict[str, Any]:

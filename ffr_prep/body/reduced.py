@@ -78,7 +78,8 @@ class Surface(Brief):
     points : (P, 3) [m] undeformed; triangles : (T, 3) indices into points; Phi : (P, 3, n) [1/sqrt(kg)]
     stress : (P, 6, n) components xx, yy, zz, xy, xz, yz of the stress per elastic coordinate, in body axes
              [Pa/(m sqrt(kg))]; None where it was not recovered
-    moduli : (P, 2) Young's modulus [Pa] and Poisson's ratio at the points, which give the strain; with the stress
+    moduli : (P, 2) Young's modulus [Pa] and Poisson's ratio at the points, which give the strain; with the stress. Zeros
+             where the material is anisotropic, of which strain is not recovered
     beams  : section forces of beam elements; None where there are none
     """
 
@@ -241,12 +242,12 @@ class FlexibleBody(Brief):
 
     @property
     def I4(self) -> Array:
-        """(3, n) integral of u_0 x phi_j dm [m sqrt(kg)]."""
+        """(3, n) integral of u_0 x phi_j dm [m sqrt(kg)]. Equation (6) of docs/notation.md."""
         return axial(self.rP_dm)
 
     @property
     def I5(self) -> Array:
-        """(3, n, n) integral of phi_i x phi_j dm at [:, i, j] [-]."""
+        """(3, n, n) integral of phi_i x phi_j dm at [:, i, j] [-]. Equation (7) of docs/notation.md."""
         return axial(self.PP_dm)
 
     @property
@@ -261,13 +262,13 @@ class FlexibleBody(Brief):
 
     @property
     def I8(self) -> Array:
-        """(n, 3, 3) integral of u_0~ phi_j~ dm [m sqrt(kg)]."""
+        """(n, 3, 3) integral of u_0~ phi_j~ dm [m sqrt(kg)]. Equation (8) of docs/notation.md."""
         trace = np.einsum("kkj->j", self.rP_dm)
         return np.einsum("klj->jlk", self.rP_dm) - trace[:, None, None] * np.eye(3)
 
     @property
     def I9(self) -> Array:
-        """(n, n, 3, 3) integral of phi_i~ phi_j~ dm at [i, j] [-]."""
+        """(n, n, 3, 3) integral of phi_i~ phi_j~ dm at [i, j] [-]. Equation (9) of docs/notation.md."""
         trace = np.einsum("kkij->ij", self.PP_dm)
         return np.einsum("klij->ijlk", self.PP_dm) - trace[:, :, None, None] * np.eye(3)
 

@@ -17,11 +17,12 @@ from ffr_prep.cli.matrices import reduce_matrices_command
 from ffr_prep.cli.options import PATH, bundle, check_points, check_writable, material_of, number_of, numbers_of
 from ffr_prep.cli.reduction import NOTES as REDUCTION_NOTES
 from ffr_prep.cli.request import REQUEST, reduce_to_file, request_of
-from ffr_prep.cli.settings import EntriesCommand
+from ffr_prep.cli.settings import EntriesCommand, NotesCommand
 from ffr_prep.cli.structure import reduce_structure_command
 from ffr_prep.cli.terminal import show, terminal_steps
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.registry import load_plugin
+from ffr_prep.mesh.formats import MESH_FORMATS
 from ffr_prep.reduction.registry import REDUCTIONS
 
 EXAMPLE = """\b
@@ -56,6 +57,8 @@ strain. With eigenmodes the choice matters: take the one that looks like the joi
 MATERIAL_NOTES = """\b
 Materials: a name (steel, aluminium, titanium, ...), or E=7e10,nu=0.3,rho=5540 in SI units; for several volumes
   --material web=steel --material rim=E=7e10,nu=0.3,rho=2700, each with the name of a volume of the mesh.
+Orthotropic ones by E1,E2,E3,nu12,nu13,nu23,G12,G13,G23,rho in the axes of the mesh, or by a file ply.toml with the same
+  keys, or `elasticity` (6 x 6, components xx, yy, zz, xy, xz, yz) and `rho`, and `axes` where the material is turned.
 """
 _PATH = click.Path(path_type=Path)
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 120}
@@ -109,7 +112,7 @@ def _mesh_settings(options: Mapping[str, Any]) -> dict[str, Any]:
     return {key: options[key] for key in ("unit", "size", "order")} | {"numbers": numbers_of(options["numbers"])}
 
 
-@cli.command()
+@cli.command(cls=NotesCommand, registries=(MESH_FORMATS,), epilog="\b\nFormats:\n{mesh format}")
 @_MESH
 def mesh(mesh: Path, **options: Any) -> None:
     """What MESH holds: elements, extent, and the names of surfaces, node sets and volumes; and whether it is sound."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ffr_prep.cli.options import PATH, bundle
-from ffr_prep.cli.settings import Numbers
+from ffr_prep.cli.settings import numbers
 from ffr_prep.common.errors import InputError
 from ffr_prep.reduction.registry import MODES, REDUCTIONS
 from ffr_prep.reduction.registry import reduction_of as reduction_made
@@ -40,14 +40,14 @@ reduction_options = bundle(
     click.option("--frequency", type=float, help="Keep all normal modes up to this frequency [Hz]."),
     click.option(
         "--accuracy",
-        type=Numbers(3),
+        callback=numbers(3),
         metavar="LOW,HIGH,ERROR",
         help="Keep as many as the receptances in a band [Hz] need.",
     ),
     click.option("--quality", type=PATH, help="Compare with the full model; folder for the pictures of it."),
     click.option(
         "--band",
-        type=Numbers(2),
+        callback=numbers(2),
         metavar="LOW,HIGH",
         help="Frequencies [Hz] of that comparison; default: those of --accuracy.",
     ),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import click
@@ -14,24 +14,22 @@ from ffr_prep.common.registry import Registry, Setting
 _COLUMN, _WIDTH = 33, 118
 
 
-class Numbers(click.ParamType):
-    """Numbers with commas between them, as a tuple; of a given count, if there is one."""
+def numbers(count: int | None = None) -> Callable[[click.Context, click.Parameter, str | None], Any]:
+    """A callback that reads an option of numbers with commas between them, of a given count, if there is one."""
 
-    name = "numbers"
-
-    def __init__(self, count: int | None = None) -> None:
-        self.count = count
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
-        """Raises InputError for other text, naming the option."""
-        what = f"{param.opts[0] if param else 'numbers'} {value}"
+    def read(_: click.Context, option: click.Parameter, text: str | None) -> tuple[float, ...] | None:
+        if text is None:
+            return None
+        what = f"{option.opts[0]} {text}"
         try:
-            values = tuple(float(word) for word in value.split(","))
+            values = tuple(float(word) for word in text.split(","))
         except ValueError:
             raise InputError(f"{what}: write numbers with commas between them, such as 10,2000") from None
-        if self.count is not None and len(values) != self.count:
-            raise InputError(f"{what}: {self.count} numbers with commas between them are needed, not {len(values)}")
+        if count not in (None, len(values)):
+            raise InputError(f"{what}: {count} numbers with commas between them are needed, not {len(values)}")
         return values
+
+    return read
 
 
 class NotesCommand(click.Command):
@@ -78,8 +76,8 @@ def option_of(setting: Setting) -> click.Option:
         return click.Option(names, is_flag=True, default=setting.default, help=setting.help)
     shown: dict[str, Any] = {"default": setting.default, "show_default": True, "help": setting.help}
     if setting.kind == "numbers":
-        shown |= {"default": ",".join(f"{x:g}" for x in setting.default), "metavar": "X1,X2,..."}
-        return click.Option(names, type=Numbers(), **shown)
+        shown |= {"default": ",".join(f"{x:g}" for x in setting.default), "metavar": "X1,X2,...", "callback": numbers()}
+        return click.Option(names, **shown)
     if isinstance(setting.kind, tuple):
         return click.Option(names, type=click.Choice(setting.kind), **shown)
     of_int = setting.kind is int and setting.least is not None

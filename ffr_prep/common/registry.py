@@ -23,16 +23,13 @@ Target = str | Callable[..., Any]
 
 
 class Entry(Protocol):
-    """Whatever has a name by which it is asked for, a help text, and settings of its own."""
+    """Whatever has a name by which it is asked for and a help text; it may have `settings`, a tuple of `Setting`."""
 
     @property
     def name(self) -> str: ...
 
     @property
     def help(self) -> str: ...
-
-    @property
-    def settings(self) -> tuple[Setting, ...]: ...
 
 
 E = TypeVar("E", bound=Entry)
@@ -80,7 +77,7 @@ class Registry(Generic[E]):
         if entry.name in self.entries:
             raise InputError(f"there is a {self.what} {entry.name!r} already: give it another name")
         known = {setting.name: setting for setting in self.settings()}
-        for setting in entry.settings:
+        for setting in settings_of(entry):
             if known.get(setting.name, setting) != setting:
                 raise InputError(
                     f"{self.what} {entry.name!r}: its setting {setting.name!r} means something else elsewhere"
@@ -89,12 +86,18 @@ class Registry(Generic[E]):
 
     def settings(self) -> tuple[Setting, ...]:
         """The settings of all entries, each once."""
-        return tuple({setting.name: setting for entry in self for setting in entry.settings}.values())
+        return tuple({setting.name: setting for entry in self for setting in settings_of(entry)}.values())
+
+
+def settings_of(entry: Entry) -> tuple[Setting, ...]:
+    """The settings of an entry, none for a kind that has none."""
+    found: tuple[Setting, ...] = getattr(entry, "settings", ())
+    return found
 
 
 def arguments(entry: Entry, given: Mapping[str, Any]) -> dict[str, Any]:
     """The arguments for the function or class of an entry among the values of settings by name."""
-    return {s.argument or s.name: given.get(s.name, s.default) for s in entry.settings}
+    return {s.argument or s.name: given.get(s.name, s.default) for s in settings_of(entry)}
 
 
 def loaded(target: Target) -> Any:

@@ -1,4 +1,4 @@
-"""What the exchange formats of reduced bodies share: coordinates, nodes, lumped masses and text files.
+"""Shared by the exchange formats of reduced bodies: coordinates, nodes, lumped masses and text files.
 
 A foreign file has its own elastic coordinates, with a modal mass M and a modal stiffness K. A FlexibleBody has
 mass-orthonormal coordinates with a diagonal stiffness; `body_from` changes from one to the other.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ import scipy.optimize
 
 from ffr_prep.body import BodyError, FlexibleBody, Interface, with_point
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.model.invariants import skew
 
 Array = np.ndarray
 
@@ -34,7 +35,7 @@ _REAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([DEde][+-]?[0-9]+)?")
 
 @dataclass(frozen=True)
 class Content:
-    """What a file says about a body, in the elastic coordinates of the file.
+    """The body of a file, in the elastic coordinates of the file.
 
     mass [kg], r_dm (3,) [kg m], rr_dm (3, 3) [kg m^2] as in FlexibleBody; P_dm (3, n), rP_dm (3, 3, n),
     PP_dm (3, 3, n, n) likewise but not yet mass-orthonormal; M, K (n, n) modal mass and stiffness;
@@ -54,6 +55,15 @@ class Content:
     interfaces: tuple[Interface, ...]
     facts: dict[str, Any]
     stiffening: Array | None = None
+
+
+def read_body(path: Path, content: Callable[[list[str], Path], Content]) -> FlexibleBody:
+    """The body of a text file, whose `content` is taken from its lines; InputError names the file."""
+    lines = read_lines(path)
+    try:
+        return body_from(content(lines, path))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def body_from(content: Content) -> FlexibleBody:
@@ -133,20 +143,9 @@ def _not_negative(omega2: Array) -> Array:
 # ---- products of vectors and their parts --------------------------------------------------------------------------
 
 
-def skew(v: Array) -> Array:
-    """(3, ...) -> (3, 3, ...): the cross product matrix of v."""
-    zero = np.zeros_like(v[0])
-    return np.stack([np.stack([zero, -v[2], v[1]]), np.stack([v[2], zero, -v[0]]), np.stack([-v[1], v[0], zero])])
-
-
 def from_parts(symmetric: Array, axial: Array) -> Array:
     """(3, 3, ...) T with T_kl + T_lk = symmetric and (T_yz - T_zy, ...) = axial (3, ...)."""
     return 0.5 * (symmetric - skew(axial))
-
-
-def from_inertia(J: Array) -> Array:
-    """(3, 3, ...) tensor S with J = tr(S) I - S."""
-    return 0.5 * np.einsum("kl,...->kl...", np.eye(3), np.einsum("kk...->...", J)) - J
 
 
 def from_crossed(X: Array) -> Array:
@@ -170,7 +169,7 @@ def mended_trace(PP_dm: Array, M: Array) -> tuple[Array, float]:
 
 @dataclass(frozen=True)
 class Bounds:
-    """What no integral can exceed (Cauchy-Schwarz): residuals of identities are measured by it.
+    """Upper bounds of the integrals (Cauchy-Schwarz): residuals of identities are measured by it.
 
     first : (n,) of P_dm; second : (n,) of rP_dm; third : (n, n) of PP_dm
     """

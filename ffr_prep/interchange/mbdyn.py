@@ -32,17 +32,15 @@ from ffr_prep.interchange.common_format import (
     MISFIT_LIMIT,
     Bounds,
     Content,
-    body_from,
     bounds,
     from_crossed,
-    from_inertia,
     from_parts,
     hold,
     mended_trace,
     moments,
     nodal_masses,
     nodes,
-    read_lines,
+    read_body,
     relative,
     write_lines,
 )
@@ -56,6 +54,7 @@ from ffr_prep.interchange.mbdyn_records import (
     shapes,
     stiffening_matrices,
 )
+from ffr_prep.model.invariants import from_inertia
 
 Array = np.ndarray
 Kind = Literal["legacy", "full"]
@@ -108,7 +107,7 @@ def write_fem(body: FlexibleBody, path: str | Path, *, kind: Kind = "legacy", su
 
 
 def left_out(body: FlexibleBody, *, kind: Kind = "legacy") -> tuple[str, ...]:
-    """What a file of this kind will not hold, in words."""
+    """The losses of a file of this kind, in words."""
     lost = kind == "legacy" and body.stiffening is not None
     return ("the geometric stiffness of the body was left out",) if lost else ()
 
@@ -229,12 +228,7 @@ def read_fem(path: str | Path) -> FlexibleBody:
     Source: MBDyn Input File Format, modal joint. Raises InputError for a file that does not exist, is damaged,
     truncated or foreign, or whose records contradict each other, naming line, record or identity, and by how much.
     """
-    path = Path(path)
-    lines = read_lines(path)
-    try:
-        return body_from(_content(lines, path))
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    return read_body(Path(path), _content)
 
 
 def _content(lines: list[str], path: Path) -> Content:

@@ -37,19 +37,16 @@ from ffr_prep.interchange.common_format import (
     MANY_MOMENTS,
     Bounds,
     Content,
-    body_from,
     bounds,
-    from_inertia,
     from_parts,
     hold,
     mended_trace,
     moments,
     nodal_masses,
     nodes,
-    read_lines,
+    read_body,
     real,
     relative,
-    skew,
     write_lines,
 )
 from ffr_prep.interchange.sid_blocks import Section, Taylor, integer, only, part, sections, taylor, value
@@ -67,6 +64,7 @@ from ffr_prep.interchange.sid_identities import (
     tensor,
 )
 from ffr_prep.interchange.sid_nodes import read_nodes
+from ffr_prep.model.invariants import from_inertia, skew
 
 Array = np.ndarray
 BLOCKS = ("mdCM", "J", "Ct", "Cr", "Me", "Gr", "Ge", "Oe", "ksigma", "Ke", "De")
@@ -203,12 +201,7 @@ def read_sid(path: str | Path) -> FlexibleBody:
     Source: Wallrapp 1994. Raises InputError for a file that does not exist, is damaged, truncated or foreign, or
     whose blocks contradict each other, naming line, block or identity, and by how much.
     """
-    path = Path(path)
-    lines = read_lines(path)
-    try:
-        return body_from(_content(lines, path))
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    return read_body(Path(path), _content)
 
 
 def _content(lines: list[str], path: Path) -> Content:

@@ -12,8 +12,9 @@ import numpy as np
 
 from ffr_prep.body import axial
 from ffr_prep.common.errors import InputError
-from ffr_prep.interchange.common_format import IDENTITY_TOLERANCE, Bounds, hold, relative, skew
+from ffr_prep.interchange.common_format import IDENTITY_TOLERANCE, Bounds, hold, relative
 from ffr_prep.interchange.sid_blocks import Taylor
+from ffr_prep.model.invariants import skew
 
 Array = np.ndarray
 Layout = Literal["mode-major", "axis-major"]

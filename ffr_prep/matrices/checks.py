@@ -1,4 +1,4 @@
-"""What matrices from outside must be: symmetric, of a free body in one piece, with a mass that is one."""
+"""Checks of matrices from outside: symmetric, of a free body in one piece, with a mass that is one."""
 
 from __future__ import annotations
 
@@ -32,8 +32,7 @@ def check_matrices(model: MatrixModel) -> None:
     differs by direction, forces under a rigid motion.
     """
     _check_translations(model)
-    for name, A in (("K", model.K), ("M", model.M)):
-        _check_symmetric(model, name, A)
+    check_symmetric(model)
     _check_mass(model)
     _check_one_mass(model)
     _check_free(model)
@@ -48,6 +47,12 @@ def _check_translations(model: MatrixModel) -> None:
             f"{node_in_words(model, short[0])} has no row for {', '.join(missing)} ({short.size} such nodes): it is "
             "supported, or the model is planar; give the matrices of the free body in space, without boundary conditions"
         )
+
+
+def check_symmetric(model: MatrixModel) -> None:
+    """Raises InputError where K or M is not symmetric."""
+    for name, A in (("K", model.K), ("M", model.M)):
+        _check_symmetric(model, name, A)
 
 
 def _check_symmetric(model: MatrixModel, name: str, A: sp.csr_array) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.registry import Registry, Setting, Target
+from ffr_prep.common.registry import Registry, Target
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,6 @@ class MatrixFormat:
     suffixes: tuple[tuple[str, ...], ...]
     read: Target
     help: str
-    settings: tuple[Setting, ...] = ()
 
 
 _ROOM = "ffr_prep.matrices"

@@ -19,6 +19,7 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.matrices.model import MatrixModel, group_nodes, node_in_words
 from ffr_prep.model.accelerations import unit_accelerations
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion, check_independent
+from ffr_prep.model.ties import check_names, interface_coordinates, six_rows, tied_rows
 from ffr_prep.structures.interfaces import rigid_coordinates, rotation_weight
 
 Array = np.ndarray
@@ -34,16 +35,17 @@ def couple_matrices(model: MatrixModel, interfaces: Sequence[InterfaceRegion], t
     positions = _positions(model, interfaces)
     centre = model.points.mean(axis=0)
     free = _free_rows(model, interfaces)
-    tied = [k for k, interface in enumerate(interfaces) if interface.kind == "rigid"]
-    C = _coordinates(model, interfaces, positions, ties)
+    rigid = [interface.kind == "rigid" for interface in interfaces]
+    C = interface_coordinates(rigid, ties, lambda k: _mean_motion(model, interfaces[k], positions[k]))
     check_independent(interfaces, C)
+    of_coordinates = positions[np.array(rigid, bool)]
     offsets = rigid_coordinates(model.points - centre)
     return CoupledModel(
         points=model.points,
         B=sp.csr_array(ties[model.dofs.translations().ravel()]),
         K=sp.csr_array(ties.T @ model.K @ ties),
         M=sp.csr_array(ties.T @ model.M @ ties),
-        T=np.vstack([model.dofs.of_nodes(offsets)[free], rigid_coordinates(positions[tied] - centre).reshape(-1, 6)]),
+        T=np.vstack([model.dofs.of_nodes(offsets)[free], rigid_coordinates(of_coordinates - centre).reshape(-1, 6)]),
         centre=centre,
         places=np.vstack([model.points[model.nodes[free]], _places(model, interfaces, positions)]),
         names=tuple(interface.name for interface in interfaces),
@@ -70,17 +72,9 @@ def tie_matrices(model: MatrixModel, interfaces: Sequence[InterfaceRegion]) -> s
     """
     _check_interfaces(model, interfaces)
     positions = _positions(model, interfaces)
-    free = _free_rows(model, interfaces)
-    rigid = [(i, at) for i, at in zip(interfaces, positions, strict=True) if i.kind == "rigid"]
-    rows, columns, values = [free], [np.arange(free.size)], [np.ones(free.size)]
-    for k, (interface, at) in enumerate(rigid):
-        own, following = _following(model, interface, at)
-        rows.append(np.repeat(own, 6))
-        columns.append(np.tile(free.size + 6 * k + np.arange(6), own.size))
-        values.append(following.ravel())
-    shape = (len(model.nodes), free.size + 6 * len(rigid))
-    triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    ties = sp.csr_array(sp.coo_array(triplets, shape=shape))
+    at_rigid = [(i, at) for i, at in zip(interfaces, positions, strict=True) if i.kind == "rigid"]
+    following = [_following(model, interface, at) for interface, at in at_rigid]
+    ties = tied_rows(len(model.nodes), _free_rows(model, interfaces), following)
     ties.eliminate_zeros()
     return ties
 
@@ -92,28 +86,11 @@ def _following(model: MatrixModel, interface: InterfaceRegion, at: Array) -> tup
     return rows, motion[np.arange(rows.size), model.components[rows]]
 
 
-def _coordinates(
-    model: MatrixModel, interfaces: Sequence[InterfaceRegion], positions: Array, ties: sp.csr_array
-) -> sp.csr_array:
-    """C (6I, Z) of all interfaces in their order."""
-    first = ties.shape[1] - 6 * sum(interface.kind == "rigid" for interface in interfaces)
-    parts = [sp.csr_array((0, ties.shape[1]))]
-    for interface, at in zip(interfaces, positions, strict=True):
-        if interface.kind == "rigid":
-            parts.append(sp.eye_array(6, ties.shape[1], k=first, format="csr"))
-            first += 6
-        else:
-            parts.append(_mean_motion(model, interface, at) @ ties)
-    return sp.csr_array(sp.vstack(parts, format="csr"))
-
-
 def _mean_motion(model: MatrixModel, interface: InterfaceRegion, at: Array) -> sp.csr_array:
     """(6, D) the rigid motion about the point that is closest to the motions of the nodes."""
     rows, following = _following(model, interface, at)
     root = _root_weight(model, rows)
-    motion = np.linalg.pinv(root @ following) @ root
-    ends = np.arange(7) * rows.size
-    return sp.csr_array((motion.ravel(), np.tile(rows, 6), ends), shape=(6, len(model.nodes)))
+    return six_rows(np.linalg.pinv(root @ following) @ root, rows, len(model.nodes))
 
 
 def _root_weight(model: MatrixModel, rows: Array) -> sp.csr_array:
@@ -156,10 +133,7 @@ def _places(model: MatrixModel, interfaces: Sequence[InterfaceRegion], positions
 
 
 def _check_interfaces(model: MatrixModel, interfaces: Sequence[InterfaceRegion]) -> None:
-    names = [interface.name for interface in interfaces]
-    repeated = sorted({name for name in names if names.count(name) > 1})
-    if repeated:
-        raise InputError(f"interface name {repeated[0]!r} is given more than once: every interface needs its own name")
+    check_names(interfaces)
     for interface in interfaces:
         _check_determined(model, interface)
     for one, other in combinations([i for i in interfaces if i.kind == "rigid"], 2):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from ffr_prep.body import content_hash
 from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import extent_in_words
+from ffr_prep.common.registry import choice
 from ffr_prep.matrices.nodal_inertia import DofMap
 from ffr_prep.matrices.unit_systems import UnitSystem
 
@@ -209,10 +209,8 @@ def with_surface(model: MatrixModel, points: Array, triangles: Array) -> MatrixM
 def group_nodes(model: MatrixModel, name: str) -> Array:
     """(m,) nodes of a group, ascending; InputError lists the groups there are."""
     if name not in model.groups:
-        near = get_close_matches(name, model.groups, n=1, cutoff=0.5)
-        known = ", ".join(repr(one) for one in model.groups) or "none; name nodes by number or position"
-        meant = f"did you mean {near[0]!r}? There" if near else "there"
-        raise InputError(f"there is no group of nodes {name!r}; {meant} are: {known}")
+        hint = "" if model.groups else "; name nodes by number or position"
+        raise InputError(f"there is no group of nodes {name!r}; {choice(name, model.groups)}{hint}")
     return np.unique(model.groups[name])
 
 

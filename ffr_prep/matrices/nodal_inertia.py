@@ -33,7 +33,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ffr_prep.body import axial
-from ffr_prep.model.invariants import InertiaIntegrals, inertia_integrals
+from ffr_prep.model.invariants import InertiaIntegrals, from_inertia, inertia_integrals, skew
 from ffr_prep.structures.interfaces import rigid_coordinates
 
 Array = np.ndarray
@@ -110,14 +110,14 @@ def nodal_integrals(points: Array, dofs: DofMap, M: sp.csr_array, Phi: Array) ->
     spin = np.stack([field.T @ momenta for field in turned])
     squares = np.stack([[a.T @ b for b in M_turned] for a in turned])
     gram = Phi.T @ momenta
-    rr = _second_moment(rigid[3:, 3:])
+    rr = from_inertia(rigid[3:, 3:])
     integrals = InertiaIntegrals(
         mass=float(np.trace(rigid[:3, :3]) / 3),
         r_dm=axial(rigid[:3, 3:]) / 2,
         rr_dm=(rr + rr.T) / 2,
         P_dm=coupling[:3],
-        rP_dm=_symmetric_first(on_turned[3:]) + _skew(coupling[3:]) / 2,
-        PP_dm=_symmetric_second(squares, gram) + _skew(spin - spin.transpose(0, 2, 1)) / 4,
+        rP_dm=_symmetric_first(on_turned[3:]) - skew(coupling[3:]) / 2,
+        PP_dm=_symmetric_second(squares, gram) - skew(spin - spin.transpose(0, 2, 1)) / 4,
     )
     return integrals, _defect(integrals, on_turned, spin, squares, gram)
 
@@ -129,35 +129,22 @@ def _turned(axis: Array, Phi: Array, dofs: DofMap) -> Array:
     return dofs.of_nodes(np.einsum("kl,nhlj->nhkj", tilde, halves).reshape(dofs.count, 6, -1))
 
 
-def _second_moment(J: Array) -> Array:
-    """W (3, 3, ...) of an inertia tensor J = tr(W) I - W."""
-    return np.einsum("kl,aa...->kl...", np.eye(3) / 2, J) - J
-
-
 def _symmetric_first(on_turned: Array) -> Array:
     """(3, 3, n) the symmetric part of rP_dm, from T_a^T M E_b phi_j at [a, b, j]."""
-    return _second_moment(on_turned + on_turned.transpose(1, 0, 2)) / 2
+    return from_inertia(on_turned + on_turned.transpose(1, 0, 2)) / 2
 
 
 def _symmetric_second(squares: Array, gram: Array) -> Array:
     """(3, 3, n, n) the symmetric part of PP_dm, its trace being Phi^T M Phi (n, n)."""
-    W = _second_moment((squares + squares.transpose(1, 0, 2, 3)) / 2)
+    W = from_inertia((squares + squares.transpose(1, 0, 2, 3)) / 2)
     W = (W + W.transpose(0, 1, 3, 2)) / 2
     return W + np.einsum("kl,ij->klij", np.eye(3) / 3, (gram + gram.T) / 2 - np.einsum("kkij->ij", W))
 
 
-def _skew(vector: Array) -> Array:
-    """(3, ...) -> (3, 3, ...) the antisymmetric tensor whose axial part is twice the vector."""
-    epsilon = np.zeros((3, 3, 3))
-    for k in range(3):
-        epsilon[k, k - 2, k - 1], epsilon[k, k - 1, k - 2] = 1.0, -1.0
-    return np.einsum("akl,a...->kl...", epsilon, vector)
-
-
 def _defect(integrals: InertiaIntegrals, on_turned: Array, spin: Array, squares: Array, gram: Array) -> Array:
     """(n,) the largest of the terms projected away, of each mode alone and with those before it, beside unit norms."""
-    momentum = on_turned[:3] - _skew(integrals.P_dm)
-    angular = on_turned[3:] - on_turned[3:].transpose(1, 0, 2) - _skew(axial(integrals.rP_dm))
+    momentum = on_turned[:3] + skew(integrals.P_dm)
+    angular = on_turned[3:] - on_turned[3:].transpose(1, 0, 2) + skew(axial(integrals.rP_dm))
     size = np.sqrt(np.trace(integrals.rr_dm))
     trace = np.einsum("aaij->ij", squares) / 2 - gram
     terms = [

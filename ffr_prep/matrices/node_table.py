@@ -1,4 +1,4 @@
-"""What the readers of matrix models share."""
+"""Nodes by their numbers in a file, and the matrix model of numbered rows, which all readers use."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class UnitSystem:
-    """What the numbers of a file count: length [m], mass [kg], time [s]; forces follow from them."""
+    """The units of the numbers in a file: length [m], mass [kg], time [s]; forces follow from them."""
 
     length: float
     mass: float

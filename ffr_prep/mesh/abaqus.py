@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from ffr_prep.common.errors import InputError
-from ffr_prep.mesh.formats import FileMesh, supported_kind
+from ffr_prep.mesh.file_mesh import FileMesh, supported_kind
 
 Array = np.ndarray
 Row = list[str]
@@ -34,7 +34,7 @@ _KINDS = {4: "tet4", 10: "tet10", 8: "hex8", 20: "hex20", 27: "hex27"}
 
 @dataclass
 class _Deck:
-    """What a file defines, by number and by name; set names in upper case lead to the spelling of the file."""
+    """The definitions of a file, by number and by name; set names in upper case lead to the spelling of the file."""
 
     nodes: dict[int, list[float]] = field(default_factory=dict)
     solids: dict[str, dict[int, list[int]]] = field(default_factory=dict)

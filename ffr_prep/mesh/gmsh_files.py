@@ -21,7 +21,7 @@ from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.registry import choice
 from ffr_prep.mesh import gmsh_process
 from ffr_prep.mesh.cells import node_order
-from ffr_prep.mesh.formats import FileMesh, supported_kind
+from ffr_prep.mesh.file_mesh import FileMesh, supported_kind
 
 Array = np.ndarray
 
@@ -40,7 +40,7 @@ _LIBRARIES = "libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1"
 def from_gmsh(
     path: Path, *, unit: str | None, size: float | None, numbers: Mapping[str, float], order: int
 ) -> FileMesh:
-    """What gmsh makes of a file, in a process of its own.
+    """The mesh that gmsh reads or makes of a file, in a process of its own.
 
     unit : of the numbers, where the file declares none or another is meant; size : largest element edge
 

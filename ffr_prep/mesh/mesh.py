@@ -8,19 +8,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ffr_prep.body import content_hash
-from ffr_prep.common.brief import Brief, Rows, listed
+from ffr_prep.common.brief import Brief, Rows, brief_tuple, listed
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.common.registry import choice, loaded
 from ffr_prep.mesh.boundary import joined_by_faces, joined_by_nodes, outer_faces, whole_faces
 from ffr_prep.mesh.cells import FACE_TRIANGLES, KINDS
-from ffr_prep.mesh.formats import FileMesh, format_of
+from ffr_prep.mesh.file_mesh import FileMesh
+from ffr_prep.mesh.formats import format_of
 
 Array = np.ndarray
 
@@ -33,8 +35,7 @@ _DOUBTFUL_LENGTH = 20.0
 _SHOWN_PARTS = 5
 
 
-@dataclass(frozen=True, repr=False)
-class Block(Brief):
+class Block(NamedTuple):
     """Volume elements of one kind: "tet4", "tet10", "hex8", "hex20" or "hex27".
 
     nodes : (E, k) indices into Mesh.points, in the node order of meshio (VTK).
@@ -42,6 +43,9 @@ class Block(Brief):
 
     kind: str
     nodes: Array
+
+    def __repr__(self) -> str:
+        return brief_tuple(self)
 
 
 @dataclass(frozen=True, repr=False)
@@ -135,12 +139,12 @@ def _in_metres(read: FileMesh, scale: float) -> Mesh:
     used = np.unique(np.concatenate([nodes.ravel() for _, nodes in read.blocks]))
     new = np.full(len(read.points), -1)
     new[used] = np.arange(used.size)
-    blocks = [(kind, new[nodes]) for kind, nodes in read.blocks]
+    blocks = tuple(Block(kind, new[nodes]) for kind, nodes in read.blocks)
     faces = {name: whole_faces(blocks, [new[corners] for corners in parts]) for name, parts in read.faces.items()}
     nodes = {name: np.unique(new[members][new[members] >= 0]) for name, members in read.nodes.items()}
     return Mesh(
         points=read.points[used] * scale,
-        blocks=tuple(Block(kind, nodes) for kind, nodes in blocks),
+        blocks=blocks,
         volume_groups=dict(read.volumes),
         face_groups={name: parts for name, parts in faces.items() if parts},
         node_groups={name: members for name, members in nodes.items() if members.size},
@@ -186,7 +190,7 @@ def region_nodes(mesh: Mesh, name: str) -> Array:
 
 def boundary_faces(mesh: Mesh) -> tuple[Array, ...]:
     """The outer faces, one array (F, k) per face size, nodes counter-clockwise seen from outside."""
-    return outer_faces(_pairs(mesh))
+    return outer_faces(mesh.blocks)
 
 
 def surface_triangles(mesh: Mesh) -> tuple[Array, Array]:
@@ -199,17 +203,13 @@ def surface_triangles(mesh: Mesh) -> tuple[Array, Array]:
     return points, triangles.reshape(-1, 3)
 
 
-def _pairs(mesh: Mesh) -> list[tuple[str, Array]]:
-    return [(block.kind, block.nodes) for block in mesh.blocks]
-
-
 # ---- identity -----------------------------------------------------------------------------------------------------
 
 
 def mesh_hash(mesh: Mesh) -> str:
     """A short hash of points, elements and groups."""
     parts = [mesh.points]
-    for kind, nodes in _pairs(mesh):
+    for kind, nodes in mesh.blocks:
         parts += [_bytes(kind), np.asarray(nodes, np.int64)]
     named: dict[str, tuple[Array, ...]] = {f"volume {name}": (of,) for name, of in mesh.volume_groups.items()}
     named |= {f"face {name}": of for name, of in mesh.face_groups.items()}
@@ -244,7 +244,7 @@ def check_mesh(mesh: Mesh) -> None:
 def _check_numbers(mesh: Mesh) -> None:
     if not sum(len(block.nodes) for block in mesh.blocks):
         raise InputError("the mesh has no volume elements; only solids can be reduced, not surfaces or beams")
-    for kind, nodes in _pairs(mesh):
+    for kind, nodes in mesh.blocks:
         if kind not in KINDS or nodes.shape[1:] != (KINDS[kind].size,):
             raise InputError(f"a block of kind {kind!r} has nodes of shape {nodes.shape}; kinds are {', '.join(KINDS)}")
     wrong = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
@@ -269,7 +269,7 @@ def _check_groups(mesh: Mesh) -> None:
 
 def _check_repeated(mesh: Mesh) -> None:
     first = 0
-    for kind, nodes in _pairs(mesh):
+    for kind, nodes in mesh.blocks:
         _, index, counts = np.unique(np.sort(nodes, axis=1), axis=0, return_index=True, return_counts=True)
         if (counts > 1).any():
             element = first + int(index[counts > 1].min())
@@ -281,7 +281,7 @@ def _check_repeated(mesh: Mesh) -> None:
 
 
 def _check_jacobians(mesh: Mesh) -> None:
-    worst = np.concatenate([_worst_jacobians(mesh.points[nodes], kind) for kind, nodes in _pairs(mesh)])
+    worst = np.concatenate([_worst_jacobians(mesh.points[nodes], kind) for kind, nodes in mesh.blocks])
     bad = np.flatnonzero(~(worst > _DEGENERATE))
     if not bad.size:
         return
@@ -325,13 +325,13 @@ def _check_coincident(mesh: Mesh) -> None:
 
 def _check_connected(mesh: Mesh) -> None:
     """Elements must hang together by whole faces; a common node or edge is a hinge."""
-    by_nodes = joined_by_nodes(_pairs(mesh))
+    by_nodes = joined_by_nodes(mesh.blocks)
     if by_nodes.max() > 0:
         raise InputError(
             f"the mesh has {by_nodes.max() + 1} unconnected parts: {_parts_in_words(mesh, by_nodes)}. A body is one "
             "piece: join the parts (shared nodes), or make each a body of its own"
         )
-    by_faces = joined_by_faces(_pairs(mesh))
+    by_faces = joined_by_faces(mesh.blocks)
     if by_faces.max() > 0:
         raise InputError(
             f"the mesh has {by_faces.max() + 1} parts that touch at nodes or edges only, a hinge and not a joint of "

@@ -13,7 +13,7 @@ import meshio
 import numpy as np
 
 from ffr_prep.common.errors import InputError
-from ffr_prep.mesh.formats import FileMesh, supported_kind
+from ffr_prep.mesh.file_mesh import FileMesh, supported_kind
 
 Array = np.ndarray
 
@@ -27,7 +27,7 @@ Groups = Mapping[str, Sequence[Array]]
 
 
 def from_meshio(path: Path) -> FileMesh:
-    """What meshio makes of a file. Raises InputError for a file that it cannot read and for other element kinds."""
+    """The mesh that meshio reads. Raises InputError for a file that it cannot read and for other element kinds."""
     read = _read(path)
     _check_coordinate_systems(path, read)
     volumes = [k for k, block in enumerate(read.cells) if block.dim == 3]

@@ -18,50 +18,34 @@ from ffr_prep.mesh.cells import KINDS, node_order
 
 Array = np.ndarray
 
-_TRIANGLE = np.array([(0, 0), (1, 0), (0, 1), (0.5, 0), (0.5, 0.5), (0, 0.5)])
-_SQUARE = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5), (0.5, 0.5)])
-# Faces by their number of nodes: shape functions, nodes of the reference face in VTK's order, order of the mass rule.
+# Faces by their number of nodes: shape functions, whose order of nodes is VTK's, and order of the mass rule.
 _FACES = {
-    3: (skfem.ElementTriP1, _TRIANGLE[:3], 2),
-    6: (skfem.ElementTriP2, _TRIANGLE, 7),
-    4: (skfem.ElementQuad1, _SQUARE[:4], 5),
-    8: (skfem.ElementQuadS2, _SQUARE[:8], 9),
-    9: (skfem.ElementQuad2, _SQUARE, 9),
+    3: (skfem.ElementTriP1(), 2),
+    6: (skfem.ElementTriP2(), 7),
+    4: (skfem.ElementQuad1(), 5),
+    8: (skfem.ElementQuadS2(), 9),
+    9: (skfem.ElementQuad2(), 9),
 }
 
 
 @dataclass(frozen=True)
-class _NodeNumbers:
-    """Degrees of freedom that are nodes: element_dofs (k, E) in scikit-fem's local order, N in all."""
-
-    element_dofs: Array
-    N: int
-    edge_dofs: tuple[()] = ()
-    facet_dofs: tuple[()] = ()
-
-
-@dataclass(frozen=True)
 class _Elements:
-    """What scikit-fem's bases and mappings ask of a mesh, for elements (or faces) of one kind; doflocs (3, N) [m]."""
+    """What scikit-fem asks of a mesh and of its degrees of freedom, for elements (or faces) of one kind.
+
+    doflocs : (3, N) nodes [m]; element_dofs : (k, E) nodes of the elements in scikit-fem's local order
+    """
 
     doflocs: Array
-    dofs: _NodeNumbers
+    element_dofs: Array
     elem: skfem.Element
+    edge_dofs: tuple[()] = ()  # those of the faces are all in `facets`
+    facet_dofs: tuple[()] = ()
 
-    @property
-    def refdom(self) -> type:
-        """The reference element."""
-        return self.elem.refdom  # type: ignore[no-any-return]
-
-    @property
-    def nelements(self) -> int:
-        """How many elements."""
-        return self.dofs.element_dofs.shape[1]
-
-    @property
-    def facets(self) -> Array:
-        """(k, E) nodes of the elements, where these are faces."""
-        return self.dofs.element_dofs
+    dofs = property(lambda self: self)
+    facets = property(lambda self: self.element_dofs)
+    refdom = property(lambda self: self.elem.refdom)
+    N = property(lambda self: self.doflocs.shape[1])
+    nelements = property(lambda self: self.element_dofs.shape[1])
 
     def dim(self) -> int:
         """Of the space."""
@@ -82,8 +66,9 @@ def local_order(kind: str) -> Array:
 
 def mapping(kind: str, points: Array, nodes: Array) -> skfem.MappingIsoparametric:
     """From the reference element to the elements with these nodes (E, k) of the points (N, 3) [m]."""
-    theirs = _NodeNumbers(np.ascontiguousarray(nodes.T[np.argsort(local_order(kind))]), len(points))
-    return skfem.MappingIsoparametric(_Elements(points.T, theirs, shape_functions(kind)), shape_functions(kind))
+    element = shape_functions(kind)
+    theirs = np.ascontiguousarray(nodes.T[np.argsort(local_order(kind))])
+    return skfem.MappingIsoparametric(_Elements(points.T, theirs, element), element)
 
 
 def determinants(geometry: skfem.MappingIsoparametric, X: Array) -> Array:
@@ -110,11 +95,8 @@ def face_mass(points: Array, faces: Array) -> Array:
     scikit-fem's basis on facets would look for the elements behind them and, by Newton's method, for the points in these;
     a face knows its own shape.
     """
-    shapes, nodes, order = _FACES[faces.shape[1]]
-    element = shapes()
-    theirs = np.linalg.norm(nodes[:, None] - element.doflocs[None], axis=-1).argmin(axis=1)
-    mesh = _Elements(points.T, _NodeNumbers(faces.T[np.argsort(theirs)], len(points)), element)
+    element, order = _FACES[faces.shape[1]]
     X, weights = get_quadrature(element.refdom, order)
-    area = skfem.MappingIsoparametric(mesh, element, element).detDG(X) * weights
-    N = np.stack([np.broadcast_to(element.lbasis(X, i)[0], weights.shape) for i in theirs])
+    area = skfem.MappingIsoparametric(_Elements(points.T, faces.T, element), element, element).detDG(X) * weights
+    N = np.stack([np.broadcast_to(element.lbasis(X, i)[0], weights.shape) for i in range(faces.shape[1])])
     return np.einsum("fq,aq,bq->fab", area, N, N, optimize=True)

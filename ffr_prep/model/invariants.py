@@ -31,7 +31,10 @@ class InertiaIntegrals:
 
 
 def inertia_integrals(points: Array, m: sp.sparray, Phi: Array) -> InertiaIntegrals:
-    """The integrals of nodal positions (N, 3) [m] and a basis Phi (N, 3, n) with the scalar mass m (N, N) [kg]."""
+    """The integrals of nodal positions (N, 3) [m] and a basis Phi (N, 3, n) with the scalar mass m (N, N) [kg].
+
+    Equation (5) of docs/notation.md.
+    """
     count, _, n = Phi.shape
     of_nodes = m @ np.ones(count)
     momenta = m @ points
@@ -46,3 +49,17 @@ def inertia_integrals(points: Array, m: sp.sparray, Phi: Array) -> InertiaIntegr
         rP_dm=(momenta.T @ modes).reshape(3, 3, n),
         PP_dm=(PP + PP.transpose(1, 0, 3, 2)) / 2,
     )
+
+
+# ---- tensors ------------------------------------------------------------------------------------------------------
+
+
+def skew(v: Array) -> Array:
+    """(3, ...) -> (3, 3, ...): the cross product matrix of v."""
+    zero = np.zeros_like(v[0])
+    return np.stack([np.stack([zero, -v[2], v[1]]), np.stack([v[2], zero, -v[0]]), np.stack([-v[1], v[0], zero])])
+
+
+def from_inertia(J: Array) -> Array:
+    """(3, 3, ...) tensor S with J = tr(S) I - S."""
+    return 0.5 * np.einsum("kl,...->kl...", np.eye(3), np.einsum("kk...->...", J)) - J

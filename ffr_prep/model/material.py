@@ -96,11 +96,19 @@ class AnisotropicMaterial:
         return np.einsum("ia,jb,kc,ld,abcd->ijkl", R, R, R, R, C, optimize=True)
 
     def engineering_constants(self) -> tuple[float, float]:
-        """Not a number, twice: the strain of a stress takes more than two constants."""
-        return math.nan, math.nan
+        """Zeros: the strain of a stress takes more than two constants."""
+        return 0.0, 0.0
 
 
 Solid = Material | AnisotropicMaterial
+
+
+def check_isotropic(material: Solid, owner: str) -> None:
+    """InputError where beams and plates are given an anisotropic material."""
+    if not isinstance(material, Material):
+        raise InputError(
+            f"{owner}: material {material.name!r} is not isotropic, as beams and plates must be: mesh the part as a solid"
+        )
 
 
 def orthotropic(

@@ -164,7 +164,7 @@ def _provenance(body: FlexibleBody, conditions: ReferenceConditions) -> dict[str
 
 
 def _losses(body: FlexibleBody, before: Mapping[str, Any]) -> list[str]:
-    """What the conversion cannot bring back, in words."""
+    """The losses that the conversion cannot bring back, in words."""
     lost = []
     count = condition_count(before)
     if count > 6:

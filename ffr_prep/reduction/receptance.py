@@ -44,7 +44,7 @@ class FreeModes:
 
 
 def free_modes(model: CoupledModel, basis: Basis) -> FreeModes:
-    """What the basis, together with the rigid motions, has as elastic modes of the free body."""
+    """The elastic modes of the free body that the basis has together with the rigid motions."""
     momenta = model.M @ model.T
     rigid = np.linalg.solve(model.T.T @ momenta, momenta.T @ basis.Z)
     M = np.eye(basis.omega2.size) - (momenta.T @ basis.Z).T @ rigid

@@ -15,6 +15,7 @@ from ffr_prep.mesh.shapes import face_mass
 from ffr_prep.model.accelerations import INERTIAL
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion, check_independent, in_words, rigid_field, skew_columns
 from ffr_prep.model.region_rotations import MeanRegion, RigidRegion, force_moments
+from ffr_prep.model.ties import check_names, interface_coordinates, six_rows, tied_rows
 from ffr_prep.solids.assembly import SolidMatrices, vector_mass
 
 Array = np.ndarray
@@ -29,11 +30,11 @@ def couple(mesh: Mesh, matrices: SolidMatrices, interfaces: Sequence[InterfaceRe
     Raises InputError for repeated names, an unknown region, a region of fewer than three or of collinear nodes,
     rigid regions that share nodes, interfaces whose coordinates depend on one another, and a mesh in several parts.
     """
-    _check_names(interfaces)
+    check_names(interfaces)
     regions = [_region(mesh, interface) for interface in interfaces]
     _check_overlaps(regions)
     B = _transformation(mesh.points, regions)
-    C = _coordinates(len(mesh.points), regions, B)
+    C = interface_coordinates(list(map(_follows, regions)), B, lambda k: _on_nodes(len(mesh.points), regions[k]))
     check_independent(interfaces, C)
     K = sp.csr_array(B.T @ matrices.K @ B)
     _check_connected(K)
@@ -167,40 +168,18 @@ def _free_nodes(points: Array, regions: Sequence[_Region]) -> Array:
 
 def _transformation(points: Array, regions: Sequence[_Region]) -> sp.csr_array:
     """B (3N, Z): the free nodes' displacements first, then six coordinates for each rigid interface."""
-    rigid = _rigid(regions)
-    free_dofs = np.flatnonzero(np.repeat(_free_nodes(points, regions), 3))
-    rows, columns, values = [free_dofs], [np.arange(free_dofs.size)], [np.ones(free_dofs.size)]
-    for k, region in enumerate(rigid):
-        following = rigid_field(points[region.nodes] - region.point)
-        node_rows = 3 * region.nodes[:, None, None] + np.arange(3)[None, :, None]
-        coordinate_columns = free_dofs.size + 6 * k + np.arange(6)[None, None, :]
-        rows.append(np.broadcast_to(node_rows, following.shape).ravel())
-        columns.append(np.broadcast_to(coordinate_columns, following.shape).ravel())
-        values.append(following.ravel())
-    shape = (3 * len(points), free_dofs.size + 6 * len(rigid))
-    triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    return sp.csr_array(sp.coo_array(triplets, shape=shape))
+    free = np.flatnonzero(np.repeat(_free_nodes(points, regions), 3))
+    following = [(_dofs(r), rigid_field(points[r.nodes] - r.point).reshape(-1, 6)) for r in _rigid(regions)]
+    return tied_rows(3 * len(points), free, following)
 
 
-def _coordinates(count: int, regions: Sequence[_Region], B: sp.csr_array) -> sp.csr_array:
-    """C (6I, Z) of all interfaces in their order."""
-    first = B.shape[1] - 6 * len(_rigid(regions))
-    parts = [sp.csr_array((0, B.shape[1]))]
-    for region in regions:
-        if _follows(region):
-            parts.append(sp.eye_array(6, B.shape[1], k=first, format="csr"))
-            first += 6
-        else:
-            parts.append(_on_nodes(count, region) @ B)
-    return sp.csr_array(sp.vstack(parts, format="csr"))
+def _dofs(region: _Region) -> Array:
+    return (3 * region.nodes[:, None] + np.arange(3)).ravel()
 
 
 def _on_nodes(count: int, region: _Region) -> sp.csr_array:
     """(6, 3N) the mean motion as rows on the nodal displacements."""
-    motion = _mean_motion(region).reshape(6, -1)
-    dofs = (3 * region.nodes[:, None] + np.arange(3)).ravel()
-    ends = np.arange(7) * dofs.size
-    return sp.csr_array((motion.ravel(), np.tile(dofs, 6), ends), shape=(6, 3 * count))
+    return six_rows(_mean_motion(region).reshape(6, -1), _dofs(region), 3 * count)
 
 
 def _rigid_motions(points: Array, centre: Array, regions: Sequence[_Region]) -> Array:
@@ -214,16 +193,6 @@ def _rigid_motions(points: Array, centre: Array, regions: Sequence[_Region]) -> 
 def _places(points: Array, regions: Sequence[_Region]) -> Array:
     of_nodes = np.repeat(points[_free_nodes(points, regions)], 3, axis=0)
     return np.vstack([of_nodes, np.full((6 * len(_rigid(regions)), 3), np.nan)])
-
-
-def _check_names(interfaces: Sequence[InterfaceRegion]) -> None:
-    texts = [interface for interface in interfaces if isinstance(interface, str)]
-    if texts:
-        raise InputError(f"interface {texts[0]!r} is a text; write InterfaceRegion({texts[0]!r})")
-    names = [interface.name for interface in interfaces]
-    repeated = sorted({name for name in names if names.count(name) > 1})
-    if repeated:
-        raise InputError(f"interface name {repeated[0]!r} is given more than once: every interface needs its own name")
 
 
 def _check_not_collinear(interface: InterfaceRegion, second_moment: Array, centroid: Array) -> None:

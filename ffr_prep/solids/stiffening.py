@@ -25,7 +25,6 @@ from ffr_prep.mesh.mesh import Mesh
 from ffr_prep.model.accelerations import unit_accelerations
 from ffr_prep.solids.assembly import (
     Chunk,
-    Gradients,
     Materials,
     SolidMatrices,
     chunks,
@@ -38,17 +37,15 @@ Array = np.ndarray
 
 def stiffening_of(mesh: Mesh, material: Materials, static: Array, Phi: Array) -> Array:
     """(r, n, n) geometric stiffness of the basis Phi (N, 3, n) under r loads with the displacements static (N, 3, r)."""
-
-    def part(chunk: Chunk) -> Array:
-        return _of_elements(displacement_gradients(mesh.points, chunk), static, Phi)
-
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # summed in the order of the elements, whoever is first
-        K = sum(pool.map(part, chunks(mesh, material)), np.zeros((static.shape[2], Phi.shape[2], Phi.shape[2])))
+        parts = pool.map(lambda chunk: _of_chunk(mesh.points, chunk, static, Phi), chunks(mesh, material))
+        K = sum(parts, np.zeros((static.shape[2], Phi.shape[2], Phi.shape[2])))
     return (K + K.transpose(0, 2, 1)) / 2
 
 
-def _of_elements(elements: Gradients, static: Array, Phi: Array) -> Array:
-    """Their part: sums over their points q, over m and over k."""
+def _of_chunk(points: Array, chunk: Chunk, static: Array, Phi: Array) -> Array:
+    """The part of some elements: sums over their points q, over m and over k."""
+    elements = displacement_gradients(points, chunk)
     n = Phi.shape[2]
     modes = np.ascontiguousarray(elements.gradient(Phi).transpose(0, 2, 1, 3)).reshape(-1, 3, 3 * n)  # [q, k, m n]
     stress = np.ascontiguousarray(np.moveaxis(elements.stress(static) * elements.volume[:, None, None, None], 3, 0))

@@ -141,7 +141,7 @@ def _picked(mesh: Mesh, keep: Array) -> Mesh:
 def _materials(mesh: Mesh, material: Materials) -> tuple[Array, Array]:
     """(m, 2) engineering constants of the materials that differ elastically, and their number for each element.
 
-    The constants are Young's modulus [Pa] and Poisson's ratio, not a number where the material is anisotropic.
+    The constants are Young's modulus [Pa] and Poisson's ratio, zeros where the material is anisotropic.
     """
     materials, of_element = element_materials(mesh, material)
     used, of_element = np.unique(of_element, return_inverse=True)

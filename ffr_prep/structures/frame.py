@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from itertools import pairwise
 
 import numpy as np
@@ -17,7 +16,8 @@ from ffr_prep.body import content_hash
 from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import extent_in_words
-from ffr_prep.model.material import Material
+from ffr_prep.common.registry import choice
+from ffr_prep.model.material import Material, check_isotropic
 from ffr_prep.structures.sections import Section
 
 Array = np.ndarray
@@ -41,6 +41,7 @@ class Member:
     orientation: Vector | None = None
 
     def __post_init__(self) -> None:
+        check_isotropic(self.material, f"member of {self.section.name!r}")
         given = self.orientation
         if given is not None and (np.shape(given) != (3,) or not 0 < np.linalg.norm(given) < np.inf):
             raise InputError(f"member of {self.section.name!r}: orientation {given} is not a direction (x, y, z)")
@@ -62,6 +63,7 @@ class Shell:
     gyration: float | None = None
 
     def __post_init__(self) -> None:
+        check_isotropic(self.material, "shell")
         if not 0 < self.thickness < math.inf:
             raise InputError(f"shell of {self.material.name}: the thickness is {self.thickness} m; it must be positive")
         if self.gyration is None:
@@ -267,10 +269,8 @@ def _size(points: Array) -> float:
 def group_nodes(frame: Frame, name: str) -> Array:
     """(m,) nodes of a group, ascending; InputError lists the groups there are."""
     if name not in frame.node_groups:
-        near = get_close_matches(name, frame.node_groups, n=1, cutoff=0.5)
-        known = ", ".join(repr(one) for one in frame.node_groups) or "none; name nodes with named(frame, ...)"
-        meant = f"did you mean {near[0]!r}? There" if near else "there"
-        raise InputError(f"the frame has no group of nodes {name!r}; {meant} are: {known}")
+        hint = "" if frame.node_groups else "; name nodes with named(frame, ...)"
+        raise InputError(f"the frame has no group of nodes {name!r}; {choice(name, frame.node_groups)}{hint}")
     return np.unique(frame.node_groups[name])
 
 

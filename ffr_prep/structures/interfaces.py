@@ -25,6 +25,7 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.model.accelerations import INERTIAL, turns
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion, rigid_field
 from ffr_prep.model.region_rotations import MeanRegion, RigidRegion, force_moments
+from ffr_prep.model.ties import check_names, interface_coordinates, six_rows, tied_rows
 from ffr_prep.structures.frame import Frame, group_nodes
 
 Array = np.ndarray
@@ -54,24 +55,10 @@ def couple_frame(
         names=tuple(interface.name for interface in interfaces),
         kinds=tuple("node" if len(_nodes(frame, i)) == 1 else i.kind for i in interfaces),
         positions=positions,
-        C=_coordinates(frame, interfaces, positions, ties),
+        C=interface_coordinates(
+            rigid.tolist(), ties, lambda k: _mean_motion(frame, _nodes(frame, interfaces[k]), positions[k])
+        ),
     )
-
-
-def _coordinates(
-    frame: Frame, interfaces: Sequence[InterfaceRegion], positions: Array, ties: sp.csr_array
-) -> sp.csr_array:
-    """C (6I, Z) of all interfaces in their order."""
-    size = ties.shape[1]
-    first = size - 6 * sum(interface.kind == "rigid" for interface in interfaces)
-    parts = [sp.csr_array((0, size))]
-    for interface, position in zip(interfaces, positions, strict=True):
-        if interface.kind == "rigid":
-            parts.append(sp.eye_array(6, size, k=first, format="csr"))
-            first += 6
-        else:
-            parts.append(_mean_motion(frame, _nodes(frame, interface), position) @ ties)
-    return sp.csr_array(sp.vstack(parts, format="csr"))
 
 
 def _mean_motion(frame: Frame, nodes: Array, position: Array) -> sp.csr_array:
@@ -82,9 +69,12 @@ def _mean_motion(frame: Frame, nodes: Array, position: Array) -> sp.csr_array:
     R = rigid_coordinates(at - position)
     weighted = weight @ R
     motion = np.linalg.solve(np.einsum("nci,ncj->ij", R, weighted), weighted.reshape(-1, 6).T)
-    columns = (6 * nodes[:, None] + np.arange(6)).ravel()
-    ends = columns.size * np.arange(7)
-    return sp.csr_array((motion.ravel(), np.tile(columns, 6), ends), shape=(6, 6 * len(frame.points)))
+    return six_rows(motion, _dofs(nodes), 6 * len(frame.points))
+
+
+def _dofs(nodes: Array) -> Array:
+    """(6m,) the coordinates of nodes (m,)."""
+    return (6 * nodes[:, None] + np.arange(6)).ravel()
 
 
 def rotation_weight(at: Array) -> Array:
@@ -160,19 +150,12 @@ def tie(frame: Frame, interfaces: Sequence[InterfaceRegion]) -> sp.csr_array:
     _check_interfaces(frame, interfaces)
     rigid = [interface for interface in interfaces if interface.kind == "rigid"]
     positions = _interface_points(frame, rigid)
-    free = (6 * _free_nodes(frame, interfaces)[:, None] + np.arange(6)).ravel()
-    rows, columns, values = [free], [np.arange(free.size)], [np.ones(free.size)]
-    for k, interface in enumerate(rigid):
-        nodes = _nodes(frame, interface)
-        following = rigid_coordinates(frame.points[nodes] - positions[k])
-        own_rows = 6 * nodes[:, None, None] + np.arange(6)[:, None]
-        own_columns = free.size + 6 * k + np.arange(6)
-        rows.append(np.broadcast_to(own_rows, following.shape).ravel())
-        columns.append(np.broadcast_to(own_columns, following.shape).ravel())
-        values.append(following.ravel())
-    shape = (6 * len(frame.points), free.size + 6 * len(rigid))
-    triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    return sp.csr_array(sp.coo_array(triplets, shape=shape))
+    nodes = [_nodes(frame, interface) for interface in rigid]
+    following = [
+        (_dofs(of), rigid_coordinates(frame.points[of] - at).reshape(-1, 6))
+        for of, at in zip(nodes, positions, strict=True)
+    ]
+    return tied_rows(6 * len(frame.points), _dofs(_free_nodes(frame, interfaces)), following)
 
 
 def rigid_coordinates(offsets: Array) -> Array:
@@ -204,10 +187,7 @@ def _places(frame: Frame, interfaces: Sequence[InterfaceRegion], positions: Arra
 
 
 def _check_interfaces(frame: Frame, interfaces: Sequence[InterfaceRegion]) -> None:
-    names = [interface.name for interface in interfaces]
-    repeated = sorted({name for name in names if names.count(name) > 1})
-    if repeated:
-        raise InputError(f"interface name {repeated[0]!r} is given more than once: every interface needs its own name")
+    check_names(interfaces)
     owner: dict[int, str] = {}
     for interface in interfaces:
         for node in _nodes(frame, interface).tolist():

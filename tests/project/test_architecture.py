@@ -255,6 +255,16 @@ def test_functions_are_short():
     assert sorted(lengths.values())[len(lengths) * 9 // 10] <= USUAL_FUNCTION
 
 
+# The comparison with another code, which the benchmarks' own libraries bring, is all that a test has of them.
+OF_BENCHMARKS = {"test_against_exudyn.py"}
+
+
+def test_tests_do_without_benchmarks():
+    sources = {path: path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("*.py")}
+    found = {path.name for path, text in sources.items() for i in imports(text, "tests") if top(i.name) == "benchmarks"}
+    assert found == OF_BENCHMARKS
+
+
 # ---- what a start loads ---------------------------------------------------------------------------------------------
 
 
@@ -348,10 +358,10 @@ def test_every_folder_of_modules_is_a_package_and_is_installed():
 
 
 def test_the_packages_hold_nothing_but_modules():
-    """Anything else would be missing from an installed copy, but the marks of typed packages, which are declared."""
+    """Anything else would be missing from an installed copy, but for the mark that says that types are given."""
     files = [path for package in PACKAGES for path in (ROOT / package).rglob("*") if path.is_file()]
-    others = [p for p in files if p.suffix != ".py" and "__pycache__" not in p.parts]
-    assert [str(p) for p in others if p.name != "py.typed"] == []
+    others = [p.relative_to(ROOT).as_posix() for p in files if p.suffix != ".py" and "__pycache__" not in p.parts]
+    assert set(others) <= {f"{package}/py.typed" for package in PACKAGES}
     assert PROJECT["tool"]["setuptools"]["package-data"] == {"*": ["py.typed"]}
 
 

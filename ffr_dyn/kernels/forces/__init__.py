@@ -1,1 +1,4 @@
-"""Applied forces, compiled."""
+"""Applied forces, compiled.
+
+Twin: `ffr_dyn.equations.forces.applied`.
+"""

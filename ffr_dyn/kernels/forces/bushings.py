@@ -2,7 +2,9 @@
 
 With the axes a_k of i and b_l of j, B_kl = a_k . b_l is the relative rotation. Its axial vector z = sin(phi) axis and its
 trace 1 + 2 cos(phi) give the rotation vector psi = z phi / sin(phi). All are made of products of axes, whose gradients are
-those of the dot-1 and dot-2 rows; the chain rule gives the generalised forces. Readable twin: `ffr_dyn.equations.forces`.
+those of the dot-1 and dot-2 rows; the chain rule gives the generalised forces.
+
+Twin: `ffr_dyn.equations.forces.applied`.
 """
 
 import math

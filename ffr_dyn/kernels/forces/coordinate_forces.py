@@ -2,6 +2,8 @@
 
 The generalised force is the law's force times the gradient of the coordinate, so that force and rate make its power on
 rigid and flexible bodies alike, and both bodies together feel neither force nor moment.
+
+Twin: `ffr_dyn.equations.forces.applied`.
 """
 
 import math

@@ -1,6 +1,6 @@
 """Force laws of a joint coordinate or a length: what acts on it, positive where it increases it.
 
-Readable twin: `ffr_dyn.equations.forces`.
+Twin: `ffr_dyn.equations.forces.applied`.
 """
 
 import math

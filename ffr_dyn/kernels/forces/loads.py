@@ -1,4 +1,7 @@
-"""All applied loads: wrenches on markers, forces on coordinates, bushings, spread loads, values of Python functions."""
+"""All applied loads: wrenches on markers, forces on coordinates, bushings, spread loads, values of Python functions.
+
+Twin: `ffr_dyn.equations.forces.applied`.
+"""
 
 from numba import types
 

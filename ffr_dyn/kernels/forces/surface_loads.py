@@ -1,4 +1,7 @@
-"""Loads spread over a body: their integrals over its basis (`ffr_dyn.scene.surface_loads`) at the present q and rotation."""
+"""Loads spread over a body: their integrals over its basis (`ffr_dyn.scene.surface_loads`) at the present q and rotation.
+
+Twin: `ffr_dyn.scene.surface_loads.distributed`.
+"""
 
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.simd.slices import part

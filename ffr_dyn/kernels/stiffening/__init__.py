@@ -1,1 +1,4 @@
-"""Geometric stiffening by load, compiled."""
+"""Geometric stiffening by load, compiled.
+
+Twin: `ffr_dyn.equations.stiffening.geometric_stiffening`.
+"""

@@ -18,6 +18,8 @@ So the loads act late on the motion that makes them. That can feed a vibration, 
 themselves: the ratio of two sweeps. It must be less than half of what the damping of the method bears, whatever the
 frequency, and is looked at from time to time, as are the forces; else, and where loads jump, sweeps are done
 (`ffr_dyn.kernels.stiffening.by_load`).
+
+Twin: `ffr_dyn.equations.stiffening.geometric_stiffening`.
 """
 
 from ffr_dyn.kernels.options import inlined, kernel

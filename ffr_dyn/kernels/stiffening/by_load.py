@@ -8,6 +8,8 @@ Within a step the first guess is extrapolated from the same stages of the steps 
 sweep that begins with it is right to that order, times the small factor above: none of the methods loses its order. More
 follow where the guess turns out poor, as after an impact. Where that factor is very small even less has to be done in every
 stage: see `ffr_dyn.kernels.stiffening.ahead`.
+
+Twin: `ffr_dyn.equations.stiffening.geometric_stiffening`.
 """
 
 from ffr_dyn.kernels.options import inlined, kernel

@@ -1,4 +1,9 @@
-"""The loads that stiffen a body, and the sum of its stiffness by load."""
+"""The loads that stiffen a body, and the sum of its stiffness by load.
+
+Twin: `ffr_dyn.equations.stiffening.stiffening_force`,
+`ffr_dyn.equations.stiffening.frame_loads`,
+`ffr_dyn.equations.stiffening.wrench_at`.
+"""
 
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.rows import reaction

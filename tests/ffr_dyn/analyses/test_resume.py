@@ -164,14 +164,14 @@ def test_a_checkpoint_of_another_version_is_refused(tmp_path, monkeypatch):
 
 def test_measuring_in_parts_gives_the_same_bits():
     """Angles, elastic displacements, work: however many rows are looked at together."""
-    from ffr_dyn.compile.engine import fill_rows, new_machine
+    from ffr_dyn.compile.engine import fill_rows, new_engine
     from ffr_dyn.compile.workspace import new_record
     from ffr_dyn.consistency.assemble import assemble
     from ffr_dyn.kernels.tables import Record
 
     state, method = assemble(SCENE), ROS2(1e-3)
     system, record = state.system, new_record(state.system, 40)
-    fill_rows(new_machine(system, state.x, state.v, method, (0.0, 0.0, 1e-9)), record, 0.0, 1)
+    fill_rows(new_engine(system, state.x, state.v, method, (0.0, 0.0, 1e-9)), record, 0.0, 1)
     wanted = selected(system, ("*",))
     once, _ = measure(system, record, {}, wanted)
     for sizes in ([1] * 40, [3, 1, 13, 7, 16], [39, 1]):

@@ -19,7 +19,8 @@ from places import ROOT
 from synthetic import cloud
 
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.analyses.settings import Kinematic, Settings
+from ffr_dyn.analyses.kinematic import Kinematic
+from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.chart.diagram import COSTS, Diagram, Lost, Point, measures_of, quantities_of, run_variants, work_precision
 from ffr_dyn.chart.draw import draw_chart
 from ffr_dyn.chart.measures import Deflection, measure_of

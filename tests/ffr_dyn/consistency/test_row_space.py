@@ -45,6 +45,16 @@ def test_rows_that_depend_on_others_or_nearly_are_left_to_dense_decompositions(o
     np.testing.assert_array_equal(found, np.linalg.lstsq(A, target, rcond=1e-10)[0])
 
 
+def test_rounding_that_couples_a_dependent_row_with_others_makes_nothing_independent():
+    """The pivot of the second row is zero to the last bit, and the third row offers 1e-11 in its place."""
+    A = np.zeros((6, 7))
+    A[0, 0] = A[1, 0] = 1.0
+    A[1, 1] = 1e-11
+    A[2:, 1:6] = np.random.default_rng(6).normal(size=(4, 5))
+    assert np.linalg.svd(A)[1].min() < 1e-10
+    assert not independent(sp.csr_array(A))
+
+
 def test_rows_that_vanish_or_are_too_many_are_dependent():
     A = banded(5)
     A[3] = 0.0

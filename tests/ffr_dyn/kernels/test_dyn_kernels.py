@@ -10,7 +10,7 @@ from ffr_gallery.bodies import beam
 from synthetic import cloud, mirrored
 
 from ffr_dyn.compile.body_tables import loads_that_stiffen, of_coordinates
-from ffr_dyn.compile.engine import evaluate_at, new_machine
+from ffr_dyn.compile.engine import evaluate_at, new_engine
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.compile.symmetry_blocks import in_blocks
 from ffr_dyn.equations.constraint_rows import drive_of, rows_at
@@ -165,9 +165,9 @@ def test_compiled_accelerations_and_multipliers_equal_the_dense_solution(kind, s
     scene = chain(*sizes, kind=kind, axis=(0.2, 1.0, 0.3), axis_j=(1.0, -0.5, 0.4))
     system = compile_scene(scene)
     x, v = random_state(scene)
-    machine = new_machine(system, x, v)
-    assert evaluate_at(machine, 0.0, x, v) == OK
-    work, twin = machine.work, equations_of_motion(scene, 0.0, x, v, system.blocks)
+    engine = new_engine(system, x, v)
+    assert evaluate_at(engine, 0.0, x, v) == OK
+    work, twin = engine.work, equations_of_motion(scene, 0.0, x, v, system.blocks)
     rows, gamma = twin.rows, np.array([row.gamma for row in twin.rows])
     solution, size = np.concatenate([twin.acceleration, twin.lam]), twin.Q.size
     np.testing.assert_allclose(work.rows.Phi, [row.Phi for row in rows], rtol=0, atol=1e-13)
@@ -195,11 +195,11 @@ def test_a_symmetric_body_is_computed_in_blocks_and_equals_its_twin(planes, bloc
     assert system.model.bodies.blocks[0] == blocks
     assert system.model.bodies.PP_dm.size < 0.6 * 9 * 24**2
     x, v = random_state(scene)
-    machine = new_machine(system, x, v)
-    assert evaluate_at(machine, 0.0, x, v) == OK
+    engine = new_engine(system, x, v)
+    assert evaluate_at(engine, 0.0, x, v) == OK
     twin = equations_of_motion(scene, 0.0, x, v, system.blocks)
     scale = max(np.abs(twin.acceleration).max(), np.abs(twin.lam).max())
-    np.testing.assert_allclose(machine.work.bodies.acc, twin.acceleration, rtol=0, atol=1e-10 * scale)
+    np.testing.assert_allclose(engine.work.bodies.acc, twin.acceleration, rtol=0, atol=1e-10 * scale)
 
 
 def products_by_plan(pool, plan, q, count, last):
@@ -259,9 +259,9 @@ def test_geometric_stiffness_in_blocks_is_the_sum_of_the_whole(n, families, symm
     )
     system = compile_scene(scene)
     x, v = random_state(scene)
-    machine = new_machine(system, x, v)
-    assert evaluate_at(machine, 0.0, x, v) == OK
-    work = machine.work.bodies
+    engine = new_engine(system, x, v)
+    assert evaluate_at(engine, 0.0, x, v) == OK
+    work = engine.work.bodies
     for b, at_marker in ((0, 24), (2, 12)):
         loads, first = loads_that_stiffen(system.model.bodies, b), system.model.bodies.where[b, IN_Q]
         assert loads.tolist() == [k for k in (*range(12), *range(at_marker, at_marker + 6)) if K[k].any()]
@@ -272,11 +272,11 @@ def test_geometric_stiffness_in_blocks_is_the_sum_of_the_whole(n, families, symm
 
 def test_tables_lie_at_the_starts_of_cache_lines():
     system = compile_scene(Scene(bodies=(Body("one", cloud(5)), Body("two", cloud(3)))))
-    machine = new_machine(system, *random_state(system.scene), RK4(1e-3))
-    for tables in (system.model.bodies, machine.work.rows, machine.work.bodies, machine.tables.stages):
+    engine = new_engine(system, *random_state(system.scene), RK4(1e-3))
+    for tables in (system.model.bodies, engine.work.rows, engine.work.bodies, engine.tables.stages):
         assert all(array.ctypes.data % 64 == 0 and array.flags.c_contiguous for array in tables if array.size)
-    assert machine.work.markers.A is machine.work.bodies.A
-    assert machine.tables.x.ctypes.data % 64 == 0
+    assert engine.work.markers.A is engine.work.bodies.A
+    assert engine.tables.x.ctypes.data % 64 == 0
 
 
 def test_a_body_without_symmetry_and_one_of_few_modes_are_one_block():
@@ -392,9 +392,9 @@ def test_compiled_drivers_equal_the_readable_ones(kind, coordinate):
     scene = replace(chain(kind=kind), drivers=(Driver("drive", "tie", DRIVE, coordinate=coordinate),))
     system = compile_scene(scene)
     (x, v), t = random_state(scene), 0.37
-    machine = new_machine(system, x, v)
-    assert evaluate_at(machine, t, x, v) == OK
-    work = machine.work
+    engine = new_engine(system, x, v)
+    assert evaluate_at(engine, t, x, v) == OK
+    work = engine.work
     rows = rows_at(scene, system.layout, list(system.blocks), x, v, t)
     for name in ("Phi", "nu", "gamma"):
         np.testing.assert_allclose(getattr(work.rows, name), [getattr(r, name) for r in rows], rtol=0, atol=1e-11)

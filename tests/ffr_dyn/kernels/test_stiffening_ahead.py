@@ -12,7 +12,7 @@ from test_dyn_references import mass_point
 from test_integrators_implicit import stiffened_pendulum
 
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.compile.engine import fill_rows, new_machine
+from ffr_dyn.compile.engine import fill_rows, new_engine
 from ffr_dyn.compile.workspace import _AT_END, _BEARABLE, new_record
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.functions.time_functions import polynomial
@@ -107,16 +107,16 @@ def test_the_feedback_that_is_allowed_is_half_of_what_the_damping_of_the_method_
 # ---- order and accuracy -----------------------------------------------------------------------------------------------
 
 
-def machine_of(scene: Scene, method):
-    """A machine at the start, and a function that does a number of steps with it."""
+def engine_of(scene: Scene, method):
+    """An engine at the start, and a function that does a number of steps with it."""
     made = assemble(scene)
-    machine = new_machine(made.system, made.x.copy(), made.v.copy(), method, (0.0, 0.0, 1e-9))
+    engine = new_engine(made.system, made.x.copy(), made.v.copy(), method, (0.0, 0.0, 1e-9))
     record = new_record(made.system, 1)
 
     def go(steps: int) -> None:
-        assert fill_rows(machine, record, 0.0, steps) == 0
+        assert fill_rows(engine, record, 0.0, steps) == 0
 
-    return machine, go
+    return engine, go
 
 
 def spinning_blade(speed: float = 60.0) -> Scene:
@@ -143,11 +143,11 @@ def test_looking_ahead_keeps_the_order(method, step):
                        for h in (step, step / 2)])  # fmt: skip
     assert errors[1, 0] < errors[0, 0] / 2 ** (method.order - 0.3)
     np.testing.assert_allclose(errors[:, 0], errors[:, 1], rtol=0.02)
-    machine, go = machine_of(scene, method(step))
+    engine, go = engine_of(scene, method(step))
     go(SETTLED)
-    assert machine.work.bodies.ahead[IN_USE] == 0.0
+    assert engine.work.bodies.ahead[IN_USE] == 0.0
     go(1)
-    assert machine.work.bodies.ahead[IN_USE] == 1.0
+    assert engine.work.bodies.ahead[IN_USE] == 1.0
 
 
 @pytest.mark.parametrize(("method", "step"), [(ROS2, 0.02), (ROS3, 0.02), (ROS3, 0.006), (ROS3, 0.06)])
@@ -181,9 +181,9 @@ def test_loads_that_change_themselves_too_much_are_swept():
     scene = stiffened_pendulum()
     fast = replace(scene, bodies=tuple(replace(body, omega_bar=(0, 0, 20.0)) for body in scene.bodies))
     for links, used in ((scene, True), (fast, False)):
-        machine, go = machine_of(links, ROS3(1e-4))
+        engine, go = engine_of(links, ROS3(1e-4))
         go(300)
-        ahead = machine.work.bodies.ahead
+        ahead = engine.work.bodies.ahead
         assert bool(ahead[PAUSE] < WATCH) is used
         assert bool(ahead[COUNT] > 0.0) is used
 
@@ -193,8 +193,8 @@ def test_a_load_that_jumps_is_swept_and_costs_no_accuracy():
     step, start = 2e-4, 50
     pull = Load("pull", "blade.tip", force=(lambda t: 600.0 * (t > (start - 0.5) * step), 0.0, 0.0))
     scene = replace(spinning_blade(10.0), loads=(pull,))
-    machine, go = machine_of(scene, ROS3(step))
-    ahead = machine.work.bodies.ahead
+    engine, go = engine_of(scene, ROS3(step))
+    ahead = engine.work.bodies.ahead
     go(start)
     assert ahead[IN_USE] == 1.0
     go(1)
@@ -221,14 +221,14 @@ def test_loads_that_are_noisy_cost_no_accuracy(share):
 
 
 def test_a_new_length_of_steps_begins_anew():
-    machine, go = machine_of(spinning_blade(), ROS3(2e-4))
+    engine, go = engine_of(spinning_blade(), ROS3(2e-4))
     go(20)
-    assert machine.work.bodies.ahead[IN_USE] == 1.0
-    machine.tables.clock.time[:] = 1e-4
+    assert engine.work.bodies.ahead[IN_USE] == 1.0
+    engine.tables.clock.time[:] = 1e-4
     go(SETTLED)
-    assert machine.work.bodies.ahead[IN_USE] == 0.0
+    assert engine.work.bodies.ahead[IN_USE] == 0.0
     go(1)
-    assert machine.work.bodies.ahead[IN_USE] == 1.0
+    assert engine.work.bodies.ahead[IN_USE] == 1.0
 
 
 def test_a_restored_state_goes_on_to_the_same_bits():

@@ -9,7 +9,7 @@ import pytest
 from synthetic import cloud
 
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.compile.engine import evaluate_at, new_machine
+from ffr_dyn.compile.engine import evaluate_at, new_engine
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.equations.constraint_rows import rows_at
 from ffr_dyn.equations.layout import layout
@@ -86,9 +86,9 @@ def test_compiled_couplings_equal_the_readable_ones_and_the_dense_solution(first
     scene = replace(arm(), couplings=(Coupling("gear", first, second, -1.5, offset=0.2),))
     system = compile_scene(scene)
     place, x, v = state(scene)
-    machine = new_machine(system, x, v)
-    assert evaluate_at(machine, 0.0, x, v) == OK
-    work = machine.work
+    engine = new_engine(system, x, v)
+    assert evaluate_at(engine, 0.0, x, v) == OK
+    work = engine.work
     rows = rows_at(scene, place, list(system.blocks), x, v, 0.0)
     for name in ("Phi", "nu", "gamma"):
         np.testing.assert_allclose(getattr(work.rows, name), [getattr(r, name) for r in rows], rtol=0, atol=1e-11)

@@ -12,7 +12,7 @@ from synthetic import cloud
 from test_dyn_kernels import chain, moved, random_state
 
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.compile.engine import evaluate_at, load_at, new_machine
+from ffr_dyn.compile.engine import evaluate_at, load_at, new_engine
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.force_jacobian import applied_forces, force_jacobian, small_motion
@@ -90,9 +90,9 @@ def test_compiled_forces_equal_the_readable_ones(force, sizes):
     system = compile_scene(scene)
     for seed in range(3):
         x, v = random_state(scene, seed)
-        machine = new_machine(system, x, v)
-        work = machine.work
-        assert load_at(machine, 0.37, x, v) == OK
+        engine = new_engine(system, x, v)
+        work = engine.work
+        assert load_at(engine, 0.37, x, v) == OK
         twin = alone(scene, x, v)
         scale = max(1.0, np.abs(twin.generalised).max())
         np.testing.assert_allclose(work.bodies.f, twin.generalised, rtol=0, atol=1e-12 * scale)
@@ -324,11 +324,11 @@ def test_a_spring_wound_at_the_start_unwinds():
 def test_turns_are_counted_from_accepted_states_and_evaluating_changes_nothing():
     scene = rotor(JointSpring("s", "hinge", 2.0, turns=1))
     system = compile_scene(scene)
-    machine = new_machine(system, np.array([0, 0, 0, 1.0, 0, 0, 0]), np.zeros(6))
-    work = machine.work
+    engine = new_engine(system, np.array([0, 0, 0, 1.0, 0, 0, 0]), np.zeros(6))
+    work = engine.work
     for angle in (0.0, 3.0, -3.0, 0.5):
         x = np.array([0, 0, 0, np.cos(angle / 2), 0, 0, np.sin(angle / 2)])
-        load_at(machine, 0.0, x, np.zeros(6))
+        load_at(engine, 0.0, x, np.zeros(6))
         assert work.loads.action[0, 0] == pytest.approx(2 * np.pi + angle)
     assert work.loads.reference[0] == pytest.approx(2 * np.pi)
 
@@ -604,9 +604,9 @@ def test_a_modal_force_accelerates_as_the_mass_matrix_says():
     body = cloud(2, stiffness=20.0)
     system = compile_scene(Scene((Body("b", body),), forces=(ModalForce("m", "b", [3.0, 0.0]),)))
     x = np.array([0, 0, 0, 1.0, 0, 0, 0, 0, 0])
-    machine = new_machine(system, x, np.zeros(8))
-    assert evaluate_at(machine, 0.0, x, np.zeros(8)) == OK
-    work = machine.work
+    engine = new_engine(system, x, np.zeros(8))
+    assert evaluate_at(engine, 0.0, x, np.zeros(8)) == OK
+    work = engine.work
     np.testing.assert_allclose(mass_matrix(body, np.zeros(2)) @ work.bodies.acc, [0] * 6 + [3.0, 0.0], atol=1e-12)
 
 

@@ -13,22 +13,17 @@ from places import ROOT
 from synthetic import cloud
 
 from ffr_dyn import cli
+from ffr_dyn.analyses.assemble import Assemble
 from ffr_dyn.analyses.bounded import Bounded
 from ffr_dyn.analyses.checkpoint import fingerprint
 from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.analyses.mixed import Causal
-from ffr_dyn.analyses.settings import (
-    Assemble,
-    Charted,
-    Inverse,
-    Kinematic,
-    Linearise,
-    Mixed,
-    MomentSettings,
-    Settings,
-    Static,
-)
+from ffr_dyn.analyses.inverse import Inverse
+from ffr_dyn.analyses.kinematic import Kinematic
+from ffr_dyn.analyses.linearise import Linearise
+from ffr_dyn.analyses.mixed import Causal, Mixed
+from ffr_dyn.analyses.settings import Charted, MomentSettings, Settings
+from ffr_dyn.analyses.static import Static
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.functions.curves import Curve
 from ffr_dyn.functions.formula import formula
@@ -488,7 +483,7 @@ METHOD = {"start": 0.1, "end": 1.1, "output_step": 0.1, "method": RK4(1e-3)}
             ),
         ),
         Settings(**METHOD, stabilisation=Projection(1e-7), analysis=Inverse()),
-        Settings(**METHOD, stabilisation=Drifting(), analysis=Inverse(quasi_static=True)),
+        Settings(**METHOD, stabilisation=Drifting(), analysis=Inverse(elastic="quasi-static")),
         Settings(**METHOD, stabilisation=Projection(), analysis=Mixed(EFFORTS)),
         Settings(**METHOD, stabilisation=Projection(), analysis=Mixed(EFFORTS[:1], ("d1",), Causal(1e-8, 10.0))),
         Settings(

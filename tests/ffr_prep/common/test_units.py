@@ -10,8 +10,8 @@ from ffr_prep.common import units
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.units import to_si
 
-# The International System of Units (BIPM, 9th edition 2019): base, derived units: tables 2 to 4; min, h, deg: table 8; bar:
-# 10^5 Pa exactly (8th edition, table 8); inch: 25.4 mm exactly (agreement of 1959); rpm: a turn of 2 pi rad in 60 s.
+# The International System of Units (BIPM, 9th edition 2019): base and derived units, tables 2 to 4; min, h, deg: table 8;
+# bar: 10^5 Pa exactly (8th edition, table 8); inch: 25.4 mm exactly (agreement of 1959); rpm: a turn of 2 pi rad in 60 s.
 DEFINED = {
     "kg": (1.0, "kg"),
     "g": (0.001, "kg"),

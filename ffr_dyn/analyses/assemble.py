@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ffr_dyn.analyses.forward import with_all_reactions
 from ffr_dyn.analyses.outcome import result_of
+from ffr_dyn.analyses.registry import OfMoment
+from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.evaluation import evaluator, record_states
 from ffr_dyn.equations.layout import initial_state
@@ -21,6 +25,14 @@ from ffr_dyn.scene.scene import Scene
 Array = np.ndarray
 
 CHANGED = 1e-9  # m, rad, m/s, rad/s and elastic coordinates, from where a change is told
+
+
+@dataclass(frozen=True)
+class Assemble(OfMoment):
+    """Corrections are the smallest in the norm of the mass matrix: heavy bodies move least."""
+
+    def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
+        return assembly(scene, **settings.span, **how)
 
 
 def assembly(
