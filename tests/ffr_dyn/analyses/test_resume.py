@@ -205,7 +205,7 @@ def test_a_checkpoint_survives_its_bytes():
 RUN = """
 import sys, time
 import test_resume as t
-from ffr_dyn import result_file
+from ffr_dyn.results import file as result_file
 from ffr_dyn.analyses import forward as f
 start = result_file.ResultWriter.__init__
 result_file.ResultWriter.__init__ = lambda *a, **k: start(*a, **(k | {"interval": 0.0, "share": 1e9}))
