@@ -11,6 +11,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from numba.core.caching import FunctionCache
 
@@ -20,6 +21,7 @@ from ffr_dyn.kernels.simd.entry_point import ENTRY_POINTS, CompiledFunction, alw
 from ffr_dyn.kernels.tables import Model
 
 _STEPS = list(dict.fromkeys(kind.do_step for kind in (*METHODS.values(), *CONTROLLED.values())))
+_CACHE: Any = FunctionCache
 _AT_WORK: dict[str, subprocess.Popen[bytes]] = {}
 _ON_DISK: set[str] = set()  # functions that were found there before: a program with many runs looks once
 
@@ -68,7 +70,7 @@ def _shares(names: Sequence[str]) -> list[list[str]]:
 
 def _is_on_disk(compiled: CompiledFunction) -> bool:
     """Whether numba has stored a compiled form of the function."""
-    folder = Path(FunctionCache(compiled.function).cache_path)
+    folder = Path(_CACHE(compiled.function).cache_path)
     return any(folder.glob(f"*.{compiled.name}-*.nbi"))
 
 
