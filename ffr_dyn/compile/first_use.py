@@ -11,6 +11,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from numba.core.caching import FunctionCache
 
@@ -19,6 +20,7 @@ from ffr_dyn.kernels.entry_points import add_loads, load_powers, run_controlled
 from ffr_dyn.kernels.simd.entry_point import ENTRY_POINTS, CompiledFunction, always
 from ffr_dyn.kernels.tables import Model
 
+_CACHE: Any = FunctionCache
 _AT_WORK: dict[str, subprocess.Popen[bytes]] = {}
 _ON_DISK: set[str] = set()  # functions that were found there before: a program with many runs looks once
 
@@ -67,7 +69,7 @@ def _shares(names: Sequence[str]) -> list[list[str]]:
 
 def _is_on_disk(compiled: CompiledFunction) -> bool:
     """Whether numba has stored a compiled form of the function."""
-    folder = Path(FunctionCache(compiled.function).cache_path)
+    folder = Path(_CACHE(compiled.function).cache_path)
     return any(folder.glob(f"*.{compiled.name}-*.nbi"))
 
 
