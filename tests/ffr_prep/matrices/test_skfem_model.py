@@ -183,4 +183,4 @@ def test_the_example_of_the_documentation():
     page = (ROOT / "docs" / "matrices.md").read_text(encoding="utf-8").partition("## scikit-fem")[2]
     space: dict = {}
     exec(compile(page.split("```python\n")[1].split("```")[0], "matrices.md", "exec"), space)
-    assert {"left", "right", "edge"} <= space["model"].groups.keys()
+    assert {"left", "right", "edge"} <= space["matrices"].groups.keys()
