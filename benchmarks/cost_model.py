@@ -14,9 +14,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ffr_gallery.scene_set import chain, four_bar, slider_crank
 from scipy.optimize import nnls
 
-from examples.scene_set import chain, four_bar, slider_crank
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.economy.model_choice import Choice, full, held_in_plane

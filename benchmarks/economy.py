@@ -33,8 +33,8 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+from ffr_gallery.scene_set import CASES, Case, case
 
-from examples.scene_set import CASES, Case, case
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.run import run as whole_run
 from ffr_dyn.economy.cost import of_run, per_evaluation, per_row

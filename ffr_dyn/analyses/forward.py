@@ -337,7 +337,7 @@ def _fingerprint(
     return fingerprint(assembled.system.model, *state, method, stabilisation, start, output_step, list(wanted))
 
 
-KEY = "engine."  # before the names of an engine's tables in result files
+KEY = "machine."  # before the names of an engine's tables in result files
 
 
 def _checkpoint(run: _Run, mark: str) -> Array:

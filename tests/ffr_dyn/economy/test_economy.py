@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from scene_set import ALUMINIUM, GRAVITY, beam, case, pendulum, slider_crank, spin_up
+from ffr_gallery.scene_set import ALUMINIUM, GRAVITY, beam, case, pendulum, slider_crank, spin_up
 
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.settings import Settings

@@ -59,7 +59,7 @@ def pendulum() -> Scene:
         "bob", mass=1.0, inertia=np.eye(3) * 1e-3, points={"pivot": np.array([-1.0, 0.0, 0.0]), "centre": np.zeros(3)}
     )
     hinge = Joint("hinge", "revolute", "ground.O", "bob.pivot")
-    return Scene((Body("bob", bob, (1.0, 0, 0)),), (hinge,), ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0))
+    return Scene((Body("bob", bob, position=(1.0, 0, 0)),), (hinge,), ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0))
 
 
 def test_the_method_that_the_interface_shows_swings_a_pendulum(tmp_path):
