@@ -10,9 +10,6 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
-from pathlib import Path
-
-from numba.core.caching import FunctionCache
 
 from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator
 from ffr_dyn.kernels.entry_points import (
@@ -22,9 +19,9 @@ from ffr_dyn.kernels.entry_points import (
     RELAXED_UNITS,
     STIFFENED_UNITS,
     UNITS,
-    Unit,
     units_of,
 )
+from ffr_dyn.kernels.simd.intrinsics import compiled_forms
 from ffr_dyn.kernels.tables import Model
 
 _METHODS = {**METHODS, **CONTROLLED}
@@ -44,7 +41,7 @@ def begin_compiling(*kinds: type[Integrator], model: Model | None = None) -> Non
     extra = {name: EXTRA_UNITS[name] for kind in kinds for name in kind.calls}
     scene = units_of(model) if model else {**UNITS, **LOAD_UNITS}
     units = {**scene, **controlled, **extra, **methods}
-    _ON_DISK.update(name for name, unit in units.items() if name not in _ON_DISK and _is_on_disk(unit))
+    _ON_DISK.update(name for name, unit in units.items() if name not in _ON_DISK and compiled_forms(unit.function))
     missing = [name for name in units if name not in _AT_WORK and name not in _ON_DISK]
     if not missing:
         return
@@ -66,12 +63,6 @@ def ensure_compiled(*kinds: type[Integrator], model: Model | None = None) -> Non
 def _shares(names: Sequence[str]) -> list[list[str]]:
     """Two parts that take about as long; `UNITS` lists the long ones first."""
     return [share for share in ([*names[::4], *names[3::4]], [*names[1::4], *names[2::4]]) if share]
-
-
-def _is_on_disk(unit: Unit) -> bool:
-    """Whether numba has stored a compiled form of the unit."""
-    folder = Path(FunctionCache(unit.function).cache_path)
-    return any(folder.glob(f"*.{unit.function.__name__}-*.nbi"))
 
 
 def compile_units(names: Sequence[str]) -> None:

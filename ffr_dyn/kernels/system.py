@@ -8,24 +8,24 @@ Order of calls: `prepare` once per elastic diagonal; `evaluate_bodies`, `evaluat
 from ffr_dyn.kernels.bodies import coupling, factorise, inertia, normalise, prepare_body, rotation_matrix
 from ffr_dyn.kernels.forces.loads import count_loads
 from ffr_dyn.kernels.markers import couple_marker, couple_pair, prepare_marker, shapes, update_marker
-from ffr_dyn.kernels.multiplier_solver import SIDE, clear_column, factorise_block, relax_block
+from ffr_dyn.kernels.multiplier_solver import (
+    SIDE,
+    add_scale,
+    clear_column,
+    couple_sides,
+    eliminate_side,
+    factorise_block,
+    relax_block,
+)
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.rows import reaction
-from ffr_dyn.kernels.simd.joint_elimination import (
-    couple_flexible,
-    couple_flexible_in_plane,
-    couple_rigid,
-    couple_rigid_in_plane,
-    eliminate_flexible,
-    eliminate_flexible_in_plane,
-    eliminate_rigid,
-    eliminate_rigid_in_plane,
-)
-from ffr_dyn.kernels.simd.simd_rows import add_scale
 from ffr_dyn.kernels.simd.slices import part
 from ffr_dyn.kernels.simd.table_address import call_unit
 from ffr_dyn.kernels.tables import ALL, IN_USE, LANES, LOADS, LOOK, NOT_FINITE, OK, REGAIN, RELATION
 from ffr_dyn.kernels.vectors import add_scaled, cross, fill, get, in_plane, put, subtract, to_body, to_global
+
+# Of the nine coefficients of a side (see `tables.RowWork.jac`), those that the rigid and the elastic coordinates move.
+RIGID, ELASTIC = (0, 1, 2, 3, 4, 5), (0, 1, 2, 6, 7, 8)
 
 
 @inlined
@@ -85,14 +85,9 @@ def couple_joint(bodies, markers, rows, pattern, bw, rw, k):
                 couple_marker(shapes(markers, marker, n), H, dinv, n, normal, P)
             if normal >= 0:
                 c0, c1, c2 = in_plane(normal)
-                if flexible:
-                    eliminate_flexible_in_plane(jac, c0, c1, c2, 6 + normal, P, L, rw.X, at)
-                else:
-                    eliminate_rigid_in_plane(jac, c0, c1, c2, 6 + normal, P, L, rw.X, at)
-            elif flexible:
-                eliminate_flexible(jac, P, L, rw.X, at)
+                eliminate_side(jac, (c0, c1, c2), (c0, c1, 6 + normal), flexible, P, L, rw.X, at)
             else:
-                eliminate_rigid(jac, P, L, rw.X, at)
+                eliminate_side(jac, RIGID, ELASTIC, flexible, P, L, rw.X, at)
             add_scale(jac, bw.inverse[b, 0], bw.inverse[b, 1], rw.scale, LANES * k)
     clear_column(pattern, rw.S, k)
     for p in range(pattern.pair_start[k], pattern.pair_start[k + 1]):
@@ -102,14 +97,9 @@ def couple_joint(bodies, markers, rows, pattern, bw, rw, k):
         flexible, size = where[b, 0] > 0, rows.start[earlier + 1] - rows.start[earlier]
         at, phiphi = pattern.pair[p, 4], rw.phiphi[pattern.pair[p, 5]]
         if where[b, 7] >= 0:
-            if flexible:
-                couple_flexible_in_plane(rw.X, first, second, size, phiphi, rw.S, at)
-            else:
-                couple_rigid_in_plane(rw.X, first, second, size, phiphi, rw.S, at)
-        elif flexible:
-            couple_flexible(rw.X, first, second, size, phiphi, rw.S, at)
+            couple_sides(rw.X, first, second, size, 3, flexible, phiphi, rw.Y, rw.S, at)
         else:
-            couple_rigid(rw.X, first, second, size, phiphi, rw.S, at)
+            couple_sides(rw.X, first, second, size, 6, flexible, phiphi, rw.Y, rw.S, at)
 
 
 @inlined
