@@ -9,7 +9,7 @@ of the earlier, with the rows of the later side by side in it. The factor is S =
 
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.simd.lanes import after, before, less, load, plus, scaled, store, times, total, zeros
-from ffr_dyn.kernels.simd.slices import part
+from ffr_dyn.kernels.simd.slices import part, peek
 from ffr_dyn.kernels.tables import LANES
 from ffr_dyn.kernels.vectors import fill
 
@@ -50,10 +50,10 @@ def eliminate_side(jac, rigid, elastic, flexible, P, L, X, at):
         if flexible:
             store(X, at + LANES * (size + c), load(jac, LANES * elastic[c]))
             for k in range(size):
-                row = less(row, P[size * c + k], load(jac, LANES * elastic[k]))
+                row = less(row, peek(P, size * c + k), load(jac, LANES * elastic[k]))
         for k in range(c):
-            row = less(row, L[6 * rigid[c] + rigid[k]], load(X, at + LANES * k))
-        store(X, at + LANES * c, scaled(L[7 * rigid[c]], row))
+            row = less(row, peek(L, 6 * rigid[c] + rigid[k]), load(X, at + LANES * k))
+        store(X, at + LANES * c, scaled(peek(L, 7 * rigid[c]), row))
 
 
 @kernel
@@ -67,15 +67,15 @@ def couple_sides(X, later, earlier, rows, size, flexible, phiphi, scratch, S, at
         for c in range(size):
             row = zeros()
             for k in range(size):
-                row = plus(row, phiphi[size * k + c], load(X, later + LANES * (size + k)))
+                row = plus(row, peek(phiphi, size * k + c), load(X, later + LANES * (size + k)))
             store(scratch, LANES * c, row)
     for r in range(rows):
         row = load(S, at + LANES * r)
         for k in range(size):
-            row = plus(row, X[earlier + LANES * k + r], load(X, later + LANES * k))
+            row = plus(row, peek(X, earlier + LANES * k + r), load(X, later + LANES * k))
         if flexible:
             for k in range(size):
-                row = plus(row, X[earlier + LANES * (size + k) + r], load(scratch, LANES * k))
+                row = plus(row, peek(X, earlier + LANES * (size + k) + r), load(scratch, LANES * k))
         store(S, at + LANES * r, row)
 
 
@@ -140,12 +140,12 @@ def factorise_rows(size, S, at, least, first, pivots, own, raw):
     """
     for c in range(size):
         place = at + LANES * c
-        row, found = load(S, place), S[place + c]
+        row, found = load(S, place), peek(S, place + c)
         raw[c] = found
-        inverse = 1.0 / max(found, least[first + c])
+        inverse = 1.0 / max(found, peek(least, first + c))
         unit = after(scaled(inverse, row), c)
         for i in range(c + 1, size):
-            store(S, at + LANES * i, less(load(S, at + LANES * i), S[place + i], unit))
+            store(S, at + LANES * i, less(load(S, at + LANES * i), peek(S, place + i), unit))
         column = before(times(row, load(pivots, own)), c)  # S was symmetric
         pivots[own + c] = inverse
         store(S, place, plus(unit, 1.0, column))
@@ -157,9 +157,9 @@ def eliminate_rows(size, S, diagonal, at, pivots, own, Y):
     for c in range(size):
         row = load(S, at + LANES * c)
         for j in range(c):
-            row = less(row, S[diagonal + LANES * j + c], load(Y, LANES * j))
+            row = less(row, peek(S, diagonal + LANES * j + c), load(Y, LANES * j))
         store(Y, LANES * c, row)
-        store(S, at + LANES * c, scaled(pivots[own + c], row))
+        store(S, at + LANES * c, scaled(peek(pivots, own + c), row))
 
 
 @kernel
@@ -167,7 +167,7 @@ def subtract_product(size, S, target, numbers, Y):
     """The row of S at `target` less sum_c S[numbers + 8 c] Y_c, over `size` rows of Y."""
     row = load(S, target)
     for c in range(size):
-        row = less(row, S[numbers + LANES * c], load(Y, LANES * c))
+        row = less(row, peek(S, numbers + LANES * c), load(Y, LANES * c))
     store(S, target, row)
 
 
@@ -175,14 +175,14 @@ def subtract_product(size, S, target, numbers, Y):
 def solve_lower(size, S, diagonal, b, own):
     """The row of b at `own` becomes U^-T times it."""
     for c in range(size - 1):
-        store(b, own, less(load(b, own), b[own + c], after(load(S, diagonal + LANES * c), c)))
+        store(b, own, less(load(b, own), peek(b, own + c), after(load(S, diagonal + LANES * c), c)))
 
 
 @kernel
 def solve_upper(size, S, diagonal, b, own):
     """The row of b at `own` becomes U^-1 times it."""
     for c in range(size - 1, 0, -1):
-        store(b, own, less(load(b, own), b[own + c], before(load(S, diagonal + LANES * c), c)))
+        store(b, own, less(load(b, own), peek(b, own + c), before(load(S, diagonal + LANES * c), c)))
 
 
 @kernel
@@ -190,7 +190,7 @@ def spread_lower(size, S, at, b, own, later):
     """The row of b at `later` less sum_c b[own + c] times row c of the block at `at`, over `size` rows."""
     row = load(b, later)
     for c in range(size):
-        row = less(row, b[own + c], load(S, at + LANES * c))
+        row = less(row, peek(b, own + c), load(S, at + LANES * c))
     store(b, later, row)
 
 

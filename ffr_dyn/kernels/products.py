@@ -5,7 +5,7 @@ The tables are stored in blocks, as `ffr_dyn.compile.symmetry_blocks` makes them
 
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.simd.lanes import load, plus, store
-from ffr_dyn.kernels.simd.slices import part
+from ffr_dyn.kernels.simd.slices import part, peek
 from ffr_dyn.kernels.tables import LANES, STRIPS
 from ffr_dyn.kernels.vectors import copy, fill
 
@@ -20,7 +20,7 @@ def multiply(count, width, stride, table, start, x, first, begin, moving, y, at)
         before, source = moving * place, start + place
         s0, s1, s2, s3 = load_four(begin, before)
         for i in range(count):
-            number, row = x[first + i], source + i * stride
+            number, row = peek(x, first + i), source + i * stride
             r0, r1, r2, r3 = load_four(table, row)
             s0, s1, s2, s3 = plus(s0, number, r0), plus(s1, number, r1), plus(s2, number, r2), plus(s3, number, r3)
         store(y, at + place, s0)
@@ -31,7 +31,7 @@ def multiply(count, width, stride, table, start, x, first, begin, moving, y, at)
         place = LANES * strip
         row = load(begin, moving * place)
         for i in range(count):
-            row = plus(row, x[first + i], load(table, start + place + i * stride))
+            row = plus(row, peek(x, first + i), load(table, start + place + i * stride))
         store(y, at + place, row)
 
 
@@ -64,8 +64,8 @@ def contract(table, start, plan, at, q, qd, width, last, scratch, base, g, l):  
         x, xd = part(scratch, first, n), part(scratch, first + n, n)
         y, yd = part(scratch, found, width + LANES), part(scratch, found + width + LANES, last + LANES)
         for k in range(n):
-            number = plan[order + k]
-            x[k], xd[k] = q[number], qd[number]
+            number = peek(plan, order + k)
+            x[k], xd[k] = peek(q, number), peek(qd, number)
     first, product, late = 0, 0, 0
     for block in range(max(blocks, 1)):
         count, outputs, of_last = n, width, last
@@ -80,6 +80,6 @@ def contract(table, start, plan, at, q, qd, width, last, scratch, base, g, l):  
     if blocks > 0:
         y[product] = yd[late] = 0.0  # what the plan has for products that vanish
         for k in range(width):
-            g[k] = base[k] + y[plan[place + k]]
+            g[k] = base[k] + peek(y, peek(plan, place + k))
         for k in range(last):
-            l[k] = yd[plan[place + width + k]]
+            l[k] = peek(yd, peek(plan, place + width + k))

@@ -119,6 +119,11 @@ def part(array, start, size):
 
 
 @kernel
+def peek(array, number):
+    return array[number]
+
+
+@kernel
 def word(address, number):
     return carray(integers_at(address + 8 * number), (1,))[0]
 

@@ -50,8 +50,18 @@ def part(typing, array, start, size):  # type: ignore[no-untyped-def]
     return _VECTOR(array, types.int64, types.int64), generate
 
 
+@intrinsic
+def peek(typing, array, number):  # type: ignore[no-untyped-def]
+    """array[number] of a contiguous vector, for a number that is none of those counted from the end."""
+
+    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        return builder.load(builder.gep(make_array(array)(context, builder, args[0]).data, [args[1]], inbounds=True))
+
+    return array.dtype(array, types.int64), generate
+
+
 if PLAIN:
-    vector_at, part = plain.vector_at, plain.part
+    vector_at, part, peek = plain.vector_at, plain.part, plain.peek
 
 
 @inlined
