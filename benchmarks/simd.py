@@ -3,8 +3,9 @@
     python -m benchmarks.simd [--rounds 5] [--quick] [--beside DIRECTORY]
 
 The runs are those of `benchmarks.race` (our side), `benchmarks.limits`, `benchmarks.planar`, `benchmarks.realtime` and
-`benchmarks.race_stiffening`; what is printed is processor time per evaluation of the equations of motion [us], of real time the
-median of a step. Every form runs in processes of its own, in turns, with its own compiled code; the least of all rounds counts.
+`benchmarks.race_stiffening`; what is printed is processor time per evaluation of the equations of motion [us], of real time
+the median of a step. Every form runs in processes of its own, in turns, with its own compiled code; the least of all rounds
+counts.
 
 FFR_DYN_PLAIN=1 in the environment, which this script sets, takes the plain forms (see `ffr_dyn.kernels.simd`).
 
@@ -146,7 +147,7 @@ def in_process(scenes: Path, root: Path, environment: dict[str, str]) -> dict[st
 
 
 def compare(forms: dict[str, tuple[Path, dict[str, str]]], rounds: int, scenes: Path) -> dict[str, dict[str, float]]:
-    """The least of some rounds, form by form; and how long the first process took to compile."""
+    """The least of some rounds, form by form."""
     least: dict[str, dict[str, float]] = {}
     for _ in range(rounds):
         for name, (root, environment) in forms.items():

@@ -46,9 +46,10 @@ def begin_compiling(*kinds: type[Integrator], model: Model | None = None) -> Non
     if not missing:
         return
     print("ffr-dyn: compiling the kernels, once (some twenty seconds) ...", file=sys.stderr, flush=True)
-    same_packages = {**os.environ, "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
+    packages = os.pathsep.join(path or os.getcwd() for path in sys.path)
+    environment = {**os.environ, "PYTHONPATH": packages, "FFR_DYN_COMPILING": "1"}
     for share in _shares(missing):
-        process = subprocess.Popen([sys.executable, "-m", __name__, *share], env=same_packages)
+        process = subprocess.Popen([sys.executable, "-m", __name__, *share], env=environment)
         _AT_WORK.update(dict.fromkeys(share, process))
 
 

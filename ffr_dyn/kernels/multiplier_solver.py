@@ -3,8 +3,9 @@
 The elimination order and the fill are fixed per topology by `ffr_dyn.compile.elimination`: for chains and trees the cost is
 linear in the number of bodies (Baraff 1996), for a few loops there is little fill.
 
-A block of S couples the rows of an earlier joint with those of a later one: a row of eight numbers (see `simd.lanes`) for each row
-of the earlier, with the rows of the later side by side in it. The factor is S = U^T D U, with ones on the diagonal of U.
+A block of S couples the rows of an earlier joint with those of a later one: a row of eight numbers (see `simd.lanes`) for
+each row of the earlier, with the rows of the later side by side in it. The factor is S = U^T D U, with ones on the diagonal
+of U.
 """
 
 from ffr_dyn.kernels.options import inlined, kernel

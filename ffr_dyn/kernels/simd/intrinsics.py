@@ -15,6 +15,17 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic as _intrinsic
 
+__all__ = [
+    "PLAIN",
+    "AttributeTemplate",
+    "call_of",
+    "cgutils",
+    "compiled_forms",
+    "intrinsic",
+    "make_array",
+    "populate_array",
+]
+
 KNOWN = (0, 60), (0, 70)  # numba from, and below
 
 try:
@@ -26,9 +37,10 @@ try:
     known = KNOWN[0] <= tuple(int(number) for number in numba.__version__.split(".")[:2]) < KNOWN[1]
 except ImportError:
     known = False
+    cgutils = FunctionCache = AttributeTemplate = make_array = populate_array = None  # type: ignore[assignment, misc]
 
 PLAIN = not known or os.environ.get("FFR_DYN_PLAIN") == "1"
-if PLAIN:
+if PLAIN and "FFR_DYN_COMPILING" not in os.environ:  # in the processes that only compile it was said before
     why = "asked for" if known else f"the inner parts of numba {numba.__version__} are not as expected"
     print(f"ffr-dyn: {why}: plain kernels run, which are several times slower", file=sys.stderr)
 

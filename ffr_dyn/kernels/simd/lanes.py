@@ -1,7 +1,7 @@
 """Rows of eight numbers as values of compiled code, which one instruction serves: the rows of a joint lie side by side.
 
-A joint has at most six rows; the lanes beyond are zero. Arrays are pooled; `at` counts numbers, not rows of eight. Each function
-does what its namesake in `plain` does to a tuple of eight.
+A joint has at most six rows; the lanes beyond are zero. Arrays are pooled; `at` counts numbers, not rows of eight. Each
+function does what its namesake in `plain` does to a tuple of eight.
 """
 
 from __future__ import annotations
@@ -89,6 +89,7 @@ def _of_three(combine: str) -> Any:
     return operate
 
 
+# row + number other, row - number other
 plus, less = _of_three("fadd"), _of_three("fsub")
 
 
@@ -117,7 +118,9 @@ def total(typing, row):  # type: ignore[no-untyped-def]
         while size > 1:
             size //= 2
             kind = ir.VectorType(ir.IntType(32), size)
-            halves = [builder.shuffle_vector(found, found, ir.Constant(kind, list(range(k, k + size)))) for k in (0, size)]
+            halves = [
+                builder.shuffle_vector(found, found, ir.Constant(kind, list(range(k, k + size)))) for k in (0, size)
+            ]
             found = builder.fadd(*halves, flags=LIBERTIES)
         return builder.extract_element(found, ir.Constant(ir.IntType(32), 0))
 
@@ -137,6 +140,7 @@ def _part(order: str) -> Any:
     return select
 
 
+# The lanes before lane `number`, those after it; zero elsewhere.
 before, after = _part("<"), _part(">")
 
 if PLAIN:

@@ -160,7 +160,7 @@ else:
 
     @lower_getattr_generic(Packed)
     def _read_field(context, builder, typ, value, attr):  # type: ignore[no-untyped-def]
-        field, at = _place(typ.table, attr)
+        field, at = _numba_type(_fields(typ.table)[attr]), _places(typ.table)[attr]
         base = builder.bitcast(value, cgutils.intp_t.as_pointer())
 
         def word(number: int) -> Any:
