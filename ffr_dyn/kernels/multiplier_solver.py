@@ -145,7 +145,8 @@ def factorise_rows(size, S, at, least, first, pivots, own, raw):
         place = at + LANES * c
         row, found = load(S, place), peek(S, place + c)
         raw[c] = found
-        inverse = 1.0 / max(found, peek(least, first + c))
+        floor = peek(least, first + c)
+        inverse = 1.0 / (found if found > floor else floor)
         unit = after(scaled(inverse, row), c)
         for i in range(c + 1, size):
             store(S, at + LANES * i, less(load(S, at + LANES * i), peek(S, place + i), unit))
