@@ -11,6 +11,7 @@ its place among the addresses, and the calls: in compiled code and from Python a
 from __future__ import annotations
 
 import ctypes
+import inspect
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any, get_type_hints
@@ -118,7 +119,11 @@ def _make_callable(entry: EntryPoint) -> None:
 
     @type_callable(entry)
     def typed(context):  # type: ignore[no-untyped-def]
-        return lambda *args: types.int64 if len(args) == len(entry.general.kinds) else None
+        def returned(*given: Any) -> Any:
+            return types.int64
+
+        returned.__signature__ = inspect.signature(entry.general.function)  # type: ignore[attr-defined]
+        return returned
 
     @lower_builtin(entry, types.VarArg(types.Any))
     def call(context, builder, sig, args):  # type: ignore[no-untyped-def]
