@@ -50,7 +50,7 @@ def realtime(
     """
     from ffr_dyn.analyses.settings import Settings
     from ffr_dyn.cli.progress_bar import progress
-    from ffr_dyn.integrators import ROS2, method_named
+    from ffr_dyn.integrators import METHODS, ROS2
     from ffr_dyn.integrators.stabilisation import Projection
     from ffr_dyn.realtime.deadline import as_json, lines, measure_steps, plot_times
     from ffr_dyn.scene_file.read import load_scene
@@ -59,9 +59,9 @@ def realtime(
     given: Any = ROS2(1e-3)
     if isinstance(settings, Settings) and not settings.method.controlled:
         given = settings.method
-    kind: Any = type(given) if method is None else method_named(method)
-    if kind.controlled:
-        raise InputError(f"--method {method}: it chooses its steps, whose cost has no bound; take one of fixed steps")
+    if method is not None and method not in METHODS:
+        raise InputError(f"--method {method}: there is no such method with fixed steps; there are {', '.join(METHODS)}")
+    kind: Any = type(given) if method is None else METHODS[method]
     require_file("--plot", plot, (".png", ".svg", ".pdf"))
     with progress(loaded.name, duration) as update:
         timing = measure_steps(

@@ -6,7 +6,7 @@ ones all begin at the same place of a page, which the processor takes for one an
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -27,7 +27,7 @@ def aligned(tables: T) -> T:
         copies[key] = memory[at : at + array.size].view(array.dtype).reshape(array.shape)
         copies[key][...] = array
         at += size
-    return _replaced(tables, copies)
+    return cast("T", _replaced(tables, copies))
 
 
 def _arrays(tables: Any) -> list[Array]:

@@ -100,5 +100,5 @@ def method_named(name: str) -> type[Any]:
     if name not in methods():
         close = get_close_matches(name, methods(), 1)
         hint = f"did you mean {close[0]!r}? " if close else ""
-        raise InputError(f"{name!r}: there is no such method; {hint}there are: {', '.join(methods())}")
+        raise InputError(f"there is no method {name!r}; {hint}there are: {', '.join(methods())}")
     return methods()[name]

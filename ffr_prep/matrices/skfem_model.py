@@ -111,7 +111,7 @@ def _triangles(basis: skfem.CellBasis, name: str, points: Array, nodes: Array) -
     )  # scikit-fem sorts the corners of tetrahedra
     cells[mirrored] = cells[mirrored][:, node_order(kind, KINDS[kind].nodes[:, [1, 0, 2]])]
     outside, triangles = surface_triangles(Mesh(points, (Block(kind, cells),), {}, {}, {}))
-    return outside[triangles]
+    return np.asarray(outside[triangles])
 
 
 # ---- guards -------------------------------------------------------------------------------------------------------

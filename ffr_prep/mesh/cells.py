@@ -93,4 +93,4 @@ def node_order(kind: str, positions: Array) -> Array:
     positions : where another program has the nodes, in the unit simplex or the unit cube
     """
     distance = np.linalg.norm(KINDS[kind].nodes[:, None] - positions[None], axis=-1)
-    return np.argmin(distance, axis=1)
+    return np.asarray(np.argmin(distance, axis=1))

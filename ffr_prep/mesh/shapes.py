@@ -73,7 +73,7 @@ def mapping(kind: str, points: Array, nodes: Array) -> skfem.MappingIsoparametri
 
 def determinants(geometry: skfem.MappingIsoparametric, X: Array) -> Array:
     """(E, Q) determinants of dx/dX [m^3] at X (3, Q) of the reference element, which scikit-fem refuses to give if 0."""
-    return np.linalg.det(geometry.DF(X).transpose(2, 3, 0, 1))
+    return np.asarray(np.linalg.det(geometry.DF(X).transpose(2, 3, 0, 1)))
 
 
 def scalar_basis(geometry: skfem.MappingIsoparametric, quadrature: tuple[Array, Array]) -> skfem.CellBasis:
@@ -99,4 +99,4 @@ def face_mass(points: Array, faces: Array) -> Array:
     X, weights = get_quadrature(element.refdom, order)
     area = skfem.MappingIsoparametric(_Elements(points.T, faces.T, element), element, element).detDG(X) * weights
     N = np.stack([np.broadcast_to(element.lbasis(X, i)[0], weights.shape) for i in range(faces.shape[1])])
-    return np.einsum("fq,aq,bq->fab", area, N, N, optimize=True)
+    return np.asarray(np.einsum("fq,aq,bq->fab", area, N, N, optimize=True))

@@ -55,7 +55,7 @@ class Material:
         mu = self.E / (2 * (1 + self.nu))
         one = np.eye(3)
         symmetric = np.einsum("ik,jl->ijkl", one, one) + np.einsum("il,jk->ijkl", one, one)
-        return lam * np.einsum("ij,kl->ijkl", one, one) + mu * symmetric
+        return np.asarray(lam * np.einsum("ij,kl->ijkl", one, one) + mu * symmetric)
 
     def engineering_constants(self) -> tuple[float, float]:
         """Young's modulus [Pa] and Poisson's ratio, which give the strain of a stress."""
@@ -93,7 +93,7 @@ class AnisotropicMaterial:
         for k, (i, j) in enumerate(TENSOR):
             place[i, j] = place[j, i] = k
         R, C = np.array(self.axes), np.array(self.elasticity)[place[:, :, None, None], place]
-        return np.einsum("ia,jb,kc,ld,abcd->ijkl", R, R, R, R, C, optimize=True)
+        return np.asarray(np.einsum("ia,jb,kc,ld,abcd->ijkl", R, R, R, R, C, optimize=True))
 
     def engineering_constants(self) -> tuple[float, float]:
         """Zeros: the strain of a stress takes more than two constants."""
@@ -188,7 +188,7 @@ def _rotation(name: str, axes: Array) -> Array:
     if axes.shape == (2, 3) and np.linalg.norm(np.cross(*axes)) > 1e-6 * np.prod(np.linalg.norm(axes, axis=1)):
         third = np.cross(*axes)
         columns = np.stack([axes[0], np.cross(third, axes[0]), third], axis=1)
-        return columns / np.linalg.norm(columns, axis=0)
+        return np.asarray(columns / np.linalg.norm(columns, axis=0))
     if axes.shape != (3, 3) or not np.allclose(axes.T @ axes, np.eye(3), atol=1e-6) or np.linalg.det(axes) < 0:
         raise InputError(
             f"material {name!r}: axes {axes.tolist()} are neither a 3 x 3 rotation matrix nor two directions that differ"

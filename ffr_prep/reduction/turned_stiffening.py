@@ -66,7 +66,7 @@ def turned_stiffening(
     _check_known(body, idle, held)
     new = Z.T @ (whole + np.tensordot(carried, whole, 1)) @ Z
     new[idle] = 0.0
-    return (new + new.transpose(0, 2, 1)) / 2
+    return np.asarray((new + new.transpose(0, 2, 1)) / 2)
 
 
 # ---- loads --------------------------------------------------------------------------------------------------------
@@ -89,7 +89,7 @@ def _reactions(body: FlexibleBody, loads: Array, L: Array) -> Array:
     flexible = L[:, 6:] / body.omega2
     gap = free.T @ (flexible @ L[:, 6:].T @ balanced + flexible @ loads[:, 6:].T)
     shared = np.linalg.lstsq(free.T @ flexible @ L[:, 6:].T @ free, -gap, rcond=None)[0]
-    return (balanced + free @ shared).T
+    return np.asarray((balanced + free @ shared).T)
 
 
 # ---- shapes -------------------------------------------------------------------------------------------------------
@@ -116,7 +116,7 @@ def _works_at_interfaces(model: CoupledModel) -> Array:
     """(6 I, 3, 6 + n) of unit forces on the turned translations, of unit moments on half the turned rotations."""
     six = model.C.toarray().reshape(-1, 2, 3, model.C.shape[1])
     works = -np.einsum("akm,islmj->islkaj", turns(), six[:, :, None]) * np.array([1.0, 0.5])[:, None, None, None, None]
-    return works.reshape(-1, 3, model.C.shape[1])
+    return np.asarray(works.reshape(-1, 3, model.C.shape[1]))
 
 
 # ---- guards -------------------------------------------------------------------------------------------------------

@@ -157,12 +157,12 @@ class Gradients:
         `interpolate` takes one field after the other.
         """
         at_points = np.einsum("eqak,eamr->eqmkr", self.shapes, field[self.nodes], optimize=True)
-        return at_points.reshape(-1, 3, 3, field.shape[2])
+        return np.asarray(at_points.reshape(-1, 3, 3, field.shape[2]))
 
     def stress(self, field: Array) -> Array:
         """(q, 3, 3, r) Cauchy stress [Pa] of nodal displacements (N, 3, r) [m]."""
         gradient = self.gradient(field)
-        return np.matmul(self.C, gradient.reshape(len(gradient), 9, -1)).reshape(gradient.shape)
+        return np.asarray(np.matmul(self.C, gradient.reshape(len(gradient), 9, -1)).reshape(gradient.shape))
 
 
 def displacement_gradients(points: Array, chunk: Chunk) -> Gradients:

@@ -51,11 +51,11 @@ def from_mesh(
     del matrices, loads  # the stiffness takes as much memory as that of the model
 
     def field(z: Array) -> Array:
-        return (coupled.B @ z).reshape(*mesh.points.shape, z.shape[1])
+        return np.asarray((coupled.B @ z).reshape(*mesh.points.shape, z.shape[1]))
 
     def stiffening(static: Array, amplitudes: Array, basis: Array) -> Array:
         of_stress = stiffening_of(mesh, material, field(static), field(basis))
-        return of_stress + region_stiffening(regions, static, amplitudes, basis)
+        return np.asarray(of_stress + region_stiffening(regions, static, amplitudes, basis))
 
     return Model(
         coupled=coupled,
@@ -80,7 +80,7 @@ def from_mesh(
 
 def nodal_basis(model: CoupledModel, basis: Basis) -> Array:
     """Phi (N, 3, n) [1/sqrt(kg)] at the nodes of the mesh."""
-    return (model.B @ basis.Z).reshape(*model.points.shape, basis.omega2.size)
+    return np.asarray((model.B @ basis.Z).reshape(*model.points.shape, basis.omega2.size))
 
 
 def boundary(mesh: Mesh, Phi: Array) -> Surface:

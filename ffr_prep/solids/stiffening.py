@@ -54,4 +54,4 @@ def _of_chunk(points: Array, chunk: Chunk, static: Array, Phi: Array) -> Array:
 
 def inertial_loads(points: Array, matrices: SolidMatrices) -> Array:
     """(3N, 12) nodal forces of unit accelerations: translation, rotation, products of the angular velocity."""
-    return -(vector_mass(matrices.m) @ unit_accelerations(points).reshape(12, -1).T)
+    return np.asarray(-(vector_mass(matrices.m) @ unit_accelerations(points).reshape(12, -1).T))

@@ -95,7 +95,7 @@ def _at_element_nodes(points: Array, chunk: Chunk, field: Array) -> Array:
     stress = displacement_gradients(points, chunk).stress(field)[:, _ROWS, _COLUMNS]
     elements, k = chunk.nodes.shape
     at_points = stress.reshape(elements, -1, 6 * field.shape[2])
-    return np.matmul(extrapolation(chunk.kind), at_points).reshape(elements, k, 6, -1)
+    return np.asarray(np.matmul(extrapolation(chunk.kind), at_points).reshape(elements, k, 6, -1))
 
 
 @cache

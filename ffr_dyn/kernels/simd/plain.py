@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import carray, types
+from numba import carray, types  # type: ignore[attr-defined]
 from numba.extending import overload_attribute
 
 from ffr_dyn.kernels.options import kernel

@@ -7,6 +7,7 @@ import pytest
 import scipy.sparse as sp
 import skfem
 from boxes import KINDS, STEEL, box_mesh, shaken
+from places import ROOT
 from skfem.helpers import dot
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
@@ -176,3 +177,10 @@ def test_matrices_of_a_held_body_are_refused():
     K = K + sp.diags_array(held)
     with pytest.raises(InputError, match="rigid"):
         reduced(from_skfem(basis, K, M))
+
+
+def test_the_example_of_the_documentation():
+    page = (ROOT / "docs" / "matrices.md").read_text(encoding="utf-8").partition("## scikit-fem")[2]
+    space: dict = {}
+    exec(compile(page.split("```python\n")[1].split("```")[0], "matrices.md", "exec"), space)
+    assert {"left", "right", "edge"} <= space["matrices"].groups.keys()

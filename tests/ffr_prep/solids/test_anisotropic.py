@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from boxes import KINDS, STEEL, box_mesh, moved, rotation, shaken
+from places import ROOT
 
 from ffr_dyn.scene.stress_sensors import StressMeasurement, measured_modes
 from ffr_prep.body import load_body, save_body
+from ffr_prep.cli.options import material_of
 from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.mesh import Block
 from ffr_prep.model.coupled import InterfaceRegion
@@ -220,3 +222,16 @@ def test_a_material_file_that_cannot_be_used_is_named(tmp_path, content, words):
         file.write_text(content, encoding="utf-8")
     with pytest.raises(InputError, match=rf"bad\.toml.*{words}"):
         parse_material(str(file))
+
+
+def test_the_command_line_takes_constants_alone_and_by_volume():
+    assert material_of([TEXT]) == PLY
+    assert material_of(["core=steel", f"skin={TEXT}"]) == {"core": parse_material("steel"), "skin": PLY}
+
+
+def test_the_examples_of_the_documentation(tmp_path):
+    page = (ROOT / "docs" / "materials.md").read_text(encoding="utf-8")
+    space: dict = {}
+    exec(compile(page.split("```python\n")[1].split("```")[0], "materials.md", "exec"), space)
+    (tmp_path / "ply.toml").write_text(page.split("```toml\n")[1].split("```")[0], encoding="utf-8")
+    assert space["same"] == space["ply"] == parse_material(str(tmp_path / "ply.toml"))
