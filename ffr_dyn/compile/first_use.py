@@ -10,17 +10,13 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
-
-from numba.core.caching import FunctionCache
 
 from ffr_dyn.integrators import Integrator, methods
 from ffr_dyn.kernels.entry_points import add_loads, load_powers, run_controlled
 from ffr_dyn.kernels.simd.entry_point import ENTRY_POINTS, CompiledFunction, always
+from ffr_dyn.kernels.simd.intrinsics import compiled_forms
 from ffr_dyn.kernels.tables import Model
 
-_CACHE: Any = FunctionCache
 _AT_WORK: dict[str, subprocess.Popen[bytes]] = {}
 _ON_DISK: set[str] = set()  # functions that were found there before: a program with many runs looks once
 
@@ -35,14 +31,15 @@ def begin_compiling(*kinds: type[Integrator], model: Model | None = None) -> Non
     functions = _of_scene(model) + [step for step in _steps() if any(kind.do_step is step for kind in kinds)]
     if any(kind.controlled for kind in kinds):
         functions.append(run_controlled.general)
-    _ON_DISK.update(each.name for each in functions if each.name not in _ON_DISK and _is_on_disk(each))
+    _ON_DISK.update(each.name for each in functions if each.name not in _ON_DISK and compiled_forms(each.function))
     missing = [each.name for each in functions if each.name not in _AT_WORK and each.name not in _ON_DISK]
     if not missing:
         return
     print("ffr-dyn: compiling the kernels, once (some twenty seconds) ...", file=sys.stderr, flush=True)
-    same_packages = {**os.environ, "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
+    packages = os.pathsep.join(path or os.getcwd() for path in sys.path)
+    environment = {**os.environ, "PYTHONPATH": packages, "FFR_DYN_COMPILING": "1"}
     for share in _shares(missing):
-        process = subprocess.Popen([sys.executable, "-m", __name__, *share], env=same_packages)
+        process = subprocess.Popen([sys.executable, "-m", __name__, *share], env=environment)
         _AT_WORK.update(dict.fromkeys(share, process))
 
 
@@ -65,12 +62,6 @@ def ensure_compiled(*kinds: type[Integrator], model: Model | None = None) -> Non
 def _shares(names: Sequence[str]) -> list[list[str]]:
     """Two parts that take about as long; those that take long come first."""
     return [share for share in ([*names[::4], *names[3::4]], [*names[1::4], *names[2::4]]) if share]
-
-
-def _is_on_disk(compiled: CompiledFunction) -> bool:
-    """Whether numba has stored a compiled form of the function."""
-    folder = Path(_CACHE(compiled.function).cache_path)
-    return any(folder.glob(f"*.{compiled.name}-*.nbi"))
 
 
 def _steps() -> list[CompiledFunction]:

@@ -9,14 +9,17 @@ Twin: none, how things are compiled.
 from __future__ import annotations
 
 import functools
+import os
 from pathlib import Path
 from typing import Any
 
 from numba import njit
 
+from ffr_dyn.kernels.simd.intrinsics import PLAIN
+
 # No reference counts (_nrt): kernels allocate nothing and return no arrays, and counting views took half of the run time.
 OPTIONS: dict[str, Any] = {
-    "_nrt": False,
+    **({} if PLAIN else {"_nrt": False}),
     "error_model": "numpy",
     "fastmath": {"contract", "reassoc", "nsz"},
 }
@@ -39,7 +42,9 @@ def _sources() -> list[Path]:
 
 
 def _stamp() -> str:
-    return "\n".join(f"{path.name} {path.stat().st_mtime_ns} {path.stat().st_size}" for path in _sources())
+    return f"{PLAIN}\n" + "\n".join(
+        f"{path.name} {path.stat().st_mtime_ns} {path.stat().st_size}" for path in _sources()
+    )
 
 
 def _compiled() -> list[Path]:
@@ -50,8 +55,10 @@ def discard_stale_kernels() -> None:
     """Delete compiled kernels when any kernel source has changed.
 
     numba notices a change in a function's own file only; an integrator compiled with an older `bodies.py` would run on.
-    Where the package folder cannot be written numba caches elsewhere, by the installed version: nothing to do.
+    Where the package folder cannot be written, or NUMBA_CACHE_DIR says so, numba caches elsewhere: nothing to do.
     """
+    if os.environ.get("NUMBA_CACHE_DIR"):
+        return
     record = _PACKAGE / "kernels" / "__pycache__" / "sources.stamp"
     try:
         if record.exists() and record.read_text() == _stamp():

@@ -5,28 +5,41 @@ The tables are stored in blocks, as `ffr_dyn.compile.symmetry_blocks` makes them
 Twin: `ffr_dyn.equations.inertia.moments`.
 """
 
-from __future__ import annotations
-
-from typing import Any
-
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-
 from ffr_dyn.kernels.options import kernel
-from ffr_dyn.kernels.simd.intrinsics import (
-    LIBERTIES,
-    POOLED,
-    broadcast,
-    case_by_case,
-    intrinsic,
-    load_row,
-    pooled_data,
-    store_row,
-)
+from ffr_dyn.kernels.simd.lanes import load, plus, store
 from ffr_dyn.kernels.simd.slices import part, peek
-from ffr_dyn.kernels.tables import LANES, MOST_ROWS
+from ffr_dyn.kernels.tables import LANES, STRIPS
 from ffr_dyn.kernels.vectors import copy, fill
+
+
+@kernel
+def multiply(count, width, stride, table, start, x, first, begin, moving, y, at):
+    """y[at + k] = begin[k] + sum over `count` rows i of x[first + i] table[start + i stride + k], k < width, in whole rows of
+    lanes. Where `moving` is zero, not one, the sums begin with the same four rows of lanes again and again."""
+    strips = (width + LANES - 1) // LANES
+    for four in range(strips // STRIPS):  # each result is stored once
+        place = STRIPS * LANES * four
+        before, source = moving * place, start + place
+        s0, s1, s2, s3 = load_four(begin, before)
+        for i in range(count):
+            number, row = peek(x, first + i), source + i * stride
+            r0, r1, r2, r3 = load_four(table, row)
+            s0, s1, s2, s3 = plus(s0, number, r0), plus(s1, number, r1), plus(s2, number, r2), plus(s3, number, r3)
+        store(y, at + place, s0)
+        store(y, at + place + LANES, s1)
+        store(y, at + place + 2 * LANES, s2)
+        store(y, at + place + 3 * LANES, s3)
+    for strip in range(strips - strips % STRIPS, strips):
+        place = LANES * strip
+        row = load(begin, moving * place)
+        for i in range(count):
+            row = plus(row, peek(x, first + i), load(table, start + place + i * stride))
+        store(y, at + place, row)
+
+
+@kernel
+def load_four(array, at):
+    return load(array, at), load(array, at + LANES), load(array, at + 2 * LANES), load(array, at + 3 * LANES)
 
 
 @kernel
@@ -45,11 +58,11 @@ def contract(table, start, plan, at, q, qd, width, last, scratch, base, g, l):  
     order = at + 1 + 3 * blocks
     place = order + n
     x, xd, y, yd, begin, moving = q, qd, g, l, base, 1
-    nothing = part(scratch, 0, LANES * MOST_ROWS)
+    nothing = part(scratch, 0, LANES * STRIPS)
     fill(nothing, 0.0)
     if blocks > 0:
         begin, moving = nothing, 0
-        first, found = LANES * MOST_ROWS, LANES * MOST_ROWS + 2 * n
+        first, found = LANES * STRIPS, LANES * STRIPS + 2 * n
         x, xd = part(scratch, first, n), part(scratch, first + n, n)
         y, yd = part(scratch, found, width + LANES), part(scratch, found + width + LANES, last + LANES)
         for k in range(n):
@@ -72,39 +85,3 @@ def contract(table, start, plan, at, q, qd, width, last, scratch, base, g, l):  
             g[k] = base[k] + peek(y, peek(plan, place + k))
         for k in range(last):
             l[k] = peek(yd, peek(plan, place + width + k))
-
-
-@intrinsic
-def multiply(typing, count, width, stride, table, start, x, first, begin, moving, y, at):  # type: ignore[no-untyped-def]
-    """y[at + k] = begin[k] + sum over `count` rows i of x[first + i] table[start + i stride + k], k < width, in whole rows of
-    lanes. Where `moving` is zero, not one, the sums begin with the same six rows of lanes again and again."""
-
-    def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
-        count, width, stride, table, start, x, first, base, moving, y, at = args
-        table, x, base, y = (pooled_data(context, builder, array) for array in (table, x, base, y))
-        sums = [cgutils.alloca_once(builder, ir.VectorType(ir.DoubleType(), LANES)) for _ in range(MOST_ROWS)]
-
-        def emit(begin: Any, strips: int) -> None:
-            """So many rows of lanes from number `begin` on: each result is stored once."""
-            source, before = builder.add(start, begin), builder.mul(moving, begin)
-            for k, sum_ in enumerate(sums[:strips]):
-                builder.store(load_row(builder, base, before, k), sum_)
-            with cgutils.for_range(builder, count) as loop:
-                number = broadcast(builder, builder.load(builder.gep(x, [builder.add(first, loop.index)])))
-                row = builder.add(source, builder.mul(loop.index, stride))
-                for k, sum_ in enumerate(sums[:strips]):
-                    product = builder.fmul(number, load_row(builder, table, row, k), flags=LIBERTIES)
-                    builder.store(builder.fadd(builder.load(sum_), product, flags=LIBERTIES), sum_)
-            for k, sum_ in enumerate(sums[:strips]):
-                store_row(builder, builder.load(sum_), y, builder.add(at, begin), k)
-
-        strips = builder.sdiv(builder.add(width, cgutils.intp_t(LANES - 1)), cgutils.intp_t(LANES))
-        whole = builder.sdiv(strips, cgutils.intp_t(MOST_ROWS))
-        together = cgutils.intp_t(LANES * MOST_ROWS)
-        with cgutils.for_range(builder, whole) as loop:
-            emit(builder.mul(loop.index, together), MOST_ROWS)
-        rest = builder.sub(strips, builder.mul(whole, cgutils.intp_t(MOST_ROWS)))
-        return case_by_case(context, builder, rest, lambda rows: emit(builder.mul(whole, together), rows))
-
-    index = types.intp
-    return types.void(index, index, index, POOLED, index, POOLED, index, POOLED, index, POOLED, index), generate

@@ -10,7 +10,7 @@ from ffr_dyn.kernels.markers import project, shapes
 from ffr_dyn.kernels.multiplier_solver import SIDE, solve_blocks
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.planar import plane_rows
-from ffr_dyn.kernels.simd.simd_rows import combine_6, dot_narrow, dot_rows, narrow_3, narrow_6
+from ffr_dyn.kernels.simd.lanes import load, plus, store, times, total
 from ffr_dyn.kernels.simd.slices import part, six_parts
 from ffr_dyn.kernels.tables import IN_SHARED, IN_V, LANES, NORMAL, N
 from ffr_dyn.kernels.vectors import add, fill, in_plane, six_rows
@@ -57,17 +57,31 @@ def reduced_rates(bodies, markers, rows, bw, rw, target):
                 if normal >= 0:
                     c0, c1, c2 = in_plane(normal)
                     moved[0], moved[1], moved[2] = z[c0], z[c1], z[c2]
+                    add_rows(rw.step, LANES * k, moved, rw.X, at, 3)
                     if n > 0:
-                        moved[3], moved[4], moved[5] = plane_rows(shapes(markers, marker, n), normal, elastic, n)
-                        narrow_6(rw.step, LANES * k, 1.0, moved, 0, 1, rw.X, at)
-                    else:
-                        narrow_3(rw.step, LANES * k, 1.0, moved, 0, 1, rw.X, at)
+                        moved[0], moved[1], moved[2] = plane_rows(shapes(markers, marker, n), normal, elastic, n)
+                        add_rows(rw.step, LANES * k, moved, rw.X, at + 3 * LANES, 3)
                     continue
-                combine_6(rw.step, LANES * k, 1.0, z, 0, 1, rw.X, at)
+                add_rows(rw.step, LANES * k, z, rw.X, at, 6)
                 if n > 0:
                     phi = shapes(markers, marker, n)
                     moved[0], moved[1], moved[2], moved[3], moved[4], moved[5] = six_rows(phi, elastic, n)
-                    combine_6(rw.step, LANES * k, 1.0, moved, 0, 1, rw.X, at + 6 * LANES)
+                    add_rows(rw.step, LANES * k, moved, rw.X, at + 6 * LANES, 6)
+
+
+@kernel
+def add_rows(target, own, numbers, X, at, count):
+    """The row of lanes at `own` grows by sum_k numbers[k] times row k of X, over `count` rows from `at` on."""
+    row = load(target, own)
+    for k in range(count):
+        row = plus(row, numbers[k], load(X, at + LANES * k))
+    store(target, own, row)
+
+
+@kernel
+def dot_rows(X, at, step, own):
+    """The product of a row of lanes of X with the one of `step`."""
+    return total(times(load(X, at), load(step, own)))
 
 
 @inlined
@@ -160,7 +174,7 @@ def react(bodies, markers, rows, bw, rw):
                     dinv = part(bw.dinv, where[b, IN_SHARED], n)
                     if normal >= 0:
                         for c in range(3):
-                            wrench[c] = dot_narrow(rw.X, at + LANES * (3 + c), rw.step, LANES * k)
+                            wrench[c] = dot_rows(rw.X, at + LANES * (3 + c), rw.step, LANES * k)
                         release_in_plane(phi, normal, dinv, wrench, n, elastic)
                     else:
                         for c in range(6):
@@ -175,9 +189,9 @@ def react_rigid(X, at, step, own, normal, z):
     """Reduced forces z (6,) of a body less those of a side's reactions."""
     if normal >= 0:
         i, j, k = in_plane(normal)
-        z[i] -= dot_narrow(X, at, step, own)
-        z[j] -= dot_narrow(X, at + LANES, step, own)
-        z[k] -= dot_narrow(X, at + 2 * LANES, step, own)
+        z[i] -= dot_rows(X, at, step, own)
+        z[j] -= dot_rows(X, at + LANES, step, own)
+        z[k] -= dot_rows(X, at + 2 * LANES, step, own)
     else:
         for c in range(6):
             z[c] -= dot_rows(X, at + LANES * c, step, own)

@@ -9,20 +9,17 @@ Twin: `ffr_dyn.equations.motion.equations_of_motion`.
 
 from ffr_dyn.kernels.bodies import factorise, inertia, prepare_body, rotation_matrix
 from ffr_dyn.kernels.markers import couple_marker, couple_pair, prepare_marker, shapes, update_marker
-from ffr_dyn.kernels.multiplier_solver import SIDE, clear_column, factorise_block, relax_block
+from ffr_dyn.kernels.multiplier_solver import (
+    SIDE,
+    add_scale,
+    clear_column,
+    couple_sides,
+    eliminate_side,
+    factorise_block,
+    relax_block,
+)
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.rows import reaction
-from ffr_dyn.kernels.simd.joint_elimination import (
-    couple_flexible,
-    couple_flexible_in_plane,
-    couple_rigid,
-    couple_rigid_in_plane,
-    eliminate_flexible,
-    eliminate_flexible_in_plane,
-    eliminate_rigid,
-    eliminate_rigid_in_plane,
-)
-from ffr_dyn.kernels.simd.simd_rows import add_scale
 from ffr_dyn.kernels.simd.slices import part
 from ffr_dyn.kernels.spatial import coupling
 from ffr_dyn.kernels.tables import (
@@ -48,6 +45,9 @@ from ffr_dyn.kernels.tables import (
     N,
 )
 from ffr_dyn.kernels.vectors import cross, fill, get, in_plane, put, subtract, to_body, to_global
+
+# Of the nine coefficients of a side (see `tables.RowWork.jac`), those that the rigid and the elastic coordinates move.
+RIGID, ELASTIC = (0, 1, 2, 3, 4, 5), (0, 1, 2, 6, 7, 8)
 
 
 @inlined
@@ -107,14 +107,9 @@ def couple_joint(bodies, markers, rows, pattern, bw, rw, k):
                 couple_marker(shapes(markers, marker, n), H, dinv, n, normal, P)
             if normal >= 0:
                 c0, c1, c2 = in_plane(normal)
-                if flexible:
-                    eliminate_flexible_in_plane(jac, c0, c1, c2, 6 + normal, P, L, rw.X, at)
-                else:
-                    eliminate_rigid_in_plane(jac, c0, c1, c2, 6 + normal, P, L, rw.X, at)
-            elif flexible:
-                eliminate_flexible(jac, P, L, rw.X, at)
+                eliminate_side(jac, (c0, c1, c2), (c0, c1, 6 + normal), flexible, P, L, rw.X, at)
             else:
-                eliminate_rigid(jac, P, L, rw.X, at)
+                eliminate_side(jac, RIGID, ELASTIC, flexible, P, L, rw.X, at)
             add_scale(jac, bw.inverse[b, 0], bw.inverse[b, 1], rw.scale, LANES * k)
     clear_column(pattern, rw.S, k)
     for p in range(pattern.pair_start[k], pattern.pair_start[k + 1]):
@@ -124,14 +119,9 @@ def couple_joint(bodies, markers, rows, pattern, bw, rw, k):
         flexible, size = where[b, N] > 0, rows.start[earlier + 1] - rows.start[earlier]
         at, phiphi = pattern.pair[p, TARGET], rw.phiphi[pattern.pair[p, PHIPHI]]
         if where[b, NORMAL] >= 0:
-            if flexible:
-                couple_flexible_in_plane(rw.X, first, second, size, phiphi, rw.S, at)
-            else:
-                couple_rigid_in_plane(rw.X, first, second, size, phiphi, rw.S, at)
-        elif flexible:
-            couple_flexible(rw.X, first, second, size, phiphi, rw.S, at)
+            couple_sides(rw.X, first, second, size, 3, flexible, phiphi, rw.Y, rw.S, at)
         else:
-            couple_rigid(rw.X, first, second, size, phiphi, rw.S, at)
+            couple_sides(rw.X, first, second, size, 6, flexible, phiphi, rw.Y, rw.S, at)
 
 
 @inlined

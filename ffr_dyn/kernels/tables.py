@@ -36,10 +36,9 @@ AFFINE, GLOBAL = 0, 1
 
 OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED, NOT_CONVERGED, STEP_TOO_SMALL = range(7)
 
-LANES = 8  # rows of a joint side by side (see `ffr_dyn.kernels.simd.simd_rows`)
-NARROW = 4  # of them are enough in the plane
+LANES = 8  # rows of a joint side by side (see `ffr_dyn.kernels.simd.lanes`)
 QUAD = 4  # rows of a symmetric matrix that are multiplied together
-MOST_ROWS = 6  # of a joint
+STRIPS = 4  # rows of eight that products of a body are found in at a time
 STAGES = 7  # of a step, at most
 MEANS = 4  # over so many steps, of the loads that stiffen
 WATCH = 32  # steps from one look at their feedback to the next

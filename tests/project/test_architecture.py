@@ -142,6 +142,14 @@ class C:
     assert found == {**dict.fromkeys(at_once, False), "gmsh": True, "ffr_dyn.equations.state_view": True}
 
 
+def test_the_inner_parts_of_numba_stay_behind_one_wall():
+    used = {module: {i.name for i in imports_of(module)} for module in MODULES}
+    inner = {m for m, names in used.items() if any(n.startswith("numba.") and n != "numba.extending" for n in names)}
+    assert inner == {"ffr_dyn.kernels.simd.intrinsics"}
+    below = {m for m, names in used.items() if top(m) == "ffr_dyn" and names & {"llvmlite", "numba.extending"}}
+    assert below <= {module for module in MODULES if module.startswith("ffr_dyn.kernels.simd.")}
+
+
 def test_the_modules_are_found():
     assert {
         DOOR,

@@ -11,6 +11,7 @@ its place among the addresses, and the calls: in compiled code and from Python a
 from __future__ import annotations
 
 import ctypes
+import inspect
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any, get_type_hints
@@ -18,12 +19,9 @@ from typing import Any, get_type_hints
 import numpy as np
 from llvmlite import ir
 from numba import cfunc, types
-from numba.core import cgutils
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import lower_builtin
+from numba.extending import lower_builtin, type_callable
 
 from ffr_dyn.kernels.options import OPTIONS
-from ffr_dyn.kernels.simd.intrinsics import data_of
 from ffr_dyn.kernels.simd.table_address import Packed, pack, place_of
 from ffr_dyn.kernels.tables import Model, Record, Tables, Vector
 
@@ -35,6 +33,7 @@ _KINDS: dict[Any, tuple[Any, Any]] = {
     float: (types.float64, ctypes.c_double),
     int: (types.int64, ctypes.c_int64),
 }
+_WORD = ir.IntType(64)
 
 
 class CompiledFunction:
@@ -118,27 +117,27 @@ def entry_point(needed: Callable[[Model], bool] = always) -> Callable[[Callable[
 def _make_callable(entry: EntryPoint) -> None:
     """Let numba type and compile calls of an entry point."""
 
-    class Call(AbstractTemplate):  # type: ignore[misc]
-        key = entry
+    @type_callable(entry)
+    def typed(context):  # type: ignore[no-untyped-def]
+        def returned(*given: Any) -> Any:
+            return types.int64
 
-        def generic(self, args, kws):  # type: ignore[no-untyped-def]
-            return signature(types.int64, *args) if len(args) == len(entry.general.kinds) and not kws else None
-
-    infer_global(entry, types.Function(Call))
+        returned.__signature__ = inspect.signature(entry.general.function)  # type: ignore[attr-defined]
+        return returned
 
     @lower_builtin(entry, types.VarArg(types.Any))
     def call(context, builder, sig, args):  # type: ignore[no-untyped-def]
         kinds = [kind for kind, _ in entry.general.kinds]
         given = [_as_kind(context, builder, *each) for each in zip(args, sig.args, kinds, strict=True)]
-        words = builder.bitcast(args[0], cgutils.intp_t.as_pointer())
-        places = builder.load(builder.gep(words, [cgutils.intp_t(place_of(Tables, "entry_points"))]))
-        at = builder.gep(builder.inttoptr(places, cgutils.intp_t.as_pointer()), [cgutils.intp_t(entry.number)])
-        function = ir.FunctionType(ir.IntType(64), [value.type for value in given])
+        words = builder.bitcast(args[0], _WORD.as_pointer())
+        places = builder.load(builder.gep(words, [_WORD(place_of(Tables, "entry_points"))]))
+        at = builder.gep(builder.inttoptr(places, _WORD.as_pointer()), [_WORD(entry.number)])
+        function = ir.FunctionType(_WORD, [value.type for value in given])
         return builder.call(builder.inttoptr(builder.load(at), function.as_pointer()), given)
 
 
 def _as_kind(context: Any, builder: Any, value: Any, given: Any, wanted: Any) -> Any:
     """A value of one type of numba as one of another: an array as the address of its data."""
     if isinstance(given, types.Array):
-        return data_of(context, builder, given, value)
+        return context.make_helper(builder, given, value).data
     return value if given == wanted else context.cast(builder, value, given, wanted)

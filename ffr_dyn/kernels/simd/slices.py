@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import Any
 
 from numba import types
-from numba.core import cgutils
-from numba.np.arrayobj import make_array, populate_array
 
-from ffr_dyn.kernels.simd.intrinsics import data_of, intrinsic
+from ffr_dyn.kernels.options import inlined
+from ffr_dyn.kernels.simd import plain
+from ffr_dyn.kernels.simd.intrinsics import PLAIN, intrinsic, make_array, populate_array
 
 _VECTOR = types.Array(types.float64, 1, "C")
 
@@ -43,7 +43,7 @@ def part(typing, array, start, size):  # type: ignore[no-untyped-def]
     """`size` numbers from number `start` of a contiguous array on, whatever its axes: a.ravel()[start : start + size]."""
 
     def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-        first = builder.gep(data_of(context, builder, array, args[0]), [args[1]], inbounds=True)
+        first = builder.gep(make_array(array)(context, builder, args[0]).data, [args[1]], inbounds=True)
         return array_at(context, builder, _VECTOR, first, [args[2]])
 
     return _VECTOR(array, types.int64, types.int64), generate
@@ -54,27 +54,22 @@ def peek(typing, array, number):  # type: ignore[no-untyped-def]
     """array[number] of a contiguous vector, for a number that is none of those counted from the end."""
 
     def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-        return builder.load(builder.gep(data_of(context, builder, array, args[0]), [args[1]], inbounds=True))
+        return builder.load(builder.gep(make_array(array)(context, builder, args[0]).data, [args[1]], inbounds=True))
 
     return array.dtype(array, types.int64), generate
 
 
-def _parts(count: int) -> Any:
-    """The compiled function that gives the first `count` rows of `size` numbers each of a contiguous array."""
-    result = types.UniTuple(_VECTOR, count)
-
-    @intrinsic
-    def first_parts(typing, array, size):  # type: ignore[no-untyped-def]
-        def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-            data, rows = data_of(context, builder, array, args[0]), []
-            for number in range(count):
-                first = builder.gep(data, [builder.mul(args[1], cgutils.intp_t(number))], inbounds=True)
-                rows.append(array_at(context, builder, _VECTOR, first, [args[1]]))
-            return context.make_tuple(builder, result, rows)
-
-        return result(array, types.int64), generate
-
-    return first_parts
+if PLAIN:
+    vector_at, part, peek = plain.vector_at, plain.part, plain.peek
 
 
-three_parts, six_parts = _parts(3), _parts(6)
+@inlined
+def three_parts(array, n):
+    """The first three rows of `n` numbers each of a contiguous array."""
+    return part(array, 0, n), part(array, n, n), part(array, 2 * n, n)
+
+
+@inlined
+def six_parts(array, n):
+    """The first six."""
+    return (*three_parts(array, n), part(array, 3 * n, n), part(array, 4 * n, n), part(array, 5 * n, n))

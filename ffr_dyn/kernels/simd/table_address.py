@@ -13,12 +13,12 @@ from typing import Any, get_type_hints
 
 import numpy as np
 from numba import types
-from numba.core import cgutils
-from numba.core.datamodel.models import OpaqueModel
-from numba.core.typing.templates import AttributeTemplate
-from numba.extending import infer_getattr, lower_getattr_generic, register_model
+from numba.extending import infer_getattr, lower_getattr_generic, models, register_model
 
+from ffr_dyn.kernels.simd import plain
+from ffr_dyn.kernels.simd.intrinsics import PLAIN, AttributeTemplate, cgutils, intrinsic
 from ffr_dyn.kernels.simd.slices import array_at
+from ffr_dyn.kernels.tables import Record, Tables
 
 Array = np.ndarray
 
@@ -95,7 +95,7 @@ class Packed(types.Type):
 
 
 @register_model(Packed)
-class PackedModel(OpaqueModel):  # type: ignore[misc]
+class PackedModel(models.OpaqueModel):  # type: ignore[misc]
     """An address."""
 
 
@@ -110,31 +110,72 @@ def _numba_type(kind: Any) -> Any:
     return types.Array(getattr(types, dtype), axes, "C")
 
 
-@infer_getattr
-class PackedFields(AttributeTemplate):  # type: ignore[misc]
-    """Types of the fields."""
-
-    key = Packed
-
-    def generic_resolve(self, value, attr):  # type: ignore[no-untyped-def, override]
-        """None where the table has no such field."""
-        kind = _fields(value.table).get(attr)
-        return None if kind is None else _numba_type(kind)
+def _place(table: Any, name: str) -> tuple[Any, int] | None:
+    """numba's type of a field and its first word; None where the table has no such field."""
+    kind = _fields(table).get(name)
+    return None if kind is None else (_numba_type(kind), _places(table)[name])
 
 
-@lower_getattr_generic(Packed)
-def _read_field(context, builder, typ, value, attr):  # type: ignore[no-untyped-def]
-    field, at = _numba_type(_fields(typ.table)[attr]), _places(typ.table)[attr]
-    base = builder.bitcast(value, cgutils.intp_t.as_pointer())
+@cache
+def _view(table: type) -> Any:
+    """The compiled function that takes an address for that of such a table."""
+    result = Packed(table)
 
-    def word(number: int) -> Any:
-        loaded = builder.load(builder.gep(base, [cgutils.intp_t(at + number)]))
-        loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
-        return loaded
+    @intrinsic
+    def table_at(typing, address):  # type: ignore[no-untyped-def]
+        def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+            return builder.inttoptr(args[0], context.get_value_type(result))
 
-    if isinstance(field, Packed):
-        return builder.bitcast(builder.gep(base, [cgutils.intp_t(at)]), context.get_value_type(field))
-    if isinstance(field, types.Array):
-        data = builder.inttoptr(word(0), context.get_data_type(field.dtype).as_pointer())
-        return array_at(context, builder, field, data, [word(1 + axis) for axis in range(field.ndim)])
-    return builder.bitcast(word(0), context.get_value_type(field)) if field is types.float64 else word(0)
+        return result(types.int64), generate
+
+    return table_at
+
+
+@intrinsic
+def _address_of(typing, table):  # type: ignore[no-untyped-def]
+    """What `_view` was given."""
+
+    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        return builder.ptrtoint(args[0], context.get_value_type(types.int64))
+
+    return types.int64(table), generate
+
+
+def _names(table: Any) -> set[str]:
+    """Of all fields, those of inner tables, too."""
+    fields = _fields(table)
+    return set(fields).union(*(_names(kind) for kind in fields.values() if _is_table(kind)))
+
+
+if PLAIN:
+    for _name in sorted(_names(Tables) | _names(Record)):
+        plain.define_field(Packed, _name, _address_of, _view, _place)
+else:
+
+    @infer_getattr
+    class PackedFields(AttributeTemplate):  # type: ignore[misc]
+        """Types of the fields."""
+
+        key = Packed
+
+        def generic_resolve(self, value, attr):  # type: ignore[no-untyped-def, override]
+            """None where the table has no such field."""
+            found = _place(value.table, attr)
+            return None if found is None else found[0]
+
+    @lower_getattr_generic(Packed)
+    def _read_field(context, builder, typ, value, attr):  # type: ignore[no-untyped-def]
+        field, at = _numba_type(_fields(typ.table)[attr]), _places(typ.table)[attr]
+        base = builder.bitcast(value, cgutils.intp_t.as_pointer())
+
+        def word(number: int) -> Any:
+            loaded = builder.load(builder.gep(base, [cgutils.intp_t(at + number)]))
+            loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
+            return loaded
+
+        if isinstance(field, Packed):
+            return builder.bitcast(builder.gep(base, [cgutils.intp_t(at)]), context.get_value_type(field))
+        if isinstance(field, types.Array):
+            data = builder.inttoptr(word(0), context.get_data_type(field.dtype).as_pointer())
+            return array_at(context, builder, field, data, [word(1 + axis) for axis in range(field.ndim)])
+        return builder.bitcast(word(0), context.get_value_type(field)) if field is types.float64 else word(0)

@@ -6,10 +6,11 @@ Twin: `ffr_dyn.equations.stiffening.stiffening_force`,
 """
 
 from ffr_dyn.kernels.options import inlined, kernel
+from ffr_dyn.kernels.products import multiply
 from ffr_dyn.kernels.rows import reaction
-from ffr_dyn.kernels.simd.slices import part, peek
-from ffr_dyn.kernels.simd.symmetric_products import multiply_blocks, weighted_sum
-from ffr_dyn.kernels.tables import IN_STIFFENING, IN_V, K_PLAN, K_SIZE, LANES, QUAD, RATES, N
+from ffr_dyn.kernels.simd.lanes import load, plus, scaled, store, times, total, zeros
+from ffr_dyn.kernels.simd.slices import part
+from ffr_dyn.kernels.tables import IN_STIFFENING, IN_V, K_PLAN, K_SIZE, LANES, QUAD, RATES, STRIPS, N
 from ffr_dyn.kernels.vectors import cross, fill, get, subtract, to_body
 
 
@@ -19,14 +20,49 @@ def sum_stiffness(bodies, w, load, b):
     plan, at = bodies.blocks, bodies.where[b, K_PLAN]
     groups, size = plan[at], plan[at + 2]
     number, start, out = at + 3 + 2 * groups + 2 * bodies.where[b, N], bodies.where[b, IN_STIFFENING], 0
-    weights = part(w.sorted, 3 * size, load.size)
+    nothing, weights = part(w.sorted, 0, LANES * STRIPS), part(w.sorted, 3 * size + LANES * STRIPS, load.size)
+    fill(nothing, 0.0)
     for group in range(groups):
         count, entries = plan[at + 3 + 2 * group], plan[at + 4 + 2 * group]
         for k in range(count):
-            weights[k] = peek(load, peek(plan, number + k))
-        weighted_sum(count, weights, bodies.stiffening, start, entries, w.K_sigma, out)
+            weights[k] = load[plan[number + k]]
+        multiply(count, entries, entries, bodies.stiffening, start, weights, 0, nothing, 0, w.K_sigma, out)
         start, out, number = start + count * entries, out + entries, number + count
     fill(part(w.K_sigma, out, QUAD * LANES), 0.0)  # what the last rows read beyond their end
+
+
+@kernel
+def multiply_blocks(parts, plan, at, K, x, y, z):
+    """y + z = K x, for blocks of K and the plan of `ffr_dyn.compile.symmetry_blocks.symmetric_blocks`, whose parts begin at
+    `at`.
+
+    Four rows at a time meet all blocks that they have, at most eight columns wide: some serve them alone, the others what
+    lies across the diagonal, too.
+
+    z : set;  y : was zero;  x : zero between a part and the next row of lanes. What y and z have there is not used.
+    """
+    blocks = at + 4 * parts
+    for header in range(at, at + 4 * parts, 4):
+        row, quads, alone, across = plan[header], plan[header + 1], plan[header + 2], plan[header + 3]
+        for r in range(0, QUAD * quads, QUAD):
+            s0, s1, s2, s3 = zeros(), zeros(), zeros(), zeros()
+            for k in range(alone + across):
+                first, stride, column = plan[blocks + 3 * k], plan[blocks + 3 * k + 1], plan[blocks + 3 * k + 2]
+                place, other = first + r * stride, load(x, column)
+                k0, k1, k2, k3 = load_lines(K, place, stride)
+                s0, s1 = plus(s0, 1.0, times(k0, other)), plus(s1, 1.0, times(k1, other))
+                s2, s3 = plus(s2, 1.0, times(k2, other)), plus(s3, 1.0, times(k3, other))
+                if k >= alone:
+                    both = plus(scaled(x[row + r], k0), x[row + r + 1], k1)
+                    both = plus(plus(both, x[row + r + 2], k2), x[row + r + 3], k3)
+                    store(y, column, plus(load(y, column), 1.0, both))
+            z[row + r], z[row + r + 1], z[row + r + 2], z[row + r + 3] = total(s0), total(s1), total(s2), total(s3)
+        blocks += 3 * (alone + across)
+
+
+@kernel
+def load_lines(K, at, stride):
+    return load(K, at), load(K, at + stride), load(K, at + 2 * stride), load(K, at + 3 * stride)
 
 
 @kernel
@@ -41,10 +77,10 @@ def multiply_stiffness(bodies, w, b, q, found):
     x, y, z = part(w.sorted, 0, size), part(w.sorted, size, size), part(w.sorted, 2 * size, size)
     fill(part(w.sorted, 0, 2 * size), 0.0)
     for k in range(n):
-        x[peek(plan, place + k)] = q[k]
+        x[plan[place + k]] = q[k]
     multiply_blocks(parts, plan, blocks, w.K_sigma, x, y, z)
     for k in range(n):
-        found[k] = peek(y, peek(plan, place + k)) + peek(z, peek(plan, place + k))
+        found[k] = y[plan[place + k]] + z[plan[place + k]]
 
 
 @kernel
@@ -53,7 +89,7 @@ def take_diagonal(bodies, w, b, diagonal):
     plan, at, n = bodies.blocks, bodies.where[b, K_PLAN], bodies.where[b, N]
     place = at + 3 + 2 * plan[at] + n
     for k in range(n):
-        diagonal[k] = peek(w.K_sigma, peek(plan, place + k))
+        diagonal[k] = w.K_sigma[plan[place + k]]
 
 
 @kernel

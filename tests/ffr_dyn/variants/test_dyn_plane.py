@@ -80,7 +80,10 @@ def test_motion_and_reactions_equal_the_spatial_ones(method, stiffening):
     assert 0 < across.sum() < across.size
     deflection = np.abs(spatial["rod.q"]).max()
     np.testing.assert_allclose(planar["rod.q"], spatial["rod.q"], rtol=0, atol=1e-10 * deflection)
+    rounding = {"rod.a.displacement": np.finfo(float).eps * np.abs(spatial["rod.b.displacement"]).max()}
     for name in ("rod.b.position", "block.R", "rod.a.displacement", "rod.omega_bar", "crank.p"):
+        if max(np.abs(run[name]).max() for run in runs) < rounding.get(name, 0.0):
+            continue  # both are zero on the scale of their kind: what is left of the end that the frame is fixed to
         np.testing.assert_allclose(planar[name], spatial[name], rtol=0, atol=1e-10 * np.abs(spatial[name]).max())
     for name in ("motor.moment", "main.force", "big.force", "small.force", "guide.force", "guide.moment"):
         np.testing.assert_allclose(planar[name], spatial[name], rtol=0, atol=1e-7 * np.abs(spatial["big.force"]).max())
