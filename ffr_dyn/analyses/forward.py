@@ -272,7 +272,7 @@ def with_all_reactions(assembled: Assembled, record: Record) -> Record:
     reaction = np.empty_like(record.reaction)
     for row, moment in enumerate(record.time):
         machine.x[:], machine.v[:] = record.x[row], record.v[row]
-        machine.work.loads.reference[:] = record.action[row, :, 0]
+        machine.work.loads.reference[:] = record.forces[row]
         record_row(machine, moment, one, 0)
         reaction[row] = one.reaction[0, numbers]
     return record._replace(reaction=reaction)

@@ -23,6 +23,8 @@ from ffr_dyn.kernels.entry_points import (
 )
 from ffr_dyn.kernels.simd.table_address import pack
 from ffr_dyn.kernels.tables import Clock, Control, Model, Record, Tables, Work
+from ffr_dyn.kernels.unit import kernel_named
+from ffr_dyn.scene.force import kernels_of
 
 if TYPE_CHECKING:
     from ffr_dyn.integrators import Controlled, Integrator
@@ -76,7 +78,8 @@ def new_machine(
 
     The first machine of a kind waits until what it needs is compiled.
     """
-    ensure_compiled(*(() if method is None else (type(method),)), model=system.model)
+    kinds = () if method is None else (type(method),)
+    ensure_compiled(*kinds, model=system.model, forces=kernels_of(system.scene))
     if method is None:
         stages, h = new_stages(system, 0), 0.0
     else:
@@ -88,9 +91,10 @@ def new_machine(
     keeps_terms, looks_ahead = (False, 0) if method is None else (method.keeps_terms, method.looks_ahead)
     work = new_work(system.model, keeps_terms=keeps_terms, looks_ahead=looks_ahead)
     units = np.array(unit_addresses(system.model, calls), dtype=np.int64)
+    forces = np.array([kernel_named(name).address for name in kernels_of(system.scene)], dtype=np.int64)
     own = np.array(x, dtype=float), np.array(v, dtype=float)
-    units, work, stages, clock, control, own = aligned((units, work, stages, clock, control, own))
-    return _packed(system, Tables(0, units, system.model, work, stages, clock, control, *own))
+    units, forces, work, stages, clock, control, own = aligned((units, forces, work, stages, clock, control, own))
+    return _packed(system, Tables(0, units, forces, system.model, work, stages, clock, control, *own))
 
 
 def _control(system: System, method: Integrator | None, start: float, spacing: float) -> Control:

@@ -22,28 +22,33 @@ from ffr_dyn.kernels.entry_points import (
     RELAXED_UNITS,
     STIFFENED_UNITS,
     UNITS,
-    Unit,
     units_of,
 )
 from ffr_dyn.kernels.tables import Model
+from ffr_dyn.kernels.unit import Unit, kernel_named
 
+FORCES = (
+    "ffr_dyn.kernels.forces.load:load",
+    "ffr_dyn.kernels.forces.spring:spring",
+)  # of a scene that is not known yet
 _METHODS = {**METHODS, **CONTROLLED}
 _AT_WORK: dict[str, subprocess.Popen[bytes]] = {}
 _ON_DISK: set[str] = set()  # units that were found there before: a program with many runs looks once
 
 
-def begin_compiling(*kinds: type[Integrator], model: Model | None = None) -> None:
+def begin_compiling(*kinds: type[Integrator], model: Model | None = None, forces: Sequence[str] = FORCES) -> None:
     """Start to compile the units of some methods where they are not on disk, and go on with something else meanwhile.
 
     For programs that mesh and reduce bodies first: a run that needs the units waits for them.
 
     model : tables of the scene; without them, of one with applied loads
+    forces : kernels of the scene's forces, "module:name"
     """
     controlled = CONTROL_UNITS if any(kind.controlled for kind in kinds) else {}
     methods = {name: kind.unit for name, kind in _METHODS.items() if kind in kinds}
     extra = {name: EXTRA_UNITS[name] for kind in kinds for name in kind.calls}
     scene = units_of(model) if model else {**UNITS, **LOAD_UNITS}
-    units = {**scene, **controlled, **extra, **methods}
+    units = {**scene, **controlled, **extra, **methods, **{name: kernel_named(name) for name in forces}}
     _ON_DISK.update(name for name, unit in units.items() if name not in _ON_DISK and _is_on_disk(unit))
     missing = [name for name in units if name not in _AT_WORK and name not in _ON_DISK]
     if not missing:
@@ -55,9 +60,9 @@ def begin_compiling(*kinds: type[Integrator], model: Model | None = None) -> Non
         _AT_WORK.update(dict.fromkeys(share, process))
 
 
-def ensure_compiled(*kinds: type[Integrator], model: Model | None = None) -> None:
+def ensure_compiled(*kinds: type[Integrator], model: Model | None = None, forces: Sequence[str] = ()) -> None:
     """Have the units of some methods on disk; where that fails, the run compiles them itself."""
-    begin_compiling(*kinds, model=model)
+    begin_compiling(*kinds, model=model, forces=forces)
     for process in set(_AT_WORK.values()):
         process.wait()
     _AT_WORK.clear()
@@ -76,7 +81,7 @@ def _is_on_disk(unit: Unit) -> bool:
 
 def compile_units(names: Sequence[str]) -> None:
     """Compile units and methods by their names."""
-    units = {
+    units: dict[str, Unit] = {
         **UNITS,
         **LOAD_UNITS,
         **RELAXED_UNITS,
@@ -86,7 +91,7 @@ def compile_units(names: Sequence[str]) -> None:
         **{name: kind.unit for name, kind in _METHODS.items()},
     }
     for name in names:
-        unit = units[name]
+        unit = kernel_named(name) if ":" in name else units[name]
         if not unit.address:
             raise RuntimeError(f"unit {name} has no address")
 

@@ -15,9 +15,9 @@ from ffr_dyn.compile.force_tables import Callback, FunctionTable, base_functions
 from ffr_dyn.equations.layout import Layout, layout
 from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.kernels.tables import LANES, Markers, Model, Pattern, Rows
-from ffr_dyn.scene.applied_loads import marker_numbers
 from ffr_dyn.scene.couplings import Coupling, coupling_word
 from ffr_dyn.scene.drivers import Driver, PointDriver, driver_word, path_words
+from ffr_dyn.scene.force import loaded_markers
 from ffr_dyn.scene.joints import RELATION, Joint, Word, words
 from ffr_dyn.scene.scene import MarkerName, Scene, joint_of, joints_of, marker_number, markers
 from ffr_prep.common.errors import InputError
@@ -136,13 +136,14 @@ def _markers(scene: Scene, blocks: tuple[Block, ...]) -> Markers:
     shapes = [np.concatenate([i.phi_t, i.phi_r]) for i in interfaces] + [np.zeros((6, 0))] * len(scene.ground)
     phi, start = once(shapes, [*(id(i) for i in interfaces), *("ground" for _ in scene.ground)])
     joint = sorted({k for block in blocks for k in block.markers})
+    loaded = [marker_number(scene, name) for name in loaded_markers(scene)]
     return Markers(
         body=np.array([entry[0] for entry in table], dtype=np.int64),
         u=np.array([i.position for i in interfaces] + list(scene.ground.values())).reshape(-1, 3),
         phi=phi,
         start=start,
         load=np.array(_load_numbers(scene), dtype=np.int64),
-        active=np.array(sorted({*joint, *marker_numbers(scene)}), dtype=np.int64),
+        active=np.array(sorted({*joint, *loaded}), dtype=np.int64),
         joint=np.array([k for k in joint if table[k][0] != ground], dtype=np.int64),
     )
 

@@ -16,7 +16,7 @@ from ffr_dyn.integrators.ros2 import ROS2
 from ffr_dyn.integrators.ros3 import ROS3, AdaptiveROS3
 from ffr_dyn.integrators.tolerances import Tolerances, tolerances
 from ffr_dyn.integrators.variational import Variational
-from ffr_dyn.kernels.entry_points import Unit
+from ffr_dyn.kernels.unit import Unit
 
 __all__ = [
     "CONTROLLED",

@@ -10,12 +10,12 @@ from typing import ClassVar
 
 from ffr_dyn.integrators.tolerances import Tolerances
 from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.entry_points import Unit
 from ffr_dyn.kernels.integrator_api import evaluate, set_diagonal, settle, solve
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.simd.table_address import tables_at
 from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
+from ffr_dyn.kernels.unit import Unit
 from ffr_dyn.kernels.vectors import add_scaled, copy, fill
 
 # Rows of the lower triangle, six to a row; the last are the weights of order five.

@@ -29,14 +29,14 @@ from typing import ClassVar
 
 from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.entry_points import Unit
 from ffr_dyn.kernels.finite_motion import carry, converging, farthest, largest_motion, unconverged
-from ffr_dyn.kernels.forces.coordinate_forces import keep_turns
+from ffr_dyn.kernels.forces.applied import keep_measured
 from ffr_dyn.kernels.integrator_api import correct, evaluate, project, set_diagonal, settle, solve_again, solve_aside
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.simd.table_address import tables_at
 from ffr_dyn.kernels.system import finite, largest, to_velocity_rates
 from ffr_dyn.kernels.tables import NOT_FINITE, OK, USER_FAILED
+from ffr_dyn.kernels.unit import Unit
 from ffr_dyn.kernels.vectors import add_scaled, copy, fill
 from ffr_prep.common.errors import InputError
 
@@ -170,7 +170,7 @@ def generalised_alpha_step(at, t, unused, unused_too):
     status = iterate(r, t, h, square, single)
     if status != OK:
         return status
-    keep_turns(r.model.loads, r.work.loads)
+    keep_measured(r.work.loads)
     r.work.drift[0] = max(r.work.drift[0], largest(r.work.rows.Phi))
     r.work.drift[1] = max(r.work.drift[1], largest(r.work.rows.nu))
     copy(s.v[BEFORE], s.v[NOW])

@@ -19,9 +19,8 @@ from typing import ClassVar
 
 from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.entry_points import Unit
 from ffr_dyn.kernels.finite_motion import into_body_axes, largest_motion
-from ffr_dyn.kernels.forces.coordinate_forces import keep_turns
+from ffr_dyn.kernels.forces.applied import keep_measured
 from ffr_dyn.kernels.integrator_api import evaluate, look_ahead, set_diagonal, settle, solve, solve_again
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.simd.slices import part
@@ -29,6 +28,7 @@ from ffr_dyn.kernels.simd.table_address import tables_at
 from ffr_dyn.kernels.solution import constraint_rates
 from ffr_dyn.kernels.system import finite, largest, to_velocity_rates
 from ffr_dyn.kernels.tables import NEAR, NOT_CONVERGED, NOT_FINITE, OK, TIGHTER
+from ffr_dyn.kernels.unit import Unit
 from ffr_dyn.kernels.vectors import add_scaled, copy
 
 ROOT = 6.0**0.5
@@ -153,7 +153,7 @@ def half_explicit_step(at, t, unused, unused_too):
             status = evaluate(r, t + C[k] * h, s.x[HERE], s.v[HERE])
         if status == OK:
             if k == 0:
-                keep_turns(r.model.loads, r.work.loads)
+                keep_measured(r.work.loads)
             status = accelerate(r, k, h * A[(STAGES + 1) * k])
         if status != OK:
             return status

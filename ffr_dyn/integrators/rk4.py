@@ -7,11 +7,11 @@ from typing import ClassVar
 
 from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.entry_points import Unit
 from ffr_dyn.kernels.integrator_api import evaluate, set_diagonal, settle, solve_stage
 from ffr_dyn.kernels.simd.table_address import tables_at
 from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
+from ffr_dyn.kernels.unit import Unit
 from ffr_dyn.kernels.vectors import add_four, add_scaled, copy
 
 AT, WEIGHTS = (0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)

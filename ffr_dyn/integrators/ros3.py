@@ -26,11 +26,11 @@ from typing import ClassVar
 from ffr_dyn.integrators.step import check_step
 from ffr_dyn.integrators.tolerances import Tolerances
 from ffr_dyn.kernels.bodies import normalise, position_rates
-from ffr_dyn.kernels.entry_points import Unit
 from ffr_dyn.kernels.integrator_api import add_elastic_part, correct, evaluate, set_diagonal, settle, solve_stage
 from ffr_dyn.kernels.simd.table_address import tables_at
 from ffr_dyn.kernels.system import acceleration_target, finite, to_velocity_rates
 from ffr_dyn.kernels.tables import OK
+from ffr_dyn.kernels.unit import Unit
 from ffr_dyn.kernels.vectors import add_four, add_scaled, combine_three, copy, fill, weigh_four
 
 GAMMA = 0.43586652150845900

@@ -30,9 +30,8 @@ from typing import ClassVar
 from ffr_dyn.integrators.generalised_alpha import check_iterations
 from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.bodies import mass_times, normalise, six_rows, three_rows
-from ffr_dyn.kernels.entry_points import Unit
 from ffr_dyn.kernels.finite_motion import carry, converging, farthest, into_global_axes, largest_motion, unconverged
-from ffr_dyn.kernels.forces.coordinate_forces import keep_turns
+from ffr_dyn.kernels.forces.applied import keep_measured
 from ffr_dyn.kernels.integrator_api import evaluate, look_ahead, set_diagonal, settle, solve_again, solve_aside
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.simd.slices import part
@@ -40,6 +39,7 @@ from ffr_dyn.kernels.simd.table_address import tables_at
 from ffr_dyn.kernels.solution import add_reactions, constraint_rates
 from ffr_dyn.kernels.system import finite, largest, to_body_axes, to_velocity_rates
 from ffr_dyn.kernels.tables import NOT_FINITE, OK, USER_FAILED
+from ffr_dyn.kernels.unit import Unit
 from ffr_dyn.kernels.vectors import add, add_scaled, copy, cross, dot, fill, get, scale, subtract
 
 # Rows of stages.v. MU: momenta at the start of the step; KICK: geometric stiffening there; MIDDLE: v_m; SHORT: what the
@@ -318,7 +318,7 @@ def variational_step(at, t, unused, unused_too):
     if status != OK:
         return status
     r.work.drift[0] = max(r.work.drift[0], largest(r.work.rows.Phi))
-    keep_turns(r.model.loads, r.work.loads)
+    keep_measured(r.work.loads)
     close(r, h)
     if stiffened:
         copy(s.v[CHANGE], r.v)

@@ -7,18 +7,12 @@ integrator costs no more than its own few lines, and compilation can be shared a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from functools import cached_property
-from typing import Any
-
-from numba import cfunc, types
+from collections.abc import Collection
 
 from ffr_dyn.kernels.bodies import mass_times
-from ffr_dyn.kernels.forces.coordinate_forces import keep_turns
-from ffr_dyn.kernels.forces.loads import apply_loads, call_user, count_loads, gravity_field, power
+from ffr_dyn.kernels.forces.applied import apply_loads, call_user, count_loads, gravity_field, keep_measured, power
 from ffr_dyn.kernels.functions import evaluate_functions
 from ffr_dyn.kernels.integrator_api import set_diagonal
-from ffr_dyn.kernels.options import OPTIONS
 from ffr_dyn.kernels.output_row import keep
 from ffr_dyn.kernels.rows import evaluate_block
 from ffr_dyn.kernels.simd.slices import part, vector_at
@@ -73,26 +67,11 @@ from ffr_dyn.kernels.tables import (
     USER_FAILED,
     Model,
 )
+from ffr_dyn.kernels.unit import Unit
 from ffr_dyn.kernels.vectors import add_scaled, copy, fill
 
 PASSES = 10  # of `relaxed_unit` at most
 UNMET = 1e3  # tolerances, beyond which a violation that the projection does not take back is no drift
-SIGNATURE = types.int64(types.int64, types.float64, types.int64, types.int64)
-
-
-class Unit:
-    """A function of SIGNATURE, compiled at the first use of its address, or read from disk."""
-
-    def __init__(self, function: Callable[..., int]) -> None:
-        self.function = function
-
-    @cached_property
-    def compiled(self) -> Any:
-        return cfunc(SIGNATURE, cache=True, **OPTIONS)(self.function)
-
-    @property
-    def address(self) -> int:
-        return self.compiled.address
 
 
 @Unit
@@ -136,7 +115,7 @@ def loads_unit(at, only, x, unused):
     f, load, first, last = r.work.bodies.f, r.work.markers.load, 0, count_loads(r.model.loads)
     if only >= 0.0:
         f, load, first, last = r.work.loads.f, r.work.loads.load, int(only), int(only) + 1
-    apply_loads(r.model, r.work, vector_at(x, r.x.size), f, load, first, last)
+    apply_loads(r, x, f, load, first, last)
     return OK
 
 
@@ -336,7 +315,7 @@ def settle_unit(at, t, x, v):
             break
         w.info[2] += 1
         call_unit(r.units[MOVE_BACK], at, t, x, v)
-    keep_turns(r.model.loads, w.loads)
+    keep_measured(w.loads)
     return OK
 
 
@@ -360,7 +339,7 @@ def record_unit(at, t, record, row):
     r = tables_at(at)
     status = call_unit(r.units[TRULY], at, t, r.x.ctypes.data, r.v.ctypes.data)
     if status == OK:
-        keep_turns(r.model.loads, r.work.loads)
+        keep_measured(r.work.loads)
         call_unit(r.units[MARKERS], at, ALL, r.x.ctypes.data, r.v.ctypes.data)
         if count_loads(r.model.loads) > 0:
             call_unit(r.units[POWERS], at, t, record, row)

@@ -6,7 +6,7 @@ Order of calls: `prepare` once per elastic diagonal; `evaluate_bodies`, `evaluat
 """
 
 from ffr_dyn.kernels.bodies import coupling, factorise, inertia, normalise, prepare_body, rotation_matrix
-from ffr_dyn.kernels.forces.loads import count_loads
+from ffr_dyn.kernels.forces.applied import count_loads
 from ffr_dyn.kernels.markers import couple_marker, couple_pair, prepare_marker, shapes, update_marker
 from ffr_dyn.kernels.multiplier_solver import SIDE, clear_column, factorise_block, relax_block
 from ffr_dyn.kernels.options import inlined, kernel

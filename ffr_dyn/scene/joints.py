@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ffr_dyn.functions.rotation import triad
 from ffr_dyn.functions.time_functions import TimeFunction, as_time_function
+from ffr_dyn.scene.fields import Direction, In, OfTime
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
@@ -225,10 +226,10 @@ class Joint:
     kind: str
     i: str
     j: str
-    axis: Any = (0.0, 0.0, 1.0)
-    axis_j: Any = None
-    length: Any = None
-    pitch: Any = None
+    axis: Annotated[Any, Direction()] = (0.0, 0.0, 1.0)
+    axis_j: Annotated[Any, Direction()] = None
+    length: Annotated[Any, OfTime("m")] = None
+    pitch: Annotated[Any, In("m")] = None
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:

@@ -26,18 +26,19 @@ def data_of(context: Any, builder: Any, kind: Any, array: Any) -> Any:
 
 
 def call_of(*kinds: Any) -> Any:
-    """The compiled function that calls the machine address it is given first with four arguments of these types.
+    """The compiled function that calls the machine address it is given first with arguments of these types.
 
     What is called returns an integer.
     """
 
     @intrinsic
-    def call(typing, address, first, second, third, fourth):  # type: ignore[no-untyped-def]
+    def call(typing, address, *arguments):  # type: ignore[no-untyped-def]
         def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
             function = ir.FunctionType(ir.IntType(64), [context.get_value_type(kind) for kind in kinds])
-            return builder.call(builder.inttoptr(args[0], function.as_pointer()), list(args[1:]))
+            given = cgutils.unpack_tuple(builder, args[1])
+            return builder.call(builder.inttoptr(args[0], function.as_pointer()), given)
 
-        return types.int64(types.int64, *kinds), generate
+        return types.int64(types.int64, types.StarArgTuple(kinds)), generate
 
     return call
 

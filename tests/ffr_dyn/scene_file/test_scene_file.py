@@ -38,12 +38,22 @@ from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection
 from ffr_dyn.results.file import load_result
 from ffr_dyn.scene.couplings import Coupling
 from ffr_dyn.scene.drivers import Driver, PointDriver
-from ffr_dyn.scene.forces import Bushing, Load, SpringDamper
-from ffr_dyn.scene.joint_forces import Actuator, JointFriction, JointSpring, JointStop, Servo
+from ffr_dyn.scene.forces import (
+    Actuator,
+    Bushing,
+    JointFriction,
+    JointSpring,
+    JointStop,
+    Load,
+    ModalForce,
+    NodalForces,
+    Pressure,
+    Servo,
+    SpringDamper,
+)
 from ffr_dyn.scene.joints import KINDS, Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.scene.sensors import Measurement
-from ffr_dyn.scene.surface_loads import ModalForce, NodalForces, Pressure
 from ffr_dyn.scene_file.read import load_scene
 from ffr_dyn.scene_file.schema import EFFORTS as EFFORT_KINDS
 from ffr_dyn.scene_file.schema import SOLUTIONS, TABLES, schema

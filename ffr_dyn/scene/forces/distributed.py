@@ -1,0 +1,97 @@
+"""Distributed loads through the reduced basis: their integrals, which laws and kernels of surface loads share.
+
+A body's surface has points u = u_0 + Phi q (body axes). Nodal forces f_p do the virtual work
+
+    sum_p f_p . delta(R + A u_p)    so that    F = sum f_p,   M = sum u_p x f_p,   Q = sum Phi_p^T f_p
+
+with f_p in body axes and M about the body's origin: the rigid resultant and the modal forces belong together (Shabana 2013,
+sec. 5.6). These loads do not add to the geometric stiffening of the body.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ffr_dyn.functions.rotation import rotation_matrix
+from ffr_dyn.scene.force import LawNumbers, LoadTable, Moment
+from ffr_dyn.scene.forces.places import OnBody
+from ffr_prep.body import FlexibleBody, Surface, axial
+from ffr_prep.common.errors import InputError
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Affine:
+    """Generalised forces constant + slope q in body axes: constant (6 + n,), slope (6 + n, n)."""
+
+    constant: Array
+    slope: Array
+
+    def at(self, q: Array, A: Array) -> Array:
+        """(6 + n,) generalised forces."""
+        return self.constant + self.slope @ q
+
+    def numbers(self) -> Array:
+        return np.concatenate([self.constant, self.slope.ravel()])
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Forces of fixed global direction: force (3,), sum of u_0 f^T (3, 3), sum of phi_j f^T (3, 3, n); f global."""
+
+    force: Array
+    u_f: Array
+    phi_f: Array
+
+    def at(self, q: Array, A: Array) -> Array:
+        """(6 + n,) generalised forces."""
+        u_f = (self.u_f + self.phi_f @ q) @ A
+        return np.concatenate([self.force @ A, axial(u_f), np.einsum("klj,lk->j", self.phi_f, A)])
+
+    def numbers(self) -> Array:
+        return np.concatenate([self.force, self.u_f.ravel(), self.phi_f.ravel()])
+
+
+def force_now(made: Affine | Spread, place: OnBody, function: Any, now: Moment, q: Array) -> Array:
+    """(6 + n,) the law of a distributed load: a function of time times its integrals."""
+    return now.value(function)[0] * made.at(q, rotation_matrix(now.state.rotation(place.body)))
+
+
+def compiled_integrals(made: Affine | Spread, function: Any, table: LoadTable) -> LawNumbers:
+    """What the kernel of distributed loads reads."""
+    return LawNumbers(made.numbers(), table.function(function))
+
+
+def affine(u: Array, Phi: Array, f: Array, slope: Array) -> Affine:
+    """Nodal forces f + slope q (N, 3), (N, 3, n) in body axes at u + Phi q: generalised forces to first order in q."""
+
+    def moment(at: str, arm: Array, force: Array) -> Array:
+        return axial(np.einsum(at, arm, force))
+
+    return Affine(
+        np.concatenate([f.sum(0), moment("pk,pl->kl", u, f), np.einsum("pkj,pk->j", Phi, f)]),
+        np.concatenate([
+            slope.sum(0),
+            moment("pkj,pl->klj", Phi, f) + moment("pk,plj->klj", u, slope),
+            np.einsum("pki,pkj->ij", Phi, slope),
+        ]),
+    )  # fmt: skip
+
+
+def surface_of(body: FlexibleBody, name: str) -> Surface:
+    """The surface on which the force of that name acts."""
+    if body.surface is None:
+        raise InputError(f"force {name!r}: body {body.name!r} has no surface to act on")
+    return body.surface
+
+
+def indices(value: Any, what: str) -> Array:
+    """Whole numbers from 0 as an array; InputError when they are none."""
+    array = np.atleast_1d(np.asarray(value))
+    if array.ndim != 1 or array.dtype.kind not in "iu" or (array < 0).any():
+        raise InputError(f"{what} must be whole numbers from 0, not {value!r}")
+    return array.astype(np.int64)
