@@ -12,6 +12,7 @@ import click
 from ffr_dyn.cli.analyses import COMMANDS
 from ffr_dyn.cli.chart import chart
 from ffr_dyn.cli.economy import economise
+from ffr_dyn.cli.plugins import plugin_option
 from ffr_dyn.cli.realtime import realtime
 from ffr_dyn.cli.run import forward, run
 from ffr_dyn.cli.stress import stress
@@ -55,6 +56,7 @@ class Commands(click.Group):
 
 
 @click.group(cls=Commands, epilog=EXAMPLE, invoke_without_command=True, context_settings=CONTEXT)
+@plugin_option
 @click.version_option(package_name="ffr")
 @click.pass_context
 def cli(context: click.Context) -> None:

@@ -48,7 +48,7 @@ def begin_compiling(*kinds: type[Integrator], model: Model | None = None, forces
     methods = {name: kind.unit for name, kind in _METHODS.items() if kind in kinds}
     extra = {name: EXTRA_UNITS[name] for kind in kinds for name in kind.calls}
     scene = units_of(model) if model else {**UNITS, **LOAD_UNITS}
-    units = {**scene, **controlled, **extra, **methods, **{name: kernel_named(name) for name in forces}}
+    units = {**scene, **controlled, **extra, **methods, **_kept(forces)}
     _ON_DISK.update(name for name, unit in units.items() if name not in _ON_DISK and _is_on_disk(unit))
     missing = [name for name in units if name not in _AT_WORK and name not in _ON_DISK]
     if not missing:
@@ -58,6 +58,11 @@ def begin_compiling(*kinds: type[Integrator], model: Model | None = None, forces
     for share in _shares(missing):
         process = subprocess.Popen([sys.executable, "-m", __name__, *share], env=same_packages)
         _AT_WORK.update(dict.fromkeys(share, process))
+
+
+def _kept(forces: Sequence[str]) -> dict[str, Unit]:
+    """The kernels of forces that are kept on disk."""
+    return {name: unit for name in forces if (unit := kernel_named(name)).own}
 
 
 def ensure_compiled(*kinds: type[Integrator], model: Model | None = None, forces: Sequence[str] = ()) -> None:

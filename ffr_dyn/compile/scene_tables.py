@@ -14,7 +14,7 @@ from ffr_dyn.compile.elimination import Elimination, eliminate
 from ffr_dyn.compile.force_tables import Callback, FunctionTable, base_functions, load_tables
 from ffr_dyn.equations.layout import Layout, layout
 from ffr_dyn.equations.state_view import StateView
-from ffr_dyn.kernels.tables import LANES, Markers, Model, Pattern, Rows
+from ffr_dyn.kernels.tables import LANES, WAYS, WORDS, Markers, Model, Pattern, Rows
 from ffr_dyn.scene.couplings import Coupling, coupling_word
 from ffr_dyn.scene.drivers import Driver, PointDriver, driver_word, path_words
 from ffr_dyn.scene.force import loaded_markers
@@ -170,14 +170,20 @@ def _rows(blocks: tuple[Block, ...], functions: FunctionTable) -> Rows:
     sides = max((len(block.markers) for block in blocks), default=2)
     marker = np.array([b.markers + (-1,) * (sides - len(b.markers)) for b in blocks], dtype=np.int64).reshape(-1, sides)
     return Rows(
-        kind=np.array([word.kind for word in listed], dtype=np.int64),
+        kind=np.array([WORDS.index(word.kind) for word in listed], dtype=np.int64),
         axes=axes,
-        relation=np.array([word.relation for word in listed], dtype=float).reshape(-1, 5),
+        relation=np.array([_relation(word) for word in listed], dtype=float).reshape(-1, 5),
         function=np.array(function, dtype=np.int64),
         start=starts([len(b.words) for b in blocks]),
         marker=marker,
         first=_first_of_each(marker),
     )
+
+
+def _relation(word: Word) -> tuple[float, ...]:
+    """`Rows.relation` of a word."""
+    terms = word.relation or ((0.0, "angle"),) * 2
+    return *(number for factor, kind in terms for number in (factor, WAYS[kind])), word.spacing
 
 
 def _first_of_each(numbers: Array) -> Array:

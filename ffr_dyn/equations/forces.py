@@ -8,14 +8,14 @@ is `ffr_dyn.kernels.forces`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ffr_dyn.equations.constraints import Parts, Row, add_part, evaluate_word, summed_parts
+from ffr_dyn.equations.constraints import Markers, Parts, Row, add_part, evaluate_word, summed_parts
+from ffr_dyn.equations.constraints import coordinate as joint_coordinate
 from ffr_dyn.equations.inertia import gravity_force
-from ffr_dyn.equations.kinematics import marker_point
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.functions.rotation import rotation_matrix
@@ -39,6 +39,10 @@ class At:
     t: float
     x: Array
     v: Array
+
+    @property
+    def markers(self) -> Markers:
+        return Markers(self.scene, self.place, self.x, self.v)
 
     @property
     def state(self) -> StateView:
@@ -139,31 +143,22 @@ def _coordinates(now: At, place: Place) -> list[Row]:
     if isinstance(place, BetweenAxes):
         return [*_displacements(now, place), *_rotations(now, place)]
     if isinstance(place, OnJoint):
-        return [_stroke(now, place) if place.coordinate == "stroke" else _angle(now, place)]
+        return [_on_joint(now, place)]
     raise TypeError(f"there are no coordinates of a {type(place).__name__}")
 
 
-def _stroke(now: At, place: OnJoint) -> Row:
-    return _product(now, DOT_2, place.axes(now.scene)[0], np.zeros(3), place)
+def _on_joint(now: At, place: OnJoint) -> Row:
+    row = joint_coordinate(now.markers, place.coordinate, place.axes(now.scene), place.ends(now.scene))
+    return replace(row, Phi=row.Phi + 2 * np.pi * place.turns)
 
 
-def _angle(now: At, place: OnJoint) -> Row:
-    f, g, f_j = place.axes(now.scene)
-    c, s = (_product(now, DOT_1, axis, f_j, place) for axis in (f, g))
-    square = c.Phi**2 + s.Phi**2
-    angle = np.arctan2(s.Phi, c.Phi) + 2 * np.pi * place.turns
-    rate = (c.Phi * s.nu - s.Phi * c.nu) / square
-    parts = summed_parts([(c.Phi / square, s), (-s.Phi / square, c)])
-    return Row(float(angle), float(rate), 0.0, parts, now.place.v_size)
-
-
-def _product(now: At, kind: int, a: Array, b: Array, place: Place) -> Row:
+def _product(now: At, kind: str, a: Array, b: Array, place: Place) -> Row:
     ends = place.ends(now.scene)
     return evaluate_word(now.scene, now.place, now.x, now.v, word(kind, "", a, b), ends, NO_DRIVE)
 
 
 def _length(now: At, place: AlongLine) -> Row:
-    at_i, at_j = (marker_point(now.scene, now.place, now.x, now.v, k) for k in place.ends(now.scene))
+    at_i, at_j = map(now.markers.point, place.ends(now.scene))
     d, parts = at_j.r - at_i.r, Parts()
     size = float(np.linalg.norm(d))
     if size == 0:

@@ -10,7 +10,7 @@ from ffr_dyn.kernels.forces.applied import count_loads
 from ffr_dyn.kernels.markers import couple_marker, couple_pair, prepare_marker, shapes, update_marker
 from ffr_dyn.kernels.multiplier_solver import SIDE, clear_column, factorise_block, relax_block
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.rows import reaction
+from ffr_dyn.kernels.rows import RELATION, reaction
 from ffr_dyn.kernels.simd.joint_elimination import (
     couple_flexible,
     couple_flexible_in_plane,
@@ -24,7 +24,7 @@ from ffr_dyn.kernels.simd.joint_elimination import (
 from ffr_dyn.kernels.simd.simd_rows import add_scale
 from ffr_dyn.kernels.simd.slices import part
 from ffr_dyn.kernels.simd.table_address import call_unit
-from ffr_dyn.kernels.tables import ALL, IN_USE, LANES, LOADS, LOOK, NOT_FINITE, OK, REGAIN, RELATION
+from ffr_dyn.kernels.tables import ALL, IN_USE, LANES, LOADS, LOOK, NOT_FINITE, OK, REGAIN
 from ffr_dyn.kernels.vectors import add_scaled, cross, fill, get, in_plane, put, subtract, to_body, to_global
 
 

@@ -24,7 +24,8 @@ F4 = Annotated[np.ndarray, ("float64", 4)]
 I1 = Annotated[np.ndarray, ("int64", 1)]
 I2 = Annotated[np.ndarray, ("int64", 2)]
 
-COINCIDENCE, DOT_1, DOT_2, DRIVEN_ANGLE, DISTANCE, RELATION = 0, 1, 2, 3, 4, 5
+# The words of constraints, in the order of their numbers in `Rows.kind` (see `ffr_dyn.kernels.rows`).
+WORDS = ("coincidence", "dot-1", "dot-2", "driven-angle", "distance", "relation")
 ANGLE, STROKE, LENGTH = 0, 1, 2
 BODY, GLOBAL, SIX = 3, 4, 5
 # The places of forces by the words of `ffr_dyn.scene.forces.places`: coordinates, and axes.

@@ -19,15 +19,24 @@ _OF_FORCE = (types.int64,) * 5
 
 
 class Unit:
-    """A function of `signature`, compiled at the first use of its address, or read from disk."""
+    """A function of `signature`, compiled at the first use of its address, or read from disk.
+
+    Those of other packages are compiled anew by every process: nobody would notice that one on disk is older than the kernels
+    it was compiled with.
+    """
 
     def __init__(self, function: Callable[..., int], signature: Any = SIGNATURE) -> None:
         self.function = function
         self.signature = signature
 
+    @property
+    def own(self) -> bool:
+        """Whether it is of this package, and kept on disk."""
+        return self.function.__module__.startswith("ffr_dyn.")
+
     @cached_property
     def compiled(self) -> Any:
-        return cfunc(self.signature, cache=True, **OPTIONS)(self.function)
+        return cfunc(self.signature, cache=self.own, **OPTIONS)(self.function)
 
     @property
     def address(self) -> int:

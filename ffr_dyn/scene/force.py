@@ -175,7 +175,7 @@ def kinds_in(table: str) -> tuple[type[Force], ...]:
 
 
 def forces_of(scene: AnyScene) -> list[Force]:
-    """All applied loads but gravity, in the order in which they are applied and their powers are recorded: by their places."""
+    """All applied loads but gravity, in the order in which they are applied and their powers are recorded: by rank."""
     return sorted([*scene.loads, *scene.springs, *scene.forces], key=lambda force: force.place.rank)
 
 

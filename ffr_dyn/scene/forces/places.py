@@ -23,7 +23,7 @@ import numpy as np
 
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.scene.force import Measured
-from ffr_dyn.scene.joints import Joint, frames
+from ffr_dyn.scene.joints import Joint, coordinate_axes, frames
 from ffr_dyn.scene.scene import (
     Body,
     Scene,
@@ -164,10 +164,7 @@ class OnJoint:
 
     def axes(self, scene: Scene) -> Array:
         """(3, 3) f_i, g_i, f_j of an angle, or h_i of a stroke, in body axes."""
-        i, j = frames(self.of(scene))
-        if self.coordinate == "angle":
-            return np.array([i[:, 0], i[:, 1], j[:, 0]])
-        return np.array([i[:, 2], np.zeros(3), np.zeros(3)])
+        return np.array(coordinate_axes(self.coordinate, *frames(self.of(scene))))
 
     def numbers(self, scene: Scene) -> list[float]:
         numbers: list[float] = self.axes(scene).ravel().tolist()
