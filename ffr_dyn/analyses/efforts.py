@@ -15,7 +15,7 @@ from ffr_dyn.compile.engine import with_model
 from ffr_dyn.consistency.evaluation import Evaluator
 from ffr_dyn.functions.time_functions import TimeFunction, constant, piecewise
 from ffr_dyn.kernels.tables import LAW
-from ffr_dyn.scene.force import forces_of
+from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces import Actuator, Load
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Scene

@@ -24,7 +24,7 @@ from ffr_dyn.kernels.entry_points import (
 from ffr_dyn.kernels.simd.table_address import pack
 from ffr_dyn.kernels.tables import Clock, Control, Model, Record, Tables, Work
 from ffr_dyn.kernels.unit import kernel_named
-from ffr_dyn.scene.force import kernels_of
+from ffr_dyn.scene.force_kinds import kernels_of
 
 if TYPE_CHECKING:
     from ffr_dyn.integrators import Controlled, Integrator

@@ -11,7 +11,8 @@ import numpy as np
 from ffr_dyn.functions.curves import Curve, pieces
 from ffr_dyn.functions.time_functions import OPERATION, USER, TimeFunction, as_time_function, is_zero
 from ffr_dyn.kernels.tables import WAYS, Functions, Loads
-from ffr_dyn.scene.force import Force, forces_of, kernels_of
+from ffr_dyn.scene.force_kinds import forces_of, kernels_of
+from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.errors import InputError
 
@@ -97,7 +98,7 @@ def base_functions(scene: Scene, functions: FunctionTable) -> Array:
 
 
 class LoadNumbers:
-    """Collects the numbers of forces while a scene is compiled (a `ffr_dyn.scene.force.LoadTable`).
+    """Collects the numbers of forces while a scene is compiled (a `ffr_dyn.scene.forces.force.LoadTable`).
 
     who : the force whose numbers are collected
     """

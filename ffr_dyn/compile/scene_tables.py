@@ -17,7 +17,7 @@ from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.kernels.tables import LANES, WAYS, WORDS, Markers, Model, Pattern, Rows
 from ffr_dyn.scene.couplings import Coupling, coupling_word
 from ffr_dyn.scene.drivers import Driver, PointDriver, driver_word, path_words
-from ffr_dyn.scene.force import loaded_markers
+from ffr_dyn.scene.force_kinds import loaded_markers
 from ffr_dyn.scene.joints import RELATION, Joint, Word, words
 from ffr_dyn.scene.scene import MarkerName, Scene, joint_of, joints_of, marker_number, markers
 from ffr_prep.common.errors import InputError

@@ -16,7 +16,7 @@ from ffr_dyn.kernels.tables import (
     USER,
     Work,
 )
-from ffr_dyn.scene.force import forces_of
+from ffr_dyn.scene.force_kinds import forces_of
 from ffr_prep.common.errors import ComputationError
 
 Array = np.ndarray

@@ -9,7 +9,7 @@ import numpy as np
 from ffr_dyn.consistency.assemble import in_space
 from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator, tolerances
 from ffr_dyn.results.result import Result
-from ffr_dyn.scene.force import in_bases
+from ffr_dyn.scene.force_kinds import in_bases
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.variants.plane import AXES, body_normal, planar_forms
 from ffr_dyn.variants.variant import STIFFENING, stiffening_by, vary, with_basis
@@ -159,7 +159,7 @@ def _in_shapes(scene: Scene, choice: Choice) -> Scene:
     if not bases:
         return scene
     bodies = tuple(in_basis(body, bases[body.name]) if body.name in bases else body for body in scene.bodies)
-    return replace(in_bases(scene, bases), bodies=bodies)
+    return replace(scene, bodies=bodies, forces=in_bases(scene.forces, bases))
 
 
 def in_basis(body: Body, V: Array) -> Body:

@@ -20,8 +20,9 @@ from ffr_dyn.equations.layout import Layout
 from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.functions.time_functions import as_time_function, evaluate
-from ffr_dyn.scene.force import Force, Place, forces_of
-from ffr_dyn.scene.forces.places import AlongLine, AtMarker, BetweenAxes, OnBody, OnJoint
+from ffr_dyn.scene.force_kinds import forces_of
+from ffr_dyn.scene.forces.force import Force
+from ffr_dyn.scene.forces.places import AlongLine, AtMarker, BetweenAxes, OnBody, OnJoint, Place
 from ffr_dyn.scene.joints import DOT_1, DOT_2, word
 from ffr_dyn.scene.scene import Scene, markers
 
@@ -32,7 +33,7 @@ NO_DRIVE = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class At:
-    """Scene, layout, time [s] and state at which forces are wanted: a `ffr_dyn.scene.force.Moment` for their laws."""
+    """Scene, layout, time [s] and state at which forces are wanted: a `ffr_dyn.scene.forces.force.Moment` for their laws."""
 
     scene: Scene
     place: Layout

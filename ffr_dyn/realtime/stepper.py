@@ -34,7 +34,7 @@ from ffr_dyn.integrators.stabilisation import Projection, Stabilisation, gains
 from ffr_dyn.kernels.tables import MEASURED, OK
 from ffr_dyn.results.quantities import DEFAULT_OUTPUTS, Entry, catalogue, needs_every_step, selected
 from ffr_dyn.results.recorded_motion import View
-from ffr_dyn.scene.force import forces_of
+from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces import Actuator
 from ffr_dyn.scene.joints import COORDINATES
 from ffr_dyn.scene.scene import Scene

@@ -15,7 +15,8 @@ import numpy as np
 from ffr_dyn.kernels.tables import MEASURED
 from ffr_dyn.results.recorded_motion import View, cross, dot
 from ffr_dyn.scene.drivers import Driver, PointDriver
-from ffr_dyn.scene.force import Force, forces_of
+from ffr_dyn.scene.force_kinds import forces_of
+from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import joint_of
 

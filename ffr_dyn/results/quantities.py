@@ -28,7 +28,8 @@ from ffr_dyn.results.power import (
 from ffr_dyn.results.recorded_motion import View, dot, shaped, times, to_axes
 from ffr_dyn.results.result import EULER_PARAMETERS, XYZ, Axis, Quantity, mode_axis
 from ffr_dyn.scene.couplings import Coupling
-from ffr_dyn.scene.force import Measured, forces_of
+from ffr_dyn.scene.force_kinds import forces_of
+from ffr_dyn.scene.forces.places import Measured
 from ffr_dyn.scene.joints import COORDINATES, Joint
 from ffr_dyn.scene.scene import marker_names, markers, measured_body
 from ffr_dyn.scene.sensors import Measurement, SectionMeasurement, StressMeasurement

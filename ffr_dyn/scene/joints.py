@@ -220,7 +220,7 @@ class Joint:
     """Two markers, `i` and `j` ("body.interface", or "ground.point"), tied by the words of `kind`.
 
     kind   : spherical, revolute, cylindrical, translational, universal, fixed, planar, point-on-line, point-on-plane,
-             orientation, parallel, perpendicular, distance or screw, or one that `register_joint` made known
+             orientation, parallel, perpendicular, distance or screw
     axis   : (3,) joint axis in the axes of i's body (or a (3, 3) joint frame); for a universal joint the arm on i
     axis_j : the same for j; by default equal to `axis`, except for the universal joint, which needs it
     length : [m] of a distance joint: a positive number or a function of time

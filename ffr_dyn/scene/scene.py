@@ -18,7 +18,7 @@ from ffr_dyn.functions.rotation import euler_parameters, rotation_matrix
 from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction, as_time_function, less
 from ffr_dyn.scene.couplings import Coupling, coupled, coupling_word
 from ffr_dyn.scene.drivers import Driver, PointDriver, driver_word
-from ffr_dyn.scene.force import forces_of, kinds_in
+from ffr_dyn.scene.force_kinds import forces_of, kinds_in
 from ffr_dyn.scene.joints import COORDINATES, Joint
 from ffr_dyn.scene.sensors import AnyMeasurement, Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.scene.stress_sensors import measured_modes

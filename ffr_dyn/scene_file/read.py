@@ -51,7 +51,7 @@ from ffr_dyn.functions.operations import FUNCTIONS
 from ffr_dyn.functions.time_functions import TimeFunction, constant, signal, signals_in
 from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator, Tolerances
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
-from ffr_dyn.scene.force import forces_of
+from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import GROUND, Body, Scene
 from ffr_dyn.scene_file.parameters import Parameters, as_number, flattened, overridden, substituted
 from ffr_dyn.scene_file.schema import (

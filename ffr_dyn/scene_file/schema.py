@@ -35,7 +35,7 @@ from ffr_dyn.scene import fields as said
 from ffr_dyn.scene import forces as _known_forces  # noqa: F401 - which makes them known
 from ffr_dyn.scene.couplings import Coupling
 from ffr_dyn.scene.drivers import Driver, PointDriver
-from ffr_dyn.scene.force import FORCES, kinds_in
+from ffr_dyn.scene.force_kinds import FORCES, kinds_in
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.sensors import Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.scene_file.values import (

@@ -16,7 +16,7 @@ import numpy as np
 
 from ffr_dyn.functions.time_functions import is_zero
 from ffr_dyn.scene.drivers import PointDriver
-from ffr_dyn.scene.force import forces_of, in_bases
+from ffr_dyn.scene.force_kinds import forces_of, in_bases
 from ffr_dyn.scene.scene import Body, Scene, body_normal, marker_number, undeformed
 from ffr_dyn.variants.variant import used_interfaces, with_modes
 from ffr_prep.body import FlexibleBody, axial
@@ -58,7 +58,7 @@ def _in_plane(scene: Scene, normal: int, *, strict: bool) -> Scene:
         model = _without_rounding(reduced.model, k, used)
         bodies.append(replace(reduced, model=model, kept=(tuple(keep.tolist()), body.model.n)))
         kept[body.name] = np.eye(body.model.n)[:, keep]
-    return replace(in_bases(scene, kept), bodies=tuple(bodies), plane=AXES[normal])
+    return replace(scene, bodies=tuple(bodies), forces=in_bases(scene.forces, kept), plane=AXES[normal])
 
 
 # ---- what stands in the way ---------------------------------------------------------------------------------------

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.scene.drivers import PointDriver
-from ffr_dyn.scene.force import in_bases, loaded_markers, modal_fields
+from ffr_dyn.scene.force_kinds import in_bases, loaded_markers, modal_fields
 from ffr_dyn.scene.scene import INERTIA_TERMS, Body, Scene
 from ffr_dyn.variants.condensation import statically_complete
 from ffr_prep.body import FlexibleBody, recombined, truncated
@@ -187,7 +187,7 @@ def vary(
         for body in scene.bodies
         if body.name in modal
     }
-    return replace(in_bases(scene, bases), bodies=tuple(bodies))
+    return replace(scene, bodies=tuple(bodies), forces=in_bases(scene.forces, bases))
 
 
 def used_interfaces(scene: Scene, body: Body) -> tuple[str, ...]:

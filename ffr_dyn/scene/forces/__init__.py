@@ -1,4 +1,4 @@
-"""Forces, a file for each kind; importing this makes them all known. What a kind says of itself: `ffr_dyn.scene.force`.
+"""Forces, a file for each kind; importing this makes them all known. What a kind says of itself is in `force`.
 
 The order is that of documentation and of the kinds in a scene file.
 """

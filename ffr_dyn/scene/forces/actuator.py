@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from ffr_dyn.scene.fields import OfMotion
-from ffr_dyn.scene.force import Force, LawNumbers, LoadTable, Moment, register
+from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_function
+from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.given import given_numbers
 from ffr_dyn.scene.forces.places import OnJoint
 
 
-@register
+@register_force
 @dataclass(frozen=True)
 class Actuator(Force):
     """A force [N] or torque [N m] on a joint coordinate.

@@ -10,8 +10,9 @@ import numpy as np
 from ffr_dyn.functions.curves import Curve, curve_value
 from ffr_dyn.functions.rotation import triad
 from ffr_dyn.scene.fields import Direction
-from ffr_dyn.scene.force import Force, LawNumbers, LoadTable, Moment, register
+from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_array, check_symmetric
+from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.places import BetweenAxes
 from ffr_dyn.scene.forces.spring_law import elastic_energy
 from ffr_prep.common.errors import InputError
@@ -19,7 +20,7 @@ from ffr_prep.common.errors import InputError
 Array = np.ndarray
 
 
-@register
+@register_force
 @dataclass(frozen=True)
 class Bushing(Force):
     """An elastic bearing in six directions between markers i and j; it pushes j back to i.

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.functions.rotation import rotation_matrix
-from ffr_dyn.scene.force import LawNumbers, LoadTable, Moment
+from ffr_dyn.scene.forces.force import LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.places import OnBody
 from ffr_prep.body import FlexibleBody, Surface, axial
 from ffr_prep.common.errors import InputError

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.scene.force import LoadTable
+from ffr_dyn.scene.forces.force import LoadTable
 from ffr_prep.common.errors import InputError
 
 
 def given_numbers(components: Sequence[Any], who: str, table: LoadTable) -> list[float]:
-    """A factor for each component, then their functions of time or -1 (see `ffr_dyn.scene.force.Force.given`)."""
+    """A factor for each component, then their functions of time or -1 (see `ffr_dyn.scene.forces.force.Force.given`)."""
     factors, functions = [], []
     for component in components:
         plain = is_number(component)

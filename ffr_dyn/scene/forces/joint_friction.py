@@ -8,13 +8,14 @@ from typing import Annotated, Any
 import numpy as np
 
 from ffr_dyn.scene.fields import OfTime
-from ffr_dyn.scene.force import Force, LawNumbers, LoadTable, Moment, register
+from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_function, check_number, check_positive
+from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.places import OnJoint
 from ffr_prep.common.errors import InputError
 
 
-@register
+@register_force
 @dataclass(frozen=True)
 class JointFriction(Force):
     """Dry friction against the rate c_dot of a joint coordinate, made smooth over the velocity `creep`:

@@ -7,15 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.functions.curves import Curve
-from ffr_dyn.scene.force import Force, LawNumbers, LoadTable, Moment, register
+from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_damping, check_number, check_number_or_curve
+from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.places import OnJoint
 from ffr_dyn.scene.forces.spring_law import compiled_spring, spring_force, stored
 
 Array = np.ndarray
 
 
-@register
+@register_force
 @dataclass(frozen=True)
 class JointSpring(Force):
     """-(stiffness (c - free) + damping dc/dt + preload) on a joint coordinate c: a torsion spring, or one along a guide.

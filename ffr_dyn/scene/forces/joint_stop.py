@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffr_dyn.scene.force import Force, LawNumbers, LoadTable, Moment, register
+from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_number, check_positive
+from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.places import OnJoint
 from ffr_prep.common.errors import InputError
 
 
-@register
+@register_force
 @dataclass(frozen=True)
 class JointStop(Force):
     """End stops: one-sided spring-dampers beyond `lower` and `upper` [m] of a joint coordinate. They never pull.

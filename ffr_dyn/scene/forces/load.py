@@ -9,7 +9,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from ffr_dyn.scene.fields import OfMotion, Three
-from ffr_dyn.scene.force import Force, LawNumbers, LoadTable, Moment, register
+from ffr_dyn.scene.force_kinds import register_force
+from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.given import given_numbers, is_number
 from ffr_dyn.scene.forces.places import AtMarker
 from ffr_dyn.scene.scene import Scene
@@ -18,7 +19,7 @@ from ffr_prep.common.errors import InputError
 Array = np.ndarray
 
 
-@register
+@register_force
 @dataclass(frozen=True)
 class Load(Force):
     """A force [N] and a moment [N m] on a marker.

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ffr_dyn.scene.fields import OfTime, Three
-from ffr_dyn.scene.force import Force, LawNumbers, LoadTable, Moment, register
+from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_array, check_function
 from ffr_dyn.scene.forces.distributed import (
     Affine,
@@ -19,6 +19,7 @@ from ffr_dyn.scene.forces.distributed import (
     indices,
     surface_of,
 )
+from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.places import OnBody
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import FlexibleBody
@@ -27,7 +28,7 @@ from ffr_prep.common.errors import InputError
 Array = np.ndarray
 
 
-@register
+@register_force
 @dataclass(frozen=True)
 class NodalForces(Force):
     """Forces (N, 3) [N] at points of a body's surface, times a function of time.

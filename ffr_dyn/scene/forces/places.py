@@ -1,4 +1,4 @@
-"""Where forces act (`ffr_dyn.scene.force.Place`): at a marker, along a line, on a joint coordinate, between axes, on a body.
+"""Where forces act: at a marker, along a line, on a joint coordinate, between axes, on a body.
 
 The law of a force is a function of the place's coordinates and their rates; forces along them do the virtual work
 F delta(c), so that F dc/dt is the power on rigid and flexible bodies alike:
@@ -16,13 +16,13 @@ F delta(c), so that F dc/dt is the power on rigid and flexible bodies alike:
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
 from ffr_dyn.functions.rotation import rotation_matrix
-from ffr_dyn.scene.force import Measured
 from ffr_dyn.scene.joints import Joint, coordinate_axes, frames
 from ffr_dyn.scene.scene import (
     Body,
@@ -42,71 +42,27 @@ COORDINATE, RATE, FORCE = range(3)  # columns recorded of a force on one coordin
 
 
 @dataclass(frozen=True)
-class AtMarker:
-    """A marker; axes "global", or "body" for those of its body."""
+class Measured:
+    """A number, or three, that a result keeps of a force: `sign` times the recorded ones from `column` on."""
 
-    marker: str
-    axes: str = "global"
-    rank: ClassVar[int] = 0
-    initial: tuple[float, ...] = ()
-    measured: tuple[Measured, ...] = ()
-
-    @property
-    def way(self) -> str:
-        return self.axes
-
-    def check(self, scene: Scene) -> None:
-        marker_number(scene, self.marker)
-
-    def markers(self, scene: Scene) -> tuple[str, ...]:
-        return (self.marker,)
-
-    def ends(self, scene: Scene) -> tuple[int, int]:
-        return marker_number(scene, self.marker), -1
-
-    def numbers(self, scene: Scene) -> tuple[float, ...]:
-        return ()
-
-    def stays_in_plane(self, scene: Scene, normal: int) -> bool:
-        return False
-
-    def axis_along(self, scene: Scene, normal: int) -> int:
-        """Which of its axes is along the global axis `normal`."""
-        bodies = [body for body in scene.bodies if body.name == self.marker.partition(".")[0]]
-        return body_normal(bodies[0], normal) if bodies and self.axes == "body" else normal
+    name: str
+    unit: str
+    text: str
+    column: int
+    size: int = 1
+    sign: float = 1.0
 
 
-@dataclass(frozen=True)
-class AlongLine:
-    """The line between two markers; without direction, and without force, while both points are at one place."""
-
-    i: str
-    j: str
-    way: str = "length"
-    rank: ClassVar[int] = 0
-    initial: tuple[float, ...] = (0.0, 0.0, 0.0)
-    measured: tuple[Measured, ...] = (
-        Measured("tension", "N", "spring-damper force, tension positive", FORCE, sign=-1.0),
-        Measured("length", "m", "distance of the ends", COORDINATE),
-    )
-
-    def check(self, scene: Scene) -> None:
-        self.ends(scene)
-
-    def markers(self, scene: Scene) -> tuple[str, ...]:
-        return self.i, self.j
-
-    def ends(self, scene: Scene) -> tuple[int, int]:
-        return marker_number(scene, self.i), marker_number(scene, self.j)
-
-    def numbers(self, scene: Scene) -> tuple[float, ...]:
-        return ()
-
-    def stays_in_plane(self, scene: Scene, normal: int) -> bool:
-        i, j = (undeformed(scene, number)[normal] for number in self.ends(scene))
-        return bool(round(abs(i - j), 9) == 0)
-
-
+_ON_LINE = (
+    Measured("tension", "N", "spring-damper force, tension positive", FORCE, sign=-1.0),
+    Measured("length", "m", "distance of the ends", COORDINATE),
+)
+_SIX = (
+    Measured("displacement", "m", "displacement of j from i, axes of the bushing on i", 0, 3),
+    Measured("rotation", "rad", "rotation vector from the axes of i to those of j", 3, 3),
+    Measured("force", "N", "force of the bushing on j, axes of the bushing on i", 12, 3),
+    Measured("moment", "N m", "moment of the bushing on j, conjugate to the rotation vector", 15, 3),
+)
 _ON_JOINT = {
     "angle": (
         Measured("torque", "N m", "torque that increases the joint angle", FORCE),
@@ -119,15 +75,98 @@ _ON_JOINT = {
 }
 
 
+class Place(ABC):
+    """Where a force acts: what its law is a function of, and what it works on.
+
+    way      : which of several such coordinates or axes, a word of `ffr_dyn.kernels.tables.WAYS`
+    rank     : forces of lower rank are applied first, equal ones as declared
+    initial  : what is recorded of a force there, as it is before the start
+    measured : how a result names it
+    """
+
+    rank: ClassVar[int] = 0
+
+    @property
+    @abstractmethod
+    def way(self) -> str: ...
+
+    @property
+    def initial(self) -> tuple[float, ...]:
+        return ()
+
+    @property
+    def measured(self) -> tuple[Measured, ...]:
+        return ()
+
+    @abstractmethod
+    def markers(self, scene: Scene) -> tuple[str, ...]:
+        """Names of the markers on which it acts."""
+
+    def ends(self, scene: Scene) -> tuple[int, int]:
+        """Numbers of its markers, -1 for what is none; or the number of its body."""
+        i, j = [*(marker_number(scene, name) for name in self.markers(scene)), -1][:2]
+        return i, j
+
+    def check(self, scene: Scene) -> None:
+        """InputError when the scene has no such place."""
+        self.ends(scene)
+
+    def numbers(self, scene: Scene) -> list[float]:
+        """What compiled code knows of it, such as axes."""
+        return []
+
+    def stays_in_plane(self, scene: Scene, normal: int) -> bool:
+        """Whether what acts there, whatever its size, moves bodies only in the plane across the global axis `normal`."""
+        return False
+
+
 @dataclass(frozen=True)
-class OnJoint:
+class AtMarker(Place):
+    """A marker; axes "global", or "body" for those of its body."""
+
+    marker: str
+    axes: str = "global"
+
+    @property
+    def way(self) -> str:
+        return self.axes
+
+    def markers(self, scene: Scene) -> tuple[str, ...]:
+        return (self.marker,)
+
+    def axis_along(self, scene: Scene, normal: int) -> int:
+        """Which of its axes is along the global axis `normal`."""
+        bodies = [body for body in scene.bodies if body.name == self.marker.partition(".")[0]]
+        return body_normal(bodies[0], normal) if bodies and self.axes == "body" else normal
+
+
+@dataclass(frozen=True)
+class AlongLine(Place):
+    """The line between two markers; without direction, and without force, while both points are at one place."""
+
+    way = "length"
+    initial = (0.0, 0.0, 0.0)
+    measured = _ON_LINE
+
+    i: str
+    j: str
+
+    def markers(self, scene: Scene) -> tuple[str, ...]:
+        return self.i, self.j
+
+    def stays_in_plane(self, scene: Scene, normal: int) -> bool:
+        i, j = (undeformed(scene, number)[normal] for number in self.ends(scene))
+        return bool(round(abs(i - j), 9) == 0)
+
+
+@dataclass(frozen=True)
+class OnJoint(Place):
     """The `angle` [rad] or `stroke` [m] of a joint, for the force `who`; turns : whole turns of the angle at the start."""
 
     who: str
     joint: str
     coordinate: str = "angle"
     turns: int = 0
-    rank: ClassVar[int] = 0
 
     def __post_init__(self) -> None:
         if self.coordinate not in _ON_JOINT:
@@ -151,24 +190,16 @@ class OnJoint:
         """The joint. Raises InputError when it is none, or has no such coordinate."""
         return joint_with(scene, self.joint, self.coordinate, self.who)
 
-    def check(self, scene: Scene) -> None:
-        self.of(scene)
-
     def markers(self, scene: Scene) -> tuple[str, ...]:
         joint = self.of(scene)
         return joint.i, joint.j
-
-    def ends(self, scene: Scene) -> tuple[int, int]:
-        i, j = self.markers(scene)
-        return marker_number(scene, i), marker_number(scene, j)
 
     def axes(self, scene: Scene) -> Array:
         """(3, 3) f_i, g_i, f_j of an angle, or h_i of a stroke, in body axes."""
         return np.array(coordinate_axes(self.coordinate, *frames(self.of(scene))))
 
     def numbers(self, scene: Scene) -> list[float]:
-        numbers: list[float] = self.axes(scene).ravel().tolist()
-        return numbers
+        return list(self.axes(scene).ravel())
 
     def stays_in_plane(self, scene: Scene, normal: int) -> bool:
         """An angle about the normal, a stroke across it."""
@@ -182,23 +213,19 @@ class OnJoint:
 
 
 @dataclass(frozen=True)
-class BetweenAxes:
+class BetweenAxes(Place):
     """Markers of two bodies, with axes (3, 3) in columns on both, for the force `who`."""
+
+    way = "six"
+    rank = 1
+    initial = (0.0,) * 18
+    measured = _SIX
 
     who: str
     i: str
     j: str
     on_i: Array = field(repr=False)
     on_j: Array = field(repr=False)
-    way: str = "six"
-    rank: ClassVar[int] = 1
-    initial: tuple[float, ...] = (0.0,) * 18
-    measured: tuple[Measured, ...] = (
-        Measured("displacement", "m", "displacement of j from i, axes of the bushing on i", 0, 3),
-        Measured("rotation", "rad", "rotation vector from the axes of i to those of j", 3, 3),
-        Measured("force", "N", "force of the bushing on j, axes of the bushing on i", 12, 3),
-        Measured("moment", "N m", "moment of the bushing on j, conjugate to the rotation vector", 15, 3),
-    )
 
     def check(self, scene: Scene) -> None:
         i, j = (markers(scene)[number] for number in self.ends(scene))
@@ -208,27 +235,19 @@ class BetweenAxes:
     def markers(self, scene: Scene) -> tuple[str, ...]:
         return self.i, self.j
 
-    def ends(self, scene: Scene) -> tuple[int, int]:
-        return marker_number(scene, self.i), marker_number(scene, self.j)
-
     def numbers(self, scene: Scene) -> list[float]:
-        numbers: list[float] = np.array([self.on_i.T, self.on_j.T]).ravel().tolist()
-        return numbers
-
-    def stays_in_plane(self, scene: Scene, normal: int) -> bool:
-        return False
+        return [*self.on_i.T.ravel(), *self.on_j.T.ravel()]
 
 
 @dataclass(frozen=True)
-class OnBody:
+class OnBody(Place):
     """A body through its basis, for the force `who`; axes "global" or "body": where directions of forces stay."""
+
+    rank = 2
 
     who: str
     body: str
     axes: str = "body"
-    rank: ClassVar[int] = 2
-    initial: tuple[float, ...] = ()
-    measured: tuple[Measured, ...] = ()
 
     @property
     def way(self) -> str:
@@ -236,19 +255,10 @@ class OnBody:
 
     def of(self, scene: Scene) -> Body:
         """The body."""
-        return scene.bodies[body_number(scene, self.body, self.who)]
-
-    def check(self, scene: Scene) -> None:
-        self.of(scene)
+        return scene.bodies[self.ends(scene)[0]]
 
     def markers(self, scene: Scene) -> tuple[str, ...]:
         return ()
 
     def ends(self, scene: Scene) -> tuple[int, int]:
         return body_number(scene, self.body, self.who), -1
-
-    def numbers(self, scene: Scene) -> tuple[float, ...]:
-        return ()
-
-    def stays_in_plane(self, scene: Scene, normal: int) -> bool:
-        return False

@@ -8,9 +8,10 @@ from typing import Annotated, Any
 import numpy as np
 
 from ffr_dyn.scene.fields import OfTime
-from ffr_dyn.scene.force import Force, LawNumbers, LoadTable, Moment, register
+from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_array, check_function
 from ffr_dyn.scene.forces.distributed import Affine, affine, compiled_integrals, force_now, indices, surface_of
+from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.places import OnBody
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import FlexibleBody, Surface
@@ -19,7 +20,7 @@ from ffr_prep.common.errors import InputError
 Array = np.ndarray
 
 
-@register
+@register_force
 @dataclass(frozen=True)
 class Pressure(Force):
     """Pressure [Pa] on triangles of a body's surface; positive pushes against their outward normals.

@@ -9,8 +9,9 @@ import numpy as np
 
 from ffr_dyn.functions.curves import Curve
 from ffr_dyn.scene.fields import In
-from ffr_dyn.scene.force import Force, LawNumbers, LoadTable, Moment, register
+from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_damping, check_number, check_number_or_curve
+from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.places import AlongLine
 from ffr_dyn.scene.forces.spring_law import compiled_spring, spring_force, stored
 from ffr_prep.common.errors import InputError
@@ -18,7 +19,7 @@ from ffr_prep.common.errors import InputError
 Array = np.ndarray
 
 
-@register
+@register_force
 @dataclass(frozen=True)
 class SpringDamper(Force):
     """Force along the line i - j, positive in tension: stiffness (l - free_length) + damping dl/dt + preload.

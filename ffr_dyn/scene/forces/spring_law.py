@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ffr_dyn.functions.curves import Curve, curve_integral, curve_value
-from ffr_dyn.scene.force import LawNumbers, LoadTable
+from ffr_dyn.scene.forces.force import LawNumbers, LoadTable
 
 Array = np.ndarray
 

@@ -24,7 +24,7 @@ from ffr_dyn.equations.layout import initial_state, layout
 from ffr_dyn.integrators import RK4
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.results.file import load_result
-from ffr_dyn.scene.force import FORCES
+from ffr_dyn.scene.force_kinds import FORCES
 from ffr_dyn.scene.forces import JointSpring
 from ffr_dyn.scene.joints import COORDINATES, KINDS, NEEDS
 from ffr_dyn.scene_file.read import load_scene
