@@ -45,7 +45,8 @@ def applied_forces(system: System, t: float, x: Array, v: Array, machine: Machin
     machine = new_machine(system, x, v) if machine is None else machine
     if load_at(machine, t, x, v) != OK:
         raise ComputationError(f"the forces stopped in a Python function of the scene: {system.user.failure}")
-    return machine.work.bodies.f + gravity_forces(system.scene, system.layout, t, x)
+    forces: Array = machine.work.bodies.f + gravity_forces(system.scene, system.layout, t, x)
+    return forces
 
 
 def force_jacobian(system: System, t: float, x: Array, v: Array) -> ForceJacobian:

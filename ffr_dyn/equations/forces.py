@@ -81,7 +81,8 @@ def applied(scene: Scene, place: Layout, t: float, x: Array, v: Array) -> list[A
 
 def gravity_at(scene: Scene, t: float) -> Array:
     """(3,) [m/s^2] gravity as the accelerated base feels it."""
-    return scene.gravity - np.array([evaluate(f, t)[0] for f in scene.base_acceleration])
+    field: Array = scene.gravity - np.array([evaluate(f, t)[0] for f in scene.base_acceleration])
+    return field
 
 
 def gravity_forces(scene: Scene, place: Layout, t: float, x: Array) -> Array:

@@ -75,7 +75,8 @@ def transmitted(view: View, joint: Joint) -> Array:
     """(T,) power that the first body gives to the second through a joint."""
     force, moment = reaction(view, joint.name)
     j = view.number(joint.j)
-    return dot(force, view.record.rd[:, j]) + dot(moment, view.spin(j))
+    given: Array = dot(force, view.record.rd[:, j]) + dot(moment, view.spin(j))
+    return given
 
 
 def reaction(view: View, name: str) -> tuple[Array, Array]:
@@ -134,12 +135,14 @@ def _of_driver(view: View, driver: Driver) -> Array:
     drive = driven(view, driver)
     if driver.coordinate == "stroke":
         h = frame_i[:, :, 2]
-        return dot(force, h) / dot(h, h) * drive[:, 1]
+        along_stroke: Array = dot(force, h) / dot(h, h) * drive[:, 1]
+        return along_stroke
     sine, cosine = np.sin(drive[:, 0])[:, None], np.cos(drive[:, 0])[:, None]
     f, g, f_j = frame_i[:, :, 0], frame_i[:, :, 1], frame_j[:, :, 0]
     along, across = cosine * f + sine * g, cosine * g - sine * f
     about = cross(f_j, across)
-    return dot(moment, about) / dot(about, about) * dot(along, f_j) * drive[:, 1]
+    turning: Array = dot(moment, about) / dot(about, about) * dot(along, f_j) * drive[:, 1]
+    return turning
 
 
 # Of what is no applied load: the power of those is recorded.

@@ -291,7 +291,8 @@ def _totals(system: System) -> Named:
 
 
 def _sum(energy: Array) -> Array:
-    return energy[:, 0] + energy[:, 1] + energy[:, 2]
+    total: Array = energy[:, 0] + energy[:, 1] + energy[:, 2]
+    return total
 
 
 # ---- measurements of the scene ------------------------------------------------------------------------------------
@@ -328,9 +329,9 @@ def _measured(view: View, m: Measurement) -> Array:
     else:
         difference = view.record.r[:, j] - view.record.r[:, i]
     if m.what == "distance":
-        return np.sqrt(dot(difference, difference))
+        return np.asarray(np.sqrt(dot(difference, difference)))
     if m.axes == "global":
-        return difference
+        return np.asarray(difference)
     return to_axes(view.axes([body.name for body in view.system.scene.bodies].index(m.axes)), difference)
 
 

@@ -94,7 +94,8 @@ class Bushing(Force):
 
     def law(self, now: Moment, c: Array, rate: Array) -> Array:
         curves = [0.0 if curve is None else curve_value(curve, x) for curve, x in zip(self.curves, c, strict=True)]
-        return np.array(self.preload) - self.stiffness_matrix @ c - self.damping_matrix @ rate - curves
+        force: Array = np.array(self.preload) - self.stiffness_matrix @ c - self.damping_matrix @ rate - curves
+        return force
 
     def compiled(self, table: LoadTable) -> LawNumbers:
         """Stiffness (36), damping (36), preload (6), start of the curve of each direction or -1 (6)."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.scene.forces.force import LawNumbers, LoadTable, Moment
-from ffr_dyn.scene.forces.places import OnBody
+from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import FlexibleBody, Surface, axial
 from ffr_prep.common.errors import InputError
 
@@ -33,7 +33,8 @@ class Affine:
 
     def at(self, q: Array, A: Array) -> Array:
         """(6 + n,) generalised forces."""
-        return self.constant + self.slope @ q
+        forces: Array = self.constant + self.slope @ q
+        return forces
 
     def numbers(self) -> Array:
         return np.concatenate([self.constant, self.slope.ravel()])
@@ -56,14 +57,24 @@ class Spread:
         return np.concatenate([self.force, self.u_f.ravel(), self.phi_f.ravel()])
 
 
-def force_now(made: Affine | Spread, place: OnBody, function: Any, now: Moment, q: Array) -> Array:
-    """(6 + n,) the law of a distributed load: a function of time times its integrals."""
-    return now.value(function)[0] * made.at(q, rotation_matrix(now.state.rotation(place.body)))
+# Of every kind whose `integrals(model)` are these, with a place on a body and a `function` of time.
 
 
-def compiled_integrals(made: Affine | Spread, function: Any, table: LoadTable) -> LawNumbers:
+def check_integrals(force: Any, scene: Scene) -> None:
+    """InputError when the body has not what the force needs."""
+    force.integrals(force.place.of(scene).model)
+
+
+def law_of_integrals(force: Any, now: Moment, c: Any, rate: Any) -> Any:
+    """(6 + n,) generalised forces: a function of time times the integrals."""
+    made: Affine | Spread = force.integrals(force.place.of(now.state.scene).model)
+    return now.value(force.function)[0] * made.at(c, rotation_matrix(now.state.rotation(force.body)))
+
+
+def compiled_integrals(force: Any, table: LoadTable) -> LawNumbers:
     """What the kernel of distributed loads reads."""
-    return LawNumbers(made.numbers(), table.function(function))
+    made: Affine | Spread = force.integrals(force.place.of(table.scene).model)
+    return LawNumbers(made.numbers(), table.function(force.function))
 
 
 def affine(u: Array, Phi: Array, f: Array, slope: Array) -> Affine:

@@ -10,10 +10,9 @@ import numpy as np
 from ffr_dyn.scene.fields import OfTime, PerMode
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_array, check_function
-from ffr_dyn.scene.forces.distributed import Affine, compiled_integrals, force_now
-from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
+from ffr_dyn.scene.forces.distributed import Affine, check_integrals, compiled_integrals, law_of_integrals
+from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import OnBody
-from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import FlexibleBody
 from ffr_prep.common.errors import InputError
 
@@ -30,6 +29,7 @@ class ModalForce(Force):
 
     word = "modal-force"
     kernel = "ffr_dyn.kernels.forces.distributed:distributed"
+    check, law, compiled = check_integrals, law_of_integrals, compiled_integrals
     acts = "forces on elastic coordinates"
     positive = "increases q"
 
@@ -53,12 +53,3 @@ class ModalForce(Force):
         if self.values.size != body.n:
             raise InputError(f"force {self.name!r}: {self.values.size} values for the {body.n} modes of {body.name!r}")
         return Affine(np.concatenate([np.zeros(6), self.values]), np.zeros((6 + body.n, body.n)))
-
-    def check(self, scene: Scene) -> None:
-        self.integrals(self.place.of(scene).model)
-
-    def law(self, now: Moment, c: Array, rate: Array) -> Array:
-        return force_now(self.integrals(self.place.of(now.state.scene).model), self.place, self.function, now, c)
-
-    def compiled(self, table: LoadTable) -> LawNumbers:
-        return compiled_integrals(self.integrals(self.place.of(table.scene).model), self.function, table)

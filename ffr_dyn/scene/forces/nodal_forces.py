@@ -14,14 +14,14 @@ from ffr_dyn.scene.forces.distributed import (
     Affine,
     Spread,
     affine,
+    check_integrals,
     compiled_integrals,
-    force_now,
     indices,
+    law_of_integrals,
     surface_of,
 )
-from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
+from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import OnBody
-from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import FlexibleBody
 from ffr_prep.common.errors import InputError
 
@@ -40,13 +40,14 @@ class NodalForces(Force):
 
     word = "nodal-forces"
     kernel = "ffr_dyn.kernels.forces.distributed:distributed"
+    check, law, compiled = check_integrals, law_of_integrals, compiled_integrals
     acts = "forces [N] at points of a body's surface, global or body axes"
     positive = "along the axes"
 
     name: str
     body: str
     points: Annotated[Any, list[int]]
-    forces: Annotated[Any, list[Three(float)]]  # type: ignore[misc]
+    forces: Annotated[Any, list[Three(float)]]
     function: Annotated[Any, OfTime()] = 1.0
     axes: str = "global"
 
@@ -76,12 +77,3 @@ class NodalForces(Force):
         if self.axes == "body":
             return affine(u, Phi, f, np.zeros((*f.shape, body.n)))
         return Spread(f.sum(0), u.T @ f, np.einsum("pkj,pl->klj", Phi, f))
-
-    def check(self, scene: Scene) -> None:
-        self.integrals(self.place.of(scene).model)
-
-    def law(self, now: Moment, c: Array, rate: Array) -> Array:
-        return force_now(self.integrals(self.place.of(now.state.scene).model), self.place, self.function, now, c)
-
-    def compiled(self, table: LoadTable) -> LawNumbers:
-        return compiled_integrals(self.integrals(self.place.of(table.scene).model), self.function, table)

@@ -10,10 +10,17 @@ import numpy as np
 from ffr_dyn.scene.fields import OfTime
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_array, check_function
-from ffr_dyn.scene.forces.distributed import Affine, affine, compiled_integrals, force_now, indices, surface_of
-from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
+from ffr_dyn.scene.forces.distributed import (
+    Affine,
+    affine,
+    check_integrals,
+    compiled_integrals,
+    indices,
+    law_of_integrals,
+    surface_of,
+)
+from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import OnBody
-from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import FlexibleBody, Surface
 from ffr_prep.common.errors import InputError
 
@@ -35,6 +42,7 @@ class Pressure(Force):
 
     word = "pressure"
     kernel = "ffr_dyn.kernels.forces.distributed:distributed"
+    check, law, compiled = check_integrals, law_of_integrals, compiled_integrals
     acts = "pressure [Pa] on surface triangles, fixed to the frame or following the deformation to first order"
     positive = "against the outward normal"
 
@@ -96,12 +104,3 @@ class Pressure(Force):
             what = "no triangle" if chosen.size == 0 else f"triangle {chosen.max()}"
             raise InputError(f"pressure {self.name!r} acts on {what}; the surface of {body.name!r} has {count}")
         return chosen
-
-    def check(self, scene: Scene) -> None:
-        self.integrals(self.place.of(scene).model)
-
-    def law(self, now: Moment, c: Array, rate: Array) -> Array:
-        return force_now(self.integrals(self.place.of(now.state.scene).model), self.place, self.function, now, c)
-
-    def compiled(self, table: LoadTable) -> LawNumbers:
-        return compiled_integrals(self.integrals(self.place.of(table.scene).model), self.function, table)

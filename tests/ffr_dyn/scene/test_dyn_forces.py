@@ -24,6 +24,7 @@ from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.functions.time_functions import evaluate, harmonic, polynomial, table
 from ffr_dyn.integrators import RK4, ROS2
 from ffr_dyn.kernels.tables import OK
+from ffr_dyn.scene.force_kinds import FORCES
 from ffr_dyn.scene.forces import (
     Actuator,
     Bushing,
@@ -947,3 +948,16 @@ def test_what_may_act_across_the_plane_is_computed_in_space(changes):
 def test_a_scene_declared_planar_refuses_a_base_that_leaves_the_plane():
     with pytest.raises(InputError, match="base_acceleration has a component"):
         assemble(arm(base_acceleration=(0, 0, 1.0), plane="z"))
+
+
+def test_the_table_of_forces_is_that_of_the_declarations():
+    """docs/forces.md: a row for each kind, as the kind says, with the names of what a result keeps of it."""
+    text = (ROOT / "docs" / "forces.md").read_text(encoding="utf-8")
+    rows = [line for line in text.splitlines() if line.startswith("| `")]
+    for kind, row in zip(FORCES, rows, strict=False):
+        table = "" if kind.table == "forces" else f" (`{kind.table}`)"
+        assert row.startswith(f"| `{kind.__name__}`{table} | {kind.acts} | {kind.positive} | ")
+    for force in (*PAIRS.values(), *SPREAD.values()):
+        row = rows[FORCES.index(type(force))]
+        named = [f"`.{one.name}` [{one.unit}]" for one in force.place.measured]
+        assert "| the same |" in row or all(name in row for name in named)
