@@ -11,7 +11,7 @@ from ffr_dyn.kernels.bodies import factorise, inertia, prepare_body, rotation_ma
 from ffr_dyn.kernels.markers import couple_marker, couple_pair, prepare_marker, shapes, update_marker
 from ffr_dyn.kernels.multiplier_solver import SIDE, clear_column, factorise_block, relax_block
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.rows import reaction
+from ffr_dyn.kernels.rows import RELATION, reaction
 from ffr_dyn.kernels.simd.joint_elimination import (
     couple_flexible,
     couple_flexible_in_plane,
@@ -43,7 +43,6 @@ from ffr_dyn.kernels.tables import (
     NOT_FINITE,
     OK,
     PHIPHI,
-    RELATION,
     TARGET,
     N,
 )

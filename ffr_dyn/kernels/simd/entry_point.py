@@ -11,7 +11,7 @@ its place among the addresses, and the calls: in compiled code and from Python a
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, get_type_hints
 
@@ -20,7 +20,7 @@ from llvmlite import ir
 from numba import cfunc, types
 from numba.core import cgutils
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import lower_builtin
+from numba.extending import intrinsic, lower_builtin
 
 from ffr_dyn.kernels.options import OPTIONS
 from ffr_dyn.kernels.simd.intrinsics import data_of
@@ -39,11 +39,20 @@ _KINDS: dict[Any, tuple[Any, Any]] = {
 
 class CompiledFunction:
     """A function of annotated arguments, the first the tables, that returns a status; compiled when its address is first
-    asked for, or read from disk."""
+    asked for, or read from disk.
+
+    Those of other packages are compiled anew by every process: nobody would notice that one on disk is older than the kernels
+    it was compiled with.
+    """
 
     def __init__(self, function: Callable[..., int]) -> None:
         self.function = function
         self.name = function.__name__
+
+    @property
+    def own(self) -> bool:
+        """Whether it is of this package, and kept on disk."""
+        return self.function.__module__.startswith("ffr_dyn.")
 
     @cached_property
     def kinds(self) -> list[tuple[Any, Any]]:
@@ -55,7 +64,7 @@ class CompiledFunction:
 
     @cached_property
     def compiled(self) -> Any:
-        return cfunc(types.int64(*(kind for kind, _ in self.kinds)), cache=True, **OPTIONS)(self.function)
+        return cfunc(types.int64(*(kind for kind, _ in self.kinds)), cache=self.own, **OPTIONS)(self.function)
 
     @property
     def address(self) -> int:
@@ -133,8 +142,28 @@ def _make_callable(entry: EntryPoint) -> None:
         words = builder.bitcast(args[0], cgutils.intp_t.as_pointer())
         places = builder.load(builder.gep(words, [cgutils.intp_t(place_of(Tables, "entry_points"))]))
         at = builder.gep(builder.inttoptr(places, cgutils.intp_t.as_pointer()), [cgutils.intp_t(entry.number)])
-        function = ir.FunctionType(ir.IntType(64), [value.type for value in given])
-        return builder.call(builder.inttoptr(builder.load(at), function.as_pointer()), given)
+        return _call_at(builder, builder.load(at), given)
+
+
+def call_like(function: Callable[..., int]) -> Any:
+    """call(address, *arguments) in compiled code, which calls what is at an address with the arguments of `function`."""
+    kinds = [kind for kind, _ in CompiledFunction(function).kinds]
+
+    @intrinsic
+    def call(typing, address, *arguments):  # type: ignore[no-untyped-def]
+        def generate(context, builder, sig, args):  # type: ignore[no-untyped-def]
+            values = cgutils.unpack_tuple(builder, args[1])
+            given = [_as_kind(context, builder, *each) for each in zip(values, sig.args[1], kinds, strict=True)]
+            return _call_at(builder, args[0], given)
+
+        return types.int64(types.int64, types.StarArgTuple(arguments)), generate
+
+    return call
+
+
+def _call_at(builder: Any, address: Any, given: Sequence[Any]) -> Any:
+    function = ir.FunctionType(ir.IntType(64), [value.type for value in given])
+    return builder.call(builder.inttoptr(address, function.as_pointer()), given)
 
 
 def _as_kind(context: Any, builder: Any, value: Any, given: Any, wanted: Any) -> Any:
