@@ -11,8 +11,8 @@ from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator, tolerances
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.force_kinds import in_bases
-from ffr_dyn.scene.scene import Body, Scene
-from ffr_dyn.variants.plane import AXES, body_normal, planar_forms
+from ffr_dyn.scene.scene import Body, Scene, body_normal
+from ffr_dyn.variants.plane import AXES, planar_forms
 from ffr_dyn.variants.variant import STIFFENING, stiffening_by, vary, with_basis
 from ffr_prep.common.errors import InputError
 

@@ -21,6 +21,7 @@ from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.equations.forces import applied
 from ffr_dyn.equations.layout import initial_state, layout
 from ffr_dyn.integrators import RK4
+from ffr_dyn.kernels.simd.force_kernel import force_kernel, kernel_of
 from ffr_dyn.kernels.tables import OK
 from ffr_dyn.results.file import load_result
 from ffr_dyn.scene.force_kinds import FORCES
@@ -168,3 +169,12 @@ def test_two_kinds_cannot_have_one_word(folder):
     second.write_text(example().replace("class CubicSpring", "class Other"), encoding="utf-8")
     with pytest.raises(InputError, match="cubic-spring"):
         load_plugin(str(second))
+
+
+def test_a_kernel_of_other_arguments_is_refused_before_it_is_called():
+    def old(at, k, x, f, load):
+        return OK
+
+    for wrong in (old, force_kernel(old)):
+        with pytest.raises(InputError, match="old"):
+            kernel_of(wrong)
