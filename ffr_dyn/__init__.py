@@ -27,17 +27,17 @@ from ffr_prep.common.front_door import front_door
 _BY_MODULE = {
     "ffr_prep.body": "FlexibleBody load_body rigid_body save_body truncated with_point",
     "ffr_prep.common.errors": "ComputationError InputError",
+    "ffr_prep.common.registry": "load_plugin",
     "ffr_dyn.functions.curves": "Curve",
     "ffr_dyn.functions.formula": "formula",
     "ffr_dyn.functions.time_functions": "TimeFunction constant harmonic piecewise polynomial signal table user",
     "ffr_dyn.scene.couplings": "Coupling",
     "ffr_dyn.scene.drivers": "Driver PointDriver",
-    "ffr_dyn.scene.forces": "Bushing Load SpringDamper",
-    "ffr_dyn.scene.joint_forces": "Actuator JointFriction JointSpring JointStop Servo",
+    "ffr_dyn.scene.forces": "Actuator Bushing JointFriction JointSpring JointStop Load ModalForce NodalForces Pressure Servo "
+    "SpringDamper",
     "ffr_dyn.scene.joints": "Joint",
     "ffr_dyn.scene.scene": "Body Scene",
     "ffr_dyn.scene.sensors": "Measurement SectionMeasurement StressMeasurement",
-    "ffr_dyn.scene.surface_loads": "ModalForce NodalForces Pressure",
     "ffr_dyn.variants.variant": "vary with_modes without_terms",
     "ffr_dyn.integrators": "AdaptiveROS3 DormandPrince GeneralisedAlpha HHT HalfExplicit Integrator RK4 ROS2 ROS3 Tolerances "
     "Variational register_integrator tolerances",
@@ -97,6 +97,7 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
         truncated as truncated, with_point as with_point
     )
     from ffr_prep.common.errors import ComputationError as ComputationError, InputError as InputError
+    from ffr_prep.common.registry import load_plugin as load_plugin
     from ffr_dyn.functions.curves import Curve as Curve
     from ffr_dyn.functions.formula import formula as formula
     from ffr_dyn.functions.time_functions import (
@@ -105,17 +106,16 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     )
     from ffr_dyn.scene.couplings import Coupling as Coupling
     from ffr_dyn.scene.drivers import Driver as Driver, PointDriver as PointDriver
-    from ffr_dyn.scene.forces import Bushing as Bushing, Load as Load, SpringDamper as SpringDamper
-    from ffr_dyn.scene.joint_forces import (
-        Actuator as Actuator, JointFriction as JointFriction, JointSpring as JointSpring, JointStop as JointStop,
-        Servo as Servo
+    from ffr_dyn.scene.forces import (
+        Actuator as Actuator, Bushing as Bushing, JointFriction as JointFriction, JointSpring as JointSpring, JointStop
+        as JointStop, Load as Load, ModalForce as ModalForce, NodalForces as NodalForces, Pressure as Pressure, Servo
+        as Servo, SpringDamper as SpringDamper
     )
     from ffr_dyn.scene.joints import Joint as Joint
     from ffr_dyn.scene.scene import Body as Body, Scene as Scene
     from ffr_dyn.scene.sensors import (
         Measurement as Measurement, SectionMeasurement as SectionMeasurement, StressMeasurement as StressMeasurement
     )
-    from ffr_dyn.scene.surface_loads import ModalForce as ModalForce, NodalForces as NodalForces, Pressure as Pressure
     from ffr_dyn.variants.variant import vary as vary, with_modes as with_modes, without_terms as without_terms
     from ffr_dyn.integrators import (
         AdaptiveROS3 as AdaptiveROS3, DormandPrince as DormandPrince, GeneralisedAlpha as GeneralisedAlpha, HHT as

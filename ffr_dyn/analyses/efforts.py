@@ -14,10 +14,10 @@ import numpy as np
 from ffr_dyn.compile.engine import with_model
 from ffr_dyn.consistency.evaluation import Evaluator
 from ffr_dyn.functions.time_functions import TimeFunction, constant, piecewise
-from ffr_dyn.scene.applied_loads import actions_of
+from ffr_dyn.kernels.tables import LAW
 from ffr_dyn.scene.checks import check_marker, check_name, check_own_name
-from ffr_dyn.scene.forces import Load
-from ffr_dyn.scene.joint_forces import Actuator
+from ffr_dyn.scene.force_kinds import forces_of
+from ffr_dyn.scene.forces import Actuator, Load
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.errors import InputError
@@ -121,16 +121,16 @@ def _load(effort: MarkerEffort, component: Any) -> Load:
 def sized(at: Evaluator, efforts: tuple[Effort, ...], sizes: Array) -> Evaluator:
     """The same memory for the scene with its unit efforts at other sizes (U,)."""
     model, scene = at.system.model, at.system.scene
-    value, data = model.loads.value.copy(), model.functions.data.copy()
-    loads, actions = [load.name for load in scene.loads], [action.name for action in actions_of(scene)]
+    numbers = model.loads.data.copy()
+    starts = dict(zip((force.name for force in forces_of(scene)), model.loads.row[:, LAW], strict=True))
     for effort, size in zip(efforts, sizes, strict=True):
+        first = starts[effort.name]
         if isinstance(effort, JointEffort):
-            number = model.loads.action[actions.index(effort.name), 5]
-            data[model.functions.start[number]] = size
+            numbers[first] = size
         else:
-            direction = np.array(effort.direction)
-            value[loads.index(effort.name), 3 * effort.moment : 3 * effort.moment + 3] = size * direction
-    tables = model._replace(loads=model.loads._replace(value=value), functions=model.functions._replace(data=data))
+            first += 3 * effort.moment
+            numbers[first : first + 3] = size * np.array(effort.direction)
+    tables = model._replace(loads=model.loads._replace(data=numbers))
     return replace(at, engine=with_model(at.engine, tables))
 
 

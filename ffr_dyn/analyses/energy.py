@@ -176,7 +176,7 @@ class EnergyWatch:
 
 
 def _row(rows: Record, k: int, energy: Array) -> _Row:
-    state = rows.x[k].copy(), rows.v[k].copy(), rows.action[k, :, 0].copy()
+    state = rows.x[k].copy(), rows.v[k].copy(), rows.forces[k].copy()
     return _Row(float(rows.time[k]), *state, float(energy[k]), float(rows.energy[k].sum()))
 
 

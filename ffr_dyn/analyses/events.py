@@ -153,7 +153,7 @@ class Watcher:
         method: Any = self._method if self._method.controlled else replace(self._method, step=length)  # type: ignore[type-var]
         time, end = float(rows.time[k]), new_record(self._system, 1)
         engine = new_engine(self._system, rows.x[k], rows.v[k], method, self._gains, start=time, spacing=length)
-        engine.work.loads.reference[:] = rows.action[k, :, 0]
+        engine.work.loads.reference[:] = rows.forces[k]
         if fill_rows(engine, end, time, 1) != OK:
             raise ComputationError(f"at t = {time:.6g} s an event cannot be located: a shorter step from there fails")
         return end

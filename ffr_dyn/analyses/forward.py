@@ -316,7 +316,7 @@ def with_all_reactions(assembled: Assembled, record: Record) -> Record:
     reaction = np.empty_like(record.reaction)
     for row, moment in enumerate(record.time):
         engine.x[:], engine.v[:] = record.x[row], record.v[row]
-        engine.work.loads.reference[:] = record.action[row, :, 0]
+        engine.work.loads.reference[:] = record.forces[row]
         record_row(engine, moment, one, 0)
         reaction[row] = one.reaction[0, numbers]
     return record._replace(reaction=reaction)

@@ -26,6 +26,7 @@ from ffr_dyn.consistency.assemble import assemble, in_space
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator, to_global_axes
 from ffr_dyn.consistency.mobility import named_motion
 from ffr_dyn.consistency.tangent import Chart, chart, derivative, rates, sizes, state, state_matrix
+from ffr_dyn.kernels.tables import LAW
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.result import Axis, Quantity, Result
@@ -186,11 +187,12 @@ def _efforts(inputs: tuple[Effort | str, ...]) -> tuple[Effort, ...]:
 
 def _with_inputs(at: Evaluator, scene: Scene, inputs: tuple[Effort | str, ...], u: Array) -> Evaluator:
     """The evaluator with the inputs u, on top of the scene's own loads."""
-    model, value = at.system.model, _declared(at)
+    model, data = at.system.model, at.system.model.loads.data.copy()
     for item, amount in zip(inputs, u, strict=True):
         if isinstance(item, str):
-            value[_load_number(scene, item)] *= 1.0 + amount
-    fed = replace(at, engine=with_model(at.engine, model._replace(loads=model.loads._replace(value=value))))
+            first = model.loads.row[_load_number(scene, item), LAW]
+            data[first : first + 6] *= 1.0 + amount
+    fed = replace(at, engine=with_model(at.engine, model._replace(loads=model.loads._replace(data=data))))
     sizes = [amount for item, amount in zip(inputs, u, strict=True) if not isinstance(item, str)]
     return sized(fed, _efforts(inputs), np.array(sizes))
 
@@ -202,15 +204,6 @@ def _load_number(scene: Scene, name: str) -> int:
     if scene.loads[names.index(name)].function is not None:
         raise InputError(f"input {name!r}: a load by a Python function has no size to vary; use an effort as input")
     return names.index(name)
-
-
-def _declared(at: Evaluator) -> Array:
-    """(W, 6) constants of the loads as the scene declares them: factors of one where a component is a function."""
-    listed = [
-        [float(c) if isinstance(c, (int, float, np.floating, np.integer)) else 1.0 for c in (*load.force, *load.moment)]
-        for load in at.system.scene.loads
-    ]
-    return np.array(listed, dtype=float).reshape(-1, 6)
 
 
 def _output_matrices(

@@ -14,8 +14,10 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_stages, new_work
 from ffr_dyn.kernels.entry_points import evaluate_exact, evaluate_loads, record_state, run, run_controlled, step
 from ffr_dyn.kernels.simd.entry_point import ENTRY_POINTS
+from ffr_dyn.kernels.simd.force_kernel import kernel_of
 from ffr_dyn.kernels.simd.table_address import pack
 from ffr_dyn.kernels.tables import PER_ROW, Clock, Control, Model, Record, Tables, Work
+from ffr_dyn.scene.force_kinds import kernels_of
 from ffr_prep.common.brief import Brief
 
 if TYPE_CHECKING:
@@ -68,7 +70,8 @@ def new_engine(
 
     The first engine of a kind waits until what it needs is compiled.
     """
-    ensure_compiled(*(() if method is None else (type(method),)), model=system.model)
+    kinds = () if method is None else (type(method),)
+    ensure_compiled(*kinds, model=system.model, forces=kernels_of(system.scene))
     if method is None:
         stages, h = new_stages(system, 0), 0.0
     else:
@@ -79,9 +82,10 @@ def new_engine(
     keeps_terms, looks_ahead = (False, 0) if method is None else (method.keeps_terms, method.looks_ahead)
     work = new_work(system.model, keeps_terms=keeps_terms, looks_ahead=looks_ahead)
     places = _addresses(system.model, method)
+    forces = np.array([kernel_of(kernel).address for kernel in kernels_of(system.scene)], dtype=np.int64)
     own = np.array(x, dtype=float), np.array(v, dtype=float)
-    places, work, stages, clock, control, own = aligned((places, work, stages, clock, control, own))
-    return _packed(system, Tables(0, places, system.model, work, stages, clock, control, *own))
+    places, forces, work, stages, clock, control, own = aligned((places, forces, work, stages, clock, control, own))
+    return _packed(system, Tables(0, places, forces, system.model, work, stages, clock, control, *own))
 
 
 def _addresses(model: Model, method: Integrator | None) -> Array:

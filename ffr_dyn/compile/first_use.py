@@ -14,25 +14,32 @@ from collections.abc import Sequence
 from ffr_dyn.integrators import Integrator, methods
 from ffr_dyn.kernels.entry_points import add_loads, load_powers, run_controlled
 from ffr_dyn.kernels.simd.entry_point import ENTRY_POINTS, CompiledFunction, always
+from ffr_dyn.kernels.simd.force_kernel import kernel_of
 from ffr_dyn.kernels.simd.intrinsics import compiled_forms
 from ffr_dyn.kernels.tables import Model
 
+Kernel = str | CompiledFunction  # of a force: "package.module:name", or itself where that is not known
+
+FORCES = ("ffr_dyn.kernels.forces.load:load", "ffr_dyn.kernels.forces.spring:spring")  # of a scene not known yet
 _AT_WORK: dict[str, subprocess.Popen[bytes]] = {}
 _ON_DISK: set[str] = set()  # functions that were found there before: a program with many runs looks once
 
 
-def begin_compiling(*kinds: type[Integrator], model: Model | None = None) -> None:
+def begin_compiling(*kinds: type[Integrator], model: Model | None = None, forces: Sequence[Kernel] = FORCES) -> None:
     """Start to compile what some methods need where it is not on disk, and go on with something else meanwhile.
 
     For programs that mesh and reduce bodies first: a run that needs it waits.
 
-    model : tables of the scene; without them, of one with applied loads
+    model  : tables of the scene; without them, of one with applied loads
+    forces : kernels of the scene's forces
     """
     functions = _of_scene(model) + [step for step in _steps() if any(kind.do_step is step for kind in kinds)]
     if any(kind.controlled for kind in kinds):
         functions.append(run_controlled.general)
-    _ON_DISK.update(each.name for each in functions if each.name not in _ON_DISK and compiled_forms(each.function))
-    missing = [each.name for each in functions if each.name not in _AT_WORK and each.name not in _ON_DISK]
+    wanted = {each.name: each for each in functions} | {one: kernel_of(one) for one in forces if isinstance(one, str)}
+    kept = {name: each for name, each in wanted.items() if each.own}
+    _ON_DISK.update(name for name, each in kept.items() if name not in _ON_DISK and compiled_forms(each.function))
+    missing = [name for name in kept if name not in _AT_WORK and name not in _ON_DISK]
     if not missing:
         return
     print("ffr-dyn: compiling the kernels, once (some twenty seconds) ...", file=sys.stderr, flush=True)
@@ -51,9 +58,9 @@ def _of_scene(model: Model | None) -> list[CompiledFunction]:
     return [entry.chosen(model) for entry in ENTRY_POINTS.values() if entry.needed(model)]
 
 
-def ensure_compiled(*kinds: type[Integrator], model: Model | None = None) -> None:
+def ensure_compiled(*kinds: type[Integrator], model: Model | None = None, forces: Sequence[Kernel] = ()) -> None:
     """Have what some methods need on disk; where that fails, the run compiles them itself."""
-    begin_compiling(*kinds, model=model)
+    begin_compiling(*kinds, model=model, forces=forces)
     for process in set(_AT_WORK.values()):
         process.wait()
     _AT_WORK.clear()
@@ -70,11 +77,13 @@ def _steps() -> list[CompiledFunction]:
 
 
 def compile_functions(names: Sequence[str]) -> None:
-    """Compile functions by their names."""
+    """Compile functions by their names, kernels of forces by "package.module:name"."""
     forms = [form for entry in ENTRY_POINTS.values() for form in (entry.general, *(form for _, form in entry.forms))]
-    for compiled in (*forms, *_steps()):
-        if compiled.name in names and not compiled.address:
-            raise RuntimeError(f"entry point {compiled.name} has no address")
+    known = {compiled.name: compiled for compiled in (*forms, *_steps())}
+    for name in names:
+        compiled = kernel_of(name) if ":" in name else known[name]
+        if not compiled.address:
+            raise RuntimeError(f"{name} has no address")
 
 
 if __name__ == "__main__":

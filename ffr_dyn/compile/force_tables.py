@@ -10,33 +10,10 @@ import numpy as np
 
 from ffr_dyn.functions.curves import Curve, pieces
 from ffr_dyn.functions.time_functions import OPERATION, USER, TimeFunction, as_time_function, is_zero
-from ffr_dyn.kernels.tables import (
-    ACTUATOR,
-    AFFINE,
-    ANGLE,
-    FRICTION,
-    GLOBAL,
-    LENGTH,
-    SERVO,
-    SPRING,
-    STOP,
-    STROKE,
-    Functions,
-    Loads,
-)
-from ffr_dyn.scene.applied_loads import Action, actions_of, bushings_of, coordinate_axes, coordinate_ends, spread_of
-from ffr_dyn.scene.forces import (
-    Bushing,
-    Load,
-    SpringDamper,
-    bushing_curves,
-    bushing_frames,
-    damping_matrix,
-    stiffness_matrix,
-)
-from ffr_dyn.scene.joint_forces import Actuator, JointFriction, JointSpring, JointStop, Servo, turns_of
-from ffr_dyn.scene.scene import Scene, body_number, marker_number
-from ffr_dyn.scene.surface_loads import Affine, SurfaceLoad, distributed
+from ffr_dyn.kernels.tables import WAYS, Functions, Loads
+from ffr_dyn.scene.force_kinds import forces_of, kernels_of
+from ffr_dyn.scene.forces.force import Force
+from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
@@ -113,23 +90,6 @@ class FunctionTable:
         )
 
 
-class NumberPool:
-    """Collects numbers; a curve that is used twice is kept twice."""
-
-    def __init__(self) -> None:
-        self.numbers: list[float] = []
-
-    def add(self, numbers: Any) -> int:
-        """Where these numbers begin."""
-        start = len(self.numbers)
-        self.numbers += np.ravel(numbers).tolist()
-        return start
-
-    def curve(self, value: Any) -> int:
-        """Where a curve begins, or -1 for what is none."""
-        return self.add(pieces(value)) if isinstance(value, Curve) else -1
-
-
 def base_functions(scene: Scene, functions: FunctionTable) -> Array:
     """(3,) time functions of the base's acceleration, -1 for a component that is zero."""
     return np.array(
@@ -137,125 +97,53 @@ def base_functions(scene: Scene, functions: FunctionTable) -> Array:
     )
 
 
+class LoadNumbers:
+    """Collects the numbers of forces while a scene is compiled (a `ffr_dyn.scene.forces.force.LoadTable`).
+
+    who : the force whose numbers are collected
+    """
+
+    def __init__(self, scene: Scene, functions: FunctionTable) -> None:
+        self.scene, self.who = scene, ""
+        self._functions = functions
+        self.data: list[float] = []
+
+    def add(self, numbers: Any) -> int:
+        """Where these numbers begin."""
+        start = len(self.data)
+        self.data += np.ravel(numbers).tolist()
+        return start
+
+    def function(self, value: Any) -> int:
+        return self._functions.add(as_time_function(value, self.who), self.who)
+
+    def callback(self, function: Callable[..., Any] | None, *sizes: int) -> int:
+        return -1 if function is None else self._functions.callback(function, sizes, self.who, with_state=True)
+
+    def curve(self, value: Any) -> int:
+        """A curve that is used twice is kept twice."""
+        return self.add(pieces(value)) if isinstance(value, Curve) else -1
+
+
 def load_tables(scene: Scene, functions: FunctionTable) -> Loads:
     """All applied loads of a scene but gravity."""
-    pool = NumberPool()
-    wrench, value, number = _wrenches(scene, functions)
-    actions = actions_of(scene)
-    bushings = bushings_of(scene)
+    numbers, kernels = LoadNumbers(scene, functions), kernels_of(scene)
+    rows: list[tuple[int, ...]] = []
+    initial: list[float] = []
+    for force in forces_of(scene):
+        rows.append((kernels.index(force.kernel), *_row(scene, force, numbers, len(initial))))
+        initial += force.place.initial
     return Loads(
-        wrench=np.array(wrench, dtype=np.int64).reshape(-1, 3),
-        value=np.array(value, dtype=float).reshape(-1, 6),
-        function=np.array(number, dtype=np.int64).reshape(-1, 6),
-        action=np.array([_action(scene, a, functions, pool) for a in actions], dtype=np.int64).reshape(-1, 6),
-        action_axes=np.array([coordinate_axes(scene, a) for a in actions]).reshape(-1, 3, 3),
-        turn=np.array([0 if isinstance(a, SpringDamper) else 2 * np.pi * turns_of(a) for a in actions], dtype=float),
-        bushing=np.array([_bushing(scene, b, pool) for b in bushings], dtype=np.int64).reshape(-1, 3),
-        frames=np.array([[f.T for f in bushing_frames(b)] for b in bushings]).reshape(-1, 2, 3, 3),
-        spread=np.array([_spread(scene, s, functions, pool) for s in spread_of(scene)], dtype=np.int64).reshape(-1, 4),
-        data=np.array(pool.numbers, dtype=float),
+        row=np.array(rows, dtype=np.int64).reshape(-1, 9),
+        data=np.array(numbers.data, dtype=float),
+        initial=np.array(initial, dtype=float),
     )
 
 
-# ---- wrenches -----------------------------------------------------------------------------------------------------
-
-
-def _wrenches(
-    scene: Scene, functions: FunctionTable
-) -> tuple[list[tuple[int, int, int]], list[list[float]], list[list[int]]]:
-    wrench, value, number = [], [], []
-    for load in scene.loads:
-        constants, indices = _components(load, functions)
-        value.append(constants)
-        number.append(indices)
-        slot = -1
-        if load.function is not None:
-            slot = functions.callback(load.function, (3, 6), f"load {load.name!r}", with_state=True)
-        wrench.append((marker_number(scene, load.marker), int(load.axes == "body"), slot))
-    return wrench, value, number
-
-
-def _components(load: Load, functions: FunctionTable) -> tuple[list[float], list[int]]:
-    constants, indices = [], []
-    for component in (*load.force, *load.moment):
-        if isinstance(component, (int, float, np.floating, np.integer)):
-            if not np.isfinite(component):
-                raise InputError(f"load {load.name!r}: a component is {component}; all must be finite")
-            constants.append(float(component))
-            indices.append(-1)
-        else:
-            what = f"load {load.name!r}"
-            constants.append(1.0)
-            indices.append(functions.add(as_time_function(component, what), what))
-    return constants, indices
-
-
-# ---- forces on coordinates ----------------------------------------------------------------------------------------
-
-
-def _action(scene: Scene, action: Action, functions: FunctionTable, pool: NumberPool) -> tuple[int, ...]:
-    law, numbers, function = _law(action, functions, pool)
-    return (_coordinate_kind(action), *coordinate_ends(scene, action), law, pool.add(numbers), function)
-
-
-def _coordinate_kind(action: Action) -> int:
-    if isinstance(action, SpringDamper):
-        return LENGTH
-    return ANGLE if action.coordinate == "angle" else STROKE
-
-
-def _law(action: Action, functions: FunctionTable, pool: NumberPool) -> tuple[int, list[float], int]:
-    """Law, its numbers, its time function or -1."""
-    who = f"force {action.name!r}"
-
-    def timed(value: Any) -> int:
-        return functions.add(as_time_function(value, who), who)
-
-    match action:
-        case SpringDamper():
-            return SPRING, _spring(action.stiffness, action.damping, action.free_length, action.preload, pool), -1
-        case JointSpring():
-            return SPRING, _spring(action.stiffness, action.damping, action.free, action.preload, pool), -1
-        case JointFriction():
-            more = 0.0 if action.static is None else action.static - action.coulomb
-            fall = 1.0 if action.stribeck is None else action.stribeck
-            return FRICTION, [action.coulomb, more, fall, action.creep, action.viscous], timed(action.normal)
-        case JointStop():
-            lower = -np.inf if action.lower is None else action.lower
-            upper = np.inf if action.upper is None else action.upper
-            return STOP, [lower, upper, action.stiffness, action.damping, action.entry], -1
-        case Servo():
-            return SERVO, [action.kp, action.kd, action.limit], timed(action.target)
-        case Actuator():
-            slot = -1
-            if action.function is not None:
-                slot = functions.callback(action.function, (1,), who, with_state=True)
-            return ACTUATOR, [slot], timed(action.force)
-
-
-def _spring(stiffness: Any, damping: Any, free: float, preload: float, pool: NumberPool) -> list[float]:
-    k = 0.0 if isinstance(stiffness, Curve) else stiffness
-    d = 0.0 if isinstance(damping, Curve) else damping
-    return [k, d, free, preload, pool.curve(stiffness), pool.curve(damping)]
-
-
-# ---- bushings and spread loads ------------------------------------------------------------------------------------
-
-
-def _bushing(scene: Scene, bushing: Bushing, pool: NumberPool) -> tuple[int, int, int]:
-    curves = [pool.curve(curve) for curve in bushing_curves(bushing)]
-    numbers = [stiffness_matrix(bushing), damping_matrix(bushing), np.array(bushing.preload, float), np.array(curves)]
-    start = pool.add(np.concatenate([np.ravel(part) for part in numbers]))
-    return marker_number(scene, bushing.i), marker_number(scene, bushing.j), start
-
-
-def _spread(scene: Scene, load: SurfaceLoad, functions: FunctionTable, pool: NumberPool) -> tuple[int, int, int, int]:
-    b = body_number(scene, load)
-    made = distributed(load, scene.bodies[b].model)
-    if isinstance(made, Affine):
-        kind, start = AFFINE, pool.add(np.concatenate([made.constant, made.slope.ravel()]))
-    else:
-        kind = GLOBAL
-        start = pool.add(np.concatenate([made.force, made.u_f.ravel(), made.phi_f.ravel()]))
-    who = f"force {load.name!r}"
-    return b, kind, start, functions.add(as_time_function(load.function, who), who)
+def _row(scene: Scene, force: Force, numbers: LoadNumbers, measured: int) -> tuple[int, ...]:
+    """`Loads.row` from its second column on."""
+    place = force.place
+    numbers.who = f"{'load' if force.table == 'loads' else 'force'} {force.name!r}"
+    law = force.compiled(numbers)
+    starts = numbers.add(place.numbers(scene)), numbers.add(law.numbers)
+    return (*starts, measured, *place.ends(scene), WAYS[place.way], law.function, law.user)

@@ -16,9 +16,10 @@ from ffr_dyn.equations.constraint_rows import Block, blocks_of
 from ffr_dyn.equations.layout import Layout, layout
 from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.equations.stiffening import stiffness_of
-from ffr_dyn.kernels.tables import LANES, Markers, Model, Pattern, Rows
-from ffr_dyn.scene.applied_loads import marker_numbers
-from ffr_dyn.scene.scene import MarkerName, Scene, markers
+from ffr_dyn.kernels.tables import LANES, WAYS, WORDS, Markers, Model, Pattern, Rows
+from ffr_dyn.scene.force_kinds import loaded_markers
+from ffr_dyn.scene.joints import Word
+from ffr_dyn.scene.scene import MarkerName, Scene, marker_number, markers
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
@@ -92,13 +93,14 @@ def _markers(scene: Scene, blocks: tuple[Block, ...]) -> Markers:
     shapes = [np.concatenate([i.phi_t, i.phi_r]) for i in interfaces] + [np.zeros((6, 0))] * len(scene.ground)
     phi, start = once(shapes, [*(id(i) for i in interfaces), *("ground" for _ in scene.ground)])
     joint = sorted({k for block in blocks for k in block.markers})
+    loaded = [marker_number(scene, name) for name in loaded_markers(scene)]
     return Markers(
         body=np.array([entry[0] for entry in table], dtype=np.int64),
         u=np.array([i.position for i in interfaces] + list(scene.ground.values())).reshape(-1, 3),
         phi=phi,
         start=start,
         load=np.array(_load_numbers(scene), dtype=np.int64),
-        active=np.array(sorted({*joint, *marker_numbers(scene)}), dtype=np.int64),
+        active=np.array(sorted({*joint, *loaded}), dtype=np.int64),
         joint=np.array([k for k in joint if table[k][0] != ground], dtype=np.int64),
     )
 
@@ -125,14 +127,20 @@ def _rows(blocks: tuple[Block, ...], functions: FunctionTable) -> Rows:
     sides = max((len(block.markers) for block in blocks), default=2)
     marker = np.array([b.markers + (-1,) * (sides - len(b.markers)) for b in blocks], dtype=np.int64).reshape(-1, sides)
     return Rows(
-        kind=np.array([word.kind for word in listed], dtype=np.int64),
+        kind=np.array([WORDS.index(word.kind) for word in listed], dtype=np.int64),
         axes=axes,
-        relation=np.array([word.relation for word in listed], dtype=float).reshape(-1, 5),
+        relation=np.array([_relation(word) for word in listed], dtype=float).reshape(-1, 5),
         function=np.array(function, dtype=np.int64),
         start=starts([len(b.words) for b in blocks]),
         marker=marker,
         first=_first_of_each(marker),
     )
+
+
+def _relation(word: Word) -> tuple[float, ...]:
+    """`Rows.relation` of a word."""
+    terms = word.relation or ((0.0, "angle"),) * 2
+    return *(number for factor, kind in terms for number in (factor, WAYS[kind])), word.spacing
 
 
 def _first_of_each(numbers: Array) -> Array:

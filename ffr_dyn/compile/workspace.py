@@ -146,9 +146,8 @@ def _rigid_inertia(bodies: Bodies, b: int) -> tuple[Array, Array, Array]:
 
 def _load_work(m: Model, V: int, M: int) -> LoadWork:
     return LoadWork(
-        reference=m.loads.turn.copy(),
-        action=np.zeros((m.loads.action.shape[0], 3)),
-        bushing=np.zeros((m.loads.bushing.shape[0], 18)),
+        reference=m.loads.initial.copy(),
+        measured=np.zeros(m.loads.initial.size),
         axes=np.zeros((2, 3, 3, 3)),
         turn=np.zeros((3, 3, 3)),
         f=np.zeros(V),
@@ -178,7 +177,6 @@ def new_record(system: System, rows: int) -> Record:
     """Room for `rows` output times."""
     m, place = system.model, system.layout
     M, K = m.markers.body.size, m.rows.marker.shape[0]
-    W, Z, Y, U = (table.shape[0] for table in (m.loads.wrench, m.loads.action, m.loads.bushing, m.loads.spread))
     return Record(
         np.zeros(rows),
         np.zeros((rows, place.x_size)),
@@ -187,10 +185,9 @@ def new_record(system: System, rows: int) -> Record:
         np.zeros((rows, M, 3)),
         np.zeros((rows, M, 3)),
         np.zeros((rows, K, 6)),
-        np.zeros((rows, Z, 3)),
-        np.zeros((rows, Y, 18)),
+        np.zeros((rows, m.loads.initial.size)),
         np.zeros((rows, m.functions.kind.size, 3)),
-        np.zeros((rows, W + Z + Y + U)),
+        np.zeros((rows, m.loads.row.shape[0])),
         np.zeros((rows, 3)),
         np.zeros((rows, 2)),
     )

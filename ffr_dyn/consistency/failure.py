@@ -6,9 +6,9 @@ import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.kernels.tables import (
-    ACTUATOR,
     AT,
     FAILED,
+    LAW,
     LEAST,
     NOT_CONVERGED,
     NOT_FINITE,
@@ -16,11 +16,14 @@ from ffr_dyn.kernels.tables import (
     SINGULAR_BODY,
     SINGULAR_CONSTRAINT,
     STEP_TOO_SMALL,
+    USER,
     WHEN,
     Work,
 )
-from ffr_dyn.scene.applied_loads import actions_of
+from ffr_dyn.scene.force_kinds import forces_of
 from ffr_prep.common.errors import ComputationError
+
+Array = np.ndarray
 
 OPEN, LOST = 1e-2, 1e2  # m, -: of constraints, more than drift, and what follows from a lost state
 HUGE = 1e12  # N, N m: no force of a machine; what made the state overflow
@@ -109,18 +112,23 @@ def _largest(system: System, work: Work) -> tuple[str, float]:
 
 def _given(system: System, work: Work) -> list[tuple[str, float]]:
     """The largest component of each load and actuator, by name. Other forces follow the state, and are lost with it."""
-    scene, loads, found = system.scene, system.model.loads, []
-    factors = np.append(work.functions[:, 0], 1.0)[loads.function]
-    with np.errstate(invalid="ignore"):
-        values = loads.value * factors
-    for load, value, (*_, slot) in zip(scene.loads, values, loads.wrench, strict=True):
-        if np.isnan(value).any() and not np.isinf(value).any():  # of time alone: not lost with the state
-            return [(load.name, np.nan)]
-        found.append((load.name, value + work.user[slot : slot + 6] if slot >= 0 else value))
-    for action, (*_, law, _, _), value in zip(actions_of(scene), loads.action, work.loads.action[:, 2:], strict=True):
-        if law == ACTUATOR:
-            found.append((action.name, value))
+    scene, found = system.scene, []
+    for force, row in zip(forces_of(scene), system.model.loads.row, strict=True):
+        if force.given:
+            timed, slot = _timed(force.given, row, system, work), row[USER]
+            if np.isnan(timed).any() and not np.isinf(timed).any():  # of time alone: not lost with the state
+                return [(force.name, np.nan)]
+            user = work.user[slot : slot + timed.size] if slot >= 0 else 0.0
+            found.append((force.name, timed + user))
     return [(name, float(np.nanmax(np.abs(value), initial=0.0))) for name, value in found]
+
+
+def _timed(count: int, row: Array, system: System, work: Work) -> Array:
+    """(count,) the components of a given force but for what the user's functions of the state add."""
+    factors, functions = system.model.loads.data[row[LAW] :][: 2 * count].reshape(2, count)
+    with np.errstate(invalid="ignore"):
+        timed: Array = factors * np.append(work.functions[:, 0], 1.0)[functions.astype(int)]
+    return timed
 
 
 def _unconverged(system: System, where: int) -> str:

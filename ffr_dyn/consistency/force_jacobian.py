@@ -45,7 +45,8 @@ def applied_forces(system: System, t: float, x: Array, v: Array, engine: Engine 
     engine = new_engine(system, x, v) if engine is None else engine
     if load_at(engine, t, x, v) != OK:
         raise ComputationError(f"the forces stopped in a Python function of the scene: {system.user.failure}")
-    return engine.work.bodies.f + gravity_forces(system.scene, system.layout, t, x)
+    forces: Array = engine.work.bodies.f + gravity_forces(system.scene, system.layout, t, x)
+    return forces
 
 
 def force_jacobian(system: System, t: float, x: Array, v: Array) -> ForceJacobian:

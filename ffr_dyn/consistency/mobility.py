@@ -11,7 +11,7 @@ from ffr_dyn.consistency.evaluation import free_motions, locked, total_mass_matr
 from ffr_dyn.equations.constraint_rows import Block, rows_at
 from ffr_dyn.equations.constraints import evaluate_word
 from ffr_dyn.equations.layout import Layout, layout
-from ffr_dyn.scene.joints import COORDINATES, RELATION, F, G, H, Joint, Word, frames
+from ffr_dyn.scene.joints import COORDINATES, RELATION, Joint, Word, coordinate_axes, frames
 from ffr_dyn.scene.scene import Scene, marker_number
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
@@ -132,10 +132,9 @@ def _jacobian(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Arr
 
 def coordinate_word(joint: Joint, coordinate: str) -> Word:
     """A joint coordinate as a row of the readable form: its value is Phi, its gradient the Jacobian."""
-    i, j = frames(joint)
-    axes = [i[:, F], i[:, G], j[:, F]] if coordinate == "angle" else [i[:, H], np.zeros(3), np.zeros(3)]
-    kind = float(("angle", "stroke").index(coordinate))
-    return Word(RELATION, f"{joint.name}.{coordinate}", np.array(axes * 2), None, (1.0, kind, 0.0, kind, 0.0))
+    axes = coordinate_axes(coordinate, *frames(joint))
+    terms = (1.0, coordinate), (0.0, coordinate)
+    return Word(RELATION, f"{joint.name}.{coordinate}", np.array(axes * 2), None, terms)
 
 
 def coordinate_gradients(scene: Scene, place: Layout, x: Array, v: Array) -> tuple[list[str], Array]:

@@ -10,9 +10,9 @@ from ffr_dyn.consistency.assemble import in_space
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.integrators import CONTROLLED, METHODS, Integrator, tolerances
 from ffr_dyn.results.result import Result
-from ffr_dyn.scene.scene import Body, Scene
-from ffr_dyn.scene.surface_loads import ModalForce
-from ffr_dyn.variants.plane import AXES, body_normal, planar_forms
+from ffr_dyn.scene.force_kinds import in_bases
+from ffr_dyn.scene.scene import Body, Scene, body_normal
+from ffr_dyn.variants.plane import AXES, planar_forms
 from ffr_dyn.variants.variant import STIFFENING, stiffening_by, vary, with_basis
 from ffr_prep.common.errors import InputError
 
@@ -179,13 +179,7 @@ def _in_shapes(scene: Scene, choice: Choice) -> Scene:
     if not bases:
         return scene
     bodies = tuple(in_basis(body, bases[body.name]) if body.name in bases else body for body in scene.bodies)
-    forces = tuple(
-        replace(force, values=force.values @ bases[force.body])
-        if isinstance(force, ModalForce) and force.body in bases
-        else force
-        for force in scene.forces
-    )
-    return replace(scene, bodies=bodies, forces=forces)
+    return replace(scene, bodies=bodies, forces=in_bases(scene.forces, bases))
 
 
 def in_basis(body: Body, V: Array) -> Body:

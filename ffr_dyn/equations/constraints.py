@@ -15,14 +15,14 @@ to this one, is `ffr_dyn.kernels.rows`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ffr_dyn.equations.kinematics import Motion, marker_axis, marker_point
 from ffr_dyn.equations.layout import Layout
-from ffr_dyn.scene.joints import COINCIDENCE, DISTANCE, DOT_1, DOT_2, RELATION, Word
+from ffr_dyn.scene.joints import COINCIDENCE, DISTANCE, DOT_1, DOT_2, DRIVEN_ANGLE, RELATION, Word
 from ffr_dyn.scene.scene import Scene
 
 Array = np.ndarray
@@ -63,34 +63,57 @@ def summed_parts(terms: Iterable[tuple[float, Row]]) -> Parts:
     return total
 
 
+@dataclass(frozen=True)
+class Markers:
+    """Points and axes of all markers at a state (x, v)."""
+
+    scene: Scene
+    place: Layout
+    x: Array
+    v: Array
+
+    def point(self, number: int) -> Motion:
+        return marker_point(self.scene, self.place, self.x, self.v, number)
+
+    def axis(self, number: int, a0: Array) -> Motion:
+        """The axis a0 (body axes, undeformed) of a marker."""
+        return marker_axis(self.scene, self.place, self.x, self.v, number, a0)
+
+    def from_to(self, i: int, j: int) -> list[tuple[Motion, float]]:
+        """r_j - r_i as a signed sum."""
+        return [(self.point(j), 1.0), (self.point(i), -1.0)]
+
+
 def evaluate_word(
     scene: Scene, place: Layout, x: Array, v: Array, word: Word, at: tuple[int, ...], drive: Drive
 ) -> Row:
     """One row on the markers `at` (numbers); drive: value and two derivatives of its time function (zeros without)."""
-    if word.kind == RELATION:
-        return _relation(scene, place, x, v, word, at, drive)
-    i, j = at[:2]
-    axis_i, axis_i2, axis_j = word.axes
+    return WORDS[word.kind](Markers(scene, place, x, v), word, at, drive)
 
-    def point(number: int) -> Motion:
-        return marker_point(scene, place, x, v, number)
 
-    def axis(number: int, a0: Array) -> Motion:
-        return marker_axis(scene, place, x, v, number, a0)
+def _coincidence(now: Markers, word: Word, at: tuple[int, ...], drive: Drive) -> Row:
+    """One component of r_j - r_i less a function of time. Equation (17) of docs/notation.md."""
+    at_i, at_j, c, parts = now.point(at[0]), now.point(at[1]), int(word.axes[0, 0]), Parts()
+    add_part(now.place, parts, at_i, -at_i.jacobian[c])
+    add_part(now.place, parts, at_j, at_j.jacobian[c])
+    off, rate, bias = at_j.r - at_i.r, at_j.r_dot - at_i.r_dot, at_i.bias - at_j.bias
+    return _driven(Row(off[c], rate[c], bias[c], parts, now.place.v_size), drive)
 
-    if word.kind == COINCIDENCE:
-        return _coincidence(place, point(i), point(j), drive, int(axis_i[0]))
-    if word.kind == DOT_1:
-        return _dot(place, axis(i, axis_i), [(axis(j, axis_j), 1.0)])
-    if word.kind == DOT_2:
-        return _driven(_dot(place, axis(i, axis_i), [(point(j), 1.0), (point(i), -1.0)]), drive)
-    if word.kind == DISTANCE:
-        return _distance(place, point(i), point(j), drive)
-    alpha, speed, second = drive
+
+def _dot_1(now: Markers, word: Word, at: tuple[int, ...], drive: Drive) -> Row:
+    return _dot(now.place, now.axis(at[0], word.axes[0]), [(now.axis(at[1], word.axes[2]), 1.0)])
+
+
+def _dot_2(now: Markers, word: Word, at: tuple[int, ...], drive: Drive) -> Row:
+    return _driven(_dot(now.place, now.axis(at[0], word.axes[0]), now.from_to(at[0], at[1])), drive)
+
+
+def _driven_angle(now: Markers, word: Word, at: tuple[int, ...], drive: Drive) -> Row:
+    (alpha, speed, second), (axis_i, axis_i2, axis_j) = drive, word.axes
     along = np.cos(alpha) * axis_i + np.sin(alpha) * axis_i2
     across = -np.sin(alpha) * axis_i + np.cos(alpha) * axis_i2
-    turning = _turning(axis(i, across), axis(i, along), speed, second)
-    return _dot(place, turning, [(axis(j, axis_j), 1.0)])
+    turning = _turning(now.axis(at[0], across), now.axis(at[0], along), speed, second)
+    return _dot(now.place, turning, [(now.axis(at[1], axis_j), 1.0)])
 
 
 def _turning(across: Motion, along: Motion, speed: float, second: float) -> Motion:
@@ -110,47 +133,60 @@ def _driven(row: Row, drive: Drive) -> Row:
     return replace(row, Phi=row.Phi - drive[0], nu=row.nu - drive[1], gamma=row.gamma + drive[2])
 
 
-def _distance(place: Layout, at_i: Motion, at_j: Motion, drive: Drive) -> Row:
+def _distance(now: Markers, word: Word, at: tuple[int, ...], drive: Drive) -> Row:
     """Half of D / s - s, with D the square of the distance, and its derivatives by the quotient rule.
 
     Equation (20) of docs/notation.md.
     """
-    s, speed, second = drive
-    parts = Parts()
+    at_i, at_j, (s, speed, second), parts = now.point(at[0]), now.point(at[1]), drive, Parts()
     d, d_dot, d_bias = at_j.r - at_i.r, at_j.r_dot - at_i.r_dot, at_j.bias - at_i.bias
-    add_part(place, parts, at_i, -d @ at_i.jacobian / s)
-    add_part(place, parts, at_j, d @ at_j.jacobian / s)
+    add_part(now.place, parts, at_i, -d @ at_i.jacobian / s)
+    add_part(now.place, parts, at_j, d @ at_j.jacobian / s)
     D, D_dot, D_bias = d @ d, 2 * d @ d_dot, 2 * (d_dot @ d_dot + d @ d_bias)
     nu = (D_dot / s - D * speed / s**2 - speed) / 2
     bias = (D_bias / s - 2 * D_dot * speed / s**2 - D * second / s**2 + 2 * D * speed**2 / s**3 - second) / 2
-    return Row(float(D / s - s) / 2, float(nu), float(-bias), parts, place.v_size)
+    return Row(float(D / s - s) / 2, float(nu), float(-bias), parts, now.place.v_size)
 
 
-def _relation(scene: Scene, place: Layout, x: Array, v: Array, word: Word, at: tuple[int, ...], drive: Drive) -> Row:
+def _relation(now: Markers, word: Word, at: tuple[int, ...], drive: Drive) -> Row:
     """factor_1 coordinate_1 + factor_2 coordinate_2 less a function of time, coordinates of two joints.
 
     Equation (22) of docs/notation.md.
     """
-    total = Row(0.0, 0.0, 0.0, {}, place.v_size)
-    for k in range(2):
-        factor, kind = word.relation[2 * k : 2 * k + 2]
-        row = _coordinate(scene, place, x, v, int(kind), word.axes[3 * k : 3 * k + 3], at[2 * k : 2 * k + 2])
+    total = Row(0.0, 0.0, 0.0, {}, now.place.v_size)
+    for k, (factor, kind) in enumerate(word.relation):
+        row = coordinate(now, kind, word.axes[3 * k : 3 * k + 3], at[2 * k : 2 * k + 2])
         total = _sum(total, 1.0, row, factor)
     driven = _driven(total, drive)
-    spacing = word.relation[4]
-    return driven if spacing == 0 else replace(driven, Phi=driven.Phi - spacing * round(driven.Phi / spacing))
+    return (
+        driven
+        if word.spacing == 0
+        else replace(driven, Phi=driven.Phi - word.spacing * round(driven.Phi / word.spacing))
+    )
 
 
-def _coordinate(scene: Scene, place: Layout, x: Array, v: Array, kind: int, axes: Array, at: tuple[int, ...]) -> Row:
-    """Value, rate and bias of an angle (0) or a stroke (1) as a row. Equation (21) of docs/notation.md."""
-    i, j = at
-    first = marker_axis(scene, place, x, v, i, axes[0])
-    if kind == 1:
-        ends = [(marker_point(scene, place, x, v, j), 1.0), (marker_point(scene, place, x, v, i), -1.0)]
-        return _dot(place, first, ends)
-    f_j = marker_axis(scene, place, x, v, j, axes[2])
-    c = _dot(place, first, [(f_j, 1.0)])
-    s = _dot(place, marker_axis(scene, place, x, v, i, axes[1]), [(f_j, 1.0)])
+# The words of `ffr_dyn.scene.joints`.
+WORDS: dict[str, Callable[[Markers, Word, tuple[int, ...], Drive], Row]] = {
+    COINCIDENCE: _coincidence,
+    DOT_1: _dot_1,
+    DOT_2: _dot_2,
+    DRIVEN_ANGLE: _driven_angle,
+    DISTANCE: _distance,
+    RELATION: _relation,
+}
+
+
+def coordinate(now: Markers, kind: str, axes: Sequence[Array] | Array, at: Sequence[int]) -> Row:
+    """Value, rate and bias of a joint coordinate, an "angle" or a "stroke", as a row; axes: f_i, g_i, f_j, or h_i.
+
+    Equation (21) of docs/notation.md.
+    """
+    first = now.axis(at[0], axes[0])
+    if kind == "stroke":
+        return _dot(now.place, first, now.from_to(at[0], at[1]))
+    f_j = now.axis(at[1], axes[2])
+    c = _dot(now.place, first, [(f_j, 1.0)])
+    s = _dot(now.place, now.axis(at[0], axes[1]), [(f_j, 1.0)])
     square = c.Phi**2 + s.Phi**2
     turn = _sum(s, c.Phi / square, c, -s.Phi / square)
     swelling = 2 * (c.Phi * c.nu + s.Phi * s.nu) / square
@@ -166,15 +202,6 @@ def _sum(one: Row, a: float, other: Row, b: float) -> Row:
         summed_parts([(a, one), (b, other)]),
         one.size,
     )
-
-
-def _coincidence(place: Layout, at_i: Motion, at_j: Motion, drive: Drive, c: int) -> Row:
-    """One component of r_j - r_i less a function of time. Equation (17) of docs/notation.md."""
-    parts = Parts()
-    add_part(place, parts, at_i, -at_i.jacobian[c])
-    add_part(place, parts, at_j, at_j.jacobian[c])
-    off, rate, bias = at_j.r - at_i.r, at_j.r_dot - at_i.r_dot, at_i.bias - at_j.bias
-    return _driven(Row(off[c], rate[c], bias[c], parts, place.v_size), drive)
 
 
 def _dot(place: Layout, a: Motion, sums: list[tuple[Motion, float]]) -> Row:

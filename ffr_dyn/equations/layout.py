@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffr_dyn.scene.scene import Scene
-from ffr_dyn.variants.plane import AXES, body_normal
+from ffr_dyn.scene.scene import Scene, body_normal
+from ffr_dyn.variants.plane import AXES
 from ffr_prep.common.brief import Brief
 
 Array = np.ndarray

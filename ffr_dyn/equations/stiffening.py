@@ -13,9 +13,9 @@ from ffr_dyn.equations.constraint_rows import Instant, drive_of
 from ffr_dyn.equations.constraints import evaluate_word
 from ffr_dyn.equations.forces import applied, gravity_at
 from ffr_dyn.functions.rotation import rotation_matrix
-from ffr_dyn.scene.applied_loads import loads_of, markers_under
-from ffr_dyn.scene.joints import RELATION
-from ffr_dyn.scene.scene import Body, markers
+from ffr_dyn.scene.force_kinds import forces_of
+from ffr_dyn.scene.joints import RELATION, Word
+from ffr_dyn.scene.scene import Body, marker_number, markers
 
 Array = np.ndarray
 
@@ -76,8 +76,9 @@ def applied_wrenches(now: Instant) -> Array:
     """(M, 6) of the loads on markers; those spread over surfaces stiffen nothing."""
     out = np.zeros((len(markers(now.scene)), 6))
     loads = applied(now.scene, now.place, now.t, now.x, now.v)
-    for declared, load in zip(loads_of(now.scene), loads, strict=True):
-        _add_wrenches(now, out, markers_under(now.scene, declared), load.generalised)
+    for force, load in zip(forces_of(now.scene), loads, strict=True):
+        ends = tuple(marker_number(now.scene, name) for name in force.place.markers(now.scene))
+        _add_wrenches(now, out, ends, load.generalised)
     return out
 
 
@@ -86,13 +87,18 @@ def _reaction_wrenches(now: Instant, lam: Array) -> Array:
     out, values = np.zeros((len(markers(now.scene)), 6)), iter(lam)
     for block in now.blocks:
         for word in block.words:
-            value, (one, kind, other, kind_2, _) = next(values), word.relation
-            halves = ((one, kind, 0.0, kind_2, 0.0), (0.0, kind, other, kind_2, 0.0))
-            for k, half in enumerate(halves if word.kind == RELATION else halves[:1]):
-                part = replace(word, relation=half)
+            value = next(values)
+            for k, part in enumerate(_halves(word) if word.kind == RELATION else [word]):
                 row = evaluate_word(now.scene, now.place, now.x, now.v, part, block.markers, drive_of(word, now.t))
                 _add_wrenches(now, out, block.markers[2 * k : 2 * k + 2], -value * row.jacobian)
     return out
+
+
+def _halves(word: Word) -> list[Word]:
+    """A relation with the factor of one of its coordinates at a time, the other zero."""
+    (one, kind), (other, kind_2) = word.relation
+    halves = ((one, kind), (0.0, kind_2)), ((0.0, kind), (other, kind_2))
+    return [replace(word, relation=half, spacing=0.0) for half in halves]
 
 
 def _add_wrenches(now: Instant, out: Array, ends: tuple[int, ...], force: Array) -> None:

@@ -47,7 +47,7 @@ def pieces(curve: Curve) -> Array:
 
 
 def curve_value(curve: Curve, x: float) -> float:
-    """The curve at x; the readable twin of `ffr_dyn.kernels.forces.force_laws.curve_value`."""
+    """The curve at x; the readable twin of `ffr_dyn.kernels.forces.curve.curve_value`."""
     from scipy.interpolate import PchipInterpolator
 
     through = PchipInterpolator(curve.at, curve.values)

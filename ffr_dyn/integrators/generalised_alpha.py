@@ -52,7 +52,7 @@ from ffr_dyn.kernels.integrator_api import (
     fill,
     finite,
     inlined,
-    keep_turns,
+    keep_measured,
     largest,
     largest_motion,
     method_step,
@@ -197,7 +197,7 @@ def generalised_alpha_step(r: Tables, t: float, again: int) -> int:
     status = iterate(r, t, h, square, single)
     if status != OK:
         return status
-    keep_turns(r.model.loads, r.work.loads)
+    keep_measured(r.work.loads)
     r.work.drift[PHI] = max(r.work.drift[PHI], largest(r.work.rows.Phi))
     r.work.drift[PHI_DOT] = max(r.work.drift[PHI_DOT], largest(r.work.rows.nu))
     copy(s.v[BEFORE], s.v[NOW])

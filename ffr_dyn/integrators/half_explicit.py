@@ -47,7 +47,7 @@ from ffr_dyn.kernels.integrator_api import (
     finite,
     inlined,
     into_body_axes,
-    keep_turns,
+    keep_measured,
     kernel,
     largest,
     largest_motion,
@@ -182,7 +182,7 @@ def half_explicit_step(r: Tables, t: float, again: int) -> int:
             status = evaluate(r, t + C[k] * h, s.x[STAGE], s.v[STAGE])
         if status == OK:
             if k == 0:
-                keep_turns(r.model.loads, r.work.loads)
+                keep_measured(r.work.loads)
             status = accelerate(r, k, h * A[(STAGES + 1) * k])
         if status != OK:
             return status

@@ -65,7 +65,7 @@ from ffr_dyn.kernels.integrator_api import (
     get,
     inlined,
     into_global_axes,
-    keep_turns,
+    keep_measured,
     kernel,
     largest,
     largest_motion,
@@ -361,7 +361,7 @@ def variational_step(r: Tables, t: float, again: int) -> int:
     if status != OK:
         return status
     r.work.drift[PHI] = max(r.work.drift[PHI], largest(r.work.rows.Phi))
-    keep_turns(r.model.loads, r.work.loads)
+    keep_measured(r.work.loads)
     close(r, h)
     if stiffened:
         copy(s.v[CHANGE], r.v)

@@ -8,8 +8,7 @@ Twin: `ffr_dyn.equations.motion.equations_of_motion`.
 """
 
 from ffr_dyn.kernels.bodies import mass_times, normalise, reduce_forces
-from ffr_dyn.kernels.forces.coordinate_forces import keep_turns
-from ffr_dyn.kernels.forces.loads import apply_loads, call_user, count_loads, gravity_field, power
+from ffr_dyn.kernels.forces.applied import apply_loads, call_user, count_loads, gravity_field, keep_measured, power
 from ffr_dyn.kernels.functions import evaluate_functions
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.output_row import keep
@@ -139,7 +138,7 @@ def add_loads(r: Tables, x: Vector, number: int) -> int:
     f, load, first, last = r.work.bodies.f, r.work.markers.load, 0, count_loads(r.model.loads)
     if number != EVERY_LOAD:
         f, load, first, last = r.work.loads.f, r.work.loads.load, number, number + 1
-    apply_loads(r.model, r.work, vector_at(x, r.x.size), f, load, first, last)
+    apply_loads(r, x, f, load, first, last)
     return OK
 
 
@@ -357,7 +356,7 @@ def stabilise(r: Tables, t: float, x: Vector, v: Vector) -> int:
             break
         w.info[PROJECTIONS] += 1
         project_state(r, x, v)
-    keep_turns(r.model.loads, w.loads)
+    keep_measured(w.loads)
     return OK
 
 
@@ -393,7 +392,7 @@ def record_state(r: Tables, t: float, out: Record, row: int) -> int:
     """Evaluate the engine's state at time t and keep it as a row of the record."""
     status = evaluate_exact(r, t, r.x, r.v)
     if status == OK:
-        keep_turns(r.model.loads, r.work.loads)
+        keep_measured(r.work.loads)
         evaluate_markers(r, ALL, r.x, r.v)
         if count_loads(r.model.loads) > 0:
             load_powers(r, out, row)

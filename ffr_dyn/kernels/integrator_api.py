@@ -46,7 +46,7 @@ from ffr_dyn.kernels.finite_motion import (
     largest_motion,
     unconverged,
 )
-from ffr_dyn.kernels.forces.coordinate_forces import keep_turns
+from ffr_dyn.kernels.forces.applied import keep_measured
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.simd.entry_point import CompiledFunction
 from ffr_dyn.kernels.simd.slices import part
@@ -143,7 +143,7 @@ __all__ = [
     "inlined",
     "into_body_axes",
     "into_global_axes",
-    "keep_turns",
+    "keep_measured",
     "kernel",
     "largest",
     "largest_motion",

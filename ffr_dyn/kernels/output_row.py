@@ -22,10 +22,7 @@ def keep(m, w, t, x, v, out, k):
         put(out.r[k], marker, get(w.markers.r, marker))
         put(out.rd[k], marker, get(w.markers.rd, marker))
     reactions(m.rows, w.markers, w.rows, out.reaction[k])
-    for action in range(m.loads.action.shape[0]):
-        copy(out.action[k, action], w.loads.action[action])
-    for bushing in range(m.loads.bushing.shape[0]):
-        copy(out.bushing[k, bushing], w.loads.bushing[bushing])
+    copy(out.forces[k], w.loads.measured)
     copy(part(out.functions, 3 * F * k, 3 * F), part(w.functions, 0, 3 * F))
     kinetic, strain, gravity = energies(w.field, m.bodies, w.bodies, x, v, w.y[0], w.y[1])
     out.energy[k, 0], out.energy[k, 1], out.energy[k, 2] = kinetic, strain, gravity

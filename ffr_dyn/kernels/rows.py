@@ -11,10 +11,11 @@ import math
 
 from ffr_dyn.kernels.markers import axis_motion
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.tables import COINCIDENCE, DISTANCE, DOT_1, DOT_2, RELATION, STROKE
+from ffr_dyn.kernels.tables import STROKE, WORDS
 from ffr_dyn.kernels.vectors import add, cross, dot, get, scale, subtract, to_body
 
 ZERO = (0.0, 0.0, 0.0)
+COINCIDENCE, DOT_1, DOT_2, DRIVEN_ANGLE, DISTANCE, RELATION = range(len(WORDS))
 
 
 @inlined

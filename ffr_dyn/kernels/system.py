@@ -19,7 +19,7 @@ from ffr_dyn.kernels.multiplier_solver import (
     relax_block,
 )
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.rows import reaction
+from ffr_dyn.kernels.rows import RELATION, reaction
 from ffr_dyn.kernels.simd.slices import part
 from ffr_dyn.kernels.spatial import coupling
 from ffr_dyn.kernels.tables import (
@@ -40,7 +40,6 @@ from ffr_dyn.kernels.tables import (
     NOT_FINITE,
     OK,
     PHIPHI,
-    RELATION,
     TARGET,
     N,
 )

@@ -29,10 +29,17 @@ F4 = Annotated[np.ndarray, ("float64", 4)]
 I1 = Annotated[np.ndarray, ("int64", 1)]
 I2 = Annotated[np.ndarray, ("int64", 2)]
 
-COINCIDENCE, DOT_1, DOT_2, DRIVEN_ANGLE, DISTANCE, RELATION = 0, 1, 2, 3, 4, 5
+# The words of constraints, in the order of their numbers in `Rows.kind` (see `ffr_dyn.kernels.rows`).
+WORDS = ("coincidence", "dot-1", "dot-2", "driven-angle", "distance", "relation")
 ANGLE, STROKE, LENGTH = 0, 1, 2
-SPRING, FRICTION, ACTUATOR, SERVO, STOP = 0, 1, 2, 3, 4
-AFFINE, GLOBAL = 0, 1
+BODY, GLOBAL, SIX = 3, 4, 5
+# The places of forces by the words of `ffr_dyn.scene.forces.places`: coordinates, and axes.
+WAYS = {"angle": ANGLE, "stroke": STROKE, "length": LENGTH, "body": BODY, "global": GLOBAL, "six": SIX}
+
+# Columns of `Loads.row`: number of the kernel in `Tables.forces`; where the numbers of the place and of the law begin in
+# `data`, and what is measured in `LoadWork.measured`; markers i and j, or the body; one of `WAYS`; time function or -1; first
+# of the user's values or -1.
+KERNEL, PLACE, LAW, MEASURED, END_I, END_J, WAY, FUNCTION, USER = range(9)
 
 OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED, NOT_CONVERGED, STEP_TOO_SMALL = range(7)
 
@@ -143,18 +150,11 @@ class Functions(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """W wrenches on markers, Z actions on coordinates, Y bushings, U spread loads."""
+    """F applied loads, in the order in which they are applied, with O measured numbers in all."""
 
-    wrench: I2  # (W, 3) marker, axes (0 global, 1 body), start in the user's values or -1
-    value: F2  # (W, 6) force and moment
-    function: I2  # (W, 6) factor by time function or -1
-    action: I2  # (Z, 6) coordinate, marker i, marker j, law, start in data, time function or -1
-    action_axes: F3  # (Z, 3, 3) f_i, g_i, f_j of an angle, or h_i of a stroke
-    turn: F1  # (Z,) whole turns at the start [rad]
-    bushing: I2  # (Y, 3) marker i, marker j, start in data
-    frames: F4  # (Y, 2, 3, 3) axes on i and j, one a row
-    spread: I2  # (U, 4) body, kind, start in data, time function
-    data: F1  # pooled numbers of laws, curves, bushings and spread loads
+    row: I2  # (F, 9) see `KERNEL` and what follows it
+    data: F1  # pooled numbers of places, laws and curves
+    initial: F1  # (O,) what is measured, before the start: angles count their turns from there
 
 
 class Model(NamedTuple):
@@ -234,11 +234,10 @@ class MarkerWork(NamedTuple):
 
 
 class LoadWork(NamedTuple):
-    """Per applied load, filled by `apply_loads`."""
+    """What the kernels of forces measure, and their scratch."""
 
-    reference: F1  # (Z,) coordinates at the last accepted state, from which angles count their turns
-    action: F2  # (Z, 3) coordinate, rate, force
-    bushing: F2  # (Y, 18) displacement and rotation, their rates, force and moment
+    reference: F1  # (O,) what was measured at the last accepted state, from which angles count their turns
+    measured: F1  # (O,) of a coordinate: value, rate, force; of a bushing: six of each
     axes: F4  # (2, 3, 3, 3) scratch of a bushing
     turn: F3  # (3, 3, 3) scratch of a bushing
     f: F1  # (V,) scratch of the powers
@@ -348,6 +347,7 @@ class Tables(NamedTuple):
 
     address: int  # of these tables, packed (see `ffr_dyn.kernels.simd.table_address`)
     entry_points: I1  # their addresses, by number (see `ffr_dyn.kernels.simd.entry_point`)
+    forces: I1  # addresses of the compiled kernels of forces, by number
     model: Model
     work: Work
     stages: Stages
@@ -367,10 +367,9 @@ class Record(NamedTuple):
     r: F3  # (T, M, 3) marker positions
     rd: F3  # (T, M, 3) marker velocities
     reaction: F3  # (T, K, 6) by block: force, moment
-    action: F3  # (T, Z, 3) coordinate, rate, force
-    bushing: F3  # (T, Y, 18) displacement and rotation, their rates, force and moment
+    forces: F2  # (T, O) what is measured of forces
     functions: F3  # (T, F, 3) time functions and two derivatives
-    power: F2  # (T, W + Z + Y + U)
+    power: F2  # (T, F)
     energy: F2  # (T, 3) kinetic, strain, gravity
     violation: F2  # (T, 2) largest |Phi|, |Phi_dot|
 

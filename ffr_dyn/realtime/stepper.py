@@ -31,11 +31,11 @@ from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.failure import failure
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation, gains
-from ffr_dyn.kernels.tables import NEXT, OK, PER_ROW
+from ffr_dyn.kernels.tables import MEASURED, NEXT, OK, PER_ROW
 from ffr_dyn.results.quantities import DEFAULT_OUTPUTS, Entry, catalogue, needs_every_step, selected
 from ffr_dyn.results.recorded_motion import View
-from ffr_dyn.scene.applied_loads import actions_of
-from ffr_dyn.scene.joint_forces import Actuator
+from ffr_dyn.scene.force_kinds import forces_of
+from ffr_dyn.scene.forces import Actuator
 from ffr_dyn.scene.joints import COORDINATES
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.brief import Brief, Rows, listed
@@ -214,7 +214,7 @@ def _all_rows(assembled: Assembled, method: Integrator, loop: _Loop) -> _Loop:
 def _give_all_reactions(loop: _Loop, all_rows: _Loop, time: float) -> None:
     """Reactions of the redundant rows too: the smallest that give the accelerations."""
     all_rows.x[:], all_rows.v[:] = loop.x, loop.v
-    all_rows.work.loads.reference[:] = loop.record.action[0, :, 0]
+    all_rows.work.loads.reference[:] = loop.record.forces[0]
     all_rows.run(time, 0, 0)
     names = [block.name for block in all_rows.system.blocks]
     for k, block in enumerate(loop.system.blocks):
@@ -318,9 +318,11 @@ def _component(system: System, name: str) -> tuple[str, int | None]:
 
 def _measured(loop: _Loop, readers: Sequence[Actuator]) -> dict[str, Array]:
     """(1,) columns of the record that hold the joint coordinates of `readers` and their rates, by name."""
-    numbers = {action.name: k for k, action in enumerate(actions_of(loop.system.scene))}
+    starts = dict(
+        zip((f.name for f in forces_of(loop.system.scene)), loop.system.model.loads.row[:, MEASURED], strict=True)
+    )
     return {
-        f"{r.joint}.{r.coordinate}{end}": loop.record.action[:, numbers[r.name], column]
+        f"{r.joint}.{r.coordinate}{end}": loop.record.forces[:, starts[r.name] + column]
         for r in readers
         for end, column in (("", 0), ("_rate", 1))
     }

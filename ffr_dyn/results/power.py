@@ -12,14 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.functions.curves import Curve, curve_integral
+from ffr_dyn.kernels.tables import MEASURED
 from ffr_dyn.results.recorded_motion import View, cross, dot
-from ffr_dyn.scene.applied_loads import AppliedLoad, actions_of, bushings_of, loads_of
 from ffr_dyn.scene.drivers import Driver, PointDriver
-from ffr_dyn.scene.forces import Bushing, SpringDamper, bushing_curves, stiffness_matrix
-from ffr_dyn.scene.joint_forces import JointSpring
+from ffr_dyn.scene.force_kinds import forces_of
+from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.joints import Joint
-from ffr_dyn.scene.scene import Scene, joint_of
+from ffr_dyn.scene.scene import joint_of
 
 Array = np.ndarray
 
@@ -76,7 +75,8 @@ def transmitted(view: View, joint: Joint) -> Array:
     """(T,) power that the first body gives to the second through a joint."""
     force, moment = reaction(view, joint.name)
     j = view.number(joint.j)
-    return dot(force, view.record.rd[:, j]) + dot(moment, view.spin(j))
+    given: Array = dot(force, view.record.rd[:, j]) + dot(moment, view.spin(j))
+    return given
 
 
 def reaction(view: View, name: str) -> tuple[Array, Array]:
@@ -89,43 +89,29 @@ def _block(view: View, name: str) -> int:
     return [block.name for block in view.system.blocks].index(name)
 
 
-def springs_of(scene: Scene) -> list[SpringDamper | JointSpring | Bushing]:
-    """What stores energy."""
-    return [load for load in loads_of(scene) if isinstance(load, (SpringDamper, JointSpring, Bushing))]
+def measured_values(view: View, force: int, columns: int | slice) -> Array:
+    """(T,) or (T, size) some of what is recorded of force number `force`."""
+    start = view.system.model.loads.row[force, MEASURED]
+    at = columns + start if isinstance(columns, int) else slice(columns.start + start, columns.stop + start)
+    values: Array = view.record.forces[:, at]
+    return values
 
 
 def spring_energy(view: View) -> Array:
-    """(T,) [J] stored in springs and bushings, preload included; zero where they are neither stretched nor turned."""
-    scene, total = view.system.scene, np.zeros(view.rows)
-    for k, action in enumerate(actions_of(scene)):
-        if isinstance(action, (SpringDamper, JointSpring)):
-            free = action.free_length if isinstance(action, SpringDamper) else action.free
-            stretch = view.record.action[:, k, 0] - free
-            total += _stored(action.stiffness, stretch) + action.preload * stretch
-    for k, bushing in enumerate(bushings_of(scene)):
-        total += _in_bushing(bushing, view.record.bushing[:, k, :6])
+    """(T,) [J] stored in forces, preload included; zero where they are neither stretched nor turned."""
+    total = np.zeros(view.rows)
+    for k, force in enumerate(forces_of(view.system.scene)):
+        if force.stores_energy:
+            count = len(force.place.initial) // 3
+            total += force.energy(measured_values(view, k, 0 if count == 1 else slice(0, count)))
     return total
-
-
-def _in_bushing(bushing: Bushing, x: Array) -> Array:
-    """(T,) energy at displacements and rotations x (T, 6)."""
-    total, K = np.zeros(len(x)), stiffness_matrix(bushing)
-    for r, (curve, preload) in enumerate(zip(bushing_curves(bushing), bushing.preload, strict=True)):
-        for c in range(6):
-            total += 0.5 * K[r, c] * x[:, r] * x[:, c]
-        total += (0.0 if curve is None else _stored(curve, x[:, r])) - preload * x[:, r]
-    return total
-
-
-def _stored(stiffness: float | Curve, stretch: Array) -> Array:
-    return curve_integral(stiffness, stretch) if isinstance(stiffness, Curve) else 0.5 * stiffness * stretch**2
 
 
 # ---- of each kind -------------------------------------------------------------------------------------------------
 
 
-def _of_force(view: View, load: AppliedLoad) -> Array:
-    names = [one.name for one in loads_of(view.system.scene)]
+def _of_force(view: View, load: Force) -> Array:
+    names = [one.name for one in forces_of(view.system.scene)]
     return view.record.power[:, names.index(load.name)]
 
 
@@ -149,12 +135,14 @@ def _of_driver(view: View, driver: Driver) -> Array:
     drive = driven(view, driver)
     if driver.coordinate == "stroke":
         h = frame_i[:, :, 2]
-        return dot(force, h) / dot(h, h) * drive[:, 1]
+        along_stroke: Array = dot(force, h) / dot(h, h) * drive[:, 1]
+        return along_stroke
     sine, cosine = np.sin(drive[:, 0])[:, None], np.cos(drive[:, 0])[:, None]
     f, g, f_j = frame_i[:, :, 0], frame_i[:, :, 1], frame_j[:, :, 0]
     along, across = cosine * f + sine * g, cosine * g - sine * f
     about = cross(f_j, across)
-    return dot(moment, about) / dot(about, about) * dot(along, f_j) * drive[:, 1]
+    turning: Array = dot(moment, about) / dot(about, about) * dot(along, f_j) * drive[:, 1]
+    return turning
 
 
 # Of what is no applied load: the power of those is recorded.

@@ -15,12 +15,21 @@ import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.kernels.tables import Record
-from ffr_dyn.results.power import Worked, damping_power, power, reaction, spring_energy, springs_of, transmitted, work
+from ffr_dyn.results.power import (
+    Worked,
+    damping_power,
+    measured_values,
+    power,
+    reaction,
+    spring_energy,
+    transmitted,
+    work,
+)
 from ffr_dyn.results.recorded_motion import View, dot, shaped, times, to_axes
 from ffr_dyn.results.result import EULER_PARAMETERS, XYZ, Axis, Quantity, mode_axis
-from ffr_dyn.scene.applied_loads import Action, actions_of, bushings_of, loads_of
 from ffr_dyn.scene.couplings import Coupling
-from ffr_dyn.scene.forces import SpringDamper
+from ffr_dyn.scene.force_kinds import forces_of
+from ffr_dyn.scene.forces.places import Measured
 from ffr_dyn.scene.joints import COORDINATES, Joint
 from ffr_dyn.scene.scene import marker_names, markers, measured_body
 from ffr_dyn.scene.sensors import Measurement, SectionMeasurement, StressMeasurement
@@ -230,48 +239,26 @@ def _reaction(name: str, marker: int, joint: Joint | None, k: int, suffix: str) 
 
 
 def _forces(system: System) -> Named:
-    """What acts on coordinates and in bushings: where it stands and what it exerts."""
-    for k, action in enumerate(actions_of(system.scene)):
-        for what, unit, column, sign, text in _of_action(action):
-            entry = _entry(unit, (), text, lambda view, k=k, c=column, s=sign: s * view.record.action[:, k, c])  # type: ignore[misc]
-            yield f"{action.name}.{what}", entry
-    for k, bushing in enumerate(bushings_of(system.scene)):
-        for what, unit, first, text in BUSHING:
-            entry = _entry(unit, (XYZ,), text, lambda view, k=k, a=first: view.record.bushing[:, k, a : a + 3])  # type: ignore[misc]
-            yield f"{bushing.name}.{what}", entry
+    """What is recorded of forces: where each stands and what it exerts."""
+    for k, force in enumerate(forces_of(system.scene)):
+        for one in force.place.measured:
+            yield f"{force.name}.{one.name}", _of_force(k, one)
 
 
-# name, unit, first column of the record, text
-BUSHING = (
-    ("displacement", "m", 0, "displacement of j from i, axes of the bushing on i"),
-    ("rotation", "rad", 3, "rotation vector from the axes of i to those of j"),
-    ("force", "N", 12, "force of the bushing on j, axes of the bushing on i"),
-    ("moment", "N m", 15, "moment of the bushing on j, conjugate to the rotation vector"),
-)
+def _of_force(k: int, one: Measured) -> Entry:
+    at, axes = (one.column, ()) if one.size == 1 else (slice(one.column, one.column + one.size), (XYZ,))
 
+    def values(view: View) -> Array:
+        found = measured_values(view, k, at)
+        return found if one.sign == 1 else one.sign * found
 
-def _of_action(action: Action) -> tuple[tuple[str, str, int, float, str], ...]:
-    """Name, unit, column of the record, sign and text of force and coordinate."""
-    if isinstance(action, SpringDamper):
-        return (
-            ("tension", "N", 2, -1.0, "spring-damper force, tension positive"),
-            ("length", "m", 0, 1.0, "distance of the ends"),
-        )
-    if action.coordinate == "angle":
-        return (
-            ("torque", "N m", 2, 1.0, "torque that increases the joint angle"),
-            ("angle", "rad", 0, 1.0, "joint angle with whole turns, as the force counts them"),
-        )
-    return (
-        ("force", "N", 2, 1.0, "force that increases the joint stroke"),
-        ("stroke", "m", 0, 1.0, "joint stroke along its axis"),
-    )
+    return _entry(one.unit, axes, one.text, values)
 
 
 def _powers(system: System) -> Named:
     scene = system.scene
     distances = [joint for joint in scene.joints if joint.kind == "distance"]
-    for thing in (*loads_of(scene), *scene.drivers, *distances):
+    for thing in (*forces_of(scene), *scene.drivers, *distances):
         yield from _worked(thing.name, "put into the scene", lambda view, thing=thing: power(view, thing))  # type: ignore[misc]
     for b, body in enumerate(scene.bodies):
         if system.layout.n[b]:
@@ -295,7 +282,7 @@ def _totals(system: System) -> Named:
         yield f"energy.{name}", _entry("J", (), f"{name} energy", lambda view, k=k: view.record.energy[:, k])  # type: ignore[misc]
     total = "kinetic, strain and gravity energy"
     yield "energy.total", _entry("J", (), total, lambda view: _sum(view.record.energy))
-    if springs_of(system.scene):
+    if any(force.stores_energy for force in forces_of(system.scene)):
         text = "energy stored in springs and bushings, preload included"
         yield "energy.springs", _entry("J", (), text, spring_energy)
     texts = (("position", "m", "largest violation of a constraint row"), ("velocity", "m/s", "largest rate of a row"))
@@ -304,7 +291,8 @@ def _totals(system: System) -> Named:
 
 
 def _sum(energy: Array) -> Array:
-    return energy[:, 0] + energy[:, 1] + energy[:, 2]
+    total: Array = energy[:, 0] + energy[:, 1] + energy[:, 2]
+    return total
 
 
 # ---- measurements of the scene ------------------------------------------------------------------------------------
@@ -341,9 +329,9 @@ def _measured(view: View, m: Measurement) -> Array:
     else:
         difference = view.record.r[:, j] - view.record.r[:, i]
     if m.what == "distance":
-        return np.sqrt(dot(difference, difference))
+        return np.asarray(np.sqrt(dot(difference, difference)))
     if m.axes == "global":
-        return difference
+        return np.asarray(difference)
     return to_axes(view.axes([body.name for body in view.system.scene.bodies].index(m.axes)), difference)
 
 

@@ -8,22 +8,25 @@ coincide. (Haug 1989, ch. 9; Rantalainen 2007, eqs. 3.90-3.95.)
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ffr_dyn.functions.rotation import triad
 from ffr_dyn.functions.time_functions import TimeFunction, as_time_function
 from ffr_dyn.scene.checks import check_markers, check_own_name
+from ffr_dyn.scene.fields import Direction, In, OfTime
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
 
-# as in ffr_dyn.kernels.tables
-COINCIDENCE, DOT_1, DOT_2, DRIVEN_ANGLE, DISTANCE, RELATION = 0, 1, 2, 3, 4, 5
+# The words: each has its readable form in `ffr_dyn.equations.constraints` and its kernel in `ffr_dyn.kernels.rows`.
+COINCIDENCE, DOT_1, DOT_2 = "coincidence", "dot-1", "dot-2"
+DRIVEN_ANGLE, DISTANCE, RELATION = "driven-angle", "distance", "relation"
 
 F, G, H = 0, 1, 2
 _MOST_TEETH = 1000
@@ -38,18 +41,20 @@ class Word(Brief):
     axes     : (3, 3) in body axes: axis on i, second axis on i of an angle, axis on j; a coincidence row has its global
                component in axes[0, 0]; a relation has (6, 3), three axes for each of its joint coordinates
     function : of time, for what is prescribed
-    relation : of a relation: factor and kind (0 angle, 1 stroke) of both coordinates, spacing of equivalent values
+    relation : of a relation, for both coordinates: its factor and "angle" or "stroke"
+    spacing  : of a relation: how far equivalent values are apart, or 0
     """
 
-    kind: int
+    kind: str
     text: str
     axes: Array
     function: TimeFunction | None = None
-    relation: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    relation: tuple[tuple[float, str], ...] = ()
+    spacing: float = 0.0
 
 
 def word(
-    kind: int,
+    kind: str,
     text: str,
     axis_i: Array,
     axis_j: Array | None = None,
@@ -70,14 +75,12 @@ def relation(one: Term, other: Term, text: str, function: TimeFunction | None = 
 
     Raises InputError when the turns of two angles have no common divisor to speak of.
     """
-    kinds = {"angle": 0.0, "stroke": 1.0}
-    axes = [axis for _, kind, i, j in (one, other) for axis in _coordinate_axes(kind, i, j)]
-    numbers = (one[0], kinds[one[1]], other[0], kinds[other[1]])
-    return Word(RELATION, text, np.array(axes), function, (*numbers, _spacing(one, other)))
+    axes = [axis for _, kind, i, j in (one, other) for axis in coordinate_axes(kind, i, j)]
+    return Word(RELATION, text, np.array(axes), function, (one[:2], other[:2]), _spacing(one, other))
 
 
-def _coordinate_axes(kind: str, i: Array, j: Array) -> tuple[Array, Array, Array]:
-    """What the kernels need of a joint coordinate: f_i, g_i, f_j of an angle, h_i of a stroke."""
+def coordinate_axes(kind: str, i: Array, j: Array) -> tuple[Array, Array, Array]:
+    """The axes that make a joint coordinate: f_i, g_i, f_j of an angle, h_i of a stroke."""
     return (i[:, F], i[:, G], j[:, F]) if kind == "angle" else (i[:, H], np.zeros(3), np.zeros(3))
 
 
@@ -175,40 +178,43 @@ def screw(i: Array, j: Array, joint: Joint) -> list[Word]:
     return [*cylindrical(i, j, joint), turn]
 
 
-KINDS = {
-    "spherical": spherical,
-    "revolute": revolute,
-    "cylindrical": cylindrical,
-    "translational": translational,
-    "universal": universal,
-    "fixed": fixed,
-    "planar": planar,
-    "point-on-line": point_on_line,
-    "point-on-plane": point_on_plane,
-    "orientation": orientation,
-    "parallel": parallel,
-    "perpendicular": perpendicular,
-    "distance": distance,
-    "screw": screw,
-}
+Sentence = Callable[[Array, Array, "Joint"], list[Word]]
 
-# The joint coordinates that a driver may prescribe and a result reports.
-COORDINATES = {
-    "spherical": (),
-    "revolute": ("angle",),
-    "cylindrical": ("angle", "stroke"),
-    "translational": ("stroke",),
-    "universal": (),
-    "fixed": (),
-    "planar": ("angle",),
-    "point-on-line": ("stroke",),
-    "point-on-plane": (),
-    "orientation": (),
-    "parallel": ("angle",),
-    "perpendicular": (),
-    "distance": (),
-    "screw": ("angle", "stroke"),
-}
+# By kind: its words, the joint coordinates that a driver may prescribe and a result reports, and what of `axis_j`, `length`
+# and `pitch` it needs.
+KINDS: dict[str, Sentence] = {}
+COORDINATES: dict[str, tuple[str, ...]] = {}
+NEEDS: dict[str, tuple[str, ...]] = {}
+
+
+def register_joint(
+    kind: str, sentence: Sentence, coordinates: tuple[str, ...] = (), needs: tuple[str, ...] = ()
+) -> None:
+    """Make a kind of joint known: `sentence` makes words of the joint frames (columns f, g, h) on i and j, and the joint.
+
+    coordinates : of "angle" (which needs both h axes parallel) and "stroke", those that it has
+    needs       : of "axis_j", "length" and "pitch", the fields of `Joint` that must be given
+    Raises InputError for a kind that there is.
+    """
+    if kind in KINDS and KINDS[kind].__qualname__ != sentence.__qualname__:
+        raise InputError(f"there is a kind of joint {kind!r} already; give the other one another name")
+    KINDS[kind], COORDINATES[kind], NEEDS[kind] = sentence, coordinates, needs
+
+
+register_joint("spherical", spherical)
+register_joint("revolute", revolute, ("angle",))
+register_joint("cylindrical", cylindrical, ("angle", "stroke"))
+register_joint("translational", translational, ("stroke",))
+register_joint("universal", universal, needs=("axis_j",))
+register_joint("fixed", fixed)
+register_joint("planar", planar, ("angle",))
+register_joint("point-on-line", point_on_line, ("stroke",))
+register_joint("point-on-plane", point_on_plane)
+register_joint("orientation", orientation)
+register_joint("parallel", parallel, ("angle",))
+register_joint("perpendicular", perpendicular)
+register_joint("distance", distance, needs=("length",))
+register_joint("screw", screw, ("angle", "stroke"), needs=("pitch",))
 
 
 @dataclass(frozen=True)
@@ -228,27 +234,33 @@ class Joint:
     i: str
     j: str
     _: KW_ONLY
-    axis: Any = (0.0, 0.0, 1.0)
-    axis_j: Any = None
-    length: Any = None
-    pitch: Any = None
+    axis: Annotated[Any, Direction()] = (0.0, 0.0, 1.0)
+    axis_j: Annotated[Any, Direction()] = None
+    length: Annotated[Any, OfTime("m")] = None
+    pitch: Annotated[Any, In("m")] = None
 
     def __post_init__(self) -> None:
         check_own_name("joint", self.name)
         check_markers(self, f"joint {self.name!r}")
         if self.kind not in KINDS:
             raise InputError(f"joint {self.name!r}: there is no kind {self.kind!r}; there are {', '.join(KINDS)}")
-        if self.kind == "universal" and self.axis_j is None:
-            raise InputError(f"joint {self.name!r}: a universal joint needs both arms, axis and axis_j")
-        if (self.length is None) != (self.kind != "distance"):
-            raise InputError(f"joint {self.name!r}: a distance joint needs a length [m], and no other kind has one")
+        needs = NEEDS[self.kind]
+        if "axis_j" in needs and self.axis_j is None:
+            raise InputError(f"joint {self.name!r}: a {self.kind} joint needs both arms, axis and axis_j")
+        if (self.length is None) == ("length" in needs):
+            who = f"joint {self.name!r}: a {_needing('length')} joint"
+            raise InputError(f"{who} needs a length [m], and no other kind has one")
         if isinstance(self.length, (int, float)) and not 0 < self.length < np.inf:
             raise InputError(f"joint {self.name!r}: length is {self.length} m; it must be positive")
-        if (self.pitch is None) != (self.kind != "screw") or self.pitch == 0:
+        if (self.pitch is None) == ("pitch" in needs) or self.pitch == 0:
             raise InputError(
-                f"joint {self.name!r}: a screw needs a pitch [m per turn], not zero; no other kind has one"
+                f"joint {self.name!r}: a {_needing('pitch')} needs a pitch [m per turn], not zero; no other kind has one"
             )
         frames(self)
+
+
+def _needing(key: str) -> str:
+    return " or ".join(kind for kind, needs in NEEDS.items() if key in needs)
 
 
 def frames(joint: Joint) -> tuple[Array, Array]:

@@ -14,24 +14,20 @@ from typing import Any, get_args
 
 import numpy as np
 
-from ffr_dyn.functions.rotation import euler_parameters
+from ffr_dyn.functions.rotation import euler_parameters, rotation_matrix
 from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction, as_time_function, less
 from ffr_dyn.scene.checks import check_name, check_own_name, several
 from ffr_dyn.scene.couplings import Coupling, coupled, coupling_word
 from ffr_dyn.scene.drivers import Driver, PointDriver, driver_word
-from ffr_dyn.scene.forces import Bushing, Load, SpringDamper
-from ffr_dyn.scene.joint_forces import JointForce
+from ffr_dyn.scene.force_kinds import forces_of, kinds_in
 from ffr_dyn.scene.joints import COORDINATES, Joint
 from ffr_dyn.scene.sensors import AnyMeasurement, Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.scene.stress_sensors import measured_modes
-from ffr_dyn.scene.surface_loads import SurfaceLoad, distributed
 from ffr_prep.body import FlexibleBody
 from ffr_prep.common.brief import Brief, Rows, in_short, listed, numbers
 from ffr_prep.common.errors import InputError
 
 Array = np.ndarray
-
-Force = Bushing | JointForce | SurfaceLoad
 
 GROUND = "ground"
 # Groups of inertia integrals that a body can do without: I3 and the parts, skew and symmetric, of the other two.
@@ -119,7 +115,7 @@ class Scene(Brief):
     """Everything an analysis needs. Raises InputError for names that do not exist, repeat or contradict each other.
 
     ground  : name -> (3,) [m], points fixed in the global frame
-    forces  : bushings, forces on joint coordinates, loads on surfaces and modes
+    loads, springs, forces : of the kinds in `ffr_dyn.scene.forces`: `Load`, `SpringDamper`, and all others
     gravity : three components [m/s^2], global, each a number, a time function or a Python function of time. What varies is
               kept as the base acceleration that acts in the same way, so that `gravity` is (3,), the constant components
     base_acceleration : three components [m/s^2], global, each a number, a time function or a Python function of time: the
@@ -135,9 +131,9 @@ class Scene(Brief):
     drivers: tuple[Driver | PointDriver, ...] = ()
     _: KW_ONLY
     couplings: tuple[Coupling, ...] = ()
-    loads: tuple[Load, ...] = ()
-    springs: tuple[SpringDamper, ...] = ()
-    forces: tuple[Force, ...] = ()
+    loads: tuple[Any, ...] = ()
+    springs: tuple[Any, ...] = ()
+    forces: tuple[Any, ...] = ()
     measurements: tuple[AnyMeasurement, ...] = ()
     ground: Mapping[str, Any] = field(default_factory=dict)
     gravity: Any = (0.0, 0.0, 0.0)
@@ -157,7 +153,7 @@ class Scene(Brief):
 
     def __post_init__(self) -> None:
         for key, kinds in _DECLARATIONS.items():
-            object.__setattr__(self, key, several(f"{key} of a scene", getattr(self, key), kinds))
+            object.__setattr__(self, key, several(f"{key} of a scene", getattr(self, key), kinds or kinds_in(key)))
         if not isinstance(self.ground, Mapping):
             raise InputError(f"ground is {self.ground!r}; give points by name, such as {{'wall': (0, 0, 0)}}")
         points = {key: _vector(at, 3, f"ground point {key!r}") for key, at in self.ground.items()}
@@ -178,12 +174,8 @@ class Scene(Brief):
                 _check_point_driver(self, driver)
         for coupling in self.couplings:
             coupling_word(coupling, *joints_of(self, coupling))
-        for marker in [m for load in self.loads for m in (load.marker,)] + [
-            m for spring in self.springs for m in (spring.i, spring.j)
-        ]:
-            marker_number(self, marker)
-        for force in self.forces:
-            _check_force(self, force)
+        for force in forces_of(self):
+            force.check(self)
         for measurement in self.measurements:
             _check_measurement(self, measurement)
 
@@ -208,9 +200,9 @@ _DECLARATIONS: dict[str, tuple[Any, ...]] = {
     "joints": (Joint,),
     "drivers": (Driver, PointDriver),
     "couplings": (Coupling,),
-    "loads": (Load,),
-    "springs": (SpringDamper,),
-    "forces": get_args(Force),
+    "loads": (),  # the kinds of force that are known then
+    "springs": (),
+    "forces": (),
     "measurements": get_args(AnyMeasurement),
 }
 
@@ -259,36 +251,38 @@ def joints_of(scene: Scene, coupling: Coupling) -> tuple[Joint, Joint]:
     return _joint(scene, first, who), _joint(scene, second, who)
 
 
-def joint_under(scene: Scene, force: JointForce) -> Joint:
-    """The joint on whose coordinate a force acts. Raises InputError when it has no such coordinate."""
-    who = f"force {force.name!r}"
-    joint = _joint(scene, force.joint, who)
-    if force.coordinate not in COORDINATES[joint.kind]:
+def joint_with(scene: Scene, name: str, coordinate: str, who: str) -> Joint:
+    """The joint of a name. Raises InputError when there is none, or it has no such coordinate."""
+    joint = _joint(scene, name, who)
+    if coordinate not in COORDINATES[joint.kind]:
         has = ", ".join(COORDINATES[joint.kind]) or "none"
-        raise InputError(
-            f"{who}: the {joint.kind} joint {joint.name!r} has no coordinate {force.coordinate!r}; it has: {has}"
-        )
+        raise InputError(f"{who}: the {joint.kind} joint {name!r} has no coordinate {coordinate!r}; it has: {has}")
     return joint
 
 
-def body_number(scene: Scene, load: SurfaceLoad) -> int:
-    """The body on which a surface load acts."""
+def body_number(scene: Scene, name: str, who: str) -> int:
+    """The number of a body. Raises InputError when there is none of that name."""
     names = [body.name for body in scene.bodies]
-    if load.body not in names:
-        raise InputError(f"force {load.name!r}: there is no body {load.body!r}; {_offer(load.body, names)}")
-    return names.index(load.body)
+    if name not in names:
+        raise InputError(f"{who}: there is no body {name!r}; {_offer(name, names)}")
+    return names.index(name)
 
 
-def _check_force(scene: Scene, force: Force) -> None:
-    """What a force needs from the scene is there."""
-    if isinstance(force, Bushing):
-        i, j = (markers(scene)[marker_number(scene, name)] for name in (force.i, force.j))
-        if i[0] == j[0]:
-            raise InputError(f"bushing {force.name!r} ties {i[1]!r} to itself; it needs markers of two bodies")
-    elif isinstance(force, JointForce):
-        joint_under(scene, force)
-    else:
-        distributed(force, scene.bodies[body_number(scene, force)].model)
+def body_normal(body: Body, normal: int) -> int:
+    """The body axis along the global axis `normal`, or -1."""
+    along = rotation_matrix(body.rotation)[normal]
+    k = int(np.argmax(np.abs(along)))
+    return k if abs(along[k]) > 1 - 1e-12 else -1
+
+
+def undeformed(scene: Scene, number: int) -> Array:
+    """(3,) [m] global place of a marker as the scene declares it."""
+    b, _, point = markers(scene)[number]
+    if b == len(scene.bodies):
+        return np.asarray(scene.ground[point])
+    body = scene.bodies[b]
+    place: Array = body.position + rotation_matrix(body.rotation) @ body.model.interface(point).position
+    return place
 
 
 def _joint(scene: Scene, name: str, who: str) -> Joint:
@@ -306,12 +300,7 @@ def _check_point_driver(scene: Scene, driver: PointDriver) -> None:
 
 def measured_body(scene: Scene, measurement: StressMeasurement | SectionMeasurement) -> int:
     """The body whose stress or section forces are measured."""
-    names = [body.name for body in scene.bodies]
-    if measurement.body not in names:
-        raise InputError(
-            f"measurement {measurement.name!r}: there is no body {measurement.body!r}; {_offer(measurement.body, names)}"
-        )
-    return names.index(measurement.body)
+    return body_number(scene, measurement.body, f"measurement {measurement.name!r}")
 
 
 def _check_measurement(scene: Scene, measurement: AnyMeasurement) -> None:

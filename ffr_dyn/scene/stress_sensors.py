@@ -33,7 +33,8 @@ def von_mises(tensor: Array) -> Array:
     """(..., 6) -> (...,): the tension that distorts as much, sqrt(3/2 s:s) of the deviator s."""
     xx, yy, zz, xy, xz, yz = np.moveaxis(tensor, -1, 0)
     normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
-    return np.sqrt(0.5 * normal + 3.0 * (xy**2 + xz**2 + yz**2))
+    stress: Array = np.sqrt(0.5 * normal + 3.0 * (xy**2 + xz**2 + yz**2))
+    return stress
 
 
 def principal_values(tensor: Array) -> Array:
@@ -101,7 +102,8 @@ def strain_of(stress: Array, moduli: Array) -> Array:
     E, nu = moduli[..., 0, None], moduli[..., 1, None]
     volume = np.zeros_like(stress)
     volume[..., :3] = stress[..., :3].sum(axis=-1, keepdims=True)
-    return ((1 + nu) * stress - nu * volume) / E
+    strain: Array = ((1 + nu) * stress - nu * volume) / E
+    return strain
 
 
 def _check_isotropic(moduli: Array) -> None:

@@ -23,7 +23,7 @@ is run.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -40,24 +40,24 @@ from ffr_dyn.functions.operations import FUNCTIONS
 from ffr_dyn.functions.time_functions import TimeFunction, constant, signal, signals_in
 from ffr_dyn.integrators import Integrator, Tolerances, method_named
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
-from ffr_dyn.scene.forces import Load
-from ffr_dyn.scene.joint_forces import Actuator
+from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import GROUND, Body, Scene
 from ffr_dyn.scene_file.parameters import Parameters, as_number, flattened, overridden, substituted
 from ffr_dyn.scene_file.schema import (
-    TABLES,
     BodyEntry,
     Kind,
     StabilisationEntry,
+    fields_of_motion,
+    formula_of,
     keys_of,
     nested_kinds,
     scene_entry,
+    tables,
 )
 from ffr_dyn.scene_file.source import Source, origin, origin_of_name, read_source
 from ffr_dyn.scene_file.state_formula import StateFormula, check_names
 from ffr_prep.body import BodyError, FlexibleBody, load_body, rigid_body, truncated, with_point
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.registry import load_plugin
 
 WHOLE = ("name", "gravity", "ground", "base_acceleration", "plane")  # fields of a scene that are no tables of entries
 
@@ -71,8 +71,6 @@ def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Sc
     """
     path = Path(path)
     source = read_source(path)
-    for name in source.tree.get("plugins", ()):
-        load_plugin(path.parent / str(name))
     try:
         values = Parameters(overridden(flattened(source.tree.pop("parameters", {})), parameters))
         tree = substituted(source.tree, values, "")
@@ -145,17 +143,17 @@ def _with_nearest(item: Any, text: str) -> str:
 
 
 def _scene(entry: Any, source: Source) -> Scene:
-    tables: dict[str, Any] = {
+    declared: dict[str, Any] = {
         table: tuple(_declared(kinds, (table, name), item, source) for name, item in getattr(entry, table).items())
-        for table, kinds in TABLES.items()
+        for table, kinds in tables().items()
     }
     _put_markers(entry, source)
     bodies = tuple(_body(name, body, source) for name, body in entry.bodies.items())
     try:
-        scene = Scene(bodies=bodies, **{key: getattr(entry, key) for key in WHOLE}, **tables)
-        for force in (*scene.loads, *scene.forces):
-            if isinstance(force, (Load, Actuator)) and isinstance(force.function, StateFormula):
-                check_names(scene, force.function, f"force {force.name!r}")
+        scene = Scene(bodies=bodies, **{key: getattr(entry, key) for key in WHOLE}, **declared)
+        for force in forces_of(scene):
+            if isinstance(formula := formula_of(force), StateFormula):
+                check_names(scene, formula, f"force {force.name!r}")
     except InputError as error:
         raise InputError(f"{origin_of_name(source, str(error))}: {error}") from None
     return scene
@@ -193,20 +191,18 @@ def _made(kind: Kind, name: str, entry: BaseModel) -> Any:
     for f in keys_of(kind):
         if given[f.name] is None and f.default is not None:
             del given[f.name]
-    special: dict[type, Callable[..., Any]] = {Load: _load, Actuator: _actuator}
-    return special.get(kind.made, kind.made)(name=name, **given)
+    if moving := fields_of_motion(kind.made):
+        given |= _with_function({key: given[key] for key in moving})
+    return kind.made(name=name, **given)
 
 
-def _load(force: list[Any], moment: list[Any], **given: Any) -> Load:
-    """Components that depend on the motion go to the load's function, the others stay functions of time."""
-    timed, moving = _separated((*force, *moment))
-    return Load(force=timed[:3], moment=timed[3:], function=moving, **given)
-
-
-def _actuator(force: Any = 0.0, **given: Any) -> Actuator:
-    """As `_load`."""
-    timed, moving = _separated((force,))
-    return Actuator(force=timed[0], function=moving, **given)
+def _with_function(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Components that depend on the motion go to the force's function, the others stay functions of time."""
+    components = [c for value in given.values() for c in (value if isinstance(value, list) else [value])]
+    timed, moving = _separated(tuple(components))
+    rest = iter(timed)
+    timed_fields = {k: [next(rest) for _ in v] if isinstance(v, list) else next(rest) for k, v in given.items()}
+    return {**timed_fields, "function": moving}
 
 
 def _separated(given: tuple[Any, ...]) -> tuple[list[float | TimeFunction], StateFormula | None]:

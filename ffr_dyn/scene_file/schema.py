@@ -1,7 +1,8 @@
 """What a scene file may hold: models of its tables, made from the declarations of `ffr_dyn` themselves.
 
-A kind of joint, driver or force is a dataclass; its fields are the keys of its entry in the file. A new kind is an entry in
-`TABLES`, and an entry in `FIELDS` for each of its fields whose type the dataclass leaves open (Any).
+A kind of joint, driver or force is a dataclass; its fields are the keys of its entry in the file. Forces say themselves how
+a file gives their fields. Another new kind is an entry in `tables`, and one in `FIELDS` for each of its fields whose type the
+dataclass leaves open (Any).
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ from ffr_dyn.analyses.registry import OverTime, analyses, analysis
 from ffr_dyn.analyses.settings import settings_of
 from ffr_dyn.functions.curves import Curve
 from ffr_dyn.integrators import CONTROLLED, METHODS, methods
+from ffr_dyn.scene import fields as said
+from ffr_dyn.scene import forces as _known_forces  # noqa: F401 - which makes them known
 from ffr_dyn.scene.couplings import Coupling
 from ffr_dyn.scene.drivers import Driver, PointDriver
-from ffr_dyn.scene.forces import Bushing, Load, SpringDamper
-from ffr_dyn.scene.joint_forces import Actuator, JointFriction, JointSpring, JointStop, Servo
+from ffr_dyn.scene.force_kinds import FORCES, kinds_in
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.sensors import Measurement, SectionMeasurement, StressMeasurement
-from ffr_dyn.scene.surface_loads import ModalForce, NodalForces, Pressure
 from ffr_dyn.scene_file.values import (
     THREE,
     In,
@@ -57,40 +58,15 @@ Direction = Vector | list[Vector]
 
 # ---- tables of the file from dataclasses --------------------------------------------------------------------------
 
-# Types of the fields that the dataclasses leave open, and units of those that are numbers; by "Class.field" or "field".
+# Types of the fields that the dataclasses leave open, by "Class.field"; forces and joints say them themselves
+# (`ffr_dyn.scene.fields`).
 FIELDS: dict[str, Any] = {
-    "axis": Direction,
-    "axis_j": Direction,
-    "Joint.length": of_time("m"),
-    "Joint.pitch": Annotated[float, In("m")],
     "Driver.function": OfTime,
     "PointDriver.x": of_time("m"),
     "PointDriver.y": of_time("m"),
     "PointDriver.z": of_time("m"),
     "StressMeasurement.point": Metres,
     "SectionMeasurement.point": Metres,
-    "Load.force": Annotated[list[of_motion("N")], THREE],  # type: ignore[misc]
-    "Load.moment": Annotated[list[of_motion("N m")], THREE],  # type: ignore[misc]
-    "SpringDamper.stiffness": or_curve("N/m"),
-    "SpringDamper.damping": or_curve("N s/m"),
-    "SpringDamper.free_length": Annotated[float, In("m")],
-    "SpringDamper.preload": Annotated[float, In("N")],
-    "Bushing.stiffness": list[or_curve()] | list[list[Number]],  # type: ignore[misc]
-    "Bushing.damping": list[Number] | list[list[Number]],
-    "Bushing.preload": list[Number],
-    "Bushing.axes": Direction,
-    "Bushing.axes_j": Direction,
-    "JointFriction.normal": of_time("N"),
-    "Actuator.force": of_motion(),
-    "Servo.target": OfTime,
-    "NodalForces.points": list[int],
-    "NodalForces.forces": list[Vector],
-    "NodalForces.function": OfTime,
-    "Pressure.pressure": Number | list[Number],
-    "Pressure.triangles": list[int],
-    "Pressure.function": OfTime,
-    "ModalForce.values": list[Number],
-    "ModalForce.function": OfTime,
     "MarkerEffort.direction": Vector,
     "Event.quantity": str,
     "Event.direction": Literal["rising", "falling", "either"],
@@ -108,30 +84,19 @@ class Kind:
     made: type
 
 
-# Tables of the file are fields of `Scene`. The first kind is meant where an entry does not say.
-TABLES: dict[str, tuple[Kind, ...]] = {
-    "joints": (Kind("", Joint),),
-    "drivers": (Kind("joint", Driver), Kind("point", PointDriver)),
-    "couplings": (Kind("", Coupling),),
-    "loads": (Kind("", Load),),
-    "springs": (Kind("", SpringDamper),),
-    "forces": (
-        Kind("bushing", Bushing),
-        Kind("joint-spring", JointSpring),
-        Kind("joint-friction", JointFriction),
-        Kind("joint-stop", JointStop),
-        Kind("actuator", Actuator),
-        Kind("servo", Servo),
-        Kind("nodal-forces", NodalForces),
-        Kind("pressure", Pressure),
-        Kind("modal-force", ModalForce),
-    ),
-    "measurements": (
-        Kind("marker", Measurement),
-        Kind("stress", StressMeasurement),
-        Kind("section", SectionMeasurement),
-    ),
-}
+def tables() -> dict[str, tuple[Kind, ...]]:
+    """Tables of the file, which are fields of `Scene`. The first kind is meant where an entry does not say."""
+    return {
+        "joints": (Kind("", Joint),),
+        "drivers": (Kind("joint", Driver), Kind("point", PointDriver)),
+        "couplings": (Kind("", Coupling),),
+        **{table: tuple(Kind(kind.word, kind) for kind in kinds_in(table)) for table in ("loads", "springs", "forces")},
+        "measurements": (
+            Kind("marker", Measurement),
+            Kind("stress", StressMeasurement),
+            Kind("section", SectionMeasurement),
+        ),
+    }
 
 
 EFFORTS = (Kind("joint", JointEffort), Kind("marker", MarkerEffort))  # tables of an analysis
@@ -141,18 +106,37 @@ SOLUTIONS = (Kind("causal", Causal), Kind("bounded", Bounded))
 
 def keys_of(kind: Kind) -> list[Field[Any]]:
     """The fields of a kind that a file holds."""
-    return [f for f in fields(kind.made) if _named(kind, f) in FIELDS or f.name not in NOT_IN_FILES]
+    hints = _hints(kind.made)
+    return [f for f in fields(kind.made) if _annotated(kind, f, hints) or f.name not in NOT_IN_FILES]
 
 
-def _named(kind: Kind, f: Field[Any]) -> str:
-    return f"{kind.made.__name__}.{f.name}"
+def fields_of_motion(made: type) -> list[str]:
+    """The fields of a force whose formulas of the motion go to its field `function`."""
+    return [name for name, hint in _hints(made).items() if said.OfMotion in map(type, _leaves(hint))]
+
+
+def formula_of(force: Any) -> Any:
+    """The Python function of the motion that a force has, or None."""
+    return force.function if fields_of_motion(type(force)) else None
+
+
+def _leaves(hint: Any) -> list[Any]:
+    return [meta.of if isinstance(meta, said.Three) else meta for meta in getattr(hint, "__metadata__", ())]
+
+
+@cache
+def _hints(made: type) -> dict[str, Any]:
+    return typing.get_type_hints(made, include_extras=True)
+
+
+def _annotated(kind: Kind, f: Field[Any], hints: Mapping[str, Any]) -> bool:
+    """Whether it is said how a file gives the field."""
+    return f"{kind.made.__name__}.{f.name}" in FIELDS or bool(_leaves(hints[f.name]))
 
 
 def _type(kind: Kind, f: Field[Any], hints: Mapping[str, Any]) -> Any:
-    """The type of a key: from `FIELDS`, or from the dataclass, where numbers become `Number`."""
-    found = FIELDS.get(_named(kind, f), FIELDS.get(f.name))
-    if found is None:
-        found = _numbered(hints[f.name])
+    """The type of a key: from `FIELDS`, or as the dataclass says."""
+    found = FIELDS.get(f"{kind.made.__name__}.{f.name}") or _given(hints[f.name])
     return found | None if _default(f) is None else found
 
 
@@ -163,20 +147,36 @@ def _default(f: Field[Any]) -> Any:
     return None if f.default in (np.inf, -np.inf) else f.default
 
 
-def _numbered(hint: Any) -> Any:
+def _given(hint: Any) -> Any:
+    """What a file gives for a field of this type, or where it is said more closely for that (`ffr_dyn.scene.fields`)."""
+    match hint:
+        case said.In(unit):
+            return Annotated[float, In(unit)]
+        case said.OfTime(unit):
+            return of_time(unit)
+        case said.OfMotion(unit):
+            return of_motion(unit)
+        case said.Three(of):
+            return Annotated[list[_given(of)], THREE]  # type: ignore[misc]
+        case said.Direction():
+            return Direction
     if hint is float:
         return Number
-    if typing.get_origin(hint) is None:
+    if said_more := getattr(hint, "__metadata__", ()):
+        curved = Curve in typing.get_args(hint.__origin__)
+        return or_curve(said_more[0].unit) if curved else _given(said_more[0])
+    parts = typing.get_args(hint)
+    if not parts:
         return hint
-    if Curve in typing.get_args(hint):
+    if Curve in parts:
         return or_curve()
-    inner = tuple(_numbered(part) for part in typing.get_args(hint))
-    return typing.Union[inner]  # noqa: UP007 - of types that are known now only
+    inner = tuple(map(_given, parts))
+    return list[inner] if typing.get_origin(hint) is list else typing.Union[inner]  # type: ignore[valid-type] # noqa: UP007
 
 
 def entry_model(kind: Kind) -> type[BaseModel]:
     """The model of an entry of this kind."""
-    hints = typing.get_type_hints(kind.made)
+    hints = _hints(kind.made)
     keys: dict[str, Any] = {"kind": (Literal[kind.word], kind.word)} if kind.word else {}
     for f in keys_of(kind):
         keys[f.name] = (_type(kind, f, hints), ... if f.default is MISSING else _default(f))
@@ -344,7 +344,7 @@ def _own_key(f: Field[Any], hint: Any) -> tuple[Any, Any]:
         return (list[str], []) if default == () else (Annotated[list[str], Key(min_length=1)] | None, default)
     if typing.get_origin(hint) is Literal:
         return hint, default
-    return _numbered(hint), list(default) if isinstance(default, tuple) else default
+    return _given(hint), list(default) if isinstance(default, tuple) else default
 
 
 class _ChartEntry(Strict):
@@ -365,19 +365,18 @@ class _SceneBase(Strict):
     gravity: Annotated[list[of_time("m/s^2")], THREE] = [0.0, 0.0, 0.0]  # type: ignore[valid-type]
     base_acceleration: Annotated[list[of_time("m/s^2")], THREE] = [0.0, 0.0, 0.0]  # type: ignore[valid-type]
     plane: Literal["auto", "none", "x", "y", "z"] = "auto"
-    plugins: list[str] = []
     ground: dict[str, Metres] = {}
     bodies: dict[str, BodyEntry]
     markers: dict[str, MarkerEntry] = {}
 
 
 def scene_entry() -> Any:
-    """The model of a scene file, with all analyses and methods that are known now."""
-    return _scene_entry(tuple(analyses()), tuple(methods()))
+    """The model of a scene file, with all analyses, methods and kinds of force that are known now."""
+    return _scene_entry(tuple(analyses()), tuple(methods()), tuple(FORCES))
 
 
 @cache
-def _scene_entry(words: tuple[str, ...], method_names: tuple[str, ...]) -> Any:
+def _scene_entry(words: tuple[str, ...], method_names: tuple[str, ...], forces: tuple[type, ...]) -> Any:
     steps = dict[Literal[method_names], list[Annotated[Number, Key(gt=0)]]]  # type: ignore[valid-type]
     chart: Any = create_model("ChartEntry", __base__=_ChartEntry, __doc__=_ChartEntry.__doc__, methods=(steps, {}))
     one = _one_of([_analysis_model(word, analysis(word)) for word in words], words)
@@ -387,7 +386,7 @@ def _scene_entry(words: tuple[str, ...], method_names: tuple[str, ...]) -> Any:
         __doc__="A scene file of ffr-dyn, after its includes are merged and its parameters put in.",
         analysis=(one, ...),
         chart=(chart, chart()),
-        **{name: (_table_model(kinds), {}) for name, kinds in TABLES.items()},  # type: ignore[call-overload]
+        **{name: (_table_model(kinds), {}) for name, kinds in tables().items()},  # type: ignore[call-overload]
     )
 
 

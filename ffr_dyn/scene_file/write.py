@@ -25,10 +25,8 @@ from ffr_dyn.functions.time_functions import (
 )
 from ffr_dyn.integrators import CONTROLLED, Controlled, Integrator, methods
 from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation
-from ffr_dyn.scene.forces import Load
-from ffr_dyn.scene.joint_forces import Actuator
 from ffr_dyn.scene.scene import Body, Scene
-from ffr_dyn.scene_file.schema import TABLES, Kind, keys_of, nested_kinds
+from ffr_dyn.scene_file.schema import Kind, fields_of_motion, formula_of, keys_of, nested_kinds, tables
 from ffr_dyn.scene_file.state_formula import StateFormula
 from ffr_prep.body import FlexibleBody, save_body
 from ffr_prep.common.errors import InputError
@@ -64,14 +62,14 @@ def to_toml(scene: Scene, settings: Settings | MomentSettings, files: Mapping[st
     tree["chart"] = _chart(settings.chart) if isinstance(settings, Settings) else {}
     tree["inputs"] = _inputs(scene)
     tree["bodies"] = {body.name: _body(body, files) for body in scene.bodies}
-    for table, kinds in TABLES.items():
+    for table, kinds in tables().items():
         tree[table] = {thing.name: _entry(_kind(kinds, thing), thing) for thing in getattr(scene, table)}
     return "\n".join(_lines(_data(tree, "scene"), ())) + "\n"
 
 
 def _inputs(scene: Scene) -> dict[str, float]:
     """Initial values of the scene's inputs by name."""
-    fields_of = [value for table in TABLES for thing in getattr(scene, table) for value in _given(thing).values()]
+    fields_of = [value for table in tables() for thing in getattr(scene, table) for value in _given(thing).values()]
     return {found.name: found.data[4] for found in _signals((*fields_of, scene.base_acceleration))}
 
 
@@ -187,7 +185,7 @@ def _is_plain(model: FlexibleBody) -> bool:
 def _entry(kind: Kind, thing: Any) -> dict[str, Any]:
     """The keys of an entry that differ from their defaults."""
     entry: dict[str, Any] = {"kind": kind.word} if kind.word else {}
-    given = _with_formulas(thing) if isinstance(thing, (Load, Actuator)) else _given(thing)
+    given = _with_formulas(thing) if isinstance(formula_of(thing), StateFormula) else _given(thing)
     for f in fields(thing):
         if callable(given[f.name]) and f.name not in [key.name for key in keys_of(kind)]:
             raise InputError(
@@ -204,15 +202,18 @@ def _given(thing: Any) -> dict[str, Any]:
     return {f.name: getattr(thing, f.name) for f in fields(thing)}
 
 
-def _with_formulas(force: Load | Actuator) -> dict[str, Any]:
+def _with_formulas(force: Any) -> dict[str, Any]:
     """The fields of a force, with the formulas of the motion back in its components."""
-    given = _given(force)
-    if not isinstance(force.function, StateFormula):
-        return given
-    components = [force.force] if isinstance(force, Actuator) else [*force.force, *force.moment]
-    both = [c if e == constant(0.0) else e for c, e in zip(components, force.function.expressions, strict=True)]
-    wholes = {"force": both[0]} if isinstance(force, Actuator) else {"force": both[:3], "moment": both[3:]}
-    return given | wholes | {"function": None}
+    given, formulas = _given(force), iter(force.function.expressions)
+
+    def whole(component: Any) -> Any:
+        formula = next(formulas)
+        return component if formula == constant(0.0) else formula
+
+    for key in fields_of_motion(type(force)):
+        value = given[key]
+        given[key] = [whole(c) for c in value] if isinstance(value, (list, tuple)) else whole(value)
+    return given | {"function": None}
 
 
 # ---- values -------------------------------------------------------------------------------------------------------
@@ -274,7 +275,7 @@ def _lines(table: Mapping[str, Any], keys: tuple[str, ...]) -> Iterator[str]:
 
 def _depth(keys: tuple[str, ...]) -> int:
     """How deep tables with headers go: entries of a table do, their own tables do not."""
-    return 2 if keys and keys[0] in ("bodies", *TABLES) else 1 if not keys else 0
+    return 2 if keys and keys[0] in ("bodies", *tables()) else 1 if not keys else 0
 
 
 def _inline(value: Any) -> str:

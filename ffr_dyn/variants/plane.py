@@ -14,13 +14,10 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.functions.time_functions import is_zero
 from ffr_dyn.scene.drivers import PointDriver
-from ffr_dyn.scene.joint_forces import JointForce
-from ffr_dyn.scene.joints import frames
-from ffr_dyn.scene.scene import Body, Scene, joint_under, marker_names, marker_number, markers
-from ffr_dyn.scene.surface_loads import ModalForce
+from ffr_dyn.scene.force_kinds import forces_of, in_bases
+from ffr_dyn.scene.scene import Body, Scene, body_normal, marker_number, undeformed
 from ffr_dyn.variants.variant import used_interfaces, with_modes
 from ffr_prep.body import FlexibleBody, axial
 from ffr_prep.common.errors import InputError
@@ -51,13 +48,6 @@ def planar_forms(scene: Scene) -> Iterator[Scene]:
                 yield _in_plane(scene, normal, strict=True)
 
 
-def body_normal(body: Body, normal: int) -> int:
-    """The body axis along the global axis `normal`, or -1."""
-    along = rotation_matrix(body.rotation)[normal]
-    k = int(np.argmax(np.abs(along)))
-    return k if abs(along[k]) > 1 - 1e-12 else -1
-
-
 def _in_plane(scene: Scene, normal: int, *, strict: bool) -> Scene:
     bodies, kept = [], {}
     for body in scene.bodies:
@@ -67,9 +57,8 @@ def _in_plane(scene: Scene, normal: int, *, strict: bool) -> Scene:
         reduced = with_modes(body, keep.tolist())
         model = _without_rounding(reduced.model, k, used)
         bodies.append(replace(reduced, model=model, kept=(tuple(keep.tolist()), body.model.n)))
-        kept[body.name] = keep
-    forces = [replace(f, values=f.values[kept[f.body]]) if isinstance(f, ModalForce) else f for f in scene.forces]
-    return replace(scene, bodies=tuple(bodies), forces=tuple(forces), plane=AXES[normal])
+        kept[body.name] = np.eye(body.model.n)[:, keep]
+    return replace(scene, bodies=tuple(bodies), forces=in_bases(scene.forces, kept), plane=AXES[normal])
 
 
 # ---- what stands in the way ---------------------------------------------------------------------------------------
@@ -103,63 +92,13 @@ def _obstacles(scene: Scene, normal: int) -> Iterator[str]:
         k = body_normal(body, normal)
         if not _symmetric(body, k, used_interfaces(scene, body)):
             yield f"body {body.name!r} is not symmetric"
-    for load in scene.loads:
-        k = normal if load.axes == "global" else _normal_of(scene, load.marker, normal)
-        if load.function is not None or not _vanishes(load.force[k]) or not _none_but(load.moment, k):
-            yield f"load {load.name!r} may act across"
-    for force in scene.forces:
-        if not isinstance(force, JointForce) or not _turns_in_plane(scene, force, normal):
+    for force in forces_of(scene):
+        if not force.stays_in_plane(scene, normal):
             yield f"force {force.name!r} may act across"
-    heights = {round(height, 9) for height in _heights(scene, normal)}
-    if len(heights) > 1:
-        yield "springs or distances run aslant"
-
-
-def _turns_in_plane(scene: Scene, force: JointForce, normal: int) -> bool:
-    """Whether a force on a joint coordinate moves bodies in the plane: an angle about the normal, a stroke across it."""
-    joint = joint_under(scene, force)
-    b = markers(scene)[marker_number(scene, joint.i)][0]
-    axis = frames(joint)[0][:, 2]
-    if b < len(scene.bodies):
-        axis = rotation_matrix(scene.bodies[b].rotation) @ axis
-    along = abs(axis[normal])
-    return bool(along > 1 - 1e-12 if force.coordinate == "angle" else along < _ZERO)
-
-
-def _heights(scene: Scene, normal: int) -> Iterator[float]:
-    """Along the normal, the distance between the ends of whatever acts along a line; zero to start with."""
-    at = dict(zip(marker_names(scene), _places(scene), strict=True))
-    yield 0.0
-    for spring in scene.springs:
-        yield abs(at[spring.i][normal] - at[spring.j][normal])
     for joint in scene.joints:
-        yield abs(at[joint.i][normal] - at[joint.j][normal])
-
-
-def _places(scene: Scene) -> list[Array]:
-    """Undeformed position of every marker as the scene declares it."""
-    found = []
-    for b, _, point in markers(scene):
-        if b == len(scene.bodies):
-            found.append(scene.ground[point])
-        else:
-            body = scene.bodies[b]
-            found.append(body.position + rotation_matrix(body.rotation) @ body.model.interface(point).position)
-    return found
-
-
-def _vanishes(component: object) -> bool:
-    return isinstance(component, (int, float, np.floating, np.integer)) and component == 0
-
-
-def _none_but(moment: tuple[object, ...], k: int) -> bool:
-    return all(_vanishes(moment[c]) for c in range(3) if c != k)
-
-
-def _normal_of(scene: Scene, marker: str, normal: int) -> int:
-    """The axis of the marker's body along the normal."""
-    body = marker.partition(".")[0]
-    return next((body_normal(b, normal) for b in scene.bodies if b.name == body), normal)
+        i, j = (undeformed(scene, marker_number(scene, name))[normal] for name in (joint.i, joint.j))
+        if round(abs(i - j), 9) > 0:
+            yield f"joint {joint.name!r} runs aslant"
 
 
 # ---- symmetry of a body -------------------------------------------------------------------------------------------

@@ -24,9 +24,8 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.scene.drivers import PointDriver
-from ffr_dyn.scene.forces import Bushing
+from ffr_dyn.scene.force_kinds import in_bases, loaded_markers, modal_fields
 from ffr_dyn.scene.scene import INERTIA_TERMS, Body, Scene
-from ffr_dyn.scene.surface_loads import ModalForce
 from ffr_dyn.variants.condensation import statically_complete
 from ffr_prep.body import FlexibleBody, recombined, truncated
 from ffr_prep.common.errors import InputError
@@ -182,28 +181,20 @@ def vary(
         used = used_interfaces(scene, body)
         kept = with_modes(made, wanted[body.name], used) if body.name in wanted else made
         bodies.append(without_terms(kept, without.get(body.name, ())))
-    modal = {force.body for force in scene.forces if isinstance(force, ModalForce)}
+    modal = {force.body for force in scene.forces if modal_fields(force)}
     bases = {
         body.name: basis_of(models[body.name], wanted.get(body.name, models[body.name].n), used_interfaces(scene, body))
         for body in scene.bodies
         if body.name in modal
     }
-    forces = [_in_basis(force, bases[force.body]) if isinstance(force, ModalForce) else force for force in scene.forces]
-    return replace(scene, bodies=tuple(bodies), forces=tuple(forces))
+    return replace(scene, bodies=tuple(bodies), forces=in_bases(scene.forces, bases))
 
 
 def used_interfaces(scene: Scene, body: Body) -> tuple[str, ...]:
     """The interfaces of a body at which joints, drivers, loads, springs or bushings act."""
-    pairs: list[Any] = [*scene.joints, *scene.springs, *(d for d in scene.drivers if isinstance(d, PointDriver))]
-    pairs += [force for force in scene.forces if isinstance(force, Bushing)]
-    ends = {load.marker for load in scene.loads} | {end for pair in pairs for end in (pair.i, pair.j)}
+    pairs: list[Any] = [*scene.joints, *(d for d in scene.drivers if isinstance(d, PointDriver))]
+    ends = {*loaded_markers(scene), *(end for pair in pairs for end in (pair.i, pair.j))}
     return tuple(i.name for i in body.model.interfaces if f"{body.name}.{i.name}" in ends)
-
-
-def _in_basis(force: ModalForce, V: Array) -> ModalForce:
-    if len(force.values) != len(V):
-        raise InputError(f"force {force.name!r} acts on modes of {force.body!r}, which another body file does not have")
-    return replace(force, values=force.values @ V)
 
 
 def _by_name(given: Any, everywhere: Iterable[str], names: list[str]) -> dict[str, Any]:

@@ -108,8 +108,9 @@ def loaded(target: Target) -> Any:
     return getattr(import_module(module), name)
 
 
-def load_plugin(path: Path) -> None:
+def load_plugin(path: str | Path) -> None:
     """Run a file of Python, once, which registers entries. Raises InputError for a file that fails."""
+    path = Path(path)
     name = f"ffr_plugin:{path.resolve()}"
     if name in sys.modules:
         return

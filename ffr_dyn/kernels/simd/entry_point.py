@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import ctypes
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, get_type_hints
 
@@ -38,11 +38,20 @@ _WORD = ir.IntType(64)
 
 class CompiledFunction:
     """A function of annotated arguments, the first the tables, that returns a status; compiled when its address is first
-    asked for, or read from disk."""
+    asked for, or read from disk.
+
+    Those of other packages are compiled anew by every process: nobody would notice that one on disk is older than the kernels
+    it was compiled with.
+    """
 
     def __init__(self, function: Callable[..., int]) -> None:
         self.function = function
         self.name = function.__name__
+
+    @property
+    def own(self) -> bool:
+        """Whether it is of this package, and kept on disk."""
+        return self.function.__module__.startswith("ffr_dyn.")
 
     @cached_property
     def kinds(self) -> list[tuple[Any, Any]]:
@@ -54,7 +63,7 @@ class CompiledFunction:
 
     @cached_property
     def compiled(self) -> Any:
-        return cfunc(types.int64(*(kind for kind, _ in self.kinds)), cache=True, **OPTIONS)(self.function)
+        return cfunc(types.int64(*(kind for kind, _ in self.kinds)), cache=self.own, **OPTIONS)(self.function)
 
     @property
     def address(self) -> int:
@@ -132,8 +141,37 @@ def _make_callable(entry: EntryPoint) -> None:
         words = builder.bitcast(args[0], _WORD.as_pointer())
         places = builder.load(builder.gep(words, [_WORD(place_of(Tables, "entry_points"))]))
         at = builder.gep(builder.inttoptr(places, _WORD.as_pointer()), [_WORD(entry.number)])
-        function = ir.FunctionType(_WORD, [value.type for value in given])
-        return builder.call(builder.inttoptr(builder.load(at), function.as_pointer()), given)
+        return _call_at(builder, builder.load(at), given)
+
+
+def call_like(function: Callable[..., int]) -> Any:
+    """call(address, *arguments) in compiled code, which calls what is at an address with the arguments of `function`."""
+    kinds = [kind for kind, _ in CompiledFunction(function).kinds]
+    address = inspect.Parameter("address", inspect.Parameter.POSITIONAL_OR_KEYWORD)
+
+    def call(*address_and_arguments: Any) -> int:
+        raise NotImplementedError("for compiled code alone")
+
+    @type_callable(call)
+    def typed(context):  # type: ignore[no-untyped-def]
+        def returned(*given: Any) -> Any:
+            return types.int64
+
+        parameters = [address, *inspect.signature(function).parameters.values()]
+        returned.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        return returned
+
+    @lower_builtin(call, types.VarArg(types.Any))
+    def lowered(context, builder, sig, args):  # type: ignore[no-untyped-def]
+        given = [_as_kind(context, builder, *each) for each in zip(args[1:], sig.args[1:], kinds, strict=True)]
+        return _call_at(builder, args[0], given)
+
+    return call
+
+
+def _call_at(builder: Any, address: Any, given: Sequence[Any]) -> Any:
+    function = ir.FunctionType(_WORD, [value.type for value in given])
+    return builder.call(builder.inttoptr(address, function.as_pointer()), given)
 
 
 def _as_kind(context: Any, builder: Any, value: Any, given: Any, wanted: Any) -> Any:

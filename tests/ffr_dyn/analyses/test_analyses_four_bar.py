@@ -18,7 +18,7 @@ from ffr_dyn.functions.formula import formula
 from ffr_dyn.integrators import RK4
 from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.scene.drivers import Driver
-from ffr_dyn.scene.joint_forces import Actuator
+from ffr_dyn.scene.forces import Actuator
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 

@@ -16,8 +16,7 @@ from ffr_dyn.functions.time_functions import harmonic, polynomial, user
 from ffr_dyn.integrators import RK4, ROS2, DormandPrince, HalfExplicit, Variational
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting
 from ffr_dyn.scene.drivers import Driver
-from ffr_dyn.scene.forces import Load, SpringDamper
-from ffr_dyn.scene.joint_forces import Actuator, JointStop, Servo
+from ffr_dyn.scene.forces import Actuator, JointStop, Load, Servo, SpringDamper
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.common.errors import ComputationError

@@ -25,7 +25,6 @@ METHOD, ANALYSES = (
 SCENE = """
 name = "rod"
 gravity = [0, -9.81, 0]
-plugins = ["{plugin}"]
 [analysis]
 {analysis}
 [ground]
@@ -58,12 +57,13 @@ def as_it_was():
 
 @pytest.fixture
 def write(tmp_path):
-    """A scene file with a plugin beside it."""
+    """A scene file, with a plugin beside it that is loaded."""
 
     def made(plugin: str, analysis: str):
         (tmp_path / "own.py").write_text(plugin, encoding="utf-8")
+        fd.load_plugin(tmp_path / "own.py")
         file = tmp_path / "rod.toml"
-        file.write_text(SCENE.format(plugin="own.py", analysis=analysis), encoding="utf-8")
+        file.write_text(SCENE.format(analysis=analysis), encoding="utf-8")
         return file
 
     return made
@@ -79,7 +79,7 @@ def test_a_method_of_ones_own_runs_from_a_file_a_command_and_python(write, tmp_p
     file = write(METHOD, 'method = "symplectic-euler"\nend = 0.2\noutput_step = 0.02\nstep = 1e-4')
     scene, settings = fd.load_scene(file)
     found = fd.run(scene, settings)
-    command("run", file, "-o", tmp_path / "a.nc")
+    command("--plugin", tmp_path / "own.py", "run", file, "-o", tmp_path / "a.nc")
     kept = fd.load_result(tmp_path / "a.nc")
     np.testing.assert_array_equal(kept["rod.tip.position"], found["rod.tip.position"])
     exact = fd.forward(scene, end=0.2, output_step=0.02, method=fd.RK4(1e-3))

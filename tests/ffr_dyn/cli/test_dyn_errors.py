@@ -20,8 +20,7 @@ from ffr_dyn.integrators import RK4, ROS2, GeneralisedAlpha, HalfExplicit
 from ffr_dyn.integrators.stabilisation import Drifting, Projection
 from ffr_dyn.results.file import load_result
 from ffr_dyn.scene.drivers import Driver
-from ffr_dyn.scene.forces import Load
-from ffr_dyn.scene.joint_forces import Actuator
+from ffr_dyn.scene.forces import Actuator, Load
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import BodyError, rigid_body, save_body, with_point

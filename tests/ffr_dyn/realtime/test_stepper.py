@@ -17,8 +17,7 @@ from ffr_dyn.integrators import RK4, ROS2, DormandPrince
 from ffr_dyn.realtime.stepper import Stepper
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.scene.drivers import Driver
-from ffr_dyn.scene.forces import Load, SpringDamper
-from ffr_dyn.scene.joint_forces import Actuator, Servo
+from ffr_dyn.scene.forces import Actuator, Load, Servo, SpringDamper
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.scene_file.read import load_scene

@@ -24,11 +24,22 @@ from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.functions.time_functions import evaluate, harmonic, polynomial, table
 from ffr_dyn.integrators import RK4, ROS2
 from ffr_dyn.kernels.tables import OK
-from ffr_dyn.scene.forces import Bushing, Load, SpringDamper
-from ffr_dyn.scene.joint_forces import Actuator, JointFriction, JointSpring, JointStop, Servo
+from ffr_dyn.scene.force_kinds import FORCES
+from ffr_dyn.scene.forces import (
+    Actuator,
+    Bushing,
+    JointFriction,
+    JointSpring,
+    JointStop,
+    Load,
+    ModalForce,
+    NodalForces,
+    Pressure,
+    Servo,
+    SpringDamper,
+)
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
-from ffr_dyn.scene.surface_loads import ModalForce, NodalForces, Pressure, distributed
 from ffr_prep.body import FlexibleBody, Surface, rigid_body
 from ffr_prep.common.errors import ComputationError, InputError
 
@@ -97,9 +108,9 @@ def test_compiled_forces_equal_the_readable_ones(force, sizes):
         scale = max(1.0, np.abs(twin.generalised).max())
         np.testing.assert_allclose(work.bodies.f, twin.generalised, rtol=0, atol=1e-12 * scale)
         if isinstance(force, Bushing):
-            np.testing.assert_allclose(work.loads.bushing[0, :6], twin.coordinate, atol=1e-12)
+            np.testing.assert_allclose(work.loads.measured[:6], twin.coordinate, atol=1e-12)
         elif twin.coordinate is not None:
-            assert work.loads.action[0, 0] == pytest.approx(twin.coordinate, abs=1e-12)
+            assert work.loads.measured[0] == pytest.approx(twin.coordinate, abs=1e-12)
 
 
 def test_all_loads_at_once_equal_the_sum_of_the_readable_ones():
@@ -329,7 +340,7 @@ def test_turns_are_counted_from_accepted_states_and_evaluating_changes_nothing()
     for angle in (0.0, 3.0, -3.0, 0.5):
         x = np.array([0, 0, 0, np.cos(angle / 2), 0, 0, np.sin(angle / 2)])
         load_at(engine, 0.0, x, np.zeros(6))
-        assert work.loads.action[0, 0] == pytest.approx(2 * np.pi + angle)
+        assert work.loads.measured[0] == pytest.approx(2 * np.pi + angle)
     assert work.loads.reference[0] == pytest.approx(2 * np.pi)
 
 
@@ -538,7 +549,7 @@ def test_the_box_is_closed_and_points_outward():
 
 @pytest.mark.parametrize("follower", [False, True])
 def test_uniform_pressure_on_a_closed_surface_has_no_resultant(follower):
-    load = distributed(Pressure("p", "b", 5.0, follower=follower), boxed())
+    load = Pressure("p", "b", 5.0, follower=follower).integrals(boxed())
     np.testing.assert_allclose(load.constant[:6], 0.0, atol=1e-12)
     if follower:  # and to first order none as it deforms
         np.testing.assert_allclose(load.slope[:6], 0.0, atol=1e-12)
@@ -547,7 +558,7 @@ def test_uniform_pressure_on_a_closed_surface_has_no_resultant(follower):
 
 def test_pressure_on_one_side_is_area_times_pressure_at_the_middle():
     top = Pressure("p", "b", 5.0, triangles=lambda centre: centre[:, 2] > 2.9)
-    load = distributed(top, boxed())
+    load = top.integrals(boxed())
     np.testing.assert_allclose(load.constant[:3], [0, 0, -10.0], atol=1e-12)
     np.testing.assert_allclose(load.constant[3:6], np.cross([0.5, 1.0, 3.0], [0, 0, -10.0]), atol=1e-12)
 
@@ -555,7 +566,7 @@ def test_pressure_on_one_side_is_area_times_pressure_at_the_middle():
 def test_linear_pressure_is_integrated_exactly():
     """Hydrostatic p = 3 - z on the whole box: buoyancy, the weight of its volume, through its middle."""
     body = boxed()
-    load = distributed(Pressure("p", "b", 3.0 - body.surface.points[:, 2]), body)
+    load = Pressure("p", "b", 3.0 - body.surface.points[:, 2]).integrals(body)
     np.testing.assert_allclose(load.constant[:3], [0, 0, 6.0], atol=1e-12)
     # and its modal forces by Gauss's quadrature of degree two, exact for linear pressure on linear shapes
     corners = body.surface.triangles
@@ -572,12 +583,11 @@ def test_linear_pressure_is_integrated_exactly():
 def test_a_following_pressure_is_the_tangent_of_that_on_the_deformed_surface():
     body, h = boxed(), 1e-5
     pressure = Pressure("p", "b", np.linspace(1, 2, 8), follower=True)
-    load = distributed(pressure, body)
+    load = pressure.integrals(body)
     for j in range(body.n):
         q = h * np.eye(body.n)[j]
         bent = [
-            distributed(
-                pressure,
+            pressure.integrals(
                 replace(
                     body, surface=replace(body.surface, points=body.surface.points + sign * (body.surface.Phi @ q))
                 ),
@@ -688,7 +698,7 @@ def test_the_jacobian_of_a_following_pressure_is_its_slope():
     system = compile_scene(scene)
     x = np.concatenate([[0, 0, 0, 1.0, 0, 0, 0], np.full(3, 0.1)])
     found = force_jacobian(system, 0.0, x, np.zeros(9))
-    np.testing.assert_allclose(found.position[:, 6:], distributed(scene.forces[0], body).slope, atol=1e-9)
+    np.testing.assert_allclose(found.position[:, 6:], scene.forces[0].integrals(body).slope, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["spring", "curved bushing", "friction", "servo"])
@@ -938,3 +948,16 @@ def test_what_may_act_across_the_plane_is_computed_in_space(changes):
 def test_a_scene_declared_planar_refuses_a_base_that_leaves_the_plane():
     with pytest.raises(InputError, match="base_acceleration has a component"):
         assemble(arm(base_acceleration=(0, 0, 1.0), plane="z"))
+
+
+def test_the_table_of_forces_is_that_of_the_declarations():
+    """docs/forces.md: a row for each kind, as the kind says, with the names of what a result keeps of it."""
+    text = (ROOT / "docs" / "forces.md").read_text(encoding="utf-8")
+    rows = [line for line in text.splitlines() if line.startswith("| `")]
+    for kind, row in zip(FORCES, rows, strict=False):
+        table = "" if kind.table == "forces" else f" (`{kind.table}`)"
+        assert row.startswith(f"| `{kind.__name__}`{table} | {kind.acts} | {kind.positive} | ")
+    for force in (*PAIRS.values(), *SPREAD.values()):
+        row = rows[FORCES.index(type(force))]
+        named = [f"`.{one.name}` [{one.unit}]" for one in force.place.measured]
+        assert "| the same |" in row or all(name in row for name in named)

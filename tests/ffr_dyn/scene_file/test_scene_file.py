@@ -33,15 +33,25 @@ from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection
 from ffr_dyn.results.file import load_result
 from ffr_dyn.scene.couplings import Coupling
 from ffr_dyn.scene.drivers import Driver, PointDriver
-from ffr_dyn.scene.forces import Bushing, Load, SpringDamper
-from ffr_dyn.scene.joint_forces import Actuator, JointFriction, JointSpring, JointStop, Servo
+from ffr_dyn.scene.forces import (
+    Actuator,
+    Bushing,
+    JointFriction,
+    JointSpring,
+    JointStop,
+    Load,
+    ModalForce,
+    NodalForces,
+    Pressure,
+    Servo,
+    SpringDamper,
+)
 from ffr_dyn.scene.joints import KINDS, Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.scene.sensors import Measurement
-from ffr_dyn.scene.surface_loads import ModalForce, NodalForces, Pressure
 from ffr_dyn.scene_file.read import load_scene
 from ffr_dyn.scene_file.schema import EFFORTS as EFFORT_KINDS
-from ffr_dyn.scene_file.schema import SOLUTIONS, TABLES, schema
+from ffr_dyn.scene_file.schema import SOLUTIONS, schema, tables
 from ffr_dyn.scene_file.toml_lines import lines_of
 from ffr_dyn.scene_file.write import save_scene, to_toml
 from ffr_prep.body import FlexibleBody, load_body, rigid_body, save_body
@@ -610,7 +620,7 @@ def test_the_published_schema_is_that_of_the_program():
 
 def test_every_kind_is_in_the_schema():
     definitions = schema()["$defs"]
-    for kinds in (*TABLES.values(), EFFORT_KINDS, SOLUTIONS):
+    for kinds in (*tables().values(), EFFORT_KINDS, SOLUTIONS):
         for kind in kinds:
             assert definitions[f"{kind.made.__name__}Entry"]["additionalProperties"] is False
     assert definitions["SpringDamperEntry"]["properties"]["free_length"]["unit"] == "m"

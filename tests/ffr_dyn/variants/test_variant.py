@@ -17,9 +17,9 @@ from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.equations.inertia import mass_matrix, quadratic_velocity
 from ffr_dyn.integrators import RK4
 from ffr_dyn.integrators.stabilisation import Projection
+from ffr_dyn.scene.forces import ModalForce
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import INERTIA_TERMS, Body, Scene
-from ffr_dyn.scene.surface_loads import ModalForce
 from ffr_dyn.scene_file.read import load_scene
 from ffr_dyn.scene_file.write import save_scene
 from ffr_dyn.variants.variant import vary, with_basis, with_model, with_modes, without_terms

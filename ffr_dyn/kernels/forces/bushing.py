@@ -9,21 +9,24 @@ Twin: `ffr_dyn.equations.forces.applied`.
 
 import math
 
-from ffr_dyn.kernels.forces.coordinate_forces import apply_side
-from ffr_dyn.kernels.forces.force_laws import curve_value
+from ffr_dyn.kernels.forces.coordinate import apply_side, three
+from ffr_dyn.kernels.forces.curve import curve_value
 from ffr_dyn.kernels.markers import axis_motion
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.rows import ZERO
+from ffr_dyn.kernels.simd.force_kernel import force_kernel
+from ffr_dyn.kernels.simd.slices import part, vector_at
+from ffr_dyn.kernels.tables import END_I, END_J, LAW, MEASURED, OK, PLACE, Tables, Vector
 from ffr_dyn.kernels.vectors import add, cross, dot, get, put, scale, subtract, to_body
 
 
 @kernel
 def move_axes(frames, w, axes, i, j):
-    """axes (2, 3, 3, 3): by side, body axes value, global value and global rate of the three axes."""
+    """axes (2, 3, 3, 3): by side, body axes value, global value and global rate of the three axes, frames (18,)."""
     for side in range(2):
         marker = i if side == 0 else j
         for c in range(3):
-            a, g, rate, _ = axis_motion(w, marker, get(frames[side], c))
+            a, g, rate, _ = axis_motion(w, marker, three(frames, 9 * side + 3 * c))
             put(axes[side, 0], c, a)
             put(axes[side, 1], c, g)
             put(axes[side, 2], c, rate)
@@ -57,12 +60,11 @@ def stretch(s, c):
 
 
 @kernel
-def six_forces(loads, start, x):
+def six_forces(data, start, x):
     """x = [displacement (6), rate (6), force (6)]: the force from the others.
 
     Data: stiffness (36), damping (36), preload (6), start of the curve of each direction or -1 (6).
     """
-    data = loads.data
     for r in range(6):
         force = data[start + 72 + r]
         for c in range(6):
@@ -113,34 +115,48 @@ def turning_side(A, axes, others, frame, C, transposed):
             sum_k = add(sum_k, scale(C[l, k] if transposed else C[k, l], get(others, l)))
         b = to_body(A, sum_k)
         turning = add(turning, cross(get(axes, k), b))
-        twist = add(twist, cross(get(frame, k), b))
+        twist = add(twist, cross(three(frame, 3 * k), b))
     return ZERO, turning, twist
 
 
 @kernel
-def combine(frame, x):
-    """sum x_c frame_c."""
-    return add(scale(x[0], get(frame, 0)), add(scale(x[1], get(frame, 1)), scale(x[2], get(frame, 2))))
+def combine(a, b, c, x):
+    """x_0 a + x_1 b + x_2 c."""
+    return add(scale(x[0], a), add(scale(x[1], b), scale(x[2], c)))
 
 
 @kernel
-def apply_bushing(where, markers, loads, w, s, f, load, k):
-    """Add bushing k to f and load (M, 6), and keep displacement, rate and force in s.bushing; w, s: Marker-, LoadWork."""
-    i, j, frames, x = loads.bushing[k, 0], loads.bushing[k, 1], loads.frames[k], s.bushing[k]
+def combine_axes(axes, x):
+    return combine(get(axes, 0), get(axes, 1), get(axes, 2), x)
+
+
+@kernel
+def apply_bushing(r, k, f, load):
+    """Add bushing k to f (V,) and load (6 M,), and keep displacement, rate and force."""
+    m, w, s, loads = r.model, r.work.markers, r.work.loads, r.model.loads
+    where, markers, i, j = m.bodies.where, m.markers, loads.row[k, END_I], loads.row[k, END_J]
+    frames, x = part(loads.data, loads.row[k, PLACE], 18), part(s.measured, loads.row[k, MEASURED], 18)
     move_axes(frames, w, s.axes, i, j)
     relate(s.axes, s.turn)
     z, g, g_s, g_c = measure_bushing(w, s, i, j, x)
-    six_forces(loads, loads.bushing[k, 2], x)
+    six_forces(loads.data, loads.row[k, LAW], x)
     weigh(z, g, g_s, g_c, (x[15], x[16], x[17]), s.turn[2])
-    ui, uj, C = get(w.u, i), get(w.u, j), s.turn[2]
+    ui, uj, C, on_body_i, on_body_j = get(w.u, i), get(w.u, j), s.turn[2], part(load, 6 * i, 6), part(load, 6 * j, 6)
 
-    force, a, a0 = (x[12], x[13], x[14]), s.axes[0, 0], frames[0]
+    force, a = (x[12], x[13], x[14]), s.axes[0, 0]
     d = to_body(w.A[w.body[i]], subtract(get(w.r, j), get(w.r, i)))
-    on_i, on_j = combine(a, force), to_body(w.A[w.body[j]], combine(s.axes[0, 1], force))
-    side_i = (scale(-1.0, on_i), add(cross(on_i, d), cross(on_i, ui)), cross(combine(a0, force), d))
-    apply_side(where, markers, ui, f, load[i], i, 1.0, side_i)
-    apply_side(where, markers, uj, f, load[j], j, 1.0, (on_j, cross(uj, on_j), ZERO))
-    side_i = turning_side(w.A[w.body[i]], a, s.axes[1, 1], a0, C, False)
-    side_j = turning_side(w.A[w.body[j]], s.axes[1, 0], s.axes[0, 1], frames[1], C, True)
-    apply_side(where, markers, ui, f, load[i], i, 1.0, side_i)
-    apply_side(where, markers, uj, f, load[j], j, 1.0, side_j)
+    on_i, on_j = combine_axes(a, force), to_body(w.A[w.body[j]], combine_axes(s.axes[0, 1], force))
+    undeformed = combine(three(frames, 0), three(frames, 3), three(frames, 6), force)
+    side_i = (scale(-1.0, on_i), add(cross(on_i, d), cross(on_i, ui)), cross(undeformed, d))
+    apply_side(where, markers, ui, f, on_body_i, i, 1.0, side_i)
+    apply_side(where, markers, uj, f, on_body_j, j, 1.0, (on_j, cross(uj, on_j), ZERO))
+    side_i = turning_side(w.A[w.body[i]], a, s.axes[1, 1], frames, C, False)
+    side_j = turning_side(w.A[w.body[j]], s.axes[1, 0], s.axes[0, 1], part(frames, 9, 9), C, True)
+    apply_side(where, markers, ui, f, on_body_i, i, 1.0, side_i)
+    apply_side(where, markers, uj, f, on_body_j, j, 1.0, side_j)
+
+
+@force_kernel
+def bushing(r: Tables, k: int, x: Vector, f: Vector, load: Vector) -> int:
+    apply_bushing(r, k, vector_at(f, r.v.size), vector_at(load, 6 * r.model.markers.body.size))
+    return OK

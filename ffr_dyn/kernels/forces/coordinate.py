@@ -1,4 +1,4 @@
-"""Forces on coordinates between two markers: the length between their points, a joint's angle or stroke.
+"""Forces on one coordinate between two markers: the length between their points, a joint's angle or stroke.
 
 The generalised force is the law's force times the gradient of the coordinate, so that force and rate make its power on
 rigid and flexible bodies alike, and both bodies together feel neither force nor moment.
@@ -8,12 +8,11 @@ Twin: `ffr_dyn.equations.forces.applied`.
 
 import math
 
-from ffr_dyn.kernels.forces.force_laws import law
 from ffr_dyn.kernels.markers import project, shapes
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.rows import ZERO, coordinate
-from ffr_dyn.kernels.simd.slices import part
-from ffr_dyn.kernels.tables import ANGLE, IN_V, LENGTH, N
+from ffr_dyn.kernels.simd.slices import part, vector_at
+from ffr_dyn.kernels.tables import ANGLE, END_I, END_J, FUNCTION, IN_V, LENGTH, MEASURED, PLACE, WAY, N
 from ffr_dyn.kernels.vectors import cross, dot, get, scale, subtract, to_body
 
 
@@ -37,16 +36,27 @@ def lifted(angle, reference):
 
 
 @kernel
-def gradient(loads, w, reference, k):
-    """Coordinate, rate and sides of action k; w: MarkerWork."""
-    kind, i, j = loads.action[k, 0], loads.action[k, 1], loads.action[k, 2]
-    if kind == LENGTH:
+def three(data, start):
+    return data[start], data[start + 1], data[start + 2]
+
+
+@kernel
+def coordinate_of(r, k):
+    """Coordinate, rate and sides (see `rows`) of force k; r: `Tables`."""
+    row, data, w = r.model.loads.row, r.model.loads.data, r.work.markers
+    way, i, j, at = row[k, WAY], row[k, END_I], row[k, END_J], row[k, PLACE]
+    if way == LENGTH:
         return length(w, i, j)
-    axes = loads.action_axes[k]
-    value, rate, _, side_i, side_j = coordinate(kind, get(axes, 0), get(axes, 1), get(axes, 2), w, i, j)
-    if kind == ANGLE:
-        value = lifted(value, reference)
+    value, rate, _, side_i, side_j = coordinate(way, three(data, at), three(data, at + 3), three(data, at + 6), w, i, j)
+    if way == ANGLE:
+        value = lifted(value, r.work.loads.reference[row[k, MEASURED]])
     return value, rate, side_i, side_j
+
+
+@kernel
+def drive_of(r, k):
+    """Value and two derivatives of the time function of force k."""
+    return get(r.work.functions, r.model.loads.row[k, FUNCTION])
 
 
 @kernel
@@ -68,22 +78,12 @@ def apply_side(where, markers, u, f, load, k, amount, side):
 
 
 @kernel
-def apply_action(where, markers, loads, w, s, functions, user, f, load, k):
-    """Add action k to f and load (M, 6), and keep its coordinate, rate and force in s.action; w, s: Marker-, LoadWork."""
-    value, rate, side_i, side_j = gradient(loads, w, s.reference[k], k)
-    drive = (1.0, 0.0, 0.0)
-    if loads.action[k, 5] >= 0:
-        drive = get(functions, loads.action[k, 5])
-    force = law(loads.action[k, 3], loads.data, loads.action[k, 4], value, rate, drive, user)
-    s.action[k, 0], s.action[k, 1], s.action[k, 2] = value, rate, force
-    i, j = loads.action[k, 1], loads.action[k, 2]
-    apply_side(where, markers, get(w.u, i), f, load[i], i, force, side_i)
-    apply_side(where, markers, get(w.u, j), f, load[j], j, force, side_j)
-
-
-@kernel
-def keep_turns(loads, s):
-    """Count the turns of the angles from this, an accepted state."""
-    for k in range(loads.action.shape[0]):
-        if s.action[k, 0] - s.action[k, 0] == 0.0:  # not from a state that is no longer finite
-            s.reference[k] = s.action[k, 0]
+def apply_along(r, k, f, load, value, rate, side_i, side_j, force):
+    """Add the force on a coordinate to the vectors f and load, and keep it with coordinate and rate."""
+    m, row, u, kept = r.model, r.model.loads.row, r.work.markers.u, r.work.loads.measured
+    at, i, j = row[k, MEASURED], row[k, END_I], row[k, END_J]
+    kept[at], kept[at + 1], kept[at + 2] = value, rate, force
+    f = vector_at(f, r.v.size)
+    load = vector_at(load, 6 * m.markers.body.size)
+    apply_side(m.bodies.where, m.markers, get(u, i), f, part(load, 6 * i, 6), i, force, side_i)
+    apply_side(m.bodies.where, m.markers, get(u, j), f, part(load, 6 * j, 6), j, force, side_j)

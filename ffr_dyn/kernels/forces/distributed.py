@@ -1,11 +1,12 @@
-"""Loads spread over a body: their integrals over its basis (`ffr_dyn.scene.surface_loads`) at the present q and rotation.
+"""Loads spread over a body: their integrals (`ffr_dyn.scene.forces.distributed`) at the present q and rotation.
 
-Twin: `ffr_dyn.scene.surface_loads.distributed`.
+Twin: `ffr_dyn.scene.forces.distributed`.
 """
 
 from ffr_dyn.kernels.options import kernel
-from ffr_dyn.kernels.simd.slices import part
-from ffr_dyn.kernels.tables import AFFINE, IN_V, IN_X, N
+from ffr_dyn.kernels.simd.force_kernel import force_kernel
+from ffr_dyn.kernels.simd.slices import part, vector_at
+from ffr_dyn.kernels.tables import END_I, FUNCTION, GLOBAL, IN_V, IN_X, LAW, OK, WAY, N, Tables, Vector
 
 
 @kernel
@@ -46,13 +47,16 @@ def add_global(data, start, factor, A, q, n, f):
                 f[6 + j] += factor * row[j] * A[l, c]
 
 
-@kernel
-def apply_spread(where, loads, A, functions, x, f, k):
-    """Add spread load k to f; A (B + 1, 3, 3)."""
-    b, kind, start, function = loads.spread[k, 0], loads.spread[k, 1], loads.spread[k, 2], loads.spread[k, 3]
+@force_kernel
+def distributed(r: Tables, k: int, x: Vector, f: Vector, load: Vector) -> int:
+    """Of directions fixed in the body, affine in q; or of fixed global directions."""
+    where, loads = r.model.bodies.where, r.model.loads
+    b, start = loads.row[k, END_I], loads.row[k, LAW]
     n, i, j = where[b, N], where[b, IN_X], where[b, IN_V]
-    q, own = part(x, i + 7, n), part(f, j, 6 + n)
-    if kind == AFFINE:
-        add_affine(loads.data, start, functions[function, 0], q, n, own)
+    q, own = part(vector_at(x, r.x.size), i + 7, n), part(vector_at(f, r.v.size), j, 6 + n)
+    factor = r.work.functions[loads.row[k, FUNCTION], 0]
+    if loads.row[k, WAY] == GLOBAL:
+        add_global(loads.data, start, factor, r.work.bodies.A[b], q, n, own)
     else:
-        add_global(loads.data, start, functions[function, 0], A[b], q, n, own)
+        add_affine(loads.data, start, factor, q, n, own)
+    return OK

@@ -1,0 +1,30 @@
+"""Dry friction on a joint coordinate.
+
+Twin: `ffr_dyn.scene.forces.joint_friction`.
+"""
+
+import math
+
+from ffr_dyn.kernels.forces.coordinate import apply_along, coordinate_of, drive_of
+from ffr_dyn.kernels.options import kernel
+from ffr_dyn.kernels.simd.force_kernel import force_kernel
+from ffr_dyn.kernels.tables import LAW, OK, Tables, Vector
+
+
+@kernel
+def rubbing(data, start, rate, normal):
+    """data: Coulomb friction, what friction at rest has more, Stribeck's velocity, creep velocity, viscous damping."""
+    fall = rate / data[start + 2]
+    size = data[start] + data[start + 1] * math.exp(-fall * fall)
+    if normal < 0.0:  # lifted off
+        size = 0.0
+    return -normal * size * math.tanh(rate / data[start + 3]) - data[start + 4] * rate
+
+
+@force_kernel
+def friction(r: Tables, k: int, x: Vector, f: Vector, load: Vector) -> int:
+    value, rate, side_i, side_j = coordinate_of(r, k)
+    loads = r.model.loads
+    force = rubbing(loads.data, loads.row[k, LAW], rate, drive_of(r, k)[0])
+    apply_along(r, k, f, load, value, rate, side_i, side_j, force)
+    return OK

@@ -1,0 +1,26 @@
+"""Forces and moments on markers.
+
+Twin: `ffr_dyn.scene.forces.load`.
+"""
+
+from ffr_dyn.kernels.forces.given import given
+from ffr_dyn.kernels.markers import apply_wrench
+from ffr_dyn.kernels.simd.force_kernel import force_kernel
+from ffr_dyn.kernels.simd.slices import part, vector_at
+from ffr_dyn.kernels.tables import END_I, GLOBAL, OK, WAY, Tables, Vector
+from ffr_dyn.kernels.vectors import get, to_body
+
+
+@force_kernel
+def load(r: Tables, k: int, x: Vector, f: Vector, load: Vector) -> int:
+    m, w = r.model, r.work.markers
+    marker = m.loads.row[k, END_I]
+    A = w.A[w.body[marker]]
+    force = given(r, k, 0, 6), given(r, k, 1, 6), given(r, k, 2, 6)
+    moment = given(r, k, 3, 6), given(r, k, 4, 6), given(r, k, 5, 6)
+    if m.loads.row[k, WAY] == GLOBAL:
+        force, moment = to_body(A, force), to_body(A, moment)
+    taken = part(vector_at(load, 6 * m.markers.body.size), 6 * marker, 6)
+    right = vector_at(f, r.v.size)
+    apply_wrench(m.bodies.where, m.markers, get(w.u, marker), right, taken, marker, force, moment)
+    return OK

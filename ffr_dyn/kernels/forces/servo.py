@@ -1,0 +1,27 @@
+"""Position control of a joint coordinate.
+
+Twin: `ffr_dyn.scene.forces.servo`.
+"""
+
+from ffr_dyn.kernels.forces.coordinate import apply_along, coordinate_of, drive_of
+from ffr_dyn.kernels.options import kernel
+from ffr_dyn.kernels.simd.force_kernel import force_kernel
+from ffr_dyn.kernels.tables import LAW, OK, Tables, Vector
+
+
+@kernel
+def control(data, start, c, rate, target, target_rate):
+    """data: kp, kd, limit."""
+    force, limit = data[start] * (target - c) + data[start + 1] * (target_rate - rate), data[start + 2]
+    if force > limit:
+        return limit
+    return -limit if force < -limit else force
+
+
+@force_kernel
+def servo(r: Tables, k: int, x: Vector, f: Vector, load: Vector) -> int:
+    value, rate, side_i, side_j = coordinate_of(r, k)
+    loads, drive = r.model.loads, drive_of(r, k)
+    force = control(loads.data, loads.row[k, LAW], value, rate, drive[0], drive[1])
+    apply_along(r, k, f, load, value, rate, side_i, side_j, force)
+    return OK

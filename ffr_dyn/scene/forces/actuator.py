@@ -1,0 +1,51 @@
+"""A given force or torque on a joint coordinate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from ffr_dyn.scene.fields import OfMotion
+from ffr_dyn.scene.force_kinds import register_force
+from ffr_dyn.scene.forces.checks import check_function
+from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
+from ffr_dyn.scene.forces.given import given_numbers
+from ffr_dyn.scene.forces.places import OnJoint
+
+
+@register_force
+@dataclass(frozen=True)
+class Actuator(Force):
+    """A force [N] or torque [N m] on a joint coordinate.
+
+    force    : a number, a time function (constant, harmonic, table, ...) or a Python function of time
+    function : added to it, a Python function (t, state) -> number; `state` is a `ffr_dyn.equations.state_view.StateView`
+    """
+
+    word = "actuator"
+    kernel = "ffr_dyn.kernels.forces.actuator:actuator"
+    acts = "number, time function, Python function of t or of (t, state)"
+    positive = "increases c"
+    given = 1
+
+    name: str
+    joint: str
+    force: Annotated[Any, OfMotion()] = 0.0
+    function: Callable[..., Any] | None = None
+    coordinate: str = "angle"
+
+    def __post_init__(self) -> None:
+        check_function(self.force, f"{self.place.who}: force")
+
+    @property
+    def place(self) -> OnJoint:
+        return OnJoint(f"force {self.name!r}", self.joint, self.coordinate)
+
+    def law(self, now: Moment, c: float, rate: float) -> float:
+        added = 0.0 if self.function is None else float(self.function(now.t, now.state))
+        return now.value(self.force)[0] + added
+
+    def compiled(self, table: LoadTable) -> LawNumbers:
+        numbers = given_numbers((self.force,), self.place.who, table)
+        return LawNumbers(numbers, user=table.callback(self.function, 1))

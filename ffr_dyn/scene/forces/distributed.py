@@ -1,0 +1,108 @@
+"""Distributed loads through the reduced basis: their integrals, which laws and kernels of surface loads share.
+
+A body's surface has points u = u_0 + Phi q (body axes). Nodal forces f_p do the virtual work
+
+    sum_p f_p . delta(R + A u_p)    so that    F = sum f_p,   M = sum u_p x f_p,   Q = sum Phi_p^T f_p
+
+with f_p in body axes and M about the body's origin: the rigid resultant and the modal forces belong together (Shabana 2013,
+sec. 5.6). These loads do not add to the geometric stiffening of the body.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ffr_dyn.functions.rotation import rotation_matrix
+from ffr_dyn.scene.forces.force import LawNumbers, LoadTable, Moment
+from ffr_dyn.scene.scene import Scene
+from ffr_prep.body import FlexibleBody, Surface, axial
+from ffr_prep.common.errors import InputError
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Affine:
+    """Generalised forces constant + slope q in body axes: constant (6 + n,), slope (6 + n, n)."""
+
+    constant: Array
+    slope: Array
+
+    def at(self, q: Array, A: Array) -> Array:
+        """(6 + n,) generalised forces."""
+        forces: Array = self.constant + self.slope @ q
+        return forces
+
+    def numbers(self) -> Array:
+        return np.concatenate([self.constant, self.slope.ravel()])
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Forces of fixed global direction: force (3,), sum of u_0 f^T (3, 3), sum of phi_j f^T (3, 3, n); f global."""
+
+    force: Array
+    u_f: Array
+    phi_f: Array
+
+    def at(self, q: Array, A: Array) -> Array:
+        """(6 + n,) generalised forces."""
+        u_f = (self.u_f + self.phi_f @ q) @ A
+        return np.concatenate([self.force @ A, axial(u_f), np.einsum("klj,lk->j", self.phi_f, A)])
+
+    def numbers(self) -> Array:
+        return np.concatenate([self.force, self.u_f.ravel(), self.phi_f.ravel()])
+
+
+# Of every kind whose `integrals(model)` are these, with a place on a body and a `function` of time.
+
+
+def check_integrals(force: Any, scene: Scene) -> None:
+    """InputError when the body has not what the force needs."""
+    force.integrals(force.place.of(scene).model)
+
+
+def law_of_integrals(force: Any, now: Moment, c: Any, rate: Any) -> Any:
+    """(6 + n,) generalised forces: a function of time times the integrals."""
+    made: Affine | Spread = force.integrals(force.place.of(now.state.scene).model)
+    return now.value(force.function)[0] * made.at(c, rotation_matrix(now.state.rotation(force.body)))
+
+
+def compiled_integrals(force: Any, table: LoadTable) -> LawNumbers:
+    """What the kernel of distributed loads reads."""
+    made: Affine | Spread = force.integrals(force.place.of(table.scene).model)
+    return LawNumbers(made.numbers(), table.function(force.function))
+
+
+def affine(u: Array, Phi: Array, f: Array, slope: Array) -> Affine:
+    """Nodal forces f + slope q (N, 3), (N, 3, n) in body axes at u + Phi q: generalised forces to first order in q."""
+
+    def moment(at: str, arm: Array, force: Array) -> Array:
+        return axial(np.einsum(at, arm, force))
+
+    return Affine(
+        np.concatenate([f.sum(0), moment("pk,pl->kl", u, f), np.einsum("pkj,pk->j", Phi, f)]),
+        np.concatenate([
+            slope.sum(0),
+            moment("pkj,pl->klj", Phi, f) + moment("pk,plj->klj", u, slope),
+            np.einsum("pki,pkj->ij", Phi, slope),
+        ]),
+    )  # fmt: skip
+
+
+def surface_of(body: FlexibleBody, name: str) -> Surface:
+    """The surface on which the force of that name acts."""
+    if body.surface is None:
+        raise InputError(f"force {name!r}: body {body.name!r} has no surface to act on")
+    return body.surface
+
+
+def indices(value: Any, what: str) -> Array:
+    """Whole numbers from 0 as an array; InputError when they are none."""
+    array = np.atleast_1d(np.asarray(value))
+    if array.ndim != 1 or array.dtype.kind not in "iu" or (array < 0).any():
+        raise InputError(f"{what} must be whole numbers from 0, not {value!r}")
+    return array.astype(np.int64)

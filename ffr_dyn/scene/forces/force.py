@@ -1,0 +1,101 @@
+"""What a force is: the one protocol that all kinds of applied load keep.
+
+A kind is a frozen dataclass in a file of its own here, with a compiled kernel in another (`ffr_dyn.kernels.forces`). It says
+where it acts (a `Place`) and by which law; scenes, scene files, tables, equations, results and documentation ask it for what
+they need, and know no kind by name.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from ffr_dyn.scene.forces.places import Place
+from ffr_dyn.scene.scene import Scene
+
+Array = np.ndarray
+
+
+class Moment(Protocol):
+    """Time [s] and state (a `ffr_dyn.equations.state_view.StateView`) at which a law is evaluated."""
+
+    @property
+    def t(self) -> float: ...
+    @property
+    def state(self) -> Any: ...
+    def value(self, function: Any) -> tuple[float, float, float]:
+        """A number or function of time now, and two derivatives."""
+
+
+class LoadTable(Protocol):
+    """What collects the numbers of forces while a scene is compiled; each method says where what it is given is kept."""
+
+    @property
+    def scene(self) -> Scene: ...
+    def function(self, value: Any) -> int:
+        """A number or function of time: the number of the function."""
+
+    def callback(self, function: Callable[..., Any] | None, *sizes: int) -> int:
+        """A Python function of (t, state) that returns as many numbers: its first among the user's values; -1 for None."""
+
+    def curve(self, value: Any) -> int:
+        """Where a curve begins; -1 for what is none."""
+
+
+@dataclass(frozen=True)
+class LawNumbers:
+    """What compiled code knows of a law: numbers, its function of time and its first among the user's values, or -1."""
+
+    numbers: Sequence[float] | Array
+    function: int = -1
+    user: int = -1
+
+
+class Force(ABC):
+    """One applied load. Kinds are final; what follows here holds unless a kind says otherwise.
+
+    table    : the field of `Scene`, and the table of a scene file, that holds it;  word : its `kind` there
+    kernel   : its compiled form (see `ffr_dyn.kernels.simd.force_kernel`), or "package.module:name", imported when it is used
+    acts, positive : what it is and which way it counts, for the table in docs/forces.md
+    stores_energy  : it has an `energy`
+    given    : how many components are given from outside, so that analyses can size them, 0 where the state makes the force;
+               the numbers of its law begin with a factor for each, then their functions of time or -1
+    """
+
+    name: str
+    table: ClassVar[str] = "forces"
+    word: ClassVar[str]
+    kernel: ClassVar[Any]
+    acts: ClassVar[str]
+    positive: ClassVar[str]
+    stores_energy: ClassVar[bool] = False
+    given: ClassVar[int] = 0
+
+    @property
+    @abstractmethod
+    def place(self) -> Place:
+        """Where it acts."""
+
+    @abstractmethod
+    def law(self, now: Moment, c: Any, rate: Any) -> Any:
+        """The readable form: force on the coordinates c of the place at these rates (see `ffr_dyn.scene.forces.places`)."""
+
+    @abstractmethod
+    def compiled(self, table: LoadTable) -> LawNumbers:
+        """What the kernel reads of the law."""
+
+    def energy(self, c: Array) -> Array:
+        """(T,) [J] stored at recorded coordinates (T,) or (T, 6)."""
+        return np.zeros(len(c))
+
+    def check(self, scene: Scene) -> None:
+        """InputError when the scene has not what the force needs."""
+        self.place.check(scene)
+
+    def stays_in_plane(self, scene: Scene, normal: int) -> bool:
+        """Whether it moves bodies only in the plane across the global axis `normal`."""
+        return self.place.stays_in_plane(scene, normal)

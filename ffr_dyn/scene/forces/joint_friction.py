@@ -1,0 +1,78 @@
+"""Dry friction on a joint coordinate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+
+from ffr_dyn.scene.fields import OfTime
+from ffr_dyn.scene.force_kinds import register_force
+from ffr_dyn.scene.forces.checks import check_function, check_number, check_positive
+from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
+from ffr_dyn.scene.forces.places import OnJoint
+from ffr_prep.common.errors import InputError
+
+
+@register_force
+@dataclass(frozen=True)
+class JointFriction(Force):
+    """Dry friction against the rate c_dot of a joint coordinate, made smooth over the velocity `creep`:
+
+        -normal (coulomb + (static - coulomb) exp(-(c_dot / stribeck)^2)) tanh(c_dot / creep) - viscous c_dot
+
+    coulomb : friction force [N] with normal = 1, or coefficient of friction with `normal` [N] (times radius for an angle)
+    normal  : a number not below zero, a time function or a Python function of time, below zero while the surfaces are
+              apart. It is given: the joint's reaction does not enter
+    creep   : [m/s]; a load below friction is not held but creeps, at creep atanh(load / coulomb)
+    static, stribeck : friction at rest, not below coulomb, and the velocity [m/s] over which it falls (Stribeck 1902);
+              both or neither
+    viscous : [N s/m]
+    """
+
+    word = "joint-friction"
+    kernel = "ffr_dyn.kernels.forces.friction:friction"
+    acts = "−N (μ + (μ_s − μ) exp(−(ċ/v_s)²)) tanh(ċ/creep) − viscous ċ"
+    positive = "increases c"
+
+    name: str
+    joint: str
+    coulomb: float
+    creep: float
+    normal: Annotated[Any, OfTime("N")] = 1.0
+    static: float | None = None
+    stribeck: float | None = None
+    viscous: float = 0.0
+    coordinate: str = "angle"
+
+    def __post_init__(self) -> None:
+        who = self.place.who
+        check_number(self.coulomb, f"{who}: coulomb", least=0.0)
+        check_positive(self.creep, f"{who}: creep")
+        check_number(self.viscous, f"{who}: viscous", least=0.0)
+        check_function(self.normal, f"{who}: normal", least=0.0)
+        if (self.static is None) != (self.stribeck is None):
+            raise InputError(f"{who}: static and stribeck belong together; give both or neither")
+        if self.static is not None:
+            check_number(self.static, f"{who}: static", least=self.coulomb)
+            check_positive(self.stribeck, f"{who}: stribeck")
+
+    @property
+    def place(self) -> OnJoint:
+        return OnJoint(f"force {self.name!r}", self.joint, self.coordinate)
+
+    def law(self, now: Moment, c: float, rate: float) -> float:
+        normal = now.value(self.normal)[0]
+        if normal < 0:  # lifted off
+            return -self.viscous * rate
+        size = self.coulomb
+        if self.static is not None and self.stribeck is not None:
+            size += (self.static - self.coulomb) * float(np.exp(-((rate / self.stribeck) ** 2)))
+        return float(-normal * size * np.tanh(rate / self.creep) - self.viscous * rate)
+
+    def compiled(self, table: LoadTable) -> LawNumbers:
+        """Coulomb friction, what friction at rest has more, Stribeck's velocity, creep velocity, viscous damping."""
+        more = 0.0 if self.static is None else self.static - self.coulomb
+        fall = 1.0 if self.stribeck is None else self.stribeck
+        return LawNumbers([self.coulomb, more, fall, self.creep, self.viscous], table.function(self.normal))

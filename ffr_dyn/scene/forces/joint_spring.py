@@ -1,0 +1,61 @@
+"""A spring and damper on a joint coordinate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_dyn.functions.curves import Curve
+from ffr_dyn.scene.force_kinds import register_force
+from ffr_dyn.scene.forces.checks import check_damping, check_number, check_number_or_curve
+from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
+from ffr_dyn.scene.forces.places import OnJoint
+from ffr_dyn.scene.forces.spring_law import compiled_spring, spring_force, stored
+
+Array = np.ndarray
+
+
+@register_force
+@dataclass(frozen=True)
+class JointSpring(Force):
+    """-(stiffness (c - free) + damping dc/dt + preload) on a joint coordinate c: a torsion spring, or one along a guide.
+
+    stiffness : [N/m], or a `Curve` of the force over c - free;  damping : [N s/m], not negative, or a `Curve` over dc/dt
+    free      : coordinate without force [m];  preload : [N], positive pulls back;  turns : whole turns at the start
+    """
+
+    word = "joint-spring"
+    kernel = "ffr_dyn.kernels.forces.spring:spring"
+    acts = "joint coordinate c: −(k (c − free) + d ċ + preload)"
+    positive = "increases c"
+    stores_energy = True
+
+    name: str
+    joint: str
+    stiffness: float | Curve = 0.0
+    damping: float | Curve = 0.0
+    free: float = 0.0
+    preload: float = 0.0
+    coordinate: str = "angle"
+    turns: int = 0
+
+    def __post_init__(self) -> None:
+        who = self.place.who
+        check_number_or_curve(self.stiffness, f"{who}: stiffness")
+        check_damping(self.damping, f"{who}: damping")
+        check_number(self.free, f"{who}: free")
+        check_number(self.preload, f"{who}: preload")
+
+    @property
+    def place(self) -> OnJoint:
+        return OnJoint(f"force {self.name!r}", self.joint, self.coordinate, self.turns)
+
+    def law(self, now: Moment, c: float, rate: float) -> float:
+        return spring_force(self.stiffness, self.damping, self.preload, c - self.free, rate)
+
+    def compiled(self, table: LoadTable) -> LawNumbers:
+        return compiled_spring(self.stiffness, self.damping, self.free, self.preload, table)
+
+    def energy(self, c: Array) -> Array:
+        return stored(self.stiffness, self.preload, c - self.free)

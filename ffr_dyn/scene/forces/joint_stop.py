@@ -1,0 +1,74 @@
+"""End stops of a joint coordinate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_dyn.scene.force_kinds import register_force
+from ffr_dyn.scene.forces.checks import check_number, check_positive
+from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
+from ffr_dyn.scene.forces.places import OnJoint
+from ffr_prep.common.errors import InputError
+
+
+@register_force
+@dataclass(frozen=True)
+class JointStop(Force):
+    """End stops: one-sided spring-dampers beyond `lower` and `upper` [m] of a joint coordinate. They never pull.
+
+    stiffness : [N/m];  damping : [N s/m], grows from zero over the depth `entry`
+    entry     : [m] depth over which the stiffness grows from zero: the force is stiffness depth^2 / (2 entry) down to it,
+                stiffness (depth - entry / 2) below
+    turns     : whole turns of an angle at the start
+    """
+
+    word = "joint-stop"
+    kernel = "ffr_dyn.kernels.forces.stop:stop"
+    acts = "one-sided spring-dampers beyond lower and upper"
+    positive = "increases c"
+
+    name: str
+    joint: str
+    stiffness: float
+    entry: float
+    lower: float | None = None
+    upper: float | None = None
+    damping: float = 0.0
+    coordinate: str = "angle"
+    turns: int = 0
+
+    def __post_init__(self) -> None:
+        who = self.place.who
+        check_positive(self.stiffness, f"{who}: stiffness")
+        check_positive(self.entry, f"{who}: entry")
+        check_number(self.damping, f"{who}: damping", least=0.0)
+        if self.lower is None and self.upper is None:
+            raise InputError(f"{who} stops nothing: give lower, upper or both")
+        for key in ("lower", "upper"):
+            if getattr(self, key) is not None:
+                check_number(getattr(self, key), f"{who}: {key}")
+        if self.lower is not None and self.upper is not None and not self.lower < self.upper:
+            raise InputError(f"{who}: lower is {self.lower:g} and upper {self.upper:g}; lower must be below upper")
+
+    @property
+    def place(self) -> OnJoint:
+        return OnJoint(f"force {self.name!r}", self.joint, self.coordinate, self.turns)
+
+    def law(self, now: Moment, c: float, rate: float) -> float:
+        below = 0.0 if self.lower is None else self._push(self.lower - c, -rate)
+        return below if self.upper is None else below - self._push(c - self.upper, rate)
+
+    def _push(self, depth: float, speed: float) -> float:
+        if depth <= 0:
+            return 0.0
+        elastic = depth**2 / (2 * self.entry) if depth < self.entry else depth - self.entry / 2
+        share = min(depth / self.entry, 1.0)
+        return max(self.stiffness * elastic + self.damping * speed * share**2 * (3 - 2 * share), 0.0)
+
+    def compiled(self, table: LoadTable) -> LawNumbers:
+        """Lower and upper end, stiffness, damping, entry."""
+        lower = -np.inf if self.lower is None else self.lower
+        upper = np.inf if self.upper is None else self.upper
+        return LawNumbers([lower, upper, self.stiffness, self.damping, self.entry])

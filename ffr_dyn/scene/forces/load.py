@@ -1,0 +1,79 @@
+"""A force and a moment on a marker."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sized
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+
+from ffr_dyn.scene.fields import OfMotion, Three
+from ffr_dyn.scene.force_kinds import register_force
+from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
+from ffr_dyn.scene.forces.given import given_numbers, is_number
+from ffr_dyn.scene.forces.places import AtMarker
+from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.errors import InputError
+
+Array = np.ndarray
+
+
+@register_force
+@dataclass(frozen=True)
+class Load(Force):
+    """A force [N] and a moment [N m] on a marker.
+
+    marker : "body.interface"
+    force, moment : three components each; a component is a number, a `TimeFunction` (constant, harmonic, table, ...)
+        or a Python function of time
+    function : instead of these, a Python function (t, state) -> (3,) force or (6,) force and moment; `state` is a
+        `ffr_dyn.equations.state_view.StateView`
+    axes : "global", or "body" for a follower load
+    """
+
+    table = "loads"
+    word = ""
+    kernel = "ffr_dyn.kernels.forces.load:load"
+    acts = (
+        "force [N] and moment [N m] on a marker, global or body axes; "
+        "numbers, time functions, Python functions of (t, state)"
+    )
+    positive = "along the axes"
+    given = 6
+
+    name: str
+    marker: str
+    force: Annotated[Any, Three(OfMotion("N"))] = (0.0, 0.0, 0.0)
+    moment: Annotated[Any, Three(OfMotion("N m"))] = (0.0, 0.0, 0.0)
+    function: Callable[..., Any] | None = None
+    axes: str = "global"
+
+    def __post_init__(self) -> None:
+        if self.axes not in ("global", "body"):
+            raise InputError(f"load {self.name!r}: axes must be 'global' or 'body', not {self.axes!r}")
+        for what, value in (("force", self.force), ("moment", self.moment)):
+            if not isinstance(value, Sized) or len(value) != 3:
+                found = len(value) if isinstance(value, Sized) else value
+                whole = "a function (t, state) that gives all of them goes to `function`"
+                raise InputError(f"load {self.name!r}: {what} needs three components, not {found}; {whole}")
+
+    @property
+    def place(self) -> AtMarker:
+        return AtMarker(self.marker, self.axes)
+
+    def law(self, now: Moment, c: Any, rate: Any) -> Array:
+        values = np.array([now.value(component)[0] for component in (*self.force, *self.moment)])
+        if self.function is not None:
+            given = np.ravel(self.function(now.t, now.state))
+            values[: given.size] += given
+        return values
+
+    def compiled(self, table: LoadTable) -> LawNumbers:
+        numbers = given_numbers((*self.force, *self.moment), f"load {self.name!r}", table)
+        return LawNumbers(numbers, user=table.callback(self.function, 3, 6))
+
+    def stays_in_plane(self, scene: Scene, normal: int) -> bool:
+        k = self.place.axis_along(scene, normal)
+        across = [self.force[k], *(self.moment[c] for c in range(3) if c != k)]
+        return self.function is None and all(is_number(component) and component == 0 for component in across)

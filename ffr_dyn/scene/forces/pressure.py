@@ -1,0 +1,106 @@
+"""Pressure on a body's surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+
+from ffr_dyn.scene.fields import OfTime
+from ffr_dyn.scene.force_kinds import register_force
+from ffr_dyn.scene.forces.checks import check_array, check_function
+from ffr_dyn.scene.forces.distributed import (
+    Affine,
+    affine,
+    check_integrals,
+    compiled_integrals,
+    indices,
+    law_of_integrals,
+    surface_of,
+)
+from ffr_dyn.scene.forces.force import Force
+from ffr_dyn.scene.forces.places import OnBody
+from ffr_prep.body import FlexibleBody, Surface
+from ffr_prep.common.errors import InputError
+
+Array = np.ndarray
+
+
+@register_force
+@dataclass(frozen=True)
+class Pressure(Force):
+    """Pressure [Pa] on triangles of a body's surface; positive pushes against their outward normals.
+
+    pressure  : a number or one for each point of the surface (P,), linear over each triangle
+    triangles : None for all, numbers of triangles, or a Python function of their centres (T, 3) [m], undeformed in the body
+                frame, that returns which (T,) are loaded
+    function  : factor over time: a number, a time function or a Python function
+    follower  : True: area and normal follow the elastic deformation, to first order in q; False: they stay those of
+                the undeformed body, fixed to its frame
+    """
+
+    word = "pressure"
+    kernel = "ffr_dyn.kernels.forces.distributed:distributed"
+    check, law, compiled = check_integrals, law_of_integrals, compiled_integrals
+    acts = "pressure [Pa] on surface triangles, fixed to the frame or following the deformation to first order"
+    positive = "against the outward normal"
+
+    name: str
+    body: str
+    pressure: Annotated[Any, float | list[float]]
+    triangles: Annotated[Any, list[int]] = None
+    function: Annotated[Any, OfTime()] = 1.0
+    follower: bool = False
+
+    def __post_init__(self) -> None:
+        who = f"pressure {self.name!r}"
+        check_function(self.function, f"{who}: function")
+        shape = np.shape(self.pressure)
+        object.__setattr__(self, "pressure", check_array(self.pressure, shape[:1], f"{who}: pressure"))
+        if self.triangles is not None and not callable(self.triangles):
+            object.__setattr__(self, "triangles", indices(self.triangles, f"{who}: triangles"))
+
+    @property
+    def place(self) -> OnBody:
+        return OnBody(f"force {self.name!r}", self.body)
+
+    def integrals(self, body: FlexibleBody) -> Affine:
+        """The work of linear pressure one on linear triangles: nodal forces -A/12 (1 + delta_ab) p_b n.
+
+        Raises InputError when the body has no surface, or not the triangles.
+        """
+        surface = surface_of(body, self.name)
+        corners = surface.triangles[self._chosen(body, surface)]
+        u, Phi = surface.points[corners], surface.Phi[corners]  # (T, 3, 3), (T, 3, 3, n)
+        edge, other = u[:, 1] - u[:, 0], u[:, 2] - u[:, 0]
+        edge_q, other_q = Phi[:, 1] - Phi[:, 0], Phi[:, 2] - Phi[:, 0]
+        area = np.cross(edge, other) / 2  # (T, 3) area times outward normal
+        area_q = (np.cross(edge_q, other[:, :, None], axis=1) + np.cross(edge[:, :, None], other_q, axis=1)) / 2
+        p = self._at_points(body, surface)[corners]
+        share = -(p + p.sum(1, keepdims=True)) / 12  # (T, 3)
+        f = share[:, :, None] * area[:, None]
+        slope = share[:, :, None, None] * area_q[:, None] * (1.0 if self.follower else 0.0)
+        count, n = 3 * len(corners), body.n
+        return affine(u.reshape(count, 3), Phi.reshape(count, 3, n), f.reshape(count, 3), slope.reshape(count, 3, n))
+
+    def _at_points(self, body: FlexibleBody, surface: Surface) -> Array:
+        size = len(surface.points)
+        if self.pressure.ndim and self.pressure.size != size:
+            raise InputError(
+                f"pressure {self.name!r}: {self.pressure.size} values for the {size} points of the surface of {body.name!r}"
+            )
+        return np.broadcast_to(self.pressure, size)
+
+    def _chosen(self, body: FlexibleBody, surface: Surface) -> Array:
+        """Numbers of the loaded triangles."""
+        count = len(surface.triangles)
+        if callable(self.triangles):
+            centres = surface.points[surface.triangles].mean(axis=1)
+            chosen = np.flatnonzero(np.broadcast_to(self.triangles(centres), count))
+        else:
+            chosen = np.arange(count) if self.triangles is None else self.triangles
+        if chosen.size == 0 or chosen.max() >= count:
+            what = "no triangle" if chosen.size == 0 else f"triangle {chosen.max()}"
+            raise InputError(f"pressure {self.name!r} acts on {what}; the surface of {body.name!r} has {count}")
+        return chosen

@@ -1,0 +1,58 @@
+"""Position control of a joint coordinate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+
+from ffr_dyn.scene.fields import OfTime
+from ffr_dyn.scene.force_kinds import register_force
+from ffr_dyn.scene.forces.checks import check_function, check_number
+from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
+from ffr_dyn.scene.forces.places import OnJoint
+from ffr_prep.common.errors import InputError
+
+
+@register_force
+@dataclass(frozen=True)
+class Servo(Force):
+    """Position control of a joint coordinate c: kp (target - c) + kd (target_dot - dc/dt), held within +-limit.
+
+    target : a number, a time function, or a Python function t -> value or (value, rate, second derivative)
+    kp [N/m], kd [N s/m]: not negative;  limit [N]: largest force, by default none;  turns : whole turns at the start
+    """
+
+    word = "servo"
+    kernel = "ffr_dyn.kernels.forces.servo:servo"
+    acts = "kp (target − c) + kd (target rate − ċ), within ± limit"
+    positive = "increases c"
+
+    name: str
+    joint: str
+    target: Annotated[Any, OfTime()]
+    kp: float
+    kd: float = 0.0
+    limit: float = np.inf
+    coordinate: str = "angle"
+    turns: int = 0
+
+    def __post_init__(self) -> None:
+        who = self.place.who
+        check_function(self.target, f"{who}: target")
+        check_number(self.kp, f"{who}: kp", least=0.0)
+        check_number(self.kd, f"{who}: kd", least=0.0)
+        if not self.limit > 0:
+            raise InputError(f"{who}: limit is {self.limit}; it must be positive")
+
+    @property
+    def place(self) -> OnJoint:
+        return OnJoint(f"force {self.name!r}", self.joint, self.coordinate, self.turns)
+
+    def law(self, now: Moment, c: float, rate: float) -> float:
+        target, speed, _ = now.value(self.target)
+        return float(np.clip(self.kp * (target - c) + self.kd * (speed - rate), -self.limit, self.limit))
+
+    def compiled(self, table: LoadTable) -> LawNumbers:
+        return LawNumbers([self.kp, self.kd, self.limit], table.function(self.target))

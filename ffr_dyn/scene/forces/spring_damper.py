@@ -1,0 +1,69 @@
+"""A spring and damper between two markers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from ffr_dyn.functions.curves import Curve
+from ffr_dyn.scene.fields import In
+from ffr_dyn.scene.force_kinds import register_force
+from ffr_dyn.scene.forces.checks import check_damping, check_number, check_number_or_curve
+from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
+from ffr_dyn.scene.forces.places import AlongLine
+from ffr_dyn.scene.forces.spring_law import compiled_spring, spring_force, stored
+from ffr_prep.common.errors import InputError
+
+Array = np.ndarray
+
+
+@register_force
+@dataclass(frozen=True)
+class SpringDamper(Force):
+    """Force along the line i - j, positive in tension: stiffness (l - free_length) + damping dl/dt + preload.
+
+    stiffness : [N/m], or a `Curve` of the force [N] over l - free_length [m]
+    damping   : [N s/m], not negative, or a `Curve` of the force [N] over dl/dt [m/s]
+    free_length [m], not negative; preload [N]
+
+    While both points are at one place the force has no direction, and is zero.
+    """
+
+    table = "springs"
+    word = ""
+    kernel = "ffr_dyn.kernels.forces.spring:spring"
+    acts = "along the line of two markers: k (l − free_length) + d l̇ + preload"
+    positive = "tension"
+    stores_energy = True
+
+    name: str
+    i: str
+    j: str
+    stiffness: Annotated[float | Curve, In("N/m")]
+    damping: Annotated[float | Curve, In("N s/m")] = 0.0
+    free_length: Annotated[float, In("m")] = 0.0
+    preload: Annotated[float, In("N")] = 0.0
+
+    def __post_init__(self) -> None:
+        who = f"spring {self.name!r}"
+        check_number_or_curve(self.stiffness, f"{who}: stiffness")
+        check_damping(self.damping, f"{who}: damping")
+        check_number(self.free_length, f"{who}: free_length", least=0.0)
+        check_number(self.preload, f"{who}: preload")
+        if self.i == self.j:
+            raise InputError(f"{who} has length zero: both its ends are at {self.i!r}")
+
+    @property
+    def place(self) -> AlongLine:
+        return AlongLine(self.i, self.j)
+
+    def law(self, now: Moment, c: float, rate: float) -> float:
+        return spring_force(self.stiffness, self.damping, self.preload, c - self.free_length, rate)
+
+    def compiled(self, table: LoadTable) -> LawNumbers:
+        return compiled_spring(self.stiffness, self.damping, self.free_length, self.preload, table)
+
+    def energy(self, c: Array) -> Array:
+        return stored(self.stiffness, self.preload, c - self.free_length)

@@ -1,0 +1,39 @@
+"""The law of springs on one coordinate, whose stiffness and damping are numbers or curves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ffr_dyn.functions.curves import Curve, curve_integral, curve_value
+from ffr_dyn.scene.forces.force import LawNumbers, LoadTable
+
+Array = np.ndarray
+
+
+def spring_force(
+    stiffness: float | Curve, damping: float | Curve, preload: float, stretch: float, rate: float
+) -> float:
+    """The force that increases the stretch [m]."""
+    return -_of(stiffness, stretch) - _of(damping, rate) - preload
+
+
+def compiled_spring(
+    stiffness: float | Curve, damping: float | Curve, free: float, preload: float, table: LoadTable
+) -> LawNumbers:
+    """Stiffness, damping, free coordinate, preload, start of the curves of force and damping or -1."""
+    k, d = (0.0 if isinstance(factor, Curve) else factor for factor in (stiffness, damping))
+    return LawNumbers([k, d, free, preload, table.curve(stiffness), table.curve(damping)])
+
+
+def stored(stiffness: float | Curve, preload: float, stretch: Array) -> Array:
+    """(T,) [J], zero where the spring is not stretched."""
+    return elastic_energy(stiffness, stretch) + preload * stretch
+
+
+def elastic_energy(stiffness: float | Curve, stretch: Array) -> Array:
+    """(T,) [J] without preload."""
+    return curve_integral(stiffness, stretch) if isinstance(stiffness, Curve) else 0.5 * stiffness * stretch**2
+
+
+def _of(factor: float | Curve, x: float) -> float:
+    return curve_value(factor, x) if isinstance(factor, Curve) else factor * x
