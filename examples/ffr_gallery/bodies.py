@@ -12,9 +12,8 @@ from ffr_dyn.results.result import Result
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import FlexibleBody, Interface, Surface, rigid_body
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
-
-Array = np.ndarray
 
 GRAVITY = (0.0, -9.81, 0.0)
 POINTS = 30  # of the quadrature: exact for the polynomials that are used

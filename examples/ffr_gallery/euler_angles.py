@@ -10,8 +10,7 @@ from ffr_dyn.integrators import RK4
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_gallery.exhibit import Claim, Curve, Exhibit, Mark, Panel, Proof
 from ffr_prep.body import rigid_body
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 SPEED, STEP, END = 1.0, 0.01, 3.0  # rad/s, s, s
 FINER = 4

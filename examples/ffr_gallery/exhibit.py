@@ -9,7 +9,7 @@ from textwrap import wrap
 
 import numpy as np
 
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 
 @dataclass(frozen=True)

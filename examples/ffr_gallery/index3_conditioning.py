@@ -19,8 +19,7 @@ from ffr_dyn.integrators import RK4, GeneralisedAlpha
 from ffr_dyn.scene.scene import Scene
 from ffr_gallery.bodies import beam, pendulum, tried
 from ffr_gallery.exhibit import Claim, Curve, Exhibit, Panel, Proof
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 BETA = 0.25
 SMALL = 1e-6  # s

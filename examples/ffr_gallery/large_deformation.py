@@ -16,8 +16,7 @@ from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_gallery.bodies import beam
 from ffr_gallery.exhibit import Claim, Curve, Exhibit, Mark, Panel, Proof, boundary
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 
 def loaded(force: float) -> Scene:

@@ -21,8 +21,7 @@ from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 CHANGED = 1e-9  # m, rad, m/s, rad/s and elastic coordinates, from where a change is told
 

@@ -21,9 +21,8 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
 from ffr_dyn.analyses.servo import ServoMotion, at_moment, at_rest, slope, slope_matrix
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
-
-Array = np.ndarray
 
 ITERATIONS = 40
 TOLERANCE = 1e-10  # of a correction, relative to the largest value

@@ -13,9 +13,8 @@ import numpy as np
 
 from ffr_dyn.results.power import Worked
 from ffr_dyn.results.quantities import Memory, Unwound
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

@@ -20,12 +20,11 @@ from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces import Actuator, Load
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

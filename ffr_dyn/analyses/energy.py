@@ -26,9 +26,8 @@ from ffr_dyn.integrators.stabilisation import excess_of_gains
 from ffr_dyn.kernels.tables import K_SIZE, NOT_FINITE, OK, Record
 from ffr_dyn.results.power import power
 from ffr_dyn.results.recorded_motion import View
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
-
-Array = np.ndarray
 
 BEYOND = 10.0  # times what there was to give, from where the energy is looked into
 ANCHOR = 2.5  # times that, up to where the part begins that is done again

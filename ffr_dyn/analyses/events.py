@@ -25,9 +25,8 @@ from ffr_dyn.integrators import Integrator
 from ffr_dyn.kernels.tables import OK, Record
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.recorded_motion import View
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
-
-Array = np.ndarray
 
 WIDTH = 4 * np.finfo(float).eps  # of a step, and relative: what brentq can reach
 

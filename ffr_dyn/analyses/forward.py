@@ -45,9 +45,8 @@ from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import Surface
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
-
-Array = np.ndarray
 
 LOOKS = 10  # of a quantity that adds up, from row to row, where the method chooses its steps
 SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, file and keyboard

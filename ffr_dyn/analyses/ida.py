@@ -29,9 +29,8 @@ from ffr_dyn.consistency.evaluation import (
 )
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.equations.motion import position_rates
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
-
-Array = np.ndarray
 
 UNCONTROLLED = 1e20  # absolute tolerance of multipliers
 MOST_STEPS = 100_000  # between two rows

@@ -28,9 +28,8 @@ from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
-
-Array = np.ndarray
 
 ITERATIONS = 30
 TOLERANCE = 1e-12  # of a change of q, relative to its size or to that which strains the body by 1e-6 of its length

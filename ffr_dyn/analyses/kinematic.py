@@ -37,9 +37,8 @@ from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Body, Scene, require_scene
 from ffr_prep.body import truncated
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
-
-Array = np.ndarray
 
 TOLERANCE = 1e-11  # of Phi [m, -]
 ITERATIONS = 8  # of Newton's method in a part of a step

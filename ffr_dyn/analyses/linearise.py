@@ -32,10 +32,9 @@ from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 STATIONARY = 1e-6  # of the accelerations in moving axes, relative to those of the applied forces
 

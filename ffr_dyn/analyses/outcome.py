@@ -20,9 +20,8 @@ from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.joints import COORDINATES, frames
 from ffr_dyn.scene.scene import GROUND, Scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 
 def output_times(start: float, end: float, output_step: float) -> Array:

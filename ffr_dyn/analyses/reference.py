@@ -26,9 +26,8 @@ from ffr_dyn.results.file import save_result
 from ffr_dyn.results.quantities import measure, needs_every_step, selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
-
-Array = np.ndarray
 
 SOLVERS = ("DOP853", "Radau", "LSODA", "BDF", "RK45")
 DIFFERENCE = 1e-7  # of a coordinate, for Jacobians

@@ -41,9 +41,8 @@ from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.scene.drivers import Driver, driver_word
 from ffr_dyn.scene.joints import COORDINATES, Word
 from ffr_dyn.scene.scene import Scene, marker_number
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
-
-Array = np.ndarray
 
 ITERATIONS = 20
 TOLERANCE = 1e-12  # of a step of the positions

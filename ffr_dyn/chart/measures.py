@@ -18,9 +18,8 @@ from ffr_dyn.results.stress import stress_histories
 from ffr_dyn.scene.scene import Body, Scene, marker_number
 from ffr_dyn.scene.stress_sensors import nearest_point
 from ffr_prep.body import BodyError, Interface
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 PLACES = 48  # points of the surface at which the deflection of a whole body is looked at
 

@@ -17,10 +17,9 @@ from ffr_dyn.chart.runner import Failure, Job, Outcome, Pool, Span, perform
 from ffr_dyn.chart.variants import FULL, Model, Variant, explicit_parts
 from ffr_dyn.integrators.stabilisation import Stabilisation
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import ComputationError
-
-Array = np.ndarray
 
 ROUNDED = 1e-7  # below which a distance that does not fall any more is due to rounding
 WANTED = 1e-6

@@ -36,9 +36,9 @@ from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import BodyError
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
-Array = np.ndarray
 Item = TypeVar("Item")
 
 RETRIES = 2

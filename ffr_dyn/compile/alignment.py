@@ -10,7 +10,8 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
+
 T = TypeVar("T", bound=tuple[Any, ...])
 
 LINE = 8  # numbers of eight bytes in a cache line

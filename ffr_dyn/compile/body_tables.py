@@ -29,8 +29,7 @@ from ffr_dyn.kernels.tables import (
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.variants.plane import stiffening_loads
 from ffr_prep.body import axial
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 ROUNDING = 1e-8  # of I5 and I9 of unit modes: what symmetry leaves of zeros
 STIFFNESS_ROUNDING = 1e-7  # the same of the stiffness by a load, relative to its largest: slopes are rougher

@@ -18,12 +18,11 @@ from ffr_dyn.kernels.simd.force_kernel import kernel_of
 from ffr_dyn.kernels.simd.table_address import pack
 from ffr_dyn.kernels.tables import PER_ROW, Clock, Control, Model, Record, Tables, Work
 from ffr_dyn.scene.force_kinds import kernels_of
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 
 if TYPE_CHECKING:
     from ffr_dyn.integrators import Controlled, Integrator
-
-Array = np.ndarray
 
 LEAST_STEP = 1e-9  # of a controlled method, relative to the spacing of its rows
 

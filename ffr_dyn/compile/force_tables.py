@@ -14,9 +14,8 @@ from ffr_dyn.kernels.tables import WAYS, Functions, Loads
 from ffr_dyn.scene.force_kinds import forces_of, kernels_of
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,9 @@ from ffr_dyn.kernels.tables import LANES, WAYS, WORDS, Markers, Model, Pattern, 
 from ffr_dyn.scene.force_kinds import loaded_markers
 from ffr_dyn.scene.joints import Word
 from ffr_dyn.scene.scene import MarkerName, Scene, marker_number, markers
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, repr=False)

@@ -13,8 +13,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from ffr_dyn.kernels.tables import LANES, QUAD
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 # What sorting costs: as much as this many multiplications per product (measured with 8 to 64 coordinates).
 SORTING = 8

@@ -32,8 +32,7 @@ from ffr_dyn.kernels.tables import (
     Work,
 )
 from ffr_dyn.kernels.vectors import LEAST_PIVOT
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 
 def new_work(m: Model, *, keeps_terms: bool = False, looks_ahead: int = 0) -> Work:

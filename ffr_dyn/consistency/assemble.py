@@ -24,10 +24,9 @@ from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction
 from ffr_dyn.scene.joints import DISTANCE
 from ffr_dyn.scene.scene import Scene, require_scene
 from ffr_dyn.variants.plane import planar_forms
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 TOLERANCE = 1e-11  # of Phi [m, -] and of its rate
 ASKED = 1e-6  # of a row across the plane at random speeds of about one; modes carry rounding of 1e-9

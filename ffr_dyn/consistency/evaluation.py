@@ -19,10 +19,9 @@ from ffr_dyn.equations.layout import Layout, initial_state
 from ffr_dyn.functions.rotation import from_vector, rotation_matrix, skew
 from ffr_dyn.kernels.tables import IN_Q, IN_SHARED, OK, SINGULAR_CONSTRAINT, Record, Work
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import ComputationError
-
-Array = np.ndarray
 
 RANK_TOLERANCE = 1e-9  # of a singular value of the mass-weighted Jacobian, relative to the largest
 

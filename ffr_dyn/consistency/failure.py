@@ -21,9 +21,8 @@ from ffr_dyn.kernels.tables import (
     Work,
 )
 from ffr_dyn.scene.force_kinds import forces_of
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
-
-Array = np.ndarray
 
 OPEN, LOST = 1e-2, 1e2  # m, -: of constraints, more than drift, and what follows from a lost state
 HUGE = 1e12  # N, N m: no force of a machine; what made the state overflow

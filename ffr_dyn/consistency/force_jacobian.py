@@ -12,9 +12,8 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.equations.forces import gravity_forces
 from ffr_dyn.functions.rotation import G_bar, rotation_matrix
 from ffr_dyn.kernels.tables import OK
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
-
-Array = np.ndarray
 
 STEP = 1e-4  # of a motion in m, rad or m sqrt(kg); divided by the largest shape for elastic coordinates
 RATE_STEP = 1e-3

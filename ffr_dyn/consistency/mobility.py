@@ -13,10 +13,9 @@ from ffr_dyn.equations.constraints import evaluate_word
 from ffr_dyn.equations.layout import Layout, layout
 from ffr_dyn.scene.joints import COORDINATES, RELATION, Joint, Word, coordinate_axes, frames
 from ffr_dyn.scene.scene import Scene, marker_number
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 MOVES = 1e-6  # of a body's motion, relative to the largest
 ALONG = ("turn x", "turn y", "turn z", "shift x", "shift y", "shift z")

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 CLEARLY = 1e-12  # of a row's square, that those before it do not contain: rounding leaves 1e-15 or so
 TRUNCATED = 1e-10  # singular values, relative to the largest, that count as zero

@@ -24,8 +24,7 @@ from ffr_dyn.consistency.evaluation import (
     total_mass_matrix,
 )
 from ffr_dyn.functions.rotation import rotation_matrix
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 STEP = 2e-4  # largest relative movement [rad, or part of the scene's size] of a difference
 CORRECTIONS = 2  # onto the constraints, at a deviation of that size

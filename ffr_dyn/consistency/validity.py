@@ -12,8 +12,7 @@ from ffr_dyn.kernels.tables import Record
 from ffr_dyn.results.recorded_motion import shaped
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import FlexibleBody
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 MEANINGLESS = 100.0  # elastic rotation [rad]
 STRAINED = 0.1  # elastic rotation [rad] beyond which linear elasticity in the moving frame is doubtful

@@ -27,9 +27,8 @@ from ffr_dyn.equations.layout import Layout, initial_state
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.scene import Body, Scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 KEPT = ("*.R", "*.p", "*.v", "*.omega_bar", "*.position", "*.velocity", "energy.*", "constraint.*")
 

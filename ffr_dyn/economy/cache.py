@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from ffr_dyn.economy.cost import of_run, per_evaluation
 from ffr_dyn.economy.model_choice import Choice, Part
 from ffr_dyn.economy.outputs import Probe
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.run import Made, Span, Trial, cost, make, run
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,7 @@ from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.residual_estimate import elastic_columns, lift
 from ffr_dyn.economy.run import Made, Trial, states
 from ffr_dyn.scene.scene import Body, Scene
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 INERTIAL = (
     *(f"acceleration along {c}" for c in "xyz"),

@@ -19,8 +19,7 @@ from ffr_dyn.kernels.tables import Record
 from ffr_dyn.results.quantities import measure, selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,7 @@ from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.residual_estimate import Samples, elastic_columns, followed, responses
 from ffr_dyn.variants.variant import STIFFENING
 from ffr_prep.body import FlexibleBody, axial
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 DROPPED = ("I9", "I5", "I8")  # terms that may be left out; I3 and I4 are what couples a mode to anything
 

@@ -16,9 +16,8 @@ from ffr_dyn.results.result import Result
 from ffr_dyn.results.stress import tensors
 from ffr_dyn.scene.scene import Scene
 from ffr_dyn.scene.stress_sensors import von_mises
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 STRESS = "stress"
 ELASTIC = ("displacement", "q", "q_dot", "q_ddot")  # quantities that a rigid body does not have: zero

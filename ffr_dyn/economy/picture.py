@@ -21,8 +21,7 @@ from ffr_dyn.economy.result import Economy
 from ffr_dyn.economy.run import Made, Span, make, simulated
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.results.result import Result
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 
 @dataclass(frozen=True)

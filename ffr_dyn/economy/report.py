@@ -21,8 +21,6 @@ from ffr_dyn.economy.result import Economy
 from ffr_dyn.scene.scene import INERTIA_TERMS, Body
 from ffr_prep.common.errors import InputError
 
-Array = np.ndarray
-
 SEPARATOR = "  "
 
 

@@ -40,8 +40,7 @@ from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.equations.stiffening import stiffness_of
 from ffr_dyn.kernels.tables import Record
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 
 @dataclass(frozen=True)

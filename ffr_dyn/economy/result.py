@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.economy.cache import Tried
 from ffr_dyn.economy.checks import Frequency, StiffeningLoad
@@ -15,9 +13,8 @@ from ffr_dyn.economy.model_choice import Choice
 from ffr_dyn.economy.outputs import Probe
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, repr=False)

@@ -14,9 +14,8 @@ from ffr_dyn.economy.outputs import limits, ranges
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.run import Trial
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
-
-Array = np.ndarray
 
 SCOUT, PILOT = "ros2", "ros3"  # methods of coarse runs of rigid bodies, and of everything
 

@@ -16,10 +16,9 @@ from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import ComputationError
-
-Array = np.ndarray
 
 STATES = ("*.R", "*.p", "*.v", "*.omega_bar", "*.q", "*.q_dot")
 

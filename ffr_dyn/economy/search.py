@@ -40,8 +40,8 @@ from ffr_dyn.economy.steps import Stepped, chosen_step
 from ffr_dyn.economy.verification import reference_cost, verified
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
 
-Array = np.ndarray
 Histories = tuple[Array, ...]
 
 

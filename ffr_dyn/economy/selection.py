@@ -16,9 +16,8 @@ from ffr_dyn.economy.policy import Policy
 from ffr_dyn.economy.rigid_start import SCOUT, Ground
 from ffr_dyn.economy.run import rings
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

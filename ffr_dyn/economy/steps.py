@@ -20,9 +20,9 @@ from ffr_dyn.economy.outputs import difference, largest
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.run import Span, Trial, rings
 from ffr_dyn.integrators import CONTROLLED, METHODS, RK4, Integrator
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
-Array = np.ndarray
 Histories = tuple[Array, ...]
 
 TWO_STAGES, EXPLICIT = "ros2", "rk4"

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from ffr_dyn.economy.cache import Ledger
 from ffr_dyn.economy.contributions import Contributions
 from ffr_dyn.economy.model_choice import Choice
@@ -15,9 +13,8 @@ from ffr_dyn.economy.rigid_start import PILOT, Ground
 from ffr_dyn.economy.run import Trial
 from ffr_dyn.economy.selection import Insufficient, selected_model
 from ffr_dyn.economy.steps import error_of, order
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 
 def reference(everything: Choice, final: Trial) -> Choice:

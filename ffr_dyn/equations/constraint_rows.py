@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ffr_dyn.equations.constraints import Row, evaluate_word
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.functions.time_functions import evaluate
@@ -13,10 +11,9 @@ from ffr_dyn.scene.couplings import Coupling, coupling_word
 from ffr_dyn.scene.drivers import Driver, PointDriver, driver_word, path_words
 from ffr_dyn.scene.joints import DISTANCE, RELATION, Joint, Word, words
 from ffr_dyn.scene.scene import Scene, joint_of, joints_of, marker_number
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, repr=False)

@@ -24,8 +24,8 @@ from ffr_dyn.equations.kinematics import Motion, marker_axis, marker_point
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.scene.joints import COINCIDENCE, DISTANCE, DOT_1, DOT_2, DRIVEN_ANGLE, RELATION, Word
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
 
-Array = np.ndarray
 Drive = tuple[float, float, float]
 
 

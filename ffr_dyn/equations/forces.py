@@ -25,8 +25,7 @@ from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import AlongLine, AtMarker, BetweenAxes, OnBody, OnJoint, Place
 from ffr_dyn.scene.joints import DOT_1, DOT_2, word
 from ffr_dyn.scene.scene import Scene, markers
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 NO_DRIVE = (0.0, 0.0, 0.0)
 

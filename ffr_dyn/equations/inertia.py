@@ -19,8 +19,7 @@ import numpy as np
 
 from ffr_dyn.functions.rotation import skew
 from ffr_prep.body import FlexibleBody, axial
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,7 @@ import numpy as np
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.functions.rotation import cross, rotation_matrix, skew
 from ffr_dyn.scene.scene import Scene, marker_number, markers
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 
 @dataclass(frozen=True)

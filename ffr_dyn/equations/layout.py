@@ -8,9 +8,8 @@ import numpy as np
 
 from ffr_dyn.scene.scene import Scene, body_normal
 from ffr_dyn.variants.plane import AXES
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, repr=False)

@@ -33,8 +33,7 @@ from ffr_dyn.equations.layout import Layout, layout
 from ffr_dyn.equations.stiffening import applied_wrenches, geometric_stiffening
 from ffr_dyn.functions.rotation import G_bar, rotation_matrix
 from ffr_dyn.scene.scene import Scene
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 SWEEPS = 50  # at most, of the loads that stiffen; each changes them by (elastic deflection / size)^2 or so
 SETTLED = 1e-14  # change of the solution, relative

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ffr_dyn.equations.kinematics import marker_motion
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.scene.scene import Scene
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 
 @dataclass(frozen=True)

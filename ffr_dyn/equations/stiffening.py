@@ -16,8 +16,7 @@ from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.joints import RELATION, Word
 from ffr_dyn.scene.scene import Body, marker_number, markers
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 
 def stiffness_of(body: Body) -> Array:

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, repr=False)

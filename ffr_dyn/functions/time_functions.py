@@ -16,10 +16,9 @@ from typing import ParamSpec
 import numpy as np
 
 from ffr_dyn.functions.operations import SUBTRACT, operate
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 # Kinds, as in ffr_dyn.kernels.functions (which must not be imported before it is needed: it loads the compiler).
 POLYNOMIAL, HARMONIC, PIECEWISE, USER, OPERATION = 0, 1, 2, 3, 4

@@ -19,7 +19,6 @@ import numpy as np
 
 from ffr_prep.common.brief import brief_tuple
 
-Array = np.ndarray
 Vector = np.ndarray  # of numbers, as an argument of an entry point: its size follows from the tables
 # Arrays of numbers and of integers by their number of axes: compiled code is told here what it finds at an address.
 F1 = Annotated[np.ndarray, ("float64", 1)]

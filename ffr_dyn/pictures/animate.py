@@ -17,7 +17,8 @@ import numpy as np
 from PIL import Image
 
 from ffr_dyn.pictures.film import Camera, Film, camera_for, film
-from ffr_dyn.results.result import Array, Result
+from ffr_dyn.results.result import Result
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 _SHORTEST, _LONGEST = 3.0, 6.0

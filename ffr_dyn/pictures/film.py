@@ -15,10 +15,11 @@ from textwrap import wrap
 import numpy as np
 
 from ffr_dyn.functions.rotation import rotation_matrix
-from ffr_dyn.results.result import Array, Result
+from ffr_dyn.results.result import Result
 from ffr_dyn.results.stress import values_at
 from ffr_dyn.scene.stress_sensors import MEASURES, Measure
 from ffr_prep.body import Surface
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.units import readable
 

@@ -17,7 +17,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from ffr_dyn.results.result import Array, Quantity, Result
+from ffr_dyn.results.result import Quantity, Result
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.units import bracketed, readable
 

@@ -23,8 +23,8 @@ from ffr_dyn.pictures.film import (
     drawn_points,
     is_coloured,
 )
-from ffr_dyn.results.result import Array
 from ffr_prep.body import Surface
+from ffr_prep.common.arrays import Array
 
 # Larger surfaces are simplified until all pictures together need no more numbers than this: some eight megabytes.
 _MOST_NUMBERS = 1_400_000

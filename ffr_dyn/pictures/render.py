@@ -21,7 +21,6 @@ from ffr_dyn.pictures.film import (
     body_points,
     is_coloured,
 )
-from ffr_dyn.results.result import Array
 from ffr_prep.body import Surface
 from ffr_prep.common.errors import ComputationError
 
@@ -31,6 +30,8 @@ if not os.environ.get("DISPLAY"):
 
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
+
+from ffr_prep.common.arrays import Array
 
 # As Any: the annotations of pyvista refuse calls that its documentation shows.
 pv: Any = importlib.import_module("pyvista")

@@ -13,7 +13,7 @@ from PIL import Image
 
 from ffr_dyn.pictures.film import Camera, film_at, measure_colours
 from ffr_dyn.pictures.histories import plot
-from ffr_dyn.results.result import EULER_PARAMETERS, XYZ, Array, Quantity, Result, mode_axis, write_csv
+from ffr_dyn.results.result import EULER_PARAMETERS, XYZ, Quantity, Result, mode_axis, write_csv
 from ffr_dyn.results.stress import (
     HotSpot,
     SectionPeak,
@@ -28,6 +28,7 @@ from ffr_dyn.results.stress import (
 )
 from ffr_dyn.scene.stress_sensors import measure, nearest_element
 from ffr_prep.body import Surface
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.units import readable
 

@@ -16,10 +16,9 @@ from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.realtime.stepper import Stepper
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 SOFT = 0.999  # of the steps must be in time
 WARMING = 100  # steps before the measurement: caches, branch prediction, first touch of memory

@@ -38,10 +38,9 @@ from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces import Actuator
 from ffr_dyn.scene.joints import COORDINATES
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 Input = float | tuple[float, float, float]
 

@@ -31,8 +31,9 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ffr_dyn.results.result import XYZ, Array, Axis, Quantity, Result, check_times
+from ffr_dyn.results.result import XYZ, Axis, Quantity, Result, check_times
 from ffr_prep.body import Surface, surface_of
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
 FORMAT = "ffr-result"

@@ -19,8 +19,7 @@ from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import joint_of
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -34,9 +34,8 @@ from ffr_dyn.scene.joints import COORDINATES, Joint
 from ffr_dyn.scene.scene import marker_names, markers, measured_body
 from ffr_dyn.scene.sensors import Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.scene.stress_sensors import measured_modes
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 # What a result keeps unless told otherwise: enough to draw, to animate and to recover stress, and what joints carry.
 DEFAULT_OUTPUTS = (

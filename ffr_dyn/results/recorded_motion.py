@@ -15,9 +15,8 @@ from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.scene.joints import Joint, frames
 from ffr_dyn.scene.scene import marker_number, markers
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
-
-Array = np.ndarray
 
 
 def dot(a: Array, b: Array) -> Array:

@@ -21,10 +21,9 @@ from typing import Any
 import numpy as np
 
 from ffr_prep.body import Surface
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, cut, listed
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 # netCDF names: a letter, digit or underscore first, no "/", no control character, no blank at the end.
 _NAME = re.compile(r"\w(?:[^/\x00-\x1f\x7f]*[^/\x00-\x1f\x7f\s])?")

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffr_dyn.results.result import Array, Axis, Quantity, Result
+from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.stress_sensors import (
     FORCE_AXIS,
     MOMENT_AXIS,
@@ -30,6 +30,7 @@ from ffr_dyn.scene.stress_sensors import (
     strain_of,
 )
 from ffr_prep.body import SECTION_FORCES, BeamForces, Surface
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 TENSOR_AXIS = Axis("tensor", TENSOR)

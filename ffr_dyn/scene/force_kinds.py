@@ -9,12 +9,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, TypeVar, get_type_hints
 
-import numpy as np
-
 from ffr_dyn.scene.fields import PerMode
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
-Array = np.ndarray
 AnyScene = Any  # a `ffr_dyn.scene.scene.Scene`, whose module imports this one
 
 FORCES: list[Any] = []

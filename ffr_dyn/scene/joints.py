@@ -19,10 +19,9 @@ from ffr_dyn.functions.rotation import triad
 from ffr_dyn.functions.time_functions import TimeFunction, as_time_function
 from ffr_dyn.scene.checks import check_markers, check_own_name
 from ffr_dyn.scene.fields import Direction, In, OfTime
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 # The words: each has its readable form in `ffr_dyn.equations.constraints` and its kernel in `ffr_dyn.kernels.rows`.
 COINCIDENCE, DOT_1, DOT_2 = "coincidence", "dot-1", "dot-2"

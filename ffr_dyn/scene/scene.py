@@ -24,10 +24,9 @@ from ffr_dyn.scene.joints import COORDINATES, Joint
 from ffr_dyn.scene.sensors import AnyMeasurement, Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.scene.stress_sensors import measured_modes
 from ffr_prep.body import FlexibleBody
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, in_short, listed, numbers
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 GROUND = "ground"
 # Groups of inertia integrals that a body can do without: I3 and the parts, skew and symmetric, of the other two.

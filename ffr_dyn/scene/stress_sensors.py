@@ -15,10 +15,8 @@ import numpy as np
 
 from ffr_dyn.scene.sensors import SectionMeasurement, StressMeasurement
 from ffr_prep.body import SECTION_FORCES, BeamForces, Surface
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
-
 
 TENSOR = ("xx", "yy", "zz", "xy", "xz", "yz")
 PLACES = ("first", "middle", "last")

@@ -14,9 +14,8 @@ from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.functions.formula import Expression, names_in, value_of
 from ffr_dyn.scene.joints import COORDINATES, Joint, frames
 from ffr_dyn.scene.scene import GROUND, Scene, marker_names, marker_number
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

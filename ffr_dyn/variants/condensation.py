@@ -20,8 +20,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from ffr_prep.body import FlexibleBody
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 _APART = 1e-7  # an interface coordinate below this share of the largest of its mode is none
 _SOFTEST = 1e-12  # share of the largest eigenvalue below which a mode counts as free

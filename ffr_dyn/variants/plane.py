@@ -20,9 +20,8 @@ from ffr_dyn.scene.force_kinds import forces_of, in_bases
 from ffr_dyn.scene.scene import Body, Scene, body_normal, marker_number, undeformed
 from ffr_dyn.variants.variant import used_interfaces, with_modes
 from ffr_prep.body import FlexibleBody, axial
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 AXES = "xyz"
 _ZERO = 1e-9

@@ -28,9 +28,8 @@ from ffr_dyn.scene.force_kinds import in_bases, loaded_markers, modal_fields
 from ffr_dyn.scene.scene import INERTIA_TERMS, Body, Scene
 from ffr_dyn.variants.condensation import statically_complete
 from ffr_prep.body import FlexibleBody, recombined, truncated
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 STIFFENING = "stiffening"
 TERMS = (*INERTIA_TERMS, STIFFENING)

@@ -14,8 +14,7 @@ from zipfile import is_zipfile
 import numpy as np
 
 from ffr_prep.body.reduced import BeamForces, BodyError, FlexibleBody, Interface, Surface, integral_shapes
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 MAGIC = "ffr-body"
 FORMAT_VERSION = 2  # 2 adds stress modes and section forces; files of version 1 are read as bodies without them

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ffr_prep.body import FlexibleBody, Interface
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 _INDEPENDENT = 1e-8
 

@@ -16,9 +16,8 @@ from dataclasses import replace
 import numpy as np
 
 from ffr_prep.body import FlexibleBody, Surface
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 _IN_PLANE = 1e-9
 _ACROSS = 1e-5

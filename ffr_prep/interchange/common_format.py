@@ -18,10 +18,9 @@ import scipy.linalg
 import scipy.optimize
 
 from ffr_prep.body import BodyError, FlexibleBody, Interface, with_point
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.invariants import skew
-
-Array = np.ndarray
 
 IDENTITY_TOLERANCE = 1e-6
 LUMPING_LIMIT = 0.5

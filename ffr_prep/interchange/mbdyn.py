@@ -25,6 +25,7 @@ from urllib.parse import quote, unquote
 import numpy as np
 
 from ffr_prep.body import FlexibleBody, Interface, axial
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.interchange.common_format import (
     IDENTITY_TOLERANCE,
@@ -56,7 +57,6 @@ from ffr_prep.interchange.mbdyn_records import (
 )
 from ffr_prep.model.invariants import from_inertia
 
-Array = np.ndarray
 Kind = Literal["legacy", "full"]
 
 # The loads of record 19 (products xx, yy, zz, xy, yz, zx of the angular velocity, angular acceleration, acceleration)

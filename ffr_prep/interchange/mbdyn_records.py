@@ -15,10 +15,9 @@ from math import prod
 
 import numpy as np
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.interchange.common_format import real, whole
-
-Array = np.ndarray
 
 _TITLE = re.compile(r"\*\*\s*RECORD GROUP\s+([0-9]{1,4})\b", re.IGNORECASE)
 _NAME = re.compile(r"\*\* (body|node ([0-9]{1,9})) = (\S+)\s*")

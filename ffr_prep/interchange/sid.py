@@ -30,6 +30,7 @@ from urllib.parse import quote, unquote
 import numpy as np
 
 from ffr_prep.body import FlexibleBody, Interface, axial
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.interchange.common_format import (
     IDENTITY_TOLERANCE,
@@ -66,7 +67,6 @@ from ffr_prep.interchange.sid_identities import (
 from ffr_prep.interchange.sid_nodes import read_nodes
 from ffr_prep.model.invariants import from_inertia, skew
 
-Array = np.ndarray
 BLOCKS = ("mdCM", "J", "Ct", "Cr", "Me", "Gr", "Ge", "Oe", "ksigma", "Ke", "De")
 NAMES = "interfaces="
 _ENOUGH_NODES = 400

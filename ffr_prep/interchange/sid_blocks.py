@@ -12,10 +12,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.interchange.common_format import IDENTITY_TOLERANCE, real, whole
-
-Array = np.ndarray
 
 _ENTRY = re.compile(r"(m[01])\s*\(([0-9 ,\t]*)\)\s*=\s*(\S+)")
 _KEYS = ("order", "nrow", "ncol", "nq", "nqn", "structure")

@@ -11,12 +11,12 @@ from typing import Literal, get_args
 import numpy as np
 
 from ffr_prep.body import axial
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.interchange.common_format import IDENTITY_TOLERANCE, Bounds, hold, relative
 from ffr_prep.interchange.sid_blocks import Taylor
 from ffr_prep.model.invariants import skew
 
-Array = np.ndarray
 Layout = Literal["mode-major", "axis-major"]
 
 J_ORDER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_prep.body import Interface
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.interchange.common_format import IDENTITY_TOLERANCE
 from ffr_prep.interchange.sid_blocks import Section, Taylor, only, part, taylor, value
 from ffr_prep.model.invariants import skew
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

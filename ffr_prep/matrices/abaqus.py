@@ -17,12 +17,11 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.matrices.model import MatrixModel
 from ffr_prep.matrices.node_table import NodeTable, model_of
 from ffr_prep.mesh.abaqus import nodes_from_abaqus
-
-Array = np.ndarray
 
 _SUPPORTED = 1e30
 

@@ -6,13 +6,12 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.matrices.model import MatrixModel, component_in_words, node_in_words, row_in_words
 from ffr_prep.matrices.nodal_inertia import rigid_motions
 from ffr_prep.model.coupled import CoupledModel, in_words
 from ffr_prep.solvers.cholesky import cholesky, solve_cholesky
-
-Array = np.ndarray
 
 _SYMMETRIC = 1e-8
 _FREE = 1e-6

@@ -19,12 +19,11 @@ import numpy as np
 import scipy.io
 import scipy.sparse as sp
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.matrices.model import MatrixModel
 from ffr_prep.matrices.node_table import NodeTable, model_of
 from ffr_prep.matrices.npz import arrays_of, sparse_of
-
-Array = np.ndarray
 
 
 def from_matrix_market(stiffness: Path, mass: Path, rows: Path) -> MatrixModel:

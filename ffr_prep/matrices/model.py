@@ -11,14 +11,13 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from ffr_prep.body import content_hash
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.common.registry import choice
 from ffr_prep.matrices.nodal_inertia import DofMap
 from ffr_prep.matrices.unit_systems import UnitSystem
-
-Array = np.ndarray
 
 _SAME_PLACE = 1e-6
 _SHOWN = 5

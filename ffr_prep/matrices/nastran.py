@@ -20,11 +20,10 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.matrices.model import MatrixModel
 from ffr_prep.matrices.node_table import NodeTable, mirrored, model_of
-
-Array = np.ndarray
 
 _PAIRS = (("KGG", "MGG"), ("KAA", "MAA"))
 _GRID, _SCALAR = 1, 2

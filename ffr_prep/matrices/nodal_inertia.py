@@ -33,10 +33,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from ffr_prep.body import axial
+from ffr_prep.common.arrays import Array
 from ffr_prep.model.invariants import InertiaIntegrals, from_inertia, inertia_integrals, skew
 from ffr_prep.structures.interfaces import rigid_coordinates
-
-Array = np.ndarray
 
 _SCALAR = 1e-9
 

@@ -20,11 +20,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from ffr_prep.body import save_arrays
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.matrices.model import MatrixModel
 from ffr_prep.matrices.node_table import NodeTable, model_of
-
-Array = np.ndarray
 
 _GROUP = "group/"
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from ffr_prep.body import Surface
 from ffr_prep.body.provenance import described
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.matrices.checks import (
@@ -30,8 +31,6 @@ from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.invariants import InertiaIntegrals
 from ffr_prep.model.model import Model
 from ffr_prep.solvers.threads import on_one_thread
-
-Array = np.ndarray
 
 _DOUBTFUL = 0.1
 

@@ -14,14 +14,13 @@ import numpy as np
 import scipy.sparse as sp
 import skfem
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.matrices.checks import check_symmetric
 from ffr_prep.matrices.model import MatrixModel
 from ffr_prep.mesh.cells import KINDS, node_order
 from ffr_prep.mesh.mesh import Block, Mesh, surface_triangles
 from ffr_prep.mesh.shapes import jacobian_determinants, local_order
-
-Array = np.ndarray
 
 _NODAL = 1e-12
 _LINEAR = {skfem.ElementTetP1.refdom: "tet4", skfem.ElementHex1.refdom: "hex8"}

@@ -17,10 +17,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.file_mesh import FileMesh, supported_kind
 
-Array = np.ndarray
 Row = list[str]
 
 # Corners of the faces S1, S2, ... of tetrahedra and hexahedra. The node order of the elements is that of VTK.

@@ -11,9 +11,9 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.mesh.cells import KINDS, face_corners
 
-Array = np.ndarray
 Blocks = Sequence[tuple[str, Array]]
 
 

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
+
 Corners = tuple[tuple[int, ...], ...]
 
 _TET_CORNERS = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))

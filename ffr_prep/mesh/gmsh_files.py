@@ -17,13 +17,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.registry import choice
 from ffr_prep.mesh import gmsh_process
 from ffr_prep.mesh.cells import node_order
 from ffr_prep.mesh.file_mesh import FileMesh, supported_kind
-
-Array = np.ndarray
 
 CAD_UNITS = {"m": "M", "cm": "CM", "mm": "MM", "in": "INCH"}
 

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ffr_prep.body import content_hash
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import extent_in_words
@@ -22,8 +23,6 @@ from ffr_prep.mesh.boundary import joined_by_faces, joined_by_nodes, outer_faces
 from ffr_prep.mesh.cells import FACE_TRIANGLES, KINDS
 from ffr_prep.mesh.file_mesh import FileMesh
 from ffr_prep.mesh.formats import format_of
-
-Array = np.ndarray
 
 UNITS: Mapping[str, float] = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 

@@ -14,9 +14,8 @@ import numpy as np
 import skfem
 from skfem.quadrature import get_quadrature
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.mesh.cells import KINDS, node_order
-
-Array = np.ndarray
 
 # Faces by their number of nodes: shape functions, whose order of nodes is VTK's, and order of the mass rule.
 _FACES = {

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 INERTIAL = 12  # loads of unit accelerations
 PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))

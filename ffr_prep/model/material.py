@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 
 from ffr_prep.body import TENSOR
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
-Array = np.ndarray
 Rows = tuple[tuple[float, ...], ...]
 
 _LIGHTEST = 1e-3  # kg/m^3; aerogels have about 1

@@ -12,12 +12,11 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 from ffr_prep.model.accelerations import INERTIAL
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.reference import ReferenceConditions, UserConditions
-
-Array = np.ndarray
 
 
 def known_loads(model: CoupledModel) -> Array:

@@ -17,10 +17,10 @@ from typing import Protocol
 import numpy as np
 import scipy.linalg
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import CoupledModel, in_words, interface_index
 
-Array = np.ndarray
 Vector = tuple[float, float, float]
 
 _RANK = 1e-9

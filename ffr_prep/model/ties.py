@@ -10,10 +10,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
-
-Array = np.ndarray
 
 
 def tied_rows(count: int, free: Array, following: Sequence[tuple[Array, Array]]) -> sp.csr_array:

@@ -19,13 +19,12 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.progress import Advance, no_advance
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.reference import body_length, free_rigid_motions, motion_in_words
 from ffr_prep.solvers.factor import CHOLESKY, FreeBody, Solver, free_body
-
-Array = np.ndarray
 
 _TIE = 1e-6
 _EQUAL = 1e-8  # relative difference of squared frequencies that are meant to be equal: rounding, not the mesh

@@ -28,6 +28,7 @@ import scipy.sparse as sp
 from ffr_prep.body import FlexibleBody, Interface, Surface
 from ffr_prep.body.interface_freedom import interface_freedom
 from ffr_prep.body.provenance import described
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.accelerations import turns
 from ffr_prep.model.coupled import CoupledModel
@@ -35,8 +36,6 @@ from ffr_prep.model.invariants import InertiaIntegrals
 from ffr_prep.model.reference import ReferenceConditions, UserConditions, functionals
 from ffr_prep.reduction.basis import diagonalised, in_frame
 from ffr_prep.reduction.turned_stiffening import condition_count, turned_stiffening
-
-Array = np.ndarray
 
 
 def with_reference(body: FlexibleBody, conditions: ReferenceConditions) -> FlexibleBody:

@@ -12,11 +12,10 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.mesh.cells import KINDS
 from ffr_prep.mesh.mesh import Mesh
 from ffr_prep.model.coupled import CoupledModel
-
-Array = np.ndarray
 
 ENOUGH = 6.0
 

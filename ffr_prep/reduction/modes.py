@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.solvers.factor import SupportedBody, solve_refined
-
-Array = np.ndarray
 
 _DENSE = 600
 _FIRST = 12

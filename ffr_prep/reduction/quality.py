@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.reduction.basis import Basis, in_frame
 from ffr_prep.reduction.mesh_resolution import resolution_warnings
@@ -33,8 +34,6 @@ from ffr_prep.reduction.receptance import (
 from ffr_prep.reduction.responses import inertial_loads, mean_motion, static_solver
 from ffr_prep.reduction.selection import Band
 from ffr_prep.solvers.factor import FreeBody, supported
-
-Array = np.ndarray
 
 ACCELERATIONS = (
     *(f"gravity or acceleration along {axis}" for axis in "xyz"),

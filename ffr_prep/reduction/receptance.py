@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.reduction.basis import Basis, basis_of
@@ -26,8 +27,6 @@ from ffr_prep.reduction.modes import modes_up_to
 from ffr_prep.reduction.responses import krylov_blocks, mean_motion, static_solver
 from ffr_prep.reduction.selection import Band
 from ffr_prep.solvers.factor import FreeBody, supported
-
-Array = np.ndarray
 
 LOSS_FACTOR = 0.02
 _RICHER = 2.0

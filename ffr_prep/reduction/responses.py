@@ -13,11 +13,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.solvers.factor import FreeBody, solve_refined, supported
-
-Array = np.ndarray
 
 _NOTHING = 1e-9
 

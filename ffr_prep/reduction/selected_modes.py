@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.reduction.basis import Basis
@@ -15,8 +14,6 @@ from ffr_prep.reduction.modes import modes_up_to, normal_modes
 from ffr_prep.reduction.receptance import free_modes, receptance_error, reference_modes
 from ffr_prep.reduction.selection import Accuracy, Selection, UpTo
 from ffr_prep.solvers.factor import FreeBody, SupportedBody
-
-Array = np.ndarray
 
 _RICHER = (2.0, 4.0, 8.0, 16.0)  # times the band: where modes are looked for
 

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 _POINTS = 200
 

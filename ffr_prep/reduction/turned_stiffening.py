@@ -34,13 +34,12 @@ import numpy as np
 import scipy.linalg
 
 from ffr_prep.body import FlexibleBody
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.accelerations import INERTIAL, gradients, turns
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.reactions import supports
 from ffr_prep.model.reference import ReferenceConditions
-
-Array = np.ndarray
 
 _ROUNDING = 1e-9  # beside one: of what a support carries, and of how a held place moves
 _LEAVE_OUT = "or leave the stiffness out (replace(body, stiffening=None) in Python, --without-stiffening)"

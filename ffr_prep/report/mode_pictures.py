@@ -21,9 +21,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from ffr_prep.body import FlexibleBody, Surface
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
-
-Array = np.ndarray
 
 COLOUR_MAP = "viridis"
 _LARGEST = 0.08  # of the diagonal of the body: deflection that is seen well and still looks like the body

@@ -13,8 +13,6 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.reduction.quality import ACCELERATIONS, Quality, quality_of
 from ffr_prep.report.mode_pictures import save_figure
 
-Array = np.ndarray
-
 _DPI = 150
 _FULL, _REDUCED, _ERROR, _INK = "#9aa0a8", "#2455A4", "#C0392B", "#222222"
 _FLOOR = 1e-8

@@ -17,12 +17,12 @@ import scipy.sparse as sp
 import skfem
 from skfem.quadrature import get_quadrature
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.mesh import Mesh
 from ffr_prep.mesh.shapes import determinants, local_order, mapping, scalar_basis
 from ffr_prep.model.material import AnisotropicMaterial, Material, Solid
 
-Array = np.ndarray
 Materials = Solid | Mapping[str, Solid]
 
 _CHUNK = 2048

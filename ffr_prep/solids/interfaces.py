@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.mesh import Mesh, face_group, region_nodes
 from ffr_prep.mesh.shapes import face_mass
@@ -17,9 +18,6 @@ from ffr_prep.model.coupled import CoupledModel, InterfaceRegion, check_independ
 from ffr_prep.model.region_rotations import MeanRegion, RigidRegion, force_moments
 from ffr_prep.model.ties import check_names, interface_coordinates, six_rows, tied_rows
 from ffr_prep.solids.assembly import SolidMatrices, vector_mass
-
-Array = np.ndarray
-
 
 _COLLINEAR = 1e-10
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ffr_prep.body import Surface
 from ffr_prep.body.provenance import described
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.mesh.mesh import Mesh, check_mesh, mesh_hash, surface_triangles
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
@@ -22,8 +23,6 @@ from ffr_prep.solids.interfaces import couple, turning_regions
 from ffr_prep.solids.stiffening import inertial_loads, stiffening_of
 from ffr_prep.solids.stress_modes import AVERAGING, stressed_boundary
 from ffr_prep.solvers.threads import on_one_thread
-
-Array = np.ndarray
 
 
 @on_one_thread

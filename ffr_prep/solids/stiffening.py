@@ -21,6 +21,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.mesh.mesh import Mesh
 from ffr_prep.model.accelerations import unit_accelerations
 from ffr_prep.solids.assembly import (
@@ -31,8 +32,6 @@ from ffr_prep.solids.assembly import (
     displacement_gradients,
     vector_mass,
 )
-
-Array = np.ndarray
 
 
 def stiffening_of(mesh: Mesh, material: Materials, static: Array, Phi: Array) -> Array:

@@ -27,6 +27,7 @@ import scipy.sparse as sp
 from skfem.quadrature import get_quadrature
 
 from ffr_prep.body import TENSOR, Surface
+from ffr_prep.common.arrays import Array
 from ffr_prep.mesh.boundary import outer_faces
 from ffr_prep.mesh.cells import FACE_TRIANGLES, KINDS
 from ffr_prep.mesh.mesh import Block, Mesh, surface_triangles
@@ -39,8 +40,6 @@ from ffr_prep.solids.assembly import (
     displacement_gradients,
     element_materials,
 )
-
-Array = np.ndarray
 
 AVERAGING = (
     "per element a least-squares fit through the integration points, extended to the nodes; there the plain mean over "

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.progress import Advance, no_advance
 from ffr_prep.solvers.multifrontal import (
     DONE,
@@ -34,8 +35,6 @@ from ffr_prep.solvers.multifrontal import (
 )
 from ffr_prep.solvers.nested_dissection import elimination_tree
 from ffr_prep.solvers.threads import Map, threads
-
-Array = np.ndarray
 
 _BRANCHES = 24  # a branch has at most this part of the work
 _TILE = 384

@@ -23,13 +23,13 @@ import scipy.linalg
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.progress import Advance, no_advance
 from ffr_prep.solvers.cholesky import cholesky, solve_cholesky
 from ffr_prep.solvers.lanczos import lowest_modes
 from ffr_prep.solvers.slepc import SlepcProcess, mpi_modes, mpi_solve, started
 
-Array = np.ndarray
 Solve = Callable[[Array], Array]
 
 _SINGULAR = 1e13

@@ -18,11 +18,10 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 from ffr_prep.common.progress import Advance, no_advance
 from ffr_prep.solvers.threads import Map, pieces, sparse_product, threads
-
-Array = np.ndarray
 
 _RESIDUAL = 1e-9
 _DEPENDENT = 1e-10

@@ -18,7 +18,7 @@ import numpy as np
 from numba import types
 from numba.extending import get_cython_function_address
 
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 DONE = -1
 

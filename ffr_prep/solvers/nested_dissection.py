@@ -16,7 +16,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import maximum_bipartite_matching
 
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
+
 Tree = tuple[list[Array], list[list[int]]]
 
 _LEAF = 40

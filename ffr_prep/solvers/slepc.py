@@ -24,10 +24,9 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.solvers import slepc_process
-
-Array = np.ndarray
 
 _PYTHON = "/usr/bin/python3"
 _HOMES = {"SLEPC_DIR": "/usr/lib/slepcdir", "PETSC_DIR": "/usr/lib/petscdir"}

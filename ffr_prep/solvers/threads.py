@@ -18,7 +18,8 @@ import numpy as np
 import scipy.sparse as sp
 from threadpoolctl import ThreadpoolController, threadpool_limits
 
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
+
 Map = Callable[[Callable[..., Any], Iterable[Any]], Iterable[Any]]
 Given = ParamSpec("Given")
 Made = TypeVar("Made")

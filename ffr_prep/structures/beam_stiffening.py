@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.model.accelerations import INERTIAL, gradients, turns, unit_accelerations
 from ffr_prep.model.region_rotations import second_order_turn
 from ffr_prep.structures.beam_stress import end_forces
@@ -36,8 +37,6 @@ from ffr_prep.structures.beams import (
     shape_functions,
     undeformed,
 )
-
-Array = np.ndarray
 
 _GAUSS = 4  # points; products of the quadratic slopes with the quadratic tension are of degree six
 

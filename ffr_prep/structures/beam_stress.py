@@ -26,11 +26,10 @@ from dataclasses import replace
 import numpy as np
 
 from ffr_prep.body import TENSOR, BeamForces, Surface
+from ffr_prep.common.arrays import Array
 from ffr_prep.structures.beam_surface import prisms, stations, swept_surface
 from ffr_prep.structures.beams import Beams, element_coordinates, stiffness, undeformed
 from ffr_prep.structures.frame import Frame, Member
-
-Array = np.ndarray
 
 SECTION_STRESS = "section forces K e of the elements; normal stress of tension and bending, shear of torque if round"
 _ROWS, _COLUMNS = np.array(TENSOR).T

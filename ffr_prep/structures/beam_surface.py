@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ffr_prep.body import Surface
+from ffr_prep.common.arrays import Array
 from ffr_prep.structures.beams import Beams, field, picked, undeformed
 from ffr_prep.structures.frame import Frame
-
-Array = np.ndarray
 
 _STATIONS = 5
 

@@ -27,11 +27,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.material import Material
 from ffr_prep.structures.sections import Section
-
-Array = np.ndarray
 
 _GAUSS = 4  # points; products of the cubic shape functions are of degree six
 _PARALLEL = 1e-6

@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 
 from ffr_prep.body import Surface
+from ffr_prep.common.arrays import Array
 from ffr_prep.structures import beams, plates
 from ffr_prep.structures.beam_stiffening import beam_stiffening
 from ffr_prep.structures.beam_stress import SECTION_STRESS, stressed_sweep
@@ -22,8 +23,6 @@ from ffr_prep.structures.beam_surface import swept_surface
 from ffr_prep.structures.frame import Frame, ends, orientations
 from ffr_prep.structures.plate_stiffening import plate_stiffening
 from ffr_prep.structures.plate_surface import FACE_STRESS, plate_faces, stressed_faces
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

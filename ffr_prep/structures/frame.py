@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ffr_prep.body import content_hash
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import extent_in_words
@@ -20,7 +21,6 @@ from ffr_prep.common.registry import choice
 from ffr_prep.model.material import Material, check_isotropic
 from ffr_prep.structures.sections import Section
 
-Array = np.ndarray
 Vector = tuple[float, float, float]
 
 _SAME_PLACE = 1e-9

@@ -20,6 +20,7 @@ import scipy.sparse as sp
 
 from ffr_prep.body import Surface
 from ffr_prep.body.provenance import described
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.model.accelerations import INERTIAL, unit_accelerations
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
@@ -30,8 +31,6 @@ from ffr_prep.solvers.threads import on_one_thread
 from ffr_prep.structures.element_families import Family, families
 from ffr_prep.structures.frame import Frame, check_frame, frame_hash
 from ffr_prep.structures.interfaces import couple_frame, tie, turning_regions
-
-Array = np.ndarray
 
 _CHUNK = 512
 

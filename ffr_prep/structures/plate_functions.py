@@ -14,7 +14,7 @@ import numpy as np
 import skfem
 from skfem.quadrature import get_quadrature
 
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 _CORNER = {3: skfem.ElementTriP1, 4: skfem.ElementQuad1}
 _SIDE = {3: skfem.ElementTriP2, 4: skfem.ElementQuadS2}

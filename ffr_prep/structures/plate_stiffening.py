@@ -18,10 +18,9 @@ from dataclasses import fields
 
 import numpy as np
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.structures.plate_functions import reference, rule
 from ffr_prep.structures.plates import Plates, displacement_gradient, element_coordinates, jacobian, membrane_strain
-
-Array = np.ndarray
 
 _ORDER = {3: 6, 4: 7}
 _CHUNK = 512

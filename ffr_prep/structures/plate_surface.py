@@ -11,9 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from ffr_prep.body import TENSOR, Surface
+from ffr_prep.common.arrays import Array
 from ffr_prep.structures.plates import Plates, bending_strain, element_coordinates, field, membrane_strain, undeformed
-
-Array = np.ndarray
 
 _CORNERS = {3: np.array([(0, 0), (1, 0), (0, 1)], float), 4: np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float)}
 _FACE = {3: np.array([(0, 1, 2)]), 4: np.array([(0, 1, 2), (0, 2, 3)])}

@@ -41,11 +41,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.structures.frame import Shell
 from ffr_prep.structures.plate_functions import Reference, reference, rule
-
-Array = np.ndarray
 
 # Exact for products of two fields, and of two strains, of triangles and parallelograms.
 _MASS_ORDER = {3: 8, 4: 7}

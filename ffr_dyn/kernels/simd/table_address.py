@@ -19,8 +19,7 @@ from ffr_dyn.kernels.simd import plain
 from ffr_dyn.kernels.simd.intrinsics import PLAIN, AttributeTemplate, cgutils, intrinsic
 from ffr_dyn.kernels.simd.slices import array_at
 from ffr_dyn.kernels.tables import Record, Tables
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 
 @cache

@@ -15,9 +15,8 @@ from ffr_dyn.scene.forces.checks import check_array, check_symmetric
 from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.places import BetweenAxes
 from ffr_dyn.scene.forces.spring_law import elastic_energy
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 
 @register_force

@@ -8,9 +8,8 @@ import numpy as np
 
 from ffr_dyn.functions.curves import Curve
 from ffr_dyn.functions.time_functions import as_time_function
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 
 def check_number(value: Any, what: str, least: float = -np.inf) -> None:

@@ -19,9 +19,8 @@ from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.scene.forces.force import LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import FlexibleBody, Surface, axial
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

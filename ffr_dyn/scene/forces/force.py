@@ -16,8 +16,7 @@ import numpy as np
 
 from ffr_dyn.scene.forces.places import Place
 from ffr_dyn.scene.scene import Scene
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 
 class Moment(Protocol):

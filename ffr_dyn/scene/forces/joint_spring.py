@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ffr_dyn.functions.curves import Curve
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_damping, check_number, check_number_or_curve
 from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.places import OnJoint
 from ffr_dyn.scene.forces.spring_law import compiled_spring, spring_force, stored
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 
 @register_force

@@ -14,9 +14,8 @@ from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.given import given_numbers, is_number
 from ffr_dyn.scene.forces.places import AtMarker
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 
 @register_force

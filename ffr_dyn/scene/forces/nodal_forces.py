@@ -25,8 +25,6 @@ from ffr_dyn.scene.forces.places import OnBody
 from ffr_prep.body import FlexibleBody
 from ffr_prep.common.errors import InputError
 
-Array = np.ndarray
-
 
 @register_force
 @dataclass(frozen=True)

@@ -34,9 +34,8 @@ from ffr_dyn.scene.scene import (
     markers,
     undeformed,
 )
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 COORDINATE, RATE, FORCE = range(3)  # columns recorded of a force on one coordinate
 

@@ -22,9 +22,8 @@ from ffr_dyn.scene.forces.distributed import (
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import OnBody
 from ffr_prep.body import FlexibleBody, Surface
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 
 @register_force

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-import numpy as np
-
 from ffr_dyn.functions.curves import Curve
 from ffr_dyn.scene.fields import In
 from ffr_dyn.scene.force_kinds import register_force
@@ -14,9 +12,8 @@ from ffr_dyn.scene.forces.checks import check_damping, check_number, check_numbe
 from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.places import AlongLine
 from ffr_dyn.scene.forces.spring_law import compiled_spring, spring_force, stored
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-
-Array = np.ndarray
 
 
 @register_force

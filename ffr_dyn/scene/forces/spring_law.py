@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ffr_dyn.functions.curves import Curve, curve_integral, curve_value
 from ffr_dyn.scene.forces.force import LawNumbers, LoadTable
-
-Array = np.ndarray
+from ffr_prep.common.arrays import Array
 
 
 def spring_force(

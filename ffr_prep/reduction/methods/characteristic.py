@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.reduction.basis import Basis, check_interfaces
@@ -17,8 +18,6 @@ from ffr_prep.reduction.methods.craig_bampton import with_fixed_interfaces
 from ffr_prep.reduction.modes import constraint_modes
 from ffr_prep.reduction.selection import Selection, UpTo, check_selection
 from ffr_prep.solvers.factor import FreeBody, supported
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

@@ -10,14 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.reduction.basis import Basis, check_interfaces, diagonalised, restricted
 from ffr_prep.reduction.modes import constraint_modes
 from ffr_prep.reduction.selected_modes import selected
 from ffr_prep.reduction.selection import Selection, check_selection
 from ffr_prep.solvers.factor import FreeBody, SupportedBody, supported
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

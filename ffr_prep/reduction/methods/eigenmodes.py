@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.reduction.basis import Basis, diagonalised
 from ffr_prep.reduction.selected_modes import selected
 from ffr_prep.reduction.selection import Selection, check_selection
 from ffr_prep.solvers.factor import FreeBody, supported
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

@@ -21,13 +21,12 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.reduction.basis import Basis, basis_of, check_interfaces
 from ffr_prep.reduction.responses import free_supports, krylov_blocks, static_solver
 from ffr_prep.solvers.factor import FreeBody
-
-Array = np.ndarray
 
 _ACCURATE = 1e-6
 

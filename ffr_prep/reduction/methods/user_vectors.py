@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.reduction.basis import Basis, basis_of
 from ffr_prep.solvers.factor import FreeBody, factorise
-
-Array = np.ndarray
 
 _NOTHING = 1e-9
 
