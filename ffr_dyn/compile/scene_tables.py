@@ -46,7 +46,7 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: f
     """Tables of a scene.
 
     blocks     : the constraint rows to use; default all
-    relaxation : above zero where rows depend on one another (see `kernels.solution.refine_motion`)
+    relaxation : above zero where rows depend on one another (`ffr_dyn.kernels.entry_points.solve_motion_of_dependent_rows`)
     """
     chosen = blocks_of(scene) if blocks is None else blocks
     place = layout(scene)

@@ -58,7 +58,7 @@ IN_USE, OF_JOINTS, ALL = 0, 1, 2
 
 EVERY_LOAD = -1  # in place of the number of one
 
-# Near a singular position (which steps pass as `passing` tells) the rows become dependent, and a violation eta of the
+# Near a singular position (`ffr_dyn.kernels.singular_positions`) the rows become dependent, and a violation eta of the
 # constraints throws the motion from its branch when it comes closer than about eta^(1/3). So on the approach (`independence`
 # below NEAR) the violation is held far lower, and at the position itself (below AT) it is left alone: along the direction
 # that is about to be free a correction would be the violation divided by the distance.
@@ -209,7 +209,7 @@ class BodyWork(NamedTuple):
     change: F2  # (3 STAGES, E_s) by what stages of the last step, and of two before, differed from the stage before
     load: F2  # (B, longest) loads of the bodies, in the order of their stiffness
     # Of methods that look ahead (E_s, B, or 0):
-    ahead: F1  # (7 + MEANS,) see `kernels.ahead`
+    ahead: F1  # (7 + MEANS,) see `ffr_dyn.kernels.stiffening.ahead`
     stage: F1  # (2,) what part of the step after its start, weight
     past: F2  # (8, E_s) K_sigma q at the start of this step, its three backward differences; q, likewise
     diagonal: F1  # (E_s,) of K_sigma at the start of this step
@@ -263,7 +263,7 @@ class RowWork(NamedTuple):
     wrench: F1  # (6,) scratch
     P: F2  # (M, 36) [P_dm; H] dinv phi^T; of a planar body nine numbers
     phiphi: F2  # (pairs that differ, 36) phi dinv phi'^T; of a planar body nine numbers
-    S: F1  # pooled blocks, rows of lanes (see `blocks`)
+    S: F1  # pooled blocks, rows of lanes (see `ffr_dyn.kernels.multiplier_solver`)
 
 
 # Numbers of `Work.info`.
@@ -290,7 +290,7 @@ class Work(NamedTuple):
     info: I1  # (3,) body or row that failed, how many evaluations, how many projections
     drift: F1  # (2,) largest |Phi| and |Phi_dot| met
     # (8,) least share of a row that others do not contain: now, least so far, and when; of a step its start and end [s],
-    # the share at its start, the least of its stages, and that at the start of the step before (see `passing`)
+    # the share at its start, the least of its stages, and that at the start of the step before (`kernels.singular_positions`)
     independence: F1
 
 
