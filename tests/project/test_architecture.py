@@ -36,7 +36,7 @@ FLOORS = {
     ),
 }  # fmt: skip
 MOST_FLAT, MOST_IN_A_FOLDER = 12, 20
-LONGEST_FUNCTION, USUAL_FUNCTION = 60, 19  # lines: of any, of nine in ten
+LONGEST_FUNCTION, USUAL_FUNCTION = 60, 18  # lines: of any, of nine in ten
 SCRIPTS = sorted([ROOT / "bootstrap.py", *(ROOT / "examples").glob("*.py"), *(ROOT / "benchmarks").glob("*.py")])
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
