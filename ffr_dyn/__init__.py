@@ -35,7 +35,10 @@ _BY_MODULE = {
     "ffr_dyn.scene.drivers": "Driver PointDriver",
     "ffr_dyn.scene.forces": "Actuator Bushing JointFriction JointSpring JointStop Load ModalForce NodalForces Pressure Servo "
     "SpringDamper",
-    "ffr_dyn.scene.joints": "Joint",
+    "ffr_dyn.scene.force_kinds": "register_force",
+    "ffr_dyn.scene.forces.force": "Force",
+    "ffr_dyn.scene.forces.places": "AlongLine AtMarker BetweenAxes OnBody OnJoint",
+    "ffr_dyn.scene.joints": "Joint register_joint",
     "ffr_dyn.scene.scene": "Body Scene",
     "ffr_dyn.scene.sensors": "Measurement SectionMeasurement StressMeasurement",
     "ffr_dyn.variants.variant": "vary with_modes without_terms",
@@ -111,7 +114,12 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
         as JointStop, Load as Load, ModalForce as ModalForce, NodalForces as NodalForces, Pressure as Pressure, Servo
         as Servo, SpringDamper as SpringDamper
     )
-    from ffr_dyn.scene.joints import Joint as Joint
+    from ffr_dyn.scene.force_kinds import register_force as register_force
+    from ffr_dyn.scene.forces.force import Force as Force
+    from ffr_dyn.scene.forces.places import (
+        AlongLine as AlongLine, AtMarker as AtMarker, BetweenAxes as BetweenAxes, OnBody as OnBody, OnJoint as OnJoint
+    )
+    from ffr_dyn.scene.joints import Joint as Joint, register_joint as register_joint
     from ffr_dyn.scene.scene import Body as Body, Scene as Scene
     from ffr_dyn.scene.sensors import (
         Measurement as Measurement, SectionMeasurement as SectionMeasurement, StressMeasurement as StressMeasurement
