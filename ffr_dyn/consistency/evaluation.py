@@ -147,16 +147,16 @@ def _jacobian(system: System, work: Work) -> Array:
             part = work.rows.jac[block * len(ends) + side, :, : rows.start[block + 1] - rows.start[block]].T
             jacobian[lines, place.rigid(b)] += part[:, :6]
             if place.n[b]:
-                phi = shapes(system, marker)
+                phi = shapes(system, work, marker)
                 jacobian[lines, place.q_dot(b)] += part[:, :3] @ phi[:3] + part[:, 6:] @ phi[3:]
     return jacobian
 
 
-def shapes(system: System, marker: int) -> Array:
-    """(6, n) phi_t and phi_r of a marker."""
+def shapes(system: System, work: Work, marker: int) -> Array:
+    """(6, n) shapes of a marker at the last evaluation: of its displacement, of its rotation vector."""
     markers = system.model.markers
     n = system.model.bodies.where[markers.body[marker], 0]
-    return markers.phi[markers.start[marker] : markers.start[marker] + 6 * n].reshape(6, n)
+    return work.markers.phi[markers.start[marker] : markers.start[marker] + 6 * n].reshape(6, n)
 
 
 # ---- small motions --------------------------------------------------------------------------------------------------
