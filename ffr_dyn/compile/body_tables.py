@@ -9,7 +9,7 @@ import numpy as np
 
 from ffr_dyn.compile.symmetry_blocks import in_blocks, symmetric_blocks
 from ffr_dyn.equations.layout import Layout
-from ffr_dyn.equations.stiffening import stiffness_of
+from ffr_dyn.equations.second_order import load_matrices
 from ffr_dyn.kernels.tables import (
     IN_PP_DM,
     IN_Q,
@@ -173,7 +173,7 @@ def _stiffness(scene: Scene, marked: Markers) -> tuple[_Blocks, list[int]]:
     owners = [(id(body.model), body.stiffening, loads) for body, loads in zip(scene.bodies, acting, strict=True)]
 
     def make(b: int) -> tuple[Array, Array]:
-        K = stiffness_of(scene.bodies[b])
+        K = load_matrices(scene.bodies[b])
         loads = np.intersect1d(stiffening_loads(K), acting[b]).astype(np.int64)
         noise = STIFFNESS_ROUNDING * np.abs(K[loads]).max(axis=(1, 2), initial=0.0)
         return symmetric_blocks(K[loads], loads, noise) if loads.size else _NONE

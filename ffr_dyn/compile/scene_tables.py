@@ -14,8 +14,8 @@ from ffr_dyn.compile.elimination import Elimination, eliminate
 from ffr_dyn.compile.force_tables import Callback, FunctionTable, base_functions, load_tables
 from ffr_dyn.equations.constraint_rows import Block, blocks_of
 from ffr_dyn.equations.layout import Layout, layout
+from ffr_dyn.equations.second_order import load_matrices
 from ffr_dyn.equations.state_view import StateView
-from ffr_dyn.equations.stiffening import stiffness_of
 from ffr_dyn.kernels.tables import LANES, WAYS, WORDS, Markers, Model, Pattern, Rows
 from ffr_dyn.scene.force_kinds import loaded_markers
 from ffr_dyn.scene.joints import Word
@@ -108,7 +108,7 @@ def _load_numbers(scene: Scene) -> list[int]:
     """Per marker, the number of its force in the stiffening loads of its body: twelve inertial ones come first."""
     numbers: list[int] = []
     for body in scene.bodies:
-        has = len(stiffness_of(body)) > 0
+        has = len(load_matrices(body)) > 0
         numbers += [12 + 6 * k if has else -1 for k in range(len(body.model.interfaces))]
     return numbers + [-1] * len(scene.ground)
 
