@@ -58,7 +58,7 @@ def marker_tables(scene: Scene, place: Layout, blocks: tuple[Block, ...]) -> Mar
 
 
 def _rows(normal: int, turns: bool) -> tuple[int, ...]:
-    """Which of the six rows of a marker are needed: in space displacement and rotation, in the plane those that keep to it."""
+    """Which of the six rows of a marker are needed: displacement, and rotation where it turns; in the plane what keeps to it."""
     if normal < 0:
         return tuple(range(6 if turns else 3))
     in_plane = sorted({0, 1, 2} - {normal})

@@ -15,6 +15,7 @@ from ffr_dyn.compile.force_tables import Callback, FunctionTable, base_functions
 from ffr_dyn.compile.marker_tables import marker_tables
 from ffr_dyn.equations.constraint_rows import Block, blocks_of
 from ffr_dyn.equations.layout import Layout, layout
+from ffr_dyn.equations.second_order import is_second_order
 from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.kernels.tables import LANES, WAYS, WORDS, Markers, Model, Pattern, Rows
 from ffr_dyn.scene.joints import Word

@@ -38,7 +38,7 @@ from ffr_dyn.consistency.evaluation import (
 )
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.equations.layout import Layout
-from ffr_dyn.equations.stiffening import stiffness_of
+from ffr_dyn.equations.second_order import load_matrices
 from ffr_dyn.kernels.tables import Record
 from ffr_prep.common.arrays import Array
 
@@ -155,7 +155,7 @@ def stiffening_forces(at: Evaluator, numbers: tuple[tuple[int, int], ...]) -> Ar
     forces = np.zeros((place.v_size, len(numbers)))
     for k, (b, load) in enumerate(numbers):
         q = at.record.x[0, place.q(b)]
-        forces[place.q_dot(b), k] = -at.work.bodies.load[b, load] * (stiffness_of(scene.bodies[b])[load] @ q)
+        forces[place.q_dot(b), k] = -at.work.bodies.load[b, load] * (load_matrices(scene.bodies[b])[load] @ q)
     return forces
 
 

@@ -63,7 +63,9 @@ N = 0  # number of elastic coordinates
 IN_X, IN_V, IN_Q = 1, 2, 3  # first of the body in x, in v, among all elastic coordinates
 IN_PP_DM = 4  # in PP_dm, or -1 where that vanishes
 NORMAL = 5  # the body axis along the normal of a planar scene, or -1
-IN_SHARED = 6  # in omega2 and the other rows by coordinate, which equal bodies share: many stay in the processor's cache
+IN_SHARED = (
+    6  # in omega2 and the other rows by coordinate, which equal bodies share: many stay in the processor's cache
+)
 PP_PLAN = 7  # in `blocks`
 
 
