@@ -14,7 +14,7 @@ from ffr_dyn.compile.engine import Engine, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.failure import failure
-from ffr_dyn.equations.inertia import mass_matrix
+from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
 from ffr_dyn.equations.layout import Layout, initial_state
 from ffr_dyn.functions.rotation import from_vector, rotation_matrix, skew
 from ffr_dyn.kernels.tables import IN_Q, IN_SHARED, OK, SINGULAR_CONSTRAINT, Record, Work
@@ -208,7 +208,7 @@ def total_mass_matrix(scene: Scene, place: Layout, x: Array) -> Array:
     M = np.zeros((place.v_size, place.v_size))
     for b, body in enumerate(scene.bodies):
         at = slice(place.iv[b], place.iv[b] + 6 + place.n[b])
-        M[at, at] = mass_matrix(body.model, x[place.q(b)])
+        M[at, at] = mass_matrix(kept_integrals(body), x[place.q(b)])
     return M
 
 
