@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from differences import difference
-from scipy.integrate import solve_ivp
+from scipy.integrate import simpson, solve_ivp
 from second_order_bodies import bending_cloud, without_rounding
 from test_beam_stiffening import STEEL, rod, thin
 from test_dyn_forces import PAIRS, alone
@@ -28,7 +28,7 @@ from ffr_dyn.equations.inertia import (
 from ffr_dyn.equations.kinematics import marker_axis, marker_point
 from ffr_dyn.equations.layout import layout
 from ffr_dyn.equations.motion import equations_of_motion, position_rates
-from ffr_dyn.equations.second_order import second_moments
+from ffr_dyn.equations.second_order import marker_matrices, second_moments
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.scene.couplings import Coupling
 from ffr_dyn.scene.drivers import Driver, PointDriver
@@ -36,7 +36,10 @@ from ffr_dyn.scene.forces import Bushing, JointSpring, Load, SpringDamper
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import INERTIA_TERMS, Body, Scene, marker_number
 from ffr_prep.body import FlexibleBody
+from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
+from ffr_prep.structures.frame import Member, named, polyline
 from ffr_prep.structures.sections import rectangle
 
 RNG = np.random.default_rng(23)
@@ -93,6 +96,26 @@ def test_the_inertia_is_that_of_the_kinetic_energy_of_all_points():
     force = inertia_force(kinetic, q, y)
     found = quadratic_velocity(integrals, q, y[3:6], y[6:])
     np.testing.assert_allclose(found, force, rtol=0, atol=1e-12 * np.abs(force).max())
+
+
+def test_moments_of_a_beam_are_those_of_the_second_order_displacements_of_its_points():
+    """int u_0k u_2l dm by Simpson's rule over interfaces along the beam; its thickness adds about (thickness / length)^2."""
+    n, count = 3, 41
+    x = np.linspace(0, LENGTH, count)
+    frame = polyline([(0, 0, 0), (LENGTH, 0, 0)], Member(SECTION, STEEL, (0, 1, 0)), elements=count - 1)
+    points = {f"p{k}": (at, 0.0, 0.0) for k, at in enumerate(x)}
+    model = fp.from_frame(named(frame, **points), [InterfaceRegion(name) for name in points])
+    request = fp.Request(name="beam", reference=fp.MeanAxis(), reduction=Eigenmodes(n), stiffening=True)
+    beam = Body("beam", without_rounding(fp.reduce(model, request)))
+    K, q = np.array([marker_matrices(beam, name) for name in points]), RNG.normal(size=n)
+    u_2 = -0.5 * np.einsum("pkij,i,j->pk", K[:, :3], q, q)
+    x = np.array([interface.position for interface in beam.model.interfaces])
+    found = 0.5 * np.einsum("klij,i,j->kl", second_moments(beam), q, q)
+    mass = beam.model.mass / LENGTH
+    expected = mass * simpson(x[:, :, None] * u_2[:, None], x=x[:, 0], axis=0)
+    size = np.abs(expected).max()
+    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-4 * size)
+    np.testing.assert_allclose(mass * simpson(u_2, x=x[:, 0], axis=0), 0.0, atol=1e-6 * size / LENGTH)
 
 
 @pytest.mark.parametrize("dropped", [(), *((term,) for term in INERTIA_TERMS), ("I5", "I9")])
