@@ -30,26 +30,57 @@ def in_blocks(table: Array, last: int, noise: Array) -> tuple[Array, Array]:
     last  : so many of the last components are multiplied by q_dot, too
     noise : (C,) entries that are not larger are rounding
 
-    plan, of integers: number of blocks; 1 where they are found in the order of the coordinates, or 0; of each block its first
-    coordinate and how many, its first product and how many, in the order of the products, none left out; where they are
-    found family by family, the numbers of the coordinates.
+    plan, of integers: number of blocks; 1 where they are in the order of coordinates and products, or 0; the first product
+    that is multiplied by q_dot, too; of each block its first coordinate and how many, its first product and how many, by
+    ascending products. Where they are sorted by family: the numbers of the coordinates; where the products of all components
+    are found, and those of the last (past the end where they vanish).
     """
     n, C, _ = table.shape
-    given, coupled = np.arange(n), np.abs(table) > noise[:, None]
+    coupled = np.abs(table) > noise[:, None]
     whole = [(0, n, 0, (C - last) * n), (0, n, (C - last) * n, last * n)]
     if n <= SORTING:
-        return _stored(table, whole, given)
+        return _in_order(table, whole, last)
     family = families(coupled)
-    order = np.argsort(family, kind="stable")
-    kept = np.where(coupled, table, 0.0)
-    by_family = coupled[order][:, :, order]
-    choices = [
-        (0, table, whole, given),
-        (0, kept, _fewest(coupled, _apart(family)), given),
-        (SORTING * C * n, kept, _fewest(by_family, _apart(family[order])), order),
-    ]
-    costs = [cost + _cost(blocks) for cost, _, blocks, _ in choices]
-    return _stored(*choices[int(np.argmin(costs))][1:])
+    found = _fewest(coupled, _apart(family))
+    sorted_pool, sorted_plan = _by_family(np.where(coupled, table, 0.0), coupled, family, last)
+    costs = [_cost(whole), _cost(found), SORTING * C * n + sorted_pool.size + BLOCK * int(sorted_plan[0])]
+    if costs[2] < min(costs[:2]):
+        return sorted_pool, sorted_plan
+    return (
+        _in_order(table, whole, last) if costs[0] <= costs[1] else _in_order(np.where(coupled, table, 0.0), found, last)
+    )
+
+
+def _by_family(table: Array, coupled: Array, family: Array, last: int) -> tuple[Array, Array]:
+    """Pool and plan of a table sorted by family: two blocks of each, of which one is multiplied by q_dot, too."""
+    n, C, _ = table.shape
+    rows, early = table.reshape(n, C * n), (C - last) * n
+    owner = np.where(coupled.any(axis=0), family[coupled.argmax(axis=0)], -1).ravel()
+    order, pool, blocks, places = [], [], [], np.full(C * n, C * n)
+    count, begin = 0, 0
+    for late in (False, True):
+        first = 0
+        for one in np.unique(family):
+            i, k = np.flatnonzero(family == one), np.flatnonzero(owner == one)
+            k = k[(k >= early) == late]
+            if k.size:
+                pool.append(rows[np.ix_(i, k)].ravel())
+                blocks.append((first, i.size, count, k.size))
+                places[k] = count + np.arange(k.size)
+                count += k.size
+            first += i.size
+            order += [] if late else [i]
+        begin = begin if late else count
+    late_places = np.where(places[early:] < C * n, places[early:] - begin, last * n)
+    listed = [[len(blocks), 0, begin], *blocks, *order, places, late_places]
+    return np.concatenate([np.zeros(0), *pool]), np.concatenate(listed).astype(np.int64)
+
+
+def _in_order(table: Array, blocks: list[Block], last: int) -> tuple[Array, Array]:
+    n, C, _ = table.shape
+    rows, kept = table.reshape(n, C * n), [block for block in blocks if block[3]]
+    pool = np.concatenate([rows[i : i + count, k : k + width].ravel() for i, count, k, width in kept])
+    return pool, np.concatenate([[len(kept), 1, (C - last) * n], *kept]).astype(np.int64)
 
 
 def _apart(family: Array) -> Array:
@@ -86,10 +117,3 @@ def _fewest(coupled: Array, first: Array) -> list[Block]:
 
 def _cost(blocks: list[Block]) -> int:
     return sum(BLOCK + count * -(-width // LANES) * LANES for _, count, _, width in blocks)
-
-
-def _stored(table: Array, blocks: list[Block], order: Array) -> tuple[Array, Array]:
-    kept, is_given = [block for block in blocks if block[3]], bool((order == np.arange(order.size)).all())
-    rows = table[order][:, :, order].reshape(len(table), -1)
-    pool = np.concatenate([rows[i : i + count, k : k + width].ravel() for i, count, k, width in kept])
-    return pool, np.concatenate([[len(kept), int(is_given)], *kept, [] if is_given else order]).astype(np.int64)

@@ -79,27 +79,26 @@ def contract(table, start, plan, at, q, qd, width, last, scratch, base, g, l):  
     Block by block, as the plan that begins at `at` says (see `ffr_dyn.compile.symmetry_blocks`); a table that starts below
     zero vanishes. g, l and the scratch are written beyond what is found, by less than a row of lanes.
     """
-    n, early = q.size, width - last
+    n = q.size
     if start < 0:
         copy(g, base)
         fill(l, 0.0)
         return
-    blocks, sorted_already = plan[at], plan[at + 1]
-    if sorted_already > 0:
-        multiply_blocks(table, start, plan, at + 2, blocks, q, qd, early, g, l)
+    blocks, given, early = plan[at], plan[at + 1], plan[at + 2]
+    if given > 0:
+        multiply_blocks(table, start, plan, at + 3, blocks, q, qd, early, g, l)
         for k in range(width):
             g[k] += base[k]
         return
-    order = at + 2 + 4 * blocks
+    order = at + 3 + 4 * blocks
+    place, late = order + n, order + n + width
     x, xd, found = part(scratch, 0, n), part(scratch, n, n), 2 * n
-    y, yd = part(scratch, found, width + LANES), part(scratch, found + width + LANES, last + LANES)
+    y, yd = part(scratch, found, width + 2 * LANES), part(scratch, found + width + 2 * LANES, last + 2 * LANES)
     for k in range(n):
-        x[k], xd[k] = peek(q, plan[order + k]), peek(qd, plan[order + k])
-    multiply_blocks(table, start, plan, at + 2, blocks, x, xd, early, y, yd)
-    for row in range(0, width, n):
-        for k in range(n):
-            to = row + plan[order + k]
-            g[to] = base[to] + y[row + k]
-    for row in range(0, last, n):
-        for k in range(n):
-            l[row + plan[order + k]] = yd[row + k]
+        x[k], xd[k] = peek(q, peek(plan, order + k)), peek(qd, peek(plan, order + k))
+    multiply_blocks(table, start, plan, at + 3, blocks, x, xd, early, y, yd)
+    y[width], yd[last] = 0.0, 0.0  # where the plan has products that vanish
+    for k in range(width):
+        g[k] = base[k] + peek(y, peek(plan, place + k))
+    for k in range(last):
+        l[k] = peek(yd, peek(plan, late + k))
