@@ -1,7 +1,7 @@
 """Products of a body in blocks: its symmetry decides which elastic coordinates they couple, and only those are computed.
 
 The shapes of a body with two planes of symmetry fall into four families, those of a body with one into two. Each component
-of the second moments of the shapes (I5, I9), and each load by its geometric stiffness, couples a family with one other; the
+of the second moments of the shapes (I5, I9), and each second-order term, couples a family with one other; the
 rest vanishes but for the rounding of the mode shapes. Sorted by family such a table is a few dense blocks, of a quarter or
 half of its entries. A body without symmetry is one block.
 """
@@ -12,7 +12,6 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from ffr_dyn.kernels.tables import LANES, QUAD
 from ffr_prep.common.arrays import Array
 
 # What sorting costs: as much as this many multiplications per product (measured with 8 to 64 coordinates).
@@ -56,77 +55,6 @@ def in_blocks(table: Array, last: int, noise: Array) -> tuple[Array, Array]:
     listed = np.concatenate(order)
     rest = np.setdiff1d(np.arange(n), listed)  # coordinates that nothing is multiplied by
     return np.concatenate(pool), np.concatenate([[len(pool)], plan, listed, rest, places, last_places]).astype(np.int64)
-
-
-def symmetric_blocks(matrices: Array, numbers: Array, noise: Array) -> tuple[Array, Array]:
-    """(pool, plan) of matrices (L, n, n) whose weighted sums are multiplied, as `kernels.stiffening` reads them.
-
-    Of symmetric ones, as all are but those of some files of other programs, only the blocks on one side of the diagonal are
-    kept: each serves its coordinates and those across.
-
-    numbers : (L,) where their weights are found
-    noise   : (L,) entries that are not larger are rounding
-
-    pool : per group of matrices that share blocks, what each has in those blocks, one row per matrix, of whole lanes
-    plan : number of groups, of parts (of families, at most a row of lanes each), of places (each part begins such a row),
-           of each group the number of matrices and of entries; the places of the coordinates; where the diagonal is among the
-           entries of all groups (past their end where it vanishes); the numbers by group; of each part its first place, its
-           fours of rows, how many blocks serve them alone, and how many also what lies across; of each block, by part, its
-           first entry, its columns, their first place
-    """
-    n = matrices.shape[1]
-    coupled = np.abs(matrices) > noise[:, None, None]
-    symmetric = bool((np.abs(matrices - np.swapaxes(matrices, 1, 2)) <= noise[:, None, None]).all())
-    family = (
-        _blocks(np.moveaxis(coupled | np.swapaxes(coupled, 1, 2), 0, 1))[0] if n > SORTING else np.zeros(n, dtype=int)
-    )
-    parts = [np.flatnonzero(family == f) for f in np.unique(family)]
-    parts = [part for each in parts for part in np.split(each, range(LANES, each.size, LANES))]
-    first = np.cumsum([0, *(in_lanes(part.size) for part in parts)])
-    places = np.empty(n, dtype=np.int64)
-    for part, at in zip(parts, first, strict=False):
-        places[part] = at + np.arange(part.size)
-    pairs = [(a, b) for a in range(len(parts)) for b in range(a if symmetric else 0, len(parts))]
-    if symmetric:
-        pairs = [min(((a, b), (b, a)), key=lambda p: (_quads(parts[p[0]].size), -parts[p[1]].size)) for a, b in pairs]
-    pairs.sort(key=lambda p: -parts[p[1]].size)  # rows that fill the lanes begin at whole ones
-    every = np.arange(len(matrices))
-    touched = np.array([coupled[np.ix_(every, parts[a], parts[b])].any(axis=(1, 2)) for a, b in pairs], dtype=float)
-    _, group = connected_components(csr_array(touched @ touched.T), directed=False)
-    pool: list[Array] = []
-    sizes: list[int] = []
-    alone: list[list[tuple[int, int, int]]] = [[] for _ in parts]
-    across: list[list[tuple[int, int, int]]] = [[] for _ in parts]
-    listed: list[Array] = []
-    kept, diagonal = 0, np.full(n, -1)
-    for g in np.unique(group[touched.any(axis=1)]):
-        own = [pairs[k] for k in np.flatnonzero(group == g)]
-        which = np.flatnonzero(touched[group == g].any(axis=0))
-        rows = [matrices[np.ix_(which, parts[a], parts[b])].reshape(which.size, -1) for a, b in own]
-        begin = np.cumsum([0, *(row.shape[1] for row in rows)])
-        rows.append(np.zeros((which.size, in_lanes(begin[-1]) - begin[-1])))
-        pool.append(np.concatenate(rows, axis=1))
-        sizes += pool[-1].shape
-        for k, (a, b) in zip(begin, own, strict=False):
-            if a == b:
-                diagonal[parts[a]] = kept + k + np.arange(parts[a].size) * (parts[a].size + 1)
-            (across if symmetric and a != b else alone)[a].append((kept + k, parts[b].size, first[b]))
-        kept += pool[-1].shape[1]
-        listed.append(numbers[which])
-    diagonal[diagonal < 0] = kept
-    heads = [(first[a], _quads(part.size), len(alone[a]), len(across[a])) for a, part in enumerate(parts)]
-    plan = [np.array([len(pool), len(parts), first[-1], *sizes]), places, diagonal, *listed, np.ravel(heads)]
-    plan += [np.ravel(blocks) for both in zip(alone, across, strict=True) for blocks in both]
-    return np.concatenate([part.ravel() for part in pool]), np.concatenate(plan).astype(np.int64)
-
-
-def _quads(rows: int) -> int:
-    return -(-rows // QUAD)
-
-
-def in_lanes(count: int) -> int:
-    """How many numbers whole rows of lanes have that hold so many."""
-    return -(-count // LANES) * LANES
 
 
 def _blocks(coupled: Array) -> tuple[Array, Array]:

@@ -17,7 +17,7 @@ from ffr_dyn.consistency.row_space import independent, smallest_solution
 from ffr_dyn.consistency.validity import stretch
 from ffr_dyn.equations.constraint_rows import Block, blocks_of, rows_at
 from ffr_dyn.equations.constraints import Row
-from ffr_dyn.equations.inertia import mass_matrix
+from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
 from ffr_dyn.equations.layout import Layout, initial_state, layout
 from ffr_dyn.functions.rotation import G_bar, rotation_matrix
 from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction
@@ -263,7 +263,7 @@ def _weights(scene: Scene, place: Layout, x: Array, elastic: bool) -> csr_array:
         key = id(body.model), q.tobytes(), active
         if key not in known:
             at = np.ix_(active, active)
-            values, vectors = np.linalg.eigh(mass_matrix(body.model, q)[at])
+            values, vectors = np.linalg.eigh(mass_matrix(kept_integrals(body), q)[at])
             known[key] = np.zeros((6 + n, 6 + n))
             known[key][at] = vectors / np.sqrt(np.maximum(values, 1e-12 * values.max()))
         blocks.append(known[key])
