@@ -403,7 +403,9 @@ def _header(
 
 
 def geometry(scene: Scene) -> dict[str, Surface]:
-    return {body.name: body.model.surface for body in scene.bodies if body.model.surface is not None}
+    """The surfaces of the bodies in their own frames."""
+    models = {body.name: body.frame.model if body.frame else body.model for body in scene.bodies}
+    return {name: model.surface for name, model in models.items() if model.surface is not None}
 
 
 def _result(scene: Scene, run: _Run, attributes: dict[str, Any]) -> Result:

@@ -33,8 +33,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.body.accelerations import turns
 from ffr_prep.common.arrays import Array
-from ffr_prep.model.accelerations import turns
 
 
 @dataclass(frozen=True)
