@@ -72,8 +72,8 @@ def _by_family(table: Array, coupled: Array, family: Array, last: int) -> tuple[
             order += [] if late else [i]
         begin = begin if late else count
     late_places = np.where(places[early:] < C * n, places[early:] - begin, last * n)
-    listed = [[len(blocks), 0, begin], *blocks, *order, places, late_places]
-    return np.concatenate([np.zeros(0), *pool]), np.concatenate(listed).astype(np.int64)
+    head = np.array([len(blocks), 0, begin, *(number for block in blocks for number in block)])
+    return np.concatenate([np.zeros(0), *pool]), np.concatenate([head, *order, places, late_places]).astype(np.int64)
 
 
 def _in_order(table: Array, blocks: list[Block], last: int) -> tuple[Array, Array]:

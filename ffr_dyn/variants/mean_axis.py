@@ -19,8 +19,9 @@ from ffr_dyn.functions.rotation import cross, from_vector, product, rotation_mat
 from ffr_dyn.scene.force_kinds import in_bases
 from ffr_dyn.scene.own_frame import OwnFrame
 from ffr_dyn.scene.scene import Body, Scene
-from ffr_dyn.variants.variant import used_interfaces
-from ffr_prep.body import idle_loads, mean_axis_form
+from ffr_dyn.variants.families import by_family
+from ffr_dyn.variants.variant import used_interfaces, with_basis
+from ffr_prep.body import FlexibleBody, idle_loads, mean_axis_form
 from ffr_prep.common.errors import InputError
 
 
@@ -29,19 +30,30 @@ def in_mean_axis_frames(scene: Scene) -> Scene:
 
     Raises InputError for joints and forces at a point whose loads have no matrices.
     """
-    bodies = tuple(_converted(scene, body) for body in scene.bodies)
+    forms: dict[int, tuple[FlexibleBody, OwnFrame]] = {}
+    bodies = tuple(_converted(scene, body, forms) for body in scene.bodies)
     bases = {
         new.name: new.frame.C for old, new in zip(scene.bodies, bodies, strict=True) if new is not old and new.frame
     }
     return replace(scene, bodies=bodies, forces=in_bases(scene.forces, bases)) if bases else scene
 
 
-def _converted(scene: Scene, body: Body) -> Body:
+def _converted(scene: Scene, body: Body, forms: dict[int, tuple[FlexibleBody, OwnFrame]]) -> Body:
+    """forms : by identity of the model, what equal bodies share"""
     if body.frame or not (body.model.n and body.stiffening and body.model.stiffening is not None):
         return body
     _check_known(scene, body)
-    form = mean_axis_form(body.model)
-    return _moved(replace(body, model=form.body, frame=OwnFrame(body.model, form.frame, form.C)))
+    if id(body.model) not in forms:
+        forms[id(body.model)] = _form(body.model)
+    model, frame = forms[id(body.model)]
+    return _moved(replace(body, model=model, frame=frame))
+
+
+def _form(model: FlexibleBody) -> tuple[FlexibleBody, OwnFrame]:
+    """The mean-axis form with its coordinates family by family, in which products are found soonest."""
+    form = mean_axis_form(model)
+    V = np.eye(form.body.n)[:, by_family(form.body)]
+    return with_basis(form.body, V), OwnFrame(model, form.frame, form.C).combined(V)
 
 
 def _moved(body: Body) -> Body:
