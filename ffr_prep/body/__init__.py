@@ -12,7 +12,18 @@ The numbered invariants I1...I9 and Shabana's S_bar family are read-only views o
 
 from ffr_prep.body.constructors import recombined, rigid_body, truncated, with_point
 from ffr_prep.body.file import content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
-from ffr_prep.body.reduced import SECTION_FORCES, TENSOR, BeamForces, BodyError, FlexibleBody, Interface, Surface, axial
+from ffr_prep.body.reduced import (
+    SECTION_FORCES,
+    TENSOR,
+    BeamForces,
+    BodyError,
+    FlexibleBody,
+    Interface,
+    QuadraticField,
+    Surface,
+    axial,
+)
+from ffr_prep.body.second_order import compressed, displacements, pair_values, pairs_of, recoordinated, values
 
 __all__ = [
     "SECTION_FORCES",
@@ -21,16 +32,23 @@ __all__ = [
     "BodyError",
     "FlexibleBody",
     "Interface",
+    "QuadraticField",
     "Surface",
     "axial",
+    "compressed",
     "content_hash",
+    "displacements",
     "load_body",
+    "pair_values",
+    "pairs_of",
     "recombined",
+    "recoordinated",
     "rigid_body",
     "save_arrays",
     "save_body",
     "surface_arrays",
     "surface_of",
     "truncated",
+    "values",
     "with_point",
 ]

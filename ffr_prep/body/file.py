@@ -13,7 +13,15 @@ from zipfile import is_zipfile
 
 import numpy as np
 
-from ffr_prep.body.reduced import BeamForces, BodyError, FlexibleBody, Interface, Surface, integral_shapes
+from ffr_prep.body.reduced import (
+    BeamForces,
+    BodyError,
+    FlexibleBody,
+    Interface,
+    QuadraticField,
+    Surface,
+    integral_shapes,
+)
 from ffr_prep.common.arrays import Array
 
 MAGIC = "ffr-body"
@@ -73,16 +81,21 @@ def surface_arrays(surface: Surface) -> dict[str, Array]:
     arrays = {"points": surface.points, "triangles": surface.triangles, "Phi": surface.Phi}
     if surface.stress is not None and surface.moduli is not None:
         arrays |= {"stress": surface.stress, "moduli": surface.moduli}
-    if surface.beams is not None:
-        arrays |= {f"beams/{f.name}": getattr(surface.beams, f.name) for f in fields(BeamForces)}
+    parts = {"beams": surface.beams, "second": surface.second, "second_stress": surface.second_stress}
+    for key, part in parts.items():
+        arrays |= {} if part is None else {f"{key}/{f.name}": getattr(part, f.name) for f in fields(part)}
     return arrays
 
 
 def surface_of(arrays: Mapping[str, Array]) -> Surface:
     """The surface of these arrays; the inverse of `surface_arrays`."""
-    own = {key: value for key, value in arrays.items() if "/" not in key}
-    beams = {key.removeprefix("beams/"): value for key, value in arrays.items() if key.startswith("beams/")}
-    return Surface(**own, beams=BeamForces(**beams) if beams else None)
+    given: dict[str, dict[str, Array]] = {}
+    for key, value in arrays.items():
+        part, _, name = key.rpartition("/")
+        given.setdefault(part, {})[name] = value
+    kinds = {"beams": BeamForces, "second": QuadraticField, "second_stress": QuadraticField}
+    parts = {key: kind(**given[key]) for key, kind in kinds.items() if key in given}
+    return Surface(**given[""], **parts)
 
 
 def load_body(path: str | Path) -> FlexibleBody:

@@ -10,7 +10,8 @@ all motion, and the body is the one that a reduction under them would have made,
 interfaces: Craig-Bampton, Rubin, static shapes. Plain eigenmodes belong to their conditions; converted, they stay the
 deformations that they were.
 
-The geometric stiffness by load follows as well (`ffr_prep.reduction.turned_stiffening`).
+The geometric stiffness by load and the second order of the surface follow as well (`ffr_prep.reduction.turned_stiffening`,
+`ffr_prep.reduction.turned_surface`).
 
 Source: A. A. Shabana, Dynamics of Multibody Systems (2013), section 6.7; O. P. Agrawal, A. A. Shabana, Computers &
 Structures 21 (1985) 1303-1312.
@@ -25,7 +26,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ffr_prep.body import FlexibleBody, Interface, Surface
+from ffr_prep.body import FlexibleBody, Interface
 from ffr_prep.body.interface_freedom import interface_freedom
 from ffr_prep.body.provenance import described
 from ffr_prep.common.arrays import Array
@@ -36,6 +37,7 @@ from ffr_prep.model.invariants import InertiaIntegrals
 from ffr_prep.model.reference import ReferenceConditions, UserConditions, functionals
 from ffr_prep.reduction.basis import diagonalised, in_frame
 from ffr_prep.reduction.turned_stiffening import condition_count, turned_stiffening
+from ffr_prep.reduction.turned_surface import turned_surface
 
 
 def with_reference(body: FlexibleBody, conditions: ReferenceConditions) -> FlexibleBody:
@@ -55,14 +57,17 @@ def with_reference(body: FlexibleBody, conditions: ReferenceConditions) -> Flexi
     elastic = in_frame(model, L, np.eye(6 + body.n)[:, 6:])
     basis = diagonalised(model, elastic, elastic.T @ (model.K @ elastic))
     Z = basis.Z
+    stiffening = (
+        None
+        if body.stiffening is None
+        else turned_stiffening(body, model, conditions, first_integrals(body), Z)
+    )
     return replace(
         body,
         omega2=basis.omega2,
         interfaces=_interfaces(body, model, Z),
-        surface=body.surface and _surface(body.surface, Z),
-        stiffening=None
-        if body.stiffening is None
-        else turned_stiffening(body, model, conditions, first_integrals(body), Z),
+        surface=turned_surface(body, Z, basis.omega2, stiffening),
+        stiffening=stiffening,
         provenance=_provenance(body, conditions),
         **vars(combined_integrals(body, Z)),
     )
@@ -141,14 +146,6 @@ def first_integrals(body: FlexibleBody) -> tuple[Array, Array]:
 def _interfaces(body: FlexibleBody, model: CoupledModel, Z: Array) -> tuple[Interface, ...]:
     shapes = (model.C @ Z).reshape(len(body.interfaces), 6, -1)
     return tuple(replace(i, phi_t=six[:3], phi_r=six[3:]) for i, six in zip(body.interfaces, shapes, strict=True))
-
-
-def _surface(surface: Surface, Z: Array) -> Surface:
-    """Rigid motion moves the points but stresses nothing."""
-    turned = np.einsum("akm,pm->pka", turns(), surface.points)
-    Phi = Z[:3] + turned @ Z[3:6] + surface.Phi @ Z[6:]
-    beams = surface.beams and replace(surface.beams, modes=surface.beams.modes @ Z[6:])
-    return replace(surface, Phi=Phi, stress=None if surface.stress is None else surface.stress @ Z[6:], beams=beams)
 
 
 def _provenance(body: FlexibleBody, conditions: ReferenceConditions) -> dict[str, Any]:
