@@ -23,7 +23,17 @@ from ffr_prep.body.reduced import (
     Surface,
     axial,
 )
-from ffr_prep.body.second_order import compressed, displacements, pair_values, pairs_of, recoordinated, values
+from ffr_prep.body.second_order import (
+    at_places,
+    compressed,
+    compressed_groups,
+    displacements,
+    linear_surface,
+    pair_values,
+    recoordinated,
+    some_points,
+    values,
+)
 
 __all__ = [
     "SECTION_FORCES",
@@ -34,18 +44,21 @@ __all__ = [
     "Interface",
     "QuadraticField",
     "Surface",
+    "at_places",
     "axial",
     "compressed",
+    "compressed_groups",
     "content_hash",
     "displacements",
+    "linear_surface",
     "load_body",
     "pair_values",
-    "pairs_of",
     "recombined",
     "recoordinated",
     "rigid_body",
     "save_arrays",
     "save_body",
+    "some_points",
     "surface_arrays",
     "surface_of",
     "truncated",

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ffr_prep.body.reduced import BodyError, FlexibleBody, Interface, Surface, axial
+from ffr_prep.body.reduced import BeamForces, BodyError, FlexibleBody, Interface, Surface, axial
 from ffr_prep.body.second_order import pair_values, recoordinated
 from ffr_prep.common.arrays import Array, ArrayLike
 
@@ -86,10 +86,14 @@ def recombined(surface: Surface, V: Array, Phi: Array) -> Surface:
         surface,
         Phi=Phi,
         stress=None if surface.stress is None else surface.stress @ V,
-        beams=surface.beams and replace(surface.beams, modes=surface.beams.modes @ V),
+        beams=surface.beams and _recombined_forces(surface.beams, V),
         second=surface.second and recoordinated(surface.second, V),
         second_stress=surface.second_stress and recoordinated(surface.second_stress, V),
     )
+
+
+def _recombined_forces(beams: BeamForces, V: Array) -> BeamForces:
+    return replace(beams, modes=beams.modes @ V, second=beams.second and recoordinated(beams.second, V))
 
 
 def _nearest(body: FlexibleBody, name: str, points: Array, position: Array) -> int:

@@ -83,19 +83,37 @@ def surface_arrays(surface: Surface) -> dict[str, Array]:
         arrays |= {"stress": surface.stress, "moduli": surface.moduli}
     parts = {"beams": surface.beams, "second": surface.second, "second_stress": surface.second_stress}
     for key, part in parts.items():
-        arrays |= {} if part is None else {f"{key}/{f.name}": getattr(part, f.name) for f in fields(part)}
+        arrays |= _arrays_of(key, part)
     return arrays
+
+
+def _arrays_of(key: str, part: BeamForces | QuadraticField | None) -> dict[str, Array]:
+    if part is None:
+        return {}
+    found = {f"{key}/{f.name}": getattr(part, f.name) for f in fields(part) if f.name != "second"}
+    return found | (_arrays_of(f"{key}/second", part.second) if isinstance(part, BeamForces) else {})
 
 
 def surface_of(arrays: Mapping[str, Array]) -> Surface:
     """The surface of these arrays; the inverse of `surface_arrays`."""
-    given: dict[str, dict[str, Array]] = {}
+    given: dict[str, dict[str, Array]] = {"beams": {}}
     for key, value in arrays.items():
         part, _, name = key.rpartition("/")
         given.setdefault(part, {})[name] = value
-    kinds = {"beams": BeamForces, "second": QuadraticField, "second_stress": QuadraticField}
-    parts = {key: kind(**given[key]) for key, kind in kinds.items() if key in given}
-    return Surface(**given[""], **parts)
+    second = {key: QuadraticField(**of) for key, of in given.items() if "shapes" in of}
+    own, beams = given[""], given["beams"]
+    return Surface(
+        points=own["points"],
+        triangles=own["triangles"],
+        Phi=own["Phi"],
+        stress=own.get("stress"),
+        moduli=own.get("moduli"),
+        beams=BeamForces(beams["positions"], beams["axes"], beams["modes"], second.get("beams/second"))
+        if beams
+        else None,
+        second=second.get("second"),
+        second_stress=second.get("second_stress"),
+    )
 
 
 def load_body(path: str | Path) -> FlexibleBody:

@@ -75,17 +75,21 @@ class BeamForces(Brief):
     axes      : (E, 3, 3) rotation from element to body axes
     modes     : (E, 3, 6, n) N, Qy, Qz, Mx, My, Mz at [element, place, force, :], which the part of the beam towards the
                 last end exerts on the other, in element axes [N/(m sqrt(kg)), N/sqrt(kg)]
+    second    : what is quadratic in the elastic coordinates of the same forces, in axes that turn with the sections; None
+                where it was not computed
     """
 
     positions: Array
     axes: Array
     modes: Array
+    second: QuadraticField | None = None
 
     def __post_init__(self) -> None:
         count, n = np.shape(self.positions)[0], np.shape(self.modes)[-1]
         _freeze(self, "positions", (count, 3, 3))
         _freeze(self, "axes", (count, 3, 3))
         _freeze(self, "modes", (count, 3, 6, n))
+        _check_quadratic(self.second, (count, 3, 6), n)
 
 
 @dataclass(frozen=True, repr=False)
@@ -351,7 +355,7 @@ def _check_quadratic(field: QuadraticField | None, places: tuple[int, ...], n: i
     if field is None or (field.shapes.shape[:-1] == places and field.weights.shape[1] == n):
         return
     raise BodyError(
-        f"surface: a quadratic field of {field.shapes.shape[:-1]} values in {field.weights.shape[1]} modes does not fit "
+        f"a quadratic field of {field.shapes.shape[:-1]} values in {field.weights.shape[1]} modes does not fit "
         f"{places} values in {n} modes"
     )
 

@@ -8,6 +8,10 @@ than `TOLERANCE` of the largest value.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 
 from ffr_prep.body.reduced import QuadraticField, Surface
@@ -16,17 +20,12 @@ from ffr_prep.common.arrays import Array
 TOLERANCE = 1e-4
 
 
-def pairs_of(n: int) -> tuple[Array, Array]:
-    """i <= j of the n (n + 1) / 2 pairs of n coordinates, in the order in which fields of pairs are listed."""
-    return np.triu_indices(n)
-
-
 def compressed(pairs: Array, omega2: Array) -> QuadraticField:
-    """The fields u_ij (..., c, n (n + 1) / 2), of  sum_ij q_i q_j u_ij / 2,  as few shapes.
+    """The fields u_ij (..., c, n (n + 1) / 2), of  sum_ij q_i q_j u_ij / 2,  as few shapes; pairs i <= j row by row.
 
     omega2 : (n,) squared frequencies, which say what amplitudes of the modes have equal energy
     """
-    i, j = pairs_of(omega2.size)
+    i, j = np.triu_indices(omega2.size)
     scale = np.where(i == j, 1.0, np.sqrt(2.0)) / np.sqrt(omega2[i] * omega2[j])
     scaled = pairs.reshape(-1, scale.size) * scale
     turn = np.linalg.eigh(scaled.T @ scaled)[1][:, ::-1]
@@ -42,6 +41,16 @@ def _rank(shapes: Array) -> int:
     squares = np.einsum("pcr,pcr->pr", shapes, shapes)
     left = np.cumsum(squares[:, ::-1], axis=1)[:, ::-1].max(axis=0, initial=0.0)  # without the shapes before
     return int(np.sum(left > TOLERANCE**2 * left.max(initial=0.0)))
+
+
+def compressed_groups(pairs: Array, omega2: Array, groups: Sequence[slice]) -> QuadraticField:
+    """As `compressed`, of components that have other units group by group: each is kept as accurate as its own largest."""
+    parts = [compressed(pairs[..., own, :], omega2) for own in groups]
+    ranks = np.cumsum([0, *(part.shapes.shape[-1] for part in parts)])
+    shapes = np.zeros((*pairs.shape[:-1], ranks[-1]))
+    for own, part, first, last in zip(groups, parts, ranks, ranks[1:], strict=False):
+        shapes[..., own, first:last] = part.shapes
+    return QuadraticField(shapes, np.concatenate([part.weights for part in parts]))
 
 
 def values(field: QuadraticField, q: Array) -> Array:
@@ -64,3 +73,21 @@ def displacements(surface: Surface, q: Array) -> Array:
     """(..., P, 3) displacements Phi q + u_2 [m] of the surface points at elastic coordinates q (..., n) [m sqrt(kg)]."""
     first = np.tensordot(q, surface.Phi, (-1, -1))
     return first if surface.second is None else first + values(surface.second, q)
+
+
+def at_places(field: QuadraticField, places: Any) -> QuadraticField:
+    """The field at some of its places, which index its first axes."""
+    return replace(field, shapes=field.shapes[places])
+
+
+def linear_surface(surface: Surface) -> Surface:
+    """The surface without its second order, as bodies have it that are computed linearly."""
+    beams = surface.beams and replace(surface.beams, second=None)
+    return replace(surface, second=None, second_stress=None, beams=beams)
+
+
+def some_points(surface: Surface, places: Array, triangles: Array) -> Surface:
+    """Some points (k,) of the surface with other triangles (T, 3) between them; without section forces."""
+    stress, moduli = (None if of is None else of[places] for of in (surface.stress, surface.moduli))
+    second, second_stress = (of and at_places(of, places) for of in (surface.second, surface.second_stress))
+    return Surface(surface.points[places], triangles, surface.Phi[places], stress, moduli, None, second, second_stress)

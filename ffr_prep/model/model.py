@@ -83,4 +83,5 @@ def merged(parts: Sequence[Surface | None]) -> Surface | None:
 
 
 def _merged_beams(beams: Sequence[BeamForces]) -> BeamForces:
-    return BeamForces(**{key: np.concatenate([vars(one)[key] for one in beams]) for key in vars(beams[0])})
+    positions, axes, modes = ([getattr(one, key) for one in beams] for key in ("positions", "axes", "modes"))
+    return BeamForces(np.concatenate(positions), np.concatenate(axes), np.concatenate(modes))

@@ -174,9 +174,7 @@ def _position(models: Sequence[CoupledModel], place: tuple[int, int]) -> Array:
 # ---- elimination --------------------------------------------------------------------------------------------------
 
 
-def elimination(
-    parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]
-) -> tuple[sp.csr_array, list[Eliminated]]:
+def elimination(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> tuple[sp.csr_array, list[Eliminated]]:
     """X (Z_1 + Z_2 + ..., Z): the coordinates of all parts from the independent ones of the joined model; and tie by tie
     what was eliminated."""
     steps: list[Eliminated] = []

@@ -70,7 +70,9 @@ def tied_second_order(
             beside += step.moves @ six
         return beside
 
-    def shown(of_part: Callable[[SecondOrder], Callable[[int, Array], Surface | None]], i: int, z: Array) -> Surface | None:
+    def shown(
+        of_part: Callable[[SecondOrder], Callable[[int, Array], Surface | None]], i: int, z: Array
+    ) -> Surface | None:
         ends = np.cumsum([x.shape[0] for x in own])[:-1]
         of_parts = np.split(X @ z + followed(i), ends)
         return merged([of_part(part)(i, mine) for part, mine in zip(parts, of_parts, strict=True)])

@@ -58,9 +58,7 @@ def with_reference(body: FlexibleBody, conditions: ReferenceConditions) -> Flexi
     basis = diagonalised(model, elastic, elastic.T @ (model.K @ elastic))
     Z = basis.Z
     stiffening = (
-        None
-        if body.stiffening is None
-        else turned_stiffening(body, model, conditions, first_integrals(body), Z)
+        None if body.stiffening is None else turned_stiffening(body, model, conditions, first_integrals(body), Z)
     )
     return replace(
         body,

@@ -7,11 +7,12 @@ makes them stay (see `ffr_prep.model.second_order`).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from ffr_prep.body import Surface, compressed, pairs_of
+from ffr_prep.body import Surface, compressed, compressed_groups
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.progress import Advance
 from ffr_prep.model.model import Model
@@ -41,11 +42,21 @@ def with_second_order(
         assert part is not None  # the model has a surface
         parts.append(part)
         advance((i + 1) / n, f"second order of {i + 1} of {n} modes")
-    made = compressed(np.concatenate([part.Phi for part in parts], axis=2), basis.omega2)
+    return _collected(surface, parts, basis.omega2)
+
+
+def _collected(surface: Surface, parts: Sequence[Surface], omega2: Array) -> Surface:
+    """The surface with the fields of all pairs, in the place of the modes of `parts`."""
+    second = compressed(np.concatenate([part.Phi for part in parts], axis=-1), omega2)
     stress = [part.stress for part in parts if part.stress is not None]
-    return replace(
-        surface, second=made, second_stress=compressed(np.concatenate(stress, axis=2), basis.omega2) if stress else None
-    )
+    second_stress = compressed(np.concatenate(stress, axis=-1), omega2) if stress else None
+    forces = [part.beams.modes for part in parts if part.beams is not None]
+    beams = surface.beams
+    if beams is not None and forces:
+        forces_and_moments = (slice(0, 3), slice(3, 6))
+        pairs = np.concatenate(forces, axis=-1)
+        beams = replace(beams, second=compressed_groups(pairs, omega2, forces_and_moments))
+    return replace(surface, second=second, second_stress=second_stress, beams=beams)
 
 
 def _prescribed(model: Model, held: SupportedBody, conditions: ReferenceConditions, second: SecondOrder) -> Array:

@@ -9,8 +9,11 @@ so to second order its displacement is
 
     u_2' = u_2 + psi x Phi q + psi x (psi x u_0) / 2 + psi_2 x u_0 + tau_2.
 
-What the new conditions hold, psi_2 and tau_2 follow from the mean translation and rotation of u_2' over the mass, which are
-those that the first six matrices of the geometric stiffness say:  int u_2 dm = 1/2 q K_k q,  int u_0 x u_2 dm = 1/2 q K_{3+k} q.
+psi_2 and tau_2, which the new conditions hold, follow from the mean translation and rotation of u_2' over the mass: those of
+the first six matrices of the geometric stiffness,
+
+    int u_2,k dm = 1/2 q K_k q,    int (u_0 x u_2)_k dm = 1/2 q K_(3+k) q.
+
 The stress of second order is that of Green's strain, which no rigid motion changes.
 
 Source: A. A. Shabana, Dynamics of Multibody Systems (2013), sections 2.2 and 6.7.
@@ -22,7 +25,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ffr_prep.body import FlexibleBody, Surface, axial, compressed, pair_values, recombined
+from ffr_prep.body import FlexibleBody, Surface, axial, compressed, linear_surface, recombined
 from ffr_prep.common.arrays import Array
 from ffr_prep.model.accelerations import turns
 from ffr_prep.model.second_order import turned
@@ -40,7 +43,7 @@ def turned_surface(body: FlexibleBody, Z: Array, omega2: Array, stiffening: Arra
     old = recombined(surface, Z[6:], surface.Phi @ Z[6:])
     new = replace(old, Phi=old.Phi + Z[:3] + arms @ Z[3:6])
     if surface.second is None or stiffening is None or body.stiffening is None:
-        return replace(new, second=None, second_stress=None)
+        return linear_surface(new)
     held = _held(body, Z, stiffening)
     parts = [_pairs(old, arms, Z[3:6], i, held[:, i, i:]) for i in range(omega2.size)]
     return replace(new, second=compressed(np.concatenate(parts, axis=2), omega2))

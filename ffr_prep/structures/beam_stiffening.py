@@ -82,7 +82,7 @@ def end_forces_of_products(elements: Beams, one: Array, others: Array) -> Array:
 
 
 def beam_forces_of_products(elements: Beams, one: Array, others: Array) -> Array:
-    """(E, 12, m) the geometric stiffness of one (E, 12, 1) and others (E, 12, m) as a linear form of the static coordinates."""
+    """(E, 12, m) geometric stiffness of one (E, 12, 1) and others (E, 12, m) as linear form of static coordinates."""
     of_sections = end_forces_of_products(elements, one, others)
     to_element = element_coordinates(elements)
     arms = np.zeros_like(of_sections)

@@ -78,7 +78,7 @@ def strain_of_products(elements: Plates, at: Array, one: Array, others: Array) -
 
 
 def plate_forces_of_products(elements: Plates, one: Array, others: Array) -> Array:
-    """(E, 6k, m) the geometric stiffness of one (E, 6k, 1) and others (E, 6k, m) as a linear form of the static coordinates."""
+    """(E, 6k, m) geometric stiffness of one (E, 6k, 1) and others (E, 6k, m) as linear form of static coordinates."""
     parts = [slice(first, first + _CHUNK) for first in range(0, len(elements.lift), _CHUNK)]
     return np.concatenate([_forces_of_products(_part(elements, own), one[own], others[own]) for own in parts])
 
