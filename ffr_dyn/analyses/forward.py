@@ -44,6 +44,7 @@ from ffr_dyn.results.quantities import Entry, Memory, measure, needs_every_step,
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.scene import Scene
+from ffr_dyn.scene.surfaces import surface_of
 from ffr_prep.body import Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
@@ -404,8 +405,8 @@ def _header(
 
 def geometry(scene: Scene) -> dict[str, Surface]:
     """The surfaces of the bodies in their own frames."""
-    models = {body.name: body.frame.model if body.frame else body.model for body in scene.bodies}
-    return {name: model.surface for name, model in models.items() if model.surface is not None}
+    surfaces = {body.name: surface_of(body) for body in scene.bodies}
+    return {name: surface for name, surface in surfaces.items() if surface is not None}
 
 
 def _result(scene: Scene, run: _Run, attributes: dict[str, Any]) -> Result:

@@ -25,7 +25,7 @@ from ffr_dyn.results.power import (
     transmitted,
     work,
 )
-from ffr_dyn.results.recorded_motion import View, dot, shaped, times, to_axes
+from ffr_dyn.results.recorded_motion import View, dot, times, to_axes
 from ffr_dyn.results.result import EULER_PARAMETERS, XYZ, Axis, Quantity, mode_axis
 from ffr_dyn.scene.couplings import Coupling
 from ffr_dyn.scene.force_kinds import forces_of
@@ -34,6 +34,7 @@ from ffr_dyn.scene.joints import COORDINATES, Joint
 from ffr_dyn.scene.scene import marker_names, markers, measured_body
 from ffr_dyn.scene.sensors import Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.scene.stress_sensors import measured_modes
+from ffr_dyn.scene.surfaces import surface_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -319,9 +320,9 @@ def _measurements(system: System) -> Named:
 def _recovered(system: System, m: StressMeasurement | SectionMeasurement) -> Entry:
     """Stress or section forces: modes times elastic coordinates, and what is made of them."""
     b = measured_body(system.scene, m)
-    found = measured_modes(m, system.scene.bodies[b].model.surface)
+    found = measured_modes(m, surface_of(system.scene.bodies[b]))
     axes = () if found.axis is None else (Axis(*found.axis),)
-    return _entry(found.unit, axes, found.text, lambda view: found.of(shaped(found.modes, view.q(b))))
+    return _entry(found.unit, axes, found.text, lambda view: found.of(found.values(view.own_elastic(b, view.q(b)))))
 
 
 def _measured(view: View, m: Measurement) -> Array:

@@ -24,8 +24,8 @@ from dataclasses import replace
 import numpy as np
 
 from ffr_prep.body.accelerations import gradients, turns
-from ffr_prep.body.constructors import recombined
-from ffr_prep.body.reduced import FlexibleBody, Interface, Surface
+from ffr_prep.body.reduced import FlexibleBody, Interface
+from ffr_prep.body.turned_surface import turned_surface
 from ffr_prep.common.arrays import Array
 
 
@@ -40,7 +40,7 @@ def in_motions(body: FlexibleBody, Z: Array, omega2: Array, stiffening: Array | 
         PP_dm=(PP + PP.transpose(1, 0, 3, 2)) / 2,
         omega2=omega2,
         interfaces=_interfaces(body, Z),
-        surface=body.surface and _surface(body.surface, Z),
+        surface=turned_surface(body, Z, omega2, stiffening),
         stiffening=stiffening,
     )
 
@@ -139,9 +139,3 @@ def _works_at_interfaces(body: FlexibleBody) -> Array:
 def _interfaces(body: FlexibleBody, Z: Array) -> tuple[Interface, ...]:
     shapes = (interface_motions(body) @ Z).reshape(len(body.interfaces), 6, -1)
     return tuple(replace(i, phi_t=six[:3], phi_r=six[3:]) for i, six in zip(body.interfaces, shapes, strict=True))
-
-
-def _surface(surface: Surface, Z: Array) -> Surface:
-    """Rigid motion moves the points but stresses nothing."""
-    turned = np.einsum("akm,pm->pka", turns(), surface.points)
-    return recombined(surface, Z[6:], Z[:3] + turned @ Z[3:6] + surface.Phi @ Z[6:])

@@ -10,7 +10,8 @@ all motion, and the body is the one that a reduction under them would have made,
 interfaces: Craig-Bampton, Rubin, static shapes. Plain eigenmodes belong to their conditions; converted, they stay the
 deformations that they were.
 
-The load matrices follow as well (`ffr_prep.reduction.turned_stiffening`).
+The load matrices follow as well (`ffr_prep.reduction.turned_stiffening`), and the second order of the surface
+(`ffr_prep.body.turned_surface`).
 
 Source: A. A. Shabana, Dynamics of Multibody Systems (2013), section 6.7; O. P. Agrawal, A. A. Shabana, Computers &
 Structures 21 (1985) 1303-1312.

@@ -68,8 +68,9 @@ def _turning(
 ) -> RigidRegion | MeanRegion:
     rotation, count = model.C[6 * k + 3 : 6 * k + 6], len(model.points)
     if _follows(region):
-        sums = force_moments(region.nodes, model.points[region.nodes] - region.point, 3, count)
-        return RigidRegion(rotation, sp.csr_array(sums @ K @ model.B), (sums @ loads).toarray())
+        arms = model.points[region.nodes] - region.point
+        sums = force_moments(region.nodes, arms, 3, count)
+        return RigidRegion(region.nodes, arms, rotation, sp.csr_array(sums @ K @ model.B), (sums @ loads).toarray())
     weighted = region.weights @ region.offsets
     sums = force_moments(region.nodes, weighted, 3, count)
     second_moment = region.offsets.T @ weighted
