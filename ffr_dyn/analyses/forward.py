@@ -404,6 +404,7 @@ def _header(
 
 
 def geometry(scene: Scene) -> dict[str, Surface]:
+    """The surfaces of the bodies in their own frames."""
     surfaces = {body.name: surface_of(body) for body in scene.bodies}
     return {name: surface for name, surface in surfaces.items() if surface is not None}
 

@@ -12,6 +12,7 @@ The numbered invariants I1...I9 and Shabana's S_bar family are read-only views o
 
 from ffr_prep.body.constructors import recombined, rigid_body, truncated, with_point
 from ffr_prep.body.file import content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
+from ffr_prep.body.mean_axis import FrameMarker, MeanAxisForm, idle_loads, mean_axis_form
 from ffr_prep.body.reduced import (
     SECTION_FORCES,
     TENSOR,
@@ -42,7 +43,9 @@ __all__ = [
     "BeamForces",
     "BodyError",
     "FlexibleBody",
+    "FrameMarker",
     "Interface",
+    "MeanAxisForm",
     "QuadraticField",
     "Surface",
     "at_places",
@@ -51,8 +54,10 @@ __all__ = [
     "compressed_beside",
     "content_hash",
     "displacements",
+    "idle_loads",
     "linear_surface",
     "load_body",
+    "mean_axis_form",
     "pair_values",
     "reach_of",
     "recombined",

@@ -33,10 +33,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.body.accelerations import INERTIAL, turned, turns
 from ffr_prep.common.arrays import Array
-from ffr_prep.model.accelerations import INERTIAL, turns
 from ffr_prep.model.coupled import CoupledModel
-from ffr_prep.model.second_order import turned
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from ffr_prep.body import Surface
 from ffr_prep.common.arrays import Array
 
@@ -42,11 +40,3 @@ class SecondOrder:
     forces: Callable[[int], Array]
     surface: Callable[[int, Array], Surface | None]
     stressed: Callable[[int, Array], Surface | None]
-
-
-def turned(one: Array, others: Array) -> Array:
-    """(..., 3, 3, m) G with the second derivative G r of the displacement of an arm r that turns by one (..., 3) and
-    others (..., 3, m)."""
-    product = one[..., :, None, None] * others[..., None, :, :]
-    trace = np.einsum("...kkm->...m", product)
-    return (product + np.swapaxes(product, -3, -2)) / 2 - trace[..., None, None, :] * np.eye(3)[..., None]

@@ -21,9 +21,9 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from ffr_prep.body import Surface
+from ffr_prep.body.accelerations import INERTIAL
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-from ffr_prep.model.accelerations import INERTIAL
 from ffr_prep.model.coupled import CoupledModel, interface_index
 from ffr_prep.model.invariants import InertiaIntegrals
 from ffr_prep.model.model import Model, merged, summed

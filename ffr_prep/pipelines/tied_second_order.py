@@ -13,10 +13,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from ffr_prep.body import Surface
+from ffr_prep.body.accelerations import INERTIAL, turned
 from ffr_prep.common.arrays import Array
-from ffr_prep.model.accelerations import INERTIAL
 from ffr_prep.model.model import Model, merged
-from ffr_prep.model.second_order import SecondOrder, turned
+from ffr_prep.model.second_order import SecondOrder
 
 Flow = tuple[list[tuple[Array, sp.csr_array]], list[Array]]
 

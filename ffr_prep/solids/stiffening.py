@@ -22,9 +22,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.body.accelerations import unit_accelerations
 from ffr_prep.common.arrays import Array
 from ffr_prep.mesh.mesh import Mesh
-from ffr_prep.model.accelerations import unit_accelerations
 from ffr_prep.solids.assembly import (
     Chunk,
     Materials,

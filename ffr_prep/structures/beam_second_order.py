@@ -22,8 +22,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_prep.body import Surface
+from ffr_prep.body.accelerations import turned
 from ffr_prep.common.arrays import Array
-from ffr_prep.model.second_order import turned
 from ffr_prep.structures.beam_stiffening import end_forces_of_products, strain_functions, turned_offsets
 from ffr_prep.structures.beam_stress import at_places, stiffness_of_ends, stressed_sweep
 from ffr_prep.structures.beam_surface import swept_surface

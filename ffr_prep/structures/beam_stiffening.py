@@ -23,10 +23,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ffr_prep.body.accelerations import INERTIAL, gradients, turned, turns, unit_accelerations
 from ffr_prep.common.arrays import Array
-from ffr_prep.model.accelerations import INERTIAL, gradients, turns, unit_accelerations
 from ffr_prep.model.region_rotations import second_order_turn
-from ffr_prep.model.second_order import turned
 from ffr_prep.structures.beam_stress import end_forces, stiffness_of_ends
 from ffr_prep.structures.beams import (
     Beams,

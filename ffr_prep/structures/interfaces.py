@@ -21,9 +21,9 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.body.accelerations import INERTIAL, turns
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-from ffr_prep.model.accelerations import INERTIAL, turns
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion, rigid_field
 from ffr_prep.model.region_rotations import MeanRegion, RigidRegion, force_moments
 from ffr_prep.model.ties import check_names, interface_coordinates, six_rows, tied_rows

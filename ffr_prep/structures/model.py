@@ -19,10 +19,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from ffr_prep.body import Surface
+from ffr_prep.body.accelerations import INERTIAL, unit_accelerations
 from ffr_prep.body.provenance import described
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.progress import Stages, no_stages
-from ffr_prep.model.accelerations import INERTIAL, unit_accelerations
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
 from ffr_prep.model.invariants import InertiaIntegrals, inertia_integrals
 from ffr_prep.model.model import Model, merged, summed

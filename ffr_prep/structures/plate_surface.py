@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from ffr_prep.body import TENSOR, Surface
+from ffr_prep.body.accelerations import turned
 from ffr_prep.common.arrays import Array
-from ffr_prep.model.second_order import turned
 from ffr_prep.structures.plate_stiffening import strain_of_products
 from ffr_prep.structures.plates import (
     Plates,

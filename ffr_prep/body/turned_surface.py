@@ -25,10 +25,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ffr_prep.body import FlexibleBody, Surface, axial, compressed, linear_surface, recombined
+from ffr_prep.body.accelerations import turned, turns
+from ffr_prep.body.constructors import recombined
+from ffr_prep.body.reduced import FlexibleBody, Surface, axial
+from ffr_prep.body.second_order import compressed, linear_surface
 from ffr_prep.common.arrays import Array
-from ffr_prep.model.accelerations import turns
-from ffr_prep.model.second_order import turned
 
 
 def turned_surface(body: FlexibleBody, Z: Array, omega2: Array, stiffening: Array | None) -> Surface | None:
