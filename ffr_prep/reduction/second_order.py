@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ffr_prep.body import Surface, compressed, compressed_groups
+from ffr_prep.body import Surface, compressed, compressed_beside, reach_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.progress import Advance
 from ffr_prep.model.model import Model
@@ -47,15 +47,16 @@ def with_second_order(
 
 def _collected(surface: Surface, parts: Sequence[Surface], omega2: Array) -> Surface:
     """The surface with the fields of all pairs, in the place of the modes of `parts`."""
+    reach = reach_of(surface, omega2)
     second = compressed(np.concatenate([part.Phi for part in parts], axis=-1), omega2)
-    stress = [part.stress for part in parts if part.stress is not None]
-    second_stress = compressed(np.concatenate(stress, axis=-1), omega2) if stress else None
-    forces = [part.beams.modes for part in parts if part.beams is not None]
-    beams = surface.beams
-    if beams is not None and forces:
-        forces_and_moments = (slice(0, 3), slice(3, 6))
-        pairs = np.concatenate(forces, axis=-1)
-        beams = replace(beams, second=compressed_groups(pairs, omega2, forces_and_moments))
+    second_stress, beams = None, surface.beams
+    if surface.stress is not None:
+        stress = np.concatenate([part.stress for part in parts if part.stress is not None], axis=-1)
+        second_stress = compressed_beside(surface.stress, stress, omega2, reach, (slice(0, 6),))
+    if beams is not None:
+        forces = np.concatenate([part.beams.modes for part in parts if part.beams is not None], axis=-1)
+        in_all = compressed_beside(beams.modes, forces, omega2, reach, (slice(0, 3), slice(3, 6)))
+        beams = replace(beams, second=in_all)
     return replace(surface, second=second, second_stress=second_stress, beams=beams)
 
 
