@@ -12,7 +12,17 @@ The numbered invariants I1...I9 and Shabana's S_bar family are read-only views o
 
 from ffr_prep.body.constructors import recombined, rigid_body, truncated, with_point
 from ffr_prep.body.file import content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
-from ffr_prep.body.reduced import SECTION_FORCES, TENSOR, BeamForces, BodyError, FlexibleBody, Interface, Surface, axial
+from ffr_prep.body.reduced import (
+    SECTION_FORCES,
+    TENSOR,
+    BeamForces,
+    BodyError,
+    FlexibleBody,
+    Interface,
+    Surface,
+    axial,
+    cut_names,
+)
 
 __all__ = [
     "SECTION_FORCES",
@@ -24,6 +34,7 @@ __all__ = [
     "Surface",
     "axial",
     "content_hash",
+    "cut_names",
     "load_body",
     "recombined",
     "rigid_body",

@@ -33,7 +33,7 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.model.accelerations import turns
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.invariants import InertiaIntegrals
-from ffr_prep.model.reference import ReferenceConditions, UserConditions, functionals
+from ffr_prep.model.reference import ReferenceConditions, UserConditions, conditions_of_part, functionals
 from ffr_prep.reduction.basis import diagonalised, in_frame
 from ffr_prep.reduction.turned_stiffening import condition_count, turned_stiffening
 
@@ -64,6 +64,9 @@ def with_reference(body: FlexibleBody, conditions: ReferenceConditions) -> Flexi
         if body.stiffening is None
         else turned_stiffening(body, model, conditions, first_integrals(body), Z),
         provenance=_provenance(body, conditions),
+        parts=tuple(
+            with_reference(p, conditions_of_part(conditions, [i.name for i in p.interfaces])) for p in body.parts
+        ),
         **vars(combined_integrals(body, Z)),
     )
 
