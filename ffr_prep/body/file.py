@@ -174,7 +174,7 @@ def _from_arrays(meta: Mapping[str, Any], arrays: Mapping[str, Array]) -> Flexib
     )
     of_surface = {key.removeprefix("surface/"): value for key, value in arrays.items() if key.startswith("surface/")}
     surface = surface_of(of_surface) if of_surface else None
-    core = {key: arrays[key] for key in integral_shapes(arrays["omega2"].size)}
+    core: dict[str, Any] = {key: arrays[key] for key in integral_shapes(arrays["omega2"].size)}
     return FlexibleBody(
         name=meta["name"],
         mass=meta["mass"],

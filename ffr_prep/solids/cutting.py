@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -38,7 +39,7 @@ def _part(mesh: Mesh, division: Division, k: int) -> Mesh:
     number = np.full(division.part.size, -1)
     number[division.part == k] = np.arange(np.sum(division.part == k))
     first = np.cumsum([0, *(len(block.nodes) for block in mesh.blocks)])
-    owned = [division.part[a:b] == k for a, b in zip(first[:-1], first[1:], strict=True)]
+    owned = [division.part[a:b] == k for a, b in pairwise(first)]
     blocks = tuple(Block(b.kind, new[b.nodes[own]]) for b, own in zip(mesh.blocks, owned, strict=True) if own.any())
     groups = {**mesh.node_groups, **groups_at_cuts(division, k)}
     return replace(
