@@ -19,7 +19,7 @@ from ffr_dyn.results.quantities import DEFAULT_OUTPUTS, measure, selected
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.joints import COORDINATES, frames
-from ffr_dyn.scene.scene import GROUND, Scene
+from ffr_dyn.scene.scene import Body, Scene, marker_number, markers
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -93,18 +93,18 @@ def efforts(scene: Scene, result: Result) -> dict[str, Quantity]:
 
 def axis_history(scene: Scene, result: Result, marker: str, axis: Array) -> Array:
     """(T, 3) global axis that stands on a marker, `axis` (3,) in body axes."""
-    name, _, point = marker.partition(".")
-    if name == GROUND:
+    b, _, point = markers(scene)[marker_number(scene, marker)]
+    if b == len(scene.bodies):
         return np.broadcast_to(axis, (result.time.size, 3))
-    A, theta = rotation_matrix(result[f"{name}.p"]), _elastic_turn(scene, result, name, point)
+    body = scene.bodies[b]
+    A, theta = rotation_matrix(result[f"{body.name}.p"]), _elastic_turn(body, result, point)
     found: Array = np.einsum("tkl,tl->tk", A, axis + np.cross(theta, axis))
     return found
 
 
-def _elastic_turn(scene: Scene, result: Result, name: str, point: str) -> Array:
+def _elastic_turn(body: Body, result: Result, point: str) -> Array:
     """(T, 3) elastic rotation of a marker, body axes."""
-    model = next(body.model for body in scene.bodies if body.name == name)
-    if model.n == 0:
+    if body.model.n == 0:
         return np.zeros((result.time.size, 3))
-    found: Array = result[f"{name}.q"] @ model.interface(point).phi_r.T
+    found: Array = result[f"{body.name}.q"] @ body.model.interface(point).phi_r.T
     return found

@@ -28,6 +28,7 @@ from ffr_dyn.consistency.tangent import Chart, chart, movement, rates, sizes, st
 from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
+from ffr_dyn.scene.parts import described
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
@@ -160,7 +161,7 @@ def _result(
     if not stable:
         notes.append(f"the equilibrium is unstable: its lowest stiffness per mass is {lowest:.4g} 1/s^2")
     attributes = {
-        "title": scene.name,
+        **described(scene),
         "analysis": "static equilibrium",
         "method": f"Newton's method, {found.iterations} steps",
         "evaluations": int(at.work.info[EVALUATIONS]),

@@ -102,7 +102,7 @@ def _parts(model: Model, request: Request, progress: Stages, advance: Advance) -
     for k, part in enumerate(models, 1):
         own = replace(
             request,
-            name=f"{request.name}-{k}",
+            name=f"{request.name}_{k}",
             reference=conditions_of_part(request.reference, part.coupled.names),
             quality=None,
             parts=None,
