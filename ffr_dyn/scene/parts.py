@@ -1,13 +1,13 @@
 """A body that is cut into parts (`FlexibleBody.parts`), as the bodies of a scene that move in its place.
 
 The parts of the body "blade" are the bodies "blade_1", "blade_2", ... Their frames coincide with that of the whole while it
-is undeformed, so its pose and its motion are theirs. Fixed joints "blade_cut_1", ... hold them together. Markers keep the name
-of the whole, "blade.tip", whichever part has them.
+is undeformed, so its pose and its motion are theirs. Fixed joints "blade_cut_1", ... hold them together. Markers keep the
+name of the whole, "blade.tip", whichever part has them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import groupby
 from typing import Any
@@ -64,3 +64,27 @@ def described(scene: Any) -> dict[str, Any]:
     """What every result says of its scene: the title, and the parts of bodies by the name of the whole."""
     parts = {name: [part.name for part in of] for name, of in wholes(scene.bodies).items()}
     return {"title": scene.name} | ({"parts": parts} if parts else {})
+
+
+def as_declared(bodies: Iterable[Any]) -> tuple[Any, ...]:
+    """The bodies as they were declared: wholes in place of their parts; the inverse of `in_parts`.
+
+    Raises InputError for parts that no longer start, or are no longer treated, as those of one undeformed body.
+    """
+    bodies = tuple(bodies)
+    whole = {name: _whole(name, parts) for name, parts in wholes(bodies).items()}
+    names = dict.fromkeys(map(owner, bodies))
+    alone = {body.name: body for body in bodies if body.part_of is None}
+    return tuple(whole.get(name) or alone[name] for name in names)
+
+
+def _whole(name: str, parts: Sequence[Any]) -> Any:
+    alike = ("position", "rotation", "velocity", "omega_bar", "stiffening", "dropped")
+    first, ratios = parts[0], np.concatenate([part.damping for part in parts])
+    differing = [key for key in alike if any(not np.array_equal(getattr(p, key), getattr(first, key)) for p in parts)]
+    if differing or any(np.any(part.q) or np.any(part.q_dot) for part in parts) or (ratios != ratios[:1]).any():
+        raise InputError(
+            f"the parts of body {name!r} differ in pose or treatment, or are deformed: they are not one body"
+        )
+    given = {key: getattr(first, key) for key in alike} | {"damping": float(ratios[0]) if ratios.size else 0.0}
+    return replace(first.part_of, model=replace(first.part_of.model, parts=[part.model for part in parts]), **given)
