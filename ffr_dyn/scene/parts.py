@@ -24,6 +24,22 @@ def owner(body: Any) -> str:
     return str(body.name if body.part_of is None else body.part_of.name)
 
 
+def taken_apart(scene: Any) -> dict[str, Any]:
+    """Bodies, joints and forces of a scene with parts in place of bodies that have them; errors as of `in_parts`."""
+    bodies = in_parts(scene.bodies)
+    there = {joint.name for joint in scene.joints}
+    joints = (*scene.joints, *(joint for joint in cut_joints(bodies) if joint.name not in there))
+    parts = wholes(bodies)
+    forces = tuple(one for force in scene.forces for one in _spread(force, parts.get(getattr(force, "body", ""), [])))
+    return {"bodies": bodies, "joints": joints, "forces": forces}
+
+
+def _spread(force: Any, parts: Sequence[Any]) -> Iterable[Any]:
+    if not parts:
+        return (force,)
+    return force.on_parts(parts[0].part_of.model, {part.name: part.model for part in parts})
+
+
 def in_parts(bodies: Iterable[Any]) -> tuple[Any, ...]:
     """The bodies of a scene, each that has parts replaced by these.
 

@@ -21,7 +21,7 @@ from ffr_dyn.scene.couplings import Coupling, coupled, coupling_word
 from ffr_dyn.scene.drivers import Driver, PointDriver, driver_word
 from ffr_dyn.scene.force_kinds import forces_of, kinds_in
 from ffr_dyn.scene.joints import COORDINATES, Joint
-from ffr_dyn.scene.parts import cut_joints, in_parts, owner, wholes
+from ffr_dyn.scene.parts import owner, taken_apart, wholes
 from ffr_dyn.scene.sensors import AnyMeasurement, Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.scene.stress_sensors import measured_modes, nearest_surface
 from ffr_prep.body import FlexibleBody
@@ -156,10 +156,8 @@ class Scene(Brief):
     def __post_init__(self) -> None:
         for key, kinds in _DECLARATIONS.items():
             object.__setattr__(self, key, several(f"{key} of a scene", getattr(self, key), kinds or kinds_in(key)))
-        object.__setattr__(self, "bodies", in_parts(self.bodies))
-        there = {joint.name for joint in self.joints}
-        cuts = tuple(joint for joint in cut_joints(self.bodies) if joint.name not in there)
-        object.__setattr__(self, "joints", (*self.joints, *cuts))
+        for key, found in taken_apart(self).items():
+            object.__setattr__(self, key, found)
         if not isinstance(self.ground, Mapping):
             raise InputError(f"ground is {self.ground!r}; give points by name, such as {{'wall': (0, 0, 0)}}")
         points = {key: _vector(at, 3, f"ground point {key!r}") for key, at in self.ground.items()}

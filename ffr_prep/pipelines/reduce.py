@@ -107,7 +107,11 @@ def _parts(model: Model, request: Request, progress: Stages, advance: Advance) -
             quality=None,
             parts=None,
         )
-        yield _reduced(part, own, lambda stage, k=k: progress(f"part {k} of {len(models)}: {stage}"), advance)  # type: ignore[misc]
+        of = f"part {k} of {len(models)}"
+        try:
+            yield _reduced(part, own, lambda stage, of=of: progress(f"{of}: {stage}"), advance)  # type: ignore[misc]
+        except InputError as error:
+            raise InputError(f"{of}: {error}") from None
 
 
 def _reduced(model: Model, request: Request, progress: Stages, advance: Advance) -> FlexibleBody:
