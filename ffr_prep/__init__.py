@@ -46,6 +46,7 @@ _BY_MODULE = {
     "ffr_prep.mesh.formats": "register_mesh_format MeshFormat",
     "ffr_prep.mesh.mesh": "Block Mesh check_mesh read_mesh",
     "ffr_prep.model.coupled": "InterfaceRegion",
+    "ffr_prep.model.cuts": "CutPlane",
     "ffr_prep.model.material": "AnisotropicMaterial Material material orthotropic",
     "ffr_prep.model.model": "Model",
     "ffr_prep.model.reference": "FixedTo MeanAxis SimplySupported Support Supports UserConditions",
@@ -109,6 +110,7 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_prep.mesh.formats import register_mesh_format as register_mesh_format, MeshFormat as MeshFormat
     from ffr_prep.mesh.mesh import Block as Block, Mesh as Mesh, check_mesh as check_mesh, read_mesh as read_mesh
     from ffr_prep.model.coupled import InterfaceRegion as InterfaceRegion
+    from ffr_prep.model.cuts import CutPlane as CutPlane
     from ffr_prep.model.material import (
         AnisotropicMaterial as AnisotropicMaterial, Material as Material, material as material,
         orthotropic as orthotropic,

@@ -35,6 +35,7 @@ from ffr_dyn.results.quantities import measure, selected
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.drivers import Driver, PointDriver
+from ffr_dyn.scene.parts import described
 from ffr_dyn.scene.scene import GROUND, Scene, require_scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
@@ -222,7 +223,7 @@ def _not_collocated(
         notes = []
     moments = [at_moment(own, float(t), w, x) for t, w, x in zip(times, ws, xs, strict=True)]
     attributes: dict[str, Any] = {
-        "title": scene.name,
+        **described(scene),
         "analysis": f"mixed dynamics, {'bounded' if isinstance(chosen, Bounded) else 'causal'}",
         "method": f"{chosen!r}",
         "evaluations": int(own.at.work.info[EVALUATIONS]),

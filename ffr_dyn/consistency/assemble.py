@@ -14,7 +14,7 @@ from scipy.sparse import block_diag, csr_array
 
 from ffr_dyn.compile.scene_tables import System, compile_scene
 from ffr_dyn.consistency.row_space import independent, smallest_solution
-from ffr_dyn.consistency.validity import stretch
+from ffr_dyn.consistency.validity import deflections
 from ffr_dyn.equations.constraint_rows import Block, blocks_of, rows_at
 from ffr_dyn.equations.constraints import Row
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
@@ -93,7 +93,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
 def _require_shape(scene: Scene, place: Layout, guess: Array, x: Array) -> None:
     """InputError where positions are met only by a body deformed beyond all sense."""
     for b, body in enumerate(scene.bodies):
-        share = stretch(body.model, (x - guess)[None, place.q(b)])
+        _, share = deflections(body.model, (x - guess)[None, place.q(b)])
         if share > TORN:
             raise InputError(
                 f"the mechanism cannot be assembled without deforming body {body.name!r} by {share:.3g} times its size; "

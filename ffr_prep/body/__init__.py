@@ -23,6 +23,7 @@ from ffr_prep.body.reduced import (
     QuadraticField,
     Surface,
     axial,
+    cut_names,
 )
 from ffr_prep.body.second_order import (
     at_places,
@@ -53,6 +54,7 @@ __all__ = [
     "compressed",
     "compressed_beside",
     "content_hash",
+    "cut_names",
     "displacements",
     "idle_loads",
     "linear_surface",

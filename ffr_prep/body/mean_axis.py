@@ -100,7 +100,7 @@ def _with_frame(body: FlexibleBody) -> FlexibleBody:
     nothing = np.zeros((3, body.n))
     stiffening = np.concatenate([np.asarray(body.stiffening), np.zeros((6, body.n, body.n))])
     frame = Interface(_FRAME, pivot, nothing, nothing)
-    return replace(body, interfaces=(*body.interfaces, frame), stiffening=stiffening, surface=None)
+    return replace(body, interfaces=(*body.interfaces, frame), stiffening=stiffening, surface=None, parts=())
 
 
 def _surface(surface: Surface, Z: Array) -> Surface:
