@@ -13,6 +13,7 @@ from scipy.linalg import qr
 from scipy.sparse import block_diag, csr_array
 
 from ffr_dyn.compile.scene_tables import System, compile_scene
+from ffr_dyn.consistency.dropped_terms import check_dropped
 from ffr_dyn.consistency.row_space import independent, smallest_solution
 from ffr_dyn.consistency.validity import stretch
 from ffr_dyn.equations.constraint_rows import Block, blocks_of, rows_at
@@ -67,6 +68,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     require_scene(scene)
     scene, blocks = flattened(scene, time)
     place = layout(scene)
+    left_out = [note for b, body in enumerate(scene.bodies) for note in check_dropped(body, place.active(b))]
     guess, v = initial_state(scene, place)
     x = close_positions(scene, place, blocks, guess, v, time)
     _require_shape(scene, place, guess, x)
@@ -76,7 +78,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     notes = [
         f"{block}: the row '{text}' is redundant; of the reactions that are possible the smallest are given"
         for block, text in redundant
-    ]
+    ] + left_out
     shift = max(np.linalg.norm(x[place.R(b)] - guess[place.R(b)]) for b in range(len(scene.bodies)))
     if shift > 1e-6:
         notes.insert(0, f"assembly moved a body by {shift:.3g} m from where the scene puts it")
