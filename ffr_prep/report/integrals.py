@@ -43,7 +43,7 @@ _MOST_COORDINATES = 1200  # of which arrays of all pairs are still shown or kept
 def integral(source: Source, name: str) -> Any:
     """An integral by its name, of `NAMES`: an array, a sparse matrix, or several of those."""
     if name not in _MEANING:
-        raise InputError(f"there is no integral {name!r}; {choice(name, NAMES)}")
+        raise InputError(f"there is no integral {name!r}; {choice(name, _MEANING)}")
     kind, _, pair = name.rpartition("_")
     if pair in _PAIRS:
         return (source.S_bar_kl if kind == "S_bar" else source.N_bar_kl)(*_PAIRS[pair])
@@ -83,7 +83,7 @@ def chosen(names: Sequence[str]) -> tuple[str, ...]:
     """The names, where "all" stands for every one; InputError for one that does not exist."""
     unknown = [name for name in names if name not in (*NAMES, "all")]
     if unknown:
-        raise InputError(f"there is no integral {unknown[0]!r}; {choice(unknown[0], (*NAMES, 'all'))}")
+        raise InputError(f"there is no integral {unknown[0]!r}; {choice(unknown[0], {**_MEANING, 'all': ''})}")
     return NAMES if "all" in names else tuple(dict.fromkeys(names))
 
 

@@ -1,8 +1,8 @@
 """The inertia integrals of a frame of beams and plates in its nodal coordinates q_n, before any reduction.
 
 With the displacement u = N q_n, N = C S C_bar B_1 (three translations and three rotations of every node), they are the
-inertia shape integrals of the books, over the same mass points from which a body's are summed: with q_n = B_2 q_f those of the
-body follow (S_bar B_2, B_2^T S_bar_kl B_2, ...). Names and signs are those of `ffr_prep.body.FlexibleBody`.
+inertia shape integrals of the books, over the same mass points from which a body's are summed: with q_n = B_2 q_f those of
+the body follow (S_bar B_2, B_2^T S_bar_kl B_2, ...). Names and signs are those of `ffr_prep.body.FlexibleBody`.
 
 Source: A. A. Shabana, Dynamics of Multibody Systems (2013), sections 5.3 and 6.5.
 """
