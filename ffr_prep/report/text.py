@@ -217,7 +217,15 @@ def _choice_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
 
 def _origin_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
     for key, value in provenance.items():
-        if value and key not in ("reduction", "reference", "material", "interfaces", "warnings", "quality"):
+        if value and key not in (
+            "reduction",
+            "reference",
+            "material",
+            "interfaces",
+            "warnings",
+            "quality",
+            "held_body",
+        ):
             yield f"{key:12}{settings_in_words(value)}"
     for warning in provenance.get("warnings", []):
         yield f"warning     {warning}"
