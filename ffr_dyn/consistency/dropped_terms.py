@@ -18,9 +18,9 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 NARROW = 0.1  # mean deflection over the size of the body below which a mass matrix that stops being positive is told
-# The same, below which terms may not be left out: the inertia that is left is off by the deflection over this one, and a
-# machine part deforms by 1e-5 to 1e-3 of its size.
-TOO_NARROW = 1e-3
+# The same, below which terms may not be left out: the inertia that is left is off by the share of this deflection that a
+# body takes up, and what is worth being computed as flexible deforms by more than that. A run that goes further stops.
+TOO_NARROW = 1e-4
 REAL = 1e-7  # imaginary part of an eigenvalue, relative to the largest, below which it is taken as real
 SINGULAR = 1e-9  # of the least eigenvalue of the rigid part, relative to that of the undeformed body
 
@@ -48,7 +48,9 @@ def check_dropped(body: Body, active: Sequence[int]) -> list[str]:
     )
     if share < TOO_NARROW:
         raise InputError(f"{said}; {remedy(body)}")
-    return [f"{said}, and a run that deforms it further stops: {remedy(body)}"]
+    return [
+        f"{said}: its inertia is off by the share of that which it takes up, and a run that goes on stops; {remedy(body)}"
+    ]
 
 
 def remedy(body: Body) -> str:
