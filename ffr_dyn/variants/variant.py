@@ -11,7 +11,8 @@ rotation and deformation, the terms that can be dropped are (`INERTIA_TERMS`)
     I5  coupling that deformation adds; Coriolis among modes     I8  inertia and centrifugal force linear in q
     I9  inertia and centrifugal force quadratic in q
 
-I3 and I4 belong together: with one of them alone the mass matrix may not be positive, which the run then says. One more
+I3 and I4 belong together: with one of them alone the mass matrix is not positive. Of the others assembly tells how far the
+body may deform without them (`ffr_dyn.consistency.dropped_terms`). One more
 term is "stiffening", the geometric stiffening (which stores energy that the account does not hold).
 """
 

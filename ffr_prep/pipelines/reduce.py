@@ -21,6 +21,7 @@ from ffr_prep.model.model import Model
 from ffr_prep.model.reactions import in_equilibrium, known_loads
 from ffr_prep.model.reference import ReferenceConditions, conditions_of_part, functionals
 from ffr_prep.reduction.basis import Basis, Reduction, check_basis, factorised
+from ffr_prep.reduction.held_body import held_body, needs_held_body
 from ffr_prep.reduction.quality import assess, completed
 from ffr_prep.reduction.second_order import with_second_order
 from ffr_prep.reduction.selection import Band
@@ -142,7 +143,7 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
         if surface is not None:
             progress("compute the second order of the surface")
             surface = with_second_order(surface, model, held, request.reference, basis, advance)
-    return FlexibleBody(
+    made = FlexibleBody(
         name=request.name,
         omega2=basis.omega2,
         interfaces=interface_shapes(coupled, basis),
@@ -151,6 +152,15 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
         provenance=completed(record(model, request, model.doubts(basis.Z)), basis, assessed),
         **vars(integrals),
     )
+    return _with_held_body(made, model, body, progress)
+
+
+def _with_held_body(made: FlexibleBody, model: Model, body: FreeBody, progress: Stages) -> FlexibleBody:
+    """The body with how it would vibrate with its interfaces held, where its own shapes cannot tell."""
+    if model.massless or not needs_held_body(made):
+        return made
+    progress("look at the interfaces held")
+    return replace(made, provenance={**made.provenance, "held_body": held_body(model.coupled, body, model.inertia)})
 
 
 # ---- basis --------------------------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from ffr_prep.body.interface_freedom import interface_freedom
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.in_words import settings_in_words, vector_in_words
 from ffr_prep.reduction.quality import Quality, quality_of
+from ffr_prep.report.integrals import integral_lines
 
 if TYPE_CHECKING:
     from ffr_prep.mesh.mesh import Mesh
@@ -47,6 +48,7 @@ def body_lines(body: FlexibleBody) -> Iterator[str]:
     yield from _interface_lines(body)
     yield from _choice_lines(body.provenance)
     yield from mode_lines(body)
+    yield from integral_lines(body)
     yield from ability_lines(body)
     yield from part_lines(body)
     yield from quality_lines(body)
@@ -224,7 +226,15 @@ def _choice_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
 
 def _origin_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
     for key, value in provenance.items():
-        if value and key not in ("reduction", "reference", "material", "interfaces", "warnings", "quality"):
+        if value and key not in (
+            "reduction",
+            "reference",
+            "material",
+            "interfaces",
+            "warnings",
+            "quality",
+            "held_body",
+        ):
             yield f"{key:12}{settings_in_words(value)}"
     for warning in provenance.get("warnings", []):
         yield f"warning     {warning}"
