@@ -17,9 +17,8 @@ import scipy.sparse as sp
 from ffr_prep.body import axial
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows
-from ffr_prep.structures.element_families import Family, families
+from ffr_prep.structures.element_families import Family, connectivity, families
 from ffr_prep.structures.frame import Frame, check_frame
-from ffr_prep.structures.model import connectivity
 
 Matrices = tuple[tuple[sp.csr_array, ...], ...]
 
