@@ -174,7 +174,7 @@ def test_a_name_that_a_cut_has():
     model = from_mesh(
         replace(mesh, face_groups={"cut_1_a": mesh.face_groups["left"]}), STEEL, [InterfaceRegion("cut_1_a")]
     )
-    with pytest.raises(InputError, match="'cut_1_a'.*another name"):
+    with pytest.raises(InputError, match=r"'cut_1_a'.*another name"):
         cut(model, 2, reference=MeanAxis())
 
 
