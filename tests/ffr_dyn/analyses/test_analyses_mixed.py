@@ -264,7 +264,7 @@ def craig_bampton(reference, modes: int, *, stiffening: bool = False) -> fp.Flex
     member = fp.Member(fp.rectangle(b=0.03, h=0.004), fp.Material("m", E=7e10, nu=0.3, rho=2700.0), (0, 1, 0))
     frame = fp.named(fp.polyline([(0, 0, 0), (1, 0, 0)], member, elements=10), root=(0, 0, 0), tip=(1, 0, 0))
     model = fp.from_frame(frame, [fp.InterfaceRegion("root"), fp.InterfaceRegion("tip")])
-    wanted = fp.Request(name="arm", reference=reference, reduction=fp.CraigBampton(modes), stiffening=stiffening)
+    wanted = fp.Request(name="arm", reference=reference, reduction=fp.CraigBampton(modes), linear=not stiffening)
     return fp.reduce(model, wanted)
 
 

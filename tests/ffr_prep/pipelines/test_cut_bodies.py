@@ -116,7 +116,7 @@ def test_a_part_has_the_materials_of_its_volumes():
 
 
 def test_every_part_has_what_was_asked_of_the_whole():
-    body = cut(MODELS["beam"](), 2, stiffening=True, stress=True)
+    body = cut(MODELS["beam"](), 2, stress=True)
     for part in body.parts:
         assert part.stiffening is not None
         assert part.surface.beams is not None
