@@ -56,7 +56,8 @@ def bar(parts: int | None) -> FlexibleBody:
     mesh = box_mesh("hex20", (1.0, 0.06, 0.04), (8, 1, 1))
     model = from_mesh(mesh, STEEL, [InterfaceRegion("root", "left"), InterfaceRegion("tip", "right")])
     return reduce(
-        model, Request(name="b", reference=FixedTo("root"), reduction=CraigBampton(4), stress=True, linear=True, parts=parts)
+        model,
+        Request(name="b", reference=FixedTo("root"), reduction=CraigBampton(4), stress=True, linear=True, parts=parts),
     )
 
 
