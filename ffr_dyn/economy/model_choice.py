@@ -15,8 +15,7 @@ from ffr_dyn.scene.force_kinds import in_bases
 from ffr_dyn.scene.scene import Body, Scene, body_normal
 from ffr_dyn.variants.plane import AXES, planar_forms
 from ffr_dyn.variants.variant import STIFFENING, stiffening_by, vary, with_basis
-from ffr_prep.body import FlexibleBody
-from ffr_prep.body.frame_change import interface_motions, mass_of_motions
+from ffr_prep.body import FlexibleBody, interface_motions, mass_of_motions
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 

@@ -50,7 +50,7 @@ def tip(body: fp.FlexibleBody, *dropped: str) -> np.ndarray:
 
 
 def rigid_part(body: Body, q: np.ndarray) -> np.ndarray:
-    M = mass_matrix(kept_integrals(body.model, body.dropped), q)
+    M = mass_matrix(kept_integrals(body), q)
     return M[:6, :6] - M[:6, 6:] @ M[6:, :6]
 
 
