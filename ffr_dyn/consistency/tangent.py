@@ -26,7 +26,7 @@ from ffr_dyn.consistency.evaluation import (
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_prep.common.arrays import Array
 
-# Largest relative movement [rad, or part of the scene's size] of a difference: stiff bodies that bend stretch with its square.
+# Largest relative movement [rad, or part of the scene's size] of a difference: stiff bodies stretch with its square.
 STEP = 1e-5
 CORRECTIONS = 2  # onto the constraints, at a deviation of that size
 
