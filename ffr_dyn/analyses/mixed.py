@@ -29,7 +29,7 @@ from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
 from ffr_dyn.consistency.evaluation import joined, record_states
-from ffr_dyn.integrators import Integrator
+from ffr_dyn.integrators import Integrator, Within
 from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.quantities import measure, selected
@@ -93,7 +93,7 @@ def mixed(
     start: float = 0.0,
     known: tuple[str, ...] | None = None,
     solution: Causal | Bounded | None = None,
-    method: Integrator | None = None,
+    method: Integrator | Within | None = None,
     outputs: Sequence[str] = ("default",),
     path: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
