@@ -7,9 +7,9 @@ looked for that is short enough.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -21,7 +21,7 @@ from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.step_error import StepError, step_errors, too_coarse
-from ffr_dyn.consistency.unresolved import fastest, lasting, vibration
+from ffr_dyn.consistency.unresolved import Vibrations, lasting, leading, vibrations
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import Integrator, Within, stepped
 from ffr_dyn.integrators.ros2 import Twin
@@ -32,7 +32,7 @@ from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.errors import ComputationError, InputError
 
 FIRST, FINEST, LEAP = 4, 1024, 8  # steps to an output row: of the first trial, at most, and times more in the next one
-MARGIN = 1.2  # by which a trial aims below the accuracy
+MARGIN = 2.0  # by which a trial aims below the accuracy
 SLOW = 0.7  # a ringing output's error falls slower than the step to this power
 QUICK = 1e7  # microseconds of the further runs, by `_cost`, up to which they are made unasked
 
@@ -73,6 +73,11 @@ class _Runs:
     start: float
     output_step: float
     how: dict[str, Any]
+
+    @cached_property
+    def vibrations(self) -> Vibrations:
+        """Of the scene at its start."""
+        return vibrations(self.assembled, self.start)
 
     def run(self, method: Integrator, **more: Any) -> Result:
         """One run."""
@@ -127,8 +132,9 @@ def forward(
     result = runs.run(method, **kept)
     if check is None:
         check = _cost(assembled, result) < QUICK
-    errors = _told(runs, method, result) if check else {}
-    return _finished(runs, method, result, errors, resume if path is None else path)
+    trial = _Trial(method, 0 if method.controlled else round(output_step / method.step), result)
+    told = _told(runs, _beside_twins(runs, trial)) if check else trial
+    return _finished(runs, told, resume if path is None else path)
 
 
 def _resumed(resume: str | Path | None, method: Integrator | Within) -> Integrator | Within:
@@ -143,36 +149,57 @@ def _resumed(resume: str | Path | None, method: Integrator | Within) -> Integrat
 # ---- the error of a run ---------------------------------------------------------------------------------------------
 
 
-def _told(runs: _Runs, method: Integrator, result: Result) -> dict[str, StepError]:
-    """The errors of a run; empty where the runs that would tell them fail."""
+@dataclass(frozen=True)
+class _Trial:
+    """A run and what tells its error; no errors where the runs that would tell them failed."""
+
+    method: Integrator
+    count: int  # steps to an output row
+    result: Result
+    twins: tuple[Result, ...] = ()
+    errors: Mapping[str, StepError] = field(default_factory=dict)
+
+
+def _beside_twins(runs: _Runs, trial: _Trial) -> _Trial:
+    """The run with its twins, and with what they tell of its errors."""
     try:
-        other, ratio = _other(runs, method)
-        twins = [runs.run(twin) for twin in _twins(runs, method)]
+        twins = tuple(runs.run(twin) for twin in _twins(runs, trial.method))
     except ComputationError:
-        return {}
-    return step_errors(result, other, ratio, method.order, twins)
+        return trial
+    errors = step_errors(trial.result, None, 1.0, trial.method.order, twins) if twins else {}
+    return replace(trial, twins=twins, errors=errors)
 
 
-def _other(runs: _Runs, method: Any) -> tuple[Result, float]:
+def _told(runs: _Runs, trial: _Trial, earlier: Sequence[_Trial] = ()) -> _Trial:
+    """The run with its errors, also by a run of another step, which is one of the earlier where it can."""
+    try:
+        other, ratio = _other(runs, trial, {one.count: one.result for one in earlier})
+    except ComputationError:
+        return replace(trial, errors={})
+    return replace(trial, errors=step_errors(trial.result, other, ratio, trial.method.order, trial.twins))
+
+
+def _other(runs: _Runs, trial: _Trial, known: Mapping[int, Result]) -> tuple[Result, float]:
     """The run with another step, and the ratio of the steps: about twice the step where elastic forces are implicit and
     twice the step is a part of a row, half of it otherwise; a tenth of the tolerance of a method that chooses its steps."""
+    method: Any = trial.method
     if method.controlled:
         tolerances = replace(method.tolerances, relative=method.tolerances.relative / 10)
         return runs.run(replace(method, tolerances=tolerances)), 10.0 ** (-1.0 / method.order)
-    count = round(runs.output_step / method.step)
-    if method.implicit and count > 1:
-        fewer = (count + 1) // 2
+    if method.implicit and trial.count > 1:
+        fewer = (trial.count + 1) // 2
         try:
-            return runs.run(replace(method, step=runs.output_step / fewer)), count / fewer
+            coarse = known.get(fewer) or runs.run(replace(method, step=runs.output_step / fewer))
+            return coarse, trial.count / fewer
         except ComputationError:
             pass  # half the step is sure to run
-    return runs.run(replace(method, step=runs.output_step / (2 * count))), 0.5
+    return runs.run(replace(method, step=runs.output_step / (2 * trial.count))), 0.5
 
 
 def _twins(runs: _Runs, method: Integrator) -> Iterator[Twin]:
     """Of the step, and of half of it for a method of order three; none of methods that damp nothing the step allows."""
     if method.implicit and not method.controlled:
-        rho = lasting(runs.assembled, runs.start, method.step)
+        rho = lasting(runs.vibrations, method.step)
         yield Twin(method.step, rho)
         if method.order > 2:
             yield Twin(method.step / 2, rho)
@@ -184,21 +211,20 @@ def _cost(assembled: Assembled, result: Result) -> float:
     return 2.0 * result.attributes["evaluations"] * sum(1.0 + 0.02 * n + 7e-4 * n * n for n in sizes)
 
 
-def _finished(
-    runs: _Runs, method: Integrator, result: Result, errors: dict[str, StepError], path: str | Path | None
-) -> Result:
-    """The result with its errors, here and in its file."""
-    notes = [*result.attributes["notes"], *_unresolved(runs, method, result, errors), *_coarse(result)]
-    told = {name: [e.error, e.of_range] for name, e in errors.items()}
-    more = {"notes": notes, "errors": told, "step": method.step}
-    if errors:
-        more["accuracy"] = _worst(errors)
+def _finished(runs: _Runs, trial: _Trial, path: str | Path | None) -> Result:
+    """The result of a run with its errors, here and in its file."""
+    result = trial.result
+    notes = [*result.attributes["notes"], *_unresolved(runs, trial), *_coarse(result)]
+    told = {name: [e.error, e.of_range] for name, e in trial.errors.items()}
+    more = {"notes": notes, "errors": told, "step": trial.method.step}
+    if trial.errors:
+        more["accuracy"] = _worst(trial.errors)
     if path is not None:
         with_attributes(path, result.attributes | more)
     return replace(result, attributes=result.attributes | more)
 
 
-def _worst(errors: dict[str, StepError]) -> str:
+def _worst(errors: Mapping[str, StepError]) -> str:
     name = max(errors, key=lambda one: errors[one].of_range)
     places = max((e.of_range for one, e in errors.items() if PLACES.search(one)), default=None)
     rest = "" if places is None or PLACES.search(name) else f"; positions and angles within {_percent(places)}"
@@ -209,27 +235,22 @@ def _percent(share: float) -> str:
     return f"{100 * share:.2g} %"
 
 
-def _unresolved(runs: _Runs, method: Integrator, result: Result, errors: dict[str, StepError]) -> list[str]:
+def _unresolved(runs: _Runs, trial: _Trial) -> list[str]:
     """A note on the vibration that the step does not resolve: its share, its frequency, and the price of resolving it."""
-    ringing = {name: e for name, e in errors.items() if e.vibrates and e.of_range > Within().accuracy}
-    if not ringing:
+    ringing = {name: e for name, e in trial.errors.items() if e.vibrates and e.of_range > Within().accuracy}
+    of, method = runs.vibrations, trial.method
+    if not ringing or not of.omega.size:
         return []
     name = max(ringing, key=lambda one: ringing[one].of_range)
-    found = vibration(runs.assembled, runs.start, *(_states(runs, one) for one in (method, Twin(method.step))))
-    omega, damped = fastest(runs.assembled, runs.start)
+    found = leading(of, trial.result, trial.twins[-1])
     words = f" of {found / 2 / np.pi:.4g} Hz" if found else ""
-    step = (1.2 if damped else 0.25) / omega if omega > 0 else method.step / 10
-    times = 4 * method.step / step / (4 if method.order > 2 else 2)
+    step = (1.2 if of.ratio[-1] > 0 else 0.25) / of.omega[-1]
+    times = (4 / step) / ((4 if method.order > 2 else 2) / method.step)
     return [
         f"vibration{words} that a step of {method.step:.3g} s does not resolve carries {_percent(ringing[name].of_range)} of "
         f"the range of {name}{_others(len(ringing) - 1)}; rk4 with a step of {step:.2g} s resolves it, for about "
         f"{max(times, 1):.2g} times the time of this run"
     ]
-
-
-def _states(runs: _Runs, method: Integrator) -> Result:
-    how = {**runs.how, "outputs": ("*.q",), "progress": None}
-    return integrate(runs.scene, method=method, assembled=runs.assembled, **how)
 
 
 def _coarse(result: Result) -> list[str]:
@@ -251,55 +272,42 @@ def _others(count: int) -> str:
 # ---- the step for an accuracy ---------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Trial:
-    count: int  # steps to an output row
-    method: Integrator
-    result: Result
-    errors: dict[str, StepError]
-
-
 def _searched(runs: _Runs, within: Within, kept: dict[str, Any]) -> Result:
     """The run with the longest step found that keeps the accuracy; where forces ring, of those that keep the positions."""
-    count, trials = FIRST, list[_Trial]()
+    count, trials, ringing = FIRST, list[_Trial](), set[str]()
     while True:
         method = stepped(within, runs.output_step / count)
         try:
             result = runs.run(method, **kept)
         except (ComputationError, InputError):
-            if count * LEAP > FINEST:
+            if count >= FINEST:
                 raise
             count *= LEAP // 2
             continue
-        trials.append(_Trial(count, method, result, _told(runs, method, result)))
-        excess = _excess(trials, within.accuracy)
+        trial = _beside_twins(runs, _Trial(method, count, result))
+        if not trial.errors or _excess(trial, ringing, trials) <= within.accuracy:
+            trial = _told(runs, trial, trials)
+        excess = _excess(trial, ringing, trials) / within.accuracy
+        trials.append(trial)
         if excess <= 1.0 or count >= FINEST:
-            break
+            return _finished(runs, trial, kept["path"] or kept["resume"])
         count = _next(count, excess)
-    last = trials[-1]
-    done = _finished(runs, last.method, last.result, last.errors, kept["path"] or kept["resume"])
-    return done
 
 
 def _next(count: int, excess: float) -> int:
-    """An even number of steps to a row, at least half as many again."""
-    wanted = count * float(np.clip((MARGIN * excess) ** 0.5, 1.5, LEAP))
+    """Steps to a row, an even number, at least twice as many; the run with half as many is the last one then."""
+    wanted = count * float(np.clip((MARGIN * excess) ** 0.5, 2.0, LEAP))
     return min(FINEST, 2 * int(np.ceil(wanted / 2)))
 
 
-def _excess(trials: Sequence[_Trial], accuracy: float) -> float:
-    """The largest error of what the last trial is to keep, over the accuracy; infinite where no error could be told."""
-    last = trials[-1].errors
-    if not last:
+def _excess(trial: _Trial, ringing: set[str], earlier: Sequence[_Trial]) -> float:
+    """The largest error over range of what a trial is to keep; infinite where no error could be told. Outputs that ring, for
+    which shorter steps have ceased to help, are added to those that do."""
+    if not trial.errors:
         return np.inf
-    wanted = [name for name in last if PLACES.search(name) or (DRIVING.search(name) and not _rings(trials, name))]
-    return max((last[name].of_range for name in wanted), default=0.0) / accuracy
-
-
-def _rings(trials: Sequence[_Trial], name: str) -> bool:
-    """Whether shorter steps have ceased to help: vibration that no affordable step resolves."""
-    told = [trial for trial in trials if trial.errors]
-    for before, after in pairwise(told[-2:]):
-        slow = (after.count / before.count) ** -SLOW
-        return after.errors[name].vibrates and after.errors[name].error > slow * before.errors[name].error
-    return False
+    for before in (one for one in earlier[-1:] if one.errors):
+        slow = (trial.count / before.count) ** -SLOW
+        driving = (name for name in trial.errors if DRIVING.search(name))
+        ringing |= {name for name in driving if trial.errors[name].error > slow * before.errors[name].error}
+    wanted = (name for name in trial.errors if PLACES.search(name) or DRIVING.search(name))
+    return max((trial.errors[name].of_range for name in wanted if name not in ringing), default=0.0)

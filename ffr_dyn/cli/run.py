@@ -32,7 +32,9 @@ keep_option = click.option(
 time_option = click.option("--time", type=float, help="[s], for what depends on time; default: the scene's, or 0.")
 end_option = click.option("--end", type=float, help="End of the run [s], instead of the scene's.")
 method_options = (
-    click.option("--step", type=float, help="Time step [s], instead of the scene's, or of one that keeps the accuracy."),
+    click.option(
+        "--step", type=float, help="Time step [s], instead of the scene's, or of one that keeps the accuracy."
+    ),
     click.option("--accuracy", type=float, help="Find the step that keeps it, relative to ranges; default: 1e-3."),
     click.option("--tolerance", type=float, help="Relative tolerance of a method that chooses its steps."),
     click.option("--method", metavar="NAME", help="Integrator, instead of the scene's; `ffr-dyn methods` lists them."),

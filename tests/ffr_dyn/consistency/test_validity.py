@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from synthetic import cloud
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
@@ -21,7 +21,7 @@ def spinning(spin: float, **changes) -> Scene:
 
 
 def notes(scene: Scene) -> list[str]:
-    return forward(scene, end=1e-3, output_step=1e-3, method=ROS2(1e-4)).attributes["notes"]
+    return integrate(scene, end=1e-3, output_step=1e-3, method=ROS2(1e-4)).attributes["notes"]
 
 
 STIFFENED = {"model": {"stiffening": np.zeros((12 + 18, 2, 2))}}
