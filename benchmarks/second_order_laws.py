@@ -1,0 +1,237 @@
+"""The laws in `benchmarks.second_order`: energy and momentum of free and jointed second-order bodies, stiff joints.
+
+Energies are those at the rows, relative to the energy at the start or, where motion begins at rest, to the largest kinetic
+one. The order of a method in the energy is that by halving its step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+import ffr_prep as fp
+from benchmarks.preparation import Figure
+from benchmarks.second_order_scenes import REFERENCES, beam, pendulum
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.equations.inertia import mass_matrix
+from ffr_dyn.functions.rotation import rotation_matrix
+from ffr_dyn.functions.time_functions import harmonic
+from ffr_dyn.integrators import RK4, ROS2, Integrator
+from ffr_dyn.results.result import Result
+from ffr_dyn.scene.forces import Bushing, JointSpring, Servo
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Body, Scene
+from ffr_prep.body import FlexibleBody, rigid_body
+from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.model.coupled import InterfaceRegion
+from ffr_prep.model.material import Material
+from ffr_prep.model.reference import MeanAxis, ReferenceConditions
+from ffr_prep.reduction.conversion import with_reference
+from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
+from ffr_prep.structures.frame import Member, named, polyline
+from ffr_prep.structures.sections import circle, rectangle
+
+Array = np.ndarray
+
+STEEL = Material("steel", 2e11, 0.3, 7870.0)
+ALUMINIUM = Material("aluminium", 7e10, 0.33, 2700.0)
+ROWS = 50
+SWAY = harmonic(amplitude=-0.3, frequency=1.5, phase=np.pi / 2, mean=0.3)  # from rest
+
+
+def highest(body: FlexibleBody) -> float:
+    """Highest frequency of the body alone, free [rad/s]."""
+    free = with_reference(replace(body, stiffening=None), MeanAxis())
+    return float(np.sqrt(free.omega2.max()))
+
+
+def run(scene: Scene, method: Integrator, rows: int, steps: int) -> Result | None:
+    """A result with the default outputs, None where the run stops with an error, which is printed."""
+    try:
+        return forward(scene, end=rows * steps * method.step, output_step=steps * method.step, method=method)
+    except (ComputationError, InputError) as error:
+        print(f"    {type(error).__name__}: {error}"[:300], flush=True)
+        return None
+
+
+def energy(found: Result | None) -> Array:
+    """(T,) [J], springs included, less that at the start, relative."""
+    if found is None:
+        return np.array([np.inf])
+    whole = found["energy.total"] + (found["energy.springs"] if "energy.springs" in found else 0.0)
+    off: Array = (whole - whole[0]) / max(abs(float(found["energy.kinetic"].max())), float(found["energy.strain"].max()))
+    return off
+
+
+def orders(who: str, scene: Scene, omega: float, steps: int, h_omega: float = 0.4) -> Iterator[Figure]:
+    """Order of RK4 in the energy, its energy below the limit, and that of ROS2 far above."""
+    coarse, fine = (
+        float(np.abs(energy(run(scene, RK4(h_omega / k / omega), ROWS, k * steps // ROWS))).max()) for k in (1, 2)
+    )
+    yield Figure(f"{who}: energy, RK4, h Omega = {h_omega / 2:g}", fine, 1e-6)
+    yield Figure(f"{who}: order of its energy", _order(coarse, fine), 3.8, above=True)
+    yield Figure(f"{who}: growth of energy, RK4, h Omega = 2.5", float(energy(run(scene, RK4(2.5 / omega), ROWS, steps // ROWS)).max()), 1e-3)
+    yield Figure(f"{who}: growth of energy, ROS2, h Omega = 20", float(energy(run(scene, ROS2(20 / omega), ROWS, steps // ROWS)).max()), 1e-2)
+
+
+def _order(coarse: float, fine: float) -> float:
+    if not np.isfinite(coarse + fine):
+        return 0.0
+    return np.inf if coarse < 1e-12 else float(np.log2(coarse / fine))
+
+
+# ---- free ---------------------------------------------------------------------------------------------------------
+
+
+def deflected(body: FlexibleBody, share: float, reach: float) -> Array:
+    """(n,) the lowest mode, whose largest deflection at an interface is a share of the reach [m]."""
+    largest = max(float(np.abs(interface.phi_t[:, 0]).max()) for interface in body.interfaces)
+    q = np.zeros(body.n)
+    q[0] = share * reach / largest
+    return q
+
+
+def free_beams() -> Iterator[Figure]:
+    """A steel beam of 1 m, 10 modes, set free from a deflection in its lowest mode."""
+    for words, reference in REFERENCES.items():
+        body = beam(rectangle(0.03, 0.01), STEEL, 1.0, 4, reference)
+        for share in (0.01, 0.05):
+            scene = Scene((Body("p0", body, q=deflected(body, share, 1.0)),))
+            yield from orders(f"free beam, {words}, deflection {share:.0%}", scene, highest(body), 10000)
+
+
+def spinning_strips() -> Iterator[Figure]:
+    """A strip of steel, bent by 3 % of its length, spinning about all axes: 1e5 steps of RK4 at h Omega = 0.2."""
+    frame = polyline([(0, 0, 0), (0.3, 0, 0)], Member(rectangle(0.02, 0.001), STEEL, (0, 1.0, 0)), elements=24)
+    ends = [InterfaceRegion("root"), InterfaceRegion("tip")]
+    model = fp.from_frame(named(frame, root=(0, 0, 0), tip=(0.3, 0, 0)), ends)
+    request = fp.Request(name="strip", reference=MeanAxis(), reduction=Eigenmodes(10), stiffening=True)
+    body = fp.reduce(model, request)
+    start = Body("strip", body, q=deflected(body, 0.03, 0.3), omega_bar=(3.0, -5.0, 20.0), velocity=(0.3, 0.2, -0.1))
+    found = run(Scene((start,)), RK4(0.2 / highest(body)), ROWS, 100_000 // ROWS)
+    yield Figure("bent spinning strip, 1e5 steps: energy", float(np.abs(energy(found)).max()), 1e-6)
+    p, L = (np.full((1, 3), np.inf),) * 2 if found is None else momenta(start, found)
+    for what, values in (("momentum", p), ("angular momentum", L)):
+        off = np.linalg.norm(values - values[0], axis=1).max() / np.linalg.norm(values[0])
+        yield Figure(f"bent spinning strip, 1e5 steps: {what}", float(off), 1e-10)
+
+
+def momenta(body: Body, found: Result) -> tuple[Array, Array]:
+    """(T, 3) momentum and angular momentum about the origin, in global axes, of a body under mean axes."""
+    p, L = [], []
+    for R, parameters, v, omega, q, q_dot in zip(
+        *(found[f"{body.name}.{key}"] for key in ("R", "p", "v", "omega_bar", "q", "q_dot")), strict=True
+    ):
+        A = rotation_matrix(parameters)
+        both = mass_matrix(body, q)[:6] @ np.concatenate([A.T @ v, omega, q_dot])
+        p.append(A @ both[:3])
+        L.append(np.cross(R, p[-1]) + A @ both[3:])
+    return np.array(p), np.array(L)
+
+
+# ---- jointed ------------------------------------------------------------------------------------------------------
+
+
+def hinged() -> Iterator[Figure]:
+    """The pendulum E = 7e9 with its frame at the hinge."""
+    scene = pendulum(7e9, 8, REFERENCES["fixed"])
+    yield from orders("pendulum, frame at the hinge", scene, highest(scene.bodies[0].model), 20000)
+
+
+def four_bar(reference: ReferenceConditions) -> Scene:
+    """Crank and rocker on skew axes, between them a bent bar of steel of 8 mm; no gravity."""
+    corners = [(0.0, 0.0, 0.0), (0.2, 0.11, 0.1), (0.4, 0.15, 0.05)]
+    frame = polyline(corners, Member(circle(0.008), STEEL, (0, 0, 1.0)), elements=12)
+    model = fp.from_frame(
+        named(frame, root=corners[0], tip=corners[2]), [InterfaceRegion("root"), InterfaceRegion("tip")]
+    )
+    coupler = fp.reduce(
+        model, fp.Request(name="coupler", reference=reference, reduction=CraigBampton(4), stiffening=True)
+    )
+    crank = rigid_body("crank", mass=0.3, inertia=np.full(3, 1e-3), points={"O": np.zeros(3), "A": np.array([0, 0.1, 0])})
+    rocker = rigid_body("rocker", mass=0.5, inertia=np.full(3, 5e-3), points={"C": np.zeros(3), "B": np.array([0, 0.25, 0])})
+    at = np.array(corners[2]) + (0, 0.1, 0)
+    bodies = (
+        Body("crank", crank, omega_bar=(0, 0, 20.0)),
+        Body("coupler", coupler, position=(0, 0.1, 0)),
+        Body("rocker", rocker, position=at - (0, 0.25, 0)),
+    )
+    joints = (
+        Joint("O", "revolute", "ground.O", "crank.O"),
+        Joint("A", "universal", "crank.A", "coupler.root", axis=(0, 0, 1), axis_j=(0, 1, 0)),
+        Joint("B", "spherical", "coupler.tip", "rocker.B"),
+        Joint("C", "revolute", "ground.C", "rocker.C", axis=(0.3, 0, 1)),
+    )
+    return Scene(bodies, joints, ground={"O": (0, 0, 0), "C": at - (0, 0.25, 0)})
+
+
+def four_bars() -> Iterator[Figure]:
+    """In space, the coupler's frame at its end and between."""
+    for words in ("fixed", "mean"):
+        scene = four_bar(REFERENCES[words])
+        yield from orders(f"four-bar, bent coupler, {words}", scene, highest(scene.bodies[1].model), 20000)
+
+
+# ---- stiff joints -------------------------------------------------------------------------------------------------
+
+
+def arm(forces: tuple[JointSpring | Servo, ...]) -> Scene:
+    """Two links of aluminium, 0.1 m x 10 mm x 6 mm, modes from 3 kHz, that fall from the horizontal."""
+    link = beam(rectangle(0.01, 0.006), ALUMINIUM, 0.1, 6, REFERENCES["supported"])
+    bodies = (Body("upper", link), Body("lower", link, position=(0.1, 0, 0)))
+    joints = (
+        Joint("shoulder", "revolute", "ground.O", "upper.root"),
+        Joint("elbow", "revolute", "upper.tip", "lower.root"),
+    )
+    return Scene(bodies, joints, forces=forces, ground={"O": (0, 0, 0)}, gravity=(0.0, -9.81, 0.0))
+
+
+def arms() -> Iterator[Figure]:
+    """Default run (ROS2, 1 ms) against half its step: tip relative to the length of the arm."""
+    hinges = ("shoulder", "elbow")
+    for d, k in ((0.05, 0.0), (0.5, 0.0), (5.0, 0.0), (50.0, 0.0), (5.0, 200.0)):
+        dampers = tuple(JointSpring(f"at_{joint}", joint, stiffness=k, damping=d) for joint in hinges)
+        yield _halved(f"light arm, joints {d:g} N m s/rad and {k:g} N m/rad", arm(dampers))
+    for kd in (0.1, 1.0, 6.0):
+        servos = tuple(Servo(f"at_{joint}", joint, SWAY, 20 * kd, kd) for joint in hinges)
+        yield _halved(f"light arm, servos kd = {kd:g} N m s/rad", arm(servos))
+
+
+def _halved(who: str, scene: Scene) -> Figure:
+    tips = []
+    for method in (None, ROS2(5e-4)):
+        try:
+            found = forward(scene, end=1.0, output_step=0.01, method=method, outputs=["lower.tip.position"])
+        except (ComputationError, InputError) as error:
+            print(f"    {type(error).__name__}: {error}"[:300], flush=True)
+            return Figure(f"{who}: half the step", np.inf, 1e-3)
+        tips.append(found["lower.tip.position"])
+    off = np.linalg.norm(tips[0] - tips[1], axis=1).max() / 0.2
+    return Figure(f"{who}: half the step", float(off), 1e-3)
+
+
+def bushings() -> Iterator[Figure]:
+    """A rigid and a flexible body held by a bushing of h omega = 100, let go out of its middle: ROS2, energy."""
+    h = 1e-3
+    block = rigid_body("block", mass=1.0, inertia=(1.0, 1.0, 1.0), points={"O": np.zeros(3)})
+    rod = beam(rectangle(0.03, 0.01), STEEL, 1.0, 4, REFERENCES["supported"])
+    for name, model, marker in (("rigid body", block, "b.O"), ("beam", rod, "b.root")):
+        stiffness = (100 / h) ** 2 * model.mass
+        bushing = Bushing("bushing", "ground.O", marker, stiffness=(stiffness,) * 6)
+        bodies = (Body("b", model, position=(1e-4, 0, 0), omega_bar=(0, 0, 1.0)),)
+        scene = Scene(bodies, forces=(bushing,), ground={"O": (0, 0, 0)})
+        found = run(scene, ROS2(h), ROWS, 20)
+        yield Figure(f"{name} on a bushing, ROS2, h omega = 100: growth of energy", float(energy(found).max()), 1e-6)
+
+
+CASES: dict[str, Callable[[], Iterator[Figure]]] = {
+    "free": free_beams,
+    "strip": spinning_strips,
+    "hinged": hinged,
+    "four-bar": four_bars,
+    "arm": arms,
+    "bushing": bushings,
+}
