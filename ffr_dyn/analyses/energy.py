@@ -19,11 +19,11 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.evaluation import evaluator
 from ffr_dyn.consistency.tangent import chart, state_matrix
-from ffr_dyn.equations.inertia import mass_matrix
+from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import excess_of_gains
-from ffr_dyn.kernels.tables import K_SIZE, NOT_FINITE, OK, Record
+from ffr_dyn.kernels.tables import NOT_FINITE, OK, Record
 from ffr_dyn.results.power import power
 from ffr_dyn.results.recorded_motion import View
 from ffr_prep.common.arrays import Array
@@ -140,8 +140,7 @@ class EnergyWatch:
 
     def _accountable(self) -> bool:
         """Whether the recorded powers are all there are."""
-        model = self.system.model
-        return bool((model.base < 0).all() and (model.bodies.where[:-1, K_SIZE] == 0).all())
+        return bool((self.system.model.base < 0).all())
 
     def _told(self, anchor: _Row, row: _Row, found: float) -> str:
         finer = f"it is {found:.3g} J" if found < row.energy else "it grows as well"
@@ -201,7 +200,7 @@ def _by_body(system: System, row: _Row) -> Array:
             q, q_dot = row.x[place.q(b)], row.v[place.q_dot(b)]
             A = rotation_matrix(row.x[place.p(b)])
             V = np.concatenate([A.T @ row.v[place.R_dot(b)], row.v[place.omega(b)], q_dot])
-            found.append(0.5 * V @ mass_matrix(body.model, q) @ V + 0.5 * body.model.omega2 @ q**2)
+            found.append(0.5 * V @ mass_matrix(kept_integrals(body), q) @ V + 0.5 * body.model.omega2 @ q**2)
     return np.array(found)
 
 

@@ -9,17 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.compile.alignment import aligned
-from ffr_dyn.compile.body_tables import body_tables, once, starts
+from ffr_dyn.compile.body_tables import body_tables, starts
 from ffr_dyn.compile.elimination import Elimination, eliminate
 from ffr_dyn.compile.force_tables import Callback, FunctionTable, base_functions, load_tables
+from ffr_dyn.compile.marker_tables import marker_tables
 from ffr_dyn.equations.constraint_rows import Block, blocks_of
 from ffr_dyn.equations.layout import Layout, layout
+from ffr_dyn.equations.second_order import is_second_order
 from ffr_dyn.equations.state_view import StateView
-from ffr_dyn.equations.stiffening import stiffness_of
 from ffr_dyn.kernels.tables import LANES, WAYS, WORDS, Markers, Model, Pattern, Rows
-from ffr_dyn.scene.force_kinds import loaded_markers
 from ffr_dyn.scene.joints import Word
-from ffr_dyn.scene.scene import MarkerName, Scene, marker_number, markers
+from ffr_dyn.scene.scene import MarkerName, Scene, markers
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
@@ -46,7 +46,7 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: f
     """Tables of a scene.
 
     blocks     : the constraint rows to use; default all
-    relaxation : above zero where rows depend on one another (`ffr_dyn.kernels.entry_points.solve_motion_of_dependent_rows`)
+    relaxation : above zero where rows depend on one another (`ffr_dyn.kernels.entry_points.solve_of_dependent_rows`)
     """
     chosen = blocks_of(scene) if blocks is None else blocks
     place = layout(scene)
@@ -56,16 +56,16 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: f
     elimination = eliminate([len(k.words) for k in chosen], moving)
     ordered = tuple(chosen[k] for k in elimination.order)
     functions = FunctionTable()
-    marked = _markers(scene, ordered)
+    marked = marker_tables(scene, place, ordered)
     equal = [
-        (id(body.model), np.asarray(body.damping).tobytes(), k)
-        for body, k in zip(scene.bodies, place.normals, strict=True)
+        (id(body.model), np.asarray(body.damping).tobytes(), place.normals[b], b if is_second_order(body) else -1)
+        for b, body in enumerate(scene.bodies)
     ]
     model = {
         "gravity": np.array(scene.gravity),
         "base": base_functions(scene, functions),
         "relaxation": relaxation,
-        "bodies": body_tables(scene, place, marked),
+        "bodies": body_tables(scene, place),
         "markers": marked,
         "rows": _rows(ordered, functions),
         "pattern": _pattern(ordered, [moving[k] for k in elimination.order], elimination, marked, equal),
@@ -80,37 +80,6 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: f
 def _moving(block: Block, table: tuple[MarkerName, ...], ground: int) -> tuple[int, ...]:
     """The bodies that a block ties, each once."""
     return tuple(dict.fromkeys(table[k][0] for k in block.markers if table[k][0] != ground))
-
-
-# ---- markers ------------------------------------------------------------------------------------------------------
-
-
-def _markers(scene: Scene, blocks: tuple[Block, ...]) -> Markers:
-    table = markers(scene)
-    ground = len(scene.bodies)
-    interfaces = [i for body in scene.bodies for i in body.model.interfaces]
-    shapes = [np.concatenate([i.phi_t, i.phi_r]) for i in interfaces] + [np.zeros((6, 0))] * len(scene.ground)
-    phi, start = once(shapes, [*(id(i) for i in interfaces), *("ground" for _ in scene.ground)])
-    joint = sorted({k for block in blocks for k in block.markers})
-    loaded = [marker_number(scene, name) for name in loaded_markers(scene)]
-    return Markers(
-        body=np.array([entry[0] for entry in table], dtype=np.int64),
-        u=np.array([i.position for i in interfaces] + list(scene.ground.values())).reshape(-1, 3),
-        phi=phi,
-        start=start,
-        load=np.array(_load_numbers(scene), dtype=np.int64),
-        active=np.array(sorted({*joint, *loaded}), dtype=np.int64),
-        joint=np.array([k for k in joint if table[k][0] != ground], dtype=np.int64),
-    )
-
-
-def _load_numbers(scene: Scene) -> list[int]:
-    """Per marker, the number of its force in the stiffening loads of its body: twelve inertial ones come first."""
-    numbers: list[int] = []
-    for body in scene.bodies:
-        has = len(stiffness_of(body)) > 0
-        numbers += [12 + 6 * k if has else -1 for k in range(len(body.model.interfaces))]
-    return numbers + [-1] * len(scene.ground)
 
 
 # ---- constraints --------------------------------------------------------------------------------------------------

@@ -12,14 +12,8 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.functions.rotation import skew
 from ffr_dyn.kernels.tables import (
     IN_Q,
-    K_SIZE,
     LANES,
-    MEANS,
     NORMAL,
-    QUAD,
-    STAGES,
-    STRIPS,
-    WATCH,
     Bodies,
     BodyWork,
     LoadWork,
@@ -35,20 +29,18 @@ from ffr_dyn.kernels.vectors import LEAST_PIVOT
 from ffr_prep.common.arrays import Array
 
 
-def new_work(m: Model, *, keeps_terms: bool = False, looks_ahead: int = 0) -> Work:
+def new_work(m: Model, *, keeps_terms: bool = False) -> Work:
     """Scratch of evaluations; what depends on the elastic diagonal is made when that is set.
 
     keeps_terms : whether the quadratic terms of all bodies are needed after an evaluation
-    looks_ahead : order to which geometric stiffening is extrapolated, 2 to 4, or 0
     """
-    V, M, n = 6 * m.bodies.mass.size + int(m.bodies.where[-1, IN_Q]), m.markers.body.size, m.bodies.where[:, N]
-    bodies = _body_work(m, keeps_terms, looks_ahead)
-    vectors = _zeros(r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), theta=(M, 3), thetad=(M, 3), load=(M, 6))
+    V, n = 6 * m.bodies.mass.size + int(m.bodies.where[-1, IN_Q]), m.bodies.where[:, N]
+    bodies = _body_work(m, keeps_terms)
     return Work(
         bodies=bodies,
-        markers=MarkerWork(body=m.markers.body, A=bodies.A, omega=bodies.omega, **vectors),
+        markers=_marker_work(m, bodies),
         rows=_row_work(m),
-        loads=_load_work(m, V, M),
+        loads=_load_work(m, V),
         field=np.zeros(3),
         diagonal=np.full(1, -1.0),
         info=np.zeros(3, dtype=np.int64),
@@ -57,52 +49,47 @@ def new_work(m: Model, *, keeps_terms: bool = False, looks_ahead: int = 0) -> Wo
     )
 
 
+def _marker_work(m: Model, bodies: BodyWork) -> MarkerWork:
+    """Scratch of the markers; the shapes of linear bodies and the axes of rigid ones, which are constant, are in it."""
+    M = m.markers.body.size
+    return MarkerWork(
+        body=m.markers.body,
+        A=bodies.A,
+        omega=bodies.omega,
+        phi=m.markers.phi.copy(),
+        kept=m.markers.phi.copy(),
+        R=_identities(M),
+        T=_identities(M),
+        bent=np.zeros(2 * (6 * int(m.bodies.where[:, N].max()) + LANES)),
+        sorted=bodies.sorted,
+        **_zeros(r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), spin=(M, 3), turning=(M, 3), six=(3, 6)),
+    )
+
+
 def _zeros(**shapes: Any) -> dict[str, Array]:
     return {key: np.zeros(shape) for key, shape in shapes.items()}
 
 
-def _body_work(m: Model, keeps_terms: bool, looks_ahead: int) -> BodyWork:
+def _body_work(m: Model, keeps_terms: bool) -> BodyWork:
     """Scratch of the bodies; the factors of rigid ones, which are constant, are in it."""
     B, E, n = m.bodies.mass.size, int(m.bodies.where[-1, IN_Q]), m.bodies.where[:, N]
     V, longest = 6 * B + E, int(n.max())
-    E_s = E if m.bodies.stiffening.size else 0
-    E_a, B_a = (E_s, B if E_s else 0) if looks_ahead else (0, 0)
     spaced = n[:-1] + LANES  # sums in whole rows of lanes end beyond the terms
-    terms, loads = int(spaced.sum() if keeps_terms else spaced.max(initial=0)), int(m.markers.load.max(initial=6)) + 6
+    terms = int(spaced.sum() if keeps_terms else spaced.max(initial=0))
     work = BodyWork(
         A=_identities(B + 1),
         dinv=np.ones(m.bodies.omega2.size),
         terms=starts(spaced)[:-1] * keeps_terms,
         **_zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), inverse=(B, 2), g=9 * terms, l=3 * terms),
-        sorted=np.zeros(2 * LANES * STRIPS + 14 * longest + 3 * LANES * longest + loads),
+        sorted=np.zeros(17 * longest + 4 * LANES),
         **_zeros(H=3 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6)),
-        **_zeros(more=V, unstiffened=E, shift=V, load=(B, loads)),
-        **_zeros(stiff=E_s, last=E_s, steady=3, change=(3 * STAGES, E_s)),
-        K_sigma=np.zeros(int(m.bodies.where[:, K_SIZE].max()) + QUAD * LANES),
-        scratch=np.zeros(longest),
-        ahead=_ahead(looks_ahead),
-        **_zeros(stage=2, past=(8, E_a), diagonal=E_a, mean=(MEANS, B_a, loads), expected=(B_a, loads)),
+        **_zeros(more=V),
     )
     work.inverse[:, 0] = [_inverse(mass) for mass in m.bodies.mass]
     for b in np.flatnonzero(n[:-1] == 0):
         work.s[b], work.J[b], work.L[b] = _rigid_inertia(m.bodies, int(b))
         work.inverse[b, 1] = _inverse(np.trace(work.J[b]))
     return work
-
-
-# By order: weights that give the value at the end of the last of some intervals by the means over them, polynomials; and half
-# of the feedback that the damping of ROS2, ROS3, RK4 bears (`tests/test_stiffening_ahead.py` derives both).
-_AT_END = {2: (3 / 2, -1 / 2, 0.0, 0.0), 3: (11 / 6, -7 / 6, 1 / 3, 0.0), 4: (25 / 12, -23 / 12, 13 / 12, -1 / 4)}
-_BEARABLE = {2: 0.003, 3: 0.008, 4: 0.007}
-
-
-def _ahead(order: int) -> Array:
-    """How geometric stiffening is extrapolated to an order, or not (see `ffr_dyn.kernels.stiffening.ahead`)."""
-    if order == 0:
-        return np.zeros(7 + MEANS)
-    return np.array(
-        [0.0, 0.0, WATCH / 2, 0.0, _BEARABLE[order] ** 2, 0.5 * (order > 2), (order > 3) / 6, *_AT_END[order]]
-    )
 
 
 def _row_work(m: Model) -> RowWork:
@@ -143,14 +130,13 @@ def _rigid_inertia(bodies: Bodies, b: int) -> tuple[Array, Array, Array]:
     return first, J, L
 
 
-def _load_work(m: Model, V: int, M: int) -> LoadWork:
+def _load_work(m: Model, V: int) -> LoadWork:
     return LoadWork(
         reference=m.loads.initial.copy(),
         measured=np.zeros(m.loads.initial.size),
         axes=np.zeros((2, 3, 3, 3)),
         turn=np.zeros((3, 3, 3)),
         f=np.zeros(V),
-        load=np.zeros((M, 6)),
     )
 
 

@@ -17,12 +17,13 @@ from ffr_dyn.consistency.row_space import independent, smallest_solution
 from ffr_dyn.consistency.validity import stretch
 from ffr_dyn.equations.constraint_rows import Block, blocks_of, rows_at
 from ffr_dyn.equations.constraints import Row
-from ffr_dyn.equations.inertia import mass_matrix
+from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
 from ffr_dyn.equations.layout import Layout, initial_state, layout
 from ffr_dyn.functions.rotation import G_bar, rotation_matrix
 from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction
 from ffr_dyn.scene.joints import DISTANCE
 from ffr_dyn.scene.scene import Scene, require_scene
+from ffr_dyn.variants.mean_axis import in_mean_axis_frames
 from ffr_dyn.variants.plane import planar_forms
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
@@ -106,8 +107,9 @@ def _movable(place: Layout) -> int:
 
 
 def flattened(scene: Scene, time: float) -> tuple[Scene, list[Block]]:
-    """The scene with its plane decided, `plane` "x", "y", "z" or "none", and its rows; those of a planar scene without
-    the ones that no motion in the plane can change."""
+    """The scene as it is computed: second-order bodies in their mean-axis form, its plane decided, `plane` "x", "y", "z" or
+    "none"; and its rows, those of a planar scene without the ones that no motion in the plane can change."""
+    scene = in_mean_axis_frames(scene)
     for flat in planar_forms(scene):
         blocks = blocks_of(flat)
         across, pure = _across(flat, blocks, time)
@@ -263,7 +265,7 @@ def _weights(scene: Scene, place: Layout, x: Array, elastic: bool) -> csr_array:
         key = id(body.model), q.tobytes(), active
         if key not in known:
             at = np.ix_(active, active)
-            values, vectors = np.linalg.eigh(mass_matrix(body.model, q)[at])
+            values, vectors = np.linalg.eigh(mass_matrix(kept_integrals(body), q)[at])
             known[key] = np.zeros((6 + n, 6 + n))
             known[key][at] = vectors / np.sqrt(np.maximum(values, 1e-12 * values.max()))
         blocks.append(known[key])

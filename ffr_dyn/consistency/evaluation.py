@@ -14,9 +14,9 @@ from ffr_dyn.compile.engine import Engine, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.failure import failure
-from ffr_dyn.equations.inertia import mass_matrix
+from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
 from ffr_dyn.equations.layout import Layout, initial_state
-from ffr_dyn.functions.rotation import from_vector, rotation_matrix, skew
+from ffr_dyn.functions.rotation import from_vector, product, rotation_matrix, skew
 from ffr_dyn.kernels.tables import IN_Q, IN_SHARED, OK, SINGULAR_CONSTRAINT, Record, Work
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
@@ -147,16 +147,16 @@ def _jacobian(system: System, work: Work) -> Array:
             part = work.rows.jac[block * len(ends) + side, :, : rows.start[block + 1] - rows.start[block]].T
             jacobian[lines, place.rigid(b)] += part[:, :6]
             if place.n[b]:
-                phi = shapes(system, marker)
+                phi = shapes(system, work, marker)
                 jacobian[lines, place.q_dot(b)] += part[:, :3] @ phi[:3] + part[:, 6:] @ phi[3:]
     return jacobian
 
 
-def shapes(system: System, marker: int) -> Array:
-    """(6, n) phi_t and phi_r of a marker."""
+def shapes(system: System, work: Work, marker: int) -> Array:
+    """(6, n) shapes of a marker at the last evaluation: of its displacement, of its rotation vector."""
     markers = system.model.markers
     n = system.model.bodies.where[markers.body[marker], 0]
-    return markers.phi[markers.start[marker] : markers.start[marker] + 6 * n].reshape(6, n)
+    return work.markers.phi[markers.start[marker] : markers.start[marker] + 6 * n].reshape(6, n)
 
 
 # ---- small motions --------------------------------------------------------------------------------------------------
@@ -171,17 +171,6 @@ def moved(place: Layout, x: Array, step: Array) -> Array:
         out[place.p(b)] = product(p, from_vector(step[place.omega(b)]))
         out[place.q(b)] += step[place.q_dot(b)]
     return out
-
-
-def product(p: Array, r: Array) -> Array:
-    """Euler parameters of the rotation p after r, of length one."""
-    a, b, c, d = p.tolist()
-    e, f, g, h = r.tolist()
-    out = np.array([
-        a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g,
-        a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e,
-    ])  # fmt: skip
-    return out / np.sqrt(out @ out)
 
 
 def to_body_axes(place: Layout, x: Array, v: Array) -> Array:
@@ -208,7 +197,7 @@ def total_mass_matrix(scene: Scene, place: Layout, x: Array) -> Array:
     M = np.zeros((place.v_size, place.v_size))
     for b, body in enumerate(scene.bodies):
         at = slice(place.iv[b], place.iv[b] + 6 + place.n[b])
-        M[at, at] = mass_matrix(body.model, x[place.q(b)])
+        M[at, at] = mass_matrix(kept_integrals(body), x[place.q(b)])
     return M
 
 

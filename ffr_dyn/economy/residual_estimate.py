@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from ffr_dyn.compile.body_tables import loads_that_stiffen, of_coordinates
+from ffr_dyn.compile.body_tables import of_coordinates
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.evaluation import (
@@ -38,7 +38,6 @@ from ffr_dyn.consistency.evaluation import (
 )
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.equations.layout import Layout
-from ffr_dyn.equations.stiffening import stiffness_of
 from ffr_dyn.kernels.tables import Record
 from ffr_prep.common.arrays import Array
 
@@ -50,7 +49,6 @@ class Samples:
     at         : the model with the memory of one evaluation;  record : what it records there
     time (T,), x (T, X), v (T, V) : the motion, lifted into the model;  acceleration : (T, V) of the motion
     M          : (T, V, V) mass;  jacobian : (T, C, V);  residual : (T, V) r of the motion
-    stiffening : (T, V, L) force of every load by way of geometric stiffness;  loads : (L,) of these, body and number
     """
 
     at: Evaluator
@@ -62,8 +60,6 @@ class Samples:
     residual: Array
     acceleration: Array
     record: Record
-    stiffening: Array
-    loads: tuple[tuple[int, int], ...]
 
     @property
     def system(self) -> System:
@@ -112,8 +108,7 @@ def samples(small: Assembled, large: Assembled, bases: tuple[Array, ...], time: 
     to_large, rows = _map(small.system.layout, large.system.layout, bases), _rows(small.system, large.system)
     seen = evaluator(large.system)
     at = seen if small is large else evaluator(small.system)
-    loads = stiffening_numbers(large.system)
-    M, J, r, acc, records, stiffening = [], [], [], [], [], []
+    M, J, r, acc, records = [], [], [], [], []
     for k, t in enumerate(time):
         own = evaluate(at, float(t), x[k], v[k])
         now = own if at is seen else evaluate(seen, float(t), X[k], W[k])
@@ -124,7 +119,6 @@ def samples(small: Assembled, large: Assembled, bases: tuple[Array, ...], time: 
         J.append(now.jacobian)
         r.append(now.force - mass @ acc[-1] - now.jacobian.T @ lam)
         records.append(copied(seen.record))
-        stiffening.append(stiffening_forces(seen, loads))
     return Samples(
         seen,
         time,
@@ -135,28 +129,7 @@ def samples(small: Assembled, large: Assembled, bases: tuple[Array, ...], time: 
         np.array(r),
         np.array(acc),
         joined(records),
-        np.array(stiffening),
-        loads,
     )
-
-
-# ---- what stiffens ----------------------------------------------------------------------------------------------------
-
-
-def stiffening_numbers(system: System) -> tuple[tuple[int, int], ...]:
-    """(body, number of the load) of all loads that stiffen a body of the model."""
-    bodies = system.model.bodies
-    return tuple((b, int(k)) for b in range(len(system.scene.bodies)) for k in loads_that_stiffen(bodies, b))
-
-
-def stiffening_forces(at: Evaluator, numbers: tuple[tuple[int, int], ...]) -> Array:
-    """(V, L) force of each load by way of the geometric stiffness, at the state evaluated last."""
-    place, scene = at.system.layout, at.system.scene
-    forces = np.zeros((place.v_size, len(numbers)))
-    for k, (b, load) in enumerate(numbers):
-        q = at.record.x[0, place.q(b)]
-        forces[place.q_dot(b), k] = -at.work.bodies.load[b, load] * (stiffness_of(scene.bodies[b])[load] @ q)
-    return forces
 
 
 # ---- passive oscillators ----------------------------------------------------------------------------------------------

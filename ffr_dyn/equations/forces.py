@@ -16,6 +16,7 @@ import numpy as np
 from ffr_dyn.equations.constraints import Markers, Parts, Row, add_part, evaluate_word, summed_parts
 from ffr_dyn.equations.constraints import coordinate as joint_coordinate
 from ffr_dyn.equations.inertia import gravity_force
+from ffr_dyn.equations.kinematics import body_state, marker_point, marker_turn
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.functions.rotation import rotation_matrix
@@ -117,16 +118,16 @@ def _applied(now: At, load: Force) -> Applied:
 
 
 def _wrench(now: At, place: AtMarker, values: Array) -> Array:
-    """(V,) of a force and moment (6,) in the axes of the place."""
+    """(V,) of a force and moment (6,) in the axes of the place: virtual power on a point and on an angular velocity."""
     Q, (number, _) = np.zeros(now.place.v_size), place.ends(now.scene)
-    b, _, point = markers(now.scene)[number]
+    b = markers(now.scene)[number][0]
     if b == len(now.scene.bodies):
         return Q
-    A, interface = rotation_matrix(now.x[now.place.p(b)]), now.scene.bodies[b].model.interface(point)
-    force, moment = values.reshape(2, 3) if place.axes == "body" else values.reshape(2, 3) @ A
-    u = interface.position + interface.phi_t @ now.x[now.place.q(b)]
-    Q[now.place.rigid(b)] = np.concatenate([force, np.cross(u, force) + moment])
-    Q[now.place.q_dot(b)] = interface.phi_t.T @ force + interface.phi_r.T @ moment
+    state = body_state(now.place, now.x, now.v, b)
+    force, moment = values.reshape(2, 3) if place.axes == "body" else values.reshape(2, 3) @ state.A
+    point = marker_point(now.scene, now.place, now.x, now.v, number)
+    part = (state.A @ force) @ point.jacobian + moment @ marker_turn(now.scene, state, number).jacobian
+    Q[now.place.iv[b] : now.place.iv[b] + part.size] = part
     return Q
 
 

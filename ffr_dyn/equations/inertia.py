@@ -8,6 +8,10 @@ velocities, so that M depends on q alone):
     J = tr(W) I - W,  W = int u u^T dm
     D = int u u_dot^T dm            L_j = int u_dot x phi_j dm
 
+The second-order part u_2 of a body (`ffr_dyn.equations.second_order`, mean-axis form) adds to W what int u_0 u_2^T dm says
+and so to G: the integral PP_dm has X added to it, and nothing else changes. T holds all terms up to second order in q and
+q_dot then, but those of int phi_i . u_2 dm, which would make the elastic block depend on q.
+
 The compiled form, which the tests hold equal to this one, is `ffr_dyn.kernels.bodies`.
 """
 
@@ -17,14 +21,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ffr_dyn.equations.second_order import second_moments
 from ffr_dyn.functions.rotation import skew
+from ffr_dyn.scene.scene import INERTIA_TERMS, Body
 from ffr_prep.body import FlexibleBody, axial
 from ffr_prep.common.arrays import Array
 
 
 @dataclass(frozen=True)
 class Integrals:
-    """The integrals of a body as its equations have them, some terms left out; names as of `FlexibleBody`."""
+    """The integrals of a body as its equations have them; names as of `FlexibleBody`."""
 
     mass: float
     r_dm: Array
@@ -37,15 +43,18 @@ class Integrals:
     I6: Array
 
 
-def kept_integrals(body: FlexibleBody, dropped: tuple[str, ...]) -> Integrals:
-    """The integrals without the terms `dropped`: I4 and I5 are the skew parts of rP_dm and PP_dm, I8 and I9 the symmetric."""
-    kept = {term: float(term not in dropped) for term in ("I3", "I4", "I5", "I8", "I9")}
+def kept_integrals(body: Body) -> Integrals:
+    """The integrals of a body of a scene: X of its second-order part is in PP_dm, and the terms that it drops are left out.
+
+    I4 and I5 are the skew parts of rP_dm and PP_dm, I8 and I9 the symmetric ones; X stays without I9.
+    """
+    model, kept = body.model, {term: float(term not in body.dropped) for term in INERTIA_TERMS}
     rP, PP = (
         symmetric * 0.5 * (part + np.swapaxes(part, 0, 1)) + skewed * 0.5 * (part - np.swapaxes(part, 0, 1))
-        for part, symmetric, skewed in ((body.rP_dm, kept["I8"], kept["I4"]), (body.PP_dm, kept["I9"], kept["I5"]))
+        for part, symmetric, skewed in ((model.rP_dm, kept["I8"], kept["I4"]), (model.PP_dm, kept["I9"], kept["I5"]))
     )
-    P = kept["I3"] * body.P_dm
-    return Integrals(body.mass, body.r_dm, body.rr_dm, P, rP, PP, body.omega2, kept["I5"] * body.I5, body.I6)
+    P, I5 = kept["I3"] * model.P_dm, kept["I5"] * model.I5
+    return Integrals(model.mass, model.r_dm, model.rr_dm, P, rP, PP + second_moments(body), model.omega2, I5, model.I6)
 
 
 @dataclass(frozen=True)

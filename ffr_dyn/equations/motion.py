@@ -6,11 +6,11 @@ body axes, [a = A^T R_ddot, omega_bar_dot, q_ddot] and [A^T F, M, Q]:
     x_dot = T(x) v                                                      kinematics
     Phi(x, t) = 0,  nu = Phi_q v + Phi_t,  Phi_q v_dot = gamma          joints, couplings, drivers
 
-    | M  J^T | | v_dot |   | Q - K_sigma q |
-    | J   0  | |  lam  | = |     gamma     |        J = Phi_q
+    | M  J^T | | v_dot |   |   Q   |
+    | J   0  | |  lam  | = | gamma |        J = Phi_q
 
-with K_sigma by the loads of the moment, accelerations and multipliers among them. The compiled form, which the tests hold
-equal to this one, is `ffr_dyn.kernels.entry_points` with what it calls.
+Bodies with a second-order part are in their mean-axis form (`ffr_dyn.equations.second_order`). The compiled form, which the
+tests hold equal to this one, is `ffr_dyn.kernels.entry_points` with what it calls.
 """
 
 from __future__ import annotations
@@ -30,20 +30,16 @@ from ffr_dyn.equations.inertia import (
     quadratic_velocity,
 )
 from ffr_dyn.equations.layout import Layout, layout
-from ffr_dyn.equations.stiffening import applied_wrenches, geometric_stiffening
 from ffr_dyn.functions.rotation import G_bar, rotation_matrix
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
-
-SWEEPS = 50  # at most, of the loads that stiffen; each changes them by (elastic deflection / size)^2 or so
-SETTLED = 1e-14  # change of the solution, relative
 
 
 @dataclass(frozen=True)
 class EquationsOfMotion:
     """The equations at one moment and their solution.
 
-    M : (V, V);  Q : (V,) all forces but those of the constraints, stiffening among them
+    M : (V, V);  Q : (V,) all forces but those of the constraints
     rows : Phi, nu, gamma and Jacobian of each constraint row;  jacobian : (C, V) of all
     acceleration : (V,) [a, omega_bar_dot, q_ddot];  lam : (C,)
     """
@@ -77,13 +73,7 @@ def equations_of_motion(
     rows = tuple(rows_at(scene, now.place, list(now.blocks), x, v, t))
     J, gamma = np.array([row.jacobian for row in rows]).reshape(-1, Q.size), np.array([row.gamma for row in rows])
     v_dot, lam = solve(now.place, M, J, Q, gamma)
-    applied_loads, stiffened = applied_wrenches(now), Q
-    for _ in range(SWEEPS):
-        before, stiffened = v_dot, Q + geometric_stiffening(now, applied_loads, v_dot, lam)
-        v_dot, lam = solve(now.place, M, J, stiffened, gamma)
-        if np.abs(v_dot - before).max() <= SETTLED * np.abs(v_dot).max():
-            break
-    return EquationsOfMotion(M, stiffened, rows, J, v_dot, lam)
+    return EquationsOfMotion(M, Q, rows, J, v_dot, lam)
 
 
 def solve(place: Layout, M: Array, J: Array, Q: Array, gamma: Array) -> tuple[Array, Array]:
@@ -112,7 +102,7 @@ def _inertia_and_forces(now: Instant) -> tuple[Array, Array]:
     M, Q = np.zeros((place.v_size, place.v_size)), np.zeros(place.v_size)
     field = gravity_at(now.scene, now.t)
     for b, body in enumerate(now.scene.bodies):
-        integrals, at = kept_integrals(body.model, body.dropped), slice(place.iv[b], place.iv[b] + 6 + place.n[b])
+        integrals, at = kept_integrals(body), slice(place.iv[b], place.iv[b] + 6 + place.n[b])
         q, q_dot, omega, A = x[place.q(b)], v[place.q_dot(b)], v[place.omega(b)], rotation_matrix(x[place.p(b)])
         M[at, at] = mass_matrix(integrals, q)
         Q[at] = (

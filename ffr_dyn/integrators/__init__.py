@@ -45,7 +45,6 @@ class Integrator(Protocol):
     stage_count: ClassVar[int]  # states (x, v) of memory that it needs
     row_stages: ClassVar[int]  # the same for constraint rows; zero where it works on accelerations alone
     keeps_terms: ClassVar[bool]  # whether it needs the quadratic terms of all bodies after an evaluation
-    looks_ahead: ClassVar[int]  # order to which it takes geometric stiffening as a function of time, or 0: not
     do_step: ClassVar[CompiledFunction]  # one step of the engine's state
 
 

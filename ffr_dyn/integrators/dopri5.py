@@ -53,7 +53,7 @@ FIRST = 3  # row of the first stage; before it the error and scratch
 def slopes(r, x, v, k):
     """Keep the slopes of what was evaluated last, at (x, v), as stage k."""
     acceleration_target(r.work.rows, r.clock.gains, r.stages.target)
-    solve(r, x, r.stages.target, k)
+    solve(r, r.stages.target)
     position_rates(r.model.bodies, x, v, r.stages.x[FIRST + k])
     velocity_rates(r, r.stages.v[FIRST + k])
 
@@ -119,6 +119,5 @@ class DormandPrince:
     stage_count: ClassVar[int] = 10
     row_stages: ClassVar[int] = 0
     keeps_terms: ClassVar[bool] = False
-    looks_ahead: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = (0.0,)
     do_step: ClassVar[CompiledFunction] = dopri5_step

@@ -32,8 +32,6 @@ from typing import ClassVar
 
 from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.integrator_api import (
-    AGAIN,
-    ASIDE,
     NOT_FINITE,
     OK,
     PHI,
@@ -85,9 +83,8 @@ def start(r, t, h, lag):
     status = stabilise(r, t, r.x, r.v)
     for attempt in range(2):
         if status == OK:
-            fill(r.work.bodies.shift, 0.0)
             copy(s.target, r.work.rows.gamma)
-            solve(r, r.x if attempt == 0 else s.x[0], s.target, ASIDE)
+            solve(r, s.target)
             velocity_rates(r, s.v[NOW if attempt == 0 else A_NOW])
         if status == OK and attempt == 0:
             position_rates(bodies, r.x, r.v, s.x[1])
@@ -124,7 +121,7 @@ def newton(r, h, square, single):
     stabilised = s.numbers[STABILISED] > 0.0
     for k in range(s.target.size):
         s.target[k] = -rows.nu[k] / single if stabilised else -rows.Phi[k] / square
-    solve(r, s.x[0], s.target, AGAIN)
+    solve(r, s.target)
     velocity_rates(r, s.v[CORRECTION])
     add_scaled(s.v[NEXT], s.v[NEXT], 1.0, s.v[CORRECTION])
     if stabilised:
@@ -236,7 +233,6 @@ class GeneralisedAlpha:
     stage_count: ClassVar[int] = 9
     row_stages: ClassVar[int] = 2
     keeps_terms: ClassVar[bool] = False
-    looks_ahead: ClassVar[int] = 0
     controlled: ClassVar[bool] = False
     do_step: ClassVar[CompiledFunction] = generalised_alpha_step
 
@@ -276,7 +272,6 @@ class HHT:
     stage_count: ClassVar[int] = 9
     row_stages: ClassVar[int] = 2
     keeps_terms: ClassVar[bool] = False
-    looks_ahead: ClassVar[int] = 0
     controlled: ClassVar[bool] = False
     do_step: ClassVar[CompiledFunction] = generalised_alpha_step
 

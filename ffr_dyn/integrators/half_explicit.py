@@ -22,12 +22,8 @@ from typing import ClassVar
 
 from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.integrator_api import (
-    AGAIN,
     FAILED,
     HERE,
-    IN_Q,
-    IN_V,
-    K_SIZE,
     NEAR,
     NOT_CONVERGED,
     NOT_FINITE,
@@ -37,7 +33,6 @@ from ffr_dyn.kernels.integrator_api import (
     TOLERANCE,
     CompiledFunction,
     H,
-    N,
     Tables,
     add_scaled,
     constraint_rates,
@@ -48,12 +43,11 @@ from ffr_dyn.kernels.integrator_api import (
     inlined,
     into_body_axes,
     keep_measured,
-    kernel,
+    keep_rows,
     largest,
     largest_motion,
     method_step,
     normalise,
-    part,
     position_rates,
     set_diagonal,
     solve,
@@ -89,29 +83,19 @@ def rates_ahead(r, u, out):
     x, y = r.stages.x[AHEAD], r.stages.v[SCRATCH]
     copy(y, u)
     into_body_axes(r.model.bodies, x, y, r.work.loads.turn[0])
-    constraint_rates(r.model.bodies.where, r.model.markers, r.model.rows, r.work.rows.kept, y, out)
+    constraint_rates(r.model.bodies.where, r.model.markers, r.model.rows, r.work.rows.kept, r.work.markers.kept, y, out)
 
 
 @inlined
 def keep_rows_ahead(r):
     """Keep what `evaluate_rows_at` found."""
-    s, rows = r.stages, r.work.rows
-    copy(s.rows[NU], rows.nu)
-    copy(part(rows.kept, 0, rows.kept.size), part(rows.jac, 0, rows.jac.size))
+    copy(r.stages.rows[NU], r.work.rows.nu)
+    keep_rows(r)
 
 
 @inlined
 def violation_allowed(r):
     return r.clock.gains[TOLERANCE] * (TIGHTER if r.work.independence[HERE] < NEAR else 1.0)
-
-
-@kernel
-def take_stiffening_out(bodies, w):
-    """The right-hand sides as they were evaluated: `solve` adds the forces of geometric stiffening to them."""
-    for b in range(bodies.mass.size):
-        if bodies.where[b, K_SIZE] > 0:
-            n, j, e = bodies.where[b, N], bodies.where[b, IN_V], bodies.where[b, IN_Q]
-            copy(part(w.f, j + 6, n), part(w.unstiffened, e, n))
 
 
 @inlined
@@ -126,11 +110,8 @@ def accelerate(r, k, ha):
     copy(s.target, rows.gamma)
     before, stuck = math.inf, 0
     exact = EXACT / abs(ha) * largest_motion(r.model.bodies, bw.J, here)[0]
-    for sweep in range(SWEEPS):
-        if sweep == 0:
-            solve(r, s.x[STAGE], s.target, k)
-        else:
-            solve(r, s.x[STAGE], s.target, AGAIN)
+    for _ in range(SWEEPS):
+        solve(r, s.target)
         velocity_rates(r, rate)
         rates_ahead(r, rate, short)
         for c in range(short.size):
@@ -141,7 +122,6 @@ def accelerate(r, k, ha):
             break
         before = min(left, before)
         add_scaled(s.target, s.target, 1.0, short)
-        take_stiffening_out(r.model.bodies, bw)
     if left == 0.0:
         return OK
     scale = largest_motion(r.model.bodies, bw.J, here)[0] + abs(ha) * largest_motion(r.model.bodies, bw.J, rate)[0]
@@ -213,7 +193,6 @@ class HalfExplicit:
     stage_count: ClassVar[int] = STAGES + 3
     row_stages: ClassVar[int] = 2
     keeps_terms: ClassVar[bool] = False
-    looks_ahead: ClassVar[int] = 0
     controlled: ClassVar[bool] = False
     numbers: ClassVar[tuple[float, ...]] = (0.0,)
     do_step: ClassVar[CompiledFunction] = half_explicit_step

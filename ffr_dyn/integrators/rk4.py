@@ -25,12 +25,12 @@ from ffr_dyn.kernels.integrator_api import (
     normalise,
     position_rates,
     set_diagonal,
-    solve_stage,
+    solve,
     stabilise,
     velocity_rates,
 )
 
-AT, WEIGHTS = (0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
+AT = (0.0, 0.5, 0.5, 1.0)
 
 
 @method_step
@@ -52,7 +52,7 @@ def rk4_step(r: Tables, t: float, again: int) -> int:
         if status != OK:
             return status
         acceleration_target(r.work.rows, r.clock.gains, stages.target)
-        solve_stage(r, xs, stages.target, k, AT[k], WEIGHTS[k])
+        solve(r, stages.target)
         position_rates(r.model.bodies, xs, vs, stages.x[k])
         velocity_rates(r, stages.v[k])
     outer, inner = h / 6.0, h / 3.0
@@ -79,7 +79,6 @@ class RK4:
     stage_count: ClassVar[int] = 5
     row_stages: ClassVar[int] = 0
     keeps_terms: ClassVar[bool] = False
-    looks_ahead: ClassVar[int] = 4
     numbers: ClassVar[tuple[float, ...]] = ()
     do_step: ClassVar[CompiledFunction] = rk4_step
 

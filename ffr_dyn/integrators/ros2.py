@@ -46,7 +46,7 @@ from ffr_dyn.kernels.integrator_api import (
     normalise,
     position_rates,
     set_diagonal,
-    solve_stage,
+    solve,
     stabilise,
     velocity_rates,
 )
@@ -68,7 +68,6 @@ def ros2_step(r: Tables, t: float, again: int) -> int:
             copy(xs, r.x)
             copy(vs, r.v)
             fill(r_x, 0.0)
-            fill(r.work.bodies.shift, 0.0)
         else:
             add_scaled(xs, r.x, h, stages.x[0])
             add_scaled(vs, r.v, h, stages.v[0])
@@ -82,7 +81,7 @@ def ros2_step(r: Tables, t: float, again: int) -> int:
         add_elastic_part(bodies, r.work.bodies.f, vs, r_x, gh)
         if k == 1:
             correct(r, r_v, stages.target)
-        solve_stage(r, xs, stages.target, k, float(k), 0.5)
+        solve(r, stages.target)
         velocity_rates(r, stages.v[k])
         add_scaled(vs, vs, gh, stages.v[k])
         position_rates(bodies, xs, vs, stages.x[k])
@@ -111,7 +110,6 @@ class ROS2:
     stage_count: ClassVar[int] = 4
     row_stages: ClassVar[int] = 0
     keeps_terms: ClassVar[bool] = False
-    looks_ahead: ClassVar[int] = 2
     numbers: ClassVar[tuple[float, ...]] = ()
     do_step: ClassVar[CompiledFunction] = ros2_step
 

@@ -47,7 +47,7 @@ from ffr_dyn.kernels.integrator_api import (
     normalise,
     position_rates,
     set_diagonal,
-    solve_stage,
+    solve,
     stabilise,
     velocity_rates,
     weigh_four,
@@ -84,7 +84,6 @@ def ros3_step(r: Tables, t: float, again: int) -> int:
     for k in range(4):
         if k == 0:
             status = stabilise(r, t, r.x, r.v)
-            fill(r.work.bodies.shift, 0.0)
             copy(xs, r.x)
             copy(vs, r.v)
             fill(r_x, 0.0)
@@ -106,7 +105,7 @@ def ros3_step(r: Tables, t: float, again: int) -> int:
         add_elastic_part(bodies, r.work.bodies.f, vs, r_x, gh)
         if k > 0:
             correct(r, r_v, stages.target)
-        solve_stage(r, xs, stages.target, k, AT[k], WEIGHTS[k])
+        solve(r, stages.target)
         velocity_rates(r, stages.v[k])
         add_scaled(vs, vs, gh, stages.v[k])
         position_rates(bodies, xs, vs, stages.x[k])
@@ -140,7 +139,6 @@ class ROS3:
     stage_count: ClassVar[int] = 6
     row_stages: ClassVar[int] = 0
     keeps_terms: ClassVar[bool] = False
-    looks_ahead: ClassVar[int] = 3
     numbers: ClassVar[tuple[float, ...]] = ()
     do_step: ClassVar[CompiledFunction] = ros3_step
 
@@ -166,6 +164,5 @@ class AdaptiveROS3:
     stage_count: ClassVar[int] = 6
     row_stages: ClassVar[int] = 0
     keeps_terms: ClassVar[bool] = False
-    looks_ahead: ClassVar[int] = 0
     numbers: ClassVar[tuple[float, ...]] = ()
     do_step: ClassVar[CompiledFunction] = ros3_step

@@ -18,7 +18,7 @@ momentum that the scene conserves are conserved to rounding, the energy of a con
 not grow. Applied forces that have no potential enter with F (the discrete principle of d'Alembert).
 
 The equations are solved by Newton corrections with the elastic diagonal 1 + h^2/4 Omega^2 + h/2 2 zeta Omega, as
-`ffr_dyn.integrators.generalised_alpha`. Geometric stiffening, which has no potential here, acts at the nodes.
+`ffr_dyn.integrators.generalised_alpha`.
 
 Twin: the statement above, held by
 `tests/ffr_dyn/integrators/test_integrators_implicit.py::test_the_variational_method_conserves_momenta_to_rounding`.
@@ -33,12 +33,8 @@ from typing import ClassVar
 from ffr_dyn.integrators.generalised_alpha import check_iterations
 from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.integrator_api import (
-    AGAIN,
-    ASIDE,
-    IN_Q,
     IN_SHARED,
     IN_V,
-    K_SIZE,
     NORMAL,
     NOT_FINITE,
     OK,
@@ -66,6 +62,7 @@ from ffr_dyn.kernels.integrator_api import (
     inlined,
     into_global_axes,
     keep_measured,
+    keep_rows,
     kernel,
     largest,
     largest_motion,
@@ -86,10 +83,10 @@ from ffr_dyn.kernels.integrator_api import (
     velocity_rates,
 )
 
-# Rows of stages.v. MU: momenta at the start of the step; KICK: geometric stiffening there; MIDDLE: v_m; SHORT: what the
-# momenta of the start are short of; END: momenta at the end; REACTION: Phi_q^T lambda at the start; CHANGE: scratch.
-MU, KICK, MIDDLE, SHORT, END, REACTION, CHANGE = range(7)
-HALF, WHOLE, NOTHING = range(3)  # rows of stages.x: x_m, x+, zeros
+# Rows of stages.v. MU: momenta at the start of the step; MIDDLE: v_m; SHORT: what the momenta of the start are short of;
+# END: momenta at the end; REACTION: Phi_q^T lambda at the start; CHANGE: scratch.
+MU, MIDDLE, SHORT, END, REACTION, CHANGE = range(6)
+HALF, WHOLE = range(2)  # rows of stages.x: x_m, x+
 LAM = 0  # row of stages.rows: multipliers of the start
 TOLERANCE, LIMIT, STARTED = range(3)
 STUCK = 1e-6  # relative: where corrections no longer shrink below this, rounding is what is left of them
@@ -203,20 +200,20 @@ def end_momenta(r, h):
     to_velocity_rates(bodies.where, bw.A, s.v[SHORT], s.v[SHORT])
     to_velocity_rates(bodies.where, bw.A, s.v[END], s.v[END])
     for k in range(r.v.size):
-        s.v[SHORT, k] = s.v[MU, k] + 0.5 * h * s.v[KICK, k] - s.v[SHORT, k]
+        s.v[SHORT, k] = s.v[MU, k] - s.v[SHORT, k]
 
 
 @inlined
 def react_at_start(r):
     """REACTION = Phi_q^T lambda at the start of the step, shaped like v."""
-    s = r.stages
+    s, m, w = r.stages, r.model, r.work
     fill(s.v[REACTION], 0.0)
-    add_reactions(r.model.bodies.where, r.model.markers, r.model.rows, r.work.rows.kept, s.rows[LAM], s.v[REACTION])
+    add_reactions(m.bodies.where, m.markers, m.rows, w.rows.kept, w.markers.kept, s.rows[LAM], s.v[REACTION])
     into_global_axes(r.model.bodies, r.x, s.v[REACTION], r.work.loads.turn[0])
 
 
 @inlined
-def keep_node(r, h):
+def keep_node(r):
     """What the next step needs of its start, from an evaluation there with the true mass matrix: momenta and rows."""
     s, bodies, bw = r.stages, r.model.bodies, r.work.bodies
     copy(bw.acc, r.v)
@@ -225,51 +222,30 @@ def keep_node(r, h):
         n, j = bodies.where[b, N], bodies.where[b, IN_V]
         momentum(bodies, bw, b, part(bw.acc, j, 6 + n), part(s.v[MU], j, 6 + n))
     to_velocity_rates(bodies.where, bw.A, s.v[MU], s.v[MU])
-    rows = r.work.rows
-    copy(part(rows.kept, 0, rows.kept.size), part(rows.jac, 0, rows.jac.size))
+    keep_rows(r)
 
 
 @inlined
-def stiffen_node(r, t, v):
-    """KICK = the forces of geometric stiffening at (t, r.x, v). Returns a status."""
-    s, bodies, bw = r.stages, r.model.bodies, r.work.bodies
-    status = evaluate(r, t, r.x, v)
-    if status == OK:
-        fill(bw.shift, 0.0)
-        copy(s.target, r.work.rows.gamma)
-        solve(r, r.x, s.target, ASIDE)
-        fill(s.v[KICK], 0.0)
-        for b in range(bodies.mass.size):
-            n, j, e = bodies.where[b, N], bodies.where[b, IN_V], bodies.where[b, IN_Q]
-            if bodies.where[b, K_SIZE] > 0:
-                for k in range(n):
-                    s.v[KICK, j + 6 + k] = bw.f[j + 6 + k] - bw.unstiffened[e + k]
-    return status
-
-
-@inlined
-def close(r, h):
+def close(r):
     """v+ from the momenta END and the constraints on velocities, by the factors of an evaluation at (x+, v_m)."""
     s, bodies, bw, rows = r.stages, r.model.bodies, r.work.bodies, r.work.rows
     copy(bw.acc, s.v[MIDDLE])
     to_body_axes(bodies.where, bw.A, bw.acc)
-    constraint_rates(bodies.where, r.model.markers, r.model.rows, rows.jac, bw.acc, s.target)
+    constraint_rates(bodies.where, r.model.markers, r.model.rows, rows.jac, r.work.markers.phi, bw.acc, s.target)
     add_scaled(s.target, s.target, -1.0, rows.nu)
-    add_scaled(bw.f, s.v[END], 0.5 * h, s.v[KICK])
+    copy(bw.f, s.v[END])
     to_body_axes(bodies.where, bw.A, bw.f)
-    solve(r, s.x[NOTHING], s.target, AGAIN)
+    solve(r, s.target)
     velocity_rates(r, r.v)
 
 
 @inlined
-def begin(r, t, h, stiffened):
-    """Momenta, rows and geometric stiffening of the first node. Returns a status."""
+def begin(r, t):
+    """Momenta and rows of the first node. Returns a status."""
     set_diagonal(r, 0.0)
     status = stabilise(r, t, r.x, r.v)
-    if status == OK and stiffened:
-        status = stiffen_node(r, t, r.v)
     if status == OK:
-        keep_node(r, h)
+        keep_node(r)
         copy(r.stages.v[MIDDLE], r.v)
         r.stages.numbers[STARTED] = 1.0
     return status
@@ -293,9 +269,8 @@ def newton(r, h):
     for k in range(r.v.size):
         bw.f[k] = 2.0 / h * s.v[SHORT, k] - s.v[REACTION, k]
     to_body_axes(bodies.where, bw.A, bw.f)
-    add_reactions(bodies.where, r.model.markers, r.model.rows, r.work.rows.jac, s.rows[LAM], bw.f)
-    fill(bw.shift, 0.0)
-    solve(r, s.x[NOTHING], s.target, AGAIN)
+    add_reactions(bodies.where, r.model.markers, r.model.rows, r.work.rows.jac, r.work.markers.phi, s.rows[LAM], bw.f)
+    solve(r, s.target)
     copy(s.rows[LAM], r.work.rows.lam)
     fill(bw.more, 0.0)
     for b in range(bodies.mass.size):  # the momenta at the end of what is corrected
@@ -342,9 +317,8 @@ def iterate(r, t, h):
 def variational_step(r: Tables, t: float, again: int) -> int:
     """One step of the engine's state from time t. Returns a status."""
     h, s = r.clock.time[H], r.stages
-    stiffened = r.model.bodies.stiffening.size > 0
     if s.numbers[STARTED] == 0.0:
-        status = begin(r, t, h, stiffened)
+        status = begin(r, t)
         if status != OK:
             return status
     set_diagonal(r, 0.5 * h)
@@ -362,16 +336,8 @@ def variational_step(r: Tables, t: float, again: int) -> int:
         return status
     r.work.drift[PHI] = max(r.work.drift[PHI], largest(r.work.rows.Phi))
     keep_measured(r.work.loads)
-    close(r, h)
-    if stiffened:
-        copy(s.v[CHANGE], r.v)
-        status = stiffen_node(r, t + h, s.v[CHANGE])
-        if status == OK:
-            status = evaluate(r, t + h, r.x, s.v[MIDDLE])
-        if status != OK:
-            return status
-        close(r, h)
-    keep_node(r, h)
+    close(r)
+    keep_node(r)
     return finite(r.x, r.v)
 
 
@@ -393,10 +359,9 @@ class Variational:
     implicit: ClassVar[bool] = True
     reach: ClassVar[float] = math.inf
     repeatable: ClassVar[bool] = False
-    stage_count: ClassVar[int] = 7
+    stage_count: ClassVar[int] = 6
     row_stages: ClassVar[int] = 1
     keeps_terms: ClassVar[bool] = True
-    looks_ahead: ClassVar[int] = 0
     controlled: ClassVar[bool] = False
     do_step: ClassVar[CompiledFunction] = variational_step
 

@@ -24,8 +24,6 @@ from ffr_dyn.kernels.solution import (
     solve_back,
 )
 from ffr_dyn.kernels.step_control import controlled_step, interpolate
-from ffr_dyn.kernels.stiffening.ahead import start_ahead
-from ffr_dyn.kernels.stiffening.by_load import solve_stiffened
 from ffr_dyn.kernels.system import (
     apply_motion,
     evaluate_joints,
@@ -40,7 +38,6 @@ from ffr_dyn.kernels.system import (
 )
 from ffr_dyn.kernels.tables import (
     ALL,
-    ASIDE,
     AT,
     EVALUATIONS,
     EVERY_LOAD,
@@ -83,10 +80,6 @@ def has_loads(model: Model) -> bool:
 
 def has_dependent_rows(model: Model) -> bool:
     return model.relaxation > 0.0
-
-
-def has_stiffening(model: Model) -> bool:
-    return model.bodies.stiffening.size > 0
 
 
 def by_method(model: Model) -> bool:
@@ -133,21 +126,18 @@ def evaluate_markers(r: Tables, which: int, x: Vector, v: Vector) -> int:
 
 @entry_point(has_loads)
 def add_loads(r: Tables, x: Vector, number: int) -> int:
-    """Applied loads at x onto the right-hand sides and the markers: EVERY_LOAD, or one by its number alone into the scratch
-    of the powers."""
-    f, load, first, last = r.work.bodies.f, r.work.markers.load, 0, count_loads(r.model.loads)
+    """Applied loads at x onto the right-hand sides: EVERY_LOAD, or one by its number alone into the scratch of the powers."""
+    f, first, last = r.work.bodies.f, 0, count_loads(r.model.loads)
     if number != EVERY_LOAD:
-        f, load, first, last = r.work.loads.f, r.work.loads.load, number, number + 1
-    apply_loads(r, x, f, load, first, last)
+        f, first, last = r.work.loads.f, number, number + 1
+    apply_loads(r, x, f, first, last)
     return OK
 
 
 @inlined
 def load_all(r, x):
-    """All applied loads at x, by marker from zero."""
+    """All applied loads at x."""
     if count_loads(r.model.loads) > 0:
-        load = r.work.markers.load
-        fill(part(load, 0, load.size), 0.0)
         add_loads(r, x, EVERY_LOAD)
 
 
@@ -216,7 +206,7 @@ def set_diagonal(r: Tables, gamma_h: float) -> int:
     bodies, dinv = r.model.bodies, r.work.bodies.dinv
     for k in range(dinv.size):
         dinv[k] = 1.0 / (1.0 + gamma_h * gamma_h * bodies.omega2[k] + gamma_h * bodies.two_zeta_omega[k])
-    prepare(bodies, r.model.markers, r.model.rows, r.model.pattern, r.work.bodies, r.work.rows)
+    prepare(bodies, r.model.markers, r.model.rows, r.model.pattern, r.work.bodies, r.work.markers, r.work.rows)
     return OK
 
 
@@ -224,23 +214,23 @@ def set_diagonal(r: Tables, gamma_h: float) -> int:
 def back_substitute(r: Tables) -> int:
     """Multipliers and motion of reduced forces."""
     m, w = r.model, r.work
-    solve_back(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows)
+    solve_back(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.markers.phi, w.rows)
     return OK
 
 
 @inlined
 def solve_once(r, target):
-    """`solve_motion` as far as elimination without pivoting goes."""
+    """`solve` as far as elimination without pivoting goes."""
     m, bw, rw = r.model, r.work.bodies, r.work.rows
     for b in range(m.bodies.mass.size):
         reduce_forces(m.bodies, bw, b)
-    reduced_rates(m.bodies, m.markers, m.rows, bw, rw, target)
+    reduced_rates(m.bodies, m.markers, m.rows, bw, r.work.markers.phi, rw, target)
     back_substitute(r)
     gather_rows(m.rows.start, rw.step, rw.lam)
 
 
 @entry_point()
-def solve_motion(r: Tables, target: Vector) -> int:
+def solve(r: Tables, target: Vector) -> int:
     """acc, lam from  M acc + Phi_q^T lam = f,  Phi_q acc = target (C,)."""
     solve_once(r, vector_at(target, r.stages.target.size))
     return OK
@@ -253,8 +243,8 @@ def project(r: Tables, value: Vector) -> int:
     return back_substitute(r)
 
 
-@solve_motion.where(has_dependent_rows)
-def solve_motion_of_dependent_rows(r: Tables, target: Vector) -> int:
+@solve.where(has_dependent_rows)
+def solve_of_dependent_rows(r: Tables, target: Vector) -> int:
     """What relaxation of the multiplier matrix does to the motion, taken out again.
 
     Of the multipliers that dependent rows leave open, the smallest are found (method of multipliers; Bayo & Ledesma,
@@ -263,7 +253,7 @@ def solve_motion_of_dependent_rows(r: Tables, target: Vector) -> int:
     m, bw, rw, wanted, before = r.model, r.work.bodies, r.work.rows, vector_at(target, r.stages.target.size), 0.0
     solve_once(r, wanted)
     for number in range(1, PASSES):
-        constraint_rates(m.bodies.where, m.markers, m.rows, rw.jac, bw.acc, rw.left)
+        constraint_rates(m.bodies.where, m.markers, m.rows, rw.jac, r.work.markers.phi, bw.acc, rw.left)
         add_scaled(rw.left, rw.left, -1.0, wanted)
         left = largest(rw.left)
         if number > 1 and not left < 0.5 * before:
@@ -277,36 +267,14 @@ def solve_motion_of_dependent_rows(r: Tables, target: Vector) -> int:
     return OK
 
 
-@entry_point(has_stiffening)
-def start_stiffening(r: Tables, x: Vector) -> int:
-    """Geometric stiffening at the start of a step, from what is known before it. Returns 1 where it may be used, or 0."""
-    return 1 if start_ahead(r, r.work.bodies, vector_at(x, r.x.size)) else 0
-
-
-@entry_point()
-def solve(r: Tables, x: Vector, target: Vector, stage: int) -> int:
-    """acc and lam of what was evaluated last, at x, in stage number `stage` of a step, from 0; AGAIN: near the last
-    solution; ASIDE: so, and nothing is kept of it."""
-    return solve_motion(r, target)
-
-
-@solve.where(has_stiffening)
-def solve_with_stiffening(r: Tables, x: Vector, target: Vector, stage: int) -> int:
-    """`solve` where geometric stiffening depends on the loads that are solved for."""
-    xs, wanted = vector_at(x, r.x.size), vector_at(target, r.stages.target.size)
-    solve_stiffened(r, xs, wanted, stage, solve_motion, start_stiffening)
-    return OK
-
-
 @entry_point()
 def correct(r: Tables, r_v: Vector, target: Vector) -> int:
-    """f += M r_v, target += Phi_q r_v, for the corrections of a stage; r_v (V,) stays in bodies.shift in body axes."""
+    """f += M r_v, target += Phi_q r_v, for the corrections of a stage; r_v (V,)."""
     bodies, bw, rw = r.model.bodies, r.work.bodies, r.work.rows
     correction, wanted = vector_at(r_v, r.v.size), vector_at(target, r.stages.target.size)
     copy(bw.acc, correction)
     to_body_axes(bodies.where, bw.A, bw.acc)
-    copy(bw.shift, bw.acc)
-    constraint_rates(bodies.where, r.model.markers, r.model.rows, rw.jac, bw.acc, rw.lam)
+    constraint_rates(bodies.where, r.model.markers, r.model.rows, rw.jac, r.work.markers.phi, bw.acc, rw.lam)
     add_scaled(wanted, wanted, 1.0, rw.lam)
     for b in range(bodies.mass.size):
         j, size = bodies.where[b, IN_V], 6 + bodies.where[b, N]
@@ -370,8 +338,7 @@ def evaluate_exact(r: Tables, t: float, x: Vector, v: Vector) -> int:
     set_diagonal(r, 0.0)
     status = evaluate(r, t, x, v)
     if status == OK:
-        fill(w.bodies.shift, 0.0)
-        solve(r, x, w.rows.gamma, ASIDE)
+        solve(r, w.rows.gamma)
         to_velocity_rates(r.model.bodies.where, w.bodies.A, w.bodies.acc, w.vd)
     return status
 

@@ -11,7 +11,7 @@ one compiled function, which does one step of the engine's state r.x, r.v from t
         if status != OK:
             return status
         acceleration_target(r.work.rows, r.clock.gains, stages.target)   # Phi_q v_dot = target
-        solve(r, r.x, stages.target, 0)                                  # M acc + Phi_q^T lam = f
+        solve(r, stages.target)                                          # M acc + Phi_q^T lam = f
         position_rates(r.model.bodies, r.x, r.v, stages.x[0])            # x_dot = T(x) v
         velocity_rates(r, stages.v[0])                                   # v_dot = acc, in global axes
         add_scaled(r.x, r.x, h, stages.x[0])
@@ -26,7 +26,7 @@ asks for, and its numbers. What an evaluation left stands in `r.work` until the 
 engine by address (`ffr_dyn.kernels.entry_points`).
 
 evaluate(r, t, x, v)            right-hand sides, rows and factors there; `stabilise` projects (x, v) first where it must
-solve(r, x, target, stage)      acc and lam, with the factors of the last evaluation; `solve_stage` says when the stage is
+solve(r, target)                acc and lam, with the factors of the last evaluation
 project(r, value)               acc: the smallest motion with Phi_q acc = -value
 correct(r, r_v, target)         f += M r_v, target += Phi_q r_v
 evaluate_rows_at(r, t, x, v)    constraint rows elsewhere, with the factors left as they are
@@ -51,18 +51,13 @@ from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.simd.entry_point import CompiledFunction
 from ffr_dyn.kernels.simd.slices import part
 from ffr_dyn.kernels.solution import add_reactions, constraint_rates
-from ffr_dyn.kernels.stiffening.ahead import AT, WEIGHT
 from ffr_dyn.kernels.system import acceleration_target, finite, largest, to_body_axes, to_velocity_rates
 from ffr_dyn.kernels.tables import (
-    AGAIN,
-    ASIDE,
     FAILED,
     HERE,
-    IN_Q,
     IN_SHARED,
     IN_V,
     IN_X,
-    K_SIZE,
     NEAR,
     NORMAL,
     NOT_CONVERGED,
@@ -97,14 +92,10 @@ from ffr_dyn.kernels.vectors import (
 )
 
 __all__ = [
-    "AGAIN",
-    "ASIDE",
     "FAILED",
     "HERE",
-    "IN_Q",
     "IN_SHARED",
     "IN_V",
-    "K_SIZE",
     "NEAR",
     "NORMAL",
     "NOT_CONVERGED",
@@ -144,6 +135,7 @@ __all__ = [
     "into_body_axes",
     "into_global_axes",
     "keep_measured",
+    "keep_rows",
     "kernel",
     "largest",
     "largest_motion",
@@ -158,7 +150,6 @@ __all__ = [
     "set_diagonal",
     "six_rows",
     "solve",
-    "solve_stage",
     "stabilise",
     "subtract",
     "three_rows",
@@ -173,14 +164,11 @@ method_step = CompiledFunction  # the decorator of a method's step
 
 
 @inlined
-def solve_stage(r, x, target, stage, at, weight):
-    """`solve` in a method that takes geometric stiffening as a function of time.
-
-    at, weight : what part of the step after its start, from 0 in the first stage; of the stage in what the step adds
-    """
-    place = r.work.bodies.stage
-    place[AT], place[WEIGHT] = at, weight
-    solve(r, x, target, stage)
+def keep_rows(r):
+    """The Jacobian of an evaluation, to have it beside another: work.rows.kept with the shapes work.markers.kept."""
+    rows, markers = r.work.rows, r.work.markers
+    copy(part(rows.kept, 0, rows.kept.size), part(rows.jac, 0, rows.jac.size))
+    copy(markers.kept, markers.phi)
 
 
 @inlined

@@ -2,14 +2,14 @@
 two joint coordinates, on the markers of both joints.
 
 Each returns Phi, nu = dPhi/dt, gamma (Phi_q v_dot = gamma) and, per side, the coefficients of the point's velocity, of
-omega_bar and of the elastic rotation rate (all in body axes).
+omega_bar and of the rate of the elastic rotation vector (all in body axes).
 
 Twin: `ffr_dyn.equations.constraints.evaluate_word`.
 """
 
 import math
 
-from ffr_dyn.kernels.markers import axis_motion
+from ffr_dyn.kernels.markers import axis_motion, on_shapes
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.tables import STROKE, WORDS
 from ffr_dyn.kernels.vectors import add, cross, dot, get, scale, subtract, to_body
@@ -29,10 +29,10 @@ def coincidence(w, i, j, c, drive):
 
 
 @kernel
-def axis_side(A, a, a0, other):
-    """Coefficients of a side that enters by its axis a (undeformed a0) alone, multiplied by the global vector `other`."""
-    b = to_body(A, other)
-    return (ZERO, cross(a, b), cross(a0, b))
+def axis_side(w, k, a, other):
+    """Coefficients of marker k that enters by its axis a (body axes) alone, multiplied by the global vector `other`."""
+    turn = cross(a, to_body(w.A[w.body[k]], other))
+    return (ZERO, turn, on_shapes(w, k, turn))
 
 
 @kernel
@@ -42,7 +42,7 @@ def dot_1(w, i, j, ai0, aj0):
     aj, gj, dj, bj = axis_motion(w, j, aj0)
     gamma = -dot(bi, gj) - 2.0 * dot(di, dj) - dot(gi, bj)
     nu = dot(di, gj) + dot(gi, dj)
-    return dot(gi, gj), nu, gamma, axis_side(w.A[w.body[i]], ai, ai0, gj), axis_side(w.A[w.body[j]], aj, aj0, gi)
+    return dot(gi, gj), nu, gamma, axis_side(w, i, ai, gj), axis_side(w, j, aj, gi)
 
 
 @kernel
@@ -53,8 +53,8 @@ def dot_2(w, i, j, a0, drive):
     db = subtract(get(w.rb, j), get(w.rb, i))
     nu = dot(rate, d) + dot(g, dd) - drive[1]
     gamma = drive[2] - dot(bias, d) - 2.0 * dot(rate, dd) - dot(g, db)
-    b = to_body(w.A[w.body[i]], d)
-    side_i = (scale(-1.0, a), add(cross(a, b), cross(a, get(w.u, i))), cross(a0, b))
+    turn = cross(a, to_body(w.A[w.body[i]], d))
+    side_i = (scale(-1.0, a), add(turn, cross(a, get(w.u, i))), on_shapes(w, i, turn))
     c = to_body(w.A[w.body[j]], g)
     return dot(g, d) - drive[0], nu, gamma, side_i, (c, cross(get(w.u, j), c), ZERO)
 
@@ -74,7 +74,7 @@ def driven_angle(w, i, j, f, g, fj0, drive):
     bias = add(bi, add(prescribed, scale(-2.0 * speed, dl)))
     gamma = -dot(bias, gj) - 2.0 * dot(rate, dj) - dot(gi, bj)
     nu = dot(rate, gj) + dot(gi, dj)
-    return dot(gi, gj), nu, gamma, axis_side(w.A[w.body[i]], ai, across, gj), axis_side(w.A[w.body[j]], aj, fj0, gi)
+    return dot(gi, gj), nu, gamma, axis_side(w, i, ai, gj), axis_side(w, j, aj, gi)
 
 
 @kernel

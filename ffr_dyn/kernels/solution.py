@@ -27,10 +27,10 @@ def reduce_miss(rows, bw, step, value):
 
 
 @inlined
-def solve_back(bodies, markers, rows, pattern, bw, rw):
+def solve_back(bodies, markers, rows, pattern, bw, phi, rw):
     """step and acc from what the rows miss (step) and the reduced forces."""
     solve_blocks(rows.start, pattern, rw.S, rw.pivots, rw.step)
-    react(bodies, markers, rows, bw, rw)
+    react(bodies, markers, rows, bw, phi, rw)
 
 
 @kernel
@@ -42,7 +42,7 @@ def gather_rows(starts, lanes, out):
 
 
 @inlined
-def reduced_rates(bodies, markers, rows, bw, rw, target):
+def reduced_rates(bodies, markers, rows, bw, phi, rw, target):
     """step = Phi_q M^-1 f - target, from the reduced forces of the bodies and the eliminated rows."""
     where, ground, sides = bodies.where, bodies.mass.size, rows.marker.shape[1]
     for k in range(rows.marker.shape[0]):
@@ -59,13 +59,13 @@ def reduced_rates(bodies, markers, rows, bw, rw, target):
                     moved[0], moved[1], moved[2] = z[c0], z[c1], z[c2]
                     add_rows(rw.step, LANES * k, moved, rw.X, at, 3)
                     if n > 0:
-                        moved[0], moved[1], moved[2] = plane_rows(shapes(markers, marker, n), normal, elastic, n)
+                        moved[0], moved[1], moved[2] = plane_rows(shapes(markers, phi, marker, n), normal, elastic, n)
                         add_rows(rw.step, LANES * k, moved, rw.X, at + 3 * LANES, 3)
                     continue
                 add_rows(rw.step, LANES * k, z, rw.X, at, 6)
                 if n > 0:
-                    phi = shapes(markers, marker, n)
-                    moved[0], moved[1], moved[2], moved[3], moved[4], moved[5] = six_rows(phi, elastic, n)
+                    own = shapes(markers, phi, marker, n)
+                    moved[0], moved[1], moved[2], moved[3], moved[4], moved[5] = six_rows(own, elastic, n)
                     add_rows(rw.step, LANES * k, moved, rw.X, at + 6 * LANES, 6)
 
 
@@ -85,8 +85,8 @@ def dot_rows(X, at, step, own):
 
 
 @inlined
-def constraint_rates(where, markers, rows, jac, acc, out):
-    """out = Phi_q acc."""
+def constraint_rates(where, markers, rows, jac, phi, acc, out):
+    """out = Phi_q acc, by the coefficients and shapes of one moment."""
     fill(out, 0.0)
     ground, sides = where.shape[0] - 1, rows.marker.shape[1]
     for k in range(rows.marker.shape[0]):
@@ -95,12 +95,12 @@ def constraint_rates(where, markers, rows, jac, acc, out):
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
                 n, j, own = where[b, N], where[b, IN_V], jac[k * sides + side]
-                phi = shapes(markers, marker, n)
+                shape = shapes(markers, phi, marker, n)
                 first, last, moved = rows.start[k], rows.start[k + 1], part(acc, j, 6 + n)
                 if where[b, NORMAL] >= 0:
-                    add_side_rates_in_plane(phi, own, moved, first, last, n, where[b, NORMAL], out)
+                    add_side_rates_in_plane(shape, own, moved, first, last, n, where[b, NORMAL], out)
                 else:
-                    add_side_rates(phi, own, moved, first, last, n, out)
+                    add_side_rates(shape, own, moved, first, last, n, out)
 
 
 @kernel
@@ -129,8 +129,8 @@ def add_side_rates_in_plane(phi, a, acc, first, last, n, normal, out):
 
 
 @inlined
-def add_reactions(where, markers, rows, jac, lam, out):
-    """out (V,) += Phi_q^T lam in body axes."""
+def add_reactions(where, markers, rows, jac, phi, lam, out):
+    """out (V,) += Phi_q^T lam in body axes, by the coefficients and shapes of one moment."""
     ground, sides = where.shape[0] - 1, rows.marker.shape[1]
     for k in range(rows.marker.shape[0]):
         for side in range(sides):
@@ -138,8 +138,8 @@ def add_reactions(where, markers, rows, jac, lam, out):
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
                 n, j, own = where[b, N], where[b, IN_V], jac[k * sides + side]
-                phi = shapes(markers, marker, n)
-                add_side_reactions(phi, own, lam, rows.start[k], rows.start[k + 1], n, part(out, j, 6 + n))
+                shape = shapes(markers, phi, marker, n)
+                add_side_reactions(shape, own, lam, rows.start[k], rows.start[k + 1], n, part(out, j, 6 + n))
 
 
 @kernel
@@ -158,7 +158,7 @@ def add_side_reactions(phi, a, lam, first, last, n, out):
 
 
 @inlined
-def react(bodies, markers, rows, bw, rw):
+def react(bodies, markers, rows, bw, phi, rw):
     """acc from the reduced forces, less Phi_q^T step by the eliminated rows."""
     where, ground, sides = bodies.where, bodies.mass.size, rows.marker.shape[1]
     for k in range(rows.marker.shape[0]):
@@ -170,16 +170,16 @@ def react(bodies, markers, rows, bw, rw):
                 normal, wrench = where[b, NORMAL], rw.wrench
                 react_rigid(rw.X, at, rw.step, LANES * k, normal, z)
                 if n > 0:
-                    phi, elastic = shapes(markers, marker, n), part(bw.acc, where[b, IN_V] + 6, n)
+                    shape, elastic = shapes(markers, phi, marker, n), part(bw.acc, where[b, IN_V] + 6, n)
                     dinv = part(bw.dinv, where[b, IN_SHARED], n)
                     if normal >= 0:
                         for c in range(3):
                             wrench[c] = dot_rows(rw.X, at + LANES * (3 + c), rw.step, LANES * k)
-                        release_in_plane(phi, normal, dinv, wrench, n, elastic)
+                        release_in_plane(shape, normal, dinv, wrench, n, elastic)
                     else:
                         for c in range(6):
                             wrench[c] = dot_rows(rw.X, at + LANES * (6 + c), rw.step, LANES * k)
-                        release(phi, dinv, wrench, n, elastic)
+                        release(shape, dinv, wrench, n, elastic)
     for b in range(ground):
         accelerate(bodies, bw, b)
 

@@ -29,6 +29,7 @@ from ffr_dyn.kernels.tables import (
     EARLIER,
     EARLIER_SIDE,
     HERE,
+    IN_BENDING,
     IN_SHARED,
     IN_USE,
     IN_V,
@@ -50,8 +51,8 @@ RIGID, ELASTIC = (0, 1, 2, 3, 4, 5), (0, 1, 2, 6, 7, 8)
 
 
 @inlined
-def prepare(bodies, markers, rows, pattern, bw, rw):
-    """What depends on the elastic diagonal alone."""
+def prepare(bodies, markers, rows, pattern, bw, mw, rw):
+    """What depends on the elastic diagonal alone. Of second-order bodies the shapes at markers do not: see `couple_joint`."""
     where = bodies.where
     for b in range(bodies.mass.size):
         prepare_body(bodies, bw, b)
@@ -60,22 +61,23 @@ def prepare(bodies, markers, rows, pattern, bw, rw):
         n, shared = where[b, N], where[b, IN_SHARED]
         if n > 0:
             P_dm, dinv = part(bodies.P_dm, 3 * shared, 3 * n), part(bw.dinv, shared, n)
-            prepare_marker(shapes(markers, k, n), P_dm, dinv, n, where[b, NORMAL], rw.P[k])
+            prepare_marker(shapes(markers, mw.phi, k, n), P_dm, dinv, n, where[b, NORMAL], rw.P[k])
     for number in range(pattern.sample.size):
         p = pattern.sample[number]
         b = pattern.pair_body[p]
         n = where[b, N]
         if n > 0:
-            left = rows.marker[pattern.pair[p, LATER], pattern.pair[p, LATER_SIDE]]
-            right = rows.marker[pattern.pair[p, EARLIER], pattern.pair[p, EARLIER_SIDE]]
-            couple_pair(
-                shapes(markers, left, n),
-                shapes(markers, right, n),
-                part(bw.dinv, where[b, IN_SHARED], n),
-                n,
-                where[b, NORMAL],
-                rw.phiphi[number],
-            )
+            couple_elastic(bodies, markers, rows, pattern, bw, mw, rw, p)
+
+
+@inlined
+def couple_elastic(bodies, markers, rows, pattern, bw, mw, rw, p):
+    """What elastic coordinates couple of pair number p."""
+    b = pattern.pair_body[p]
+    n, dinv = bodies.where[b, N], part(bw.dinv, bodies.where[b, IN_SHARED], bodies.where[b, N])
+    left = shapes(markers, mw.phi, rows.marker[pattern.pair[p, LATER], pattern.pair[p, LATER_SIDE]], n)
+    right = shapes(markers, mw.phi, rows.marker[pattern.pair[p, EARLIER], pattern.pair[p, EARLIER_SIDE]], n)
+    couple_pair(left, right, dinv, n, bodies.where[b, NORMAL], rw.phiphi[pattern.pair[p, PHIPHI]])
 
 
 @inlined
@@ -89,7 +91,7 @@ def factorise_bodies(gravity, bodies, w, x, v):
 
 
 @inlined
-def couple_joint(bodies, markers, rows, pattern, bw, rw, k):
+def couple_joint(bodies, markers, rows, pattern, bw, mw, rw, k):
     """Rows of joint k after elimination of the elastic coordinates, and what couples it with itself and the joints before."""
     where, sides = bodies.where, rows.marker.shape[1]
     ground = where.shape[0] - 1
@@ -103,7 +105,7 @@ def couple_joint(bodies, markers, rows, pattern, bw, rw, k):
             flexible, normal, L, P = n > 0, where[b, NORMAL], part(bw.L, 36 * b, 36), rw.P[marker]
             if flexible and rows.first[k, side] == 1:
                 _, H, dinv = coupling(bodies, bw, b)
-                couple_marker(shapes(markers, marker, n), H, dinv, n, normal, P)
+                couple_marker(shapes(markers, mw.phi, marker, n), H, dinv, n, normal, P)
             if normal >= 0:
                 c0, c1, c2 = in_plane(normal)
                 eliminate_side(jac, (c0, c1, c2), (c0, c1, 6 + normal), flexible, P, L, rw.X, at)
@@ -117,6 +119,8 @@ def couple_joint(bodies, markers, rows, pattern, bw, rw, k):
         second = (earlier * sides + pattern.pair[p, EARLIER_SIDE]) * SIDE
         flexible, size = where[b, N] > 0, rows.start[earlier + 1] - rows.start[earlier]
         at, phiphi = pattern.pair[p, TARGET], rw.phiphi[pattern.pair[p, PHIPHI]]
+        if flexible and markers.second[rows.marker[k, pattern.pair[p, LATER_SIDE]], IN_BENDING] >= 0:
+            couple_elastic(bodies, markers, rows, pattern, bw, mw, rw, p)
         if where[b, NORMAL] >= 0:
             couple_sides(rw.X, first, second, size, 3, flexible, phiphi, rw.Y, rw.S, at)
         else:
@@ -150,7 +154,7 @@ def evaluate_joints(m, w):
     w.independence[HERE] = 1.0
     done = 0
     for k in range(m.rows.marker.shape[0]):
-        couple_joint(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.rows, k)
+        couple_joint(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.markers, w.rows, k)
         if m.relaxation > 0.0:
             relax_block(m.rows.start, m.pattern, w.rows.S, m.relaxation, k)
         while done <= k and m.pattern.reach[done] <= k:

@@ -43,15 +43,7 @@ KERNEL, PLACE, LAW, MEASURED, END_I, END_J, WAY, FUNCTION, USER = range(9)
 OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED, NOT_CONVERGED, STEP_TOO_SMALL = range(7)
 
 LANES = 8  # rows of a joint side by side (see `ffr_dyn.kernels.simd.lanes`)
-QUAD = 4  # rows of a symmetric matrix that are multiplied together
 STRIPS = 4  # rows of eight that products of a body are found in at a time
-STAGES = 7  # of a step, at most
-MEANS = 4  # over so many steps, of the loads that stiffen
-WATCH = 32  # steps from one look at their feedback to the next
-RATES, INERTIAL = 6, 12  # of these the first by angular velocities, the first at an interface
-
-# A solution at a stage of a step is asked for by the stage's number; near the last one, or aside from the steps:
-AGAIN, ASIDE = -1, -2
 
 # Which markers are brought up to date: those that joints or loads use, those of joints, all.
 IN_USE, OF_JOINTS, ALL = 0, 1, 2
@@ -69,30 +61,33 @@ TIGHTER = 1e-4
 # Columns of `Bodies.where`.
 N = 0  # number of elastic coordinates
 IN_X, IN_V, IN_Q = 1, 2, 3  # first of the body in x, in v, among all elastic coordinates
-IN_PP_DM, IN_STIFFENING = 4, 5  # in PP_dm and in stiffening, or -1 where that vanishes
-K_SIZE = 6  # how many numbers its K_sigma has; 0 without geometric stiffening
-NORMAL = 7  # the body axis along the normal of a planar scene, or -1
+IN_PP_DM = 4  # in PP_dm, or -1 where that vanishes
+NORMAL = 5  # the body axis along the normal of a planar scene, or -1
 IN_SHARED = (
-    8  # in omega2 and the other rows by coordinate; equal bodies share them, so that many stay in the processor's cache
+    6  # in omega2 and the other rows by coordinate, which equal bodies share: many stay in the processor's cache
 )
-PP_PLAN, K_PLAN = 9, 10  # in `blocks`, for PP_dm and for stiffening
+PP_PLAN = 7  # in `blocks`
 
 
 class Bodies(NamedTuple):
     """B bodies, E elastic coordinates in all."""
 
-    where: I2  # (B + 1, 11) sizes of a body and where its parts begin, by the columns above
+    where: I2  # (B + 1, 8) sizes of a body and where its parts begin, by the columns above
     mass: F1  # (B,)
     moments: F2  # (B, 9) first moment r_dm (3), second moment rr_dm (6)
     P_dm: F1  # pooled; per body 3 rows of n
     rP_dm: F1  # pooled; per body 9 rows of n: six symmetric parts, three axial components (I4)
-    # pooled; per body n x 9 x n: for q_i the same nine rows over j (last three: I5), in blocks; in the plane n x 3 x n: two
-    # symmetric parts in it, and the axial component across
+    # pooled; per body n x 9 x n: for q_i the same nine rows over j (last three: I5), second-order moments among them, in
+    # blocks; in the plane n x 3 x n: two symmetric parts in it, and the axial component across
     PP_dm: F1
     omega2: F1  # pooled, n of all bodies that differ
     two_zeta_omega: F1  # likewise
-    stiffening: F1  # pooled; of each body the stiffness by each load, in blocks; empty without geometric stiffening
-    blocks: I1  # pooled; how PP_dm and stiffening are stored (see `ffr_dyn.compile.symmetry_blocks`)
+    blocks: I1  # pooled; how PP_dm is stored (see `ffr_dyn.compile.symmetry_blocks`)
+
+
+# Columns of `Markers.second`: whether the axes of the marker are asked for; how many of its six rows are of second order;
+# where they begin in `bending`, or -1; where their plan begins in `blocks`.
+TURNS, COUNT, IN_BENDING, BEND_PLAN = range(4)
 
 
 class Markers(NamedTuple):
@@ -100,9 +95,13 @@ class Markers(NamedTuple):
 
     body: I1  # (M,)
     u: F2  # (M, 3) undeformed position in the body frame (ground: global)
-    phi: F1  # pooled, shared by equal bodies; per marker 6 rows of n: phi_t, phi_r
+    phi: F1  # pooled, shared by equal linear bodies; per marker 6 rows of n: phi_t, phi_r
     start: I1  # (M,) in phi
-    load: I1  # (M,) number of the marker's first load in its body's stiffening, or -1
+    second: I2  # (M, 4) by the columns above
+    # pooled; per marker of a second-order body the rows of phi that bend, and over q_i those of -K, in blocks: in space the
+    # first COUNT of the six, in the plane displacements in it and the rotation across
+    bending: F1
+    blocks: I1  # pooled; how they are stored
     active: I1  # markers that joints or loads use, updated at every evaluation
     joint: I1  # markers of bodies that joints use
 
@@ -185,7 +184,7 @@ class BodyWork(NamedTuple):
     terms: I1  # (B,)
     g: F1  # pooled; G_j: six symmetric rows of n, three axial ones; in the plane two and one
     l: F1  # pooled; three rows of n, integral of u_dot x phi_j dm; in the plane one  # noqa: E741
-    sorted: F1  # scratch of products by blocks: zeros, q, q_dot, products; or q, the two parts of K_sigma q, loads
+    sorted: F1  # scratch of products: q, q_dot and sums by family; in the plane, undeformed moments
     H: F1  # (3 E,) the axial rows of G_j
     # (B, 6, 6) Cholesky factor of the Schur complement, reciprocal diagonal; with s and J it is constant for a rigid body,
     # and not positive in [0, 0] where that has none
@@ -198,23 +197,6 @@ class BodyWork(NamedTuple):
     # likewise, is where the elastic accelerations will be
     rigid: F2
     more: F1  # (V,) scratch
-    unstiffened: F1  # (E,) elastic right-hand side without geometric stiffening
-    shift: F1  # (V,) part of acc that is no acceleration (corrections of an integrator's stage), body axes
-    # Of scenes with geometric stiffening (E_s = E, else 0):
-    K_sigma: F1  # scratch: that of one body, in blocks on one side of the diagonal
-    scratch: F1  # (longest,) of one body
-    stiff: F1  # (E_s,) K_sigma q
-    last: F1  # (E_s,) that of the last solution in a step; zero before the first
-    steady: F1  # (3,) length of the last step, how many there were of that length before it, its last stage
-    change: F2  # (3 STAGES, E_s) by what stages of the last step, and of two before, differed from the stage before
-    load: F2  # (B, longest) loads of the bodies, in the order of their stiffness
-    # Of methods that look ahead (E_s, B, or 0):
-    ahead: F1  # (7 + MEANS,) see `ffr_dyn.kernels.stiffening.ahead`
-    stage: F1  # (2,) what part of the step after its start, weight
-    past: F2  # (8, E_s) K_sigma q at the start of this step, its three backward differences; q, likewise
-    diagonal: F1  # (E_s,) of K_sigma at the start of this step
-    mean: F3  # (MEANS, B, longest) loads, over this step so far and over those before
-    expected: F2  # (B, longest) loads at the start of this step
 
 
 class MarkerWork(NamedTuple):
@@ -227,9 +209,15 @@ class MarkerWork(NamedTuple):
     rd: F2  # (M, 3) global velocity
     rb: F2  # (M, 3) quadratic velocity part of the global acceleration
     u: F2  # (M, 3) position in body axes
-    theta: F2  # (M, 3) elastic rotation phi_r q
-    thetad: F2  # (M, 3)
-    load: F2  # (M, 6) applied force and moment, body axes
+    phi: F1  # as Markers.phi, at q: d(displacement) / dq and d(rotation vector) / dq
+    kept: F1  # those of another moment, for methods that need both
+    R: F3  # (M, 3, 3) elastic rotation
+    T: F3  # (M, 3, 3) angular velocity per rate of the rotation vector, body axes
+    spin: F2  # (M, 3) angular velocity, body axes
+    turning: F2  # (M, 3) quadratic velocity part of the angular acceleration, body axes
+    six: F2  # (3, 6) scratch: elastic motion, rate, quadratic velocity part of the second derivative
+    bent: F1  # scratch of one marker: rows at q, and their rates
+    sorted: F1  # scratch of products by blocks
 
 
 class LoadWork(NamedTuple):
@@ -240,7 +228,6 @@ class LoadWork(NamedTuple):
     axes: F4  # (2, 3, 3, 3) scratch of a bushing
     turn: F3  # (3, 3, 3) scratch of a bushing
     f: F1  # (V,) scratch of the powers
-    load: F2  # (M, 6) scratch of the powers
 
 
 class RowWork(NamedTuple):

@@ -10,7 +10,7 @@ from ffr_dyn.kernels.tables import OK, Tables, Vector
 
 
 @force_kernel
-def actuator(r: Tables, k: int, x: Vector, f: Vector, load: Vector) -> int:
+def actuator(r: Tables, k: int, x: Vector, f: Vector) -> int:
     value, rate, side_i, side_j = coordinate_of(r, k)
-    apply_along(r, k, f, load, value, rate, side_i, side_j, given(r, k, 0, 1))
+    apply_along(r, k, f, value, rate, side_i, side_j, given(r, k, 0, 1))
     return OK

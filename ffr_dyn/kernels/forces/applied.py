@@ -30,11 +30,10 @@ def count_loads(loads):
 
 
 @kernel
-def apply_loads(r, x, f, load, first, last):
-    """Add loads number first ... last - 1 at the positions x, a `Vector`, to the right-hand sides f (V,), and to load
-    (M, 6)."""
+def apply_loads(r, x, f, first, last):
+    """Add loads number first ... last - 1 at the positions x, a `Vector`, to the right-hand sides f (V,)."""
     for k in range(first, last):
-        call_force(r.forces[r.model.loads.row[k, KERNEL]], r, k, x, f, load)
+        call_force(r.forces[r.model.loads.row[k, KERNEL]], r, k, x, f)
 
 
 @kernel

@@ -11,7 +11,7 @@ import math
 
 from ffr_dyn.kernels.forces.coordinate import apply_side, three
 from ffr_dyn.kernels.forces.curve import curve_value
-from ffr_dyn.kernels.markers import axis_motion
+from ffr_dyn.kernels.markers import axis_motion, on_shapes
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.rows import ZERO
 from ffr_dyn.kernels.simd.force_kernel import force_kernel
@@ -106,17 +106,15 @@ def weigh(z, g, g_s, g_c, moment, C):
 
 
 @kernel
-def turning_side(A, axes, others, frame, C, transposed):
-    """The side of sum C_kl d(a_k . b_l) that moves `axes` (body axes), with the global axes `others` held."""
-    turning, twist = ZERO, ZERO
+def turning_side(w, marker, axes, others, C, transposed):
+    """The side of sum C_kl d(a_k . b_l) that moves `axes` (body axes) of a marker, with the global axes `others` held."""
+    A, turning = w.A[w.body[marker]], ZERO
     for k in range(3):
         sum_k = ZERO
         for l in range(3):  # noqa: E741
             sum_k = add(sum_k, scale(C[l, k] if transposed else C[k, l], get(others, l)))
-        b = to_body(A, sum_k)
-        turning = add(turning, cross(get(axes, k), b))
-        twist = add(twist, cross(three(frame, 3 * k), b))
-    return ZERO, turning, twist
+        turning = add(turning, cross(get(axes, k), to_body(A, sum_k)))
+    return ZERO, turning, on_shapes(w, marker, turning)
 
 
 @kernel
@@ -131,8 +129,8 @@ def combine_axes(axes, x):
 
 
 @kernel
-def apply_bushing(r, k, f, load):
-    """Add bushing k to f (V,) and load (6 M,), and keep displacement, rate and force."""
+def apply_bushing(r, k, f):
+    """Add bushing k to f (V,), and keep displacement, rate and force."""
     m, w, s, loads = r.model, r.work.markers, r.work.loads, r.model.loads
     where, markers, i, j = m.bodies.where, m.markers, loads.row[k, END_I], loads.row[k, END_J]
     frames, x = part(loads.data, loads.row[k, PLACE], 18), part(s.measured, loads.row[k, MEASURED], 18)
@@ -141,22 +139,20 @@ def apply_bushing(r, k, f, load):
     z, g, g_s, g_c = measure_bushing(w, s, i, j, x)
     six_forces(loads.data, loads.row[k, LAW], x)
     weigh(z, g, g_s, g_c, (x[15], x[16], x[17]), s.turn[2])
-    ui, uj, C, on_body_i, on_body_j = get(w.u, i), get(w.u, j), s.turn[2], part(load, 6 * i, 6), part(load, 6 * j, 6)
+    ui, uj, C = get(w.u, i), get(w.u, j), s.turn[2]
 
     force, a = (x[12], x[13], x[14]), s.axes[0, 0]
     d = to_body(w.A[w.body[i]], subtract(get(w.r, j), get(w.r, i)))
     on_i, on_j = combine_axes(a, force), to_body(w.A[w.body[j]], combine_axes(s.axes[0, 1], force))
-    undeformed = combine(three(frames, 0), three(frames, 3), three(frames, 6), force)
-    side_i = (scale(-1.0, on_i), add(cross(on_i, d), cross(on_i, ui)), cross(undeformed, d))
-    apply_side(where, markers, ui, f, on_body_i, i, 1.0, side_i)
-    apply_side(where, markers, uj, f, on_body_j, j, 1.0, (on_j, cross(uj, on_j), ZERO))
-    side_i = turning_side(w.A[w.body[i]], a, s.axes[1, 1], frames, C, False)
-    side_j = turning_side(w.A[w.body[j]], s.axes[1, 0], s.axes[0, 1], part(frames, 9, 9), C, True)
-    apply_side(where, markers, ui, f, on_body_i, i, 1.0, side_i)
-    apply_side(where, markers, uj, f, on_body_j, j, 1.0, side_j)
+    turn = cross(on_i, d)
+    side_i = (scale(-1.0, on_i), add(turn, cross(on_i, ui)), on_shapes(w, i, turn))
+    apply_side(where, markers, w, f, i, 1.0, side_i)
+    apply_side(where, markers, w, f, j, 1.0, (on_j, cross(uj, on_j), ZERO))
+    apply_side(where, markers, w, f, i, 1.0, turning_side(w, i, a, s.axes[1, 1], C, False))
+    apply_side(where, markers, w, f, j, 1.0, turning_side(w, j, s.axes[1, 0], s.axes[0, 1], C, True))
 
 
 @force_kernel
-def bushing(r: Tables, k: int, x: Vector, f: Vector, load: Vector) -> int:
-    apply_bushing(r, k, vector_at(f, r.v.size), vector_at(load, 6 * r.model.markers.body.size))
+def bushing(r: Tables, k: int, x: Vector, f: Vector) -> int:
+    apply_bushing(r, k, vector_at(f, r.v.size))
     return OK

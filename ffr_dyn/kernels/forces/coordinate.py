@@ -60,30 +60,26 @@ def drive_of(r, k):
 
 
 @kernel
-def apply_side(where, markers, u, f, load, k, amount, side):
-    """Add amount times a side (see `rows`) of marker k, at u, to the right-hand sides f and to the marker's load (6,)."""
+def apply_side(where, markers, w, f, k, amount, side):
+    """Add amount times a side (see `rows`) of marker k to the right-hand sides f."""
     b = markers.body[k]
     if b == where.shape[0] - 1:
         return
     n, j = where[b, N], where[b, IN_V]
     force, turning, twist = scale(amount, side[0]), scale(amount, side[1]), scale(amount, side[2])
-    moment = subtract(turning, cross(u, force))
     for c in range(3):
         f[j + c] += force[c]
         f[j + 3 + c] += turning[c]
-        load[c] += force[c]
-        load[3 + c] += moment[c]
     if n > 0:
-        project(shapes(markers, k, n), force, twist, part(f, j + 6, n), n)
+        project(shapes(markers, w.phi, k, n), force, twist, part(f, j + 6, n), n)
 
 
 @kernel
-def apply_along(r, k, f, load, value, rate, side_i, side_j, force):
-    """Add the force on a coordinate to the vectors f and load, and keep it with coordinate and rate."""
-    m, row, u, kept = r.model, r.model.loads.row, r.work.markers.u, r.work.loads.measured
+def apply_along(r, k, f, value, rate, side_i, side_j, force):
+    """Add the force on a coordinate to the vector f, and keep it with coordinate and rate."""
+    m, row, w, kept = r.model, r.model.loads.row, r.work.markers, r.work.loads.measured
     at, i, j = row[k, MEASURED], row[k, END_I], row[k, END_J]
     kept[at], kept[at + 1], kept[at + 2] = value, rate, force
     f = vector_at(f, r.v.size)
-    load = vector_at(load, 6 * m.markers.body.size)
-    apply_side(m.bodies.where, m.markers, get(u, i), f, part(load, 6 * i, 6), i, force, side_i)
-    apply_side(m.bodies.where, m.markers, get(u, j), f, part(load, 6 * j, 6), j, force, side_j)
+    apply_side(m.bodies.where, m.markers, w, f, i, force, side_i)
+    apply_side(m.bodies.where, m.markers, w, f, j, force, side_j)

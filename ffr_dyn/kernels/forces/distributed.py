@@ -48,7 +48,7 @@ def add_global(data, start, factor, A, q, n, f):
 
 
 @force_kernel
-def distributed(r: Tables, k: int, x: Vector, f: Vector, load: Vector) -> int:
+def distributed(r: Tables, k: int, x: Vector, f: Vector) -> int:
     """Of directions fixed in the body, affine in q; or of fixed global directions."""
     where, loads = r.model.bodies.where, r.model.loads
     b, start = loads.row[k, END_I], loads.row[k, LAW]

@@ -22,9 +22,9 @@ def rubbing(data, start, rate, normal):
 
 
 @force_kernel
-def friction(r: Tables, k: int, x: Vector, f: Vector, load: Vector) -> int:
+def friction(r: Tables, k: int, x: Vector, f: Vector) -> int:
     value, rate, side_i, side_j = coordinate_of(r, k)
     loads = r.model.loads
     force = rubbing(loads.data, loads.row[k, LAW], rate, drive_of(r, k)[0])
-    apply_along(r, k, f, load, value, rate, side_i, side_j, force)
+    apply_along(r, k, f, value, rate, side_i, side_j, force)
     return OK

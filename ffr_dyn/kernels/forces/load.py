@@ -6,13 +6,13 @@ Twin: `ffr_dyn.scene.forces.load`.
 from ffr_dyn.kernels.forces.given import given
 from ffr_dyn.kernels.markers import apply_wrench
 from ffr_dyn.kernels.simd.force_kernel import force_kernel
-from ffr_dyn.kernels.simd.slices import part, vector_at
+from ffr_dyn.kernels.simd.slices import vector_at
 from ffr_dyn.kernels.tables import END_I, GLOBAL, OK, WAY, Tables, Vector
-from ffr_dyn.kernels.vectors import get, to_body
+from ffr_dyn.kernels.vectors import to_body
 
 
 @force_kernel
-def load(r: Tables, k: int, x: Vector, f: Vector, load: Vector) -> int:
+def load(r: Tables, k: int, x: Vector, f: Vector) -> int:
     m, w = r.model, r.work.markers
     marker = m.loads.row[k, END_I]
     A = w.A[w.body[marker]]
@@ -20,7 +20,5 @@ def load(r: Tables, k: int, x: Vector, f: Vector, load: Vector) -> int:
     moment = given(r, k, 3, 6), given(r, k, 4, 6), given(r, k, 5, 6)
     if m.loads.row[k, WAY] == GLOBAL:
         force, moment = to_body(A, force), to_body(A, moment)
-    taken = part(vector_at(load, 6 * m.markers.body.size), 6 * marker, 6)
-    right = vector_at(f, r.v.size)
-    apply_wrench(m.bodies.where, m.markers, get(w.u, marker), right, taken, marker, force, moment)
+    apply_wrench(m.bodies.where, m.markers, w, vector_at(f, r.v.size), marker, force, moment)
     return OK

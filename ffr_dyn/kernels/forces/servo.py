@@ -19,9 +19,9 @@ def control(data, start, c, rate, target, target_rate):
 
 
 @force_kernel
-def servo(r: Tables, k: int, x: Vector, f: Vector, load: Vector) -> int:
+def servo(r: Tables, k: int, x: Vector, f: Vector) -> int:
     value, rate, side_i, side_j = coordinate_of(r, k)
     loads, drive = r.model.loads, drive_of(r, k)
     force = control(loads.data, loads.row[k, LAW], value, rate, drive[0], drive[1])
-    apply_along(r, k, f, load, value, rate, side_i, side_j, force)
+    apply_along(r, k, f, value, rate, side_i, side_j, force)
     return OK

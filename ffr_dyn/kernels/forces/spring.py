@@ -23,8 +23,8 @@ def pull(data, start, c, rate):
 
 
 @force_kernel
-def spring(r: Tables, k: int, x: Vector, f: Vector, load: Vector) -> int:
+def spring(r: Tables, k: int, x: Vector, f: Vector) -> int:
     value, rate, side_i, side_j = coordinate_of(r, k)
     loads = r.model.loads
-    apply_along(r, k, f, load, value, rate, side_i, side_j, -pull(loads.data, loads.row[k, LAW], value, rate))
+    apply_along(r, k, f, value, rate, side_i, side_j, -pull(loads.data, loads.row[k, LAW], value, rate))
     return OK

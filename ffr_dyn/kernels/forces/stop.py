@@ -23,10 +23,10 @@ def push(data, start, depth, speed):
 
 
 @force_kernel
-def stop(r: Tables, k: int, x: Vector, f: Vector, load: Vector) -> int:
+def stop(r: Tables, k: int, x: Vector, f: Vector) -> int:
     """data: lower and upper end, then what `push` reads."""
     value, rate, side_i, side_j = coordinate_of(r, k)
     data, start = r.model.loads.data, r.model.loads.row[k, LAW]
     force = push(data, start + 2, data[start] - value, -rate) - push(data, start + 2, value - data[start + 1], rate)
-    apply_along(r, k, f, load, value, rate, side_i, side_j, force)
+    apply_along(r, k, f, value, rate, side_i, side_j, force)
     return OK

@@ -14,15 +14,14 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.common.registry import loaded
 
 
-def _declared(r: Tables, k: int, x: Vector, f: Vector, load: Vector) -> int:
-    """Force number k at positions x: adds to f (V,) the right-hand sides, body axes, and to load (M, 6) what markers take.
-    Returns OK."""
+def _declared(r: Tables, k: int, x: Vector, f: Vector) -> int:
+    """Force number k at positions x: adds to f (V,) the right-hand sides, body axes. Returns OK."""
     raise NotImplementedError
 
 
 force_kernel = CompiledFunction  # the decorator of a kernel, a function with the arguments of `_declared`
 
-call_force = call_like(_declared)  # call_force(address, r, k, x, f, load)
+call_force = call_like(_declared)  # call_force(address, r, k, x, f)
 
 
 def kernel_of(kernel: str | CompiledFunction) -> CompiledFunction:
@@ -33,7 +32,7 @@ def kernel_of(kernel: str | CompiledFunction) -> CompiledFunction:
     if _types(found.function) != _types(_declared):
         raise InputError(
             f"the kernel {found.name} of a force must be declared as"
-            f" {found.name}(r: Tables, k: int, x: Vector, f: Vector, load: Vector) -> int"
+            f" {found.name}(r: Tables, k: int, x: Vector, f: Vector) -> int"
         )
     return found
 

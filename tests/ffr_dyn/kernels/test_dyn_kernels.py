@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ffr_gallery.bodies import beam
 from synthetic import cloud, mirrored
 
-from ffr_dyn.compile.body_tables import loads_that_stiffen, of_coordinates
+from ffr_dyn.compile.body_tables import of_coordinates
 from ffr_dyn.compile.engine import evaluate_at, new_engine
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.compile.symmetry_blocks import in_blocks
@@ -22,9 +21,8 @@ from ffr_dyn.functions.rotation import G_bar, rotation_matrix, skew
 from ffr_dyn.functions.time_functions import evaluate, harmonic, polynomial, table
 from ffr_dyn.integrators import RK4
 from ffr_dyn.kernels.functions import evaluate_functions
-from ffr_dyn.kernels.tables import IN_Q, LANES, OK, Functions
+from ffr_dyn.kernels.tables import LANES, OK, Functions
 from ffr_dyn.scene.drivers import Driver, PointDriver
-from ffr_dyn.scene.forces import Load
 from ffr_dyn.scene.joints import KINDS, Joint
 from ffr_dyn.scene.scene import Body, Scene
 
@@ -239,37 +237,6 @@ def test_blocks_give_the_products_of_the_whole_table():
     np.testing.assert_allclose(last.reshape(2, n), expected[4:], atol=1e-13)
 
 
-@pytest.mark.parametrize("n", [1, 3, 8, 11, 30, 75])
-@pytest.mark.parametrize("families", [1, 4])
-@pytest.mark.parametrize("symmetric", [True, False])
-def test_geometric_stiffness_in_blocks_is_the_sum_of_the_whole(n, families, symmetric):
-    """Each load couples a family of coordinates with one other, or, with one family, all with all; 18 loads act."""
-    rng = np.random.default_rng(n)
-    family = rng.permutation(n) % families
-    K = 1e-3 * rng.normal(size=(30, n, n))
-    for load, matrix in enumerate(K):
-        matrix += matrix.T * symmetric
-        matrix *= (family[:, None] ^ family) == load % families
-    body = replace(cloud(n, points=30), stiffening=K)
-    scene = Scene(
-        bodies=(Body("one", body), Body("rigid", cloud(0)), Body("two", body)),
-        joints=(Joint("root", "spherical", "ground.O", "two.a"), Joint("tie", "spherical", "two.a", "rigid.b")),
-        loads=(Load("push", "one.c", force=(1.0, 2.0, 3.0)),),
-        ground={"O": (0.1, 0.2, 0.3)},
-    )
-    system = compile_scene(scene)
-    x, v = random_state(scene)
-    engine = new_engine(system, x, v)
-    assert evaluate_at(engine, 0.0, x, v) == OK
-    work = engine.work.bodies
-    for b, at_marker in ((0, 24), (2, 12)):
-        loads, first = loads_that_stiffen(system.model.bodies, b), system.model.bodies.where[b, IN_Q]
-        assert loads.tolist() == [k for k in (*range(12), *range(at_marker, at_marker + 6)) if K[k].any()]
-        expected = np.einsum("l,lij,j->i", work.load[b, loads], K[loads], x[system.layout.q(b)])
-        found = work.stiff[first : first + n]
-        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max(initial=1e-3))
-
-
 def test_tables_lie_at_the_starts_of_cache_lines():
     system = compile_scene(Scene(bodies=(Body("one", cloud(5)), Body("two", cloud(3)))))
     engine = new_engine(system, *random_state(system.scene), RK4(1e-3))
@@ -296,17 +263,6 @@ def test_equal_bodies_share_what_they_have_by_coordinate_unless_their_damping_di
     np.testing.assert_array_equal(of_coordinates(bodies, bodies.omega2), np.tile(model.omega2, 3))
     expected = np.concatenate([2 * r * np.sqrt(model.omega2) for r in ratios])
     np.testing.assert_allclose(of_coordinates(bodies, bodies.two_zeta_omega), expected, rtol=1e-15)
-
-
-def test_loads_at_interfaces_that_nothing_acts_on_stiffen_nothing():
-    model = beam("one", 1.0, 1.0, 10.0, 3)
-    bar = Body("one", model)
-    ground = {"O": (0.0, 0.0, 0.0)}
-    held = Scene((bar,), (Joint("root", "revolute", "ground.O", "one.a", axis=(0, 0, 1)),), ground=ground)
-    pulled = replace(held, loads=(Load("pull", "one.b", force=(1.0, 0.0, 0.0)),))
-    first = 12 + 6 * [i.name for i in model.interfaces].index("b")
-    assert not any(first <= k < first + 6 for k in loads_that_stiffen(compile_scene(held).model.bodies, 0))
-    assert first in loads_that_stiffen(compile_scene(pulled).model.bodies, 0)
 
 
 # ---- constraints: finite differences ----------------------------------------------------------------------------------
