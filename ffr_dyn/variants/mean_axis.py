@@ -24,6 +24,8 @@ from ffr_dyn.variants.variant import used_interfaces, with_basis
 from ffr_prep.body import FlexibleBody, idle_loads, mean_axis_form
 from ffr_prep.common.errors import InputError
 
+HELD = 1e-9  # of a unit mode: what rounding moves a held place by
+
 
 def in_mean_axis_frames(scene: Scene) -> Scene:
     """The scene with every second-order body in its mean-axis form; those that are in it stay as they are.
@@ -43,6 +45,8 @@ def _converted(scene: Scene, body: Body, forms: dict[int, tuple[FlexibleBody, Ow
     if body.frame or not (body.model.n and body.stiffening and body.model.stiffening is not None):
         return body
     _check_known(scene, body)
+    if _is_mean_axis(body.model):
+        return body
     if id(body.model) not in forms:
         forms[id(body.model)] = _form(body.model)
     model, frame = forms[id(body.model)]
@@ -86,7 +90,9 @@ def _moved(body: Body) -> Body:
 def _check_known(scene: Scene, body: Body) -> None:
     """InputError where something acts at a point that has no second-order displacement."""
     idle = idle_loads(body.model).tolist()[::6]
-    unknown = {i.name for i, none in zip(body.model.interfaces, idle, strict=True) if none}
+    # A held place may turn, and moments on slender bodies have no matrix.
+    moved = [np.sqrt(body.model.mass) * np.abs(i.phi_t).max() > HELD for i in body.model.interfaces]
+    unknown = {i.name for i, none, moves in zip(body.model.interfaces, idle, moved, strict=True) if none and moves}
     for name in used_interfaces(scene, body):
         if name in unknown:
             raise InputError(
@@ -94,3 +100,19 @@ def _check_known(scene: Scene, body: Body) -> None:
                 "acts (a point that was added to an older file?): make it an interface of the reduction, or compute the "
                 "body without load matrices (stiffening = false)"
             )
+
+
+def with_mean_axis_bodies(scene: Scene) -> Scene:
+    """The scene with second-order bodies that are theirs in the mean-axis form: its frame and modes are those of its results.
+
+    Raises InputError as `in_mean_axis_frames`.
+    """
+    converted = in_mean_axis_frames(scene)
+    return replace(converted, bodies=tuple(replace(body, frame=None) for body in converted.bodies))
+
+
+def _is_mean_axis(model: FlexibleBody) -> bool:
+    """Whether a body is in its mean-axis form already: what vanishes there is zero, and no rounding."""
+    assert model.stiffening is not None
+    skew = model.rP_dm - model.rP_dm.transpose(1, 0, 2)
+    return not (model.P_dm.any() or model.stiffening[:6].any() or skew.any())

@@ -14,7 +14,7 @@ import click
 from ffr_prep.cli.conversion import convert
 from ffr_prep.cli.interchange import export_body, import_body
 from ffr_prep.cli.matrices import reduce_matrices_command
-from ffr_prep.cli.options import PATH, bundle, check_points, check_writable, material_of, number_of, numbers_of
+from ffr_prep.cli.options import PATH, bundle, check_points, check_writable, gone, material_of, number_of, numbers_of
 from ffr_prep.cli.reduction import NOTES as REDUCTION_NOTES
 from ffr_prep.cli.request import REQUEST, reduce_to_file, request_of
 from ffr_prep.cli.settings import EntriesCommand, NotesCommand
@@ -128,9 +128,8 @@ def mesh(mesh: Path, **options: Any) -> None:
 @_MESH
 @click.option("--material", "materials", multiple=True, required=True, metavar="MATERIAL", help="See below.")
 @REQUEST
-@click.option(
-    "--stiffening", is_flag=True, help="Also compute geometric stiffening: slender rods under load, fast blades."
-)
+@click.option("--linear", is_flag=True, help="Leave out the load matrices: linear elasticity, for what barely bends.")
+@gone("--stiffening", "load matrices are computed by default; --linear leaves them out")
 @click.option(
     "--stress", is_flag=True, help="Also keep the stress at the surface, which ffr-dyn stress and animate show."
 )

@@ -50,7 +50,7 @@ def solver_of(options: Mapping[str, Any]) -> Solver:
 
 
 def request_of(options: Mapping[str, Any]) -> tuple[Sequence[InterfaceRegion], Request]:
-    """The interfaces and the request of the options REQUEST, and of --stiffening and --stress where a command has them;
+    """The interfaces and the request of the options REQUEST, and of --linear and --stress where a command has them;
     InputError for options that cannot be used.
     """
     from ffr_prep.pipelines.reduce import Request
@@ -61,7 +61,7 @@ def request_of(options: Mapping[str, Any]) -> tuple[Sequence[InterfaceRegion], R
         reduction=reduction_of(options),
         quality=band_of(options),
         solver=solver_of(options),
-        stiffening=options.get("stiffening", False),
+        linear=options.get("linear", False),
         stress=options.get("stress", False),
     )
 

@@ -32,6 +32,7 @@ class Model(Brief):
     packages   : whose versions are recorded
     doubts     : what the integrals of a basis (Z, n) cannot be trusted with, in words
     massless   : some coordinates have no mass
+    unstressed : stresses are not known, and with them neither `stiffening` nor `second`: the body is linear
     diagnose   : called when a computation has failed; raises InputError where the model is found to be the cause
     """
 
@@ -46,6 +47,7 @@ class Model(Brief):
     packages: tuple[str, ...] = ("ffr", "numpy", "scipy", "scikit-fem")
     doubts: Callable[[Array], list[str]] = lambda _: []
     massless: bool = False
+    unstressed: bool = False
     diagnose: Callable[[], None] = lambda: None
 
     def _rows(self) -> Rows:

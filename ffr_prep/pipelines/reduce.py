@@ -36,7 +36,8 @@ class Request:
     name       : of the body
     reference  : how its frame is attached, such as FixedTo("root") or MeanAxis()
     reduction  : which deformation shapes it keeps, such as CraigBampton(10)
-    stiffening : also compute the geometric stiffness by load, which a simulation then uses
+    linear     : leave out the load matrices, and with them the second-order displacement by which a simulation has elastic
+                 bodies stiffen, and foreshorten, as they bend; bodies of matrices from outside are linear anyway
     stress     : also keep section forces of beams and the stress at the surface per elastic coordinate
     quality    : compare the body with the full model over this band of frequencies, and keep what was found
     solver     : what factorises the stiffness and finds the modes
@@ -48,7 +49,7 @@ class Request:
     name: str
     reference: ReferenceConditions
     reduction: Reduction
-    stiffening: bool = False
+    linear: bool = False
     stress: bool = False
     quality: Band | None = None
     solver: Solver = CHOLESKY
@@ -104,9 +105,9 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
     if request.stress and surface is None:
         raise InputError("no part of this model knows its stress: reduce it without")
     stiffening = None
-    if request.stiffening:
+    if basis.omega2.size and not (request.linear or model.unstressed):
         held = supported(body, L)
-        progress("compute the geometric stiffness")
+        progress("compute the load matrices")
         stiffening = stiffening_matrices(model, request, held, basis)
         if surface is not None:
             progress("compute the second order of the surface")
@@ -168,7 +169,7 @@ def interface_shapes(model: CoupledModel, basis: Basis) -> tuple[Interface, ...]
 
 
 def stiffening_matrices(model: Model, request: Request, held: SupportedBody, basis: Basis) -> Array:
-    """(12 + 6 I, n, n) reduced geometric stiffness per unit load, in the order of `FlexibleBody.stiffening`.
+    """(12 + 6 I, n, n) load matrices, in the order of `FlexibleBody.stiffening`.
 
     held : the body under its reference conditions
 

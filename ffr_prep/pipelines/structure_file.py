@@ -103,7 +103,7 @@ def read_structure(path: str | Path, progress: Stages = no_stages) -> Structure:
                 name=entry.name or path.stem,
                 reference=_reference(entry.reference),
                 reduction=reduction_of([vars(of) for of in entry.reduction], path.parent),
-                stiffening=entry.stiffening,
+                linear=entry.linear,
                 stress=entry.stress,
                 quality=None if entry.quality is None else Band(*entry.quality),
             ),

@@ -216,9 +216,16 @@ class StructureEntry(Strict):
     ties: list[tuple[str, str]] = []
     reference: ReferenceEntry = MeanAxisEntry(kind="mean-axis")
     reduction: list[ReductionEntry]
-    stiffening: bool = False
+    linear: bool = False
     stress: bool = False
     quality: tuple[float, float] | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _renamed(cls, value: Any) -> Any:
+        if isinstance(value, dict) and "stiffening" in value:
+            raise ValueError("stiffening: load matrices are computed by default; write linear = true to leave them out")
+        return value
 
     @field_validator("reduction", mode="before")
     @classmethod

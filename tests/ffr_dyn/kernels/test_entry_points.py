@@ -78,7 +78,6 @@ def test_the_method_that_the_interface_shows_swings_a_pendulum(tmp_path):
         stage_count: ClassVar[int] = 1
         row_stages: ClassVar[int] = 0
         keeps_terms: ClassVar[bool] = False
-        looks_ahead: ClassVar[int] = 0
         do_step: ClassVar[Any] = euler_step
 
     def end(method: Any) -> np.ndarray:

@@ -561,7 +561,7 @@ def test_the_body_file_holds_a_frame(tmp_path):
     make = {"reference": FixedTo("root"), "reduction": CraigBampton(2)}
     body = fp.reduce(
         fp.from_frame(frame, regions("root")),
-        fp.Request(name="rod", stiffening=True, provenance={"drawing": 7}, **make),
+        fp.Request(name="rod", provenance={"drawing": 7}, **make),
     )
     again = load_body(save_body(body, tmp_path / "rod.ffr"))
     assert again.provenance == body.provenance
