@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 from boxes import box_mesh, rotation
+from places import REFERENCE
 from test_dyn_references import slider_crank
 
 import ffr_prep as fp
@@ -124,7 +125,7 @@ def test_pendulum_against_the_exact_beam(reference):
 
 
 def test_slider_crank_with_a_rod_under_pressure():
-    """Mid-rod deflection at 0.02, 0.04, 0.05 and 0.08 s: independent planar beam with stiffening by load."""
+    """Mid-rod deflection: the geometrically exact beam, computed independently (see the data file), to 0.4 % of its peak."""
     frame = polyline([(0, 0, 0), (0.3, 0, 0)], Member(thin(circle(0.006)), STEEL, (0, 1.0, 0)), elements=24)
     body = fp.reduce(
         fp.from_frame(
@@ -136,8 +137,9 @@ def test_slider_crank_with_a_rod_under_pressure():
     result = forward(slider_crank(body), end=0.084, output_step=4e-4, method=ROS2(5e-6))
     middle = np.abs(body.surface.points[:, 0] - 0.15) < 1e-9
     deflection = result["rod.q"] @ body.surface.Phi[middle].mean(axis=0)[1]
-    stiffened = [0.925e-3, -2.329e-3, 3.816e-3, -3.165e-3]
-    np.testing.assert_allclose(deflection[[50, 100, 125, 200]], stiffened, atol=3e-6)
+    exact = np.loadtxt(REFERENCE / "slider_crank_exact.csv", delimiter=",")
+    peak = np.abs(exact[:, 1]).max()
+    np.testing.assert_allclose(deflection, np.interp(result.time, *exact.T), atol=4e-3 * peak)
 
 
 def test_spin_up_of_a_cantilever():
