@@ -40,7 +40,7 @@ def beam(
         fp.from_frame(
             named(frame, root=(0, 0, 0), tip=(length, 0, 0)), [InterfaceRegion("root"), InterfaceRegion("tip")]
         ),
-        fp.Request(name="beam", reference=reference, reduction=CraigBampton(modes), stiffening=True),
+        fp.Request(name="beam", reference=reference, reduction=CraigBampton(modes)),
     )
     side = np.ptp(body.surface.points[:, 1]) / 2
     edge = np.array([length / 2, side, body.surface.points[:, 2].max()])

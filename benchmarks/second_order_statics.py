@@ -134,7 +134,7 @@ def cantilevers() -> Iterator[Figure]:
     material = Material("steel", 2e11, 0.3, 7870.0)
     unit = float(np.sqrt(material.E * 1e-6 / material.rho))
     for words, reference in REFERENCES.items():
-        body = beam(section, material, 1.0, 20, reference)
+        body = beam(section, material, 1.0, 14, reference)
         for eta, (flap, goal) in FLAP.items():
             found = linearise(rotor(body, polynomial(0.0, eta * unit), eta * unit))
             lag, other = _two_lowest(found.eigenvalues) / unit
