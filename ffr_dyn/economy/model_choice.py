@@ -15,13 +15,11 @@ from ffr_dyn.scene.force_kinds import in_bases
 from ffr_dyn.scene.scene import Body, Scene, body_normal
 from ffr_dyn.variants.plane import AXES, planar_forms
 from ffr_dyn.variants.variant import STIFFENING, stiffening_by, vary, with_basis
-from ffr_prep.body import FlexibleBody
-from ffr_prep.body.frame_change import interface_motions, mass_of_motions
+from ffr_prep.body import FlexibleBody, interface_motions, mass_of_motions
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 RIGID, QUASI_STATIC, FLEXIBLE = "rigid", "quasi-static", "flexible"
-RIGID_SHARE = 1e-9  # of the largest square of a frequency: motions without deformation
 
 
 @dataclass(frozen=True)
@@ -222,7 +220,7 @@ def lowest_frequency(model: FlexibleBody, V: Array) -> float:
     for rows in (np.zeros((0, 6 + model.n)), *interface_motions(model).reshape(-1, 6, 6 + model.n)):
         Z = null_space(rows @ T) if len(rows) else np.eye(len(T.T))
         squares = eigh(Z.T @ K @ Z, Z.T @ M @ Z, eigvals_only=True)
-        found.append(float(np.sqrt(squares[squares > RIGID_SHARE * squares[-1]].min())))
+        found.append(float(np.sqrt(squares[0 if len(rows) else 6])))  # a free body has six motions without deformation
     return min(found)
 
 

@@ -100,7 +100,7 @@ def _with_frame(body: FlexibleBody) -> FlexibleBody:
     nothing = np.zeros((3, body.n))
     stiffening = np.concatenate([np.asarray(body.stiffening), np.zeros((6, body.n, body.n))])
     frame = Interface(_FRAME, pivot, nothing, nothing)
-    return replace(body, interfaces=(*body.interfaces, frame), stiffening=stiffening, surface=None)
+    return replace(body, interfaces=(*body.interfaces, frame), stiffening=stiffening, surface=None, parts=())
 
 
 def _surface(surface: Surface, Z: Array) -> Surface:
@@ -155,7 +155,7 @@ def idle_loads(body: FlexibleBody) -> Array:
     about 1 / sqrt(mass), and for rotations 1 / sqrt(second moment of mass).
     """
     assert body.stiffening is not None
-    six = body.stiffening[INERTIAL:].reshape(len(body.interfaces), -1)
+    six = body.stiffening[INERTIAL:].reshape(len(body.interfaces), 6 * body.n * body.n)
     shift, turn = np.sqrt(body.mass), np.sqrt(np.trace(body.rr_dm) - body.r_dm @ body.r_dm / body.mass)
     motions = [np.stack([shift * i.phi_t, turn * i.phi_r]) for i in body.interfaces]
     moving = np.array([np.abs(of).max(initial=0.0) > _ROUNDING for of in motions], bool)

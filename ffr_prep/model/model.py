@@ -12,6 +12,7 @@ from ffr_prep.body import BeamForces, Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.model.coupled import CoupledModel
+from ffr_prep.model.cuts import Cuts
 from ffr_prep.model.invariants import InertiaIntegrals
 from ffr_prep.model.second_order import SecondOrder
 
@@ -34,6 +35,7 @@ class Model(Brief):
     massless   : some coordinates have no mass
     unstressed : stresses are not known, and with them neither `stiffening` nor `second`: the body is linear
     diagnose   : called when a computation has failed; raises InputError where the model is found to be the cause
+    cut        : the models of the parts that a body is cut into; None where the model cannot be cut
     """
 
     coupled: CoupledModel
@@ -49,6 +51,7 @@ class Model(Brief):
     massless: bool = False
     unstressed: bool = False
     diagnose: Callable[[], None] = lambda: None
+    cut: Callable[[Cuts], Sequence[Model]] | None = None
 
     def _rows(self) -> Rows:
         kind = [key for key in ("mesh", "frame", "matrices") if key in self.record]

@@ -200,6 +200,13 @@ class SolidEntry(Strict):
     order: Literal[1, 2] = 2
 
 
+class CutEntry(Strict):
+    """A plane that cuts the body into parts, through a point [m]; the next part lies where the normal points."""
+
+    point: Vector
+    normal: Vector
+
+
 class StructureEntry(Strict):
     """The whole file."""
 
@@ -219,6 +226,7 @@ class StructureEntry(Strict):
     linear: bool = False
     stress: bool = False
     quality: tuple[float, float] | None = None
+    parts: int | list[float | CutEntry] | None = None
 
     @model_validator(mode="before")
     @classmethod

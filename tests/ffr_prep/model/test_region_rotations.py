@@ -288,8 +288,7 @@ def test_buckling_of_a_column_with_a_rigid_end(kind, arm):
 @pytest.mark.parametrize(
     ("share", "what", "frame"),
     [
-        (0.9, "moment", FixedTo("left")),
-        (0.9, "force", FixedTo("left")),
+        (0.5, "force", FixedTo("left")),  # moments of fixed axis in space are not semitangential
         (0.5, "force", SimplySupported("left", "right")),
     ],
     ids=str,
