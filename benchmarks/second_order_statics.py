@@ -17,20 +17,21 @@ from benchmarks.second_order_scenes import (
     PRINCETON_SECTION,
     REFERENCES,
     beam,
+    measured,
     princeton,
     rotor,
 )
 from ffr_dyn.analyses.linearise import linearise
-from ffr_dyn.analyses.static import static
 from ffr_dyn.analyses.states import scene_at
+from ffr_dyn.analyses.static import static
 from ffr_dyn.consistency.assemble import assemble, in_space
 from ffr_dyn.consistency.evaluation import evaluator
 from ffr_dyn.consistency.tangent import chart, stiffness
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
-from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.material import Material
+from ffr_prep.model.reference import ReferenceConditions
 from ffr_prep.structures.sections import general, with_mass_moments
 
 Array = np.ndarray
@@ -46,6 +47,7 @@ PUBLISHED = {
     75: (3.538889001, 142.194370),
     90: (0.0, 146.245978),
 }
+MODES = 12
 LATERAL = {1: 1.5e-2, 2: 6e-3, 4: 1.5e-3}
 # First flap frequency by the speed, in sqrt(EI/rho A L^4): series in twelve digits, agrees with Wright, Smith, Thresher &
 # Wang, J. Appl. Mech. 49 (1982) 197-202; lag: mu^2 = flap^2 - eta^2
@@ -72,29 +74,24 @@ def princeton_table() -> Iterator[Figure]:
 
 
 def princetons() -> Iterator[Figure]:
-    """The worst of the seven angles, by reference conditions and number of parts: lateral, axial, Newton's steps, tangent."""
+    """The worst of the seven angles, by reference conditions and number of parts: lateral, axial, Newton's steps."""
     for words, reference in REFERENCES.items():
         for parts, goal in LATERAL.items():
-            found = np.array([_bent(degrees, reference, parts) for degrees in PUBLISHED])
-            lateral, axial, steps = found.max(axis=0)
-            who = f"Princeton beam, parts: {parts}, {words}"
-            yield Figure(f"{who}: lateral", lateral, goal)
+            goals = {"lateral": goal, "steps of Newton's method": 6}
             if parts > 1:
-                yield Figure(f"{who}: axial", axial, 1.5e-2)
-            yield Figure(f"{who}: steps of Newton's method", steps, 6)
+                goals["axial"] = 1.5e-2
+            yield from measured(f"Princeton beam, parts: {parts}, {words}", goals, _worst, reference, parts, len(goals))
 
 
-def _bent(degrees: int, reference: object, parts: int) -> tuple[float, float, float]:
-    """Errors of the tip, lateral and axial, relative to its way, and the number of Newton's steps."""
-    try:
-        found = static(princeton(degrees, 8, reference, parts))  # type: ignore[arg-type]
-    except (ComputationError, InputError) as error:
-        print(f"    {degrees} degrees, parts: {parts}: {type(error).__name__}: {error}"[:200], flush=True)
-        return np.inf, np.inf, np.inf
-    tip, exact = found[f"p{parts - 1}.tip.position"][0], np.array(exact_tip(degrees))
-    lateral = np.linalg.norm(tip[1:] - exact[1:]) / np.linalg.norm(exact[1:])
-    axial = abs(tip[0] - exact[0]) / (PRINCETON_LENGTH - exact[0])
-    return float(lateral), float(axial), _steps(found)
+def _worst(reference: ReferenceConditions, parts: int, count: int) -> tuple[float, ...]:
+    """Errors of the tip relative to its way, lateral, and axial at last, between them the number of Newton's steps."""
+    found = []
+    for degrees in PUBLISHED:
+        at_rest = static(princeton(degrees, MODES, reference, parts))
+        off = at_rest["beam.tip.position"][0] - (exact := np.array(exact_tip(degrees)))
+        lateral = np.linalg.norm(off[1:]) / np.linalg.norm(exact[1:])
+        found.append((lateral, _steps(at_rest), abs(off[0]) / (PRINCETON_LENGTH - exact[0])))
+    return tuple(np.max(found, axis=0)[:count])
 
 
 def _steps(found: Result) -> float:
@@ -103,23 +100,22 @@ def _steps(found: Result) -> float:
 
 def tangents() -> Iterator[Figure]:
     """At 45 degrees: steps up to 16 parts, skew part of the tangent stiffness by its size, and the time for ten parts."""
-    for parts in (1, 2, 4, 8, 16):
-        scene = princeton(45, 8, REFERENCES["fixed"], parts)
-        try:
-            found = static(scene)
-        except (ComputationError, InputError) as error:
-            print(f"    parts: {parts}: {type(error).__name__}: {error}"[:200], flush=True)
-            continue
-        yield Figure(f"Princeton beam, 45 degrees, parts: {parts}: steps of Newton's method", _steps(found), 6)
-        if parts <= 4:
-            yield Figure(f"Princeton beam, 45 degrees, parts: {parts}: skew part of the tangent", _skew(scene, found), 1e-9)
-    scene = princeton(45, 8, REFERENCES["fixed"], 10)
-    began = time.perf_counter()
-    try:
+
+    def steps_and_skew(parts: int, count: int) -> tuple[float, ...]:
+        scene = princeton(45, MODES, REFERENCES["fixed"], parts)
+        found = static(scene)
+        return (_steps(found), _skew(scene, found) if count > 1 else 0.0)[:count]
+
+    def seconds() -> tuple[float]:
+        scene = princeton(45, MODES, REFERENCES["fixed"], 10)
+        began = time.perf_counter()
         static(scene)
-    except (ComputationError, InputError) as error:
-        print(f"    {type(error).__name__}: {error}"[:200], flush=True)
-    yield Figure("Princeton beam, 45 degrees, ten parts [s]", time.perf_counter() - began, 1.0)
+        return (time.perf_counter() - began,)
+
+    for parts in (1, 2, 4, 8, 16):
+        goals = {"steps of Newton's method": 6.0} | ({"skew part of the tangent": 1e-9} if parts <= 4 else {})
+        yield from measured(f"Princeton beam, 45 degrees, parts: {parts}", goals, steps_and_skew, parts, len(goals))
+    yield from measured("Princeton beam, 45 degrees, ten parts", {"time of statics [s]": 1.0}, seconds)
 
 
 def _skew(scene: Scene, found: Result) -> float:
@@ -130,21 +126,20 @@ def _skew(scene: Scene, found: Result) -> float:
 
 def cantilevers() -> Iterator[Figure]:
     """Lag and flap of a cantilever in steady rotation about its root, in the plane of rotation and across it."""
-    section = with_mass_moments(general("rod", A=1.0, Iy=1.00002e-6, Iz=1e-6, J=1e-6), 1e-9, 0.0)
+    section = with_mass_moments(general("rod", A=1.0, Iy=1.00002e-6, Iz=1e-6, J=1e-6), 1e-7, 0.0)
     material = Material("steel", 2e11, 0.3, 7870.0)
     unit = float(np.sqrt(material.E * 1e-6 / material.rho))
+
+    def errors(reference: ReferenceConditions, eta: float, flap: float) -> tuple[float, float]:
+        body = beam(section, material, 1.0, 20, reference)
+        found = linearise(rotor(body, polynomial(0.0, eta * unit), eta * unit)).eigenvalues.imag / unit
+        lag, other = np.sort(found[found > 0])[:2]
+        return abs(lag / np.sqrt(flap**2 - eta**2) - 1), abs(other / flap - 1)
+
     for words, reference in REFERENCES.items():
-        body = beam(section, material, 1.0, 14, reference)
         for eta, (flap, goal) in FLAP.items():
-            found = linearise(rotor(body, polynomial(0.0, eta * unit), eta * unit))
-            lag, other = _two_lowest(found.eigenvalues) / unit
-            yield Figure(f"rotating cantilever, {words}, speed {eta}: lag", abs(lag / np.sqrt(flap**2 - eta**2) - 1), goal)
-            yield Figure(f"rotating cantilever, {words}, speed {eta}: flap", abs(other / flap - 1), goal)
-
-
-def _two_lowest(eigenvalues: Array) -> Array:
-    vibrating = np.sort(eigenvalues.imag[eigenvalues.imag > 0])
-    return vibrating[:2] if vibrating.size > 1 else np.full(2, np.nan)
+            who = f"rotating cantilever, {words}, speed {eta}"
+            yield from measured(who, {"lag": goal, "flap": goal}, errors, reference, eta, flap)
 
 
 CASES: dict[str, Callable[[], Iterator[Figure]]] = {
