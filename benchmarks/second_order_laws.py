@@ -155,7 +155,7 @@ def four_bar(reference: ReferenceConditions) -> Scene:
     )
     at = np.add(corners[2], (0, 0.1, 0))
     bodies = (
-        Body("crank", crank, omega_bar=(0, 0, 20.0)),
+        Body("crank", crank, omega_bar=(0, 0, 120.0)),
         Body("coupler", coupler, position=(0, 0.1, 0)),
         Body("rocker", rocker, position=at - (0, 0.25, 0)),
     )
