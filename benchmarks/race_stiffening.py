@@ -1,4 +1,6 @@
-"""What the second-order displacement of bodies costs per step, and what it gains: part of `benchmarks.race`.
+"""What the second-order displacement of bodies costs per step, and what it gains: part of `benchmarks.race`, and by itself:
+
+    python -m benchmarks.race_stiffening
 
 Cost: processor time of the compiled loop of the same bodies, second-order and linear, ROS3 with the same steps, runs
 in turns. Goal: at most 1.3 times.
@@ -97,3 +99,7 @@ def print_cost(name: str, scene: Scene, span: tuple[float, int, int], repeats: i
 def print_gain(words: str, value: float) -> None:
     off = 100 * (value / EXACT - 1)
     print(f"  {words:13}largest deflection of the rod {1e3 * value:.4f} mm, {off:+.1f} % off the exact one")
+
+
+if __name__ == "__main__":
+    report(repeats=25)
