@@ -24,6 +24,7 @@ from benchmarks.second_order_scenes import (
 from ffr_dyn.analyses.linearise import linearise
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
+from ffr_dyn.consistency.validity import parts_needed
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
@@ -140,9 +141,25 @@ def cantilevers() -> Iterator[Figure]:
             yield from measured(who, {"lag": goal, "flap": goal}, errors, reference, eta, flap)
 
 
+def told() -> Iterator[Figure]:
+    """The number of parts that the note of a first run in one piece names, and what the beam reaches with so many."""
+
+    def advised() -> tuple[float, ...]:
+        scene = princeton(90, MODES, REFERENCES["mean"], 1)
+        in_one_piece = static(scene)
+        parts = parts_needed(scene, in_one_piece)["beam"]
+        notes = [note for note in in_one_piece.attributes["notes"] if f"{parts} parts would do" in note]
+        off = static(princeton(90, MODES, REFERENCES["mean"], parts))["beam.tip.position"][0] - exact_tip(90)
+        return 1 - len(notes), parts, np.linalg.norm(off) / exact_tip(90)[2]
+
+    goals = {"deflections not told": 0.0, "parts that would do": 4.0, "error of the tip with these": 1e-3}
+    yield from measured("Princeton beam, 90 degrees, one body", goals, advised)
+
+
 CASES: dict[str, Callable[[], Iterator[Figure]]] = {
     "princeton-table": princeton_table,
     "princeton": princetons,
     "tangent": tangents,
+    "told": told,
     "cantilever": cantilevers,
 }
