@@ -122,7 +122,7 @@ def forward(
     the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
     assembled = assemble(scene, time=start) if assembled is None else assembled
-    common = {"start": start, "end": end, "output_step": output_step, "stabilisation": stabilisation}
+    common: dict[str, Any] = {"start": start, "end": end, "output_step": output_step, "stabilisation": stabilisation}
     common |= {"outputs": outputs, "progress": progress, "stopwatch": stopwatch}
     runs = _Runs(scene, assembled, start, output_step, common)
     kept = {"events": events, "path": path, "resume": resume}
@@ -216,12 +216,13 @@ def _finished(runs: _Runs, trial: _Trial, path: str | Path | None) -> Result:
     result = trial.result
     notes = [*result.attributes["notes"], *_unresolved(runs, trial), *_coarse(result)]
     told = {name: [e.error, e.of_range] for name, e in trial.errors.items()}
-    more = {"notes": notes, "errors": told, "step": trial.method.step}
+    more: dict[str, Any] = {"notes": notes, "errors": told, "step": trial.method.step}
     if trial.errors:
         more["accuracy"] = _worst(trial.errors)
+    attributes = {**result.attributes, **more}
     if path is not None:
-        with_attributes(path, result.attributes | more)
-    return replace(result, attributes=result.attributes | more)
+        with_attributes(path, attributes)
+    return replace(result, attributes=attributes)
 
 
 def _worst(errors: Mapping[str, StepError]) -> str:

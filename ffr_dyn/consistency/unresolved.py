@@ -46,8 +46,8 @@ def vibrations(assembled: Assembled, time: float) -> Vibrations:
 
 
 def lasting(of: Vibrations, step: float) -> float:
-    """exp(-zeta h omega) of the slowest vibration that steps of h [s] do not resolve, with the smallest damping ratio of them:
-    what the damping of the scene leaves of it after a step. 1 where there is none."""
+    """What the damping of the scene leaves, after a step of h [s], of the slowest vibration that such steps do not resolve:
+    exp(-zeta h omega), with the smallest damping ratio of them. 1 where there is none."""
     beyond = of.omega * step > UNRESOLVED
     if not beyond.any():
         return 1.0
@@ -55,7 +55,7 @@ def lasting(of: Vibrations, step: float) -> float:
 
 
 def leading(of: Vibrations, run: Result, twin: Result) -> float:
-    """[rad/s] of the vibration in which two runs differ most, by its velocity; 0 where their elastic coordinates are not kept."""
+    """[rad/s] of the vibration in which two runs differ most, by its velocity; 0 where they do not keep all "*.q"."""
     place, bodies = of.assembled.system.layout, of.assembled.system.scene.bodies
     flexible = [b for b in range(len(bodies)) if place.n[b]]
     if not of.omega.size or any(f"{bodies[b].name}.q" not in run.quantities for b in flexible):

@@ -7,7 +7,8 @@ Hundsdorfer 1999, ROS2):
     (I - gamma h A) k1 = f(t, y)
     (I - gamma h A) k2 = f(t + h, y + h k1) - 2 k1,     y+ = y + 3/2 h k1 + 1/2 h k2,     gamma = 1 - 1/sqrt(2)
 
-L-stable in the elastic part; with another gamma of the same order, which damps vibrations less. Since Omega^2 and 2 zeta Omega are diagonal, a stage is an explicit evaluation with
+L-stable in the elastic part; another gamma keeps the order and damps vibrations less (`Twin`). Since Omega^2 and
+2 zeta Omega are diagonal, a stage is an explicit evaluation with
 1 + gamma^2 h^2 Omega^2 + 2 gamma h zeta Omega in place of the unit elastic mass:
 
     (M + diag_ff(gamma^2 h^2 Omega^2 + 2 gamma h zeta Omega)) k_v + Phi_q^T mu = Q + M r_v - gamma h Omega^2 (q_dot + r_q)
