@@ -44,6 +44,7 @@ def new_work(m: Model, *, keeps_terms: bool = False) -> Work:
         loads=_load_work(m, V),
         field=np.zeros(3),
         diagonal=np.full(1, -1.0),
+        implicit=np.array([0.0, 0.0, 0.0, 1.0]),
         info=np.zeros(3, dtype=np.int64),
         independence=np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
         **_zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=2),
@@ -103,6 +104,7 @@ def _row_work(m: Model) -> RowWork:
         **_zeros(Phi=C, nu=C, gamma=C, lam=C, left=C),
         **_zeros(jac=(K * D, 9, LANES), kept=(K * D, 9, LANES), X=K * D * 12 * LANES, Y=12 * LANES),
         **_zeros(scale=K * LANES, least=K * LANES, pivots=K * LANES, step=K * LANES),
+        **_zeros(compliance=K * LANES, pull=K * LANES, relief=K * LANES),
         **_zeros(wrench=6, P=(M, 36), phiphi=(pairs, 36), S=stored),
     )
 

@@ -62,6 +62,7 @@ from ffr_dyn.kernels.integrator_api import (
     stabilise,
     unconverged,
     velocity_rates,
+    weigh_forces,
 )
 from ffr_prep.common.errors import InputError
 
@@ -187,6 +188,7 @@ def generalised_alpha_step(r: Tables, t: float, again: int) -> int:
         if status != OK:
             return status
     set_diagonal(r, square**0.5)  # in which the damping is right to a few per cent
+    weigh_forces(r, single, square)
     add_scaled(s.v[NEXT], s.v[NOW], -1.0, s.v[BEFORE])
     add_scaled(s.v[NEXT], s.v[NEXT], 1.0, s.v[NOW])
     fill(s.v[SHIFT], 0.0)
@@ -228,6 +230,7 @@ class GeneralisedAlpha:
     scaled: bool = True
     order: ClassVar[int] = 2
     implicit: ClassVar[bool] = True
+    takes_forces: ClassVar[bool] = True
     reach: ClassVar[float] = math.inf
     repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 9
@@ -267,6 +270,7 @@ class HHT:
     iterations: int = 20
     order: ClassVar[int] = 2
     implicit: ClassVar[bool] = True
+    takes_forces: ClassVar[bool] = True
     reach: ClassVar[float] = math.inf
     repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 9

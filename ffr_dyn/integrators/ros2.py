@@ -34,18 +34,19 @@ from ffr_dyn.kernels.integrator_api import (
     Tables,
     acceleration_target,
     add_both,
-    add_elastic_part,
     add_scaled,
+    add_stiff_part,
+    begin_stages,
     copy,
     correct,
     evaluate,
     fill,
     finite,
+    hold_slopes,
     method_step,
     multiple,
     normalise,
     position_rates,
-    set_diagonal,
     solve,
     stabilise,
     velocity_rates,
@@ -60,7 +61,7 @@ def ros2_step(r: Tables, t: float, again: int) -> int:
     h = r.clock.time[H]
     bodies, stages = r.model.bodies, r.stages
     gh = GAMMA * h
-    set_diagonal(r, gh)
+    begin_stages(r, gh, h)
     xs, vs, r_x, r_v = stages.x[2], stages.v[2], stages.x[3], stages.v[3]
     for k in range(2):
         if k == 0:
@@ -78,10 +79,11 @@ def ros2_step(r: Tables, t: float, again: int) -> int:
         if status != OK:
             return status
         acceleration_target(r.work.rows, r.clock.gains, stages.target)
-        add_elastic_part(bodies, r.work.bodies.f, vs, r_x, gh)
         if k == 1:
             correct(r, r_v, stages.target)
+        add_stiff_part(r, xs, vs, r_x, gh)
         solve(r, stages.target)
+        hold_slopes(r)
         velocity_rates(r, stages.v[k])
         add_scaled(vs, vs, gh, stages.v[k])
         position_rates(bodies, xs, vs, stages.x[k])
@@ -104,6 +106,7 @@ class ROS2:
     step: float
     order: ClassVar[int] = 2
     implicit: ClassVar[bool] = True
+    takes_forces: ClassVar[bool] = True
     reach: ClassVar[float] = math.inf
     controlled: ClassVar[bool] = False
     repeatable: ClassVar[bool] = True

@@ -34,19 +34,20 @@ from ffr_dyn.kernels.integrator_api import (
     H,
     Tables,
     acceleration_target,
-    add_elastic_part,
     add_four,
     add_scaled,
+    add_stiff_part,
+    begin_stages,
     combine_three,
     copy,
     correct,
     evaluate,
     fill,
     finite,
+    hold_slopes,
     method_step,
     normalise,
     position_rates,
-    set_diagonal,
     solve,
     stabilise,
     velocity_rates,
@@ -79,7 +80,7 @@ def ros3_step(r: Tables, t: float, again: int) -> int:
     h = r.clock.time[H]
     bodies, stages = r.model.bodies, r.stages
     gh = GAMMA * h
-    set_diagonal(r, gh)
+    begin_stages(r, gh, h)
     xs, vs, r_x, r_v = stages.x[4], stages.v[4], stages.x[5], stages.v[5]
     for k in range(4):
         if k == 0:
@@ -102,10 +103,11 @@ def ros3_step(r: Tables, t: float, again: int) -> int:
         if status != OK:
             return status
         acceleration_target(r.work.rows, r.clock.gains, stages.target)
-        add_elastic_part(bodies, r.work.bodies.f, vs, r_x, gh)
         if k > 0:
             correct(r, r_v, stages.target)
+        add_stiff_part(r, xs, vs, r_x, gh)
         solve(r, stages.target)
+        hold_slopes(r)
         velocity_rates(r, stages.v[k])
         add_scaled(vs, vs, gh, stages.v[k])
         position_rates(bodies, xs, vs, stages.x[k])
@@ -133,6 +135,7 @@ class ROS3:
     step: float
     order: ClassVar[int] = 3
     implicit: ClassVar[bool] = True
+    takes_forces: ClassVar[bool] = True
     reach: ClassVar[float] = math.inf
     controlled: ClassVar[bool] = False
     repeatable: ClassVar[bool] = True
@@ -157,6 +160,7 @@ class AdaptiveROS3:
     order: ClassVar[int] = 3
     estimate_order: ClassVar[int] = 3
     implicit: ClassVar[bool] = True
+    takes_forces: ClassVar[bool] = True
     reach: ClassVar[float] = math.inf
     controlled: ClassVar[bool] = True
     step: ClassVar[float] = 0.0

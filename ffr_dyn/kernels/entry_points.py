@@ -19,11 +19,13 @@ from ffr_dyn.kernels.singular_positions import note_independence, numbered_step
 from ffr_dyn.kernels.solution import (
     constraint_rates,
     gather_rows,
+    rates_of,
     reduce_miss,
     reduced_rates,
     solve_back,
 )
 from ffr_dyn.kernels.step_control import controlled_step, interpolate
+from ffr_dyn.kernels.stiff_forces import corrected_velocities, subtract_yield, take_pull
 from ffr_dyn.kernels.system import (
     apply_motion,
     evaluate_joints,
@@ -39,10 +41,13 @@ from ffr_dyn.kernels.system import (
 from ffr_dyn.kernels.tables import (
     ALL,
     AT,
+    BY_PLACE,
+    BY_RATE,
     EVALUATIONS,
     EVERY_LOAD,
     FAILED,
     FILLED,
+    FRESH,
     HERE,
     IN_USE,
     IN_V,
@@ -80,6 +85,10 @@ def has_loads(model: Model) -> bool:
 
 def has_dependent_rows(model: Model) -> bool:
     return model.relaxation > 0.0
+
+
+def has_stiff_forces(model: Model) -> bool:
+    return model.stiff_count > 0
 
 
 def by_method(model: Model) -> bool:
@@ -199,7 +208,10 @@ def evaluate_loads(r: Tables, t: float, x: Vector, v: Vector) -> int:
 
 @entry_point()
 def set_diagonal(r: Tables, gamma_h: float) -> int:
-    """The elastic diagonal 1 + (gamma h)^2 Omega^2 + gamma h 2 zeta Omega of a linearly implicit method; 0: explicit."""
+    """The elastic diagonal 1 + (gamma h)^2 Omega^2 + gamma h 2 zeta Omega of a linearly implicit method, and the same for
+    stiff forces; 0: explicit."""
+    implicit = r.work.implicit
+    implicit[BY_RATE], implicit[BY_PLACE], implicit[FRESH] = gamma_h, gamma_h * gamma_h, 1.0
     if r.work.diagonal[0] == gamma_h:
         return OK
     r.work.diagonal[0] = gamma_h
@@ -255,6 +267,7 @@ def solve_of_dependent_rows(r: Tables, target: Vector) -> int:
     for number in range(1, PASSES):
         constraint_rates(m.bodies.where, m.markers, m.rows, rw.jac, r.work.markers.phi, bw.acc, rw.left)
         add_scaled(rw.left, rw.left, -1.0, wanted)
+        subtract_yield(m.rows, rw, rw.lam, rw.left)
         left = largest(rw.left)
         if number > 1 and not left < 0.5 * before:
             break
@@ -279,6 +292,19 @@ def correct(r: Tables, r_v: Vector, target: Vector) -> int:
     for b in range(bodies.mass.size):
         j, size = bodies.where[b, IN_V], 6 + bodies.where[b, N]
         mass_times(bodies, bw, b, part(bw.acc, j, size), part(bw.f, j, size))
+    return OK
+
+
+@entry_point(has_stiff_forces)
+def pull_forces(r: Tables, x: Vector, v: Vector, r_x: Vector, target: Vector) -> int:
+    """Targets of the rows of stiff forces at a stage (x, v) with the correction r_x (X,) of position rates."""
+    m, w = r.model, r.work
+    x, v, correction = vector_at(x, r.x.size), vector_at(v, r.v.size), vector_at(r_x, r.x.size)
+    corrected_velocities(m.bodies.where, w.bodies.A, x, v, correction, w.bodies.acc)
+    rates_of(
+        m.bodies.where, m.markers, m.rows, m.rows.forced, w.rows.jac, w.markers.phi, w.bodies.acc, w.rows.left
+    )  # fmt: skip
+    take_pull(m.rows, w.rows, w.rows.left, vector_at(target, r.stages.target.size))
     return OK
 
 

@@ -30,13 +30,22 @@ solve(r, target)                acc and lam, with the factors of the last evalua
 project(r, value)               acc: the smallest motion with Phi_q acc = -value
 correct(r, r_v, target)         f += M r_v, target += Phi_q r_v
 evaluate_rows_at(r, t, x, v)    constraint rows elsewhere, with the factors left as they are
-set_diagonal(r, gamma_h)        the elastic diagonal of a linearly implicit method
+set_diagonal(r, gamma_h)        the elastic diagonal of a linearly implicit method, and its part in stiff forces
 
 Twin: none, names of calls.
 """
 
 from ffr_dyn.kernels.bodies import mass_times, normalise, position_rates
-from ffr_dyn.kernels.entry_points import correct, evaluate, evaluate_rows_at, project, set_diagonal, solve, stabilise
+from ffr_dyn.kernels.entry_points import (
+    correct,
+    evaluate,
+    evaluate_rows_at,
+    project,
+    pull_forces,
+    set_diagonal,
+    solve,
+    stabilise,
+)
 from ffr_dyn.kernels.finite_motion import (
     carry,
     converging,
@@ -53,7 +62,11 @@ from ffr_dyn.kernels.simd.slices import part
 from ffr_dyn.kernels.solution import add_reactions, constraint_rates
 from ffr_dyn.kernels.system import acceleration_target, finite, largest, to_body_axes, to_velocity_rates
 from ffr_dyn.kernels.tables import (
+    AHEAD,
+    BY_PLACE,
+    BY_RATE,
     FAILED,
+    FRESH,
     HERE,
     IN_SHARED,
     IN_V,
@@ -113,10 +126,11 @@ __all__ = [
     "acceleration_target",
     "add",
     "add_both",
-    "add_elastic_part",
     "add_four",
     "add_reactions",
     "add_scaled",
+    "add_stiff_part",
+    "begin_stages",
     "carry",
     "combine_three",
     "constraint_rates",
@@ -131,6 +145,7 @@ __all__ = [
     "fill",
     "finite",
     "get",
+    "hold_slopes",
     "inlined",
     "into_body_axes",
     "into_global_axes",
@@ -157,6 +172,7 @@ __all__ = [
     "to_velocity_rates",
     "unconverged",
     "velocity_rates",
+    "weigh_forces",
     "weigh_four",
 ]  # fmt: skip
 
@@ -178,9 +194,33 @@ def velocity_rates(r, out):
 
 
 @inlined
-def add_elastic_part(bodies, f, v, r_x, gh):
-    """f -= gamma h Omega^2 (q_dot + r_q)."""
+def begin_stages(r, gh, h):
+    """What a step of length h of a linearly implicit method has on the left side of its stages: gamma h of the elastic forces
+    and of stiff ones, whose slopes the first stage finds."""
+    set_diagonal(r, gh)
+    r.work.implicit[AHEAD] = h
+
+
+@inlined
+def hold_slopes(r):
+    """In the stages that follow, one-sided forces keep the slopes of the one before."""
+    r.work.implicit[FRESH] = 0.0
+
+
+@inlined
+def weigh_forces(r, by_rate, by_place):
+    """Of a method of Newton's, after `set_diagonal`: what its accelerations do to rates and places at the end of a step."""
+    r.work.implicit[BY_RATE], r.work.implicit[BY_PLACE] = by_rate, by_place
+
+
+@inlined
+def add_stiff_part(r, x, v, r_x, gh):
+    """What a stage has on its right side beside the forces: f -= gamma h Omega^2 (q_dot + r_q), and the targets of stiff
+    forces. After `correct`."""
+    bodies, f = r.model.bodies, r.work.bodies.f
     for b in range(bodies.mass.size):
         n, i, j, shared = bodies.where[b, N], bodies.where[b, IN_X], bodies.where[b, IN_V], bodies.where[b, IN_SHARED]
         for k in range(n):
             f[j + 6 + k] -= gh * bodies.omega2[shared + k] * (v[j + 6 + k] + r_x[i + 7 + k])
+    if r.model.stiff_count > 0:
+        pull_forces(r, x, v, r_x, r.stages.target)

@@ -12,6 +12,7 @@ from ffr_dyn.kernels.markers import project, shapes
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.rows import ZERO, coordinate
 from ffr_dyn.kernels.simd.slices import part, vector_at
+from ffr_dyn.kernels.stiff_forces import keep_row
 from ffr_dyn.kernels.tables import ANGLE, END_I, END_J, FUNCTION, IN_V, LENGTH, MEASURED, PLACE, WAY, N
 from ffr_dyn.kernels.vectors import cross, dot, get, scale, subtract, to_body
 
@@ -75,11 +76,15 @@ def apply_side(where, markers, w, f, k, amount, side):
 
 
 @kernel
-def apply_along(r, k, f, value, rate, side_i, side_j, force):
-    """Add the force on a coordinate to the vector f, and keep it with coordinate and rate."""
+def apply_along(r, k, f, value, rate, side_i, side_j, force, stiffness, damping):
+    """Add the force on a coordinate to the vector f, and keep it with coordinate and rate.
+
+    stiffness, damping : how much the force falls with coordinate and rate, or more, for implicit methods; zeros: explicit
+    """
     m, row, w, kept = r.model, r.model.loads.row, r.work.markers, r.work.loads.measured
     at, i, j = row[k, MEASURED], row[k, END_I], row[k, END_J]
     kept[at], kept[at + 1], kept[at + 2] = value, rate, force
     f = vector_at(f, r.v.size)
     apply_side(m.bodies.where, m.markers, w, f, i, force, side_i)
     apply_side(m.bodies.where, m.markers, w, f, j, force, side_j)
+    keep_row(r, k, 0, side_i, side_j, stiffness, damping)
