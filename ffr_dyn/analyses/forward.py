@@ -44,6 +44,7 @@ from ffr_dyn.results.quantities import Entry, Memory, measure, needs_every_step,
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.scene import Scene
+from ffr_dyn.scene.surfaces import surface_of
 from ffr_prep.body import Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
@@ -403,7 +404,9 @@ def _header(
 
 
 def geometry(scene: Scene) -> dict[str, Surface]:
-    return {body.name: body.model.surface for body in scene.bodies if body.model.surface is not None}
+    """The surfaces of the bodies in their own frames."""
+    surfaces = {body.name: surface_of(body) for body in scene.bodies}
+    return {name: surface for name, surface in surfaces.items() if surface is not None}
 
 
 def _result(scene: Scene, run: _Run, attributes: dict[str, Any]) -> Result:

@@ -119,7 +119,7 @@ def undeformed(scene: Scene) -> Scene:
 
 
 def _rigid(body: Body) -> Body:
-    return replace(body, model=truncated(body.model, 0), q=None, q_dot=None, damping=0.0, stiffening=False)
+    return replace(body, model=truncated(body.model, 0), q=None, q_dot=None, damping=0.0, stiffening=False, frame=None)
 
 
 def _undeformed_notes(scene: Scene) -> list[str]:

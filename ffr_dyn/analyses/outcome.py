@@ -19,7 +19,7 @@ from ffr_dyn.results.quantities import DEFAULT_OUTPUTS, measure, selected
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.joints import COORDINATES, frames
-from ffr_dyn.scene.scene import GROUND, Scene
+from ffr_dyn.scene.scene import GROUND, Scene, joint_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -56,7 +56,9 @@ def accompanying(scene: Scene) -> tuple[str, ...]:
 
 def needed(scene: Scene, outputs: Sequence[str]) -> tuple[str, ...]:
     """What has to be computed for `outputs` and for the efforts, which come from default quantities."""
-    return ("default", *accompanying(scene), *outputs)
+    driven = {joint_of(scene, driver).i for driver in scene.drivers if isinstance(driver, Driver)}
+    turned = (f"{marker}.orientation" for marker in sorted(driven) if not marker.startswith(f"{GROUND}."))
+    return ("default", *accompanying(scene), *turned, *outputs)
 
 
 def only(result: Result, scene: Scene, outputs: Sequence[str]) -> Result:
@@ -83,7 +85,7 @@ def efforts(scene: Scene, result: Result) -> dict[str, Quantity]:
     for driver in scene.drivers:
         if isinstance(driver, Driver):
             joint = joint_named(scene, driver.joint, f"driver {driver.name!r}")
-            axis = axis_history(scene, result, joint.i, frames(joint)[0][:, 2])
+            axis = _axis_history(result, joint.i, frames(joint)[0][:, 2])
             angular = driver.coordinate == "angle"
             effort = (result[f"{driver.name}.{'moment' if angular else 'force'}"] * axis).sum(1)
             text = f"effort along {driver.joint}.{driver.coordinate}, on the second body"
@@ -91,20 +93,8 @@ def efforts(scene: Scene, result: Result) -> dict[str, Quantity]:
     return found
 
 
-def axis_history(scene: Scene, result: Result, marker: str, axis: Array) -> Array:
+def _axis_history(result: Result, marker: str, axis: Array) -> Array:
     """(T, 3) global axis that stands on a marker, `axis` (3,) in body axes."""
-    name, _, point = marker.partition(".")
-    if name == GROUND:
+    if marker.startswith(f"{GROUND}."):
         return np.broadcast_to(axis, (result.time.size, 3))
-    A, theta = rotation_matrix(result[f"{name}.p"]), _elastic_turn(scene, result, name, point)
-    found: Array = np.einsum("tkl,tl->tk", A, axis + np.cross(theta, axis))
-    return found
-
-
-def _elastic_turn(scene: Scene, result: Result, name: str, point: str) -> Array:
-    """(T, 3) elastic rotation of a marker, body axes."""
-    model = next(body.model for body in scene.bodies if body.name == name)
-    if model.n == 0:
-        return np.zeros((result.time.size, 3))
-    found: Array = result[f"{name}.q"] @ model.interface(point).phi_r.T
-    return found
+    return rotation_matrix(result[f"{marker}.orientation"]) @ axis

@@ -17,7 +17,7 @@ from ffr_dyn.results.result import Result
 from ffr_dyn.results.stress import stress_histories
 from ffr_dyn.scene.scene import Body, Scene, marker_number
 from ffr_dyn.scene.stress_sensors import nearest_point
-from ffr_prep.body import BodyError, Interface
+from ffr_prep.body import BodyError, Interface, displacements, some_points
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -137,9 +137,8 @@ class Shape:
             return np.zeros((result.time.size, 3 * len(self.places)))
         surface = result.geometry[self.body]
         near = [nearest_point(surface, np.array(place), self.body) for place in self.places]
-        u = np.einsum("pcj,tj->tpc", surface.Phi[near], result[f"{self.body}.q"]) / len(self.places) ** 0.5
-        found: Array = u.reshape(result.time.size, -1)
-        return found
+        u = displacements(some_points(surface, np.array(near), np.zeros((0, 3))), result[f"{self.body}.q"])
+        return u.reshape(result.time.size, -1) / np.sqrt(len(self.places))
 
     def scale(self, result: Result) -> float:
         return _largest(self.values(result))

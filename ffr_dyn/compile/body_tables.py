@@ -24,11 +24,10 @@ from ffr_dyn.kernels.tables import (
     N,
 )
 from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.variants.families import ROUNDING, SECOND_ORDER_ROUNDING
 from ffr_prep.body import axial
 from ffr_prep.common.arrays import Array
 
-ROUNDING = 1e-8  # of I5 and I9 of unit modes: what symmetry leaves of zeros
-SECOND_ORDER_ROUNDING = 1e-7  # the same of second-order terms, relative to the largest: slopes are rougher
 SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 

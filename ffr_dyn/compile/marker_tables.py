@@ -6,7 +6,7 @@ from collections.abc import Hashable
 
 import numpy as np
 
-from ffr_dyn.compile.body_tables import NO_BLOCKS, SECOND_ORDER_ROUNDING, once, tables_in_blocks
+from ffr_dyn.compile.body_tables import NO_BLOCKS, once, tables_in_blocks
 from ffr_dyn.compile.symmetry_blocks import in_blocks
 from ffr_dyn.equations.constraint_rows import Block
 from ffr_dyn.equations.layout import Layout
@@ -15,6 +15,7 @@ from ffr_dyn.kernels.tables import Markers
 from ffr_dyn.scene.force_kinds import forces_of, loaded_markers
 from ffr_dyn.scene.joints import COINCIDENCE, DISTANCE
 from ffr_dyn.scene.scene import Scene, marker_number, markers
+from ffr_dyn.variants.families import rounding_of
 from ffr_prep.common.arrays import Array
 
 
@@ -35,10 +36,9 @@ def marker_tables(scene: Scene, place: Layout, blocks: tuple[Block, ...]) -> Mar
         b, _, point = table[k]
         if not bends[k]:
             return NO_BLOCKS
-        K = marker_matrices(scene.bodies[b], point)[list(rows[k])]
-        noise = SECOND_ORDER_ROUNDING * np.abs(K).max(axis=(1, 2))
-        pool, plan = in_blocks(-np.moveaxis(K, 1, 0), len(K), noise)
-        return np.concatenate([shapes[k][list(rows[k])].ravel(), pool]), plan
+        K, kept = marker_matrices(scene.bodies[b], point), list(rows[k])
+        pool, plan = in_blocks(-np.moveaxis(K[kept], 1, 0), len(kept), rounding_of(K)[kept])
+        return np.concatenate([shapes[k][kept].ravel(), pool]), plan
 
     body = [scene.bodies[b].model if b < ground else None for b, _, _ in table]
     bending = tables_in_blocks([(id(body[k]), table[k][2], rows[k], bends[k]) for k in range(len(table))], make)
@@ -58,7 +58,7 @@ def marker_tables(scene: Scene, place: Layout, blocks: tuple[Block, ...]) -> Mar
 
 
 def _rows(normal: int, turns: bool) -> tuple[int, ...]:
-    """Which of the six rows of a marker are needed: displacement, and rotation where it turns; in the plane what keeps to it."""
+    """Which of the six rows of a marker are needed: displacement, rotation where it turns; in the plane what keeps to it."""
     if normal < 0:
         return tuple(range(6 if turns else 3))
     in_plane = sorted({0, 1, 2} - {normal})

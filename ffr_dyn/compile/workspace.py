@@ -14,7 +14,6 @@ from ffr_dyn.kernels.tables import (
     IN_Q,
     LANES,
     NORMAL,
-    STRIPS,
     Bodies,
     BodyWork,
     LoadWork,
@@ -83,7 +82,7 @@ def _body_work(m: Model, keeps_terms: bool) -> BodyWork:
         dinv=np.ones(m.bodies.omega2.size),
         terms=starts(spaced)[:-1] * keeps_terms,
         **_zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), inverse=(B, 2), g=9 * terms, l=3 * terms),
-        sorted=np.zeros(2 * LANES * STRIPS + 14 * longest + 2 * LANES),
+        sorted=np.zeros(17 * longest + 4 * LANES),
         **_zeros(H=3 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6)),
         **_zeros(more=V),
     )

@@ -23,6 +23,7 @@ from ffr_dyn.functions.rotation import G_bar, rotation_matrix
 from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction
 from ffr_dyn.scene.joints import DISTANCE
 from ffr_dyn.scene.scene import Scene, require_scene
+from ffr_dyn.variants.mean_axis import in_mean_axis_frames
 from ffr_dyn.variants.plane import planar_forms
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
@@ -106,8 +107,9 @@ def _movable(place: Layout) -> int:
 
 
 def flattened(scene: Scene, time: float) -> tuple[Scene, list[Block]]:
-    """The scene with its plane decided, `plane` "x", "y", "z" or "none", and its rows; those of a planar scene without
-    the ones that no motion in the plane can change."""
+    """The scene as it is computed: second-order bodies in their mean-axis form, its plane decided, `plane` "x", "y", "z" or
+    "none"; and its rows, those of a planar scene without the ones that no motion in the plane can change."""
+    scene = in_mean_axis_frames(scene)
     for flat in planar_forms(scene):
         blocks = blocks_of(flat)
         across, pure = _across(flat, blocks, time)

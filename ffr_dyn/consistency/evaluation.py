@@ -16,7 +16,7 @@ from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.failure import failure
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
 from ffr_dyn.equations.layout import Layout, initial_state
-from ffr_dyn.functions.rotation import from_vector, rotation_matrix, skew
+from ffr_dyn.functions.rotation import from_vector, product, rotation_matrix, skew
 from ffr_dyn.kernels.tables import IN_Q, IN_SHARED, OK, SINGULAR_CONSTRAINT, Record, Work
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
@@ -171,17 +171,6 @@ def moved(place: Layout, x: Array, step: Array) -> Array:
         out[place.p(b)] = product(p, from_vector(step[place.omega(b)]))
         out[place.q(b)] += step[place.q_dot(b)]
     return out
-
-
-def product(p: Array, r: Array) -> Array:
-    """Euler parameters of the rotation p after r, of length one."""
-    a, b, c, d = p.tolist()
-    e, f, g, h = r.tolist()
-    out = np.array([
-        a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g,
-        a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e,
-    ])  # fmt: skip
-    return out / np.sqrt(out @ out)
 
 
 def to_body_axes(place: Layout, x: Array, v: Array) -> Array:

@@ -27,6 +27,7 @@ from ffr_dyn.equations.layout import Layout, initial_state
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.variants.mean_axis import with_mean_axis_bodies
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -84,12 +85,13 @@ def adaptive_forward(
     divisions : steps from one output row to the next
     policy    : numbers of the estimates
 
-    The result has the states, marker motions and energies of a forward run, and model.coordinates (elastic coordinates of
+    The result has the states (of second-order bodies those of their mean-axis form), marker motions and energies of a forward
+    run, and model.coordinates (elastic coordinates of
     each body), energy.switched (energy that switches have added since the start, negative where they took some away).
 
     Raises InputError and ComputationError as `economise`.
     """
-    span = Span(start, end, output_step, stabilisation)
+    span, scene = Span(start, end, output_step, stabilisation), with_mean_axis_bodies(scene)
     of = probe(assemble(scene, time=start), [as_output(one, tolerance) for one in outputs], policy)
     everything = replace(full(scene, method, divisions), plane=scene.plane)
     models = _Models(span)

@@ -16,6 +16,7 @@ from ffr_dyn.results.result import Result
 from ffr_dyn.results.stress import tensors
 from ffr_dyn.scene.scene import Scene
 from ffr_dyn.scene.stress_sensors import von_mises
+from ffr_dyn.scene.surfaces import surface_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -147,7 +148,7 @@ def _history(of: Probe, k: int, scene: Scene, result: Result) -> Array:
 
 def largest_stress(scene: Scene, name: str, q: Array) -> Array:
     """(T,) largest von Mises stress over the surface of a body [Pa] for its elastic coordinates (T, n)."""
-    surface = next(body.model.surface for body in scene.bodies if body.name == name)
+    surface = next(surface_of(body) for body in scene.bodies if body.name == name)
     if surface is None:
         return np.zeros(len(q))
     chunk = max(1, 2_000_000 // (6 * max(1, len(surface.points))))

@@ -40,6 +40,7 @@ from ffr_dyn.economy.steps import Stepped, chosen_step
 from ffr_dyn.economy.verification import reference_cost, verified
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.scene.scene import Scene
+from ffr_dyn.variants.mean_axis import with_mean_axis_bodies
 from ffr_prep.common.arrays import Array
 
 Histories = tuple[Array, ...]
@@ -81,7 +82,8 @@ def economise(
 ) -> Economy:
     """The cheapest model found whose outputs stay within their tolerances over a forward run, with its estimated errors.
 
-    scene     : with everything flexible, all modes and all terms that could matter
+    scene     : with everything flexible, all modes and all terms that could matter; second-order bodies are taken in their
+                mean-axis form, in which modes are told apart best: its frame and modes are those of the model found
     outputs   : names such as "rod.tip.position.y" or "rod.stress", with their own tolerances where they are `Output`s or
                 written "rod.stress=1e6" (absolute) or "rod.stress=0.1%"
     tolerance : of outputs without their own: share of the range of the output over the run
@@ -92,7 +94,7 @@ def economise(
     Raises InputError for outputs that do not exist or stay zero and for tolerances that cannot be met or told;
     ComputationError when no run of the scene comes to an end.
     """
-    span = Span(start, end, output_step, stabilisation)
+    span, scene = Span(start, end, output_step, stabilisation), with_mean_axis_bodies(scene)
     tell("assemble")
     assembled = assemble(scene, time=start)
     of = probe(assembled, [as_output(one, tolerance) for one in outputs], policy)

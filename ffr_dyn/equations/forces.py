@@ -16,7 +16,7 @@ import numpy as np
 from ffr_dyn.equations.constraints import Markers, Parts, Row, add_part, evaluate_word, summed_parts
 from ffr_dyn.equations.constraints import coordinate as joint_coordinate
 from ffr_dyn.equations.inertia import gravity_force
-from ffr_dyn.equations.kinematics import marker_point, marker_turn
+from ffr_dyn.equations.kinematics import body_state, marker_point, marker_turn
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.functions.rotation import rotation_matrix
@@ -123,10 +123,10 @@ def _wrench(now: At, place: AtMarker, values: Array) -> Array:
     b = markers(now.scene)[number][0]
     if b == len(now.scene.bodies):
         return Q
-    A = rotation_matrix(now.x[now.place.p(b)])
-    force, moment = values.reshape(2, 3) if place.axes == "body" else values.reshape(2, 3) @ A
-    point, turn = (at(now.scene, now.place, now.x, now.v, number) for at in (marker_point, marker_turn))
-    part = (A @ force) @ point.jacobian + moment @ turn.jacobian
+    state = body_state(now.place, now.x, now.v, b)
+    force, moment = values.reshape(2, 3) if place.axes == "body" else values.reshape(2, 3) @ state.A
+    point = marker_point(now.scene, now.place, now.x, now.v, number)
+    part = (state.A @ force) @ point.jacobian + moment @ marker_turn(now.scene, state, number).jacobian
     Q[now.place.iv[b] : now.place.iv[b] + part.size] = part
     return Q
 

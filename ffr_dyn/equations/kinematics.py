@@ -146,15 +146,15 @@ def marker_axis(scene: Scene, place: Layout, x: Array, v: Array, number: int, a0
     b = markers(scene)[number][0]
     if b == len(scene.bodies):
         return fixed_vector(a0, b)
-    return axis_motion(body_state(place, x, v, b), a0, marker_turn(scene, place, x, v, number), b)
+    state = body_state(place, x, v, b)
+    return axis_motion(state, a0, marker_turn(scene, state, number), b)
 
 
-def marker_turn(scene: Scene, place: Layout, x: Array, v: Array, number: int) -> Turn:
-    """How a marker of a body, not of the ground, turns, by number."""
+def marker_turn(scene: Scene, state: BodyState, number: int) -> Turn:
+    """How a marker turns with its body, which is not the ground, by number."""
     b, _, point = markers(scene)[number]
     body = scene.bodies[b]
-    K_r = marker_matrices(body, point)[3:]
-    return turning(body_state(place, x, v, b), body.model.interface(point).phi_r, K_r)
+    return turning(state, body.model.interface(point).phi_r, marker_matrices(body, point)[3:])
 
 
 def marker_motion(scene: Scene, place: Layout, x: Array, v: Array, name: str) -> Motion:

@@ -37,7 +37,7 @@ def load_matrices(body: Body) -> Array:
 
 def is_second_order(body: Body) -> bool:
     """Whether a body of a scene has a second-order part."""
-    return len(load_matrices(body)) > 0
+    return load_matrices(body).size > 0
 
 
 def marker_matrices(body: Body, point: str) -> Array:

@@ -1,11 +1,12 @@
-"""What a user's Python force sees of the moving system."""
+"""What a user's Python force sees of the moving system: bodies in their own frames, however they are computed."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ffr_dyn.equations.kinematics import marker_motion
+from ffr_dyn.equations.kinematics import Turn, body_state, marker_motion, turning
 from ffr_dyn.equations.layout import Layout
+from ffr_dyn.functions.rotation import from_matrix, product, rotation_matrix
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 
@@ -32,19 +33,40 @@ class StateView:
 
     def rotation(self, body: str) -> Array:
         """(4,) Euler parameters of a body."""
-        return self.x[self.layout.p(self._number(body))]
+        b = self._number(body)
+        own = self._own_turn(b)
+        return self.x[self.layout.p(b)] if own is None else product(self.x[self.layout.p(b)], from_matrix(own.rotation))
 
     def omega_bar(self, body: str) -> Array:
         """(3,) [rad/s] angular velocity of a body, body axes."""
-        return self.v[self.layout.omega(self._number(body))]
+        b = self._number(body)
+        own = self._own_turn(b)
+        return self.v[self.layout.omega(b)] if own is None else own.rotation.T @ own.omega
 
     def q(self, body: str) -> Array:
         """(n,) elastic coordinates of a body."""
-        return self.x[self.layout.q(self._number(body))]
+        b = self._number(body)
+        return self._own(b, self.x[self.layout.q(b)])
 
     def q_dot(self, body: str) -> Array:
         """(n,) rates of the elastic coordinates of a body."""
-        return self.v[self.layout.q_dot(self._number(body))]
+        b = self._number(body)
+        return self._own(b, self.v[self.layout.q_dot(b)])
+
+    def axes(self, body: str) -> Array:
+        """(3, 3) of the frame in which a body is computed, to global: its mean-axis frame if it is of second order."""
+        return rotation_matrix(self.x[self.layout.p(self._number(body))])
+
+    def _own(self, b: int, values: Array) -> Array:
+        frame = self.scene.bodies[b].frame
+        return frame.C @ values if frame else values
+
+    def _own_turn(self, b: int) -> Turn | None:
+        """How the own frame of a body stands in that in which it is computed; None where they are one."""
+        frame = self.scene.bodies[b].frame
+        if not frame:
+            return None
+        return turning(body_state(self.layout, self.x, self.v, b), frame.marker.phi_r, frame.marker.K[3:])
 
     def _number(self, name: str) -> int:
         return [body.name for body in self.scene.bodies].index(name)

@@ -56,9 +56,20 @@ def from_vector(vector: Array) -> Array:
     return np.concatenate([[np.cos(angle / 2)], np.sinc(angle / (2 * np.pi)) / 2 * np.asarray(vector, float)])
 
 
+def product(p: Array, r: Array) -> Array:
+    """Euler parameters of the rotation p after r, of length one."""
+    a, b, c, d = p.tolist()
+    e, f, g, h = r.tolist()
+    out = np.array([
+        a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g,
+        a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e,
+    ])  # fmt: skip
+    return out / np.sqrt(out @ out)
+
+
 _K = np.arange(9)
 # (9, 4) powers of h^2 in (1 - cos h) / h^2, (h - sin h) / h^3, and the derivatives of both by h, divided by h.
-_SERIES = (-1.0) ** _K[:, None] / np.array([[math.factorial(2 * k + m) for m in (2, 3, 4, 5)] for k in _K])
+_SERIES = (-1.0) ** _K[:, None] / np.array([[float(math.factorial(2 * k + m)) for m in (2, 3, 4, 5)] for k in _K])
 _SERIES[:, 2:] *= -2.0 * (_K[:, None] + 1)
 
 
@@ -69,6 +80,18 @@ def _coefficients(square: float) -> Array:
     h = math.sqrt(square)
     b, c = (1 - math.cos(h)) / square, (1 - math.sin(h) / h) / square
     return np.array([b, c, (math.sin(h) / h - 2 * b) / square, (b - 3 * c) / square])
+
+
+def turn_factors(squares: Array) -> Array:
+    """(T,) h^2 -> (4, T) what `_coefficients` gives of each."""
+    small, series = squares < 1, np.zeros((4, *squares.shape))
+    near, far = np.where(small, squares, 0.0), np.where(small, 1.0, squares)
+    for row in _SERIES[::-1]:
+        series = series * near + row[:, None]
+    h = np.sqrt(far)
+    b, c = (1 - np.cos(h)) / far, (1 - np.sin(h) / h) / far
+    beyond = np.array([b, c, (np.sin(h) / h - 2 * b) / far, (b - 3 * c) / far])
+    return np.where(small, series, beyond)
 
 
 def tangent(theta: Array) -> Array:

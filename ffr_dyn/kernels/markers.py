@@ -18,6 +18,10 @@ from ffr_dyn.kernels.tables import BEND_PLAN, COUNT, IN_BENDING, IN_V, IN_X, LAN
 from ffr_dyn.kernels.vectors import add, copy, cross, dot, fill, get, in_plane, put, scale, to_body, to_global
 
 SMALL = 0.25  # rad^2: below, the functions of a rotation vector by their series, here to rounding
+COSINE = tuple((-1.0) ** k / math.factorial(2 * k + 2) for k in range(8))
+SINE = tuple((-1.0) ** k / math.factorial(2 * k + 3) for k in range(8))
+COSINE_SLOPE = tuple(2.0 * k * COSINE[k] for k in range(1, 8))
+SINE_SLOPE = tuple(2.0 * k * SINE[k] for k in range(1, 8))
 
 
 @inlined
@@ -63,16 +67,16 @@ def bend_marker(markers, w, k, n, normal, q, qd):
 
 
 @kernel
+def series(c, x):
+    """c[0] + c[1] x + ... + c[6] x^6."""
+    return c[0] + x * (c[1] + x * (c[2] + x * (c[3] + x * (c[4] + x * (c[5] + x * c[6])))))
+
+
+@kernel
 def turn_factors(square):
     """(1 - cos h) / h^2, (h - sin h) / h^3, and their derivatives by h, over h; by h^2."""
     if square < SMALL:
-        x = square
-        a = 1.0 - x / 30.0 * (1.0 - x / 56.0 * (1.0 - x / 90.0 * (1.0 - x / 132.0 * (1.0 - x / 182.0))))
-        b = 1.0 - x / 42.0 * (1.0 - x / 72.0 * (1.0 - x / 110.0 * (1.0 - x / 156.0 * (1.0 - x / 210.0))))
-        c = 1.0 - 5.0 * x / 528.0 * (1.0 - 3.0 * x / 455.0)
-        c = 1.0 - x / 15.0 * (1.0 - 3.0 * x / 112.0 * (1.0 - 2.0 * x / 135.0 * c))
-        d = 1.0 - x / 21.0 * (1.0 - x / 48.0 * (1.0 - 2.0 * x / 165.0 * (1.0 - 5.0 * x / 624.0 * (1.0 - x / 175.0))))
-        return 0.5 - x / 24.0 * a, 1.0 / 6.0 - x / 120.0 * b, -c / 12.0, -d / 60.0
+        return series(COSINE, square), series(SINE, square), series(COSINE_SLOPE, square), series(SINE_SLOPE, square)
     h = square**0.5
     sine, rest = math.sin(h), 2.0 * math.sin(0.5 * h) ** 2
     a, b = rest / square, (h - sine) / (h * square)

@@ -29,12 +29,12 @@ def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s, normal):
     c0, c1, _ = in_plane(normal)
     turning = 6 + normal
     g0, g1, h = three_parts(g, n)
-    r0, r1 = part(rP, c0 * n, n), part(rP, c1 * n, n)
-    copy(g0, r0)
-    copy(g1, r1)
-    copy(h, part(rP, turning * n, n))
-    terms, at = part(g, 0, 3 * n), bodies.where[b, PP_PLAN]
-    contract(bodies.PP_dm, start, bodies.blocks, at, q, qd, 3 * n, n, w.sorted, terms, terms, l)
+    r0, r1, undeformed = part(rP, c0 * n, n), part(rP, c1 * n, n), part(w.sorted, w.sorted.size - 3 * n, 3 * n)
+    copy(part(undeformed, 0, n), r0)
+    copy(part(undeformed, n, n), r1)
+    copy(part(undeformed, 2 * n, n), part(rP, turning * n, n))
+    at = bodies.where[b, PP_PLAN]
+    contract(bodies.PP_dm, start, bodies.blocks, at, q, qd, 3 * n, n, w.sorted, undeformed, part(g, 0, 3 * n), l)
     copy(part(w.H, 3 * e + normal * n, n), h)
     f = part(w.f, bodies.where[b, IN_V] + 6, n)
     omega2, damping = part(bodies.omega2, c, n), part(bodies.two_zeta_omega, c, n)

@@ -6,40 +6,70 @@ Twin: `ffr_dyn.equations.inertia.moments`.
 """
 
 from ffr_dyn.kernels.options import kernel
-from ffr_dyn.kernels.simd.lanes import load, plus, store
+from ffr_dyn.kernels.simd.lanes import load, plus, store, zeros
 from ffr_dyn.kernels.simd.slices import part, peek
 from ffr_dyn.kernels.tables import LANES, STRIPS
 from ffr_dyn.kernels.vectors import copy, fill
 
 
 @kernel
-def multiply(count, width, stride, table, start, x, first, begin, moving, y, at):
-    """y[at + k] = begin[k] + sum over `count` rows i of x[first + i] table[start + i stride + k], k < width, in whole rows of
-    lanes. Where `moving` is zero, not one, the sums begin with the same four rows of lanes again and again."""
+def multiply(count, width, table, start, x, first, y, at):
+    """y[at + k] = sum over `count` rows i of x[first + i] table[start + i width + k], k < width, in whole rows of lanes."""
     strips = (width + LANES - 1) // LANES
     for four in range(strips // STRIPS):  # each result is stored once
         place = STRIPS * LANES * four
-        before, source = moving * place, start + place
-        s0, s1, s2, s3 = load_four(begin, before)
+        s0, s1, s2, s3 = zeros(), zeros(), zeros(), zeros()
         for i in range(count):
-            number, row = peek(x, first + i), source + i * stride
-            r0, r1, r2, r3 = load_four(table, row)
-            s0, s1, s2, s3 = plus(s0, number, r0), plus(s1, number, r1), plus(s2, number, r2), plus(s3, number, r3)
+            number, row = peek(x, first + i), start + i * width + place
+            s0, s1 = plus(s0, number, load(table, row)), plus(s1, number, load(table, row + LANES))
+            s2, s3 = plus(s2, number, load(table, row + 2 * LANES)), plus(s3, number, load(table, row + 3 * LANES))
         store(y, at + place, s0)
         store(y, at + place + LANES, s1)
         store(y, at + place + 2 * LANES, s2)
         store(y, at + place + 3 * LANES, s3)
     for strip in range(strips - strips % STRIPS, strips):
         place = LANES * strip
-        row = load(begin, moving * place)
+        s0 = zeros()
         for i in range(count):
-            row = plus(row, peek(x, first + i), load(table, start + place + i * stride))
-        store(y, at + place, row)
+            s0 = plus(s0, peek(x, first + i), load(table, start + i * width + place))
+        store(y, at + place, s0)
 
 
 @kernel
-def load_four(array, at):
-    return load(array, at), load(array, at + LANES), load(array, at + 2 * LANES), load(array, at + 3 * LANES)
+def multiply_both(count, width, table, start, x, xd, first, y, yd, at, late):
+    """`multiply` by x into y from `at` on and by xd into yd from `late` on: the table is read once."""
+    strips = (width + LANES - 1) // LANES
+    for two in range(strips // 2):
+        place = 2 * LANES * two
+        s0, s1, d0, d1 = zeros(), zeros(), zeros(), zeros()
+        for i in range(count):
+            number, rate, row = peek(x, first + i), peek(xd, first + i), start + i * width + place
+            r0, r1 = load(table, row), load(table, row + LANES)
+            s0, s1, d0, d1 = plus(s0, number, r0), plus(s1, number, r1), plus(d0, rate, r0), plus(d1, rate, r1)
+        store(y, at + place, s0)
+        store(y, at + place + LANES, s1)
+        store(yd, late + place, d0)
+        store(yd, late + place + LANES, d1)
+    if strips % 2 > 0:
+        place = LANES * (strips - 1)
+        s0, d0 = zeros(), zeros()
+        for i in range(count):
+            row = load(table, start + i * width + place)
+            s0, d0 = plus(s0, peek(x, first + i), row), plus(d0, peek(xd, first + i), row)
+        store(y, at + place, s0)
+        store(yd, late + place, d0)
+
+
+@kernel
+def multiply_blocks(table, start, plan, at, blocks, x, xd, early, y, yd):
+    """Block after block, in the order of their products: what one writes beyond its own, the next writes again."""
+    for block in range(at, at + 4 * blocks, 4):
+        first, count, out, width = plan[block], plan[block + 1], plan[block + 2], plan[block + 3]
+        if out >= early:
+            multiply_both(count, width, table, start, x, xd, first, y, yd, out, out - early)
+        else:
+            multiply(count, width, table, start, x, first, y, out)
+        start += count * width
 
 
 @kernel
@@ -54,34 +84,21 @@ def contract(table, start, plan, at, q, qd, width, last, scratch, base, g, l):  
         copy(g, base)
         fill(l, 0.0)
         return
-    blocks = plan[at]
-    order = at + 1 + 3 * blocks
-    place = order + n
-    x, xd, y, yd, begin, moving = q, qd, g, l, base, 1
-    nothing = part(scratch, 0, LANES * STRIPS)
-    fill(nothing, 0.0)
-    if blocks > 0:
-        begin, moving = nothing, 0
-        first, found = LANES * STRIPS, LANES * STRIPS + 2 * n
-        x, xd = part(scratch, first, n), part(scratch, first + n, n)
-        y, yd = part(scratch, found, width + LANES), part(scratch, found + width + LANES, last + LANES)
-        for k in range(n):
-            number = peek(plan, order + k)
-            x[k], xd[k] = peek(q, number), peek(qd, number)
-    first, product, late = 0, 0, 0
-    for block in range(max(blocks, 1)):
-        count, outputs, of_last = n, width, last
-        if blocks > 0:
-            count, outputs, of_last = plan[at + 1 + 3 * block], plan[at + 2 + 3 * block], plan[at + 3 + 3 * block]
-        multiply(count, outputs, outputs, table, start, x, first, begin, moving, y, product)
-        multiply(count, of_last, outputs, table, start + outputs - of_last, xd, first, nothing, 0, yd, late)
-        start += count * outputs
-        first += count
-        product += outputs
-        late += of_last
-    if blocks > 0:
-        y[product] = yd[late] = 0.0  # what the plan has for products that vanish
+    blocks, given, early = plan[at], plan[at + 1], plan[at + 2]
+    if given > 0:
+        multiply_blocks(table, start, plan, at + 3, blocks, q, qd, early, g, l)
         for k in range(width):
-            g[k] = base[k] + peek(y, peek(plan, place + k))
-        for k in range(last):
-            l[k] = peek(yd, peek(plan, place + width + k))
+            g[k] += base[k]
+        return
+    order = at + 3 + 4 * blocks
+    place, late = order + n, order + n + width
+    x, xd, found = part(scratch, 0, n), part(scratch, n, n), 2 * n
+    y, yd = part(scratch, found, width + 2 * LANES), part(scratch, found + width + 2 * LANES, last + 2 * LANES)
+    for k in range(n):
+        x[k], xd[k] = peek(q, peek(plan, order + k)), peek(qd, peek(plan, order + k))
+    multiply_blocks(table, start, plan, at + 3, blocks, x, xd, early, y, yd)
+    y[width], yd[last] = 0.0, 0.0  # where the plan has products that vanish
+    for k in range(width):
+        g[k] = base[k] + peek(y, peek(plan, place + k))
+    for k in range(last):
+        l[k] = peek(yd, peek(plan, late + k))

@@ -188,7 +188,7 @@ class BodyWork(NamedTuple):
     terms: I1  # (B,)
     g: F1  # pooled; G_j: six symmetric rows of n, three axial ones; in the plane two and one
     l: F1  # pooled; three rows of n, integral of u_dot x phi_j dm; in the plane one  # noqa: E741
-    sorted: F1  # scratch of products by blocks: zeros, q, q_dot, products
+    sorted: F1  # scratch of products: q, q_dot and sums by family; in the plane, undeformed moments
     H: F1  # (3 E,) the axial rows of G_j
     # (B, 6, 6) Cholesky factor of the Schur complement, reciprocal diagonal; with s and J it is constant for a rigid body,
     # and not positive in [0, 0] where that has none

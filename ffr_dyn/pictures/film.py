@@ -1,8 +1,9 @@
 """What an animation shows, as arrays: poses and elastic coordinates of the bodies at the times of the pictures.
 
-A point with the undeformed position u_0 in the body frame is drawn at R + A(p) (u_0 + scale Phi q). The scale
-exaggerates the deformation only. Flexible bodies may be coloured by a field on their surface: the elastic displacement
-or a measure of stress or strain. Everything here comes from the result alone and is independent of how it is rendered.
+A point with the undeformed position u_0 in the body frame is drawn at R + A(p) (u_0 + u(scale q)), with the displacement
+u(q) = Phi q + u_2(q), u_2 where the body has a second order: a beam that bends keeps its length. The scale exaggerates the
+deformation only. Flexible bodies may be coloured by a field on their surface: the elastic displacement or a measure of stress
+or strain. Everything here comes from the result alone and is independent of how it is rendered.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from ffr_dyn.results.result import Result
 from ffr_dyn.results.stress import values_at
 from ffr_dyn.scene.stress_sensors import MEASURES, Measure
 from ffr_prep.body import Surface
+from ffr_prep.body import displacements as surface_displacements
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.units import readable
@@ -101,7 +103,7 @@ class Film:
     """Bodies at the times (F,) [s] of the pictures.
 
     scale      : factor of the drawn deformation
-    deflection : largest elastic displacement |Phi q| over bodies and times, not scaled [m]
+    deflection : largest elastic displacement |u(q)| over bodies and times, not scaled [m]
     traces     : by marker, its path over all rows of the result (T, 3) [m]
     colouring  : what the colours of flexible bodies show; None leaves them plain
     marks      : words at points (3,) [m] that do not move
@@ -281,20 +283,19 @@ def is_coloured(shown: Film, solid: Solid) -> bool:
 
 
 def body_points(solid: Solid, frame: int, scale: float) -> Array:
-    """(P, 3) deformed points in the body frame, u_0 + scale Phi q [m]."""
-    found: Array = solid.surface.points + scale * (solid.surface.Phi @ solid.q[frame])
-    return found
+    """(P, 3) deformed points in the body frame, u_0 + u(scale q) [m]."""
+    return solid.surface.points + surface_displacements(solid.surface, scale * solid.q[frame])
 
 
 def drawn_points(solid: Solid, frame: int, scale: float) -> Array:
-    """(P, 3) points in the global frame, R + A (u_0 + scale Phi q) [m]."""
+    """(P, 3) points in the global frame, R + A (u_0 + u(scale q)) [m]."""
     found: Array = solid.R[frame] + body_points(solid, frame, scale) @ solid.A[frame].T
     return found
 
 
 def displacements(solid: Solid, frame: int) -> Array:
-    """(P,) elastic displacements |Phi q|, not scaled [m]."""
-    found: Array = np.linalg.norm(solid.surface.Phi @ solid.q[frame], axis=1)
+    """(P,) sizes of the elastic displacements u(q), not scaled [m]."""
+    found: Array = np.linalg.norm(surface_displacements(solid.surface, solid.q[frame]), axis=1)
     return found
 
 

@@ -23,7 +23,7 @@ from ffr_dyn.pictures.film import (
     drawn_points,
     is_coloured,
 )
-from ffr_prep.body import Surface
+from ffr_prep.body import Surface, some_points
 from ffr_prep.common.arrays import Array
 
 # Larger surfaces are simplified until all pictures together need no more numbers than this: some eight megabytes.
@@ -272,5 +272,4 @@ def decimated(surface: Surface, share: float) -> Surface:
 
     coarse = pv.PolyData.from_regular_faces(np.array(surface.points), np.array(surface.triangles)).decimate(1.0 - share)
     nearest = cKDTree(surface.points).query(coarse.points)[1]
-    stress, moduli = (None if of is None else of[nearest] for of in (surface.stress, surface.moduli))
-    return Surface(surface.points[nearest], coarse.regular_faces, surface.Phi[nearest], stress, moduli)
+    return some_points(surface, nearest, coarse.regular_faces)

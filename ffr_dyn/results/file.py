@@ -7,7 +7,8 @@ every variable whenever one is made or resized: seconds for some hundred quantit
 * every other axis is a dimension with a coordinate variable of labels: xyz, euler_parameter, <body>.mode;
 * group ``geometry/<body>``: points (point, xyz) [m], triangles (triangle, corner), Phi (point, xyz, mode) [kg^-0.5]; where
   the body has them, stress (point, component, mode) [Pa/(m sqrt(kg))] with the components xx, yy, zz, xy, xz, yz, moduli
-  (point, modulus) and the group beams of section forces (element, place, force, mode);
+  (point, modulus) and the group beams of section forces (element, place, force, mode); groups second, second_stress and
+  beams/second hold what is quadratic in the modes, shapes (..., part) and weights (part, mode_1, mode_2);
 * where a run can be continued, group ``checkpoint`` with the bytes of `ffr_dyn.analyses.checkpoint`, those of the last row;
 * attributes: Conventions, title, source, status, and those of the result; text and numbers as they are, any other
   JSON value in the attribute ``json_attributes``. No pickle.
@@ -32,7 +33,7 @@ import h5py
 import numpy as np
 
 from ffr_dyn.results.result import XYZ, Axis, Quantity, Result, check_times
-from ffr_prep.body import Surface, surface_of
+from ffr_prep.body import QuadraticField, Surface, surface_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
@@ -40,6 +41,7 @@ FORMAT = "ffr-result"
 FORMAT_VERSION = 1
 
 _SURFACE = ("points", "triangles", "Phi", "stress", "moduli", "beams/positions", "beams/axes", "beams/modes")
+_SECOND = ("second", "second_stress", "beams/second")
 _CHUNK_BYTES, _CHUNK_ROWS = 32768, 512
 _BUFFER_BYTES = 4 << 20
 _MARKS = ("Conventions", "ffr_format", "ffr_format_version", "json_attributes")
@@ -301,6 +303,7 @@ def _write_surface(group: h5py.Group, xyz: h5py.Dataset, surface: Surface) -> No
         mode = _index(group, "mode", n)
         _attach(shapes, [points, xyz, mode])
         _write_stress(group, points, mode, surface)
+        _write_second(group, "second", surface.second, "m-1 kg-1", [points, xyz])
 
 
 def _write_stress(group: h5py.Group, point: h5py.Dataset, mode: h5py.Dataset, surface: Surface) -> None:
@@ -308,7 +311,9 @@ def _write_stress(group: h5py.Group, point: h5py.Dataset, mode: h5py.Dataset, su
         stress = _array(
             group, "stress", surface.stress, "Pa m-1 kg-0.5", "stress modes xx, yy, zz, xy, xz, yz, body axes"
         )
-        _attach(stress, [point, _index(group, "component", 6), mode])
+        component = _index(group, "component", 6)
+        _attach(stress, [point, component, mode])
+        _write_second(group, "second_stress", surface.second_stress, "Pa m-2 kg-1", [point, component])
         moduli = _array(group, "moduli", surface.moduli, "1", "Young's modulus [Pa] and Poisson's ratio")
         _attach(moduli, [point, _index(group, "modulus", 2)])
     if surface.beams is not None:
@@ -321,7 +326,22 @@ def _write_stress(group: h5py.Group, point: h5py.Dataset, mode: h5py.Dataset, su
         forces = _array(
             beams, "modes", surface.beams.modes, "N m-1 kg-0.5", "N, Qy, Qz, Mx, My, Mz (moments: N kg-0.5)"
         )
-        _attach(forces, [element, place, _index(beams, "force", 6), mode])
+        force = _index(beams, "force", 6)
+        _attach(forces, [element, place, force, mode])
+        _write_second(beams, "second", surface.beams.second, "N m-2 kg-1", [element, place, force])
+
+
+def _write_second(
+    group: h5py.Group, name: str, field: QuadraticField | None, unit: str, places: list[h5py.Dataset]
+) -> None:
+    """What is quadratic in the elastic coordinates: sum over r of shapes_r (q . weights_r q) / 2."""
+    if field is None or not field.weights.size:
+        return
+    own = group.create_group(name, track_order=True)
+    rank, n = field.weights.shape[:2]
+    part, one, other = _index(own, "part", rank), _index(own, "mode_1", n), _index(own, "mode_2", n)
+    _attach(_array(own, "shapes", field.shapes, unit, "what is quadratic in the modes: shapes"), [*places, part])
+    _attach(_array(own, "weights", field.weights, "1", "and their quadratic weights"), [part, one, other])
 
 
 def _write_checkpoint(file: h5py.File, content: Array) -> None:
@@ -402,7 +422,8 @@ def _read_quantity(variable: h5py.Dataset) -> Quantity:
 def _read_surface(group: h5py.Group) -> Surface:
     points = group["points"][:]
     empty = {"triangles": np.zeros((0, 3), int), "Phi": np.zeros((len(points), 3, 0))}
-    return surface_of(empty | {key: group[key][:] for key in _SURFACE if key in group})
+    known = (*_SURFACE, *(f"{of}/{name}" for of in _SECOND for name in ("shapes", "weights")))
+    return surface_of(empty | {key: group[key][:] for key in known if key in group})
 
 
 def _read_attributes(file: h5py.File) -> dict[str, Any]:

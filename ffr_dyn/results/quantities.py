@@ -25,7 +25,7 @@ from ffr_dyn.results.power import (
     transmitted,
     work,
 )
-from ffr_dyn.results.recorded_motion import View, dot, shaped, times, to_axes
+from ffr_dyn.results.recorded_motion import View, dot, times, to_axes
 from ffr_dyn.results.result import EULER_PARAMETERS, XYZ, Axis, Quantity, mode_axis
 from ffr_dyn.scene.couplings import Coupling
 from ffr_dyn.scene.force_kinds import forces_of
@@ -34,6 +34,7 @@ from ffr_dyn.scene.joints import COORDINATES, Joint
 from ffr_dyn.scene.scene import marker_names, markers, measured_body
 from ffr_dyn.scene.sensors import Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.scene.stress_sensors import measured_modes
+from ffr_dyn.scene.surfaces import surface_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -139,24 +140,35 @@ def _entry(unit: str, axes: tuple[Axis, ...], text: str, values: Callable[[View]
 def _bodies(system: System) -> Named:
     place = system.layout
     for b, body in enumerate(system.scene.bodies):
-        n, R, omega = body.name, place.R_dot(b), place.omega(b)
-        yield f"{n}.R", _column("m", XYZ, "origin of the body frame, global axes", "x", place.R(b))
-        yield f"{n}.p", _column("1", EULER_PARAMETERS, "Euler parameters, body to global", "x", place.p(b))
-        yield f"{n}.v", _column("m/s", XYZ, "velocity of the origin, global axes", "v", R)
-        yield f"{n}.omega_bar", _column("rad/s", XYZ, "angular velocity, body axes", "v", omega)
-        yield f"{n}.a", _column("m/s^2", XYZ, "acceleration of the origin, global axes", "vd", R)
-        yield f"{n}.alpha_bar", _column("rad/s^2", XYZ, "angular acceleration, body axes", "vd", omega)
+        for name, unit, axis, text in _POSES:
+            values = lambda view, b=b, name=name: getattr(view.pose(b), name)  # type: ignore[misc]  # noqa: E731
+            yield f"{body.name}.{name}", _entry(unit, (axis,), text, values)
         if place.n[b] or (body.kept and body.kept[1]):
             yield from _elastic(system, b)
+
+
+_POSES = (
+    ("R", "m", XYZ, "origin of the body frame, global axes"),
+    ("p", "1", EULER_PARAMETERS, "Euler parameters, body to global"),
+    ("v", "m/s", XYZ, "velocity of the origin, global axes"),
+    ("omega_bar", "rad/s", XYZ, "angular velocity, body axes"),
+    ("a", "m/s^2", XYZ, "acceleration of the origin, global axes"),
+    ("alpha_bar", "rad/s^2", XYZ, "angular acceleration, body axes"),
+)
 
 
 def _elastic(system: System, b: int) -> Named:
     place, body = system.layout, system.scene.bodies[b]
     numbers, count = body.kept or (tuple(range(place.n[b])), place.n[b])
+    count = body.frame.model.n if body.frame else count
     modes, unit, text = mode_axis(body.name, count), "m sqrt(kg)", "elastic coordinates (mass-normalised)"
 
     def column(unit: str, text: str, of: str, at: slice) -> Entry:
-        return _entry(unit, (modes,), text, lambda view: _spread(getattr(view.record, of)[:, at], numbers, count))
+        def values(view: View) -> Array:
+            recorded = getattr(view.record, of)[:, at]
+            return view.own_elastic(b, recorded) if body.frame else _spread(recorded, numbers, count)
+
+        return _entry(unit, (modes,), text, values)
 
     yield f"{body.name}.q", column(unit, text, "x", place.q(b))
     yield f"{body.name}.q_dot", column(f"{unit}/s", f"rates of the {text}", "v", place.q_dot(b))
@@ -168,10 +180,6 @@ def _spread(values: Array, numbers: Sequence[int], count: int) -> Array:
     out = np.zeros((len(values), count))
     out[:, list(numbers)] = values
     return out
-
-
-def _column(unit: str, axis: Axis, text: str, of: str, at: slice) -> Entry:
-    return _entry(unit, (axis,), text, lambda view: getattr(view.record, of)[:, at])
 
 
 def _markers(system: System) -> Named:
@@ -312,9 +320,9 @@ def _measurements(system: System) -> Named:
 def _recovered(system: System, m: StressMeasurement | SectionMeasurement) -> Entry:
     """Stress or section forces: modes times elastic coordinates, and what is made of them."""
     b = measured_body(system.scene, m)
-    found = measured_modes(m, system.scene.bodies[b].model.surface)
+    found = measured_modes(m, surface_of(system.scene.bodies[b]))
     axes = () if found.axis is None else (Axis(*found.axis),)
-    return _entry(found.unit, axes, found.text, lambda view: found.of(shaped(found.modes, view.q(b))))
+    return _entry(found.unit, axes, found.text, lambda view: found.of(found.values(view.own_elastic(b, view.q(b)))))
 
 
 def _measured(view: View, m: Measurement) -> Array:

@@ -6,15 +6,17 @@ anywhere and continued gives the same bits. Hence the sums written out here, whe
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
-from ffr_dyn.functions.rotation import rotation_matrix
+from ffr_dyn.equations.second_order import marker_matrices
+from ffr_dyn.functions.rotation import rotation_matrix, turn_factors
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.scene.joints import Joint, frames
 from ffr_dyn.scene.scene import marker_number, markers
+from ffr_prep.body import Interface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 
@@ -60,12 +62,62 @@ def times(p: Array, r: Array) -> Array:
     return np.stack(rows, axis=1)
 
 
+def summed(rows: Array, q: Array) -> Array:
+    """(T, k, n), (T, n) -> (T, k)."""
+    total = np.zeros(rows.shape[:2])
+    for j in range(q.shape[1]):
+        total += rows[:, :, j] * q[:, j, None]
+    return total
+
+
+def from_vectors(theta: Array) -> Array:
+    """(T, 3) rotation vectors -> (T, 4) Euler parameters."""
+    angle = np.sqrt(dot(theta, theta))
+    half = np.sinc(angle / (2 * np.pi)) / 2
+    return np.concatenate([np.cos(angle / 2)[:, None], half[:, None] * theta], axis=1)
+
+
+def turn_rates(theta: Course) -> tuple[Array, Array]:
+    """(T, 3) angular velocity of axes that turn by rotation vectors, and its derivative, in the axes that stay."""
+    h, h_dot = theta.value, theta.rate
+    b, c, b_h, c_h = (factor[:, None] for factor in turn_factors(dot(h, h)))
+    across = cross(h, h_dot)
+    twist = h_dot + b * across + c * cross(h, across)
+    beside = cross(h, theta.growth)
+    change = theta.growth + b * beside + c * cross(h, beside) + c * cross(h_dot, across)
+    return twist, change + dot(h, h_dot)[:, None] * (b_h * across + c_h * cross(h, across))
+
+
+@dataclass(frozen=True)
+class Course:
+    """A quantity along the recorded rows, with two time derivatives, each (T, k)."""
+
+    value: Array
+    rate: Array
+    growth: Array
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A point and axes that move: position R [m], velocity, acceleration, global axes; Euler parameters p (T, 4); angular
+    velocity and acceleration in own axes; each (T, 3)."""
+
+    R: Array
+    p: Array
+    v: Array
+    omega_bar: Array
+    a: Array
+    alpha_bar: Array
+
+
 @dataclass(frozen=True, repr=False)
 class View(Brief):
-    """Recorded rows of a compiled scene."""
+    """Recorded rows of a compiled scene. Bodies of second order are recorded in their mean-axis form; what is asked for by a
+    public name is in the frames that bodies have of their own (`ffr_dyn.variants.mean_axis`)."""
 
     system: System
     record: Record
+    _poses: dict[int, Pose] = field(default_factory=dict)
 
     @property
     def rows(self) -> int:
@@ -76,89 +128,147 @@ class View(Brief):
         """The number of a marker."""
         return marker_number(self.system.scene, marker)
 
-    def _owner(self, marker: int) -> tuple[int, Array, Array] | None:
-        """(body, phi_t, phi_r) of a marker; None on the ground."""
-        b, _, point = markers(self.system.scene)[marker]
-        if b == len(self.system.scene.bodies):
-            return None
-        interface = self.system.scene.bodies[b].model.interface(point)
-        return b, interface.phi_t, interface.phi_r
+    # ---- bodies ----------------------------------------------------------------------------------------------------
 
-    def parameters(self, b: int) -> Array:
-        """(T, 4) Euler parameters of body b."""
-        return self.record.x[:, self.system.layout.p(b)]
+    def pose(self, b: int) -> Pose:
+        """Of the own frame of body b."""
+        if b not in self._poses:
+            self._poses[b] = self._pose(b)
+        return self._poses[b]
+
+    def _pose(self, b: int) -> Pose:
+        place, record, frame = self.system.layout, self.record, self.system.scene.bodies[b].frame
+        R, p = record.x[:, place.R(b)], record.x[:, place.p(b)]
+        V, omega = record.v[:, place.R_dot(b)], record.v[:, place.omega(b)]
+        a, alpha = record.vd[:, place.R_dot(b)], record.vd[:, place.omega(b)]
+        if not frame:
+            return Pose(R, p, V, omega, a, alpha)
+        at, A = frame.marker, self._computed_axes(b)
+        point = self._carried(b, at.pivot, self._elastic(b, at.phi_t, at.K[:3]))
+        turned = self._elastic(b, at.phi_r, at.K[3:])
+        own = times(p, from_vectors(turned.value))
+        twist, change = turn_rates(turned)
+        E = rotation_matrix(from_vectors(turned.value))
+        own_omega, own_alpha = to_axes(E, omega + twist), to_axes(E, alpha + change - cross(twist, omega))
+        own_A, arm = rotation_matrix(own), np.broadcast_to(at.pivot, R.shape)
+        spin = cross(own_omega, arm)
+        return Pose(
+            R + (to_global(A, point.value) - to_global(own_A, arm)),
+            own,
+            V + (to_global(A, point.rate) - to_global(own_A, spin)),
+            own_omega,
+            a + (to_global(A, point.growth) - to_global(own_A, cross(own_alpha, arm) + cross(own_omega, spin))),
+            own_alpha,
+        )
 
     def axes(self, b: int) -> Array:
         """(T, 3, 3) of body b; the ground has the number after the last."""
         if b == len(self.system.scene.bodies):
             return np.broadcast_to(np.eye(3), (self.rows, 3, 3))
-        return rotation_matrix(self.parameters(b))
+        return rotation_matrix(self.pose(b).p)
+
+    def own_elastic(self, b: int, values: Array) -> Array:
+        """(T, n) coordinates of body b, their rates or accelerations (T, m), as those that it has of its own."""
+        frame = self.system.scene.bodies[b].frame
+        return shaped(frame.C, values) if frame else values
 
     def q(self, b: int) -> Array:
-        """(T, n)."""
+        """(T, n) of the model that is computed."""
         return self.record.x[:, self.system.layout.q(b)]
 
     def q_dot(self, b: int) -> Array:
-        """(T, n)."""
+        """(T, n) of the model that is computed."""
         return self.record.v[:, self.system.layout.q_dot(b)]
 
-    def displacement(self, marker: int) -> Array:
-        """(T, 3) elastic displacement, body axes."""
-        owner = self._owner(marker)
-        return np.zeros((self.rows, 3)) if owner is None else shaped(owner[1], self.q(owner[0]))
+    def _computed_axes(self, b: int) -> Array:
+        return rotation_matrix(self.record.x[:, self.system.layout.p(b)])
 
-    def acceleration(self, marker: int) -> Array:
-        """(T, 3) R_ddot + A (omega_dot x u + phi_t q_ddot + omega x (omega x u) + 2 omega x phi_t q_dot)."""
+    def _elastic(self, b: int, phi: Array, K: Array) -> Course:
+        """phi q - q K q / 2 of body b, phi (k, n), K (k, n, n)."""
+        q, q_dot = self.q(b), self.q_dot(b)
+        q_ddot = self.record.vd[:, self.system.layout.q_dot(b)]
+        straight = Course(*(shaped(phi, values) for values in (q, q_dot, q_ddot)))
+        if not K.any():
+            return straight
+        bent, bending = (shaped(K.reshape(-1, K.shape[2]), values).reshape(-1, *K.shape[:2]) for values in (q, q_dot))
+        return Course(
+            straight.value - 0.5 * summed(bent, q),
+            straight.rate - summed(bent, q_dot),
+            straight.growth - summed(bent, q_ddot) - summed(bending, q_dot),
+        )
+
+    def _carried(self, b: int, at: Array, u: Course) -> Course:
+        """The point at + u of body b as seen from its origin: place, rate and acceleration, in its axes."""
+        omega, alpha = (values[:, self.system.layout.omega(b)] for values in (self.record.v, self.record.vd))
+        arm = at + u.value
+        spin = cross(omega, arm)
+        return Course(arm, spin + u.rate, cross(alpha, arm) + u.growth + cross(omega, spin + 2 * u.rate))
+
+    # ---- markers ---------------------------------------------------------------------------------------------------
+
+    def _owner(self, marker: int) -> tuple[int, Interface] | None:
+        """Body and interface of a marker; None on the ground."""
+        b, _, point = markers(self.system.scene)[marker]
+        if b == len(self.system.scene.bodies):
+            return None
+        return b, self.system.scene.bodies[b].model.interface(point)
+
+    def _matrices(self, b: int, interface: Interface) -> Array:
+        return marker_matrices(self.system.scene.bodies[b], interface.name)
+
+    def _turned(self, b: int, interface: Interface) -> Course:
+        """Rotation vector of a marker."""
+        return self._elastic(b, interface.phi_r, self._matrices(b, interface)[3:])
+
+    def displacement(self, marker: int) -> Array:
+        """(T, 3) elastic displacement: the place of the marker less the undeformed one, body axes."""
         owner = self._owner(marker)
         if owner is None:
             return np.zeros((self.rows, 3))
-        b, phi_t, _ = owner
-        place, record, A = self.system.layout, self.record, self.axes(b)
-        omega = record.v[:, place.omega(b)]
-        u = to_axes(A, record.r[:, marker] - record.x[:, place.R(b)])
-        u_dot, u_ddot = shaped(phi_t, self.q_dot(b)), shaped(phi_t, record.vd[:, place.q_dot(b)])
-        inside = cross(record.vd[:, place.omega(b)], u) + u_ddot + cross(omega, cross(omega, u) + 2 * u_dot)
-        return record.vd[:, place.R_dot(b)] + to_global(A, inside)
+        b, interface = owner
+        moved = self._elastic(b, interface.phi_t, self._matrices(b, interface)[:3]).value
+        if not (frame := self.system.scene.bodies[b].frame):
+            return moved
+        at, arm = frame.marker, interface.position - frame.marker.pivot
+        own = rotation_matrix(from_vectors(self._elastic(b, at.phi_r, at.K[3:]).value))
+        return to_axes(own, moved - self._elastic(b, at.phi_t, at.K[:3]).value + arm) - arm
+
+    def acceleration(self, marker: int) -> Array:
+        """(T, 3) R_ddot + A (omega_dot x u + u_ddot + omega x (omega x u) + 2 omega x u_dot)."""
+        owner = self._owner(marker)
+        if owner is None:
+            return np.zeros((self.rows, 3))
+        b, interface = owner
+        u = self._elastic(b, interface.phi_t, self._matrices(b, interface)[:3])
+        carried = self._carried(b, interface.position, u)
+        return self.record.vd[:, self.system.layout.R_dot(b)] + to_global(self._computed_axes(b), carried.growth)
 
     def orientation(self, marker: int) -> Array:
         """(T, 4) Euler parameters of the marker's axes: those of its body, turned by the elastic rotation."""
         owner = self._owner(marker)
         if owner is None:
             return np.broadcast_to([1.0, 0.0, 0.0, 0.0], (self.rows, 4))
-        half = 0.5 * shaped(owner[2], self.q(owner[0]))
-        small = np.concatenate([np.ones((self.rows, 1)), half], axis=1)
-        return times(self.parameters(owner[0]), small / np.sqrt(1.0 + dot(half, half))[:, None])
+        p = self.record.x[:, self.system.layout.p(owner[0])]
+        return times(p, from_vectors(self._turned(*owner).value))
 
     def spin(self, marker: int) -> Array:
         """(T, 3) angular velocity of the marker, global axes."""
         owner = self._owner(marker)
         if owner is None:
             return np.zeros((self.rows, 3))
-        b, _, phi_r = owner
-        omega = self.record.v[:, self.system.layout.omega(b)]
-        return to_global(self.axes(b), omega + shaped(phi_r, self.q_dot(b)))
+        omega = self.record.v[:, self.system.layout.omega(owner[0])]
+        return to_global(self._computed_axes(owner[0]), omega + turn_rates(self._turned(*owner))[0])
 
     def frame(self, marker: int, frame: Array) -> Array:
-        """(T, 3, 3) joint frame (columns f, g, h) of a marker in global axes, turned linearly by the deformation."""
-        owner = self._owner(marker)
-        if owner is None:
-            return np.broadcast_to(frame, (self.rows, 3, 3))
-        b, _, phi_r = owner
-        theta, A = shaped(phi_r, self.q(b)), self.axes(b)
+        """(T, 3, 3) joint frame (columns f, g, h) of a marker in global axes."""
+        A = rotation_matrix(self.orientation(marker))
         columns = [np.broadcast_to(frame[:, k], (self.rows, 3)) for k in range(3)]
-        return np.stack([to_global(A, a + cross(theta, a)) for a in columns], axis=2)
+        return np.stack([to_global(A, column) for column in columns], axis=2)
 
     def frame_rate(self, marker: int, frame: Array) -> Array:
         """(T, 3, 3) time derivative of `frame`."""
-        owner = self._owner(marker)
-        if owner is None:
-            return np.zeros((self.rows, 3, 3))
-        b, _, phi_r = owner
-        omega, theta = self.record.v[:, self.system.layout.omega(b)], shaped(phi_r, self.q(b))
-        twist, A = shaped(phi_r, self.q_dot(b)), self.axes(b)
-        columns = [np.broadcast_to(frame[:, k], (self.rows, 3)) for k in range(3)]
-        rates = [cross(omega, a + cross(theta, a)) + cross(twist, a) for a in columns]
-        return np.stack([to_global(A, rate) for rate in rates], axis=2)
+        omega, columns = self.spin(marker), self.frame(marker, frame)
+        return np.stack([cross(omega, columns[:, :, k]) for k in range(3)], axis=2)
 
     def joint_frames(self, joint: Joint) -> tuple[Array, Array]:
         """Frames (T, 3, 3) of a joint on its markers i and j, global axes."""

@@ -1,11 +1,12 @@
 """Stress, strain and section forces of a result: sums of the bodies' stress modes with the elastic coordinates.
 
-    sigma(u_0, t) = sum_j sigma_j(u_0) q_j(t),    epsilon = ((1 + nu) sigma - nu tr(sigma) 1) / E.
+    sigma(u_0, t) = sum_j sigma_j(u_0) q_j(t) + sigma_2,    epsilon = ((1 + nu) sigma - nu tr(sigma) 1) / E.
 
-The modes come with the surface that a result keeps for every body (`ffr_prep.body.Surface`). Tensors have the six
-components xx, yy, zz, xy, xz, yz in body axes along their last axis; shear strains are those of the tensor, half the
-engineering ones. Stress is found where the basis can show it: loads along the body, its own inertia among them, need
-shapes made for them (inertia relief) or many normal modes.
+With sigma_2 what is quadratic in q of bodies with a second order: sigma is then the second Piola-Kirchhoff stress of
+Green's strain, in axes that follow the material. The modes come with the surface that a result keeps for every body
+(`ffr_prep.body.Surface`). Tensors have the six components xx, yy, zz, xy, xz, yz in body axes along their last axis; shear
+strains are those of the tensor, half the engineering ones. Stress is found where the basis can show it: loads along the body,
+its own inertia among them, need shapes made for them (inertia relief) or many normal modes.
 
 Source: Timoshenko & Goodier, Theory of Elasticity (1970), articles 6 and 77 (Hooke's law, principal stresses).
 """
@@ -25,11 +26,12 @@ from ffr_dyn.scene.stress_sensors import (
     TENSOR,
     Measure,
     _size,
+    in_all,
     measure,
     nearest_point,
     strain_of,
 )
-from ffr_prep.body import SECTION_FORCES, BeamForces, Surface
+from ffr_prep.body import SECTION_FORCES, BeamForces, Surface, at_places
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -80,8 +82,8 @@ def tensors(surface: Surface, q: Array, points: Array | slice = slice(None), *, 
     """
     if surface.stress is None or surface.moduli is None:
         raise InputError("the surface has no stress modes; reduce the body with stress=True (ffr-prep reduce --stress)")
-    modes = surface.stress[points]
-    stress = np.moveaxis((modes.reshape(-1, q.shape[1]) @ q.T).reshape(*modes.shape[:2], len(q)), 1, -1)
+    second = surface.second_stress and at_places(surface.second_stress, points)
+    stress = np.moveaxis(in_all(surface.stress[points], second, q), 0, 1)
     return strain_of(stress, surface.moduli[points][:, None]) if strain else stress
 
 
@@ -191,7 +193,12 @@ def section_forces(result: Result, body: str, element: int) -> Array:
     beams = beams_of(result, body)
     if not 0 <= element < len(beams.modes):
         raise InputError(f"body {body!r} has no beam element {element}; it has {len(beams.modes)}, counted from 0")
-    return np.einsum("sfj,tj->tsf", beams.modes[element], _coordinates(result, body))
+    return _in_element(beams, element, _coordinates(result, body))
+
+
+def _in_element(beams: BeamForces, element: int, q: Array) -> Array:
+    """(T, 3, 6) section forces of an element at elastic coordinates q (T, n)."""
+    return in_all(beams.modes[element], beams.second and at_places(beams.second, element), q)
 
 
 def section_histories(result: Result, body: str, element: int) -> Result:
@@ -222,7 +229,7 @@ def section_peaks(result: Result, body: str) -> tuple[SectionPeak, ...]:
     beams, q = beams_of(result, body), _coordinates(result, body)
     best: list[SectionPeak | None] = [None] * 6
     for element in range(len(beams.modes)):
-        values = np.einsum("sfj,tj->fst", beams.modes[element], q)
+        values = np.moveaxis(_in_element(beams, element, q), 0, 2).swapaxes(0, 1)
         for k, of_force in enumerate(values):
             place, row = np.unravel_index(np.argmax(np.abs(of_force)), of_force.shape)
             value, known = float(of_force[place, row]), best[k]

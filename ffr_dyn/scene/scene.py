@@ -21,6 +21,7 @@ from ffr_dyn.scene.couplings import Coupling, coupled, coupling_word
 from ffr_dyn.scene.drivers import Driver, PointDriver, driver_word
 from ffr_dyn.scene.force_kinds import forces_of, kinds_in
 from ffr_dyn.scene.joints import COORDINATES, Joint
+from ffr_dyn.scene.own_frame import OwnFrame
 from ffr_dyn.scene.sensors import AnyMeasurement, Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.scene.stress_sensors import measured_modes
 from ffr_prep.body import FlexibleBody
@@ -43,10 +44,12 @@ class Body(Brief):
     velocity : (3,) [m/s] of the origin, global;  omega_bar : (3,) [rad/s] in body axes
     q, q_dot : (n,) elastic coordinates and rates; default zero
     damping  : modal damping ratio, one for all modes or (n,)
-    stiffening : use the geometric stiffening that the model has, if any
+    stiffening : use the second-order displacement that the model has, if any
     dropped  : names of the `INERTIA_TERMS` that the equations of motion leave out (see
                `ffr_dyn.variants.variant.without_terms`)
     kept     : set where a planar scene leaves modes out: the numbers of those that stay, and how many there were
+    frame    : set where the body is computed in its mean-axis form (`ffr_dyn.variants.mean_axis`), which model, pose and
+               motion are then those of: the frame to which the scene and results refer
 
     Pose and motion are a first guess: assembly makes them meet the joints.
     """
@@ -64,6 +67,7 @@ class Body(Brief):
     stiffening: bool = True
     dropped: tuple[str, ...] = ()
     kept: tuple[tuple[int, ...], int] | None = None
+    frame: OwnFrame | None = None
 
     def __post_init__(self) -> None:
         check_own_name("body", self.name)
@@ -99,7 +103,7 @@ class Body(Brief):
             rows += [("elastic", f"{hertz.min():.4g} to {hertz.max():.4g} Hz, damping ratio {' to '.join(damping)}")]
             deformed = float(np.abs(self.q).max()), float(np.abs(self.q_dot).max())
             rows += [("deformed", f"|q| up to {deformed[0]:.4g}, rates {deformed[1]:.4g}")] if any(deformed) else []
-        left_out = [*self.dropped, *(["geometric stiffening"] if not self.stiffening else [])]
+        left_out = [*self.dropped, *(["second order"] if not self.stiffening else [])]
         return rows + ([("left out", listed(left_out))] if left_out else [])
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.scene.sensors import SectionMeasurement, StressMeasurement
-from ffr_prep.body import SECTION_FORCES, BeamForces, Surface
+from ffr_prep.body import SECTION_FORCES, BeamForces, QuadraticField, Surface, at_places, values
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -131,7 +131,8 @@ def _size(surface: Surface) -> float:
 
 @dataclass(frozen=True)
 class MeasuredModes:
-    """What a measurement of stress or section forces is made of: modes (k, n) per elastic coordinate, and how.
+    """What a measurement of stress or section forces is made of: modes (k, n) per elastic coordinate, what is quadratic in
+    the coordinates besides, and how.
 
     of   : (T, k) -> (T, k) or (T,)
     axis : name and labels of the k components, None for a scalar
@@ -139,10 +140,21 @@ class MeasuredModes:
     """
 
     modes: Array
+    second: QuadraticField | None
     of: Callable[[Array], Array]
     unit: str
     axis: tuple[str, tuple[str, ...]] | None
     text: str
+
+    def values(self, q: Array) -> Array:
+        """(T, k) of elastic coordinates q (T, n)."""
+        return in_all(self.modes, self.second, q)
+
+
+def in_all(modes: Array, second: QuadraticField | None, q: Array) -> Array:
+    """(T, ...) of modes (..., n) and what is quadratic beside them, for elastic coordinates q (T, n)."""
+    linear = np.tensordot(q, modes, (-1, -1))
+    return linear if second is None else linear + values(second, q)
 
 
 def measured_modes(measurement: StressMeasurement | SectionMeasurement, surface: Surface | None) -> MeasuredModes:
@@ -159,16 +171,18 @@ def measured_modes(measurement: StressMeasurement | SectionMeasurement, surface:
         )
     point = nearest_point(surface, np.array(measurement.point), measurement.body)
     at, moduli = f"at {np.round(surface.points[point], 6).tolist()} m", surface.moduli[point]
-    modes = surface.stress[point]
+    modes, second = surface.stress[point], surface.second_stress and at_places(surface.second_stress, point)
     if measurement.what == "stress":
-        return MeasuredModes(modes, lambda tensor: tensor, "Pa", ("tensor", TENSOR), f"stress {at}, body axes")
+        return MeasuredModes(modes, second, lambda tensor: tensor, "Pa", ("tensor", TENSOR), f"stress {at}, body axes")
     if measurement.what.startswith("strain"):
         _check_isotropic(moduli)
     if measurement.what == "strain":
-        return MeasuredModes(modes, lambda t: strain_of(t, moduli), "1", ("tensor", TENSOR), f"strain {at}, body axes")
+        return MeasuredModes(
+            modes, second, lambda t: strain_of(t, moduli), "1", ("tensor", TENSOR), f"strain {at}, body axes"
+        )
     of = measure(measurement.what)
-    values = (lambda t: of.of(strain_of(t, moduli))) if of.strain else of.of
-    return MeasuredModes(modes, values, of.unit, None, f"{of.words} {at}")
+    measured = (lambda t: of.of(strain_of(t, moduli))) if of.strain else of.of
+    return MeasuredModes(modes, second, measured, of.unit, None, f"{of.words} {at}")
 
 
 def _measured_section(measurement: SectionMeasurement, surface: Surface | None) -> MeasuredModes:
@@ -179,10 +193,11 @@ def _measured_section(measurement: SectionMeasurement, surface: Surface | None) 
     point = np.array(measurement.point, float)
     nearest_point(surface, point, measurement.body)
     element, first = nearest_element(surface.beams, point), 3 * (measurement.what == "moment")
-    modes = surface.beams.modes[element, PLACES.index(measurement.place), first : first + 3]
+    at = element, PLACES.index(measurement.place), slice(first, first + 3)
+    second = surface.beams.second and at_places(surface.beams.second, at)
     axis, unit = (MOMENT_AXIS, "N m") if first else (FORCE_AXIS, "N")
     text = f"section {measurement.what} of element {element}, {measurement.place}, element axes"
-    return MeasuredModes(modes, lambda forces: forces, unit, axis, text)
+    return MeasuredModes(surface.beams.modes[at], second, lambda forces: forces, unit, axis, text)
 
 
 def nearest_element(beams: BeamForces, position: Array) -> int:

@@ -252,6 +252,7 @@ def _model(name: str, entry: BodyEntry) -> FlexibleBody:
     if entry.file is not None:
         model = load_body(entry.file)
         model = model if entry.modes is None else truncated(model, entry.modes)
+        model = model if entry.stiffening else replace(model, stiffening=None)
         for point, at in points.items():
             model = with_point(model, point, at)
         return model

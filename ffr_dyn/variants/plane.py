@@ -17,14 +17,16 @@ import numpy as np
 from ffr_dyn.functions.time_functions import is_zero
 from ffr_dyn.scene.drivers import PointDriver
 from ffr_dyn.scene.force_kinds import forces_of, in_bases
+from ffr_dyn.scene.own_frame import OwnFrame
 from ffr_dyn.scene.scene import Body, Scene, body_normal, marker_number, undeformed
 from ffr_dyn.variants.variant import used_interfaces, with_modes
-from ffr_prep.body import FlexibleBody, axial
+from ffr_prep.body import FlexibleBody, FrameMarker, Interface, axial
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 AXES = "xyz"
 _ZERO = 1e-9
+_MIXED = 1e-12  # of a mode of norm one
 # What the search for a plane understands; a scene with anything else is planar only when it is declared so.
 _KNOWN = {"bodies", "joints", "drivers", "couplings", "loads", "springs", "forces", "ground"}
 _KNOWN |= {"gravity", "base_acceleration", "measurements", "name", "plane"}
@@ -55,7 +57,8 @@ def _in_plane(scene: Scene, normal: int, *, strict: bool) -> Scene:
         keep = np.flatnonzero(_stays(body.model, k, used) if strict else _mostly(body.model, k, used))
         reduced = with_modes(body, keep.tolist())
         model = _without_rounding(reduced.model, k, used)
-        bodies.append(replace(reduced, model=model, kept=(tuple(keep.tolist()), body.model.n)))
+        frame = reduced.frame and _frame_in_plane(reduced.frame, reduced.model, k, used)
+        bodies.append(replace(reduced, model=model, frame=frame, kept=(tuple(keep.tolist()), body.model.n)))
         kept[body.name] = np.eye(body.model.n)[:, keep]
     return replace(scene, bodies=tuple(bodies), forces=in_bases(scene.forces, kept), plane=AXES[normal])
 
@@ -117,7 +120,7 @@ def _symmetric(part: Body, k: int, used: Sequence[str]) -> bool:
     stays, leaves = _stays(body, k, used), _leaves(body, k, used)
     if (stays == leaves).any():
         return False
-    if part.stiffening and body.stiffening is not None and not _splits(body.stiffening, stays, k):
+    if part.stiffening and body.stiffening is not None and not _splits(body, stays, k, used):
         return False
     PP, turning = body.PP_dm, axial(body.PP_dm)
     mixed = np.array([PP[a, a] + PP[b, b], turning[k]])[:, stays][:, :, leaves]
@@ -125,14 +128,28 @@ def _symmetric(part: Body, k: int, used: Sequence[str]) -> bool:
     return bool(max(np.abs(mixed).max(initial=0.0), np.abs(out).max(initial=0.0)) < _ZERO)
 
 
-def _splits(stiffening: Array, stays: Array, k: int) -> bool:
-    """Whether no load in the plane across body axis k couples modes that stay in the plane with modes that leave it."""
-    in_plane = [c for c in range(3) if c != k] + [3 + k]
-    acting = [*in_plane, 6 + k, *(c + first for first in range(12, len(stiffening), 6) for c in in_plane)]
-    stiffening = stiffening[np.intersect1d(acting, stiffening_loads(stiffening))]
-    scale = np.abs(stiffening).max(axis=(1, 2), initial=0.0)
-    mixed = np.abs(stiffening[:, stays][:, :, ~stays]).max(axis=(1, 2), initial=0.0)
-    return bool((mixed <= 1e-6 * scale).all())
+def _splits(body: FlexibleBody, stays: Array, k: int, used: Sequence[str]) -> bool:
+    """Whether what stays in the plane across body axis k is moved in it alone to second order: no load in the plane couples
+    modes that stay in it with modes that leave it, and none across it modes that stay."""
+    K, in_plane = np.asarray(body.stiffening), [*(c for c in range(3) if c != k), 3 + k]
+    products = np.isin(np.arange(6), [0, 1, 2, 5 - k])  # squares of rates, and the product about the axes in the plane
+    groups = [(K[6:12], products)]
+    for first in _first_loads(body, used):
+        along = np.isin(np.arange(6), in_plane)
+        groups += [(K[first + at : first + at + 3], along[at : at + 3]) for at in (0, 3)]
+    return all(_keeps_apart(*group, stays) for group in groups)
+
+
+def _first_loads(body: FlexibleBody, used: Sequence[str]) -> list[int]:
+    """Numbers of the first load at each interface that is used."""
+    return [12 + 6 * m for m, interface in enumerate(body.interfaces) if interface.name in used]
+
+
+def _keeps_apart(K: Array, along: Array, stays: Array) -> bool:
+    """Of matrices (l, n, n) of loads in the plane and across it, in the same units."""
+    inside, mixed = K[:, stays][:, :, stays], K[:, stays][:, :, ~stays]
+    wrong = np.concatenate([mixed[along].ravel(), inside[~along].ravel()])
+    return bool(np.abs(wrong).max(initial=0.0) <= 1e-6 * np.abs(K).max(initial=0.0))
 
 
 def _stays(body: FlexibleBody, k: int, used: Sequence[str]) -> Array:
@@ -205,15 +222,42 @@ def _without_rounding(body: FlexibleBody, k: int, used: Sequence[str]) -> Flexib
         for one, other in ((c, k), (k, c)):
             _drop(rP_dm[one, other], size * shape * length)
             _drop(PP_dm[one, other], pairs)
-    interfaces = []
-    for interface in body.interfaces:
-        phi_t, phi_r = interface.phi_t.copy(), interface.phi_r.copy()
-        if interface.name in used:
-            _drop(phi_t[k], size / shape)
-            _drop(phi_r[a], size / (shape * length))
-            _drop(phi_r[b], size / (shape * length))
-        interfaces.append(replace(interface, phi_t=phi_t, phi_r=phi_r))
-    return replace(body, P_dm=P_dm, rP_dm=rP_dm, PP_dm=PP_dm, interfaces=tuple(interfaces))
+    interfaces = tuple(
+        replace(i, phi_t=phi_t, phi_r=phi_r) if i.name in used else i
+        for i, (phi_t, phi_r) in ((i, _shapes_in_plane(i, body, k, size)) for i in body.interfaces)
+    )
+    stiffening = None if body.stiffening is None else _matrices_in_plane(body.stiffening, _first_loads(body, used), k)
+    return replace(body, P_dm=P_dm, rP_dm=rP_dm, PP_dm=PP_dm, interfaces=interfaces, stiffening=stiffening)
+
+
+def _shapes_in_plane(marker: Interface | FrameMarker, body: FlexibleBody, k: int, size: Array) -> tuple[Array, Array]:
+    """phi_t and phi_r of an interface, or of the frame, without the rounding across the plane."""
+    phi_t, phi_r, shape = marker.phi_t.copy(), marker.phi_r.copy(), np.sqrt(body.mass)
+    _drop(phi_t[k], size / shape)
+    for c in range(3):
+        if c != k:
+            _drop(phi_r[c], size / (shape * _length(body)))
+    return phi_t, phi_r
+
+
+def _frame_in_plane(frame: OwnFrame, body: FlexibleBody, k: int, used: Sequence[str]) -> OwnFrame:
+    """The own frame of a body, without the rounding that moves it, or modes, across the plane."""
+    old = frame.marker
+    phi_t, phi_r = _shapes_in_plane(old, body, k, _sizes(body, used))
+    marker = replace(old, phi_t=phi_t, phi_r=phi_r, K=_matrices_in_plane(old.K, [0], k))
+    return replace(frame, marker=marker, C=np.where(np.abs(frame.C) < _MIXED, 0.0, frame.C))
+
+
+def _matrices_in_plane(matrices: Array, firsts: Sequence[int], k: int) -> Array:
+    """Load matrices without what moves places across the plane, where that is rounding only; firsts : the first of the six
+    loads at each place."""
+    K = np.array(matrices)
+    for first in firsts:
+        for at, across in ((first, [k]), (first + 3, [c for c in range(3) if c != k])):
+            of_kind = K[at : at + 3]
+            size = np.abs(of_kind).max(initial=0.0)
+            of_kind[across] = np.where(np.abs(of_kind[across]) < _ZERO * size, 0.0, of_kind[across])
+    return K
 
 
 def _drop(part: Array, size: Array) -> None:
@@ -228,15 +272,3 @@ def _mostly(body: FlexibleBody, k: int, used: Sequence[str]) -> Array:
     along, across = _motion_along(body, k, used), _motion_across(body, k, used)
     neither = np.maximum(along, across) < _ZERO * _sizes(body, used)
     return np.where(neither, np.einsum("jj->j", body.PP_dm[k, k]) < 0.5, along >= across)
-
-
-_NOTHING = 1e-16  # of the stiffness by a load, relative to that by the others
-
-
-def stiffening_loads(stiffening: Array) -> Array:
-    """Numbers of the loads that do anything, but for rounding, to the stiffness (loads, n, n).
-
-    Forces at an interface that the reference conditions hold do nothing.
-    """
-    size = np.abs(stiffening).max(axis=(1, 2), initial=0.0)
-    return np.flatnonzero(size > _NOTHING * size.max(initial=0.0))

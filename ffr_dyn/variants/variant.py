@@ -86,13 +86,14 @@ def with_modes(body: Body, keep: Modes, interfaces: Iterable[str] | None = None)
     """
     if not isinstance(keep, (int, np.integer)):
         at = np.asarray(keep, int)
-        model = truncated(body.model, at)
-        return replace(body, model=model, q=body.q[at], q_dot=body.q_dot[at], damping=body.damping[at])
+        model, frame = truncated(body.model, at), body.frame and body.frame.combined(np.eye(body.model.n)[:, at])
+        return replace(body, model=model, frame=frame, q=body.q[at], q_dot=body.q_dot[at], damping=body.damping[at])
     if keep >= body.model.n:
         return body
     V = basis_of(body.model, keep, interfaces)
-    model = with_basis(body.model, V)
-    return replace(body, model=model, q=body.q @ V, q_dot=body.q_dot @ V, damping=_damping(body, model, V))
+    model, frame = with_basis(body.model, V), body.frame and body.frame.combined(V)
+    damping = _damping(body, model, V)
+    return replace(body, model=model, frame=frame, q=body.q @ V, q_dot=body.q_dot @ V, damping=damping)
 
 
 def _damping(body: Body, model: FlexibleBody, V: Array) -> Array:

@@ -12,7 +12,29 @@ The numbered invariants I1...I9 and Shabana's S_bar family are read-only views o
 
 from ffr_prep.body.constructors import recombined, rigid_body, truncated, with_point
 from ffr_prep.body.file import content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
-from ffr_prep.body.reduced import SECTION_FORCES, TENSOR, BeamForces, BodyError, FlexibleBody, Interface, Surface, axial
+from ffr_prep.body.mean_axis import FrameMarker, MeanAxisForm, idle_loads, mean_axis_form
+from ffr_prep.body.reduced import (
+    SECTION_FORCES,
+    TENSOR,
+    BeamForces,
+    BodyError,
+    FlexibleBody,
+    Interface,
+    QuadraticField,
+    Surface,
+    axial,
+)
+from ffr_prep.body.second_order import (
+    at_places,
+    compressed,
+    compressed_groups,
+    displacements,
+    linear_surface,
+    pair_values,
+    recoordinated,
+    some_points,
+    values,
+)
 
 __all__ = [
     "SECTION_FORCES",
@@ -20,17 +42,31 @@ __all__ = [
     "BeamForces",
     "BodyError",
     "FlexibleBody",
+    "FrameMarker",
     "Interface",
+    "MeanAxisForm",
+    "QuadraticField",
     "Surface",
+    "at_places",
     "axial",
+    "compressed",
+    "compressed_groups",
     "content_hash",
+    "displacements",
+    "idle_loads",
+    "linear_surface",
     "load_body",
+    "mean_axis_form",
+    "pair_values",
     "recombined",
+    "recoordinated",
     "rigid_body",
     "save_arrays",
     "save_body",
+    "some_points",
     "surface_arrays",
     "surface_of",
     "truncated",
+    "values",
     "with_point",
 ]

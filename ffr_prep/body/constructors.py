@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ffr_prep.body.reduced import BodyError, FlexibleBody, Interface, Surface, axial
+from ffr_prep.body.reduced import BeamForces, BodyError, FlexibleBody, Interface, Surface, axial
+from ffr_prep.body.second_order import pair_values, recoordinated
 from ffr_prep.common.arrays import Array, ArrayLike
 
 
@@ -81,9 +82,18 @@ def recombined(surface: Surface, V: Array, Phi: Array) -> Surface:
 
     Phi may differ from the old basis times V by rigid motions, which cause no stress.
     """
-    stress = None if surface.stress is None else surface.stress @ V
-    beams = surface.beams and replace(surface.beams, modes=surface.beams.modes @ V)
-    return replace(surface, Phi=Phi, stress=stress, beams=beams)
+    return replace(
+        surface,
+        Phi=Phi,
+        stress=None if surface.stress is None else surface.stress @ V,
+        beams=surface.beams and _recombined_forces(surface.beams, V),
+        second=surface.second and recoordinated(surface.second, V),
+        second_stress=surface.second_stress and recoordinated(surface.second_stress, V),
+    )
+
+
+def _recombined_forces(beams: BeamForces, V: Array) -> BeamForces:
+    return replace(beams, modes=beams.modes @ V, second=beams.second and recoordinated(beams.second, V))
 
 
 def _nearest(body: FlexibleBody, name: str, points: Array, position: Array) -> int:
@@ -103,26 +113,61 @@ def _nearest(body: FlexibleBody, name: str, points: Array, position: Array) -> i
 def with_point(body: FlexibleBody, name: str, position: ArrayLike) -> FlexibleBody:
     """The body with one more interface, at the surface node nearest to `position` (3,) [m], body frame.
 
-    Joints, forces and sensors can then attach there. Its rotation is the least-squares rotation of the node's
-    neighbours on the surface. Nothing is added to the basis: what the node does under load is what the basis can show;
-    loads there do not stiffen the body.
+    Joints, forces and sensors can then attach there. Its rotation is that of the best fit to the node's neighbours on the
+    surface. Nothing is added to the basis: what the node does under load is what the basis can show. A body with load
+    matrices gets those of the point from the second-order displacement of its surface.
 
-    Raises BodyError when the body has no surface, or the position is farther from it than half the size of the body.
+    Raises BodyError when the body has no surface, when it has load matrices and its surface no second-order displacement,
+    or the position is farther from it than half the size of the body.
     """
     if body.surface is None:
         raise BodyError(f"body {body.name!r} has no surface to put the point {name!r} on")
     points, Phi = body.surface.points, body.surface.Phi
     node = _nearest(body, name, points, np.asarray(position, float))
-    here = np.flatnonzero((points == points[node]).all(1))  # points are there twice where materials meet
-    around = body.surface.triangles[np.isin(body.surface.triangles, here).any(1)]
-    ring = np.setdiff1d(around, here)
-    ring = ring[np.sort(np.unique(points[ring], axis=0, return_index=True)[1])]
+    ring = _neighbours(body.surface, node)
     arms, moved = points[ring] - points[node], Phi[ring] - Phi[node]
     # omega minimises sum |omega x arm - moved|^2, so (sum arm^2 I - arm arm^T) omega = sum arm x moved
     normal = (arms**2).sum() * np.eye(3) - arms.T @ arms
     phi_r = np.linalg.lstsq(normal, axial(np.einsum("pk,plj->klj", arms, moved)), rcond=None)[0]
     stiffening = body.stiffening
     if stiffening is not None:
-        stiffening = np.concatenate([stiffening, np.zeros((6, body.n, body.n))])
+        second = _second_motion(body, name, node, ring, phi_r)
+        stiffening = np.concatenate([stiffening, -second])
     point = Interface(name, points[node], Phi[node], phi_r)
     return replace(body, interfaces=(*body.interfaces, point), stiffening=stiffening)
+
+
+def _neighbours(surface: Surface, node: int) -> Array:
+    """The points around a surface point; points are there twice where materials meet."""
+    points = surface.points
+    here = np.flatnonzero((points == points[node]).all(1))
+    around = surface.triangles[np.isin(surface.triangles, here).any(1)]
+    ring = np.setdiff1d(around, here)
+    return ring[np.sort(np.unique(points[ring], axis=0, return_index=True)[1])]
+
+
+def _second_motion(body: FlexibleBody, name: str, node: int, ring: Array, phi: Array) -> Array:
+    """(6, n, n) second derivatives by q of translation and rotation vector of a surface node that turns by phi (3, n).
+
+    The rotation vector of the best fit to second order, as in `ffr_prep.model.region_rotations`:
+    phi + I_J^-1 (sum of arm x moved - (J phi) x phi / 2 - ((tr E) I - E) phi), with the stretch E and J = sum of arm arm^T.
+    """
+    surface = body.surface
+    if surface is None or surface.second is None:
+        raise BodyError(
+            f"body {body.name!r} has load matrices, but no second-order displacement of its surface, which the point "
+            f"{name!r} needs: reduce it again, or leave the second order out (stiffening = false in a scene file, "
+            "replace(body, stiffening=None) in Python)"
+        )
+    translation = pair_values(surface.second, np.array([node]))[0]
+    arms = surface.points[ring] - surface.points[node]
+    moved = pair_values(surface.second, ring) - translation
+    J = arms.T @ arms
+    spread = np.einsum("pki,pm->kmi", surface.Phi[ring] - surface.Phi[node], arms)
+    E = spread - np.cross(phi.T[:, None], J).transpose(2, 1, 0)
+    of_rotation = np.cross((J @ phi).T[:, None], phi.T).transpose(2, 0, 1)
+    of_stretch = np.einsum("kki,lj->lij", E, phi) - np.einsum("kli,lj->kij", E, phi)
+    products = of_rotation / 2 + of_stretch
+    turned = axial(np.einsum("pk,plij->klij", arms, moved)) - products - products.transpose(0, 2, 1)
+    rotation = np.linalg.lstsq(np.trace(J) * np.eye(3) - J, turned.reshape(3, -1), rcond=None)[0]
+    return np.concatenate([translation, rotation.reshape(turned.shape)])

@@ -13,7 +13,15 @@ from zipfile import is_zipfile
 
 import numpy as np
 
-from ffr_prep.body.reduced import BeamForces, BodyError, FlexibleBody, Interface, Surface, integral_shapes
+from ffr_prep.body.reduced import (
+    BeamForces,
+    BodyError,
+    FlexibleBody,
+    Interface,
+    QuadraticField,
+    Surface,
+    integral_shapes,
+)
 from ffr_prep.common.arrays import Array
 
 MAGIC = "ffr-body"
@@ -73,16 +81,39 @@ def surface_arrays(surface: Surface) -> dict[str, Array]:
     arrays = {"points": surface.points, "triangles": surface.triangles, "Phi": surface.Phi}
     if surface.stress is not None and surface.moduli is not None:
         arrays |= {"stress": surface.stress, "moduli": surface.moduli}
-    if surface.beams is not None:
-        arrays |= {f"beams/{f.name}": getattr(surface.beams, f.name) for f in fields(BeamForces)}
+    parts = {"beams": surface.beams, "second": surface.second, "second_stress": surface.second_stress}
+    for key, part in parts.items():
+        arrays |= _arrays_of(key, part)
     return arrays
+
+
+def _arrays_of(key: str, part: BeamForces | QuadraticField | None) -> dict[str, Array]:
+    if part is None:
+        return {}
+    found = {f"{key}/{f.name}": getattr(part, f.name) for f in fields(part) if f.name != "second"}
+    return found | (_arrays_of(f"{key}/second", part.second) if isinstance(part, BeamForces) else {})
 
 
 def surface_of(arrays: Mapping[str, Array]) -> Surface:
     """The surface of these arrays; the inverse of `surface_arrays`."""
-    own = {key: value for key, value in arrays.items() if "/" not in key}
-    beams = {key.removeprefix("beams/"): value for key, value in arrays.items() if key.startswith("beams/")}
-    return Surface(**own, beams=BeamForces(**beams) if beams else None)
+    given: dict[str, dict[str, Array]] = {"beams": {}}
+    for key, value in arrays.items():
+        part, _, name = key.rpartition("/")
+        given.setdefault(part, {})[name] = value
+    second = {key: QuadraticField(**of) for key, of in given.items() if "shapes" in of}
+    own, beams = given[""], given["beams"]
+    return Surface(
+        points=own["points"],
+        triangles=own["triangles"],
+        Phi=own["Phi"],
+        stress=own.get("stress"),
+        moduli=own.get("moduli"),
+        beams=BeamForces(beams["positions"], beams["axes"], beams["modes"], second.get("beams/second"))
+        if beams
+        else None,
+        second=second.get("second"),
+        second_stress=second.get("second_stress"),
+    )
 
 
 def load_body(path: str | Path) -> FlexibleBody:

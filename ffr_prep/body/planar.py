@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ffr_prep.body import FlexibleBody, Surface
+from ffr_prep.body import FlexibleBody, recombined
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -77,15 +77,6 @@ def combined(body: FlexibleBody, V: Array, omega2: Array) -> FlexibleBody:
         PP_dm=np.einsum("klij,ia,jb->klab", body.PP_dm, V, V, optimize=True),
         omega2=omega2,
         interfaces=tuple(replace(i, phi_t=i.phi_t @ V, phi_r=i.phi_r @ V) for i in body.interfaces),
-        surface=body.surface and _combined_surface(body.surface, V),
+        surface=body.surface and recombined(body.surface, V, body.surface.Phi @ V),
         stiffening=None if body.stiffening is None else V.T @ body.stiffening @ V,
-    )
-
-
-def _combined_surface(surface: Surface, V: Array) -> Surface:
-    return replace(
-        surface,
-        Phi=surface.Phi @ V,
-        stress=None if surface.stress is None else surface.stress @ V,
-        beams=surface.beams and replace(surface.beams, modes=surface.beams.modes @ V),
     )

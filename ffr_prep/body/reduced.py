@@ -51,6 +51,23 @@ SECTION_FORCES = ("N", "Qy", "Qz", "Mx", "My", "Mz")
 
 
 @dataclass(frozen=True, repr=False)
+class QuadraticField(Brief):
+    """A field that is quadratic in the elastic coordinates, of rank r:  sum_r shapes_r (q . weights_r q) / 2.
+
+    shapes  : (..., r) at every place and component, in its unit divided by m^2 kg
+    weights : (r, n, n) symmetric [-]
+    """
+
+    shapes: Array
+    weights: Array
+
+    def __post_init__(self) -> None:
+        n, r = np.shape(self.weights)[-1], np.shape(self.shapes)[-1]
+        _freeze(self, "shapes", (*np.shape(self.shapes)[:-1], r))
+        _freeze(self, "weights", (r, n, n))
+
+
+@dataclass(frozen=True, repr=False)
 class BeamForces(Brief):
     """Section forces of E beam elements per elastic coordinate, at the first end, the middle and the last end of each.
 
@@ -58,17 +75,21 @@ class BeamForces(Brief):
     axes      : (E, 3, 3) rotation from element to body axes
     modes     : (E, 3, 6, n) N, Qy, Qz, Mx, My, Mz at [element, place, force, :], which the part of the beam towards the
                 last end exerts on the other, in element axes [N/(m sqrt(kg)), N/sqrt(kg)]
+    second    : what is quadratic in the elastic coordinates of the same forces, in axes that turn with the sections; None
+                where it was not computed
     """
 
     positions: Array
     axes: Array
     modes: Array
+    second: QuadraticField | None = None
 
     def __post_init__(self) -> None:
         count, n = np.shape(self.positions)[0], np.shape(self.modes)[-1]
         _freeze(self, "positions", (count, 3, 3))
         _freeze(self, "axes", (count, 3, 3))
         _freeze(self, "modes", (count, 3, 6, n))
+        _check_quadratic(self.second, (count, 3, 6), n)
 
 
 @dataclass(frozen=True, repr=False)
@@ -76,8 +97,10 @@ class Surface(Brief):
     """What is drawn and where fields are recovered: a triangulated boundary with the basis at its points.
 
     points : (P, 3) [m] undeformed; triangles : (T, 3) indices into points; Phi : (P, 3, n) [1/sqrt(kg)]
+    second : second-order displacement of the points, in all Phi q + second(q); None where it was not computed
     stress : (P, 6, n) components xx, yy, zz, xy, xz, yz of the stress per elastic coordinate, in body axes
              [Pa/(m sqrt(kg))]; None where it was not recovered
+    second_stress : what is quadratic in the elastic coordinates of the same stress; None where it was not computed
     moduli : (P, 2) Young's modulus [Pa] and Poisson's ratio at the points, which give the strain; with the stress. Zeros
              where the material is anisotropic, of which strain is not recovered
     beams  : section forces of beam elements; None where there are none
@@ -89,6 +112,8 @@ class Surface(Brief):
     stress: Array | None = None
     moduli: Array | None = None
     beams: BeamForces | None = None
+    second: QuadraticField | None = None
+    second_stress: QuadraticField | None = None
 
     def __post_init__(self) -> None:
         count, n = np.shape(self.points)[0], np.shape(self.Phi)[-1]
@@ -103,6 +128,8 @@ class Surface(Brief):
             _freeze(self, "moduli", (count, 2))
         if self.beams is not None and self.beams.modes.shape[-1] != n:
             raise BodyError(f"surface: the section forces have {self.beams.modes.shape[-1]} modes, the surface {n}")
+        _check_quadratic(self.second, (count, 3), n)
+        _check_quadratic(self.second_stress, (count, 6), n)
         triangles = np.array(self.triangles, dtype=np.int64).reshape(-1, 3)
         if triangles.size and (triangles.min() < 0 or triangles.max() >= count):
             raise BodyError(f"surface: a triangle refers to point {triangles.max()}, but there are {count} points")
@@ -162,6 +189,7 @@ class FlexibleBody(Brief):
         holds = {
             "geometric stiffening": self.stiffening,
             "surface": surface,
+            "foreshortening": surface and surface.second,
             "stress": surface and surface.stress,
             "section forces": surface and surface.beams,
         }
@@ -321,6 +349,15 @@ def _freeze(owner: Any, key: str, shape: tuple[int, ...]) -> None:
         raise BodyError(f"{type(owner).__name__}: {key} holds values that are not finite")
     value.setflags(write=False)
     object.__setattr__(owner, key, value)
+
+
+def _check_quadratic(field: QuadraticField | None, places: tuple[int, ...], n: int) -> None:
+    if field is None or (field.shapes.shape[:-1] == places and field.weights.shape[1] == n):
+        return
+    raise BodyError(
+        f"a quadratic field of {field.shapes.shape[:-1]} values in {field.weights.shape[1]} modes does not fit "
+        f"{places} values in {n} modes"
+    )
 
 
 def _check(body: FlexibleBody) -> None:

@@ -21,10 +21,8 @@ Example:
 @click.argument("body", type=PATH)
 @OUTPUT
 @click.option("--reference", required=True, metavar="CONDITIONS", help="As in reduce, on the interfaces of BODY.")
-@click.option(
-    "--without-stiffening", is_flag=True, help="Leave out the geometric stiffness, where it cannot come along."
-)
-def convert(body: Path, output: Path, reference: str, without_stiffening: bool) -> None:
+@click.option("--linear", is_flag=True, help="Leave out the load matrices, where they cannot come along.")
+def convert(body: Path, output: Path, reference: str, linear: bool) -> None:
     """Attach the frame of BODY in another way, without its mesh: to an interface, between two, or to the mean axis.
 
     The motions that the body can make stay the same. What it has lost before is said, and not brought back.
@@ -36,7 +34,7 @@ def convert(body: Path, output: Path, reference: str, without_stiffening: bool) 
     conditions = reference_of(reference)
     check_writable(output)
     loaded = load_body(body)
-    converted = with_reference(replace(loaded, stiffening=None) if without_stiffening else loaded, conditions)
+    converted = with_reference(replace(loaded, stiffening=None) if linear else loaded, conditions)
     save_body(converted, output)
     show(short_lines(converted))
     filed(output)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -221,7 +221,8 @@ def nodes(body: FlexibleBody, *, surface: bool) -> tuple[Interface, ...]:
         raise InputError(
             f"body {body.name!r}: rename the interface {min(taken & set(names))!r}; surface points need it"
         )
-    extra = tuple(with_point(body, name, at).interfaces[-1] for name, at in zip(names, points, strict=True))
+    linear = replace(body, stiffening=None)
+    extra = tuple(with_point(linear, name, at).interfaces[-1] for name, at in zip(names, points, strict=True))
     if not body.interfaces + extra:
         raise InputError(f"body {body.name!r} has neither interfaces nor surface points; the format needs a node")
     return body.interfaces + extra

@@ -15,10 +15,10 @@ from itertools import combinations
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.body.accelerations import unit_accelerations
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.matrices.model import MatrixModel, group_nodes, node_in_words
-from ffr_prep.model.accelerations import unit_accelerations
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion, check_independent
 from ffr_prep.model.ties import check_names, interface_coordinates, six_rows, tied_rows
 from ffr_prep.structures.interfaces import rigid_coordinates, rotation_weight

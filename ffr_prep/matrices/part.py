@@ -9,6 +9,7 @@ say). Matrices know no stress, so a body with such a part has no geometric stiff
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NoReturn
 
 import numpy as np
 
@@ -71,6 +72,7 @@ def from_matrices(
         surface=lambda basis: surface_of_nodes(model, ties @ basis),
         stressed=lambda basis: None,
         stiffening=_unstressed,
+        second=_unstressed,
         recovery="none of matrices from outside",
         record={
             "matrices": {
@@ -111,7 +113,7 @@ def _doubts(defect: Array) -> list[str]:
     ]
 
 
-def _unstressed(static: Array, loads: Array, basis: Array) -> Array:
+def _unstressed(*fields: Array) -> NoReturn:
     raise InputError(
         "geometric stiffening needs stresses, which matrices from outside do not give: reduce the body without it"
     )

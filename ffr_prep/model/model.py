@@ -13,6 +13,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.invariants import InertiaIntegrals
+from ffr_prep.model.second_order import SecondOrder
 
 
 @dataclass(frozen=True, repr=False)
@@ -25,6 +26,7 @@ class Model(Brief):
     stressed   : the same with stress modes, and section forces where there are beams; None where no stress is known
     stiffening : (r, n, n) geometric stiffness of a basis (Z, n) under r loads, of their static displacements (Z, r) and
                  their amplitudes (12 + 6 I, r) of the known loads (`ffr_prep.model.reactions`), reactions included
+    second     : second order of a basis (Z, n), in the sense of `stiffening`
     recovery   : how the stress is recovered, in words
     record     : what the model is; JSON values
     packages   : whose versions are recorded
@@ -38,6 +40,7 @@ class Model(Brief):
     surface: Callable[[Array], Surface | None]
     stressed: Callable[[Array], Surface | None]
     stiffening: Callable[[Array, Array, Array], Array]
+    second: Callable[[Array], SecondOrder]
     recovery: str
     record: Mapping[str, Any]
     packages: tuple[str, ...] = ("ffr", "numpy", "scipy", "scikit-fem")
@@ -80,4 +83,5 @@ def merged(parts: Sequence[Surface | None]) -> Surface | None:
 
 
 def _merged_beams(beams: Sequence[BeamForces]) -> BeamForces:
-    return BeamForces(**{key: np.concatenate([vars(one)[key] for one in beams]) for key in vars(beams[0])})
+    positions, axes, modes = ([getattr(one, key) for one in beams] for key in ("positions", "axes", "modes"))
+    return BeamForces(np.concatenate(positions), np.concatenate(axes), np.concatenate(modes))

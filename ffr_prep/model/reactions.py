@@ -1,6 +1,6 @@
 """Loads that a model knows by name, and the reactions to them under reference conditions.
 
-The known loads are the twelve inertial ones (`ffr_prep.model.accelerations`), then forces and moments at the interfaces. The
+The known loads are the twelve inertial ones (`ffr_prep.body.accelerations`), then forces and moments at the interfaces. The
 conditions that hold a body frame react by the same: supports at interfaces by forces and moments there, the mean axis by
 inertia. So every static problem under unit loads has an equilibrium of known loads.
 """
@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.body.accelerations import INERTIAL
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
-from ffr_prep.model.accelerations import INERTIAL
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.reference import ReferenceConditions, UserConditions
 

@@ -33,19 +33,23 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.body.accelerations import INERTIAL, turned, turns
 from ffr_prep.common.arrays import Array
-from ffr_prep.model.accelerations import turns
+from ffr_prep.model.coupled import CoupledModel
 
 
 @dataclass(frozen=True)
 class RigidRegion:
     """Nodes that follow an interface, as far as their rotation does work.
 
+    nodes, offsets : (m,) and (m, 3) [m] from the point of the interface
     rotation : (3, Z) of the interface
     internal : (9, Z) S of the forces on the nodes that the stiffness asks for, K u
     loads    : (9, 12 + 6 I) S of the known loads on them
     """
 
+    nodes: Array
+    offsets: Array
     rotation: sp.csr_array
     internal: sp.csr_array
     loads: Array
@@ -86,6 +90,29 @@ def region_stiffening(regions: Sequence[RigidRegion | MeanRegion], static: Array
         else:
             K += _of_mean(region, loads[region.first : region.first + 6].T, basis)
     return K
+
+
+def known_second_order(regions: Sequence[RigidRegion | MeanRegion], model: CoupledModel, basis: Array) -> Array:
+    """(12 + 6 I, n, n) the part E of `region_stiffening` as linear form of the amplitudes of the known loads."""
+    size, count = model.C.shape[1], INERTIAL + model.C.shape[0]
+    return region_stiffening(regions, np.zeros((size, count)), np.eye(count), basis)
+
+
+def second_order_forces(regions: Sequence[RigidRegion | MeanRegion], one: Array, others: Array) -> Array:
+    """(Z, m) the part F of `region_stiffening` as linear form of the static displacement, of one (Z,) with others (Z, m)."""
+    rigid = [region for region in regions if isinstance(region, RigidRegion)]
+    pairs = [turned(region.rotation @ one, region.rotation @ others).reshape(9, -1) for region in rigid]
+    return sum((of.internal.T @ G for of, G in zip(rigid, pairs, strict=True)), np.zeros(others.shape))
+
+
+def turned_nodes(regions: Sequence[RigidRegion | MeanRegion], count: int, one: Array, others: Array) -> Array:
+    """(N, 3, m) second derivatives of the displacement of `count` nodes, those of rigid regions by their rotation."""
+    field = np.zeros((count, 3, others.shape[1]))
+    for region in regions:
+        if isinstance(region, RigidRegion):
+            G = turned(region.rotation @ one, region.rotation @ others)
+            field[region.nodes] = np.einsum("klm,pl->pkm", G, region.offsets)
+    return field
 
 
 def second_order_turn(S: Array) -> Array:

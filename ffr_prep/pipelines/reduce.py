@@ -21,6 +21,7 @@ from ffr_prep.model.reactions import in_equilibrium, known_loads
 from ffr_prep.model.reference import ReferenceConditions, functionals
 from ffr_prep.reduction.basis import Basis, Reduction, check_basis, factorised
 from ffr_prep.reduction.quality import assess, completed
+from ffr_prep.reduction.second_order import with_second_order
 from ffr_prep.reduction.selection import Band
 from ffr_prep.solvers.factor import CHOLESKY, FreeBody, Solver, SupportedBody, solve_refined, supported
 from ffr_prep.solvers.threads import on_one_thread
@@ -102,14 +103,20 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
     surface = (model.stressed if request.stress else model.surface)(basis.Z)
     if request.stress and surface is None:
         raise InputError("no part of this model knows its stress: reduce it without")
+    stiffening = None
     if request.stiffening:
+        held = supported(body, L)
         progress("compute the geometric stiffness")
+        stiffening = stiffening_matrices(model, request, held, basis)
+        if surface is not None:
+            progress("compute the second order of the surface")
+            surface = with_second_order(surface, model, held, request.reference, basis, advance)
     return FlexibleBody(
         name=request.name,
         omega2=basis.omega2,
         interfaces=interface_shapes(coupled, basis),
         surface=surface,
-        stiffening=stiffening_matrices(model, request, supported(body, L), basis) if request.stiffening else None,
+        stiffening=stiffening,
         provenance=completed(record(model, request, model.doubts(basis.Z)), basis, assessed),
         **vars(integrals),
     )

@@ -21,14 +21,16 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from ffr_prep.body import Surface
+from ffr_prep.body.accelerations import INERTIAL
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-from ffr_prep.model.accelerations import INERTIAL
 from ffr_prep.model.coupled import CoupledModel, interface_index
 from ffr_prep.model.invariants import InertiaIntegrals
 from ffr_prep.model.model import Model, merged, summed
 from ffr_prep.model.reactions import known_loads
 from ffr_prep.model.region_rotations import second_order_turn
+from ffr_prep.model.second_order import SecondOrder
+from ffr_prep.pipelines.tied_second_order import Eliminated, tied_second_order
 from ffr_prep.solvers.threads import on_one_thread
 from ffr_prep.structures.interfaces import rigid_coordinates
 
@@ -55,7 +57,7 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
     models = list(parts.values())
     _check_ties(parts, ties)
     _check_joined(parts, ties)
-    X = elimination(parts, ties)
+    X, steps = elimination(parts, ties)
     coupled = _coupled(parts, ties, X)
     rows = np.split(np.arange(X.shape[0]), np.cumsum([m.coupled.K.shape[0] for m in models])[:-1])
     own = [X[of] for of in rows]
@@ -77,6 +79,12 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
         of_arms = [phi.T @ second_order_turn(S) @ phi for S, rotation in of_ties for phi in [rotation @ basis]]
         return np.sum([*of_parts, *of_arms], axis=0)
 
+    def second(basis: Array) -> SecondOrder:
+        count, identity = INERTIAL + coupled.C.shape[0], sp.eye_array(X.shape[1], format="csr")
+        of_ties, loads = _through_ties(parts, ties, own, identity, np.zeros((count, X.shape[1])))
+        known = stiffening(np.zeros((X.shape[1], count)), np.eye(count), basis)
+        return tied_second_order(models, X, own, steps, (of_ties, loads), known, basis)
+
     def doubts(basis: Array) -> list[str]:
         return [
             f"{name}: {doubt}" for (name, m), x in zip(parts.items(), own, strict=True) for doubt in m.doubts(x @ basis)
@@ -88,6 +96,7 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
         surface=surfaces,
         stressed=stressed,
         stiffening=stiffening,
+        second=second,
         recovery="; ".join(dict.fromkeys(m.recovery for m in models)),
         record={
             "parts": {name: {k: v for k, v in part.record.items() if k != "warnings"} for name, part in parts.items()},
@@ -105,7 +114,7 @@ def _through_ties(
     parts: Mapping[str, Model],
     ties: Sequence[tuple[str, str]],
     own: Sequence[sp.csr_array],
-    static: Array,
+    static: Array | sp.csr_array,
     loads: Array,
 ) -> tuple[list[tuple[Array, sp.csr_array]], list[Array]]:
     """What each tie carries as (r, 3, 3) force f_a times arm d_b, with the rotation (3, Z) of its arm, and for each part
@@ -125,7 +134,7 @@ def _through_ties(
         rows = _own(_rows(models, places[0]), 0)
         assert rows is not None  # `elimination` has refused the tie otherwise
         z = own[d] @ static
-        wrench = models[d].K[rows] @ z - known_loads(models[d])[rows] @ of_parts[d]
+        wrench = np.asarray(models[d].K[rows] @ z - known_loads(models[d])[rows] @ of_parts[d])
         arm = _position(models, places[0]) - _position(models, places[1])
         of_parts[d][_amplitudes(places[0])] += wrench
         of_parts[m][_amplitudes(places[1])] -= np.vstack([wrench[:3], wrench[3:] + np.cross(arm, wrench[:3].T).T])
@@ -165,8 +174,10 @@ def _position(models: Sequence[CoupledModel], place: tuple[int, int]) -> Array:
 # ---- elimination --------------------------------------------------------------------------------------------------
 
 
-def elimination(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> sp.csr_array:
-    """X (Z_1 + Z_2 + ..., Z): the coordinates of all parts from the independent ones of the joined model."""
+def elimination(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> tuple[sp.csr_array, list[Eliminated]]:
+    """X (Z_1 + Z_2 + ..., Z): the coordinates of all parts from the independent ones of the joined model; and tie by tie
+    what was eliminated."""
+    steps: list[Eliminated] = []
     ends = [(_end(parts, one), _end(parts, other)) for one, other in ties]
     size = sum(part.coupled.K.shape[0] for part in parts.values())
     X = sp.eye_array(size, format="csr")
@@ -178,13 +189,17 @@ def elimination(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> 
                 f"interfaces {one.name!r} and {other.name!r} are both mean, so neither has coordinates of its own to tie: "
                 "make one of them rigid"
             )
-        follow = rigid_coordinates(dependent.position - master.position) @ (master.C @ X)
+        rigid = rigid_coordinates(dependent.position - master.position)
+        follow = rigid @ (master.C @ X)
         columns = np.flatnonzero(np.isin(kept, dependent.own))
         rest = np.flatnonzero(~np.isin(kept, dependent.own))
         _check_apart(dependent, master, follow[:, columns])
+        names = master.name.partition(".")
+        at = list(parts).index(names[0]), interface_index(parts[names[0]].coupled, names[2])
+        steps.append(Eliminated(sp.csr_array(X[:, columns]), master.C, rigid, dependent.position - master.position, at))
         X = X[:, rest] + X[:, columns] @ sp.csr_array(follow[:, rest])
         kept = kept[rest]
-    return sp.csr_array(X)
+    return sp.csr_array(X), steps
 
 
 def _end(parts: Mapping[str, Model], name: str) -> _End:

@@ -161,7 +161,20 @@ class Gradients:
 
     def stress(self, field: Array) -> Array:
         """(q, 3, 3, r) Cauchy stress [Pa] of nodal displacements (N, 3, r) [m]."""
-        gradient = self.gradient(field)
+        return self._elastic(self.gradient(field))
+
+    def stress_of_products(self, one: Array, others: Array) -> Array:
+        """(q, 3, 3, m) second derivatives of the stress by the amplitudes of one (N, 3, 1) and others (N, 3, m)."""
+        product = np.einsum("qmk,qmlr->qklr", self.gradient(one)[..., 0], self.gradient(others), optimize=True)
+        return self._elastic(product)
+
+    def forces(self, stress: Array) -> Array:
+        """(e, k, 3, r) forces at the nodes of the elements that hold the stress (q, 3, 3, r) in equilibrium [N]."""
+        elements, points = self.shapes.shape[:2]
+        acting = (stress * self.volume[:, None, None, None]).reshape(elements, points, *stress.shape[1:])
+        return np.asarray(np.einsum("eqak,eqmkr->eamr", self.shapes, acting, optimize=True))
+
+    def _elastic(self, gradient: Array) -> Array:
         return np.asarray(np.matmul(self.C, gradient.reshape(len(gradient), 9, -1)).reshape(gradient.shape))
 
 

@@ -9,11 +9,11 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from ffr_prep.body.accelerations import INERTIAL
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.mesh import Mesh, face_group, region_nodes
 from ffr_prep.mesh.shapes import face_mass
-from ffr_prep.model.accelerations import INERTIAL
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion, check_independent, in_words, rigid_field, skew_columns
 from ffr_prep.model.region_rotations import MeanRegion, RigidRegion, force_moments
 from ffr_prep.model.ties import check_names, interface_coordinates, six_rows, tied_rows
@@ -68,8 +68,9 @@ def _turning(
 ) -> RigidRegion | MeanRegion:
     rotation, count = model.C[6 * k + 3 : 6 * k + 6], len(model.points)
     if _follows(region):
-        sums = force_moments(region.nodes, model.points[region.nodes] - region.point, 3, count)
-        return RigidRegion(rotation, sp.csr_array(sums @ K @ model.B), (sums @ loads).toarray())
+        arms = model.points[region.nodes] - region.point
+        sums = force_moments(region.nodes, arms, 3, count)
+        return RigidRegion(region.nodes, arms, rotation, sp.csr_array(sums @ K @ model.B), (sums @ loads).toarray())
     weighted = region.weights @ region.offsets
     sums = force_moments(region.nodes, weighted, 3, count)
     second_moment = region.offsets.T @ weighted

@@ -7,11 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ffr_prep.body import Surface
 from ffr_prep.body.provenance import described
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.progress import Stages, no_stages
-from ffr_prep.mesh.mesh import Mesh, check_mesh, mesh_hash, surface_triangles
+from ffr_prep.mesh.mesh import Mesh, check_mesh, mesh_hash
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
 from ffr_prep.model.invariants import inertia_integrals
 from ffr_prep.model.model import Model
@@ -20,8 +19,9 @@ from ffr_prep.reduction.basis import Basis
 from ffr_prep.reduction.mesh_resolution import element_edges
 from ffr_prep.solids.assembly import Materials, assemble
 from ffr_prep.solids.interfaces import couple, turning_regions
+from ffr_prep.solids.second_order import second_order
 from ffr_prep.solids.stiffening import inertial_loads, stiffening_of
-from ffr_prep.solids.stress_modes import AVERAGING, stressed_boundary
+from ffr_prep.solids.stress_modes import AVERAGING, boundary, stressed_boundary
 from ffr_prep.solvers.threads import on_one_thread
 
 
@@ -62,6 +62,7 @@ def from_mesh(
         surface=lambda basis: boundary(mesh, field(basis)),
         stressed=lambda basis: stressed_boundary(mesh, material, field(basis)),
         stiffening=stiffening,
+        second=lambda basis: second_order(mesh, material, coupled, regions, basis),
         recovery=AVERAGING,
         record={
             "mesh": {
@@ -80,12 +81,6 @@ def from_mesh(
 def nodal_basis(model: CoupledModel, basis: Basis) -> Array:
     """Phi (N, 3, n) [1/sqrt(kg)] at the nodes of the mesh."""
     return np.asarray((model.B @ basis.Z).reshape(*model.points.shape, basis.omega2.size))
-
-
-def boundary(mesh: Mesh, Phi: Array) -> Surface:
-    """The triangulated boundary of the mesh with the basis at its points."""
-    points, triangles = surface_triangles(mesh)
-    return Surface(mesh.points[points], triangles, Phi[points])
 
 
 def mesh_warnings(mesh: Mesh) -> list[str]:

@@ -20,10 +20,11 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+import scipy.sparse as sp
 
+from ffr_prep.body.accelerations import unit_accelerations
 from ffr_prep.common.arrays import Array
 from ffr_prep.mesh.mesh import Mesh
-from ffr_prep.model.accelerations import unit_accelerations
 from ffr_prep.solids.assembly import (
     Chunk,
     Materials,
@@ -49,6 +50,27 @@ def _of_chunk(points: Array, chunk: Chunk, static: Array, Phi: Array) -> Array:
     modes = np.ascontiguousarray(elements.gradient(Phi).transpose(0, 2, 1, 3)).reshape(-1, 3, 3 * n)  # [q, k, m n]
     stress = np.ascontiguousarray(np.moveaxis(elements.stress(static) * elements.volume[:, None, None, None], 3, 0))
     return np.stack([modes.reshape(-1, n).T @ np.matmul(of_load, modes).reshape(-1, n) for of_load in stress])
+
+
+def forces_of_products(mesh: Mesh, material: Materials, one: Array, others: Array) -> Array:
+    """(3N, m) the geometric stiffness of one (N, 3, 1) and others (N, 3, m) as a linear form of the static displacement:
+    nodal forces that the stress of their products makes."""
+    total = np.zeros((len(mesh.points), 3 * others.shape[2]))
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        parts = pool.map(lambda chunk: _forces_of_chunk(mesh.points, chunk, one, others), chunks(mesh, material))
+        for nodes, forces in parts:
+            total[nodes] += forces
+    return total.reshape(-1, others.shape[2])
+
+
+def _forces_of_chunk(points: Array, chunk: Chunk, one: Array, others: Array) -> tuple[Array, Array]:
+    """The nodes (p,) of some elements and the forces (p, 3 m) on them."""
+    elements = displacement_gradients(points, chunk)
+    forces = elements.forces(elements.stress_of_products(one, others)).reshape(chunk.nodes.size, -1)
+    nodes, place = np.unique(chunk.nodes, return_inverse=True)
+    columns = np.arange(chunk.nodes.size)
+    gather = sp.csr_array((np.ones(columns.size), (place.ravel(), columns)), shape=(nodes.size, columns.size))
+    return nodes, gather @ forces
 
 
 def inertial_loads(points: Array, matrices: SolidMatrices) -> Array:

@@ -19,8 +19,9 @@ Sources: J. Barlow, Int. J. Numer. Meth. Eng. 10 (1976) 243-251 (optimal points)
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -35,6 +36,7 @@ from ffr_prep.mesh.shapes import local_order, shape_functions
 from ffr_prep.solids.assembly import (
     STIFFNESS_ORDER,
     Chunk,
+    Gradients,
     Materials,
     chunks,
     displacement_gradients,
@@ -48,8 +50,19 @@ AVERAGING = (
 _ROWS, _COLUMNS = np.array(TENSOR).T
 
 
-def stressed_boundary(mesh: Mesh, material: Materials, Phi: Array) -> Surface:
+def boundary(mesh: Mesh, Phi: Array) -> Surface:
+    """The triangulated boundary of the mesh with the basis at its points."""
+    points, triangles = surface_triangles(mesh)
+    return Surface(mesh.points[points], triangles, Phi[points])
+
+
+def stressed_boundary(
+    mesh: Mesh, material: Materials, Phi: Array, products: tuple[Array, Array] | None = None
+) -> Surface:
     """The triangulated boundary with basis and stress modes at its points; Phi (N, 3, n) at the nodes.
+
+    products : one (N, 3, 1) and others (N, 3, n), of which Phi is the second-order displacement of the pairs: the stress is
+               then theirs, that of the strain of second order included
 
     Nodes where several materials meet are there once for each. Raises InputError for elements without a material or with
     two.
@@ -66,35 +79,48 @@ def stressed_boundary(mesh: Mesh, material: Materials, Phi: Array) -> Surface:
         points=mesh.points[points],
         triangles=np.concatenate(triangles),
         Phi=Phi[points],
-        stress=nodal_stress(near, material, Phi, of_element, points, owner),
+        stress=nodal_stress(near, material, partial(_stress, Phi, products), Phi.shape[2], of_element, points, owner),
         moduli=moduli[owner],
     )
 
 
-def nodal_stress(mesh: Mesh, material: Materials, field: Array, of_element: Array, nodes: Array, owner: Array) -> Array:
-    """(P, 6, r) stress [Pa] of the displacement fields (N, 3, r) [m] at nodes (P,), each of one material.
+def _stress(Phi: Array, products: tuple[Array, Array] | None, elements: Gradients) -> Array:
+    """(q, 3, 3, n)."""
+    linear = elements.stress(Phi)
+    return linear if products is None else linear + elements.stress_of_products(*products)
 
+
+def nodal_stress(
+    mesh: Mesh,
+    material: Materials,
+    stress: Callable[[Gradients], Array],
+    fields: int,
+    of_element: Array,
+    nodes: Array,
+    owner: Array,
+) -> Array:
+    """(P, 6, r) stress [Pa] at nodes (P,), each of one material.
+
+    stress     : (q, 3, 3, r) of some elements at their points; fields : r
     of_element : (E,) number of each element's material; owner (P,) that of each point
     """
-    total = np.zeros((len(nodes), 6, field.shape[2]))
-    count = np.zeros(len(nodes))
+    total, count = np.zeros((len(nodes), 6 * fields)), np.zeros(len(nodes))
     place = np.full((owner.max(initial=0) + 1, len(mesh.points)), -1)
     place[owner, nodes] = np.arange(len(nodes))
     for chunk in chunks(mesh, material):
         target = place[of_element[chunk.elements, None], chunk.nodes].ravel()
         wanted = np.flatnonzero(target >= 0)
         gather = sp.csr_array((np.ones(len(wanted)), (target[wanted], wanted)), shape=(len(nodes), len(target)))
-        total += (gather @ _at_element_nodes(mesh.points, chunk, field).reshape(len(target), -1)).reshape(total.shape)
+        total += gather @ _at_element_nodes(chunk, stress(displacement_gradients(mesh.points, chunk)))
         count += gather.sum(axis=1)
-    return total / count[:, None, None]
+    return total.reshape(len(nodes), 6, -1) / count[:, None, None]
 
 
-def _at_element_nodes(points: Array, chunk: Chunk, field: Array) -> Array:
-    """(e, k, 6, r) stress of each element extended to its own nodes."""
-    stress = displacement_gradients(points, chunk).stress(field)[:, _ROWS, _COLUMNS]
+def _at_element_nodes(chunk: Chunk, stress: Array) -> Array:
+    """(e k, 6 r) stress (q, 3, 3, r) of each element extended to its own nodes."""
     elements, k = chunk.nodes.shape
-    at_points = stress.reshape(elements, -1, 6 * field.shape[2])
-    return np.asarray(np.matmul(extrapolation(chunk.kind), at_points).reshape(elements, k, 6, -1))
+    at_points = stress[:, _ROWS, _COLUMNS].reshape(elements, -1, 6 * stress.shape[3])
+    return np.asarray(np.matmul(extrapolation(chunk.kind), at_points).reshape(elements * k, -1))
 
 
 @cache

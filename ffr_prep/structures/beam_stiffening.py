@@ -23,10 +23,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ffr_prep.body.accelerations import INERTIAL, gradients, turned, turns, unit_accelerations
 from ffr_prep.common.arrays import Array
-from ffr_prep.model.accelerations import INERTIAL, gradients, turns, unit_accelerations
 from ffr_prep.model.region_rotations import second_order_turn
-from ffr_prep.structures.beam_stress import end_forces
+from ffr_prep.structures.beam_stress import end_forces, stiffness_of_ends
 from ffr_prep.structures.beams import (
     Beams,
     axis_functions,
@@ -47,14 +47,12 @@ def beam_stiffening(elements: Beams, static: Array, accelerations: Array, basis:
     Both are nodal coordinates in body axes. `accelerations` (12, r) of the unit accelerations act inside the elements, all
     other loads at nodes.
     """
-    at, weights = np.polynomial.legendre.leggauss(_GAUSS)
-    xi = (1 + at) / 2
+    xi, weight = _gauss_points(elements)
     to_element = element_coordinates(elements)
     ends = end_forces(elements, static) - element_loads(elements) @ accelerations
     spread = section_loads(elements) @ accelerations
     forces = section_forces(elements, ends, to_element @ static, spread, xi)
     strains = strain_functions(elements, xi) @ (to_element @ basis)[:, None]
-    weight = (elements.length[:, None] * weights / 2)[..., None, None]
     turning = elements.C.transpose(0, 2, 1)[:, None] @ basis.reshape(len(basis), 2, 6, -1)[:, :, 3:]
     return np.array(
         [
@@ -63,6 +61,46 @@ def beam_stiffening(elements: Beams, static: Array, accelerations: Array, basis:
             for k in range(static.shape[2])
         ]
     )
+
+
+def end_forces_of_products(elements: Beams, one: Array, others: Array) -> Array:
+    """(E, 12, m) forces on the ends of the centroid line, in element axes, that the products of shapes make.
+
+    one (E, 12, 1), others (E, 12, m): nodal coordinates in body axes
+    """
+    xi, weight = _gauss_points(elements)
+    to_element = element_coordinates(elements)
+    ends, e = stiffness_of_ends(elements), np.broadcast_to(np.eye(12), to_element.shape)
+    forces = section_forces(elements, ends, e, np.zeros((len(e), 3, 3, 12)), xi)
+    functions = strain_functions(elements, xi) @ to_element[:, None]
+    first, second = (functions @ of[:, None] for of in (one, others))
+    unit = np.broadcast_to(np.eye(6), (*weight.shape[:2], 6, 6))
+    products = [(weight * _work(elements, unit[..., k], np.zeros((len(e), 3, 3)))) @ second for k in range(6)]
+    works = np.stack([np.einsum("eqs,eqsm->eqm", first[..., 0], of) for of in products], axis=2)
+    return np.einsum("eqfi,eqfm->eim", forces, works, optimize=True)
+
+
+def beam_forces_of_products(elements: Beams, one: Array, others: Array) -> Array:
+    """(E, 12, m) geometric stiffness of one (E, 12, 1) and others (E, 12, m) as linear form of static coordinates."""
+    of_sections = end_forces_of_products(elements, one, others)
+    to_element = element_coordinates(elements)
+    arms = np.zeros_like(of_sections)
+    arms.reshape(len(arms), 2, 6, -1)[:, :, :3] = turned_offsets(elements, one, others)
+    inside = of_sections + stiffness_of_ends(elements).transpose(0, 2, 1) @ arms
+    return to_element.transpose(0, 2, 1) @ inside
+
+
+def turned_offsets(elements: Beams, one: Array, others: Array) -> Array:
+    """(E, 2, 3, m) second derivatives of the displacement of the ends of the centroid line, which turn about the nodes."""
+    turning = elements.C.transpose(0, 2, 1)[:, None]
+    phi, psi = (turning @ of.reshape(len(of), 2, 6, -1)[:, :, 3:] for of in (one, others))
+    return np.einsum("enklm,el->enkm", turned(phi[..., 0], psi), elements.offset)
+
+
+def _gauss_points(elements: Beams) -> tuple[Array, Array]:
+    """xi (Q,) along the elements and the length (E, Q, 1, 1) of each point."""
+    at, weights = np.polynomial.legendre.leggauss(_GAUSS)
+    return (1 + at) / 2, (elements.length[:, None] * weights / 2)[..., None, None]
 
 
 # ---- loads and section forces -------------------------------------------------------------------------------------

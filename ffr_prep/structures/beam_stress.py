@@ -27,7 +27,7 @@ import numpy as np
 
 from ffr_prep.body import TENSOR, BeamForces, Surface
 from ffr_prep.common.arrays import Array
-from ffr_prep.structures.beam_surface import prisms, stations, swept_surface
+from ffr_prep.structures.beam_surface import Moved, prisms, stations, swept_surface
 from ffr_prep.structures.beams import Beams, element_coordinates, stiffness, undeformed
 from ffr_prep.structures.frame import Frame, Member
 
@@ -36,29 +36,26 @@ _ROWS, _COLUMNS = np.array(TENSOR).T
 _MIDDLE = np.array([0.0, 0.5, 1.0])
 
 
-def stressed_sweep(frame: Frame, elements: Beams, nodal: Array) -> Surface:
-    """The swept surface of the frame with stress modes at its points and the section forces of its elements.
-
-    nodal : (E, 12, n) coordinates of every element, in body axes, per elastic coordinate
-    """
-    forces = beam_forces(elements, nodal)
+def stressed_sweep(frame: Frame, elements: Beams, moved: Moved, modes: Array) -> Surface:
+    """The swept surface of the frame with the stress at its points of the section forces modes (E, 3, 6, n)."""
     stress, moduli = [], []
     for own, outline in prisms(frame):
         member = frame.members[frame.member_of[own[0]]]
         xi, across = stations(outline, len(own))
-        at_stations = section_forces_at(forces.modes[own], xi)
-        stress.append(_outline_stress(member, elements.C[own], across, at_stations).reshape(-1, 6, nodal.shape[2]))
+        at_stations = section_forces_at(modes[own], xi)
+        stress.append(_outline_stress(member, elements.C[own], across, at_stations).reshape(-1, 6, modes.shape[3]))
         moduli.append(np.tile([member.material.E, member.material.nu], (len(stress[-1]), 1)))
-    swept = swept_surface(frame, elements, nodal)
-    return replace(swept, stress=np.concatenate(stress), moduli=np.concatenate(moduli), beams=forces)
-
-
-def beam_forces(elements: Beams, nodal: Array) -> BeamForces:
-    """Section forces at both ends and in the middle of every element."""
-    on_axis = np.zeros((len(elements.length), len(_MIDDLE), 2))
-    return BeamForces(
-        positions=undeformed(elements, _MIDDLE, on_axis), axes=elements.C, modes=section_forces(elements, nodal)
+    return replace(
+        swept_surface(frame, elements, moved),
+        stress=np.concatenate(stress),
+        moduli=np.concatenate(moduli),
+        beams=BeamForces(positions=_places(elements), axes=elements.C, modes=modes),
     )
+
+
+def _places(elements: Beams) -> Array:
+    """(E, 3, 3) both ends and the middle of the centroid line of every element, in the body frame [m]."""
+    return undeformed(elements, _MIDDLE, np.zeros((len(elements.length), len(_MIDDLE), 2)))
 
 
 def section_forces(elements: Beams, nodal: Array) -> Array:
@@ -66,15 +63,24 @@ def section_forces(elements: Beams, nodal: Array) -> Array:
 
     They are what the part of the beam towards the last end exerts on the other part; N is tension.
     """
-    f = end_forces(elements, nodal)
-    first, last = -f[:, :6], f[:, 6:]
+    return at_places(end_forces(elements, nodal))
+
+
+def at_places(ends: Array) -> Array:
+    """(E, 3, 6, n) section forces at the first end, the middle and the last end, of the forces on the ends (E, 12, n)."""
+    first, last = -ends[:, :6], ends[:, 6:]
     return np.stack([first, (first + last) / 2, last], axis=1)
 
 
 def end_forces(elements: Beams, nodal: Array) -> Array:
     """(E, 12, n) forces and moments on the ends of the centroid line, in element axes, that hold the element bent."""
-    to_element = element_coordinates(elements)
-    return np.linalg.solve(to_element.transpose(0, 2, 1), stiffness(elements) @ nodal)
+    return stiffness_of_ends(elements) @ element_coordinates(elements) @ nodal
+
+
+def stiffness_of_ends(elements: Beams) -> Array:
+    """(E, 12, 12) stiffness of the coordinates of the centroid line in element axes."""
+    to_nodes = np.linalg.inv(element_coordinates(elements))
+    return to_nodes.transpose(0, 2, 1) @ stiffness(elements) @ to_nodes
 
 
 def section_forces_at(modes: Array, xi: Array) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ffr_prep.body import Surface
@@ -11,22 +13,29 @@ from ffr_prep.structures.frame import Frame
 
 _STATIONS = 5
 
+Moved = Callable[[Array, Array, Array], Array]
 
-def swept_surface(frame: Frame, elements: Beams, nodal: Array) -> Surface:
-    """The boundary of all elements with the basis at its points: translation of the axis and rotation of the section.
 
-    nodal : (E, 12, n) coordinates of every element, in body axes, per elastic coordinate
+def swept_surface(frame: Frame, elements: Beams, moved: Moved) -> Surface:
+    """The boundary of all elements with fields of displacement at its points.
+
+    moved : of some elements, xi (Q,) and across (E, Q, 2), the fields (E, Q, 3, n) there, in body axes
     """
     points, triangles, shapes, count = [], [], [], 0
     for own, outline in prisms(frame):
         xi, across = stations(outline, len(own))
-        part = picked(elements, own)
         first = count + len(xi) * np.arange(len(own))
-        points.append(undeformed(part, xi, across).reshape(-1, 3))
+        points.append(undeformed(picked(elements, own), xi, across).reshape(-1, 3))
         triangles.append((first[:, None, None] + _prism(len(outline))).reshape(-1, 3))
-        shapes.append((field(part, xi, across) @ nodal[own][:, None]).reshape(-1, 3, nodal.shape[2]))
+        at_points = moved(own, xi, across)
+        shapes.append(at_points.reshape(-1, 3, at_points.shape[-1]))
         count += len(points[-1])
     return Surface(np.vstack(points), np.vstack(triangles), np.vstack(shapes))
+
+
+def moved_linearly(elements: Beams, nodal: Array) -> Moved:
+    """Translation of the axis and rotation of the section, of the coordinates nodal (E, 12, n) in body axes."""
+    return lambda own, xi, across: field(picked(elements, own), xi, across) @ nodal[own][:, None]
 
 
 def prisms(frame: Frame) -> list[tuple[Array, Array]]:

@@ -13,15 +13,18 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+import scipy.sparse as sp
 
 from ffr_prep.body import Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.structures import beams, plates
-from ffr_prep.structures.beam_stiffening import beam_stiffening
-from ffr_prep.structures.beam_stress import SECTION_STRESS, stressed_sweep
-from ffr_prep.structures.beam_surface import swept_surface
+from ffr_prep.structures.beam_second_order import second_stressed_sweep, second_sweep
+from ffr_prep.structures.beam_stiffening import beam_forces_of_products, beam_stiffening
+from ffr_prep.structures.beam_stress import SECTION_STRESS, section_forces, stressed_sweep
+from ffr_prep.structures.beam_surface import moved_linearly, swept_surface
 from ffr_prep.structures.frame import Frame, ends, orientations
-from ffr_prep.structures.plate_stiffening import plate_stiffening
+from ffr_prep.structures.plate_second_order import second_faces, second_stressed_faces
+from ffr_prep.structures.plate_stiffening import plate_forces_of_products, plate_stiffening
 from ffr_prep.structures.plate_surface import FACE_STRESS, plate_faces, stressed_faces
 
 
@@ -40,6 +43,9 @@ class Family:
     recovery   : how the stress is recovered, in words
     stiffening : (r, n, n) geometric stiffness, of the static coordinates (E, 6k, r) of r loads, their accelerations (12, r),
                  which act inside the elements, and the basis (E, 6k, n)
+    forces_of_products : (E, 6k, m) its linear form in the static coordinates, of one (E, 6k, 1) and others (E, 6k, m)
+    second     : what is drawn, with the displacements of pairs: of their coordinates (E, 6k, m), one and others
+    second_stressed : the same with their stress, and section forces of beams
     """
 
     name: str
@@ -52,6 +58,9 @@ class Family:
     stressed: Callable[[Array], Surface]
     recovery: str
     stiffening: Callable[[Array, Array, Array], Array]
+    forces_of_products: Callable[[Array, Array], Array]
+    second: Callable[[Array, Array, Array], Surface]
+    second_stressed: Callable[[Array, Array, Array], Surface]
 
 
 def families(frame: Frame) -> tuple[Family, ...]:
@@ -78,10 +87,15 @@ def beam_family(frame: Frame) -> Family:
         positions=beams.undeformed(elements, xi, across),
         mass=mass,
         field=beams.field(elements, xi, across),
-        surface=partial(swept_surface, frame, elements),
-        stressed=partial(stressed_sweep, frame, elements),
+        surface=lambda nodal: swept_surface(frame, elements, moved_linearly(elements, nodal)),
+        stressed=lambda nodal: stressed_sweep(
+            frame, elements, moved_linearly(elements, nodal), section_forces(elements, nodal)
+        ),
         recovery=SECTION_STRESS,
         stiffening=partial(beam_stiffening, elements),
+        forces_of_products=partial(beam_forces_of_products, elements),
+        second=partial(second_sweep, frame, elements),
+        second_stressed=partial(second_stressed_sweep, frame, elements),
     )
 
 
@@ -106,4 +120,22 @@ def plate_family(name: str, frame: Frame, nodes: Array, shell_of: Array) -> Fami
         stressed=partial(stressed_faces, elements, nodes),
         recovery=FACE_STRESS,
         stiffening=partial(plate_stiffening, elements),
+        forces_of_products=partial(plate_forces_of_products, elements),
+        second=partial(second_faces, elements, nodes),
+        second_stressed=partial(second_stressed_faces, elements, nodes),
     )
+
+
+# ---- nodal coordinates ---------------------------------------------------------------------------------------------
+
+
+def connectivity(nodes: Array, count: int) -> sp.csr_array:
+    """B_1 (6kE, 6N) Boolean: the coordinates of elements with the nodes (E, k) among those of all `count` nodes."""
+    columns = (6 * nodes[:, :, None] + np.arange(6)).ravel()
+    return sp.csr_array((np.ones(columns.size), columns, np.arange(columns.size + 1)), shape=(columns.size, 6 * count))
+
+
+def element_values(part: Family, q_n: Array) -> Array:
+    """(E, 6k, n) the coordinates of each element, B_1 q_n, of the nodal coordinates (6N, n)."""
+    by_node = q_n.reshape(-1, 6, q_n.shape[1])
+    return by_node[part.nodes].reshape(len(part.nodes), -1, q_n.shape[1])

@@ -21,9 +21,9 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.body.accelerations import INERTIAL, turns
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-from ffr_prep.model.accelerations import INERTIAL, turns
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion, rigid_field
 from ffr_prep.model.region_rotations import MeanRegion, RigidRegion, force_moments
 from ffr_prep.model.ties import check_names, interface_coordinates, six_rows, tied_rows
@@ -104,8 +104,10 @@ def turning_regions(
     for k, interface in enumerate(interfaces):
         rotation, nodes = model.C[6 * k + 3 : 6 * k + 6], _nodes(frame, interface)
         if interface.kind == "rigid":
-            sums = force_moments(nodes, frame.points[nodes] - model.positions[k], 6, len(frame.points))
-            made.append(RigidRegion(rotation, sp.csr_array(sums @ K @ ties), (sums @ every_load).toarray()))
+            arms = frame.points[nodes] - model.positions[k]
+            sums = force_moments(nodes, arms, 6, len(frame.points))
+            internal, external = sp.csr_array(sums @ K @ ties), (sums @ every_load).toarray()
+            made.append(RigidRegion(nodes, arms, rotation, internal, external))
         else:
             made.append(_mean_region(frame, nodes, model.positions[k], rotation, ties, INERTIAL + 6 * k))
     return made

@@ -19,18 +19,20 @@ import numpy as np
 import scipy.sparse as sp
 
 from ffr_prep.body import Surface
+from ffr_prep.body.accelerations import INERTIAL, unit_accelerations
 from ffr_prep.body.provenance import described
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.progress import Stages, no_stages
-from ffr_prep.model.accelerations import INERTIAL, unit_accelerations
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
 from ffr_prep.model.invariants import InertiaIntegrals, inertia_integrals
 from ffr_prep.model.model import Model, merged, summed
 from ffr_prep.model.region_rotations import region_stiffening
+from ffr_prep.model.second_order import SecondOrder
 from ffr_prep.solvers.threads import on_one_thread
-from ffr_prep.structures.element_families import Family, families
+from ffr_prep.structures.element_families import Family, connectivity, element_values, families
 from ffr_prep.structures.frame import Frame, check_frame, frame_hash
 from ffr_prep.structures.interfaces import couple_frame, tie, turning_regions
+from ffr_prep.structures.second_order import frame_second_order
 
 _CHUNK = 512
 
@@ -81,6 +83,11 @@ def from_frame(frame: Frame, interfaces: Sequence[InterfaceRegion] = (), *, prog
         of_elements = [part.stiffening(nodal(part, static), inside, nodal(part, basis)) for part in parts]
         return np.sum(of_elements, axis=0) + region_stiffening(regions, static, amplitudes, basis)
 
+    def second(basis: Array) -> SecondOrder:
+        count = INERTIAL + 6 * len(interfaces)
+        known = stiffening(np.zeros((len(basis), count)), np.eye(count), basis)
+        return frame_second_order(parts, ties, regions, known, basis)
+
     def surface(basis: Array) -> Surface | None:
         return merged([part.surface(nodal(part, basis)) for part in parts])
 
@@ -93,6 +100,7 @@ def from_frame(frame: Frame, interfaces: Sequence[InterfaceRegion] = (), *, prog
         surface=surface,
         stressed=stressed,
         stiffening=stiffening,
+        second=second,
         recovery="; ".join(dict.fromkeys(part.recovery for part in parts)),
         record=_record(frame, interfaces, coupled, parts),
     )
@@ -116,18 +124,6 @@ def assemble_frame(frame: Frame, parts: Sequence[Family]) -> StructuralMatrices:
 def _edges(nodes: Array) -> Array:
     """(E k, 2) the edges of elements (E, k); those of beams twice."""
     return np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=-1).reshape(-1, 2)
-
-
-def connectivity(nodes: Array, count: int) -> sp.csr_array:
-    """B_1 (6kE, 6N) Boolean: the coordinates of elements with the nodes (E, k) among those of all `count` nodes."""
-    columns = (6 * nodes[:, :, None] + np.arange(6)).ravel()
-    return sp.csr_array((np.ones(columns.size), columns, np.arange(columns.size + 1)), shape=(columns.size, 6 * count))
-
-
-def element_values(part: Family, q_n: Array) -> Array:
-    """(E, 6k, n) the coordinates of each element, B_1 q_n, of the nodal coordinates (6N, n)."""
-    by_node = q_n.reshape(-1, 6, q_n.shape[1])
-    return by_node[part.nodes].reshape(len(part.nodes), -1, q_n.shape[1])
 
 
 def element_mass(part: Family) -> Array:

@@ -65,6 +65,35 @@ def _gradient(elements: Plates, e: Array) -> tuple[Array, Array]:
     return np.ascontiguousarray(fields.reshape(count, points, 2, 3, -1).transpose(2, 3, 0, 1, 4)), area
 
 
+def strain_of_products(elements: Plates, at: Array, one: Array, others: Array) -> Array:
+    """(E, Q, 3, m) second derivatives of the strains xx, yy, 2 xy of the middle plane by the amplitudes of shapes.
+
+    one (E, 6k, 1), others (E, 6k, m), in element axes
+    """
+    gradient = displacement_gradient(elements, at)
+    g, h = (np.einsum("eqami,eir->eqamr", gradient, e, optimize=True) for e in (one, others))
+    product = np.einsum("eqam,eqbmr->eqabr", g[..., 0], h)
+    shear = product[:, :, 0, 1] + product[:, :, 1, 0]
+    return np.stack([product[:, :, 0, 0], product[:, :, 1, 1], shear], axis=2)
+
+
+def plate_forces_of_products(elements: Plates, one: Array, others: Array) -> Array:
+    """(E, 6k, m) geometric stiffness of one (E, 6k, 1) and others (E, 6k, m) as linear form of static coordinates."""
+    parts = [slice(first, first + _CHUNK) for first in range(0, len(elements.lift), _CHUNK)]
+    return np.concatenate([_forces_of_products(_part(elements, own), one[own], others[own]) for own in parts])
+
+
+def _forces_of_products(elements: Plates, one: Array, others: Array) -> Array:
+    k = elements.lift.shape[1]
+    at, weights = rule(k, _ORDER[k])
+    area = jacobian(elements, reference(k, at))[1] * weights
+    to_element = element_coordinates(elements)
+    strain = strain_of_products(elements, at, to_element @ one, to_element @ others)
+    forces = (elements.membrane[:, None] @ strain) * area[..., None, None]
+    of_coordinates = np.einsum("eqsi,eqsr->eir", membrane_strain(elements, at), forces, optimize=True)
+    return to_element.transpose(0, 2, 1) @ of_coordinates
+
+
 def _of_forces(gradient: Array, area: Array, forces: Array) -> Array:
     n = gradient.shape[-1]
     xx, yy, xy = np.moveaxis(forces * area[..., None], -1, 0)[..., None]

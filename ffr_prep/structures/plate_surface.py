@@ -11,8 +11,18 @@ from dataclasses import replace
 import numpy as np
 
 from ffr_prep.body import TENSOR, Surface
+from ffr_prep.body.accelerations import turned
 from ffr_prep.common.arrays import Array
-from ffr_prep.structures.plates import Plates, bending_strain, element_coordinates, field, membrane_strain, undeformed
+from ffr_prep.structures.plate_stiffening import strain_of_products
+from ffr_prep.structures.plates import (
+    Plates,
+    bending_strain,
+    element_coordinates,
+    fibre_rotation,
+    field,
+    membrane_strain,
+    undeformed,
+)
 
 _CORNERS = {3: np.array([(0, 0), (1, 0), (0, 1)], float), 4: np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float)}
 _FACE = {3: np.array([(0, 1, 2)]), 4: np.array([(0, 1, 2), (0, 2, 3)])}
@@ -38,10 +48,28 @@ def plate_faces(elements: Plates, nodes: Array, nodal: Array) -> Surface:
     return Surface(points[kept], triangles, shapes[kept])
 
 
-def stressed_faces(elements: Plates, nodes: Array, nodal: Array) -> Surface:
-    """As `plate_faces`, with stress modes."""
+def turned_faces(elements: Plates, nodes: Array, one: Array, others: Array) -> Array:
+    """(P, 3, m) second derivatives of the displacement of the points of `plate_faces` by the turn of the fibres.
+
+    one (E, 6k, 1) and others (E, 6k, m): coordinates in body axes
+    """
+    at, half = np.tile(_CORNERS[nodes.shape[1]], (2, 1)), _heights(elements)
+    turn = fibre_rotation(elements, at) @ element_coordinates(elements)[:, None]
+    of_fibre = turned((turn @ one[:, None])[..., 0], turn @ others[:, None])[:, :, :, 2] * half[..., None, None]
+    in_body_axes = np.einsum("eck,eqkr->eqcr", elements.C, of_fibre)
+    return in_body_axes.reshape(-1, 3, others.shape[2])[_shared(nodes, elements, half)[0]]
+
+
+def stressed_faces(
+    elements: Plates, nodes: Array, nodal: Array, products: tuple[Array, Array] | None = None
+) -> Surface:
+    """As `plate_faces`, with stress modes.
+
+    products : one (E, 6k, 1) and others (E, 6k, n), of which `nodal` is the second order: the stress is then that of the
+               pairs, the strain of second order included
+    """
     kept, place = _shared(nodes, elements, _heights(elements))
-    stress = _corner_stress(elements, nodal).reshape(len(place), 6, -1)
+    stress = _corner_stress(elements, nodal, products).reshape(len(place), 6, -1)
     total = np.zeros((len(kept), *stress.shape[1:]))
     np.add.at(total, place, stress)
     moduli = np.repeat(np.stack([elements.E, elements.nu], axis=1), 2 * nodes.shape[1], axis=0)
@@ -49,12 +77,15 @@ def stressed_faces(elements: Plates, nodes: Array, nodal: Array) -> Surface:
     return replace(plate_faces(elements, nodes, nodal), stress=mean, moduli=moduli[kept])
 
 
-def _corner_stress(elements: Plates, nodal: Array) -> Array:
+def _corner_stress(elements: Plates, nodal: Array, products: tuple[Array, Array] | None) -> Array:
     """(E, 2k, 6, n) stress in body axes at the corners of the upper and then of the lower face."""
-    at = _CORNERS[nodal.shape[1] // 6]
-    e = (element_coordinates(elements) @ nodal)[:, None]
+    at, to_element = _CORNERS[nodal.shape[1] // 6], element_coordinates(elements)
+    e = (to_element @ nodal)[:, None]
     half = elements.thickness[:, None, None, None] / 2
-    membrane, bent = membrane_strain(elements, at) @ e, half * (bending_strain(elements, at) @ e)
+    membrane = membrane_strain(elements, at) @ e
+    if products is not None:
+        membrane = membrane + strain_of_products(elements, at, *(to_element @ of for of in products))
+    bent = half * (bending_strain(elements, at) @ e)
     elastic = (elements.membrane / elements.thickness[:, None, None])[:, None]
     plane = elastic @ np.concatenate([membrane + bent, membrane - bent], axis=1)
     tensor = np.zeros((*plane.shape[:2], 3, 3, plane.shape[3]))

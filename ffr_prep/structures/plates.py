@@ -290,6 +290,14 @@ def displacement_gradient(elements: Plates, at: Array) -> Array:
     return gradient
 
 
+def fibre_rotation(elements: Plates, at: Array) -> Array:
+    """(E, Q, 3, 6k) rotation of the fibres about x and y and of the nodes about the normal, in element axes."""
+    of, sides = reference(elements.lift.shape[1], at), _sides(elements)
+    tilt = _rotation(sides, of.N[None], of.P[None])
+    drilling = np.broadcast_to(_nodal(of.N, 5)[:, None], (*tilt.shape[:2], 1, tilt.shape[3]))
+    return np.concatenate([tilt, drilling], axis=2)
+
+
 def membrane_strain(elements: Plates, at: Array) -> Array:
     """(E, Q, 3, 6k) strains xx, yy, 2 xy of the middle plane of the element coordinates W C_bar B_1 q_n, element axes [1/m].
 

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.scene.forces.force import LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import FlexibleBody, Surface, axial
@@ -67,7 +66,7 @@ def check_integrals(force: Any, scene: Scene) -> None:
 def law_of_integrals(force: Any, now: Moment, c: Any, rate: Any) -> Any:
     """(6 + n,) generalised forces: a function of time times the integrals."""
     made: Affine | Spread = force.integrals(force.place.of(now.state.scene).model)
-    return now.value(force.function)[0] * made.at(c, rotation_matrix(now.state.rotation(force.body)))
+    return now.value(force.function)[0] * made.at(c, now.state.axes(force.body))
 
 
 def compiled_integrals(force: Any, table: LoadTable) -> LawNumbers:

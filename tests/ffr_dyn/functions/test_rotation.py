@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from differences import difference
 
 from ffr_dyn.functions.rotation import from_vector, rotation_matrix, skew, tangent, tangent_rate
 
@@ -13,12 +14,6 @@ AXIS, RATE = np.array([0.36, -0.48, 0.8]), np.array([0.7, 0.2, -0.5])
 
 def exponential(theta: np.ndarray) -> np.ndarray:
     return rotation_matrix(from_vector(theta))
-
-
-def difference(function, h: float = 2e-3) -> np.ndarray:
-    """d/ds at zero, of order eight."""
-    steps, weights = (1, 2, 3, 4), (4 / 5, -1 / 5, 4 / 105, -1 / 280)
-    return sum(w * (function(k * h) - function(-k * h)) for k, w in zip(steps, weights, strict=True)) / h
 
 
 @pytest.mark.parametrize("angle", ANGLES)

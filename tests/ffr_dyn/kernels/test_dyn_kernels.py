@@ -190,7 +190,7 @@ def test_a_symmetric_body_is_computed_in_blocks_and_equals_its_twin(planes, bloc
         gravity=(0.5, -9.81, 0.2),
     )
     system = compile_scene(scene)
-    assert system.model.bodies.blocks[0] == blocks
+    assert system.model.bodies.blocks[0] == 2 * blocks  # those that are multiplied by q_dot, too, apart
     assert system.model.bodies.PP_dm.size < 0.6 * 9 * 24**2
     x, v = random_state(scene)
     engine = new_engine(system, x, v)
@@ -200,26 +200,29 @@ def test_a_symmetric_body_is_computed_in_blocks_and_equals_its_twin(planes, bloc
     np.testing.assert_allclose(engine.work.bodies.acc, twin.acceleration, rtol=0, atol=1e-10 * scale)
 
 
-def products_by_plan(pool, plan, q, count, last):
-    """sum_i q_i table_i of all components, and of the last, from their blocks."""
-    n = q.size
-    sizes = plan[1 : 1 + 3 * plan[0]].reshape(-1, 3)
-    order, place, late_place = np.split(plan[1 + sizes.size :], [n, n + count])
-    found, late, at, first = [], [], 0, 0
-    for inputs, outputs, of_last in sizes:
-        block = pool[at : at + inputs * outputs].reshape(inputs, outputs)
-        y = q[order[first : first + inputs]] @ block
-        found.append(y)
-        late.append(y[outputs - of_last :])
-        at, first = at + inputs * outputs, first + inputs
-    found, late = np.append(np.concatenate(found), 0.0), np.append(np.concatenate(late), 0.0)
-    return found[place], late[late_place[:last]]
+def products_by_plan(pool, plan, q, q_dot, count, last):
+    """sum_i q_i table_i of all components, and sum_i q_dot_i of the last, from their blocks, as `contract` finds them."""
+    n, (number, given, early) = q.size, plan[:3]
+    blocks = plan[3 : 3 + 4 * number].reshape(-1, 4)
+    order, place, late_place = (
+        np.split(plan[3 + 4 * number :], [n, n + count]) if not given else (np.arange(n), None, None)
+    )
+    found, late, at = np.zeros(count + 1), np.zeros(last + 1), 0
+    for first, inputs, out, width in blocks:
+        block = pool[at : at + inputs * width].reshape(inputs, width)
+        found[out : out + width] = q[order][first : first + inputs] @ block
+        if out >= early:
+            late[out - early : out - early + width] = q_dot[order][first : first + inputs] @ block
+        at += inputs * width
+    return (found[:-1], late[:-1]) if given else (found[place], late[late_place])
 
 
-def test_blocks_give_the_products_of_the_whole_table():
-    """Also where components vanish, coordinates are in none, and a family's rounding is not zero."""
+@pytest.mark.parametrize("mixed", [True, False])
+def test_blocks_give_the_products_of_the_whole_table(mixed):
+    """Also where components vanish, coordinates are in none, and a family's rounding is not zero; families may lie mixed."""
     rng = np.random.default_rng(5)
-    n, families = 30, np.arange(30) % 3
+    n = 30 if mixed else 60
+    families = np.arange(n) % 3 if mixed else np.sort(np.arange(n) % 3)
     table = np.zeros((n, 6, n))
     table[:, 0] = rng.normal(size=(n, n)) * (families[:, None] == families)
     table[:, 1] = rng.normal(size=(n, n)) * (families[:, None] + families == 3)
@@ -229,12 +232,13 @@ def test_blocks_give_the_products_of_the_whole_table():
     table[:, :4] += np.swapaxes(table[:, :4], 0, 2)
     table[:, 4:] -= np.swapaxes(table[:, 4:], 0, 2)
     pool, plan = in_blocks(table, 2, np.full(6, 1e-9))
-    assert plan[0] == 3  # component 1 couples two families, but each of its products belongs to one
-    q = rng.normal(size=n)
-    expected = np.einsum("i,icj->cj", q, np.where(np.abs(table) < 1e-9, 0.0, table))
-    every, last = products_by_plan(pool, plan, q, 6 * n, 2 * n)
-    np.testing.assert_allclose(every.reshape(6, n), expected, atol=1e-13)
-    np.testing.assert_allclose(last.reshape(2, n), expected[4:], atol=1e-13)
+    assert plan[1] == (not mixed)
+    assert pool.size < 0.3 * table.size
+    q, q_dot = rng.normal(size=(2, n))
+    kept = np.where(np.abs(table) < 1e-9, 0.0, table)
+    every, last = products_by_plan(pool, plan, q, q_dot, 6 * n, 2 * n)
+    np.testing.assert_allclose(every.reshape(6, n), np.einsum("i,icj->cj", q, kept), atol=1e-13)
+    np.testing.assert_allclose(last.reshape(2, n), np.einsum("i,icj->cj", q_dot, kept)[4:], atol=1e-13)
 
 
 def test_tables_lie_at_the_starts_of_cache_lines():
@@ -249,7 +253,7 @@ def test_tables_lie_at_the_starts_of_cache_lines():
 def test_a_body_without_symmetry_and_one_of_few_modes_are_one_block():
     for body in (cloud(20), mirrored(8, 2)):
         bodies = compile_scene(Scene(bodies=(Body("one", body),))).model.bodies
-        assert bodies.blocks.tolist() == [0]
+        assert bodies.blocks[0] == 2
         assert bodies.PP_dm.size == 9 * body.n**2 + LANES
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.integrators.rk4 import RK4
 from ffr_dyn.kernels import integrator_api
-from ffr_dyn.kernels.entry_points import evaluate, solve, solve_motion
+from ffr_dyn.kernels.entry_points import evaluate, solve
 from ffr_dyn.kernels.simd.entry_point import ENTRY_POINTS
 from ffr_dyn.kernels.simd.table_address import Packed
 from ffr_dyn.kernels.tables import Tables
@@ -33,7 +33,6 @@ def test_all_are_given_the_tables_first_and_forms_share_their_arguments():
         assert entry.general.kinds[0][0] == Packed(Tables)
         assert all(form.kinds == entry.general.kinds for _, form in entry.forms)
     assert solve.forms
-    assert solve_motion.forms
 
 
 def example() -> str:
@@ -80,7 +79,6 @@ def test_the_method_that_the_interface_shows_swings_a_pendulum(tmp_path):
         stage_count: ClassVar[int] = 1
         row_stages: ClassVar[int] = 0
         keeps_terms: ClassVar[bool] = False
-        looks_ahead: ClassVar[int] = 0
         do_step: ClassVar[Any] = euler_step
 
     def end(method: Any) -> np.ndarray:

@@ -25,7 +25,7 @@ from ffr_dyn.kernels.multiplier_solver import (
     solve_upper,
 )
 from ffr_dyn.kernels.options import OPTIONS
-from ffr_dyn.kernels.products import multiply
+from ffr_dyn.kernels.products import multiply, multiply_both
 from ffr_dyn.kernels.simd import lanes, plain
 from ffr_dyn.kernels.simd.intrinsics import PLAIN, compiled_forms
 from ffr_dyn.kernels.simd.slices import part, peek, three_parts, vector_at
@@ -152,17 +152,18 @@ def test_sides_are_eliminated_and_coupled(flexible, plane):
 @pytest.mark.parametrize("width", [1, 8, 24, 33, 72, 100])
 def test_products_of_a_table(count, width):
     rng = np.random.default_rng(count * width)
-    table, x, begin = rng.normal(size=(count + 1, width + 3)), rng.normal(size=count), rng.normal(size=width + LANES)
+    table, x, xd = rng.normal(size=(count, width)), *rng.normal(size=(2, count + 1))
 
     @compiled
-    def run(count, width, stride, table, x, begin, y):
-        multiply(count, width, stride, table, 2, x, 0, begin, 1, y, 1)
+    def run(count, width, table, x, xd, alone, y, yd):
+        multiply(count, width, table, 2, x, 1, alone, 3)
+        multiply_both(count, width, table, 2, x, xd, 1, y, yd, 1, 2)
 
-    y = np.zeros(width + 2 * LANES)
-    pool = np.concatenate([table.ravel(), np.zeros(LANES)])
-    run(count, width, width + 3, pool, x, begin, y)
-    expected = begin[:width] + x @ table[:count, 2 : 2 + width]
-    np.testing.assert_allclose(y[1 : 1 + width], expected, rtol=1e-12, atol=1e-13)
+    alone, y, yd = np.zeros((3, width + 2 * LANES))
+    run(count, width, np.concatenate([[0.0, 0.0], table.ravel(), np.zeros(LANES)]), x, xd, alone, y, yd)
+    np.testing.assert_allclose(alone[3 : 3 + width], x[1:] @ table, rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(y[1 : 1 + width], x[1:] @ table, rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(yd[2 : 2 + width], xd[1:] @ table, rtol=1e-12, atol=1e-13)
 
 
 # ---- another numba -----------------------------------------------------------------------------------------------------

@@ -109,7 +109,7 @@ def test_a_tie_between_points_that_differ_is_a_rigid_arm():
     )
     second = fp.from_frame(named(frame, tip=(0.8, 0, 0.2)), [InterfaceRegion("a"), InterfaceRegion("tip")])
     parts = {"first": first, "second": second}
-    X = elimination(parts, [("first.end", "second.a")])
+    X, _ = elimination(parts, [("first.end", "second.a")])
     model = tied(parts, [("first.end", "second.a")])
     z = X @ np.random.default_rng(0).normal(size=(X.shape[1], 1))
     end, a = (parts[p].coupled.C for p in parts)

@@ -16,8 +16,8 @@ from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import FlexibleBody, truncated
+from ffr_prep.body.accelerations import unit_accelerations
 from ffr_prep.body.planar import in_plane
-from ffr_prep.model.accelerations import unit_accelerations
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported

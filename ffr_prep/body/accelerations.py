@@ -33,3 +33,11 @@ def unit_accelerations(points: Array) -> Array:
     """(12, P, 3) acceleration at the points (P, 3): translations, angular accelerations, products."""
     along = np.broadcast_to(np.eye(3)[:, None], (3, *points.shape))
     return np.concatenate([along, points @ gradients().transpose(0, 2, 1)])
+
+
+def turned(one: Array, others: Array) -> Array:
+    """(..., 3, 3, m) G with the second derivative G r of the displacement of an arm r that turns by one (..., 3) and
+    others (..., 3, m)."""
+    product = one[..., :, None, None] * others[..., None, :, :]
+    trace = np.einsum("...kkm->...m", product)
+    return (product + np.swapaxes(product, -3, -2)) / 2 - trace[..., None, None, :] * np.eye(3)[..., None]

@@ -1,0 +1,115 @@
+"""Second-order bodies of a scene in their mean-axis form, and the state of a scene in its own frames brought into it.
+
+With the elastic coordinates q of the form, R and A its frame, and its own frame a marker at rho(q) that turns by
+exp(theta(q)) (`ffr_prep.body.mean_axis`), x_c the pivot in the own frame:
+
+    q_own = C q,   A_own = A exp(theta~),   R_own = R + A rho - A_own x_c.
+
+What a scene declares is in its own frames; here it is taken into the other, velocities included. The way back, of results,
+is `ffr_dyn.results.recorded_motion.View`, of a single state `ffr_dyn.equations.state_view`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ffr_dyn.functions.rotation import cross, from_vector, product, rotation_matrix, tangent
+from ffr_dyn.scene.force_kinds import in_bases
+from ffr_dyn.scene.own_frame import OwnFrame
+from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.variants.families import by_family
+from ffr_dyn.variants.variant import used_interfaces, with_basis
+from ffr_prep.body import FlexibleBody, idle_loads, mean_axis_form
+from ffr_prep.common.errors import InputError
+
+
+def in_mean_axis_frames(scene: Scene) -> Scene:
+    """The scene with every second-order body in its mean-axis form; those that are in it stay as they are.
+
+    Raises InputError for joints and forces at a point whose loads have no matrices.
+    """
+    forms: dict[int, tuple[FlexibleBody, OwnFrame]] = {}
+    bodies = tuple(_converted(scene, body, forms) for body in scene.bodies)
+    bases = {
+        new.name: new.frame.C for old, new in zip(scene.bodies, bodies, strict=True) if new is not old and new.frame
+    }
+    return replace(scene, bodies=bodies, forces=in_bases(scene.forces, bases)) if bases else scene
+
+
+def _converted(scene: Scene, body: Body, forms: dict[int, tuple[FlexibleBody, OwnFrame]]) -> Body:
+    """forms : by identity of the model, what equal bodies share"""
+    if body.frame or not (body.model.n and body.stiffening and body.model.stiffening is not None):
+        return body
+    _check_known(scene, body)
+    if _is_mean_axis(body.model):
+        return body
+    if id(body.model) not in forms:
+        forms[id(body.model)] = _form(body.model)
+    model, frame = forms[id(body.model)]
+    return _moved(replace(body, model=model, frame=frame))
+
+
+def _form(model: FlexibleBody) -> tuple[FlexibleBody, OwnFrame]:
+    """The mean-axis form with its coordinates family by family, in which products are found soonest."""
+    form = mean_axis_form(model)
+    V = np.eye(form.body.n)[:, by_family(form.body)]
+    return with_basis(form.body, V), OwnFrame(model, form.frame, form.C).combined(V)
+
+
+def _moved(body: Body) -> Body:
+    """A body whose state is still that in its own frame, in the state that belongs to the mean-axis form."""
+    assert body.frame
+    if not (body.q.any() or body.q_dot.any()):
+        return body
+    at, C = body.frame.marker, body.frame.C
+    q, q_dot = np.linalg.solve(C, body.q), np.linalg.solve(C, body.q_dot)
+    bent = at.K @ q
+    phi = np.concatenate([at.phi_t, at.phi_r])
+    place, rates = (phi - 0.5 * bent) @ q, (phi - bent) @ q_dot
+    rho, theta = at.pivot + place[:3], place[3:]
+    turn = from_vector(theta)
+    rotation = product(body.rotation, turn * [1.0, -1.0, -1.0, -1.0])
+    own, A = rotation_matrix(body.rotation), rotation_matrix(rotation)
+    omega = rotation_matrix(turn) @ body.omega_bar - tangent(theta) @ rates[3:]
+    shift = own @ cross(body.omega_bar, at.pivot) - A @ (cross(omega, rho) + rates[:3])
+    return replace(
+        body,
+        position=body.position + (own @ at.pivot - A @ rho),
+        rotation=rotation,
+        velocity=body.velocity + shift,
+        omega_bar=omega,
+        q=q,
+        q_dot=q_dot,
+    )
+
+
+def _check_known(scene: Scene, body: Body) -> None:
+    """InputError where something acts at a point that has no second-order displacement."""
+    idle = idle_loads(body.model).tolist()[::6]
+    # A held place may turn, and moments on slender bodies have no matrix.
+    unknown = {i.name for i, none in zip(body.model.interfaces, idle, strict=True) if none and np.any(i.phi_t)}
+    for name in used_interfaces(scene, body):
+        if name in unknown:
+            raise InputError(
+                f"body {body.name!r} does not know the second-order displacement of its point {name!r}, at which something "
+                "acts (a point that was added to an older file?): make it an interface of the reduction, or compute the "
+                "body without load matrices (stiffening = false)"
+            )
+
+
+def with_mean_axis_bodies(scene: Scene) -> Scene:
+    """The scene with second-order bodies that are theirs in the mean-axis form: its frame and modes are those of its results.
+
+    Raises InputError as `in_mean_axis_frames`.
+    """
+    converted = in_mean_axis_frames(scene)
+    return replace(converted, bodies=tuple(replace(body, frame=None) for body in converted.bodies))
+
+
+def _is_mean_axis(model: FlexibleBody) -> bool:
+    """Whether a body is in its mean-axis form already: what vanishes there is zero, and no rounding."""
+    assert model.stiffening is not None
+    skew = model.rP_dm - model.rP_dm.transpose(1, 0, 2)
+    return not (model.P_dm.any() or model.stiffening[:6].any() or skew.any())
