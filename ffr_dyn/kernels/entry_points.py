@@ -25,7 +25,7 @@ from ffr_dyn.kernels.solution import (
     solve_back,
 )
 from ffr_dyn.kernels.step_control import controlled_step, interpolate
-from ffr_dyn.kernels.stiff_forces import corrected_velocities, subtract_yield, take_pull
+from ffr_dyn.kernels.stiff_forces import corrected_velocities, leave_forces, subtract_yield, take_pull
 from ffr_dyn.kernels.system import (
     apply_motion,
     evaluate_joints,
@@ -282,12 +282,13 @@ def solve_of_dependent_rows(r: Tables, target: Vector) -> int:
 
 @entry_point()
 def correct(r: Tables, r_v: Vector, target: Vector) -> int:
-    """f += M r_v, target += Phi_q r_v, for the corrections of a stage; r_v (V,)."""
+    """f += M r_v, target += Phi_q r_v of the constraint rows, for the corrections of a stage; r_v (V,)."""
     bodies, bw, rw = r.model.bodies, r.work.bodies, r.work.rows
     correction, wanted = vector_at(r_v, r.v.size), vector_at(target, r.stages.target.size)
     copy(bw.acc, correction)
     to_body_axes(bodies.where, bw.A, bw.acc)
     constraint_rates(bodies.where, r.model.markers, r.model.rows, rw.jac, r.work.markers.phi, bw.acc, rw.lam)
+    leave_forces(r.model.rows, rw.lam)
     add_scaled(wanted, wanted, 1.0, rw.lam)
     for b in range(bodies.mass.size):
         j, size = bodies.where[b, IN_V], 6 + bodies.where[b, N]

@@ -216,7 +216,7 @@ def weigh_forces(r, by_rate, by_place):
 @inlined
 def add_stiff_part(r, x, v, r_x, gh):
     """What a stage has on its right side beside the forces: f -= gamma h Omega^2 (q_dot + r_q), and the targets of stiff
-    forces. After `correct`."""
+    forces."""
     bodies, f = r.model.bodies, r.work.bodies.f
     for b in range(bodies.mass.size):
         n, i, j, shared = bodies.where[b, N], bodies.where[b, IN_X], bodies.where[b, IN_V], bodies.where[b, IN_SHARED]

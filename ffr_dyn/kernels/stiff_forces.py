@@ -72,6 +72,14 @@ def subtract_yield(rows, rw, lam, out):
             out[row] -= rw.compliance[LANES * k + row - rows.start[k]] * lam[row]
 
 
+@kernel
+def leave_forces(rows, out):
+    """Zeros in out (C,) at the rows of stiff forces."""
+    for k in range(rows.forced.size):
+        for row in range(rows.forced[k], rows.start[k + 1]):
+            out[row] = 0.0
+
+
 @inlined
 def take_pull(rows, rw, rate, target):
     """target (C,) of the rows of stiff forces from the rates J (v + r_x) of their coordinates."""
