@@ -122,9 +122,7 @@ def slider_crank_rod(elements: int, modes: int) -> FlexibleBody:
             named(frame, crankpin=(0, 0, 0), slider=(0.3, 0, 0)),
             [InterfaceRegion("crankpin"), InterfaceRegion("slider")],
         ),
-        fp.Request(
-            name="rod", reference=SimplySupported("crankpin", "slider"), reduction=CraigBampton(modes), stiffening=True
-        ),
+        fp.Request(name="rod", reference=SimplySupported("crankpin", "slider"), reduction=CraigBampton(modes)),
     )
 
 
@@ -139,7 +137,7 @@ def pendulum_rod() -> FlexibleBody:
     frame = polyline([(0, 0, 0), (1.2, 0, 0)], member, elements=40)
     return fp.reduce(
         fp.from_frame(named(frame, root=(0, 0, 0), tip=(1.2, 0, 0)), ENDS),
-        fp.Request(name="rod", reference=SimplySupported("root", "tip"), reduction=CraigBampton(20), stiffening=True),
+        fp.Request(name="rod", reference=SimplySupported("root", "tip"), reduction=CraigBampton(20)),
     )
 
 
@@ -151,7 +149,7 @@ def spin_up_beam() -> FlexibleBody:
     )
     return fp.reduce(
         fp.from_frame(named(frame, root=(0, 0, 0), tip=(10.0, 0, 0)), ENDS),
-        fp.Request(name="beam", reference=FixedTo("root"), reduction=Eigenmodes(12), stiffening=True),
+        fp.Request(name="beam", reference=FixedTo("root"), reduction=Eigenmodes(12)),
     )
 
 
@@ -165,7 +163,7 @@ def rotating(kind: str) -> tuple[FlexibleBody, float]:
         frame = polyline([(0, 0, 0), (1.0, 0, 0)], Member(section, STEEL, (0, 1.0, 0)), elements=45)
         body = fp.reduce(
             fp.from_frame(named(frame, root=(0, 0, 0)), ENDS[:1]),
-            fp.Request(name="beam", reference=FixedTo("root"), reduction=Eigenmodes(10), stiffening=True),
+            fp.Request(name="beam", reference=FixedTo("root"), reduction=Eigenmodes(10)),
         )
         unit = STEEL.E * 1e-6 / STEEL.rho
     else:
@@ -173,7 +171,7 @@ def rotating(kind: str) -> tuple[FlexibleBody, float]:
         mesh = replace(mesh, points=mesh.points - (0, 0.00505, 0.005))
         body = fp.reduce(
             fp.from_mesh(mesh, UNCONTRACTED, [InterfaceRegion("left")]),
-            fp.Request(name="bar", reference=FixedTo("left"), reduction=Eigenmodes(10), stiffening=True),
+            fp.Request(name="bar", reference=FixedTo("left"), reduction=Eigenmodes(10)),
         )
         unit = UNCONTRACTED.E * 0.01**2 / 12 / UNCONTRACTED.rho
     chosen = [np.flatnonzero(body.PP_dm[c, c].diagonal() > 0.9)[:3] for c in (1, 2)]
@@ -237,7 +235,7 @@ def thin_ring(rich: bool) -> tuple[FlexibleBody, float]:
 
 def strip(kind: str, reference: ReferenceConditions) -> FlexibleBody:
     """A strip of 1 m whose height is along y, of beams or solids, with stiffening."""
-    make = {"name": "strip", "reference": reference, "stiffening": True}
+    make = {"name": "strip", "reference": reference}
     if kind == "beams":
         section = shear_rigid(general("strip", A=1e-3, Iy=1e-9, Iz=1e-4, J=4e-9))
         frame = polyline([(0, 0, 0), (1.0, 0, 0)], Member(section, STEEL, (0, 1.0, 0)), elements=40)

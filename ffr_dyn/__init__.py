@@ -51,10 +51,11 @@ _BY_MODULE = {
     "ffr_dyn.results.stress": "hot_spots peaks section_forces section_histories section_peaks stress_histories",
     "ffr_dyn.consistency.assemble": "Assembled assemble",
     "ffr_dyn.consistency.mobility": "Mobility mobility",
+    "ffr_dyn.consistency.validity": "parts_needed",
     "ffr_dyn.pictures.animate": "animate",
     "ffr_dyn.pictures.histories": "plot plot_path",
     "ffr_dyn.pictures.stress_report": "report_lines stress_report",
-    "ffr_dyn.analyses.bounded": "Bounded",
+    "ffr_dyn.analyses.inversion.bounded": "Bounded",
     "ffr_dyn.analyses.efforts": "JointEffort MarkerEffort recorded with_effort",
     "ffr_dyn.analyses.events": "Event",
     "ffr_dyn.analyses.forward": "Forward forward",
@@ -141,10 +142,11 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     )
     from ffr_dyn.consistency.assemble import Assembled as Assembled, assemble as assemble
     from ffr_dyn.consistency.mobility import Mobility as Mobility, mobility as mobility
+    from ffr_dyn.consistency.validity import parts_needed as parts_needed
     from ffr_dyn.pictures.animate import animate as animate
     from ffr_dyn.pictures.histories import plot as plot, plot_path as plot_path
     from ffr_dyn.pictures.stress_report import report_lines as report_lines, stress_report as stress_report
-    from ffr_dyn.analyses.bounded import Bounded as Bounded
+    from ffr_dyn.analyses.inversion.bounded import Bounded as Bounded
     from ffr_dyn.analyses.efforts import (
         JointEffort as JointEffort, MarkerEffort as MarkerEffort, recorded as recorded, with_effort as with_effort
     )

@@ -46,6 +46,7 @@ _BY_MODULE = {
     "ffr_prep.mesh.formats": "register_mesh_format MeshFormat",
     "ffr_prep.mesh.mesh": "Block Mesh check_mesh read_mesh",
     "ffr_prep.model.coupled": "InterfaceRegion",
+    "ffr_prep.model.cuts": "CutPlane",
     "ffr_prep.model.material": "AnisotropicMaterial Material material orthotropic",
     "ffr_prep.model.model": "Model",
     "ffr_prep.model.reference": "FixedTo MeanAxis SimplySupported Support Supports UserConditions",
@@ -74,6 +75,7 @@ _BY_MODULE = {
     "ffr_prep.structures.frame": "Frame Member Shell joined named panel polyline triangulated",
     "ffr_prep.structures.frame_geometry": "read_frame",
     "ffr_prep.structures.model": "from_frame",
+    "ffr_prep.structures.nodal_integrals": "NodalIntegrals nodal_integrals",
     "ffr_prep.structures.sections": "Section circle general i_section rectangle shear_rigid shifted tube "
     "with_mass_moments",
 }
@@ -109,6 +111,7 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_prep.mesh.formats import register_mesh_format as register_mesh_format, MeshFormat as MeshFormat
     from ffr_prep.mesh.mesh import Block as Block, Mesh as Mesh, check_mesh as check_mesh, read_mesh as read_mesh
     from ffr_prep.model.coupled import InterfaceRegion as InterfaceRegion
+    from ffr_prep.model.cuts import CutPlane as CutPlane
     from ffr_prep.model.material import (
         AnisotropicMaterial as AnisotropicMaterial, Material as Material, material as material,
         orthotropic as orthotropic,
@@ -146,6 +149,7 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     )
     from ffr_prep.structures.frame_geometry import read_frame as read_frame
     from ffr_prep.structures.model import from_frame as from_frame
+    from ffr_prep.structures.nodal_integrals import NodalIntegrals as NodalIntegrals, nodal_integrals as nodal_integrals
     from ffr_prep.structures.sections import (
         Section as Section, circle as circle, general as general, i_section as i_section,
         rectangle as rectangle, shear_rigid as shear_rigid, shifted as shifted, tube as tube,

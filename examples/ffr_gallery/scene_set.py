@@ -66,7 +66,7 @@ def beam(
     frame = named(polyline([(0, 0, 0), (length, 0, 0)], member, elements=16), a=(0, 0, 0), b=(length, 0, 0))
     return fp.reduce(
         fp.from_frame(frame, [InterfaceRegion("a"), InterfaceRegion("b")]),
-        fp.Request(name=name, reference=reference, reduction=CraigBampton(modes), stiffening=True, stress=True),
+        fp.Request(name=name, reference=reference, reduction=CraigBampton(modes), stress=True),
     )
 
 

@@ -20,6 +20,7 @@ from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
+from ffr_dyn.scene.parts import described
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 
@@ -51,7 +52,7 @@ def assembly(
     record = record_states(at, np.array([time]), assembled.x[None], assembled.v[None])
     notes = [note for note in assembled.notes if not note.startswith("assembly moved")]
     attributes = {
-        "title": scene.name,
+        **described(scene),
         "analysis": "assembly",
         "method": "smallest changes in the norm of the mass matrix",
         "evaluations": int(at.work.info[EVALUATIONS]),

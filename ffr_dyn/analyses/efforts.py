@@ -119,18 +119,26 @@ def _load(effort: MarkerEffort, component: Any) -> Load:
 
 def sized(at: Evaluator, efforts: tuple[Effort, ...], sizes: Array) -> Evaluator:
     """The same memory for the scene with its unit efforts at other sizes (U,)."""
-    model, scene = at.system.model, at.system.scene
+    model = at.system.model
     numbers = model.loads.data.copy()
-    starts = dict(zip((force.name for force in forces_of(scene)), model.loads.row[:, LAW], strict=True))
-    for effort, size in zip(efforts, sizes, strict=True):
-        first = starts[effort.name]
-        if isinstance(effort, JointEffort):
-            numbers[first] = size
-        else:
-            first += 3 * effort.moment
-            numbers[first : first + 3] = size * np.array(effort.direction)
+    slots, shares = effort_slots(at, efforts)
+    numbers[slots] = shares @ sizes
     tables = model._replace(loads=model.loads._replace(data=numbers))
     return replace(at, engine=with_model(at.engine, tables))
+
+
+def effort_slots(at: Evaluator, efforts: tuple[Effort, ...]) -> tuple[Array, Array]:
+    """Where the numbers (S,) of unit efforts stand in the data of the loads, and their shares (S, U) in each effort."""
+    starts = dict(
+        zip((force.name for force in forces_of(at.system.scene)), at.system.model.loads.row[:, LAW], strict=True)
+    )
+    slots, shares = [np.zeros(0, int)], [np.zeros((0, len(efforts)))]
+    for effort, one in zip(efforts, np.eye(len(efforts)), strict=True):
+        along = np.ones(1) if isinstance(effort, JointEffort) else np.array(effort.direction)
+        first = starts[effort.name] + (3 * effort.moment if isinstance(effort, MarkerEffort) else 0)
+        slots.append(first + np.arange(along.size))
+        shares.append(np.outer(along, one))
+    return np.concatenate(slots), np.concatenate(shares)
 
 
 def recorded(times: Array, values: Array, *, rates: Array | None = None, degree: int = 5) -> TimeFunction:

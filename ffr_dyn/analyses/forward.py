@@ -43,6 +43,7 @@ from ffr_dyn.results.file import ResultWriter, load_checkpoint, load_result
 from ffr_dyn.results.quantities import Entry, Memory, measure, needs_every_step, selected
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.checks import several
+from ffr_dyn.scene.parts import described
 from ffr_dyn.scene.scene import Scene
 from ffr_dyn.scene.surfaces import surface_of
 from ffr_prep.body import Surface
@@ -391,7 +392,7 @@ def _header(
 ) -> dict[str, Any]:
     start, end, output_step = span
     return {
-        "title": scene.name,
+        **described(scene),
         "analysis": "forward dynamics",
         "method": f"{method!r}",
         "stabilisation": f"{stabilisation!r}",

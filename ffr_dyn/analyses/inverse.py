@@ -27,6 +27,7 @@ from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
+from ffr_dyn.scene.parts import described
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
@@ -125,7 +126,7 @@ def _quasi_static(
     record = joined(rows)
     turned, _, stretched = extremes(assembled.system, record)
     attributes = {
-        "title": scene.name,
+        **described(scene),
         "analysis": "inverse dynamics, quasi-static deformation",
         "method": "Newton-Raphson",
         "evaluations": int(at.work.info[EVALUATIONS]),

@@ -35,6 +35,7 @@ from ffr_dyn.consistency.mobility import named_motion, require_driven
 from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
+from ffr_dyn.scene.parts import described
 from ffr_dyn.scene.scene import Body, Scene, require_scene
 from ffr_prep.body import truncated
 from ffr_prep.common.arrays import Array
@@ -101,7 +102,7 @@ def kinematic(
     record = _recorded(assembled, poses)
     notes = [*assembled.notes, *_undeformed_notes(scene), *_singular_notes(followed)]
     attributes = {
-        "title": scene.name,
+        **described(scene),
         "analysis": "kinematic",
         "method": "Newton-Raphson",
         "evaluations": int(at.work.info[EVALUATIONS]),

@@ -31,6 +31,7 @@ from ffr_dyn.results.file import save_result
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.checks import several
+from ffr_dyn.scene.parts import described
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
@@ -269,7 +270,7 @@ def as_result(scene: Scene, found: Linearisation, time: float = 0.0) -> Result:
             labelled = tuple(a if isinstance(a, Axis) else Axis(_AXES[a is found.inputs], _labels(a)) for a in axes)
             quantities[name] = Quantity(matrix[None], "1", labelled, f"state space matrix {name}")
     attributes = {
-        "title": scene.name,
+        **described(scene),
         "analysis": "linearised",
         "method": f"central differences, step halving changes A by {found.error:.1e}",
         "degrees_of_freedom": d,

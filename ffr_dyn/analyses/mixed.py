@@ -17,17 +17,18 @@ from typing import Any, ClassVar, get_args
 
 import numpy as np
 
-from ffr_dyn.analyses.bounded import Bounded, bounded_solution
 from ffr_dyn.analyses.efforts import Effort, JointEffort, MarkerEffort, sized, unit, with_units
 from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.inversion.bounded import Bounded, bounded_solution
+from ffr_dyn.analyses.inversion.internal_dynamics import fitting, internal
+from ffr_dyn.analyses.inversion.plant import Plant, plant, slopes, with_efforts
+from ffr_dyn.analyses.inversion.servo import ServoMotion, at_moment, internal_values, servo, slope, slope_matrix
 from ffr_dyn.analyses.outcome import efforts, needed, only, output_times, result_of, with_quantities
 from ffr_dyn.analyses.registry import OverTime, option
-from ffr_dyn.analyses.servo import Moment, ServoMotion, at_moment, internal_values, servo, slope, slope_matrix
 from ffr_dyn.analyses.settings import Settings
-from ffr_dyn.compile.scene_tables import System, compile_scene
-from ffr_dyn.consistency.assemble import assemble, flattened
-from ffr_dyn.consistency.evaluation import Evaluator, evaluator, joined, record_states
-from ffr_dyn.equations.constraint_rows import blocks_of
+from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
+from ffr_dyn.consistency.evaluation import joined, record_states
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.kernels.tables import EVALUATIONS, Record
@@ -35,9 +36,12 @@ from ffr_dyn.results.quantities import measure, selected
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.drivers import Driver, PointDriver
+from ffr_dyn.scene.parts import described
 from ffr_dyn.scene.scene import GROUND, Scene, require_scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
+
+AT_ONCE = 2  # derivatives of known motions after which efforts that act on them directly appear
 
 
 @dataclass(frozen=True)
@@ -203,46 +207,65 @@ def _not_collocated(
     progress: Callable[[float], None] | None,
 ) -> Result:
     start, end, output_step = span
-    stiffened = [b.name for b in scene.bodies if b.stiffening and b.model.stiffening is not None]
-    if stiffened:
-        raise InputError(
-            f"servo constraints need bodies without geometric stiffening: set stiffening=False of {stiffened}"
-        )
     assembled = assemble(with_units(scene, unknown), time=start)
-    own = servo(assembled, names, unknown, (start, end))
-    at = _freed(own, names)
-    selected(at.system, outputs)
+    whole, degree = _fitted(assembled, names, unknown, (start, end))
+    selected(whole.free.system, outputs)
+    own = servo(assembled, names, whole.own.unknown, (start, end)) if degree == AT_ONCE else whole.own
     w = internal_values(own, assembled.x, assembled.v)
-    chosen = _solution(own, start, end, w, assembled.x, solution)
+    chosen = _solution(own, degree, w, assembled.x, solution)
     if isinstance(chosen, Bounded):
-        times, ws, xs, notes = bounded_solution(own, chosen, output_step, w, assembled.x)
+        y = internal_values(whole.own, assembled.x, assembled.v)[: whole.size]
+        times, us, states, notes = bounded_solution(whole, chosen, output_step, y, assembled.x, progress)
     else:
-        times = output_times(start, end, output_step)
-        ws, xs = _integrated(own, chosen, times, w, assembled.x, progress)
-        notes = []
-    moments = [at_moment(own, float(t), w, x) for t, w, x in zip(times, ws, xs, strict=True)]
+        times, notes = output_times(start, end, output_step), []
+        us, states = _integrated(own, chosen, times, w, assembled.x, progress)
     attributes: dict[str, Any] = {
-        "title": scene.name,
+        **described(scene),
         "analysis": f"mixed dynamics, {'bounded' if isinstance(chosen, Bounded) else 'causal'}",
         "method": f"{chosen!r}",
-        "evaluations": int(own.at.work.info[EVALUATIONS]),
+        "evaluations": int(own.at.work.info[EVALUATIONS] + whole.free.work.info[EVALUATIONS]),
         "degrees_of_freedom": own.size,
         "internal_coordinates": list(own.names),
         "notes": [*assembled.notes, *notes],
         "status": "complete",
     }
-    record = _recorded(at, unknown, own, times, moments)
-    found = _efforts_found(at.system, record, own.unknown, np.array([moment.u for moment in moments]))
-    return with_quantities(result_of(at.system, record, attributes, outputs=outputs), found, path)
+    record = _recorded(whole, times, us, states)
+    system = whole.free.system
+    found = _efforts_found(system, record, whole.own.unknown, us)
+    return with_quantities(result_of(system, record, attributes, outputs=outputs), found, path)
 
 
-def _solution(
-    own: ServoMotion, start: float, end: float, w: Array, x: Array, wanted: Causal | Bounded | None
-) -> Causal | Bounded:
-    """What was asked for, or what the internal dynamics allow at the start; ComputationError for a causal run they do not."""
+def _fitted(
+    assembled: Assembled, names: tuple[str, ...], unknown: tuple[Effort, ...], span: tuple[float, float]
+) -> tuple[Plant, int]:
+    """The scene with as many of the unknown efforts as motions are known, and how often these are differentiated until the
+    efforts appear. InputError where they do not fit."""
+    texts = {b.name: [w.text for w in b.words] for b in assembled.system.blocks}
+    labels = [f"{name}: {text}" for name in names for text in texts[name]]
+    if len(unknown) < len(labels):
+        raise InputError(
+            f"{len(labels)} motions are known ({'; '.join(labels)}) but only {len(unknown)} forces are unknown; name as many"
+        )
+    whole = plant(assembled, names, unknown, span)
+    y = internal_values(whole.own, assembled.x, assembled.v)[: whole.size]
+    at = slopes(whole, span[0], y, np.zeros(whole.size), np.zeros(len(unknown)), assembled.x)
+    chosen = fitting(whole, at, assembled.x, labels)
+    kept = np.array([unknown.index(effort) for effort in chosen], int)
+    return with_efforts(whole, chosen), internal(replace(at, by_u=at.by_u[:, kept])).degree
+
+
+def _solution(own: ServoMotion, degree: int, w: Array, x: Array, wanted: Causal | Bounded | None) -> Causal | Bounded:
+    """What was asked for, or what the internal dynamics allow at the start; an error for a causal run they do not."""
+    if degree != AT_ONCE:
+        if isinstance(wanted, Causal):
+            raise InputError(
+                f"the unknown forces reach a known motion by its derivative of order {degree} only, by way of what gives "
+                "between them: use solution=Bounded(), for a known motion that starts and ends at rest"
+            )
+        return wanted or Bounded()
     if isinstance(wanted, Bounded) or own.size == 0:
         return wanted or Causal()
-    causal = wanted or Causal()
+    causal, (start, end) = wanted or Causal(), own.span
     rate = float(np.linalg.eigvals(slope_matrix(own, start, w, x)).real.max())
     if rate * (end - start) <= np.log(causal.growth):
         return causal
@@ -256,51 +279,37 @@ def _solution(
 
 def _integrated(
     own: ServoMotion, causal: Causal, times: Array, w: Array, x: Array, progress: Callable[[float], None] | None
-) -> tuple[Array, list[Array]]:
-    """w (T, 2 d) and the states x at the output times."""
+) -> tuple[Array, list[tuple[Array, Array]]]:
+    """Efforts (T, U) and states (x, v) at the output times."""
     from scipy.integrate import DOP853
 
-    nearest = [x]
+    moments = [at_moment(own, float(times[0]), w, x)]
 
-    def right(t: float, y: Array) -> Array:
-        value, nearest[0] = slope(own, t, y, nearest[0])
-        return value
+    def right(t: float, w: Array) -> Array:
+        return slope(own, t, w, moments[-1].x)[0]
 
-    ws, xs = [w], [x]
-    if own.size == 0:
-        for time in times[1:]:
-            xs.append(at_moment(own, float(time), w, xs[-1]).x)
-        return np.zeros((times.size, 0)), xs
     for before, time in pairwise(times):
-        solver = DOP853(right, float(before), ws[-1], float(time), rtol=causal.tolerance, atol=causal.tolerance * 1e-2)
-        while solver.status == "running":
-            message = solver.step()
-        if solver.status == "failed":
-            raise ComputationError(f"at t = {solver.t:.6g} s the internal dynamics could not be integrated: {message}")
-        ws.append(solver.y)
-        xs.append(at_moment(own, float(time), solver.y, nearest[0]).x)
+        if own.size:
+            solver = DOP853(right, float(before), w, float(time), rtol=causal.tolerance, atol=causal.tolerance * 1e-2)
+            while solver.status == "running":
+                message = solver.step()
+            if solver.status == "failed":
+                raise ComputationError(
+                    f"at t = {solver.t:.6g} s the internal dynamics could not be integrated: {message}"
+                )
+            w = solver.y
+        moments.append(at_moment(own, float(time), w, moments[-1].x))
         if progress is not None:
             progress(float(time))
-    return np.array(ws), xs
+    return np.array([moment.u for moment in moments]), [(moment.x, moment.v) for moment in moments]
 
 
-def _freed(own: ServoMotion, names: tuple[str, ...]) -> Evaluator:
-    """The scene without its known drivers, in which the efforts found act."""
-    scene = own.at.system.scene
-    free = replace(scene, drivers=tuple(driver for driver in scene.drivers if driver.name not in names))
-    rows_of = {block.name: block for block in own.at.system.blocks}
-    return evaluator(compile_scene(free, [rows_of[block.name] for block in blocks_of(free)]))
-
-
-def _recorded(
-    at: Evaluator, unknown: tuple[Effort, ...], own: ServoMotion, times: Array, moments: list[Moment]
-) -> Record:
-    """The states, with the efforts found."""
-    silent = sized(at, unknown, np.zeros(len(unknown)))
+def _recorded(of: Plant, times: Array, us: Array, states: list[tuple[Array, Array]]) -> Record:
+    """The states (x, v), with the efforts us (T, U)."""
     rows = []
-    for time, moment in zip(times, moments, strict=True):
-        here = sized(silent, own.unknown, moment.u)
-        row = record_states(here, np.clip([time], *own.span), moment.x[None], moment.v[None])
+    for time, u, (x, v) in zip(times, us, states, strict=True):
+        here = sized(of.free, of.own.unknown, u)
+        row = record_states(here, np.clip([time], *of.own.span), x[None], v[None])
         rows.append(row._replace(time=np.array([time])))
     return joined(rows)
 

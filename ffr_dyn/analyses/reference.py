@@ -25,6 +25,7 @@ from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.quantities import measure, needs_every_step, selected
 from ffr_dyn.results.result import Result
+from ffr_dyn.scene.parts import described
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
@@ -108,7 +109,7 @@ def reference(
     record = with_all_reactions(assembled, joined(rows))
     quantities, _ = measure(assembled.system, record, {}, wanted)
     attributes = {
-        "title": scene.name,
+        **described(scene),
         "analysis": "forward dynamics",
         "method": f"{method!r}",
         "stabilisation": "projection at the output rows" if isinstance(method, SciPy) else "index 2, stabilised",

@@ -25,9 +25,11 @@ from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator, record_states
 from ffr_dyn.consistency.mobility import named_motion
 from ffr_dyn.consistency.tangent import Chart, chart, movement, rates, sizes, state, stiffness
+from ffr_dyn.consistency.validity import extremes, strained
 from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
+from ffr_dyn.scene.parts import described
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
@@ -156,11 +158,12 @@ def _result(
     still = np.zeros(assembled.system.layout.v_size)
     record = record_states(at, np.array([found.near.time]), found.near.x[None], still[None])
     stable = lowest > 0
-    notes = list(assembled.notes)
+    turned, _, stretched = extremes(assembled.system, record)
+    notes = [*assembled.notes, *strained(assembled.system.scene, turned, stretched)]
     if not stable:
         notes.append(f"the equilibrium is unstable: its lowest stiffness per mass is {lowest:.4g} 1/s^2")
     attributes = {
-        "title": scene.name,
+        **described(scene),
         "analysis": "static equilibrium",
         "method": f"Newton's method, {found.iterations} steps",
         "evaluations": int(at.work.info[EVALUATIONS]),

@@ -15,7 +15,8 @@ import numpy as np
 
 from ffr_dyn.results.result import Result
 from ffr_dyn.results.stress import stress_histories
-from ffr_dyn.scene.scene import Body, Scene, marker_number
+from ffr_dyn.scene.parts import owner
+from ffr_dyn.scene.scene import Body, Scene, marker_number, markers
 from ffr_dyn.scene.stress_sensors import nearest_point
 from ffr_prep.body import BodyError, Interface, displacements, some_points
 from ffr_prep.common.arrays import Array
@@ -229,7 +230,9 @@ def default_measures(scene: Scene, quantities: Any) -> tuple[Measure, ...]:
     """Of the largest flexible body: the position of its last interface and its deflection; else of the last body."""
     body = max(scene.bodies, key=lambda b: b.model.n)
     body = body if body.model.n else scene.bodies[-1]
-    texts = [f"position:{body.name}.{body.model.interfaces[-1].name}"] if body.model.interfaces else [f"{body.name}.R"]
+    texts = (
+        [f"position:{owner(body)}.{body.model.interfaces[-1].name}"] if body.model.interfaces else [f"{body.name}.R"]
+    )
     if body.model.n and body.model.surface is not None:
         texts.append(f"deflection:{body.name}")
     return tuple(measure_of(text, scene, quantities) for text in texts)
@@ -319,12 +322,11 @@ _KINDS = {
 def _marker(text: str, name: str, scene: Scene) -> Interface:
     """The interface of a marker on a body."""
     try:
-        marker_number(scene, name)
-        owner, _, point = name.partition(".")
-        return next(body for body in scene.bodies if body.name == owner).model.interface(point)
+        b, _, point = markers(scene)[marker_number(scene, name)]
+        return scene.bodies[b].model.interface(point)
     except (InputError, BodyError) as error:
         raise InputError(f"measure {text!r}: {error}") from None
-    except StopIteration:
+    except IndexError:
         raise InputError(f"measure {text!r}: {name!r} is a point of the ground, which does not move") from None
 
 

@@ -13,8 +13,10 @@ from scipy.linalg import qr
 from scipy.sparse import block_diag, csr_array
 
 from ffr_dyn.compile.scene_tables import System, compile_scene
+from ffr_dyn.consistency.dropped_terms import check_dropped
+from ffr_dyn.consistency.held_frequencies import held_frequencies
 from ffr_dyn.consistency.row_space import independent, smallest_solution
-from ffr_dyn.consistency.validity import stretch
+from ffr_dyn.consistency.validity import deflections
 from ffr_dyn.equations.constraint_rows import Block, blocks_of, rows_at
 from ffr_dyn.equations.constraints import Row
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
@@ -66,8 +68,10 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     contradicts the joints.
     """
     require_scene(scene)
+    declared = scene
     scene, blocks = flattened(scene, time)
     place = layout(scene)
+    left_out = [note for b, body in enumerate(scene.bodies) for note in check_dropped(body, place.active(b))]
     guess, v = initial_state(scene, place)
     x = close_positions(scene, place, blocks, guess, v, time)
     _require_shape(scene, place, guess, x)
@@ -77,7 +81,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     notes = [
         f"{block}: the row '{text}' is redundant; of the reactions that are possible the smallest are given"
         for block, text in redundant
-    ]
+    ] + left_out
     shift = max(np.linalg.norm(x[place.R(b)] - guess[place.R(b)]) for b in range(len(scene.bodies)))
     if shift > 1e-6:
         notes.insert(0, f"assembly moved a body by {shift:.3g} m from where the scene puts it")
@@ -86,6 +90,9 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
             f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes without their rounding "
             "across it"
         )
+    notes += held_frequencies(
+        declared, [(x[place.R(b)], x[place.p(b)]) for b in range(len(place.n))], scene.plane, time
+    )
     all_rows = compile_scene(scene, blocks, RELAXATION) if redundant else None
     return Assembled(compile_scene(scene, kept), all_rows, x, v, _movable(place) - rows, tuple(notes), tuple(redundant))
 
@@ -93,7 +100,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
 def _require_shape(scene: Scene, place: Layout, guess: Array, x: Array) -> None:
     """InputError where positions are met only by a body deformed beyond all sense."""
     for b, body in enumerate(scene.bodies):
-        share = stretch(body.model, (x - guess)[None, place.q(b)])
+        _, share = deflections(body.model, (x - guess)[None, place.q(b)])
         if share > TORN:
             raise InputError(
                 f"the mechanism cannot be assembled without deforming body {body.name!r} by {share:.3g} times its size; "

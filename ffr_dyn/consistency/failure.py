@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.consistency.dropped_terms import remedy
 from ffr_dyn.kernels.tables import (
     AT,
     FAILED,
@@ -43,10 +44,12 @@ def failure(system: System, work: Work, status: int, time: float, cause: str = "
             f"{at} the state of {_worst(system, work)} is no longer finite: {_overflow(system, work)}"
         )
     if status == SINGULAR_BODY:
-        name = system.scene.bodies[where].name
+        body = system.scene.bodies[where]
+        where_from = f" without {', '.join(body.dropped)}" if body.dropped else ""
+        change = remedy(body) if body.dropped else "give it mass and inertia about all axes, or keep fewer modes"
         return ComputationError(
-            f"{at} the mass matrix of body {name!r} is not positive: it has no inertia left for rigid motion; "
-            "give it mass and inertia about all axes, or keep fewer modes"
+            f"{at} the mass matrix of body {body.name!r} is not positive{where_from}: it has no inertia left for rigid "
+            f"motion; {change}"
         )
     if status == SINGULAR_CONSTRAINT:
         row = int(np.searchsorted(system.model.rows.start, where, side="right")) - 1

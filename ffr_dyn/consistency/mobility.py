@@ -45,6 +45,7 @@ class Mobility(Brief):
     free       : rigid motions with all bodies undeformed; at a singular position more than the mechanism has elsewhere
     redundant  : (joint, row) pairs that follow from the other rows
     overdriven : drivers whose motion the joints and the other drivers fix already
+    doubts     : bodies whose modes do not fit the joints, or that cannot do without the inertia terms they leave out
     """
 
     degrees_of_freedom: int
@@ -53,6 +54,7 @@ class Mobility(Brief):
     free: tuple[FreeMotion, ...]
     redundant: tuple[tuple[str, str], ...]
     overdriven: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
         """The report, a line each."""
@@ -65,7 +67,8 @@ class Mobility(Brief):
             said.append(f"planar       normal {self.plane}: runs are computed in the plane, without rows across it")
         said += [f"free         {motion.name}: moves {', '.join(motion.bodies)}" for motion in self.free]
         said += [f"redundant    {joint}: {row}" for joint, row in self.redundant]
-        return said + [f"overdriven   {driver}" for driver in self.overdriven]
+        said += [f"overdriven   {driver}" for driver in self.overdriven]
+        return said + [f"doubt        {doubt}" for doubt in self.doubts]
 
 
 def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobility:
@@ -84,7 +87,8 @@ def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobili
     M = total_mass_matrix(flat, place, assembled.x)
     Z = free_motions(jacobian[:, rigid], M[np.ix_(rigid, rigid)])
     motions = tuple(_motions(flat, place, assembled.x, assembled.v, rigid, Z))
-    return Mobility(assembled.degrees_of_freedom, sum(place.n), plane, motions, assembled.redundant, over)
+    doubts = tuple(note for note in assembled.notes if note.startswith("body "))
+    return Mobility(assembled.degrees_of_freedom, sum(place.n), plane, motions, assembled.redundant, over, doubts)
 
 
 def overdriven(scene: Scene, time: float = 0.0) -> tuple[str, ...]:

@@ -26,7 +26,8 @@ from ffr_dyn.consistency.evaluation import (
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_prep.common.arrays import Array
 
-STEP = 2e-4  # largest relative movement [rad, or part of the scene's size] of a difference
+# Largest relative movement [rad, or part of the scene's size] of a difference: stiff bodies stretch with its square.
+STEP = 1e-5
 CORRECTIONS = 2  # onto the constraints, at a deviation of that size
 
 

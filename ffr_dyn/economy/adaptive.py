@@ -26,6 +26,7 @@ from ffr_dyn.economy.run import Made, Span, Trial, make, run, states
 from ffr_dyn.equations.layout import Layout, initial_state
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.result import Axis, Quantity, Result
+from ffr_dyn.scene.parts import described
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.variants.mean_axis import with_mean_axis_bodies
 from ffr_prep.common.arrays import Array
@@ -329,7 +330,7 @@ def _result(scene: Scene, pieces: list[_Piece], method: str, divisions: int, out
     )
     evaluations = sum(piece.trial.evaluations for piece in pieces)
     attributes = {
-        "title": scene.name,
+        **described(scene),
         "analysis": "forward dynamics, adaptive order",
         "method": f"{method}, step {output_step / divisions:g}",
         "evaluations": evaluations,

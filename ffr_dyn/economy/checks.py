@@ -14,6 +14,7 @@ from scipy.linalg import LinAlgError, eigvalsh, null_space
 from ffr_dyn.compile.body_tables import of_coordinates
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.evaluation import evaluate, evaluated_mass_matrix, evaluator
+from ffr_dyn.consistency.second_order_loads import loads_at
 from ffr_dyn.economy.model_choice import Choice, bases_between
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.residual_estimate import elastic_columns, lift
@@ -88,12 +89,28 @@ class StiffeningLoad:
 
 
 def stiffening_loads(trial: Trial, policy: Policy = DEFAULT) -> tuple[StiffeningLoad, ...]:
-    """The loads on bodies whose stiffening is in the model, the largest first: accelerations, spin, forces at interfaces."""
-    assembled = trial.made.assembled
+    """The loads on bodies whose stiffening is in the model, the largest first: spin, forces at interfaces."""
+    (x, v), assembled = states(trial), trial.made.assembled
     bodies = [b for b, body in enumerate(assembled.system.scene.bodies) if _stiffened(body)]
     if not bodies:
         return ()
-    return ()
+    at, time = evaluator(assembled.system), trial.result.time
+    rows = np.unique(np.linspace(0, len(time) - 1, policy.load_samples).round().astype(int))
+    loads = []
+    for row in rows:
+        evaluate(at, float(time[row]), x[row], v[row])
+        here = loads_at(at, float(time[row]), x[row], v[row])
+        loads.append([here[b] for b in bodies])
+    found = []
+    for k, b in enumerate(bodies):
+        body = assembled.system.scene.bodies[b]
+        if body.model.stiffening is not None:
+            largest = np.abs([row[k] for row in loads]).max(axis=0)[: len(body.model.stiffening)]
+            scaled = body.model.stiffening / np.sqrt(np.outer(body.model.omega2, body.model.omega2))
+            shares = largest * np.abs(np.linalg.eigvalsh(0.5 * (scaled + scaled.transpose(0, 2, 1)))).max(axis=1)
+            names = load_names(body)
+            found += [StiffeningLoad(body.name, name, float(s)) for name, s in zip(names, shares, strict=True)]
+    return tuple(sorted(found, key=lambda one: -one.share))
 
 
 def load_names(body: Body) -> tuple[str, ...]:

@@ -38,7 +38,7 @@ class TermEffect:
 
 def term_effects(seen: Samples, sensitivity: Contributions, policy: Policy = DEFAULT) -> tuple[TermEffect, ...]:
     """Effects along a motion that its own model sees, where `sensitivity` tells what each of its modes does."""
-    listed = list(_inertial(seen))
+    listed = [*_inertial(seen), *_stiffening(seen)]
     if not listed or not len(sensitivity.body):
         return ()
     D = np.eye(seen.system.layout.v_size)[:, elastic_columns(seen.system.layout)]
@@ -81,6 +81,11 @@ def _with_terms(part: Part, names: list[str], loads: tuple[int, ...], fewer: boo
 # ---- forces of terms --------------------------------------------------------------------------------------------------
 
 _Force = tuple[int, str, int | None, Array]
+
+
+def _stiffening(seen: Samples) -> Iterator[_Force]:
+    for k, (b, number) in enumerate(seen.loads):
+        yield b, STIFFENING, number, seen.stiffening[:, :, k]
 
 
 def _inertial(seen: Samples) -> Iterator[_Force]:

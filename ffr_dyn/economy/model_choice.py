@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag, eigh, null_space
 
 from ffr_dyn.consistency.assemble import in_space
 from ffr_dyn.economy.policy import DEFAULT, Policy
@@ -14,6 +15,7 @@ from ffr_dyn.scene.force_kinds import in_bases
 from ffr_dyn.scene.scene import Body, Scene, body_normal
 from ffr_dyn.variants.plane import AXES, planar_forms
 from ffr_dyn.variants.variant import STIFFENING, stiffening_by, vary, with_basis
+from ffr_prep.body import FlexibleBody, interface_motions, mass_of_motions
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -204,10 +206,22 @@ def kind(scene: Scene, choice: Choice, number: int, output_step: float) -> str:
     part, model = choice.parts[number], scene.bodies[number].model
     if not part.count:
         return RIGID
-    V = part.basis(model.n)
-    lowest = float(np.sqrt(np.einsum("ia,i,ia->a", V, model.omega2, V).min()))
+    lowest = lowest_frequency(model, part.basis(model.n))
     implicit = type(choice.integrator(output_step)).implicit
     return QUASI_STATIC if implicit and lowest * output_step / choice.divisions > 1.0 else FLEXIBLE
+
+
+def lowest_frequency(model: FlexibleBody, V: Array) -> float:
+    """[rad/s] the lowest of a body in the shapes V (n, m), free or held at any one of its interfaces: joints are between."""
+    T = block_diag(np.eye(6), V)
+    M = T.T @ mass_of_motions(model) @ T
+    K = T.T @ np.diag(np.concatenate([np.zeros(6), model.omega2])) @ T
+    found = []
+    for rows in (np.zeros((0, 6 + model.n)), *interface_motions(model).reshape(-1, 6, 6 + model.n)):
+        Z = null_space(rows @ T) if len(rows) else np.eye(len(T.T))
+        squares = eigh(Z.T @ K @ Z, Z.T @ M @ Z, eigvals_only=True)
+        found.append(float(np.sqrt(squares[0 if len(rows) else 6])))  # a free body has six motions without deformation
+    return min(found)
 
 
 def _without(stiffening: bool) -> tuple[str, ...]:

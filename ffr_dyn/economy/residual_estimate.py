@@ -36,6 +36,7 @@ from ffr_dyn.consistency.evaluation import (
     locked,
     unit_rows,
 )
+from ffr_dyn.consistency.second_order_loads import loads_that_act, second_order_forces
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.kernels.tables import Record
@@ -49,6 +50,7 @@ class Samples:
     at         : the model with the memory of one evaluation;  record : what it records there
     time (T,), x (T, X), v (T, V) : the motion, lifted into the model;  acceleration : (T, V) of the motion
     M          : (T, V, V) mass;  jacobian : (T, C, V);  residual : (T, V) r of the motion
+    stiffening : (T, V, L) elastic force of every load by its second-order matrix;  loads : (L,) body and number of each
     """
 
     at: Evaluator
@@ -60,6 +62,8 @@ class Samples:
     residual: Array
     acceleration: Array
     record: Record
+    stiffening: Array
+    loads: tuple[tuple[int, int], ...]
 
     @property
     def system(self) -> System:
@@ -108,7 +112,8 @@ def samples(small: Assembled, large: Assembled, bases: tuple[Array, ...], time: 
     to_large, rows = _map(small.system.layout, large.system.layout, bases), _rows(small.system, large.system)
     seen = evaluator(large.system)
     at = seen if small is large else evaluator(small.system)
-    M, J, r, acc, records = [], [], [], [], []
+    loads = loads_that_act(large.system.scene)
+    M, J, r, acc, records, stiffening = [], [], [], [], [], []
     for k, t in enumerate(time):
         own = evaluate(at, float(t), x[k], v[k])
         now = own if at is seen else evaluate(seen, float(t), X[k], W[k])
@@ -119,6 +124,7 @@ def samples(small: Assembled, large: Assembled, bases: tuple[Array, ...], time: 
         J.append(now.jacobian)
         r.append(now.force - mass @ acc[-1] - now.jacobian.T @ lam)
         records.append(copied(seen.record))
+        stiffening.append(second_order_forces(seen, float(t), X[k], W[k], loads))
     return Samples(
         seen,
         time,
@@ -129,6 +135,8 @@ def samples(small: Assembled, large: Assembled, bases: tuple[Array, ...], time: 
         np.array(r),
         np.array(acc),
         joined(records),
+        np.array(stiffening),
+        loads,
     )
 
 

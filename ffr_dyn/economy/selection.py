@@ -17,7 +17,7 @@ from ffr_dyn.economy.rigid_start import SCOUT, Ground
 from ffr_dyn.economy.run import rings
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import ComputationError
+from ffr_prep.common.errors import ComputationError, InputError
 
 
 @dataclass(frozen=True)
@@ -215,7 +215,7 @@ def gap(ledger: Ledger, ground: Ground, choice: Choice, what: str) -> Array:
     """(outputs,) how far a model is from everything with the same coarse step; infinite where its run fails."""
     try:
         trial = ledger.run(choice)
-    except ComputationError:
+    except (ComputationError, InputError):
         return np.full(len(ground.limits), np.inf)
     error = largest(difference(trial.values, ground.pilot.values))
     ledger.note(trial, what, error)

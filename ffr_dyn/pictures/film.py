@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from textwrap import wrap
 
 import numpy as np
@@ -18,6 +18,7 @@ import numpy as np
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.results.result import Result
 from ffr_dyn.results.stress import values_at
+from ffr_dyn.results.wholes import parts_of, with_wholes
 from ffr_dyn.scene.stress_sensors import MEASURES, Measure
 from ffr_prep.body import Surface
 from ffr_prep.body import displacements as surface_displacements
@@ -40,14 +41,27 @@ _TITLE_WIDTH = 13
 
 
 @dataclass(frozen=True, eq=False)
+class Parts:
+    """Where the parts of a body are: of (P,) which part has each point of its surface; R (F, K, 3) [m], A (F, K, 3, 3)."""
+
+    of: Array
+    R: Array
+    A: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Solid:
-    """A body with a surface. R (F, 3) [m], A (F, 3, 3), q (F, n) [m sqrt(kg)] at the F times; n = 0 if it is rigid."""
+    """A body with a surface. R (F, 3) [m], A (F, 3, 3), q (F, n) [m sqrt(kg)] at the F times; n = 0 if it is rigid.
+
+    parts : of a body in parts, whose R and A are those of the first of them
+    """
 
     name: str
     surface: Surface
     R: Array
     A: Array
     q: Array
+    parts: Parts | None = None
 
     @property
     def is_flexible(self) -> bool:
@@ -215,8 +229,15 @@ def film_at(
         raise InputError(f"scale is {scale!r}; it must be a number that is not negative, or 'auto'")
     if limit is not None and not 0 < limit < math.inf:
         raise InputError(f"the end of the colour bar is {limit}; it must be a positive number")
-    solids = tuple(_solid(result, name, times) for name in result.geometry if f"{name}.R" in result.quantities)
-    links = tuple(_link(result, name, times) for name in _bodies(result) if name not in result.geometry)
+    in_parts, apart = parts_of(result), result
+    result = with_wholes(result)
+    solids = tuple(
+        _with_parts(_solid(result, name, times), apart, times, in_parts.get(name, []))
+        for name in result.geometry
+        if f"{name}.R" in result.quantities
+    )
+    drawn = {*result.geometry, *(part for parts in in_parts.values() for part in parts)}
+    links = tuple(_link(result, name, times) for name in _bodies(result) if name not in drawn)
     if not solids and not links:
         raise InputError("nothing to animate: the result has no body (quantities <body>.R and <body>.p)")
     deflections = [float(max(displacements(solid, k).max() for k in range(len(times)))) for solid in solids]
@@ -283,8 +304,20 @@ def is_coloured(shown: Film, solid: Solid) -> bool:
 
 
 def body_points(solid: Solid, frame: int, scale: float) -> Array:
-    """(P, 3) deformed points in the body frame, u_0 + u(scale q) [m]."""
+    """(P, 3) deformed points in the body frame, u_0 + u(scale q) [m]; of parts, which turn, u_0 + scale u(q)."""
+    if solid.parts is not None:
+        return solid.surface.points + scale * displaced(solid, frame)
     return solid.surface.points + surface_displacements(solid.surface, scale * solid.q[frame])
+
+
+def displaced(solid: Solid, frame: int) -> Array:
+    """(P, 3) elastic displacements u(q) in the body frame [m]; those of parts are seen from the frame of the first."""
+    points, elastic = solid.surface.points, surface_displacements(solid.surface, solid.q[frame])
+    if solid.parts is None:
+        return elastic
+    R, A = solid.parts.R[frame, solid.parts.of], solid.parts.A[frame, solid.parts.of]
+    there = R + np.einsum("pij,pj->pi", A, points + elastic)
+    return np.asarray((there - solid.R[frame]) @ solid.A[frame] - points)
 
 
 def drawn_points(solid: Solid, frame: int, scale: float) -> Array:
@@ -295,7 +328,7 @@ def drawn_points(solid: Solid, frame: int, scale: float) -> Array:
 
 def displacements(solid: Solid, frame: int) -> Array:
     """(P,) sizes of the elastic displacements u(q), not scaled [m]."""
-    found: Array = np.linalg.norm(surface_displacements(solid.surface, solid.q[frame]), axis=1)
+    found: Array = np.linalg.norm(displaced(solid, frame), axis=1)
     return found
 
 
@@ -329,6 +362,16 @@ def _solid(result: Result, name: str, times: Array) -> Solid:
         raise InputError(f"body {name!r} has {q.shape[1]} elastic coordinates, but its surface has {n} mode shapes")
     R = _at(times, result.time, result[f"{name}.R"], name)
     return Solid(name, surface, R, _rotations(times, result, name), _at(times, result.time, q, name))
+
+
+def _with_parts(solid: Solid, result: Result, times: Array, names: list[str]) -> Solid:
+    """The solid with the poses of its parts, if it has any."""
+    if not names:
+        return solid
+    counts = [len(result.geometry[name].points) for name in names]
+    R = np.stack([_at(times, result.time, result[f"{name}.R"], name) for name in names], axis=1)
+    A = np.stack([_rotations(times, result, name) for name in names], axis=1)
+    return replace(solid, parts=Parts(np.repeat(np.arange(len(names)), counts), R, A))
 
 
 def _rotations(times: Array, result: Result, name: str) -> Array:

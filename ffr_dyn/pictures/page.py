@@ -260,16 +260,20 @@ def _simplified(shown: Film) -> Film:
     if per_frame * shown.times.size <= _MOST_NUMBERS:
         return shown
     share = _MOST_NUMBERS / (per_frame * shown.times.size)
-    return replace(
-        shown, solids=tuple(replace(solid, surface=decimated(solid.surface, share)) for solid in shown.solids)
-    )
+    return replace(shown, solids=tuple(_decimated(solid, share) for solid in shown.solids))
 
 
-def decimated(surface: Surface, share: float) -> Surface:
-    """A coarser surface of about that share of the triangles; its points are points of the given one."""
+def _decimated(solid: Solid, share: float) -> Solid:
+    surface, nearest = decimated(solid.surface, share)
+    parts = solid.parts and replace(solid.parts, of=solid.parts.of[nearest])
+    return replace(solid, surface=surface, parts=parts)
+
+
+def decimated(surface: Surface, share: float) -> tuple[Surface, Array]:
+    """A coarser surface of about that share of the triangles; its points are points of the given one, with these numbers."""
     import pyvista as pv
     from scipy.spatial import cKDTree
 
     coarse = pv.PolyData.from_regular_faces(np.array(surface.points), np.array(surface.triangles)).decimate(1.0 - share)
     nearest = cKDTree(surface.points).query(coarse.points)[1]
-    return some_points(surface, nearest, coarse.regular_faces)
+    return some_points(surface, nearest, coarse.regular_faces), nearest

@@ -26,6 +26,7 @@ from ffr_dyn.results.stress import (
     stressed_bodies,
     stressed_surface,
 )
+from ffr_dyn.results.wholes import with_wholes
 from ffr_dyn.scene.stress_sensors import measure, nearest_element
 from ffr_prep.body import Surface
 from ffr_prep.common.arrays import Array
@@ -75,7 +76,7 @@ def stress_report(
     one with the largest bending moment.
     Raises InputError for names and points that do not exist, ComputationError when this machine cannot render.
     """
-    folder, result = Path(folder), result if since is None else _later(result, since)
+    folder, result = Path(folder), with_wholes(result if since is None else _later(result, since))
     bodies = stressed_bodies(result) if body is None else (body,)
     if len(bodies) > 1 and len(points):
         raise InputError(f"points are in the frame of one body; say which: {', '.join(bodies)}")

@@ -3,10 +3,10 @@
     sigma(u_0, t) = sum_j sigma_j(u_0) q_j(t) + sigma_2,    epsilon = ((1 + nu) sigma - nu tr(sigma) 1) / E.
 
 With sigma_2 what is quadratic in q of bodies with a second order: sigma is then the second Piola-Kirchhoff stress of
-Green's strain, in axes that follow the material. The modes come with the surface that a result keeps for every body
-(`ffr_prep.body.Surface`). Tensors have the six components xx, yy, zz, xy, xz, yz in body axes along their last axis; shear
-strains are those of the tensor, half the engineering ones. Stress is found where the basis can show it: loads along the body,
-its own inertia among them, need shapes made for them (inertia relief) or many normal modes.
+Green's strain, in axes that follow the material. The modes come with the surface that a result keeps of each body
+(`ffr_prep.body.Surface`); a body in parts is one body here. Tensors have the six components xx, yy, zz, xy, xz, yz in body
+axes along their last axis; shear strains are those of the tensor, half the engineering ones. Stress is found where the basis
+can show it: loads along the body, its own inertia among them, need shapes made for them (inertia relief) or many modes.
 
 Source: Timoshenko & Goodier, Theory of Elasticity (1970), articles 6 and 77 (Hooke's law, principal stresses).
 """
@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.results.result import Axis, Quantity, Result
+from ffr_dyn.results.wholes import with_wholes
 from ffr_dyn.scene.stress_sensors import (
     FORCE_AXIS,
     MOMENT_AXIS,
@@ -47,7 +48,7 @@ _APART = 0.1  # of the body's size, between two hot spots
 
 def stressed_bodies(result: Result) -> tuple[str, ...]:
     """The bodies of the result that have stress modes; InputError when none has."""
-    modes = {name: surface.stress for name, surface in result.geometry.items()}
+    modes = {name: surface.stress for name, surface in with_wholes(result).geometry.items()}
     names = tuple(name for name, stress in modes.items() if stress is not None and stress.shape[2] > 0)
     if not names:
         raise InputError(
@@ -62,12 +63,12 @@ def stressed_surface(result: Result, body: str) -> Surface:
     known = stressed_bodies(result)
     if body not in known:
         raise InputError(f"body {body!r} has no stress modes in the result; those that have: {', '.join(known)}")
-    return result.geometry[body]
+    return with_wholes(result).geometry[body]
 
 
 def _coordinates(result: Result, body: str) -> Array:
     """(T, n) elastic coordinates of a body; InputError without rows and for values that are not finite."""
-    q = result[f"{body}.q"]
+    q = with_wholes(result)[f"{body}.q"]
     if not len(q) or not np.isfinite(q).all():
         raise InputError(
             f"body {body!r} has {len(q)} rows of elastic coordinates, not all finite; run the analysis again"
@@ -176,9 +177,10 @@ def stress_histories(result: Result, body: str, places: Mapping[str, Array], qua
 
 def beams_of(result: Result, body: str) -> BeamForces:
     """The section forces of a body of beams; InputError for one that has none."""
-    surface = result.geometry.get(body)
+    geometry = with_wholes(result).geometry
+    surface = geometry.get(body)
     if surface is None or surface.beams is None:
-        known = [name for name, other in result.geometry.items() if other.beams is not None]
+        known = [name for name, other in geometry.items() if other.beams is not None]
         raise InputError(
             f"body {body!r} has no section forces in the result; those that have: {', '.join(known) or 'none'}"
         )

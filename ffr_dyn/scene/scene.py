@@ -22,8 +22,9 @@ from ffr_dyn.scene.drivers import Driver, PointDriver, driver_word
 from ffr_dyn.scene.force_kinds import forces_of, kinds_in
 from ffr_dyn.scene.joints import COORDINATES, Joint
 from ffr_dyn.scene.own_frame import OwnFrame
+from ffr_dyn.scene.parts import owner, taken_apart, wholes
 from ffr_dyn.scene.sensors import AnyMeasurement, Measurement, SectionMeasurement, StressMeasurement
-from ffr_dyn.scene.stress_sensors import measured_modes
+from ffr_dyn.scene.stress_sensors import measured_modes, nearest_surface
 from ffr_prep.body import FlexibleBody
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, in_short, listed, numbers
@@ -48,6 +49,7 @@ class Body(Brief):
     dropped  : names of the `INERTIA_TERMS` that the equations of motion leave out (see
                `ffr_dyn.variants.variant.without_terms`)
     kept     : set where a planar scene leaves modes out: the numbers of those that stay, and how many there were
+    part_of  : set by a scene of a body that is cut into parts (`ffr_dyn.scene.parts`): the whole
     frame    : set where the body is computed in its mean-axis form (`ffr_dyn.variants.mean_axis`), which model, pose and
                motion are then those of: the frame to which the scene and results refer
 
@@ -67,6 +69,7 @@ class Body(Brief):
     stiffening: bool = True
     dropped: tuple[str, ...] = ()
     kept: tuple[tuple[int, ...], int] | None = None
+    part_of: Body | None = None
     frame: OwnFrame | None = None
 
     def __post_init__(self) -> None:
@@ -110,7 +113,7 @@ class Body(Brief):
 _UNITS = ("m", "e0..e3", "m/s", "rad/s")
 
 
-MarkerName = tuple[int, str, str]  # number and name of the body, name of the point
+MarkerName = tuple[int, str, str]  # number of the body, the name that its points go by, name of the point
 
 
 @dataclass(frozen=True, repr=False)
@@ -146,7 +149,7 @@ class Scene(Brief):
 
     @cached_property
     def _markers(self) -> tuple[MarkerName, ...]:
-        listed = [(b, body.name, i.name) for b, body in enumerate(self.bodies) for i in body.model.interfaces]
+        listed = [(b, owner(body), i.name) for b, body in enumerate(self.bodies) for i in body.model.interfaces]
         return (*listed, *((len(self.bodies), GROUND, point) for point in self.ground))
 
     @cached_property
@@ -157,6 +160,8 @@ class Scene(Brief):
     def __post_init__(self) -> None:
         for key, kinds in _DECLARATIONS.items():
             object.__setattr__(self, key, several(f"{key} of a scene", getattr(self, key), kinds or kinds_in(key)))
+        for key, found in taken_apart(self).items():
+            object.__setattr__(self, key, found)
         if not isinstance(self.ground, Mapping):
             raise InputError(f"ground is {self.ground!r}; give points by name, such as {{'wall': (0, 0, 0)}}")
         points = {key: _vector(at, 3, f"ground point {key!r}") for key, at in self.ground.items()}
@@ -233,7 +238,7 @@ def marker_number(scene: Scene, name: str) -> int:
     if name in names:
         return names[name]
     body, _, point = name.partition(".")
-    bodies = [GROUND, *(b.name for b in scene.bodies)]
+    bodies = [GROUND, *dict.fromkeys(map(owner, scene.bodies))]
     if body not in bodies:
         raise InputError(f"marker {name!r}: there is no body {body!r}; {_offer(body, bodies)}")
     if not point:
@@ -266,9 +271,11 @@ def joint_with(scene: Scene, name: str, coordinate: str, who: str) -> Joint:
 def body_number(scene: Scene, name: str, who: str) -> int:
     """The number of a body. Raises InputError when there is none of that name."""
     names = [body.name for body in scene.bodies]
-    if name not in names:
-        raise InputError(f"{who}: there is no body {name!r}; {_offer(name, names)}")
-    return names.index(name)
+    if name in names:
+        return names.index(name)
+    if parts := wholes(scene.bodies).get(name):
+        raise InputError(f"{who}: body {name!r} is in parts; name one: {', '.join(part.name for part in parts)}")
+    raise InputError(f"{who}: there is no body {name!r}; {_offer(name, names)}")
 
 
 def body_normal(body: Body, normal: int) -> int:
@@ -302,8 +309,12 @@ def _check_point_driver(scene: Scene, driver: PointDriver) -> None:
 
 
 def measured_body(scene: Scene, measurement: StressMeasurement | SectionMeasurement) -> int:
-    """The body whose stress or section forces are measured."""
-    return body_number(scene, measurement.body, f"measurement {measurement.name!r}")
+    """The body whose stress or section forces are measured; of a whole in parts the one nearest to the place."""
+    parts = wholes(scene.bodies).get(measurement.body, [])
+    surfaces = [part.model.surface for part in parts]
+    nearest = nearest_surface(surfaces, measurement.point) if all(surfaces) else 0
+    name = parts[nearest].name if parts else measurement.body
+    return body_number(scene, name, f"measurement {measurement.name!r}")
 
 
 def _check_measurement(scene: Scene, measurement: AnyMeasurement) -> None:

@@ -8,14 +8,14 @@ Source: Timoshenko & Goodier, Theory of Elasticity (1970), articles 6 and 77 (Ho
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ffr_dyn.scene.sensors import SectionMeasurement, StressMeasurement
 from ffr_prep.body import SECTION_FORCES, BeamForces, QuadraticField, Surface, at_places, values
-from ffr_prep.common.arrays import Array
+from ffr_prep.common.arrays import Array, ArrayLike
 from ffr_prep.common.errors import InputError
 
 TENSOR = ("xx", "yy", "zz", "xy", "xz", "yz")
@@ -123,6 +123,12 @@ def nearest_point(surface: Surface, position: Array, body: str) -> int:
             f"{np.round(low, 6).tolist()} and {np.round(high, 6).tolist()} m; give it in metres, in the body frame"
         )
     return point
+
+
+def nearest_surface(surfaces: Sequence[Surface], position: ArrayLike) -> int:
+    """The number of the surface with the point nearest to a position (3,) [m]; zero of none."""
+    distances = [np.linalg.norm(surface.points - np.asarray(position, float), axis=1).min() for surface in surfaces]
+    return int(np.argmin(distances)) if distances else 0
 
 
 def _size(surface: Surface) -> float:

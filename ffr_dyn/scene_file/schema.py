@@ -24,9 +24,9 @@ from pydantic import (
 )
 from pydantic import Field as Key
 
-from ffr_dyn.analyses.bounded import Bounded
 from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort
 from ffr_dyn.analyses.events import Event
+from ffr_dyn.analyses.inversion.bounded import Bounded
 from ffr_dyn.analyses.mixed import Causal
 from ffr_dyn.analyses.registry import OverTime, analyses, analysis
 from ffr_dyn.analyses.settings import settings_of

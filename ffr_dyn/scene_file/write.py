@@ -25,6 +25,7 @@ from ffr_dyn.functions.time_functions import (
 )
 from ffr_dyn.integrators import CONTROLLED, Controlled, Integrator, methods
 from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation
+from ffr_dyn.scene.parts import as_declared, cut_joints
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.scene_file.schema import Kind, fields_of_motion, formula_of, keys_of, nested_kinds, tables
 from ffr_dyn.scene_file.state_formula import StateFormula
@@ -38,9 +39,10 @@ def save_scene(scene: Scene, settings: Settings | MomentSettings, path: str | Pa
     """Write a scene file, and beside it a body file <file>.<body>.ffr for every flexible body."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    files = {body.name: f"{path.stem}.{body.name}.ffr" for body in scene.bodies if not _is_plain(body.model)}
+    bodies = as_declared(scene.bodies)
+    files = {body.name: f"{path.stem}.{body.name}.ffr" for body in bodies if not _is_plain(body.model)}
     text = to_toml(scene, settings, files)
-    for body in scene.bodies:
+    for body in bodies:
         if body.name in files:
             save_body(body.model, path.parent / files[body.name])
     temporary = path.with_name(path.name + ".part")
@@ -54,16 +56,18 @@ def to_toml(scene: Scene, settings: Settings | MomentSettings, files: Mapping[st
 
     files : by name of a flexible body, the file in which it is kept
 
-    Raises InputError for what a file cannot hold: Python functions, and flexible bodies without a file.
+    Raises InputError for what a file cannot hold: Python functions, flexible bodies without a file, a deformed body in parts.
     """
     top = {"name": scene.name, "gravity": scene.gravity, "base_acceleration": scene.base_acceleration}
     top["plane"] = scene.plane
     tree = {**top, "outputs": list(settings.outputs), "analysis": _analysis(settings), "ground": dict(scene.ground)}
     tree["chart"] = _chart(settings.chart) if isinstance(settings, Settings) else {}
     tree["inputs"] = _inputs(scene)
-    tree["bodies"] = {body.name: _body(body, files) for body in scene.bodies}
+    tree["bodies"] = {body.name: _body(body, files) for body in as_declared(scene.bodies)}
+    made = {joint.name for joint in cut_joints(scene.bodies)}
     for table, kinds in tables().items():
-        tree[table] = {thing.name: _entry(_kind(kinds, thing), thing) for thing in getattr(scene, table)}
+        things = [thing for thing in getattr(scene, table) if thing.name not in made]
+        tree[table] = {thing.name: _entry(_kind(kinds, thing), thing) for thing in things}
     return "\n".join(_lines(_data(tree, "scene"), ())) + "\n"
 
 

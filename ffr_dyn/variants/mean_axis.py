@@ -24,6 +24,8 @@ from ffr_dyn.variants.variant import used_interfaces, with_basis
 from ffr_prep.body import FlexibleBody, idle_loads, mean_axis_form
 from ffr_prep.common.errors import InputError
 
+HELD = 1e-9  # of a unit mode: what rounding moves a held place by
+
 
 def in_mean_axis_frames(scene: Scene) -> Scene:
     """The scene with every second-order body in its mean-axis form; those that are in it stay as they are.
@@ -89,7 +91,8 @@ def _check_known(scene: Scene, body: Body) -> None:
     """InputError where something acts at a point that has no second-order displacement."""
     idle = idle_loads(body.model).tolist()[::6]
     # A held place may turn, and moments on slender bodies have no matrix.
-    unknown = {i.name for i, none in zip(body.model.interfaces, idle, strict=True) if none and np.any(i.phi_t)}
+    moved = [np.sqrt(body.model.mass) * np.abs(i.phi_t).max() > HELD for i in body.model.interfaces]
+    unknown = {i.name for i, none, moves in zip(body.model.interfaces, idle, moved, strict=True) if none and moves}
     for name in used_interfaces(scene, body):
         if name in unknown:
             raise InputError(

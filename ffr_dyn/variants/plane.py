@@ -249,14 +249,11 @@ def _frame_in_plane(frame: OwnFrame, body: FlexibleBody, k: int, used: Sequence[
 
 
 def _matrices_in_plane(matrices: Array, firsts: Sequence[int], k: int) -> Array:
-    """Load matrices without what moves places across the plane, where that is rounding only; firsts : the first of the six
-    loads at each place."""
+    """Load matrices without what moves places across the plane to second order; firsts : the first of the six loads at each
+    place."""
     K = np.array(matrices)
     for first in firsts:
-        for at, across in ((first, [k]), (first + 3, [c for c in range(3) if c != k])):
-            of_kind = K[at : at + 3]
-            size = np.abs(of_kind).max(initial=0.0)
-            of_kind[across] = np.where(np.abs(of_kind[across]) < _ZERO * size, 0.0, of_kind[across])
+        K[[first + k, *(first + 3 + c for c in range(3) if c != k)]] = 0.0
     return K
 
 

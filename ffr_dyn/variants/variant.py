@@ -11,7 +11,8 @@ rotation and deformation, the terms that can be dropped are (`INERTIA_TERMS`)
     I5  coupling that deformation adds; Coriolis among modes     I8  inertia and centrifugal force linear in q
     I9  inertia and centrifugal force quadratic in q
 
-I3 and I4 belong together: with one of them alone the mass matrix may not be positive, which the run then says. One more
+I3 and I4 belong together: with one of them alone the mass matrix is not positive. Of the others assembly tells how far the
+body may deform without them (`ffr_dyn.consistency.dropped_terms`). One more
 term is "stiffening", the geometric stiffening (which stores energy that the account does not hold).
 """
 
@@ -25,6 +26,7 @@ import numpy as np
 
 from ffr_dyn.scene.drivers import PointDriver
 from ffr_dyn.scene.force_kinds import in_bases, loaded_markers, modal_fields
+from ffr_dyn.scene.parts import owner
 from ffr_dyn.scene.scene import INERTIA_TERMS, Body, Scene
 from ffr_dyn.variants.condensation import statically_complete
 from ffr_prep.body import FlexibleBody, recombined, truncated
@@ -194,7 +196,7 @@ def used_interfaces(scene: Scene, body: Body) -> tuple[str, ...]:
     """The interfaces of a body at which joints, drivers, loads, springs or bushings act."""
     pairs: list[Any] = [*scene.joints, *(d for d in scene.drivers if isinstance(d, PointDriver))]
     ends = {*loaded_markers(scene), *(end for pair in pairs for end in (pair.i, pair.j))}
-    return tuple(i.name for i in body.model.interfaces if f"{body.name}.{i.name}" in ends)
+    return tuple(i.name for i in body.model.interfaces if f"{owner(body)}.{i.name}" in ends)
 
 
 def _by_name(given: Any, everywhere: Iterable[str], names: list[str]) -> dict[str, Any]:

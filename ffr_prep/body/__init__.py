@@ -12,6 +12,7 @@ The numbered invariants I1...I9 and Shabana's S_bar family are read-only views o
 
 from ffr_prep.body.constructors import recombined, rigid_body, truncated, with_point
 from ffr_prep.body.file import content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
+from ffr_prep.body.frame_change import interface_motions, mass_of_motions
 from ffr_prep.body.mean_axis import FrameMarker, MeanAxisForm, idle_loads, mean_axis_form
 from ffr_prep.body.reduced import (
     SECTION_FORCES,
@@ -23,14 +24,16 @@ from ffr_prep.body.reduced import (
     QuadraticField,
     Surface,
     axial,
+    cut_names,
 )
 from ffr_prep.body.second_order import (
     at_places,
     compressed,
-    compressed_groups,
+    compressed_beside,
     displacements,
     linear_surface,
     pair_values,
+    reach_of,
     recoordinated,
     some_points,
     values,
@@ -50,14 +53,18 @@ __all__ = [
     "at_places",
     "axial",
     "compressed",
-    "compressed_groups",
+    "compressed_beside",
     "content_hash",
+    "cut_names",
     "displacements",
     "idle_loads",
+    "interface_motions",
     "linear_surface",
     "load_body",
+    "mass_of_motions",
     "mean_axis_form",
     "pair_values",
+    "reach_of",
     "recombined",
     "recoordinated",
     "rigid_body",

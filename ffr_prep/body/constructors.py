@@ -52,7 +52,7 @@ def rigid_body(
 
 
 def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
-    """The body with only its first ``modes`` elastic coordinates, or those whose indices are listed.
+    """The body with only its first ``modes`` elastic coordinates, or those whose indices are listed; so are its parts.
 
     Raises BodyError for a mode that does not exist or is listed twice.
     """
@@ -74,6 +74,7 @@ def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
         interfaces=tuple(replace(i, phi_t=i.phi_t[:, keep], phi_r=i.phi_r[:, keep]) for i in body.interfaces),
         surface=body.surface and recombined(body.surface, np.eye(body.n)[:, keep], body.surface.Phi[:, :, keep]),
         stiffening=None if body.stiffening is None else body.stiffening[:, keep][:, :, keep],
+        parts=tuple(truncated(part, modes if np.ndim(modes) else min(int(modes), part.n)) for part in body.parts),
     )
 
 
@@ -134,7 +135,19 @@ def with_point(body: FlexibleBody, name: str, position: ArrayLike) -> FlexibleBo
         second = _second_motion(body, name, node, ring, phi_r)
         stiffening = np.concatenate([stiffening, -second])
     point = Interface(name, points[node], Phi[node], phi_r)
-    return replace(body, interfaces=(*body.interfaces, point), stiffening=stiffening)
+    interfaces = (*body.interfaces, point)
+    return replace(
+        body, interfaces=interfaces, stiffening=stiffening, parts=_parts_with_point(body, name, points[node])
+    )
+
+
+def _parts_with_point(body: FlexibleBody, name: str, position: Array) -> tuple[FlexibleBody, ...]:
+    """The parts of a body with one more point, on the part that is nearest to it."""
+    if not body.parts:
+        return ()
+    surfaces = [part.surface.points if part.surface else np.full((1, 3), np.inf) for part in body.parts]
+    nearest = int(np.argmin([np.linalg.norm(points - position, axis=1).min() for points in surfaces]))
+    return tuple(with_point(p, name, position) if k == nearest else p for k, p in enumerate(body.parts))
 
 
 def _neighbours(surface: Surface, node: int) -> Array:

@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 from zipfile import is_zipfile
@@ -25,7 +25,9 @@ from ffr_prep.body.reduced import (
 from ffr_prep.common.arrays import Array
 
 MAGIC = "ffr-body"
-FORMAT_VERSION = 2  # 2 adds stress modes and section forces; files of version 1 are read as bodies without them
+# 2 adds stress modes and section forces, 3 the parts of a body that is cut. Files of before are read as bodies without them,
+# and a body without parts is written as before.
+WHOLE, IN_PARTS = 2, 3
 
 
 def content_hash(*arrays: Array) -> str:
@@ -43,6 +45,20 @@ def save_body(body: FlexibleBody, path: str | Path) -> Path:
     Raises BodyError when the provenance is not JSON, OSError when the file cannot be written.
     """
     path = Path(path)
+    arrays = _arrays(body)
+    for k, part in enumerate(body.parts):
+        arrays |= {f"part/{k}/{key}": value for key, value in _arrays(part).items()}
+    version = IN_PARTS if body.parts else WHOLE
+    meta = {"magic": MAGIC, "format_version": version, **_described(body)}
+    if body.parts:
+        meta["parts"] = [_described(part) for part in body.parts]
+    arrays["meta"] = np.frombuffer(_header(body, meta).encode(), dtype=np.uint8)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return save_arrays(arrays, path)
+
+
+def _arrays(body: FlexibleBody) -> dict[str, Array]:
+    """The arrays of a body by name, those of its parts not among them."""
     arrays = {key: getattr(body, key) for key in integral_shapes(body.n)}
     for k, interface in enumerate(body.interfaces):
         for key in ("position", "phi_t", "phi_r"):
@@ -51,17 +67,17 @@ def save_body(body: FlexibleBody, path: str | Path) -> Path:
         arrays |= {f"surface/{key}": value for key, value in surface_arrays(body.surface).items()}
     if body.stiffening is not None:
         arrays["stiffening"] = body.stiffening
-    meta = {
-        "magic": MAGIC,
-        "format_version": FORMAT_VERSION,
+    return arrays
+
+
+def _described(body: FlexibleBody) -> dict[str, Any]:
+    """What the header says of a body."""
+    return {
         "name": body.name,
         "mass": body.mass,
         "interfaces": [{"name": i.name, "kind": i.kind} for i in body.interfaces],
         "provenance": dict(body.provenance),
     }
-    arrays["meta"] = np.frombuffer(_header(body, meta).encode(), dtype=np.uint8)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    return save_arrays(arrays, path)
 
 
 def save_arrays(arrays: Mapping[str, Any], path: Path) -> Path:
@@ -120,7 +136,7 @@ def load_body(path: str | Path) -> FlexibleBody:
     """Read a body file. Raises BodyError for a missing, damaged, truncated, foreign or newer file."""
     path = Path(path)
     try:
-        return _from_arrays(*_read(path))
+        return _with_parts(*_read(path))
     except FileNotFoundError:
         raise BodyError(f"body file {path} does not exist") from None
     except (PermissionError, IsADirectoryError) as error:
@@ -160,11 +176,20 @@ def _meta(stored: Any) -> dict[str, Any]:
     meta = json.loads(stored["meta"].tobytes())
     if not isinstance(meta, dict) or meta.get("magic") != MAGIC:
         raise BodyError("not a body file (foreign header); write one with ffr-prep reduce")
-    if meta["format_version"] > FORMAT_VERSION:
+    if meta["format_version"] > IN_PARTS:
         raise BodyError(
-            f"body format {meta['format_version']}; this program reads up to {FORMAT_VERSION}: update the program"
+            f"body format {meta['format_version']}; this program reads up to {IN_PARTS}: update the program"
         )
     return meta
+
+
+def _with_parts(meta: Mapping[str, Any], arrays: Mapping[str, Array]) -> FlexibleBody:
+    own: list[dict[str, Array]] = [{} for _ in meta.get("parts", ())]
+    for key in [key for key in arrays if key.startswith("part/")]:
+        _, k, name = key.split("/", 2)
+        own[int(k)][name] = arrays[key]
+    parts = tuple(_from_arrays(of, found) for of, found in zip(meta.get("parts", ()), own, strict=True))
+    return replace(_from_arrays(meta, arrays), parts=parts)
 
 
 def _from_arrays(meta: Mapping[str, Any], arrays: Mapping[str, Array]) -> FlexibleBody:
@@ -180,7 +205,7 @@ def _from_arrays(meta: Mapping[str, Any], arrays: Mapping[str, Array]) -> Flexib
     )
     of_surface = {key.removeprefix("surface/"): value for key, value in arrays.items() if key.startswith("surface/")}
     surface = surface_of(of_surface) if of_surface else None
-    core = {key: arrays[key] for key in integral_shapes(arrays["omega2"].size)}
+    core: dict[str, Any] = {key: arrays[key] for key in integral_shapes(arrays["omega2"].size)}
     return FlexibleBody(
         name=meta["name"],
         mass=meta["mass"],

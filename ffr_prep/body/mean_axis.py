@@ -18,7 +18,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffr_prep.body.accelerations import INERTIAL
+from ffr_prep.body.accelerations import INERTIAL, turns
+from ffr_prep.body.constructors import recombined
 from ffr_prep.body.frame_change import (
     in_motions,
     loads_on_motions,
@@ -26,7 +27,7 @@ from ffr_prep.body.frame_change import (
     second_moments,
     stiffening_in,
 )
-from ffr_prep.body.reduced import FlexibleBody, Interface
+from ffr_prep.body.reduced import FlexibleBody, Interface, Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import ComputationError, InputError
@@ -81,7 +82,7 @@ def _form(body: FlexibleBody) -> MeanAxisForm:
     moved = in_motions(framed, Z, omega2, K)
     _check(body, moved)
     frame = moved.interfaces[-1]
-    made = _exact(moved)
+    made = replace(_exact(moved), surface=body.surface and _surface(body.surface, Z))
     for array in (K, Z):
         array.setflags(write=False)
     form = MeanAxisForm(made, FrameMarker(frame.position, frame.phi_t, frame.phi_r, K[-6:]), Z[6:])
@@ -92,13 +93,20 @@ def _form(body: FlexibleBody) -> MeanAxisForm:
 
 
 def _with_frame(body: FlexibleBody) -> FlexibleBody:
-    """The body with its frame as one more interface, which does not move; at an interface that does not move either."""
+    """The body with its frame as one more interface, which does not move, at an interface that does not move either; without
+    its surface."""
     still = [i for i in body.interfaces if np.abs(i.phi_t).max(initial=0.0) * np.sqrt(body.mass) < _ROUNDING]
     pivot = min(still, key=lambda i: np.abs(i.phi_r).max(initial=0.0)).position if still else np.zeros(3)
     nothing = np.zeros((3, body.n))
     stiffening = np.concatenate([np.asarray(body.stiffening), np.zeros((6, body.n, body.n))])
     frame = Interface(_FRAME, pivot, nothing, nothing)
-    return replace(body, interfaces=(*body.interfaces, frame), stiffening=stiffening)
+    return replace(body, interfaces=(*body.interfaces, frame), stiffening=stiffening, surface=None, parts=())
+
+
+def _surface(surface: Surface, Z: Array) -> Surface:
+    """Without the second-order displacement, which is for pictures: they are drawn in the frame that the body had."""
+    arms = np.einsum("akm,pm->pka", turns(), surface.points)
+    return recombined(replace(surface, second=None), Z[6:], Z[:3] + arms @ Z[3:6] + surface.Phi @ Z[6:])
 
 
 def _motions(body: FlexibleBody) -> tuple[Array, Array]:
@@ -147,7 +155,7 @@ def idle_loads(body: FlexibleBody) -> Array:
     about 1 / sqrt(mass), and for rotations 1 / sqrt(second moment of mass).
     """
     assert body.stiffening is not None
-    six = body.stiffening[INERTIAL:].reshape(len(body.interfaces), -1)
+    six = body.stiffening[INERTIAL:].reshape(len(body.interfaces), 6 * body.n * body.n)
     shift, turn = np.sqrt(body.mass), np.sqrt(np.trace(body.rr_dm) - body.r_dm @ body.r_dm / body.mass)
     motions = [np.stack([shift * i.phi_t, turn * i.phi_r]) for i in body.interfaces]
     moving = np.array([np.abs(of).max(initial=0.0) > _ROUNDING for of in motions], bool)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import settings_in_words, vector_in_words
 
 _ORTHONORMAL_TOLERANCE = 1e-8
+_PARTS_TOLERANCE = 1e-9
 
 
 class BodyError(InputError):
@@ -153,9 +155,12 @@ class FlexibleBody(Brief):
         (3) [m/s^2], its angular acceleration (3) [rad/s^2], the products xx, yy, zz, xy, xz, yz of its angular velocity
         (6) [rad^2/s^2], and for each of the I interfaces force (3) [N] and semitangential moment (3)
         [N m]; all in body axes. None where it was not computed
+    parts     : bodies that the body is cut into, one after the other, if it is: each in the same frame, undeformed, with the
+        interfaces of the whole that lie in it and those at its cuts (`cut_names`). A scene moves them in place of the whole
     provenance: how the body was made; plain JSON values
 
-    Raises BodyError when the integrals contradict each other (shape, symmetry, orthonormality, negative mass).
+    Raises BodyError when the integrals contradict each other (shape, symmetry, orthonormality, negative mass), and for parts
+    that do not make up the whole.
     """
 
     name: str
@@ -170,6 +175,7 @@ class FlexibleBody(Brief):
     surface: Surface | None = None
     stiffening: Array | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    parts: tuple[FlexibleBody, ...] = ()
 
     def __post_init__(self) -> None:
         n = np.size(self.omega2)
@@ -180,6 +186,9 @@ class FlexibleBody(Brief):
         if self.stiffening is not None:
             _freeze(self, "stiffening", (12 + 6 * len(self.interfaces), n, n))
         _check(self)
+        object.__setattr__(self, "parts", tuple(self.parts))
+        if self.parts:
+            _check_parts(self)
 
     def _title(self) -> str:
         return f"FlexibleBody {self.name!r}"
@@ -198,6 +207,7 @@ class FlexibleBody(Brief):
             "size": f"{self.size:.5g} m",
             "modes": f"{self.n}: {listed(f'{f:.4g}' for f in self.frequencies)} Hz" if self.n else "none: rigid",
             "interfaces": listed(f"{i.name} ({i.kind})" for i in self.interfaces),
+            "parts": str(len(self.parts) or ""),
             "reference": settings_in_words(self.provenance.get("reference", "")),
             "reduction": settings_in_words(self.provenance.get("reduction", "")),
             "holds": ", ".join(what for what, there in holds.items() if there is not None),
@@ -326,6 +336,11 @@ def axial(tensor: Array) -> Array:
     return np.stack([tensor[1, 2] - tensor[2, 1], tensor[2, 0] - tensor[0, 2], tensor[0, 1] - tensor[1, 0]])
 
 
+def cut_names(k: int) -> tuple[str, str]:
+    """The interfaces at the k-th cut of a body in parts, k from 1: that of part k and that of part k + 1, at one place."""
+    return f"cut_{k}_a", f"cut_{k}_b"
+
+
 # ---- guards -------------------------------------------------------------------------------------------------------
 
 
@@ -389,3 +404,22 @@ def _check(body: FlexibleBody) -> None:
             f"body {body.name!r}: no mass distribution has the principal moments of inertia {moments} kg m^2 "
             "(each must be at most the sum of the other two)"
         )
+
+
+def _check_parts(body: FlexibleBody) -> None:
+    """Parts have the mass and the interfaces of the whole, and meet at their cuts."""
+    names = [interface.name for part in body.parts for interface in part.interfaces]
+    cuts = [name for k in range(1, len(body.parts)) for name in cut_names(k)]
+    if sorted(names) != sorted([*cuts, *(i.name for i in body.interfaces)]):
+        raise BodyError(
+            f"body {body.name!r}: its parts have the interfaces {names}; they must be those of the whole, each once, and "
+            f"those of the cuts: {cuts}"
+        )
+    mass = sum(part.mass for part in body.parts)
+    if abs(mass - body.mass) > _PARTS_TOLERANCE * body.mass or any(part.parts for part in body.parts):
+        raise BodyError(f"body {body.name!r}: its parts have {mass:.9g} kg together, the whole {body.mass:.9g} kg")
+    for k, (one, other) in enumerate(pairwise(body.parts), 1):
+        a, b = cut_names(k)
+        apart = np.abs(one.interface(a).position - other.interface(b).position).max()
+        if apart > _PARTS_TOLERANCE * max(body.size, one.size):
+            raise BodyError(f"body {body.name!r}: parts {k} and {k + 1} are {apart:.3g} m apart at their cut")

@@ -20,37 +20,62 @@ from ffr_prep.common.arrays import Array
 TOLERANCE = 1e-4
 
 
-def compressed(pairs: Array, omega2: Array) -> QuadraticField:
+def compressed(pairs: Array, omega2: Array, least: float = 0.0) -> QuadraticField:
     """The fields u_ij (..., c, n (n + 1) / 2), of  sum_ij q_i q_j u_ij / 2,  as few shapes; pairs i <= j row by row.
 
     omega2 : (n,) squared frequencies, which say what amplitudes of the modes have equal energy
+    least  : largest value, at q . omega2 q = 1, that counts as large
     """
     i, j = np.triu_indices(omega2.size)
     scale = np.where(i == j, 1.0, np.sqrt(2.0)) / np.sqrt(omega2[i] * omega2[j])
     scaled = pairs.reshape(-1, scale.size) * scale
     turn = np.linalg.eigh(scaled.T @ scaled)[1][:, ::-1]
     shapes = (scaled @ turn).reshape(*pairs.shape[:-1], scale.size)
-    kept = _rank(shapes.reshape(-1, *shapes.shape[-2:]))
+    kept = _rank(shapes.reshape(-1, *shapes.shape[-2:]), least)
     weights = np.zeros((kept, omega2.size, omega2.size))
     weights[:, i, j] = weights[:, j, i] = (turn[:, :kept] / scale[:, None]).T
-    return QuadraticField(shapes[..., :kept], weights)
+    return QuadraticField(_rounded(shapes[..., :kept]), weights)
 
 
-def _rank(shapes: Array) -> int:
+def _rounded(shapes: Array) -> Array:
+    """The shapes (..., c, r) in a tenth of the tolerance, as multiples of a power of two: what files can compress."""
+    largest = TOLERANCE * _largest(shapes)
+    step = 2.0 ** np.floor(np.log2(0.1 * largest / np.sqrt(max(shapes.shape[-1], 1)))) if largest > 0 else 1.0
+    return np.asarray(np.round(shapes / step) * step)
+
+
+def _rank(shapes: Array, least: float) -> int:
     """How many of the shapes (P, c, r) are kept, the others being small at every place together."""
     squares = np.einsum("pcr,pcr->pr", shapes, shapes)
     left = np.cumsum(squares[:, ::-1], axis=1)[:, ::-1].max(axis=0, initial=0.0)  # without the shapes before
-    return int(np.sum(left > TOLERANCE**2 * left.max(initial=0.0)))
+    return int(np.sum(left > TOLERANCE**2 * left.max(initial=least**2)))
 
 
-def compressed_groups(pairs: Array, omega2: Array, groups: Sequence[slice]) -> QuadraticField:
-    """As `compressed`, of components that have other units group by group: each is kept as accurate as its own largest."""
-    parts = [compressed(pairs[..., own, :], omega2) for own in groups]
+def compressed_beside(
+    linear: Array, pairs: Array, omega2: Array, reach: float, groups: Sequence[slice]
+) -> QuadraticField:
+    """As `compressed`, of components beside the linear ones (..., c, n), group by group of one unit.
+
+    What is small beside the linear part even where the energy is reach times a unit is left out: rounding, where u_2 takes
+    all of it, as from the section forces of a cantilever.
+    """
+    at_unit = linear / np.sqrt(omega2)
+    parts = [compressed(pairs[..., own, :], omega2, _largest(at_unit[..., own, :]) / reach) for own in groups]
     ranks = np.cumsum([0, *(part.shapes.shape[-1] for part in parts)])
     shapes = np.zeros((*pairs.shape[:-1], ranks[-1]))
     for own, part, first, last in zip(groups, parts, ranks, ranks[1:], strict=False):
         shapes[..., own, first:last] = part.shapes
     return QuadraticField(shapes, np.concatenate([part.weights for part in parts]))
+
+
+def reach_of(surface: Surface, omega2: Array) -> float:
+    """sqrt(q . omega2 q) at which the surface moves by its own size."""
+    return float(np.ptp(surface.points, axis=0).max()) / (_largest(surface.Phi / np.sqrt(omega2)) or 1.0)
+
+
+def _largest(fields: Array) -> float:
+    """The largest value (..., c, n) that the fields take together."""
+    return float(np.sqrt(np.einsum("...ci,...ci->...", fields, fields).max(initial=0.0)))
 
 
 def values(field: QuadraticField, q: Array) -> Array:

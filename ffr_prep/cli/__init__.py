@@ -4,26 +4,29 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ffr_prep.cli.conversion import convert
 from ffr_prep.cli.interchange import export_body, import_body
 from ffr_prep.cli.matrices import reduce_matrices_command
-from ffr_prep.cli.options import PATH, bundle, check_points, check_writable, material_of, number_of, numbers_of
+from ffr_prep.cli.options import PATH, bundle, check_points, check_writable, gone, material_of, number_of, numbers_of
 from ffr_prep.cli.reduction import NOTES as REDUCTION_NOTES
 from ffr_prep.cli.request import REQUEST, reduce_to_file, request_of
 from ffr_prep.cli.settings import EntriesCommand, NotesCommand
 from ffr_prep.cli.structure import reduce_structure_command
-from ffr_prep.cli.terminal import show, terminal_steps
+from ffr_prep.cli.terminal import filed, show, terminal_steps
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.registry import load_plugin
 from ffr_prep.mesh.formats import MESH_FORMATS
 from ffr_prep.reduction.registry import REDUCTIONS
+
+if TYPE_CHECKING:
+    from ffr_prep.report.integrals import Source
 
 EXAMPLE = """\b
 Example:
@@ -128,9 +131,8 @@ def mesh(mesh: Path, **options: Any) -> None:
 @_MESH
 @click.option("--material", "materials", multiple=True, required=True, metavar="MATERIAL", help="See below.")
 @REQUEST
-@click.option(
-    "--stiffening", is_flag=True, help="Also compute geometric stiffening: slender rods under load, fast blades."
-)
+@click.option("--linear", is_flag=True, help="Leave out the load matrices: linear elasticity, for what barely bends.")
+@gone("--stiffening", "load matrices are computed by default; --linear leaves them out")
 @click.option(
     "--stress", is_flag=True, help="Also keep the stress at the surface, which ffr-dyn stress and animate show."
 )
@@ -165,16 +167,48 @@ def reduce(mesh: Path, materials: tuple[str, ...], **options: Any) -> None:
 
 @cli.command()
 @click.argument("body", type=PATH)
-def info(body: Path) -> None:
-    """What BODY is: mass, inertia, interfaces, frequencies, what it can represent, and how it was made.
+@click.option(
+    "--terms",
+    multiple=True,
+    metavar="NAME",
+    help="Print this inertia integral in full: I1 ... I9, S_bar, S_bar_xy, N_bar_xy, S_bar_ff, or all; repeat.",
+)
+@click.option("-o", "--output", type=PATH, help="Write the integrals, or those of --terms, to this .npz file.")
+def info(body: Path, terms: tuple[str, ...], output: Path | None) -> None:
+    """What BODY is: mass, inertia, interfaces, frequencies, inertia integrals, what it can represent, how it was made.
 
     The effective mass of a mode is the part of the mass that it sets in motion when the frame is shaken along an axis;
     modes with little of it matter little for inertia loads. With the mean-axis frame all of them are zero.
-    """
-    from ffr_prep.body import load_body
-    from ffr_prep.report.text import body_lines
 
-    show(body_lines(load_body(body)))
+    Of a structure file (.toml) the integrals are in nodal coordinates, before reduction: six of each node, in turn.
+    """
+    from ffr_prep.report.integrals import chosen, save_terms, term_lines
+
+    chosen(terms)
+    if output is not None:
+        check_writable(output)
+    source, lines = _described(body)
+    show(term_lines(source, terms) if terms else lines)
+    if output is not None:
+        filed(save_terms(source, terms or ("all",), output))
+
+
+def _described(path: Path) -> tuple[Source, Iterable[str]]:
+    """A body or the nodal integrals of a structure, and its description."""
+    if path.suffix != ".toml":
+        from ffr_prep.body import load_body
+        from ffr_prep.report.text import body_lines
+
+        body = load_body(path)
+        return body, body_lines(body)
+    from ffr_prep.cli.structure import frame_lines
+    from ffr_prep.pipelines.structure_file import read_structure
+    from ffr_prep.report.integrals import integral_lines
+    from ffr_prep.structures.nodal_integrals import nodal_integrals
+
+    frame = read_structure(path).frame
+    found = nodal_integrals(frame)
+    return found, (*frame_lines(frame), *integral_lines(found))
 
 
 @cli.command()

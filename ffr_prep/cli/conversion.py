@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from ffr_prep.cli.options import PATH, check_writable, reference_of
+from ffr_prep.cli.options import PATH, check_writable, gone, reference_of
 from ffr_prep.cli.request import OUTPUT
 from ffr_prep.cli.terminal import filed, show
 
@@ -21,6 +21,7 @@ Example:
 @click.argument("body", type=PATH)
 @OUTPUT
 @click.option("--reference", required=True, metavar="CONDITIONS", help="As in reduce, on the interfaces of BODY.")
+@gone("--without-stiffening", "it is --linear now")
 @click.option("--linear", is_flag=True, help="Leave out the load matrices, where they cannot come along.")
 def convert(body: Path, output: Path, reference: str, linear: bool) -> None:
     """Attach the frame of BODY in another way, without its mesh: to an interface, between two, or to the mean axis.

@@ -38,7 +38,7 @@ Interfaces: as in `ffr-prep reduce`, on groups of nodes.
   --interface rim:mean           the mean motion of the nodes counts (RBE3)
   --interface pin=rim@0,0,0      the interface "pin" on group "rim", its node at this point [m]
 
-Reference conditions and methods are those of `ffr-prep reduce`. Geometric stiffening is not available.
+Reference conditions and methods are those of `ffr-prep reduce`. The body is linear.
 """
 
 

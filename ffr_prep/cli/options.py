@@ -40,6 +40,16 @@ def bundle(*options: Decorator) -> Decorator:
     return added
 
 
+def gone(option: str, remedy: str) -> Decorator:
+    """A flag of earlier versions that is refused; the remedy says what to write now."""
+
+    def refused(context: click.Context, parameter: click.Parameter, given: bool) -> None:
+        if given:
+            raise InputError(f"{option} is no option any more: {remedy}")
+
+    return click.option(option, is_flag=True, hidden=True, expose_value=False, callback=refused)
+
+
 def numbers_of(settings: Sequence[str]) -> dict[str, float]:
     for text in settings:
         if "=" not in text:

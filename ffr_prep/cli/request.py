@@ -14,6 +14,7 @@ import click
 from ffr_prep.cli.options import PATH, bundle, interface_of, reference_of
 from ffr_prep.cli.reduction import band_of, draw_quality, reduction_of, reduction_options
 from ffr_prep.cli.terminal import Steps, filed, show
+from ffr_prep.common.errors import InputError
 
 if TYPE_CHECKING:
     from ffr_prep.model.coupled import InterfaceRegion
@@ -32,12 +33,26 @@ SOLVER = bundle(
     ),
     click.option("--ranks", type=int, default=1, show_default=True, help="MPI processes of the solver slepc."),
 )
+PARTS = (
+    "Also cut the body into N parts along its long axis, or at distances X1,X2,... [m] from its end: for large "
+    "deflections; a scene then moves the parts."
+)
+
+
+def _parts(_: click.Context, option: click.Parameter, text: str | None) -> int | list[float] | None:
+    try:
+        return None if text is None else int(text) if text.isdigit() else [float(word) for word in text.split(",")]
+    except ValueError:
+        raise InputError(f"--parts {text}: write a number of parts, or distances [m] such as 0.1,0.25") from None
+
+
 REQUEST = bundle(
     OUTPUT,
     click.option("--name", help="Name of the body; default: the name of the file."),
     click.option("--interface", "interfaces", multiple=True, metavar="INTERFACE", help="See below; may be repeated."),
     click.option("--reference", default="mean-axis", show_default=True, metavar="CONDITIONS", help="See below."),
     reduction_options,
+    click.option("--parts", callback=_parts, metavar="N or X1,X2,...", help=PARTS),
     SOLVER,
 )
 
@@ -50,7 +65,7 @@ def solver_of(options: Mapping[str, Any]) -> Solver:
 
 
 def request_of(options: Mapping[str, Any]) -> tuple[Sequence[InterfaceRegion], Request]:
-    """The interfaces and the request of the options REQUEST, and of --stiffening and --stress where a command has them;
+    """The interfaces and the request of the options REQUEST, and of --linear and --stress where a command has them;
     InputError for options that cannot be used.
     """
     from ffr_prep.pipelines.reduce import Request
@@ -60,8 +75,9 @@ def request_of(options: Mapping[str, Any]) -> tuple[Sequence[InterfaceRegion], R
         reference=reference_of(options["reference"]),
         reduction=reduction_of(options),
         quality=band_of(options),
+        parts=options["parts"],
         solver=solver_of(options),
-        stiffening=options.get("stiffening", False),
+        linear=options.get("linear", False),
         stress=options.get("stress", False),
     )
 

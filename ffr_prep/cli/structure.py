@@ -60,12 +60,12 @@ def reduce_structure_command(structure: Path, output: Path, **options: Any) -> N
     steps = terminal_steps()
     loaded = read_structure(structure, steps)
     steps.end()
-    show(_lines(loaded.frame))
+    show(frame_lines(loaded.frame))
     request = replace(loaded.request, solver=solver, provenance={"source": {"file": structure.name}})
     reduce_to_file(lambda: loaded.model(steps), request, output, steps)
 
 
-def _lines(frame: Frame) -> Iterator[str]:
+def frame_lines(frame: Frame) -> Iterator[str]:
     """Size, extent and groups of a frame."""
     kinds = {"beams": frame.elements, "triangles": frame.triangles, "quadrilaterals": frame.quadrilaterals}
     elements = ", ".join(f"{len(nodes)} {kind}" for kind, nodes in kinds.items() if len(nodes))

@@ -83,12 +83,13 @@ def from_matrices(
                 "mass": "general, by rigid motions of the nodes" if m is None else "one scalar mass for x, y and z",
             },
             "interfaces": [described(interface) for interface in interfaces],
-            "notes": [*model.notes, "geometric stiffening is not available for matrices from outside"],
+            "notes": [*model.notes, "matrices from outside do not tell their stresses: the body is linear"],
             "warnings": precision_warnings(model),
         },
         packages=("ffr", "numpy", "scipy"),
         doubts=doubts,
         massless=mass_is_singular(model),
+        unstressed=True,
         diagnose=lambda: check_mechanisms(model, coupled, ties),
     )
 
@@ -114,6 +115,4 @@ def _doubts(defect: Array) -> list[str]:
 
 
 def _unstressed(*fields: Array) -> NoReturn:
-    raise InputError(
-        "geometric stiffening needs stresses, which matrices from outside do not give: reduce the body without it"
-    )
+    raise InputError("load matrices need stresses, which matrices from outside do not give: the body is linear")

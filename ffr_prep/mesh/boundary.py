@@ -42,6 +42,16 @@ def joined_by_faces(blocks: Blocks) -> Array:
     return _parts(np.repeat(np.arange(per_element.size), per_element), face)
 
 
+def neighbours(blocks: Blocks) -> Array:
+    """(P, 2) pairs of elements that share a whole face."""
+    _, _, face = _numbered(blocks, [])
+    per_element = np.concatenate([np.full(len(nodes), len(KINDS[kind].faces)) for kind, nodes in blocks])
+    owner = np.repeat(np.arange(per_element.size), per_element)
+    order = np.argsort(face, kind="stable")
+    same = face[order][1:] == face[order][:-1]
+    return np.stack([owner[order][:-1][same], owner[order][1:][same]], axis=1)
+
+
 def joined_by_nodes(blocks: Blocks) -> Array:
     """(E,) number of the part that each element belongs to, parts being joined by at least one node."""
     sizes = np.concatenate([np.full(len(nodes), nodes.shape[1]) for _, nodes in blocks])

@@ -12,6 +12,7 @@ from ffr_prep.body import BeamForces, Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.model.coupled import CoupledModel
+from ffr_prep.model.cuts import Cuts
 from ffr_prep.model.invariants import InertiaIntegrals
 from ffr_prep.model.second_order import SecondOrder
 
@@ -32,7 +33,9 @@ class Model(Brief):
     packages   : whose versions are recorded
     doubts     : what the integrals of a basis (Z, n) cannot be trusted with, in words
     massless   : some coordinates have no mass
+    unstressed : stresses are not known, and with them neither `stiffening` nor `second`: the body is linear
     diagnose   : called when a computation has failed; raises InputError where the model is found to be the cause
+    cut        : the models of the parts that a body is cut into; None where the model cannot be cut
     """
 
     coupled: CoupledModel
@@ -46,7 +49,9 @@ class Model(Brief):
     packages: tuple[str, ...] = ("ffr", "numpy", "scipy", "scikit-fem")
     doubts: Callable[[Array], list[str]] = lambda _: []
     massless: bool = False
+    unstressed: bool = False
     diagnose: Callable[[], None] = lambda: None
+    cut: Callable[[Cuts], Sequence[Model]] | None = None
 
     def _rows(self) -> Rows:
         kind = [key for key in ("mesh", "frame", "matrices") if key in self.record]

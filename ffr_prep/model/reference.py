@@ -10,7 +10,7 @@ A. A. Shabana, Computers & Structures 21 (1985) 1303-1312 (mean axis).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -44,6 +44,22 @@ def functionals(conditions: ReferenceConditions, model: CoupledModel) -> Array:
         motions = " and ".join(motion_in_words(motion, model.centre, body_length(model)) for motion in free.T)
         raise InputError(f"the reference conditions do not prevent {motions}: add a condition that does")
     return L
+
+
+def conditions_of_part(conditions: ReferenceConditions, interfaces: Collection[str]) -> ReferenceConditions:
+    """The conditions for a part of a body with these interfaces: as they are where it has all that they name, and mean axis
+    where it has not, or where they are on the nodes of the whole.
+    """
+    match conditions:
+        case FixedTo(interface=name):
+            named = {name}
+        case SimplySupported(pin=pin, roller=roller):
+            named = {pin, roller}
+        case Supports(supports=supports):
+            named = {support.interface for support in supports}
+        case _:
+            return MeanAxis()
+    return conditions if named <= set(interfaces) else MeanAxis()
 
 
 # ---- the choices --------------------------------------------------------------------------------------------------

@@ -31,12 +31,12 @@ class SecondOrder:
     """The second order of a basis (Z, n), pair by pair.
 
     known    : (12 + 6 I, n, n) E
-    forces   : i -> (Z, n - i) F_ij for j from i on
+    forces   : some of the i -> (Z, ...) F_ij of each with the j from i on
     surface  : (i, u_ij (Z, n - i)) -> what is drawn, with the displacements of the pairs in the place of the basis
     stressed : the same with the stress of the pairs, where stress is known
     """
 
     known: Array
-    forces: Callable[[int], Array]
+    forces: Callable[[range], Array]
     surface: Callable[[int, Array], Surface | None]
     stressed: Callable[[int, Array], Surface | None]

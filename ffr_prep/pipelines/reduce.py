@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from typing import Any
@@ -16,10 +16,12 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.progress import Advance, Stages, no_advance, no_stages
 from ffr_prep.model.coupled import CoupledModel
+from ffr_prep.model.cuts import Cuts
 from ffr_prep.model.model import Model
 from ffr_prep.model.reactions import in_equilibrium, known_loads
-from ffr_prep.model.reference import ReferenceConditions, functionals
+from ffr_prep.model.reference import ReferenceConditions, conditions_of_part, functionals
 from ffr_prep.reduction.basis import Basis, Reduction, check_basis, factorised
+from ffr_prep.reduction.held_body import held_body, needs_held_body
 from ffr_prep.reduction.quality import assess, completed
 from ffr_prep.reduction.second_order import with_second_order
 from ffr_prep.reduction.selection import Band
@@ -36,9 +38,14 @@ class Request:
     name       : of the body
     reference  : how its frame is attached, such as FixedTo("root") or MeanAxis()
     reduction  : which deformation shapes it keeps, such as CraigBampton(10)
-    stiffening : also compute the geometric stiffness by load, which a simulation then uses
+    linear     : leave out the load matrices, and with them the second-order displacement by which a simulation has elastic
+                 bodies stiffen, and foreshorten, as they bend; bodies of matrices from outside are linear anyway
     stress     : also keep section forces of beams and the stress at the surface per elastic coordinate
     quality    : compare the body with the full model over this band of frequencies, and keep what was found
+    parts      : also cut the body into so many parts of equal length along its long axis; or at stations, distances [m] from
+                 its end, or `CutPlane`s. Each is reduced like the whole (`FlexibleBody.parts`) and a scene moves them in its
+                 place, which large deflections ask for. A part has the reference conditions if it has the interfaces that
+                 they name, and else its mean axis
     solver     : what factorises the stiffness and finds the modes
     provenance : JSON values kept with the body, beside what is recorded anyway
 
@@ -48,9 +55,10 @@ class Request:
     name: str
     reference: ReferenceConditions
     reduction: Reduction
-    stiffening: bool = False
+    linear: bool = False
     stress: bool = False
     quality: Band | None = None
+    parts: Cuts | None = None
     solver: Solver = CHOLESKY
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
@@ -78,11 +86,35 @@ def reduce(
         raise InputError(
             "the quality of a reduction needs a mass for every coordinate, and some have none: leave out the quality report"
         )
+    if request.parts is not None and model.cut is None:
+        raise InputError("this model cannot be cut into parts: meshes of solids and frames of beams and plates can")
     try:
-        return _reduced(model, request, progress, advance)
+        whole = _reduced(model, request, progress, advance)
+        return replace(whole, parts=tuple(_parts(model, request, progress, advance)))
     except ComputationError:
         model.diagnose()
         raise
+
+
+def _parts(model: Model, request: Request, progress: Stages, advance: Advance) -> Iterator[FlexibleBody]:
+    """The parts of the body, reduced one after the other."""
+    if request.parts is None or model.cut is None:
+        return
+    progress("cut into parts")
+    models = model.cut(request.parts)
+    for k, part in enumerate(models, 1):
+        own = replace(
+            request,
+            name=f"{request.name}_{k}",
+            reference=conditions_of_part(request.reference, part.coupled.names),
+            quality=None,
+            parts=None,
+        )
+        of = f"part {k} of {len(models)}"
+        try:
+            yield _reduced(part, own, lambda stage, of=of: progress(f"{of}: {stage}"), advance)  # type: ignore[misc]
+        except InputError as error:
+            raise InputError(f"{of}: {error}") from None
 
 
 def _reduced(model: Model, request: Request, progress: Stages, advance: Advance) -> FlexibleBody:
@@ -104,14 +136,14 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
     if request.stress and surface is None:
         raise InputError("no part of this model knows its stress: reduce it without")
     stiffening = None
-    if request.stiffening:
+    if basis.omega2.size and not (request.linear or model.unstressed):
         held = supported(body, L)
-        progress("compute the geometric stiffness")
+        progress("compute the load matrices")
         stiffening = stiffening_matrices(model, request, held, basis)
         if surface is not None:
             progress("compute the second order of the surface")
             surface = with_second_order(surface, model, held, request.reference, basis, advance)
-    return FlexibleBody(
+    made = FlexibleBody(
         name=request.name,
         omega2=basis.omega2,
         interfaces=interface_shapes(coupled, basis),
@@ -120,6 +152,15 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
         provenance=completed(record(model, request, model.doubts(basis.Z)), basis, assessed),
         **vars(integrals),
     )
+    return _with_held_body(made, model, body, progress)
+
+
+def _with_held_body(made: FlexibleBody, model: Model, body: FreeBody, progress: Stages) -> FlexibleBody:
+    """The body with how it would vibrate with its interfaces held, where its own shapes cannot tell."""
+    if model.massless or not needs_held_body(made):
+        return made
+    progress("look at the interfaces held")
+    return replace(made, provenance={**made.provenance, "held_body": held_body(model.coupled, body, model.inertia)})
 
 
 # ---- basis --------------------------------------------------------------------------------------------------------
@@ -168,7 +209,7 @@ def interface_shapes(model: CoupledModel, basis: Basis) -> tuple[Interface, ...]
 
 
 def stiffening_matrices(model: Model, request: Request, held: SupportedBody, basis: Basis) -> Array:
-    """(12 + 6 I, n, n) reduced geometric stiffness per unit load, in the order of `FlexibleBody.stiffening`.
+    """(12 + 6 I, n, n) load matrices, in the order of `FlexibleBody.stiffening`.
 
     held : the body under its reference conditions
 

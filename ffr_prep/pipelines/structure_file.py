@@ -35,11 +35,13 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.mesh.mesh import Mesh, read_mesh
 from ffr_prep.model.coupled import InterfaceRegion
+from ffr_prep.model.cuts import CutPlane, Cuts
 from ffr_prep.model.material import Material, material
 from ffr_prep.model.model import Model
 from ffr_prep.model.reference import FixedTo, MeanAxis, ReferenceConditions, SimplySupported, Support, Supports
 from ffr_prep.pipelines.reduce import Request
 from ffr_prep.pipelines.structure_schema import (
+    CutEntry,
     InterfaceEntry,
     MemberEntry,
     PanelEntry,
@@ -103,9 +105,10 @@ def read_structure(path: str | Path, progress: Stages = no_stages) -> Structure:
                 name=entry.name or path.stem,
                 reference=_reference(entry.reference),
                 reduction=reduction_of([vars(of) for of in entry.reduction], path.parent),
-                stiffening=entry.stiffening,
+                linear=entry.linear,
                 stress=entry.stress,
                 quality=None if entry.quality is None else Band(*entry.quality),
+                parts=_cuts(entry.parts),
             ),
         )
     except InputError as error:
@@ -222,6 +225,12 @@ def _section(entry: MemberEntry) -> Section:
     section = make[entry.section.shape](**constants)
     section = section if entry.shear else shear_rigid(section)
     return shifted(section, *entry.offset) if any(entry.offset) else section
+
+
+def _cuts(given: int | list[float | CutEntry] | None) -> Cuts | None:
+    if given is None or isinstance(given, int):
+        return given
+    return [CutPlane(one.point, one.normal) if isinstance(one, CutEntry) else one for one in given]
 
 
 def _reference(entry: ReferenceEntry) -> ReferenceConditions:

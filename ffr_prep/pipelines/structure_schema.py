@@ -200,6 +200,13 @@ class SolidEntry(Strict):
     order: Literal[1, 2] = 2
 
 
+class CutEntry(Strict):
+    """A plane that cuts the body into parts, through a point [m]; the next part lies where the normal points."""
+
+    point: Vector
+    normal: Vector
+
+
 class StructureEntry(Strict):
     """The whole file."""
 
@@ -216,9 +223,17 @@ class StructureEntry(Strict):
     ties: list[tuple[str, str]] = []
     reference: ReferenceEntry = MeanAxisEntry(kind="mean-axis")
     reduction: list[ReductionEntry]
-    stiffening: bool = False
+    linear: bool = False
     stress: bool = False
     quality: tuple[float, float] | None = None
+    parts: int | list[float | CutEntry] | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _renamed(cls, value: Any) -> Any:
+        if isinstance(value, dict) and "stiffening" in value:
+            raise ValueError("stiffening: load matrices are computed by default; write linear = true to leave them out")
+        return value
 
     @field_validator("reduction", mode="before")
     @classmethod

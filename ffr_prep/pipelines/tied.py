@@ -104,6 +104,7 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
             "warnings": [f"{name}: {w}" for name, part in parts.items() for w in part.record.get("warnings", [])],
         },
         doubts=doubts,
+        unstressed=any(m.unstressed for m in models),
     )
 
 

@@ -51,10 +51,14 @@ def tied_second_order(
     parts = [model.second(x @ basis) for model, x in zip(models, own, strict=True)]
     arms, loads = flow
 
-    def forces(i: int) -> Array:
+    def forces(some: range) -> Array:
+        through_ties = np.hstack([carried(i) for i in some])
+        return np.asarray(sum((x.T @ part.forces(some) for part, x in zip(parts, own, strict=True)), through_ties))
+
+    def carried(i: int) -> Array:
         total = np.zeros((X.shape[1], basis.shape[1] - i))
-        for part, x, load in zip(parts, own, loads, strict=True):
-            total += x.T @ part.forces(i) + load.T @ part.known[:, i, i:]
+        for part, load in zip(parts, loads, strict=True):
+            total += load.T @ part.known[:, i, i:]
         for S, rotation in arms:
             total += S.reshape(len(S), 9) @ turned(rotation @ basis[:, i], rotation @ basis[:, i:]).reshape(9, -1)
         return total

@@ -32,7 +32,7 @@ from ffr_prep.body.interface_freedom import interface_freedom
 from ffr_prep.body.provenance import described
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import CoupledModel
-from ffr_prep.model.reference import ReferenceConditions, UserConditions, functionals
+from ffr_prep.model.reference import ReferenceConditions, UserConditions, conditions_of_part, functionals
 from ffr_prep.reduction.basis import diagonalised, in_frame
 from ffr_prep.reduction.turned_stiffening import turned_stiffening
 
@@ -55,7 +55,8 @@ def with_reference(body: FlexibleBody, conditions: ReferenceConditions) -> Flexi
     basis = diagonalised(model, elastic, elastic.T @ (model.K @ elastic))
     stiffening = None if body.stiffening is None else turned_stiffening(body, model, conditions, basis.Z)
     converted = in_motions(body, basis.Z, basis.omega2, stiffening)
-    return replace(converted, provenance=_provenance(body, conditions))
+    parts = [with_reference(p, conditions_of_part(conditions, [i.name for i in p.interfaces])) for p in body.parts]
+    return replace(converted, provenance=_provenance(body, conditions), parts=tuple(parts))
 
 
 # ---- the body as a model of its own motions -----------------------------------------------------------------------

@@ -1,8 +1,8 @@
 """The second-order displacement of a reduced body at the points of its surface, and the stress there.
 
 For each pair of modes one static problem under the reference conditions, with the one factorisation that there is:
-n (n + 1) / 2 right-hand sides. Held by conditions L on coordinates that move to second order themselves, L u_ij is what
-makes them stay (see `ffr_prep.model.second_order`).
+n (n + 1) / 2 right-hand sides, solved without refinement, as less is kept. Held by conditions L on coordinates that move to
+second order themselves, L u_ij is what makes them stay (see `ffr_prep.model.second_order`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ffr_prep.body import Surface, compressed, compressed_groups
+from ffr_prep.body import Surface, compressed, compressed_beside, reach_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.progress import Advance
 from ffr_prep.model.model import Model
@@ -20,42 +20,54 @@ from ffr_prep.model.reactions import known_loads, supports
 from ffr_prep.model.reference import ReferenceConditions
 from ffr_prep.model.second_order import SecondOrder
 from ffr_prep.reduction.basis import Basis
-from ffr_prep.solvers.factor import SupportedBody, solve_refined
+from ffr_prep.solvers.factor import SupportedBody, solve_supported
+
+_PAIRS = 48  # solved at once
 
 
 def with_second_order(
     surface: Surface, model: Model, held: SupportedBody, conditions: ReferenceConditions, basis: Basis, advance: Advance
 ) -> Surface:
-    """The surface with its second-order displacement, and second-order stress where it has stress.
-
-    held : the body under its reference conditions
-
-    Raises ComputationError when a static problem fails.
-    """
+    """The surface with its second-order displacement, and second-order stress where it has stress; held : the body under its
+    reference conditions."""
     second, n = model.second(basis.Z), basis.omega2.size
     prescribed = _prescribed(model, held, conditions, second)
     shown = second.surface if surface.stress is None else second.stressed
     parts = []
-    for i in range(n):
-        u = solve_refined(held, -second.forces(i), prescribed[:, i, i:])[0]
-        part = shown(i, u)
-        assert part is not None  # the model has a surface
-        parts.append(part)
-        advance((i + 1) / n, f"second order of {i + 1} of {n} modes")
+    for some in _blocks(n):
+        moved = np.hstack([prescribed[:, i, i:] for i in some])
+        u = solve_supported(held, -second.forces(some), moved)[0]
+        for i, of_one in zip(some, np.split(u, np.cumsum([n - i for i in some])[:-1], axis=1), strict=True):
+            part = shown(i, of_one)
+            assert part is not None  # the model has a surface
+            parts.append(part)
+        advance(some.stop / n, f"second order of {some.stop} of {n} modes")
     return _collected(surface, parts, basis.omega2)
+
+
+def _blocks(n: int) -> list[range]:
+    """The modes in blocks that make few pairs, each with those from it on, but not one by one."""
+    starts, pairs = [0], 0
+    for i in range(n):
+        if pairs and pairs + n - i > _PAIRS:
+            starts.append(i)
+            pairs = 0
+        pairs += n - i
+    return [range(first, last) for first, last in zip(starts, [*starts[1:], n], strict=True) if last > first]
 
 
 def _collected(surface: Surface, parts: Sequence[Surface], omega2: Array) -> Surface:
     """The surface with the fields of all pairs, in the place of the modes of `parts`."""
+    reach = reach_of(surface, omega2)
     second = compressed(np.concatenate([part.Phi for part in parts], axis=-1), omega2)
-    stress = [part.stress for part in parts if part.stress is not None]
-    second_stress = compressed(np.concatenate(stress, axis=-1), omega2) if stress else None
-    forces = [part.beams.modes for part in parts if part.beams is not None]
-    beams = surface.beams
-    if beams is not None and forces:
-        forces_and_moments = (slice(0, 3), slice(3, 6))
-        pairs = np.concatenate(forces, axis=-1)
-        beams = replace(beams, second=compressed_groups(pairs, omega2, forces_and_moments))
+    second_stress, beams = None, surface.beams
+    if surface.stress is not None:
+        stress = np.concatenate([part.stress for part in parts if part.stress is not None], axis=-1)
+        second_stress = compressed_beside(surface.stress, stress, omega2, reach, (slice(0, 6),))
+    if beams is not None:
+        forces = np.concatenate([part.beams.modes for part in parts if part.beams is not None], axis=-1)
+        in_all = compressed_beside(beams.modes, forces, omega2, reach, (slice(0, 3), slice(3, 6)))
+        beams = replace(beams, second=in_all)
     return replace(surface, second=second, second_stress=second_stress, beams=beams)
 
 

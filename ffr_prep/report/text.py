@@ -12,6 +12,7 @@ from ffr_prep.body.interface_freedom import interface_freedom
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.in_words import settings_in_words, vector_in_words
 from ffr_prep.reduction.quality import Quality, quality_of
+from ffr_prep.report.integrals import integral_lines
 
 if TYPE_CHECKING:
     from ffr_prep.mesh.mesh import Mesh
@@ -47,7 +48,9 @@ def body_lines(body: FlexibleBody) -> Iterator[str]:
     yield from _interface_lines(body)
     yield from _choice_lines(body.provenance)
     yield from mode_lines(body)
+    yield from integral_lines(body)
     yield from ability_lines(body)
+    yield from part_lines(body)
     yield from quality_lines(body)
     yield from _origin_lines(body.provenance)
 
@@ -59,6 +62,7 @@ def short_lines(body: FlexibleBody) -> Iterator[str]:
     if body.n:
         shown = ", ".join(f"{f:.4g}" for f in body.frequencies[:6])
         yield f"modes       {body.n}: {shown}{', ...' if body.n > 6 else ''} Hz"
+    yield from part_lines(body)
     yield from quality_lines(body)
     for warning in body.provenance.get("warnings", []):
         yield f"warning     {warning}"
@@ -92,6 +96,13 @@ def _interface_lines(body: FlexibleBody) -> Iterator[str]:
         yield f"{label:12}{interface.name:{width}}  {interface.kind:5}  at {vector_in_words(interface.position, size)} m"
     if len(body.interfaces) > _MOST_INTERFACES:
         yield f"{'':12}{len(body.interfaces) - _MOST_INTERFACES} more"
+
+
+def part_lines(body: FlexibleBody) -> Iterator[str]:
+    """The parts that a body is cut into: how many, and for each its mass, coordinates and interfaces."""
+    for k, part in enumerate(body.parts):
+        names = ", ".join(interface.name for interface in part.interfaces)
+        yield f"{'' if k else 'parts':12}{part.name}  {part.mass:.5g} kg, {part.n} elastic coordinates, {names}"
 
 
 def mode_lines(body: FlexibleBody) -> Iterator[str]:
@@ -215,7 +226,15 @@ def _choice_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
 
 def _origin_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
     for key, value in provenance.items():
-        if value and key not in ("reduction", "reference", "material", "interfaces", "warnings", "quality"):
+        if value and key not in (
+            "reduction",
+            "reference",
+            "material",
+            "interfaces",
+            "warnings",
+            "quality",
+            "held_body",
+        ):
             yield f"{key:12}{settings_in_words(value)}"
     for warning in provenance.get("warnings", []):
         yield f"warning     {warning}"

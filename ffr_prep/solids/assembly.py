@@ -163,10 +163,12 @@ class Gradients:
         """(q, 3, 3, r) Cauchy stress [Pa] of nodal displacements (N, 3, r) [m]."""
         return self._elastic(self.gradient(field))
 
-    def stress_of_products(self, one: Array, others: Array) -> Array:
-        """(q, 3, 3, m) second derivatives of the stress by the amplitudes of one (N, 3, 1) and others (N, 3, m)."""
-        product = np.einsum("qmk,qmlr->qklr", self.gradient(one)[..., 0], self.gradient(others), optimize=True)
-        return self._elastic(product)
+    def stress_of_products(self, gradient: Array, i: int) -> Array:
+        """(q, 3, 3, n - i) second derivatives of the stress by the amplitudes of the field i and those from it on, of n
+        with the gradient (q, 3, 3, n)."""
+        others = gradient[..., i:]
+        product = np.matmul(gradient[..., i].transpose(0, 2, 1), others.reshape(len(others), 3, -1))
+        return self._elastic(product.reshape(others.shape))
 
     def forces(self, stress: Array) -> Array:
         """(e, k, 3, r) forces at the nodes of the elements that hold the stress (q, 3, 3, r) in equilibrium [N]."""

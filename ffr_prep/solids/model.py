@@ -18,6 +18,7 @@ from ffr_prep.model.region_rotations import region_stiffening
 from ffr_prep.reduction.basis import Basis
 from ffr_prep.reduction.mesh_resolution import element_edges
 from ffr_prep.solids.assembly import Materials, assemble
+from ffr_prep.solids.cutting import cut_mesh
 from ffr_prep.solids.interfaces import couple, turning_regions
 from ffr_prep.solids.second_order import second_order
 from ffr_prep.solids.stiffening import inertial_loads, stiffening_of
@@ -75,6 +76,7 @@ def from_mesh(
             "interfaces": [described(interface) for interface in interfaces],
             "warnings": mesh_warnings(mesh),
         },
+        cut=lambda cuts: [from_mesh(*part) for part in cut_mesh(mesh, material, interfaces, cuts)],
     )
 
 

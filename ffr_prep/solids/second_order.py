@@ -39,12 +39,9 @@ def second_order(
 
     Phi = field(basis)
 
-    def products(i: int) -> tuple[Array, Array]:
-        return Phi[..., i : i + 1], Phi[..., i:]
-
-    def forces(i: int) -> Array:
-        inside = forces_of_products(mesh, material, *products(i))
-        return np.asarray(model.B.T @ inside + second_order_forces(regions, basis[:, i], basis[:, i:]))
+    def forces(some: range) -> Array:
+        turning = [second_order_forces(regions, basis[:, i], basis[:, i:]) for i in some]
+        return np.asarray(model.B.T @ forces_of_products(mesh, material, Phi, some) + np.hstack(turning))
 
     def whole(i: int, z: Array) -> Array:
         return field(z) + turned_nodes(regions, len(mesh.points), basis[:, i], basis[:, i:])
@@ -53,5 +50,5 @@ def second_order(
         known=known_second_order(regions, model, basis),
         forces=forces,
         surface=lambda i, z: boundary(mesh, whole(i, z)),
-        stressed=lambda i, z: stressed_boundary(mesh, material, whole(i, z), products(i)),
+        stressed=lambda i, z: stressed_boundary(mesh, material, whole(i, z), (Phi, i)),
     )

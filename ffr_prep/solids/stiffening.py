@@ -52,21 +52,23 @@ def _of_chunk(points: Array, chunk: Chunk, static: Array, Phi: Array) -> Array:
     return np.stack([modes.reshape(-1, n).T @ np.matmul(of_load, modes).reshape(-1, n) for of_load in stress])
 
 
-def forces_of_products(mesh: Mesh, material: Materials, one: Array, others: Array) -> Array:
-    """(3N, m) the geometric stiffness of one (N, 3, 1) and others (N, 3, m) as a linear form of the static displacement:
-    nodal forces that the stress of their products makes."""
-    total = np.zeros((len(mesh.points), 3 * others.shape[2]))
+def forces_of_products(mesh: Mesh, material: Materials, Phi: Array, some: range) -> Array:
+    """(3N, ...) the geometric stiffness of pairs of Phi (N, 3, n) as a linear form of the static displacement: nodal forces
+    that the stress of their products makes; of each of some with those from it on."""
+    total = np.zeros((len(mesh.points), 3 * sum(Phi.shape[2] - i for i in some)))
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        parts = pool.map(lambda chunk: _forces_of_chunk(mesh.points, chunk, one, others), chunks(mesh, material))
+        parts = pool.map(lambda chunk: _forces_of_chunk(mesh.points, chunk, Phi, some), chunks(mesh, material))
         for nodes, forces in parts:
             total[nodes] += forces
-    return total.reshape(-1, others.shape[2])
+    return total.reshape(3 * len(total), -1)
 
 
-def _forces_of_chunk(points: Array, chunk: Chunk, one: Array, others: Array) -> tuple[Array, Array]:
-    """The nodes (p,) of some elements and the forces (p, 3 m) on them."""
+def _forces_of_chunk(points: Array, chunk: Chunk, Phi: Array, some: range) -> tuple[Array, Array]:
+    """The nodes (p,) of some elements and the forces (p, 3 ...) on them."""
     elements = displacement_gradients(points, chunk)
-    forces = elements.forces(elements.stress_of_products(one, others)).reshape(chunk.nodes.size, -1)
+    gradient = elements.gradient(Phi)
+    of_each = [elements.forces(elements.stress_of_products(gradient, i)) for i in some]
+    forces = np.concatenate(of_each, axis=3).reshape(chunk.nodes.size, -1)
     nodes, place = np.unique(chunk.nodes, return_inverse=True)
     columns = np.arange(chunk.nodes.size)
     gather = sp.csr_array((np.ones(columns.size), (place.ravel(), columns)), shape=(nodes.size, columns.size))

@@ -56,13 +56,11 @@ def boundary(mesh: Mesh, Phi: Array) -> Surface:
     return Surface(mesh.points[points], triangles, Phi[points])
 
 
-def stressed_boundary(
-    mesh: Mesh, material: Materials, Phi: Array, products: tuple[Array, Array] | None = None
-) -> Surface:
+def stressed_boundary(mesh: Mesh, material: Materials, Phi: Array, pairs: tuple[Array, int] | None = None) -> Surface:
     """The triangulated boundary with basis and stress modes at its points; Phi (N, 3, n) at the nodes.
 
-    products : one (N, 3, 1) and others (N, 3, n), of which Phi is the second-order displacement of the pairs: the stress is
-               then theirs, that of the strain of second order included
+    pairs : first-order displacements and the number of one, of whose pairs with those from it on Phi is the second-order
+            displacement: the stress is then theirs, that of the strain of second order included
 
     Nodes where several materials meet are there once for each. Raises InputError for elements without a material or with
     two.
@@ -79,15 +77,15 @@ def stressed_boundary(
         points=mesh.points[points],
         triangles=np.concatenate(triangles),
         Phi=Phi[points],
-        stress=nodal_stress(near, material, partial(_stress, Phi, products), Phi.shape[2], of_element, points, owner),
+        stress=nodal_stress(near, material, partial(_stress, Phi, pairs), Phi.shape[2], of_element, points, owner),
         moduli=moduli[owner],
     )
 
 
-def _stress(Phi: Array, products: tuple[Array, Array] | None, elements: Gradients) -> Array:
+def _stress(Phi: Array, pairs: tuple[Array, int] | None, elements: Gradients) -> Array:
     """(q, 3, 3, n)."""
     linear = elements.stress(Phi)
-    return linear if products is None else linear + elements.stress_of_products(*products)
+    return linear if pairs is None else linear + elements.stress_of_products(elements.gradient(pairs[0]), pairs[1])
 
 
 def nodal_stress(

@@ -9,9 +9,8 @@ element goes on along
 to second order: it shortens by what its slopes take of the length, its slopes are not quite the rotation vector, and this
 twists where the section does not.
 
-The section forces of pairs are those of the ends, K e_ij + F_ij, in axes that turn with the section: a force f that keeps its
-direction is f - phi x f there; and as the moment whose work is M . phi with the rotation vector phi is the moment m less
-phi x m / 2, that is M - phi x m / 2.
+The section forces of pairs are those of the ends, K e_ij + F_ij: of the strains of second order, which are those of axes that
+turn with the sections.
 
 Source: as `ffr_prep.structures.beam_stiffening`.
 """
@@ -26,7 +25,7 @@ from ffr_prep.body import Surface
 from ffr_prep.body.accelerations import turned
 from ffr_prep.common.arrays import Array
 from ffr_prep.structures.beam_stiffening import end_forces_of_products, strain_functions, turned_offsets
-from ffr_prep.structures.beam_stress import at_places, end_forces, stiffness_of_ends, stressed_sweep
+from ffr_prep.structures.beam_stress import at_places, stiffness_of_ends, stressed_sweep
 from ffr_prep.structures.beam_surface import swept_surface
 from ffr_prep.structures.beams import Beams, axis_functions, element_coordinates, picked
 from ffr_prep.structures.frame import Frame
@@ -147,19 +146,8 @@ def _axis_strains(strains: Array) -> Array:
 
 def _end_forces(elements: Beams, nodal: Array, one: Array, others: Array) -> Array:
     """(E, 12, m) forces of pairs on the ends of the centroid line, in axes that turn with the sections."""
-    fixed = stiffness_of_ends(elements) @ _of_line(elements, nodal, one, others)
-    fixed += end_forces_of_products(elements, one, others)
-    to_element = element_coordinates(elements)
-    phi, psi = (_ends(to_element @ of)[:, :, 1] for of in (one, others))
-    f, g = (_ends(end_forces(elements, of)) for of in (one, others))
-    turn = _cross(phi[:, :, None], g) + _cross(psi[:, :, None], f)
-    half = np.array([1.0, 0.5])[:, None, None]
-    return fixed - (half * turn).reshape(fixed.shape)
-
-
-def _ends(e: Array) -> Array:
-    """(E, 2, 2, 3, m) by ends, translation or force and rotation or moment."""
-    return e.reshape(len(e), 2, 2, 3, -1)
+    linear = stiffness_of_ends(elements) @ _of_line(elements, nodal, one, others)
+    return np.asarray(linear + end_forces_of_products(elements, one, others))
 
 
 def _cross(a: Array, b: Array) -> Array:

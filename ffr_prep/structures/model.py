@@ -29,6 +29,7 @@ from ffr_prep.model.model import Model, merged, summed
 from ffr_prep.model.region_rotations import region_stiffening
 from ffr_prep.model.second_order import SecondOrder
 from ffr_prep.solvers.threads import on_one_thread
+from ffr_prep.structures.cutting import cut_frame
 from ffr_prep.structures.element_families import Family, connectivity, element_values, families
 from ffr_prep.structures.frame import Frame, check_frame, frame_hash
 from ffr_prep.structures.interfaces import couple_frame, tie, turning_regions
@@ -103,6 +104,7 @@ def from_frame(frame: Frame, interfaces: Sequence[InterfaceRegion] = (), *, prog
         second=second,
         recovery="; ".join(dict.fromkeys(part.recovery for part in parts)),
         record=_record(frame, interfaces, coupled, parts),
+        cut=lambda cuts: [from_frame(*part) for part in cut_frame(frame, interfaces, cuts)],
     )
 
 

@@ -28,7 +28,10 @@ def frame_second_order(
     def products(part: Family, i: int) -> tuple[Array, Array]:
         return element_values(part, q[:, i : i + 1]), element_values(part, q[:, i:])
 
-    def forces(i: int) -> Array:
+    def forces(some: range) -> Array:
+        return np.hstack([of_one(i) for i in some])
+
+    def of_one(i: int) -> Array:
         total = second_order_forces(regions, basis[:, i], basis[:, i:])
         for part in parts:
             inside = part.forces_of_products(*products(part, i))

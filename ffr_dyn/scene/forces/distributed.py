@@ -21,6 +21,8 @@ from ffr_prep.body import FlexibleBody, Surface, axial
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
+_SAME_PLACE = 1e-9  # of the size of the body
+
 
 @dataclass(frozen=True)
 class Affine:
@@ -96,6 +98,15 @@ def surface_of(body: FlexibleBody, name: str) -> Surface:
     if body.surface is None:
         raise InputError(f"force {name!r}: body {body.name!r} has no surface to act on")
     return body.surface
+
+
+def numbers_at(places: Array, among: Array) -> Array:
+    """(N,) which of the places (M, 3) [m] each of the places (N, 3) is; -1 for none."""
+    from scipy.spatial import cKDTree  # here, because it is slow to load
+
+    distance, number = cKDTree(among).query(places)
+    size = float(np.linalg.norm(np.ptp(among, axis=0)))
+    return np.where(distance <= _SAME_PLACE * size, number, -1)
 
 
 def indices(value: Any, what: str) -> Array:

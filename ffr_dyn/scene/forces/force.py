@@ -8,7 +8,7 @@ they need, and know no kind by name.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
@@ -16,6 +16,7 @@ import numpy as np
 
 from ffr_dyn.scene.forces.places import Place
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.body import FlexibleBody
 from ffr_prep.common.arrays import Array
 
 
@@ -104,6 +105,10 @@ class Force(ABC):
     def check(self, scene: Scene) -> None:
         """InputError when the scene has not what the force needs."""
         self.place.check(scene)
+
+    def on_parts(self, whole: FlexibleBody, parts: Mapping[str, FlexibleBody]) -> tuple[Force, ...]:
+        """What acts on the parts, by name, in place of a force on the body that they make up."""
+        return (self,)
 
     def stays_in_plane(self, scene: Scene, normal: int) -> bool:
         """Whether it moves bodies only in the plane across the global axis `normal`."""

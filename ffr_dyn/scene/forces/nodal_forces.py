@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -18,11 +19,12 @@ from ffr_dyn.scene.forces.distributed import (
     compiled_integrals,
     indices,
     law_of_integrals,
+    numbers_at,
     surface_of,
 )
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import OnBody
-from ffr_prep.body import FlexibleBody
+from ffr_prep.body import FlexibleBody, Surface
 from ffr_prep.common.errors import InputError
 
 
@@ -63,15 +65,41 @@ class NodalForces(Force):
     def place(self) -> OnBody:
         return OnBody(f"force {self.name!r}", self.body, self.axes)
 
+    def on_parts(self, whole: FlexibleBody, parts: Mapping[str, FlexibleBody]) -> tuple[Force, ...]:
+        """The forces, each on the first part that has its point.
+
+        Raises InputError when a point is on none.
+        """
+        surface = surface_of(whole, self.name)
+        _check_points(self, whole, surface)
+        places, free, found = surface.points[self.points], np.ones(self.points.size, bool), []
+        for k, (name, part) in enumerate(parts.items(), 1):
+            at = numbers_at(places, surface_of(part, self.name).points)
+            here = free & (at >= 0)
+            free &= ~here
+            if here.any():
+                found.append(
+                    replace(self, name=f"{self.name}_{k}", body=name, points=at[here], forces=self.forces[here])
+                )
+        if free.any():
+            raise InputError(
+                f"force {self.name!r}: {free.sum()} points of {whole.name!r} are on none of its parts; load these"
+            )
+        return tuple(found)
+
     def integrals(self, body: FlexibleBody) -> Affine | Spread:
         """For a factor of one. Raises InputError when the body has no surface, or not the points."""
         surface = surface_of(body, self.name)
-        if self.points.max(initial=-1) >= len(surface.points):
-            raise InputError(
-                f"force {self.name!r}: there is no point {self.points.max()}; the surface of {body.name!r} has "
-                f"{len(surface.points)} points, counted from 0"
-            )
+        _check_points(self, body, surface)
         u, Phi, f = surface.points[self.points], surface.Phi[self.points], self.forces
         if self.axes == "body":
             return affine(u, Phi, f, np.zeros((*f.shape, body.n)))
         return Spread(f.sum(0), u.T @ f, np.einsum("pkj,pl->klj", Phi, f))
+
+
+def _check_points(force: NodalForces, body: FlexibleBody, surface: Surface) -> None:
+    if force.points.max(initial=-1) >= len(surface.points):
+        raise InputError(
+            f"force {force.name!r}: there is no point {force.points.max()}; the surface of {body.name!r} has "
+            f"{len(surface.points)} points, counted from 0"
+        )

@@ -135,8 +135,8 @@ class AtMarker(Place):
 
     def axis_along(self, scene: Scene, normal: int) -> int:
         """Which of its axes is along the global axis `normal`."""
-        bodies = [body for body in scene.bodies if body.name == self.marker.partition(".")[0]]
-        return body_normal(bodies[0], normal) if bodies and self.axes == "body" else normal
+        b = self.ends(scene)[0]
+        return body_normal(scene.bodies[b], normal) if b < len(scene.bodies) and self.axes == "body" else normal
 
 
 @dataclass(frozen=True)

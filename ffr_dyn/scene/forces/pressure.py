@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from ffr_dyn.scene.forces.distributed import (
     compiled_integrals,
     indices,
     law_of_integrals,
+    numbers_at,
     surface_of,
 )
 from ffr_dyn.scene.forces.force import Force
@@ -63,6 +65,28 @@ class Pressure(Force):
     @property
     def place(self) -> OnBody:
         return OnBody(f"force {self.name!r}", self.body)
+
+    def on_parts(self, whole: FlexibleBody, parts: Mapping[str, FlexibleBody]) -> tuple[Force, ...]:
+        """The same pressure on the triangles of each part that are those of the whole: not on its cuts.
+
+        Raises InputError when the surfaces of the parts have other triangles.
+        """
+        surface = surface_of(whole, self.name)
+        chosen, pressure = surface.triangles[self._chosen(whole, surface)], self._at_points(whole, surface)
+        centres, found, left = surface.points[chosen].mean(axis=1), [], len(chosen)
+        for k, (name, part) in enumerate(parts.items(), 1):
+            own = surface_of(part, self.name)
+            loaded = np.flatnonzero(numbers_at(own.points[own.triangles].mean(axis=1), centres) >= 0)
+            at = numbers_at(own.points, surface.points)
+            values = np.where(at >= 0, pressure[at], 0.0) if self.pressure.ndim else self.pressure
+            left -= len(loaded)
+            if len(loaded):
+                found.append(replace(self, name=f"{self.name}_{k}", body=name, triangles=loaded, pressure=values))
+        if left:
+            raise InputError(
+                f"pressure {self.name!r}: {left} triangles of {whole.name!r} are on none of its parts; load these"
+            )
+        return tuple(found)
 
     def integrals(self, body: FlexibleBody) -> Affine:
         """The work of linear pressure one on linear triangles: nodal forces -A/12 (1 + delta_ab) p_b n.

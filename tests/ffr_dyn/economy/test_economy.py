@@ -41,6 +41,7 @@ from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.scene_file.read import load_scene
 from ffr_dyn.scene_file.write import save_scene
+from ffr_dyn.variants.mean_axis import with_mean_axis_bodies
 from ffr_dyn.variants.variant import STIFFENING, stiffening_by
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
@@ -79,6 +80,7 @@ def test_a_damped_oscillator_decays_from_where_it_starts():
 
 def looked_at(scene: Scene, outputs, end: float, step: float, *, divisions: int = 2):
     """Ledger, and choice of everything."""
+    scene = with_mean_axis_bodies(scene)
     of = probe(assemble(scene), [Output(name, 1e-3) for name in outputs])
     return Ledger(scene, Span(0, end, step), of, lambda stage: None), full(scene, "ros3", divisions)
 
@@ -350,7 +352,7 @@ def test_a_fine_tolerance_takes_shorter_steps_and_one_look_at_everything_with_th
 def test_rigid_bodies_are_scouted_with_steps_over_two_rows_where_rows_are_even():
     for end, wide in ((0.28, True), (0.266, False)):
         ledger, _ = looked_at(SLOW.scene(), SLOW.outputs, end, 0.014)
-        stiff = started(ledger, assemble(SLOW.scene()).system.scene)
+        stiff = started(ledger, assemble(ledger.scene).system.scene)
         assert (len(ledger.wide), len(ledger.runs)) == ((1, 0) if wide else (0, 1))
         assert stiff.trial.result.time.size == (11 if wide else 20)
         assert stiff.everything.plane == "z"

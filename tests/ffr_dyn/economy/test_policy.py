@@ -583,9 +583,9 @@ def load_samples(policy: Policy, patch: Any) -> Any:
     looked: list[int] = []
     body = replace(SCENE.bodies[0], model=replace(SCENE.bodies[0].model, stiffening=np.zeros((30, 4, 4))))
     system = SimpleNamespace(scene=SimpleNamespace(bodies=(body,)))
-    at = SimpleNamespace(work=SimpleNamespace(bodies=SimpleNamespace(load=np.zeros((1, 30)))))
-    patch.setattr(checks, "evaluator", lambda *a: at)
+    patch.setattr(checks, "evaluator", lambda *a: None)
     patch.setattr(checks, "evaluate", lambda *a: looked.append(1))
+    patch.setattr(checks, "loads_at", lambda *a: [np.zeros(30)])
     patch.setattr(checks, "states", lambda trial: (np.zeros((1000, 1)), np.zeros((1000, 1))))
     made = Made(None, SimpleNamespace(system=system))
     checks.stiffening_loads(Trial(EVERYTHING, made, (), 0, SimpleNamespace(time=np.arange(1000.0))), policy)

@@ -415,7 +415,7 @@ def test_a_page_has_at_most_eighty_pictures_and_little_more_than_plotly(tmp_path
 
 def test_a_large_surface_is_simplified_for_a_page_to_some_of_its_points():
     surface = box_surface(stations=400)
-    coarse = page.decimated(surface, 0.25)
+    coarse, _ = page.decimated(surface, 0.25)
     assert 0.2 < len(coarse.triangles) / len(surface.triangles) < 0.3
     own = {tuple(point): k for k, point in enumerate(surface.points)}
     kept = [own[tuple(point)] for point in coarse.points]

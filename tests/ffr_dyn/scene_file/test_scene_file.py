@@ -14,11 +14,11 @@ from synthetic import cloud
 
 from ffr_dyn import cli
 from ffr_dyn.analyses.assemble import Assemble
-from ffr_dyn.analyses.bounded import Bounded
 from ffr_dyn.analyses.checkpoint import fingerprint
 from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.inverse import Inverse
+from ffr_dyn.analyses.inversion.bounded import Bounded
 from ffr_dyn.analyses.kinematic import Kinematic
 from ffr_dyn.analyses.linearise import Linearise
 from ffr_dyn.analyses.mixed import Causal, Mixed

@@ -35,7 +35,7 @@ def rod(name: str, length: float, *, stiffening: bool = False):
     frame = named(polyline([(0, 0, 0), (length, 0, 0)], member, elements=6), a=(0, 0, 0), b=(length, 0, 0))
     return fp.reduce(
         fp.from_frame(frame, [InterfaceRegion("a"), InterfaceRegion("b")]),
-        fp.Request(name=name, reference=SimplySupported("a", "b"), reduction=CraigBampton(6), stiffening=stiffening),
+        fp.Request(name=name, reference=SimplySupported("a", "b"), reduction=CraigBampton(6), linear=not stiffening),
     )
 
 

@@ -38,7 +38,7 @@ def rod(conditions, modes: int = 4) -> FlexibleBody:
     frame = named(polyline([(0, 0, 0), (1.2, 0, 0)], member, elements=8), left=(0, 0, 0), right=(1.2, 0, 0))
     return fp.reduce(
         fp.from_frame(frame, [fp.InterfaceRegion("left"), fp.InterfaceRegion("right")]),
-        fp.Request(name="rod", reference=conditions, reduction=fp.CraigBampton(modes), stiffening=True, stress=True),
+        fp.Request(name="rod", reference=conditions, reduction=fp.CraigBampton(modes), stress=True),
     )
 
 

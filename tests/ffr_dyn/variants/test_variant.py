@@ -24,7 +24,7 @@ from ffr_dyn.scene_file.read import load_scene
 from ffr_dyn.scene_file.write import save_scene
 from ffr_dyn.variants.variant import vary, with_basis, with_model, with_modes, without_terms
 from ffr_prep.body import BodyError, axial, rigid_body
-from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import SimplySupported
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
@@ -166,12 +166,6 @@ def test_energy_is_conserved_whatever_is_left_out(dropped):
     coarse, fine = drift(0.01), drift(0.005)
     assert coarse / fine > 8
     assert fine < 1e-3
-
-
-def test_half_of_the_coupling_to_rigid_motion_may_be_no_mass_matrix():
-    scene = vary(Scene((Body("b", cloud(4), omega_bar=(1, 2, 3)),)), drop=("I3",))
-    with pytest.raises(ComputationError, match="mass matrix of body 'b' is not positive"):
-        forward(scene, end=0.1, output_step=0.1, method=RK4(0.01))
 
 
 def test_dropping_the_stiffening_is_the_body_without_it():

@@ -78,7 +78,7 @@ def test_a_beam_cut_in_two_is_the_beam():
     second = beam_half(0.4, 0.6, 6, left="joint", right="tip")
     model = tied({"first": first, "second": second}, [("first.joint", "second.joint")])
     whole = beam_half(0, 1.0, 10, left="root", right="tip")
-    one, two = (fp.reduce(m, fp.Request(name="b", stiffening=True, stress=True, **END)) for m in (whole, model))
+    one, two = (fp.reduce(m, fp.Request(name="b", stress=True, **END)) for m in (whole, model))
     np.testing.assert_allclose(two.omega2, one.omega2, rtol=1e-8)
     np.testing.assert_allclose(np.abs(two.P_dm), np.abs(one.P_dm), atol=1e-7)
     sign = np.sign(np.einsum("kj,kj->j", one.interface("tip").phi_t, two.interface("tip").phi_t))
@@ -135,7 +135,7 @@ def test_a_plate_on_a_solid_and_a_beam_on_the_plate(tmp_path):
         "beam": beam_half(L, L / 2, 4, left="a", right="tip"),
     }
     model = tied(parts, [("solid.joint", "plate.a"), ("plate.b", "beam.a")])
-    body = fp.reduce(model, fp.Request(name="rod", stress=True, stiffening=True, **END))
+    body = fp.reduce(model, fp.Request(name="rod", stress=True, **END))
     assert body.mass == pytest.approx(STEEL.rho * 1.5 * L * B * H, rel=1e-12)
     beam = fp.reduce(beam_half(0, 1.5 * L, 24, left="root", right="tip"), fp.Request(name="rod", **END))
     np.testing.assert_allclose(body.frequencies[0], beam.frequencies[0], rtol=0.01)
@@ -156,7 +156,7 @@ def test_one_model_alone_is_the_body_of_its_kind():
     mesh = box_mesh("hex20", (0.3, B, H), (3, 1, 1))
     model, request = (
         fp.from_mesh(mesh, STEEL, [InterfaceRegion("root", "left")]),
-        fp.Request(name="b", stiffening=True, **END),
+        fp.Request(name="b", **END),
     )
     whole = fp.reduce(model, request)
     part = fp.reduce(tied({"one": model}, []), request)

@@ -58,7 +58,7 @@ OTHERS = [
 def reduced(solver, reduction=KEPT, reference=CLAMPED):
     return fp.reduce(
         fp.from_mesh(MESH, STEEL, ENDS),
-        fp.Request(name="bar", reference=reference, reduction=reduction, stiffening=True, solver=solver),
+        fp.Request(name="bar", reference=reference, reduction=reduction, solver=solver),
     )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 from boxes import box_mesh, rotation
+from places import REFERENCE
 from test_dyn_references import slider_crank
 
 import ffr_prep as fp
@@ -41,7 +42,7 @@ def rod(section, length, elements, modes, reference, material=STEEL, turned=None
     frame = polyline([(0, 0, 0), tip], Member(section, material, tuple(R[:, 1])), elements=elements)
     return fp.reduce(
         fp.from_frame(named(frame, root=(0, 0, 0), tip=tip), [InterfaceRegion("root"), InterfaceRegion("tip")]),
-        fp.Request(name="rod", reference=reference, reduction=CraigBampton(modes), stiffening=True),
+        fp.Request(name="rod", reference=reference, reduction=CraigBampton(modes)),
     )
 
 
@@ -124,22 +125,21 @@ def test_pendulum_against_the_exact_beam(reference):
 
 
 def test_slider_crank_with_a_rod_under_pressure():
-    """Mid-rod deflection at 0.02, 0.04, 0.05 and 0.08 s: independent planar beam with stiffening by load."""
+    """Mid-rod deflection: the geometrically exact beam, computed independently (see the data file), to 0.4 % of its peak."""
     frame = polyline([(0, 0, 0), (0.3, 0, 0)], Member(thin(circle(0.006)), STEEL, (0, 1.0, 0)), elements=24)
     body = fp.reduce(
         fp.from_frame(
             named(frame, crankpin=(0, 0, 0), slider=(0.3, 0, 0)),
             [InterfaceRegion("crankpin"), InterfaceRegion("slider")],
         ),
-        fp.Request(
-            name="rod", reference=SimplySupported("crankpin", "slider"), reduction=CraigBampton(10), stiffening=True
-        ),
+        fp.Request(name="rod", reference=SimplySupported("crankpin", "slider"), reduction=CraigBampton(10)),
     )
     result = forward(slider_crank(body), end=0.084, output_step=4e-4, method=ROS2(5e-6))
     middle = np.abs(body.surface.points[:, 0] - 0.15) < 1e-9
     deflection = result["rod.q"] @ body.surface.Phi[middle].mean(axis=0)[1]
-    stiffened = [0.925e-3, -2.329e-3, 3.816e-3, -3.165e-3]
-    np.testing.assert_allclose(deflection[[50, 100, 125, 200]], stiffened, atol=3e-6)
+    exact = np.loadtxt(REFERENCE / "slider_crank_exact.csv", delimiter=",")
+    peak = np.abs(exact[:, 1]).max()
+    np.testing.assert_allclose(deflection, np.interp(result.time, *exact.T), atol=4e-3 * peak)
 
 
 def test_spin_up_of_a_cantilever():
@@ -194,7 +194,7 @@ def slender_beam() -> tuple[FlexibleBody, float]:
     frame = named(polyline([(0, 0, 0), (1.0, 0, 0)], Member(section, STEEL, (0, 1, 0)), elements=45), root=(0, 0, 0))
     body = fp.reduce(
         fp.from_frame(frame, [InterfaceRegion("root")]),
-        fp.Request(name="beam", reference=FixedTo("root"), reduction=Eigenmodes(10), stiffening=True),
+        fp.Request(name="beam", reference=FixedTo("root"), reduction=Eigenmodes(10)),
     )
     return body, STEEL.E * 1e-6 / STEEL.rho
 
@@ -205,7 +205,7 @@ def slender_solid() -> tuple[FlexibleBody, float]:
     mesh = box_mesh("hex27", (1.0, height, width), (24, 1, 1), origin=(0.0, -height / 2, -width / 2))
     body = fp.reduce(
         fp.from_mesh(mesh, material, [InterfaceRegion("left")]),
-        fp.Request(name="bar", reference=FixedTo("left"), reduction=Eigenmodes(10), stiffening=True),
+        fp.Request(name="bar", reference=FixedTo("left"), reduction=Eigenmodes(10)),
     )
     return body, material.E * width**2 / 12 / material.rho
 
@@ -238,7 +238,7 @@ def test_spin_up_with_three_bending_modes():
     frame = named(polyline([(0, 0, 0), (10.0, 0, 0)], member, elements=30), root=(0, 0, 0), tip=(10.0, 0, 0))
     free = fp.reduce(
         fp.from_frame(frame, [InterfaceRegion("root"), InterfaceRegion("tip")]),
-        fp.Request(name="beam", reference=FixedTo("root"), reduction=Eigenmodes(12), stiffening=True),
+        fp.Request(name="beam", reference=FixedTo("root"), reduction=Eigenmodes(12)),
     )
     body = truncated(in_plane(free), 3)
     assert np.einsum("jj->j", body.PP_dm[1, 1]).min() > 0.9

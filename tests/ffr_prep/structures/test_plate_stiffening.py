@@ -78,7 +78,7 @@ def strip(cut, modes: int, *, turned=None, elements=(24, 1), material=None, widt
     frame = replace(frame, node_groups={"root": np.flatnonzero(x < 1e-9), "tip": np.flatnonzero(x > 1 - 1e-9)})
     return fp.reduce(
         fp.from_frame(frame, [InterfaceRegion("root"), InterfaceRegion("tip")]),
-        fp.Request(name="strip", reference=FixedTo("root"), reduction=CraigBampton(modes), stiffening=True),
+        fp.Request(name="strip", reference=FixedTo("root"), reduction=CraigBampton(modes)),
     )
 
 

@@ -86,9 +86,7 @@ def test_planar_connecting_rod_of_two_elements(section):
     frame = polyline([(0, 0, 0), (2 * l, 0, 0)], Member(thin, STEEL, (0, 1.0, 0)), elements=2)
     rod = fp.reduce(
         fp.from_frame(named(frame, A=(0, 0, 0), B=(2 * l, 0, 0)), [InterfaceRegion("A"), InterfaceRegion("B")]),
-        fp.Request(
-            name="rod", reference=SimplySupported("A", "B"), reduction=CraigBampton(6), stiffening=True, stress=True
-        ),
+        fp.Request(name="rod", reference=SimplySupported("A", "B"), reduction=CraigBampton(6), stress=True),
     )
     planar = in_plane(rod)
     assert planar.n == 6
@@ -188,7 +186,7 @@ L, B, H = 1.0, 0.06, 0.02
 
 
 def cantilever(kind: str) -> FlexibleBody:
-    request = fp.Request(name=kind, reference=FixedTo("root"), reduction=Eigenmodes(6), stiffening=True)
+    request = fp.Request(name=kind, reference=FixedTo("root"), reduction=Eigenmodes(6))
     if kind == "solid":
         mesh = box_mesh("hex20", (L, B, H), (20, 1, 1), (0, -B / 2, -H / 2))
         return fp.reduce(fp.from_mesh(mesh, STIFF_ACROSS, [InterfaceRegion("root", "left")]), request)
@@ -229,7 +227,7 @@ def test_flexible_pendulum_of_plates(cut):
     frame = replace(frame, node_groups={"root": np.flatnonzero(x < 1e-9), "tip": np.flatnonzero(x > 1.2 - 1e-9)})
     rod = fp.reduce(
         fp.from_frame(frame, [InterfaceRegion("root"), InterfaceRegion("tip")]),
-        fp.Request(name="rod", reference=SimplySupported("root", "tip"), reduction=CraigBampton(6)),
+        fp.Request(name="rod", reference=SimplySupported("root", "tip"), reduction=CraigBampton(6), linear=True),
     )
     scene = Scene(
         (Body("rod", with_point(rod, "middle", np.array((0.6, 0.0045, 0)))),),

@@ -52,12 +52,13 @@ UNDETERMINED = 1e-8  # of the smallest singular value of P with rows and columns
 
 @dataclass(frozen=True)
 class ServoMotion:
-    """A scene with known motions and the unknown efforts that shall realise them.
+    """A scene with known motions and the efforts that shall realise them, in coordinates y that fix every position.
 
-    at       : evaluator with all rows: joints, known motions, internal joint coordinates
-    plant, known, inner : row numbers of the joints (and true drivers), of the known motions, of the internal coordinates
-    elastic  : numbers in v of internal elastic coordinates, which come after the joint coordinates in y
-    data     : where the functions of the internal joint coordinates keep their two numbers
+    at       : evaluator with all rows: joints, known motions, joint coordinates of y. It owns its functions' numbers
+    plant, known, inner : row numbers of the joints (and true drivers), of the known motions, of the joint coordinates
+    held     : rows that fix positions with y: all of a motion that is known, without the known ones of a free scene
+    elastic  : numbers in v of elastic coordinates of y, which come after the joint coordinates
+    data     : where the functions of the joint coordinates keep their two numbers
     span     : known motions are held at their values outside of it [s]
     """
 
@@ -66,6 +67,7 @@ class ServoMotion:
     plant: Array
     known: Array
     inner: Array
+    held: Array
     elastic: Array
     data: Array
     span: tuple[float, float]
@@ -73,60 +75,79 @@ class ServoMotion:
 
     @property
     def size(self) -> int:
-        """Number of internal coordinates y."""
+        """Number of coordinates y."""
         return self.inner.size + self.elastic.size
 
 
 @dataclass(frozen=True)
 class Moment:
-    """The scene at one time: x, v (global), accelerations (V,) in body axes, efforts u, y_ddot, sigma of known motions."""
+    """The scene at one time: x, v (global), efforts u, y_ddot."""
 
     x: Array
     v: Array
-    acceleration: Array
     u: Array
     y_ddot: Array
-    sigma: Array
 
 
 def servo(
     assembled: Assembled, known: tuple[str, ...], unknown: tuple[Effort, ...], span: tuple[float, float]
 ) -> ServoMotion:
-    """Choose internal coordinates at the assembled state, by rank, and of the unknown efforts as many as motions are known.
+    """What the known motions leave free, in internal coordinates chosen at the assembled state, by rank.
 
-    Raises InputError when motions and efforts do not fit, with the combination that is not determined.
+    Raises InputError where joint and elastic coordinates do not describe it.
     """
+    return _in_coordinates(assembled, known, known, unknown, span)
+
+
+def unguided(
+    assembled: Assembled, known: tuple[str, ...], unknown: tuple[Effort, ...], span: tuple[float, float]
+) -> ServoMotion:
+    """The scene that the efforts move, in coordinates that leave the known motions free. Errors as of `servo`."""
+    return _in_coordinates(assembled, known, (), unknown, span)
+
+
+def left_free(assembled: Assembled, time: float) -> tuple[str, ...]:
+    """Names of coordinates that describe what joints and known motions leave free."""
+    now = evaluate(evaluator(assembled.system), time, assembled.x, assembled.v)
+    return _internal(assembled.system.scene, assembled, now.jacobian)[2]
+
+
+def _in_coordinates(
+    assembled: Assembled,
+    known: tuple[str, ...],
+    kept: tuple[str, ...],
+    unknown: tuple[Effort, ...],
+    span: tuple[float, float],
+) -> ServoMotion:
+    """Coordinates of what the joints and the known motions that are `kept` leave free."""
     scene, blocks = assembled.system.scene, list(assembled.system.blocks)
-    bare = sized(evaluator(assembled.system), unknown, np.zeros(len(unknown)))
-    now = evaluate(bare, span[0], assembled.x, assembled.v)
-    known_rows = _rows_of(blocks, known)
-    plant_rows = np.setdiff1d(np.arange(now.Phi.size), known_rows)
-    M = total_mass_matrix(scene, assembled.system.layout, assembled.x)
-    labels = [f"{b.name}: {w.text}" for b in blocks for w in b.words]
-    B = effort_columns(bare, unknown, (span[0], assembled.x, assembled.v), now.force)
-    chosen = _fitting(now, B, M, plant_rows, known_rows, unknown, [labels[k] for k in known_rows])
-    words, elastic, names = _internal(scene, assembled, now, M)
+    now = evaluate(evaluator(assembled.system), span[0], assembled.x, assembled.v)
+    free = rows_of(blocks, tuple(name for name in known if name not in kept))
+    words, elastic, names = _internal(scene, assembled, np.delete(now.jacobian, free, axis=0))
     inner = [Block(f"internal {k}", ends, (word,), driver=True) for k, (ends, word) in enumerate(words)]
     system = compile_scene(scene, blocks + inner)
     ordered, rows = list(system.blocks), system.model.rows
-    inner_rows = _rows_of(ordered, tuple(block.name for block in inner))
-    known_rows = _rows_of(ordered, known)
-    plant_rows = np.setdiff1d(
-        np.arange(rows.kind.size + locked(system.layout).size), np.concatenate([inner_rows, known_rows])
-    )
+    inner_rows, known_rows = rows_of(ordered, tuple(block.name for block in inner)), rows_of(ordered, known)
+    every = np.arange(rows.kind.size + locked(system.layout).size)
+    held = np.setdiff1d(every, rows_of(ordered, tuple(name for name in known if name not in kept)))
+    plant_rows = np.setdiff1d(every, np.concatenate([inner_rows, known_rows]))
     data = system.model.functions.start[rows.function[inner_rows]]
-    at = sized(evaluator(system), unknown, np.zeros(len(unknown)))
-    return ServoMotion(at, chosen, plant_rows, known_rows, inner_rows, np.array(elastic, int), data, span, names)
+    at = _owning(sized(evaluator(system), unknown, np.zeros(len(unknown))))
+    return ServoMotion(at, unknown, plant_rows, known_rows, inner_rows, held, np.array(elastic, int), data, span, names)
 
 
-def _rows_of(blocks: list[Block], names: tuple[str, ...]) -> Array:
+def _owning(at: Evaluator) -> Evaluator:
+    """The evaluator with numbers of functions that no other has, so that they may change from call to call."""
+    model = at.system.model
+    numbers = model.functions._replace(data=model.functions.data.copy())
+    return replace(at, engine=with_model(at.engine, model._replace(functions=numbers)))
+
+
+def rows_of(blocks: list[Block], names: tuple[str, ...]) -> Array:
     """Row numbers of the named blocks, in the order of the names."""
     starts = np.concatenate([[0], np.cumsum([len(block.words) for block in blocks])])
     at = {block.name: np.arange(starts[k], starts[k + 1]) for k, block in enumerate(blocks)}
     return np.concatenate([at[name] for name in names] or [np.zeros(0)]).astype(int)
-
-
-# ---- do the efforts fit the motions? ---------------------------------------------------------------------------------
 
 
 def effort_columns(
@@ -138,60 +159,16 @@ def effort_columns(
     return np.array(forces).reshape(len(unknown), without.size).T
 
 
-def _responses(J: Array, M: Array, B: Array) -> Array:
-    """(V, U) accelerations that columns B of force give on the joints' rows J."""
-    Z = free_motions(J, M)
-    found: Array = Z @ (Z.T @ B)
-    return found
-
-
-def _fitting(
-    now: Evaluation,
-    B: Array,
-    M: Array,
-    plant: Array,
-    known: Array,
-    unknown: tuple[Effort, ...],
-    labels: list[str],
-) -> tuple[Effort, ...]:
-    """As many of the unknown efforts as motions are known, the best determined ones (pivoted QR of P)."""
-    if len(unknown) < known.size:
-        raise InputError(
-            f"{known.size} motions are known ({'; '.join(labels)}) but only {len(unknown)} forces are unknown; name as many"
-        )
-    S = now.jacobian[known]
-    response = _responses(now.jacobian[plant], M, B)
-    free = free_motions(now.jacobian[plant], M)
-    reach = np.linalg.norm(S @ free, axis=1)
-    size = np.sqrt(np.einsum("vu,vw,wu->u", response, M, response))
-    P = S @ response / np.where(reach > 0, reach, 1.0)[:, None] / np.where(size > 0, size, 1.0)
-    _, _, order = qr(P, pivoting=True)
-    chosen = np.sort(order[: known.size])
-    left, values, right = np.linalg.svd(P[:, chosen])
-    if values.min(initial=1.0) < UNDETERMINED:
-        motions = _combination(left[:, -1], labels)
-        forces = _combination(right[-1], [unknown[k].name for k in chosen])
-        raise InputError(
-            f"the unknown forces do not determine the known motions: no force changes the acceleration {motions}, and "
-            f"{forces} changes none of them; know another motion or let another force be unknown"
-        )
-    return tuple(unknown[k] for k in chosen)
-
-
-def _combination(weights: Array, names: list[str]) -> str:
-    said = [(weight, name) for weight, name in zip(weights, names, strict=True) if abs(weight) > 1e-3]
-    return " ".join(f"{weight:+.3g} ({name})" for weight, name in said)
-
-
 # ---- internal coordinates --------------------------------------------------------------------------------------------
 
 
 def _internal(
-    scene: Scene, assembled: Assembled, now: Evaluation, M: Array
+    scene: Scene, assembled: Assembled, jacobian: Array
 ) -> tuple[list[tuple[tuple[int, int], Word]], list[int], tuple[str, ...]]:
-    """Words (with markers) of internal joint coordinates, numbers of internal elastic ones, and the names of all."""
+    """Words (with markers) of joint coordinates, numbers of elastic ones, that fix what rows (C, V) leave free; all names."""
     place = assembled.system.layout
-    Z = free_motions(now.jacobian, M)
+    M = total_mass_matrix(scene, place, assembled.x)
+    Z = free_motions(jacobian, M)
     names, gradients = coordinate_gradients(scene, place, assembled.x, assembled.v)
     joints = [(joint, c) for joint in scene.joints for c in COORDINATES[joint.kind]]
     elastic = [int(k) for b in range(len(place.n)) for k in np.arange(place.v_size)[place.q_dot(b)]]
@@ -248,14 +225,12 @@ def _positions(own: ServoMotion) -> Array:
 # ---- the reduced equations -------------------------------------------------------------------------------------------
 
 
-def _guided(own: ServoMotion, time: float, w: Array) -> Evaluator:
-    """The evaluator whose internal joint coordinates go through y with the rate y_dot."""
-    d, model = own.size, own.at.system.model
-    data = model.functions.data.copy()
+def guided(own: ServoMotion, time: float, w: Array) -> Evaluator:
+    """The evaluator whose joint coordinates go through y with the rate y_dot."""
+    d, data = own.size, own.at.system.model.functions.data
     y, rate = w[: own.inner.size], w[d : d + own.inner.size]
     data[own.data], data[own.data + 1] = y - rate * time, rate
-    guided = model._replace(functions=model.functions._replace(data=data))
-    return replace(own.at, engine=with_model(own.at.engine, guided))
+    return own.at
 
 
 def at_moment(own: ServoMotion, time: float, w: Array, near: Array) -> Moment:
@@ -264,34 +239,26 @@ def at_moment(own: ServoMotion, time: float, w: Array, near: Array) -> Moment:
     Raises ComputationError when the internal coordinates no longer describe the motion or the efforts are not determined.
     """
     clock = float(np.clip(time, *own.span))
-    at = _guided(own, clock, w)
-    x, now = _placed(own, at, clock, w, near)
-    V = np.linalg.solve(_square(own, now), np.concatenate([-now.nu, w[own.size + own.inner.size :]]))
+    at = guided(own, clock, w)
+    x, now = placed(own, at, clock, w, near)
+    V = np.linalg.solve(square(own, now), np.concatenate([-now.nu[own.held], w[own.size + own.inner.size :]]))
     v = to_global_axes(own.at.system.layout, x, V)
     now = evaluate(at, clock, x, v)
     return _accelerated(own, at, now, (clock, x, v), now.gamma)
 
 
-def at_rest(own: ServoMotion, time: float, y: Array, near: Array) -> Moment:
-    """The same with the known motions held still where they are at that time, and y at rest."""
-    clock = float(np.clip(time, *own.span))
-    w = np.concatenate([y, np.zeros(own.size)])
-    at = _guided(own, clock, w)
-    x, now = _placed(own, at, clock, w, near)
-    still = np.zeros(own.at.system.layout.v_size)
-    return _accelerated(own, at, now, (clock, x, still), np.zeros_like(now.gamma))
-
-
-def _placed(own: ServoMotion, at: Evaluator, time: float, w: Array, x: Array) -> tuple[Array, Evaluation]:
+def placed(own: ServoMotion, at: Evaluator, time: float, w: Array, x: Array) -> tuple[Array, Evaluation]:
     """The position by Newton's method from x, and the equations there at rest."""
     place, slots = own.at.system.layout, _positions(own)
     still, d = np.zeros(place.v_size), own.size
     for _ in range(ITERATIONS):
         now = evaluate(at, time, x, still)
-        left = np.concatenate([-now.Phi, w[own.inner.size : d] - x[slots]])
+        left = np.concatenate([-now.Phi[own.held], w[own.inner.size : d] - x[slots]])
         if np.abs(left).max() < TOLERANCE:
             return x, now
-        step = np.linalg.solve(_square(own, now), left)
+        if not np.isfinite(left).all():
+            break
+        step = np.linalg.solve(square(own, now), left)
         x = moved(place, x, step)
         if np.abs(step).max() < TOLERANCE:
             return x, evaluate(at, time, x, still)
@@ -301,8 +268,8 @@ def _placed(own: ServoMotion, at: Evaluator, time: float, w: Array, x: Array) ->
     )
 
 
-def _square(own: ServoMotion, now: Evaluation) -> Array:
-    return np.concatenate([now.jacobian, unit_rows(own.elastic, now.jacobian.shape[1])])
+def square(own: ServoMotion, now: Evaluation) -> Array:
+    return np.concatenate([now.jacobian[own.held], unit_rows(own.elastic, now.jacobian.shape[1])])
 
 
 def _accelerated(
@@ -321,7 +288,7 @@ def _accelerated(
     acceleration = found[:V]
     joints = now.jacobian[own.inner] @ acceleration - gamma[own.inner]
     y_ddot = np.concatenate([joints, acceleration[own.elastic]])
-    return Moment(state[1], state[2], acceleration, found[V + C :], y_ddot, now.gamma[own.known])
+    return Moment(state[1], state[2], found[V + C :], y_ddot)
 
 
 def _check_determined(matrix: Array, time: float) -> None:

@@ -1,0 +1,1 @@
+"""Motions that are known while forces elsewhere realise them."""

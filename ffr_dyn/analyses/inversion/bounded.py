@@ -1,0 +1,376 @@
+"""The bounded solution of unstable internal dynamics: stable inversion, as a two-point boundary value problem.
+
+    y_ddot = a(t, y, y_dot) + A(t, y) u,    s(t, y) = 0    at all times, y, y_ddot and u unknown at each;
+    at the start the parts of the internal dynamics along stable and neutral directions rest,
+    at the end those along unstable ones
+
+in the equilibria before and after the known motion. The times reach so far beyond it that the unstable part has died away
+backwards, the stable one forwards. As u is found with y, the known motions may be any number of derivatives away from it.
+Numerov's scheme, of order four, all times at once,
+
+    y_{k+1} - 2 y_k + y_{k-1} = h^2 (a_{k+1} + 10 a_k + a_{k-1}) / 12
+    y_dot_k = (y_{k+1} - y_{k-1}) / 2h - h (a_{k+1} - a_{k-1}) / 12
+
+answers motions faster than the step by their statics. Newton's method with derivatives from a few places along the path, more
+of them where that converges slowly. What the scheme has beside the internal dynamics, oscillations near the ends that a step
+divides by ten, is kept smallest in the third differences of u. (Devasia, Chen & Paden, IEEE Transactions on Automatic Control
+41 (1996) 930-942; Brüls, Bastos & Seifried, Multibody System Dynamics 31 (2014) 189-211; Hairer, Nørsett & Wanner 1993,
+sec. III.10.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import KW_ONLY, dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import schur
+from scipy.sparse.linalg import splu
+
+from ffr_dyn.analyses.inversion.internal_dynamics import internal, time_unit
+from ffr_dyn.analyses.inversion.plant import Look, Plant, Slopes, look, slopes
+from ffr_dyn.consistency.evaluation import evaluate
+from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import ComputationError, InputError
+
+ITERATIONS = 40
+TOLERANCE = 1e-10  # of a correction, relative to the largest value
+ROUNDING = 1e-7  # the same, below which corrections that do not shrink any more are rounding
+FOLDS = 25.0  # e-folds of the slowest internal motion in the added times
+NEUTRAL = 1e-5  # of a real part, relative to the modulus, below which a direction is neutral
+STILL = 1e-3  # e-folds over the known motion, below which it is so too
+REST = 1e-6  # of a speed or an acceleration
+SLOW = 0.3  # contraction, beyond which the derivatives along the path are renewed
+PLACES = 17  # along the path, at which derivatives are found first
+LONGEST = 2.0  # of the added times over the known motion's, by default
+FAINT = 1e-4  # weight of what only the scheme needs at the ends, beside what the internal dynamics do
+_ROUGH = 3  # times at either end at which the third differences of u are kept small
+Told = Callable[[float], None] | None
+
+
+@dataclass(frozen=True)
+class Bounded:
+    """Settings of the bounded solution.
+
+    before, after : times [s] added to the known motion; default: 25 e-folds of the slowest motion that grows (before it) or
+                    decays (after it), at most twice as long as the motion
+    parts         : of an output step, for collocation
+    """
+
+    _: KW_ONLY
+    before: float | None = None
+    after: float | None = None
+    parts: int = 1
+
+
+@dataclass(frozen=True)
+class Path:
+    """The unknowns at times (T,): y, h^2 y_ddot (T, D), u (T, U), and states x near to y."""
+
+    y: Array
+    a: Array
+    u: Array
+    near: list[Array]
+
+
+@dataclass(frozen=True)
+class _End:
+    """An equilibrium (y, u) with a state x; derivatives there; left bases, in (y, y_dot), of growing and other motions and of
+    what known motions fix; the slowest rates [1/s] of growth and decay."""
+
+    y: Array
+    u: Array
+    x: Array
+    slopes: Slopes
+    growing: Array
+    other: Array
+    chain: Array
+    growth: float
+    decay: float
+
+
+def bounded_solution(
+    of: Plant, settings: Bounded, output_step: float, y: Array, x: Array, progress: Told = None
+) -> tuple[Array, Array, list[tuple[Array, Array]], list[str]]:
+    """Times (T,), u (T, U), states (x, v), and notes. y, x : near the equilibrium before the known motion.
+
+    Raises InputError when the known motion does not start and end at rest; ComputationError when nothing converges.
+    """
+    places = list(_equilibria(of, y, x))
+    first, last = places[0], places[-1]
+    _require_rest(of, first, last)
+    if first.growing.shape != last.growing.shape or len(first.other) != len(last.other):
+        raise ComputationError(
+            f"the internal dynamics have {len(first.growing)} growing motions at the start and {len(last.growing)} at the "
+            "end: there is no bounded solution that belongs to both"
+        )
+    span = of.own.span[1] - of.own.span[0]
+    before, after = (
+        _whole(min(FOLDS / rate, LONGEST * span) if wanted is None else wanted, output_step)
+        for wanted, rate in ((settings.before, first.growth), (settings.after, last.decay))
+    )
+    rows = round(span / output_step) * settings.parts
+    h = output_step / settings.parts
+    times = of.own.span[0] + h * np.arange(-before * settings.parts, rows + after * settings.parts + 1)
+    path = _collocated(of, times, places, progress)
+    keep = slice(None, None, settings.parts)
+    rates = _velocities(path.y, path.a, h)
+    looks = [
+        look(of, float(t), *w)
+        for t, *w in zip(times[keep], path.y[keep], rates[keep], path.u[keep], path.near[keep], strict=True)
+    ]
+    note = (
+        f"bounded solution over {times[0]:.4g} to {times[-1]:.4g} s with {len(first.growing)} growing internal motions"
+    )
+    return times[keep], path.u[keep], [(now.x, now.v) for now in looks], [note]
+
+
+def _whole(span: float, output_step: float) -> int:
+    return int(np.ceil(span / output_step - 1e-9))
+
+
+# ---- equilibria along the known motion -------------------------------------------------------------------------------
+
+
+def _equilibria(of: Plant, y: Array, x: Array) -> Iterator[_End]:
+    """Where the plant would rest if the known motion stood still, at a few times from its start to its end."""
+    u, still = np.zeros(len(of.own.unknown)), np.zeros(of.size)
+    at = slopes(of, of.own.span[0], y, still, u, x)
+    for time in np.linspace(*of.own.span, PLACES):
+        y, u, x = _equilibrium(of, float(time), y, u, x, at)
+        at = slopes(of, float(time), y, still, u, x)
+        yield _end(at, y, u, x, STILL / (of.own.span[1] - of.own.span[0]))
+
+
+def _equilibrium(of: Plant, time: float, y: Array, u: Array, x: Array, at: Slopes) -> tuple[Array, Array, Array]:
+    """(y, u, x) by Newton's method on a(y, 0) + A u = 0, s(y) = 0, with derivatives from nearby, renewed where it is slow."""
+    still, before = np.zeros(of.size), np.inf
+    for _ in range(ITERATIONS):
+        now = look(of, time, y, still, u, x)
+        x, scale = now.x, time_unit(at) ** 2
+        matrix = np.block([[scale * at.by_y, scale * at.by_u], [at.outputs, np.zeros((len(u), len(u)))]])
+        step = np.linalg.lstsq(matrix, -np.concatenate([scale * now.y_ddot, now.s]), rcond=1e-12)[0]
+        y, u, size = y + step[: y.size], u + step[y.size :], float(np.abs(step[: y.size]).max())
+        if size < 1e-11 * max(1.0, float(np.abs(y).max())):
+            left = np.abs(now.y_ddot).max(), np.abs(now.s).max(initial=0.0)
+            if left[0] <= REST * max(1.0, float(np.abs(at.by_y).max())) and left[1] < REST:
+                return y, u, x
+            break  # forces along a motion without stiffness
+        if size > SLOW * before:
+            at = slopes(of, time, y, still, u, x)
+        before = size
+    if np.abs(now.s).max(initial=0.0) > REST:
+        raise ComputationError(f"at t = {time:.6g} s no position belongs to the known motions: they are out of reach")
+    raise ComputationError(
+        f"at t = {time:.6g} s the internal dynamics have no equilibrium near the known motion: nothing holds "
+        f"{', '.join(of.left_free)} against the forces there; add a spring, or let another motion be known"
+    )
+
+
+def _end(at: Slopes, y: Array, u: Array, x: Array, still: float) -> _End:
+    """The internal dynamics at an equilibrium, split by the real Schur form; rates below `still` [1/s] are neutral."""
+    found, D = internal(at), y.size
+    A = found.matrix
+    values = np.linalg.eigvals(A)
+
+    def grows(re: float, im: float) -> bool:
+        return bool(re > max(NEUTRAL * np.hypot(re, im), still))
+
+    _, vectors, count = schur(A.T, output="real", sort=grows)
+    _, others, rest = schur(A.T, output="real", sort=lambda re, im: not grows(re, im))
+    to_z = np.diag(np.repeat([1.0, time_unit(at)], D))
+    rates = [values.real[values.real > 0], -values.real[values.real < 0]]
+    moving = [rate[rate > still] for rate in rates]
+    return _End(
+        y, u, x, at,
+        growing=vectors[:, :count].T @ found.basis.T @ to_z,
+        other=others[:, :rest].T @ found.basis.T @ to_z,
+        chain=found.chain @ to_z,
+        growth=float(moving[0].min(initial=np.inf)),
+        decay=float(moving[1].min(initial=np.inf)),
+    )  # fmt: skip
+
+
+def _require_rest(of: Plant, *ends: _End) -> None:
+    own = of.own
+    for time, end in zip(own.span, ends, strict=True):
+        still = np.zeros(own.at.system.layout.v_size)
+        rows = evaluate(own.at, time, end.x, still)
+        speed, change = (float(np.abs(row[own.known]).max(initial=0.0)) for row in (rows.nu, rows.gamma))
+        if max(speed, change) > REST:
+            raise InputError(
+                f"at t = {time:.6g} s a known motion is not at rest (speed {speed:.3g}, acceleration {change:.3g}): the "
+                "bounded solution needs one that starts and ends at rest; give it ends where both are zero"
+            )
+
+
+# ---- all times at once -----------------------------------------------------------------------------------------------
+
+
+def _collocated(of: Plant, times: Array, places: list[_End], progress: Told) -> Path:
+    """Newton's method from the equilibria along the known motion."""
+    h, inside = float(times[1] - times[0]), np.linspace(*of.own.span, len(places))
+    y = np.array([np.interp(times, inside, row) for row in np.array([end.y for end in places]).T]).T
+    u = np.array([np.interp(times, inside, row) for row in np.array([end.u for end in places]).T]).T
+    nearest = np.abs(times[:, None] - inside).argmin(axis=1)
+    path = Path(y, np.zeros_like(y), u.reshape(times.size, -1), [places[k].x for k in nearest])
+    at = _between(inside, [end.slopes for end in places], times)
+    count, size, before, done = PLACES, 0.0, np.inf, 0.0
+    solve = _linear(at, places[0], places[-1], h)
+    for _ in range(ITERATIONS):
+        try:
+            found, residual = _residual(of, times, path, h)
+        except ComputationError:  # where the corrections have led to
+            break
+        step = solve(residual, _boundary(path, places[0], places[-1], h))
+        path = _moved(path, found, step)
+        size = max(float(np.abs(step[k]).max(initial=0.0)) for k in (0, 1))
+        if progress is not None:
+            done = max(done, _done(size, TOLERANCE))
+            progress(float(times[0] + (times[-1] - times[0]) * done))
+        scale = max(float(np.abs(path.y).max()), 1e-6)
+        if size < TOLERANCE * scale or ROUNDING * scale > size > SLOW * before:
+            return path
+        if size > SLOW * before and count < times.size:
+            count = min(2 * count, times.size)
+            solve = _linear(_renewed(of, times, path, h, count), places[0], places[-1], h)
+        before = size
+    raise ComputationError(
+        f"the bounded solution did not converge: the last correction was {size:.3g}; use a smaller output step or more parts"
+    )
+
+
+def _done(size: float, tolerance: float) -> float:
+    """The share of the way that corrections have come, from a size of one to the tolerance."""
+    return float(np.clip(np.log(max(size, 1e-300)) / np.log(tolerance), 0.0, 1.0))
+
+
+def _velocities(y: Array, a: Array, h: float) -> Array:
+    """(T, D) y_dot of y and h^2 y_ddot, to order four."""
+    rate = np.empty_like(y)
+    rate[1:-1] = (y[2:] - y[:-2]) / 2 - (a[2:] - a[:-2]) / 12
+    rate[0] = y[1] - y[0] - (7 * a[0] + 6 * a[1] - a[2]) / 24
+    rate[-1] = y[-1] - y[-2] + (7 * a[-1] + 6 * a[-2] - a[-3]) / 24
+    return rate / h
+
+
+def _residual(of: Plant, times: Array, path: Path, h: float) -> tuple[list[Look], tuple[Array, Array, Array]]:
+    """The plant at all times, and how far a, s and Numerov's scheme are off."""
+    rates = _velocities(path.y, path.a, h)
+    found = [look(of, float(t), *w) for t, *w in zip(times, path.y, rates, path.u, path.near, strict=True)]
+    dynamics = path.a - h**2 * np.array([now.y_ddot for now in found])
+    scheme = path.y[2:] - 2 * path.y[1:-1] + path.y[:-2] - (path.a[2:] + 10 * path.a[1:-1] + path.a[:-2]) / 12
+    return found, (dynamics, np.array([now.s for now in found]), scheme)
+
+
+def _boundary(path: Path, first: _End, last: _End, h: float) -> Array:
+    """What shall vanish at the ends, in the mean square: see `_linear`."""
+    rates = _velocities(path.y, path.a, h)
+    start, end = (np.concatenate([path.y[k] - at.y, rates[k]]) for k, at in ((0, first), (-1, last)))
+    smooth = np.diff(FAINT * h**2 * _effect(first) * path.u, n=3, axis=0)
+    count = min(_ROUGH, len(smooth))
+    return np.concatenate([
+        first.other @ start, FAINT * (first.chain @ start), last.growing @ end, FAINT * (last.chain @ end),
+        smooth[:count].ravel(), smooth[len(smooth) - count :].ravel(),
+    ])  # fmt: skip
+
+
+def _moved(path: Path, found: list[Look], step: tuple[Array, Array, Array]) -> Path:
+    return Path(path.y + step[0], path.a + step[1], path.u + step[2], [now.x for now in found])
+
+
+def _between(clock: Array, known: list[Slopes], times: Array) -> Slopes:
+    """Derivatives (T, ., .) at the times, linear between those at a clock (K,), held outside."""
+    place = np.interp(times, clock, np.arange(len(clock)))
+    left = np.minimum(place.astype(int), max(len(clock) - 2, 0))
+    share = (place - left)[:, None, None]
+    stacked = {name: np.array([vars(at)[name] for at in known]) for name in vars(known[0])}
+    return Slopes(**{
+        name: (1 - share) * all_of[left] + share * all_of[np.minimum(left + 1, len(clock) - 1)]
+        for name, all_of in stacked.items()
+    })  # fmt: skip
+
+
+def _renewed(of: Plant, times: Array, path: Path, h: float, count: int) -> Slopes:
+    """Derivatives along the path, found at some of its times."""
+    chosen = np.unique(np.linspace(0, times.size - 1, count).round().astype(int))
+    rates = _velocities(path.y, path.a, h)
+    found = [slopes(of, float(times[k]), path.y[k], rates[k], path.u[k], path.near[k]) for k in chosen]
+    return _between(times[chosen], found, times)
+
+
+_Step = Callable[[tuple[Array, Array, Array], Array], tuple[Array, Array, Array]]
+
+
+def _linear(at: Slopes, first: _End, last: _End, h: float) -> _Step:
+    """Solver for the change of (y, a, u) at all times that brings the equations to zero, and to the least in the mean square
+    what shall vanish at the ends."""
+    T, D, U = at.by_u.shape
+    one = sp.eye_array(D)
+    by_y, by_rate, by_u, outputs = (_diagonal(part) for part in (at.by_y, at.by_rate, at.by_u, at.outputs))
+    rate_y, rate_a = (sp.csr_array(sp.kron(part, one)) / h for part in _rate_stencils(T))
+    second, numerov = (
+        sp.kron(sp.diags_array(values, offsets=[0, 1, 2], shape=(T - 2, T)), one)
+        for values in ([1.0, -2.0, 1.0], [1 / 12, 10 / 12, 1 / 12])
+    )
+    equations = sp.block_array([
+        [-(h**2) * (by_y + by_rate @ rate_y), sp.eye_array(T * D) - h**2 * by_rate @ rate_a, -(h**2) * by_u],
+        [outputs, None, None],
+        [second, -numerov, None],
+    ])  # fmt: skip
+    ends = _end_rows((T, D, U), rate_y, rate_a, first, last, FAINT * h**2 * _effect(first))
+    count = ends.shape[0]
+    system = splu(
+        sp.csc_array(
+            sp.block_array([[sp.eye_array(count), ends, None], [ends.T, None, equations.T], [None, equations, None]])
+        )
+    )
+
+    def solve(residual: tuple[Array, Array, Array], boundary: Array) -> tuple[Array, Array, Array]:
+        wanted = -np.concatenate([part.ravel() for part in residual])
+        found = system.solve(np.concatenate([-boundary, np.zeros(ends.shape[1]), wanted]))
+        y, a, u = np.split(found[count : count + ends.shape[1]], [T * D, 2 * T * D])
+        return y.reshape(T, D), a.reshape(T, D), u.reshape(T, U)
+
+    return solve
+
+
+def _effect(end: _End) -> float:
+    """How much a unit of effort accelerates [1/s^2]."""
+    return float(np.linalg.norm(end.slopes.by_u)) or 1.0
+
+
+def _end_rows(
+    shape: tuple[int, int, int], rate_y: sp.csr_array, rate_a: sp.csr_array, first: _End, last: _End, faint: float
+) -> Any:
+    """The derivative of `_boundary`, sparse."""
+    T, D, U = shape
+    rows = []
+    for at, parts in ((0, (first.other, FAINT * first.chain)), (T - 1, (last.growing, FAINT * last.chain))):
+        own = slice(at * D, (at + 1) * D)
+        place = sp.eye_array(T * D, format="csr")[own]
+        for part in parts:
+            of_y = part[:, :D] @ place + part[:, D:] @ rate_y[own]
+            rows.append([sp.csr_array(of_y), sp.csr_array(part[:, D:] @ rate_a[own]), None])
+    smooth = sp.diags_array([-1.0, 3.0, -3.0, 1.0], offsets=[0, 1, 2, 3], shape=(T - 3, T), format="csr")
+    count = min(_ROUGH, T - 3)
+    nothing = sp.csr_array((count * U, T * D))
+    rows += [
+        [nothing, None, faint * sp.kron(part, sp.eye_array(U))] for part in (smooth[:count], smooth[T - 3 - count :])
+    ]
+    return sp.block_array([row for row in rows if row[0].shape[0]], format="csr")
+
+
+def _rate_stencils(T: int) -> tuple[sp.csr_array, sp.csr_array]:
+    """(T, T) how h y_dot follows from y and h^2 y_ddot at all times: see `_velocities`."""
+    one = np.eye(T)
+    return tuple(sp.csr_array(h_rate) for h_rate in (_velocities(one, 0 * one, 1.0), _velocities(0 * one, one, 1.0)))
+
+
+def _diagonal(blocks: Array) -> sp.csr_array:
+    """The block-diagonal matrix of (T, r, c)."""
+    count, r, c = blocks.shape
+    whole = sp.bsr_array((blocks, np.arange(count), np.arange(count + 1)), shape=(count * r, count * c))
+    return sp.csr_array(whole)

@@ -1,0 +1,106 @@
+"""Reference conditions against joints: the frequency that a body has where it is held, and the one it should have."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import ffr_prep as fp
+from ffr_dyn.consistency.assemble import assemble
+from ffr_dyn.consistency.mobility import mobility
+from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.variants.variant import vary
+from ffr_prep.body import load_body, rigid_body, save_body
+
+LENGTH, DIAMETER, E, RHO = 0.3, 0.006, 2e11, 7870.0
+UNIT = np.sqrt(E / RHO) * DIAMETER / 4 / LENGTH**2 / (2 * np.pi)  # Hz of a beam of unit constants
+PINNED = np.pi**2 * UNIT
+FIXED, SUPPORTED = fp.FixedTo("a"), fp.SimplySupported("a", "b")
+
+
+def rod(reference, reduction) -> fp.FlexibleBody:
+    member = fp.Member(fp.circle(DIAMETER), fp.Material("steel", E=E, nu=0.3, rho=RHO))
+    frame = fp.named(fp.polyline([(0, 0, 0), (LENGTH, 0, 0)], member, elements=12), a=(0, 0, 0), b=(LENGTH, 0, 0))
+    model = fp.from_frame(frame, [fp.InterfaceRegion("a"), fp.InterfaceRegion("b")])
+    return fp.reduce(model, fp.Request(name="rod", reference=reference, reduction=reduction))
+
+
+def on_two_hinges(body: fp.FlexibleBody, kind: str = "revolute") -> Scene:
+    """A rod on a hinge, with a sliding hinge at its end."""
+    carriage = rigid_body("carriage", mass=0.1, inertia=(1e-4, 1e-4, 1e-4), points={"c": (0, 0, 0)})
+    return Scene(
+        (Body("rod", body), Body("carriage", carriage, position=(LENGTH, 0, 0))),
+        (
+            Joint("left", "revolute", "ground.O", "rod.a"),
+            Joint("right", kind, "rod.b", "carriage.c"),
+            Joint("rail", "translational", "ground.O", "carriage.c", axis=(1, 0, 0)),
+        ),
+        ground={"O": (0, 0, 0)},
+        gravity=(0, -9.81, 0),
+    )
+
+
+def told(scene: Scene) -> list[tuple[float, float]]:
+    """(has, should) of every body that is told of [Hz]."""
+    said = [
+        re.search(r"vibrates at ([\d.e+]+) Hz, and should at ([\d.e+]+) Hz", note) for note in assemble(scene).notes
+    ]
+    return [(float(match[1]), float(match[2])) for match in said if match]
+
+
+def test_one_end_fixed_on_two_hinges():
+    """The example of the gallery: one mode of a clamped beam bends 48 % too stiff between hinges."""
+    scene = on_two_hinges(rod(FIXED, fp.Eigenmodes(2)))
+    ((has, should),) = told(scene)
+    assert should == pytest.approx(PINNED, rel=2e-3)
+    assert has / should == pytest.approx(1.48, abs=0.01)
+    (note,) = (note for note in assemble(scene).notes if "vibrates" in note)
+    assert "body 'rod': held by left, right" in note
+    assert "(FixedTo interface a); reduce it with craig-bampton" in note
+    assert any("vibrates" in line for line in mobility(scene).lines())
+
+
+@pytest.mark.parametrize(
+    ("reference", "reduction"),
+    [
+        (FIXED, fp.CraigBampton(2)),
+        (SUPPORTED, fp.Eigenmodes(2)),
+        (FIXED, fp.Union((fp.Eigenmodes(2), fp.AttachmentModes()))),
+    ],
+)
+def test_conditions_that_the_joints_keep_or_static_shapes_are_not_told(reference, reduction):
+    assert told(on_two_hinges(rod(reference, reduction))) == []
+
+
+def test_clamped_at_both_ends():
+    """Eigenmodes of a pinned rod, welded at both ends: 22.373 for 9.870 of the unit."""
+    body = rod(SUPPORTED, fp.Eigenmodes(8))
+    scene = on_two_hinges(body, "fixed")
+    scene = replace(scene, joints=(replace(scene.joints[0], kind="fixed"), *scene.joints[1:]))
+    ((has, should),) = told(scene)
+    assert should == pytest.approx(22.3733 * UNIT, rel=2e-3)
+    assert has > 1.03 * should
+
+
+def test_a_driven_hinge_clamps():
+    """Modes fixed at the hub suit a driven hinge with a free end, and not one without driver."""
+    hub = Scene(
+        (Body("rod", rod(FIXED, fp.Eigenmodes(4))),),
+        (Joint("left", "revolute", "ground.O", "rod.a"),),
+        (Driver("motor", "left", 0.0),),
+        ground={"O": (0, 0, 0)},
+        gravity=(0, -9.81, 0),
+    )
+    assert told(hub) == []
+
+
+def test_fewer_modes_are_told_too_and_files_keep_what_it_takes(tmp_path):
+    body = load_body(save_body(rod(FIXED, fp.Eigenmodes(8)), tmp_path / "rod.ffr"))
+    assert told(on_two_hinges(body)) == []
+    assert told(vary(on_two_hinges(body), modes={"rod": range(2)}))
+    assert "held_body" not in rod(FIXED, fp.CraigBampton(2)).provenance
