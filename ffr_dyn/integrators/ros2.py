@@ -42,7 +42,7 @@ from ffr_dyn.kernels.integrator_api import (
     evaluate,
     fill,
     finite,
-    hold_slopes,
+    later_stage,
     method_step,
     multiple,
     normalise,
@@ -75,6 +75,7 @@ def ros2_step(r: Tables, t: float, again: int) -> int:
             multiple(r_x, -2.0, stages.x[0])
             multiple(r_v, -2.0, stages.v[0])
             normalise(bodies, xs)  # r_v goes to body axes and comes back, which wants a true rotation
+            later_stage(r, -gh)
             status = evaluate(r, t + h, xs, vs)
         if status != OK:
             return status
@@ -83,7 +84,6 @@ def ros2_step(r: Tables, t: float, again: int) -> int:
             correct(r, r_v, stages.target)
         add_stiff_part(r, xs, vs, r_x, gh)
         solve(r, stages.target)
-        hold_slopes(r)
         velocity_rates(r, stages.v[k])
         add_scaled(vs, vs, gh, stages.v[k])
         position_rates(bodies, xs, vs, stages.x[k])

@@ -44,7 +44,7 @@ from ffr_dyn.kernels.integrator_api import (
     evaluate,
     fill,
     finite,
-    hold_slopes,
+    later_stage,
     method_step,
     normalise,
     position_rates,
@@ -99,6 +99,7 @@ def ros3_step(r: Tables, t: float, again: int) -> int:
             combine_three(stages.x[0], stages.x[m], stages.x[n], xs, r.x, a0, a1, a2, r_x, g0, g1, g2)
             combine_three(stages.v[0], stages.v[m], stages.v[n], vs, r.v, a0, a1, a2, r_v, g0, g1, g2)
             normalise(bodies, xs)  # r_v goes to body axes and comes back, which wants a true rotation
+            later_stage(r, gh * (1.0 + g0 + g1 + g2))
             status = evaluate(r, t + AT[k] * h, xs, vs)
         if status != OK:
             return status
@@ -107,7 +108,6 @@ def ros3_step(r: Tables, t: float, again: int) -> int:
             correct(r, r_v, stages.target)
         add_stiff_part(r, xs, vs, r_x, gh)
         solve(r, stages.target)
-        hold_slopes(r)
         velocity_rates(r, stages.v[k])
         add_scaled(vs, vs, gh, stages.v[k])
         position_rates(bodies, xs, vs, stages.x[k])

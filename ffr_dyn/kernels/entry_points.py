@@ -43,6 +43,7 @@ from ffr_dyn.kernels.tables import (
     AT,
     BY_PLACE,
     BY_RATE,
+    BY_TIME,
     EVALUATIONS,
     EVERY_LOAD,
     FAILED,
@@ -211,7 +212,7 @@ def set_diagonal(r: Tables, gamma_h: float) -> int:
     """The elastic diagonal 1 + (gamma h)^2 Omega^2 + gamma h 2 zeta Omega of a linearly implicit method, and the same for
     stiff forces; 0: explicit."""
     implicit = r.work.implicit
-    implicit[BY_RATE], implicit[BY_PLACE], implicit[FRESH] = gamma_h, gamma_h * gamma_h, 1.0
+    implicit[BY_RATE], implicit[BY_PLACE], implicit[FRESH], implicit[BY_TIME] = gamma_h, gamma_h * gamma_h, 1.0, 0.0
     if r.work.diagonal[0] == gamma_h:
         return OK
     r.work.diagonal[0] = gamma_h

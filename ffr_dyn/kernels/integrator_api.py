@@ -65,6 +65,7 @@ from ffr_dyn.kernels.tables import (
     AHEAD,
     BY_PLACE,
     BY_RATE,
+    BY_TIME,
     FAILED,
     FRESH,
     HERE,
@@ -145,10 +146,10 @@ __all__ = [
     "fill",
     "finite",
     "get",
-    "hold_slopes",
     "inlined",
     "into_body_axes",
     "into_global_axes",
+    "later_stage",
     "keep_measured",
     "keep_rows",
     "kernel",
@@ -198,13 +199,13 @@ def begin_stages(r, gh, h):
     """What a step of length h of a linearly implicit method has on the left side of its stages: gamma h of the elastic forces
     and of stiff ones, whose slopes the first stage finds."""
     set_diagonal(r, gh)
-    r.work.implicit[AHEAD] = h
+    r.work.implicit[AHEAD], r.work.implicit[BY_TIME] = h, gh
 
 
 @inlined
-def hold_slopes(r):
-    """In the stages that follow, one-sided forces keep the slopes of the one before."""
-    r.work.implicit[FRESH] = 0.0
+def later_stage(r, by_time):
+    """One-sided forces keep the slopes of the stage before; by_time: gamma h (1 + r_t), r_t the correction of time's rate."""
+    r.work.implicit[FRESH], r.work.implicit[BY_TIME] = 0.0, by_time
 
 
 @inlined

@@ -263,8 +263,9 @@ class RowWork(NamedTuple):
 # Numbers of `Work.info`.
 FAILED, EVALUATIONS, PROJECTIONS = range(3)
 # Numbers of `Work.implicit`: what a rate and a displacement add to the coordinate of a stiff force, per change of the
-# acceleration; how far ahead a one-sided force looks [s]; whether its slopes belong to this state, or to one before.
-BY_RATE, BY_PLACE, AHEAD, FRESH = range(4)
+# acceleration; how far ahead a one-sided force looks [s]; whether its slopes belong to this state, or to one before; the time
+# that a stage of a W-method goes on by, as by its displacements.
+BY_RATE, BY_PLACE, AHEAD, FRESH, BY_TIME = range(5)
 # Numbers of `Work.drift`.
 PHI, PHI_DOT = range(2)
 # Numbers of `Work.independence` (see `ffr_dyn.kernels.singular_positions`).
@@ -284,7 +285,7 @@ class Work(NamedTuple):
     functions: F2  # (F, 3) value, first and second time derivative
     user: F1  # (user_count,)
     diagonal: F1  # (1,) gamma h of the elastic diagonal that is in place (see `entry_points.set_diagonal`), or -1
-    implicit: F1  # (4,) by the names above
+    implicit: F1  # (5,) by the names above
     info: I1  # (3,) body or row that failed, how many evaluations, how many projections
     drift: F1  # (2,) largest |Phi| and |Phi_dot| met
     # (8,) least share of a row that others do not contain: now, least so far, and when; of a step its start and end [s],

@@ -13,7 +13,7 @@ from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.rows import ZERO, coordinate
 from ffr_dyn.kernels.simd.slices import part, vector_at
 from ffr_dyn.kernels.stiff_forces import keep_row
-from ffr_dyn.kernels.tables import ANGLE, END_I, END_J, FUNCTION, IN_V, LENGTH, MEASURED, PLACE, WAY, N
+from ffr_dyn.kernels.tables import ANGLE, BY_TIME, END_I, END_J, FUNCTION, IN_V, LENGTH, MEASURED, PLACE, WAY, N
 from ffr_dyn.kernels.vectors import cross, dot, get, scale, subtract, to_body
 
 
@@ -76,15 +76,17 @@ def apply_side(where, markers, w, f, k, amount, side):
 
 
 @kernel
-def apply_along(r, k, f, value, rate, side_i, side_j, force, stiffness, damping):
+def apply_along(r, k, f, value, rate, side_i, side_j, force, stiffness=0.0, damping=0.0, by_time=0.0):
     """Add the force on a coordinate to the vector f, and keep it with coordinate and rate.
 
     stiffness, damping : how much the force falls with coordinate and rate, or more, for implicit methods; zeros: explicit
+    by_time            : how fast it grows where coordinate and rate stay
     """
     m, row, w, kept = r.model, r.model.loads.row, r.work.markers, r.work.loads.measured
     at, i, j = row[k, MEASURED], row[k, END_I], row[k, END_J]
     kept[at], kept[at + 1], kept[at + 2] = value, rate, force
     f = vector_at(f, r.v.size)
+    force += r.work.implicit[BY_TIME] * by_time
     apply_side(m.bodies.where, m.markers, w, f, i, force, side_i)
     apply_side(m.bodies.where, m.markers, w, f, j, force, side_j)
     keep_row(r, k, 0, side_i, side_j, stiffness, damping)

@@ -24,5 +24,6 @@ def servo(r: Tables, k: int, x: Vector, f: Vector) -> int:
     loads, drive = r.model.loads, drive_of(r, k)
     data, start = loads.data, loads.row[k, LAW]
     force, share = control(data, start, value, rate, drive[0], drive[1])
-    apply_along(r, k, f, value, rate, side_i, side_j, force, share * data[start], share * data[start + 1])
+    kp, kd = share * data[start], share * data[start + 1]
+    apply_along(r, k, f, value, rate, side_i, side_j, force, kp, kd, kp * drive[1] + kd * drive[2])
     return OK
