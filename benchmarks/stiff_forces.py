@@ -1,8 +1,8 @@
 """What implicit forces cost: processor time of a step of ROS2, with and without them, for chains of 32 links.
 
-A damper on every joint shares the block of its joint: goal, at most a quarter of a step (half a stage of two). Springs between
-the middles of neighbouring links and bushings in place of joints have blocks of their own. Beside them the same forces with RK4,
-where they are explicit, by its four evaluations as two.
+A damper on every joint shares the block of its joint: goal, at most a quarter of a step (half a stage of two). Springs
+between the middles of neighbouring links and bushings in place of joints have blocks of their own. Beside them the same
+forces with RK4, where they are explicit, by its four evaluations as two.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Constraint rows -> the tables that the kernels read: the rows, and how the multiplier matrix is assembled and factorised."""
+"""Constraint rows -> the tables that the kernels read: rows, and how the multiplier matrix is assembled and factorised."""
 
 from __future__ import annotations
 

@@ -104,6 +104,7 @@ def _row_work(m: Model) -> RowWork:
         **_zeros(jac=(K * D, 9, LANES), kept=(K * D, 9, LANES), X=K * D * 12 * LANES, Y=12 * LANES),
         **_zeros(scale=K * LANES, least=K * LANES, pivots=K * LANES, step=K * LANES),
         **_zeros(compliance=K * LANES, pull=K * LANES, relief=K * LANES),
+        **_zeros(along=(3, C), begun=(2, C), grown=(3, 2, C), held=(2, C)),
         **_zeros(wrench=6, P=(M, 36), phiphi=(pairs, 36), S=stored),
     )
 
@@ -136,8 +137,9 @@ def _load_work(m: Model, V: int) -> LoadWork:
     return LoadWork(
         reference=m.loads.initial.copy(),
         measured=np.zeros(m.loads.initial.size),
-        axes=np.zeros((2, 3, 3, 3)),
+        axes=np.zeros((2, 4, 3, 3)),
         turn=np.zeros((3, 3, 3)),
+        curved=np.zeros(6),
         f=np.zeros(V),
     )
 

@@ -102,8 +102,8 @@ def _overflow(system: System, work: Work) -> str:
             "motions within reach, or use projection"
         )
     return (
-        "the step is too large for a mode (use ROS2), a stiff spring or stop, or a fast rotation (use a smaller step), or a "
-        "force is not finite"
+        "the step is too large for a mode or a stiff spring (use ROS2), for a stop or a fast rotation (use a smaller step), "
+        "or a force is not finite"
     )
 
 

@@ -47,7 +47,7 @@ from ffr_dyn.kernels.integrator_api import (
     multiple,
     normalise,
     position_rates,
-    solve,
+    solve_stage,
     stabilise,
     velocity_rates,
 )
@@ -82,8 +82,8 @@ def ros2_step(r: Tables, t: float, again: int) -> int:
         acceleration_target(r.work.rows, r.clock.gains, stages.target)
         if k == 1:
             correct(r, r_v, stages.target)
-        add_stiff_part(r, xs, vs, r_x, gh)
-        solve(r, stages.target)
+        add_stiff_part(r, k, vs, r_x, gh, (h, 0.0, 0.0), (-2.0, 0.0, 0.0))
+        solve_stage(r, k)
         velocity_rates(r, stages.v[k])
         add_scaled(vs, vs, gh, stages.v[k])
         position_rates(bodies, xs, vs, stages.x[k])

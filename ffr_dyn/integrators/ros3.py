@@ -48,7 +48,7 @@ from ffr_dyn.kernels.integrator_api import (
     method_step,
     normalise,
     position_rates,
-    solve,
+    solve_stage,
     stabilise,
     velocity_rates,
     weigh_four,
@@ -83,6 +83,9 @@ def ros3_step(r: Tables, t: float, again: int) -> int:
     begin_stages(r, gh, h)
     xs, vs, r_x, r_v = stages.x[4], stages.v[4], stages.x[5], stages.v[5]
     for k in range(4):
+        # the coefficients of later stages, which may hold anything, are zero
+        a0, a1, a2 = h * ALPHA[4 * k], h * ALPHA[4 * k + 1], h * ALPHA[4 * k + 2]
+        g0, g1, g2 = GAMMAS[4 * k] / GAMMA, GAMMAS[4 * k + 1] / GAMMA, GAMMAS[4 * k + 2] / GAMMA
         if k == 0:
             status = stabilise(r, t, r.x, r.v)
             copy(xs, r.x)
@@ -90,12 +93,7 @@ def ros3_step(r: Tables, t: float, again: int) -> int:
             fill(r_x, 0.0)
             fill(r_v, 0.0)
         else:
-            m, n = (
-                min(1, k - 1),
-                min(2, k - 1),
-            )  # the coefficients of later stages, which may hold anything, are zero
-            a0, a1, a2 = h * ALPHA[4 * k], h * ALPHA[4 * k + 1], h * ALPHA[4 * k + 2]
-            g0, g1, g2 = GAMMAS[4 * k] / GAMMA, GAMMAS[4 * k + 1] / GAMMA, GAMMAS[4 * k + 2] / GAMMA
+            m, n = min(1, k - 1), min(2, k - 1)
             combine_three(stages.x[0], stages.x[m], stages.x[n], xs, r.x, a0, a1, a2, r_x, g0, g1, g2)
             combine_three(stages.v[0], stages.v[m], stages.v[n], vs, r.v, a0, a1, a2, r_v, g0, g1, g2)
             normalise(bodies, xs)  # r_v goes to body axes and comes back, which wants a true rotation
@@ -106,8 +104,8 @@ def ros3_step(r: Tables, t: float, again: int) -> int:
         acceleration_target(r.work.rows, r.clock.gains, stages.target)
         if k > 0:
             correct(r, r_v, stages.target)
-        add_stiff_part(r, xs, vs, r_x, gh)
-        solve(r, stages.target)
+        add_stiff_part(r, k, vs, r_x, gh, (a0, a1, a2), (g0, g1, g2))
+        solve_stage(r, k)
         velocity_rates(r, stages.v[k])
         add_scaled(vs, vs, gh, stages.v[k])
         position_rates(bodies, xs, vs, stages.x[k])

@@ -19,13 +19,12 @@ from ffr_dyn.kernels.singular_positions import note_independence, numbered_step
 from ffr_dyn.kernels.solution import (
     constraint_rates,
     gather_rows,
-    rates_of,
     reduce_miss,
     reduced_rates,
     solve_back,
 )
 from ffr_dyn.kernels.step_control import controlled_step, interpolate
-from ffr_dyn.kernels.stiff_forces import corrected_velocities, leave_forces, subtract_yield, take_pull
+from ffr_dyn.kernels.stiff_forces import add_to_joints, keep_growth, set_targets, subtract_yield
 from ffr_dyn.kernels.system import (
     apply_motion,
     evaluate_joints,
@@ -283,14 +282,16 @@ def solve_of_dependent_rows(r: Tables, target: Vector) -> int:
 
 @entry_point()
 def correct(r: Tables, r_v: Vector, target: Vector) -> int:
-    """f += M r_v, target += Phi_q r_v of the constraint rows, for the corrections of a stage; r_v (V,)."""
+    """f += M r_v, target += Phi_q r_v of the constraint rows, for the corrections of a stage; r_v (V,).
+
+    The rates of all rows stay in `RowWork.left`.
+    """
     bodies, bw, rw = r.model.bodies, r.work.bodies, r.work.rows
     correction, wanted = vector_at(r_v, r.v.size), vector_at(target, r.stages.target.size)
     copy(bw.acc, correction)
     to_body_axes(bodies.where, bw.A, bw.acc)
-    constraint_rates(bodies.where, r.model.markers, r.model.rows, rw.jac, r.work.markers.phi, bw.acc, rw.lam)
-    leave_forces(r.model.rows, rw.lam)
-    add_scaled(wanted, wanted, 1.0, rw.lam)
+    constraint_rates(bodies.where, r.model.markers, r.model.rows, rw.jac, r.work.markers.phi, bw.acc, rw.left)
+    add_to_joints(r.model.rows, wanted, rw.left)
     for b in range(bodies.mass.size):
         j, size = bodies.where[b, IN_V], 6 + bodies.where[b, N]
         mass_times(bodies, bw, b, part(bw.acc, j, size), part(bw.f, j, size))
@@ -298,15 +299,20 @@ def correct(r: Tables, r_v: Vector, target: Vector) -> int:
 
 
 @entry_point(has_stiff_forces)
-def pull_forces(r: Tables, x: Vector, v: Vector, r_x: Vector, target: Vector) -> int:
-    """Targets of the rows of stiff forces at a stage (x, v) with the correction r_x (X,) of position rates."""
-    m, w = r.model, r.work
-    x, v, correction = vector_at(x, r.x.size), vector_at(v, r.v.size), vector_at(r_x, r.x.size)
-    corrected_velocities(m.bodies.where, w.bodies.A, x, v, correction, w.bodies.acc)
-    rates_of(
-        m.bodies.where, m.markers, m.rows, m.rows.forced, w.rows.jac, w.markers.phi, w.bodies.acc, w.rows.left
-    )  # fmt: skip
-    take_pull(m.rows, w.rows, w.rows.left, vector_at(target, r.stages.target.size))
+def pull_forces(
+    r: Tables, stage: int, s0: float, s1: float, s2: float, g0: float, g1: float, g2: float, target: Vector
+) -> int:
+    """Targets of the rows of stiff forces at a stage (see `stiff_forces.set_targets`)."""
+    wanted, gh = vector_at(target, r.stages.target.size), r.work.implicit[BY_RATE]
+    set_targets(r.model.rows, r.work.rows, stage, (s0, s1, s2), (g0, g1, g2), gh, wanted)
+    return OK
+
+
+@entry_point(has_stiff_forces)
+def follow_forces(r: Tables, stage: int, target: Vector) -> int:
+    """What the solution of a stage makes of the coordinates of stiff forces."""
+    wanted = vector_at(target, r.stages.target.size)
+    keep_growth(r.model.rows, r.work.rows, stage, r.work.implicit[BY_RATE], wanted)
     return OK
 
 

@@ -40,6 +40,7 @@ from ffr_dyn.kernels.entry_points import (
     correct,
     evaluate,
     evaluate_rows_at,
+    follow_forces,
     project,
     pull_forces,
     set_diagonal,
@@ -149,12 +150,12 @@ __all__ = [
     "inlined",
     "into_body_axes",
     "into_global_axes",
-    "later_stage",
     "keep_measured",
     "keep_rows",
     "kernel",
     "largest",
     "largest_motion",
+    "later_stage",
     "mass_times",
     "method_step",
     "multiple",
@@ -166,6 +167,7 @@ __all__ = [
     "set_diagonal",
     "six_rows",
     "solve",
+    "solve_stage",
     "stabilise",
     "subtract",
     "three_rows",
@@ -215,13 +217,23 @@ def weigh_forces(r, by_rate, by_place):
 
 
 @inlined
-def add_stiff_part(r, x, v, r_x, gh):
+def add_stiff_part(r, stage, v, r_x, gh, shares, factors):
     """What a stage has on its right side beside the forces: f -= gamma h Omega^2 (q_dot + r_q), and the targets of stiff
-    forces."""
+    forces, in whose coordinates are `shares` of what earlier stages made of them, and `factors` in their corrections."""
     bodies, f = r.model.bodies, r.work.bodies.f
     for b in range(bodies.mass.size):
         n, i, j, shared = bodies.where[b, N], bodies.where[b, IN_X], bodies.where[b, IN_V], bodies.where[b, IN_SHARED]
         for k in range(n):
             f[j + 6 + k] -= gh * bodies.omega2[shared + k] * (v[j + 6 + k] + r_x[i + 7 + k])
     if r.model.stiff_count > 0:
-        pull_forces(r, x, v, r_x, r.stages.target)
+        s0, s1, s2 = shares
+        g0, g1, g2 = factors
+        pull_forces(r, stage, s0, s1, s2, g0, g1, g2, r.stages.target)
+
+
+@inlined
+def solve_stage(r, stage):
+    """`solve` of a linearly implicit method. Stiff forces remember three stages."""
+    solve(r, r.stages.target)
+    if r.model.stiff_count > 0 and stage < 3:
+        follow_forces(r, stage, r.stages.target)

@@ -87,37 +87,29 @@ def dot_rows(X, at, step, own):
 @inlined
 def constraint_rates(where, markers, rows, jac, phi, acc, out):
     """out = Phi_q acc, by the coefficients and shapes of one moment."""
-    rates_of(where, markers, rows, rows.start, jac, phi, acc, out)
-
-
-@inlined
-def rates_of(where, markers, rows, begin, jac, phi, acc, out):
-    """`constraint_rates` of the rows of each block from row begin[k] on; out is zero elsewhere."""
     fill(out, 0.0)
     ground, sides = where.shape[0] - 1, rows.marker.shape[1]
     for k in range(rows.marker.shape[0]):
-        if begin[k] == rows.start[k + 1]:
-            continue
         for side in range(sides):
             marker = rows.marker[k, side]
             b = markers.body[marker] if marker >= 0 else ground
             if b != ground:
                 n, j, own = where[b, N], where[b, IN_V], jac[k * sides + side]
                 shape = shapes(markers, phi, marker, n)
-                start, first, last, moved = rows.start[k], begin[k], rows.start[k + 1], part(acc, j, 6 + n)
+                first, last, moved = rows.start[k], rows.start[k + 1], part(acc, j, 6 + n)
                 if where[b, NORMAL] >= 0:
-                    add_side_rates_in_plane(shape, own, moved, start, first, last, n, where[b, NORMAL], out)
+                    add_side_rates_in_plane(shape, own, moved, first, last, n, where[b, NORMAL], out)
                 else:
-                    add_side_rates(shape, own, moved, start, first, last, n, out)
+                    add_side_rates(shape, own, moved, first, last, n, out)
 
 
 @kernel
-def add_side_rates(phi, a, acc, start, first, last, n, out):
+def add_side_rates(phi, a, acc, first, last, n, out):
     e0, e1, e2, e3, e4, e5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if n > 0:
         e0, e1, e2, e3, e4, e5 = six_rows(phi, part(acc, 6, n), n)
-    for k in range(first - start, last - start):
-        out[start + k] += (
+    for k in range(last - first):
+        out[first + k] += (
             a[0, k] * (acc[0] + e0) + a[1, k] * (acc[1] + e1) + a[2, k] * (acc[2] + e2)
             + a[3, k] * acc[3] + a[4, k] * acc[4] + a[5, k] * acc[5]
             + a[6, k] * e3 + a[7, k] * e4 + a[8, k] * e5
@@ -125,13 +117,13 @@ def add_side_rates(phi, a, acc, start, first, last, n, out):
 
 
 @kernel
-def add_side_rates_in_plane(phi, a, acc, start, first, last, n, normal, out):
+def add_side_rates_in_plane(phi, a, acc, first, last, n, normal, out):
     i, j, turn = in_plane(normal)
     e0, e1, e2 = 0.0, 0.0, 0.0
     if n > 0:
         e0, e1, e2 = plane_rows(phi, normal, part(acc, 6, n), n)
-    for k in range(first - start, last - start):
-        out[start + k] += (
+    for k in range(last - first):
+        out[first + k] += (
             a[i, k] * (acc[i] + e0) + a[j, k] * (acc[j] + e1) + a[turn, k] * acc[turn] + a[6 + normal, k] * e2
         )
 

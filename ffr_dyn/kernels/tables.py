@@ -30,7 +30,9 @@ I2 = Annotated[np.ndarray, ("int64", 2)]
 
 # The words of constraints, in the order of their numbers in `Rows.kind` (see `ffr_dyn.kernels.rows`).
 WORDS = ("coincidence", "dot-1", "dot-2", "driven-angle", "distance", "relation")
-FORCED = len(WORDS)  # in place of one in `Rows.kind`: the coordinate of a stiff force (see `ffr_dyn.kernels.stiff_forces`)
+FORCED = len(
+    WORDS
+)  # in place of one in `Rows.kind`: the coordinate of a stiff force (see `ffr_dyn.kernels.stiff_forces`)
 ANGLE, STROKE, LENGTH = 0, 1, 2
 BODY, GLOBAL, SIX = 3, 4, 5
 # The places of forces by the words of `ffr_dyn.scene.forces.places`: coordinates, and axes.
@@ -229,8 +231,9 @@ class LoadWork(NamedTuple):
 
     reference: F1  # (O,) what was measured at the last accepted state, from which angles count their turns
     measured: F1  # (O,) of a coordinate: value, rate, force; of a bushing: six of each
-    axes: F4  # (2, 3, 3, 3) scratch of a bushing
+    axes: F4  # (2, 4, 3, 3) scratch of a bushing
     turn: F3  # (3, 3, 3) scratch of a bushing
+    curved: F1  # (6,) scratch of a bushing
     f: F1  # (V,) scratch of the powers
 
 
@@ -244,9 +247,15 @@ class RowWork(NamedTuple):
     left: F1  # (C,) scratch
     scale: F1  # (8 K,) what the entry of S on the diagonal is at least
     least: F1  # (8 K,) what it is taken for where it is less
-    compliance: F1  # (8 K,) of the rows of stiff forces 1 / (gamma h d + (gamma h)^2 k), or 0 where they have no slope
+    compliance: F1  # (8 K,) of the rows of stiff forces 1 / (gamma h d + (gamma h)^2 k)
     pull: F1  # (8 K,) likewise gamma h k / (gamma h d + (gamma h)^2 k)
     relief: F1  # (8 K,) what rows of stiff forces before have taken from the diagonal of S
+    along: (
+        F2  # (3, C) of stiff forces: coordinate, rate and quadratic velocity part of its second derivative at the state
+    )
+    begun: F2  # (2, C) coordinate and rate at the start of the step
+    grown: F3  # (3, 2, C) rates of both by the stages before
+    held: F2  # (2, C) scratch
     # (K D, 9, 8) per side of a block: coefficients of point velocity, omega_bar, elastic rotation rate, its rows in lanes
     jac: F3
     kept: F3  # those of another moment, for methods that need both

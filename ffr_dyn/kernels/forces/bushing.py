@@ -23,14 +23,16 @@ from ffr_dyn.kernels.vectors import add, cross, dot, get, put, scale, subtract, 
 
 @kernel
 def move_axes(frames, w, axes, i, j):
-    """axes (2, 3, 3, 3): by side, body axes value, global value and global rate of the three axes, frames (18,)."""
+    """axes (2, 4, 3, 3): by side, of the three axes, frames (18,), value in body axes, global value and rate, and quadratic
+    velocity part of the second derivative."""
     for side in range(2):
         marker = i if side == 0 else j
         for c in range(3):
-            a, g, rate, _ = axis_motion(w, marker, three(frames, 9 * side + 3 * c))
+            a, g, rate, bias = axis_motion(w, marker, three(frames, 9 * side + 3 * c))
             put(axes[side, 0], c, a)
             put(axes[side, 1], c, g)
             put(axes[side, 2], c, rate)
+            put(axes[side, 3], c, bias)
 
 
 @kernel
@@ -92,6 +94,30 @@ def measure_bushing(w, s, i, j, x):
         x[3 + c] = g * z[c]
         x[9 + c] = g * z_rate[c] + g_rate * z[c]
     return z, g, g_s, g_c
+
+
+@kernel
+def curve_motion(w, s, i, j, turn):
+    """Quadratic velocity parts of the second derivatives of all six into s.curved.
+
+    On rotations g is a function of the cosine c alone, with (1 - c^2) dg/dc = c g - 1.
+    """
+    d, dd = subtract(get(w.r, j), get(w.r, i)), subtract(get(w.rd, j), get(w.rd, i))
+    db, axes, rate, bias = subtract(get(w.rb, j), get(w.rb, i)), s.axes, s.turn[1], s.turn[2]
+    for k in range(3):
+        moved = dot(get(axes[0, 3], k), d) + 2.0 * dot(get(axes[0, 2], k), dd)
+        s.curved[k] = moved + dot(get(axes[0, 1], k), db)
+        for l in range(3):  # noqa: E741
+            ends = dot(get(axes[0, 3], k), get(axes[1, 1], l)) + dot(get(axes[0, 1], k), get(axes[1, 3], l))
+            bias[k, l] = ends + 2.0 * dot(get(axes[0, 2], k), get(axes[1, 2], l))
+    z, g, g_s, g_c = turn
+    cosine, square = 0.5 * (s.turn[0, 0, 0] + s.turn[0, 1, 1] + s.turn[0, 2, 2] - 1.0), dot(z, z)
+    speed, growth = 0.5 * (rate[0, 0] + rate[1, 1] + rate[2, 2]), 0.5 * (bias[0, 0] + bias[1, 1] + bias[2, 2])
+    slope = g_c - cosine * g_s
+    second = (g + 3.0 * cosine * slope) / square if square > 1e-3 else 4.0 / 15.0 + 12.0 / 35.0 * (1.0 - cosine)
+    z_rate, z_bias, g_bias = half_axial(rate), half_axial(bias), slope * growth + second * speed * speed
+    for c in range(3):
+        s.curved[3 + c] = g * z_bias[c] + 2.0 * slope * speed * z_rate[c] + g_bias * z[c]
 
 
 @kernel
@@ -162,6 +188,8 @@ def keep_rows(r, k, turn, x):
     if loads.row[k, BLOCK] < 0:
         return
     data, start, i, j, number = loads.data, loads.row[k, LAW], loads.row[k, END_I], loads.row[k, END_J], 0
+    curve_motion(w, s, i, j, turn)
+    curved = s.curved
     for c in range(6):
         stiffness, damping, curve = data[start + 84 + c], data[start + 90 + c], int(data[start + 78 + c])
         if stiffness <= 0.0 and damping <= 0.0 and curve < 0:
@@ -172,7 +200,7 @@ def keep_rows(r, k, turn, x):
             side_i, side_j = displacement_sides(w, s.axes, i, j, unit(c))
         else:
             side_i, side_j = rotation_sides(w, s, i, j, turn, unit(c - 3))
-        keep_row(r, k, number, side_i, side_j, stiffness, damping)
+        keep_row(r, k, number, x[c], x[6 + c], (curved[c], side_i, side_j), stiffness, damping)
         number += 1
 
 

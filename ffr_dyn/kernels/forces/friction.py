@@ -27,8 +27,8 @@ def drag(data, start, rate, normal):
 
 @force_kernel
 def friction(r: Tables, k: int, x: Vector, f: Vector) -> int:
-    value, rate, side_i, side_j = coordinate_of(r, k)
+    value, rate, motion = coordinate_of(r, k)
     loads = r.model.loads
     damping = drag(loads.data, loads.row[k, LAW], rate, drive_of(r, k)[0])
-    apply_along(r, k, f, value, rate, side_i, side_j, -damping * rate, 0.0, damping)
+    apply_along(r, k, f, value, rate, motion, -damping * rate, 0.0, damping)
     return OK

@@ -20,10 +20,10 @@ def control(data, start, c, rate, target, target_rate):
 
 @force_kernel
 def servo(r: Tables, k: int, x: Vector, f: Vector) -> int:
-    value, rate, side_i, side_j = coordinate_of(r, k)
+    value, rate, motion = coordinate_of(r, k)
     loads, drive = r.model.loads, drive_of(r, k)
     data, start = loads.data, loads.row[k, LAW]
     force, share = control(data, start, value, rate, drive[0], drive[1])
     kp, kd = share * data[start], share * data[start + 1]
-    apply_along(r, k, f, value, rate, side_i, side_j, force, kp, kd, kp * drive[1] + kd * drive[2])
+    apply_along(r, k, f, value, rate, motion, force, kp, kd, kp * drive[1] + kd * drive[2])
     return OK

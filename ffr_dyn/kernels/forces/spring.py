@@ -24,7 +24,7 @@ def pull(data, start, c, rate):
 
 @kernel
 def slopes(data, start, c, rate):
-    """By stretch and by rate; of a curve over the rate no less than the chord from rest, for those that grow less and less."""
+    """By stretch and by rate; of a curve over the rate at least the chord from rest, for those that grow less and less."""
     stiffness, damping = data[start], data[start + 1]
     if data[start + 4] >= 0.0:
         stiffness += curve_slope(data, int(data[start + 4]), c - data[start + 2])
@@ -37,9 +37,9 @@ def slopes(data, start, c, rate):
 
 @force_kernel
 def spring(r: Tables, k: int, x: Vector, f: Vector) -> int:
-    value, rate, side_i, side_j = coordinate_of(r, k)
+    value, rate, motion = coordinate_of(r, k)
     loads = r.model.loads
     data, start = loads.data, loads.row[k, LAW]
     stiffness, damping = slopes(data, start, value, rate)
-    apply_along(r, k, f, value, rate, side_i, side_j, -pull(data, start, value, rate), stiffness, damping)
+    apply_along(r, k, f, value, rate, motion, -pull(data, start, value, rate), stiffness, damping)
     return OK

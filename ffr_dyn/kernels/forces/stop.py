@@ -40,7 +40,7 @@ def steepness(data, start, depth, speed, ahead):
 @force_kernel
 def stop(r: Tables, k: int, x: Vector, f: Vector) -> int:
     """data: lower and upper end, then what `push` reads."""
-    value, rate, side_i, side_j = coordinate_of(r, k)
+    value, rate, motion = coordinate_of(r, k)
     data, start = r.model.loads.data, r.model.loads.row[k, LAW]
     below, above = data[start] - value, value - data[start + 1]
     force = push(data, start + 2, below, -rate) - push(data, start + 2, above, rate)
@@ -49,5 +49,5 @@ def stop(r: Tables, k: int, x: Vector, f: Vector) -> int:
         ahead = r.work.implicit[AHEAD]
         lower, upper = steepness(data, start + 2, below, -rate, ahead), steepness(data, start + 2, above, rate, ahead)
         stiffness, damping = lower[0] + upper[0], lower[1] + upper[1]
-    apply_along(r, k, f, value, rate, side_i, side_j, force, stiffness, damping)
+    apply_along(r, k, f, value, rate, motion, force, stiffness, damping)
     return OK

@@ -14,10 +14,8 @@ def spring_force(
     return -_of(stiffness, stretch) - _of(damping, rate) - preload
 
 
-def spring_slopes(
-    stiffness: float | Curve, damping: float | Curve, stretch: float, rate: float
-) -> tuple[float, float]:
-    """By stretch and by rate; of a curve over the rate no less than the chord from rest, for those that grow less and less."""
+def spring_slopes(stiffness: float | Curve, damping: float | Curve, stretch: float, rate: float) -> tuple[float, float]:
+    """By stretch and by rate; of a curve over the rate at least the chord from rest, for those that grow less and less."""
     d = damping
     if isinstance(damping, Curve):
         chord = (curve_value(damping, rate) - curve_value(damping, 0.0)) / rate if rate else 0.0
