@@ -1,4 +1,4 @@
-"""A linearly implicit W-method of order two: elastic stiffness and damping implicit, everything else explicit.
+"""A linearly implicit W-method of order two: elastic and stiff forces implicit, everything else explicit.
 
 Rosenbrock-type method with the elastic part  A = d(q_ddot)/d(q, q_dot) of  M v_dot = ... - Omega^2 q - 2 zeta Omega q_dot
 and the kinematics x_dot = T(x) v as its Jacobian; its order does not depend on what A leaves out (Verwer, Spee, Blom,
@@ -12,6 +12,8 @@ L-stable in the elastic part. Since Omega^2 and 2 zeta Omega are diagonal, a sta
 
     (M + diag_ff(gamma^2 h^2 Omega^2 + 2 gamma h zeta Omega)) k_v + Phi_q^T mu = Q + M r_v - gamma h Omega^2 (q_dot + r_q)
     Phi_q k_v = gamma_rhs + Phi_q r_v,      k_x = T(x) (v + gamma h k_v) + r_x     (r = 0, then -2 k1)
+
+Stiff forces are rows beside those of the joints (`ffr_dyn.kernels.forces.implicit`).
 
 All positions move with v + gamma h k_v, not the elastic ones alone: otherwise a joint that stiff modes move would be left by
 its two sides at different rates, and drift.
@@ -96,7 +98,7 @@ def ros2_step(r: Tables, t: float, again: int) -> int:
 
 @dataclass(frozen=True)
 class ROS2:
-    """Linearly implicit, order two; no elastic frequency limits the step, and a step costs two evaluations.
+    """Linearly implicit, order two; neither elastic frequencies nor stiff forces limit the step, which costs two evaluations.
 
     Modes with h Omega > 1 are damped numerically; those the step resolves are right to second order.
 

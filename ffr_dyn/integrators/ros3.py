@@ -1,4 +1,4 @@
-"""A linearly implicit W-method of order three: elastic stiffness and damping implicit, everything else explicit.
+"""A linearly implicit W-method of order three: elastic and stiff forces implicit, everything else explicit.
 
 Four stages, stiffly accurate, with the stability of ROS34PW2 (Rang & Angermann, BIT 45 (2005) 761-787): L-stable in what is
 implicit, of order three whatever the Jacobian leaves out. ROS34PW2 wants one Jacobian for all stages of a step; here the mass
@@ -123,7 +123,8 @@ def ros3_step(r: Tables, t: float, again: int) -> int:
 
 @dataclass(frozen=True)
 class ROS3:
-    """Linearly implicit, order three; no elastic frequency limits the step, and a step costs four evaluations.
+    """Linearly implicit, order three; neither elastic frequencies nor stiff forces limit the step, which costs four
+    evaluations.
 
     Modes with h Omega > 1 are damped numerically; those the step resolves are right to third order.
 

@@ -9,6 +9,7 @@ Twin: `ffr_dyn.equations.motion.equations_of_motion`.
 
 from ffr_dyn.kernels.bodies import mass_times, normalise, reduce_forces
 from ffr_dyn.kernels.forces.applied import apply_loads, call_user, count_loads, gravity_field, keep_measured, power
+from ffr_dyn.kernels.forces.implicit import add_to_joints, keep_growth, set_targets, subtract_yield
 from ffr_dyn.kernels.functions import evaluate_functions
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.output_row import keep
@@ -24,7 +25,6 @@ from ffr_dyn.kernels.solution import (
     solve_back,
 )
 from ffr_dyn.kernels.step_control import controlled_step, interpolate
-from ffr_dyn.kernels.stiff_forces import add_to_joints, keep_growth, set_targets, subtract_yield
 from ffr_dyn.kernels.system import (
     apply_motion,
     evaluate_joints,
@@ -302,7 +302,7 @@ def correct(r: Tables, r_v: Vector, target: Vector) -> int:
 def pull_forces(
     r: Tables, stage: int, s0: float, s1: float, s2: float, g0: float, g1: float, g2: float, target: Vector
 ) -> int:
-    """Targets of the rows of stiff forces at a stage (see `stiff_forces.set_targets`)."""
+    """Targets of the rows of stiff forces at a stage (see `forces.implicit.set_targets`)."""
     wanted, gh = vector_at(target, r.stages.target.size), r.work.implicit[BY_RATE]
     set_targets(r.model.rows, r.work.rows, stage, (s0, s1, s2), (g0, g1, g2), gh, wanted)
     return OK

@@ -31,6 +31,8 @@ project(r, value)               acc: the smallest motion with Phi_q acc = -value
 correct(r, r_v, target)         f += M r_v, target += Phi_q r_v
 evaluate_rows_at(r, t, x, v)    constraint rows elsewhere, with the factors left as they are
 set_diagonal(r, gamma_h)        the elastic diagonal of a linearly implicit method, and its part in stiff forces
+begin_stages(r, gamma_h, h)     the same for a step of a linearly implicit method, whose later stages call `later_stage`
+                                before they evaluate, and all `add_stiff_part` and `solve_stage` in place of `solve`
 
 Twin: none, names of calls.
 """

@@ -8,6 +8,7 @@ Twin: `ffr_dyn.equations.motion.equations_of_motion`.
 """
 
 from ffr_dyn.kernels.bodies import factorise, inertia, prepare_body, rotation_matrix
+from ffr_dyn.kernels.forces.implicit import soften_block
 from ffr_dyn.kernels.markers import couple_marker, couple_pair, prepare_marker, shapes, update_marker
 from ffr_dyn.kernels.multiplier_solver import (
     SIDE,
@@ -22,7 +23,6 @@ from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.rows import RELATION, reaction
 from ffr_dyn.kernels.simd.slices import part
 from ffr_dyn.kernels.spatial import coupling
-from ffr_dyn.kernels.stiff_forces import soften_block
 from ffr_dyn.kernels.tables import (
     ALL,
     ALPHA,

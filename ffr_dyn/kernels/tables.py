@@ -30,9 +30,8 @@ I2 = Annotated[np.ndarray, ("int64", 2)]
 
 # The words of constraints, in the order of their numbers in `Rows.kind` (see `ffr_dyn.kernels.rows`).
 WORDS = ("coincidence", "dot-1", "dot-2", "driven-angle", "distance", "relation")
-FORCED = len(
-    WORDS
-)  # in place of one in `Rows.kind`: the coordinate of a stiff force (see `ffr_dyn.kernels.stiff_forces`)
+# In place of one: the coordinate of a stiff force (see `ffr_dyn.kernels.forces.implicit`).
+FORCED = len(WORDS)
 ANGLE, STROKE, LENGTH = 0, 1, 2
 BODY, GLOBAL, SIX = 3, 4, 5
 # The places of forces by the words of `ffr_dyn.scene.forces.places`: coordinates, and axes.

@@ -11,12 +11,12 @@ import math
 
 from ffr_dyn.kernels.forces.coordinate import apply_side, three
 from ffr_dyn.kernels.forces.curve import curve_slope, curve_value
+from ffr_dyn.kernels.forces.implicit import keep_row
 from ffr_dyn.kernels.markers import axis_motion, on_shapes
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.rows import ZERO
 from ffr_dyn.kernels.simd.force_kernel import force_kernel
 from ffr_dyn.kernels.simd.slices import part, vector_at
-from ffr_dyn.kernels.stiff_forces import keep_row
 from ffr_dyn.kernels.tables import BLOCK, END_I, END_J, LAW, MEASURED, OK, PLACE, Tables, Vector
 from ffr_dyn.kernels.vectors import add, cross, dot, get, put, scale, subtract, to_body
 

@@ -8,11 +8,11 @@ Twin: `ffr_dyn.equations.forces.applied`.
 
 import math
 
+from ffr_dyn.kernels.forces.implicit import keep_row
 from ffr_dyn.kernels.markers import project, shapes
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.rows import ZERO, coordinate
 from ffr_dyn.kernels.simd.slices import part, vector_at
-from ffr_dyn.kernels.stiff_forces import keep_row
 from ffr_dyn.kernels.tables import ANGLE, BY_TIME, END_I, END_J, FUNCTION, IN_V, LENGTH, MEASURED, PLACE, WAY, N
 from ffr_dyn.kernels.vectors import cross, dot, get, scale, subtract, to_body
 

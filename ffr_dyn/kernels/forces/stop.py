@@ -4,9 +4,9 @@ Twin: `ffr_dyn.scene.forces.joint_stop`.
 """
 
 from ffr_dyn.kernels.forces.coordinate import apply_along, coordinate_of
+from ffr_dyn.kernels.forces.implicit import HELD
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.simd.force_kernel import force_kernel
-from ffr_dyn.kernels.stiff_forces import HELD
 from ffr_dyn.kernels.tables import AHEAD, FRESH, LAW, OK, Tables, Vector
 
 

@@ -20,7 +20,7 @@ from ffr_dyn.functions.curves import Curve
 from ffr_dyn.functions.time_functions import harmonic, signal
 from ffr_dyn.integrators import HHT, RK4, ROS2, ROS3, AdaptiveROS3, GeneralisedAlpha, tolerances
 from ffr_dyn.kernels.entry_points import evaluate, pull_forces, set_diagonal, solve
-from ffr_dyn.kernels.stiff_forces import LEAST
+from ffr_dyn.kernels.forces.implicit import LEAST
 from ffr_dyn.kernels.tables import BLOCK, BY_TIME, LANE, LANES, OK
 from ffr_dyn.realtime.stepper import Stepper
 from ffr_dyn.scene.drivers import Driver
