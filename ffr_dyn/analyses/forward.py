@@ -126,9 +126,9 @@ def forward(
     common |= {"outputs": outputs, "progress": progress, "stopwatch": stopwatch}
     runs = _Runs(scene, assembled, start, output_step, common)
     kept = {"events": events, "path": path, "resume": resume}
-    method = _resumed(resume, Within() if method is None else method)
+    method, count = _resumed(resume, Within() if method is None else method, output_step)
     if isinstance(method, Within):
-        return _searched(runs, method, kept)
+        return _searched(runs, method, kept, count)
     result = runs.run(method, **kept)
     if check is None:
         check = _cost(assembled, result) < QUICK
@@ -137,13 +137,16 @@ def forward(
     return _finished(runs, told, resume if path is None else path)
 
 
-def _resumed(resume: str | Path | None, method: Integrator | Within) -> Integrator | Within:
-    """The method of a run that goes on: the step that was found for it."""
+def _resumed(
+    resume: str | Path | None, method: Integrator | Within, output_step: float
+) -> tuple[Integrator | Within, int]:
+    """The method of a run that goes on, and how many steps to a row the first trial has where one is still looked for: a
+    finished run has found its step, one that was stopped was a trial."""
     if isinstance(method, Within) and resume is not None and Path(resume).exists():
-        step = load_result(resume).attributes.get("step")
-        if step is not None:
-            return stepped(method, step)
-    return method
+        attributes = load_result(resume).attributes
+        if step := attributes.get("step"):
+            return (stepped(method, step) if "errors" in attributes else method), round(output_step / step)
+    return method, FIRST
 
 
 # ---- the error of a run ---------------------------------------------------------------------------------------------
@@ -216,7 +219,7 @@ def _finished(runs: _Runs, trial: _Trial, path: str | Path | None) -> Result:
     result = trial.result
     notes = [*result.attributes["notes"], *_unresolved(runs, trial), *_coarse(result)]
     told = {name: [e.error, e.of_range] for name, e in trial.errors.items()}
-    more: dict[str, Any] = {"notes": notes, "errors": told, "step": trial.method.step}
+    more: dict[str, Any] = {"notes": notes, "errors": told}
     if trial.errors:
         more["accuracy"] = _worst(trial.errors)
     attributes = {**result.attributes, **more}
@@ -273,9 +276,9 @@ def _others(count: int) -> str:
 # ---- the step for an accuracy ---------------------------------------------------------------------------------------
 
 
-def _searched(runs: _Runs, within: Within, kept: dict[str, Any]) -> Result:
+def _searched(runs: _Runs, within: Within, kept: dict[str, Any], count: int) -> Result:
     """The run with the longest step found that keeps the accuracy; where forces ring, of those that keep the positions."""
-    count, trials, ringing = FIRST, list[_Trial](), set[str]()
+    trials, ringing, path = list[_Trial](), set[str](), kept["path"] or kept["resume"]
     while True:
         method = stepped(within, runs.output_step / count)
         try:
@@ -291,8 +294,8 @@ def _searched(runs: _Runs, within: Within, kept: dict[str, Any]) -> Result:
         excess = _excess(trial, ringing, trials) / within.accuracy
         trials.append(trial)
         if excess <= 1.0 or count >= FINEST:
-            return _finished(runs, trial, kept["path"] or kept["resume"])
-        count = _next(count, excess)
+            return _finished(runs, trial, path)
+        count, kept = _next(count, excess), {**kept, "path": path, "resume": None}
 
 
 def _next(count: int, excess: float) -> int:

@@ -119,6 +119,23 @@ def test_a_run_that_goes_on_keeps_its_step(tmp_path):
     assert on["rod.q"].tobytes() == whole["rod.q"].tobytes()
 
 
+def test_a_search_that_was_stopped_goes_on(tmp_path):
+    path = tmp_path / "run.nc"
+
+    class StoppedError(Exception):
+        pass
+
+    def stop(reached):
+        raise StoppedError
+
+    with pytest.raises(StoppedError):
+        forward(swinging(0.02), **SPAN, path=path, progress=stop)
+    found, whole = forward(swinging(0.02), **SPAN, resume=path), forward(swinging(0.02), **SPAN)
+    assert found.attributes["step"] == whole.attributes["step"]
+    assert found["rod.q"].tobytes() == whole["rod.q"].tobytes()
+    assert load_result(path)["rod.q"].tobytes() == whole["rod.q"].tobytes()
+
+
 def test_a_check_can_be_left_out_or_asked_for():
     assert forward(driven(), **SPAN, method=ROS2(1e-3), check=False).attributes["errors"] == {}
     assert forward(driven(), **SPAN, method=ROS2(1e-3), check=True).attributes["errors"]

@@ -157,7 +157,7 @@ def test_a_checkpoint_of_another_version_is_refused(tmp_path, monkeypatch):
             kept = {key: array for key, array in saved.arrays.items() if key != name}
             return replace(saved, arrays=kept | change)
 
-        monkeypatch.setattr("ffr_dyn.analyses.forward.decode", older)
+        monkeypatch.setattr("ffr_dyn.analyses.integration.decode", older)
         with pytest.raises(InputError, match="another version"):
             integrate(SCENE, **SETTINGS, resume=path)
 
@@ -206,11 +206,11 @@ RUN = """
 import sys, time
 import test_resume as t
 from ffr_dyn.results import file as result_file
-from ffr_dyn.analyses import forward as f
+from ffr_dyn.analyses import integration as f
 start = result_file.ResultWriter.__init__
 result_file.ResultWriter.__init__ = lambda *a, **k: start(*a, **(k | {"interval": 0.0, "share": 1e9}))
 f.SECONDS_PER_CALL = 1e-9  # one row a call, so that a run of a hundred rows takes two seconds
-f.forward(t.SCENE, **t.SETTINGS, resume=sys.argv[1], progress=lambda reached: time.sleep(0.02))
+f.integrate(t.SCENE, **t.SETTINGS, resume=sys.argv[1], progress=lambda reached: time.sleep(0.02))
 """
 
 
