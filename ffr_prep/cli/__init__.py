@@ -132,6 +132,11 @@ def mesh(mesh: Path, **options: Any) -> None:
 @click.option("--material", "materials", multiple=True, required=True, metavar="MATERIAL", help="See below.")
 @REQUEST
 @click.option("--linear", is_flag=True, help="Leave out the load matrices: linear elasticity, for what barely bends.")
+@click.option(
+    "--drawn-modes",
+    type=click.IntRange(min=1),
+    help="Lowest modes that foreshorten what is drawn; default: all. m of them cost m (m + 1) / 2 static problems.",
+)
 @gone("--stiffening", "load matrices are computed by default; --linear leaves them out")
 @click.option(
     "--stress", is_flag=True, help="Also keep the stress at the surface, which ffr-dyn stress and animate show."

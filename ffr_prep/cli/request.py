@@ -65,8 +65,8 @@ def solver_of(options: Mapping[str, Any]) -> Solver:
 
 
 def request_of(options: Mapping[str, Any]) -> tuple[Sequence[InterfaceRegion], Request]:
-    """The interfaces and the request of the options REQUEST, and of --linear and --stress where a command has them;
-    InputError for options that cannot be used.
+    """The interfaces and the request of the options REQUEST, and of --linear, --drawn-modes and --stress where a command has
+    them; InputError for options that cannot be used.
     """
     from ffr_prep.pipelines.reduce import Request
 
@@ -78,6 +78,7 @@ def request_of(options: Mapping[str, Any]) -> tuple[Sequence[InterfaceRegion], R
         parts=options["parts"],
         solver=solver_of(options),
         linear=options.get("linear", False),
+        drawn_modes=options.get("drawn_modes"),
         stress=options.get("stress", False),
     )
 
