@@ -25,7 +25,7 @@ from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator, record_states
 from ffr_dyn.consistency.mobility import named_motion
 from ffr_dyn.consistency.tangent import Chart, chart, movement, rates, sizes, state, stiffness
-from ffr_dyn.consistency.validity import extremes, strained
+from ffr_dyn.consistency.validity import strained_in
 from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
@@ -158,8 +158,7 @@ def _result(
     still = np.zeros(assembled.system.layout.v_size)
     record = record_states(at, np.array([found.near.time]), found.near.x[None], still[None])
     stable = lowest > 0
-    turned, _, stretched = extremes(assembled.system, record)
-    notes = [*assembled.notes, *strained(assembled.system.scene, turned, stretched)]
+    notes = [*assembled.notes, *strained_in(assembled.system, record)]
     if not stable:
         notes.append(f"the equilibrium is unstable: its lowest stiffness per mass is {lowest:.4g} 1/s^2")
     attributes = {
