@@ -5,6 +5,8 @@ Both are looked at along the run and told at its end; a run stops for a deformat
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
@@ -14,8 +16,9 @@ from ffr_dyn.scene.parts import owner
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import FlexibleBody, Interface
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import ComputationError, InputError
 
+ROUNDS = 4  # analyses, each with more parts; mostly the second has enough
 MEANINGLESS = 100.0  # elastic rotation [rad]
 STRAINED = 0.1  # elastic rotation [rad] beyond which linear elasticity in the moving frame is doubtful
 # The same for a body with a second-order displacement. A cantilever under a force at its end, against the exact beam: its tip
@@ -135,6 +138,27 @@ def parts_needed(scene: Scene, result: Result, angle: float = BENT) -> dict[str,
             parts = _enough(_count(body), turn / angle, share / STRETCHED)
             needed[owner(body)] = max(parts, needed.get(owner(body), 1))
     return needed
+
+
+def in_enough_parts(
+    make: Callable[[Mapping[str, int]], Scene], analyse: Callable[[Scene], Result], angle: float = BENT
+) -> tuple[Scene, Result]:
+    """The scene with its bodies in so many parts as `parts_needed` says, and its result.
+
+    make    : the scene with these bodies in so many equal parts; with none at first
+    analyse : such as `static`, or a forward run; its result keeps `*.q`
+
+    Raises InputError as `parts_needed`; ComputationError where ever more parts are needed.
+    """
+    scene = make({})
+    for _ in range(ROUNDS):
+        result = analyse(scene)
+        there = {owner(body): _count(body) for body in scene.bodies}
+        more = {name: count for name, count in parts_needed(scene, result, angle).items() if count > there[name]}
+        if not more:
+            return scene, result
+        scene = make({name: count for name, count in (there | more).items() if count > 1})
+    raise ComputationError(f"after {ROUNDS} analyses still more parts are needed: {more}; allow a larger angle")
 
 
 def unstiffened(scene: Scene, spun: Array) -> list[str]:
