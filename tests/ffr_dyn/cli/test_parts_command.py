@@ -81,8 +81,8 @@ def test_a_body_keeps_its_command_but_for_file_and_parts(folder):
 def test_the_command_is_told(folder, capsys):
     run(ffr_dyn, "parts", "scene.toml", "--angle", "5deg")
     said = capsys.readouterr().out
-    assert "body         strip: 9 parts do" in said
-    assert "command      ffr-prep reduce-structure strip.toml --parts 9 -o strip.ffr" in said
+    assert "body         strip: 10 parts do" in said
+    assert "command      ffr-prep reduce-structure strip.toml --parts 10 -o strip.ffr" in said
     assert load_body("strip.ffr").parts == ()
 
 
