@@ -27,11 +27,11 @@ from ffr_dyn.consistency.evaluation import (
     evaluate,
     evaluator,
     joined,
-    moved,
     to_global_axes,
     total_mass_matrix,
 )
 from ffr_dyn.consistency.mobility import named_motion, require_driven
+from ffr_dyn.equations.layout import moved
 from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result

@@ -17,12 +17,12 @@ from ffr_dyn.consistency.evaluation import (
     Evaluator,
     evaluate,
     free_motions,
-    moved,
     smallest_step,
     to_body_axes,
     to_global_axes,
     total_mass_matrix,
 )
+from ffr_dyn.equations.layout import moved
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_prep.common.arrays import Array
 
