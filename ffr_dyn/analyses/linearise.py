@@ -23,9 +23,10 @@ from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
 from ffr_dyn.compile.engine import with_model
 from ffr_dyn.consistency.assemble import assemble, in_space
-from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator, to_global_axes
+from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
 from ffr_dyn.consistency.mobility import named_motion
 from ffr_dyn.consistency.tangent import Chart, chart, derivative, rates, sizes, state, state_matrix
+from ffr_dyn.equations.layout import to_global_axes
 from ffr_dyn.kernels.tables import LAW
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.quantities import catalogue

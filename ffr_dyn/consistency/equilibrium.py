@@ -7,8 +7,8 @@ With the exact tangent of `ffr_dyn.equations.statics`, a step y (V,) and new mul
 
 s = 0 where K is positive on the motions that the rows leave free, and the step no longer than a radius. As rows need not be
 met on the way, stiff bodies bend and turn without being stretched, and few steps do for any load. Where Newton's step fails,
-s is about the smallest that makes it so: a step of the motion downhill from there under great damping, so that what begins far
-away comes to a stable equilibrium, bit by bit of its loads. A step is taken again with half the radius where the one that
+s is about the smallest that makes it so: a step of the motion downhill from there under great damping, so that what begins
+far away comes to a stable equilibrium, bit by bit of its loads. A step is taken again with half the radius where the one that
 would follow, with the same tangent, is longer or goes back. (Nocedal & Wright 2006, ch. 16; Deuflhard 2004, ch. 3.)
 """
 

@@ -82,3 +82,19 @@ def moved(place: Layout, x: Array, step: Array) -> Array:
         out[place.p(b)] = product(p, from_vector(step[place.omega(b)]))
         out[place.q(b)] += step[place.q_dot(b)]
     return out
+
+
+def to_body_axes(place: Layout, x: Array, v: Array) -> Array:
+    """[R_dot, omega_bar, q_dot] -> [A^T R_dot, omega_bar, q_dot] for all bodies."""
+    out = v.copy()
+    for b in range(len(place.n)):
+        out[place.R_dot(b)] = rotation_matrix(x[place.p(b)]).T @ v[place.R_dot(b)]
+    return out
+
+
+def to_global_axes(place: Layout, x: Array, v: Array) -> Array:
+    """[A^T R_dot, omega_bar, q_dot] -> [R_dot, omega_bar, q_dot] for all bodies."""
+    out = v.copy()
+    for b in range(len(place.n)):
+        out[place.R_dot(b)] = rotation_matrix(x[place.p(b)]) @ v[place.R_dot(b)]
+    return out

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from ffr_dyn.equations.forces import At, gravity_at
 from ffr_dyn.equations.inertia import gravity_force, kept_integrals
 from ffr_dyn.equations.jets import WORDS, Jet, Pair, coordinates, joint_coordinate
 from ffr_dyn.equations.kinematics import body_state, deflection
-from ffr_dyn.equations.layout import Layout, moved
+from ffr_dyn.equations.layout import Layout, moved, to_global_axes
 from ffr_dyn.equations.second_order import marker_matrices
 from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.functions.rotation import (
@@ -293,28 +294,83 @@ def _add_on_coordinates(total: _Sums, now: At, force: Force, near: Mapping[str, 
     if force.name in near:
         c += 2 * np.pi * np.round((near[force.name] - c) / (2 * np.pi))
     watched = _Watched(now.scene, now.place, now.t, now.x, now.v, [])
-    given, gradients = _law(force, watched, c), np.array([jet.first for jet in jets])
-    steps = STEP * np.eye(c.size)
-    slopes = np.array([_law(force, now, c + step) - _law(force, now, c - step) for step in steps]).T / (2 * STEP)
+    still, gradients = np.zeros(c.size), np.array([jet.first for jet in jets])
+    given = _law(force, watched, c, still)
+    slopes = _differences(lambda step: _law(force, now, c + step, still), range(c.size), c.size)
     second = gradients.T @ slopes @ gradients + sum(f * jet.second for f, jet in zip(given, jets, strict=True))
     total.add_on_pair(ends, given @ gradients, second)
     if watched.looks:
-        by_state = _by_state(now, lambda there: _law(force, there, c), range(now.place.v_size))
+        by_state = _by_state(now, lambda there: _law(force, there, c, still), range(now.place.v_size))
         total.tangent[:] += total.gradient(ends, gradients).T @ by_state
 
 
-def _law(force: Force, now: At, c: Array) -> Array:
-    """(K,) the force at rest on K coordinates."""
-    still = np.zeros(c.size)
-    return np.ravel(force.law(now, c, still) if c.size > 1 else force.law(now, float(c[0]), 0.0))
+def _law(force: Force, now: At, c: Array, rate: Array) -> Array:
+    """(K,) the force on K coordinates."""
+    return np.ravel(force.law(now, c, rate) if c.size > 1 else force.law(now, float(c[0]), float(rate[0])))
 
 
 def _by_state(now: At, law: Callable[[At], Array], columns: Iterable[int]) -> Array:
     """(K, V) derivative of K numbers by the motions `columns` of bodies, by differences."""
-    found = np.zeros((law(now).size, now.place.v_size))
+
+    def at(step: Array) -> Array:
+        return law(replace(now, x=moved(now.place, now.x, step)))
+
+    return _differences(at, columns, now.place.v_size)
+
+
+def _differences(function: Callable[[Array], Array], columns: Iterable[int], size: int) -> Array:
+    """(K, size) derivative of K numbers at zero by `size` others, of these the columns, by central differences."""
+    found = np.zeros((np.size(function(np.zeros(size))), size))
     for k in columns:
-        step = np.zeros(now.place.v_size)
+        step = np.zeros(size)
         step[k] = STEP
-        ahead, behind = (law(replace(now, x=moved(now.place, now.x, sign * step))) for sign in (1, -1))
-        found[:, k] = np.ravel(ahead - behind) / (2 * STEP)
+        found[:, k] = np.ravel(function(step) - function(-step)) / (2 * STEP)
     return found
+
+
+# ---- damping --------------------------------------------------------------------------------------------------------
+
+
+def damping(scene: Scene, place: Layout, t: float, x: Array) -> Array:
+    """(V, V) less the derivative of all forces at rest by the velocities [A^T R_dot, omega_bar, q_dot]."""
+    now = At(scene, place, t, x, np.zeros(place.v_size))
+    total = _Sums([_placed(now, k) for k in range(len(markers(scene)))], np.zeros(place.v_size), np.zeros((0, 0)))
+    D = np.zeros((place.v_size, place.v_size))
+    for b, body in enumerate(scene.bodies):
+        at = np.arange(place.iv[b] + 6, place.iv[b] + 6 + place.n[b])
+        D[at, at] = 2 * body.damping * np.sqrt(body.model.omega2)
+    for force in forces_of(scene):
+        way, rates, law = _along(total, now, force)
+        D -= way.T @ _differences(partial(law, now), range(len(rates)), len(rates)) @ rates
+        if isinstance(force.place, OnBody):
+            continue
+        watched, still = _Watched(scene, place, t, x, now.v, []), np.zeros(len(rates))
+        law(watched, still)
+        if watched.looks:
+            D -= way.T @ _by_speed(now, partial(law, rate=still))
+    return D
+
+
+def _by_speed(now: At, law: Callable[[At], Array]) -> Array:
+    """(K, V) derivative of K numbers by the velocities of bodies, by differences."""
+    size = now.place.v_size
+    return _differences(lambda y: law(replace(now, v=to_global_axes(now.place, now.x, y))), range(size), size)
+
+
+def _along(total: _Sums, now: At, force: Force) -> tuple[Array, Array, Callable[[At, Array], Array]]:
+    """What a force acts along (K, V), the coordinates of whose rates it is a function (L, V), and that function."""
+    place, scene = force.place, now.scene
+    if isinstance(place, AtMarker):
+        marker, way = total.placed[place.ends(scene)[0]], np.zeros((6, now.place.v_size))
+        turned = marker.A if place.axes == "body" else np.eye(3)
+        way[:, marker.at] = np.kron(np.eye(2), turned.T) @ marker.jacobian
+        return way, way[:0], lambda there, rate: force.law(there, None, None)
+    if isinstance(place, OnBody):
+        b = place.ends(scene)[0]
+        way, q = np.eye(now.place.v_size)[now.place.iv[b] : now.place.iv[b] + 6 + now.place.n[b]], now.x[now.place.q(b)]
+        return way, way[6:], lambda there, rate: np.asarray(force.law(there, q, rate))
+    ends = place.ends(scene)
+    jets = coordinates(scene, _pair(*(total.placed[number] for number in ends)), place)
+    way = total.gradient(ends, np.array([jet.first for jet in jets]).reshape(-1, 12))
+    c = np.array([float(jet.value) for jet in jets])
+    return way, way, lambda there, rate: _law(force, there, c, rate) if c.size else c
