@@ -49,7 +49,7 @@ class Linearisation(Brief):
     Z           : (V, d) free motions, in body axes [A^T R_dot, omega_bar, q_dot]
     eigenvalues : (2d,) [1/s] by rising modulus;  modes : (V, 2d) the motions of the bodies that belong to them
     leading     : what moves most in each mode
-    error       : relative difference of A from step halving
+    error       : relative difference of A from step halving; zero at rest, where A is exact
     """
 
     A: Array
@@ -273,7 +273,9 @@ def as_result(scene: Scene, found: Linearisation, time: float = 0.0) -> Result:
     attributes = {
         **described(scene),
         "analysis": "linearised",
-        "method": f"central differences, step halving changes A by {found.error:.1e}",
+        "method": f"central differences, step halving changes A by {found.error:.1e}"
+        if found.error
+        else "exact tangent",
         "degrees_of_freedom": d,
         "stability_margin": found.stability_margin,
         "leading": list(found.leading),

@@ -20,7 +20,14 @@ from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import held
 from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
 from ffr_dyn.consistency.equilibrium import Equilibrium, equilibrium
-from ffr_dyn.consistency.evaluation import Evaluator, evaluator, free_motions, record_states, total_mass_matrix
+from ffr_dyn.consistency.evaluation import (
+    Evaluator,
+    evaluate,
+    evaluator,
+    free_motions,
+    record_states,
+    total_mass_matrix,
+)
 from ffr_dyn.consistency.mobility import counted, named_motion
 from ffr_dyn.consistency.tangent import sizes
 from ffr_dyn.consistency.validity import extremes, strained
@@ -66,19 +73,21 @@ def static(
 
 def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium) -> float:
     """[1/s^2] per mass, of the free motions; infinite where there is none. InputError for a motion that nothing holds."""
-    M = total_mass_matrix(at.system.scene, at.system.layout, found.x)
+    M = total_mass_matrix(at.system.scene, at.system.layout, found.path[-1])
     Z = free_motions(found.balance.jacobian, M)
     if not Z.shape[1]:
         return float("inf")
     K = Z.T @ found.balance.stiffness @ Z
     values, vectors = np.linalg.eigh(0.5 * (K + K.T))
     if not found.found:
-        raise _not_held(assembled, found.x, Z @ vectors[:, 0], f"no equilibrium was found in {len(found.steps)} steps")
+        raise _not_held(
+            assembled, found.path[-1], Z @ vectors[:, 0], f"no equilibrium was found in {len(found.steps)} steps"
+        )
     applied = np.linalg.solve(M, found.balance.forces) / sizes(at)
     limit = NEUTRAL * np.abs(applied).max() + ROUNDING * np.abs(values).max()
     loose = int(np.argmin(np.abs(values)))
     if abs(values[loose]) <= limit:
-        raise _not_held(assembled, found.x, Z @ vectors[:, loose], "the equilibrium is not determined")
+        raise _not_held(assembled, found.path[-1], Z @ vectors[:, loose], "the equilibrium is not determined")
     return float(values[0])
 
 
@@ -102,7 +111,9 @@ def _result(
     path: str | Path | None,
 ) -> Result:
     still = np.zeros(assembled.system.layout.v_size)
-    record = record_states(at, np.array([time]), found.x[None], still[None])
+    for x in found.path[:-1]:  # forces count the turns of angles on the way
+        evaluate(at, time, x, still)
+    record = record_states(at, np.array([time]), found.path[-1:], still[None])
     stable = lowest > 0
     turned, _, stretched = extremes(assembled.system, record)
     notes = [*assembled.notes, *strained(assembled.system.scene, turned, stretched)]

@@ -15,7 +15,7 @@ would follow, with the same tangent, is longer or goes back. (Nocedal & Wright 2
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,8 +23,8 @@ from scipy.linalg import LinAlgWarning, eigvalsh_tridiagonal, ldl, lu_factor, lu
 
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.evaluation import locked, total_mass_matrix, unit_rows
-from ffr_dyn.equations.layout import initial_state, moved
-from ffr_dyn.equations.statics import Balance, balance, counted_angles
+from ffr_dyn.equations.layout import moved
+from ffr_dyn.equations.statics import Balance, balance
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 
@@ -37,12 +37,12 @@ ATTEMPTS, HALVINGS = 40, 3  # shifts four times as large each; and between the l
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """Positions x, the balance there, and the lengths of the steps taken to it [rad, or part of the scene's size].
+    """Positions (N, X) on the way, the balance at the last, and the lengths of all steps tried [rad, or of the scene's size].
 
-    found : whether the last of them was Newton's, and below the tolerance
+    found : whether the last step was Newton's, and below the tolerance
     """
 
-    x: Array
+    path: Array
     balance: Balance
     steps: tuple[float, ...]
     found: bool
@@ -69,32 +69,34 @@ def equilibrium(system: System, time: float, x: Array, sizes: Array) -> Equilibr
 
     Raises ComputationError where the forces are not finite.
     """
-    at, steps, radius = _balances(system, time), list[float](), LARGEST_STEP
-    now = at(x, _multipliers(at(x, None), _mass(system, x)))
+    at, path, steps, radius = _balances(system, time), [x], list[float](), LARGEST_STEP
+    now = at(x, None, {})
+    now = at(x, _multipliers(now, _mass(system, x)), {})
     while len(steps) < ITERATIONS:
-        M = _mass(system, x)
+        x, M = path[-1], _mass(system, path[-1])
         step = _step(now, M, sizes, radius)
         there = moved(system.layout, x, step.y)
-        beyond = at(there, step.lam)
+        beyond = at(there, step.lam, now.angles)
         steps.append(step.length)
         if step.shift == 0 and step.length < TOLERANCE:
-            return Equilibrium(there, beyond, tuple(steps), True)
+            return Equilibrium(np.array([*path, there]), beyond, tuple(steps), True)
         if _fails(step, step.next(beyond), M):
             radius = 0.5 * step.length
         else:
-            x, now, radius = there, beyond, min(2 * radius, LARGEST_STEP)
-    return Equilibrium(x, now, tuple(steps), False)
+            path.append(there)
+            now, radius = beyond, min(2 * radius, LARGEST_STEP)
+    return Equilibrium(np.array(path), now, tuple(steps), False)
 
 
-def _balances(system: System, time: float) -> Callable[[Array, Array | None], Balance]:
+def _balances(system: System, time: float) -> Callable[[Array, Array | None, Mapping[str, float]], Balance]:
     """The balance at positions x with multipliers lam, None for zeros; with rows for what a plane locks."""
     scene, place = system.scene, system.layout
-    angles, across = counted_angles(scene, place, initial_state(scene, place)[0]), locked(place)
+    across = locked(place)
     none = np.zeros(sum(len(block.words) for block in system.blocks))
 
-    def at(x: Array, lam: Array | None) -> Balance:
+    def at(x: Array, lam: Array | None, near: Mapping[str, float]) -> Balance:
         try:
-            now = balance(scene, place, system.blocks, time, x, none if lam is None else lam, angles)
+            now = balance(scene, place, system.blocks, time, x, none if lam is None else lam, near)
             finite = np.isfinite(now.forces).all() and np.isfinite(now.stiffness).all()
         except (ZeroDivisionError, OverflowError, ValueError):  # of a function of time
             finite = False

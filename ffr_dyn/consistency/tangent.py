@@ -16,8 +16,8 @@ import numpy as np
 
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, free_motions, smallest_step, total_mass_matrix
 from ffr_dyn.equations.inertia import Integrals, kept_integrals, mass_matrix
-from ffr_dyn.equations.layout import initial_state, moved, to_body_axes, to_global_axes
-from ffr_dyn.equations.statics import balance, counted_angles, damping
+from ffr_dyn.equations.layout import moved, to_body_axes, to_global_axes
+from ffr_dyn.equations.statics import balance, damping
 from ffr_dyn.functions.rotation import rotation_matrix, skew
 from ffr_prep.common.arrays import Array
 
@@ -123,8 +123,7 @@ def _at_rest(near: Chart) -> tuple[Array, Array]:
     system, time, x = near.at.system, near.time, near.x
     scene, place = system.scene, system.layout
     now = evaluate(near.at, time, x, np.zeros(place.v_size))
-    angles = counted_angles(scene, place, initial_state(scene, place)[0])
-    K = balance(scene, place, system.blocks, time, x, now.lam, angles).stiffness
+    K = balance(scene, place, system.blocks, time, x, now.lam, {}).stiffness
     left = near.M @ now.acceleration  # what is not balanced: it turns with the axes of the bodies, unlike in `balance`
     for b in range(len(place.n)):
         turn = place.omega(b)

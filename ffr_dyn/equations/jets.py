@@ -8,6 +8,7 @@ a row is symmetric: that of its value along a motion d(t), phi(t) of constant ra
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -51,7 +52,7 @@ def dot(a: Jet, b: Jet) -> Jet:
     return Jet(a.value @ b.value, a.value @ b.first + b.value @ a.first, second)
 
 
-def composed(value: float, slopes: Sequence[float], curvatures: Array, of: Sequence[Jet]) -> Jet:
+def composed(value: float, slopes: Sequence[float] | Sequence[Array], curvatures: Array, of: Sequence[Jet]) -> Jet:
     """A function of K numbers, from its value, its first (K,) and second (K, K) derivatives by them."""
     first = np.array([jet.first for jet in of])
     second = first.T @ np.asarray(curvatures) @ first
@@ -146,7 +147,7 @@ def joint_coordinate(at: Pair, kind: str, axes: Array) -> Jet:
     x, y = float(c.value), float(s.value)
     square = x**2 + y**2
     own, mixed = 2 * x * y / square**2, (y**2 - x**2) / square**2
-    return composed(float(np.arctan2(y, x)), (-y / square, x / square), np.array([[own, mixed], [mixed, -own]]), (c, s))
+    return composed(math.atan2(y, x), (-y / square, x / square), np.array([[own, mixed], [mixed, -own]]), (c, s))
 
 
 def coordinates(scene: Scene, at: Pair, place: Place) -> list[Jet]:
