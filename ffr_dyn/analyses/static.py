@@ -122,7 +122,8 @@ def _result(
     attributes = {
         **described(scene),
         "analysis": "static equilibrium",
-        "method": f"Newton's method, {len(found.steps)} steps",
+        "method": f"Newton's method, {len(found.steps)} steps"
+        + f" in {found.load_steps} load steps" * (found.load_steps > 1),
         "evaluations": int(at.work.info[EVALUATIONS]),
         "degrees_of_freedom": assembled.degrees_of_freedom,
         "stable": int(stable),

@@ -15,7 +15,7 @@ would follow, with the same tangent, is longer or goes back. (Nocedal & Wright 2
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,20 +32,25 @@ ITERATIONS = 100
 LARGEST_STEP = 1.0  # rad, or part of the scene's size
 TOLERANCE = 1e-9  # of the last step, the same: the next would be its square
 LEAST_SHIFT = 1e-3  # of what takes a step of the radius where nothing is stiff
+FIRST_SHARE, LEAST_SHARE, ITERATIONS_OF_A_SHARE = 0.25, 1e-3, 12  # of all loads
+BACK = -0.5  # part of a step that the following one may go back
 ATTEMPTS, HALVINGS = 40, 3  # shifts four times as large each; and between the last of them and the one before
 
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """Positions (N, X) on the way, the balance at the last, and the lengths of all steps tried [rad, or of the scene's size].
+    """Positions (N, X) on the way, multipliers and balance at the last, and lengths of all steps tried, relative to sizes.
 
-    found : whether the last step was Newton's, and below the tolerance
+    found      : whether the last step was Newton's, and below the tolerance
+    load_steps : parts in which weight and loads were applied
     """
 
     path: Array
+    lam: Array | None
     balance: Balance
     steps: tuple[float, ...]
     found: bool
+    load_steps: int = 1
 
 
 @dataclass(frozen=True)
@@ -67,36 +72,69 @@ class _Step:
 def equilibrium(system: System, time: float, x: Array, sizes: Array) -> Equilibrium:
     """From the positions x at the time [s]; sizes (V,) of what counts as a step of one.
 
+    What comes to no equilibrium under all loads at once bears them bit by bit.
+
     Raises ComputationError where the forces are not finite.
     """
-    at, path, steps, radius = _balances(system, time), [x], list[float](), LARGEST_STEP
-    now = at(x, None, {})
-    now = at(x, _multipliers(now, _mass(system, x)), {})
-    while len(steps) < ITERATIONS:
-        x, M = path[-1], _mass(system, path[-1])
-        step = _step(now, M, sizes, radius)
-        there = moved(system.layout, x, step.y)
-        beyond = at(there, step.lam, now.angles)
+    problem = _Problem(system, time, total_mass_matrix(system.scene, system.layout, x), sizes)
+    start = Equilibrium(x[None], None, problem.balance(x, None, {}, 1.0), (), False)
+    found = _newton(problem, start, 1.0, ITERATIONS)
+    return found if found.found else _by_load_steps(problem, start, found)
+
+
+def _by_load_steps(problem: _Problem, start: Equilibrium, failed: Equilibrium) -> Equilibrium:
+    """With shares of the loads that grow as they are borne; what failed if there is none that is."""
+    share, size, now, path, steps, count = 0.0, FIRST_SHARE, start, [start.path], list(failed.steps), 0
+    while share < 1 and size > LEAST_SHARE:
+        goal = min(share + size, 1.0)
+        there = _newton(problem, now, goal, ITERATIONS_OF_A_SHARE)
+        steps += there.steps
+        if not there.found:
+            size /= 2
+            continue
+        share, size, now, count = goal, 2 * size, there, count + 1
+        path.append(there.path)
+    return Equilibrium(np.concatenate(path), now.lam, now.balance, tuple(steps), True, count) if share == 1 else failed
+
+
+def _newton(problem: _Problem, start: Equilibrium, share: float, iterations: int) -> Equilibrium:
+    x, path, steps, radius, M = start.path[-1], list[Array](), list[float](), LARGEST_STEP, problem.M
+    now = problem.balance(x, start.lam, start.balance.angles, share)
+    lam = start.lam
+    if lam is None:
+        lam = _multipliers(now, M)
+        now = problem.balance(x, lam, start.balance.angles, share)
+    while len(steps) < iterations and (step := _step(now, M, problem.sizes, radius)) is not None:
+        there = moved(problem.system.layout, x, step.y)
+        beyond = problem.balance(there, step.lam, now.angles, share)
         steps.append(step.length)
         if step.shift == 0 and step.length < TOLERANCE:
-            return Equilibrium(np.array([*path, there]), beyond, tuple(steps), True)
-        if _fails(step, step.next(beyond), M):
+            return Equilibrium(np.array([*path, there]), step.lam, beyond, tuple(steps), True)
+        ahead = _ahead(step, beyond, M)
+        if not ahead > BACK:
             radius = 0.5 * step.length
-        else:
-            path.append(there)
-            now, radius = beyond, min(2 * radius, LARGEST_STEP)
-    return Equilibrium(np.array(path), now, tuple(steps), False)
+            continue
+        path.append(there)
+        x, lam, now, radius = there, step.lam, beyond, min(2 * radius if ahead > 0.5 * BACK else radius, LARGEST_STEP)
+    return Equilibrium(np.array([start.path[-1], *path]), lam, now, tuple(steps), False)
 
 
-def _balances(system: System, time: float) -> Callable[[Array, Array | None, Mapping[str, float]], Balance]:
-    """The balance at positions x with multipliers lam, None for zeros; with rows for what a plane locks."""
-    scene, place = system.scene, system.layout
-    across = locked(place)
-    none = np.zeros(sum(len(block.words) for block in system.blocks))
+@dataclass(frozen=True)
+class _Problem:
+    """A compiled scene at a time; a mass matrix (V, V) and sizes (V,) to measure steps with."""
 
-    def at(x: Array, lam: Array | None, near: Mapping[str, float]) -> Balance:
+    system: System
+    time: float
+    M: Array
+    sizes: Array
+
+    def balance(self, x: Array, lam: Array | None, near: Mapping[str, float], share: float) -> Balance:
+        """At positions x with multipliers lam, None for zeros, and a share of the loads; with rows for what a plane locks."""
+        scene, place, blocks = self.system.scene, self.system.layout, self.system.blocks
+        across = locked(place)
+        lam = np.zeros(sum(len(block.words) for block in blocks)) if lam is None else lam
         try:
-            now = balance(scene, place, system.blocks, time, x, none if lam is None else lam, near)
+            now = balance(scene, place, blocks, self.time, x, lam, near, share)
             finite = np.isfinite(now.forces).all() and np.isfinite(now.stiffness).all()
         except (ZeroDivisionError, OverflowError, ValueError):  # of a function of time
             finite = False
@@ -107,12 +145,6 @@ def _balances(system: System, time: float) -> Callable[[Array, Array | None, Map
         jacobian = np.concatenate([now.jacobian, unit_rows(across, place.v_size)])
         return replace(now, Phi=np.append(now.Phi, np.zeros(across.size)), jacobian=jacobian)
 
-    return at
-
-
-def _mass(system: System, x: Array) -> Array:
-    return total_mass_matrix(system.scene, system.layout, x)
-
 
 def _multipliers(now: Balance, M: Array) -> Array:
     """Those with which the scene would start to move from rest."""
@@ -121,32 +153,30 @@ def _multipliers(now: Balance, M: Array) -> Array:
     return solution[now.forces.size :]
 
 
-def _step(now: Balance, M: Array, sizes: Array, radius: float) -> _Step:
-    """Newton's step, or else one with a shift."""
-    newton, fits = _shifted(now, M, sizes, radius, 0.0)
+def _step(now: Balance, M: Array, sizes: Array, radius: float) -> _Step | None:
+    """Newton's step, or else one with a shift, or None. The radius bounds what goes beyond the smallest step to the rows."""
+    sides = np.zeros((now.forces.size + now.Phi.size, 2))
+    sides[: sizes.size, 0], sides[sizes.size :, 1] = now.forces, -now.Phi
+    free, closing = np.linalg.lstsq(_bordered(M, now.jacobian), sides, rcond=None)[0][: sizes.size].T
+    step, fits = _shifted(now, M, sizes, 0.0, closing, radius)
     if fits:
-        return newton
-    last, shift = 0.0, _first_shift(now, M, sizes, radius)
+        return step
+    last, shift = 0.0, max(LEAST_SHIFT * float(np.abs(free / sizes).max()) / radius, 1e-12)
     for _ in range(ATTEMPTS):
-        step, fits = _shifted(now, M, sizes, radius, shift)
+        step, fits = _shifted(now, M, sizes, shift, closing, radius)
         if fits:
             break
         last, shift = shift, 4 * shift
+    else:
+        return None
     for _ in range(HALVINGS if last else 0):
         middle = np.sqrt(last * step.shift)
-        longer, fits = _shifted(now, M, sizes, radius, middle)
+        longer, fits = _shifted(now, M, sizes, middle, closing, radius)
         last, step = (last, longer) if fits else (middle, step)
     return step
 
 
-def _first_shift(now: Balance, M: Array, sizes: Array, radius: float) -> float:
-    """[1/s^2]"""
-    free = np.concatenate([now.forces, -now.Phi])
-    y = np.linalg.lstsq(_bordered(M, now.jacobian), free, rcond=None)[0][: sizes.size]
-    return max(LEAST_SHIFT * float(np.abs(y / sizes).max()) / radius, 1e-12)
-
-
-def _shifted(now: Balance, M: Array, sizes: Array, radius: float, shift: float) -> tuple[_Step, bool]:
+def _shifted(now: Balance, M: Array, sizes: Array, shift: float, closing: Array, radius: float) -> tuple[_Step, bool]:
     """The step with a shift, and whether it will do; Newton's last one does wherever it leads."""
     matrix, right = _bordered(now.stiffness + shift * M, now.jacobian), np.concatenate([now.forces, -now.Phi])
     with warnings.catch_warnings():
@@ -154,16 +184,19 @@ def _shifted(now: Balance, M: Array, sizes: Array, radius: float, shift: float) 
         factors = lu_factor(matrix, check_finite=False)
     with np.errstate(all="ignore"):
         solution = lu_solve(factors, right, check_finite=False)
-    length = float(np.abs(solution[: sizes.size] / sizes).max())
-    step = _Step(solution[: sizes.size], solution[sizes.size :], shift, length, factors)
-    short = bool(length <= radius)
-    return step, short and ((shift == 0 and length < TOLERANCE) or _positive(matrix, now.Phi.size))
+    y, lam = solution[: sizes.size], solution[sizes.size :]
+    step = _Step(y, lam, shift, float(np.abs(y / sizes).max()), factors)
+    short = bool(np.abs((y - closing) / sizes).max() <= radius)
+    return step, short and ((shift == 0 and step.length < TOLERANCE) or _positive(matrix, now.Phi.size))
 
 
-def _fails(step: _Step, following: Array, M: Array) -> bool:
-    along, size = following @ M @ step.y, step.y @ M @ step.y
-    grows = step.shift == 0 and following @ M @ following > size
-    return bool(grows or along < -0.5 * size)
+def _ahead(step: _Step, there: Balance, M: Array) -> float:
+    """How far the following step goes on along this one, relative to it; after Newton's it must not be longer."""
+    following = step.next(there)
+    size = step.y @ M @ step.y
+    if step.shift == 0 and following @ M @ following > size:
+        return -np.inf
+    return float(following @ M @ step.y / size)
 
 
 def _bordered(K: Array, J: Array) -> Array:

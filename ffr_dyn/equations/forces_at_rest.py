@@ -37,6 +37,11 @@ class _Watched(At):
         return super().state
 
 
+def is_load(force: Force) -> bool:
+    """Whether a force is given from outside, and not made by the state."""
+    return force.given > 0 or isinstance(force.place, OnBody)
+
+
 def add_force(total: Sums, now: At, force: Force, near: Mapping[str, float], angles: dict[str, float]) -> None:
     if isinstance(force.place, AtMarker):
         _add_at_marker(total, now, force)

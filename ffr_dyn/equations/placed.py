@@ -45,7 +45,12 @@ class Placed:
     K: Array
 
 
-def placed(now: At, number: int) -> Placed:
+def all_placed(now: At) -> list[Placed]:
+    """The markers of a scene, by number."""
+    return [_placed(now, number) for number in range(len(markers(now.scene)))]
+
+
+def _placed(now: At, number: int) -> Placed:
     b, _, point = markers(now.scene)[number]
     if b == len(now.scene.bodies):
         one, none, nothing = np.eye(3), np.zeros(3), np.zeros((3, 0))
@@ -114,7 +119,6 @@ class Sums:
         return found
 
 
-def sums(now: At) -> Sums:
-    """Nothing yet."""
-    size = now.place.v_size
-    return Sums([placed(now, k) for k in range(len(markers(now.scene)))], np.zeros(size), np.zeros((size, size)))
+def nothing_on(placed: list[Placed], size: int) -> Sums:
+    """No forces yet, of V = size."""
+    return Sums(placed, np.zeros(size), np.zeros((size, size)))

@@ -17,11 +17,11 @@ import numpy as np
 
 from ffr_dyn.equations.constraint_rows import Block, drive_of
 from ffr_dyn.equations.forces import At, gravity_at
-from ffr_dyn.equations.forces_at_rest import add_force, damping_of
+from ffr_dyn.equations.forces_at_rest import add_force, damping_of, is_load
 from ffr_dyn.equations.inertia import gravity_force, kept_integrals
 from ffr_dyn.equations.jets import WORDS, Jet, joint_coordinate
 from ffr_dyn.equations.layout import Layout
-from ffr_dyn.equations.placed import Sums, curvature, pair, sums
+from ffr_dyn.equations.placed import Sums, all_placed, curvature, nothing_on, pair
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.joints import RELATION, Word
@@ -45,28 +45,42 @@ class Balance:
 
 
 def balance(
-    scene: Scene, place: Layout, blocks: Sequence[Block], t: float, x: Array, lam: Array, near: Mapping[str, float]
+    scene: Scene,
+    place: Layout,
+    blocks: Sequence[Block],
+    t: float,
+    x: Array,
+    lam: Array,
+    near: Mapping[str, float],
+    share: float = 1.0,
 ) -> Balance:
     """A scene at rest at the time t [s] and the positions x, its rows those of the blocks, with multipliers lam (C,).
 
     near : angles of a state before, to which whole turns are counted; without them as the forces say of the start
+    share : of weight and loads
     """
     now, angles = At(scene, place, t, x, np.zeros(place.v_size)), dict[str, float]()
-    total = sums(now)
+    placed = all_placed(now)
+    total, loads, acting = (nothing_on(placed, place.v_size) for _ in range(3))
     for number in range(len(scene.bodies)):
-        _add_body(total, now, number)
+        _add_weight(loads, now, number)
+        elastic, omega2 = place.q_dot(number), kept_integrals(scene.bodies[number]).omega2
+        total.forces[elastic] -= omega2 * x[place.q(number)]
+        total.tangent[elastic, elastic] -= np.diag(omega2)
     for force in forces_of(scene):
-        add_force(total, now, force, near, angles)
-    acting, multipliers = Sums(total.placed, np.zeros(place.v_size), -total.tangent), iter(lam.tolist())
+        add_force(loads if is_load(force) else total, now, force, near, angles)
+    total.forces[:] += share * loads.forces
+    total.tangent[:] += share * loads.tangent
+    multipliers = iter(lam.tolist())
     rows = [row for block in blocks for row in _add_block(acting, block, t, multipliers)]
     Phi, jacobian = np.array([value for value, _ in rows]), np.array([gradient for _, gradient in rows])
-    return Balance(total.forces, Phi, jacobian.reshape(-1, place.v_size), acting.tangent, angles)
+    return Balance(total.forces, Phi, jacobian.reshape(-1, place.v_size), acting.tangent - total.tangent, angles)
 
 
 def damping(scene: Scene, place: Layout, t: float, x: Array) -> Array:
     """(V, V) less the derivative of all forces at rest by the velocities [A^T R_dot, omega_bar, q_dot]."""
     now, D = At(scene, place, t, x, np.zeros(place.v_size)), np.zeros((place.v_size, place.v_size))
-    total = sums(now)
+    total = nothing_on(all_placed(now), place.v_size)
     for b, body in enumerate(scene.bodies):
         at = np.arange(place.iv[b] + 6, place.iv[b] + 6 + place.n[b])
         D[at, at] = 2 * body.damping * np.sqrt(body.model.omega2)
@@ -104,14 +118,10 @@ def _jets(total: Sums, block: Block, word: Word, s: float) -> list[tuple[tuple[i
     return found
 
 
-def _add_body(total: Sums, now: At, b: int) -> None:
-    """Weight and elastic forces."""
+def _add_weight(total: Sums, now: At, b: int) -> None:
     body, place, x = now.scene.bodies[b], now.place, now.x
     integrals, q, A = kept_integrals(body), x[place.q(b)], rotation_matrix(x[place.p(b)])
     field, at = gravity_at(now.scene, now.t), slice(place.iv[b], place.iv[b] + 6 + place.n[b])
     s, none = integrals.r_dm + integrals.P_dm @ q, np.zeros(3)
     total.forces[at] += gravity_force(integrals, q, A, field)
     total.tangent[at, at] += curvature(s, integrals.P_dm, none, 0 * integrals.P_dm, np.zeros((6, 0)), field @ A, none)
-    elastic = np.arange(place.iv[b] + 6, at.stop)
-    total.forces[elastic] -= integrals.omega2 * q
-    total.tangent[elastic, elastic] -= integrals.omega2
