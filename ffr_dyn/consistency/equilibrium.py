@@ -34,6 +34,9 @@ TOLERANCE = 1e-9  # of the last step, the same: the next would be its square
 LEAST_SHIFT = 1e-3  # of what takes a step of the radius where nothing is stiff
 FIRST_SHARE, LEAST_SHARE, ITERATIONS_OF_A_SHARE = 0.25, 1e-3, 12  # of all loads
 BACK = -0.5  # part of a step that the following one may go back
+OPEN = (
+    0.25  # rad, or part of the size: motion that the rows ask for, beyond which a step of shift infinity is that alone
+)
 ATTEMPTS, HALVINGS = 40, 3  # shifts four times as large each; and between the last of them and the one before
 
 
@@ -157,10 +160,15 @@ def _step(now: Balance, M: Array, sizes: Array, radius: float) -> _Step | None:
     """Newton's step, or else one with a shift, or None. The radius bounds what goes beyond the smallest step to the rows."""
     sides = np.zeros((now.forces.size + now.Phi.size, 2))
     sides[: sizes.size, 0], sides[sizes.size :, 1] = now.forces, -now.Phi
-    free, closing = np.linalg.lstsq(_bordered(M, now.jacobian), sides, rcond=None)[0][: sizes.size].T
+    both = np.linalg.lstsq(_bordered(M, now.jacobian), sides, rcond=None)[0]
+    free, closing = both[: sizes.size].T
     step, fits = _shifted(now, M, sizes, 0.0, closing, radius)
     if fits:
         return step
+    gap = float(np.abs(closing / sizes).max())
+    if gap > OPEN:
+        part = min(1.0, LARGEST_STEP / gap)
+        return _Step(part * closing, both[sizes.size :, 0], np.inf, part * gap, step.factors)
     last, shift = 0.0, max(LEAST_SHIFT * float(np.abs(free / sizes).max()) / radius, 1e-12)
     for _ in range(ATTEMPTS):
         step, fits = _shifted(now, M, sizes, shift, closing, radius)
@@ -194,6 +202,8 @@ def _ahead(step: _Step, there: Balance, M: Array) -> float:
     """How far the following step goes on along this one, relative to it; after Newton's it must not be longer."""
     following = step.next(there)
     size = step.y @ M @ step.y
+    if step.shift == np.inf:
+        return 0.0
     if step.shift == 0 and following @ M @ following > size:
         return -np.inf
     return float(following @ M @ step.y / size)
