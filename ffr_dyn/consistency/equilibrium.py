@@ -157,19 +157,25 @@ def _multipliers(now: Balance, M: Array) -> Array:
 
 
 def _step(now: Balance, M: Array, sizes: Array, radius: float) -> _Step | None:
-    """Newton's step, or else one with a shift, or None. The radius bounds what goes beyond the smallest step to the rows."""
+    """Newton's step, or else one that meets the rows, or one with a shift, or None."""
+    newton, fits = _shifted(now, M, sizes, 0.0, np.zeros(sizes.size), radius)
+    if fits:
+        return newton
     sides = np.zeros((now.forces.size + now.Phi.size, 2))
     sides[: sizes.size, 0], sides[sizes.size :, 1] = now.forces, -now.Phi
     both = np.linalg.lstsq(_bordered(M, now.jacobian), sides, rcond=None)[0]
-    free, closing = both[: sizes.size].T
-    step, fits = _shifted(now, M, sizes, 0.0, closing, radius)
-    if fits:
-        return step
+    (free, closing), lam = both[: sizes.size].T, both[sizes.size :, 0]
     gap = float(np.abs(closing / sizes).max())
     if gap > OPEN:
         part = min(1.0, LARGEST_STEP / gap)
-        return _Step(part * closing, both[sizes.size :, 0], np.inf, part * gap, step.factors)
-    last, shift = 0.0, max(LEAST_SHIFT * float(np.abs(free / sizes).max()) / radius, 1e-12)
+        return _Step(part * closing, lam, np.inf, part * gap, newton.factors)
+    first = max(LEAST_SHIFT * float(np.abs(free / sizes).max()) / radius, 1e-12)
+    return _least_shifted(now, M, sizes, first, closing, radius)
+
+
+def _least_shifted(now: Balance, M: Array, sizes: Array, first: float, closing: Array, radius: float) -> _Step | None:
+    """The step with about the smallest shift that will do, None where there is none."""
+    last, shift = 0.0, first
     for _ in range(ATTEMPTS):
         step, fits = _shifted(now, M, sizes, shift, closing, radius)
         if fits:
@@ -185,7 +191,10 @@ def _step(now: Balance, M: Array, sizes: Array, radius: float) -> _Step | None:
 
 
 def _shifted(now: Balance, M: Array, sizes: Array, shift: float, closing: Array, radius: float) -> tuple[_Step, bool]:
-    """The step with a shift, and whether it will do; Newton's last one does wherever it leads."""
+    """The step with a shift, and whether it will do; Newton's last one does wherever it leads.
+
+    The radius bounds what goes beyond the smallest step to the rows, `closing` (V,).
+    """
     matrix, right = _bordered(now.stiffness + shift * M, now.jacobian), np.concatenate([now.forces, -now.Phi])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", LinAlgWarning)  # of a singular matrix, whose step is not finite or too long
