@@ -73,21 +73,20 @@ def static(
 
 def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium) -> float:
     """[1/s^2] per mass, of the free motions; infinite where there is none. InputError for a motion that nothing holds."""
-    M = total_mass_matrix(at.system.scene, at.system.layout, found.path[-1])
+    x = found.path[-1]
+    M = total_mass_matrix(at.system.scene, at.system.layout, x if found.found else found.path[0])
     Z = free_motions(found.balance.jacobian, M)
     if not Z.shape[1]:
         return float("inf")
     K = Z.T @ found.balance.stiffness @ Z
     values, vectors = np.linalg.eigh(0.5 * (K + K.T))
     if not found.found:
-        raise _not_held(
-            assembled, found.path[-1], Z @ vectors[:, 0], f"no equilibrium was found in {len(found.steps)} steps"
-        )
+        raise _not_held(assembled, x, Z @ vectors[:, 0], f"no equilibrium was found in {len(found.steps)} steps")
     applied = np.linalg.solve(M, found.balance.forces) / sizes(at)
     limit = NEUTRAL * np.abs(applied).max() + ROUNDING * np.abs(values).max()
     loose = int(np.argmin(np.abs(values)))
     if abs(values[loose]) <= limit:
-        raise _not_held(assembled, found.path[-1], Z @ vectors[:, loose], "the equilibrium is not determined")
+        raise _not_held(assembled, x, Z @ vectors[:, loose], "the equilibrium is not determined")
     return float(values[0])
 
 

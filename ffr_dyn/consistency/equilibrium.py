@@ -7,9 +7,10 @@ With the exact tangent of `ffr_dyn.equations.statics`, a step y (V,) and new mul
 
 s = 0 where K is positive on the motions that the rows leave free, and the step no longer than a radius. As rows need not be
 met on the way, stiff bodies bend and turn without being stretched, and few steps do for any load. Where Newton's step fails,
-s is about the smallest that makes it so: a step of the motion downhill from there under great damping, so that what begins
-far away comes to a stable equilibrium, bit by bit of its loads. A step is taken again with half the radius where the one that
-would follow, with the same tangent, is longer or goes back. (Nocedal & Wright 2006, ch. 16; Deuflhard 2004, ch. 3.)
+s is about the smallest that makes it so: a step downhill, as of a motion under great damping, so that what begins far away
+comes to a stable equilibrium; where the rows are far from met by then, a step meets them alone. A step is taken again with
+half the radius where the one that would follow, with the same tangent, is longer or goes back. What comes nowhere so bears
+its loads bit by bit. (Nocedal & Wright 2006, ch. 16; Deuflhard 2004, ch. 3.)
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ LEAST_SHIFT = 1e-3  # of what takes a step of the radius where nothing is stiff
 FIRST_SHARE, LEAST_SHARE, ITERATIONS_OF_A_SHARE = 0.25, 1e-3, 12  # of all loads
 BACK = -0.5  # part of a step that the following one may go back
 OPEN = (
-    0.25  # rad, or part of the size: motion that the rows ask for, beyond which a step of shift infinity is that alone
+    0.25  # rad, or part of the size: motion to the rows beyond which a step is that alone; its shift counts as infinite
 )
 ATTEMPTS, HALVINGS = 40, 3  # shifts four times as large each; and between the last of them and the one before
 
@@ -105,7 +106,7 @@ def _newton(problem: _Problem, start: Equilibrium, share: float, iterations: int
     now = problem.balance(x, start.lam, start.balance.angles, share)
     lam = start.lam
     if lam is None:
-        lam = _multipliers(now, M)
+        _, lam, _ = _from_rest(now, M)
         now = problem.balance(x, lam, start.balance.angles, share)
     while len(steps) < iterations and (step := _step(now, M, problem.sizes, radius)) is not None:
         there = moved(problem.system.layout, x, step.y)
@@ -149,11 +150,13 @@ class _Problem:
         return replace(now, Phi=np.append(now.Phi, np.zeros(across.size)), jacobian=jacobian)
 
 
-def _multipliers(now: Balance, M: Array) -> Array:
-    """Those with which the scene would start to move from rest."""
-    right = np.concatenate([now.forces, np.zeros(now.Phi.size)])
-    solution = np.linalg.lstsq(_bordered(M, now.jacobian), right, rcond=None)[0]
-    return solution[now.forces.size :]
+def _from_rest(now: Balance, M: Array) -> tuple[Array, Array, Array]:
+    """How the scene starts to move from rest (V,), its multipliers then (C,), and the smallest motion (V,) to the rows."""
+    size = now.forces.size
+    sides = np.zeros((size + now.Phi.size, 2))
+    sides[:size, 0], sides[size:, 1] = now.forces, -now.Phi
+    both = np.linalg.lstsq(_bordered(M, now.jacobian), sides, rcond=None)[0]
+    return both[:size, 0], both[size:, 0], both[:size, 1]
 
 
 def _step(now: Balance, M: Array, sizes: Array, radius: float) -> _Step | None:
@@ -161,10 +164,7 @@ def _step(now: Balance, M: Array, sizes: Array, radius: float) -> _Step | None:
     newton, fits = _shifted(now, M, sizes, 0.0, np.zeros(sizes.size), radius)
     if fits:
         return newton
-    sides = np.zeros((now.forces.size + now.Phi.size, 2))
-    sides[: sizes.size, 0], sides[sizes.size :, 1] = now.forces, -now.Phi
-    both = np.linalg.lstsq(_bordered(M, now.jacobian), sides, rcond=None)[0]
-    (free, closing), lam = both[: sizes.size].T, both[sizes.size :, 0]
+    free, lam, closing = _from_rest(now, M)
     gap = float(np.abs(closing / sizes).max())
     if gap > OPEN:
         part = min(1.0, LARGEST_STEP / gap)
@@ -209,10 +209,9 @@ def _shifted(now: Balance, M: Array, sizes: Array, shift: float, closing: Array,
 
 def _ahead(step: _Step, there: Balance, M: Array) -> float:
     """How far the following step goes on along this one, relative to it; after Newton's it must not be longer."""
-    following = step.next(there)
-    size = step.y @ M @ step.y
     if step.shift == np.inf:
         return 0.0
+    following, size = step.next(there), step.y @ M @ step.y
     if step.shift == 0 and following @ M @ following > size:
         return -np.inf
     return float(following @ M @ step.y / size)
