@@ -16,7 +16,7 @@ from ffr_prep.cli.interchange import export_body, import_body
 from ffr_prep.cli.matrices import reduce_matrices_command
 from ffr_prep.cli.options import PATH, bundle, check_points, check_writable, gone, material_of, number_of, numbers_of
 from ffr_prep.cli.reduction import NOTES as REDUCTION_NOTES
-from ffr_prep.cli.request import REQUEST, reduce_to_file, request_of
+from ffr_prep.cli.request import REQUEST, WORDS, reduce_to_file, request_of
 from ffr_prep.cli.settings import EntriesCommand, NotesCommand
 from ffr_prep.cli.structure import reduce_structure_command
 from ffr_prep.cli.terminal import filed, show, terminal_steps
@@ -67,7 +67,16 @@ _PATH = click.Path(path_type=Path)
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 120}
 
 
-@click.group(epilog=EXAMPLE, invoke_without_command=True, context_settings=CONTEXT)
+class Remembering(click.Group):
+    """Commands whose words are kept with what they make (`ffr_prep.cli.request.retold`)."""
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        """As always."""
+        ctx.meta[WORDS] = list(args)
+        return super().resolve_command(ctx, args)
+
+
+@click.group(cls=Remembering, epilog=EXAMPLE, invoke_without_command=True, context_settings=CONTEXT)
 @click.version_option(package_name="ffr")
 @click.option(
     "--plugin",
@@ -132,6 +141,11 @@ def mesh(mesh: Path, **options: Any) -> None:
 @click.option("--material", "materials", multiple=True, required=True, metavar="MATERIAL", help="See below.")
 @REQUEST
 @click.option("--linear", is_flag=True, help="Leave out the load matrices: linear elasticity, for what barely bends.")
+@click.option(
+    "--drawn-modes",
+    type=click.IntRange(min=1),
+    help="Lowest modes that foreshorten what is drawn; default: all. m of them cost m (m + 1) / 2 static problems.",
+)
 @gone("--stiffening", "load matrices are computed by default; --linear leaves them out")
 @click.option(
     "--stress", is_flag=True, help="Also keep the stress at the surface, which ffr-dyn stress and animate show."

@@ -28,7 +28,7 @@ from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.functions.curves import Curve
 from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.time_functions import evaluate, harmonic, polynomial, table
-from ffr_dyn.integrators import RK4, ROS2, Within
+from ffr_dyn.integrators import RK4, Within
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection
 from ffr_dyn.results.file import load_result
 from ffr_dyn.scene.couplings import Coupling
