@@ -12,9 +12,9 @@ For every scene, with the step that is found for an accuracy of 1e-3 and with st
     cost     processor time of the time loop of all runs, in final runs: of a default run, search and check included, and what
              the check of a given step adds
 
-The truth is RK4 with a step that resolves the fastest vibration (h omega <= 0.3), and no longer than a sixteenth of the run's;
-a scene where that takes more than LONGEST steps is left out and said so. Variants: "plain", "undamped", "shock" (bodies set off
-with a deflection), "soft" and "stiff" (frequencies a third and four times as high).
+The truth is RK4 with a step that resolves the fastest vibration (h omega <= 0.3), no longer than a sixteenth of the run's; a
+scene where that takes more than LONGEST steps is left out and said so. Variants: "plain", "undamped", "shock" (bodies set
+off with a deflection), "soft" and "stiff" (frequencies a third and four times as high).
 """
 
 from __future__ import annotations
@@ -179,7 +179,7 @@ def summarise(every: list[Found]) -> None:
     inside, below = np.mean((pairs >= LOW) & (pairs <= HIGH)), np.mean(pairs < FALSE)
     reached = np.mean([found.places <= ACCURACY for found in every])
     cost, extra = (statistics.median(getattr(found, of) for found in every) for of in ("cost", "extra"))
-    print(f"{pairs.size} pairs: {100 * inside:.1f} % within {LOW} to {HIGH} (goal 95), {100 * below:.2f} % below {FALSE} (0)\n"
+    print(f"{pairs.size} pairs: {100 * inside:.1f} % within {LOW} to {HIGH} (goal 95), {100 * below:.2f} % below {FALSE}\n"
           f"positions and angles within {ACCURACY:g}: {100 * reached:.0f} % of {len(every)} scenes (goal 95)\n"
           f"forces not told to ring, largest error: {max(found.forces for found in every):.2g} (goal {ACCURACY:g})\n"
           f"true over three times told, worst: {max(found.silent for found in every):.2f} (goal 1)\n"

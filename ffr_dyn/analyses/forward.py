@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ffr_dyn.analyses.events import Event
-from ffr_dyn.analyses.integration import integrate
+from ffr_dyn.analyses.integration import check_output_step, integrate
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble
@@ -121,6 +121,7 @@ def forward(
     Raises InputError for a scene or settings that cannot be used, ComputationError when the run fails: with the time,
     the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
+    check_output_step(output_step)
     assembled = assemble(scene, time=start) if assembled is None else assembled
     common: dict[str, Any] = {"start": start, "end": end, "output_step": output_step, "stabilisation": stabilisation}
     common |= {"outputs": outputs, "progress": progress, "stopwatch": stopwatch}

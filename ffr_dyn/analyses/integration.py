@@ -95,7 +95,9 @@ def integrate(
     Raises InputError for a scene or settings that cannot be used, ComputationError when the run fails: with the time,
     the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
-    _check_method(method, output_step)
+    check_output_step(output_step)
+    if isinstance(method, (str, type)):
+        raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
     spacing = output_step / LOOKS if method.controlled else method.step
     substeps, rows = _counts(end - start, output_step, spacing)
     _check_step(scene, method)
@@ -124,11 +126,10 @@ def integrate(
     return _result(scene, run, header | account | {"status": "complete"})
 
 
-def _check_method(method: Integrator, output_step: float) -> None:
+def check_output_step(output_step: float) -> None:
+    """Raises InputError for one that is none."""
     if not 0 < output_step < np.inf:
         raise InputError(f"the output step is {output_step} s; it must be positive and finite")
-    if isinstance(method, (str, type)):
-        raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
 
 
 def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
