@@ -53,13 +53,14 @@ def step_errors(
     for name, scale in scales.items():
         y = run[name]
         step = 0.0 if other is None else largest_difference(y, other[name]) * abs(1.0 / (ratio**order - 1.0))
-        vibration = _beside_twins(y, [twin[name] for twin in twins])
+        vibration = beside_twins(y, [twin[name] for twin in twins])
         error = max(step, vibration)
         found[name] = StepError(error, error / scale if scale > 0 else 0.0, vibration > VIBRATION * step)
     return found
 
 
-def _beside_twins(y: Array, twins: Sequence[Array]) -> float:
+def beside_twins(y: Array, twins: Sequence[Array]) -> float:
+    """v of a history: 0 without twins; that of ROS2 with one, of the same step; that of ROS3 with two, of h and of h/2."""
     if len(twins) < 2:
         return largest_difference(y, twins[0]) if twins else 0.0
     coarse, fine = twins

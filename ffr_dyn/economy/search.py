@@ -37,7 +37,7 @@ from ffr_dyn.economy.rigid_start import PILOT, Ground, Rigid, started, unmoved
 from ffr_dyn.economy.run import Span, Trial, rings
 from ffr_dyn.economy.selection import Insufficient, Selection, gap, selected_model
 from ffr_dyn.economy.steps import Stepped, chosen_step
-from ffr_dyn.economy.verification import reference_cost, verified
+from ffr_dyn.economy.verification import reference_cost, sharpened, unheard, verified
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.scene.scene import Scene
 from ffr_dyn.variants.mean_axis import with_mean_axis_bodies
@@ -217,14 +217,42 @@ def _is_verified(ledger: Ledger, everything: Choice, final: Trial, verify: bool 
     )
 
 
+def _heard(ledger: Ledger, found: Chosen) -> Chosen:
+    """With vibration that the steps damp away counted as error; where that is too much, with steps in which everything keeps
+    it, and as everything where the model does not. Where no verification follows, this is not seen otherwise."""
+    final, limits, step = found.final, found.limits, largest(found.time)
+    if final.choice.controlled:
+        return found
+    lost = unheard(ledger, final, step)
+    if (found.error + lost <= limits).all():
+        return replace(found, error=found.error + lost, time=_with(found.time, lost))
+    ledger.tell("steps that resolve vibration")
+    policy, fewest = ledger.policy, 2 * final.choice.divisions
+    whole = sharpened(ledger, found.everything, policy.omitted_share * limits, fewest, policy.asked_verification)
+    same = ledger.run(final.choice.stepped_as(whole.trial.choice))
+    left = largest(difference(same.values, whole.trial.values))
+    if (left + whole.own > limits).any():
+        same, left = whole.trial, np.zeros(len(limits))
+    time = _with(tuple(np.zeros_like(y) for y in same.values), whole.own)
+    return replace(found, final=same, model=left, time=time, error=left + whole.own, together=False)
+
+
+def _with(histories: Histories, least: Array) -> Histories:
+    """Histories whose largest sizes are no less than `least` (outputs,)."""
+    return tuple(np.where(np.abs(y) < small, small, y) for y, small in zip(histories, least, strict=True))
+
+
 # ---- the end ----------------------------------------------------------------------------------------------------------
 
 
 def _finished(ledger: Ledger, found: Chosen, verify: bool | None) -> Economy:
-    final, verification = found.final, None
+    is_verified, verification = _is_verified(ledger, found.everything, found.final, verify), None
+    found = found if is_verified else _heard(ledger, found)
+    final = found.final
     ledger.note(final, "chosen", found.error)
-    if _is_verified(ledger, found.everything, final, verify):
-        final, verification = verified(ledger, found.everything, found.limits, final, found.omitted)
+    if is_verified:
+        allowed = ledger.policy.asked_verification if verify else ledger.policy.unasked_verification
+        final, verification = verified(ledger, found.everything, found.limits, final, found.omitted, allowed)
     kept, omitted = _explained(ledger, found, final)
     names = [output.name for output in ledger.of.outputs]
     return Economy(
