@@ -53,24 +53,28 @@ def step_errors(
     for name, scale in scales.items():
         y = run[name]
         step = 0.0 if other is None else largest_difference(y, other[name]) * abs(1.0 / (ratio**order - 1.0))
-        vibration = beside_twins(y, [twin[name] for twin in twins])
+        vibration = _beside_twins(y, [twin[name] for twin in twins])
         error = max(step, vibration)
         found[name] = StepError(error, error / scale if scale > 0 else 0.0, vibration > VIBRATION * step)
     return found
 
 
-def beside_twins(y: Array, twins: Sequence[Array]) -> float:
-    """v of a history: 0 without twins; that of ROS2 with one, of the same step; that of ROS3 with two, of h and of h/2."""
+def _beside_twins(y: Array, twins: Sequence[Array]) -> float:
     if len(twins) < 2:
         return largest_difference(y, twins[0]) if twins else 0.0
     coarse, fine = twins
-    rows = min(len(coarse), len(fine))
-    near = min(largest_difference(y, fine), largest_difference(y, (4.0 * fine[:rows] - coarse[:rows]) / 3.0))
+    near = nearest(y, coarse, fine)
     rows = min(len(y), len(fine))
     if rows <= 4:
         return near
     amplitude = largest_difference(_amplitudes(y[:rows]), _amplitudes(fine[:rows]))
     return min(near, MIDDLE * (near * amplitude) ** 0.5)
+
+
+def nearest(y: Array, coarse: Array, fine: Array) -> float:
+    """v1 of a history, beside twins of h and of h/2: no smaller than the true error, too large by the phase of the twins."""
+    rows = min(len(coarse), len(fine))
+    return min(largest_difference(y, fine), largest_difference(y, (4.0 * fine[:rows] - coarse[:rows]) / 3.0))
 
 
 def _amplitudes(y: Array) -> Array:

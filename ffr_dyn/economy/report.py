@@ -77,8 +77,8 @@ def _verdict(found: Economy) -> str:
         if apart > 1 and known < apart:
             return f"NOT within its tolerances: {apart:.2g} times the tolerance of an output from everything{again}."
         return (
-            f"Estimated, not verified{again}: in the time allowed the reference is known to {known:.2g} of a tolerance, where "
-            f"a verification takes {found.policy.reference_share:g}. Ask for a larger tolerance, or for one of fewer outputs; "
+            f"Estimated, not verified{again}: in the time allowed the reference is known to {known:.2g} of a tolerance, "
+            f"where a verification takes {found.policy.reference_share:g}. Larger tolerances and fewer outputs take less; "
             "damping helps, since undamped modes ring at every step."
         )
     if worst > 1:
@@ -116,8 +116,8 @@ def _outputs(found: Economy) -> Table:
             else "with it the last two"
         )
         text += (
-            f" True by everything, {verified.choice.method} with {verified.choice.divisions} steps to a row, whose own error is "
-            f"{own}; {last}."
+            f" True by everything, {verified.choice.method} with {verified.choice.divisions} steps to a row, whose own error "
+            f"is {own}; {last}."
         )
         text += (
             " All columns before are of the model that the estimates had chosen at first." if verified.attempts else ""

@@ -21,9 +21,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import Forward
+from ffr_dyn.analyses.events import Event
+from ffr_dyn.analyses.forward import Forward, forward
 from ffr_dyn.analyses.settings import Settings
-from ffr_dyn.consistency.assemble import assemble
+from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.economy.cache import Ledger, Tried
 from ffr_dyn.economy.checks import frequencies, stiffening_loads
 from ffr_dyn.economy.contributions import Contributions, nothing, of_motion, of_omitted, own
@@ -42,6 +43,7 @@ from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.scene.scene import Scene
 from ffr_dyn.variants.mean_axis import with_mean_axis_bodies
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import InputError
 
 Histories = tuple[Array, ...]
 
@@ -77,6 +79,7 @@ def economise(
     start: float = 0.0,
     verify: bool | None = None,
     stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
+    events: Sequence[Event] = (),
     policy: Policy = DEFAULT,
     tell: Callable[[str], None] = lambda stage: None,
 ) -> Economy:
@@ -88,6 +91,7 @@ def economise(
                 written "rod.stress=1e6" (absolute) or "rod.stress=0.1%"
     tolerance : of outputs without their own: share of the range of the output over the run
     verify    : compare with a run of everything on and a finer step; by default where that takes some seconds only
+    events    : moments that the run with the model looks for; where one ends it, the model is one for the rows before
     policy    : the numbers that all decisions rest on
     tell      : called with the name of each stage
 
@@ -97,13 +101,36 @@ def economise(
     span, scene = Span(start, end, output_step, stabilisation), with_mean_axis_bodies(scene)
     tell("assemble")
     assembled = assemble(scene, time=start)
+    if any(event.stop for event in events):
+        span = _ended(scene, assembled, span, events)
     of = probe(assembled, [as_output(one, tolerance) for one in outputs], policy)
     ledger = Ledger(scene, span, of, tell, policy)
     stiff = started(ledger, assembled.system.scene)
     limits = stiff.limits
     omitted = None if limits is None else stiff.contributions(limits)
     found = None if omitted is None else _surely_rigid(ledger, stiff, omitted)
-    return _finished(ledger, _beside_everything(ledger, stiff, omitted, verify) if found is None else found, verify)
+    found = _beside_everything(ledger, stiff, omitted, verify) if found is None else found
+    economy = _finished(ledger, found, verify)
+    return replace(economy, settings=replace(economy.settings, end=end, analysis=Forward(tuple(events))))
+
+
+def _ended(scene: Scene, assembled: Assembled, span: Span, events: Sequence[Event]) -> Span:
+    """The span up to the last row before the event that ends the run."""
+    result = forward(
+        scene,
+        start=span.start,
+        end=span.end,
+        output_step=span.output_step,
+        stabilisation=span.stabilisation,
+        events=events,
+        assembled=assembled,
+    )
+    rows = int((result.time[-1] - span.start) / span.output_step * (1.0 + 1e-12))
+    if rows < 2:
+        raise InputError(
+            f"an event ends the run at {result.time[-1]:g} s, within two output rows; take a shorter output_step"
+        )
+    return replace(span, end=span.start + rows * span.output_step)
 
 
 # ---- rigid bodies -----------------------------------------------------------------------------------------------------
@@ -293,9 +320,10 @@ def _everything_in_space(found: Chosen, final: Trial) -> Choice:
 def _all_runs(ledger: Ledger, found: Chosen, verification: Verification | None) -> tuple[Tried, ...]:
     """Every run with its error, against the best that is known of the outputs."""
     truth = found.final.values if verification is None else ledger.runs[verification.choice].values
-    own = largest(found.time) if verification is None else np.zeros(len(found.limits))
+    floor = largest(found.time) if verification is None else np.zeros(len(found.limits))
+    own = 0.0 if verification is None else verification.own
     return tuple(
-        Tried(choice, "run", ledger.cost(trial), np.maximum(largest(difference(trial.values, truth)), own))
+        Tried(choice, "run", ledger.cost(trial), np.maximum(largest(difference(trial.values, truth)), floor) + own)
         for choice, trial in ledger.runs.items()
         if verification is None or choice != verification.choice
     )

@@ -16,7 +16,7 @@ from math import ceil
 
 import numpy as np
 
-from ffr_dyn.consistency.step_error import VIBRATION, beside_twins
+from ffr_dyn.consistency.step_error import VIBRATION, largest_difference, nearest
 from ffr_dyn.economy.cache import Ledger
 from ffr_dyn.economy.contributions import Contributions
 from ffr_dyn.economy.model_choice import Choice
@@ -32,10 +32,11 @@ from ffr_prep.common.errors import ComputationError, InputError
 
 @dataclass(frozen=True)
 class Known:
-    """A run and its own error (outputs,)."""
+    """A run and its own error (outputs,); `cost` [us] of all runs that were made for it, by the cost model."""
 
     trial: Trial
     own: Array
+    cost: float
 
 
 def verified(
@@ -46,29 +47,34 @@ def verified(
     omitted : what modes do, driven by the rigid motion, for a model that has to be chosen anew
     allowed : [us] for all references, by the cost model
     """
-    first, attempts, before, refined = final, 0, ledger.spent, 0.0
+    first, attempts = final, 0
     reference = sharpened(
         ledger, everything, ledger.policy.reference_share * limits, 2 * final.choice.divisions, allowed
     )
     while True:
-        is_known = bool((reference.own <= ledger.policy.reference_share * limits).all())
-        error = _error(final, reference)
+        is_known, error = _is_known(reference, final, ledger.policy.reference_share * limits), _error(final, reference)
         ledger.note(final, "verified" if is_known else "beside everything", error)
         if (error <= limits + (0.0 if is_known else reference.own)).all():
             break
         if attempts + 1 == ledger.policy.verification_attempts:
             final = _cheapest_within(ledger, reference, limits, final)
-            error = _error(final, reference)
+            is_known, error = (
+                _is_known(reference, final, ledger.policy.reference_share * limits),
+                _error(final, reference),
+            )
             break
-        attempts, spent = attempts + 1, ledger.spent
+        attempts += 1
         final = _better(ledger, limits, final, ledger.run(half(reference.trial.choice)), omitted, (attempts, error))
-        refined += ledger.spent - spent
         if final.choice.divisions > reference.trial.choice.divisions // 2:
-            rest = allowed - (ledger.spent - before - refined)
-            reference = _finer(ledger, reference, limits, final, rest)
-    cost = ledger.spent - before - refined
+            reference = _finer(ledger, reference, final, allowed)
     true = largest(difference(first.values, reference.trial.values))
-    return final, Verification(reference.trial.choice, error, true, reference.own, is_known, attempts, cost)
+    return final, Verification(reference.trial.choice, error, true, reference.own, is_known, attempts, reference.cost)
+
+
+def _is_known(reference: Known, final: Trial, enough: Array) -> bool:
+    """Whether the error of the reference is, and its steps are at most half of those of the model."""
+    finer = 2 * final.choice.divisions <= reference.trial.choice.divisions
+    return finer and bool((reference.own <= enough).all())
 
 
 def _error(trial: Trial, reference: Known) -> Array:
@@ -101,15 +107,17 @@ def sharpened(ledger: Ledger, model: Choice, wanted: Array, divisions: int, allo
 
     divisions : steps to a row, at least
     """
-    policy, before, best = ledger.policy, ledger.spent, None
+    policy, spent = ledger.policy, 0.0
+    best: Known | None = None
     needed = {PILOT: _in_fours(divisions), EXPLICIT: _in_fours(max(divisions, _resolving(ledger, model)))}
     while needed:
         name = min(needed, key=lambda name: _price(ledger, replace(model, method=name, divisions=needed[name])))
         choice = replace(model, method=name, divisions=needed.pop(name))
         if choice.divisions > policy.most_divisions:
             continue
-        if best is not None and ledger.spent - before + _price(ledger, choice) > allowed:
-            return best
+        if best is not None and spent + _price(ledger, choice) > allowed:
+            break
+        spent += _price(ledger, choice)
         found = _known(ledger, choice)
         missing = float("inf") if found is None else float((found.own / wanted).max(initial=0.0))
         if found is not None and (best is None or missing < (best.own / wanted).max()):
@@ -121,15 +129,18 @@ def sharpened(ledger: Ledger, model: Choice, wanted: Array, divisions: int, allo
             needed[name] = times * choice.divisions
     if best is None:
         raise ComputationError("no step completes a run of everything that the model could be compared with")
-    return best
+    return replace(best, cost=spent)
 
 
-def _finer(ledger: Ledger, reference: Known, limits: Array, final: Trial, allowed: float) -> Known:
+def _finer(ledger: Ledger, reference: Known, final: Trial, allowed: float) -> Known:
     """The reference with steps finer than those of the model; as it is where that takes too long."""
     choice = replace(reference.trial.choice, divisions=_in_fours(2 * final.choice.divisions))
-    if choice.divisions > ledger.policy.most_divisions or _price(ledger, choice) > allowed:
-        return replace(reference, own=np.full(len(limits), np.inf))
-    return _known(ledger, choice) or replace(reference, own=np.full(len(limits), np.inf))
+    cost = reference.cost + _price(ledger, choice)
+    if choice.divisions <= ledger.policy.most_divisions and cost <= allowed:
+        found = _known(ledger, choice)
+        if found is not None:
+            return replace(found, cost=cost)
+    return reference
 
 
 def _in_fours(divisions: int) -> int:
@@ -167,7 +178,7 @@ def _known(ledger: Ledger, choice: Choice) -> Known | None:
         return None
     apart, before = (largest(difference(*(t.values for t in two))) for two in ((sharp, coarse), (coarse, coarsest)))
     fall = np.clip(apart / np.maximum(before, 1e-300), 0.5 ** order(sharp), ledger.policy.fall)
-    return Known(sharp, np.maximum(apart * fall / (1.0 - fall), vibration))
+    return Known(sharp, np.maximum(apart * fall / (1.0 - fall), vibration), 0.0)
 
 
 def _vibration(ledger: Ledger, trial: Trial) -> Array:
@@ -175,9 +186,11 @@ def _vibration(ledger: Ledger, trial: Trial) -> Array:
     choice = trial.choice
     if choice.method == EXPLICIT or choice.controlled or not choice.count:
         return np.zeros(len(trial.values))
-    steps = [choice.divisions * k for k in range(1, order(trial))]
-    twins = [ledger.twin(replace(choice, divisions=divisions)).values for divisions in steps]
-    return np.array([beside_twins(y, [twin[k] for twin in twins]) for k, y in enumerate(trial.values)])
+    twin = ledger.twin(choice).values
+    if order(trial) == 2:
+        return np.array([largest_difference(y, t) for y, t in zip(trial.values, twin, strict=True)])
+    fine = ledger.twin(replace(choice, divisions=2 * choice.divisions)).values
+    return np.array([nearest(*histories) for histories in zip(trial.values, twin, fine, strict=True)])
 
 
 # ---- without a reference ------------------------------------------------------------------------------------------------

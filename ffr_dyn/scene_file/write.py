@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, asdict, fields
 from pathlib import Path
@@ -27,7 +29,10 @@ from ffr_dyn.integrators import CONTROLLED, Controlled, Integrator, Within, meth
 from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation
 from ffr_dyn.scene.parts import as_declared, cut_joints
 from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.scene_file.parameters import flattened, overridden
+from ffr_dyn.scene_file.read import load_scene
 from ffr_dyn.scene_file.schema import Kind, fields_of_motion, formula_of, keys_of, nested_kinds, tables
+from ffr_dyn.scene_file.source import PATHS, read_source
 from ffr_dyn.scene_file.state_formula import StateFormula
 from ffr_prep.body import FlexibleBody, save_body
 from ffr_prep.common.errors import InputError
@@ -49,6 +54,65 @@ def save_scene(scene: Scene, settings: Settings | MomentSettings, path: str | Pa
     temporary.write_text(text, encoding="utf-8")
     temporary.replace(path)
     return path
+
+
+def save_changed(
+    scene: Scene,
+    settings: Settings | MomentSettings,
+    path: str | Path,
+    original: str | Path,
+    given: Mapping[str, str] = {},
+) -> Path:
+    """Write a scene file as `save_scene` does, with the parameters of the file that the scene has been made from.
+
+    What the change has left as it was stands as in that file, in formulas of the parameters, so that these may be changed
+    still.
+
+    given : values, as text, of parameters in place of those in the original file
+    """
+    path, source = save_scene(scene, settings, path), read_source(Path(original))
+    parameters = overridden(flattened(source.tree.pop("parameters", {})), given)
+    if not parameters:
+        return path
+    plain = tomllib.loads(path.read_text(encoding="utf-8"))
+    first, how = load_scene(original, given)
+    before = tomllib.loads(to_toml(first, how, {body.name: "" for body in first.bodies if not _is_plain(body.model)}))
+    tree = _as_given(plain, before, _moved(_without_marked(source.tree), path.parent))
+    text = "\n".join(_lines({"parameters": parameters, **tree}, ())) + "\n"
+    temporary = path.with_name(path.name + ".part")
+    temporary.write_text(text, encoding="utf-8")
+    files = {name: entry["file"] for name, entry in plain["bodies"].items() if "file" in entry}
+    if tomllib.loads(to_toml(*load_scene(temporary), files)) == plain:
+        temporary.replace(path)
+    temporary.unlink(missing_ok=True)
+    return path
+
+
+def _as_given(new: Any, before: Any, text: Any) -> Any:
+    """A tree with the entries that have not changed as they were given."""
+    if new == before:
+        return text
+    if not all(isinstance(tree, dict) for tree in (new, before, text)):
+        return new
+    return {key: _as_given(item, before.get(key), text[key]) if key in text else item for key, item in new.items()}
+
+
+def _without_marked(tree: dict[str, Any]) -> dict[str, Any]:
+    """Without the bodies that have more markers: these stand among their points in what is written."""
+    marked = {entry.get("body") for entry in tree.get("markers", {}).values()}
+    ground = {} if "ground" in marked or "ground" not in tree else {"ground": tree["ground"]}
+    bodies = {name: entry for name, entry in tree.get("bodies", {}).items() if name not in marked}
+    return {key: item for key, item in tree.items() if key != "ground"} | {"bodies": bodies, **ground}
+
+
+def _moved(value: Any, folder: Path) -> Any:
+    """The tree with the paths in it relative to a folder."""
+    if isinstance(value, dict):
+        return {
+            key: os.path.relpath(item, folder) if key in PATHS and isinstance(item, str) else _moved(item, folder)
+            for key, item in value.items()
+        }
+    return [_moved(item, folder) for item in value] if isinstance(value, list) else value
 
 
 def to_toml(scene: Scene, settings: Settings | MomentSettings, files: Mapping[str, str] = {}) -> str:
