@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffr_prep.cli.options import PATH, check_writable
+from ffr_prep.cli.options import TIME_LIMIT, tell_of_programs
 from ffr_prep.cli.request import REQUEST, reduce_to_file, request_of
 from ffr_prep.cli.settings import EntriesCommand
 from ffr_prep.cli.terminal import show, terminal_steps
+from ffr_prep.common.command import INPUT_FILE, reserve
 from ffr_prep.common.errors import InputError
 from ffr_prep.matrices.formats import MATRIX_FORMATS
 from ffr_prep.matrices.unit_systems import UNIT_SYSTEMS
@@ -43,13 +44,14 @@ Reference conditions and methods are those of `ffr-prep reduce`. The body is lin
 
 
 @click.command("reduce-matrices", cls=EntriesCommand, registries=(REDUCTIONS, MATRIX_FORMATS), epilog=NOTES)
-@click.argument("files", type=PATH, nargs=-1, required=True)
+@click.argument("files", type=INPUT_FILE, nargs=-1, required=True)
 @click.option(
     "--units", type=click.Choice(list(UNIT_SYSTEMS)), help="Of the numbers in FILES; default: as declared, or m-kg-s."
 )
 @click.option("--group", "groups", multiple=True, metavar="GROUP", help="See below; may be repeated.")
-@click.option("--surface", type=PATH, help="Mesh of the same solid, for drawing; in the length unit of FILES.")
+@click.option("--surface", type=INPUT_FILE, help="Mesh of the same solid, for drawing; in the length unit of FILES.")
 @REQUEST
+@TIME_LIMIT
 def reduce_matrices_command(
     files: tuple[Path, ...], units: str | None, groups: tuple[str, ...], surface: Path | None, **options: Any
 ) -> None:
@@ -61,7 +63,7 @@ def reduce_matrices_command(
     from ffr_prep.matrices.readers import read_matrices
 
     interfaces, request = request_of(options)
-    check_writable(options["output"])
+    reserve("-o", options["output"])
     steps = terminal_steps()
     steps("read the matrices")
     model = _named(read_matrices(files, units=units), groups)
@@ -118,6 +120,7 @@ def _drawn(model: MatrixModel, surface: Path) -> MatrixModel:
     length = model.source["units"].partition("-")[0]
     if length not in UNITS:
         raise InputError(f"--surface {surface}: meshes in {length} cannot be read; they may be in {', '.join(UNITS)}")
+    tell_of_programs([surface])
     mesh = read_mesh(surface, unit=length)
     points, triangles = surface_triangles(mesh)
     return with_surface(model, mesh.points[points], triangles)

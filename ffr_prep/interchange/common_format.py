@@ -6,7 +6,6 @@ mass-orthonormal coordinates with a diagonal stiffness; `body_from` changes from
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -20,6 +19,7 @@ import scipy.optimize
 from ffr_prep.body import BodyError, FlexibleBody, Interface, with_point
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.outputs import replacing
 from ffr_prep.model.invariants import skew
 
 IDENTITY_TOLERANCE = 1e-6
@@ -275,13 +275,8 @@ def read_lines(path: Path) -> list[str]:
 
 def write_lines(path: Path, lines: Sequence[str]) -> Path:
     """Write the file whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + ".part")
-    try:
-        temporary.write_text("\n".join([*lines, ""]), encoding="ascii")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with replacing(path) as part:
+        part.write_text("\n".join([*lines, ""]), encoding="ascii")
     return path
 
 

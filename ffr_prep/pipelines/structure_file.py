@@ -115,6 +115,13 @@ def read_structure(path: str | Path, progress: Stages = no_stages) -> Structure:
         raise InputError(f"{path}: {error}") from None
 
 
+def geometry_files(path: Path) -> list[Path]:
+    """The meshes and geometries that a structure file names. Raises InputError for a file that cannot be read."""
+    entry = _read(path)
+    named = [entry.geometry, *entry.solids.values()]
+    return [path.parent / of.file for of in named if of is not None]
+
+
 def _read(path: Path) -> StructureEntry:
     try:
         return structure_schema().model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
