@@ -58,6 +58,7 @@ from ffr_dyn.scene_file.source import Source, origin, origin_of_name, read_sourc
 from ffr_dyn.scene_file.state_formula import StateFormula, check_names
 from ffr_prep.body import BodyError, FlexibleBody, load_body, rigid_body, truncated, with_point
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.reading import reading
 
 WHOLE = ("name", "gravity", "ground", "base_acceleration", "plane")  # fields of a scene that are no tables of entries
 
@@ -71,6 +72,11 @@ def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Sc
     """
     path = Path(path)
     source = read_source(path)
+    with reading(path, "a scene file"):
+        return _loaded(source, parameters)
+
+
+def _loaded(source: Source, parameters: Mapping[str, str]) -> tuple[Scene, Settings | MomentSettings]:
     try:
         values = Parameters(overridden(flattened(source.tree.pop("parameters", {})), parameters))
         tree = substituted(source.tree, values, "")

@@ -23,6 +23,7 @@ from ffr_prep.body.reduced import (
 )
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.outputs import note_input, replacing
+from ffr_prep.common.reading import read_arrays
 
 MAGIC = "ffr-body"
 # 2 adds stress modes and section forces, 3 the parts of a body that is cut. Files of before are read as bodies without them,
@@ -153,20 +154,19 @@ def _header(body: FlexibleBody, meta: Mapping[str, Any]) -> str:
 
 
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:
-    with open(path, "rb") as stream:  # NumPy would leave it open where the file is damaged
+    with open(path, "rb") as stream:
         magic = stream.read(6)
         if magic == b"\x93NUMPY":
             raise BodyError("not a body file (a bare array); write one with ffr-prep reduce")
         if magic[:2] != b"PK":
             raise ValueError("no zip file")
         stream.seek(0)
-        with np.load(stream, allow_pickle=False) as stored:
-            meta = _meta(stored)
-            return meta, {key: stored[key] for key in stored.files if key != "meta"}
+        arrays = read_arrays(stream)
+        return _meta(arrays), {key: array for key, array in arrays.items() if key != "meta"}
 
 
-def _meta(stored: Any) -> dict[str, Any]:
-    if "meta" not in stored.files:
+def _meta(stored: Mapping[str, Array]) -> dict[str, Any]:
+    if "meta" not in stored:
         raise BodyError("not a body file (it has no header); write one with ffr-prep reduce")
     meta = json.loads(stored["meta"].tobytes())
     if not isinstance(meta, dict) or meta.get("magic") != MAGIC:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -15,6 +16,7 @@ from ffr_prep.cli.settings import EntriesCommand
 from ffr_prep.cli.terminal import show, terminal_steps
 from ffr_prep.common.command import INPUT_FILE, reserve
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.reading import check_count
 from ffr_prep.matrices.formats import MATRIX_FORMATS
 from ffr_prep.matrices.unit_systems import UNIT_SYSTEMS
 from ffr_prep.reduction.registry import REDUCTIONS
@@ -102,14 +104,22 @@ def _named(model: MatrixModel, groups: Sequence[str]) -> MatrixModel:
 
 def _numbers(text: str) -> list[int]:
     ends = [(int(first), int(last or first)) for first, _, last in (part.partition("-") for part in text.split(","))]
+    if wrong := [f"{first}-{last}" for first, last in ends if last < first]:
+        raise InputError(f"--group: the range {wrong[0]} runs backwards; write the smaller number first")
+    check_count(sum(last - first + 1 for first, last in ends), "nodes in a group")
+    if max(last for _, last in ends) >= 1 << 63:
+        raise InputError(f"--group: {max(last for _, last in ends)} is no number of a node")
     return [number for first, last in ends for number in range(first, last + 1)]
 
 
 def _place(text: str, words: Sequence[str]) -> list[float]:
     try:
-        return [float(word) for word in words]
+        place = [float(word) for word in words]
     except ValueError:
-        raise InputError(f"--group {text}: a point has three coordinates x,y,z in metres") from None
+        place = []
+    if not place or not all(map(math.isfinite, place)):
+        raise InputError(f"--group {text}: a point has three coordinates x,y,z in metres")
+    return place
 
 
 def _drawn(model: MatrixModel, surface: Path) -> MatrixModel:

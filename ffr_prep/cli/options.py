@@ -7,7 +7,6 @@ option and what it may be.
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.reading import read_toml
 from ffr_prep.mesh.time_limit import USUAL, mesher_time_limit
 
 if TYPE_CHECKING:
@@ -141,14 +141,12 @@ def _supports(path: Path) -> ReferenceConditions:
     from ffr_prep.model.reference import Support, Supports
 
     try:
-        content = tomllib.loads(path.read_text())
+        content = read_toml(path, "reference conditions")
         entries = content.pop("support")
         supports = tuple(Support(e.pop("interface"), e.pop("motion"), tuple(e.pop("direction"))) for e in entries)
-    except FileNotFoundError:
-        raise InputError(f"reference conditions {path} do not exist") from None
     except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    except (tomllib.TOMLDecodeError, KeyError, TypeError, AttributeError, UnicodeDecodeError) as error:
+        raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise InputError(f"{path} is not a list of supports ({error!r}); `ffr-prep reduce --help` shows one") from None
     unknown = [*content, *(key for entry in entries for key in entry)]
     if unknown:

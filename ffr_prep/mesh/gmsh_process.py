@@ -80,6 +80,8 @@ def _open(gmsh: Any, job: dict[str, Any]) -> None:
     if job["path"].lower().endswith(_CAD):
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _ELEMENTS_PER_TURN)
     gmsh.open(job["path"])
+    if not gmsh.model.getEntities():
+        raise ValueError("nothing in it is a geometry or a mesh")
 
 
 def _too_many(gmsh: Any, job: dict[str, Any]) -> str:
