@@ -26,6 +26,7 @@ from ffr_dyn.integrators.stabilisation import excess_of_gains
 from ffr_dyn.kernels.tables import NOT_FINITE, OK, Record
 from ffr_dyn.results.power import power
 from ffr_dyn.results.recorded_motion import View
+from ffr_dyn.scene.force_kinds import forces_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 
@@ -162,14 +163,16 @@ class EnergyWatch:
             return excess
         fastest = _fastest(self.system, anchor)
         if h * fastest > self.method.reach:
-            other = ", or ROS2" if max(self.system.layout.n) > 0 else ""
+            stiff = any(force.stiff_coordinates for force in forces_of(self.system.scene))
+            other = ", or ROS2" if stiff or max(self.system.layout.n) > 0 else ""
             return (
                 f"A step of {h:.3g} s is beyond the stability of {kind}: the scene vibrates with up to {fastest:.4g} "
                 f"rad/s, which needs one below {self.method.reach / fastest:.2g} s; use that{other}"
             )
+        force = "a stop or a Python function" if self.method.takes_forces else "a stiff spring or stop"
         return (
-            f"A step of {h:.3g} s of {kind} is too long for this motion, whose fastest rate is {fastest:.4g} 1/s (a stiff "
-            "spring or stop, fast rotation, or a mode that is loaded); use a smaller step, or projection if constraints drift"
+            f"A step of {h:.3g} s of {kind} is too long for this motion, whose fastest rate is {fastest:.4g} 1/s ({force}, "
+            "fast rotation, or a mode that is loaded); use a smaller step, or projection if constraints drift"
         )
 
 

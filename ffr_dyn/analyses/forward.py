@@ -217,7 +217,7 @@ def _started(
     first = new_record(assembled.system, 1)
     status = record_row(engine, start, first, 0)
     if status != OK:
-        raise failure(assembled.system, engine.work, status, start)
+        raise failure(engine.system, engine.work, status, start)
     first = with_all_reactions(assembled, first)
     energy.look(first)
     parts, memory = measure(assembled.system, first, {}, wanted)
@@ -269,7 +269,7 @@ def _advance(
             return
         if status != OK:
             cause = excess_of_gains(run.energy.gains, run.energy.spacing)
-            raise failure(system, run.engine.work, status, reached(run.engine, start), cause)
+            raise failure(run.engine.system, run.engine.work, status, reached(run.engine, start), cause)
         count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
 
 

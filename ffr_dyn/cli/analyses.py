@@ -61,7 +61,8 @@ def list_methods() -> None:
 
     for name, method in methods().items():
         steps = "chooses its steps" if method.controlled else "steps of one length"
-        elastic = "elastic forces implicit" if method.implicit else "explicit"
+        forces = "elastic and stiff forces implicit" if method.takes_forces else "elastic forces implicit"
+        elastic = forces if method.implicit else "explicit"
         click.echo(f"{name:18} order {method.order}, {steps}, {elastic}")
 
 

@@ -65,7 +65,7 @@ def run(
 ) -> None:
     """Analyse SCENE as its file says, forward dynamics if it does not, and write the result file.
 
-    ros2 and ros3 (more accurate, twice the cost of a step) treat the elastic modes implicitly: no elastic frequency limits
+    ros2 and ros3 (more accurate, twice the cost of a step) treat elastic modes and stiff forces implicitly: neither limits
     their step. rk4 is explicit, of fourth order: exact for soft bodies at small steps, unstable when step times the highest
     circular frequency exceeds about 2.8. ros3-adaptive and dopri5 (explicit) choose their steps by --tolerance.
     Drift off the constraints is held by projection and reported. A run that was killed keeps what its last flush wrote,

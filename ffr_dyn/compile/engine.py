@@ -11,6 +11,7 @@ import numpy as np
 from ffr_dyn.compile.alignment import aligned
 from ffr_dyn.compile.first_use import ensure_compiled
 from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.compile.stiff_rows import with_stiff_rows
 from ffr_dyn.compile.workspace import new_stages, new_work
 from ffr_dyn.kernels.entry_points import evaluate_exact, evaluate_loads, record_state, run, run_controlled, step
 from ffr_dyn.kernels.simd.entry_point import ENTRY_POINTS
@@ -69,6 +70,8 @@ def new_engine(
 
     The first engine of a kind waits until what it needs is compiled.
     """
+    if method is not None and method.takes_forces:
+        system = with_stiff_rows(system)
     kinds = () if method is None else (type(method),)
     ensure_compiled(*kinds, model=system.model, forces=kernels_of(system.scene))
     if method is None:

@@ -133,7 +133,7 @@ def load_tables(scene: Scene, functions: FunctionTable) -> Loads:
         rows.append((kernels.index(force.kernel), *_row(scene, force, numbers, len(initial))))
         initial += force.place.initial
     return Loads(
-        row=np.array(rows, dtype=np.int64).reshape(-1, 9),
+        row=np.array(rows, dtype=np.int64).reshape(-1, 11),
         data=np.array(numbers.data, dtype=float),
         initial=np.array(initial, dtype=float),
     )
@@ -145,4 +145,4 @@ def _row(scene: Scene, force: Force, numbers: LoadNumbers, measured: int) -> tup
     numbers.who = f"{'load' if force.table == 'loads' else 'force'} {force.name!r}"
     law = force.compiled(numbers)
     starts = numbers.add(place.numbers(scene)), numbers.add(law.numbers)
-    return (*starts, measured, *place.ends(scene), WAYS[place.way], law.function, law.user)
+    return (*starts, measured, *place.ends(scene), WAYS[place.way], law.function, law.user, -1, -1)

@@ -43,6 +43,7 @@ def new_work(m: Model, *, keeps_terms: bool = False) -> Work:
         loads=_load_work(m, V),
         field=np.zeros(3),
         diagonal=np.full(1, -1.0),
+        implicit=np.array([0.0, 0.0, 0.0, 1.0, 0.0]),
         info=np.zeros(3, dtype=np.int64),
         independence=np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
         **_zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=2),
@@ -102,6 +103,8 @@ def _row_work(m: Model) -> RowWork:
         **_zeros(Phi=C, nu=C, gamma=C, lam=C, left=C),
         **_zeros(jac=(K * D, 9, LANES), kept=(K * D, 9, LANES), X=K * D * 12 * LANES, Y=12 * LANES),
         **_zeros(scale=K * LANES, least=K * LANES, pivots=K * LANES, step=K * LANES),
+        **_zeros(compliance=K * LANES, pull=K * LANES, relief=K * LANES),
+        **_zeros(along=(3, C), begun=(2, C), grown=(3, 2, C), held=(2, C)),
         **_zeros(wrench=6, P=(M, 36), phiphi=(pairs, 36), S=stored),
     )
 
@@ -134,8 +137,9 @@ def _load_work(m: Model, V: int) -> LoadWork:
     return LoadWork(
         reference=m.loads.initial.copy(),
         measured=np.zeros(m.loads.initial.size),
-        axes=np.zeros((2, 3, 3, 3)),
+        axes=np.zeros((2, 4, 3, 3)),
         turn=np.zeros((3, 3, 3)),
+        curved=np.zeros(6),
         f=np.zeros(V),
     )
 

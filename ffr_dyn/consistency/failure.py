@@ -102,8 +102,8 @@ def _overflow(system: System, work: Work) -> str:
             "motions within reach, or use projection"
         )
     return (
-        "the step is too large for a mode (use ROS2), a stiff spring or stop, or a fast rotation (use a smaller step), or a "
-        "force is not finite"
+        "the step is too large for a mode or a stiff spring (use ROS2), for a stop or a fast rotation (use a smaller step), "
+        "or a force is not finite"
     )
 
 
@@ -144,6 +144,6 @@ def _unconverged(system: System, where: int) -> str:
     block = system.blocks[int(np.searchsorted(system.model.rows.start, where - len(bodies), side="right")) - 1]
     return (
         f"worst in {block.name!r}: its constraint cannot be met, because the mechanism locks there (a dead point that a "
-        "driver goes beyond) or is singular, or because the step is too large; keep driven motions within reach, use a "
-        "smaller step, or pass a singular position with ROS2"
+        "driver goes beyond) or is singular, or because the step is too large or a stiff spring far from its free length; "
+        "keep driven motions within reach, use a smaller step, or pass a singular position with ROS2"
     )

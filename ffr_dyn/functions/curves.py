@@ -54,6 +54,13 @@ def curve_value(curve: Curve, x: float) -> float:
     return float(through(inside) + through(inside, 1) * (x - inside))
 
 
+def curve_slope(curve: Curve, x: float) -> float:
+    """The slope of the curve at x."""
+    from scipy.interpolate import PchipInterpolator
+
+    return float(PchipInterpolator(curve.at, curve.values)(np.clip(x, curve.at[0], curve.at[-1]), 1))
+
+
 def curve_integral(curve: Curve, x: Array) -> Array:
     """Integral of the curve from 0 to x, of the shape of x: the energy that a spring of this curve stores."""
     found: Array = _primitive(curve, np.asarray(x, float)) - _primitive(curve, np.zeros(()))

@@ -39,6 +39,7 @@ class Integrator(Protocol):
 
     order: ClassVar[int]
     implicit: ClassVar[bool]  # whether it treats the elastic forces implicitly
+    takes_forces: ClassVar[bool]  # whether it treats stiff forces implicitly (see `ffr_dyn.kernels.forces.implicit`)
     reach: ClassVar[float]  # h omega up to which an undamped elastic oscillation does not grow
     controlled: ClassVar[bool]  # whether it chooses its steps (see `Controlled`)
     repeatable: ClassVar[bool]  # whether steps of a given length may be done again from an earlier state

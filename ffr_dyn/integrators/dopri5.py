@@ -112,6 +112,7 @@ class DormandPrince:
     order: ClassVar[int] = 5
     estimate_order: ClassVar[int] = 5
     implicit: ClassVar[bool] = False
+    takes_forces: ClassVar[bool] = False
     reach: ClassVar[float] = 0.9971  # where |R(i y)| exceeds 1, by little up to 3.3: steps are chosen by their error
     controlled: ClassVar[bool] = True
     step: ClassVar[float] = 0.0

@@ -62,6 +62,7 @@ from ffr_dyn.kernels.integrator_api import (
     stabilise,
     unconverged,
     velocity_rates,
+    weigh_forces,
 )
 from ffr_prep.common.errors import InputError
 
@@ -76,8 +77,12 @@ ROUNDING = 4e-15  # of positions, over the step: what rounding leaves of a veloc
 
 
 @inlined
-def start(r, t, h, lag):
-    """Accelerations at the start, and a = v_dot(t + lag): what makes the method of second order from its first step."""
+def start(r, t, lag, square, single):
+    """Accelerations at the start, and a = v_dot(t + lag): what makes the method of second order from its first step.
+
+    The change from one to the other is that of an explicit step, which what is stiff makes far too large: so it is what the
+    matrix of the iteration leaves of it.
+    """
     s, bodies = r.stages, r.model.bodies
     set_diagonal(r, 0.0)
     status = stabilise(r, t, r.x, r.v)
@@ -92,9 +97,27 @@ def start(r, t, h, lag):
             add_scaled(s.v[V], r.v, lag, s.v[NOW])
             normalise(bodies, s.x[0])
             status = evaluate(r, t + lag, s.x[0], s.v[V])
+    set_factors(r, square, single)
+    if status == OK:
+        status = evaluate(r, t + lag, s.x[0], s.v[V])
+    if status == OK:
+        add_scaled(s.v[CORRECTION], s.v[A_NOW], -1.0, s.v[NOW])
+        fill(r.work.bodies.f, 0.0)
+        fill(s.target, 0.0)
+        correct(r, s.v[CORRECTION], s.target)
+        solve(r, s.target)
+        velocity_rates(r, s.v[CORRECTION])
+        add_scaled(s.v[A_NOW], s.v[NOW], 1.0, s.v[CORRECTION])
     copy(s.v[BEFORE], s.v[NOW])
     s.numbers[STARTED] = 1.0
     return status
+
+
+@inlined
+def set_factors(r, square, single):
+    """What is implicit in the matrix of the iteration."""
+    set_diagonal(r, square**0.5)  # in which the elastic damping is right to a few per cent
+    weigh_forces(r, single, square)
 
 
 @inlined
@@ -183,10 +206,10 @@ def generalised_alpha_step(r: Tables, t: float, again: int) -> int:
     share = (1.0 - number[ALPHA_F]) / (1.0 - number[ALPHA_M])
     square, single = share * number[BETA] * h * h, share * number[GAMMA] * h
     if number[STARTED] == 0.0:
-        status = start(r, t, h, (number[ALPHA_M] - number[ALPHA_F]) * h)
+        status = start(r, t, (number[ALPHA_M] - number[ALPHA_F]) * h, square, single)
         if status != OK:
             return status
-    set_diagonal(r, square**0.5)  # in which the damping is right to a few per cent
+    set_factors(r, square, single)
     add_scaled(s.v[NEXT], s.v[NOW], -1.0, s.v[BEFORE])
     add_scaled(s.v[NEXT], s.v[NEXT], 1.0, s.v[NOW])
     fill(s.v[SHIFT], 0.0)
@@ -228,6 +251,7 @@ class GeneralisedAlpha:
     scaled: bool = True
     order: ClassVar[int] = 2
     implicit: ClassVar[bool] = True
+    takes_forces: ClassVar[bool] = True
     reach: ClassVar[float] = math.inf
     repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 9
@@ -267,6 +291,7 @@ class HHT:
     iterations: int = 20
     order: ClassVar[int] = 2
     implicit: ClassVar[bool] = True
+    takes_forces: ClassVar[bool] = True
     reach: ClassVar[float] = math.inf
     repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 9

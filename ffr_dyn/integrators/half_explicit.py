@@ -188,6 +188,7 @@ class HalfExplicit:
     step: float
     order: ClassVar[int] = 4
     implicit: ClassVar[bool] = False
+    takes_forces: ClassVar[bool] = False
     reach: ClassVar[float] = 3.2757  # where |R(i y)| exceeds 1
     repeatable: ClassVar[bool] = True
     stage_count: ClassVar[int] = STAGES + 3

@@ -73,6 +73,7 @@ class RK4:
     step: float
     order: ClassVar[int] = 4
     implicit: ClassVar[bool] = False
+    takes_forces: ClassVar[bool] = False
     reach: ClassVar[float] = 8**0.5  # Hairer & Wanner 1996, IV.2
     controlled: ClassVar[bool] = False
     repeatable: ClassVar[bool] = True

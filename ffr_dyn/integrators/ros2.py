@@ -1,4 +1,4 @@
-"""A linearly implicit W-method of order two: elastic stiffness and damping implicit, everything else explicit.
+"""A linearly implicit W-method of order two: elastic and stiff forces implicit, everything else explicit.
 
 Rosenbrock-type method with the elastic part  A = d(q_ddot)/d(q, q_dot) of  M v_dot = ... - Omega^2 q - 2 zeta Omega q_dot
 and the kinematics x_dot = T(x) v as its Jacobian; its order does not depend on what A leaves out (Verwer, Spee, Blom,
@@ -12,6 +12,8 @@ L-stable in the elastic part. Since Omega^2 and 2 zeta Omega are diagonal, a sta
 
     (M + diag_ff(gamma^2 h^2 Omega^2 + 2 gamma h zeta Omega)) k_v + Phi_q^T mu = Q + M r_v - gamma h Omega^2 (q_dot + r_q)
     Phi_q k_v = gamma_rhs + Phi_q r_v,      k_x = T(x) (v + gamma h k_v) + r_x     (r = 0, then -2 k1)
+
+Stiff forces are rows beside those of the joints (`ffr_dyn.kernels.forces.implicit`).
 
 All positions move with v + gamma h k_v, not the elastic ones alone: otherwise a joint that stiff modes move would be left by
 its two sides at different rates, and drift.
@@ -34,19 +36,20 @@ from ffr_dyn.kernels.integrator_api import (
     Tables,
     acceleration_target,
     add_both,
-    add_elastic_part,
     add_scaled,
+    add_stiff_part,
+    begin_stages,
     copy,
     correct,
     evaluate,
     fill,
     finite,
+    later_stage,
     method_step,
     multiple,
     normalise,
     position_rates,
-    set_diagonal,
-    solve,
+    solve_stage,
     stabilise,
     velocity_rates,
 )
@@ -60,7 +63,7 @@ def ros2_step(r: Tables, t: float, again: int) -> int:
     h = r.clock.time[H]
     bodies, stages = r.model.bodies, r.stages
     gh = GAMMA * h
-    set_diagonal(r, gh)
+    begin_stages(r, gh, h)
     xs, vs, r_x, r_v = stages.x[2], stages.v[2], stages.x[3], stages.v[3]
     for k in range(2):
         if k == 0:
@@ -74,14 +77,15 @@ def ros2_step(r: Tables, t: float, again: int) -> int:
             multiple(r_x, -2.0, stages.x[0])
             multiple(r_v, -2.0, stages.v[0])
             normalise(bodies, xs)  # r_v goes to body axes and comes back, which wants a true rotation
+            later_stage(r, -gh)
             status = evaluate(r, t + h, xs, vs)
         if status != OK:
             return status
         acceleration_target(r.work.rows, r.clock.gains, stages.target)
-        add_elastic_part(bodies, r.work.bodies.f, vs, r_x, gh)
         if k == 1:
             correct(r, r_v, stages.target)
-        solve(r, stages.target)
+        add_stiff_part(r, k, vs, r_x, gh, (h, 0.0, 0.0), (-2.0, 0.0, 0.0))
+        solve_stage(r, k)
         velocity_rates(r, stages.v[k])
         add_scaled(vs, vs, gh, stages.v[k])
         position_rates(bodies, xs, vs, stages.x[k])
@@ -94,7 +98,7 @@ def ros2_step(r: Tables, t: float, again: int) -> int:
 
 @dataclass(frozen=True)
 class ROS2:
-    """Linearly implicit, order two; no elastic frequency limits the step, and a step costs two evaluations.
+    """Linearly implicit, order two; neither elastic frequencies nor stiff forces limit the step, which costs two evaluations.
 
     Modes with h Omega > 1 are damped numerically; those the step resolves are right to second order.
 
@@ -104,6 +108,7 @@ class ROS2:
     step: float
     order: ClassVar[int] = 2
     implicit: ClassVar[bool] = True
+    takes_forces: ClassVar[bool] = True
     reach: ClassVar[float] = math.inf
     controlled: ClassVar[bool] = False
     repeatable: ClassVar[bool] = True

@@ -1,4 +1,4 @@
-"""A linearly implicit W-method of order three: elastic stiffness and damping implicit, everything else explicit.
+"""A linearly implicit W-method of order three: elastic and stiff forces implicit, everything else explicit.
 
 Four stages, stiffly accurate, with the stability of ROS34PW2 (Rang & Angermann, BIT 45 (2005) 761-787): L-stable in what is
 implicit, of order three whatever the Jacobian leaves out. ROS34PW2 wants one Jacobian for all stages of a step; here the mass
@@ -34,20 +34,21 @@ from ffr_dyn.kernels.integrator_api import (
     H,
     Tables,
     acceleration_target,
-    add_elastic_part,
     add_four,
     add_scaled,
+    add_stiff_part,
+    begin_stages,
     combine_three,
     copy,
     correct,
     evaluate,
     fill,
     finite,
+    later_stage,
     method_step,
     normalise,
     position_rates,
-    set_diagonal,
-    solve,
+    solve_stage,
     stabilise,
     velocity_rates,
     weigh_four,
@@ -79,9 +80,12 @@ def ros3_step(r: Tables, t: float, again: int) -> int:
     h = r.clock.time[H]
     bodies, stages = r.model.bodies, r.stages
     gh = GAMMA * h
-    set_diagonal(r, gh)
+    begin_stages(r, gh, h)
     xs, vs, r_x, r_v = stages.x[4], stages.v[4], stages.x[5], stages.v[5]
     for k in range(4):
+        # the coefficients of later stages, which may hold anything, are zero
+        a0, a1, a2 = h * ALPHA[4 * k], h * ALPHA[4 * k + 1], h * ALPHA[4 * k + 2]
+        g0, g1, g2 = GAMMAS[4 * k] / GAMMA, GAMMAS[4 * k + 1] / GAMMA, GAMMAS[4 * k + 2] / GAMMA
         if k == 0:
             status = stabilise(r, t, r.x, r.v)
             copy(xs, r.x)
@@ -89,23 +93,19 @@ def ros3_step(r: Tables, t: float, again: int) -> int:
             fill(r_x, 0.0)
             fill(r_v, 0.0)
         else:
-            m, n = (
-                min(1, k - 1),
-                min(2, k - 1),
-            )  # the coefficients of later stages, which may hold anything, are zero
-            a0, a1, a2 = h * ALPHA[4 * k], h * ALPHA[4 * k + 1], h * ALPHA[4 * k + 2]
-            g0, g1, g2 = GAMMAS[4 * k] / GAMMA, GAMMAS[4 * k + 1] / GAMMA, GAMMAS[4 * k + 2] / GAMMA
+            m, n = min(1, k - 1), min(2, k - 1)
             combine_three(stages.x[0], stages.x[m], stages.x[n], xs, r.x, a0, a1, a2, r_x, g0, g1, g2)
             combine_three(stages.v[0], stages.v[m], stages.v[n], vs, r.v, a0, a1, a2, r_v, g0, g1, g2)
             normalise(bodies, xs)  # r_v goes to body axes and comes back, which wants a true rotation
+            later_stage(r, gh * (1.0 + g0 + g1 + g2))
             status = evaluate(r, t + AT[k] * h, xs, vs)
         if status != OK:
             return status
         acceleration_target(r.work.rows, r.clock.gains, stages.target)
-        add_elastic_part(bodies, r.work.bodies.f, vs, r_x, gh)
         if k > 0:
             correct(r, r_v, stages.target)
-        solve(r, stages.target)
+        add_stiff_part(r, k, vs, r_x, gh, (a0, a1, a2), (g0, g1, g2))
+        solve_stage(r, k)
         velocity_rates(r, stages.v[k])
         add_scaled(vs, vs, gh, stages.v[k])
         position_rates(bodies, xs, vs, stages.x[k])
@@ -123,7 +123,8 @@ def ros3_step(r: Tables, t: float, again: int) -> int:
 
 @dataclass(frozen=True)
 class ROS3:
-    """Linearly implicit, order three; no elastic frequency limits the step, and a step costs four evaluations.
+    """Linearly implicit, order three; neither elastic frequencies nor stiff forces limit the step, which costs four
+    evaluations.
 
     Modes with h Omega > 1 are damped numerically; those the step resolves are right to third order.
 
@@ -133,6 +134,7 @@ class ROS3:
     step: float
     order: ClassVar[int] = 3
     implicit: ClassVar[bool] = True
+    takes_forces: ClassVar[bool] = True
     reach: ClassVar[float] = math.inf
     controlled: ClassVar[bool] = False
     repeatable: ClassVar[bool] = True
@@ -157,6 +159,7 @@ class AdaptiveROS3:
     order: ClassVar[int] = 3
     estimate_order: ClassVar[int] = 3
     implicit: ClassVar[bool] = True
+    takes_forces: ClassVar[bool] = True
     reach: ClassVar[float] = math.inf
     controlled: ClassVar[bool] = True
     step: ClassVar[float] = 0.0

@@ -357,6 +357,7 @@ class Variational:
     iterations: int = 30
     order: ClassVar[int] = 2
     implicit: ClassVar[bool] = True
+    takes_forces: ClassVar[bool] = False
     reach: ClassVar[float] = math.inf
     repeatable: ClassVar[bool] = False
     stage_count: ClassVar[int] = 6

@@ -9,6 +9,7 @@ Twin: `ffr_dyn.equations.motion.equations_of_motion`.
 
 from ffr_dyn.kernels.bodies import mass_times, normalise, reduce_forces
 from ffr_dyn.kernels.forces.applied import apply_loads, call_user, count_loads, gravity_field, keep_measured, power
+from ffr_dyn.kernels.forces.implicit import add_to_joints, keep_growth, set_targets, subtract_yield
 from ffr_dyn.kernels.functions import evaluate_functions
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.output_row import keep
@@ -39,10 +40,14 @@ from ffr_dyn.kernels.system import (
 from ffr_dyn.kernels.tables import (
     ALL,
     AT,
+    BY_PLACE,
+    BY_RATE,
+    BY_TIME,
     EVALUATIONS,
     EVERY_LOAD,
     FAILED,
     FILLED,
+    FRESH,
     HERE,
     IN_USE,
     IN_V,
@@ -80,6 +85,10 @@ def has_loads(model: Model) -> bool:
 
 def has_dependent_rows(model: Model) -> bool:
     return model.relaxation > 0.0
+
+
+def has_stiff_forces(model: Model) -> bool:
+    return model.stiff_count > 0
 
 
 def by_method(model: Model) -> bool:
@@ -199,7 +208,10 @@ def evaluate_loads(r: Tables, t: float, x: Vector, v: Vector) -> int:
 
 @entry_point()
 def set_diagonal(r: Tables, gamma_h: float) -> int:
-    """The elastic diagonal 1 + (gamma h)^2 Omega^2 + gamma h 2 zeta Omega of a linearly implicit method; 0: explicit."""
+    """The elastic diagonal 1 + (gamma h)^2 Omega^2 + gamma h 2 zeta Omega of a linearly implicit method, and the same for
+    stiff forces; 0: explicit."""
+    implicit = r.work.implicit
+    implicit[BY_RATE], implicit[BY_PLACE], implicit[FRESH], implicit[BY_TIME] = gamma_h, gamma_h * gamma_h, 1.0, 0.0
     if r.work.diagonal[0] == gamma_h:
         return OK
     r.work.diagonal[0] = gamma_h
@@ -255,6 +267,7 @@ def solve_of_dependent_rows(r: Tables, target: Vector) -> int:
     for number in range(1, PASSES):
         constraint_rates(m.bodies.where, m.markers, m.rows, rw.jac, r.work.markers.phi, bw.acc, rw.left)
         add_scaled(rw.left, rw.left, -1.0, wanted)
+        subtract_yield(m.rows, rw, rw.lam, rw.left)
         left = largest(rw.left)
         if number > 1 and not left < 0.5 * before:
             break
@@ -269,16 +282,37 @@ def solve_of_dependent_rows(r: Tables, target: Vector) -> int:
 
 @entry_point()
 def correct(r: Tables, r_v: Vector, target: Vector) -> int:
-    """f += M r_v, target += Phi_q r_v, for the corrections of a stage; r_v (V,)."""
+    """f += M r_v, target += Phi_q r_v of the constraint rows, for the corrections of a stage; r_v (V,).
+
+    The rates of all rows stay in `RowWork.left`.
+    """
     bodies, bw, rw = r.model.bodies, r.work.bodies, r.work.rows
     correction, wanted = vector_at(r_v, r.v.size), vector_at(target, r.stages.target.size)
     copy(bw.acc, correction)
     to_body_axes(bodies.where, bw.A, bw.acc)
-    constraint_rates(bodies.where, r.model.markers, r.model.rows, rw.jac, r.work.markers.phi, bw.acc, rw.lam)
-    add_scaled(wanted, wanted, 1.0, rw.lam)
+    constraint_rates(bodies.where, r.model.markers, r.model.rows, rw.jac, r.work.markers.phi, bw.acc, rw.left)
+    add_to_joints(r.model.rows, wanted, rw.left)
     for b in range(bodies.mass.size):
         j, size = bodies.where[b, IN_V], 6 + bodies.where[b, N]
         mass_times(bodies, bw, b, part(bw.acc, j, size), part(bw.f, j, size))
+    return OK
+
+
+@entry_point(has_stiff_forces)
+def pull_forces(
+    r: Tables, stage: int, s0: float, s1: float, s2: float, g0: float, g1: float, g2: float, target: Vector
+) -> int:
+    """Targets of the rows of stiff forces at a stage (see `forces.implicit.set_targets`)."""
+    wanted, gh = vector_at(target, r.stages.target.size), r.work.implicit[BY_RATE]
+    set_targets(r.model.rows, r.work.rows, stage, (s0, s1, s2), (g0, g1, g2), gh, wanted)
+    return OK
+
+
+@entry_point(has_stiff_forces)
+def follow_forces(r: Tables, stage: int, target: Vector) -> int:
+    """What the solution of a stage makes of the coordinates of stiff forces."""
+    wanted = vector_at(target, r.stages.target.size)
+    keep_growth(r.model.rows, r.work.rows, stage, r.work.implicit[BY_RATE], wanted)
     return OK
 
 

@@ -30,13 +30,25 @@ solve(r, target)                acc and lam, with the factors of the last evalua
 project(r, value)               acc: the smallest motion with Phi_q acc = -value
 correct(r, r_v, target)         f += M r_v, target += Phi_q r_v
 evaluate_rows_at(r, t, x, v)    constraint rows elsewhere, with the factors left as they are
-set_diagonal(r, gamma_h)        the elastic diagonal of a linearly implicit method
+set_diagonal(r, gamma_h)        the elastic diagonal of a linearly implicit method, and its part in stiff forces
+begin_stages(r, gamma_h, h)     the same for a step of a linearly implicit method, whose later stages call `later_stage`
+                                before they evaluate, and all `add_stiff_part` and `solve_stage` in place of `solve`
 
 Twin: none, names of calls.
 """
 
 from ffr_dyn.kernels.bodies import mass_times, normalise, position_rates
-from ffr_dyn.kernels.entry_points import correct, evaluate, evaluate_rows_at, project, set_diagonal, solve, stabilise
+from ffr_dyn.kernels.entry_points import (
+    correct,
+    evaluate,
+    evaluate_rows_at,
+    follow_forces,
+    project,
+    pull_forces,
+    set_diagonal,
+    solve,
+    stabilise,
+)
 from ffr_dyn.kernels.finite_motion import (
     carry,
     converging,
@@ -53,7 +65,12 @@ from ffr_dyn.kernels.simd.slices import part
 from ffr_dyn.kernels.solution import add_reactions, constraint_rates
 from ffr_dyn.kernels.system import acceleration_target, finite, largest, to_body_axes, to_velocity_rates
 from ffr_dyn.kernels.tables import (
+    AHEAD,
+    BY_PLACE,
+    BY_RATE,
+    BY_TIME,
     FAILED,
+    FRESH,
     HERE,
     IN_SHARED,
     IN_V,
@@ -113,10 +130,11 @@ __all__ = [
     "acceleration_target",
     "add",
     "add_both",
-    "add_elastic_part",
     "add_four",
     "add_reactions",
     "add_scaled",
+    "add_stiff_part",
+    "begin_stages",
     "carry",
     "combine_three",
     "constraint_rates",
@@ -139,6 +157,7 @@ __all__ = [
     "kernel",
     "largest",
     "largest_motion",
+    "later_stage",
     "mass_times",
     "method_step",
     "multiple",
@@ -150,6 +169,7 @@ __all__ = [
     "set_diagonal",
     "six_rows",
     "solve",
+    "solve_stage",
     "stabilise",
     "subtract",
     "three_rows",
@@ -157,6 +177,7 @@ __all__ = [
     "to_velocity_rates",
     "unconverged",
     "velocity_rates",
+    "weigh_forces",
     "weigh_four",
 ]  # fmt: skip
 
@@ -178,9 +199,43 @@ def velocity_rates(r, out):
 
 
 @inlined
-def add_elastic_part(bodies, f, v, r_x, gh):
-    """f -= gamma h Omega^2 (q_dot + r_q)."""
+def begin_stages(r, gh, h):
+    """What a step of length h of a linearly implicit method has on the left side of its stages: gamma h of the elastic forces
+    and of stiff ones, whose slopes the first stage finds."""
+    set_diagonal(r, gh)
+    r.work.implicit[AHEAD], r.work.implicit[BY_TIME] = h, gh
+
+
+@inlined
+def later_stage(r, by_time):
+    """One-sided forces keep the slopes of the stage before; by_time: gamma h (1 + r_t), r_t the correction of time's rate."""
+    r.work.implicit[FRESH], r.work.implicit[BY_TIME] = 0.0, by_time
+
+
+@inlined
+def weigh_forces(r, by_rate, by_place):
+    """Of a method of Newton's, after `set_diagonal`: what its accelerations do to rates and places at the end of a step."""
+    r.work.implicit[BY_RATE], r.work.implicit[BY_PLACE] = by_rate, by_place
+
+
+@inlined
+def add_stiff_part(r, stage, v, r_x, gh, shares, factors):
+    """What a stage has on its right side beside the forces: f -= gamma h Omega^2 (q_dot + r_q), and the targets of stiff
+    forces, in whose coordinates are `shares` of what earlier stages made of them, and `factors` in their corrections."""
+    bodies, f = r.model.bodies, r.work.bodies.f
     for b in range(bodies.mass.size):
         n, i, j, shared = bodies.where[b, N], bodies.where[b, IN_X], bodies.where[b, IN_V], bodies.where[b, IN_SHARED]
         for k in range(n):
             f[j + 6 + k] -= gh * bodies.omega2[shared + k] * (v[j + 6 + k] + r_x[i + 7 + k])
+    if r.model.stiff_count > 0:
+        s0, s1, s2 = shares
+        g0, g1, g2 = factors
+        pull_forces(r, stage, s0, s1, s2, g0, g1, g2, r.stages.target)
+
+
+@inlined
+def solve_stage(r, stage):
+    """`solve` of a linearly implicit method. Stiff forces remember three stages."""
+    solve(r, r.stages.target)
+    if r.model.stiff_count > 0 and stage < 3:
+        follow_forces(r, stage, r.stages.target)

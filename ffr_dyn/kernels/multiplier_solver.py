@@ -101,30 +101,33 @@ def relax_block(starts, pattern, S, relaxation, k):
 
 
 @inlined
-def factorise_block(starts, pattern, S, rw, independence, k):
+def factorise_block(starts, forced, pattern, S, rw, independence, k):
     """Factorise block k in place (right-looking). Returns the row without a pivot, or -1.
 
     rw.scale (8 K,)   : what the entry of a row on the diagonal is at least
-    independence (1,) : the least share of a row that the rows before it do not contain, so far
+    rw.relief (8 K,)  : what rows of stiff forces took of it, which bind nothing
+    independence (1,) : the least share of a row that the constraint rows before it do not contain, so far
     """
-    size, own = starts[k + 1] - starts[k], LANES * k
+    size, own, joints = starts[k + 1] - starts[k], LANES * k, forced[k] - starts[k]
     for row in range(size):
         rw.least[own + row] = FLOOR * rw.scale[own + row]
     factorise_rows(size, S, pattern.diagonal[k], rw.least, own, rw.pivots, own, rw.Y)
-    for c in range(size):
-        share, scale = rw.Y[c] / rw.scale[own + c], rw.scale[own + c]
+    for c in range(joints):
+        scale = rw.scale[own + c]
+        share = (rw.Y[c] + rw.relief[own + c]) / scale
         if not scale > 0.0 or share != share:
             return starts[k] + c
         independence[HERE] = min(independence[HERE], share)
-    eliminate_block(starts, pattern, S, k, size, rw.pivots, rw.Y)
+    eliminate_block(starts, pattern, S, k, size, joints, rw.pivots, rw.relief, rw.Y)
     return -1
 
 
 @inlined
-def eliminate_block(starts, pattern, S, k, size, pivots, Y):
+def eliminate_block(starts, pattern, S, k, size, joints, pivots, relief, Y):
     update, first, diagonal = pattern.update_start[k], pattern.column_start[k], pattern.diagonal[k]
     for entry in range(first, pattern.column_start[k + 1]):
         eliminate_rows(size, S, diagonal, pattern.column[entry, 1], pivots, LANES * k, Y)
+        relieve(size, joints, S, pattern.column[entry, 1], Y, relief, LANES * pattern.column[entry, 0])
         for other in range(first, entry + 1):
             earlier, Z = pattern.column[other, 0], pattern.column[other, 1]
             target = pattern.update[update]
@@ -164,6 +167,14 @@ def eliminate_rows(size, S, diagonal, at, pivots, own, Y):
             row = less(row, peek(S, diagonal + LANES * j + c), load(Y, LANES * j))
         store(Y, LANES * c, row)
         store(S, at + LANES * c, scaled(peek(pivots, own + c), row))
+
+
+@kernel
+def relieve(size, first, S, at, Y, relief, later):
+    """The row of `relief` at `later` grows by what rows from `first` on take from the diagonal of a later block."""
+    for c in range(first, size):
+        row = times(load(S, at + LANES * c), load(Y, LANES * c))
+        store(relief, later, plus(load(relief, later), 1.0, row))
 
 
 @kernel

@@ -162,7 +162,7 @@ def row_of(kind, axes, drive, w, i, j):
 def evaluate_block(rows, functions, markers, w, k):
     """Fill the rows of block k of w (a RowWork); markers: MarkerWork; functions (F, 3)."""
     i, j, first_side = rows.marker[k, 0], rows.marker[k, 1], k * rows.marker.shape[1]
-    for row in range(rows.start[k], rows.start[k + 1]):
+    for row in range(rows.start[k], rows.forced[k]):
         drive, lane = ZERO, row - rows.start[k]
         if rows.function[row] >= 0:
             drive = get(functions, rows.function[row])
@@ -186,7 +186,7 @@ def reaction(rw, rows, k, side):
     """(force, moment about the body's origin) in body axes that block k takes from the body of a side."""
     jac, first = rw.jac[k * rows.marker.shape[1] + side], rows.start[k]
     force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for lane in range(rows.start[k + 1] - first):
+    for lane in range(rows.forced[k] - first):
         lam = rw.lam[first + lane]
         force = add(force, (jac[0, lane] * lam, jac[1, lane] * lam, jac[2, lane] * lam))
         moment = add(moment, (jac[3, lane] * lam, jac[4, lane] * lam, jac[5, lane] * lam))

@@ -8,6 +8,7 @@ Twin: `ffr_dyn.equations.motion.equations_of_motion`.
 """
 
 from ffr_dyn.kernels.bodies import factorise, inertia, prepare_body, rotation_matrix
+from ffr_dyn.kernels.forces.implicit import soften_block
 from ffr_dyn.kernels.markers import couple_marker, couple_pair, prepare_marker, shapes, update_marker
 from ffr_dyn.kernels.multiplier_solver import (
     SIDE,
@@ -96,6 +97,7 @@ def couple_joint(bodies, markers, rows, pattern, bw, mw, rw, k):
     where, sides = bodies.where, rows.marker.shape[1]
     ground = where.shape[0] - 1
     fill(part(rw.scale, LANES * k, LANES), 0.0)
+    fill(part(rw.relief, LANES * k, LANES), 0.0)
     for side in range(sides):
         marker = rows.marker[k, side]
         b = markers.body[marker] if marker >= 0 else ground
@@ -155,10 +157,11 @@ def evaluate_joints(m, w):
     done = 0
     for k in range(m.rows.marker.shape[0]):
         couple_joint(m.bodies, m.markers, m.rows, m.pattern, w.bodies, w.markers, w.rows, k)
+        soften_block(m.rows, m.pattern, w.rows, k)
         if m.relaxation > 0.0:
             relax_block(m.rows.start, m.pattern, w.rows.S, m.relaxation, k)
         while done <= k and m.pattern.reach[done] <= k:
-            failed = factorise_block(m.rows.start, m.pattern, w.rows.S, w.rows, w.independence, done)
+            failed = factorise_block(m.rows.start, m.rows.forced, m.pattern, w.rows.S, w.rows, w.independence, done)
             if failed >= 0:
                 return failed
             done += 1
@@ -249,9 +252,12 @@ def reactions(rows, mw, rw, out):
     A relation between joint coordinates has one number: the force or torque along a coordinate of factor one.
     """
     for k in range(rows.marker.shape[0]):
+        at = rows.reaction[k]
+        if at < 0:
+            continue
         if rows.start[k] < rows.start[k + 1] and rows.kind[rows.start[k]] == RELATION:
-            fill(out[k], 0.0)
-            out[k, 0] = -rw.lam[rows.start[k]]
+            fill(out[at], 0.0)
+            out[at, 0] = -rw.lam[rows.start[k]]
             continue
         marker = rows.marker[k, 1]
         force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -262,5 +268,5 @@ def reactions(rows, mw, rw, out):
         moment = subtract(moment, cross(get(mw.u, marker), force))
         force, moment = to_global(mw.A[mw.body[marker]], force), to_global(mw.A[mw.body[marker]], moment)
         for c in range(3):
-            out[k, c] = force[c]
-            out[k, 3 + c] = moment[c]
+            out[at, c] = force[c]
+            out[at, 3 + c] = moment[c]

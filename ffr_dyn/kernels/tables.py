@@ -30,6 +30,8 @@ I2 = Annotated[np.ndarray, ("int64", 2)]
 
 # The words of constraints, in the order of their numbers in `Rows.kind` (see `ffr_dyn.kernels.rows`).
 WORDS = ("coincidence", "dot-1", "dot-2", "driven-angle", "distance", "relation")
+# In place of one: the coordinate of a stiff force (see `ffr_dyn.kernels.forces.implicit`).
+FORCED = len(WORDS)
 ANGLE, STROKE, LENGTH = 0, 1, 2
 BODY, GLOBAL, SIX = 3, 4, 5
 # The places of forces by the words of `ffr_dyn.scene.forces.places`: coordinates, and axes.
@@ -37,8 +39,8 @@ WAYS = {"angle": ANGLE, "stroke": STROKE, "length": LENGTH, "body": BODY, "globa
 
 # Columns of `Loads.row`: number of the kernel in `Tables.forces`; where the numbers of the place and of the law begin in
 # `data`, and what is measured in `LoadWork.measured`; markers i and j, or the body; one of `WAYS`; time function or -1; first
-# of the user's values or -1.
-KERNEL, PLACE, LAW, MEASURED, END_I, END_J, WAY, FUNCTION, USER = range(9)
+# of the user's values or -1; block and first lane of its rows where it is implicit, or -1.
+KERNEL, PLACE, LAW, MEASURED, END_I, END_J, WAY, FUNCTION, USER, BLOCK, LANE = range(11)
 
 OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED, NOT_CONVERGED, STEP_TOO_SMALL = range(7)
 
@@ -115,6 +117,8 @@ class Rows(NamedTuple):
     relation: F2  # (C, 5) of a relation: factor and kind of both coordinates, spacing of equivalent values or 0
     function: I1  # (C,) time function or -1
     start: I1  # (K + 1,) first row of each block
+    forced: I1  # (K,) the first row of stiff forces in each block, which are its last, or the start of the next block
+    reaction: I1  # (K,) place of each block among the reactions of results, -1 for one of forces alone
     marker: I2  # (K, 2 or 4) markers i, j of a joint, or of both joints of a relation; -1 where there is none
     first: I2  # likewise: whether no block before has the marker
 
@@ -150,7 +154,7 @@ class Functions(NamedTuple):
 class Loads(NamedTuple):
     """F applied loads, in the order in which they are applied, with O measured numbers in all."""
 
-    row: I2  # (F, 9) see `KERNEL` and what follows it
+    row: I2  # (F, 11) see `KERNEL` and what follows it
     data: F1  # pooled numbers of places, laws and curves
     initial: F1  # (O,) what is measured, before the start: angles count their turns from there
 
@@ -169,6 +173,7 @@ class Model(NamedTuple):
     loads: Loads
     user_address: int  # C callback that evaluates the user's Python functions
     user_count: int
+    stiff_count: int  # rows of stiff forces
 
 
 class BodyWork(NamedTuple):
@@ -225,8 +230,9 @@ class LoadWork(NamedTuple):
 
     reference: F1  # (O,) what was measured at the last accepted state, from which angles count their turns
     measured: F1  # (O,) of a coordinate: value, rate, force; of a bushing: six of each
-    axes: F4  # (2, 3, 3, 3) scratch of a bushing
+    axes: F4  # (2, 4, 3, 3) scratch of a bushing
     turn: F3  # (3, 3, 3) scratch of a bushing
+    curved: F1  # (6,) scratch of a bushing
     f: F1  # (V,) scratch of the powers
 
 
@@ -240,6 +246,15 @@ class RowWork(NamedTuple):
     left: F1  # (C,) scratch
     scale: F1  # (8 K,) what the entry of S on the diagonal is at least
     least: F1  # (8 K,) what it is taken for where it is less
+    compliance: F1  # (8 K,) of the rows of stiff forces 1 / (gamma h d + (gamma h)^2 k)
+    pull: F1  # (8 K,) likewise gamma h k / (gamma h d + (gamma h)^2 k)
+    relief: F1  # (8 K,) what rows of stiff forces before have taken from the diagonal of S
+    along: (
+        F2  # (3, C) of stiff forces: coordinate, rate and quadratic velocity part of its second derivative at the state
+    )
+    begun: F2  # (2, C) coordinate and rate at the start of the step
+    grown: F3  # (3, 2, C) rates of both by the stages before
+    held: F2  # (2, C) scratch
     # (K D, 9, 8) per side of a block: coefficients of point velocity, omega_bar, elastic rotation rate, its rows in lanes
     jac: F3
     kept: F3  # those of another moment, for methods that need both
@@ -255,6 +270,10 @@ class RowWork(NamedTuple):
 
 # Numbers of `Work.info`.
 FAILED, EVALUATIONS, PROJECTIONS = range(3)
+# Numbers of `Work.implicit`: what a rate and a displacement add to the coordinate of a stiff force, per change of the
+# acceleration; how far ahead a one-sided force looks [s]; whether its slopes belong to this state, or to one before; the time
+# that a stage of a W-method goes on by, as by its displacements.
+BY_RATE, BY_PLACE, AHEAD, FRESH, BY_TIME = range(5)
 # Numbers of `Work.drift`.
 PHI, PHI_DOT = range(2)
 # Numbers of `Work.independence` (see `ffr_dyn.kernels.singular_positions`).
@@ -274,6 +293,7 @@ class Work(NamedTuple):
     functions: F2  # (F, 3) value, first and second time derivative
     user: F1  # (user_count,)
     diagonal: F1  # (1,) gamma h of the elastic diagonal that is in place (see `entry_points.set_diagonal`), or -1
+    implicit: F1  # (5,) by the names above
     info: I1  # (3,) body or row that failed, how many evaluations, how many projections
     drift: F1  # (2,) largest |Phi| and |Phi_dot| met
     # (8,) least share of a row that others do not contain: now, least so far, and when; of a step its start and end [s],

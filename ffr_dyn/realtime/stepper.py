@@ -171,7 +171,7 @@ class Stepper(Brief):
         status = loop.run(self._start, self._steps, count)
         if status != OK:
             reached = int(loop.engine.tables.clock.steps[NEXT])
-            raise failure(self._system, loop.work, status, self._start + reached * self._step)
+            raise failure(loop.engine.system, loop.work, status, self._start + reached * self._step)
         self._steps += count
         for other in self._loops[1:]:
             _give_all_reactions(loop, other, self.time)

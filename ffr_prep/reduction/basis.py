@@ -32,6 +32,7 @@ _RIGID = 1e-9
 NO_INERTIA = 1e-14  # relative to the largest, of a body of size one
 _CONTAINED = 1e-8  # relative mass norm of what a vector adds to those before it
 _DEPENDENT = 1e-7  # the same among the additions, whose products square it
+_LEFT = 1e-6  # relative mass norm of the motion of the frame that is left in a vector
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,10 @@ def factorised(model: CoupledModel, solver: Solver = CHOLESKY, advance: Advance 
 def basis_of(model: CoupledModel, L: Array, *vectors: Array) -> Basis:
     """The basis of the space of all vectors (Z, p) under the reference conditions L (r, Z); earlier ones have precedence."""
     Q, dropped = orthonormalised(model.M, *(in_frame(model, L, V) for V in vectors))
+    if len(L) <= 6 and Q.size:
+        again = in_frame(model, L, Q)
+        sound = _norms(model.M, Q - again) < _LEFT  # others are rounding, of vectors that nearly depended on others
+        Q, dropped = again[:, sound], dropped + int(np.sum(~sound))
     basis = diagonalised(model, Q, Q.T @ (model.K @ Q))
     return Basis(basis.Z, basis.omega2, dropped)
 

@@ -10,26 +10,29 @@ Twin: `ffr_dyn.equations.forces.applied`.
 import math
 
 from ffr_dyn.kernels.forces.coordinate import apply_side, three
-from ffr_dyn.kernels.forces.curve import curve_value
+from ffr_dyn.kernels.forces.curve import curve_slope, curve_value
+from ffr_dyn.kernels.forces.implicit import keep_row
 from ffr_dyn.kernels.markers import axis_motion, on_shapes
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.rows import ZERO
 from ffr_dyn.kernels.simd.force_kernel import force_kernel
 from ffr_dyn.kernels.simd.slices import part, vector_at
-from ffr_dyn.kernels.tables import END_I, END_J, LAW, MEASURED, OK, PLACE, Tables, Vector
+from ffr_dyn.kernels.tables import BLOCK, END_I, END_J, LAW, MEASURED, OK, PLACE, Tables, Vector
 from ffr_dyn.kernels.vectors import add, cross, dot, get, put, scale, subtract, to_body
 
 
 @kernel
 def move_axes(frames, w, axes, i, j):
-    """axes (2, 3, 3, 3): by side, body axes value, global value and global rate of the three axes, frames (18,)."""
+    """axes (2, 4, 3, 3): by side, of the three axes, frames (18,), value in body axes, global value and rate, and quadratic
+    velocity part of the second derivative."""
     for side in range(2):
         marker = i if side == 0 else j
         for c in range(3):
-            a, g, rate, _ = axis_motion(w, marker, three(frames, 9 * side + 3 * c))
+            a, g, rate, bias = axis_motion(w, marker, three(frames, 9 * side + 3 * c))
             put(axes[side, 0], c, a)
             put(axes[side, 1], c, g)
             put(axes[side, 2], c, rate)
+            put(axes[side, 3], c, bias)
 
 
 @kernel
@@ -94,6 +97,30 @@ def measure_bushing(w, s, i, j, x):
 
 
 @kernel
+def curve_motion(w, s, i, j, turn):
+    """Quadratic velocity parts of the second derivatives of all six into s.curved.
+
+    On rotations g is a function of the cosine c alone, with (1 - c^2) dg/dc = c g - 1.
+    """
+    d, dd = subtract(get(w.r, j), get(w.r, i)), subtract(get(w.rd, j), get(w.rd, i))
+    db, axes, rate, bias = subtract(get(w.rb, j), get(w.rb, i)), s.axes, s.turn[1], s.turn[2]
+    for k in range(3):
+        moved = dot(get(axes[0, 3], k), d) + 2.0 * dot(get(axes[0, 2], k), dd)
+        s.curved[k] = moved + dot(get(axes[0, 1], k), db)
+        for l in range(3):  # noqa: E741
+            ends = dot(get(axes[0, 3], k), get(axes[1, 1], l)) + dot(get(axes[0, 1], k), get(axes[1, 3], l))
+            bias[k, l] = ends + 2.0 * dot(get(axes[0, 2], k), get(axes[1, 2], l))
+    z, g, g_s, g_c = turn
+    cosine, square = 0.5 * (s.turn[0, 0, 0] + s.turn[0, 1, 1] + s.turn[0, 2, 2] - 1.0), dot(z, z)
+    speed, growth = 0.5 * (rate[0, 0] + rate[1, 1] + rate[2, 2]), 0.5 * (bias[0, 0] + bias[1, 1] + bias[2, 2])
+    slope = g_c - cosine * g_s
+    second = (g + 3.0 * cosine * slope) / square if square > 1e-3 else 4.0 / 15.0 + 12.0 / 35.0 * (1.0 - cosine)
+    z_rate, z_bias, g_bias = half_axial(rate), half_axial(bias), slope * growth + second * speed * speed
+    for c in range(3):
+        s.curved[3 + c] = g * z_bias[c] + 2.0 * slope * speed * z_rate[c] + g_bias * z[c]
+
+
+@kernel
 def weigh(z, g, g_s, g_c, moment, C):
     """C (3, 3) with moment . d(psi) = sum C_kl dB_kl."""
     power = dot(moment, z)
@@ -129,30 +156,70 @@ def combine_axes(axes, x):
 
 
 @kernel
-def apply_bushing(r, k, f):
-    """Add bushing k to f (V,), and keep displacement, rate and force."""
-    m, w, s, loads = r.model, r.work.markers, r.work.loads, r.model.loads
-    where, markers, i, j = m.bodies.where, m.markers, loads.row[k, END_I], loads.row[k, END_J]
-    frames, x = part(loads.data, loads.row[k, PLACE], 18), part(s.measured, loads.row[k, MEASURED], 18)
-    move_axes(frames, w, s.axes, i, j)
-    relate(s.axes, s.turn)
-    z, g, g_s, g_c = measure_bushing(w, s, i, j, x)
-    six_forces(loads.data, loads.row[k, LAW], x)
-    weigh(z, g, g_s, g_c, (x[15], x[16], x[17]), s.turn[2])
-    ui, uj, C = get(w.u, i), get(w.u, j), s.turn[2]
+def displacement_sides(w, axes, i, j, force):
+    """Sides of a force (3,) on the displacement."""
+    on_i, on_j = combine_axes(axes[0, 0], force), to_body(w.A[w.body[j]], combine_axes(axes[0, 1], force))
+    turn = cross(on_i, to_body(w.A[w.body[i]], subtract(get(w.r, j), get(w.r, i))))
+    side_i = (scale(-1.0, on_i), add(turn, cross(on_i, get(w.u, i))), on_shapes(w, i, turn))
+    return side_i, (on_j, cross(get(w.u, j), on_j), ZERO)
 
-    force, a = (x[12], x[13], x[14]), s.axes[0, 0]
-    d = to_body(w.A[w.body[i]], subtract(get(w.r, j), get(w.r, i)))
-    on_i, on_j = combine_axes(a, force), to_body(w.A[w.body[j]], combine_axes(s.axes[0, 1], force))
-    turn = cross(on_i, d)
-    side_i = (scale(-1.0, on_i), add(turn, cross(on_i, ui)), on_shapes(w, i, turn))
-    apply_side(where, markers, w, f, i, 1.0, side_i)
-    apply_side(where, markers, w, f, j, 1.0, (on_j, cross(uj, on_j), ZERO))
-    apply_side(where, markers, w, f, i, 1.0, turning_side(w, i, a, s.axes[1, 1], C, False))
-    apply_side(where, markers, w, f, j, 1.0, turning_side(w, j, s.axes[1, 0], s.axes[0, 1], C, True))
+
+@kernel
+def rotation_sides(w, s, i, j, turn, moment):
+    """Sides of a moment (3,) on the rotation vector; turn: what `measure_bushing` returned."""
+    z, g, g_s, g_c = turn
+    weigh(z, g, g_s, g_c, moment, s.turn[2])
+    side_i = turning_side(w, i, s.axes[0, 0], s.axes[1, 1], s.turn[2], False)
+    return side_i, turning_side(w, j, s.axes[1, 0], s.axes[0, 1], s.turn[2], True)
+
+
+@kernel
+def unit(c):
+    return (1.0 if c == 0 else 0.0, 1.0 if c == 1 else 0.0, 1.0 if c == 2 else 0.0)
+
+
+@kernel
+def keep_rows(r, k, turn, x):
+    """The rows of the directions that have stiffness or damping, where the bushing is implicit.
+
+    Data: after those of the force slopes that exceed stiffness (6) and damping (6), whatever couples the directions.
+    """
+    w, s, loads = r.work.markers, r.work.loads, r.model.loads
+    if loads.row[k, BLOCK] < 0:
+        return
+    data, start, i, j, number = loads.data, loads.row[k, LAW], loads.row[k, END_I], loads.row[k, END_J], 0
+    curve_motion(w, s, i, j, turn)
+    curved = s.curved
+    for c in range(6):
+        stiffness, damping, curve = data[start + 84 + c], data[start + 90 + c], int(data[start + 78 + c])
+        if stiffness <= 0.0 and damping <= 0.0 and curve < 0:
+            continue
+        if curve >= 0:
+            stiffness += curve_slope(data, curve, x[c])
+        if c < 3:
+            side_i, side_j = displacement_sides(w, s.axes, i, j, unit(c))
+        else:
+            side_i, side_j = rotation_sides(w, s, i, j, turn, unit(c - 3))
+        keep_row(r, k, number, x[c], x[6 + c], (curved[c], side_i, side_j), stiffness, damping)
+        number += 1
 
 
 @force_kernel
 def bushing(r: Tables, k: int, x: Vector, f: Vector) -> int:
-    apply_bushing(r, k, vector_at(f, r.v.size))
+    """Adds the bushing to f, and keeps displacement, rate and force."""
+    m, w, s, loads = r.model, r.work.markers, r.work.loads, r.model.loads
+    where, markers, i, j = m.bodies.where, m.markers, loads.row[k, END_I], loads.row[k, END_J]
+    frames, six = part(loads.data, loads.row[k, PLACE], 18), part(s.measured, loads.row[k, MEASURED], 18)
+    move_axes(frames, w, s.axes, i, j)
+    relate(s.axes, s.turn)
+    turn = measure_bushing(w, s, i, j, six)
+    six_forces(loads.data, loads.row[k, LAW], six)
+    own = vector_at(f, r.v.size)
+    side_i, side_j = displacement_sides(w, s.axes, i, j, (six[12], six[13], six[14]))
+    apply_side(where, markers, w, own, i, 1.0, side_i)
+    apply_side(where, markers, w, own, j, 1.0, side_j)
+    side_i, side_j = rotation_sides(w, s, i, j, turn, (six[15], six[16], six[17]))
+    apply_side(where, markers, w, own, i, 1.0, side_i)
+    apply_side(where, markers, w, own, j, 1.0, side_j)
+    keep_rows(r, k, turn, six)
     return OK

@@ -8,25 +8,27 @@ Twin: `ffr_dyn.equations.forces.applied`.
 
 import math
 
+from ffr_dyn.kernels.forces.implicit import keep_row
 from ffr_dyn.kernels.markers import project, shapes
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.rows import ZERO, coordinate
 from ffr_dyn.kernels.simd.slices import part, vector_at
-from ffr_dyn.kernels.tables import ANGLE, END_I, END_J, FUNCTION, IN_V, LENGTH, MEASURED, PLACE, WAY, N
+from ffr_dyn.kernels.tables import ANGLE, BY_TIME, END_I, END_J, FUNCTION, IN_V, LENGTH, MEASURED, PLACE, WAY, N
 from ffr_dyn.kernels.vectors import cross, dot, get, scale, subtract, to_body
 
 
 @kernel
 def length(w, i, j):
-    """Length, rate and sides of the distance between two points; no direction, and no force, where it is zero."""
-    d = subtract(get(w.r, j), get(w.r, i))
+    """Distance between two points, its rate and motion; no direction, and no force, where it is zero."""
+    d, dd = subtract(get(w.r, j), get(w.r, i)), subtract(get(w.rd, j), get(w.rd, i))
     size = dot(d, d) ** 0.5
     if size == 0.0:
-        return 0.0, 0.0, (ZERO, ZERO, ZERO), (ZERO, ZERO, ZERO)
+        return 0.0, 0.0, (0.0, (ZERO, ZERO, ZERO), (ZERO, ZERO, ZERO))
     along = scale(1.0 / size, d)
-    rate = dot(along, subtract(get(w.rd, j), get(w.rd, i)))
+    rate = dot(along, dd)
+    bias = dot(along, subtract(get(w.rb, j), get(w.rb, i))) + (dot(dd, dd) - rate * rate) / size
     bi, bj = to_body(w.A[w.body[i]], scale(-1.0, along)), to_body(w.A[w.body[j]], along)
-    return size, rate, (bi, cross(get(w.u, i), bi), ZERO), (bj, cross(get(w.u, j), bj), ZERO)
+    return size, rate, (bias, (bi, cross(get(w.u, i), bi), ZERO), (bj, cross(get(w.u, j), bj), ZERO))
 
 
 @kernel
@@ -42,15 +44,18 @@ def three(data, start):
 
 @kernel
 def coordinate_of(r, k):
-    """Coordinate, rate and sides (see `rows`) of force k; r: `Tables`."""
+    """Coordinate of force k, its rate and its motion: the quadratic velocity part of its second derivative, and its sides
+    (see `rows`); r: `Tables`."""
     row, data, w = r.model.loads.row, r.model.loads.data, r.work.markers
     way, i, j, at = row[k, WAY], row[k, END_I], row[k, END_J], row[k, PLACE]
     if way == LENGTH:
         return length(w, i, j)
-    value, rate, _, side_i, side_j = coordinate(way, three(data, at), three(data, at + 3), three(data, at + 6), w, i, j)
+    value, rate, gamma, side_i, side_j = coordinate(
+        way, three(data, at), three(data, at + 3), three(data, at + 6), w, i, j
+    )
     if way == ANGLE:
         value = lifted(value, r.work.loads.reference[row[k, MEASURED]])
-    return value, rate, side_i, side_j
+    return value, rate, (-gamma, side_i, side_j)
 
 
 @kernel
@@ -75,11 +80,17 @@ def apply_side(where, markers, w, f, k, amount, side):
 
 
 @kernel
-def apply_along(r, k, f, value, rate, side_i, side_j, force):
-    """Add the force on a coordinate to the vector f, and keep it with coordinate and rate."""
+def apply_along(r, k, f, value, rate, motion, force, stiffness=0.0, damping=0.0, by_time=0.0):
+    """Add the force on a coordinate to the vector f, and keep it with coordinate and rate.
+
+    stiffness, damping : how much the force falls with coordinate and rate, or more, for implicit methods; zeros: explicit
+    by_time            : how fast it grows where coordinate and rate stay
+    """
     m, row, w, kept = r.model, r.model.loads.row, r.work.markers, r.work.loads.measured
     at, i, j = row[k, MEASURED], row[k, END_I], row[k, END_J]
     kept[at], kept[at + 1], kept[at + 2] = value, rate, force
     f = vector_at(f, r.v.size)
-    apply_side(m.bodies.where, m.markers, w, f, i, force, side_i)
-    apply_side(m.bodies.where, m.markers, w, f, j, force, side_j)
+    force += r.work.implicit[BY_TIME] * by_time
+    apply_side(m.bodies.where, m.markers, w, f, i, force, motion[1])
+    apply_side(m.bodies.where, m.markers, w, f, j, force, motion[2])
+    keep_row(r, k, 0, value, rate, motion, stiffness, damping)

@@ -14,3 +14,10 @@ def curve_value(data, start, x):
     inside = min(max(x, first), last)
     value, slope, _ = piecewise(data, start, inside)
     return value + slope * (x - inside)
+
+
+@kernel
+def curve_slope(data, start, x):
+    """The slope of a curve at x."""
+    first, last = data[start + 2], data[start + 2 + int(data[start])]
+    return piecewise(data, start, min(max(x, first), last))[1]

@@ -12,19 +12,23 @@ from ffr_dyn.kernels.tables import LAW, OK, Tables, Vector
 
 
 @kernel
-def rubbing(data, start, rate, normal):
-    """data: Coulomb friction, what friction at rest has more, Stribeck's velocity, creep velocity, viscous damping."""
-    fall = rate / data[start + 2]
+def drag(data, start, rate, normal):
+    """Friction over the rate: what an implicit method goes by, since the slope is nothing where friction has its full size.
+
+    data: Coulomb friction, what friction at rest has more, Stribeck's velocity, creep velocity, viscous damping.
+    """
+    fall, share = rate / data[start + 2], rate / data[start + 3]
     size = data[start] + data[start + 1] * math.exp(-fall * fall)
     if normal < 0.0:  # lifted off
         size = 0.0
-    return -normal * size * math.tanh(rate / data[start + 3]) - data[start + 4] * rate
+    steep = math.tanh(share) / share if abs(share) > 1e-6 else 1.0
+    return normal * size * steep / data[start + 3] + data[start + 4]
 
 
 @force_kernel
 def friction(r: Tables, k: int, x: Vector, f: Vector) -> int:
-    value, rate, side_i, side_j = coordinate_of(r, k)
+    value, rate, motion = coordinate_of(r, k)
     loads = r.model.loads
-    force = rubbing(loads.data, loads.row[k, LAW], rate, drive_of(r, k)[0])
-    apply_along(r, k, f, value, rate, side_i, side_j, force)
+    damping = drag(loads.data, loads.row[k, LAW], rate, drive_of(r, k)[0])
+    apply_along(r, k, f, value, rate, motion, -damping * rate, 0.0, damping)
     return OK

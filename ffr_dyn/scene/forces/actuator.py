@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from ffr_dyn.scene.fields import OfMotion
 from ffr_dyn.scene.force_kinds import register_force
-from ffr_dyn.scene.forces.checks import check_function
+from ffr_dyn.scene.forces.checks import check_function, check_number
 from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.given import given_numbers
 from ffr_dyn.scene.forces.places import OnJoint
@@ -21,6 +21,8 @@ class Actuator(Force):
 
     force    : a number, a time function (constant, harmonic, table, ...) or a Python function of time
     function : added to it, a Python function (t, state) -> number; `state` is a `ffr_dyn.equations.state_view.StateView`
+    stiffness, damping : how much the function falls with the coordinate and its rate, or more [N/m], [N s/m]: implicit
+        methods, which cannot see it, then bear any step. They change no force
     """
 
     word = "actuator"
@@ -34,9 +36,13 @@ class Actuator(Force):
     force: Annotated[Any, OfMotion()] = 0.0
     function: Callable[..., Any] | None = None
     coordinate: str = "angle"
+    stiffness: float = 0.0
+    damping: float = 0.0
 
     def __post_init__(self) -> None:
         check_function(self.force, f"{self.place.who}: force")
+        check_number(self.stiffness, f"{self.place.who}: stiffness", least=0.0)
+        check_number(self.damping, f"{self.place.who}: damping", least=0.0)
 
     @property
     def place(self) -> OnJoint:
@@ -46,6 +52,13 @@ class Actuator(Force):
         added = 0.0 if self.function is None else float(self.function(now.t, now.state))
         return now.value(self.force)[0] + added
 
+    @property
+    def stiff_coordinates(self) -> tuple[int, ...]:
+        return (0,) if self.stiffness or self.damping else ()
+
+    def slopes(self, now: Moment, c: float, rate: float) -> tuple[float, float]:
+        return self.stiffness, self.damping
+
     def compiled(self, table: LoadTable) -> LawNumbers:
-        numbers = given_numbers((self.force,), self.place.who, table)
+        numbers = [*given_numbers((self.force,), self.place.who, table), self.stiffness, self.damping]
         return LawNumbers(numbers, user=table.callback(self.function, 1))

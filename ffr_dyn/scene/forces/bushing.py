@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ffr_dyn.functions.curves import Curve, curve_value
+from ffr_dyn.functions.curves import Curve, curve_slope, curve_value
 from ffr_dyn.functions.rotation import triad
 from ffr_dyn.scene.fields import Direction
 from ffr_dyn.scene.force_kinds import register_force
@@ -96,10 +96,22 @@ class Bushing(Force):
         force: Array = np.array(self.preload) - self.stiffness_matrix @ c - self.damping_matrix @ rate - curves
         return force
 
+    @property
+    def stiff_coordinates(self) -> tuple[int, ...]:
+        found = dominating(self.stiffness_matrix) + dominating(self.damping_matrix)
+        return tuple(c for c in range(6) if found[c] > 0 or self.curves[c] is not None)
+
+    def slopes(self, now: Moment, c: Array, rate: Array) -> tuple[Array, Array]:
+        """By direction, whatever couples them."""
+        own, stiffness = list(self.stiff_coordinates), dominating(self.stiffness_matrix)
+        curves = [0.0 if curve is None else curve_slope(curve, x) for curve, x in zip(self.curves, c, strict=True)]
+        return (stiffness + curves)[own], dominating(self.damping_matrix)[own]
+
     def compiled(self, table: LoadTable) -> LawNumbers:
-        """Stiffness (36), damping (36), preload (6), start of the curve of each direction or -1 (6)."""
+        """Stiffness (36), damping (36), preload (6), start of the curve of each direction or -1 (6), slopes (12)."""
         curves = [table.curve(curve) for curve in self.curves]
-        parts = [self.stiffness_matrix, self.damping_matrix, np.array(self.preload, float), np.array(curves)]
+        slopes = [dominating(self.stiffness_matrix), dominating(self.damping_matrix)]
+        parts = [self.stiffness_matrix, self.damping_matrix, np.array(self.preload, float), np.array(curves), *slopes]
         return LawNumbers(np.concatenate([np.ravel(part) for part in parts]))
 
     def energy(self, c: Array) -> Array:
@@ -109,3 +121,11 @@ class Bushing(Force):
                 total += 0.5 * K[row, column] * c[:, row] * c[:, column]
             total += (0.0 if curve is None else elastic_energy(curve, c[:, row])) - preload * c[:, row]
         return total
+
+
+def dominating(matrix: Array) -> Array:
+    """(6,) a diagonal that exceeds a symmetric matrix (their difference has no negative eigenvalue), whatever the units."""
+    unit = np.sqrt(np.abs(np.diag(matrix)))
+    unit[unit == 0] = 1.0
+    found: Array = unit * (np.abs(matrix) @ (1 / unit))
+    return found

@@ -88,6 +88,16 @@ class Force(ABC):
     def compiled(self, table: LoadTable) -> LawNumbers:
         """What the kernel reads of the law."""
 
+    @property
+    def stiff_coordinates(self) -> tuple[int, ...]:
+        """Numbers of the place's coordinates along which implicit methods take it so; none: it is explicit everywhere."""
+        return ()
+
+    def slopes(self, now: Moment, c: Any, rate: Any) -> tuple[Any, Any]:
+        """What the kernel gives to implicit methods: how much the force falls with each of those coordinates and with its
+        rate. Stability asks that they are no less than what the law does; negative ones count as zero."""
+        return 0.0, 0.0
+
     def energy(self, c: Array) -> Array:
         """(T,) [J] stored at recorded coordinates (T,) or (T, 6)."""
         return np.zeros(len(c))

@@ -63,13 +63,24 @@ class JointFriction(Force):
         return OnJoint(f"force {self.name!r}", self.joint, self.coordinate)
 
     def law(self, now: Moment, c: float, rate: float) -> float:
-        normal = now.value(self.normal)[0]
-        if normal < 0:  # lifted off
-            return -self.viscous * rate
+        return float(-self._size(now, rate) * np.tanh(rate / self.creep) - self.viscous * rate)
+
+    def _size(self, now: Moment, rate: float) -> float:
+        """Dry friction beyond creep."""
         size = self.coulomb
         if self.static is not None and self.stribeck is not None:
             size += (self.static - self.coulomb) * float(np.exp(-((rate / self.stribeck) ** 2)))
-        return float(-normal * size * np.tanh(rate / self.creep) - self.viscous * rate)
+        return max(now.value(self.normal)[0], 0.0) * size  # below zero it is lifted off
+
+    @property
+    def stiff_coordinates(self) -> tuple[int, ...]:
+        return (0,)
+
+    def slopes(self, now: Moment, c: float, rate: float) -> tuple[float, float]:
+        """The force over the rate: its slope says nothing where friction has its full size."""
+        share = rate / self.creep
+        steep = np.tanh(share) / share if abs(share) > 1e-6 else 1.0
+        return 0.0, float(self._size(now, rate) * steep / self.creep + self.viscous)
 
     def compiled(self, table: LoadTable) -> LawNumbers:
         """Coulomb friction, what friction at rest has more, Stribeck's velocity, creep velocity, viscous damping."""

@@ -67,6 +67,21 @@ class JointStop(Force):
         share = min(depth / self.entry, 1.0)
         return max(self.stiffness * elastic + self.damping * speed * share**2 * (3 - 2 * share), 0.0)
 
+    @property
+    def stiff_coordinates(self) -> tuple[int, ...]:
+        return (0,)
+
+    def slopes(self, now: Moment, c: float, rate: float) -> tuple[float, float]:
+        """W-methods go by the depth that the step reaches, where that is more."""
+        below = (0.0, 0.0) if self.lower is None else self._slopes(self.lower - c, -rate)
+        above = (0.0, 0.0) if self.upper is None else self._slopes(c - self.upper, rate)
+        return below[0] + above[0], below[1] + above[1]
+
+    def _slopes(self, depth: float, speed: float) -> tuple[float, float]:
+        share = min(max(depth, 0.0) / self.entry, 1.0)
+        growth = 6 * self.damping * max(speed, 0.0) * share * (1 - share) / self.entry
+        return self.stiffness * share + growth, self.damping * share**2 * (3 - 2 * share)
+
     def compiled(self, table: LoadTable) -> LawNumbers:
         """Lower and upper end, stiffness, damping, entry."""
         lower = -np.inf if self.lower is None else self.lower

@@ -51,8 +51,21 @@ class Servo(Force):
         return OnJoint(f"force {self.name!r}", self.joint, self.coordinate, self.turns)
 
     def law(self, now: Moment, c: float, rate: float) -> float:
+        return float(np.clip(self._wanted(now, c, rate), -self.limit, self.limit))
+
+    def _wanted(self, now: Moment, c: float, rate: float) -> float:
         target, speed, _ = now.value(self.target)
-        return float(np.clip(self.kp * (target - c) + self.kd * (speed - rate), -self.limit, self.limit))
+        return self.kp * (target - c) + self.kd * (speed - rate)
+
+    @property
+    def stiff_coordinates(self) -> tuple[int, ...]:
+        return (0,) if self.kp or self.kd else ()
+
+    def slopes(self, now: Moment, c: float, rate: float) -> tuple[float, float]:
+        """Less where it is limited: those of the line from zero to the limit."""
+        wanted = abs(self._wanted(now, c, rate))
+        share = self.limit / wanted if wanted > self.limit else 1.0
+        return share * self.kp, share * self.kd
 
     def compiled(self, table: LoadTable) -> LawNumbers:
         return LawNumbers([self.kp, self.kd, self.limit], table.function(self.target))

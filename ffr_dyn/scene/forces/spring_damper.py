@@ -11,7 +11,7 @@ from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_damping, check_number, check_number_or_curve
 from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.places import AlongLine
-from ffr_dyn.scene.forces.spring_law import compiled_spring, spring_force, stored
+from ffr_dyn.scene.forces.spring_law import compiled_spring, spring_force, spring_slopes, stiff, stored
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -58,6 +58,13 @@ class SpringDamper(Force):
 
     def law(self, now: Moment, c: float, rate: float) -> float:
         return spring_force(self.stiffness, self.damping, self.preload, c - self.free_length, rate)
+
+    @property
+    def stiff_coordinates(self) -> tuple[int, ...]:
+        return stiff(self.stiffness, self.damping)
+
+    def slopes(self, now: Moment, c: float, rate: float) -> tuple[float, float]:
+        return spring_slopes(self.stiffness, self.damping, c - self.free_length, rate)
 
     def compiled(self, table: LoadTable) -> LawNumbers:
         return compiled_spring(self.stiffness, self.damping, self.free_length, self.preload, table)

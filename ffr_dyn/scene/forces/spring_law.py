@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ffr_dyn.functions.curves import Curve, curve_integral, curve_value
+from ffr_dyn.functions.curves import Curve, curve_integral, curve_slope, curve_value
 from ffr_dyn.scene.forces.force import LawNumbers, LoadTable
 from ffr_prep.common.arrays import Array
 
@@ -12,6 +12,20 @@ def spring_force(
 ) -> float:
     """The force that increases the stretch [m]."""
     return -_of(stiffness, stretch) - _of(damping, rate) - preload
+
+
+def spring_slopes(stiffness: float | Curve, damping: float | Curve, stretch: float, rate: float) -> tuple[float, float]:
+    """By stretch and by rate; of a curve over the rate at least the chord from rest, for those that grow less and less."""
+    d = damping
+    if isinstance(damping, Curve):
+        chord = (curve_value(damping, rate) - curve_value(damping, 0.0)) / rate if rate else 0.0
+        d = max(curve_slope(damping, rate), chord)
+    return curve_slope(stiffness, stretch) if isinstance(stiffness, Curve) else stiffness, float(d)  # type: ignore[arg-type]
+
+
+def stiff(stiffness: float | Curve, damping: float | Curve) -> tuple[int, ...]:
+    """The one coordinate of a spring, unless it is none."""
+    return (0,) if any(isinstance(factor, Curve) or factor > 0 for factor in (stiffness, damping)) else ()
 
 
 def compiled_spring(

@@ -72,6 +72,7 @@ def test_the_method_that_the_interface_shows_swings_a_pendulum(tmp_path):
         numbers: ClassVar[tuple[float, ...]] = ()
         order: ClassVar[int] = 1
         implicit: ClassVar[bool] = False
+        takes_forces: ClassVar[bool] = False
         reach: ClassVar[float] = 0.0
         controlled: ClassVar[bool] = False
         repeatable: ClassVar[bool] = False

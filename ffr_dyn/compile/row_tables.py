@@ -1,0 +1,131 @@
+"""Constraint rows -> the tables that the kernels read: rows, and how the multiplier matrix is assembled and factorised."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+
+import numpy as np
+
+from ffr_dyn.compile.body_tables import starts
+from ffr_dyn.compile.elimination import Elimination
+from ffr_dyn.compile.force_tables import FunctionTable
+from ffr_dyn.equations.constraint_rows import Block
+from ffr_dyn.equations.layout import Layout
+from ffr_dyn.equations.second_order import is_second_order
+from ffr_dyn.kernels.tables import LANES, WAYS, WORDS, Markers, Pattern, Rows
+from ffr_dyn.scene.joints import Word
+from ffr_dyn.scene.scene import MarkerName, Scene
+from ffr_prep.common.arrays import Array
+
+
+def moving_bodies(block: Block, table: tuple[MarkerName, ...], ground: int) -> tuple[int, ...]:
+    """The bodies that a block ties, each once."""
+    return tuple(dict.fromkeys(table[k][0] for k in block.markers if table[k][0] != ground))
+
+
+def alike(scene: Scene, place: Layout) -> list[Hashable]:
+    """Per body, what two bodies have in common whose elastic coordinates couple equal markers equally."""
+    return [
+        (id(body.model), np.asarray(body.damping).tobytes(), place.normals[b], b if is_second_order(body) else -1)
+        for b, body in enumerate(scene.bodies)
+    ]
+
+
+def row_tables(blocks: tuple[Block, ...], functions: FunctionTable) -> Rows:
+    """The rows of all blocks; their functions of time go to `functions`."""
+    said = [(block, word) for block in blocks for word in block.words]
+    function = [-1 if w.function is None else functions.add(w.function, f"{b.name!r}") for b, w in said]
+    listed = [word for _, word in said]
+    axes = np.zeros((len(listed), 6, 3))
+    for row, word in enumerate(listed):
+        axes[row, : len(word.axes)] = word.axes
+    sides = max((len(block.markers) for block in blocks), default=2)
+    marker = np.array([b.markers + (-1,) * (sides - len(b.markers)) for b in blocks], dtype=np.int64).reshape(-1, sides)
+    begin = starts([len(b.words) for b in blocks])
+    return Rows(
+        kind=np.array([WORDS.index(word.kind) for word in listed], dtype=np.int64),
+        axes=axes,
+        relation=np.array([_relation(word) for word in listed], dtype=float).reshape(-1, 5),
+        function=np.array(function, dtype=np.int64),
+        start=begin,
+        forced=begin[1:].copy(),
+        reaction=np.arange(len(blocks), dtype=np.int64),
+        marker=marker,
+        first=first_of_each(marker),
+    )
+
+
+def _relation(word: Word) -> tuple[float, ...]:
+    """`Rows.relation` of a word."""
+    terms = word.relation or ((0.0, "angle"),) * 2
+    return *(number for factor, kind in terms for number in (factor, WAYS[kind])), word.spacing
+
+
+def first_of_each(numbers: Array) -> Array:
+    """Of numbers in any order, 1 where one is there for the first time."""
+    first = np.zeros(numbers.size, dtype=np.int64)
+    first[np.unique(numbers, return_index=True)[1]] = 1
+    return first.reshape(numbers.shape)
+
+
+def pattern_of(
+    blocks: tuple[Block, ...],
+    moving: list[tuple[int, ...]],
+    elimination: Elimination,
+    marked: Markers,
+    equal: Sequence[Hashable],
+) -> Pattern:
+    """equal : of the bodies, as `alike` tells"""
+    size = [len(b.words) for b in blocks]
+    offsets: dict[tuple[int, int], int] = {}
+    total = 0
+    for k, column in enumerate(elimination.columns):
+        for later in (k, *column):
+            offsets[later, k] = total
+            total += LANES * size[k]
+    sides = [[int(marked.body[marker]) for marker in block.markers] for block in blocks]
+    pairs = [
+        (b, later, side, earlier, other, offsets[later, earlier])
+        for earlier in range(len(blocks))
+        for later in (earlier, *elimination.columns[earlier])
+        for b in moving[earlier]
+        for side in _where(sides[later], b)
+        for other in _where(sides[earlier], b)
+    ]
+    listed = np.array(sorted(pairs, key=lambda pair: pair[1]), dtype=np.int64).reshape(-1, 6)
+    shared = _shared(listed, [block.markers for block in blocks], marked, equal)
+    reach = [max(column, default=k) for k, column in enumerate(elimination.columns)]
+    updates = [
+        [offsets[a, b] for at, a in enumerate(column) for b in column[: at + 1]] for column in elimination.columns
+    ]
+    stored = [(later, offsets[later, k]) for k, column in enumerate(elimination.columns) for later in column]
+    return Pattern(
+        pair_body=listed[:, 0].copy(),
+        pair=np.column_stack([listed[:, 1:], shared]),
+        sample=np.unique(shared, return_index=True)[1],
+        pair_start=starts(np.bincount(listed[:, 1], minlength=len(blocks)).tolist()),
+        reach=np.array(np.maximum.accumulate(reach), dtype=np.int64) if reach else np.zeros(0, dtype=np.int64),
+        diagonal=np.array([offsets[k, k] for k in range(len(blocks))], dtype=np.int64),
+        column_start=starts([len(column) for column in elimination.columns]),
+        column=np.array(stored, dtype=np.int64).reshape(-1, 2),
+        update_start=starts([len(column) for column in updates]),
+        update=np.array([offset for column in updates for offset in column], dtype=np.int64),
+    )
+
+
+def _shared(pairs: Array, of: list[tuple[int, ...]], marked: Markers, equal: Sequence[Hashable]) -> Array:
+    """(P,) numbers of pairs, the same for those of equal markers on equal bodies; `of`: the markers of each block."""
+    numbers: dict[Hashable, int] = {}
+    return np.array(
+        [
+            numbers.setdefault(
+                (equal[b], *(int(marked.start[of[k][side]]) for k, side in ((later, i), (earlier, j)))), len(numbers)
+            )
+            for b, later, i, earlier, j, _ in pairs.tolist()
+        ],
+        dtype=np.int64,
+    )
+
+
+def _where(sides: list[int], body: int) -> list[int]:
+    return [k for k, b in enumerate(sides) if b == body]
