@@ -23,7 +23,7 @@ from ffr_prep.body.reduced import (
 )
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.outputs import note_input, replacing
-from ffr_prep.common.reading import read_arrays
+from ffr_prep.common.stored_arrays import read_arrays
 
 MAGIC = "ffr-body"
 # 2 adds stress modes and section forces, 3 the parts of a body that is cut. Files of before are read as bodies without them,

@@ -16,7 +16,6 @@ from ffr_prep.cli.settings import EntriesCommand
 from ffr_prep.cli.terminal import show, terminal_steps
 from ffr_prep.common.command import INPUT_FILE, reserve
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.reading import check_count
 from ffr_prep.matrices.formats import MATRIX_FORMATS
 from ffr_prep.matrices.unit_systems import UNIT_SYSTEMS
 from ffr_prep.reduction.registry import REDUCTIONS
@@ -103,6 +102,8 @@ def _named(model: MatrixModel, groups: Sequence[str]) -> MatrixModel:
 
 
 def _numbers(text: str) -> list[int]:
+    from ffr_prep.common.reading import check_count
+
     ends = [(int(first), int(last or first)) for first, _, last in (part.partition("-") for part in text.split(","))]
     if wrong := [f"{first}-{last}" for first, last in ends if last < first]:
         raise InputError(f"--group: the range {wrong[0]} runs backwards; write the smaller number first")

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.reading import read_toml
 from ffr_prep.mesh.time_limit import USUAL, mesher_time_limit
 
 if TYPE_CHECKING:
@@ -54,7 +53,7 @@ def tell_of_programs(paths: Iterable[Path]) -> None:
     """Scripts of gmsh are programs; that one is run is said."""
     for path in paths:
         if path.suffix.lower() == ".geo":
-            click.echo(f"ffr-prep: {path} is a program, which gmsh runs: open only what you trust", err=True)
+            click.echo(f"program     {path}, which gmsh runs: open only what you trust")
 
 
 def gone(option: str, remedy: str) -> Decorator:
@@ -138,6 +137,7 @@ def reference_of(text: str) -> ReferenceConditions:
 
 def _supports(path: Path) -> ReferenceConditions:
     """Prevented motions from a file: tables [[support]] with interface, motion and direction."""
+    from ffr_prep.common.reading import read_toml
     from ffr_prep.model.reference import Support, Supports
 
     try:

@@ -99,13 +99,13 @@ def replacing(path: str | Path) -> Iterator[Path]:
             yield part
             _to_disk(part)
             check_output(path)
+            os.replace(part, path)
         except OSError as error:
             part.unlink(missing_ok=True)
             raise ComputationError(not_written(path, error)) from error
         except BaseException:
             part.unlink(missing_ok=True)
             raise
-        os.replace(part, path)
 
 
 def not_written(path: Path, error: OSError) -> str:

@@ -22,7 +22,7 @@ import scipy.sparse as sp
 from ffr_prep.body import save_arrays
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.reading import read_arrays
+from ffr_prep.common.stored_arrays import read_arrays
 from ffr_prep.matrices.model import MatrixModel
 from ffr_prep.matrices.node_table import NodeTable, model_of
 
