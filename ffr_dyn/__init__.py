@@ -51,7 +51,7 @@ _BY_MODULE = {
     "ffr_dyn.results.stress": "hot_spots peaks section_forces section_histories section_peaks stress_histories",
     "ffr_dyn.consistency.assemble": "Assembled assemble",
     "ffr_dyn.consistency.mobility": "Mobility mobility",
-    "ffr_dyn.consistency.validity": "parts_needed",
+    "ffr_dyn.consistency.validity": "in_enough_parts parts_needed",
     "ffr_dyn.pictures.animate": "animate",
     "ffr_dyn.pictures.histories": "plot plot_path",
     "ffr_dyn.pictures.stress_report": "report_lines stress_report",
@@ -142,7 +142,7 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     )
     from ffr_dyn.consistency.assemble import Assembled as Assembled, assemble as assemble
     from ffr_dyn.consistency.mobility import Mobility as Mobility, mobility as mobility
-    from ffr_dyn.consistency.validity import parts_needed as parts_needed
+    from ffr_dyn.consistency.validity import in_enough_parts as in_enough_parts, parts_needed as parts_needed
     from ffr_dyn.pictures.animate import animate as animate
     from ffr_dyn.pictures.histories import plot as plot, plot_path as plot_path
     from ffr_dyn.pictures.stress_report import report_lines as report_lines, stress_report as stress_report

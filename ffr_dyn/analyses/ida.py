@@ -17,17 +17,8 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.consistency.assemble import Assembled
-from ffr_dyn.consistency.evaluation import (
-    Evaluator,
-    accelerations,
-    closed,
-    evaluate,
-    evaluated_mass_matrix,
-    locked,
-    to_body_axes,
-    to_global_axes,
-)
-from ffr_dyn.equations.layout import Layout
+from ffr_dyn.consistency.evaluation import Evaluator, accelerations, closed, evaluate, evaluated_mass_matrix, locked
+from ffr_dyn.equations.layout import Layout, to_body_axes, to_global_axes
 from ffr_dyn.equations.motion import position_rates
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError

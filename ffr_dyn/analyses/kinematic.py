@@ -20,18 +20,9 @@ from ffr_dyn.analyses.outcome import output_times, result_of
 from ffr_dyn.analyses.registry import OverTime
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble
-from ffr_dyn.consistency.evaluation import (
-    Evaluation,
-    Evaluator,
-    copied,
-    evaluate,
-    evaluator,
-    joined,
-    moved,
-    to_global_axes,
-    total_mass_matrix,
-)
+from ffr_dyn.consistency.evaluation import Evaluation, Evaluator, copied, evaluate, evaluator, joined, total_mass_matrix
 from ffr_dyn.consistency.mobility import named_motion, require_driven
+from ffr_dyn.equations.layout import moved, to_global_axes
 from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result

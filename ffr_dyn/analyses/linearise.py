@@ -23,9 +23,11 @@ from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
 from ffr_dyn.compile.engine import with_model
 from ffr_dyn.consistency.assemble import assemble, in_space
-from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator, to_global_axes
+from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
 from ffr_dyn.consistency.mobility import named_motion
 from ffr_dyn.consistency.tangent import Chart, chart, derivative, rates, sizes, state, state_matrix
+from ffr_dyn.consistency.validity import strained_in
+from ffr_dyn.equations.layout import to_global_axes
 from ffr_dyn.kernels.tables import LAW
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.quantities import catalogue
@@ -48,7 +50,7 @@ class Linearisation(Brief):
     Z           : (V, d) free motions, in body axes [A^T R_dot, omega_bar, q_dot]
     eigenvalues : (2d,) [1/s] by rising modulus;  modes : (V, 2d) the motions of the bodies that belong to them
     leading     : what moves most in each mode
-    error       : relative difference of A from step halving
+    error       : relative difference of A from step halving; zero at rest, where A is exact
     """
 
     A: Array
@@ -142,7 +144,7 @@ def linearise(
     modes = modes / np.where((size := np.abs(modes).max(axis=0)) > 0, size, 1.0)
     leading = tuple(_leading(near, mode) for mode in modes.T)
     names = tuple(item if isinstance(item, str) else item.name for item in inputs)
-    notes = (*assembled.notes, *_stationary_notes(near))
+    notes = (*assembled.notes, *_stationary_notes(near), *strained_in(at.system, at.record))
     return Linearisation(A, B, C, D, near.Z, eigenvalues, modes, leading, names, tuple(outputs), error, notes)
 
 
@@ -272,7 +274,9 @@ def as_result(scene: Scene, found: Linearisation, time: float = 0.0) -> Result:
     attributes = {
         **described(scene),
         "analysis": "linearised",
-        "method": f"central differences, step halving changes A by {found.error:.1e}",
+        "method": f"central differences, step halving changes A by {found.error:.1e}"
+        if found.error
+        else "exact tangent",
         "degrees_of_freedom": d,
         "stability_margin": found.stability_margin,
         "leading": list(found.leading),

@@ -1,10 +1,7 @@
 """Static equilibrium: where a scene stays at rest under gravity, loads and springs, its drivers held still.
 
-In minimal coordinates y of unit mass the residual is the acceleration from rest, r(y) = y_ddot, and K = -dr/dy the tangent
-stiffness: constraint forces, elastic forces and geometric stiffening are all in it. A step solves (K + s) dy = r with the
-smallest shift s >= 0 that makes K + s positive and the step no longer than a radius: far away it goes downhill, so that a
-stable equilibrium is found, and near it is Newton's. A step that overshoots (r . dy turns strongly negative) is taken again
-with half the radius. (Nocedal & Wright 2006, ch. 4; Matthies & Strang 1979 for the work of a step as its measure.)
+How it is found, `ffr_dyn.consistency.equilibrium` says. In minimal coordinates of unit mass the tangent stiffness tells what
+holds the scene there: a motion without stiffness is held by nothing, one of negative stiffness is unstable.
 """
 
 from __future__ import annotations
@@ -22,21 +19,26 @@ from ffr_dyn.analyses.registry import OfMoment
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import held
 from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
-from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator, record_states
-from ffr_dyn.consistency.mobility import named_motion
-from ffr_dyn.consistency.tangent import Chart, chart, movement, rates, sizes, state, stiffness
-from ffr_dyn.consistency.validity import extremes, strained
+from ffr_dyn.consistency.equilibrium import Equilibrium, equilibrium
+from ffr_dyn.consistency.evaluation import (
+    Evaluator,
+    evaluate,
+    evaluator,
+    free_motions,
+    record_states,
+    total_mass_matrix,
+)
+from ffr_dyn.consistency.mobility import counted, named_motion
+from ffr_dyn.consistency.tangent import sizes
+from ffr_dyn.consistency.validity import strained_in
 from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.parts import described
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.errors import InputError
 
-ITERATIONS = 100
-LARGEST_STEP = 0.3  # rad, or part of the scene's size
-TOLERANCE = 1e-12  # of the last step, the same
 NEUTRAL = 1e-7  # of a stiffness, relative to that of the applied forces
 ROUNDING = 1e-13  # of a stiffness, relative to the largest
 
@@ -47,16 +49,6 @@ class Static(OfMoment):
 
     def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
         return static(scene, **settings.span, **how)
-
-
-@dataclass(frozen=True)
-class _Balance:
-    """A position, what is left of the forces there (d,), tangent stiffness (d, d), and iterations so far."""
-
-    near: Chart
-    residual: Array
-    K: Array
-    iterations: int
 
 
 def static(
@@ -74,75 +66,36 @@ def static(
     assembled = assemble(in_space(held(scene, time)), time=time)
     selected(assembled.system, outputs)
     at = evaluator(assembled.system)
-    found = _balanced(at, time, assembled.x)
-    lowest = float("inf")
-    if found.residual.size:
-        values, vectors = np.linalg.eigh(0.5 * (found.K + found.K.T))
-        _require_held(found, values, vectors)
-        lowest = float(values[0])
-    return _result(scene, assembled, at, found, lowest, outputs, path)
+    found = equilibrium(assembled.system, time, assembled.x, sizes(at))
+    lowest = _lowest_stiffness(at, assembled, found)
+    return _result(scene, assembled, at, found, time, lowest, outputs, path)
 
 
-def _balanced(at: Evaluator, time: float, x: Array) -> _Balance:
-    """The equilibrium. One pass: tangent at a position, then the longest step that does not overshoot."""
-    radius, still = LARGEST_STEP, np.zeros(at.system.layout.v_size)
-    for iteration in range(ITERATIONS):
-        near = chart(at, time, x, still)
-        d = near.steps.size
-        residual = rates(near, near.x, still)[d:]
-        K, _ = stiffness(near)
-        if not np.isfinite(K).all():
-            raise ComputationError("the forces are not finite near the equilibrium; check loads and springs")
-        step = _step(near, K, residual, radius)
-        if movement(near, step) < TOLERANCE:
-            return _Balance(near, residual, K, iteration + 1)
-        for _ in range(20):
-            there, _ = state(near, step, np.zeros(d))
-            if rates(near, there, still)[d:] @ step > -0.5 * (residual @ step):
-                break
-            radius = 0.5 * movement(near, step)
-            step = _step(near, K, residual, radius)
-        x, radius = there, min(2 * radius, LARGEST_STEP)
-    _, vectors = np.linalg.eigh(0.5 * (K + K.T))
-    raise _not_held(near, vectors[:, 0], f"no equilibrium was found in {ITERATIONS} steps")
-
-
-def _step(near: Chart, K: Array, residual: Array, radius: float) -> Array:
-    """(K + s) dy = r with the smallest shift that makes K + s positive and the movement at most the radius."""
-    if residual.size == 0:
-        return residual
-    values = np.linalg.eigvalsh(0.5 * (K + K.T))
-    one = np.eye(len(K))
-    floor = ROUNDING * np.abs(values).max() + 1e-12
-    shift = 0.0 if values[0] > floor else floor - 1.5 * values[0]
-    step = np.linalg.solve(K + shift * one, residual)
-    if movement(near, step) <= radius:
-        return step
-    low, high = shift, max(2 * shift, np.abs(values).min(), floor)
-    while movement(near, np.linalg.solve(K + high * one, residual)) > radius:
-        low, high = high, 4 * high
-    for _ in range(12):
-        middle = np.sqrt(max(low, 1e-6 * high) * high)
-        longer = movement(near, np.linalg.solve(K + middle * one, residual)) > radius
-        low, high = (middle, high) if longer else (low, middle)
-    return np.linalg.solve(K + high * one, residual)
-
-
-def _require_held(found: _Balance, values: Array, vectors: Array) -> None:
-    near = found.near
-    now = evaluate(near.at, near.time, near.x, np.zeros(near.at.system.layout.v_size))
-    applied = np.linalg.solve(near.M, now.force) / sizes(near.at)
+def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium) -> float:
+    """[1/s^2] per mass, of the free motions; infinite where there is none. InputError for a motion that nothing holds."""
+    x = found.path[-1]
+    M = total_mass_matrix(at.system.scene, at.system.layout, x if found.found else found.path[0])
+    Z = free_motions(found.balance.jacobian, M)
+    if not Z.shape[1]:
+        return float("inf")
+    K = Z.T @ found.balance.stiffness @ Z
+    values, vectors = np.linalg.eigh(0.5 * (K + K.T))
+    if not found.found:
+        raise _not_held(assembled, x, Z @ vectors[:, 0], f"no equilibrium was found in {len(found.steps)} steps")
+    applied = np.linalg.solve(M, found.balance.forces) / sizes(at)
     limit = NEUTRAL * np.abs(applied).max() + ROUNDING * np.abs(values).max()
     loose = int(np.argmin(np.abs(values)))
     if abs(values[loose]) <= limit:
-        raise _not_held(near, vectors[:, loose], "the equilibrium is not determined")
+        raise _not_held(assembled, x, Z @ vectors[:, loose], "the equilibrium is not determined")
+    return float(values[0])
 
 
-def _not_held(near: Chart, direction: Array, what: str) -> InputError:
-    motion = named_motion(near.at.system.scene, near.at.system.layout, near.x, near.Z @ direction)
+def _not_held(assembled: Assembled, x: Array, direction: Array, what: str) -> InputError:
+    system = assembled.system
+    motion = named_motion(system.scene, system.layout, x, direction)
     return InputError(
         f"{what}: nothing holds the motion {motion}; add a joint, a driver or a spring that does, or start nearer to an "
-        "equilibrium"
+        f"equilibrium ({counted(assembled.degrees_of_freedom, sum(system.layout.n), len(assembled.redundant))})"
     )
 
 
@@ -150,22 +103,25 @@ def _result(
     scene: Scene,
     assembled: Assembled,
     at: Evaluator,
-    found: _Balance,
+    found: Equilibrium,
+    time: float,
     lowest: float,
     outputs: Sequence[str],
     path: str | Path | None,
 ) -> Result:
     still = np.zeros(assembled.system.layout.v_size)
-    record = record_states(at, np.array([found.near.time]), found.near.x[None], still[None])
+    for x in found.path[:-1]:  # forces count the turns of angles on the way
+        evaluate(at, time, x, still)
+    record = record_states(at, np.array([time]), found.path[-1:], still[None])
     stable = lowest > 0
-    turned, _, stretched = extremes(assembled.system, record)
-    notes = [*assembled.notes, *strained(assembled.system.scene, turned, stretched)]
+    notes = [*assembled.notes, *strained_in(assembled.system, record)]
     if not stable:
         notes.append(f"the equilibrium is unstable: its lowest stiffness per mass is {lowest:.4g} 1/s^2")
     attributes = {
         **described(scene),
         "analysis": "static equilibrium",
-        "method": f"Newton's method, {found.iterations} steps",
+        "method": f"Newton's method, {len(found.steps)} steps"
+        + f" in {found.load_steps} load steps" * (found.load_steps > 1),
         "evaluations": int(at.work.info[EVALUATIONS]),
         "degrees_of_freedom": assembled.degrees_of_freedom,
         "stable": int(stable),

@@ -11,6 +11,7 @@ import click
 from ffr_dyn.cli.analyses import check, commands, list_methods
 from ffr_dyn.cli.chart import chart
 from ffr_dyn.cli.economy import economise
+from ffr_dyn.cli.parts import parts
 from ffr_dyn.cli.realtime import realtime
 from ffr_dyn.cli.run import run
 from ffr_dyn.cli.stress import stress
@@ -161,7 +162,7 @@ def animate(result: Path, output: Path, scale: str, duration: float | None, colo
     click.echo(f"film     {output}")
 
 
-for command in (run, check, list_methods, stress, chart, economise, realtime):
+for command in (run, check, list_methods, stress, chart, economise, parts, realtime):
     cli.add_command(command)
 
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ffr_dyn.analyses.registry import OfMoment, OverTime
     from ffr_dyn.analyses.settings import MomentSettings, Settings
     from ffr_dyn.integrators import Integrator
+    from ffr_dyn.results.result import Result
     from ffr_dyn.scene.scene import Scene
 
 scene_argument = click.argument("scene", type=INPUT_FILE)
@@ -156,7 +157,17 @@ def _method(settings: Settings, given: Mapping[str, Any]) -> Integrator:
 
 
 def perform(scene: Scene, settings: Settings | MomentSettings, output: Path, resume: bool = False) -> None:
-    """Analyse a scene, with progress where that takes its time, and tell what came of it."""
+    """Analyse a scene and tell what came of it."""
+    result = analysed(scene, settings, output, resume)
+    for line in settings.analysis.report(result):
+        click.echo(line)
+    click.echo(f"result       {output}")
+
+
+def analysed(
+    scene: Scene, settings: Settings | MomentSettings, output: Path | None = None, resume: bool = False
+) -> Result:
+    """The result of a scene, with progress where that takes its time."""
     from ffr_dyn.analyses.run import require_resumable
     from ffr_dyn.analyses.run import run as analyse
     from ffr_dyn.analyses.settings import Settings
@@ -165,11 +176,7 @@ def perform(scene: Scene, settings: Settings | MomentSettings, output: Path, res
     if resume:
         require_resumable(settings)
     reserve("-o", output)
-    if isinstance(settings, Settings):
-        with progress(scene.name, settings.end, start=settings.start) as update:
-            result = analyse(scene, settings, path=output, resume=output if resume else None, progress=update)
-    else:
-        result = analyse(scene, settings, path=output)
-    for line in settings.analysis.report(result):
-        click.echo(line)
-    click.echo(f"result       {output}")
+    if not isinstance(settings, Settings):
+        return analyse(scene, settings, path=output)
+    with progress(scene.name, settings.end, start=settings.start) as update:
+        return analyse(scene, settings, path=output, resume=output if resume else None, progress=update)

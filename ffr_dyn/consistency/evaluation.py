@@ -15,8 +15,8 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.failure import failure
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
-from ffr_dyn.equations.layout import Layout, initial_state
-from ffr_dyn.functions.rotation import from_vector, product, rotation_matrix, skew
+from ffr_dyn.equations.layout import Layout, initial_state, moved, to_body_axes, to_global_axes
+from ffr_dyn.functions.rotation import skew
 from ffr_dyn.kernels.tables import IN_Q, IN_SHARED, OK, SINGULAR_CONSTRAINT, Record, Work
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
@@ -157,36 +157,6 @@ def shapes(system: System, work: Work, marker: int) -> Array:
     markers = system.model.markers
     n = system.model.bodies.where[markers.body[marker], 0]
     return work.markers.phi[markers.start[marker] : markers.start[marker] + 6 * n].reshape(6, n)
-
-
-# ---- small motions --------------------------------------------------------------------------------------------------
-
-
-def moved(place: Layout, x: Array, step: Array) -> Array:
-    """x moved by a small motion (V,) in body axes; rotations are exact."""
-    out = x.copy()
-    for b in range(len(place.n)):
-        p = x[place.p(b)]
-        out[place.R(b)] += rotation_matrix(p) @ step[place.R_dot(b)]
-        out[place.p(b)] = product(p, from_vector(step[place.omega(b)]))
-        out[place.q(b)] += step[place.q_dot(b)]
-    return out
-
-
-def to_body_axes(place: Layout, x: Array, v: Array) -> Array:
-    """[R_dot, omega_bar, q_dot] -> [A^T R_dot, omega_bar, q_dot] for all bodies."""
-    out = v.copy()
-    for b in range(len(place.n)):
-        out[place.R_dot(b)] = rotation_matrix(x[place.p(b)]).T @ v[place.R_dot(b)]
-    return out
-
-
-def to_global_axes(place: Layout, x: Array, v: Array) -> Array:
-    """[A^T R_dot, omega_bar, q_dot] -> [R_dot, omega_bar, q_dot] for all bodies."""
-    out = v.copy()
-    for b in range(len(place.n)):
-        out[place.R_dot(b)] = rotation_matrix(x[place.p(b)]) @ v[place.R_dot(b)]
-    return out
 
 
 # ---- mass and free motions ------------------------------------------------------------------------------------------

@@ -58,17 +58,23 @@ class Mobility(Brief):
 
     def lines(self) -> list[str]:
         """The report, a line each."""
-        rigid = self.degrees_of_freedom - self.elastic
-        about = f"{self.degrees_of_freedom} degrees of freedom" + (
-            f", {self.elastic} of them elastic coordinates" * bool(self.elastic)
-        )
-        said = [about if rigid >= 0 else f"{about}; joints and drivers deform bodies in {-rigid} ways"]
+        said = [counted(self.degrees_of_freedom, self.elastic, len(self.redundant))]
         if self.plane != "none":
             said.append(f"planar       normal {self.plane}: runs are computed in the plane, without rows across it")
         said += [f"free         {motion.name}: moves {', '.join(motion.bodies)}" for motion in self.free]
         said += [f"redundant    {joint}: {row}" for joint, row in self.redundant]
         said += [f"overdriven   {driver}" for driver in self.overdriven]
         return said + [f"doubt        {doubt}" for doubt in self.doubts]
+
+
+def counted(degrees_of_freedom: int, elastic: int, redundant: int) -> str:
+    """What can move, in words: "3 rigid degrees of freedom, 2 redundant rows; 101 elastic coordinates"."""
+    rigid, rows = degrees_of_freedom - elastic, f", {redundant} redundant row{'s' * (redundant > 1)}" * bool(redundant)
+    said = (
+        f"{max(rigid, 0)} rigid degree{'s' * (rigid != 1)} of freedom{rows}"
+        + f"; {elastic} elastic coordinates" * bool(elastic)
+    )
+    return said if rigid >= 0 else f"{said}, which joints and drivers deform in {-rigid} ways"
 
 
 def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobility:

@@ -3,7 +3,8 @@
 A deviation (y, z) (d,) each: with Z spanning the free motions (Phi_q Z = 0, Z^T M Z = 1) the positions are moved by Z y in
 body axes, the velocities [A^T R_dot, omega_bar, q_dot] changed by Z z, and both brought back to the constraints in the
 norm of the mass matrix. As the deviation is seen from axes that move with the bodies, a state of steady rotation has
-constant coefficients. Derivatives are central differences with steps h and h/2, extrapolated; their difference is the error.
+constant coefficients. At rest the derivatives are exact (`ffr_dyn.equations.statics`); of a moving scene they are central
+differences with steps h and h/2, extrapolated; their difference is the error.
 """
 
 from __future__ import annotations
@@ -13,21 +14,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffr_dyn.consistency.evaluation import (
-    Evaluator,
-    evaluate,
-    free_motions,
-    moved,
-    smallest_step,
-    to_body_axes,
-    to_global_axes,
-    total_mass_matrix,
-)
-from ffr_dyn.functions.rotation import rotation_matrix
+from ffr_dyn.consistency.evaluation import Evaluator, evaluate, free_motions, smallest_step, total_mass_matrix
+from ffr_dyn.equations.inertia import Integrals, kept_integrals, mass_matrix
+from ffr_dyn.equations.layout import moved, to_body_axes, to_global_axes
+from ffr_dyn.equations.statics import balance, damping
+from ffr_dyn.functions.rotation import rotation_matrix, skew
 from ffr_prep.common.arrays import Array
 
 # Largest relative movement [rad, or part of the scene's size] of a difference: stiff bodies stretch with its square.
 STEP = 1e-5
+AT_REST = 1e-12  # of velocities [1/s], relative to the size of the scene
 CORRECTIONS = 2  # onto the constraints, at a deviation of that size
 
 
@@ -110,8 +106,11 @@ def _central(function: Callable[[Array], Array], steps: Array) -> Array:
 
 
 def state_matrix(near: Chart) -> tuple[Array, float]:
-    """A (2 d, 2 d) with d/dt (y, z) = A (y, z), and its error, relative."""
+    """A (2 d, 2 d) with d/dt (y, z) = A (y, z), and its error, relative: by differences, or of a scene at rest exactly."""
     d = near.steps.size
+    if np.abs(near.V / sizes(near.at)).max(initial=0.0) < AT_REST:
+        K, D = _at_rest(near)
+        return np.block([[np.zeros((d, d)), np.eye(d)], [-near.Z.T @ K @ near.Z, -near.Z.T @ D @ near.Z]]), 0.0
 
     def at(deviation: Array) -> Array:
         return rates(near, *state(near, deviation[:d], deviation[d:]))
@@ -119,15 +118,26 @@ def state_matrix(near: Chart) -> tuple[Array, float]:
     return derivative(at, np.concatenate([near.steps, near.steps / _period(near)]))
 
 
-def stiffness(near: Chart) -> tuple[Array, float]:
-    """(d, d) reduced tangent stiffness at rest, in coordinates of unit mass [1/s^2], and its error, relative."""
-    d = near.steps.size
+def _at_rest(near: Chart) -> tuple[Array, Array]:
+    """(V, V) stiffness and damping: less the derivatives of forces - jacobian^T lam - M acceleration, in body axes."""
+    system, time, x = near.at.system, near.time, near.x
+    scene, place = system.scene, system.layout
+    now = evaluate(near.at, time, x, np.zeros(place.v_size))
+    K = balance(scene, place, system.blocks, time, x, now.lam, {}).stiffness
+    left = near.M @ now.acceleration  # what is not balanced: it turns with the axes of the bodies, unlike in `balance`
+    for b in range(len(place.n)):
+        turn = place.omega(b)
+        K[place.R_dot(b), turn] -= skew(left[place.R_dot(b)])
+        K[turn, turn] -= 0.5 * skew(left[turn])
+        at = slice(place.iv[b], place.iv[b] + 6 + place.n[b])
+        K[at, place.q_dot(b)] += _by_shape(kept_integrals(scene.bodies[b]), x[place.q(b)], now.acceleration[at])
+    return K, damping(scene, place, time, x)
 
-    def at(deviation: Array) -> Array:
-        return rates(near, *state(near, deviation, np.zeros(d)))[d:]
 
-    K, error = derivative(at, near.steps)
-    return -K, error
+def _by_shape(integrals: Integrals, q: Array, acceleration: Array) -> Array:
+    """(6 + n, n) derivative of M(q) acceleration by q; the steps may be large, as M is quadratic."""
+    columns = [mass_matrix(integrals, q + step) - mass_matrix(integrals, q - step) for step in np.eye(q.size)]
+    return 0.5 * np.array([M @ acceleration for M in columns]).reshape(q.size, acceleration.size).T
 
 
 def _period(near: Chart) -> float:
@@ -136,11 +146,6 @@ def _period(near: Chart) -> float:
     size = sizes(near.at)
     rate = max(np.abs(near.V / size).max(initial=0.0), np.sqrt(np.abs(now.acceleration / size).max(initial=0.0)))
     return 1.0 / max(rate, 1.0)
-
-
-def movement(near: Chart, y: Array) -> float:
-    """How far a deviation moves anything: largest turn [rad] or shift, relative to the size of the scene."""
-    return float(np.abs(near.Z @ y / sizes(near.at)).max(initial=0.0))
 
 
 def sizes(at: Evaluator) -> Array:

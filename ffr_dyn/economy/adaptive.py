@@ -16,14 +16,13 @@ import numpy as np
 
 from ffr_dyn.analyses.forward import geometry
 from ffr_dyn.consistency.assemble import assemble, close_positions, close_velocities
-from ffr_dyn.consistency.evaluation import moved, to_body_axes, to_global_axes
 from ffr_dyn.economy.contributions import effects_of
 from ffr_dyn.economy.model_choice import Choice, Part, full
 from ffr_dyn.economy.outputs import Output, Probe, as_output, limits, probe, ranges
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.residual_estimate import Samples, driven, followed, samples
 from ffr_dyn.economy.run import Made, Span, Trial, make, run, states
-from ffr_dyn.equations.layout import Layout, initial_state
+from ffr_dyn.equations.layout import Layout, initial_state, moved, to_body_axes, to_global_axes
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.parts import described

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffr_dyn.compile.body_tables import of_coordinates
-from ffr_dyn.consistency.evaluation import moved, record_states, to_body_axes, to_global_axes
+from ffr_dyn.consistency.evaluation import record_states
 from ffr_dyn.economy.cache import Ledger
 from ffr_dyn.economy.model_choice import Choice, bases_between
 from ffr_dyn.economy.outputs import Probe, difference, histories, needed
 from ffr_dyn.economy.policy import Policy
 from ffr_dyn.economy.residual_estimate import Samples, driven, elastic_columns, followed, samples
 from ffr_dyn.economy.run import Made, Trial, states
-from ffr_dyn.equations.layout import Layout
+from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.results.quantities import measure, selected
 from ffr_dyn.results.result import Result

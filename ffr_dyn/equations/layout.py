@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ffr_dyn.functions.rotation import from_vector, product, rotation_matrix
 from ffr_dyn.scene.scene import Scene, body_normal
 from ffr_dyn.variants.plane import AXES
 from ffr_prep.common.arrays import Array
@@ -70,3 +71,30 @@ def initial_state(scene: Scene, place: Layout) -> tuple[Array, Array]:
         x[place.R(b)], x[place.p(b)], x[place.q(b)] = body.position, body.rotation, body.q
         v[place.R_dot(b)], v[place.omega(b)], v[place.q_dot(b)] = body.velocity, body.omega_bar, body.q_dot
     return x, v
+
+
+def moved(place: Layout, x: Array, step: Array) -> Array:
+    """x moved by a small motion (V,) in body axes; rotations are exact."""
+    out = x.copy()
+    for b in range(len(place.n)):
+        p = x[place.p(b)]
+        out[place.R(b)] += rotation_matrix(p) @ step[place.R_dot(b)]
+        out[place.p(b)] = product(p, from_vector(step[place.omega(b)]))
+        out[place.q(b)] += step[place.q_dot(b)]
+    return out
+
+
+def to_body_axes(place: Layout, x: Array, v: Array) -> Array:
+    """[R_dot, omega_bar, q_dot] -> [A^T R_dot, omega_bar, q_dot] for all bodies."""
+    out = v.copy()
+    for b in range(len(place.n)):
+        out[place.R_dot(b)] = rotation_matrix(x[place.p(b)]).T @ v[place.R_dot(b)]
+    return out
+
+
+def to_global_axes(place: Layout, x: Array, v: Array) -> Array:
+    """[A^T R_dot, omega_bar, q_dot] -> [R_dot, omega_bar, q_dot] for all bodies."""
+    out = v.copy()
+    for b in range(len(place.n)):
+        out[place.R_dot(b)] = rotation_matrix(x[place.p(b)]) @ v[place.R_dot(b)]
+    return out

@@ -111,6 +111,14 @@ def tangent_rate(theta: Array, theta_dot: Array) -> Array:
     return (theta @ theta_dot) * (b_h * across + c_h * cross(theta, across)) + c * cross(theta_dot, across)
 
 
+def tangent_rate_form(theta: Array, moment: Array) -> Array:
+    """(3, 3) symmetric C with theta_dot . C theta_dot = moment . T_dot theta_dot, of `tangent_rate`."""
+    square, along = float(theta @ theta), float(moment @ theta)
+    _, c, b_h, c_h = _coefficients(square)
+    form = np.outer(theta, b_h * cross(moment, theta) + c_h * (along * theta - square * moment) - c * moment)
+    return 0.5 * (form + form.T) + c * along * np.eye(3)
+
+
 def from_matrix(A: Array) -> Array:
     """(3, 3) proper orthogonal -> (4,) Euler parameters (largest of the four first: Shepperd 1978)."""
     A = np.asarray(A, float)

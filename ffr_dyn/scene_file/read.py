@@ -70,13 +70,23 @@ def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Sc
 
     Raises InputError that names the file, the entry, its value and what is expected, with the nearest known name.
     """
-    path = Path(path)
-    source = read_source(path)
     with reading(path, "a scene file"):
-        return _loaded(source, parameters)
+        entry, source = _read(Path(path), parameters)
+        settings = _settings(entry.analysis, entry.outputs, source)
+        return _scene(entry, source), _with_chart(settings, entry.chart, source)
 
 
-def _loaded(source: Source, parameters: Mapping[str, str]) -> tuple[Scene, Settings | MomentSettings]:
+def body_files(path: str | Path, parameters: Mapping[str, str] = {}) -> dict[str, Path]:
+    """The files from ffr-prep of the bodies of a scene file, by the names of the bodies; parameters and errors as of
+    `load_scene`."""
+    with reading(path, "a scene file"):
+        bodies = _read(Path(path), parameters)[0].bodies.items()
+    return {name: entry.file for name, entry in bodies if entry.file is not None}
+
+
+def _read(path: Path, parameters: Mapping[str, str]) -> tuple[Any, Source]:
+    """The entries of a scene file, checked."""
+    source = read_source(path)
     try:
         values = Parameters(overridden(flattened(source.tree.pop("parameters", {})), parameters))
         tree = substituted(source.tree, values, "")
@@ -85,11 +95,9 @@ def _loaded(source: Source, parameters: Mapping[str, str]) -> tuple[Scene, Setti
         keys = tuple(str(error).partition(":")[0].split("."))
         raise InputError(f"{origin(source, keys)}: {error}") from None
     try:
-        entry = scene_entry().model_validate(tree, context={"parameters": known})
+        return scene_entry().model_validate(tree, context={"parameters": known}), source
     except ValidationError as error:
         raise InputError(_explained(error, source)) from None
-    settings = _settings(entry.analysis, entry.outputs, source)
-    return _scene(entry, source), _with_chart(settings, entry.chart, source)
 
 
 def _signals(table: Mapping[str, Any], parameters: Parameters) -> dict[str, TimeFunction]:

@@ -24,7 +24,7 @@ from ffr_prep.cli.options import (
     tell_of_programs,
 )
 from ffr_prep.cli.reduction import NOTES as REDUCTION_NOTES
-from ffr_prep.cli.request import REQUEST, reduce_to_file, request_of
+from ffr_prep.cli.request import REQUEST, WORDS, reduce_to_file, request_of
 from ffr_prep.cli.settings import EntriesCommand, NotesCommand
 from ffr_prep.cli.structure import reduce_structure_command
 from ffr_prep.cli.terminal import filed, show, terminal_steps
@@ -75,7 +75,16 @@ Orthotropic ones by E1,E2,E3,nu12,nu13,nu23,G12,G13,G23,rho in the axes of the m
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 120}
 
 
-@click.group(epilog=EXAMPLE, invoke_without_command=True, context_settings=CONTEXT)
+class Remembering(click.Group):
+    """Commands whose words are kept with what they make (`ffr_prep.cli.request.retold`)."""
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        """As always."""
+        ctx.meta[WORDS] = list(args)
+        return super().resolve_command(ctx, args)
+
+
+@click.group(cls=Remembering, epilog=EXAMPLE, invoke_without_command=True, context_settings=CONTEXT)
 @click.version_option(package_name="ffr")
 @click.option(
     "--plugin",
@@ -142,6 +151,11 @@ def mesh(mesh: Path, **options: Any) -> None:
 @click.option("--material", "materials", multiple=True, required=True, metavar="MATERIAL", help="See below.")
 @REQUEST
 @click.option("--linear", is_flag=True, help="Leave out the load matrices: linear elasticity, for what barely bends.")
+@click.option(
+    "--drawn-modes",
+    type=click.IntRange(min=1),
+    help="Lowest modes that foreshorten what is drawn; default: all. m of them cost m (m + 1) / 2 static problems.",
+)
 @gone("--stiffening", "load matrices are computed by default; --linear leaves them out")
 @click.option(
     "--stress", is_flag=True, help="Also keep the stress at the surface, which ffr-dyn stress and animate show."

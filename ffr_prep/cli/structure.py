@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ffr_prep.cli.options import TIME_LIMIT, tell_of_programs
-from ffr_prep.cli.request import OUTPUT, SOLVER, reduce_to_file, solver_of
+from ffr_prep.cli.request import CUTS, OUTPUT, SOLVER, reduce_to_file, solver_of
 from ffr_prep.cli.terminal import show, terminal_steps
 from ffr_prep.common.command import INPUT_FILE, reserve
 
@@ -51,6 +51,7 @@ Solids tied to the frame, and other reductions:
 @click.command("reduce-structure", epilog=NOTES)
 @click.argument("structure", type=INPUT_FILE)
 @OUTPUT
+@CUTS
 @SOLVER
 @TIME_LIMIT
 def reduce_structure_command(structure: Path, output: Path, **options: Any) -> None:
@@ -64,7 +65,8 @@ def reduce_structure_command(structure: Path, output: Path, **options: Any) -> N
     loaded = read_structure(structure, steps)
     steps.end()
     show(frame_lines(loaded.frame))
-    request = replace(loaded.request, solver=solver, provenance={"source": {"file": structure.name}})
+    cuts = loaded.request.parts if options["parts"] is None else options["parts"]
+    request = replace(loaded.request, parts=cuts, solver=solver, provenance={"source": {"file": structure.name}})
     reduce_to_file(lambda: loaded.model(steps), request, output, steps)
 
 

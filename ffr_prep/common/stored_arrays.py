@@ -17,12 +17,10 @@ def read_arrays(stream: IO[bytes]) -> dict[str, Array]:
     The size that a header announces is held against that of the member, and this against the file, before memory is taken.
     """
     with zipfile.ZipFile(stream) as archive:
-        members = archive.infolist()
+        members = [member for member in archive.infolist() if member.filename.endswith(".npy")]
         packed = sum(member.compress_size for member in members)
         stream.seek(0, 2)
-        if packed > stream.tell() or len(
-            {member.filename for member in members if member.filename.endswith(".npy")}
-        ) < len(members):
+        if packed > stream.tell() or len({member.filename for member in members}) < len(members):
             raise ValueError("its table of contents is damaged")
         return {member.filename.removesuffix(".npy"): _array(archive, member) for member in members}
 

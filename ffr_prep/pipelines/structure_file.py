@@ -113,6 +113,7 @@ def _structure(path: Path, entry: StructureEntry, progress: Stages) -> Structure
             reference=_reference(entry.reference),
             reduction=reduction_of([vars(of) for of in entry.reduction], path.parent),
             linear=entry.linear,
+            drawn_modes=entry.drawn_modes,
             stress=entry.stress,
             quality=None if entry.quality is None else Band(*entry.quality),
             parts=_cuts(entry.parts),

@@ -18,8 +18,9 @@ from ffr_dyn.analyses.inversion.servo import ServoMotion, guided, left_free, pla
 from ffr_dyn.compile.engine import with_model
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.consistency.assemble import Assembled
-from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator, to_global_axes
+from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
 from ffr_dyn.equations.constraint_rows import blocks_of
+from ffr_dyn.equations.layout import to_global_axes
 from ffr_prep.common.arrays import Array
 
 DIFFERENCE = 1e-6

@@ -28,15 +28,13 @@ from ffr_dyn.consistency.evaluation import (
     evaluator,
     free_motions,
     locked,
-    moved,
-    to_body_axes,
-    to_global_axes,
     total_mass_matrix,
     unit_rows,
 )
 from ffr_dyn.consistency.mobility import coordinate_gradients, coordinate_word
 from ffr_dyn.equations.constraint_rows import Block
 from ffr_dyn.equations.constraints import evaluate_word
+from ffr_dyn.equations.layout import moved, to_body_axes, to_global_axes
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.scene.drivers import Driver, driver_word
 from ffr_dyn.scene.joints import COORDINATES, Word

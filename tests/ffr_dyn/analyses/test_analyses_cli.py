@@ -55,7 +55,7 @@ def run(tmp_path):
 
 def test_check(run):
     assert "free         hinge.angle: moves rod" in run("check", driven=False)[0]
-    assert "0 degrees of freedom" in run("check")[0]
+    assert "0 rigid degrees of freedom" in run("check")[0]
 
 
 def test_kinematic_inverse_and_mixed_agree(run):
@@ -183,7 +183,7 @@ def test_a_command_goes_before_the_file(run_file):
     assert load_result(file)["rod.tip.position.x"][0] == pytest.approx(2 * np.cos(0.5), abs=1e-9)
     failed, said, _ = run_file(AT_A_TIME["static"], "check", "-p", "m=3", "--time", "0.2")
     assert failed is None
-    assert "0 degrees of freedom" in said
+    assert "0 rigid degrees of freedom" in said
 
 
 @pytest.mark.parametrize(

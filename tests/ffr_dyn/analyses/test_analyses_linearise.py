@@ -85,7 +85,9 @@ def test_a_damped_flexible_mechanism_decays():
     scene = flexible()
     found = linearise(scene_at(scene, static(scene)))
     assert found.stability_margin < 0
-    assert found.notes == ()
+    assert all(
+        "moving frame" in note for note in found.notes
+    )  # it is an equilibrium, of a body that bends by a seventh
 
 
 def test_a_closed_loop_swings_as_its_energy_says():

@@ -245,6 +245,12 @@ def test_tip_path_known_needs_the_moment_before_the_motion():
     np.testing.assert_allclose(run["arm.tip.position.y"], found["arm.tip.position.y"], atol=4e-7)
 
 
+def test_an_arm_that_bends_too_far_is_told():
+    path = replace(TIP, y=rest_to_rest(0.8, 0.3))
+    notes = mixed(one_link(path), unknown=(MOTOR,), end=0.3, output_step=5e-3).attributes["notes"]
+    assert any("body 'arm' deforms" in note for note in notes), notes
+
+
 def test_causal_inversion_of_the_tip_path_is_refused():
     with pytest.raises(ComputationError, match="internal dynamics are unstable"):
         mixed(one_link(TIP), unknown=(MOTOR,), end=0.6, output_step=0.01, solution=Causal())

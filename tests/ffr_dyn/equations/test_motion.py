@@ -15,10 +15,10 @@ from ffr_dyn.compile.engine import evaluate_at, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System, compile_scene
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import RELAXATION, assemble
-from ffr_dyn.consistency.evaluation import to_body_axes
 from ffr_dyn.equations.constraint_rows import blocks_of
 from ffr_dyn.equations.forces import gravity_at
 from ffr_dyn.equations.inertia import energies, kept_integrals
+from ffr_dyn.equations.layout import to_body_axes
 from ffr_dyn.equations.motion import equations_of_motion, position_rates
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.functions.time_functions import harmonic

@@ -276,9 +276,9 @@ def test_a_result_tells_how_many_parts_would_do():
     result = static(scene)
     (note,) = result.attributes["notes"]
     assert "body 'beam' deforms by up to 0.41 of its size and turns within itself by up to 0.6 rad" in note
-    assert "5 parts would do (ffr-prep reduce --parts)" in note
-    assert parts_needed(scene, result) == {"beam": 5}
-    assert parts_needed(scene, result, angle=0.05) == {"beam": 13}
+    assert "7 parts would do (ffr-prep reduce --parts)" in note
+    assert parts_needed(scene, result) == {"beam": 7}
+    assert parts_needed(scene, result, angle=0.05) == {"beam": 25}
     small = static(WHOLE)
     assert small.attributes["notes"] == []
     assert parts_needed(WHOLE, small) == {"beam": 1}

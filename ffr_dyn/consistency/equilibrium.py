@@ -1,0 +1,228 @@
+"""The equilibrium of a scene by Newton's method on forces and constraints, the multipliers among the unknowns.
+
+With the exact tangent of `ffr_dyn.equations.statics`, a step y (V,) and new multipliers solve
+
+    | K + s M   J^T | | y       |   | forces |
+    |   J        0  | | lam new | = |  -Phi  |
+
+s = 0 where K is positive on the motions that the rows leave free, and the step no longer than a radius. As rows need not be
+met on the way, stiff bodies bend and turn without being stretched, and few steps do for any load. Where Newton's step fails,
+s is about the smallest that makes it so: a step downhill, as of a motion under great damping, so that what begins far away
+comes to a stable equilibrium; where the rows are far from met by then, a step meets them alone. A step is taken again with
+half the radius where the one that would follow, with the same tangent, is longer or goes back. What comes nowhere so bears
+its loads bit by bit. (Nocedal & Wright 2006, ch. 16; Deuflhard 2004, ch. 3.)
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import LinAlgWarning, eigvalsh_tridiagonal, ldl, lu_factor, lu_solve
+
+from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.consistency.evaluation import locked, total_mass_matrix, unit_rows
+from ffr_dyn.equations.layout import moved
+from ffr_dyn.equations.statics import Balance, balance
+from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import ComputationError
+
+ITERATIONS = 100
+LARGEST_STEP = 1.0  # rad, or part of the scene's size
+TOLERANCE = 1e-9  # of the last step, the same: the next would be its square
+LEAST_SHIFT = 1e-3  # of what takes a step of the radius where nothing is stiff
+FIRST_SHARE, LEAST_SHARE, ITERATIONS_OF_A_SHARE = 0.25, 1e-3, 12  # of all loads
+BACK = -0.5  # part of a step that the following one may go back
+OPEN = (
+    0.25  # rad, or part of the size: motion to the rows beyond which a step is that alone; its shift counts as infinite
+)
+ATTEMPTS, HALVINGS = 40, 3  # shifts four times as large each; and between the last of them and the one before
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """Positions (N, X) on the way, multipliers and balance at the last, and lengths of all steps tried, relative to sizes.
+
+    found      : whether the last step was Newton's, and below the tolerance
+    load_steps : parts in which weight and loads were applied
+    """
+
+    path: Array
+    lam: Array | None
+    balance: Balance
+    steps: tuple[float, ...]
+    found: bool
+    load_steps: int = 1
+
+
+@dataclass(frozen=True)
+class _Step:
+    """A step (V,) with the multipliers after it, its shift, its length, and the factors of its matrix."""
+
+    y: Array
+    lam: Array
+    shift: float
+    length: float
+    factors: tuple[Array, Array]
+
+    def next(self, there: Balance) -> Array:
+        """(V,) the step that would follow from where this one leads, with the same matrix."""
+        left = np.concatenate([there.forces - self.lam @ there.jacobian, -there.Phi])
+        return lu_solve(self.factors, left, check_finite=False)[: self.y.size]
+
+
+def equilibrium(system: System, time: float, x: Array, sizes: Array) -> Equilibrium:
+    """From the positions x at the time [s]; sizes (V,) of what counts as a step of one.
+
+    What comes to no equilibrium under all loads at once bears them bit by bit.
+
+    Raises ComputationError where the forces are not finite.
+    """
+    problem = _Problem(system, time, total_mass_matrix(system.scene, system.layout, x), sizes)
+    start = Equilibrium(x[None], None, problem.balance(x, None, {}, 1.0), (), False)
+    found = _newton(problem, start, 1.0, ITERATIONS)
+    return found if found.found else _by_load_steps(problem, start, found)
+
+
+def _by_load_steps(problem: _Problem, start: Equilibrium, failed: Equilibrium) -> Equilibrium:
+    """With shares of the loads that grow as they are borne; what failed if there is none that is."""
+    share, size, now, path, steps, count = 0.0, FIRST_SHARE, start, [start.path], list(failed.steps), 0
+    while share < 1 and size > LEAST_SHARE:
+        goal = min(share + size, 1.0)
+        there = _newton(problem, now, goal, ITERATIONS_OF_A_SHARE)
+        steps += there.steps
+        if not there.found:
+            size /= 2
+            continue
+        share, size, now, count = goal, 2 * size, there, count + 1
+        path.append(there.path)
+    return Equilibrium(np.concatenate(path), now.lam, now.balance, tuple(steps), True, count) if share == 1 else failed
+
+
+def _newton(problem: _Problem, start: Equilibrium, share: float, iterations: int) -> Equilibrium:
+    x, path, steps, radius, M = start.path[-1], list[Array](), list[float](), LARGEST_STEP, problem.M
+    now = problem.balance(x, start.lam, start.balance.angles, share)
+    lam = start.lam
+    if lam is None:
+        _, lam, _ = _from_rest(now, M)
+        now = problem.balance(x, lam, start.balance.angles, share)
+    while len(steps) < iterations and (step := _step(now, M, problem.sizes, radius)) is not None:
+        there = moved(problem.system.layout, x, step.y)
+        beyond = problem.balance(there, step.lam, now.angles, share)
+        steps.append(step.length)
+        if step.shift == 0 and step.length < TOLERANCE:
+            return Equilibrium(np.array([*path, there]), step.lam, beyond, tuple(steps), True)
+        ahead = _ahead(step, beyond, M)
+        if not ahead > BACK:
+            radius = 0.5 * step.length
+            continue
+        path.append(there)
+        x, lam, now, radius = there, step.lam, beyond, min(2 * radius if ahead > 0.5 * BACK else radius, LARGEST_STEP)
+    return Equilibrium(np.array([start.path[-1], *path]), lam, now, tuple(steps), False)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """A compiled scene at a time; a mass matrix (V, V) and sizes (V,) to measure steps with."""
+
+    system: System
+    time: float
+    M: Array
+    sizes: Array
+
+    def balance(self, x: Array, lam: Array | None, near: Mapping[str, float], share: float) -> Balance:
+        """At positions x with multipliers lam, None for zeros, and a share of the loads; with rows for what a plane locks."""
+        scene, place, blocks = self.system.scene, self.system.layout, self.system.blocks
+        across = locked(place)
+        lam = np.zeros(sum(len(block.words) for block in blocks)) if lam is None else lam
+        try:
+            now = balance(scene, place, blocks, self.time, x, lam, near, share)
+            finite = np.isfinite(now.forces).all() and np.isfinite(now.stiffness).all()
+        except (ZeroDivisionError, OverflowError, ValueError):  # of a function of time
+            finite = False
+        if not finite:
+            raise ComputationError("the forces are not finite near the equilibrium; check loads and springs")
+        if not across.size:
+            return now
+        jacobian = np.concatenate([now.jacobian, unit_rows(across, place.v_size)])
+        return replace(now, Phi=np.append(now.Phi, np.zeros(across.size)), jacobian=jacobian)
+
+
+def _from_rest(now: Balance, M: Array) -> tuple[Array, Array, Array]:
+    """How the scene starts to move from rest (V,), its multipliers then (C,), and the smallest motion (V,) to the rows."""
+    size = now.forces.size
+    sides = np.zeros((size + now.Phi.size, 2))
+    sides[:size, 0], sides[size:, 1] = now.forces, -now.Phi
+    both = np.linalg.lstsq(_bordered(M, now.jacobian), sides, rcond=None)[0]
+    return both[:size, 0], both[size:, 0], both[:size, 1]
+
+
+def _step(now: Balance, M: Array, sizes: Array, radius: float) -> _Step | None:
+    """Newton's step, or else one that meets the rows, or one with a shift, or None."""
+    newton, fits = _shifted(now, M, sizes, 0.0, np.zeros(sizes.size), radius)
+    if fits:
+        return newton
+    free, lam, closing = _from_rest(now, M)
+    gap = float(np.abs(closing / sizes).max())
+    if gap > OPEN:
+        part = min(1.0, LARGEST_STEP / gap)
+        return _Step(part * closing, lam, np.inf, part * gap, newton.factors)
+    first = max(LEAST_SHIFT * float(np.abs(free / sizes).max()) / radius, 1e-12)
+    return _least_shifted(now, M, sizes, first, closing, radius)
+
+
+def _least_shifted(now: Balance, M: Array, sizes: Array, first: float, closing: Array, radius: float) -> _Step | None:
+    """The step with about the smallest shift that will do, None where there is none."""
+    last, shift = 0.0, first
+    for _ in range(ATTEMPTS):
+        step, fits = _shifted(now, M, sizes, shift, closing, radius)
+        if fits:
+            break
+        last, shift = shift, 4 * shift
+    else:
+        return None
+    for _ in range(HALVINGS if last else 0):
+        middle = np.sqrt(last * step.shift)
+        longer, fits = _shifted(now, M, sizes, middle, closing, radius)
+        last, step = (last, longer) if fits else (middle, step)
+    return step
+
+
+def _shifted(now: Balance, M: Array, sizes: Array, shift: float, closing: Array, radius: float) -> tuple[_Step, bool]:
+    """The step with a shift, and whether it will do; Newton's last one does wherever it leads.
+
+    The radius bounds what goes beyond the smallest step to the rows, `closing` (V,).
+    """
+    matrix, right = _bordered(now.stiffness + shift * M, now.jacobian), np.concatenate([now.forces, -now.Phi])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LinAlgWarning)  # of a singular matrix, whose step is not finite or too long
+        factors = lu_factor(matrix, check_finite=False)
+    with np.errstate(all="ignore"):
+        solution = lu_solve(factors, right, check_finite=False)
+    y, lam = solution[: sizes.size], solution[sizes.size :]
+    step = _Step(y, lam, shift, float(np.abs(y / sizes).max()), factors)
+    short = bool(np.abs((y - closing) / sizes).max() <= radius)
+    return step, short and ((shift == 0 and step.length < TOLERANCE) or _positive(matrix, now.Phi.size))
+
+
+def _ahead(step: _Step, there: Balance, M: Array) -> float:
+    """How far the following step goes on along this one, relative to it; after Newton's it must not be longer."""
+    if step.shift == np.inf:
+        return 0.0
+    following, size = step.next(there), step.y @ M @ step.y
+    if step.shift == 0 and following @ M @ following > size:
+        return -np.inf
+    return float(following @ M @ step.y / size)
+
+
+def _bordered(K: Array, J: Array) -> Array:
+    return np.block([[K, J.T], [J, np.zeros((len(J), len(J)))]])
+
+
+def _positive(matrix: Array, rows: int) -> bool:
+    """Whether K is positive on the free motions: the bordered matrix has one negative eigenvalue for each row then."""
+    _, D, _ = ldl(0.5 * (matrix + matrix.T), check_finite=False)
+    values = eigvalsh_tridiagonal(np.diag(D).copy(), np.diag(D, -1).copy())
+    return int((values < 0).sum()) == rows
