@@ -43,7 +43,7 @@ _BY_MODULE = {
     "ffr_dyn.scene.sensors": "Measurement SectionMeasurement StressMeasurement",
     "ffr_dyn.variants.variant": "vary with_modes without_terms",
     "ffr_dyn.integrators": "AdaptiveROS3 DormandPrince GeneralisedAlpha HHT HalfExplicit Integrator RK4 ROS2 ROS3 Tolerances "
-    "Variational register_integrator tolerances",
+    "Variational Within register_integrator tolerances",
     "ffr_dyn.integrators.stabilisation": "Baumgarte Drifting Projection",
     "ffr_dyn.compile.first_use": "begin_compiling",
     "ffr_dyn.results.file": "load_result save_result",
@@ -129,8 +129,8 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_dyn.integrators import (
         AdaptiveROS3 as AdaptiveROS3, DormandPrince as DormandPrince, GeneralisedAlpha as GeneralisedAlpha, HHT as
         HHT, HalfExplicit as HalfExplicit, Integrator as Integrator, RK4 as RK4, ROS2 as ROS2, ROS3 as ROS3,
-        Tolerances as Tolerances, Variational as Variational, register_integrator as register_integrator, tolerances
-        as tolerances
+        Tolerances as Tolerances, Variational as Variational, Within as Within, register_integrator as
+        register_integrator, tolerances as tolerances
     )
     from ffr_dyn.integrators.stabilisation import Baumgarte as Baumgarte, Drifting as Drifting, Projection as Projection
     from ffr_dyn.compile.first_use import begin_compiling as begin_compiling

@@ -23,7 +23,7 @@ from ffr_dyn.consistency.evaluation import Evaluator, copied, evaluate, evaluato
 from ffr_dyn.consistency.mobility import require_driven
 from ffr_dyn.consistency.validity import strained_in
 from ffr_dyn.equations.layout import moved, to_global_axes
-from ffr_dyn.integrators import Integrator
+from ffr_dyn.integrators import Integrator, Within
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
@@ -40,9 +40,9 @@ DIFFERENCE = 1e-6
 
 @dataclass(frozen=True)
 class Dynamic:
-    """Elastic coordinates are integrated; by default with ROS2 and a tenth of the output step."""
+    """Elastic coordinates are integrated; `method` is that of `forward`."""
 
-    method: Integrator | None = None
+    method: Integrator | Within | None = None
     stabilisation: Stabilisation = Projection()  # noqa: RUF009 - frozen
 
 

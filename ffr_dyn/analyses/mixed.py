@@ -30,7 +30,7 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
 from ffr_dyn.consistency.evaluation import joined, record_states
 from ffr_dyn.consistency.validity import strained_in
-from ffr_dyn.integrators import Integrator
+from ffr_dyn.integrators import Integrator, Within
 from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.quantities import measure, selected
@@ -94,7 +94,7 @@ def mixed(
     start: float = 0.0,
     known: tuple[str, ...] | None = None,
     solution: Causal | Bounded | None = None,
-    method: Integrator | None = None,
+    method: Integrator | Within | None = None,
     outputs: Sequence[str] = ("default",),
     path: str | Path | None = None,
     progress: Callable[[float], None] | None = None,

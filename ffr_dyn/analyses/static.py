@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import with_all_reactions
+from ffr_dyn.analyses.integration import with_all_reactions
 from ffr_dyn.analyses.outcome import result_of
 from ffr_dyn.analyses.registry import OfMoment
 from ffr_dyn.analyses.settings import MomentSettings

@@ -51,15 +51,16 @@ def realtime(
     """
     from ffr_dyn.analyses.settings import Settings
     from ffr_dyn.cli.progress_bar import progress
-    from ffr_dyn.integrators import METHODS, ROS2
+    from ffr_dyn.integrators import METHODS, ROS2, Within, stepped
     from ffr_dyn.integrators.stabilisation import Projection
     from ffr_dyn.realtime.deadline import as_json, lines, measure_steps, plot_times
     from ffr_dyn.scene_file.read import load_scene
 
     loaded, settings = load_scene(scene, assignments(parameters))
     given: Any = ROS2(1e-3)
-    if isinstance(settings, Settings) and not settings.method.controlled:
-        given = settings.method
+    if isinstance(settings, Settings):
+        own = settings.method
+        given = stepped(own, settings.output_step / 10) if isinstance(own, Within) else given if own.controlled else own
     if method is not None and method not in METHODS:
         raise InputError(f"--method {method}: there is no such method with fixed steps; there are {', '.join(METHODS)}")
     kind: Any = type(given) if method is None else METHODS[method]

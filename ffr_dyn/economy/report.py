@@ -49,7 +49,7 @@ def _summary(found: Economy) -> Table:
     rows = [
         ("scene", found.original.name),
         ("computed", "in space" if choice.plane == "none" else f"in the plane across {choice.plane}"),
-        ("integrator", _integrator(choice, settings.method.step)),
+        ("integrator", _integrator(choice, settings.output_step / choice.divisions)),
         ("stabilisation", repr(settings.stabilisation)),
         ("elastic coordinates", f"{choice.count} of {sum(b.model.n for b in found.original.bodies)}"),
         ("cost of a run", f"{found.cost / 1e6:.3g} s, everything with the same step {found.before / 1e6:.3g} s: "

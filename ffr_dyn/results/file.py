@@ -67,6 +67,17 @@ def load_result(path: str | Path) -> Result:
         return _read(file)
 
 
+def with_attributes(path: str | Path, attributes: Mapping[str, Any]) -> None:
+    """Give a finished result file other attributes, in one piece: it is replaced by its copy with them."""
+    path = Path(path)
+    copy = path.with_name(f"{path.name}.attributes")
+    shutil.copyfile(path, copy)
+    with h5py.File(copy, "r+") as file:
+        _write_attributes(file, attributes)
+        file.attrs["status"] = attributes.get("status", "complete")
+    os.replace(copy, path)
+
+
 @contextmanager
 def _reading(path: Path) -> Iterator[h5py.File]:
     """A result file, open; whatever is wrong with it becomes an InputError."""

@@ -38,7 +38,7 @@ from ffr_dyn.analyses.settings import Charted, MomentSettings, Settings
 from ffr_dyn.functions.formula import CONSTANTS, Expression, Operation, is_constant
 from ffr_dyn.functions.operations import FUNCTIONS
 from ffr_dyn.functions.time_functions import TimeFunction, constant, signal, signals_in
-from ffr_dyn.integrators import Integrator, Tolerances, method_named
+from ffr_dyn.integrators import Integrator, Tolerances, Within, method_named, stepped
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import GROUND, Body, Scene
@@ -322,13 +322,18 @@ def _with_chart(settings: Settings | MomentSettings, entry: Any, source: Source)
     return replace(settings, chart=Charted(measures=tuple(entry.measures), methods=methods, modes=modes, drops=drops))
 
 
-def _method(entry: Any, source: Source) -> Integrator:
-    kind, step = method_named(getattr(entry, "method", "ros2")), getattr(entry, "step", None)
+def _method(entry: Any, source: Source) -> Integrator | Within:
+    name, step = getattr(entry, "method", "ros2"), getattr(entry, "step", None)
+    kind, own = method_named(name), getattr(entry, "settings", {})
     try:
         if kind.controlled:
-            found: Integrator = kind(Tolerances(**(entry.tolerances.model_dump() if entry.tolerances else {})))
+            found: Integrator | Within = kind(Tolerances(**(entry.tolerances.model_dump() if entry.tolerances else {})))
+        elif step is not None:
+            found = kind(step, **own)
         else:
-            found = kind(entry.output_step / 10 if step is None else step, **getattr(entry, "settings", {}))
+            given = {} if getattr(entry, "accuracy", None) is None else {"accuracy": entry.accuracy}
+            found = Within(method=name, settings=tuple(own.items()), **given)
+            stepped(found, entry.output_step)
     except InputError as error:
         raise InputError(f"{origin(source, ('analysis', 'settings'))}: analysis.settings: {error}") from None
     return found

@@ -23,7 +23,7 @@ from ffr_dyn.functions.time_functions import (
     constant,
     signals_in,
 )
-from ffr_dyn.integrators import CONTROLLED, Controlled, Integrator, methods
+from ffr_dyn.integrators import CONTROLLED, Controlled, Integrator, Within, methods
 from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation
 from ffr_dyn.scene.parts import as_declared, cut_joints
 from ffr_dyn.scene.scene import Body, Scene
@@ -112,7 +112,10 @@ def _chart(chart: Charted) -> dict[str, Any]:
     return {} if chart == Charted() else entry
 
 
-def _method(method: Integrator) -> dict[str, Any]:
+def _method(method: Integrator | Within) -> dict[str, Any]:
+    if isinstance(method, Within):
+        settings = {"settings": dict(method.settings)} if method.settings else {}
+        return {"method": method.method, "accuracy": method.accuracy, **settings}
     name = next(word for word, made in methods().items() if type(method) is made)
     if name in CONTROLLED:
         return {"method": name, "tolerances": asdict(cast("Controlled", method).tolerances)}

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.integrators import ROS3
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
@@ -48,7 +48,7 @@ def swing(body, **treated):
         ground={"O": (0, 0, 0)},
         gravity=(0, -9.81, 1.0),
     )
-    return forward(scene, end=0.3, output_step=0.1, method=ROS3(1e-3))
+    return integrate(scene, end=0.3, output_step=0.1, method=ROS3(1e-3))
 
 
 @pytest.mark.parametrize("way", WAYS)

@@ -11,7 +11,7 @@ from synthetic import cloud
 import ffr_dyn as fd
 import ffr_prep as fp
 from ffr_dyn.analyses.assemble import assembly
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
@@ -28,7 +28,7 @@ def spinning(spin: float, **changes) -> Scene:
 
 
 def notes(scene: Scene) -> list[str]:
-    return forward(scene, end=1e-3, output_step=1e-3, method=ROS2(1e-4)).attributes["notes"]
+    return integrate(scene, end=1e-3, output_step=1e-3, method=ROS2(1e-4)).attributes["notes"]
 
 
 STIFFENED = {"model": {"stiffening": np.zeros((12 + 18, 2, 2))}}
@@ -96,7 +96,7 @@ SHORT = {"end": 0.01, "output_step": 0.01}
 ANALYSES = {
     "static": fd.static,
     "assemble": assembly,
-    "forward": lambda scene: forward(scene, method=ROS2(1e-3), **SHORT),
+    "forward": lambda scene: integrate(scene, method=ROS2(1e-3), **SHORT),
     "reference": lambda scene: fd.reference(scene, method=fd.SciPy("DOP853", rtol=1e-6), end=1e-4, output_step=1e-4),
     "inverse": lambda scene: fd.inverse(scene, elastic=fd.Dynamic(ROS2(1e-3)), **SHORT),
     "quasi-static": lambda scene: fd.inverse(scene, elastic=fd.QuasiStatic(), **SHORT),

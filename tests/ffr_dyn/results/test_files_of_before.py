@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from places import REFERENCE
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.integrators import ROS3
 from ffr_dyn.results.file import load_result
 from ffr_dyn.scene.joints import Joint
@@ -58,4 +58,4 @@ def tip_of(body):
         ground={"O": (0, 0, 0)},
         gravity=(0, -9.81, 0),
     )
-    return forward(scene, end=0.02, output_step=0.01, method=ROS3(1e-4))["rod.b.position"]
+    return integrate(scene, end=0.02, output_step=0.01, method=ROS3(1e-4))["rod.b.position"]
