@@ -267,6 +267,12 @@ def test_functions_are_short():
 OF_BENCHMARKS = {"test_against_exudyn.py"}
 
 
+def test_files_of_tests_have_names_of_their_own():
+    """pytest imports them by their names alone."""
+    names = [path.name for path in (ROOT / "tests").rglob("test_*.py")]
+    assert sorted(names) == sorted(set(names))
+
+
 def test_tests_do_without_benchmarks():
     sources = {path: path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("*.py")}
     found = {path.name for path, text in sources.items() for i in imports(text, "tests") if top(i.name) == "benchmarks"}
