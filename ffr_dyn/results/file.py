@@ -71,7 +71,7 @@ def with_attributes(path: str | Path, attributes: Mapping[str, Any]) -> None:
     """Give a finished result file other attributes, in one piece: it is replaced by its copy with them."""
     with replacing(path) as part:
         shutil.copyfile(path, part)
-        with h5py.File(part, "r+", locking=False) as file:
+        with h5py.File(part, "r+", **_HOW) as file:
             _write_attributes(file, attributes)
             file.attrs["status"] = attributes.get("status", "complete")
 
