@@ -36,6 +36,7 @@ from ffr_dyn.scene_file.source import PATHS, read_source
 from ffr_dyn.scene_file.state_formula import StateFormula
 from ffr_prep.body import FlexibleBody, save_body
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.outputs import replacing
 
 _BARE = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
 
@@ -43,16 +44,13 @@ _BARE = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
 def save_scene(scene: Scene, settings: Settings | MomentSettings, path: str | Path) -> Path:
     """Write a scene file, and beside it a body file <file>.<body>.ffr for every flexible body."""
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     bodies = as_declared(scene.bodies)
     files = {body.name: f"{path.stem}.{body.name}.ffr" for body in bodies if not _is_plain(body.model)}
     text = to_toml(scene, settings, files)
     for body in bodies:
         if body.name in files:
             save_body(body.model, path.parent / files[body.name])
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(text, encoding="utf-8")
-    temporary.replace(path)
+    _replace(path, text)
     return path
 
 
@@ -70,22 +68,25 @@ def save_changed(
 
     given : values, as text, of parameters in place of those in the original file
     """
-    path, source = save_scene(scene, settings, path), read_source(Path(original))
+    source, (first, how) = read_source(Path(original)), load_scene(original, given)
     parameters = overridden(flattened(source.tree.pop("parameters", {})), given)
+    path = save_scene(scene, settings, path)
     if not parameters:
         return path
-    plain = tomllib.loads(path.read_text(encoding="utf-8"))
-    first, how = load_scene(original, given)
+    text = path.read_text(encoding="utf-8")
+    plain = tomllib.loads(text)
     before = tomllib.loads(to_toml(first, how, {body.name: "" for body in first.bodies if not _is_plain(body.model)}))
     tree = _as_given(plain, before, _moved(_without_marked(source.tree), path.parent))
-    text = "\n".join(_lines({"parameters": parameters, **tree}, ())) + "\n"
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(text, encoding="utf-8")
+    _replace(path, "\n".join(_lines({"parameters": parameters, **tree}, ())) + "\n")
     files = {name: entry["file"] for name, entry in plain["bodies"].items() if "file" in entry}
-    if tomllib.loads(to_toml(*load_scene(temporary), files)) == plain:
-        temporary.replace(path)
-    temporary.unlink(missing_ok=True)
+    if tomllib.loads(to_toml(*load_scene(path), files)) != plain:
+        _replace(path, text)  # what is written must be the scene, with its formulas or without
     return path
+
+
+def _replace(path: Path, text: str) -> None:
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")
 
 
 def _as_given(new: Any, before: Any, text: Any) -> Any:
