@@ -38,12 +38,12 @@ from ffr_dyn.economy.rigid_start import PILOT, Ground, Rigid, started, unmoved
 from ffr_dyn.economy.run import Span, Trial, rings
 from ffr_dyn.economy.selection import Insufficient, Selection, gap, selected_model
 from ffr_dyn.economy.steps import Stepped, chosen_step
-from ffr_dyn.economy.verification import reference_cost, sharpened, unheard, verified
+from ffr_dyn.economy.verification import apart, reference_cost, sharpened, unheard, verified
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.scene.scene import Scene
 from ffr_dyn.variants.mean_axis import with_mean_axis_bodies
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import ComputationError, InputError
 
 Histories = tuple[Array, ...]
 
@@ -195,19 +195,20 @@ def _stepped(
     """
     choice = selection.choice
     beside = ledger.run(choice)
-    apart = difference(beside.values, ground.pilot.values)
+    off = difference(beside.values, ground.pilot.values)
     together = choice.method != ground.everything.method
     if together:
-        stepped = Stepped(beside, apart)
+        stepped = Stepped(beside, off)
     elif like is None:
-        stepped = _with_step(ledger, choice, largest(apart), ground.limits)
+        stepped = _with_any_step(ledger, ground, choice)
+        off = difference(ledger.run(stepped.trial.choice.stepped_as(choice)).values, ground.pilot.values)
     else:
         stepped = Stepped(ledger.run(choice.stepped_as(like.final.choice)), like.time)
     return Chosen(
         stepped.trial,
-        selection.left if together else largest(apart),
+        selection.left if together else largest(off),
         stepped.error,
-        largest(apart if together else total(apart, stepped.error)),
+        largest(off if together else total(off, stepped.error)),
         selection.terms,
         ground.everything,
         ground.spatial,
@@ -216,6 +217,20 @@ def _stepped(
         omitted,
         together,
     )
+
+
+def _with_any_step(ledger: Ledger, ground: Ground, choice: Choice) -> Stepped:
+    """The model with its step; with all terms, or all of everything, where it does not come through with shorter steps."""
+    parts = zip(choice.parts, ground.everything.parts, strict=True)
+    whole = tuple(replace(own, dropped=full.dropped, loads=full.loads) if own.count else own for own, full in parts)
+    failed = ComputationError("there is no model")
+    for model in dict.fromkeys((choice, replace(choice, parts=whole), ground.everything)):
+        try:
+            left = largest(difference(ledger.run(model).values, ground.pilot.values))
+            return _with_step(ledger, model, left, ground.limits)
+        except ComputationError as error:
+            failed = error
+    raise failed
 
 
 def _finer_ground(ledger: Ledger, ground: Ground, final: Trial, verify: bool | None) -> Ground | None:
@@ -256,10 +271,10 @@ def _heard(ledger: Ledger, found: Chosen) -> Chosen:
     ledger.tell("steps that resolve vibration")
     policy, fewest = ledger.policy, 2 * final.choice.divisions
     whole = sharpened(ledger, found.everything, policy.omitted_share * limits, fewest, policy.asked_verification)
-    same = ledger.run(final.choice.stepped_as(whole.trial.choice))
-    left = largest(difference(same.values, whole.trial.values))
-    if (left + whole.own > limits).any():
-        same, left = whole.trial, np.zeros(len(limits))
+    steps = final.choice.stepped_as(whole.trial.choice)
+    left = apart(ledger, steps, whole.trial)
+    is_enough = bool((left + whole.own <= limits).all())
+    same, left = (ledger.run(steps), left) if is_enough else (whole.trial, np.zeros(len(limits)))
     time = _with(tuple(np.zeros_like(y) for y in same.values), whole.own)
     return replace(found, final=same, model=left, time=time, error=left + whole.own, together=False)
 

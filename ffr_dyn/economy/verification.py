@@ -176,9 +176,9 @@ def _known(ledger: Ledger, choice: Choice) -> Known | None:
         vibration = _vibration(ledger, sharp)
     except (ComputationError, InputError):
         return None
-    apart, before = (largest(difference(*(t.values for t in two))) for two in ((sharp, coarse), (coarse, coarsest)))
-    fall = np.clip(apart / np.maximum(before, 1e-300), 0.5 ** order(sharp), ledger.policy.fall)
-    return Known(sharp, np.maximum(apart * fall / (1.0 - fall), vibration), 0.0)
+    last, before = (largest(difference(*(t.values for t in two))) for two in ((sharp, coarse), (coarse, coarsest)))
+    fall = np.clip(last / np.maximum(before, 1e-300), 0.5 ** order(sharp), ledger.policy.fall)
+    return Known(sharp, np.maximum(last * fall / (1.0 - fall), vibration), 0.0)
 
 
 def _vibration(ledger: Ledger, trial: Trial) -> Array:
@@ -222,8 +222,7 @@ def _better(
     looks : how many there were, and the error (outputs,) of the last
     """
     attempts, error = looks
-    same = final.choice.stepped_as(coarse.choice)
-    gap = largest(difference(ledger.run(same).values, coarse.values))
+    gap = apart(ledger, final.choice.stepped_as(coarse.choice), coarse)
     if (gap <= ledger.policy.omitted_share * limits).all():
         return ledger.run(_shorter(final.choice))
     stepped = _shorter(final.choice) if (error - gap > ledger.policy.unexplained * limits).any() else final.choice
@@ -235,6 +234,14 @@ def _better(
     beyond = Insufficient(final.choice.count, float((gap / limits).max()))
     anew = selected_model(ledger, ground, omitted, beyond).choice
     return ledger.run(anew.stepped_as(stepped))
+
+
+def apart(ledger: Ledger, choice: Choice, trial: Trial) -> Array:
+    """(outputs,) how far a model is from a run; infinite where its own fails."""
+    try:
+        return largest(difference(ledger.run(choice).values, trial.values))
+    except (ComputationError, InputError):
+        return np.full(len(trial.values), np.inf)
 
 
 def _shorter(choice: Choice) -> Choice:
