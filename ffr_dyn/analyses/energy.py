@@ -18,6 +18,7 @@ import numpy as np
 from ffr_dyn.compile.engine import fill_rows, new_engine
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
+from ffr_dyn.consistency.balance import Account, add_rows, amiss
 from ffr_dyn.consistency.evaluation import evaluator
 from ffr_dyn.consistency.tangent import chart, state_matrix
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
@@ -60,7 +61,7 @@ class EnergyWatch:
     complete : gives a record the reactions of redundant rows
     begun    : [J] at the start, with what turned out to have a source later;  highest : [J] energy of gravity so far
     time, powers, work : of the last row, and of each force and driver [W] and [J]
-    anchor   : the last row with an energy that is no wonder
+    anchor   : the last row with an energy that is no wonder;  account : of all energy, both ways
     """
 
     system: System
@@ -74,11 +75,23 @@ class EnergyWatch:
     powers: Array = field(default_factory=lambda: np.zeros(0))
     work: Array = field(default_factory=lambda: np.zeros(0))
     anchor: _Row | None = None
+    account: Account = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.account = Account(self.system)
+
+    def amiss(self) -> list[str]:
+        """Notes on energy that forces and drivers do not account for, too little to stop the run."""
+        kind = type(self.method).__name__
+        if self.method.controlled:
+            return amiss(self.account, kind, "use smaller tolerances")
+        return amiss(self.account, f"{kind}, {self.method.step:.3g} s", "use a smaller step")
 
     def look(self, rows: Record) -> None:
         """Take note of the rows that follow. Raises ComputationError when their energy comes from nowhere."""
         with np.errstate(all="ignore"):
             energy, powers = rows.energy[:, 0] + rows.energy[:, 1], _powers(self.system, rows)
+            add_rows(self.account, rows, powers)
             if self.anchor is None:
                 self._begin(rows, energy, powers)
             given = self._given(rows, powers)

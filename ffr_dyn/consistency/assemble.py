@@ -16,6 +16,7 @@ from ffr_dyn.compile.scene_tables import System, compile_scene
 from ffr_dyn.consistency.dropped_terms import check_dropped
 from ffr_dyn.consistency.held_frequencies import held_frequencies
 from ffr_dyn.consistency.row_space import independent, smallest_solution
+from ffr_dyn.consistency.sliding import sliding_notes
 from ffr_dyn.consistency.validity import deflections
 from ffr_dyn.equations.constraint_rows import Block, blocks_of, rows_at
 from ffr_dyn.equations.constraints import Row
@@ -90,6 +91,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
             f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes without their rounding "
             "across it"
         )
+    notes += sliding_notes(scene)
     notes += held_frequencies(
         declared, [(x[place.R(b)], x[place.p(b)]) for b in range(len(place.n))], scene.plane, time
     )

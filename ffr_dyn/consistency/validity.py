@@ -75,18 +75,6 @@ def meaningless(scene: Scene, found: Array) -> str:
     )
 
 
-def doubts(scene: Scene, found: Array) -> list[str]:
-    """Notes on bodies that a run with these extremes (3, B) takes beyond its theory."""
-    turned, spun, stretched = found
-    return [*strained(scene, turned, stretched), *unstiffened(scene, spun)]
-
-
-def strained_in(system: System, record: Record) -> list[str]:
-    """Notes on bodies that recorded states deform too much for one moving frame."""
-    turned, _, stretched = extremes(system, record)
-    return strained(system.scene, turned, stretched)
-
-
 def strained(scene: Scene, turned: Array, stretched: Array) -> list[str]:
     """Bodies that deform too much for one moving frame; turned (B,) [rad], stretched (B,) of the body's size. Of a body in
     parts the one that does so most.

@@ -28,6 +28,7 @@ from ffr_dyn.compile.engine import new_engine, row_filler
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import Assembled, assemble
+from ffr_dyn.consistency.doubts import ended, held, look, nothing_seen
 from ffr_dyn.consistency.failure import failure
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation, gains
@@ -95,6 +96,7 @@ class Stepper(Brief):
         self._arrays = tuple(array for loop in self._loops for array in loop.arrays())
         self._set = {name: _Setting(self._loops, name) for name in self._system.inputs}
         self._outputs, self._computed = _outputs(self._loops[0], outputs, readers)
+        self._seen = nothing_seen(assembled, method, *held(stabilisation))
         self._advance(0)
 
     def _title(self) -> str:
@@ -148,6 +150,13 @@ class Stepper(Brief):
         for compute in self._computed:
             compute()
         return self._outputs
+
+    def doubts(self) -> list[str]:
+        """What is doubtful of the states at which this was asked, beside the notes of assembly: as the notes of `forward`
+        (the table in docs/analyses.md), but for the energy, and nothing is an error."""
+        record = self._loops[0].record
+        look(self._seen, record)
+        return [*self._seen.assembled.notes, *ended("stepper", self._seen)]
 
     def save(self) -> State:
         """The state, with inputs."""
