@@ -15,9 +15,9 @@ from ffr_dyn.analyses.energy import EnergyWatch
 from ffr_dyn.analyses.events import Event, Watcher
 from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.workspace import new_record
+from ffr_dyn.consistency import failure as failing
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.doubts import BALANCE, SINGULAR, Seen, ended, held, look, nothing_seen
-from ffr_dyn.consistency.failure import failure
 from ffr_dyn.consistency.validity import meaningless
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import Integrator, methods
@@ -183,7 +183,8 @@ def _begun(
     mark: str,
 ) -> _Run:
     """The run at its start, or where the file to resume left it."""
-    system, gained, seen = assembled.system, gains(stabilisation), nothing_seen(assembled, method, *held(stabilisation))
+    system, gained = assembled.system, gains(stabilisation)
+    seen = nothing_seen(assembled, method, *held(system.scene, stabilisation))
     engine = new_engine(system, assembled.x, assembled.v, method, gained, start=start, spacing=spacing)
     energy = EnergyWatch(system, method, gained, spacing, lambda rows: with_all_reactions(assembled, rows))
     if resume is not None and Path(resume).exists():
@@ -198,7 +199,7 @@ def _started(
     first = new_record(assembled.system, 1)
     status = record_row(engine, start, first, 0)
     if status != OK:
-        raise failure(engine.system, engine.work, status, start)
+        raise failing.failure(engine.system, engine.work, status, start)
     first = with_all_reactions(assembled, first)
     energy.look(first)
     look(seen, first)
@@ -250,8 +251,9 @@ def _advance(
         if ends:
             return
         if status != OK:
-            cause = excess_of_gains(run.energy.gains, run.energy.spacing)
-            raise failure(run.engine.system, run.engine.work, status, reached(run.engine, start), cause)
+            gained = run.energy.gains
+            settings = failing.Settings(method, gained[2] > 0, excess_of_gains(gained, run.energy.spacing))
+            raise failing.failure(run.engine.system, run.engine.work, status, reached(run.engine, start), settings)
         count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
 
 

@@ -51,7 +51,7 @@ def add_rows(account: Account, rows: Record, powers: Array) -> None:
     steps = np.diff(rows.time, prepend=numbers[TIME])
     known = np.concatenate([numbers[[BEFORE, POWER]], power])
     work = numbers[WORK] + np.cumsum(0.5 * steps * (known[1:-1] + known[2:]))
-    left_open = numbers[OPEN] + np.cumsum(steps / 12 * np.abs(known[2:] - 2 * known[1:-1] + known[:-2]))
+    left_open = numbers[OPEN] + np.cumsum(steps * _left_open(known))
     left = total - numbers[BEGUN] - work
     sure = np.where(np.abs(left) > SURE * left_open, left, 0.0)
     worst = int(np.argmax(np.abs(sure)))
@@ -77,6 +77,15 @@ def amiss(account: Account, method: str, remedy: str) -> list[str]:
         f"by t = {when:.6g} s energy of {abs(worst):.3g} J {way}, {abs(worst) / most:.2g} of the most that was in motion and "
         f"strain: {cause} ({method}); {remedy}"
     ]
+
+
+def _left_open(known: Array) -> Array:
+    """(T,) [W] what the trapezoid may be off in the interval that ends at each of the last T of T + 2 powers: by the second
+    derivative where they are smooth, by all of a jump where they are not."""
+    growth = np.diff(known)
+    bend = np.abs(np.diff(growth))
+    smooth = bend < 0.5 * (np.abs(growth[1:]) + np.abs(growth[:-1]))
+    return np.where(smooth, bend / 12, bend / 2)
 
 
 def _stored(system: System, rows: Record) -> Array:

@@ -61,9 +61,10 @@ TABLE: dict[str, dict[str, str]] = {
 OPEN, APART, ASTRAY, QUICK, _, BALANCE, STIFF, STRAINED, MEANINGLESS, SPUN, SINGULAR, MASS = TABLE
 
 MET = 1e-8  # m, -: of constraints that Newton's method closes
-KEPT = 10.0  # times the tolerance of a projection, which looks at constraints before a step and not after it
-DRIFTED = 1e-4  # m, -: of constraints that no projection holds
-TORN = 1e-2  # m, -: more than any drift that is of use
+KEPT = 10.0  # times the tolerance of a projection
+# Of the size of the scene up to a metre: how far constraints come open in the step before a row, which a projection at the
+# beginning of the next one closes; and more than any drift that is of use.
+DRIFTED, TORN = 1e-5, 1e-2
 BESIDE = 0.1  # rad, by which a driven angle may differ
 TURNED = 0.1  # rad, or of the scene's size: h^2 times a driver's second derivative that a step bears
 DEPENDENT = 1e-10  # smallest eigenvalue of a mass matrix with ones on its diagonal
@@ -102,9 +103,16 @@ def nothing_seen(
     return Seen(assembled, method, tolerance, apart, {name: np.zeros(size) for name, size in sizes.items()})
 
 
-def held(stabilisation: Stabilisation) -> tuple[float, float]:
+def held(scene: Scene, stabilisation: Stabilisation) -> tuple[float, float]:
     """(tolerance, apart) [m, -]: a projection holds the constraints; gains and drifting let them go as far as they do."""
-    return (KEPT * stabilisation.tolerance, TORN) if isinstance(stabilisation, Projection) else (DRIFTED, np.inf)
+    size = min(1.0, _size(scene))
+    if isinstance(stabilisation, Projection):
+        return max(KEPT * stabilisation.tolerance, DRIFTED * size), TORN * size
+    return DRIFTED * size, np.inf
+
+
+def _size(scene: Scene) -> float:
+    return max(body.model.size for body in scene.bodies) or 1.0
 
 
 def look(seen: Seen, rows: Record) -> None:
@@ -171,13 +179,13 @@ def ended(analysis: str, seen: Seen, more: Mapping[str, Sequence[str]] | None = 
 def _found(seen: Seen) -> dict[str, list[str]]:
     """All doubts, with their texts."""
     scene, (turned, spun, stretched) = seen.scene, seen.arrays["bodies"]
-    lost = meaningless(scene, seen.arrays["bodies"])
+    lost, quick = meaningless(scene, seen.arrays["bodies"]), list(_quick(seen))
     return {
-        **_constraints(seen),
+        **_constraints(seen, quick),
         ASTRAY: [
             _astray(d, off) for d, off in zip(scene.drivers, seen.arrays["driven"][0], strict=True) if off > BESIDE
         ],
-        QUICK: list(_quick(seen)),
+        QUICK: quick,
         STIFF: [] if seen.method is None else told(seen.assembled.system, seen.method, seen.arrays["rates"]),
         STRAINED: strained(scene, turned, stretched),
         MEANINGLESS: [lost] if lost else [],
@@ -186,17 +194,18 @@ def _found(seen: Seen) -> dict[str, list[str]]:
     }
 
 
-def _constraints(seen: Seen) -> dict[str, list[str]]:
+def _constraints(seen: Seen, quick: list[str]) -> dict[str, list[str]]:
     value, time, number = seen.arrays["open"]
     if not value > seen.tolerance:
         return {}
     blocks = (seen.assembled.all_rows or seen.assembled.system).blocks
-    name, text = [(block.name, word.text) for block in blocks for word in block.words][int(number)]
-    change = "a smaller step" if seen.apart < np.inf else "projection, or a smaller step"
-    where = f"at t = {time:.6g} s the row '{text}' of {name!r} is open by {value:.2g}"
+    block, text = [(block, word.text) for block in blocks for word in block.words][int(number)]
+    change = "use a smaller step" if seen.apart < np.inf else "use projection, or a smaller step"
+    where = f"at t = {time:.6g} s the row '{text}' of {block.name!r} is open by {value:.2g}"
     if value > seen.apart:
-        return {APART: [f"{where}: the mechanism has come apart; use {change}"]}
-    return {OPEN: [f"{where}, the most of all, where {seen.tolerance:.1g} was to be held; use {change}"]}
+        what = "the driver is not followed" if block.driver else "the mechanism has come apart"
+        return {APART: [f"{where}: {what}; {quick[0] if quick else change}"]}
+    return {OPEN: [f"{where}, the most of all, and more than {seen.tolerance:.1g}; {change}"]}
 
 
 def _astray(driver: Driver | PointDriver, off: float) -> str:
@@ -209,10 +218,9 @@ def _astray(driver: Driver | PointDriver, off: float) -> str:
 def _quick(seen: Seen) -> Iterator[str]:
     if seen.method is None or seen.method.controlled:
         return
-    size = max(body.model.size for body in seen.scene.bodies) or 1.0
     for driver, growth in zip(seen.scene.drivers, seen.arrays["driven"][1], strict=True):
         angular = isinstance(driver, Driver) and driver.coordinate == "angle"
-        step, bears = seen.method.step, TURNED if angular else TURNED * size
+        step, bears = seen.method.step, TURNED if angular else TURNED * _size(seen.scene)
         if step**2 * growth > bears:
             yield (
                 f"driver {driver.name!r} is faster than the step: its motion changes by up to {step**2 * growth:.2g} "
