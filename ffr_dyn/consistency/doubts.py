@@ -67,7 +67,7 @@ KEPT = 10.0  # times the tolerance of a projection
 DRIFTED, TORN = 1e-5, 1e-2
 BESIDE = 0.1  # rad, by which a driven angle may differ
 TURNED = 0.1  # rad, or of the scene's size: h^2 times a driver's second derivative that a step bears
-DEPENDENT = 1e-10  # smallest eigenvalue of a mass matrix with ones on its diagonal
+DEPENDENT = 1e-8  # smallest eigenvalue of a mass matrix with ones on its diagonal
 
 
 @dataclass(frozen=True)
