@@ -80,9 +80,8 @@ def failure(system: System, work: Work, status: int, time: float, settings: Sett
     if status == STEP_TOO_SMALL:
         return ComputationError(
             f"{at} the step has become too small: the motion is not smooth there (an impact, a jump of a force or of a "
-            "driver), the mechanism locks (a dead point that a driver goes beyond), or the tolerances are below what "
-            "rounding allows; smooth the jump, end the run before it, keep driven motions within reach, or use larger "
-            "tolerances"
+            f"driver), the mechanism locks{_dead_point(system)}, or the tolerances are below what rounding allows; smooth "
+            f"the jump, end the run before it, {_remedy(system, 'use larger tolerances')}"
         )
     return ComputationError(f"{at} the run stopped: {system.user.failure or 'unknown cause'}")
 
@@ -114,8 +113,8 @@ def _overflow(system: System, work: Work, settings: Settings) -> str:
     if (least < AT or work.drift[PHI] > OPEN) and work.drift[PHI] < LOST:
         return (
             f"its constraints came open by up to {work.drift[PHI]:.2g}, and were nearest to dependence at t = {when:.6g} s: "
-            "the mechanism locks there (a dead point that a driver goes beyond), or passes a singular position; keep driven "
-            f"motions within reach{'' if settings.projected else ', or use projection'}"
+            f"the mechanism locks there{_dead_point(system)}, or passes a singular position; "
+            f"{_remedy(system, 'use a smaller step' if settings.projected else 'use projection')}"
         )
     if settings.method is None:
         return "a force, an initial state or a driver is beyond all sense there; look at their numbers and units"
@@ -127,6 +126,14 @@ def _overflow(system: System, work: Work, settings: Settings) -> str:
         "the step is too large for a mode or a stiff spring (use ROS2, or a smaller step), or for a stop or a fast rotation "
         "(use a smaller step)"
     )
+
+
+def _dead_point(system: System) -> str:
+    return " (a dead point that a driver goes beyond)" if system.scene.drivers else ""
+
+
+def _remedy(system: System, change: str) -> str:
+    return f"keep driven motions within reach, or {change}" if system.scene.drivers else change
 
 
 def _largest(system: System, work: Work) -> tuple[str, float]:
@@ -164,8 +171,9 @@ def _unconverged(system: System, where: int, settings: Settings) -> str:
             f"friction that acts on it; use a smaller step{', ROS2' if other else ''}, or a softer force"
         )
     block = system.blocks[int(np.searchsorted(system.model.rows.start, where - len(bodies), side="right")) - 1]
+    change = f"use a smaller step{', or ROS2 to pass a singular position' if other else ''}"
     return (
-        f"worst in {block.name!r}: its constraint cannot be met, because the mechanism locks there (a dead point that a "
-        "driver goes beyond) or is singular, or because the step is too large or a stiff spring far from its free length; "
-        f"keep driven motions within reach, or use a smaller step{', or ROS2 to pass a singular position' if other else ''}"
+        f"worst in {block.name!r}: its constraint cannot be met, because the mechanism locks there{_dead_point(system)} or is "
+        "singular, or because the step is too large or a stiff spring far from its free length; "
+        f"{_remedy(system, change)}"
     )

@@ -39,7 +39,7 @@ def extremes(system: System, record: Record) -> Array:
         q, omega = record.x[:, system.layout.q(b)], record.v[:, system.layout.omega(b)]
         turn, stretch = deflections(body.model, q)
         turns.append(turn)
-        spins.append(np.sqrt((omega**2).sum(axis=1)).max(initial=0.0))
+        spins.append(np.linalg.norm(omega, axis=1).max(initial=0.0))
         stretches.append(stretch)
     return np.array([turns, spins, stretches])
 
@@ -146,7 +146,7 @@ def in_enough_parts(
         if not more:
             return scene, result
         scene = make({name: count for name, count in (there | more).items() if count > 1})
-    raise ComputationError(f"after {ROUNDS} analyses still more parts are needed: {more}; allow a larger angle")
+    raise ComputationError(f"after {ROUNDS} analyses still more parts are needed: {more}; begin with so many")
 
 
 def unstiffened(scene: Scene, spun: Array) -> list[str]:
