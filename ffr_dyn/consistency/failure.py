@@ -173,7 +173,7 @@ def _unconverged(system: System, where: int, settings: Settings) -> str:
     block = system.blocks[int(np.searchsorted(system.model.rows.start, where - len(bodies), side="right")) - 1]
     change = f"use a smaller step{', or ROS2 to pass a singular position' if other else ''}"
     return (
-        f"worst in {block.name!r}: its constraint cannot be met, because the mechanism locks there{_dead_point(system)} or is "
-        "singular, or because the step is too large or a stiff spring far from its free length; "
+        f"worst in {block.name!r}: its constraint cannot be met, because the mechanism locks there{_dead_point(system)} or "
+        "is singular, or because the step is too large or a stiff spring far from its free length; "
         f"{_remedy(system, change)}"
     )

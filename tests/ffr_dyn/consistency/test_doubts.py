@@ -10,11 +10,13 @@ from functools import partial
 import numpy as np
 import pytest
 from ffr_gallery.bodies import bar, pendulum
+from places import ROOT
 from synthetic import cloud
 
 from ffr_dyn.analyses.assemble import assembly
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.inverse import Dynamic, inverse
+from ffr_dyn.analyses.kinematic import kinematic
 from ffr_dyn.analyses.linearise import linearise
 from ffr_dyn.consistency import doubts
 from ffr_dyn.consistency.assemble import assemble
@@ -78,6 +80,21 @@ def test_every_cell_does_what_it_says(doubt, analysis):
             ended(analysis, seen, found)
     else:
         assert ended(analysis, seen, found) == ["a doubt"] * (TABLE[doubt][analysis] == NOTE)
+
+
+def test_the_page_shows_the_table():
+    page = (ROOT / "docs" / "analyses.md").read_text(encoding="utf-8")
+    rows = [f"| {doubt} | {' | '.join(row[analysis] for analysis in ANALYSES)} |" for doubt, row in TABLE.items()]
+    assert f"| doubt | {' | '.join(ANALYSES)} |" in page
+    assert [row for row in rows if row not in page] == []
+
+
+def test_a_driver_that_stands_still_does_not_choose_another_plane():
+    """A bar along x, held on a hinge about z, lies in x-z as well, where the driver would have no effort."""
+    held = replace(HINGED, drivers=(Driver("drive", "hinge", 0.0),), gravity=(0, -9.81, 0))
+    result = kinematic(held, end=0.1, output_step=0.1)
+    mass, arm = bar("bar").mass, bar("bar").r_dm[0] / bar("bar").mass
+    np.testing.assert_allclose(result["drive.effort"], 9.81 * mass * arm, rtol=1e-9)
 
 
 def test_the_table_is_complete():
