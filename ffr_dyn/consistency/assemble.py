@@ -16,6 +16,7 @@ from ffr_dyn.compile.scene_tables import System, compile_scene
 from ffr_dyn.consistency.dropped_terms import check_dropped
 from ffr_dyn.consistency.held_frequencies import held_frequencies
 from ffr_dyn.consistency.row_space import independent, smallest_solution
+from ffr_dyn.consistency.sliding import sliding_notes
 from ffr_dyn.consistency.validity import deflections
 from ffr_dyn.equations.constraint_rows import Block, blocks_of, rows_at
 from ffr_dyn.equations.constraints import Row
@@ -90,6 +91,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
             f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes without their rounding "
             "across it"
         )
+    notes += sliding_notes(scene)
     notes += held_frequencies(
         declared, [(x[place.R(b)], x[place.p(b)]) for b in range(len(place.n))], scene.plane, time
     )
@@ -149,10 +151,17 @@ def _across(scene: Scene, blocks: list[Block], time: float) -> tuple[list[bool],
     across = most_inside <= RANK_TOLERANCE * most_outside
     mixed = ~across & (most_outside > RANK_TOLERANCE * most_inside)
     moving = np.array([_changes(word.function) for block in blocks for word in block.words], bool)
-    asked = (most_left[across] >= ASKED).any() or moving[across].any()
+    asked = (most_left[across] >= ASKED).any() or moving[across].any() or _driver_lost(blocks, across)
     held = [row for row, k in zip(rows, across, strict=True) if k]
     pure = not (mixed.any() or asked) and _columns_independent(stacked(held, place)[:, ~active])
     return across.tolist(), bool(pure)
+
+
+def _driver_lost(blocks: list[Block], across: Array) -> bool:
+    """Whether all rows of a driver act across the plane: in the plane it would have no effort."""
+    numbers = iter(across.tolist())
+    acts = [[next(numbers) for _ in block.words] for block in blocks]
+    return any(all(rows) for block, rows in zip(blocks, acts, strict=True) if block.driver)
 
 
 def _largest(row: Row, chosen: Array) -> float:
