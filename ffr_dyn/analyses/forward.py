@@ -7,7 +7,7 @@ looked for that is short enough.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -235,10 +235,10 @@ def _cost(assembled: Assembled, result: Result) -> float:
     return 2.0 * result.attributes["evaluations"] * sum(1.0 + 0.02 * n + 7e-4 * n * n for n in sizes)
 
 
-def _finished(runs: _Runs, trial: _Trial, path: str | Path | None) -> Result:
-    """The result of a run with its errors, here and in its file."""
+def _finished(runs: _Runs, trial: _Trial, path: str | Path | None, ringing: Set[str] = frozenset()) -> Result:
+    """The result of a run with its errors, here and in its file; `ringing` outputs are told to be so."""
     result = trial.result
-    notes = [*result.attributes["notes"], *_unresolved(runs, trial), *_coarse(result)]
+    notes = [*result.attributes["notes"], *_unresolved(runs, trial, ringing), *_coarse(result)]
     told = {name: [e.error, e.of_range] for name, e in trial.errors.items()}
     more: dict[str, Any] = {"notes": notes, "errors": told}
     if trial.errors:
@@ -260,20 +260,21 @@ def _percent(share: float) -> str:
     return f"{100 * share:.2g} %"
 
 
-def _unresolved(runs: _Runs, trial: _Trial) -> list[str]:
+def _unresolved(runs: _Runs, trial: _Trial, ringing: Set[str]) -> list[str]:
     """A note on the vibration that the step does not resolve: its share, its frequency, and the price of resolving it."""
-    ringing = {name: e for name, e in trial.errors.items() if e.vibrates and e.of_range > Within().accuracy}
+    large = {name: e for name, e in trial.errors.items() if e.of_range > Within().accuracy}
+    told = {name: e for name, e in large.items() if e.vibrates or name in ringing}
     of, method = runs.vibrations, trial.method
-    if not ringing or not of.omega.size:
+    if not told or not of.omega.size:
         return []
-    name = max(ringing, key=lambda one: ringing[one].of_range)
+    name = max(told, key=lambda one: told[one].of_range)
     found = leading(of, trial.result, trial.twins[-1])
     words = f" of {found / 2 / np.pi:.4g} Hz" if found else ""
     step = (1.2 if of.ratio[-1] > 0 else 0.25) / of.omega[-1]
     times = (4 / step) / ((4 if method.order > 2 else 2) / method.step)
     return [
-        f"vibration{words} that a step of {method.step:.3g} s does not resolve carries {_percent(ringing[name].of_range)} of "
-        f"the range of {name}{_others(len(ringing) - 1)}; rk4 with a step of {step:.2g} s resolves it, for about "
+        f"vibration{words} that a step of {method.step:.3g} s does not resolve carries {_percent(told[name].of_range)} of "
+        f"the range of {name}{_others(len(told) - 1)}; rk4 with a step of {step:.2g} s resolves it, for about "
         f"{max(times, 1):.2g} times the time of this run"
     ]
 
@@ -315,7 +316,7 @@ def _searched(runs: _Runs, within: Within, kept: dict[str, Any], count: int) -> 
         excess = _excess(trial, ringing, trials) / within.accuracy
         trials.append(trial)
         if excess <= 1.0 or count >= FINEST:
-            return _finished(runs, trial, path)
+            return _finished(runs, trial, path, ringing)
         count, kept = _next(count, excess), {**kept, "path": path, "resume": None}
 
 

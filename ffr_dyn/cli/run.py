@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, reserve
 from ffr_prep.common.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,10 +20,8 @@ if TYPE_CHECKING:
     from ffr_dyn.results.result import Result
     from ffr_dyn.scene.scene import Scene
 
-scene_argument = click.argument("scene", type=click.Path(path_type=Path))
-output_option = click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="Result file (netCDF); default: <scene>.nc."
-)
+scene_argument = click.argument("scene", type=INPUT_FILE)
+output_option = click.option("-o", "--output", type=OUTPUT_FILE, help="Result file (netCDF); default: <scene>.nc.")
 parameter_option = click.option(
     "-p", "--parameter", "parameters", multiple=True, metavar="NAME=VALUE", help="A parameter of the scene file."
 )
@@ -91,21 +89,6 @@ def assignments(parameters: tuple[str, ...]) -> dict[str, str]:
             raise InputError(f"-p {text}: write it as NAME=VALUE")
     pairs = (text.partition("=") for text in parameters)
     return {name.strip(): value.strip() for name, _, value in pairs}
-
-
-def require_file(option: str, path: Path | None, suffixes: tuple[str, ...] = ()) -> None:
-    """Before the work, not after it: InputError for a file that could not be written, or not in a known format."""
-    if path is None:
-        return
-    if path.is_dir():
-        raise InputError(f"{option} {path} is a folder; name the file to write")
-    if suffixes and path.suffix.lower() not in suffixes:
-        raise InputError(
-            f"{option} {path}: it is written as {' or '.join(suffixes)}, not {path.suffix or 'without a suffix'}"
-        )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if not os.access(path.parent, os.W_OK):
-        raise InputError(f"{option} {path}: the folder {path.parent} cannot be written to; choose another place")
 
 
 def require_after(option: str, end: float | None, start: float) -> None:
@@ -221,6 +204,7 @@ def analysed(
 
     if resume:
         require_resumable(settings)
+    reserve("-o", output)
     if not isinstance(settings, Settings):
         return analyse(scene, settings, path=output)
     with progress(scene.name, settings.end, start=settings.start) as update:

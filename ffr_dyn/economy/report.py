@@ -20,6 +20,7 @@ from ffr_dyn.economy.model_choice import Choice, kind
 from ffr_dyn.economy.result import Economy
 from ffr_dyn.scene.scene import INERTIA_TERMS, Body
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.outputs import replacing
 
 SEPARATOR = "  "
 
@@ -333,7 +334,6 @@ def write_report(found: Economy, path: str | Path) -> Path:
         chart.unlink()
     else:
         text = as_markdown(found) if path.suffix == ".md" else as_text(found)
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(text, encoding="utf-8")
-    temporary.replace(path)
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")
     return path

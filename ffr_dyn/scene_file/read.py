@@ -58,6 +58,7 @@ from ffr_dyn.scene_file.source import Source, origin, origin_of_name, read_sourc
 from ffr_dyn.scene_file.state_formula import StateFormula, check_names
 from ffr_prep.body import BodyError, FlexibleBody, load_body, rigid_body, truncated, with_point
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.reading import reading
 
 WHOLE = ("name", "gravity", "ground", "base_acceleration", "plane")  # fields of a scene that are no tables of entries
 
@@ -69,15 +70,17 @@ def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Sc
 
     Raises InputError that names the file, the entry, its value and what is expected, with the nearest known name.
     """
-    entry, source = _read(Path(path), parameters)
-    settings = _settings(entry.analysis, entry.outputs, source)
-    return _scene(entry, source), _with_chart(settings, entry.chart, source)
+    with reading(path, "a scene file"):
+        entry, source = _read(Path(path), parameters)
+        settings = _settings(entry.analysis, entry.outputs, source)
+        return _scene(entry, source), _with_chart(settings, entry.chart, source)
 
 
 def body_files(path: str | Path, parameters: Mapping[str, str] = {}) -> dict[str, Path]:
     """The files from ffr-prep of the bodies of a scene file, by the names of the bodies; parameters and errors as of
     `load_scene`."""
-    bodies = _read(Path(path), parameters)[0].bodies.items()
+    with reading(path, "a scene file"):
+        bodies = _read(Path(path), parameters)[0].bodies.items()
     return {name: entry.file for name, entry in bodies if entry.file is not None}
 
 

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffr_prep.cli.options import PATH, bundle, interface_of, reference_of
+from ffr_prep.cli.options import bundle, interface_of, reference_of
 from ffr_prep.cli.reduction import band_of, draw_quality, reduction_of, reduction_options
 from ffr_prep.cli.terminal import Steps, filed, show
+from ffr_prep.common.command import OUTPUT_FILE
 from ffr_prep.common.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from ffr_prep.pipelines.reduce import Request
     from ffr_prep.solvers.factor import Solver
 
-OUTPUT = click.option("-o", "--output", type=PATH, required=True, help="Body file to write.")
+OUTPUT = click.option("-o", "--output", type=OUTPUT_FILE, required=True, help="Body file to write.")
 SOLVER = bundle(
     click.option(
         "--solver",

@@ -280,7 +280,7 @@ MOTOR = '[drivers.m]\njoint = "hinge"\nfunction = '
         ("[drivers]", MOTOR + '{table = [[0, 2, 1], [0, 1, 2]]}', ["drivers.m.function", "increasing"]),
         ("[drivers]", MOTOR + '{table = [[0, 1]]}', ["drivers.m", "table"]),
         ("[drivers]", MOTOR + '{polynomial = [1], formula = "t"}', ["exactly one of"]),
-        ("[drivers]", MOTOR + '{table_file = "none.csv"}', ["none.csv is not a file of two columns"]),
+        ("[drivers]", MOTOR + '{table_file = "none.csv"}', ["none.csv does not exist"]),
         ("[drivers]", MOTOR + '{harmonic = {amplitude = 1}}', ["frequency [Hz] or speed"]),
         ("[drivers]", MOTOR + 'true', ["drivers.m"]),
         ("[drivers]", MOTOR + '[1]', ["give a number, a formula or a table"]),
