@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -24,6 +25,8 @@ from ffr_dyn.variants.variant import used_interfaces, with_basis, with_modes
 from ffr_prep.body import FlexibleBody, FrameMarker, Interface, axial
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+
+Marker = TypeVar("Marker", Interface, FrameMarker)
 
 AXES = "xyz"
 _NOTHING = 1e-9  # of gravity and velocities
@@ -72,8 +75,8 @@ def _in_plane(scene: Scene, normal: int) -> Scene:
         body = body if V is None else combined(body, V)
         keep = np.flatnonzero(_mostly(body.model, k, used))
         reduced = with_modes(body, keep.tolist())
-        model = _without_rounding(reduced.model, k, used)
-        frame = reduced.frame and _frame_in_plane(reduced.frame, reduced.model, k, used)
+        model = _flat(reduced.model, k, used)
+        frame = reduced.frame and _flat_frame(reduced.frame, k)
         bodies.append(replace(reduced, model=model, frame=frame, kept=(tuple(keep.tolist()), body.model.n)))
         kept[body.name] = (np.eye(body.model.n) if V is None else V)[:, keep]
     return replace(scene, bodies=tuple(bodies), forces=in_bases(scene.forces, kept), plane=AXES[normal])
@@ -227,45 +230,33 @@ def _sizes(body: FlexibleBody, used: Sequence[str]) -> Array:
     return np.abs(np.vstack(motions)).max(axis=0)
 
 
-def _without_rounding(body: FlexibleBody, k: int, used: Sequence[str]) -> FlexibleBody:
-    """The body with zeros where the symmetry of in-plane modes asks for them and only rounding is left.
+def _flat(body: FlexibleBody, k: int, used: Sequence[str]) -> FlexibleBody:
+    """The body with zeros for what in-plane modes do across the plane, which of a symmetric body is rounding.
 
     Rows of joints across the plane then vanish exactly, however large the modes are.
     """
     if not body.n:
         return body
     a, b = (c for c in range(3) if c != k)
-    size, length, shape = _sizes(body, used), size_of(body), np.sqrt(body.mass)
-    pairs = np.sqrt(np.outer(size, size))
     P_dm, rP_dm, PP_dm = body.P_dm.copy(), body.rP_dm.copy(), body.PP_dm.copy()
-    _drop(P_dm[k], size * shape)
-    for c in (a, b):
-        for one, other in ((c, k), (k, c)):
-            _drop(rP_dm[one, other], size * shape * length)
-            _drop(PP_dm[one, other], pairs)
-    interfaces = tuple(
-        replace(i, phi_t=phi_t, phi_r=phi_r) if i.name in used else i
-        for i, (phi_t, phi_r) in ((i, _shapes_in_plane(i, body, k, size)) for i in body.interfaces)
-    )
+    P_dm[k] = 0.0
+    for part in (rP_dm, PP_dm):
+        part[[a, b, k, k], [k, k, a, b]] = 0.0
+    interfaces = tuple(_flat_marker(i, k) if i.name in used else i for i in body.interfaces)
     stiffening = None if body.stiffening is None else _matrices_in_plane(body.stiffening, _first_loads(body, used), k)
     return replace(body, P_dm=P_dm, rP_dm=rP_dm, PP_dm=PP_dm, interfaces=interfaces, stiffening=stiffening)
 
 
-def _shapes_in_plane(marker: Interface | FrameMarker, body: FlexibleBody, k: int, size: Array) -> tuple[Array, Array]:
-    """phi_t and phi_r of an interface, or of the frame, without the rounding across the plane."""
-    phi_t, phi_r, shape = marker.phi_t.copy(), marker.phi_r.copy(), np.sqrt(body.mass)
-    _drop(phi_t[k], size / shape)
-    for c in range(3):
-        if c != k:
-            _drop(phi_r[c], size / (shape * size_of(body)))
-    return phi_t, phi_r
+def _flat_marker(marker: Marker, k: int) -> Marker:
+    """An interface, or the frame, that modes move in the plane only."""
+    phi_t, phi_r = marker.phi_t.copy(), marker.phi_r.copy()
+    phi_t[k] = phi_r[[c for c in range(3) if c != k]] = 0.0
+    return replace(marker, phi_t=phi_t, phi_r=phi_r)
 
 
-def _frame_in_plane(frame: OwnFrame, body: FlexibleBody, k: int, used: Sequence[str]) -> OwnFrame:
-    """The own frame of a body, without the rounding that moves it, or modes, across the plane."""
-    old = frame.marker
-    phi_t, phi_r = _shapes_in_plane(old, body, k, _sizes(body, used))
-    marker = replace(old, phi_t=phi_t, phi_r=phi_r, K=_matrices_in_plane(old.K, [0], k))
+def _flat_frame(frame: OwnFrame, k: int) -> OwnFrame:
+    """The own frame of a body that modes move in the plane only."""
+    marker = replace(_flat_marker(frame.marker, k), K=_matrices_in_plane(frame.marker.K, [0], k))
     return replace(frame, marker=marker, C=np.where(np.abs(frame.C) < _MIXED, 0.0, frame.C))
 
 
@@ -276,10 +267,6 @@ def _matrices_in_plane(matrices: Array, firsts: Sequence[int], k: int) -> Array:
     for first in firsts:
         K[[first + k, *(first + 3 + c for c in range(3) if c != k)]] = 0.0
     return K
-
-
-def _drop(part: Array, size: Array) -> None:
-    part[np.abs(part) < _ZERO * size] = 0.0
 
 
 def _mostly(body: FlexibleBody, k: int, used: Sequence[str]) -> Array:
