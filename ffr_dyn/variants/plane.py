@@ -4,7 +4,7 @@ A scene is planar about a global axis when its joints hold every body in the pla
 against them: every body has a body axis along the normal and is symmetric about the plane through its origin, markers
 that are used lie in that plane, axes of joints are in the plane or along the normal, and so are forces. Then the in-plane
 motion and all reactions are those of the spatial scene, while a body has three rigid coordinates, no out-of-plane modes,
-and a revolute joint two rows.
+and a revolute joint two rows. What a mesh leaves of symmetry and places counts as nothing (`ffr_dyn.variants.aligned`).
 """
 
 from __future__ import annotations
