@@ -390,6 +390,7 @@ def _header(
         "end": end,
         "output_step": output_step,
         "degrees_of_freedom": assembled.degrees_of_freedom,
+        "computed": assembled.computed,
         "notes": list(assembled.notes),
     }
 
