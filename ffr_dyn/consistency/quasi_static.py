@@ -32,17 +32,22 @@ LEAST = 1e-9  # sqrt(kg) m, where there is none
 SLOW = 0.3  # a step of this part of the one before asks for the tangent
 APART = 0.1  # of the times of the differences: over the lowest omega, and rad of a turn
 PASSES = 2
-RATE, ACCELERATION = np.array([-11, 18, -9, 2]) / 6, np.array([2.0, -5, 4, -1])  # one-sided differences
-FOLLOWING = 0.1  # of the deflections: what their own acceleration may change
+SMALL = 0.1  # of deflections: what two derivatives more, over omega^2, may be of a slow motion
+# One-sided differences by five values, of the derivatives from the first to the fourth.
+WEIGHTS = (
+    np.array([[-25, 48, -36, 16, -3], [35, -104, 114, -56, 11], [-30, 108, -144, 84, -18], [12, -48, 72, -48, 12]]) / 12
+)
 DIFFERENCE = 1e-6  # of deflections, relative
 
 
 @dataclass(frozen=True)
 class _Motion:
-    """Rates and accelerations (N,) of the deflections of all bodies, one after the other."""
+    """Derivatives by time (N,), the first to the fourth, of the deflections of all bodies, one after the other."""
 
     rate: Array
     acceleration: Array
+    third: Array
+    fourth: Array
 
 
 @dataclass(frozen=True)
@@ -92,18 +97,17 @@ def quasi_static(assembled: Assembled, time: float) -> Assembled:
 
 def _slow(search: _Search, time: float, x: Array, v: Array, h: float) -> tuple[Array, Array, bool]:
     """(x, v) with the deflections of the motion, and whether it is slow."""
-    motion = _Motion(*np.zeros((2, search.elastic.size)))
+    motion = _Motion(*np.zeros((4, search.elastic.size)))
     x, v, tangent = _settled(search, time, x, v, motion, -np.diag(search.of.omega**2))
-    first = search.amplitudes(x[search.places])
     for _ in range(PASSES):
         try:
             motion = _followed(search, time, x, v, motion, tangent, h)
             x, v, tangent = _settled(search, time, x, v, motion, tangent)
         except (ComputationError, np.linalg.LinAlgError):
             return x, v, False
-    last, rate = (search.amplitudes(q) for q in (x[search.places], motion.rate))
-    size = np.linalg.norm(last) + np.linalg.norm(rate / search.of.omega)
-    return x, v, bool(np.linalg.norm(last - first) <= FOLLOWING * size)
+    derivatives = x[search.places], motion.rate, motion.acceleration, motion.third, motion.fourth
+    sizes = [np.linalg.norm(search.amplitudes(q) / search.of.omega**k) for k, q in enumerate(derivatives)]
+    return x, v, bool(sizes[2] <= SMALL * (sizes[0] + sizes[1]) or sizes[3] + sizes[4] <= SMALL * sizes[2])
 
 
 def _failed(time: float) -> ComputationError:
@@ -170,13 +174,13 @@ def _tangent(search: _Search, time: float, x: Array, v: Array, motion: _Motion) 
 
 
 def _followed(search: _Search, time: float, x: Array, v: Array, motion: _Motion, tangent: Array, h: float) -> _Motion:
-    """The motion of the deflections at x, v, by their differences to those at the times + h, 2 h, 3 h along the motion."""
+    """The motion of the deflections at x, v, by their differences to those at the times + h to 4 h along the motion."""
     place = search.at.system.layout
     a, q = accelerations(search.at, time, x, v), [x[search.places]]
-    for s in (h, 2 * h, 3 * h):
+    for s in (h, 2 * h, 3 * h, 4 * h):
         step = s * v + 0.5 * s**2 * a
         step[search.elastic] = s * motion.rate + 0.5 * s**2 * motion.acceleration
         there = moved(place, x, to_body_axes(place, x, step))
         then = replace(motion, rate=motion.rate + s * motion.acceleration)
         q.append(_settled(search, time + s, there, v + s * a, then, tangent)[0][search.places])
-    return _Motion(*(weights @ np.array(q) for weights in (RATE / h, ACCELERATION / h**2)))
+    return _Motion(*(weights @ np.array(q) / h**k for k, weights in enumerate(WEIGHTS, start=1)))
