@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import with_all_reactions
+from ffr_dyn.analyses.integration import with_all_reactions
 from ffr_dyn.analyses.outcome import result_of
 from ffr_dyn.analyses.registry import OfMoment
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.evaluation import evaluator, record_states
+from ffr_dyn.consistency.validity import strained_in
 from ffr_dyn.equations.layout import initial_state
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.kernels.tables import EVALUATIONS
@@ -57,7 +58,7 @@ def assembly(
         "method": "smallest changes in the norm of the mass matrix",
         "evaluations": int(at.work.info[EVALUATIONS]),
         "degrees_of_freedom": assembled.degrees_of_freedom,
-        "notes": [*changes(assembled), *notes],
+        "notes": [*changes(assembled), *notes, *strained_in(assembled.system, record)],
         "status": "complete",
     }
     return result_of(assembled.system, with_all_reactions(assembled, record), attributes, path, outputs)
