@@ -126,11 +126,12 @@ def _place(text: str, words: Sequence[str]) -> list[float]:
 def _drawn(model: MatrixModel, surface: Path) -> MatrixModel:
     """The model with the boundary of a mesh to draw."""
     from ffr_prep.matrices.model import with_surface
-    from ffr_prep.mesh.mesh import UNITS, read_mesh, surface_triangles
+    from ffr_prep.mesh.faces import METRES
+    from ffr_prep.mesh.mesh import read_mesh, surface_triangles
 
     length = model.source["units"].partition("-")[0]
-    if length not in UNITS:
-        raise InputError(f"--surface {surface}: meshes in {length} cannot be read; they may be in {', '.join(UNITS)}")
+    if length not in METRES:
+        raise InputError(f"--surface {surface}: meshes in {length} cannot be read; they may be in {', '.join(METRES)}")
     tell_of_programs([surface])
     mesh = read_mesh(surface, unit=length)
     points, triangles = surface_triangles(mesh)

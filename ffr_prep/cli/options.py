@@ -101,11 +101,14 @@ def material_of(texts: Sequence[str]) -> Solid | Mapping[str, Solid]:
 
 def interface_of(text: str) -> InterfaceRegion:
     """NAME[=REGION][:rigid|mean][@x,y,z]."""
+    from ffr_prep.mesh.region_words import is_query
     from ffr_prep.model.coupled import InterfaceRegion
 
-    parts = re.fullmatch(r"([^=:@]+)(?:=([^:@]+))?(?::(\w+))?(?:@([^@]+))?", text)
+    parts = re.fullmatch(r"([^=:@]+)(?:=(.+?))?(?::(\w+))?(?:@([^@]+))?", text)
     if parts is None:
         raise InputError(f"--interface {text}: write NAME, NAME:mean, NAME=SURFACE or NAME@x,y,z (see --help)")
+    if is_query(text):
+        raise InputError(f'--interface {text}: give it a name as well, such as --interface "bore={text}"')
     name, region, kind, point = parts.groups()
     return InterfaceRegion(name, region, kind or "rigid", None if point is None else _point(text, point))
 

@@ -6,6 +6,7 @@ Blocks are pairs (kind, nodes (E, k)) as in `elements`; element numbers count th
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
@@ -28,11 +29,22 @@ def whole_faces(blocks: Blocks, corners: Sequence[Array]) -> tuple[Array, ...]:
 
     One array (F, k) per face size, outward where the face is outside.
     """
-    faces, wanted, face = _numbered(blocks, corners)
-    _, first = np.unique(face, return_index=True)
-    keep = np.zeros(face.size, bool)
-    keep[first] = np.isin(face[first], wanted)
-    return _chosen(faces, keep)
+    return groups_of_whole_faces(blocks, [corners])[0]
+
+
+def groups_of_whole_faces(blocks: Blocks, groups: Sequence[Sequence[Array]]) -> list[tuple[Array, ...]]:
+    """`whole_faces` of several groups of corners; the sides of the elements are numbered once."""
+    faces, wanted, face = _numbered(blocks, [part for group in groups for part in group])
+    first = np.full(max(face.max(initial=-1), wanted.max(initial=-1)) + 1, -1)
+    first[face[::-1]] = np.arange(face.size)[::-1]
+    ends = np.cumsum([0, *(sum(map(len, group)) for group in groups)])
+    found = []
+    for own in (wanted[start:end] for start, end in pairwise(ends)):
+        keep = np.zeros(face.size, bool)
+        sides = first[own]
+        keep[sides[sides >= 0]] = True
+        found.append(_chosen(faces, keep))
+    return found
 
 
 def joined_by_faces(blocks: Blocks) -> Array:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from ffr_prep.common.registry import Registry, Target
 
+MOST_ELEMENTS = 2e6  # of second order some eight million unknowns, which take more memory than a large machine has
+
 _ANY = "*"
 
 
@@ -16,7 +18,7 @@ class MeshFormat:
 
     read       : function, or "package.module:function", of the path that returns a `ffr_prep.mesh.file_mesh.FileMesh`; for
                  geometry it is called with the further arguments unit, size, numbers and order of
-                 `ffr_prep.mesh.mesh.read_mesh`
+                 `ffr_prep.mesh.mesh.read_mesh`, and with glue, solids and most_elements where they are not the usual ones
     suffixes   : in lower case, with the dot
     geometry   : whether the file is meshed on reading
     parameters : whether it has numbers that may be changed by name

@@ -11,8 +11,8 @@ import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,9 @@ from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.registry import choice
 from ffr_prep.mesh import gmsh_process
 from ffr_prep.mesh.cells import node_order
-from ffr_prep.mesh.file_mesh import FileMesh, supported_kind
+from ffr_prep.mesh.file_mesh import DrawnFace, FileMesh, FileSkin, FileSolid, supported_kind
+from ffr_prep.mesh.formats import MOST_ELEMENTS
+from ffr_prep.mesh.step_text import face_labels, length_unit
 from ffr_prep.mesh.time_limit import limit
 
 CAD_UNITS = {"m": "M", "cm": "CM", "mm": "MM", "in": "INCH"}
@@ -50,23 +52,30 @@ _LIBRARIES = "libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1"
 # ---- the mesh -------------------------------------------------------------------------------------------------------
 
 
-def from_gmsh(
-    path: Path, *, unit: str | None, size: float | None, numbers: Mapping[str, float], order: int
-) -> FileMesh:
-    """The mesh that gmsh reads or makes of a file, in a process of its own.
+def from_gmsh(path: Path, **wanted: Any) -> FileMesh:
+    """The mesh that gmsh reads or makes of a file, in a process of its own; arguments as of `read_mesh`.
 
-    unit : of the numbers, where the file declares none or another is meant; size : largest element edge
-
-    Raises InputError for a file that gmsh cannot read, for parameters that a script does not have and for a unit of a file
-    that is converted to another; ComputationError when meshing fails.
+    Raises InputError for a file that gmsh cannot read, for parameters that a script does not have and for a unit that
+    contradicts the file's; ComputationError when meshing fails.
     """
-    stored, unit = _arrays(path, dimension=3, unit=unit, size=size, numbers=numbers, order=order)
-    return _file_mesh(stored, unit)
+    stored, unit = _arrays(path, "solids", **wanted)
+    return _file_mesh(path, stored, unit)
 
 
 def mesh_from_gmsh(path: Path) -> FileMesh:
     """A mesh that gmsh reads; errors as in `from_gmsh`."""
-    return from_gmsh(path, unit=None, size=None, numbers={}, order=1)
+    return from_gmsh(path)
+
+
+def skin_from_gmsh(path: Path, **wanted: Any) -> FileSkin:
+    """The faces of the solids of a geometry with what they are, without a volume mesh; arguments and errors as of `from_gmsh`."""
+    stored, unit = _arrays(path, "skin", **wanted)
+    names = json.loads(stored["names"].tobytes())
+    solids = [
+        (s["name"], s["label"], s["volume"], np.array(s["centre"]), np.reshape(s["inertia"], (3, 3)))
+        for s in names["solids"]
+    ]
+    return FileSkin(stored["points"], _drawn_faces(path, stored, names), tuple(FileSolid(*of) for of in solids), unit)
 
 
 @dataclass(frozen=True)
@@ -87,7 +96,7 @@ def lines_and_faces(
 
     Other arguments and errors as in `from_gmsh`.
     """
-    stored, unit = _arrays(path, dimension=2 if faces else 1, unit=unit, size=size, numbers=numbers, order=1)
+    stored, unit = _arrays(path, "surfaces" if faces else "lines", unit=unit, size=size, numbers=numbers)
     names = json.loads(stored["names"].tobytes())
     return LinesAndFaces(
         points=stored["points"],
@@ -99,27 +108,42 @@ def lines_and_faces(
 
 
 def _arrays(
-    path: Path, *, dimension: int, unit: str | None, size: float | None, numbers: Mapping[str, float], order: int
+    path: Path,
+    wanted: str,
+    *,
+    unit: str | None = None,
+    size: float | None = None,
+    numbers: Mapping[str, float] | None = None,
+    order: int = 1,
+    most_elements: float = MOST_ELEMENTS,
+    glue: bool = False,
+    solids: Sequence[str] = (),
 ) -> tuple[dict[str, Array], str | None]:
     """The arrays that the process writes, and the unit of their numbers, where it is known."""
     suffix = path.suffix.lower()
     _check_content(path)
-    _check_geometry(path, unit, numbers)
+    _check_geometry(path, unit, numbers or {})
+    if suffix == _SCRIPT and (glue or solids):
+        what = "--glue joins" if glue else "--solid chooses"
+        raise InputError(f"{what} solids of CAD files; in {path}, write BooleanFragments and Physical Volume")
     declared = declared_unit(path) if suffix in _WITH_UNIT else None
     job: dict[str, Any] = {
-        "dimension": dimension,
+        "wanted": wanted,
         "generate": suffix not in _MESHES,
         "unit": CAD_UNITS[declared or unit or "m"],  # what a script merges comes in the unit of its own numbers
         "size": size,
-        "numbers": dict(numbers),
+        "numbers": dict(numbers or {}),
         "order": order,
+        "most": most_elements,
+        "glue": glue,
+        "solids": list(solids),
     }
     with tempfile.TemporaryDirectory(prefix="ffr-gmsh-") as folder:
         job_file, result = Path(folder, "job.json"), Path(folder, "result.npz")
         job_file.write_text(json.dumps(job | {"path": str(_alone(path, Path(folder)))}))
         _run_gmsh(path, job_file, result)
         with np.load(result) as stored:
-            return dict(stored), unit or declared
+            return dict(stored), declared or unit
 
 
 def _alone(path: Path, folder: Path) -> Path:
@@ -147,6 +171,11 @@ def _check_geometry(path: Path, unit: str | None, numbers: Mapping[str, float]) 
     suffix = path.suffix.lower()
     if suffix in _IGES and unit not in (None, "mm"):
         raise InputError(f"{path} declares its unit and is converted to millimetres; leave out the unit {unit!r}")
+    if suffix in _WITH_UNIT and unit not in (None, declared_unit(path)):
+        raise InputError(
+            f"{path} declares that its numbers are {declared_unit(path)}, and the unit {unit!r} is given: leave it out, or, if "
+            "the file is wrong, export it again with the unit that is meant"
+        )
     if suffix == _SCRIPT:
         if path.read_bytes().rpartition(b"\n")[2].strip():
             raise InputError(
@@ -186,8 +215,8 @@ def _run_gmsh(path: Path, job_file: Path, result: Path) -> None:
         raise ComputationError(f"gmsh cannot be loaded ({said}); on Debian: apt-get install {_LIBRARIES}")
     if done.returncode == gmsh_process.UNREADABLE:
         raise InputError(f"gmsh cannot read {path}: {said}; is it complete, and does its ending name its format?")
-    if done.returncode == gmsh_process.TOO_FINE:
-        raise InputError(f"{path}: {said}")
+    if done.returncode == gmsh_process.REFUSED:
+        raise InputError(f"{path}: {done.stderr.strip()}")
     if done.returncode == gmsh_process.UNMESHED:
         raise ComputationError(f"gmsh could not mesh {path}: {said}; try another element size, or repair the geometry")
     if done.returncode:
@@ -202,7 +231,7 @@ def _last_words(log: str) -> str:
     return " | ".join(dict.fromkeys((errors or lines)[-3:]))
 
 
-def _file_mesh(stored: dict[str, Array], unit: str | None) -> FileMesh:
+def _file_mesh(path: Path, stored: dict[str, Array], unit: str | None) -> FileMesh:
     names = json.loads(stored["names"].tobytes())
     kinds = [_gmsh_kind(name, stored[f"cells_{k}"].shape[1]) for k, name in enumerate(names["kinds"])]
     blocks = [_gmsh_block(kind, stored, k) for k, kind in enumerate(kinds)]
@@ -219,7 +248,20 @@ def _file_mesh(stored: dict[str, Array], unit: str | None) -> FileMesh:
         nodes=_nodes(stored, names),
         notes=tuple(names["notes"]),
         unit=unit,
+        drawn=_drawn_faces(path, stored, names),
     )
+
+
+def _drawn_faces(path: Path, stored: Mapping[str, Array], names: Mapping[str, Any]) -> tuple[DrawnFace, ...]:
+    """The faces of the geometry, with the names that the text of a STEP file has for them."""
+    faces = [
+        DrawnFace(**facts, corners=(stored[f"geometry_{k}_3"], stored[f"geometry_{k}_4"]))
+        for k, facts in enumerate(names["geometry"])
+    ]
+    if path.suffix.lower() not in (".step", ".stp"):
+        return tuple(faces)
+    labels = face_labels(path.read_text(errors="replace"), [face.kind for face in faces])
+    return tuple(replace(f, label=f.label or label) for f, label in zip(faces, labels, strict=True))
 
 
 def _faces(stored: Mapping[str, Array], names: Mapping[str, list[str]]) -> dict[str, tuple[Array, Array]]:
@@ -251,13 +293,4 @@ def declared_unit(path: Path) -> str:
     """
     if path.suffix.lower() in _IGES:
         return "mm"
-    text = path.read_text(errors="replace")
-    context = re.search(r"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\s*\(([^)]*)\)", text)
-    for reference in re.findall(r"#\d+", context[1]) if context else []:
-        entity = re.search(rf"{reference}\s*=\s*\(([^;]*)\)\s*;", text)
-        if entity and "LENGTH_UNIT" in entity[1]:
-            if re.search(r"CONVERSION_BASED_UNIT\s*\(\s*'INCH", entity[1], re.IGNORECASE):
-                return "in"
-            prefix = re.search(r"SI_UNIT\s*\(\s*(\$|\.\w+\.)\s*,\s*\.METRE\.", entity[1])
-            return {"$": "m", ".CENTI.": "cm"}.get(prefix[1], "mm") if prefix else "mm"
-    return "mm"
+    return length_unit(path.read_text(errors="replace"))

@@ -3,14 +3,18 @@
 Run as  python gmsh_process.py JOB.json RESULT.npz.  Gmsh is a large native library that may crash or exit; here that
 ends only this process. It runs on one thread, so the same file gives the same mesh bit for bit.
 
-Exit codes: 0 done, 2 the file cannot be read, 3 gmsh cannot be loaded, 4 meshing failed, 5 the size of the elements makes
-more than could be used. Messages are on stderr.
+A job has: path, wanted ("lines", "surfaces", "solids", or "skin": the faces of solids with what they are), generate, unit,
+size, numbers, order, most (elements), glue, solids (names of those to keep; all where there are none).
+
+Exit codes: 0 done, 2 the file cannot be read, 3 gmsh cannot be loaded, 4 meshing failed, 5 the job asks for what cannot be
+meant, such as more elements than could be used. Messages are on stderr.
 
 Source: C. Geuzaine, J.-F. Remacle, Int. J. Numer. Meth. Engng 79 (2009) 1309-1331; gmsh reference manual.
 """
 
 from __future__ import annotations
 
+import fnmatch
 import json
 import re
 import sys
@@ -19,15 +23,20 @@ from typing import Any
 
 import numpy as np
 
-UNREADABLE, UNLOADABLE, UNMESHED, TOO_FINE = 2, 3, 4, 5
+UNREADABLE, UNLOADABLE, UNMESHED, REFUSED = 2, 3, 4, 5
 
-_HXT = 10
+_HXT, _DELAUNAY = 10, 1
+_FLAT = 1e-9
 _ELEMENTS_PER_TURN = 12
 _DIGITS = 12
 _TETRAHEDRA_PER_CUBE = 8.5  # regular ones, of an edge like that of the cube
-_MOST_ELEMENTS, _MOST_ALONG = 5e7, 2e4
+_MOST_ALONG = 2e4
 _IGES = (".iges", ".igs")
 _CAD = (".step", ".stp", ".brep", *_IGES)
+
+
+class Refused(Exception):
+    """What is asked for cannot be meant; the message says why, and what to ask for."""
 
 
 def main() -> int:
@@ -44,13 +53,14 @@ def main() -> int:
     except Exception as error:  # gmsh raises nothing more specific
         return _failed(error, UNREADABLE)
     try:
-        if job["generate"] and (many := _too_many(gmsh, job)):
-            return _failed(many, TOO_FINE)
+        _choose(gmsh, job)
         if job["generate"]:
             _generate(gmsh, job)
-        arrays, names = {1: _lines, 2: _surfaces, 3: _result}[job["dimension"]](gmsh)
+        arrays, names = _RESULTS[job["wanted"]](gmsh)
         if job["generate"]:
             arrays["points"] = _rounded(arrays["points"])
+    except Refused as error:
+        return _failed(error, REFUSED)
     except Exception as error:
         return _failed(error, UNMESHED)
     arrays["names"] = np.frombuffer(json.dumps(names).encode(), np.uint8)
@@ -79,52 +89,134 @@ def _open(gmsh: Any, job: dict[str, Any]) -> None:
         gmsh.option.setString("Geometry.OCCTargetUnit", job["unit"])
     if job["path"].lower().endswith(_CAD):
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _ELEMENTS_PER_TURN)
+    gmsh.option.setNumber("Geometry.OCCImportLabels", 1)  # names and colours
     gmsh.open(job["path"])
     if not gmsh.model.getEntities():
         raise ValueError("nothing in it is a geometry or a mesh")
 
 
-def _too_many(gmsh: Any, job: dict[str, Any]) -> str:
-    """Why a size cannot be meant, if it makes so many elements that no mesh would come of it; empty if it can."""
-    if job["size"] is None or not gmsh.model.getEntities(job["dimension"]):
-        return ""
+def _choose(gmsh: Any, job: dict[str, Any]) -> None:
+    """Keep the solids that are asked for, and let those that touch share their faces, where that is asked for."""
+    if job["solids"]:
+        _keep(gmsh, job["solids"])
+    solids = gmsh.model.occ.getEntities(3)
+    if job["glue"] and len(solids) > 1:
+        looks = [(gmsh.model.getEntityName(*solid), gmsh.model.getColor(*solid)) for solid in solids]
+        _, pieces = gmsh.model.occ.fragment(solids[:1], solids[1:])
+        gmsh.model.occ.synchronize()
+        for (name, colour), of in zip(looks, pieces, strict=False):
+            for piece in [piece for piece in of if piece[0] == 3]:
+                gmsh.model.setEntityName(*piece, name)
+                gmsh.model.setColor([piece], *colour)
+
+
+def _keep(gmsh: Any, wanted: list[str]) -> None:
+    """Remove all solids but those of these names, which may be patterns."""
+    names = {
+        tag: [f"volume_{tag}", _given_name(gmsh.model.getEntityName(3, tag))] for _, tag in gmsh.model.getEntities(3)
+    }
+    known = ", ".join(repr(name or own) for own, name in names.values())
+    kept = {tag for tag, of in names.items() if any(fnmatch.fnmatchcase(one, word) for one in of for word in wanted)}
+    for word in wanted:
+        if not any(fnmatch.fnmatchcase(one, word) for of in names.values() for one in of):
+            raise Refused(f"there is no solid {word!r}; there are: {known or 'none'}")
+    others = [(3, tag) for tag in names if tag not in kept]
+    if others:
+        gmsh.model.occ.remove(others, recursive=True)
+        gmsh.model.occ.synchronize()
+
+
+def _check_size(gmsh: Any, job: dict[str, Any]) -> None:
+    """Refuse a size that makes so many elements that no mesh would come of it."""
+    size, most = job["size"], job["most"]
+    if size is None or not gmsh.model.getEntities(2):
+        return
     low, high = np.split(np.array(gmsh.model.getBoundingBox(-1, -1)), 2)
-    extent = max(high - low)
-    solids = [tag for _, tag in gmsh.model.occ.getEntities(3)] if job["dimension"] == 3 else []
-    filled = sum(gmsh.model.occ.getMass(3, tag) for tag in solids)  # of what OpenCASCADE does not know nothing
-    elements = _TETRAHEDRA_PER_CUBE * filled / job["size"] ** 3
-    if elements < _MOST_ELEMENTS and extent / job["size"] < _MOST_ALONG:
-        return ""
-    return (
-        f"elements of size {job['size']:g} would be far too many for a geometry of extent {extent:.5g}; "
-        "both are in the unit of the file"
+    extent, along = max(high - low), max(high - low) / size
+    elements = _estimate(gmsh, job) / size ** (3 if job["wanted"] == "solids" else 2)
+    if elements < most and along < _MOST_ALONG:
+        return
+    enough = size * max((elements / most) ** (1 / 3 if job["wanted"] == "solids" else 1 / 2), along / _MOST_ALONG)
+    raise Refused(
+        f"elements of size {size:g} would be far too many for a geometry of extent {extent:.5g}, some {elements:.1g}; both "
+        f"are in the unit of the file{_metres(1e3 * size / extent)}. A size of {_up(enough)} makes {most:.3g} at most, which may be set (--most-elements)"
     )
+
+
+def _metres(share: float) -> str:
+    """A question where a thousand times the size would be a usual share of the extent."""
+    return " (is the size in metres, and the file in millimetres?)" if 0.002 < share < 1 else ""
+
+
+def _estimate(gmsh: Any, job: dict[str, Any]) -> float:
+    """The number of elements of size one: what OpenCASCADE knows of volumes, or areas; else nothing."""
+    if job["wanted"] == "solids":
+        return float(
+            _TETRAHEDRA_PER_CUBE * sum(gmsh.model.occ.getMass(3, tag) for _, tag in gmsh.model.occ.getEntities(3))
+        )
+    return float(2.3 * sum(gmsh.model.occ.getMass(2, tag) for _, tag in gmsh.model.occ.getEntities(2)))
+
+
+def _up(size: float) -> float:
+    """The next number of two digits."""
+    step = 10.0 ** (np.floor(np.log10(size)) - 1)
+    return float(f"{np.ceil(1.02 * size / step) * step:.3g}")
+
+
+def _check_curves(gmsh: Any, job: dict[str, Any]) -> None:
+    """Refuse what the curvature of many fine faces makes too many of: each has so many triangles to the turn."""
+    triangles = 0.0
+    for kind, tag in gmsh.model.occ.getEntities(2):
+        radius = gmsh.model.getEntityProperties(kind, tag)[1][-1:]
+        if gmsh.model.getType(kind, tag) in ("Cylinder", "Sphere", "Torus") and radius.size and radius[0] > 0:
+            triangles += 2.3 * gmsh.model.occ.getMass(kind, tag) / (2 * np.pi * radius[0] / _ELEMENTS_PER_TURN) ** 2
+    if triangles > job["most"]:
+        raise Refused(
+            f"its fine curves alone would make some {triangles:.1g} elements: simplify the geometry, or allow more than "
+            f"{job['most']:.3g} (--most-elements)"
+        )
 
 
 def _generate(gmsh: Any, job: dict[str, Any]) -> None:
     """Mesh the volumes, the surfaces or the curves; the options set here win over those of a script."""
+    dimension, lack = _NEEDS[job["wanted"]]
+    if not gmsh.model.getEntities(dimension):
+        raise ValueError(lack)
+    _check_size(gmsh, job)
+    if job["path"].lower().endswith(_CAD) and job["wanted"] != "lines":
+        _check_curves(gmsh, job)
     if job["size"] is not None:
         gmsh.option.setNumber("Mesh.MeshSizeMax", job["size"])
         if job["path"].lower().endswith(_CAD):  # without sizes at points, gmsh takes a tenth of the diagonal
             gmsh.model.mesh.setSize(gmsh.model.getEntities(0), job["size"])
     gmsh.option.setNumber("Mesh.ElementOrder", job["order"])
-    if job["dimension"] == 1:
-        if not gmsh.model.getEntities(1):
-            raise ValueError("the geometry has no curves: draw the axes of the beams")
-        gmsh.model.mesh.generate(1)
+    if job["wanted"] != "solids":
+        gmsh.model.mesh.generate(min(dimension, 2))
         return
-    if job["dimension"] == 2:
-        if not gmsh.model.getEntities(2):
-            raise ValueError("the geometry has no surfaces: draw the plates as surfaces")
-        gmsh.model.mesh.generate(2)
-        return
-    if not gmsh.model.getEntities(3):
-        raise ValueError("the geometry has no volume, only surfaces or curves: make it a solid")
     if not gmsh.model.mesh.getElementTypes(3).size:
         gmsh.model.mesh.generate(3)
+        if _has_flat_elements(gmsh):  # of which no optimisation makes anything
+            gmsh.model.mesh.clear()
+            gmsh.option.setNumber("Mesh.Algorithm3D", _DELAUNAY)
+            gmsh.model.mesh.generate(3)
     gmsh.model.mesh.setOrder(job["order"])
     if job["order"] == 2 and _smallest_jacobian(gmsh) <= 0:
         gmsh.model.mesh.optimize("HighOrder")
+
+
+def _has_flat_elements(gmsh: Any) -> bool:
+    """Whether there are tetrahedra whose corners span no volume, measured by the others."""
+    tags, places, _ = gmsh.model.mesh.getNodes()
+    points = np.zeros((int(tags.max()) + 1, 3))
+    points[tags] = places.reshape(-1, 3)
+    volumes = [np.ones(1)]
+    for kind in gmsh.model.mesh.getElementTypes(3):
+        _, _, _, size, _, primary = gmsh.model.mesh.getElementProperties(kind)
+        if primary == 4:
+            corners = points[gmsh.model.mesh.getElementsByType(kind)[1].reshape(-1, size)[:, :4]]
+            volumes.append(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])))
+    sizes = np.concatenate(volumes[1:] or volumes)
+    return bool(sizes.min() <= _FLAT * np.median(sizes))
 
 
 def _rounded(points: np.ndarray) -> np.ndarray:
@@ -149,6 +241,7 @@ def _result(gmsh: Any) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     _add_volumes(gmsh, index_of, arrays, names)
     _add_faces(gmsh, index_of, arrays, names)
     _add_nodes(gmsh, index_of, arrays, names)
+    _add_geometry(gmsh, index_of, arrays, names)
     return arrays, names
 
 
@@ -222,6 +315,64 @@ def _add_faces(gmsh: Any, index_of: np.ndarray, arrays: dict[str, np.ndarray], n
             arrays[f"face_{g}_{corners}"] = np.concatenate(found)
 
 
+def _skin(gmsh: Any) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """The faces of the solids as triangles, what they are, and the mass properties of the solids at density one."""
+    arrays, index_of = _points(gmsh)
+    names: dict[str, Any] = {}
+    _add_geometry(gmsh, index_of, arrays, names)
+    known = {tag for _, tag in gmsh.model.occ.getEntities(3)}
+    names["solids"] = [
+        {
+            "name": f"volume_{tag}",
+            "label": _given_name(gmsh.model.getEntityName(3, tag)),
+            "volume": gmsh.model.occ.getMass(3, tag),
+            "centre": list(gmsh.model.occ.getCenterOfMass(3, tag)),
+            "inertia": list(gmsh.model.occ.getMatrixOfInertia(3, tag)),
+        }
+        for _, tag in gmsh.model.getEntities(3)
+        if tag in known
+    ]
+    return arrays, names
+
+
+def _add_geometry(gmsh: Any, index_of: np.ndarray, arrays: dict[str, np.ndarray], names: dict[str, Any]) -> None:
+    """The faces of the solids that are drawn and not only meshed: their kind, numbers, names, colour and corners."""
+    names["geometry"] = []
+    known = {tag for _, tag in gmsh.model.occ.getEntities(2)}
+    drawn = [tag for _, tag in gmsh.model.getEntities(2) if gmsh.model.getType(2, tag) != "Discrete surface"]
+    types = [
+        (int(kind), gmsh.model.mesh.getElementProperties(int(kind))) for kind in gmsh.model.mesh.getElementTypes(2)
+    ]
+    for tag in drawn:
+        solids = [int(solid) for solid in gmsh.model.getAdjacencies(2, tag)[0]]
+        if not solids:
+            continue
+        groups = [_physical_name(gmsh, 2, int(group)) for group in gmsh.model.getPhysicalGroupsForEntity(2, tag)]
+        red, green, blue, alpha = gmsh.model.getColor(2, tag)
+        face = len(names["geometry"])
+        names["geometry"].append(
+            {
+                "name": f"surface_{tag}",
+                "kind": gmsh.model.getType(2, tag).lower(),
+                "numbers": [float(x) for x in gmsh.model.getEntityProperties(2, tag)[1]],
+                "exact": [gmsh.model.occ.getMass(2, tag), *gmsh.model.occ.getCenterOfMass(2, tag)]
+                if tag in known
+                else [],
+                "label": _given_name(gmsh.model.getEntityName(2, tag)),
+                "colour": f"#{red:02x}{green:02x}{blue:02x}" if alpha else "",
+                "groups": groups,
+                "solids": [_given_name(gmsh.model.getEntityName(3, s)) or f"volume_{s}" for s in solids],
+            }
+        )
+        for corners in (3, 4):
+            found = [np.zeros((0, corners), np.int64)]
+            for kind, (_, _, _, size, _, primary) in types:
+                if primary == corners:
+                    nodes = gmsh.model.mesh.getElementsByType(kind, tag)[1]
+                    found.append(index_of[nodes].reshape(-1, size)[:, :corners])
+            arrays[f"geometry_{face}_{corners}"] = np.concatenate(found)
+
+
 def _add_nodes(
     gmsh: Any,
     index_of: np.ndarray,
@@ -262,6 +413,14 @@ def _given_name(path: str) -> str:
     name = path.rpartition("/")[2].strip()
     return "" if re.match(r"Open CASCADE STEP translator|COMPOUND$|SOLID$", name) else name
 
+
+_RESULTS = {"lines": _lines, "surfaces": _surfaces, "solids": _result, "skin": _skin}
+_NEEDS = {
+    "lines": (1, "the geometry has no curves: draw the axes of the beams"),
+    "surfaces": (2, "the geometry has no surfaces: draw the plates as surfaces"),
+    "solids": (3, "the geometry has no volume, only surfaces or curves: make it a solid"),
+    "skin": (3, "the geometry has no volume, only surfaces or curves: make it a solid"),
+}
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -5,9 +5,10 @@ Everything is in metres: the unit of a file is converted once, on reading.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -20,17 +21,17 @@ from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.common.reading import check_ordinary, reading
 from ffr_prep.common.registry import choice, loaded
-from ffr_prep.mesh.boundary import joined_by_faces, joined_by_nodes, outer_faces, whole_faces
-from ffr_prep.mesh.cells import FACE_TRIANGLES, KINDS
-from ffr_prep.mesh.file_mesh import FileMesh
-from ffr_prep.mesh.formats import format_of
-
-UNITS: Mapping[str, float] = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+from ffr_prep.mesh.boundary import groups_of_whole_faces, joined_by_faces, joined_by_nodes, outer_faces
+from ffr_prep.mesh.cells import FACE_TRIANGLES, KINDS, face_corners
+from ffr_prep.mesh.faces import METRES, Face, face_of
+from ffr_prep.mesh.file_mesh import DrawnFace, FileMesh
+from ffr_prep.mesh.formats import MOST_ELEMENTS, format_of
 
 _CHUNK = 4096
 _DEGENERATE = 1e-10
 _COINCIDENT = 1e-9
 _DOUBTFUL_LENGTH = 20.0
+_LONG, _SHORT = 100.0, 3e-4  # bodies beyond are told of, whatever their unit [m]
 _SHOWN_PARTS = 5
 _FAR = 1e30  # products of coordinates must be finite
 
@@ -56,6 +57,8 @@ class Mesh(Brief):
     face_groups   : name -> tuple of (F, k) face connectivities, k = 3, 6 (triangles), 4, 8, 9 (quadrilaterals)
     node_groups   : name -> (m,) node indices
     notes         : what was left out or changed on reading, in words
+    drawn         : of a geometry, each face with its facets as in face_groups
+    unit          : in which the file has its lengths, for texts such as "cylinder r=6 at 0,0,0"
     """
 
     points: Array
@@ -64,6 +67,8 @@ class Mesh(Brief):
     face_groups: Mapping[str, tuple[Array, ...]]
     node_groups: Mapping[str, Array]
     notes: tuple[str, ...] = ()
+    drawn: tuple[tuple[Face, tuple[Array, ...]], ...] = ()
+    unit: str = "m"
 
     def _rows(self) -> Rows:
         return [
@@ -87,15 +92,22 @@ def read_mesh(
     size: float | None = None,
     numbers: Mapping[str, float] | None = None,
     order: int = 2,
+    glue: bool = False,
+    solids: Sequence[str] = (),
+    most_elements: float = MOST_ELEMENTS,
     progress: Stages = no_stages,
 ) -> Mesh:
     """A mesh from a file, in metres; geometry (.geo, .step, .iges, .brep) is meshed by gmsh first.
 
     unit     : of the numbers in the file, "m", "cm", "mm" or "in"; without it the unit that a STEP file declares,
-               millimetres for IGES, which is converted to them, and metres for every other file
+               millimetres for IGES, which is converted to them, and metres for every other file. Another unit than a STEP
+               or IGES file declares is refused
     size     : largest element edge when geometry is meshed, in the unit of the file
     numbers  : parameters of a .geo script to change, by name
     order    : 1 or 2, of the elements when geometry is meshed; second-order elements follow curved surfaces
+    glue     : solids of a CAD file that touch share the faces between them, and are one body then
+    solids   : of a CAD file, the names of those to keep, or patterns such as "volume_1" or "arm*"; all when not given
+    most_elements : a geometry whose size, or whose fine curves, ask for more is refused before it is meshed
     progress : called with the name of the stage as it begins
 
     A .geo file is a program and may run others: open only what you trust. Faces and volumes of CAD files without
@@ -107,21 +119,33 @@ def read_mesh(
     check_request(path, unit, size, numbers, order)
     progress("read the mesh")
     entry = format_of(path)
-    of_geometry = {"unit": unit, "size": size, "numbers": numbers, "order": order} if entry.geometry else {}
+    of_cad = cad_settings(path, glue, solids, most_elements)
+    of_geometry = {"unit": unit, "size": size, "numbers": numbers, "order": order} | of_cad if entry.geometry else {}
     with reading(path, "a mesh or a geometry"):
         read: FileMesh = loaded(entry.read)(path, **of_geometry)
         if not read.blocks:
             raise InputError(f"{path} has no volume elements; only solids can be reduced, not surfaces or beams")
         _check_places(path, read)
         known = unit or read.unit
-        mesh = _in_metres(read, UNITS[known or "m"])
-    return mesh if known else replace(mesh, notes=(*mesh.notes, *_doubtful_unit(mesh)))
+        mesh = _in_metres(read, known or "m")
+    return replace(mesh, notes=(*mesh.notes, *_doubtful_unit(mesh, known), *_doubtful_size(mesh, size)))
+
+
+def cad_settings(path: Path, glue: bool, solids: Sequence[str], most_elements: float) -> dict[str, Any]:
+    """The settings that differ from what is usual. Raises InputError for those that a file has no use for."""
+    if (glue or solids) and not format_of(path).geometry:
+        raise InputError(f"{path} is meshed already, so its solids cannot be glued or chosen: do that where it is made")
+    if not 1 <= most_elements < np.inf:
+        raise InputError(f"most_elements is {most_elements}; give a number of elements such as 1e6")
+    given = {"glue": glue, "solids": tuple(solids), "most_elements": most_elements}
+    usual = {"glue": False, "solids": (), "most_elements": MOST_ELEMENTS}
+    return {key: value for key, value in given.items() if value != usual[key]}
 
 
 def check_request(path: Path, unit: str | None, size: float | None, numbers: Mapping[str, float], order: int) -> None:
     """Raises InputError for a unit, size, parameter, order or file that cannot be used."""
-    if unit is not None and unit not in UNITS:
-        raise InputError(f"unit {unit!r} is not known; the units are {', '.join(UNITS)}")
+    if unit is not None and unit not in METRES:
+        raise InputError(f"unit {unit!r} is not known; the units are {', '.join(METRES)}")
     if size is not None and not 0 < size < np.inf:
         raise InputError(f"element size {size} cannot be used; it must be positive")
     if order not in (1, 2):
@@ -143,22 +167,38 @@ def _check_places(path: Path, read: FileMesh) -> None:
         raise InputError(f"{path} has nodes without a place: their coordinates are no finite numbers")
 
 
-def _in_metres(read: FileMesh, scale: float) -> Mesh:
+def _in_metres(read: FileMesh, unit: str) -> Mesh:
     """The mesh without the nodes that no element uses, its faces completed from the volume elements."""
     used = np.unique(np.concatenate([nodes.ravel() for _, nodes in read.blocks]))
     new = np.full(len(read.points), -1)
     new[used] = np.arange(used.size)
     blocks = [(kind, new[nodes]) for kind, nodes in read.blocks]
-    faces = {name: whole_faces(blocks, [new[corners] for corners in parts]) for name, parts in read.faces.items()}
+    points = read.points[used] * METRES[unit]
+    groups = [*read.faces.values(), *(face.corners for face in read.drawn)]
+    whole = groups_of_whole_faces(blocks, [[new[corners] for corners in parts] for parts in groups])
+    faces = dict(zip(read.faces, whole, strict=False))
+    drawn = zip(read.drawn, whole[len(faces) :], strict=True)
     nodes = {name: np.unique(new[members][new[members] >= 0]) for name, members in read.nodes.items()}
     return Mesh(
-        points=read.points[used] * scale,
+        points=points,
         blocks=tuple(Block(kind, nodes) for kind, nodes in blocks),
         volume_groups=dict(read.volumes),
         face_groups={name: parts for name, parts in faces.items() if parts},
         node_groups={name: members for name, members in nodes.items() if members.size},
         notes=(*read.notes, *_left_out(len(read.points) - used.size, faces, nodes)),
+        drawn=tuple(_drawn(face, facets, points, METRES[unit]) for face, facets in drawn if facets),
+        unit=unit,
     )
+
+
+def _drawn(face: DrawnFace, facets: tuple[Array, ...], points: Array, scale: float) -> tuple[Face, tuple[Array, ...]]:
+    return face_of(face, scale, points, facet_triangles(facets)), facets
+
+
+def facet_triangles(facets: Sequence[Array]) -> Array:
+    """(T, 3) triangles between the corners of facets (F, k)."""
+    parts = [FACE_TRIANGLES[face_corners(of.shape[1])] for of in facets]
+    return np.concatenate([of[:, corners].reshape(-1, 3) for of, corners in zip(facets, parts, strict=True)])
 
 
 def _left_out(unused: int, faces: Mapping[str, tuple[Array, ...]], nodes: Mapping[str, Array]) -> list[str]:
@@ -167,11 +207,31 @@ def _left_out(unused: int, faces: Mapping[str, tuple[Array, ...]], nodes: Mappin
     return notes + [f"group {name!r} is left out: nothing of it belongs to a volume element" for name in lost]
 
 
-def _doubtful_unit(mesh: Mesh) -> list[str]:
+def _doubtful_unit(mesh: Mesh, known: str | None) -> list[str]:
+    """Lengths that are most likely off by a factor of a thousand."""
     length = float(np.ptp(mesh.points, axis=0).max())
-    if length < _DOUBTFUL_LENGTH:
+    if known is None and length >= _DOUBTFUL_LENGTH:
+        return [f"the mesh is {length:.4g} m long, read in metres as no unit was given; are its numbers millimetres?"]
+    if length >= _LONG:
+        return [
+            f"the body is {length:.4g} m long, its numbers read as {known or 'm'}: is that meant, or are they smaller?"
+        ]
+    if length <= _SHORT:
+        return [
+            f"the body is {1e3 * length:.4g} mm long, its numbers read as {known or 'm'}: is that meant, or are they larger?"
+        ]
+    return []
+
+
+def _doubtful_size(mesh: Mesh, size: float | None) -> list[str]:
+    """A size of elements that a geometry is too small for."""
+    length = float(np.ptp(mesh.points, axis=0).max()) / METRES[mesh.unit]
+    if size is None or size <= length:
         return []
-    return [f"the mesh is {length:.4g} m long, read in metres as no unit was given; are its numbers millimetres?"]
+    return [
+        f"elements of size {size:g} are asked for in a body that is {length:.4g} {mesh.unit} long, so size says nothing: it is "
+        f"in the unit of the file, {mesh.unit}"
+    ]
 
 
 # ---- groups -------------------------------------------------------------------------------------------------------
@@ -191,7 +251,10 @@ def region_nodes(mesh: Mesh, name: str) -> Array:
     if name in mesh.node_groups:
         return np.unique(mesh.node_groups[name])
     known = dict.fromkeys([*mesh.face_groups, *mesh.node_groups])
-    raise InputError(f"the mesh has no group of faces or nodes {name!r}; {choice(name, known)}")
+    raise InputError(
+        f"the mesh has no group of faces or nodes {name!r}; {choice(name, known)}. Faces are also found by what they are, such as "
+        "'cylinder r=6mm at 0,0,0' or 'plane z=0'"
+    )
 
 
 # ---- outside ------------------------------------------------------------------------------------------------------

@@ -93,9 +93,21 @@ def _interface_lines(body: FlexibleBody) -> Iterator[str]:
     size = float(np.sqrt(np.trace(body.rr_dm) / body.mass)) if body.mass > 0 else 0.0
     for k, interface in enumerate(body.interfaces[:_MOST_INTERFACES]):
         label = "interfaces" if k == 0 else ""
-        yield f"{label:12}{interface.name:{width}}  {interface.kind:5}  at {vector_in_words(interface.position, size)} m"
+        where = (
+            f"{label:12}{interface.name:{width}}  {interface.kind:5}  at {vector_in_words(interface.position, size)} m"
+        )
+        yield where + _region_in_words(body.provenance, interface.name)
     if len(body.interfaces) > _MOST_INTERFACES:
         yield f"{'':12}{len(body.interfaces) - _MOST_INTERFACES} more"
+
+
+def _region_in_words(provenance: Mapping[str, Any], name: str) -> str:
+    """The region of an interface as it was asked for, with the faces that were found; empty where it is called like it."""
+    for entry in provenance.get("interfaces", ()):
+        if isinstance(entry, Mapping) and entry.get("name") == name and entry.get("region") not in (None, name):
+            faces = "+".join(entry.get("faces", ()))
+            return f": {entry['region']}" + (f" ({faces})" if faces not in ("", entry["region"]) else "")
+    return ""
 
 
 def part_lines(body: FlexibleBody) -> Iterator[str]:

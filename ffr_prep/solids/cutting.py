@@ -49,6 +49,7 @@ def _part(mesh: Mesh, division: Division, k: int) -> Mesh:
         volume_groups=_filled({name: number[of] for name, of in mesh.volume_groups.items()}),
         face_groups=_faces(blocks, {name: [new[f] for f in of] for name, of in mesh.face_groups.items()}),
         node_groups=_filled({name: new[of] for name, of in groups.items()}),
+        drawn=(),
     )
 
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from ffr_prep.body.provenance import described
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import InputError
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.mesh.mesh import Mesh, check_mesh, mesh_hash
+from ffr_prep.mesh.skin import region_faces, with_regions
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
 from ffr_prep.model.invariants import inertia_integrals
 from ffr_prep.model.model import Model
@@ -33,13 +36,14 @@ def from_mesh(
     """The model of a meshed solid, ready to be reduced or to be tied to others.
 
     material   : one, or one for each volume group
-    interfaces : at face or node groups of the mesh
+    interfaces : at face or node groups of the mesh, or at faces found by what they are (`ffr_prep.mesh.region_words`)
     progress   : called with the name of each stage as it begins
 
     Raises InputError for input that cannot be used.
     """
     progress("check the mesh")
     check_mesh(mesh)
+    plain, mesh = mesh, _with_interfaces(mesh, interfaces)
     progress("assemble stiffness and mass")
     matrices = assemble(mesh, material)
     progress("tie the interfaces")
@@ -67,17 +71,33 @@ def from_mesh(
         recovery=AVERAGING,
         record={
             "mesh": {
-                "hash": mesh_hash(mesh),
+                "hash": mesh_hash(plain),
                 "nodes": len(mesh.points),
                 "elements": element_counts(mesh),
                 "degrees_of_freedom": coupled.K.shape[0],
             },
             "material": described(material),
-            "interfaces": [described(interface) for interface in interfaces],
+            "interfaces": [_described(plain, interface) for interface in interfaces],
             "warnings": mesh_warnings(mesh),
         },
         cut=lambda cuts: [from_mesh(*part) for part in cut_mesh(mesh, material, interfaces, cuts)],
     )
+
+
+def _with_interfaces(mesh: Mesh, interfaces: Sequence[InterfaceRegion]) -> Mesh:
+    """The mesh with a group for the region of each interface."""
+    for interface in interfaces:
+        try:
+            mesh = with_regions(mesh, [interface.region or interface.name])
+        except InputError as error:
+            raise InputError(f"interface {interface.name!r}: {error}") from None
+    return mesh
+
+
+def _described(mesh: Mesh, interface: InterfaceRegion) -> dict[str, Any]:
+    """The interface as JSON values, with the faces that its query has found."""
+    faces = region_faces(mesh, interface.region or interface.name)
+    return {**described(interface), **({"faces": list(faces)} if faces else {})}
 
 
 def nodal_basis(model: CoupledModel, basis: Basis) -> Array:

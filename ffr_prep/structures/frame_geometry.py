@@ -12,7 +12,8 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.common.registry import choice
 from ffr_prep.mesh.gmsh_files import LinesAndFaces, lines_and_faces
-from ffr_prep.mesh.mesh import UNITS, check_request
+from ffr_prep.mesh.faces import METRES
+from ffr_prep.mesh.mesh import check_request
 from ffr_prep.structures.frame import Frame, Member, Shell
 
 SUFFIXES = (".geo", ".msh", ".step", ".stp", ".brep", ".med", ".unv")
@@ -51,7 +52,7 @@ def read_frame(
     if shells:
         _check_shells(path, found, shells)
     _check_members(path, found.lines, members, needed=not shells)
-    return _frame(found, UNITS[found.unit or "m"], members, shells)
+    return _frame(found, METRES[found.unit or "m"], members, shells)
 
 
 def _frame(found: LinesAndFaces, scale: float, members: Mapping[str, Member], shells: Mapping[str, Shell]) -> Frame:

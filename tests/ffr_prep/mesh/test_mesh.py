@@ -633,13 +633,13 @@ def cad(tmp_path_factory):
         ("box.step", None, 1e-3),
         ("metres.step", None, 1.0),
         ("centimetres.stp", None, 1e-2),
-        ("box.step", "m", 1.0),
+        ("box.step", "mm", 1e-3),
         ("box.brep", "in", 0.0254),
         ("box.igs", None, 1e-3),
     ],
 )
 def test_units_of_cad_files(cad, name, unit, metre):
-    """A declared unit counts unless another is given for the numbers; the element size is in the unit of the file."""
+    """A declared unit counts; the element size is in the unit of the file."""
     mesh = read_mesh(cad / name, unit=unit, size=30.0, order=1)
     np.testing.assert_allclose(np.ptp(mesh.points, axis=0), np.array([10, 20, 30]) * metre, rtol=1e-9)
     assert len(mesh.points) < 100
@@ -648,6 +648,11 @@ def test_units_of_cad_files(cad, name, unit, metre):
 def test_iges_has_its_unit(cad):
     with pytest.raises(InputError, match="converted to millimetres; leave out the unit 'm'"):
         read_mesh(cad / "box.igs", unit="m")
+
+
+def test_another_unit_than_the_file_declares_is_refused(cad):
+    with pytest.raises(InputError, match="declares that its numbers are mm, and the unit 'm' is given: leave it out"):
+        read_mesh(cad / "box.step", unit="m", size=30.0)
 
 
 INCHES = """

@@ -1,0 +1,288 @@
+"""Faces of a body: what surface each lies on, where, how large, and which faces are one surface.
+
+A *feature* is what a user sees as one thing: the faces of one plane, cylinder, ... that hang together, such as a bore that its
+file has as four faces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from ffr_prep.common.arrays import Array
+from ffr_prep.common.brief import Brief, Rows, numbers
+from ffr_prep.mesh.file_mesh import DrawnFace
+
+METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "other")
+
+_ANGLE = 1e-3  # within which directions are the same [rad]
+
+
+@dataclass(frozen=True, repr=False)
+class Face(Brief):
+    """A face of a body, in metres.
+
+    name   : such as surface_5, by which it is a region
+    kind   : "plane", "cylinder", "cone", "sphere", "torus" or "other"
+    centre : (3,) centroid of its area [m]; area [m^2]
+    point  : (3,) [m] on a plane or an axis, the centre of a sphere or torus, the tip of a cone
+    axis   : (3,) the normal of a plane, which points outside, or the axis of what has one
+    radius : of cylinder, sphere, torus [m]; half the angle of a cone [rad]; minor: the second radius of a torus [m]
+    hollow : whether material lies outside of a curved face, as around a bore; None where that is not known
+    label, colour : that the file has for it, or "": the colour as #rrggbb
+    groups, solids : that it belongs to
+    """
+
+    name: str
+    kind: str
+    centre: Array
+    area: float
+    point: Array | None = None
+    axis: Array | None = None
+    radius: float | None = None
+    minor: float | None = None
+    hollow: bool | None = None
+    label: str = ""
+    colour: str = ""
+    groups: tuple[str, ...] = ()
+    solids: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, repr=False)
+class Faces(Brief):
+    """The faces of a body with their triangles, in metres.
+
+    faces     : all of them
+    points    : (P, 3) [m]
+    triangles : for each face (T, 3) indices into points, counter-clockwise seen from outside
+    unit      : in which the file has its lengths, in which they are shown and typed: "m", "cm", "mm" or "in"
+    tolerance : within which places and radii are the same, of the size of the body
+    notes     : what is to be known, in words
+    features  : the numbers of the faces of each feature
+    """
+
+    faces: tuple[Face, ...]
+    points: Array
+    triangles: tuple[Array, ...]
+    unit: str = "m"
+    tolerance: float = 1e-5
+    notes: tuple[str, ...] = ()
+    features: tuple[tuple[int, ...], ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "features", _features(self))
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+    @property
+    def size(self) -> float:
+        """The diagonal of the box around all [m]."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0))) if len(self.points) else 0.0
+
+    def _title(self) -> str:
+        return f"{len(self.faces)} faces, {len(self.features)} features"
+
+    def _rows(self) -> Rows:
+        return [(self.faces[of[0]].name, feature_in_words(self, of)) for of in self.features]
+
+
+# ---- what makes faces one feature -----------------------------------------------------------------------------------
+
+
+def same_surface(one: Face, other: Face, near: float) -> bool:
+    """Whether two faces lie on one plane, cylinder, cone, sphere or torus, to within a length [m]."""
+    if one is other:
+        return True
+    if one.kind != other.kind or one.kind == "other" or one.point is None or other.point is None:
+        return False
+    between = other.point - one.point
+    if one.kind == "sphere":
+        return _close(one.radius, other.radius, near) and bool(np.linalg.norm(between) < near)
+    assert one.axis is not None and other.axis is not None  # all others have one
+    if np.linalg.norm(np.cross(one.axis, other.axis)) > _ANGLE:
+        return False
+    if one.kind == "plane":
+        return abs(between @ one.axis) < near
+    if one.kind == "cylinder":
+        return _close(one.radius, other.radius, near) and bool(np.linalg.norm(np.cross(between, one.axis)) < near)
+    equal = _close(one.radius, other.radius, near) and _close(one.minor, other.minor, near)
+    return equal and bool(np.linalg.norm(between) < near)
+
+
+def _close(one: float | None, other: float | None, near: float) -> bool:
+    return one == other or (one is not None and other is not None and abs(one - other) < near)
+
+
+def _features(of: Faces) -> tuple[tuple[int, ...], ...]:
+    """The faces of each feature: those of one surface that share a point, directly or through others."""
+    if not of.faces:
+        return ()
+    nodes, near = _merged(of.points), of.tolerance * of.size
+    touched = [np.unique(nodes[triangles]) for triangles in of.triangles]
+    owner = np.repeat(np.arange(len(touched)), [len(t) for t in touched])
+    use = sp.coo_array(
+        (np.ones(owner.size), (owner, np.concatenate(touched))), (len(touched), int(nodes.max()) + 1)
+    ).tocsr()
+    pairs = sp.coo_array(use @ use.T)
+    bonds = [
+        (i, j)
+        for i, j in zip(pairs.row, pairs.col, strict=True)
+        if i < j and same_surface(of.faces[i], of.faces[j], near)
+    ]
+    rows, columns = np.array(bonds, int).reshape(-1, 2).T
+    graph = sp.coo_array((np.ones(len(rows)), (rows, columns)), (len(touched), len(touched)))
+    _, part = connected_components(graph, directed=False)
+    return tuple(tuple(int(k) for k in np.flatnonzero(part == p)) for p in dict.fromkeys(part.tolist()))
+
+
+def _merged(points: Array) -> Array:
+    """(P,) a number for each point, the same where points coincide: solids that touch without sharing have two."""
+    scale = float(np.ptp(points, axis=0).max()) or 1.0
+    return np.asarray(np.unique(np.round(points / (1e-7 * scale)), axis=0, return_inverse=True)[1]).ravel()
+
+
+# ---- from geometry --------------------------------------------------------------------------------------------------
+
+
+def face_of(drawn: DrawnFace, scale: float, points: Array, triangles: Array) -> Face:
+    """The face of a geometry; points (P, 3) [m] and triangles (T, 3) of it, which point outside; scale to metres."""
+    centre, area, normal = measures(points, triangles)
+    if len(drawn.exact):
+        area, centre = drawn.exact[0] * scale**2, np.array(drawn.exact[1:]) * scale
+    face = Face(
+        drawn.name, drawn.kind if drawn.kind in KINDS else "other", centre, area,
+        label=drawn.label, colour=drawn.colour, groups=tuple(drawn.groups), solids=tuple(drawn.solids),
+    )  # fmt: skip
+    given = np.asarray(drawn.numbers, float)
+    read = _READERS.get(drawn.kind)
+    if read is None or given.size < read[1] or not np.isfinite(given).all():
+        return replace(face, kind="other") if drawn.kind != "plane" else replace(face, point=centre, axis=normal)
+    return with_side(replace(face, **read[0](given, scale, centre, normal)), points, triangles)
+
+
+def with_side(face: Face, points: Array, triangles: Array) -> Face:
+    """The face with whether it is hollow, which its triangles tell that point outside."""
+    if face.kind not in ("cylinder", "cone", "sphere", "torus") or face.point is None:
+        return face
+    middle = points[triangles].mean(axis=1)
+    arm = middle - face.point
+    if face.axis is not None:
+        arm -= (arm @ face.axis)[:, None] * face.axis
+    if face.kind == "torus" and face.radius is not None:
+        arm = middle - face.point - face.radius * arm / np.linalg.norm(arm, axis=1)[:, None]
+    return replace(face, hollow=bool((arm * _normals(points, triangles)).sum() < 0))
+
+
+def _plane(given: Array, scale: float, centre: Array, normal: Array) -> dict[str, Any]:
+    axis = given[:3] / np.linalg.norm(given[:3]) + 0.0
+    distance = -given[3] * scale / np.linalg.norm(given[:3])
+    return {
+        "point": centre + (distance - centre @ axis) * axis,
+        "axis": axis * (1.0 if axis @ normal >= 0 else -1.0) + 0.0,
+    }
+
+
+def _round(given: Array, scale: float, centre: Array, _: Array) -> dict[str, Any]:
+    """A cylinder; its point is moved along the axis to the middle of the face."""
+    axis = oriented_axis(given[3:6])
+    start = given[:3] * scale
+    return {"point": start + ((centre - start) @ axis) * axis, "axis": axis, "radius": given[6] * scale}
+
+
+def _cone(given: Array, scale: float, _: Array, __: Array) -> dict[str, Any]:
+    tip = given[:3] * scale - given[3:6] * (given[6] * scale / np.tan(given[7]))
+    return {"point": tip, "axis": oriented_axis(given[3:6]), "radius": abs(given[7])}
+
+
+def _sphere(given: Array, scale: float, _: Array, __: Array) -> dict[str, Any]:
+    return {"point": given[:3] * scale, "radius": given[3] * scale}
+
+
+def _torus(given: Array, scale: float, _: Array, __: Array) -> dict[str, Any]:
+    return {
+        "point": given[:3] * scale,
+        "axis": oriented_axis(given[3:6]),
+        "radius": given[6] * scale,
+        "minor": given[7] * scale,
+    }
+
+
+_READERS = {
+    "plane": (_plane, 4),
+    "cylinder": (_round, 7),
+    "cone": (_cone, 8),
+    "sphere": (_sphere, 4),
+    "torus": (_torus, 8),
+}
+
+
+def oriented_axis(axis: Array) -> Array:
+    """The axis without a sign: its largest component, the last of equal ones, is positive."""
+    unit = axis / np.linalg.norm(axis)
+    sizes = np.round(np.abs(unit), 6)
+    return np.asarray(unit * np.sign(unit[2 - int(np.argmax(sizes[::-1]))]) + 0.0)
+
+
+def measures(points: Array, triangles: Array) -> tuple[Array, float, Array]:
+    """Centroid (3,) [m], area [m^2] and mean unit normal (3,) of triangles."""
+    normals = _normals(points, triangles)
+    areas = np.linalg.norm(normals, axis=1)
+    area = float(areas.sum())
+    total = normals.sum(axis=0)
+    centre = areas @ points[triangles].mean(axis=1) / area if area else points[triangles[:, 0]].mean(axis=0)
+    return centre, area, total / max(float(np.linalg.norm(total)), np.finfo(float).tiny)
+
+
+def _normals(points: Array, triangles: Array) -> Array:
+    """(T, 3) normals of the length of the area."""
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    return np.asarray(np.cross(b - a, c - a) / 2)
+
+
+# ---- in words -------------------------------------------------------------------------------------------------------
+
+
+def feature_centre(of: Faces, feature: Sequence[int]) -> tuple[Array, float]:
+    """Centroid (3,) [m] and area [m^2] of several faces."""
+    areas = np.array([of.faces[k].area for k in feature])
+    return areas @ np.array([of.faces[k].centre for k in feature]) / areas.sum(), float(areas.sum())
+
+
+def feature_in_words(of: Faces, feature: Sequence[int]) -> str:
+    """Kind, size and place of a feature in the unit of the file, and the names of its faces if there are several."""
+    centre, area = feature_centre(of, feature)
+    scale, first = METRES[of.unit], of.faces[feature[0]]
+    names = f"; {'+'.join(of.faces[k].name for k in feature)}" if len(feature) > 1 else ""
+    at = numbers(tidy(centre / scale, of.size / scale))
+    return f"{surface_in_words(of, first)}, centre {at} {of.unit}, area {area / scale**2:.5g} {of.unit}²{names}"
+
+
+def surface_in_words(of: Faces, face: Face) -> str:
+    """Such as "bore r 6, axis (0, 0, 1)", lengths in the unit of the file."""
+    scale = METRES[of.unit]
+    word = {("cylinder", True): "bore", ("cylinder", False): "cylinder"}.get((face.kind, bool(face.hollow)), face.kind)
+    if face.kind == "cone" and face.radius is not None:
+        return f"{word} {np.degrees(face.radius):.5g}°, axis {direction(face)}"
+    if face.radius is not None:
+        word += f" r {face.radius / scale:.6g}" + (f" and {face.minor / scale:.6g}" if face.minor is not None else "")
+    if face.axis is None:
+        return word
+    return f"{word}, {'normal' if face.kind == 'plane' else 'axis'} {direction(face)}"
+
+
+def direction(face: Face) -> str:
+    """The axis or normal, such as (0, 0, 1)."""
+    return numbers(tidy(face.axis, 1.0)) if face.axis is not None else ""
+
+
+def tidy(values: Any, size: float) -> Array:
+    """Values rounded to some 1e-5 of a size."""
+    digits = 5 - int(np.floor(np.log10(size))) if size > 0 else 12
+    return np.round(np.asarray(values, float), digits) + 0.0
