@@ -16,6 +16,9 @@ file. `reduce(model, request)` makes a *body* of it. A `Request` says how: refer
 chooses its shapes; a number, `UpTo` or `Accuracy` says how many modes. Bodies are immutable: `truncated`, `with_point`,
 `with_reference` return others.
 
+`faces` tells what surfaces a part has; `InterfaceRegion("pin", "cylinder r=6mm at 0,0,0")` finds one by what it is, and
+`found_faces` tells which; `face_picture` and `face_page` show them. `rigid_part` makes a rigid body of a geometry.
+
 `register_reduction`, `register_mesh_format`, `register_matrix_format` and `register_exchange_format` add to what command
 line and files offer (CONTRIBUTING.md shows how). `dir(ffr_prep)` lists all names; `help(ffr_prep.reduce)` and the like
 explain them. Each is loaded when it is first used, with what it needs. What is not listed here is private: the modules of
@@ -42,6 +45,8 @@ _BY_MODULE = {
     "ffr_prep.matrices.part": "from_matrices",
     "ffr_prep.matrices.readers": "read_matrices",
     "ffr_prep.matrices.skfem_model": "from_skfem",
+    "ffr_prep.mesh.face_files": "faces found_faces",
+    "ffr_prep.mesh.faces": "Face Faces",
     "ffr_prep.mesh.file_mesh": "FileMesh",
     "ffr_prep.mesh.formats": "register_mesh_format MeshFormat",
     "ffr_prep.mesh.mesh": "Block Mesh check_mesh read_mesh",
@@ -51,6 +56,7 @@ _BY_MODULE = {
     "ffr_prep.model.model": "Model",
     "ffr_prep.model.reference": "FixedTo MeanAxis SimplySupported Support Supports UserConditions",
     "ffr_prep.pipelines.reduce": "Request reduce",
+    "ffr_prep.pipelines.rigid": "rigid_part",
     "ffr_prep.pipelines.structure_file": "Structure read_structure",
     "ffr_prep.pipelines.tied": "tied",
     "ffr_prep.reduction.basis": "Basis Reduction basis_of",
@@ -68,6 +74,8 @@ _BY_MODULE = {
     "ffr_prep.reduction.quality": "Quality quality_of",
     "ffr_prep.reduction.registry": "register_reduction ReductionMethod",
     "ffr_prep.reduction.selection": "Accuracy Band UpTo",
+    "ffr_prep.report.face_page": "face_page",
+    "ffr_prep.report.faces": "face_picture",
     "ffr_prep.report.mode_pictures": "mode_pictures",
     "ffr_prep.report.quality_pictures": "quality_pictures",
     "ffr_prep.solids.model": "from_mesh",
@@ -107,6 +115,8 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_prep.matrices.part import from_matrices as from_matrices
     from ffr_prep.matrices.readers import read_matrices as read_matrices
     from ffr_prep.matrices.skfem_model import from_skfem as from_skfem
+    from ffr_prep.mesh.face_files import faces as faces, found_faces as found_faces
+    from ffr_prep.mesh.faces import Face as Face, Faces as Faces
     from ffr_prep.mesh.file_mesh import FileMesh as FileMesh
     from ffr_prep.mesh.formats import register_mesh_format as register_mesh_format, MeshFormat as MeshFormat
     from ffr_prep.mesh.mesh import Block as Block, Mesh as Mesh, check_mesh as check_mesh, read_mesh as read_mesh
@@ -122,6 +132,7 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
         Supports as Supports, UserConditions as UserConditions,
     )
     from ffr_prep.pipelines.reduce import Request as Request, reduce as reduce
+    from ffr_prep.pipelines.rigid import rigid_part as rigid_part
     from ffr_prep.pipelines.structure_file import Structure as Structure, read_structure as read_structure
     from ffr_prep.pipelines.tied import tied as tied
     from ffr_prep.reduction.basis import Basis as Basis, Reduction as Reduction, basis_of as basis_of
@@ -139,6 +150,8 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_prep.reduction.quality import Quality as Quality, quality_of as quality_of
     from ffr_prep.reduction.registry import register_reduction as register_reduction, ReductionMethod as ReductionMethod
     from ffr_prep.reduction.selection import Accuracy as Accuracy, Band as Band, UpTo as UpTo
+    from ffr_prep.report.face_page import face_page as face_page
+    from ffr_prep.report.faces import face_picture as face_picture
     from ffr_prep.report.mode_pictures import mode_pictures as mode_pictures
     from ffr_prep.report.quality_pictures import quality_pictures as quality_pictures
     from ffr_prep.solids.model import from_mesh as from_mesh

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ffr_prep.cli.conversion import convert
+from ffr_prep.cli.geometry import GLUE, MOST, REGIONS, SOLIDS, UNIT, faces_command, rigid_command
 from ffr_prep.cli.interchange import export_body, import_body
 from ffr_prep.cli.matrices import reduce_matrices_command
 from ffr_prep.cli.options import (
@@ -50,7 +51,8 @@ Interfaces: where the body meets joints and forces.
   --interface face:mean          "face" stays soft and its mean motion counts, as where a load is spread (mean, RBE3)
   --interface pin=surface_7      the interface is called "pin", the surface "surface_7"
   --interface hook@0.1,0,0.02    its node is at this point [m] instead of the centroid of the surface
-  `ffr-prep mesh MESH` lists the surfaces and node sets there are.
+  --interface "pin=cylinder r=6mm at 0,0,0"    the surface is found by what it is, as told under Regions
+  `ffr-prep faces MESH` lists the surfaces with what to type for each; `ffr-prep mesh MESH` node sets as well.
 
 \b
 Reference conditions: how the body frame is attached to the deforming body.
@@ -98,8 +100,9 @@ class Remembering(click.Group):
 def cli(context: click.Context, plugins: tuple[Path, ...]) -> None:
     """From a mesh to a reduced flexible body for multibody dynamics in the floating frame of reference.
 
-    `reduce` computes a body file from a mesh or a CAD geometry; `mesh` shows what is in a mesh; `info` and `modes` show
-    what is in a body file, in numbers and in pictures.
+    `faces` shows what surfaces a part has and what to type for each; `reduce` computes a body file from a mesh or a CAD
+    geometry, `rigid` one of a body that does not deform; `mesh` shows what is in a mesh; `info` and `modes` show what is in a
+    body file, in numbers and in pictures.
     """
     for plugin in plugins:
         load_plugin(plugin)
@@ -111,11 +114,7 @@ def cli(context: click.Context, plugins: tuple[Path, ...]) -> None:
 
 _MESH = bundle(
     click.argument("mesh", type=INPUT_FILE),
-    click.option(
-        "--unit",
-        type=click.Choice(["m", "cm", "mm", "in"]),
-        help="Unit of the numbers in MESH; default: what a STEP file declares, mm for IGES, m for others.",
-    ),
+    UNIT,
     click.option("--size", type=float, help="Largest element edge, in that unit, when geometry is meshed."),
     click.option("--set", "numbers", multiple=True, metavar="NAME=VALUE", help="Change a parameter of a .geo script."),
     click.option(
@@ -125,12 +124,16 @@ _MESH = bundle(
         show_default=True,
         help="Of the elements, when geometry is meshed.",
     ),
+    GLUE,
+    SOLIDS,
+    MOST,
     TIME_LIMIT,
 )
 
 
 def _mesh_settings(options: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: options[key] for key in ("unit", "size", "order")} | {"numbers": numbers_of(options["numbers"])}
+    given = ("unit", "size", "order", "glue", "solids", "most_elements")
+    return {key: options[key] for key in given} | {"numbers": numbers_of(options["numbers"])}
 
 
 @cli.command(cls=NotesCommand, registries=(MESH_FORMATS,), epilog="\b\nFormats:\n{mesh format}")
@@ -146,7 +149,9 @@ def mesh(mesh: Path, **options: Any) -> None:
     check_mesh(loaded)
 
 
-@cli.command(cls=EntriesCommand, registries=(REDUCTIONS,), epilog=f"{REDUCE_NOTES}{REDUCTION_NOTES}\n{MATERIAL_NOTES}")
+@cli.command(
+    cls=EntriesCommand, registries=(REDUCTIONS,), epilog=f"{REDUCE_NOTES}{REGIONS}\n{REDUCTION_NOTES}\n{MATERIAL_NOTES}"
+)
 @_MESH
 @click.option("--material", "materials", multiple=True, required=True, metavar="MATERIAL", help="See below.")
 @REQUEST
@@ -180,6 +185,7 @@ def reduce(mesh: Path, materials: tuple[str, ...], **options: Any) -> None:
     show(mesh_lines(loaded))
     check_points(interfaces, loaded)
     source = {"file": mesh.name, **{key: settings[key] for key in ("unit", "size", "numbers", "order")}}
+    source |= {key: value for key, value in (("glue", settings["glue"]), ("solids", list(settings["solids"]))) if value}
     request = replace(request, provenance={"source": source, "notes": list(loaded.notes)})
     reduce_to_file(
         lambda: from_mesh(loaded, material, interfaces, progress=steps),
@@ -261,9 +267,11 @@ def modes(body: Path, output: Path, chosen: str, scale: str) -> None:
 
 cli.add_command(convert)
 cli.add_command(export_body)
+cli.add_command(faces_command)
 cli.add_command(import_body)
 cli.add_command(reduce_matrices_command)
 cli.add_command(reduce_structure_command)
+cli.add_command(rigid_command)
 
 
 # ---- arguments ----------------------------------------------------------------------------------------------------

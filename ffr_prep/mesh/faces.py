@@ -1,7 +1,7 @@
 """Faces of a body: what surface each lies on, where, how large, and which faces are one surface.
 
-A *feature* is what a user sees as one thing: the faces of one plane, cylinder, ... that hang together, such as a bore that its
-file has as four faces.
+A *feature* is what a user sees as one thing: the faces of one plane, cylinder, ... that hang together, such as a bore that
+its file has as four faces.
 """
 
 from __future__ import annotations
@@ -53,6 +53,11 @@ class Face(Brief):
     groups: tuple[str, ...] = ()
     solids: tuple[str, ...] = ()
 
+    @property
+    def inner(self) -> bool:
+        """Whether it lies between two solids, which no query means."""
+        return len(self.solids) > 1
+
 
 @dataclass(frozen=True, repr=False)
 class Faces(Brief):
@@ -100,12 +105,19 @@ def same_surface(one: Face, other: Face, near: float) -> bool:
     """Whether two faces lie on one plane, cylinder, cone, sphere or torus, to within a length [m]."""
     if one is other:
         return True
-    if one.kind != other.kind or one.kind == "other" or one.point is None or other.point is None:
+    if (
+        one.kind != other.kind
+        or one.inner != other.inner
+        or one.kind == "other"
+        or one.point is None
+        or other.point is None
+    ):
         return False
     between = other.point - one.point
     if one.kind == "sphere":
         return _close(one.radius, other.radius, near) and bool(np.linalg.norm(between) < near)
-    assert one.axis is not None and other.axis is not None  # all others have one
+    if one.axis is None or other.axis is None:
+        return False
     if np.linalg.norm(np.cross(one.axis, other.axis)) > _ANGLE:
         return False
     if one.kind == "plane":
@@ -267,6 +279,8 @@ def feature_in_words(of: Faces, feature: Sequence[int]) -> str:
 def surface_in_words(of: Faces, face: Face) -> str:
     """Such as "bore r 6, axis (0, 0, 1)", lengths in the unit of the file."""
     scale = METRES[of.unit]
+    if face.inner:
+        return f"{face.kind} between {' and '.join(face.solids)}"
     word = {("cylinder", True): "bore", ("cylinder", False): "cylinder"}.get((face.kind, bool(face.hollow)), face.kind)
     if face.kind == "cone" and face.radius is not None:
         return f"{word} {np.degrees(face.radius):.5g}°, axis {direction(face)}"

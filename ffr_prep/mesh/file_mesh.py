@@ -16,8 +16,8 @@ class DrawnFace:
 
     name    : such as surface_5
     kind    : of its surface: plane, cylinder, cone, sphere, torus, or another word
-    numbers : of the surface. Plane: a, b, c, d of a x + b y + c z + d = 0. Cylinder: point, axis, radius. Cone: point, axis, radius
-              there, half the angle. Sphere: centre, radius. Torus: centre, axis, both radii
+    numbers : of the surface. Plane: a, b, c, d of a x + b y + c z + d = 0. Cylinder: point, axis, radius. Cone: point, axis,
+              radius there, half the angle. Sphere: centre, radius. Torus: centre, axis, both radii
     exact   : area and centroid, where the CAD library knows them; else empty
     label, colour : that it has in the file, or ""; the colour as #rrggbb
     groups, solids : that it belongs to

@@ -68,7 +68,7 @@ def mesh_from_gmsh(path: Path) -> FileMesh:
 
 
 def skin_from_gmsh(path: Path, **wanted: Any) -> FileSkin:
-    """The faces of the solids of a geometry with what they are, without a volume mesh; arguments and errors as of `from_gmsh`."""
+    """The faces of the solids of a geometry with what they are, without a volume mesh; otherwise as `from_gmsh`."""
     stored, unit = _arrays(path, "skin", **wanted)
     names = json.loads(stored["names"].tobytes())
     solids = [
@@ -173,8 +173,8 @@ def _check_geometry(path: Path, unit: str | None, numbers: Mapping[str, float]) 
         raise InputError(f"{path} declares its unit and is converted to millimetres; leave out the unit {unit!r}")
     if suffix in _WITH_UNIT and unit not in (None, declared_unit(path)):
         raise InputError(
-            f"{path} declares that its numbers are {declared_unit(path)}, and the unit {unit!r} is given: leave it out, or, if "
-            "the file is wrong, export it again with the unit that is meant"
+            f"{path} declares that its numbers are {declared_unit(path)}, and the unit {unit!r} is given: leave it out, or, "
+            "if the file is wrong, export it again with the unit that is meant"
         )
     if suffix == _SCRIPT:
         if path.read_bytes().rpartition(b"\n")[2].strip():
@@ -226,7 +226,8 @@ def _run_gmsh(path: Path, job_file: Path, result: Path) -> None:
 def _last_words(log: str) -> str:
     """The errors in a log of gmsh in one line, or its last lines where there are none."""
     plain = re.sub(r"\x1b\[[0-9;]*m", "", log)
-    lines = [re.sub(r"\s+", " ", line).strip() for line in plain.splitlines() if line.strip()]
+    lines = [re.sub(r"\s+", " ", line).strip() for line in plain.splitlines()]
+    lines = [line for line in lines if line and not line.startswith("Info")] or lines
     errors = [line for line in lines if re.match(r"Error|.*Error\b", line)]
     return " | ".join(dict.fromkeys((errors or lines)[-3:]))
 

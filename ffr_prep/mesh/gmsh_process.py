@@ -88,7 +88,7 @@ def _open(gmsh: Any, job: dict[str, Any]) -> None:
     else:
         gmsh.option.setString("Geometry.OCCTargetUnit", job["unit"])
     if job["path"].lower().endswith(_CAD):
-        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _ELEMENTS_PER_TURN)
+        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _ELEMENTS_PER_TURN * (1 + (job["wanted"] == "skin")))
     gmsh.option.setNumber("Geometry.OCCImportLabels", 1)  # names and colours
     gmsh.open(job["path"])
     if not gmsh.model.getEntities():

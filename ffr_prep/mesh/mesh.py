@@ -119,7 +119,7 @@ def read_mesh(
     check_request(path, unit, size, numbers, order)
     progress("read the mesh")
     entry = format_of(path)
-    of_cad = cad_settings(path, glue, solids, most_elements)
+    of_cad = cad_settings(path, glue=glue, solids=solids, most_elements=most_elements)
     of_geometry = {"unit": unit, "size": size, "numbers": numbers, "order": order} | of_cad if entry.geometry else {}
     with reading(path, "a mesh or a geometry"):
         read: FileMesh = loaded(entry.read)(path, **of_geometry)
@@ -131,7 +131,9 @@ def read_mesh(
     return replace(mesh, notes=(*mesh.notes, *_doubtful_unit(mesh, known), *_doubtful_size(mesh, size)))
 
 
-def cad_settings(path: Path, glue: bool, solids: Sequence[str], most_elements: float) -> dict[str, Any]:
+def cad_settings(
+    path: Path, *, glue: bool, solids: Sequence[str], most_elements: float = MOST_ELEMENTS
+) -> dict[str, Any]:
     """The settings that differ from what is usual. Raises InputError for those that a file has no use for."""
     if (glue or solids) and not format_of(path).geometry:
         raise InputError(f"{path} is meshed already, so its solids cannot be glued or chosen: do that where it is made")
@@ -313,6 +315,7 @@ def check_mesh(mesh: Mesh) -> None:
     _check_groups(mesh)
     _check_repeated(mesh)
     _check_jacobians(mesh)
+    _check_glued(mesh)
     _check_coincident(mesh)
     _check_connected(mesh)
 
@@ -386,6 +389,20 @@ def _worst_jacobians(corners: Array, kind: str) -> Array:
         determinants = jacobian_determinants(kind, of).min(axis=1)
         worst[start : start + _CHUNK] = determinants / np.maximum(size, np.finfo(float).tiny ** 0.25) ** 3
     return worst
+
+
+def _check_glued(mesh: Mesh) -> None:
+    """Solids of a geometry, which the program that meshes it does not join by itself."""
+    part = joined_by_faces(_pairs(mesh)) if mesh.drawn and len(mesh.volume_groups) > 1 else np.zeros(1, int)
+    if not part.max():
+        return
+    alone = {int(part[of[0]]): name for name, of in mesh.volume_groups.items() if np.unique(part[of]).size == 1}
+    names = [alone.get(p, f"part {p + 1}") for p in range(int(part.max()) + 1)]
+    raise InputError(
+        f"the geometry has {len(names)} solids that do not hang together: {listed(map(repr, names))}. Where they touch, --glue "
+        "(glue=True) lets them share the faces between them; what is apart then has a gap. Or take one as a body of its own: "
+        f"--solid {names[0]!r} (solids=[{names[0]!r}])"
+    )
 
 
 def _check_coincident(mesh: Mesh) -> None:

@@ -128,7 +128,7 @@ def _nearest(faces: Faces, query: Query, fitting: Sequence[int]) -> list[list[in
 def _misfit(faces: Faces, face: Face, query: Query) -> float:
     """How far a face is from what is asked: at most 1 where it fits, infinite for another kind."""
     kind = "cylinder" if query.kind == "bore" else query.kind
-    if kind not in ("face", face.kind) or (query.kind == "bore" and face.hollow is False):
+    if face.inner or kind not in ("face", face.kind) or (query.kind == "bore" and face.hollow is False):
         return np.inf
     worst = 0.0
     if query.radius is not None:
@@ -203,7 +203,8 @@ def _distance(faces: Faces, k: int, point: Array) -> float:
 def _what_is_near(faces: Faces, query: Query) -> str:
     """The features that come closest, each with what to type."""
     kind = "cylinder" if query.kind == "bore" else query.kind
-    of_kind = [f for f in faces.features if kind in ("face", faces.faces[f[0]].kind)]
+    outer = [f for f in faces.features if not faces.faces[f[0]].inner]
+    of_kind = [f for f in outer if kind in ("face", faces.faces[f[0]].kind)]
     if not of_kind:
         kinds = dict.fromkeys(face.kind for face in faces.faces)
         return f"There is no {query.kind} at all; there are: {', '.join(kinds)}. `ffr-prep faces FILE` lists them"

@@ -65,7 +65,7 @@ def mode_pictures(
     surface = _drawable(body, numbers)
     factors = [_factor(surface, k, scale) for k in numbers]
     shapes = [surface.Phi[:, :, k - 1] for k in numbers]
-    camera = _camera(surface.points, [factor * shape for factor, shape in zip(factors, shapes, strict=True)])
+    camera = camera_of(surface.points, [factor * shape for factor, shape in zip(factors, shapes, strict=True)])
     images = list(_render(surface, shapes, factors, camera))
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
@@ -100,7 +100,7 @@ def _factor(surface: Surface, k: int, scale: float | str) -> float:
 # ---- view ---------------------------------------------------------------------------------------------------------
 
 
-def _camera(points: Array, displacements: Sequence[Array]) -> Camera:
+def camera_of(points: Array, displacements: Sequence[Array]) -> Camera:
     """Oblique view of the broad side of the body: its longest axis to the right, its thinnest towards the viewer."""
     towards_side, vertical = _axes(np.ptp(points, axis=0))
     horizontal = np.cross(vertical, towards_side)
@@ -130,25 +130,28 @@ def _axes(extent: Array) -> tuple[Array, Array]:
 
 def _render(surface: Surface, shapes: Sequence[Array], factors: Sequence[float], camera: Camera) -> Iterator[Array]:
     """(height, width, 3) pictures of the deformed body, coloured by displacement, before its undeformed ghost."""
-    pv = _pyvista()
+    pv = off_screen()
     faces = np.hstack([np.full((len(surface.triangles), 1), 3), surface.triangles]).ravel()
     ghost = pv.PolyData(surface.points, faces)
     edges = ghost.extract_feature_edges(_SHARP, boundary_edges=False, manifold_edges=False)
     look = {"smooth_shading": True, "split_sharp_edges": True, "feature_angle": _SHARP}
-    behind = _shot(pv, camera, [(ghost, {"color": _GHOST, **look}), (edges, {"color": _GHOST_EDGES, "line_width": 2})])
+    behind = shot(pv, camera, [(ghost, {"color": _GHOST, **look}), (edges, {"color": _GHOST_EDGES, "line_width": 2})])
     for shape, factor in zip(shapes, factors, strict=True):
         deformed = pv.PolyData(surface.points + factor * shape, faces)
         deformed["displacement"] = np.linalg.norm(shape, axis=1)
         colours = {"scalars": "displacement", "cmap": COLOUR_MAP, "clim": [0.0, _top(shape)], "specular": 0.15}
-        yield _over(_shot(pv, camera, [(deformed, colours | look | {"show_scalar_bar": False})]), behind)
+        yield _over(shot(pv, camera, [(deformed, colours | look | {"show_scalar_bar": False})]), behind)
 
 
-def _shot(pv: Any, camera: Camera, shown: Sequence[tuple[Any, dict[str, Any]]]) -> Array:
-    """(height, width, 4) picture of meshes with their looks, without a background; ComputationError where VTK fails."""
+def shot(pv: Any, camera: Camera, shown: Sequence[tuple[Any, dict[str, Any]]], *, smooth: bool = True) -> Array:
+    """(height, width, 4) picture of meshes with their looks, without a background; ComputationError where VTK fails.
+
+    smooth : edges are; without it every pixel has the colour of one mesh
+    """
     try:
         plotter = pv.Plotter(off_screen=True, window_size=_PIXELS, lighting="three lights")
         plotter.set_background("white")
-        plotter.enable_anti_aliasing("ssaa")
+        plotter.enable_anti_aliasing("ssaa") if smooth else plotter.disable_anti_aliasing()
         for mesh, look in shown:
             plotter.add_mesh(mesh, **look)
         _aim(plotter, camera)
@@ -170,7 +173,8 @@ def _over(front: Array, behind: Array) -> Array:
     return np.round(picture).astype(np.uint8)
 
 
-def _pyvista() -> Any:
+def off_screen() -> Any:
+    """PyVista, made ready to render without a display; ComputationError where VTK cannot be loaded."""
     if not os.environ.get("DISPLAY"):
         # VTK tries X first and complains; EGL needs no display. It reads the variable when its window is made.
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
@@ -201,7 +205,7 @@ def _picture(body: FlexibleBody, k: int, shape: Array, factor: float, image: Arr
     axes = figure.add_axes((0.01, 0.08, 0.86, 0.78))
     _show(axes, image)
     _length_bar(axes, camera, image.shape[0])
-    _triad(figure.add_axes((0.885, 0.03, 0.11, 0.17)), camera)
+    draw_triad(figure.add_axes((0.885, 0.03, 0.11, 0.17)), camera)
     figure.text(0.03, 0.945, f"Mode {k}", fontsize=20, fontweight="bold", color=_INK, va="center")
     figure.text(0.155, 0.945, f"{body.frequencies[k - 1]:.5g} Hz", fontsize=20, color=_INK, va="center")
     note = f"{body.name}: {_conditions(body)}shape drawn × {factor:.3g} m√kg"
@@ -260,7 +264,7 @@ def _length_bar(axes: Any, camera: Camera, pixels: int) -> None:
     axes.text(left + length * per_metre + 12, below + 3, label, ha="left", va="center", fontsize=11, color=_INK)
 
 
-def _triad(axes: Any, camera: Camera) -> None:
+def draw_triad(axes: Any, camera: Camera) -> None:
     """The axes of the body frame as seen by the camera."""
     for name, colour, axis in zip("xyz", ("#C0392B", "#1E8449", "#2455A4"), np.eye(3), strict=True):
         tip = np.array([axis @ camera.right, axis @ camera.up])

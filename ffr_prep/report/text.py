@@ -57,7 +57,7 @@ def body_lines(body: FlexibleBody) -> Iterator[str]:
 
 def short_lines(body: FlexibleBody) -> Iterator[str]:
     """A body in a few lines."""
-    yield f"mass        {body.mass:.6g} kg, centre of mass {vector_in_words(body.centre_of_mass)} m"
+    yield f"mass        {body.mass:.6g} kg, centre of mass {vector_in_words(body.centre_of_mass, _size(body))} m"
     yield from _interface_lines(body)
     if body.n:
         shown = ", ".join(f"{f:.4g}" for f in body.frequencies[:6])
@@ -90,7 +90,7 @@ def _tensor_lines(label: str, tensor: Array) -> Iterator[str]:
 
 def _interface_lines(body: FlexibleBody) -> Iterator[str]:
     width = max((len(i.name) for i in body.interfaces[:_MOST_INTERFACES]), default=0)
-    size = float(np.sqrt(np.trace(body.rr_dm) / body.mass)) if body.mass > 0 else 0.0
+    size = _size(body)
     for k, interface in enumerate(body.interfaces[:_MOST_INTERFACES]):
         label = "interfaces" if k == 0 else ""
         where = (
@@ -99,6 +99,11 @@ def _interface_lines(body: FlexibleBody) -> Iterator[str]:
         yield where + _region_in_words(body.provenance, interface.name)
     if len(body.interfaces) > _MOST_INTERFACES:
         yield f"{'':12}{len(body.interfaces) - _MOST_INTERFACES} more"
+
+
+def _size(body: FlexibleBody) -> float:
+    """The root of the mean square of the distances of its mass from the origin [m]."""
+    return float(np.sqrt(np.trace(body.rr_dm) / body.mass)) if body.mass > 0 else 0.0
 
 
 def _region_in_words(provenance: Mapping[str, Any], name: str) -> str:

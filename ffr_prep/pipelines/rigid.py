@@ -1,0 +1,132 @@
+"""A rigid body from the geometry of a part: mass properties by its density, without a reduction."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ffr_prep.body import FlexibleBody, Surface, rigid_body
+from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import InputError
+from ffr_prep.common.reading import reading
+from ffr_prep.mesh.face_files import skin_faces
+from ffr_prep.mesh.faces import METRES, Faces
+from ffr_prep.mesh.file_mesh import FileSolid
+from ffr_prep.mesh.formats import format_of
+from ffr_prep.mesh.gmsh_files import skin_from_gmsh
+from ffr_prep.mesh.mesh import cad_settings, check_mesh, check_request, read_mesh
+from ffr_prep.mesh.regions import found
+from ffr_prep.mesh.skin import mesh_faces
+from ffr_prep.model.coupled import InterfaceRegion
+
+
+def rigid_part(
+    path: str | Path,
+    density: float,
+    interfaces: Sequence[InterfaceRegion] = (),
+    *,
+    name: str | None = None,
+    unit: str | None = None,
+    numbers: Mapping[str, float] | None = None,
+    solids: Sequence[str] = (),
+) -> FlexibleBody:
+    """The rigid body of a part, with its surface to draw; all its solids move as one.
+
+        pin = fp.rigid_part("pin.step", 7850.0, [fp.InterfaceRegion("hole", "cylinder r=6mm at 0,0,0")])
+        fp.save_body(pin, "pin.ffr")
+
+    density    : [kg/m^3]
+    interfaces : points at which joints and forces attach: at the centroid of the faces of a region, or at its own point
+    name       : of the body; that of the file without it
+    other arguments as of `read_mesh`
+
+    Mass, centre and inertia of CAD files are those of the CAD library, exact; of meshes those of their facets.
+
+    Raises InputError for a density that is not positive, a file or a region that cannot be used.
+    """
+    path, numbers = Path(path), dict(numbers or {})
+    if not 0 < density < np.inf:
+        raise InputError(f"the density is {density} kg/m^3; it must be positive")
+    check_request(path, unit, None, numbers, 1)
+    faces, solid = _geometry(path, unit, numbers, solids)
+    points = {interface.name: _place(faces, interface) for interface in interfaces}
+    if len(points) < len(interfaces):
+        raise InputError("two interfaces have the same name: give each a name of its own")
+    body = rigid_body(
+        name or path.stem,
+        mass=density * solid.volume,
+        inertia=density * (solid.inertia + solid.inertia.T) / 2,
+        centre_of_mass=solid.centre,
+        points=points,
+        surface=_surface(faces),
+    )
+    regions = [{"name": i.name, "region": i.region or i.name} for i in interfaces if i.point is None]
+    source = {"file": path.name, "unit": faces.unit, "density": density}
+    return replace(body, provenance={"kind": "rigid", "source": source, "interfaces": regions})
+
+
+def _geometry(
+    path: Path, unit: str | None, numbers: Mapping[str, float], solids: Sequence[str]
+) -> tuple[Faces, FileSolid]:
+    """The faces, and the volume, the centre and the inertia about it of all solids, in metres."""
+    if format_of(path).geometry:
+        settings = cad_settings(path, glue=False, solids=solids)
+        with reading(path, "a geometry"):
+            skin = skin_from_gmsh(path, unit=unit, numbers=numbers, **settings)
+        scale = METRES[skin.unit or "m"]
+        if skin.solids:
+            known = [
+                FileSolid(s.name, s.label, s.volume * scale**3, s.centre * scale, s.inertia * scale**5)
+                for s in skin.solids
+            ]
+            return skin_faces(skin), _together(known)
+    cad_settings(path, glue=False, solids=solids)
+    mesh = read_mesh(path, unit=unit, numbers=numbers, order=2 if format_of(path).geometry else 1)
+    check_mesh(mesh)
+    faces = mesh_faces(mesh)
+    return faces, _enclosed(faces.points, np.concatenate(faces.triangles))
+
+
+def _together(solids: Sequence[FileSolid]) -> FileSolid:
+    """Several solids as one."""
+    volume = sum(s.volume for s in solids)
+    centre = sum((s.volume * s.centre for s in solids), np.zeros(3)) / volume
+    inertia = np.zeros((3, 3))
+    for s in solids:
+        arm = s.centre - centre
+        inertia += s.inertia + s.volume * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return FileSolid("", "", volume, centre, inertia)
+
+
+def _enclosed(points: Array, triangles: Array) -> FileSolid:
+    """What a closed surface of triangles encloses: tetrahedra from a point in the middle to each."""
+    middle = points[triangles].mean(axis=(0, 1))
+    corners = points[triangles] - middle
+    volumes = np.linalg.det(corners) / 6
+    volume, total = float(volumes.sum()), corners.sum(axis=1)
+    first = volumes @ total / 4
+    second = (
+        np.einsum("t,tci,tcj->ij", volumes, corners, corners) + np.einsum("t,ti,tj->ij", volumes, total, total)
+    ) / 20
+    second -= np.outer(first, first) / volume
+    return FileSolid("", "", volume, middle + first / volume, np.trace(second) * np.eye(3) - second)
+
+
+def _place(faces: Faces, interface: InterfaceRegion) -> Array:
+    """The point of an interface."""
+    if interface.point is not None:
+        return np.asarray(interface.point, float)
+    try:
+        chosen = found(faces, interface.region or interface.name)
+    except InputError as error:
+        raise InputError(f"interface {interface.name!r}: {error}") from None
+    areas = np.array([faces.faces[k].area for k in chosen])
+    return np.asarray(areas @ np.array([faces.faces[k].centre for k in chosen]) / areas.sum())
+
+
+def _surface(faces: Faces) -> Surface:
+    used, triangles = np.unique(np.concatenate(faces.triangles), return_inverse=True)
+    return Surface(faces.points[used], triangles.reshape(-1, 3), np.zeros((used.size, 3, 0)))
