@@ -15,9 +15,9 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import extent_in_words
-from ffr_prep.common.registry import choice
 from ffr_prep.matrices.nodal_inertia import DofMap
 from ffr_prep.matrices.unit_systems import UnitSystem
+from ffr_prep.mesh.node_regions import nodes_of_region
 
 _FAR = 1e100  # m; squares of coordinates must be finite
 _SAME_PLACE = 1e-6
@@ -209,11 +209,9 @@ def with_surface(model: MatrixModel, points: Array, triangles: Array) -> MatrixM
 
 
 def group_nodes(model: MatrixModel, name: str) -> Array:
-    """(m,) nodes of a group, ascending; InputError lists the groups there are."""
-    if name not in model.groups:
-        hint = "" if model.groups else "; name nodes by number or position"
-        raise InputError(f"there is no group of nodes {name!r}; {choice(name, model.groups)}{hint}")
-    return np.unique(model.groups[name])
+    """(m,) nodes of a group, or of a region such as "nearest 0,0,1", ascending; InputError lists the groups there are."""
+    hint = "" if model.groups else "; name nodes by number or position"
+    return nodes_of_region(model.points, model.groups, name, "there is no group of nodes", hint)
 
 
 def _real(name: str, A: sp.csr_array) -> sp.csr_array:

@@ -34,8 +34,8 @@ def faces(
         for face in fp.faces("part.step").faces:
             print(face.name, face.kind, face.centre, face.radius)
 
-    Faces of a geometry are those that its file has, and are exact. Those of a mesh are recognised on its skin: planes, cylinders
-    and spheres; of .msh files and other meshes with groups none reaches over the border of a group. All lengths are in metres.
+    Faces of a geometry are those that its file has, and are exact. Those of a mesh are recognised on its skin: planes,
+    cylinders and spheres, none of which reaches over the border of a group of the mesh. All lengths are in metres.
 
     Raises InputError for a file that cannot be used, ComputationError where it cannot be meshed.
     """

@@ -35,7 +35,7 @@ _IGES = (".iges", ".igs")
 _CAD = (".step", ".stp", ".brep", *_IGES)
 
 
-class Refused(Exception):
+class RefusedError(Exception):
     """What is asked for cannot be meant; the message says why, and what to ask for."""
 
 
@@ -59,7 +59,7 @@ def main() -> int:
         arrays, names = _RESULTS[job["wanted"]](gmsh)
         if job["generate"]:
             arrays["points"] = _rounded(arrays["points"])
-    except Refused as error:
+    except RefusedError as error:
         return _failed(error, REFUSED)
     except Exception as error:
         return _failed(error, UNMESHED)
@@ -119,7 +119,7 @@ def _keep(gmsh: Any, wanted: list[str]) -> None:
     kept = {tag for tag, of in names.items() if any(fnmatch.fnmatchcase(one, word) for one in of for word in wanted)}
     for word in wanted:
         if not any(fnmatch.fnmatchcase(one, word) for of in names.values() for one in of):
-            raise Refused(f"there is no solid {word!r}; there are: {known or 'none'}")
+            raise RefusedError(f"there is no solid {word!r}; there are: {known or 'none'}")
     others = [(3, tag) for tag in names if tag not in kept]
     if others:
         gmsh.model.occ.remove(others, recursive=True)
@@ -137,9 +137,10 @@ def _check_size(gmsh: Any, job: dict[str, Any]) -> None:
     if elements < most and along < _MOST_ALONG:
         return
     enough = size * max((elements / most) ** (1 / 3 if job["wanted"] == "solids" else 1 / 2), along / _MOST_ALONG)
-    raise Refused(
+    raise RefusedError(
         f"elements of size {size:g} would be far too many for a geometry of extent {extent:.5g}, some {elements:.1g}; both "
-        f"are in the unit of the file{_metres(1e3 * size / extent)}. A size of {_up(enough)} makes {most:.3g} at most, which may be set (--most-elements)"
+        f"are in the unit of the file{_metres(1e3 * size / extent)}. A size of {_up(enough)} makes {most:.3g} at most, which "
+        "may be set (--most-elements)"
     )
 
 
@@ -171,7 +172,7 @@ def _check_curves(gmsh: Any, job: dict[str, Any]) -> None:
         if gmsh.model.getType(kind, tag) in ("Cylinder", "Sphere", "Torus") and radius.size and radius[0] > 0:
             triangles += 2.3 * gmsh.model.occ.getMass(kind, tag) / (2 * np.pi * radius[0] / _ELEMENTS_PER_TURN) ** 2
     if triangles > job["most"]:
-        raise Refused(
+        raise RefusedError(
             f"its fine curves alone would make some {triangles:.1g} elements: simplify the geometry, or allow more than "
             f"{job['most']:.3g} (--most-elements)"
         )

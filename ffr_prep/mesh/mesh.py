@@ -231,8 +231,8 @@ def _doubtful_size(mesh: Mesh, size: float | None) -> list[str]:
     if size is None or size <= length:
         return []
     return [
-        f"elements of size {size:g} are asked for in a body that is {length:.4g} {mesh.unit} long, so size says nothing: it is "
-        f"in the unit of the file, {mesh.unit}"
+        f"elements of size {size:g} are asked for in a body that is {length:.4g} {mesh.unit} long, so size says nothing: it "
+        f"is in the unit of the file, {mesh.unit}"
     ]
 
 
@@ -254,8 +254,8 @@ def region_nodes(mesh: Mesh, name: str) -> Array:
         return np.unique(mesh.node_groups[name])
     known = dict.fromkeys([*mesh.face_groups, *mesh.node_groups])
     raise InputError(
-        f"the mesh has no group of faces or nodes {name!r}; {choice(name, known)}. Faces are also found by what they are, such as "
-        "'cylinder r=6mm at 0,0,0' or 'plane z=0'"
+        f"the mesh has no group of faces or nodes {name!r}; {choice(name, known)}. Faces are also found by what they are, "
+        "such as 'cylinder r=6mm at 0,0,0' or 'plane z=0'"
     )
 
 
@@ -399,8 +399,8 @@ def _check_glued(mesh: Mesh) -> None:
     alone = {int(part[of[0]]): name for name, of in mesh.volume_groups.items() if np.unique(part[of]).size == 1}
     names = [alone.get(p, f"part {p + 1}") for p in range(int(part.max()) + 1)]
     raise InputError(
-        f"the geometry has {len(names)} solids that do not hang together: {listed(map(repr, names))}. Where they touch, --glue "
-        "(glue=True) lets them share the faces between them; what is apart then has a gap. Or take one as a body of its own: "
+        f"the geometry has {len(names)} solids that do not hang together: {listed(map(repr, names))}. Where they touch, "
+        "--glue (glue=True) lets them share the faces between them; what is apart then has a gap. Or take one as a body: "
         f"--solid {names[0]!r} (solids=[{names[0]!r}])"
     )
 

@@ -1,8 +1,8 @@
 """The faces of a mesh: those of its geometry, or else what can be recognised of its skin.
 
-Without geometry the skin is cut along its sharp edges and along the borders of its groups. A piece is a plane, a cylinder or a
-sphere where its nodes lie on one; otherwise flat parts are taken out of it, as where a fillet runs into a plane, and what is
-left is looked at again. What then is none of these is "other".
+Without geometry the skin is cut along its sharp edges and along the borders of its groups. A piece is a plane, a cylinder
+or a sphere where its nodes lie on one; otherwise flat parts are taken out of it, as where a fillet runs into a plane, and
+what is left is looked at again. What then is none of these is "other".
 """
 
 from __future__ import annotations
@@ -265,7 +265,7 @@ def _sphere(face: Face, nodes: Array) -> Face | None:
 
 
 def _circle(places: Array) -> tuple[Array, float, float]:
-    """Centre and radius of the circle or sphere through places (m, d) in the least-squares sense; the largest distance from it."""
+    """Centre and radius of the circle or sphere that fits places (m, d) best, and the largest distance from it."""
     A = np.hstack([2 * places, np.ones((len(places), 1))])
     solved = np.linalg.lstsq(A, (places**2).sum(axis=1), rcond=None)[0]
     radius = float(np.sqrt(max(solved[-1] + solved[:-1] @ solved[:-1], 0.0)))

@@ -179,9 +179,8 @@ def _regions(entries: Mapping[str, InterfaceEntry]) -> tuple[InterfaceRegion, ..
 def _solid(
     entry: StructureEntry, of: SolidEntry, folder: Path, progress: Stages
 ) -> tuple[Mesh, Materials, tuple[InterfaceRegion, ...]]:
-    mesh = read_mesh(
-        folder / of.file, unit=of.unit, size=of.size, numbers=of.numbers, order=of.order, progress=progress
-    )
+    how: dict[str, Any] = {key: getattr(of, key) for key in ("unit", "size", "numbers", "order", "glue")}
+    mesh = read_mesh(folder / of.file, **how, progress=progress)
     if isinstance(of.material, str):
         return mesh, _material(entry, of.material), _regions(of.interfaces)
     return mesh, {volume: _material(entry, name) for volume, name in of.material.items()}, _regions(of.interfaces)

@@ -188,7 +188,7 @@ class ReductionEntry(Strict):
 
 class SolidEntry(Strict):
     """A solid that is tied to the frame: a mesh or geometry as in `ffr_prep.mesh.mesh.read_mesh`, of one material or of one
-    for each volume, with interfaces of its own.
+    for each volume, with interfaces of its own. glue: solids of a CAD file that touch share the faces between them.
     """
 
     file: Path
@@ -198,6 +198,7 @@ class SolidEntry(Strict):
     size: float | None = None
     numbers: dict[str, float] = {}
     order: Literal[1, 2] = 2
+    glue: bool = False
 
 
 class CutEntry(Strict):

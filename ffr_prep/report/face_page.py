@@ -83,7 +83,8 @@ li:hover { background: #eef2f7; } li.on { background: #ffe3b0; }
 ul { padding: 0; margin: 0.6rem 0 0; } small { color: #666; display: block; }
 </style></head><body>
 <div id="left"><canvas id="view" tabindex="0"></canvas>
-<div id="hint">click: a surface (Alt: one face of it, Shift: add) &middot; drag: turn &middot; right drag: move &middot; wheel: zoom</div></div>
+<div id="hint">click: a surface (Alt: one face of it, Shift: add) &middot; drag: turn &middot; right drag: move &middot;
+wheel: zoom</div></div>
 <div id="right"><h1>@TITLE@</h1>
 <label>interface <input id="name" value="NAME" spellcheck="false"></label> <button id="copy">copy</button>
 <textarea id="type" rows="3" readonly>click a face</textarea>
@@ -124,7 +125,8 @@ function prepare() {
   const ends = new Float32Array(3 * borders.length);
   borders.forEach((v, k) => ends.set(P.subarray(3 * v, 3 * v + 3), 3 * k));
   [corner, tint, edges] = [own, new Float32Array(3 * T.length), ends].map(values => {
-    const b = gl.createBuffer(); gl.bindBuffer(gl.ARRAY_BUFFER, b); gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW); return b; });
+    const b = gl.createBuffer();
+    gl.bindBuffer(gl.ARRAY_BUFFER, b); gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW); return b; });
 }
 function paint() {
   const c = new Float32Array(3 * T.length);
@@ -144,7 +146,8 @@ function draw() {
   gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   gl.uniformMatrix3fv(at.R, true, R); gl.uniform4f(at.s, ...scales(), ...shift);
   const bind = (name, buffer) => { const a = gl.getAttribLocation(program, name); if (a < 0) return;
-    gl.bindBuffer(gl.ARRAY_BUFFER, buffer); gl.enableVertexAttribArray(a); gl.vertexAttribPointer(a, 3, gl.FLOAT, false, 0, 0); };
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffer); gl.enableVertexAttribArray(a);
+    gl.vertexAttribPointer(a, 3, gl.FLOAT, false, 0, 0); };
   gl.enable(gl.POLYGON_OFFSET_FILL); gl.polygonOffset(1, 1);
   gl.uniform1f(at.lines, 0); bind("p", corner); bind("c", tint); gl.drawArrays(gl.TRIANGLES, 0, T.length);
   gl.disable(gl.POLYGON_OFFSET_FILL);
@@ -179,7 +182,8 @@ function choose(faces, add) {
 }
 function typed() {
   const words = [], left = new Set(picked);
-  for (const f of D.features) if (f.faces.every(k => left.has(k))) { words.push(f.type); f.faces.forEach(k => left.delete(k)); }
+  for (const f of D.features)
+    if (f.faces.every(k => left.has(k))) { words.push(f.type); f.faces.forEach(k => left.delete(k)); }
   left.forEach(k => words.push(D.faces[k].name));
   return words.join(" + ");
 }
@@ -190,14 +194,18 @@ function tell() {
 }
 D.features.forEach((f, k) => {
   const li = document.createElement("li"), small = document.createElement("small");
-  li.textContent = f.type; small.textContent = f.faces.map(i => D.faces[i].name).join("+") + ": " + f.what.split(";")[0];
+  li.textContent = f.type;
+  small.textContent = f.faces.map(i => D.faces[i].name).join("+") + ": " + f.what.split(";")[0];
   li.append(small); li.onclick = e => choose(f.faces, e.shiftKey); $("list").append(li); });
 $("name").oninput = tell;
 $("copy").onclick = () => { $("type").select(); document.execCommand("copy"); };
 
 // ---- mouse
 let from = null, moved = 0;
-canvas.onpointerdown = e => { from = [e.clientX, e.clientY, e.button]; moved = 0; canvas.setPointerCapture && e.isTrusted && canvas.setPointerCapture(e.pointerId); };
+canvas.onpointerdown = e => {
+  from = [e.clientX, e.clientY, e.button]; moved = 0;
+  if (e.isTrusted) canvas.setPointerCapture(e.pointerId);
+};
 canvas.onpointermove = e => {
   if (!from) return;
   const dx = e.clientX - from[0], dy = e.clientY - from[1];
@@ -220,10 +228,14 @@ canvas.oncontextmenu = e => e.preventDefault();
 canvas.onwheel = e => { e.preventDefault(); zoom *= Math.exp(-e.deltaY * 0.001); if (gl) draw(); };
 function turn(i, j, angle) {  // two rows of R about the third
   const c = Math.cos(angle), s = Math.sin(angle);
-  for (let k = 0; k < 3; k++) { const a = R[3 * i + k], b = R[3 * j + k]; R[3 * i + k] = c * a + s * b; R[3 * j + k] = c * b - s * a; }
+  for (let k = 0; k < 3; k++) {
+    const a = R[3 * i + k], b = R[3 * j + k];
+    R[3 * i + k] = c * a + s * b; R[3 * j + k] = c * b - s * a;
+  }
 }
 (function square() {  // R exactly orthonormal
-  const n = v => { const l = Math.hypot(...v); return v.map(x => x / l); }, x = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const n = v => { const l = Math.hypot(...v); return v.map(x => x / l); };
+  const x = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
   const t = n(R.slice(6)), r = n(x([0, 0, 1], t)); R = [...r, ...x(t, r), ...t]; })();
 if (gl) { prepare(); new ResizeObserver(draw).observe(canvas); }
 paint();

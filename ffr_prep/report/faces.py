@@ -38,7 +38,8 @@ def face_lines(faces: Faces) -> Iterator[str]:
     unit = faces.unit
     extent = tidy(np.ptp(faces.points, axis=0) / METRES[unit], faces.size / METRES[unit])
     several = len(faces.features) < len(faces.faces)
-    yield f"faces       {len(faces.faces)}{f' of {len(faces.features)} surfaces' if several else ''}; extent {numbers(extent)} {unit}"
+    of = f", which are {len(faces.features)} surfaces" if several else ""
+    yield f"faces       {len(faces.faces)}{of}; extent {numbers(extent)} {unit}"
     rows = [_row(faces, feature) for feature in faces.features]
     heads = ("faces", "what", f"centre [{unit}]", f"area [{unit}²]", "what to type")
     widths = [max(len(row[k]) for row in [heads, *rows]) for k in range(4)]

@@ -18,7 +18,7 @@ from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.common.reading import check_count
-from ffr_prep.common.registry import choice
+from ffr_prep.mesh.node_regions import nodes_of_region
 from ffr_prep.model.material import Material, check_isotropic
 from ffr_prep.structures.sections import Section
 
@@ -275,11 +275,9 @@ def _size(points: Array) -> float:
 
 
 def group_nodes(frame: Frame, name: str) -> Array:
-    """(m,) nodes of a group, ascending; InputError lists the groups there are."""
-    if name not in frame.node_groups:
-        hint = "" if frame.node_groups else "; name nodes with named(frame, ...)"
-        raise InputError(f"the frame has no group of nodes {name!r}; {choice(name, frame.node_groups)}{hint}")
-    return np.unique(frame.node_groups[name])
+    """(m,) nodes of a group, or of a region such as "nearest 0,0,1", ascending; InputError lists the groups there are."""
+    hint = "" if frame.node_groups else "; name nodes with named(frame, ...)"
+    return nodes_of_region(frame.points, frame.node_groups, name, "the frame has no group of nodes", hint)
 
 
 def ends(frame: Frame) -> Array:
