@@ -118,6 +118,7 @@ def rigid_command(part: Path, interfaces: tuple[str, ...], output: Path, **optio
     body = rigid_part(part, density, points, name=options["name"] or output.stem, **_settings(options))
     save_body(body, output)
     show(short_lines(body))
+    show(f"note        {note}" for note in body.provenance["notes"])
     filed(output)
 
 

@@ -9,11 +9,12 @@ import numpy as np
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.reading import reading
-from ffr_prep.mesh.faces import METRES, Faces, face_of
+from ffr_prep.mesh.drawn import face_of
+from ffr_prep.mesh.faces import METRES, Faces
 from ffr_prep.mesh.file_mesh import FileSkin
 from ffr_prep.mesh.formats import format_of
 from ffr_prep.mesh.gmsh_files import skin_from_gmsh
-from ffr_prep.mesh.mesh import cad_settings, check_request, facet_triangles, read_mesh
+from ffr_prep.mesh.mesh import cad_settings, check_request, doubtful_unit, facet_triangles, read_mesh
 from ffr_prep.mesh.regions import found
 from ffr_prep.mesh.skin import mesh_faces
 
@@ -68,7 +69,8 @@ def skin_faces(skin: FileSkin) -> Faces:
         points, [facet_triangles(face.corners) for face in skin.drawn], [face.solids for face in skin.drawn]
     )
     made = [face_of(face, scale, points, own) for face, own in zip(skin.drawn, triangles, strict=True)]
-    return Faces(tuple(made), points, tuple(triangles), unit=skin.unit or "m")
+    notes = doubtful_unit(float(np.ptp(points, axis=0).max()), skin.unit)
+    return Faces(tuple(made), points, tuple(triangles), unit=skin.unit or "m", notes=tuple(notes))
 
 
 def _outward(points: Array, triangles: Sequence[Array], solids: Sequence[Sequence[str]]) -> list[Array]:

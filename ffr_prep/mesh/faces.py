@@ -16,11 +16,11 @@ from scipy.sparse.csgraph import connected_components
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, numbers
-from ffr_prep.mesh.file_mesh import DrawnFace
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "other")
 
+_SHOWN = 60
 _ANGLE = 1e-3  # within which directions are the same [rad]
 
 
@@ -95,7 +95,9 @@ class Faces(Brief):
         return f"{len(self.faces)} faces, {len(self.features)} features"
 
     def _rows(self) -> Rows:
-        return [(self.faces[of[0]].name, feature_in_words(self, of)) for of in self.features]
+        rows = [(self.faces[of[0]].name, feature_in_words(self, of)) for of in self.features[:_SHOWN]]
+        left = len(self.features) - _SHOWN
+        return [*rows, ("...", f"{left} more")] if left > 0 else rows
 
 
 # ---- what makes faces one feature -----------------------------------------------------------------------------------
@@ -160,23 +162,7 @@ def _merged(points: Array) -> Array:
     return np.asarray(np.unique(np.round(points / (1e-7 * scale)), axis=0, return_inverse=True)[1]).ravel()
 
 
-# ---- from geometry --------------------------------------------------------------------------------------------------
-
-
-def face_of(drawn: DrawnFace, scale: float, points: Array, triangles: Array) -> Face:
-    """The face of a geometry; points (P, 3) [m] and triangles (T, 3) of it, which point outside; scale to metres."""
-    centre, area, normal = measures(points, triangles)
-    if len(drawn.exact):
-        area, centre = drawn.exact[0] * scale**2, np.array(drawn.exact[1:]) * scale
-    face = Face(
-        drawn.name, drawn.kind if drawn.kind in KINDS else "other", centre, area,
-        label=drawn.label, colour=drawn.colour, groups=tuple(drawn.groups), solids=tuple(drawn.solids),
-    )  # fmt: skip
-    given = np.asarray(drawn.numbers, float)
-    read = _READERS.get(drawn.kind)
-    if read is None or given.size < read[1] or not np.isfinite(given).all():
-        return replace(face, kind="other") if drawn.kind != "plane" else replace(face, point=centre, axis=normal)
-    return with_side(replace(face, **read[0](given, scale, centre, normal)), points, triangles)
+# ---- measures -----------------------------------------------------------------------------------------------------
 
 
 def with_side(face: Face, points: Array, triangles: Array) -> Face:
@@ -189,50 +175,7 @@ def with_side(face: Face, points: Array, triangles: Array) -> Face:
         arm -= (arm @ face.axis)[:, None] * face.axis
     if face.kind == "torus" and face.radius is not None:
         arm = middle - face.point - face.radius * arm / np.linalg.norm(arm, axis=1)[:, None]
-    return replace(face, hollow=bool((arm * _normals(points, triangles)).sum() < 0))
-
-
-def _plane(given: Array, scale: float, centre: Array, normal: Array) -> dict[str, Any]:
-    axis = given[:3] / np.linalg.norm(given[:3]) + 0.0
-    distance = -given[3] * scale / np.linalg.norm(given[:3])
-    return {
-        "point": centre + (distance - centre @ axis) * axis,
-        "axis": axis * (1.0 if axis @ normal >= 0 else -1.0) + 0.0,
-    }
-
-
-def _round(given: Array, scale: float, centre: Array, _: Array) -> dict[str, Any]:
-    """A cylinder; its point is moved along the axis to the middle of the face."""
-    axis = oriented_axis(given[3:6])
-    start = given[:3] * scale
-    return {"point": start + ((centre - start) @ axis) * axis, "axis": axis, "radius": given[6] * scale}
-
-
-def _cone(given: Array, scale: float, _: Array, __: Array) -> dict[str, Any]:
-    tip = given[:3] * scale - given[3:6] * (given[6] * scale / np.tan(given[7]))
-    return {"point": tip, "axis": oriented_axis(given[3:6]), "radius": abs(given[7])}
-
-
-def _sphere(given: Array, scale: float, _: Array, __: Array) -> dict[str, Any]:
-    return {"point": given[:3] * scale, "radius": given[3] * scale}
-
-
-def _torus(given: Array, scale: float, _: Array, __: Array) -> dict[str, Any]:
-    return {
-        "point": given[:3] * scale,
-        "axis": oriented_axis(given[3:6]),
-        "radius": given[6] * scale,
-        "minor": given[7] * scale,
-    }
-
-
-_READERS = {
-    "plane": (_plane, 4),
-    "cylinder": (_round, 7),
-    "cone": (_cone, 8),
-    "sphere": (_sphere, 4),
-    "torus": (_torus, 8),
-}
+    return replace(face, hollow=bool((arm * normals_of(points, triangles)).sum() < 0))
 
 
 def oriented_axis(axis: Array) -> Array:
@@ -244,7 +187,7 @@ def oriented_axis(axis: Array) -> Array:
 
 def measures(points: Array, triangles: Array) -> tuple[Array, float, Array]:
     """Centroid (3,) [m], area [m^2] and mean unit normal (3,) of triangles."""
-    normals = _normals(points, triangles)
+    normals = normals_of(points, triangles)
     areas = np.linalg.norm(normals, axis=1)
     area = float(areas.sum())
     total = normals.sum(axis=0)
@@ -252,7 +195,7 @@ def measures(points: Array, triangles: Array) -> tuple[Array, float, Array]:
     return centre, area, total / max(float(np.linalg.norm(total)), np.finfo(float).tiny)
 
 
-def _normals(points: Array, triangles: Array) -> Array:
+def normals_of(points: Array, triangles: Array) -> Array:
     """(T, 3) normals of the length of the area."""
     a, b, c = np.moveaxis(points[triangles], 1, 0)
     return np.asarray(np.cross(b - a, c - a) / 2)

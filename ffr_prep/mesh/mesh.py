@@ -23,7 +23,8 @@ from ffr_prep.common.reading import check_ordinary, reading
 from ffr_prep.common.registry import choice, loaded
 from ffr_prep.mesh.boundary import groups_of_whole_faces, joined_by_faces, joined_by_nodes, outer_faces
 from ffr_prep.mesh.cells import FACE_TRIANGLES, KINDS, face_corners
-from ffr_prep.mesh.faces import METRES, Face, face_of
+from ffr_prep.mesh.drawn import face_of
+from ffr_prep.mesh.faces import METRES, Face
 from ffr_prep.mesh.file_mesh import DrawnFace, FileMesh
 from ffr_prep.mesh.formats import MOST_ELEMENTS, format_of
 
@@ -128,7 +129,8 @@ def read_mesh(
         _check_places(path, read)
         known = unit or read.unit
         mesh = _in_metres(read, known or "m")
-    return replace(mesh, notes=(*mesh.notes, *_doubtful_unit(mesh, known), *_doubtful_size(mesh, size)))
+    length = float(np.ptp(mesh.points, axis=0).max())
+    return replace(mesh, notes=(*mesh.notes, *doubtful_unit(length, known), *_doubtful_size(length, mesh.unit, size)))
 
 
 def cad_settings(
@@ -209,30 +211,25 @@ def _left_out(unused: int, faces: Mapping[str, tuple[Array, ...]], nodes: Mappin
     return notes + [f"group {name!r} is left out: nothing of it belongs to a volume element" for name in lost]
 
 
-def _doubtful_unit(mesh: Mesh, known: str | None) -> list[str]:
-    """Lengths that are most likely off by a factor of a thousand."""
-    length = float(np.ptp(mesh.points, axis=0).max())
+def doubtful_unit(length: float, known: str | None) -> list[str]:
+    """A note on a length [m] that is most likely off by a factor of a thousand; `known` is the unit of its numbers."""
     if known is None and length >= _DOUBTFUL_LENGTH:
         return [f"the mesh is {length:.4g} m long, read in metres as no unit was given; are its numbers millimetres?"]
-    if length >= _LONG:
-        return [
-            f"the body is {length:.4g} m long, its numbers read as {known or 'm'}: is that meant, or are they smaller?"
-        ]
-    if length <= _SHORT:
-        return [
-            f"the body is {1e3 * length:.4g} mm long, its numbers read as {known or 'm'}: is that meant, or are they larger?"
-        ]
-    return []
+    if _SHORT < length < _LONG:
+        return []
+    meant = "smaller" if length >= _LONG else "larger"
+    return [
+        f"the body is {length:.3g} m long, its numbers read as {known or 'm'}: is that meant, or is the unit {meant}?"
+    ]
 
 
-def _doubtful_size(mesh: Mesh, size: float | None) -> list[str]:
-    """A size of elements that a geometry is too small for."""
-    length = float(np.ptp(mesh.points, axis=0).max()) / METRES[mesh.unit]
-    if size is None or size <= length:
+def _doubtful_size(length: float, unit: str, size: float | None) -> list[str]:
+    """A note on a size of elements that a geometry is too small for."""
+    if size is None or size * METRES[unit] <= length:
         return []
     return [
-        f"elements of size {size:g} are asked for in a body that is {length:.4g} {mesh.unit} long, so size says nothing: it "
-        f"is in the unit of the file, {mesh.unit}"
+        f"elements of size {size:g} are asked for in a body that is {length / METRES[unit]:.4g} {unit} long, so size says "
+        f"nothing: it is in the unit of the file, {unit}"
     ]
 
 

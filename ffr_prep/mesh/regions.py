@@ -64,7 +64,10 @@ def _of_names(faces: Faces, term: Names) -> list[int]:
 
 
 def _known(faces: Faces, name: str) -> str:
-    return choice(name, dict.fromkeys(name for face in faces.faces for name in names_of(face)))
+    return (
+        f"{choice(name, dict.fromkeys(known for face in faces.faces for known in names_of(face)))}. Faces are also found by "
+        "what they are, such as 'cylinder r=6mm at 0,0,0' or 'plane z=0'"
+    )
 
 
 # ---- by query -------------------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ what is left is looked at again. What then is none of these is "other".
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -20,7 +21,8 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.boundary import groups_of_whole_faces
 from ffr_prep.mesh.cells import face_corners
-from ffr_prep.mesh.faces import Face, Faces, measures, oriented_axis, with_side
+from ffr_prep.mesh.faces import Face, Faces, measures
+from ffr_prep.mesh.fits import recognised
 from ffr_prep.mesh.mesh import Mesh, boundary_faces, facet_triangles, region_nodes
 from ffr_prep.mesh.region_words import Names, parsed
 from ffr_prep.mesh.regions import found, names_of
@@ -30,7 +32,6 @@ _FLAT = 1e-6  # of 1 - cos, between facets of a plane
 _LARGE = 0.2  # of the area of a piece that a plane in it has
 _ON = 2e-4  # how far nodes may lie off their surface, of its size
 _DEEPEST = 20
-_TILT, _STEPS = 0.05, 8  # of normals of chords towards the axis of a cylinder, squared; of the fit
 
 Facets = tuple[Array, ...]
 
@@ -110,10 +111,12 @@ def _with_facets(mesh: Mesh) -> tuple[Faces, list[Facets]]:
     """The faces, and the facets of each."""
     if mesh.drawn:
         known, facets = [face for face, _ in mesh.drawn], [of for _, of in mesh.drawn]
-        return Faces(tuple(known), mesh.points, tuple(map(facet_triangles, facets)), unit=mesh.unit), facets
-    pieces = list(_recognised(mesh))
+        triangles = tuple(map(facet_triangles, facets))
+        return Faces(tuple(known), mesh.points, triangles, mesh.unit, notes=mesh.notes), facets
+    pieces = sorted(_recognised(mesh), key=lambda piece: _in_order(piece[0].name))
     triangles = tuple(facet_triangles(of) for _, of in pieces)
-    return Faces(tuple(face for face, _ in pieces), mesh.points, triangles, mesh.unit, _ON), [of for _, of in pieces]
+    known = [face for face, _ in pieces]
+    return Faces(tuple(known), mesh.points, triangles, mesh.unit, _ON, mesh.notes), [of for _, of in pieces]
 
 
 # ---- recognised on the skin -----------------------------------------------------------------------------------------
@@ -130,6 +133,11 @@ class _Skin:
     bonds: Array
 
 
+def _in_order(name: str) -> list[str]:
+    """Names with numbers by these, not by their first digits."""
+    return [part.zfill(12) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
+
+
 def _recognised(mesh: Mesh) -> Iterator[tuple[Face, Facets]]:
     """The pieces of the skin, each with its facets."""
     whole = boundary_faces(mesh)
@@ -141,7 +149,8 @@ def _recognised(mesh: Mesh) -> Iterator[tuple[Face, Facets]]:
         groups = tuple(name for g, name in enumerate(names) if skin.member[of[0], g])
         alone = [name for name in groups if sizes[names.index(name)] == of.size]
         facets = tuple(f[of[(of >= a) & (of < b)] - a] for f, (a, b) in zip(whole, pairwise(starts), strict=True))
-        face = replace(_fitted(skin, of), name=alone[0] if alone else f"patch_{k}", groups=groups)
+        name = alone[0] if alone else f"patch_{k}"
+        face = replace(_fitted(skin, of), name=name, groups=tuple(group for group in groups if group != name))
         yield face, tuple(part for part in facets if len(part))
 
 
@@ -208,66 +217,9 @@ def _components(chosen: Array, bonds: Array) -> list[Array]:
     return sorted(np.split(chosen[order], np.flatnonzero(np.diff(part[order])) + 1), key=lambda of: int(of[0]))
 
 
-# ---- what a piece lies on -------------------------------------------------------------------------------------------
-
-
 def _fitted(skin: _Skin, piece: Array) -> Face:
     """The face that facets are."""
     corners = skin.corners[piece]
     triangles = np.concatenate([corners[:, :3], corners[corners[:, 2] != corners[:, 3]][:, [0, 2, 3]]])
-    centre, area, normal = measures(skin.points, triangles)
-    nodes = skin.points[np.unique(corners)]
-    face = Face("", "other", centre, area)
-    size = float(np.linalg.norm(np.ptp(nodes, axis=0)))
-    if np.abs((nodes - centre) @ normal).max() < _ON * size:
-        return replace(face, kind="plane", point=centre, axis=normal)
-    unit = skin.normals[piece] / np.linalg.norm(skin.normals[piece], axis=1)[:, None]
-    made = _cylinder(face, nodes, unit) or _sphere(face, nodes)
-    return face if made is None else with_side(made, skin.points, triangles)
-
-
-def _cylinder(face: Face, nodes: Array, unit: Array) -> Face | None:
-    """The cylinder whose axis the normals are nearly perpendicular to and on which all nodes lie."""
-    moments, axes = np.linalg.eigh(unit.T @ unit / len(unit))
-    if moments[0] > _TILT or moments[1] < 1e-3:
-        return None
-    axis, places = axes[:, 0], nodes - face.centre
-    middle, radius, off = _about(axis, places)
-    for _ in range(_STEPS):  # of Gauss and Newton: the axis is turned by what the distances from it grow along it
-        if off <= 1e-9 * radius:
-            break
-        arms = places - middle
-        arms -= np.outer(arms @ axis, axis)
-        out = arms / np.linalg.norm(arms, axis=1)[:, None]
-        across = np.linalg.svd(axis[None])[2][1:]
-        J = np.hstack([-(places @ axis)[:, None] * (out @ across.T), -out @ across.T, -np.ones((len(places), 1))])
-        step = np.linalg.lstsq(J, radius - np.linalg.norm(arms, axis=1), rcond=None)[0]
-        axis = axis + step[:2] @ across
-        axis /= np.linalg.norm(axis)
-        middle, radius, off = _about(axis, places)
-    if off > 10 * _ON * radius or radius > 100 * np.ptp(places, axis=0).max():
-        return None
-    return replace(face, kind="cylinder", point=face.centre + middle, axis=oriented_axis(axis), radius=radius)
-
-
-def _about(axis: Array, places: Array) -> tuple[Array, float, float]:
-    """`_circle` seen along an axis; its centre (3,)."""
-    across = np.linalg.svd(axis[None])[2][1:]
-    middle, radius, off = _circle(places @ across.T)
-    return middle @ across, radius, off
-
-
-def _sphere(face: Face, nodes: Array) -> Face | None:
-    middle, radius, off = _circle(nodes - face.centre)
-    if not 0 < radius < 100 * np.ptp(nodes, axis=0).max() or off > 10 * _ON * radius:
-        return None
-    return replace(face, kind="sphere", point=face.centre + middle, radius=radius)
-
-
-def _circle(places: Array) -> tuple[Array, float, float]:
-    """Centre and radius of the circle or sphere that fits places (m, d) best, and the largest distance from it."""
-    A = np.hstack([2 * places, np.ones((len(places), 1))])
-    solved = np.linalg.lstsq(A, (places**2).sum(axis=1), rcond=None)[0]
-    radius = float(np.sqrt(max(solved[-1] + solved[:-1] @ solved[:-1], 0.0)))
-    off = np.abs(np.linalg.norm(places - solved[:-1], axis=1) - radius).max()
-    return solved[:-1], radius, float(off)
+    centre, area, _ = measures(skin.points, triangles)
+    return recognised(Face("", "other", centre, area), skin.points, triangles, _ON)

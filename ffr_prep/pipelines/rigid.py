@@ -17,10 +17,13 @@ from ffr_prep.mesh.faces import METRES, Faces
 from ffr_prep.mesh.file_mesh import FileSolid
 from ffr_prep.mesh.formats import format_of
 from ffr_prep.mesh.gmsh_files import skin_from_gmsh
-from ffr_prep.mesh.mesh import cad_settings, check_mesh, check_request, read_mesh
+from ffr_prep.mesh.mesh import Mesh, cad_settings, check_mesh, check_request, read_mesh
 from ffr_prep.mesh.regions import found
 from ffr_prep.mesh.skin import mesh_faces
 from ffr_prep.model.coupled import InterfaceRegion
+from ffr_prep.model.invariants import inertia_integrals
+from ffr_prep.model.material import Material
+from ffr_prep.solids.assembly import assemble
 
 
 def rigid_part(
@@ -43,7 +46,7 @@ def rigid_part(
     name       : of the body; that of the file without it
     other arguments as of `read_mesh`
 
-    Mass, centre and inertia of CAD files are those of the CAD library, exact; of meshes those of their facets.
+    Mass, centre and inertia of CAD files are those of the CAD library, exact; of meshes those of their elements.
 
     Raises InputError for a density that is not positive, a file or a region that cannot be used.
     """
@@ -65,7 +68,8 @@ def rigid_part(
     )
     regions = [{"name": i.name, "region": i.region or i.name} for i in interfaces if i.point is None]
     source = {"file": path.name, "unit": faces.unit, "density": density}
-    return replace(body, provenance={"kind": "rigid", "source": source, "interfaces": regions})
+    made = {"kind": "rigid", "source": source, "interfaces": regions, "notes": list(faces.notes)}
+    return replace(body, provenance=made)
 
 
 def _geometry(
@@ -86,8 +90,7 @@ def _geometry(
     cad_settings(path, glue=False, solids=solids)
     mesh = read_mesh(path, unit=unit, numbers=numbers, order=2 if format_of(path).geometry else 1)
     check_mesh(mesh)
-    faces = mesh_faces(mesh)
-    return faces, _enclosed(faces.points, np.concatenate(faces.triangles))
+    return mesh_faces(mesh), _integrated(mesh)
 
 
 def _together(solids: Sequence[FileSolid]) -> FileSolid:
@@ -101,18 +104,12 @@ def _together(solids: Sequence[FileSolid]) -> FileSolid:
     return FileSolid("", "", volume, centre, inertia)
 
 
-def _enclosed(points: Array, triangles: Array) -> FileSolid:
-    """What a closed surface of triangles encloses: tetrahedra from a point in the middle to each."""
-    middle = points[triangles].mean(axis=(0, 1))
-    corners = points[triangles] - middle
-    volumes = np.linalg.det(corners) / 6
-    volume, total = float(volumes.sum()), corners.sum(axis=1)
-    first = volumes @ total / 4
-    second = (
-        np.einsum("t,tci,tcj->ij", volumes, corners, corners) + np.einsum("t,ti,tj->ij", volumes, total, total)
-    ) / 20
-    second -= np.outer(first, first) / volume
-    return FileSolid("", "", volume, middle + first / volume, np.trace(second) * np.eye(3) - second)
+def _integrated(mesh: Mesh) -> FileSolid:
+    """What the elements enclose, curved ones as well."""
+    m = assemble(mesh, Material("of density one", 1.0, 0.0, 1.0)).m
+    found = inertia_integrals(mesh.points, m, np.zeros((len(mesh.points), 3, 0)))
+    second = found.rr_dm - np.outer(found.r_dm, found.r_dm) / found.mass
+    return FileSolid("", "", found.mass, found.r_dm / found.mass, np.trace(second) * np.eye(3) - second)
 
 
 def _place(faces: Faces, interface: InterfaceRegion) -> Array:
