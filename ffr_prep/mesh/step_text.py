@@ -16,8 +16,8 @@ _SURFACES = {  # words of STEP and of the CAD library
     "SPHERICAL_SURFACE": "sphere",
     "TOROIDAL_SURFACE": "torus",
 }
-_ENTITY = re.compile(r"#(\d+)\s*=\s*([A-Z_]+)\s*\(((?:'(?:[^']|'')*'|[^';])*)\)\s*;")
-_FACE = re.compile(r"\s*'((?:[^']|'')*)'.*,\s*#(\d+)\s*,\s*\.[TF]\.\s*", re.DOTALL)
+_ENTITY = re.compile(r"#(\d+)\s*=\s*([A-Z_]+)\s*\(((?:'[^']*+'|[^';])*+);")  # a quote in a text is two quotes
+_FACE = re.compile(r"\s*'((?:[^']|'')*+)'[^']*,\s*#(\d+)\s*,\s*\.[TF]\.\s*\)\s*")
 _MADE_UP = re.compile(r"(NONE|FACE|ADVANCED_FACE)?\s*\d*", re.IGNORECASE)
 
 
@@ -47,7 +47,7 @@ def face_labels(text: str, kinds: Sequence[str]) -> list[str]:
         word, body = entities.get(face, ("", ""))
         parts = _FACE.fullmatch(body) if word in ("ADVANCED_FACE", "FACE_SURFACE") else None
         surface = entities.get(parts[2], ("", ""))[0] if parts else ""
-        found.append((parts[1].strip() if parts else "", _SURFACES.get(surface, "")))
+        found.append((parts[1].replace("''", "'").strip() if parts else "", _SURFACES.get(surface, "")))
     named = {name for name, _ in found if not _MADE_UP.fullmatch(name)}
     same = len(found) == len(kinds) and all(of in ("", kind) for (_, of), kind in zip(found, kinds, strict=True))
     return [name if name in named else "" for name, _ in found] if same and named else [""] * len(kinds)
