@@ -18,7 +18,8 @@ from ffr_prep.mesh.mesh import cad_settings, check_request, doubtful_unit, facet
 from ffr_prep.mesh.regions import found
 from ffr_prep.mesh.skin import mesh_faces
 
-_RAY = np.array([0.5773, 0.2113, 0.7887])  # along no plane that a part is likely to have
+_RAY = np.array([0.5773, 0.2113, 0.7887]) / np.linalg.norm([0.5773, 0.2113, 0.7887])  # in no plane that a part may have
+_ITSELF = 1e-9  # of the size, within which a ray meets the triangle that it starts from
 
 
 def faces(
@@ -82,25 +83,41 @@ def _outward(points: Array, triangles: Sequence[Array], solids: Sequence[Sequenc
     for own, of in zip(triangles, solids, strict=True):
         for solid in of:
             bounding[solid].append(own)
-    whole = {solid: np.concatenate(parts) for solid, parts in bounding.items()}
+    rays = {solid: _Rays(points, np.concatenate(parts)) for solid, parts in bounding.items()}
     inside = [
-        len(of) == 1 and _points_inside(points, own, whole[of[0]]) for own, of in zip(triangles, solids, strict=True)
+        len(of) == 1 and _points_inside(points, own, rays[of[0]]) for own, of in zip(triangles, solids, strict=True)
     ]
     return [own[:, ::-1] if turned else own for own, turned in zip(triangles, inside, strict=True)]
 
 
-def _points_inside(points: Array, own: Array, bounding: Array) -> bool:
-    """Whether the largest triangle of a face has its normal towards the inside of what the bounding triangles enclose."""
+class _Rays:
+    """Triangles as rays along _RAY see them: their corners (T, 3, 3), two across and one along, and their boxes across."""
+
+    def __init__(self, points: Array, triangles: Array) -> None:
+        axes = np.vstack([np.linalg.svd(_RAY[None])[2][1:], _RAY])
+        self.axes, self.corners = axes, (points @ axes.T)[triangles]
+        self.low, self.high = self.corners[..., :2].min(axis=1), self.corners[..., :2].max(axis=1)
+
+    def heights(self, start: Array) -> Array:
+        """(k,) [m] where the line through a point meets triangles, measured from the point."""
+        at = self.axes @ start
+        near = ((self.low <= at[:2]) & (at[:2] <= self.high)).all(axis=1)
+        a, b, c = np.moveaxis(self.corners[near] - at, 1, 0)
+        double = _cross(b - a, c - a)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u, v, w = _cross(b, c) / double, _cross(c, a) / double, _cross(a, b) / double
+            height = u * a[:, 2] + v * b[:, 2] + w * c[:, 2]
+        return np.asarray(height[(u >= 0) & (v >= 0) & (w >= 0)])
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def _points_inside(points: Array, own: Array, rays: _Rays) -> bool:
+    """Whether the largest triangle of a face has its normal towards the inside of what the triangles enclose."""
     a, b, c = np.moveaxis(points[own], 1, 0)
     normals = np.cross(b - a, c - a)
     k = int(np.argmax((normals**2).sum(axis=1)))
-    start = (a[k] + b[k] + c[k]) / 3
-    ray = _RAY * np.sign(_RAY @ normals[k] or 1.0)
-    a, b, c = np.moveaxis(points[bounding[(bounding != own[k]).any(axis=1)]], 1, 0)
-    across = np.cross(ray, c - a)
-    volume = ((b - a) * across).sum(axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        u = ((start - a) * across).sum(axis=1) / volume
-        v = (ray * np.cross(start - a, b - a)).sum(axis=1) / volume
-        t = ((c - a) * np.cross(start - a, b - a)).sum(axis=1) / volume
-    return bool(np.sum((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)) % 2)
+    heights = rays.heights((a[k] + b[k] + c[k]) / 3) * np.sign(_RAY @ normals[k] or 1.0)
+    return bool(np.sum(heights > _ITSELF * np.ptp(points, axis=0).max()) % 2)

@@ -11,17 +11,15 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, numbers
+from ffr_prep.mesh.face_table import FaceTable, face_table, features_of
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "other")
 
 _SHOWN = 60
-_ANGLE = 1e-3  # within which directions are the same [rad]
 
 
 @dataclass(frozen=True, repr=False)
@@ -69,7 +67,9 @@ class Faces(Brief):
     unit      : in which the file has its lengths, in which they are shown and typed: "m", "cm", "mm" or "in"
     tolerance : within which places and radii are the same, of the size of the body
     notes     : what is to be known, in words
+    size      : the diagonal of the box around all [m]
     features  : the numbers of the faces of each feature
+    table     : the faces as arrays
     """
 
     faces: tuple[Face, ...]
@@ -78,18 +78,19 @@ class Faces(Brief):
     unit: str = "m"
     tolerance: float = 1e-5
     notes: tuple[str, ...] = ()
+    size: float = field(init=False)
     features: tuple[tuple[int, ...], ...] = field(init=False)
+    table: FaceTable = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "features", _features(self))
+        size = float(np.linalg.norm(np.ptp(self.points, axis=0))) if len(self.points) else 0.0
+        object.__setattr__(self, "size", size)
+        table = face_table(self.faces, self.points, self.triangles, self.tolerance * self.size)
+        object.__setattr__(self, "table", table)
+        object.__setattr__(self, "features", features_of(table, self.points, self.triangles))
 
     def __len__(self) -> int:
         return len(self.faces)
-
-    @property
-    def size(self) -> float:
-        """The diagonal of the box around all [m]."""
-        return float(np.linalg.norm(np.ptp(self.points, axis=0))) if len(self.points) else 0.0
 
     def _title(self) -> str:
         return f"{len(self.faces)} faces, {len(self.features)} features"
@@ -98,68 +99,6 @@ class Faces(Brief):
         rows = [(self.faces[of[0]].name, feature_in_words(self, of)) for of in self.features[:_SHOWN]]
         left = len(self.features) - _SHOWN
         return [*rows, ("...", f"{left} more")] if left > 0 else rows
-
-
-# ---- what makes faces one feature -----------------------------------------------------------------------------------
-
-
-def same_surface(one: Face, other: Face, near: float) -> bool:
-    """Whether two faces lie on one plane, cylinder, cone, sphere or torus, to within a length [m]."""
-    if one is other:
-        return True
-    if (
-        one.kind != other.kind
-        or one.inner != other.inner
-        or one.kind == "other"
-        or one.point is None
-        or other.point is None
-    ):
-        return False
-    between = other.point - one.point
-    if one.kind == "sphere":
-        return _close(one.radius, other.radius, near) and bool(np.linalg.norm(between) < near)
-    if one.axis is None or other.axis is None:
-        return False
-    if np.linalg.norm(np.cross(one.axis, other.axis)) > _ANGLE:
-        return False
-    if one.kind == "plane":
-        return abs(between @ one.axis) < near
-    if one.kind == "cylinder":
-        return _close(one.radius, other.radius, near) and bool(np.linalg.norm(np.cross(between, one.axis)) < near)
-    equal = _close(one.radius, other.radius, near) and _close(one.minor, other.minor, near)
-    return equal and bool(np.linalg.norm(between) < near)
-
-
-def _close(one: float | None, other: float | None, near: float) -> bool:
-    return one == other or (one is not None and other is not None and abs(one - other) < near)
-
-
-def _features(of: Faces) -> tuple[tuple[int, ...], ...]:
-    """The faces of each feature: those of one surface that share a point, directly or through others."""
-    if not of.faces:
-        return ()
-    nodes, near = _merged(of.points), of.tolerance * of.size
-    touched = [np.unique(nodes[triangles]) for triangles in of.triangles]
-    owner = np.repeat(np.arange(len(touched)), [len(t) for t in touched])
-    use = sp.coo_array(
-        (np.ones(owner.size), (owner, np.concatenate(touched))), (len(touched), int(nodes.max()) + 1)
-    ).tocsr()
-    pairs = sp.coo_array(use @ use.T)
-    bonds = [
-        (i, j)
-        for i, j in zip(pairs.row, pairs.col, strict=True)
-        if i < j and same_surface(of.faces[i], of.faces[j], near)
-    ]
-    rows, columns = np.array(bonds, int).reshape(-1, 2).T
-    graph = sp.coo_array((np.ones(len(rows)), (rows, columns)), (len(touched), len(touched)))
-    _, part = connected_components(graph, directed=False)
-    return tuple(tuple(int(k) for k in np.flatnonzero(part == p)) for p in dict.fromkeys(part.tolist()))
-
-
-def _merged(points: Array) -> Array:
-    """(P,) a number for each point, the same where points coincide: solids that touch without sharing have two."""
-    scale = float(np.ptp(points, axis=0).max()) or 1.0
-    return np.asarray(np.unique(np.round(points / (1e-7 * scale)), axis=0, return_inverse=True)[1]).ravel()
 
 
 # ---- measures -----------------------------------------------------------------------------------------------------

@@ -28,6 +28,7 @@ UNREADABLE, UNLOADABLE, UNMESHED, REFUSED = 2, 3, 4, 5
 _HXT, _DELAUNAY = 10, 1
 _FLAT = 1e-9
 _ELEMENTS_PER_TURN = 12
+_FEW_FACES = 100
 _DIGITS = 12
 _TETRAHEDRA_PER_CUBE = 8.5  # regular ones, of an edge like that of the cube
 _MOST_ALONG = 2e4
@@ -88,9 +89,13 @@ def _open(gmsh: Any, job: dict[str, Any]) -> None:
     else:
         gmsh.option.setString("Geometry.OCCTargetUnit", job["unit"])
     if job["path"].lower().endswith(_CAD):
-        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _ELEMENTS_PER_TURN * (1 + (job["wanted"] == "skin")))
+        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _ELEMENTS_PER_TURN)
+    if job["wanted"] == "skin":  # what is drawn is fine along its curves alone
+        gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
     gmsh.option.setNumber("Geometry.OCCImportLabels", 1)  # names and colours
     gmsh.open(job["path"])
+    if job["wanted"] == "skin" and 0 < len(gmsh.model.getEntities(2)) <= _FEW_FACES:
+        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 2 * _ELEMENTS_PER_TURN)
     if not gmsh.model.getEntities():
         raise ValueError("nothing in it is a geometry or a mesh")
 

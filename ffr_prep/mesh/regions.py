@@ -11,10 +11,10 @@ import numpy as np
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.registry import choice
-from ffr_prep.mesh.faces import METRES, Face, Faces, feature_centre, feature_in_words, same_surface, tidy
+from ffr_prep.mesh.faces import METRES, Face, Faces, feature_centre, feature_in_words, tidy
+from ffr_prep.mesh.misfits import across, fitting, kind_of, misfits, nearest, off_surface
 from ffr_prep.mesh.region_words import Names, Query, is_query, parsed
 
-_SAME = 1e-4  # within which a number that was typed is met, relatively
 _SHOWN = 6
 
 
@@ -90,114 +90,28 @@ def _of_query(faces: Faces, query: Query) -> list[int]:
 
 def _meant(faces: Faces, query: Query) -> list[list[int]]:
     """The faces of each surface that fits, or of the features that are equally near; one where the query is clear."""
-    fitting = [k for k, face in enumerate(faces.faces) if _misfit(faces, face, query) <= 1]
-    if not fitting:
+    fits = fitting(faces, query)
+    if not fits.size:
         return []
     if query.near is not None:
-        return _nearest(faces, query, fitting)
-    return [fitting] if query.every else _surfaces(faces, fitting)
+        return _nearest(faces, query, fits)
+    surfaces = np.zeros(fits.size, int) if query.every else faces.table.surface[fits]
+    return [fits[surfaces == one].tolist() for one in dict.fromkeys(surfaces.tolist())]
 
 
-def _surfaces(faces: Faces, chosen: Sequence[int]) -> list[list[int]]:
-    """The chosen faces by the surface that they lie on."""
-    groups: list[list[int]] = []
-    for k in chosen:
-        for group in groups:
-            if same_surface(faces.faces[group[0]], faces.faces[k], faces.tolerance * faces.size):
-                group.append(k)
-                break
-        else:
-            groups.append([k])
-    return groups
-
-
-def _nearest(faces: Faces, query: Query, fitting: Sequence[int]) -> list[list[int]]:
+def _nearest(faces: Faces, query: Query, fits: Array) -> list[list[int]]:
     """Of the features of fitting faces those that are nearest to the point of the query."""
-    features = [[k for k in of if k in set(fitting)] for of in faces.features]
-    features = [of for of in features if of]
-    point = np.array(query.near)
-    distances = np.array([min(_distance(faces, k, point) for k in of) for of in features])
-    order = np.argsort(distances, kind="stable")
-    tied = [features[k] for k in order if distances[k] - distances[order[0]] <= faces.tolerance * faces.size]
-    if distances[order[0]] > faces.size:
+    distances = nearest(faces, fits, np.array(query.near))
+    least = float(distances.min())
+    if least > faces.size:
         scale = METRES[faces.unit]
         raise InputError(
-            f"{query.text!r}: the point is {distances[order[0]] / scale:.4g} {faces.unit} away from the body, whose size is "
+            f"{query.text!r}: the point is {least / scale:.4g} {faces.unit} away from the body, whose size is "
             f"{faces.size / scale:.4g} {faces.unit}; numbers without a unit are {faces.unit}{_thousand(faces, query)}"
         )
-    return tied
-
-
-def _misfit(faces: Faces, face: Face, query: Query) -> float:
-    """How far a face is from what is asked: at most 1 where it fits, infinite for another kind."""
-    kind = "cylinder" if query.kind == "bore" else query.kind
-    if face.inner or kind not in ("face", face.kind) or (query.kind == "bore" and face.hollow is False):
-        return np.inf
-    worst = 0.0
-    if query.radius is not None:
-        if face.radius is None or face.kind == "cone":
-            return np.inf
-        worst = abs(face.radius - query.radius) / max(_SAME * query.radius, faces.tolerance * faces.size)
-    if query.colour and face.colour != query.colour:
-        return np.inf
-    for wanted, signed in ((query.normal, True), (query.axis, False)):
-        worst = max(worst, _turned(face, wanted, signed))
-    if query.through is not None:
-        worst = max(worst, _across(faces, face, *query.through))
-    if query.at is not None:
-        worst = max(worst, _off(face, np.array(query.at)) / (faces.tolerance * faces.size))
-    return worst
-
-
-def _turned(face: Face, wanted: Sequence[float] | None, signed: bool) -> float:
-    """How far the normal (signed) or axis is from a direction."""
-    if wanted is None:
-        return 0.0
-    if face.axis is None or signed != (face.kind == "plane"):
-        return np.inf
-    unit = np.array(wanted) / np.linalg.norm(wanted)
-    return np.inf if signed and unit @ face.axis < 0 else float(np.linalg.norm(np.cross(unit, face.axis))) / 1e-3
-
-
-def _across(faces: Faces, face: Face, axis: int, place: float) -> float:
-    """How far a plane is from one across an axis of coordinates at a place."""
-    if face.kind != "plane" or face.axis is None or face.point is None:
-        return np.inf
-    tilt = np.linalg.norm(np.delete(face.axis, axis))
-    return (
-        np.inf
-        if tilt > 1e-3
-        else abs(face.point[axis] - place) / max(faces.tolerance * faces.size, _SAME * abs(place) / 10)
-    )
-
-
-def _off(face: Face, point: Array) -> float:
-    """Distance of a point from a plane, from an axis, from a centre [m]."""
-    if face.point is None:
-        return np.inf
-    arm = point - face.point
-    if face.kind == "plane" and face.axis is not None:
-        return float(abs(arm @ face.axis))
-    if face.kind in ("cylinder", "cone") and face.axis is not None:
-        return float(np.linalg.norm(np.cross(arm, face.axis)))
-    return float(np.linalg.norm(arm))
-
-
-def _distance(faces: Faces, k: int, point: Array) -> float:
-    """Distance of a point from the triangles of a face [m]."""
-    a, b, c = np.moveaxis(faces.points[faces.triangles[k]], 1, 0)
-    normal = np.cross(b - a, c - a)
-    length = np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)
-    height = ((point - a) * normal).sum(axis=1) / length
-    foot = point - height[:, None] * normal / length[:, None]
-    inside = np.ones(len(a), bool)
-    edges = np.full(len(a), np.inf)
-    for p, q in ((a, b), (b, c), (c, a)):
-        along = q - p
-        inside &= (np.cross(along, foot - p) * normal).sum(axis=1) >= 0
-        share = ((point - p) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
-        edges = np.minimum(edges, np.linalg.norm(point - p - np.clip(share, 0, 1)[:, None] * along, axis=1))
-    return float(np.where(inside, np.abs(height), edges).min())
+    tied = set(fits[distances <= least + faces.tolerance * faces.size].tolist())
+    known = set(fits.tolist())
+    return [[k for k in of if k in known] for of in faces.features if tied & set(of)]
 
 
 # ---- what is near, and what to type ---------------------------------------------------------------------------------
@@ -205,29 +119,25 @@ def _distance(faces: Faces, k: int, point: Array) -> float:
 
 def _what_is_near(faces: Faces, query: Query) -> str:
     """The features that come closest, each with what to type."""
-    kind = "cylinder" if query.kind == "bore" else query.kind
     outer = [f for f in faces.features if not faces.faces[f[0]].inner]
-    of_kind = [f for f in outer if kind in ("face", faces.faces[f[0]].kind)]
+    of_kind = [f for f in outer if kind_of(query) in ("face", faces.faces[f[0]].kind)]
     if not of_kind:
         kinds = dict.fromkeys(face.kind for face in faces.faces)
         return f"There is no {query.kind} at all; there are: {', '.join(kinds)}. `ffr-prep faces FILE` lists them"
+    first = np.array([f[0] for f in of_kind])
     loose = replace(query, through=None, at=None, near=None)
-    misfits = [min(_misfit(faces, faces.faces[f[0]], q) for q in (query, loose)) for f in of_kind]
-    apart = [_apart(faces, f, query) for f in of_kind]
-    order = sorted(range(len(of_kind)), key=lambda k: (misfits[k], apart[k]))[:_SHOWN]
+    rough = np.minimum(misfits(faces, query), misfits(faces, loose))[first]
+    order = np.lexsort((_apart(faces, query)[first], rough))[:_SHOWN]
     shown = "\n".join(_offer(faces, of_kind[k]) for k in order)
     return f"Near are{_thousand(faces, query)}:\n{shown}"
 
 
-def _apart(faces: Faces, feature: Sequence[int], query: Query) -> float:
-    face = faces.faces[feature[0]]
+def _apart(faces: Faces, query: Query) -> Array:
+    """(F,) [m] how far faces are from the place of a query."""
     point = query.at or query.near
     if point is not None:
-        return _off(face, np.array(point))
-    if query.through is not None and face.point is not None and face.axis is not None:
-        axis, place = query.through
-        return float(abs(face.point[axis] - place)) if abs(face.axis[axis]) > 1 - 1e-6 else np.inf
-    return 0.0
+        return off_surface(faces, point)
+    return np.zeros(len(faces)) if query.through is None else across(faces, *query.through)
 
 
 def _thousand(faces: Faces, query: Query) -> str:
@@ -242,12 +152,8 @@ def _thousand(faces: Faces, query: Query) -> str:
         )
         if scaled == query:
             continue
-        hit = any(_misfit(faces, face, scaled) <= 1 for face in faces.faces)
-        reached = (
-            scaled.near is None
-            or min(_distance(faces, k, np.array(scaled.near)) for k in range(len(faces))) < faces.size
-        )
-        if hit and reached:
+        fits = fitting(faces, scaled)
+        if fits.size and (scaled.near is None or nearest(faces, fits, np.array(scaled.near)).min() < faces.size):
             meant = f", so write {unit} behind the numbers" if faces.unit != unit else ""
             return f" (a factor of a thousand would make it fit{meant})"
     return ""

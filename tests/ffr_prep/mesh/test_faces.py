@@ -326,7 +326,7 @@ def test_too_many_elements_are_refused_with_a_size_that_would_do(parts):
         read_mesh(parts["plate"], size=2.0, most_elements=5000)
     enough = float(str(small.value).partition("A size of ")[2].split()[0])
     mesh = read_mesh(parts["plate"], size=enough, most_elements=5000, order=1)
-    assert 500 < sum(len(block.nodes) for block in mesh.blocks)
+    assert sum(len(block.nodes) for block in mesh.blocks) > 500
     with pytest.raises(InputError, match="most_elements is 0"):
         read_mesh(parts["plate"], most_elements=0)
 
