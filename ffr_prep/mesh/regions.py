@@ -79,12 +79,11 @@ def _of_query(faces: Faces, query: Query) -> list[int]:
         raise InputError(f"{query.text!r} finds no face. {_what_is_near(faces, query)}")
     if len(meant) == 1:
         return meant[0]
-    shown = "\n".join(_offer(faces, of) for of in meant[:_SHOWN])
-    more = f"\n  and {len(meant) - _SHOWN} more" if len(meant) > _SHOWN else ""
+    shown = _offers(faces, meant)
     if query.near is not None:
-        raise InputError(f"{query.text!r}: these are equally near; write one, or several joined by +:\n{shown}{more}")
+        raise InputError(f"{query.text!r}: these are equally near; write one, or several joined by +: {shown}")
     raise InputError(
-        f"{query.text!r} finds {len(meant)} {query.kind}s; write 'all {query.text}' for all of them, or one:\n{shown}{more}"
+        f"{query.text!r} finds {len(meant)} {query.kind}s; write 'all {query.text}' for all of them, or one: {shown}"
     )
 
 
@@ -127,9 +126,8 @@ def _what_is_near(faces: Faces, query: Query) -> str:
     first = np.array([f[0] for f in of_kind])
     loose = replace(query, through=None, at=None, near=None)
     rough = np.minimum(misfits(faces, query), misfits(faces, loose))[first]
-    order = np.lexsort((_apart(faces, query)[first], rough))[:_SHOWN]
-    shown = "\n".join(_offer(faces, of_kind[k]) for k in order)
-    return f"Near are{_thousand(faces, query)}:\n{shown}"
+    order = np.lexsort((_apart(faces, query)[first], rough))
+    return f"Near are{_thousand(faces, query)}: {_offers(faces, [of_kind[k] for k in order])}"
 
 
 def _apart(faces: Faces, query: Query) -> Array:
@@ -159,8 +157,15 @@ def _thousand(faces: Faces, query: Query) -> str:
     return ""
 
 
-def _offer(faces: Faces, feature: Sequence[int]) -> str:
-    return f"  {query_for(faces, feature)}    ({feature_in_words(faces, feature)})"
+def _offers(faces: Faces, features: Sequence[Sequence[int]]) -> str:
+    """What to type for the first of several features; what they are where it does not tell."""
+    typed = [query_for(faces, feature) for feature in features[:_SHOWN]]
+    known = [
+        text if is_query(text) else f"{text} ({feature_in_words(faces, feature)})"
+        for text, feature in zip(typed, features, strict=False)
+    ]
+    more = [f"and {len(features) - _SHOWN} more"] if len(features) > _SHOWN else []
+    return "; ".join([*known, *more])
 
 
 def query_for(faces: Faces, feature: Sequence[int]) -> str:

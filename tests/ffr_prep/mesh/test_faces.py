@@ -192,11 +192,11 @@ def test_pieces_of_one_cylinder_are_one_surface_and_near_takes_a_piece(parts):
 @pytest.mark.parametrize(
     ("region", "message"),
     [
-        ("bore r=6", r"finds 4 bores; write 'all bore r=6'.*\n  cylinder r=6mm at -45,-25,0mm"),
-        ("cylinder r=6 at 0,0,0", r"finds no face. Near are:\n  cylinder r=6mm at"),
+        ("bore r=6", r"finds 4 bores; write 'all bore r=6'.*: cylinder r=6mm at -45,-25,0mm"),
+        ("cylinder r=6 at 0,0,0", r"finds no face. Near are: cylinder r=6mm at"),
         ("cylinder r=0.006", r"a factor of a thousand would make it fit, so write m behind the numbers"),
         ("plane z=5000", r"a factor of a thousand would make it fit"),
-        ("plane z=4", r"finds no face. Near are:\n  plane z=5mm"),
+        ("plane z=4", r"finds no face. Near are: plane z=5mm"),
         ("sphere r=3", "There is no sphere at all; there are: plane, cylinder"),
         ("nearest 0.01,0,1e5", "away from the body, whose size is 144.6 mm; numbers without a unit are mm"),
         ("nearest 0,0,0", "equally near"),
@@ -213,8 +213,9 @@ def test_pieces_of_one_cylinder_are_one_surface_and_near_takes_a_piece(parts):
     ],
 )
 def test_what_finds_nothing_or_too_much_says_what_to_type(region, message, parts):
-    with pytest.raises(InputError, match=f"(?s){message}"):
+    with pytest.raises(InputError, match=message) as refused:
         fp.found_faces(faces_of(parts["plate"]), region)
+    assert "\n" not in str(refused.value)
 
 
 def test_a_name_that_looks_like_a_query_is_a_name(parts):
