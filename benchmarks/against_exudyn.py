@@ -28,7 +28,7 @@ import numpy as np
 from benchmarks.exudyn_twin import CENTRE_OF_MASS, UNDEFORMED_BODY, exu, fem_interface, mass_terms, motion, twin
 from benchmarks.exudyn_twin import ObjectFFRFreducedOrderInterface as ReducedOrder
 from benchmarks.scenes import MeshedBody, connecting_rod, pendulum, pendulum_rod, slider_crank
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.consistency.assemble import assemble, in_space
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.integrators import RK4, Integrator
@@ -80,7 +80,7 @@ def middle_node(case: Case) -> int:
 
 def ours(case: Case, method: Integrator) -> Array:
     """(rows + 1, 2, 3) positions of the point and of the node in the middle, by `ffr_dyn`."""
-    result = forward(case.scene, end=case.end, output_step=case.end / case.rows, method=method)
+    result = integrate(case.scene, end=case.end, output_step=case.end / case.rows, method=method)
     node = middle_node(case)
     A = np.array([rotation_matrix(p) for p in result["rod.p"]])
     u = case.rod.points[node] + result["rod.q"] @ case.rod.Phi[node].T

@@ -17,7 +17,7 @@ import numpy as np
 from ffr_gallery.scene_set import chain, four_bar, slider_crank
 from scipy.optimize import nnls
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.economy.model_choice import Choice, full, held_in_plane
 from ffr_dyn.economy.run import Span, make
@@ -72,7 +72,7 @@ def timed(scene: Scene, choice: Choice, span: Span) -> Timing:
         found = []
         for _ in range(REPEATS):
             watch = Stopwatch()
-            result = forward(
+            result = integrate(
                 made.scene,
                 end=span.end,
                 output_step=span.output_step,

@@ -35,7 +35,7 @@ from itertools import combinations
 import numpy as np
 from ffr_gallery.scene_set import CASES, Case, case
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.run import run as whole_run
 from ffr_dyn.economy.cost import of_run, per_evaluation, per_row
 from ffr_dyn.economy.model_choice import Choice, Part, orthonormal
@@ -199,7 +199,7 @@ def processor_time(scene: Scene, choice: Choice, span: Span) -> float:
     times: list[float] = []
     while len(times) < REPEATS[0] or (len(times) < REPEATS[1] and sum(times) < 1.0):
         watch = Stopwatch()
-        forward(
+        integrate(
             made.scene,
             end=span.end,
             output_step=span.output_step,

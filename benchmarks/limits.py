@@ -29,7 +29,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.scenes import chain, pendulum_rod
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.compile.engine import fill_rows, new_engine
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.compile.workspace import new_record
@@ -140,7 +140,7 @@ def stiff_table() -> None:
         for h in (0.02, 0.01):
             factor = (1e5 / (0.01 * fastest)) ** 2
             tips = [
-                forward(chain(stiffened(body, f), 1, "revolute"), end=1.0, output_step=0.1, method=kind(step))
+                integrate(chain(stiffened(body, f), 1, "revolute"), end=1.0, output_step=0.1, method=kind(step))
                 for f, step in ((factor, h), (factor, 2e-4))
             ]
             errors.append(np.abs(tips[0]["link0.tip.position"] - tips[1]["link0.tip.position"]).max())

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 import ffr_prep as fp
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import RK4, ROS2, Integrator
 from ffr_dyn.scene.drivers import Driver
@@ -86,7 +86,7 @@ def per_evaluation(scenes: Sequence[Scene], method: Integrator, span: float) -> 
 
     def run(scene: Scene, end: float) -> tuple[float, int]:
         began = time.process_time()
-        evaluations = forward(scene, end=end, output_step=end / 2, method=method).attributes["evaluations"]
+        evaluations = integrate(scene, end=end, output_step=end / 2, method=method).attributes["evaluations"]
         return time.process_time() - began, evaluations
 
     runs = [(scene, end) for scene in scenes for end in (span / 10, span)]

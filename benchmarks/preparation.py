@@ -33,7 +33,7 @@ from benchmarks.preparation_bodies import (
     tree,
 )
 from benchmarks.scenes import slider_crank
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.functions.time_functions import user
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.results.result import Result
@@ -192,7 +192,7 @@ def spin_up() -> Iterator[Figure]:
         (Body("beam", body),), (Joint("axis", "revolute", "ground.O", "beam.root"),),
         (Driver("motor", "axis", user(_spinning)),), ground={"O": (0, 0, 0)},
     )  # fmt: skip
-    result = forward(scene, end=10.0, output_step=0.1, method=ROS2(2e-3))
+    result = integrate(scene, end=10.0, output_step=0.1, method=ROS2(2e-3))
     tip = result["beam.q"] @ body.interface("tip").phi_t[1]
     off = max(abs(np.interp(t, result.time, tip) - d) for t, d in SPIN_UP.items())
     yield Figure("spin-up with three modes: tip [m]", off, 1e-3)
@@ -213,7 +213,7 @@ def slider_cranks() -> Iterator[Figure]:
     middle = np.abs(body.surface.points[:, 0] - 0.15) < 1e-9
     shape = body.surface.Phi[middle].mean(axis=0)[1]
     runs = [
-        forward(_switched(slider_crank(body), on), end=0.084, output_step=4e-4, method=ROS2(5e-6))
+        integrate(_switched(slider_crank(body), on), end=0.084, output_step=4e-4, method=ROS2(5e-6))
         for on in (False, True)
     ]
     linear, stiffened = (run["rod.q"] @ shape for run in runs)
@@ -233,7 +233,7 @@ def pendulums() -> Iterator[Figure]:
         (Body("rod", body),), (Joint("hinge", "revolute", "ground.O", "rod.root"),), ground={"O": (0, 0, 0)},
         gravity=(0.0, -9.81, 0.0),
     )  # fmt: skip
-    runs = [forward(_switched(scene, on), end=2.0, output_step=0.01, method=ROS2(2.5e-5)) for on in (False, True)]
+    runs = [integrate(_switched(scene, on), end=2.0, output_step=0.01, method=ROS2(2.5e-5)) for on in (False, True)]
     linear, stiffened = (run["rod.tip.position"][:, :2] for run in runs)
     in_theory, exact = (_table(f"pendulum_{name}.csv")[:, 1:3] for name in ("linear", "exact"))
     off = np.abs(linear[: len(in_theory)] - in_theory).max()

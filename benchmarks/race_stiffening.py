@@ -21,7 +21,7 @@ import numpy as np
 import ffr_prep as fp
 from benchmarks.courses import FIXED_INTERFACE_MODES, chained
 from benchmarks.scenes import MESHES, pendulum, slider_crank, with_middle
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import ROS3
 from ffr_dyn.scene.scene import Scene
@@ -53,7 +53,7 @@ def loop_time(scene: Scene, output_step: float, rows: int, fineness: int) -> flo
     """Processor time of a step [us]."""
     watch = Stopwatch()
     method, end = ROS3(output_step / fineness), rows * output_step
-    forward(scene, end=end, output_step=output_step, method=method, outputs=["*.position"], stopwatch=watch)
+    integrate(scene, end=end, output_step=output_step, method=method, outputs=["*.position"], stopwatch=watch)
     return 1e6 * watch.cpu / (rows * fineness)
 
 
@@ -61,7 +61,7 @@ def peak(scene: Scene) -> float:
     """Largest offset [m] of the middle of the slider-crank's rod, to the left."""
     names = ("rod.crankpin", "rod.slider", "rod.middle")
     outputs = [f"{name}.position" for name in names]
-    found = forward(scene, end=0.084, output_step=1e-4, method=ROS3(2.5e-5), outputs=outputs)
+    found = integrate(scene, end=0.084, output_step=1e-4, method=ROS3(2.5e-5), outputs=outputs)
     pin, slider, middle = (found[output] for output in outputs)
     chord, offset = slider - pin, middle - (pin + slider) / 2
     left = chord[:, 0] * offset[:, 1] - chord[:, 1] * offset[:, 0]

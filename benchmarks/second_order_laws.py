@@ -14,7 +14,7 @@ import numpy as np
 import ffr_prep as fp
 from benchmarks.preparation import Figure
 from benchmarks.second_order_scenes import REFERENCES, beam, measured, pendulum
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.functions.time_functions import harmonic
@@ -51,7 +51,7 @@ def highest(body: FlexibleBody) -> float:
 def run(scene: Scene, method: Integrator, steps: int) -> Result:
     """A result of `ROWS` rows with the default outputs."""
     apart = steps // ROWS * method.step
-    return forward(scene, end=ROWS * apart, output_step=apart, method=method)
+    return integrate(scene, end=ROWS * apart, output_step=apart, method=method)
 
 
 def energy(found: Result) -> Array:
@@ -180,7 +180,9 @@ def conditions() -> Iterator[Figure]:
     """A point of bodies reduced under each reference condition, over 0.2 s [m]."""
 
     def apart(make: Callable[[ReferenceConditions], Scene], point: str) -> tuple[float]:
-        tracks = [forward(make(of), end=0.2, output_step=0.01, method=ROS2(2e-4))[point] for of in REFERENCES.values()]
+        tracks = [
+            integrate(make(of), end=0.2, output_step=0.01, method=ROS2(2e-4))[point] for of in REFERENCES.values()
+        ]
         return (np.ptp(tracks, axis=0).max(),)
 
     who, goals = "a body under three reference conditions", {"tip of the pendulum E = 7e9 [m]": 1e-10}
@@ -217,7 +219,7 @@ def arms() -> Iterator[Figure]:
 
 def _halved(scene: Scene) -> tuple[float]:
     coarse, fine = (
-        forward(scene, end=1.0, output_step=0.01, method=method, outputs=["lower.tip.position"])["lower.tip.position"]
+        integrate(scene, end=1.0, output_step=0.01, method=method, outputs=["lower.tip.position"])["lower.tip.position"]
         for method in (None, ROS2(5e-4))
     )
     return (np.linalg.norm(coarse - fine, axis=1).max() / 0.2,)

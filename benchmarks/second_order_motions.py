@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.exact_beam import spinning
 from benchmarks.preparation import Figure
 from benchmarks.second_order_scenes import IN_PLANE, REFERENCES, STRIP, beam, measured, pendulum, rotor, slider_crank
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.functions.time_functions import user
 from ffr_dyn.integrators import ROS3
 from ffr_dyn.scene.scene import Scene
@@ -30,7 +30,7 @@ SPIN_UP = Section("beam", A=1.0, Iy=5e-4, Iz=5e-4, J=1e-3, ky=1e7 * 2.6 / 2.8e7,
 def tracked(scene: Scene, end: float, output_step: float, step: float) -> tuple[Array, Array]:
     """(T, 3) tip of the beam [m], (T,) how far its middle lies to the left of the way from root to tip, in the plane [m]."""
     names = [f"beam.{name}.position" for name in ("root", "tip", "above", "below")]
-    found = forward(scene, end=end, output_step=output_step, method=ROS3(step), outputs=names)
+    found = integrate(scene, end=end, output_step=output_step, method=ROS3(step), outputs=names)
     root, tip, above, below = (found[name] for name in names)
     chord, offset = tip - root, (above + below - root - tip) / 2
     left: Array = (chord[:, 0] * offset[:, 1] - chord[:, 1] * offset[:, 0]) / np.linalg.norm(chord, axis=1)
@@ -97,7 +97,7 @@ def spin_up() -> Iterator[Figure]:
 
     def errors(reference: ReferenceConditions) -> tuple[float, float]:
         body = beam(SPIN_UP, Material("beam", 2.8e7, 0.3, 1.2), 10.0, 6, reference)
-        found = forward(rotor(body, user(spinning)), end=10.0, output_step=0.1, method=ROS3(1e-3), outputs=outputs)
+        found = integrate(rotor(body, user(spinning)), end=10.0, output_step=0.1, method=ROS3(1e-3), outputs=outputs)
         angle = np.array([spinning(t)[0] for t in found.time])
         (x, y, _), c, s = found[outputs[0]].T, np.cos(angle), np.sin(angle)
         off = np.abs(c * x + s * y - 10.0 - axial)

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from benchmarks.courses import FIXED_INTERFACE_MODES, LINKS
 from benchmarks.scenes import chain, pendulum_rod, with_middle
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import RK4, ROS2, Integrator
 from ffr_dyn.scene.forces import Bushing, JointSpring, SpringDamper
@@ -27,7 +27,7 @@ STEP, STEPS = 5e-5, 400
 def time_of_step(scene: Scene, method: Integrator) -> float:
     """Processor time [us]."""
     watch = Stopwatch()
-    forward(scene, end=STEP * STEPS, output_step=STEP * STEPS, method=method, outputs=["*.R"], stopwatch=watch)
+    integrate(scene, end=STEP * STEPS, output_step=STEP * STEPS, method=method, outputs=["*.R"], stopwatch=watch)
     return 1e6 * watch.cpu / STEPS
 
 

@@ -43,7 +43,7 @@ _BY_MODULE = {
     "ffr_dyn.scene.sensors": "Measurement SectionMeasurement StressMeasurement",
     "ffr_dyn.variants.variant": "vary with_modes without_terms",
     "ffr_dyn.integrators": "AdaptiveROS3 DormandPrince GeneralisedAlpha HHT HalfExplicit Integrator RK4 ROS2 ROS3 Tolerances "
-    "Variational register_integrator tolerances",
+    "Variational Within register_integrator tolerances",
     "ffr_dyn.integrators.stabilisation": "Baumgarte Drifting Projection",
     "ffr_dyn.compile.first_use": "begin_compiling",
     "ffr_dyn.results.file": "load_result save_result",
@@ -51,7 +51,7 @@ _BY_MODULE = {
     "ffr_dyn.results.stress": "hot_spots peaks section_forces section_histories section_peaks stress_histories",
     "ffr_dyn.consistency.assemble": "Assembled assemble",
     "ffr_dyn.consistency.mobility": "Mobility mobility",
-    "ffr_dyn.consistency.validity": "parts_needed",
+    "ffr_dyn.consistency.validity": "in_enough_parts parts_needed",
     "ffr_dyn.pictures.animate": "animate",
     "ffr_dyn.pictures.histories": "plot plot_path",
     "ffr_dyn.pictures.stress_report": "report_lines stress_report",
@@ -129,8 +129,8 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_dyn.integrators import (
         AdaptiveROS3 as AdaptiveROS3, DormandPrince as DormandPrince, GeneralisedAlpha as GeneralisedAlpha, HHT as
         HHT, HalfExplicit as HalfExplicit, Integrator as Integrator, RK4 as RK4, ROS2 as ROS2, ROS3 as ROS3,
-        Tolerances as Tolerances, Variational as Variational, register_integrator as register_integrator, tolerances
-        as tolerances
+        Tolerances as Tolerances, Variational as Variational, Within as Within, register_integrator as
+        register_integrator, tolerances as tolerances
     )
     from ffr_dyn.integrators.stabilisation import Baumgarte as Baumgarte, Drifting as Drifting, Projection as Projection
     from ffr_dyn.compile.first_use import begin_compiling as begin_compiling
@@ -142,7 +142,7 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     )
     from ffr_dyn.consistency.assemble import Assembled as Assembled, assemble as assemble
     from ffr_dyn.consistency.mobility import Mobility as Mobility, mobility as mobility
-    from ffr_dyn.consistency.validity import parts_needed as parts_needed
+    from ffr_dyn.consistency.validity import in_enough_parts as in_enough_parts, parts_needed as parts_needed
     from ffr_dyn.pictures.animate import animate as animate
     from ffr_dyn.pictures.histories import plot as plot, plot_path as plot_path
     from ffr_dyn.pictures.stress_report import report_lines as report_lines, stress_report as stress_report

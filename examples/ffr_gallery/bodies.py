@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Legendre
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
@@ -105,6 +105,6 @@ def pendulum(*models: FlexibleBody, **more: Any) -> Scene:
 def tried(scene: Scene, **settings: Any) -> Result | None:
     """A forward run, or None where it failed."""
     try:
-        return forward(scene, **settings)
+        return integrate(scene, **settings)
     except ComputationError:
         return None

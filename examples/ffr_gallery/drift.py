@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.integrators import RK4
 from ffr_dyn.integrators.stabilisation import Drifting, Projection, Stabilisation
 from ffr_gallery.bodies import bar, pendulum
@@ -20,7 +20,7 @@ def drift(steps: int = 1_000_000) -> Exhibit:
 
     def violation(count: int, step: float, keep: Stabilisation) -> tuple[np.ndarray, np.ndarray]:
         every = count * step / ROWS
-        result = forward(scene, end=count * step, output_step=every, method=RK4(step), stabilisation=keep,
+        result = integrate(scene, end=count * step, output_step=every, method=RK4(step), stabilisation=keep,
                          outputs=("constraint.*",))  # fmt: skip
         return result.time[1:], result["constraint.position"][1:]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.functions.rotation import from_vector, rotation_matrix
 from ffr_dyn.integrators import RK4
 from ffr_dyn.scene.scene import Body, Scene
@@ -93,5 +93,5 @@ def _with_parameters(distance: float) -> float:
     omega_bar = tilt.T @ np.array([0.0, SPEED, 0.0])
     ball = rigid_body("ball", mass=1.0, inertia=np.ones(3))
     scene = Scene((Body("ball", ball, rotation=tilt, omega_bar=omega_bar),), plane="none")
-    result = forward(scene, end=END, output_step=END, method=RK4(STEP))
+    result = integrate(scene, end=END, output_step=END, method=RK4(STEP))
     return _off(rotation_matrix(result["ball.p"][-1]), tilt @ _turn(omega_bar))

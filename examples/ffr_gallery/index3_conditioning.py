@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.evaluation import evaluate, evaluated_mass_matrix, evaluator
 from ffr_dyn.integrators import RK4, GeneralisedAlpha
@@ -46,7 +46,7 @@ def links(bending: float) -> Scene:
 def error(scene: Scene, h: float, scaled: bool) -> tuple[float, float]:
     """Of the tip [m] and of the reaction of the first hinge (relative), after some steps of generalised-alpha."""
     outputs, end = ("link1.b.position", "hinge0.force"), STEPS * h
-    true = forward(scene, end=end, output_step=end, method=RK4(h / 10), outputs=outputs)
+    true = integrate(scene, end=end, output_step=end, method=RK4(h / 10), outputs=outputs)
     found = tried(scene, end=end, output_step=end, method=GeneralisedAlpha(h, scaled=scaled), outputs=outputs)
     if found is None:
         return BROKEN, BROKEN

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
 from ffr_dyn.consistency.validity import STRAINED
@@ -48,7 +48,7 @@ def large_deformation() -> Exhibit:
 
     def warned(force: float) -> bool:
         scene = loaded(force)
-        result = forward(scene_at(scene, static(scene)), end=1e-3, output_step=1e-3, method=ROS2(1e-3))
+        result = integrate(scene_at(scene, static(scene)), end=1e-3, output_step=1e-3, method=ROS2(1e-3))
         return any("turns within itself" in note for note in result.attributes["notes"])
 
     predicted = 2 * STRAINED  # F L^2 / 2 EI = 0.1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.integrators import RK4, Variational
 from ffr_dyn.scene.forces import SpringDamper
 from ffr_dyn.scene.joints import Joint
@@ -35,7 +35,7 @@ def long_time_energy(turns: int = 100_000) -> Exhibit:
     def lost(kind: type[RK4] | type[Variational], steps: int, turns: int) -> tuple[np.ndarray, np.ndarray]:
         step = 2 * np.pi / steps
         every = turns * 2 * np.pi / ROWS
-        result = forward(scene, end=turns * 2 * np.pi, output_step=every, method=kind(step), outputs=("energy.*",))
+        result = integrate(scene, end=turns * 2 * np.pi, output_step=every, method=kind(step), outputs=("energy.*",))
         total = result["energy.total"] + result["energy.springs"]
         return result.time / (2 * np.pi), np.abs(total / total[0] - 1)
 

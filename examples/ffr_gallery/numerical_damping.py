@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.integrators import ROS2, ROS3, Integrator
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
@@ -27,7 +27,7 @@ def factor(method: type[ROS2] | type[ROS3], z: float) -> float:
     mode = Body("rod", rod, q=(1e-3,), stiffening=False)  # of linear theory, as the formula
     clamped = Scene((mode,), (Joint("clamp", "fixed", "ground.O", "rod.a"),), ground={"O": (0, 0, 0)}, plane="z")
     steps = 8 if z < 10 else 2  # before rounding is all that is left
-    result = forward(clamped, end=steps * made.step, output_step=steps * made.step, method=made)
+    result = integrate(clamped, end=steps * made.step, output_step=steps * made.step, method=made)
     energy = result["energy.kinetic"] + result["energy.strain"]
     return float((energy[-1] / energy[0]) ** (0.5 / steps))
 

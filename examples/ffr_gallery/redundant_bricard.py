@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.evaluation import evaluate, evaluated_mass_matrix, evaluator
@@ -54,7 +54,7 @@ def redundant_bricard() -> Exhibit:
     lower = np.linalg.cholesky(evaluated_mass_matrix(at))
     weighted = np.linalg.solve(lower, jacobian.T).T
     values = np.linalg.svd(weighted / np.linalg.norm(weighted, axis=1)[:, None], compute_uv=False)
-    result = forward(scene, end=2.0, output_step=0.5, method=RK4(5e-4))
+    result = integrate(scene, end=2.0, output_step=0.5, method=RK4(5e-4))
     rows = {time: int(np.argmin(np.abs(result.time - time))) for time in REFERENCE}
     off = max(float(np.abs(result["r2.b.position"][row] - REFERENCE[time]).max()) for time, row in rows.items())
     rank = int((values > 1e-9).sum())

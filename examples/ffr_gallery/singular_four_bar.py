@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ffr_dyn.analyses.events import Event
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.integrators import RK4
 from ffr_dyn.integrators.stabilisation import Drifting, Projection, Stabilisation
 from ffr_dyn.results.result import Result
@@ -53,7 +53,7 @@ def singular_four_bar() -> Exhibit:
     ours = [max(change(steps, off, Projection()) for off in (0.0, 1e-6)) for steps in STEPS]
     free, held = (np.array([change(STEPS[2], off, keep) for off in OFF]) for keep in (Drifting(), Projection()))
     falling = Event("down", "s0.b.position.y", 0.0, direction="falling")
-    passed = forward(scene, end=1.0, output_step=0.1, method=RK4(1e-3), events=(falling,)).attributes["events"][0][
+    passed = integrate(scene, end=1.0, output_step=0.1, method=RK4(1e-3), events=(falling,)).attributes["events"][0][
         "time"
     ]
     through = run(STEPS[2], 0.0, Projection())

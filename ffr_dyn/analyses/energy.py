@@ -3,7 +3,8 @@
 At every recorded row kinetic and strain energy are compared with what the scene had to give: what it began with, what
 gravity has released, and the work of all forces and drivers, by their powers at the rows. Rows may miss what happens between
 them. So where the energy is far beyond, the last part of the run is done again with a quarter of the step, and the run stops
-only when the energy does not grow there, or grows to something else and without a source too.
+only when the energy does not grow there, or grows to something else and without a source too; and only when it grows on with
+the step as it is: a shock that steps do not resolve leaves what it leaves, and no more.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ BEYOND = 10.0  # times what there was to give, from where the energy is looked i
 ANCHOR = 2.5  # times that, up to where the part begins that is done again
 SHORTER = 4  # times, the steps with which it is
 ROWS = 2000  # of the part, at most
+FURTHER = 50  # steps at least, with which it must grow on
 QUIET = 1e-6  # m^2/s^2, twice the energy by mass that is not looked at
 AGREED = 0.1  # part of the energy by which both steps may differ where it is none of their doing
 
@@ -112,27 +114,36 @@ class EnergyWatch:
         """The row. Raises ComputationError when a quarter of the step tells that its energy has no source."""
         anchor = self.anchor
         assert anchor is not None
-        status, fine = self._again(anchor, row.time)
+        status, fine = self._again(anchor, row.time, SHORTER)
         found = float(fine.energy[-1, :2].sum()) if status == OK else np.inf
-        if status == NOT_FINITE or (status == OK and not found >= 0.5 * row.energy):
+        if (status == NOT_FINITE or (status == OK and not found >= 0.5 * row.energy)) and self._grows_on(row):
             raise ComputationError(self._told(anchor, row, found))
         if status == OK and not abs(found - row.energy) <= AGREED * row.energy and self._accountable():
             with np.errstate(all="ignore"):
                 powers = _powers(self.system, self.complete(fine)).sum(axis=1)
                 work = float(np.diff(fine.time, prepend=anchor.time) @ powers)
                 grown = float(fine.energy[-1].sum()) - anchor.total
-            if not grown - work <= 0.5 * found:
+            if not grown - work <= 0.5 * found and self._grows_on(row):
                 raise ComputationError(self._told(anchor, row, found))
         return row
 
-    def _again(self, anchor: _Row, end: float) -> tuple[int, Record]:
-        """From a row to a time with shorter steps: a status, and the rows."""
+    def _grows_on(self, row: _Row) -> bool:
+        """Whether the energy doubles as soon again when the run goes on from a row."""
+        anchor = self.anchor
+        assert anchor is not None
+        span = max(row.time - anchor.time, FURTHER * self.spacing)
+        status, later = self._again(row, row.time + span, 1)
+        with np.errstate(all="ignore"):
+            return status != OK or not bool((later.energy[:, :2].sum(axis=1) <= 2.0 * row.energy).all())
+
+    def _again(self, anchor: _Row, end: float, shorter: int) -> tuple[int, Record]:
+        """From a row to a time with steps so many times shorter: a status, and the rows."""
         span = end - anchor.time
-        steps = SHORTER * max(1, round(span / self.spacing))
+        steps = shorter * max(1, round(span / self.spacing))
         rows = min(steps, ROWS)
         substeps = -(-steps // rows)
         step = span / (rows * substeps)
-        method = _finer(self.method, step)
+        method = _finer(self.method, step) if shorter > 1 or not self.method.controlled else self.method
         spacing = step * substeps if method.controlled else step
         engine = new_engine(self.system, anchor.x, anchor.v, method, self.gains, start=anchor.time, spacing=spacing)
         engine.work.loads.reference[:] = anchor.reference

@@ -1,88 +1,87 @@
-"""Forward dynamics: all forces known, the motion wanted."""
+"""Forward dynamics: all forces known, the motion wanted, with what the length of the steps costs every output.
+
+A run is followed by others that tell its error (`ffr_dyn.consistency.step_error`), and where no step is given the one is
+looked for that is short enough.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import nullcontext
-from dataclasses import dataclass, replace
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, get_args
+from typing import Any, ClassVar
 
 import numpy as np
 
-from ffr_dyn.analyses.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
-from ffr_dyn.analyses.energy import EnergyWatch
-from ffr_dyn.analyses.events import Event, Watcher
-from ffr_dyn.analyses.registry import OverTime
+from ffr_dyn.analyses.events import Event
+from ffr_dyn.analyses.integration import check_output_step, integrate
+from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.settings import Settings
-from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
-from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import Assembled, assemble
-from ffr_dyn.consistency.failure import failure
-from ffr_dyn.consistency.validity import doubts, extremes, meaningless
+from ffr_dyn.consistency.step_error import StepError, step_errors, too_coarse
+from ffr_dyn.consistency.unresolved import Vibrations, lasting, leading, vibrations
 from ffr_dyn.functions.stopwatch import Stopwatch
-from ffr_dyn.integrators import ROS2, Integrator, methods
-from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation, excess_of_gains, gains
-from ffr_dyn.kernels.tables import (
-    AT,
-    EVALUATIONS,
-    FILLED,
-    LEAST,
-    NEXT,
-    NOW,
-    OK,
-    PHI,
-    PHI_DOT,
-    PROJECTIONS,
-    SPACING,
-    WHEN,
-    Record,
-    Work,
-)
-from ffr_dyn.results.file import ResultWriter, load_checkpoint, load_result
-from ffr_dyn.results.quantities import Entry, Memory, measure, needs_every_step, selected
-from ffr_dyn.results.result import Quantity, Result
-from ffr_dyn.scene.checks import several
-from ffr_dyn.scene.parts import described
+from ffr_dyn.integrators import Integrator, Within, stepped
+from ffr_dyn.integrators.ros2 import Twin
+from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
+from ffr_dyn.results.file import load_result, with_attributes
+from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
-from ffr_dyn.scene.surfaces import surface_of
-from ffr_prep.body import Surface
-from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
-LOOKS = 10  # of a quantity that adds up, from row to row, where the method chooses its steps
-SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, file and keyboard
+FIRST, FINEST, LEAP = 4, 1024, 8  # steps to an output row: of the first trial, at most, and times more in the next one
+MARGIN = 2.0  # by which a trial aims below the accuracy
+SLOW = 0.7  # a ringing output's error falls slower than the step to this power
+QUICK = 1e7  # microseconds of the further runs, by `_cost`, up to which they are made unasked
+
+# What a step is to keep within the accuracy always, and what where it does not ring.
+PLACES = re.compile(r"\.(position|R|p|angle|stroke|orientation)$")
+DRIVING = re.compile(r"\.(displacement|rotation|force|moment|effort|torque|tension)$|^measured\.")
 
 
 @dataclass(frozen=True)
 class Forward(OverTime):
-    """From start to end; step defaults to a tenth of output_step. Events are moments to find."""
+    """From start to end; without a step the one is found that keeps the accuracy. Events are moments to find."""
 
     resumable: ClassVar[bool] = True
     integrates: ClassVar[bool] = True
     stabilised: ClassVar[bool] = True
     events: tuple[Event, ...] = ()
+    check: bool | None = field(
+        default=None,
+        metadata=option("--check/--no-check", "Tell the error of every output by further runs; default: if short."),
+    )
 
     def perform(self, scene: Scene, settings: Settings, **how: Any) -> Result:
         own: dict[str, Any] = {
             "events": self.events,
+            "check": self.check,
             "method": settings.method,
             "stabilisation": settings.stabilisation,
         }
         return forward(scene, **own, **settings.span, **how)
 
 
-@dataclass
-class _Run:
-    """What changes while a run goes on; `done` counts the steps."""
+@dataclass(frozen=True)
+class _Runs:
+    """A scene and what all its runs have in common."""
 
-    engine: Engine
-    energy: EnergyWatch
-    memory: Memory
-    parts: list[dict[str, Quantity]]
-    times: list[Array]
-    extremes: Array
-    done: int
+    scene: Scene
+    assembled: Assembled
+    start: float
+    output_step: float
+    how: dict[str, Any]
+
+    @cached_property
+    def vibrations(self) -> Vibrations:
+        """Of the scene at its start."""
+        return vibrations(self.assembled, self.start)
+
+    def run(self, method: Integrator, **more: Any) -> Result:
+        """One run."""
+        return integrate(self.scene, method=method, assembled=self.assembled, **self.how, **more)
 
 
 def forward(
@@ -90,11 +89,12 @@ def forward(
     *,
     end: float,
     output_step: float,
-    method: Integrator | None = None,
+    method: Integrator | Within | None = None,
     start: float = 0.0,
     stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
     outputs: Sequence[str] = ("default",),
     events: Sequence[Event] = (),
+    check: bool | None = None,
     path: str | Path | None = None,
     resume: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
@@ -103,345 +103,217 @@ def forward(
 ) -> Result:
     """Integrate the equations of motion of a scene from `start` to `end` [s], keeping a row every `output_step` [s].
 
-    method      : RK4(step), ROS2(step), ...; by default ROS2 with a tenth of the output step
+    method      : RK4(step), ROS2(step), ...; or `Within(accuracy)`, the default with 1e-3: the step is found that keeps
+                  positions and angles within the accuracy, relative to their ranges, and forces where they do not ring
     outputs     : names or patterns of the quantities to keep (`ffr_dyn.results.quantities.selected`), such as "*.power"
     events      : moments to find (`ffr_dyn.analyses.events`), listed in the result's attribute "events"; one may end the run
+    check       : whether further runs are made that tell the error of every output; by default where that takes seconds.
+                  A step that is found is always checked
     path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
     resume      : a result file whose run goes on to the same bits; `end` may be later. A new file: a run from the start
     progress    : called with the time reached, a few times a second
-    stopwatch   : takes the time of the integrator's compiled loop
+    stopwatch   : takes the time of the integrator's compiled loop, in all runs
     assembled   : what `assemble` made of the scene at `start`, for programs that run it more than once
+
+    The result's attribute "errors" has [error in its unit, error over range] of every output but the violations of
+    constraints; "accuracy" says the worst in a sentence. Notes tell what rings and which rows are too coarse.
 
     Raises InputError for a scene or settings that cannot be used, ComputationError when the run fails: with the time,
     the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
-    method = _method(method, output_step)
-    spacing = output_step / LOOKS if method.controlled else method.step
-    substeps, rows = _counts(end - start, output_step, spacing)
-    _check_step(scene, method)
-    _check_stabilisation(method, stabilisation)
-    events = several("events", events, (Event,))
+    check_output_step(output_step)
     assembled = assemble(scene, time=start) if assembled is None else assembled
-    wanted = selected(assembled.system, outputs)
-    span = (start, end, output_step)
-    mark = _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
-    header = _header(scene, assembled, method, stabilisation, span)
-    run = _begun(assembled, method, gains(stabilisation), start, spacing, wanted, resume, mark)
-    _check_resumed(run, substeps * rows, output_step / substeps)
-    watcher = _watcher(assembled, run, method, stabilisation, spacing, events, resume) if events else None
-    path = resume if path is None else path
-    watch = Stopwatch() if stopwatch is None else stopwatch
-    first = Result(run.times[0], run.parts[0], geometry(scene), header | {"status": "running"})
-    with nullcontext() if path is None else ResultWriter(path, first, checkpoint=_checkpoint(run, mark)) as writer:
-        for times, part in _advance(assembled, run, method, start, substeps, rows, wanted, watch, watcher):
-            if writer is not None:
-                writer.append(times, {name: quantity.values for name, quantity in part.items()}, _checkpoint(run, mark))
-            if progress is not None:
-                progress(float(times[-1]))
-        account = _account(scene, run, header["notes"]) | ({} if watcher is None else {"events": watcher.found})
-        if writer is not None:
-            writer.close("complete", header | account)
-    return _result(scene, run, header | account | {"status": "complete"})
+    common: dict[str, Any] = {"start": start, "end": end, "output_step": output_step, "stabilisation": stabilisation}
+    common |= {"outputs": outputs, "progress": progress, "stopwatch": stopwatch}
+    runs = _Runs(scene, assembled, start, output_step, common)
+    kept = {"events": events, "path": path, "resume": resume}
+    method, count = _resumed(resume, Within() if method is None else method, output_step)
+    if isinstance(method, Within):
+        return _searched(runs, method, kept, count)
+    result = runs.run(method, **kept)
+    if check is None:
+        check = _cost(assembled, result) < QUICK
+    trial = _Trial(method, 0 if method.controlled else round(output_step / method.step), result)
+    told = _told(runs, _beside_twins(runs, trial)) if check else trial
+    return _finished(runs, told, resume if path is None else path)
 
 
-def _method(given: Integrator | None, output_step: float) -> Integrator:
-    if not 0 < output_step < np.inf:
-        raise InputError(f"the output step is {output_step} s; it must be positive and finite")
-    if isinstance(given, (str, type)):
-        raise InputError(f"method is {given!r}; give one with its step, such as ROS2(1e-3)")
-    return ROS2(step=output_step / 10) if given is None else given
+def _resumed(
+    resume: str | Path | None, method: Integrator | Within, output_step: float
+) -> tuple[Integrator | Within, int]:
+    """The method of a run that goes on, and how many steps to a row the first trial has where one is still looked for: a
+    finished run has found its step, one that was stopped was a trial."""
+    if isinstance(method, Within) and resume is not None and Path(resume).exists():
+        attributes = load_result(resume).attributes
+        if step := attributes.get("step"):
+            return (stepped(method, step) if "errors" in attributes else method), round(output_step / step)
+    return method, FIRST
 
 
-def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
-    """(steps per output row, output rows)."""
-    if not 0 < span < np.inf:
-        raise InputError(f"the duration, from start to end, is {span} s; it must be positive and finite")
-    substeps, rows = round(output_step / step), round(span / output_step)
-    if substeps < 1 or abs(substeps * step - output_step) > 1e-9 * output_step:
-        better = output_step / max(1, round(output_step / step))
-        raise InputError(
-            f"the output step {output_step} s is not a multiple of the step {step} s; try a step of {better:.6g}"
-        )
-    if rows < 1 or abs(rows * output_step - span) > 1e-9 * span:
-        raise InputError(f"the duration {span} s is not a multiple of the output step {output_step} s")
-    return substeps, rows
+# ---- the error of a run ---------------------------------------------------------------------------------------------
 
 
-def _check_stabilisation(method: Integrator, stabilisation: Stabilisation) -> None:
-    """Refuse what is none, and gains of accelerations for a method that keeps constraints in another way."""
-    if not isinstance(stabilisation, get_args(Stabilisation)):
-        raise InputError(f"stabilisation is {stabilisation!r}; give Projection(), Baumgarte(alpha, beta) or Drifting()")
-    if isinstance(stabilisation, Baumgarte) and method.row_stages:
-        others = [kind.__name__ for kind in methods().values() if not kind.row_stages]
-        raise InputError(
-            f"Baumgarte's gains act on the accelerations of the constraints, and {type(method).__name__} holds positions or "
-            f"rates themselves; leave them out, or use one of {', '.join(others)}"
-        )
+@dataclass(frozen=True)
+class _Trial:
+    """A run and what tells its error; no errors where the runs that would tell them failed."""
+
+    method: Integrator
+    count: int  # steps to an output row
+    result: Result
+    twins: tuple[Result, ...] = ()
+    errors: Mapping[str, StepError] = field(default_factory=dict)
 
 
-def _check_step(scene: Scene, method: Integrator) -> None:
-    """Refuse an explicit step that cannot be stable for any state."""
-    fastest = max(scene.bodies, key=lambda body: body.model.omega2.max(initial=0.0))
-    omega = float(np.sqrt(fastest.model.omega2.max(initial=0.0)))
-    if method.step * omega > method.reach:
-        raise InputError(
-            f"{type(method).__name__} with a step of {method.step:g} s is unstable: body {fastest.name!r} has a mode of "
-            f"{omega / 2 / np.pi:.4g} Hz, which needs a step below {method.reach / omega:.2g} s (joints lower this further); "
-            "use ROS2, fewer modes or a smaller step"
-        )
+def _beside_twins(runs: _Runs, trial: _Trial) -> _Trial:
+    """The run with its twins, and with what they tell of its errors."""
+    try:
+        twins = tuple(runs.run(twin) for twin in _twins(runs, trial.method))
+    except ComputationError:
+        return trial
+    errors = step_errors(trial.result, None, 1.0, trial.method.order, twins) if twins else {}
+    return replace(trial, twins=twins, errors=errors)
 
 
-def _begun(
-    assembled: Assembled,
-    method: Integrator,
-    gained: tuple[float, float, float],
-    start: float,
-    spacing: float,
-    wanted: Mapping[str, Entry],
-    resume: str | Path | None,
-    mark: str,
-) -> _Run:
-    """The run at its start, or where the file to resume left it."""
-    system = assembled.system
-    engine = new_engine(system, assembled.x, assembled.v, method, gained, start=start, spacing=spacing)
-    energy = EnergyWatch(system, method, gained, spacing, lambda rows: with_all_reactions(assembled, rows))
-    if resume is not None and Path(resume).exists():
-        return _resumed(Path(resume), mark, engine, energy)
-    return _started(assembled, engine, energy, start, wanted)
+def _told(runs: _Runs, trial: _Trial, earlier: Sequence[_Trial] = ()) -> _Trial:
+    """The run with its errors, also by a run of another step, which is one of the earlier where it can."""
+    try:
+        other, ratio = _other(runs, trial, {one.count: one.result for one in earlier})
+    except ComputationError:
+        return replace(trial, errors={})
+    return replace(trial, errors=step_errors(trial.result, other, ratio, trial.method.order, trial.twins))
 
 
-def _started(
-    assembled: Assembled, engine: Engine, energy: EnergyWatch, start: float, wanted: Mapping[str, Entry]
-) -> _Run:
-    """The run with its first row."""
-    first = new_record(assembled.system, 1)
-    status = record_row(engine, start, first, 0)
-    if status != OK:
-        raise failure(engine.system, engine.work, status, start)
-    first = with_all_reactions(assembled, first)
-    energy.look(first)
-    parts, memory = measure(assembled.system, first, {}, wanted)
-    return _Run(engine, energy, memory, [parts], [first.time], extremes(assembled.system, first), 0)
+def _other(runs: _Runs, trial: _Trial, known: Mapping[int, Result]) -> tuple[Result, float]:
+    """The run with another step, and the ratio of the steps: about twice the step where elastic forces are implicit and
+    twice the step is a part of a row, half of it otherwise; a tenth of the tolerance of a method that chooses its steps."""
+    method: Any = trial.method
+    if method.controlled:
+        tolerances = replace(method.tolerances, relative=method.tolerances.relative / 10)
+        return runs.run(replace(method, tolerances=tolerances)), 10.0 ** (-1.0 / method.order)
+    if method.implicit and trial.count > 1:
+        fewer = (trial.count + 1) // 2
+        try:
+            coarse = known.get(fewer) or runs.run(replace(method, step=runs.output_step / fewer))
+            return coarse, trial.count / fewer
+        except ComputationError:
+            pass  # half the step is sure to run
+    return runs.run(replace(method, step=runs.output_step / (2 * trial.count))), 0.5
 
 
-def _advance(
-    assembled: Assembled,
-    run: _Run,
-    method: Integrator,
-    start: float,
-    substeps: int,
-    rows: int,
-    wanted: Mapping[str, Entry],
-    watch: Stopwatch,
-    watcher: Watcher | None = None,
-) -> Iterator[tuple[Array, dict[str, Quantity]]]:
-    """Yields (times, quantities) of output rows chunk after chunk, each about SECONDS_PER_CALL long.
-
-    Where a quantity adds up over the steps, or events are looked for, every step is looked at and only the output rows are
-    kept.
-    """
-    system, steps = assembled.system, run.engine.tables.clock.steps
-    looks = substeps if needs_every_step(wanted) or watcher is not None else 1
-    ends = False
-    count = 1
-    while run.done < rows * substeps:
-        chunk = new_record(system, looks * min(count, rows - run.done // substeps))
-        with watch:
-            status = fill_rows(run.engine, chunk, start, substeps // looks)
-        filled = int(steps[FILLED]) - int(steps[FILLED]) % looks
-        if filled:
-            kept = with_all_reactions(assembled, Record(*(column[:filled] for column in chunk)))
-            if watcher is not None:
-                kept, ends = watcher.look(kept)
-            run.energy.look(kept)
-            shown = _shown(kept.time.size, looks, ends)
-            every, run.memory = measure(system, kept, run.memory, wanted)
-            part = {name: replace(quantity, values=quantity.values[shown]) for name, quantity in every.items()}
-            times = kept.time[shown]
-            run.parts.append(part)
-            run.times.append(times)
-            run.extremes = np.maximum(run.extremes, extremes(system, kept))
-            if lost := meaningless(system.scene, run.extremes):
-                raise ComputationError(f"by t = {times[-1]:.6g} s {lost}")
-            run.done += filled // looks * substeps
-            yield times, part
-        if ends:
-            return
-        if status != OK:
-            cause = excess_of_gains(run.energy.gains, run.energy.spacing)
-            raise failure(run.engine.system, run.engine.work, status, reached(run.engine, start), cause)
-        count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
+def _twins(runs: _Runs, method: Integrator) -> Iterator[Twin]:
+    """Of the step, and of half of it for a method of order three; none of methods that damp nothing the step allows."""
+    if method.implicit and not method.controlled:
+        rho = lasting(runs.vibrations, method.step)
+        yield Twin(method.step, rho)
+        if method.order > 2:
+            yield Twin(method.step / 2, rho)
 
 
-def _shown(rows: int, looks: int, ends: bool) -> Array:
-    """Numbers of the output rows among those that were looked at; the row of an event that ends the run is one."""
-    shown = np.arange(looks - 1, rows, looks)
-    return np.union1d(shown, [rows - 1]) if ends else shown
+def _cost(assembled: Assembled, result: Result) -> float:
+    """[us], about, of the runs that tell the error of a run; the same on every machine."""
+    sizes = [body.model.n for body in assembled.system.scene.bodies]
+    return 2.0 * result.attributes["evaluations"] * sum(1.0 + 0.02 * n + 7e-4 * n * n for n in sizes)
 
 
-def _watcher(
-    assembled: Assembled,
-    run: _Run,
-    method: Integrator,
-    stabilisation: Stabilisation,
-    spacing: float,
-    events: Sequence[Event],
-    resume: str | Path | None,
-) -> Watcher:
-    """What looks for events from where the run stands."""
-    if resume is not None:
-        raise InputError(
-            "a run with events cannot be resumed: those of its first part are not in the file; run the whole"
-        )
-    watcher = Watcher(assembled, method, gains(stabilisation), spacing, events)
-    watcher.begin(run.engine, float(run.times[0][0]))
-    return watcher
+def _finished(runs: _Runs, trial: _Trial, path: str | Path | None, ringing: Set[str] = frozenset()) -> Result:
+    """The result of a run with its errors, here and in its file; `ringing` outputs are told to be so."""
+    result = trial.result
+    notes = [*result.attributes["notes"], *_unresolved(runs, trial, ringing), *_coarse(result)]
+    told = {name: [e.error, e.of_range] for name, e in trial.errors.items()}
+    more: dict[str, Any] = {"notes": notes, "errors": told}
+    if trial.errors:
+        more["accuracy"] = _worst(trial.errors)
+    attributes = {**result.attributes, **more}
+    if path is not None:
+        with_attributes(path, attributes)
+    return replace(result, attributes=attributes)
 
 
-def reached(engine: Engine, start: float) -> float:
-    """Time of the engine's state [s], for a run from `start`."""
-    clock, control = engine.tables.clock, engine.tables.control
-    if control.numbers.size:
-        return float(control.numbers[NOW])
-    return start + int(clock.steps[NEXT]) * float(clock.time[SPACING])
+def _worst(errors: Mapping[str, StepError]) -> str:
+    name = max(errors, key=lambda one: errors[one].of_range)
+    places = max((e.of_range for one, e in errors.items() if PLACES.search(one)), default=None)
+    rest = "" if places is None or PLACES.search(name) else f"; positions and angles within {_percent(places)}"
+    return f"step: within {_percent(errors[name].of_range)} of the range of {name}{rest}"
 
 
-def with_all_reactions(assembled: Assembled, record: Record) -> Record:
-    """The record with reactions of the redundant rows too: at every state, the smallest that give its accelerations."""
-    if assembled.all_rows is None:
-        return record
-    system = assembled.all_rows
-    engine, one = new_engine(system, record.x[0], record.v[0]), new_record(system, 1)
-    names = [block.name for block in system.blocks]
-    numbers = [names.index(block.name) for block in assembled.system.blocks]
-    reaction = np.empty_like(record.reaction)
-    for row, moment in enumerate(record.time):
-        engine.x[:], engine.v[:] = record.x[row], record.v[row]
-        engine.work.loads.reference[:] = record.forces[row]
-        record_row(engine, moment, one, 0)
-        reaction[row] = one.reaction[0, numbers]
-    return record._replace(reaction=reaction)
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %"
 
 
-# ---- stopping and going on -------------------------------------------------------------------------------------------
-
-
-def _fingerprint(
-    assembled: Assembled,
-    method: Integrator,
-    stabilisation: Stabilisation,
-    start: float,
-    output_step: float,
-    wanted: Mapping[str, Entry],
-) -> str:
-    state = (assembled.x.tobytes(), assembled.v.tobytes())
-    return fingerprint(assembled.system.model, *state, method, stabilisation, start, output_step, list(wanted))
-
-
-KEY = "machine."  # before the names of an engine's tables in result files
-
-
-def _checkpoint(run: _Run, mark: str) -> Array:
-    arrays = {"extremes": run.extremes, **{KEY + key: array for key, array in _changing(run.engine)}}
-    return encode(Checkpoint(mark, run.done, arrays, run.memory))
-
-
-def _changing(engine: Engine) -> Iterator[tuple[str, Array]]:
-    """What of an engine's tables a run changes."""
-    for name in ("work", "stages", "clock", "control", "x", "v"):
-        yield from leaves(getattr(engine.tables, name), name)
-
-
-def _resumed(path: Path, mark: str, engine: Engine, energy: EnergyWatch) -> _Run:
-    """The run that a result file holds, ready to go on in the engine."""
-    content = load_checkpoint(path)
-    if content is None:
-        raise InputError(f"{path} has no checkpoint: it is not the result of a forward run; run from the start")
-    saved, earlier = decode(content), load_result(path)
-    if saved.fingerprint != mark:
-        raise InputError(
-            f"{path} is the result of another scene or of other settings (step, method, start, output step, outputs): its "
-            "run cannot be continued with these; run from the start, to another file if that one is still wanted"
-        )
-    changing = {KEY + name: array for name, array in _changing(engine)}
-    if any(name not in saved.arrays or saved.arrays[name].shape != array.shape for name, array in changing.items()):
-        raise InputError(
-            f"{path} was written by another version of ffr_dyn, whose runs this one cannot continue; run from the start, to "
-            "another file if that one is still wanted"
-        )
-    for name, array in changing.items():
-        array[...] = saved.arrays[name]
-    extremes_then = saved.arrays["extremes"].copy()
-    return _Run(engine, energy, saved.memory, [dict(earlier.quantities)], [earlier.time], extremes_then, saved.steps)
-
-
-def _check_resumed(run: _Run, steps: int, step: float) -> None:
-    if run.done > steps:
-        raise InputError(f"the run to be continued has gone {(run.done - steps) * step:g} s beyond this end already")
-
-
-# ---- the result -----------------------------------------------------------------------------------------------------
-
-
-def _header(
-    scene: Scene,
-    assembled: Assembled,
-    method: Integrator,
-    stabilisation: Stabilisation,
-    span: tuple[float, float, float],
-) -> dict[str, Any]:
-    start, end, output_step = span
-    return {
-        **described(scene),
-        "analysis": "forward dynamics",
-        "method": f"{method!r}",
-        "stabilisation": f"{stabilisation!r}",
-        "start": start,
-        "end": end,
-        "output_step": output_step,
-        "degrees_of_freedom": assembled.degrees_of_freedom,
-        "notes": list(assembled.notes),
-    }
-
-
-def geometry(scene: Scene) -> dict[str, Surface]:
-    """The surfaces of the bodies in their own frames."""
-    surfaces = {body.name: surface_of(body) for body in scene.bodies}
-    return {name: surface for name, surface in surfaces.items() if surface is not None}
-
-
-def _result(scene: Scene, run: _Run, attributes: dict[str, Any]) -> Result:
-    names = run.parts[0]
-    quantities = {
-        name: Quantity(np.concatenate([part[name].values for part in run.parts]), q.unit, q.axes, q.description)
-        for name, q in names.items()
-    }
-    return Result(np.concatenate(run.times), quantities, geometry(scene), attributes)
-
-
-def _account(scene: Scene, run: _Run, notes: list[str]) -> dict[str, Any]:
-    """What only the end of a run can tell."""
-    info, drift = run.engine.work.info, run.engine.work.drift
-    return {
-        "evaluations": int(info[EVALUATIONS]),
-        "projections": int(info[PROJECTIONS]),
-        **_steps(run.engine),
-        "largest_drift": [float(drift[PHI]), float(drift[PHI_DOT])],
-        "notes": [*notes, *_singular(run.engine.work), *doubts(scene, run.extremes)],
-    }
-
-
-def _steps(engine: Engine) -> dict[str, Any]:
-    """Steps that the method chose."""
-    control = engine.tables.control
-    return {"steps": int(control.counts[0]), "refused_steps": int(control.counts[1])} if control.numbers.size else {}
-
-
-def _singular(work: Work) -> list[str]:
-    least, time = work.independence[[LEAST, WHEN]]
-    if least >= AT:
+def _unresolved(runs: _Runs, trial: _Trial, ringing: Set[str]) -> list[str]:
+    """A note on the vibration that the step does not resolve: its share, its frequency, and the price of resolving it."""
+    large = {name: e for name, e in trial.errors.items() if e.of_range > Within().accuracy}
+    told = {name: e for name, e in large.items() if e.vibrates or name in ringing}
+    of, method = runs.vibrations, trial.method
+    if not told or not of.omega.size:
         return []
+    name = max(told, key=lambda one: told[one].of_range)
+    found = leading(of, trial.result, trial.twins[-1])
+    words = f" of {found / 2 / np.pi:.4g} Hz" if found else ""
+    step = (1.2 if of.ratio[-1] > 0 else 0.25) / of.omega[-1]
+    times = (4 / step) / ((4 if method.order > 2 else 2) / method.step)
     return [
-        f"the motion passes a singular position near t = {time:.6g} s, where constraints become dependent; it goes on along "
-        "its branch, and reactions there are large or not unique"
+        f"vibration{words} that a step of {method.step:.3g} s does not resolve carries {_percent(told[name].of_range)} of "
+        f"the range of {name}{_others(len(told) - 1)}; rk4 with a step of {step:.2g} s resolves it, for about "
+        f"{max(times, 1):.2g} times the time of this run"
     ]
+
+
+def _coarse(result: Result) -> list[str]:
+    found = too_coarse(result)
+    if not found:
+        return []
+    name = max(found, key=lambda one: found[one])
+    return [
+        f"rows every {float(result.attributes['output_step']):g} s are too coarse for what {name} does"
+        f"{_others(len(found) - 1)}: between them it is up to {_percent(found[name])} of its range off the curve through "
+        "them, or more; take a smaller output_step to see it"
+    ]
+
+
+def _others(count: int) -> str:
+    return "" if count < 1 else f" and of {count} other output{'s' if count > 1 else ''}"
+
+
+# ---- the step for an accuracy ---------------------------------------------------------------------------------------
+
+
+def _searched(runs: _Runs, within: Within, kept: dict[str, Any], count: int) -> Result:
+    """The run with the longest step found that keeps the accuracy; where forces ring, of those that keep the positions."""
+    trials, ringing, path = list[_Trial](), set[str](), kept["path"] or kept["resume"]
+    while True:
+        method = stepped(within, runs.output_step / count)
+        try:
+            result = runs.run(method, **kept)
+        except (ComputationError, InputError):
+            if count >= FINEST:
+                raise
+            count *= LEAP // 2
+            continue
+        trial = _beside_twins(runs, _Trial(method, count, result))
+        if not trial.errors or _excess(trial, ringing, trials) <= within.accuracy:
+            trial = _told(runs, trial, trials)
+        excess = _excess(trial, ringing, trials) / within.accuracy
+        trials.append(trial)
+        if excess <= 1.0 or count >= FINEST:
+            return _finished(runs, trial, path, ringing)
+        count, kept = _next(count, excess), {**kept, "path": path, "resume": None}
+
+
+def _next(count: int, excess: float) -> int:
+    """Steps to a row, an even number, at least twice as many; the run with half as many is the last one then."""
+    wanted = count * float(np.clip((MARGIN * excess) ** 0.5, 2.0, LEAP))
+    return min(FINEST, 2 * int(np.ceil(wanted / 2)))
+
+
+def _excess(trial: _Trial, ringing: set[str], earlier: Sequence[_Trial]) -> float:
+    """The largest error over range of what a trial is to keep; infinite where no error could be told. Outputs that ring, for
+    which shorter steps have ceased to help, are added to those that do."""
+    if not trial.errors:
+        return np.inf
+    for before in (one for one in earlier[-1:] if one.errors):
+        slow = (trial.count / before.count) ** -SLOW
+        driving = (name for name in trial.errors if DRIVING.search(name))
+        ringing |= {name for name in driving if trial.errors[name].error > slow * before.errors[name].error}
+    wanted = (name for name in trial.errors if PLACES.search(name) or DRIVING.search(name))
+    return max((trial.errors[name].of_range for name in wanted if name not in ringing), default=0.0)

@@ -21,9 +21,9 @@ from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
 from ffr_dyn.consistency.evaluation import Evaluator, copied, evaluate, evaluator, joined, locked
 from ffr_dyn.consistency.mobility import require_driven
-from ffr_dyn.consistency.validity import extremes, strained
+from ffr_dyn.consistency.validity import strained_in
 from ffr_dyn.equations.layout import moved, to_global_axes
-from ffr_dyn.integrators import Integrator
+from ffr_dyn.integrators import Integrator, Within
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
@@ -40,9 +40,9 @@ DIFFERENCE = 1e-6
 
 @dataclass(frozen=True)
 class Dynamic:
-    """Elastic coordinates are integrated; by default with ROS2 and a tenth of the output step."""
+    """Elastic coordinates are integrated; `method` is that of `forward`."""
 
-    method: Integrator | None = None
+    method: Integrator | Within | None = None
     stabilisation: Stabilisation = Projection()  # noqa: RUF009 - frozen
 
 
@@ -125,14 +125,13 @@ def _quasi_static(
         if progress is not None:
             progress(float(time))
     record = joined(rows)
-    turned, _, stretched = extremes(assembled.system, record)
     attributes = {
         **described(scene),
         "analysis": "inverse dynamics, quasi-static deformation",
         "method": "Newton-Raphson",
         "evaluations": int(at.work.info[EVALUATIONS]),
         "degrees_of_freedom": assembled.degrees_of_freedom,
-        "notes": [*assembled.notes, *strained(scene, turned, stretched)],
+        "notes": [*assembled.notes, *strained_in(assembled.system, record)],
         "status": "complete",
     }
     return result_of(assembled.system, record, attributes, path, outputs)

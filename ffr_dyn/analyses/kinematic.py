@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import with_all_reactions
+from ffr_dyn.analyses.integration import with_all_reactions
 from ffr_dyn.analyses.outcome import output_times, result_of
 from ffr_dyn.analyses.registry import OverTime
 from ffr_dyn.analyses.settings import Settings

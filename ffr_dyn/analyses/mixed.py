@@ -29,7 +29,8 @@ from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
 from ffr_dyn.consistency.evaluation import joined, record_states
-from ffr_dyn.integrators import Integrator
+from ffr_dyn.consistency.validity import strained_in
+from ffr_dyn.integrators import Integrator, Within
 from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.quantities import measure, selected
@@ -93,7 +94,7 @@ def mixed(
     start: float = 0.0,
     known: tuple[str, ...] | None = None,
     solution: Causal | Bounded | None = None,
-    method: Integrator | None = None,
+    method: Integrator | Within | None = None,
     outputs: Sequence[str] = ("default",),
     path: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
@@ -219,6 +220,8 @@ def _not_collocated(
     else:
         times, notes = output_times(start, end, output_step), []
         us, states = _integrated(own, chosen, times, w, assembled.x, progress)
+    record = _recorded(whole, times, us, states)
+    system = whole.free.system
     attributes: dict[str, Any] = {
         **described(scene),
         "analysis": f"mixed dynamics, {'bounded' if isinstance(chosen, Bounded) else 'causal'}",
@@ -226,11 +229,9 @@ def _not_collocated(
         "evaluations": int(own.at.work.info[EVALUATIONS] + whole.free.work.info[EVALUATIONS]),
         "degrees_of_freedom": own.size,
         "internal_coordinates": list(own.names),
-        "notes": [*assembled.notes, *notes],
+        "notes": [*assembled.notes, *notes, *strained_in(system, record)],
         "status": "complete",
     }
-    record = _recorded(whole, times, us, states)
-    system = whole.free.system
     found = _efforts_found(system, record, whole.own.unknown, us)
     return with_quantities(result_of(system, record, attributes, outputs=outputs), found, path)
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.efforts import joint_named
-from ffr_dyn.analyses.forward import geometry
+from ffr_dyn.analyses.integration import geometry
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.kernels.tables import Record

@@ -130,6 +130,8 @@ def summary(attributes: Mapping[str, Any]) -> list[str]:
         lines.append(
             f"constraints  left by at most {position:.1e} (rate {velocity:.1e}); {a['projections']} projections"
         )
+    if "accuracy" in a:
+        lines.append(f"accuracy     {a['accuracy']}")
     if "stable" in a:
         lines.append(f"equilibrium  {'stable' if a['stable'] else 'unstable'}")
     passed = [f"event        {e['event']} at t = {e['time']:.9g} s" for e in a.get("events", [])]

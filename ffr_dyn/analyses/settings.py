@@ -8,7 +8,7 @@ from dataclasses import KW_ONLY, dataclass, field, fields
 from typing import Any
 
 from ffr_dyn.analyses.registry import OfMoment, OverTime, analysis
-from ffr_dyn.integrators import Integrator
+from ffr_dyn.integrators import Integrator, Within
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 
 
@@ -37,7 +37,7 @@ class Settings:
     start: float
     end: float
     output_step: float
-    method: Integrator
+    method: Integrator | Within
     stabilisation: Stabilisation = Projection()  # noqa: RUF009 - frozen
     outputs: tuple[str, ...] = ("default",)
     analysis: OverTime = field(default_factory=lambda: analysis("forward")())

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import with_all_reactions
+from ffr_dyn.analyses.integration import with_all_reactions
 from ffr_dyn.analyses.outcome import result_of
 from ffr_dyn.analyses.registry import OfMoment
 from ffr_dyn.analyses.settings import MomentSettings
@@ -30,7 +30,7 @@ from ffr_dyn.consistency.evaluation import (
 )
 from ffr_dyn.consistency.mobility import counted, named_motion
 from ffr_dyn.consistency.tangent import sizes
-from ffr_dyn.consistency.validity import extremes, strained
+from ffr_dyn.consistency.validity import strained_in
 from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
@@ -114,8 +114,7 @@ def _result(
         evaluate(at, time, x, still)
     record = record_states(at, np.array([time]), found.path[-1:], still[None])
     stable = lowest > 0
-    turned, _, stretched = extremes(assembled.system, record)
-    notes = [*assembled.notes, *strained(assembled.system.scene, turned, stretched)]
+    notes = [*assembled.notes, *strained_in(assembled.system, record)]
     if not stable:
         notes.append(f"the equilibrium is unstable: its lowest stiffness per mass is {lowest:.4g} 1/s^2")
     attributes = {

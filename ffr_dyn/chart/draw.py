@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from matplotlib.ticker import LogFormatterSciNotation, LogLocator
 from ffr_dyn.chart.diagram import CPU, EVALUATIONS, WALL, Diagram, Point
 from ffr_dyn.pictures.histories import PALETTE
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.outputs import replacing
 
 COST_WORDS = {
     CPU: "CPU time of the run [s]",
@@ -198,9 +198,7 @@ def _is_bar(handle: Artist) -> bool:
 
 
 def _written(figure: Figure, path: Path) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + ".part")
     kind = path.suffix.lower()
-    figure.savefig(temporary, format=kind[1:], dpi=130, metadata=_METADATA[kind])
-    os.replace(temporary, path)
+    with replacing(path) as part:
+        figure.savefig(part, format=kind[1:], dpi=130, metadata=_METADATA[kind])
     return path

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import os
 from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
@@ -13,6 +12,7 @@ import plotly.io
 
 from ffr_dyn.chart.diagram import COSTS, CPU, EVALUATIONS, Diagram, Point
 from ffr_dyn.chart.draw import COST_WORDS, FLOOR, FRONT, error_words, look
+from ffr_prep.common.outputs import replacing
 
 SYMBOLS = {
     "o": "circle", "s": "square", "^": "triangle-up", "D": "diamond", "v": "triangle-down", "<": "triangle-left",
@@ -25,10 +25,8 @@ Item = dict[str, Any]
 def write_page(diagram: Diagram, path: str | Path) -> Path:
     """Write the page, atomically: lines with every variant's numbers under the mouse, and menus for measure and cost."""
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(page(diagram), encoding="utf-8")
-    os.replace(temporary, path)
+    with replacing(path) as part:
+        part.write_text(page(diagram), encoding="utf-8")
     return path
 
 

@@ -25,7 +25,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.chart.measures import Measure
 from ffr_dyn.chart.variants import Variant
 from ffr_dyn.compile.first_use import ensure_compiled
@@ -147,7 +147,7 @@ def _warm_up(scene: Scene, method: Any, job: Job) -> None:
     if type(method) in _WARM:
         return
     span = job.span
-    forward(scene, start=span.start, end=span.start + span.output_step, output_step=span.output_step, method=method)
+    integrate(scene, start=span.start, end=span.start + span.output_step, output_step=span.output_step, method=method)
     _WARM.add(type(method))
 
 
@@ -158,7 +158,7 @@ def _clocked(scene: Scene, method: Any, job: Job, outputs: tuple[str, ...]) -> t
         if time.monotonic() - began > job.limit:
             raise ComputationError(f"took longer than {job.limit:g} s; it had reached t = {reached:.6g} s")
 
-    result = forward(
+    result = integrate(
         scene,
         start=span.start,
         end=span.end,

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import csv
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
 from ffr_dyn.chart.diagram import CPU, EVALUATIONS, WALL, Diagram
+from ffr_prep.common.outputs import replacing
 
 
 def headings(diagram: Diagram) -> list[str]:
@@ -37,11 +37,8 @@ def rows(diagram: Diagram) -> Iterator[list[object]]:
 def write_table(diagram: Diagram, path: str | Path) -> Path:
     """Write the table as comma-separated values (RFC 4180), atomically."""
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + ".part")
-    with open(temporary, "w", newline="", encoding="utf-8") as stream:
+    with replacing(path) as part, open(part, "w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
         writer.writerow(headings(diagram))
         writer.writerows(rows(diagram))
-    os.replace(temporary, path)
     return path

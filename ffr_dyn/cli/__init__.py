@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
@@ -12,10 +11,12 @@ import click
 from ffr_dyn.cli.analyses import check, commands, list_methods
 from ffr_dyn.cli.chart import chart
 from ffr_dyn.cli.economy import economise
+from ffr_dyn.cli.parts import parts
 from ffr_dyn.cli.realtime import realtime
 from ffr_dyn.cli.run import run
 from ffr_dyn.cli.stress import stress
-from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, reserve, run_command
+from ffr_prep.common.errors import InputError
 from ffr_prep.common.registry import load_plugin
 
 EXAMPLE = """\b
@@ -65,7 +66,7 @@ def _load_plugins(context: click.Context, option: click.Parameter, paths: tuple[
 @click.version_option(package_name="ffr")
 @click.option(
     "--plugin",
-    type=click.Path(path_type=Path),
+    type=INPUT_FILE,
     multiple=True,
     metavar="FILE.py",
     is_eager=True,
@@ -95,7 +96,7 @@ def schema() -> None:
 
 
 @cli.command()
-@click.argument("result", type=click.Path(path_type=Path))
+@click.argument("result", type=INPUT_FILE)
 def info(result: Path) -> None:
     """What RESULT holds: how it was made, notes, and every quantity with its unit."""
     from ffr_dyn.results.file import load_result
@@ -111,9 +112,9 @@ def info(result: Path) -> None:
 
 
 @cli.command(epilog=PLOT_EXAMPLE)
-@click.argument("result", type=click.Path(path_type=Path))
+@click.argument("result", type=INPUT_FILE)
 @click.argument("names", nargs=-1, required=True)
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="Picture, .png or .svg.")
+@click.option("-o", "--output", type=OUTPUT_FILE, required=True, help="Picture, .png or .svg.")
 @click.option("--title", help="Title of the picture.")
 @click.option("--path", "plane", metavar="PLANE", help="Draw the path of one marker, such as rod.tip, in xy, zx, ...")
 def plot(result: Path, names: tuple[str, ...], output: Path, title: str | None, plane: str | None) -> None:
@@ -124,6 +125,7 @@ def plot(result: Path, names: tuple[str, ...], output: Path, title: str | None, 
     from ffr_dyn.pictures import histories as plots
     from ffr_dyn.results.file import load_result
 
+    reserve("-o", output)
     if plane is None:
         plots.plot(load_result(result), names, output, title=title)
     elif len(names) == 1:
@@ -134,8 +136,8 @@ def plot(result: Path, names: tuple[str, ...], output: Path, title: str | None, 
 
 
 @cli.command(epilog=FILM_EXAMPLE)
-@click.argument("result", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help=".gif, .mp4 or .html.")
+@click.argument("result", type=INPUT_FILE)
+@click.option("-o", "--output", type=OUTPUT_FILE, required=True, help=".gif, .mp4 or .html.")
 @click.option("--scale", default="auto", help="Factor on the deformation: a number, or auto.", show_default=True)
 @click.option("--duration", type=float, help="Length of the film [s]; default: chosen from the run.")
 @click.option(
@@ -153,13 +155,14 @@ def animate(result: Path, output: Path, scale: str, duration: float | None, colo
     from ffr_dyn.pictures import animate as animation
     from ffr_dyn.results.file import load_result
 
+    reserve("-o", output)
     factor: float | str = scale if scale == "auto" else _number(scale)
     loaded = load_result(result)
     animation.animate(loaded, output, scale=factor, duration=duration, colour=colour, limit=limit)
     click.echo(f"film     {output}")
 
 
-for command in (run, check, list_methods, stress, chart, economise, realtime):
+for command in (run, check, list_methods, stress, chart, economise, parts, realtime):
     cli.add_command(command)
 
 
@@ -184,26 +187,5 @@ def _number(text: str) -> float:
 
 
 def main() -> None:
-    """Entry point: exit code 2 for bad input, 1 for a failed computation, no traceback for either."""
-    from ffr_prep.body import BodyError
-
-    try:
-        cli(prog_name="ffr-dyn", standalone_mode=False)
-    except (InputError, BodyError) as error:
-        _leave(str(error), 2)
-    except ComputationError as error:
-        _leave(str(error), 1)
-    except click.UsageError as error:
-        where = error.ctx.command_path if error.ctx else "ffr-dyn"
-        _leave(f"{error.format_message()} ({where} --help tells more)", 2)
-    except click.ClickException as error:
-        _leave(error.format_message(), error.exit_code)
-    except OSError as error:
-        _leave(f"{error.filename2 or error.filename or 'file'}: {error.strerror or error}; choose another place", 2)
-    except (click.Abort, KeyboardInterrupt):
-        _leave("interrupted; the result file holds what was computed", 1)
-
-
-def _leave(message: str, code: int) -> None:
-    click.echo(f"ffr-dyn: {message}", err=True)
-    sys.exit(code)
+    """Entry point: exit code 2 for bad input, 1 for a failed computation or a signal, no traceback for either."""
+    run_command(cli, "ffr-dyn")

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffr_dyn.cli.run import assignments, parameter_option, require_after, require_file, scene_argument
+from ffr_dyn.cli.run import assignments, parameter_option, require_after, scene_argument
+from ffr_prep.common.command import OUTPUT_FILE, reserve
 from ffr_prep.common.errors import InputError
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from ffr_dyn.chart.variants import Model
     from ffr_dyn.scene.scene import Scene
 
+SUFFIXES = (".csv", ".png", ".svg", ".html")
 _NOTES = """\b
 Examples:
   ffr-dyn chart crank.toml -m deflection:rod -m reaction:crankpin --modes 2,4,8,all --drop I5,I9 -o out/chart
@@ -39,9 +41,7 @@ Terms that --drop leaves out: I3 I4 I5 I8 I9 (inertia integrals) and stiffening;
 
 @click.command(epilog=_NOTES)
 @scene_argument
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="Name of the files without suffix; default: <scene>.chart"
-)
+@click.option("-o", "--output", type=OUTPUT_FILE, help="Name of the files without suffix; default: <scene>.chart")
 @click.option("-m", "--measure", "measures", multiple=True, metavar="WHAT", help="What is compared; see below.")
 @click.option("--method", "methods", multiple=True, metavar="NAME[=NUMBER,...]",
               help="A method, with its steps [s] or tolerances, or those that are chosen for it. Default: all.")  # fmt: skip
@@ -100,7 +100,8 @@ def chart(
         raise InputError("a chart compares runs of forward dynamics; the scene file asks for another analysis")
     require_after("--end", end, settings.start)
     output = output or scene.with_suffix(".chart")
-    require_file("-o", output.with_name(f"{output.name}.png"))
+    for suffix in SUFFIXES:
+        reserve("-o", output.with_name(output.name + suffix))
     span = Span(settings.end if end is None else end, settings.output_step, settings.start)
     asked = settings.chart
     wanted = _methods(methods) if methods else {name: numbers or None for name, numbers in asked.methods} or None
@@ -195,6 +196,6 @@ def _write(found: Diagram, output: Path, against: str) -> list[Path]:
     def named(suffix: str) -> Path:
         return output.with_name(output.name + suffix)
 
-    written = [write_table(found, named(".csv"))]
-    pictures = [draw_chart(found, named(suffix), against=against) for suffix in (".png", ".svg")]
-    return [*pictures, write_page(found, named(".html")), *written]
+    table, *pictures, page = map(named, SUFFIXES)
+    written = write_table(found, table)
+    return [*(draw_chart(found, picture, against=against) for picture in pictures), write_page(found, page), written]

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from ffr_dyn.cli.run import assignments, over_time, parameter_option, require_after, require_file, scene_argument
+from ffr_dyn.cli.run import assignments, over_time, parameter_option, require_after, scene_argument
+from ffr_prep.common.command import OUTPUT_FILE, reserve
 
 EXAMPLE = """\b
 Example:
@@ -32,13 +33,9 @@ Example:
 @click.option(
     "--verify/--no-verify", default=None, help="Run everything with a finer step to check; default: if short."
 )
-@click.option(
-    "-o", "target", type=click.Path(path_type=Path), help="Scene file to write; default: <scene>.economised.toml."
-)
-@click.option(
-    "--report", type=click.Path(path_type=Path), help="Report: .html (with chart), .md or .txt; default: .html."
-)
-@click.option("--chart", type=click.Path(path_type=Path), help="Picture of error over cost, .png or .svg.")
+@click.option("-o", "target", type=OUTPUT_FILE, help="Scene file to write; default: <scene>.economised.toml.")
+@click.option("--report", type=OUTPUT_FILE, help="Report: .html (with chart), .md or .txt; default: .html.")
+@click.option("--chart", type=OUTPUT_FILE, help="Picture of error over cost, .png or .svg.")
 def economise(
     scene: Path,
     parameters: tuple[str, ...],
@@ -67,9 +64,10 @@ def economise(
     settings = over_time(given, Forward(), ())
     target = target or scene.with_suffix(".economised.toml")
     require_after("--end", end, settings.start)
-    require_file("-o", target)
-    require_file("--report", report, (".html", ".md", ".txt"))
-    require_file("--chart", chart, (".png", ".svg"))
+    reserve("-o", target)
+    report = report or target.with_suffix(".html")
+    reserve("--report", report, (".html", ".md", ".txt"))
+    reserve("--chart", chart, (".png", ".svg"))
     found = search(
         loaded,
         outputs,
@@ -82,8 +80,8 @@ def economise(
         tell=lambda stage: click.echo(f"... {stage}", err=True),
     )
     save_scene(found.scene, found.settings, target)
-    write_report(found, report or target.with_suffix(".html"))
+    write_report(found, report)
     if chart is not None:
         draw(found, chart)
     click.echo(as_text(found))
-    click.echo(f"scene    {target}\nreport   {report or target.with_suffix('.html')}")
+    click.echo(f"scene    {target}\nreport   {report}")

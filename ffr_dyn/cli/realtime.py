@@ -8,7 +8,8 @@ from typing import Any
 
 import click
 
-from ffr_dyn.cli.run import assignments, parameter_option, require_file, scene_argument
+from ffr_dyn.cli.run import assignments, parameter_option, scene_argument
+from ffr_prep.common.command import OUTPUT_FILE, reserve
 from ffr_prep.common.errors import InputError
 
 EXAMPLE = """\b
@@ -26,7 +27,7 @@ Example:
 @click.option("--method", help="Integrator, instead of the scene's: ros2, rk4, ...")
 @click.option("--output", "outputs", multiple=True, metavar="NAME", help="Quantity to read at each step; repeat.")
 @click.option("--paced", is_flag=True, help="Start each step when the clock says so, instead of one after the other.")
-@click.option("--plot", type=click.Path(path_type=Path), help="Picture of the times, .png or .svg.")
+@click.option("--plot", type=OUTPUT_FILE, help="Picture of the times, .png or .svg.")
 @click.option("--json", "as_data", is_flag=True, help="Print numbers for programs instead.")
 def realtime(
     scene: Path,
@@ -50,19 +51,20 @@ def realtime(
     """
     from ffr_dyn.analyses.settings import Settings
     from ffr_dyn.cli.progress_bar import progress
-    from ffr_dyn.integrators import METHODS, ROS2
+    from ffr_dyn.integrators import METHODS, ROS2, Within, stepped
     from ffr_dyn.integrators.stabilisation import Projection
     from ffr_dyn.realtime.deadline import as_json, lines, measure_steps, plot_times
     from ffr_dyn.scene_file.read import load_scene
 
     loaded, settings = load_scene(scene, assignments(parameters))
     given: Any = ROS2(1e-3)
-    if isinstance(settings, Settings) and not settings.method.controlled:
-        given = settings.method
+    if isinstance(settings, Settings):
+        own = settings.method
+        given = stepped(own, settings.output_step / 10) if isinstance(own, Within) else given if own.controlled else own
     if method is not None and method not in METHODS:
         raise InputError(f"--method {method}: there is no such method with fixed steps; there are {', '.join(METHODS)}")
     kind: Any = type(given) if method is None else METHODS[method]
-    require_file("--plot", plot, (".png", ".svg", ".pdf"))
+    reserve("--plot", plot, (".png", ".svg", ".pdf"))
     with progress(loaded.name, duration) as update:
         timing = measure_steps(
             loaded,

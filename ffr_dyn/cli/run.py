@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, reserve
 from ffr_prep.common.errors import InputError
 
 if TYPE_CHECKING:
     from ffr_dyn.analyses.registry import OfMoment, OverTime
     from ffr_dyn.analyses.settings import MomentSettings, Settings
-    from ffr_dyn.integrators import Integrator
+    from ffr_dyn.integrators import Integrator, Within
+    from ffr_dyn.results.result import Result
     from ffr_dyn.scene.scene import Scene
 
-scene_argument = click.argument("scene", type=click.Path(path_type=Path))
-output_option = click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="Result file (netCDF); default: <scene>.nc."
-)
+scene_argument = click.argument("scene", type=INPUT_FILE)
+output_option = click.option("-o", "--output", type=OUTPUT_FILE, help="Result file (netCDF); default: <scene>.nc.")
 parameter_option = click.option(
     "-p", "--parameter", "parameters", multiple=True, metavar="NAME=VALUE", help="A parameter of the scene file."
 )
@@ -32,14 +31,17 @@ keep_option = click.option(
 time_option = click.option("--time", type=float, help="[s], for what depends on time; default: the scene's, or 0.")
 end_option = click.option("--end", type=float, help="End of the run [s], instead of the scene's.")
 method_options = (
-    click.option("--step", type=float, help="Time step [s], instead of the scene's."),
+    click.option(
+        "--step", type=float, help="Time step [s], instead of the scene's, or of one that keeps the accuracy."
+    ),
+    click.option("--accuracy", type=float, help="Find the step that keeps it, relative to ranges; default: 1e-3."),
     click.option("--tolerance", type=float, help="Relative tolerance of a method that chooses its steps."),
     click.option("--method", metavar="NAME", help="Integrator, instead of the scene's; `ffr-dyn methods` lists them."),
 )
 resume_option = click.option(
     "--resume", is_flag=True, help="Go on where the result file ends, as if the run had never stopped."
 )
-INTEGRATION = ("end", "step", "tolerance", "method")
+INTEGRATION = ("end", "step", "accuracy", "tolerance", "method")
 
 
 def with_options(*options: Callable[..., Any]) -> Callable[..., Any]:
@@ -87,21 +89,6 @@ def assignments(parameters: tuple[str, ...]) -> dict[str, str]:
             raise InputError(f"-p {text}: write it as NAME=VALUE")
     pairs = (text.partition("=") for text in parameters)
     return {name.strip(): value.strip() for name, _, value in pairs}
-
-
-def require_file(option: str, path: Path | None, suffixes: tuple[str, ...] = ()) -> None:
-    """Before the work, not after it: InputError for a file that could not be written, or not in a known format."""
-    if path is None:
-        return
-    if path.is_dir():
-        raise InputError(f"{option} {path} is a folder; name the file to write")
-    if suffixes and path.suffix.lower() not in suffixes:
-        raise InputError(
-            f"{option} {path}: it is written as {' or '.join(suffixes)}, not {path.suffix or 'without a suffix'}"
-        )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if not os.access(path.parent, os.W_OK):
-        raise InputError(f"{option} {path}: the folder {path.parent} cannot be written to; choose another place")
 
 
 def require_after(option: str, end: float | None, start: float) -> None:
@@ -152,28 +139,64 @@ def changed(settings: Settings | MomentSettings, changes: Mapping[str, Any]) -> 
     return replace(settings, end=given.get("end", settings.end), method=method)
 
 
-def _method(settings: Settings, given: Mapping[str, Any]) -> Integrator:
-    """The method of the file, or the one that was asked for, with the step or the tolerance that was asked for."""
-    from ffr_dyn.integrators import method_named, tolerances
+def _method(settings: Settings, given: Mapping[str, Any]) -> Integrator | Within:
+    """The method of the file, or the one that was asked for, with the step, accuracy or tolerance that was asked for."""
+    from ffr_dyn.integrators import Within, method_named, stepped, tolerances
 
-    named = given.get("method")
-    kind: Any = type(settings.method) if named is None else method_named(named)
+    own, named = settings.method, given.get("method")
+    word = named or (own.method if isinstance(own, Within) else _word(own))
+    kind = method_named(word)
     if kind.controlled:
-        if "step" in given:
-            raise InputError(f"--step: {kind.__name__} chooses its steps; give --tolerance")
+        for key in ("step", "accuracy"):
+            if key in given:
+                raise InputError(f"--{key}: {kind.__name__} chooses its steps; give --tolerance")
         if "tolerance" in given:
             found: Integrator = kind(tolerances(given["tolerance"]))
             return found
-        return settings.method if named is None else kind()
+        return own if named is None else kind()
     if "tolerance" in given:
-        raise InputError(f"--tolerance: {kind.__name__} takes steps of one length; give --step")
-    usual = settings.output_step / 10 if settings.method.controlled else settings.method.step
-    step = given.get("step", usual)
-    return replace(settings.method, step=step) if kind is type(settings.method) else kind(step)  # type: ignore[type-var]
+        raise InputError(f"--tolerance: {kind.__name__} takes steps of one length; give --step or --accuracy")
+    if {"step", "accuracy"} <= given.keys():
+        raise InputError("--accuracy finds the step; leave out --step, or the accuracy")
+    within = _within(own, word, given)
+    if "step" in given:
+        return stepped(within, given["step"])
+    if "accuracy" in given or isinstance(own, Within) or own.controlled:
+        return within
+    return stepped(within, own.step)
+
+
+def _word(method: Integrator) -> str:
+    from ffr_dyn.integrators import methods
+
+    return next(word for word, made in methods().items() if type(method) is made)
+
+
+def _within(own: Integrator | Within, word: str, given: Mapping[str, Any]) -> Within:
+    """The method of a word with the accuracy that was asked for, or the file's, and the file's settings of that method."""
+    from ffr_dyn.analyses.settings import settings_of
+    from ffr_dyn.integrators import Within, method_named
+
+    accuracy = given.get("accuracy", own.accuracy if isinstance(own, Within) else Within().accuracy)
+    if isinstance(own, Within):
+        return Within(accuracy, word, own.settings if word == own.method else ())
+    kind = method_named(word)
+    settings = tuple((key, getattr(own, key)) for key in settings_of(kind)) if type(own) is kind else ()
+    return Within(accuracy, word, settings)
 
 
 def perform(scene: Scene, settings: Settings | MomentSettings, output: Path, resume: bool = False) -> None:
-    """Analyse a scene, with progress where that takes its time, and tell what came of it."""
+    """Analyse a scene and tell what came of it."""
+    result = analysed(scene, settings, output, resume)
+    for line in settings.analysis.report(result):
+        click.echo(line)
+    click.echo(f"result       {output}")
+
+
+def analysed(
+    scene: Scene, settings: Settings | MomentSettings, output: Path | None = None, resume: bool = False
+) -> Result:
+    """The result of a scene, with progress where that takes its time."""
     from ffr_dyn.analyses.run import require_resumable
     from ffr_dyn.analyses.run import run as analyse
     from ffr_dyn.analyses.settings import Settings
@@ -181,11 +204,8 @@ def perform(scene: Scene, settings: Settings | MomentSettings, output: Path, res
 
     if resume:
         require_resumable(settings)
-    if isinstance(settings, Settings):
-        with progress(scene.name, settings.end, start=settings.start) as update:
-            result = analyse(scene, settings, path=output, resume=output if resume else None, progress=update)
-    else:
-        result = analyse(scene, settings, path=output)
-    for line in settings.analysis.report(result):
-        click.echo(line)
-    click.echo(f"result       {output}")
+    reserve("-o", output)
+    if not isinstance(settings, Settings):
+        return analyse(scene, settings, path=output)
+    with progress(scene.name, settings.end, start=settings.start) as update:
+        return analyse(scene, settings, path=output, resume=output if resume else None, progress=update)

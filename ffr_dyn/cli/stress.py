@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, check_folder
 from ffr_prep.common.errors import InputError
 
 _NOTES = """\b
@@ -22,8 +23,8 @@ Example:
 
 
 @click.command(epilog=_NOTES)
-@click.argument("result", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="Folder for tables and pictures.")
+@click.argument("result", type=INPUT_FILE)
+@click.option("-o", "--output", type=OUTPUT_FILE, required=True, help="Folder for tables and pictures.")
 @click.option("--body", help="Look at this body only.")
 @click.option("--point", "points", multiple=True, metavar="X,Y,Z", help="History at this place [m] in the body frame.")
 @click.option("--quantity", default="von-mises", show_default=True, help="See below.")
@@ -46,6 +47,7 @@ def stress(
     from ffr_dyn.pictures.stress_report import report_lines, stress_report
     from ffr_dyn.results.file import load_result
 
+    check_folder("-o", output)
     places = [_place(text) for text in points]
     loaded = load_result(result)
     report = stress_report(loaded, output, body=body, quantity=quantity, points=places, count=count, since=since)

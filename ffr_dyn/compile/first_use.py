@@ -17,6 +17,7 @@ from ffr_dyn.kernels.simd.entry_point import ENTRY_POINTS, CompiledFunction, alw
 from ffr_dyn.kernels.simd.force_kernel import kernel_of
 from ffr_dyn.kernels.simd.intrinsics import compiled_forms
 from ffr_dyn.kernels.tables import Model
+from ffr_prep.common.children import ending_with_us
 
 Kernel = str | CompiledFunction  # of a force: "package.module:name", or itself where that is not known
 
@@ -46,7 +47,7 @@ def begin_compiling(*kinds: type[Integrator], model: Model | None = None, forces
     packages = os.pathsep.join(path or os.getcwd() for path in sys.path)
     environment = {**os.environ, "PYTHONPATH": packages, "FFR_DYN_COMPILING": "1"}
     for share in _shares(missing):
-        process = subprocess.Popen([sys.executable, "-m", __name__, *share], env=environment)
+        process = subprocess.Popen(ending_with_us([sys.executable, "-m", __name__, *share]), env=environment)
         _AT_WORK.update(dict.fromkeys(share, process))
 
 

@@ -13,6 +13,7 @@ from scipy.sparse import csr_array
 
 from ffr_dyn.compile.scene_tables import System, compile_scene
 from ffr_dyn.consistency.closing import close_positions, close_velocities, stacked
+from ffr_dyn.consistency.driven_angles import led_to_drivers
 from ffr_dyn.consistency.dropped_terms import check_dropped
 from ffr_dyn.consistency.held_frequencies import held_frequencies
 from ffr_dyn.consistency.independence import independent_blocks
@@ -31,6 +32,7 @@ from ffr_prep.common.errors import InputError
 
 ASKED = 1e-6  # of a row across the plane at random speeds of about one; modes carry rounding of 1e-9
 ACROSS = 1e-8  # of the largest entry of a row, what counts as zero
+SHIFTED = 1e-6  # m, rad, from where it is told that assembly moved a body
 RELAXATION = 1e-8  # of dependent rows, relative
 TORN = 0.5  # elastic displacement of an interface over the size of its body that no joint may ask for
 
@@ -68,7 +70,9 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     place = layout(scene)
     left_out = [note for b, body in enumerate(scene.bodies) for note in check_dropped(body, place.active(b))]
     guess, v = initial_state(scene, place)
-    x = close_positions(scene, place, blocks, guess, v, time)
+    x = led_to_drivers(
+        scene, place, blocks, guess, time, lambda rows, at: close_positions(scene, place, rows, at, v, time)
+    )
     _require_shape(scene, place, guess, x)
     kept, redundant = independent_blocks(scene, place, blocks, x, v, time)
     v = close_velocities(scene, place, blocks, x, v, time)
@@ -77,9 +81,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
         f"{block}: the row '{text}' is redundant; of the reactions that are possible the smallest are given"
         for block, text in redundant
     ] + left_out
-    shift = max(np.linalg.norm(x[place.R(b)] - guess[place.R(b)]) for b in range(len(scene.bodies)))
-    if shift > 1e-6:
-        notes.insert(0, f"assembly moved a body by {shift:.3g} m from where the scene puts it")
+    notes = shifted(scene, place, guess, x) + notes
     if scene.plane != "none":
         notes.append(
             f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes without their rounding "
@@ -90,6 +92,25 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     )
     all_rows = compile_scene(scene, blocks, RELAXATION) if redundant else None
     return Assembled(compile_scene(scene, kept), all_rows, x, v, _movable(place) - rows, tuple(notes), tuple(redundant))
+
+
+def shifted(scene: Scene, place: Layout, guess: Array, x: Array) -> list[str]:
+    """A note on the bodies that assembly has moved or turned, the one moved most and the one turned most by name."""
+    shifts = [float(np.linalg.norm(x[place.R(b)] - guess[place.R(b)])) for b in range(len(place.n))]
+    turns = [turned(x[place.p(b)], guess[place.p(b)]) for b in range(len(place.n))]
+    count = sum(shift > SHIFTED or turn > SHIFTED for shift, turn in zip(shifts, turns, strict=True))
+    said = [
+        f"{word} body {scene.bodies[b].name!r} by {sizes[b]:.3g} {unit}"
+        for word, sizes, unit in (("moved", shifts, "m"), ("turned", turns, "rad"))
+        if sizes[b := int(np.argmax(sizes))] > SHIFTED
+    ]
+    more = f", the most of {count} bodies," if count > 1 else ""
+    return [f"assembly {' and '.join(said)}{more} from where the scene puts it"] if said else []
+
+
+def turned(p: Array, p0: Array) -> float:
+    """[rad] the angle between two attitudes, Euler parameters of length one."""
+    return 2.0 * float(np.arctan2(np.linalg.norm(np.outer(p, p0) - np.outer(p0, p)) / np.sqrt(2.0), abs(p @ p0)))
 
 
 def _require_shape(scene: Scene, place: Layout, guess: Array, x: Array) -> None:

@@ -189,9 +189,17 @@ def evaluated_mass_matrix(at: Evaluator) -> Array:
     return M
 
 
+def _weights(M: Array) -> Array:
+    """(V, V) lower triangle whose square is M; motions without inertia, as about the axis of a thin rod, get a little."""
+    try:
+        return np.linalg.cholesky(M)
+    except np.linalg.LinAlgError:
+        return np.linalg.cholesky(M + np.diag(NO_INERTIA * np.maximum(np.diag(M), np.diag(M).max())))
+
+
 def free_motions(jacobian: Array, M: Array) -> Array:
     """(V, d) with jacobian Z = 0 and Z^T M Z = 1: all motions that the rows leave free."""
-    lower = np.linalg.cholesky(M)
+    lower = _weights(M)
     if jacobian.shape[0] == 0:
         return np.linalg.inv(lower).T
     weighted = np.linalg.solve(lower, jacobian.T).T
@@ -203,11 +211,12 @@ def free_motions(jacobian: Array, M: Array) -> Array:
 
 def smallest_step(jacobian: Array, M: Array, target: Array) -> Array:
     """The step (V,) with jacobian step = target that is smallest in the norm of the mass matrix."""
-    lower = np.linalg.cholesky(M)
+    lower = _weights(M)
     weighted = np.linalg.solve(lower, jacobian.T).T
     return np.linalg.solve(lower.T, np.linalg.lstsq(weighted, target, rcond=RANK_TOLERANCE)[0])
 
 
+NO_INERTIA = 1e-9  # of the largest inertia, in place of none
 CLOSED = 1e-12  # of Phi [m, -] after a projection
 
 

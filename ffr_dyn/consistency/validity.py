@@ -5,6 +5,8 @@ Both are looked at along the run and told at its end; a run stops for a deformat
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
@@ -14,8 +16,9 @@ from ffr_dyn.scene.parts import owner
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import FlexibleBody, Interface
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import ComputationError, InputError
 
+ROUNDS = 4  # analyses, each with more parts; mostly the second has enough
 MEANINGLESS = 100.0  # elastic rotation [rad]
 STRAINED = 0.1  # elastic rotation [rad] beyond which linear elasticity in the moving frame is doubtful
 # The same for a body with a second-order displacement. A cantilever under a force at its end, against the exact beam: its tip
@@ -78,6 +81,12 @@ def doubts(scene: Scene, found: Array) -> list[str]:
     return [*strained(scene, turned, stretched), *unstiffened(scene, spun)]
 
 
+def strained_in(system: System, record: Record) -> list[str]:
+    """Notes on bodies that recorded states deform too much for one moving frame."""
+    turned, _, stretched = extremes(system, record)
+    return strained(system.scene, turned, stretched)
+
+
 def strained(scene: Scene, turned: Array, stretched: Array) -> list[str]:
     """Bodies that deform too much for one moving frame; turned (B,) [rad], stretched (B,) of the body's size. Of a body in
     parts the one that does so most.
@@ -90,7 +99,7 @@ def strained(scene: Scene, turned: Array, stretched: Array) -> list[str]:
             note = (
                 f"body {body.name!r} deforms by up to {share:.2g} of its size and turns within itself by up to {turn:.2g} "
                 f"rad: one moving frame is strained beyond about {STRETCHED:g} of the size or {limit:g} rad; "
-                f"{np.ceil(beyond * _count(body)):.0f} parts would do (ffr-prep reduce --parts)"
+                f"{_enough(_count(body), turn / limit, share / STRETCHED)} parts would do (ffr-prep reduce --parts)"
             )
             worst[owner(body)] = beyond, note
     return [note for _, note in worst.values()]
@@ -99,6 +108,16 @@ def strained(scene: Scene, turned: Array, stretched: Array) -> list[str]:
 def _count(body: Body) -> int:
     """How many parts the whole has that the body is a part of; 1 of a body alone."""
     return len(body.part_of.model.parts) if body.part_of else 1
+
+
+def _enough(count: int, turn: float, share: float) -> int:
+    """How many equal parts a body in so many needs, the worst of which turns and deflects by these shares of the limits.
+
+    As many as a cantilever under a force at its end, whose curvature falls evenly from the root: that of the root makes a
+    part of several turn by the mean of the worst part times 2 N / (2 N - 1), and deflect by that times 3 N / (3 N - 1).
+    """
+    most = int(np.ceil(count * max(turn / (1 - 1 / (2 * count)), share / (1 - 1 / (3 * count)))))
+    return max(1, min(count, most) if max(turn, share) <= 1 else max(count + 1, most))
 
 
 def parts_needed(scene: Scene, result: Result, angle: float = BENT) -> dict[str, int]:
@@ -116,9 +135,30 @@ def parts_needed(scene: Scene, result: Result, angle: float = BENT) -> dict[str,
     for body in scene.bodies:
         if body.model.n:
             turn, share = deflections(body.model, result[f"{body.name}.q"])
-            parts = int(np.ceil(_count(body) * max(turn / angle, share / STRETCHED)))
-            needed[owner(body)] = max(1, parts, needed.get(owner(body), 1))
+            parts = _enough(_count(body), turn / angle, share / STRETCHED)
+            needed[owner(body)] = max(parts, needed.get(owner(body), 1))
     return needed
+
+
+def in_enough_parts(
+    make: Callable[[Mapping[str, int]], Scene], analyse: Callable[[Scene], Result], angle: float = BENT
+) -> tuple[Scene, Result]:
+    """The scene with its bodies in so many parts as `parts_needed` says, and its result.
+
+    make    : the scene with these bodies in so many equal parts; with none at first
+    analyse : such as `static`, or a forward run; its result keeps `*.q`
+
+    Raises InputError as `parts_needed`; ComputationError where ever more parts are needed.
+    """
+    scene = make({})
+    for _ in range(ROUNDS):
+        result = analyse(scene)
+        there = {owner(body): _count(body) for body in scene.bodies}
+        more = {name: count for name, count in parts_needed(scene, result, angle).items() if count > there[name]}
+        if not more:
+            return scene, result
+        scene = make({name: count for name, count in (there | more).items() if count > 1})
+    raise ComputationError(f"after {ROUNDS} analyses still more parts are needed: {more}; allow a larger angle")
 
 
 def unstiffened(scene: Scene, spun: Array) -> list[str]:
@@ -130,7 +170,7 @@ def unstiffened(scene: Scene, spun: Array) -> list[str]:
             notes.append(
                 f"body {body.name!r} spins at up to {spin:.4g} rad/s, {share:.2g} of its first frequency, without geometric "
                 f"stiffening: its frequencies are off by up to {50 * share**2:.2g} %"
-                f"{', and its computed motion may diverge' if share > 1 else ''}; reduce it with --stiffening"
+                f"{', and its computed motion may diverge' if share > 1 else ''}; reduce it without --linear"
             )
     return notes
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import geometry
+from ffr_dyn.analyses.integration import geometry
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.closing import close_positions, close_velocities
 from ffr_dyn.economy.contributions import effects_of

@@ -27,12 +27,12 @@ def _line(found: Economy, b: int, body: Body) -> str:
         )
     highest = _highest(found, b)
     options = f"--method craig-bampton --frequency {_rounded(found.policy.band * highest)}"
-    stiffening = " --stiffening" if found.choice.parts[b].stiffened and body.model.stiffening is not None else ""
+    linear = "" if found.choice.parts[b].stiffened and body.model.stiffening is not None else " --linear"
     stress = " --stress" if any(output.name == f"{body.name}.stress" for output in found.probe.outputs) else ""
     size = _mesh_size(body, highest, found.policy.elements_per_wave)
     mesh = f"; elements of second order of at most {size:.2g} m along it" if size else ""
     return (
-        f"{body.name}: matters up to {highest:.4g} Hz: ffr-prep reduce FILE{_interfaces(body)} {options}{stiffening}{stress} "
+        f"{body.name}: matters up to {highest:.4g} Hz: ffr-prep reduce FILE{_interfaces(body)} {options}{linear}{stress} "
         f"-o {body.name}.ffr{mesh}"
     )
 

@@ -20,6 +20,7 @@ from ffr_dyn.economy.model_choice import Choice, kind
 from ffr_dyn.economy.result import Economy
 from ffr_dyn.scene.scene import INERTIA_TERMS, Body
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.outputs import replacing
 
 SEPARATOR = "  "
 
@@ -48,7 +49,7 @@ def _summary(found: Economy) -> Table:
     rows = [
         ("scene", found.original.name),
         ("computed", "in space" if choice.plane == "none" else f"in the plane across {choice.plane}"),
-        ("integrator", _integrator(choice, settings.method.step)),
+        ("integrator", _integrator(choice, settings.output_step / choice.divisions)),
         ("stabilisation", repr(settings.stabilisation)),
         ("elastic coordinates", f"{choice.count} of {sum(b.model.n for b in found.original.bodies)}"),
         ("cost of a run", f"{found.cost / 1e6:.3g} s, everything with the same step {found.before / 1e6:.3g} s: "
@@ -333,7 +334,6 @@ def write_report(found: Economy, path: str | Path) -> Path:
         chart.unlink()
     else:
         text = as_markdown(found) if path.suffix == ".md" else as_text(found)
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(text, encoding="utf-8")
-    temporary.replace(path)
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")
     return path

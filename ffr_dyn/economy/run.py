@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.economy.cost import of_evaluations, of_run
 from ffr_dyn.economy.model_choice import Choice, applied
@@ -83,7 +83,7 @@ def simulated(
     made: Made, choice: Choice, span: Span, outputs: tuple[str, ...], stopwatch: Stopwatch | None = None
 ) -> Result:
     """A forward run of a model. Raises ComputationError as `forward` does."""
-    return forward(
+    return integrate(
         made.scene,
         start=span.start,
         end=span.end,

@@ -22,6 +22,7 @@ from ffr_dyn.integrators.ros3 import AdaptiveROS3 as AdaptiveROS3
 from ffr_dyn.integrators.tolerances import Tolerances as Tolerances
 from ffr_dyn.integrators.tolerances import tolerances as tolerances
 from ffr_dyn.integrators.variational import Variational as Variational
+from ffr_dyn.integrators.within import Within as Within
 from ffr_dyn.kernels.integrator_api import CompiledFunction
 from ffr_prep.common.errors import InputError
 
@@ -75,6 +76,15 @@ CONTROLLED: dict[str, type[Any]] = {"ros3-adaptive": AdaptiveROS3, "dopri5": Dor
 def methods() -> dict[str, type[Any]]:
     """All methods by name."""
     return {**METHODS, **CONTROLLED}
+
+
+def stepped(within: Within, step: float) -> Integrator:
+    """The method of an accuracy with a step [s]. Raises InputError for one that chooses its steps."""
+    kind = method_named(within.method)
+    if kind.controlled:
+        raise InputError(f"{within.method} chooses its steps by its tolerances; give these, or a method of fixed steps")
+    made: Integrator = kind(step, **dict(within.settings))
+    return made
 
 
 def register_integrator(name: str, method: type[Any]) -> None:

@@ -16,6 +16,7 @@ from typing import Any
 from numba import njit
 
 from ffr_dyn.kernels.simd.intrinsics import PLAIN
+from ffr_prep.common.compile_cache import check_compiled_code
 
 # No reference counts (_nrt): kernels allocate nothing and return no arrays, and counting views took half of the run time.
 OPTIONS: dict[str, Any] = {
@@ -72,3 +73,5 @@ def discard_stale_kernels() -> None:
 
 
 discard_stale_kernels()
+if not PLAIN:
+    check_compiled_code()

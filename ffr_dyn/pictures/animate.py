@@ -8,7 +8,6 @@ imported only when they are needed.
 from __future__ import annotations
 
 import importlib.util
-import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ from ffr_dyn.pictures.film import Camera, Film, camera_for, film
 from ffr_dyn.results.result import Result
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.outputs import replacing
 
 _SHORTEST, _LONGEST = 3.0, 6.0
 _PAGE_FRAMES = 80
@@ -72,13 +72,8 @@ def animate(
         frames = min(frames, _PAGE_FRAMES)
     shown = film(result, frames, scale=scale, traces=traces, colour=colour, limit=limit)
     show = _Show(shown, playing / frames, camera or camera_for(shown), size)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + ".part")
-    try:
-        write(show, temporary)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with replacing(path) as part:
+        write(show, part)
     return path
 
 

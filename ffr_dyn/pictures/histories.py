@@ -5,7 +5,6 @@ The figures are made without pyplot: no global state, no window, the same bytes 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +19,7 @@ from matplotlib.figure import Figure
 from ffr_dyn.results.result import Quantity, Result
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.outputs import replacing
 from ffr_prep.common.units import bracketed, readable
 
 # Okabe & Ito 2008, "Color universal design", without the yellow, which is too pale for a line on white.
@@ -172,8 +172,6 @@ def _write(figure: Figure, path: str | Path) -> Path:
     kind = path.suffix.lower()
     if kind not in _METADATA:
         raise InputError(f"{path}: pictures are written as {', '.join(_METADATA)}, not {kind or 'without a suffix'}")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + ".part")
-    figure.savefig(temporary, format=kind[1:], dpi=130, metadata=_METADATA[kind])
-    os.replace(temporary, path)
+    with replacing(path) as part:
+        figure.savefig(part, format=kind[1:], dpi=130, metadata=_METADATA[kind])
     return path

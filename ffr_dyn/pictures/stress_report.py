@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,6 +30,7 @@ from ffr_dyn.scene.stress_sensors import measure, nearest_element
 from ffr_prep.body import Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.outputs import replacing
 from ffr_prep.common.units import readable
 
 Places = dict[str, Array]
@@ -136,11 +136,8 @@ def _spot_table(spots: Sequence[HotSpot], quantity: str, path: Path) -> Path:
     unit = measure(quantity).unit
     rows = [(k + 1, s.body, s.point, *s.position, s.row, s.time, s.value) for k, s in enumerate(spots)]
     heading = ("rank", "body", "point", "x [m]", "y [m]", "z [m]", "row", "time [s]", f"{quantity} [{unit}]")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + ".part")
-    with open(temporary, "w", newline="", encoding="utf-8") as stream:
+    with replacing(path) as part, open(part, "w", newline="", encoding="utf-8") as stream:
         csv.writer(stream).writerows([heading, *rows])
-    os.replace(temporary, path)
     return path
 
 
@@ -189,9 +186,8 @@ def _peak_picture(result: Result, body: str, spots: Sequence[HotSpot], quantity:
     heading = _heading(result, body, of.words) + ("     (n): hidden" if set(marks) - set(numbered) else "")
     shown = replace(shown, colouring=shades, marks=marks, heading=heading)
     (picture,) = pictures(shown, camera, _SIZE)
-    temporary = path.with_name(path.name + ".part")
-    Image.fromarray(picture).save(temporary, "PNG")
-    os.replace(temporary, path)
+    with replacing(path) as part:
+        Image.fromarray(picture).save(part, "PNG")
     return path
 
 

@@ -18,24 +18,28 @@ Histories carry Fletcher-32 checksums, so a damaged value is an error and never 
 
 from __future__ import annotations
 
+import errno
+import functools
 import json
 import os
 import shutil
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
 
 from ffr_dyn.results.result import XYZ, Axis, Quantity, Result, check_times
-from ffr_prep.body import QuadraticField, Surface, surface_of
+from ffr_prep.body import QuadraticField, Surface, surface_arrays, surface_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.interrupts import undisturbed
+from ffr_prep.common.outputs import check_output, writing
 
 FORMAT = "ffr-result"
 FORMAT_VERSION = 1
@@ -44,6 +48,8 @@ _SURFACE = ("points", "triangles", "Phi", "stress", "moduli", "beams/positions",
 _SECOND = ("second", "second_stress", "beams/second")
 _CHUNK_BYTES, _CHUNK_ROWS = 32768, 512
 _BUFFER_BYTES = 4 << 20
+_SPARE_BYTES, _SPARE_OF_QUANTITY = 1 << 16, 4096  # for what HDF5 keeps beside the values
+_HOW: dict[str, Any] = {"libver": ("v108", "v108"), "locking": False}  # the working file is locked by `writing`
 _MARKS = ("Conventions", "ffr_format", "ffr_format_version", "json_attributes")
 
 
@@ -61,6 +67,17 @@ def load_result(path: str | Path) -> Result:
         return _read(file)
 
 
+def with_attributes(path: str | Path, attributes: Mapping[str, Any]) -> None:
+    """Give a finished result file other attributes, in one piece: it is replaced by its copy with them."""
+    path = Path(path)
+    copy = path.with_name(f"{path.name}.attributes")
+    shutil.copyfile(path, copy)
+    with h5py.File(copy, "r+") as file:
+        _write_attributes(file, attributes)
+        file.attrs["status"] = attributes.get("status", "complete")
+    os.replace(copy, path)
+
+
 @contextmanager
 def _reading(path: Path) -> Iterator[h5py.File]:
     """A result file, open; whatever is wrong with it becomes an InputError."""
@@ -72,7 +89,7 @@ def _reading(path: Path) -> Iterator[h5py.File]:
         with h5py.File(path, "r") as file:
             _check_format(path, file)
             yield file
-    except (OSError, KeyError, IndexError, RuntimeError, ValueError, TypeError, OverflowError, MemoryError) as error:
+    except Exception as error:  # HDF5 and what reads it fail in any way
         if isinstance(error, InputError) and str(path) in str(error):
             raise
         raise InputError(
@@ -90,24 +107,46 @@ def load_checkpoint(path: str | Path) -> Array | None:
         return file["checkpoint/state"][:] if "checkpoint/state" in file else None
 
 
+def _whole(step: Callable[..., None]) -> Callable[..., None]:
+    """A step of the writer that signals do not break: they wait until it is done."""
+
+    @functools.wraps(step)
+    def done(*arguments: Any, **settings: Any) -> None:
+        with undisturbed():
+            step(*arguments, **settings)
+
+    return done
+
+
+class _Entry(NamedTuple):
+    """Rows of the time and of all quantities, in order, and the checkpoint after them."""
+
+    columns: list[Array]
+    checkpoint: Array | None
+
+
 class ResultWriter:
     """Writes a result while it grows. After a kill, ``path`` holds a complete file with all rows up to the last flush.
 
-    Rows go to the working file ``<name>.part``. A flush closes it, copies it to ``<name>.new``, brings that to the disk
-    (fsync) and renames it over ``path``: the rename is atomic, so until the first flush is complete ``path`` keeps what
-    it held before, and readers of the old file are undisturbed. A copy takes time in proportion to the length of the
-    file, so equally spaced flushes would cost O(n^2) in all. Therefore the time between flushes is at least
-    ``interval`` [s] and at least the duration of the last flush over ``share``: the run is never slowed down by more
-    than that share, and a kill loses no more than the time since the last flush. Memory is a buffer of a few MB,
-    however long the run. The last flush needs no copy. The working files of a killed run are overwritten by the next
-    run to the same path, and may be deleted.
+    Rows go to the working file ``<name>.part``, which is locked: a second run to the same path is refused. A flush closes
+    it, copies it to ``<name>.new``, brings that to the disk (fsync) and renames it over ``path``: the rename is atomic, so
+    until the first flush is complete ``path`` keeps what it held before, and readers of the old file are undisturbed. A
+    copy takes time in proportion to the length of the file, so equally spaced flushes would cost O(n^2) in all. Therefore
+    the time between flushes is at least ``interval`` [s] and at least the duration of the last flush over ``share``: the
+    run is never slowed down by more than that share, and a kill loses no more than the time since the last flush. Memory
+    is a buffer of a few MB, however long the run. The last flush needs no copy. The working files of a killed run are
+    overwritten by the next run to the same path, and may be deleted.
+
+    Space on the disk is taken before rows are handed to HDF5, which does not survive a full disk: where there is none, the
+    run stops, and ``path`` gets all rows that were written. Signals that end the process wait for the end of a step, and
+    what was computed until then is kept.
 
     path   : the file to write; its directory is made if necessary
     header : quantities, geometry and attributes, and the first rows (none, or those of a run to be continued)
     checkpoint : bytes (uint8) from which the run can go on after the rows of the header
 
-    As a context manager it closes with the status "complete", or "stopped: ..." when an exception passes through; a run
-    that stopped before its first row leaves ``path`` as it was.
+    As a context manager it closes with the status "complete", or "stopped: ..." when an exception passes through, to which
+    it adds a note on what is kept; a run that stopped before its first row leaves ``path`` as it was.
     Raises InputError when path cannot be written, ComputationError when writing fails later (such as a full disk).
     """
 
@@ -121,29 +160,36 @@ class ResultWriter:
         share: float = 0.03,
     ) -> None:
         self.path = Path(path)
-        self._part = self.path.with_name(self.path.name + ".part")
         self._interval, self._share = interval, share
         self._names = tuple(header.quantities)
         self._shapes = [quantity.values.shape[1:] for quantity in header.quantities.values()]
-        self._pending: list[list[Array]] = []
+        self._pending: list[_Entry] = []
         self._pending_bytes = 0
         self._rows = header.time.size
         self._last_time = header.time[-1:]
         self._checkpoint = checkpoint
+        self._held, self._published = ExitStack(), False
+        self._file: Any = None
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            if self.path.is_dir():
-                raise InputError(f"{self.path} is a directory; give the name of a result file")
-            self._file = h5py.File(self._part, "w", libver=("v108", "v108"), track_order=True)
-            _write_structure(self._file, header)
-            self._keep_checkpoint()
-        except OSError as error:
+            self._begin(header)
+        except (OSError, ComputationError) as error:
+            self._give_up()
             raise InputError(
-                f"{self.path} cannot be written ({error}); choose another place or end the other run"
+                f"{self.path} cannot be written ({error.__cause__ or error}); choose another place or end the other run"
             ) from None
         self._published_at = time.monotonic()
         self._publishing_took = 0.0
 
+    @_whole
+    def _begin(self, header: Result) -> None:
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        self._part = self._held.enter_context(writing(self.path))
+        self._file = h5py.File(self._part, "w", track_order=True, **_HOW)
+        self._take_space(_bytes_of(header))
+        _write_structure(self._file, header)
+        self._keep_checkpoint()
+
+    @_whole
     def append(self, times: Array, values: Mapping[str, Array], checkpoint: Array | None = None) -> None:
         """Add k rows: times (k,) [s] and, for every quantity of the header, values (k, ...). Flushes when it is due.
 
@@ -159,47 +205,66 @@ class ResultWriter:
         for name, row, shape in zip(self._names, rows, self._shapes, strict=True):
             if row.shape != (times.size, *shape):
                 raise InputError(f"rows of {name!r} have shape {row.shape}, not {(times.size, *shape)}")
-        self._pending.append([times, *rows])
-        self._pending_bytes += sum(row.nbytes for row in self._pending[-1])
+        self._pending.append(_Entry([times, *rows], checkpoint))
+        self._pending_bytes += sum(row.nbytes for row in rows)
         self._last_time = np.append(self._last_time, times)[-1:]
-        self._checkpoint = checkpoint
         if time.monotonic() - self._published_at >= max(self._interval, self._publishing_took / self._share):
             self.flush()
         elif self._pending_bytes > _BUFFER_BYTES:
             with self._explained():
                 self._drain()
 
+    @_whole
     def flush(self) -> None:
         """Publish all rows so far at ``path``, with the status "running"."""
         started = time.monotonic()
         with self._explained():
             self._drain()
             self._file.close()
-            snapshot = self.path.with_name(self.path.name + ".new")
-            shutil.copyfile(self._part, snapshot)
-            _sync(snapshot)
-            os.replace(snapshot, self.path)
-            self._file = h5py.File(self._part, "r+", libver=("v108", "v108"))
+            try:
+                self._publish_copy()
+            finally:
+                self._file = h5py.File(self._part, "r+", **_HOW)
         self._published_at = time.monotonic()
         self._publishing_took = self._published_at - started
 
+    def _publish_copy(self) -> None:
+        snapshot = self.path.with_name(self.path.name + ".new")
+        try:
+            snapshot.unlink(missing_ok=True)
+            shutil.copyfile(self._part, snapshot)
+            _sync(snapshot)
+            check_output(self.path)
+            os.replace(snapshot, self.path)
+            self._published = True
+        except OSError as error:
+            snapshot.unlink(missing_ok=True)
+            raise self._stopped(error) from error
+
+    @_whole
     def close(self, status: str = "complete", attributes: Mapping[str, Any] | None = None) -> None:
         """Publish the finished file at ``path``; attributes, when given, replace the header's. Again does nothing."""
         if not self._file:
             return
         with self._explained():
             self._drain()
+            self._take_space(2 * len(json.dumps(dict(attributes or {}), default=str)))
+            self._file.close()
+            self._file = h5py.File(self._part, "r+", **_HOW)  # which sees the space that was taken, and gives it back
             if attributes is not None:
                 _write_attributes(self._file, attributes)
             self._file.attrs["status"] = status
             self._file.close()
             _sync(self._part)
+            check_output(self.path)
             os.replace(self._part, self.path)
+            self._published = True
+        self._held.close()
 
+    @_whole
     def discard(self) -> None:
         """Give up the rows since the last flush; ``path`` stays as it is."""
-        self._file.close()
-        self._part.unlink(missing_ok=True)
+        self._give_up()
 
     def __enter__(self) -> ResultWriter:
         return self
@@ -207,35 +272,116 @@ class ResultWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if kind is None:
+        if error is None:
             self.close()
         elif self._rows or self._pending:
-            self.close(f"stopped: {str(error) or kind.__name__}")
+            self.close(f"stopped: {str(error) or type(error).__name__}")
+            if self._published:
+                error.add_note(f"{self.path} holds what was computed until then")
         else:
             self.discard()
 
     def _drain(self) -> None:
-        columns = [np.concatenate(parts) for parts in zip(*self._pending, strict=True)]
-        if not columns:
-            return
+        """Hand the rows over to HDF5; on a full disk as many as fit."""
+        while self._pending:
+            count = len(self._pending)
+            while not self._has_space(self._pending[:count]) and count > 1:
+                count //= 2
+            entries, self._pending = self._pending[:count], self._pending[count:]
+            self._write(entries)
+        self._pending_bytes = 0
+
+    def _has_space(self, entries: list[_Entry]) -> bool:
+        """Whether the disk has what these take; ComputationError where it does not have what the first takes."""
+        end = self._rows + sum(entry.columns[0].size for entry in entries)
+        variables = [self._file[name] for name in ("time", *self._names)]
+        chunks = sum(
+            8 * int(np.prod(variable.chunks)) * (-(-end // variable.chunks[0]) - self._rows // variable.chunks[0])
+            for variable in variables
+        )
+        checkpoint = 0 if entries[-1].checkpoint is None else entries[-1].checkpoint.nbytes
+        try:
+            self._take_space(chunks + checkpoint + _SPARE_OF_QUANTITY * len(variables))
+        except ComputationError:
+            if len(entries) == 1:
+                self._pending = []
+                raise
+            return False
+        return True
+
+    def _write(self, entries: list[_Entry]) -> None:
+        columns = [np.concatenate(parts) for parts in zip(*(entry.columns for entry in entries), strict=True)]
         end = self._rows + columns[0].shape[0]
         for name, rows in zip(("time", *self._names), columns, strict=True):
             variable = self._file[name]
             variable.resize(end, axis=0)
             variable[self._rows : end] = rows
-        self._rows, self._pending, self._pending_bytes = end, [], 0
+        self._rows, self._checkpoint = end, entries[-1].checkpoint
         self._keep_checkpoint()
+        self._file.flush()  # into the space that was taken
 
     def _keep_checkpoint(self) -> None:
         if self._checkpoint is not None:
             _write_checkpoint(self._file, self._checkpoint)
 
+    def _take_space(self, size: int) -> None:
+        """Have so many bytes more in the file, and some to close it with. ComputationError where the disk has not."""
+        if not hasattr(os, "posix_fallocate"):
+            return
+        try:
+            with open(self._part, "r+b") as stream:
+                os.posix_fallocate(stream.fileno(), self._file.id.get_filesize(), size + _SPARE_BYTES)
+        except OSError as error:
+            if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS):  # of file systems without this
+                raise self._stopped(error) from error
+
+    def _stopped(self, error: OSError) -> ComputationError:
+        """The file itself is sound."""
+        why = error.strerror or error
+        return ComputationError(
+            f"writing {self.path} failed ({why}); rows until then are kept: check the free space of the disk"
+        )
+
+    def _give_up(self) -> None:
+        """Leave the working file, whatever state it is in."""
+        if self._file:
+            _abandon(self._file)
+            self._part.unlink(missing_ok=True)
+        self._held.close()
+
     @contextmanager
     def _explained(self) -> Iterator[None]:
+        """What HDF5 could not write leaves it a file that is of no use."""
         try:
             yield
-        except OSError as error:
-            raise ComputationError(f"writing {self.path} failed ({error}); check the free space of the disk") from error
+        except (InputError, ComputationError):
+            raise
+        except (OSError, RuntimeError) as error:
+            self._give_up()
+            kept = "it holds the rows of before" if self._published else "it is as it was"
+            raise ComputationError(
+                f"writing {self.path} failed ({error}); {kept}: check the free space of the disk"
+            ) from error
+
+
+def _bytes_of(result: Result) -> int:
+    """About what a result takes in a file."""
+    values = sum(
+        8 * int(np.prod(_chunk(q.values))) * -(-result.time.size // _chunk(q.values)[0]) + 2 * _SPARE_OF_QUANTITY
+        for q in result.quantities.values()
+    )
+    surfaces = sum(array.nbytes for surface in result.geometry.values() for array in surface_arrays(surface).values())
+    return values + surfaces + _SPARE_BYTES
+
+
+def _abandon(file: h5py.File) -> None:
+    """Close a file that cannot be written any more: HDF5 would not let go of it, and crash at the end of the process."""
+    if hasattr(os, "memfd_create"):
+        nowhere = os.memfd_create("lost")
+        os.dup2(nowhere, file.id.get_vfd_handle())
+        os.close(nowhere)
+    with suppress(OSError, RuntimeError, ValueError):
+        file.close()
 
 
 # ---- writing ------------------------------------------------------------------------------------------------------
@@ -280,8 +426,7 @@ def _is_plain(value: Any) -> bool:
 
 
 def _history(file: h5py.File, name: str, values: Array, unit: str, description: str) -> h5py.Dataset:
-    row_bytes = 8 * int(np.prod(values.shape[1:]))
-    chunk = (max(1, min(_CHUNK_ROWS, _CHUNK_BYTES // row_bytes)), *values.shape[1:])
+    chunk = _chunk(values)
     variable = file.create_dataset(
         name, data=values, maxshape=(None, *values.shape[1:]), chunks=chunk, fletcher32=True, track_order=True
     )
@@ -289,6 +434,12 @@ def _history(file: h5py.File, name: str, values: Array, unit: str, description: 
     if description:
         variable.attrs["long_name"] = description
     return variable
+
+
+def _chunk(values: Array) -> tuple[int, ...]:
+    """Of a history with rows like these."""
+    row_bytes = 8 * int(np.prod(values.shape[1:]))
+    return (max(1, min(_CHUNK_ROWS, _CHUNK_BYTES // row_bytes)), *values.shape[1:])
 
 
 def _write_surface(group: h5py.Group, xyz: h5py.Dataset, surface: Surface) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -24,6 +23,7 @@ from ffr_prep.body import Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, cut, listed
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.outputs import replacing
 
 # netCDF names: a letter, digit or underscore first, no "/", no control character, no blank at the end.
 _NAME = re.compile(r"\w(?:[^/\x00-\x1f\x7f]*[^/\x00-\x1f\x7f\s])?")
@@ -162,13 +162,10 @@ def write_csv(result: Result, path: str | Path, names: Iterable[str] | None = No
     """Write `table` as comma-separated values (RFC 4180, shortest digits that read back exactly), atomically."""
     headings, rows = table(result, names)
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + ".part")
-    with open(temporary, "w", newline="", encoding="utf-8") as stream:
+    with replacing(path) as part, open(part, "w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
         writer.writerow(headings)
         writer.writerows(rows.tolist())
-    os.replace(temporary, path)
     return path
 
 

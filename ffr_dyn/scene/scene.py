@@ -44,7 +44,8 @@ class Body(Brief):
     rotation : rotation vector (3,) [rad], Euler parameters (4,) or matrix (3, 3), body -> global
     velocity : (3,) [m/s] of the origin, global;  omega_bar : (3,) [rad/s] in body axes
     q, q_dot : (n,) elastic coordinates and rates; default zero
-    damping  : modal damping ratio, one for all modes or (n,)
+    damping  : modal damping ratio, one for all modes or (n,); of a body that moves to second order they are the ratios of the
+               modes of its mean-axis form, by frequency, whatever conditions it was reduced under
     stiffening : use the second-order displacement that the model has, if any
     dropped  : names of the `INERTIA_TERMS` that the equations of motion leave out (see
                `ffr_dyn.variants.variant.without_terms`)

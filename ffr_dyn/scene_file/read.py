@@ -38,7 +38,7 @@ from ffr_dyn.analyses.settings import Charted, MomentSettings, Settings
 from ffr_dyn.functions.formula import CONSTANTS, Expression, Operation, is_constant
 from ffr_dyn.functions.operations import FUNCTIONS
 from ffr_dyn.functions.time_functions import TimeFunction, constant, signal, signals_in
-from ffr_dyn.integrators import Integrator, Tolerances, method_named
+from ffr_dyn.integrators import Integrator, Tolerances, Within, method_named, stepped
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import GROUND, Body, Scene
@@ -58,6 +58,7 @@ from ffr_dyn.scene_file.source import Source, origin, origin_of_name, read_sourc
 from ffr_dyn.scene_file.state_formula import StateFormula, check_names
 from ffr_prep.body import BodyError, FlexibleBody, load_body, rigid_body, truncated, with_point
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.reading import reading
 
 WHOLE = ("name", "gravity", "ground", "base_acceleration", "plane")  # fields of a scene that are no tables of entries
 
@@ -69,7 +70,22 @@ def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Sc
 
     Raises InputError that names the file, the entry, its value and what is expected, with the nearest known name.
     """
-    path = Path(path)
+    with reading(path, "a scene file"):
+        entry, source = _read(Path(path), parameters)
+        settings = _settings(entry.analysis, entry.outputs, source)
+        return _scene(entry, source), _with_chart(settings, entry.chart, source)
+
+
+def body_files(path: str | Path, parameters: Mapping[str, str] = {}) -> dict[str, Path]:
+    """The files from ffr-prep of the bodies of a scene file, by the names of the bodies; parameters and errors as of
+    `load_scene`."""
+    with reading(path, "a scene file"):
+        bodies = _read(Path(path), parameters)[0].bodies.items()
+    return {name: entry.file for name, entry in bodies if entry.file is not None}
+
+
+def _read(path: Path, parameters: Mapping[str, str]) -> tuple[Any, Source]:
+    """The entries of a scene file, checked."""
     source = read_source(path)
     try:
         values = Parameters(overridden(flattened(source.tree.pop("parameters", {})), parameters))
@@ -79,11 +95,9 @@ def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Sc
         keys = tuple(str(error).partition(":")[0].split("."))
         raise InputError(f"{origin(source, keys)}: {error}") from None
     try:
-        entry = scene_entry().model_validate(tree, context={"parameters": known})
+        return scene_entry().model_validate(tree, context={"parameters": known}), source
     except ValidationError as error:
         raise InputError(_explained(error, source)) from None
-    settings = _settings(entry.analysis, entry.outputs, source)
-    return _scene(entry, source), _with_chart(settings, entry.chart, source)
 
 
 def _signals(table: Mapping[str, Any], parameters: Parameters) -> dict[str, TimeFunction]:
@@ -308,13 +322,18 @@ def _with_chart(settings: Settings | MomentSettings, entry: Any, source: Source)
     return replace(settings, chart=Charted(measures=tuple(entry.measures), methods=methods, modes=modes, drops=drops))
 
 
-def _method(entry: Any, source: Source) -> Integrator:
-    kind, step = method_named(getattr(entry, "method", "ros2")), getattr(entry, "step", None)
+def _method(entry: Any, source: Source) -> Integrator | Within:
+    name, step = getattr(entry, "method", "ros2"), getattr(entry, "step", None)
+    kind, own = method_named(name), getattr(entry, "settings", {})
     try:
         if kind.controlled:
-            found: Integrator = kind(Tolerances(**(entry.tolerances.model_dump() if entry.tolerances else {})))
+            found: Integrator | Within = kind(Tolerances(**(entry.tolerances.model_dump() if entry.tolerances else {})))
+        elif step is not None:
+            found = kind(step, **own)
         else:
-            found = kind(entry.output_step / 10 if step is None else step, **getattr(entry, "settings", {}))
+            given = {} if getattr(entry, "accuracy", None) is None else {"accuracy": entry.accuracy}
+            found = Within(method=name, settings=tuple(own.items()), **given)
+            stepped(found, entry.output_step)
     except InputError as error:
         raise InputError(f"{origin(source, ('analysis', 'settings'))}: analysis.settings: {error}") from None
     return found

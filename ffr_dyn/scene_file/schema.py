@@ -286,6 +286,7 @@ class _Moment(Strict):
 class _Integrated(_Span):
     method: str = "ros2"
     step: Annotated[float, In("s"), Key(gt=0)] | None = None
+    accuracy: Annotated[Number, Key(ge=1e-8, le=1)] | None = None
     tolerances: TolerancesEntry | None = None
     settings: dict[str, bool | int | float | str] = {}
 
@@ -296,6 +297,9 @@ class _Integrated(_Span):
             raise ValueError(f"{self.method} chooses its steps: give 'tolerances' in place of 'step'")
         if not controlled and self.tolerances is not None:
             raise ValueError(f"{self.method} takes steps of one length: give 'step' in place of 'tolerances'")
+        if self.accuracy is not None and (controlled or self.step is not None):
+            given = "tolerances" if controlled else "step"
+            raise ValueError(f"accuracy: the step is found that keeps it; leave out {given}, or the accuracy")
         known = [] if controlled else settings_of(METHODS[self.method])
         for name in self.settings:
             if name not in known:

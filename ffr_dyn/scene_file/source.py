@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ffr_dyn.scene_file.toml_lines import lines_of
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.reading import read_toml
 
 PATHS = ("file", "table_file")  # keys whose value is a path relative to the file in which it stands
 
@@ -75,12 +75,7 @@ def _read(path: Path, above: tuple[Path, ...]) -> Source:
 
 
 def _parsed(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"scene file {path} does not exist") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path} is not a readable TOML file: {error}") from None
+    return read_toml(path, "a scene file")
 
 
 def _includes(tree: dict[str, Any], path: Path) -> list[str]:

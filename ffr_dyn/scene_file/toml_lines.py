@@ -41,7 +41,7 @@ def _statements(text: str) -> Iterator[tuple[int, str]]:
         if not waiting and (not line.strip() or line.lstrip().startswith("#")):
             continue
         begun, waiting = (begun, f"{waiting}\n{line}") if waiting else (number, line.strip())
-        if _reads(waiting):
+        if not line.rstrip().endswith(",") and _reads(waiting):  # of long lists the end alone
             yield begun, waiting
             waiting = ""
 

@@ -25,6 +25,7 @@ from ffr_dyn.functions.formula import Expression, is_constant, parse
 from ffr_dyn.functions.time_functions import HARMONIC, TimeFunction, constant, harmonic, piecewise, polynomial, table
 from ffr_dyn.scene_file.parameters import as_number
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.reading import reading
 from ffr_prep.common.strict import Strict
 from ffr_prep.common.units import split_quantity
 
@@ -165,10 +166,8 @@ def _piecewise(entry: PiecewiseEntry) -> TimeFunction:
 
 
 def _read_table(file: Path) -> TimeFunction:
-    try:
+    with reading(file, "a file of two columns of numbers, time and value", ValueError):
         columns = np.loadtxt(file, delimiter=",", ndmin=2, comments="#")
-    except (OSError, ValueError) as error:
-        raise InputError(f"{file} is not a file of two columns of numbers, time and value ({error})") from None
     if columns.shape[1] != 2:
         raise InputError(f"{file} has {columns.shape[1]} columns; it needs two, time and value")
     return table(columns[:, 0], columns[:, 1])

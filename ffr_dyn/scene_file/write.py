@@ -23,7 +23,7 @@ from ffr_dyn.functions.time_functions import (
     constant,
     signals_in,
 )
-from ffr_dyn.integrators import CONTROLLED, Controlled, Integrator, methods
+from ffr_dyn.integrators import CONTROLLED, Controlled, Integrator, Within, methods
 from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation
 from ffr_dyn.scene.parts import as_declared, cut_joints
 from ffr_dyn.scene.scene import Body, Scene
@@ -31,6 +31,7 @@ from ffr_dyn.scene_file.schema import Kind, fields_of_motion, formula_of, keys_o
 from ffr_dyn.scene_file.state_formula import StateFormula
 from ffr_prep.body import FlexibleBody, save_body
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.outputs import replacing
 
 _BARE = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
 
@@ -38,16 +39,14 @@ _BARE = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
 def save_scene(scene: Scene, settings: Settings | MomentSettings, path: str | Path) -> Path:
     """Write a scene file, and beside it a body file <file>.<body>.ffr for every flexible body."""
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     bodies = as_declared(scene.bodies)
     files = {body.name: f"{path.stem}.{body.name}.ffr" for body in bodies if not _is_plain(body.model)}
     text = to_toml(scene, settings, files)
     for body in bodies:
         if body.name in files:
             save_body(body.model, path.parent / files[body.name])
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(text, encoding="utf-8")
-    temporary.replace(path)
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")
     return path
 
 
@@ -113,7 +112,10 @@ def _chart(chart: Charted) -> dict[str, Any]:
     return {} if chart == Charted() else entry
 
 
-def _method(method: Integrator) -> dict[str, Any]:
+def _method(method: Integrator | Within) -> dict[str, Any]:
+    if isinstance(method, Within):
+        settings = {"settings": dict(method.settings)} if method.settings else {}
+        return {"method": method.method, "accuracy": method.accuracy, **settings}
     name = next(word for word, made in methods().items() if type(method) is made)
     if name in CONTROLLED:
         return {"method": name, "tolerances": asdict(cast("Controlled", method).tolerances)}

@@ -28,7 +28,8 @@ HELD = 1e-9  # of a unit mode: what rounding moves a held place by
 
 
 def in_mean_axis_frames(scene: Scene) -> Scene:
-    """The scene with every second-order body in its mean-axis form; those that are in it stay as they are.
+    """The scene with every second-order body in its mean-axis form; those that are in it stay as they are. Damping ratios
+    are those of its modes there, by frequency.
 
     Raises InputError for joints and forces at a point whose loads have no matrices.
     """
@@ -50,7 +51,8 @@ def _converted(scene: Scene, body: Body, forms: dict[int, tuple[FlexibleBody, Ow
     if id(body.model) not in forms:
         forms[id(body.model)] = _form(body.model)
     model, frame = forms[id(body.model)]
-    return _moved(replace(body, model=model, frame=frame))
+    by_frequency = np.argsort(np.argsort(model.omega2, kind="stable"))
+    return _moved(replace(body, model=model, frame=frame, damping=body.damping[by_frequency]))
 
 
 def _form(model: FlexibleBody) -> tuple[FlexibleBody, OwnFrame]:

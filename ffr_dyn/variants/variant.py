@@ -13,7 +13,7 @@ rotation and deformation, the terms that can be dropped are (`INERTIA_TERMS`)
 
 I3 and I4 belong together: with one of them alone the mass matrix is not positive. Of the others assembly tells how far the
 body may deform without them (`ffr_dyn.consistency.dropped_terms`). One more
-term is "stiffening", the geometric stiffening (which stores energy that the account does not hold).
+term is "stiffening", the second-order displacement, and with it geometric stiffening and foreshortening.
 """
 
 from __future__ import annotations

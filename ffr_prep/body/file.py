@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
@@ -23,6 +22,8 @@ from ffr_prep.body.reduced import (
     integral_shapes,
 )
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.outputs import note_input, replacing
+from ffr_prep.common.stored_arrays import read_arrays
 
 MAGIC = "ffr-body"
 # 2 adds stress modes and section forces, 3 the parts of a body that is cut. Files of before are read as bodies without them,
@@ -42,7 +43,7 @@ def content_hash(*arrays: Array) -> str:
 def save_body(body: FlexibleBody, path: str | Path) -> Path:
     """Write the body to one file, atomically: an existing file is replaced only by a complete new one.
 
-    Raises BodyError when the provenance is not JSON, OSError when the file cannot be written.
+    Raises BodyError when the provenance is not JSON; other errors as in `replacing`.
     """
     path = Path(path)
     arrays = _arrays(body)
@@ -53,7 +54,6 @@ def save_body(body: FlexibleBody, path: str | Path) -> Path:
     if body.parts:
         meta["parts"] = [_described(part) for part in body.parts]
     arrays["meta"] = np.frombuffer(_header(body, meta).encode(), dtype=np.uint8)
-    path.parent.mkdir(parents=True, exist_ok=True)
     return save_arrays(arrays, path)
 
 
@@ -81,14 +81,9 @@ def _described(body: FlexibleBody) -> dict[str, Any]:
 
 
 def save_arrays(arrays: Mapping[str, Any], path: Path) -> Path:
-    """Write a compressed .npz file that appears only when it is complete. Raises OSError when it cannot be written."""
-    temporary = path.with_name(path.name + ".part")
-    try:
-        with open(temporary, "wb") as stream:
-            np.savez_compressed(stream, **arrays)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    """Write a compressed .npz file that appears only when it is complete; errors as in `replacing`."""
+    with replacing(path) as part, open(part, "wb") as stream:
+        np.savez_compressed(stream, **arrays)
     return path
 
 
@@ -135,6 +130,7 @@ def surface_of(arrays: Mapping[str, Array]) -> Surface:
 def load_body(path: str | Path) -> FlexibleBody:
     """Read a body file. Raises BodyError for a missing, damaged, truncated, foreign or newer file."""
     path = Path(path)
+    note_input(path)
     try:
         return _with_parts(*_read(path))
     except FileNotFoundError:
@@ -158,20 +154,19 @@ def _header(body: FlexibleBody, meta: Mapping[str, Any]) -> str:
 
 
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:
-    with open(path, "rb") as stream:  # NumPy would leave it open where the file is damaged
+    with open(path, "rb") as stream:
         magic = stream.read(6)
         if magic == b"\x93NUMPY":
             raise BodyError("not a body file (a bare array); write one with ffr-prep reduce")
         if magic[:2] != b"PK":
             raise ValueError("no zip file")
         stream.seek(0)
-        with np.load(stream, allow_pickle=False) as stored:
-            meta = _meta(stored)
-            return meta, {key: stored[key] for key in stored.files if key != "meta"}
+        arrays = read_arrays(stream)
+        return _meta(arrays), {key: array for key, array in arrays.items() if key != "meta"}
 
 
-def _meta(stored: Any) -> dict[str, Any]:
-    if "meta" not in stored.files:
+def _meta(stored: Mapping[str, Array]) -> dict[str, Any]:
+    if "meta" not in stored:
         raise BodyError("not a body file (it has no header); write one with ffr-prep reduce")
     meta = json.loads(stored["meta"].tobytes())
     if not isinstance(meta, dict) or meta.get("magic") != MAGIC:

@@ -137,5 +137,5 @@ def _works_at_interfaces(body: FlexibleBody) -> Array:
 
 
 def _interfaces(body: FlexibleBody, Z: Array) -> tuple[Interface, ...]:
-    shapes = (interface_motions(body) @ Z).reshape(len(body.interfaces), 6, -1)
+    shapes = (interface_motions(body) @ Z).reshape(len(body.interfaces), 6, Z.shape[1])
     return tuple(replace(i, phi_t=six[:3], phi_r=six[3:]) for i, six in zip(body.interfaces, shapes, strict=True))

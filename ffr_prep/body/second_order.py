@@ -68,9 +68,9 @@ def compressed_beside(
     return QuadraticField(shapes, np.concatenate([part.weights for part in parts]))
 
 
-def reach_of(surface: Surface, omega2: Array) -> float:
-    """sqrt(q . omega2 q) at which the surface moves by its own size."""
-    return float(np.ptp(surface.points, axis=0).max()) / (_largest(surface.Phi / np.sqrt(omega2)) or 1.0)
+def reach_of(points: Array, Phi: Array, omega2: Array) -> float:
+    """sqrt(q . omega2 q) at which the points (P, 3) move by Phi q as far as they lie apart."""
+    return float(np.ptp(points, axis=0).max()) / (_largest(Phi / np.sqrt(omega2)) or 1.0)
 
 
 def _largest(fields: Array) -> float:

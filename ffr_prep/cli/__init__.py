@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,13 +13,23 @@ import click
 from ffr_prep.cli.conversion import convert
 from ffr_prep.cli.interchange import export_body, import_body
 from ffr_prep.cli.matrices import reduce_matrices_command
-from ffr_prep.cli.options import PATH, bundle, check_points, check_writable, gone, material_of, number_of, numbers_of
+from ffr_prep.cli.options import (
+    TIME_LIMIT,
+    bundle,
+    check_points,
+    gone,
+    material_of,
+    number_of,
+    numbers_of,
+    tell_of_programs,
+)
 from ffr_prep.cli.reduction import NOTES as REDUCTION_NOTES
-from ffr_prep.cli.request import REQUEST, reduce_to_file, request_of
+from ffr_prep.cli.request import REQUEST, WORDS, reduce_to_file, request_of
 from ffr_prep.cli.settings import EntriesCommand, NotesCommand
 from ffr_prep.cli.structure import reduce_structure_command
 from ffr_prep.cli.terminal import filed, show, terminal_steps
-from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, check_folder, reserve, run_command
+from ffr_prep.common.errors import InputError
 from ffr_prep.common.registry import load_plugin
 from ffr_prep.mesh.formats import MESH_FORMATS
 from ffr_prep.reduction.registry import REDUCTIONS
@@ -63,16 +72,24 @@ Materials: a name (steel, aluminium, titanium, ...), or E=7e10,nu=0.3,rho=5540 i
 Orthotropic ones by E1,E2,E3,nu12,nu13,nu23,G12,G13,G23,rho in the axes of the mesh, or by a file ply.toml with the same
   keys, or `elasticity` (6 x 6, components xx, yy, zz, xy, xz, yz) and `rho`, and `axes` where the material is turned.
 """
-_PATH = click.Path(path_type=Path)
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 120}
 
 
-@click.group(epilog=EXAMPLE, invoke_without_command=True, context_settings=CONTEXT)
+class Remembering(click.Group):
+    """Commands whose words are kept with what they make (`ffr_prep.cli.request.retold`)."""
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        """As always."""
+        ctx.meta[WORDS] = list(args)
+        return super().resolve_command(ctx, args)
+
+
+@click.group(cls=Remembering, epilog=EXAMPLE, invoke_without_command=True, context_settings=CONTEXT)
 @click.version_option(package_name="ffr")
 @click.option(
     "--plugin",
     "plugins",
-    type=_PATH,
+    type=INPUT_FILE,
     multiple=True,
     metavar="FILE.py",
     help="Run this Python first: it may register reductions and file formats; may be repeated.",
@@ -93,7 +110,7 @@ def cli(context: click.Context, plugins: tuple[Path, ...]) -> None:
 # ---- options that describe a mesh ---------------------------------------------------------------------------------
 
 _MESH = bundle(
-    click.argument("mesh", type=PATH),
+    click.argument("mesh", type=INPUT_FILE),
     click.option(
         "--unit",
         type=click.Choice(["m", "cm", "mm", "in"]),
@@ -108,6 +125,7 @@ _MESH = bundle(
         show_default=True,
         help="Of the elements, when geometry is meshed.",
     ),
+    TIME_LIMIT,
 )
 
 
@@ -122,6 +140,7 @@ def mesh(mesh: Path, **options: Any) -> None:
     from ffr_prep.mesh.mesh import check_mesh, read_mesh
     from ffr_prep.report.text import mesh_lines
 
+    tell_of_programs([mesh])
     loaded = read_mesh(mesh, **_mesh_settings(options))
     show(mesh_lines(loaded))
     check_mesh(loaded)
@@ -132,6 +151,11 @@ def mesh(mesh: Path, **options: Any) -> None:
 @click.option("--material", "materials", multiple=True, required=True, metavar="MATERIAL", help="See below.")
 @REQUEST
 @click.option("--linear", is_flag=True, help="Leave out the load matrices: linear elasticity, for what barely bends.")
+@click.option(
+    "--drawn-modes",
+    type=click.IntRange(min=1),
+    help="Lowest modes that foreshorten what is drawn; default: all. m of them cost m (m + 1) / 2 static problems.",
+)
 @gone("--stiffening", "load matrices are computed by default; --linear leaves them out")
 @click.option(
     "--stress", is_flag=True, help="Also keep the stress at the surface, which ffr-dyn stress and animate show."
@@ -148,7 +172,8 @@ def reduce(mesh: Path, materials: tuple[str, ...], **options: Any) -> None:
 
     material, (interfaces, request) = material_of(materials), request_of(options)
     settings = _mesh_settings(options)
-    check_writable(options["output"])
+    reserve("-o", options["output"])
+    tell_of_programs([mesh])
     steps = terminal_steps()
     loaded = read_mesh(mesh, **settings, progress=steps)
     steps.end()
@@ -166,14 +191,14 @@ def reduce(mesh: Path, materials: tuple[str, ...], **options: Any) -> None:
 
 
 @cli.command()
-@click.argument("body", type=PATH)
+@click.argument("body", type=INPUT_FILE)
 @click.option(
     "--terms",
     multiple=True,
     metavar="NAME",
     help="Print this inertia integral in full: I1 ... I9, S_bar, S_bar_xy, N_bar_xy, S_bar_ff, or all; repeat.",
 )
-@click.option("-o", "--output", type=PATH, help="Write the integrals, or those of --terms, to this .npz file.")
+@click.option("-o", "--output", type=OUTPUT_FILE, help="Write the integrals, or those of --terms, to this .npz file.")
 def info(body: Path, terms: tuple[str, ...], output: Path | None) -> None:
     """What BODY is: mass, inertia, interfaces, frequencies, inertia integrals, what it can represent, how it was made.
 
@@ -186,7 +211,7 @@ def info(body: Path, terms: tuple[str, ...], output: Path | None) -> None:
 
     chosen(terms)
     if output is not None:
-        check_writable(output)
+        reserve("-o", output)
     source, lines = _described(body)
     show(term_lines(source, terms) if terms else lines)
     if output is not None:
@@ -212,8 +237,8 @@ def _described(path: Path) -> tuple[Source, Iterable[str]]:
 
 
 @cli.command()
-@click.argument("body", type=PATH)
-@click.option("-o", "--output", type=PATH, required=True, help="Folder for the pictures.")
+@click.argument("body", type=INPUT_FILE)
+@click.option("-o", "--output", type=OUTPUT_FILE, required=True, help="Folder for the pictures.")
 @click.option("--modes", "chosen", default="1-6", show_default=True, help="Numbers and ranges, such as 1-4,7; or all.")
 @click.option(
     "--scale", default="auto", show_default=True, help="Factor on the mode shapes: a number [m sqrt(kg)], or auto."
@@ -226,8 +251,7 @@ def modes(body: Path, output: Path, chosen: str, scale: str) -> None:
     from ffr_prep.body import load_body
     from ffr_prep.report.mode_pictures import mode_pictures
 
-    if output.exists() and not output.is_dir():
-        raise InputError(f"--output {output} is a file; name a folder for the pictures")
+    check_folder("-o", output)
     loaded = load_body(body)
     numbers = _mode_numbers(chosen, loaded.n)
     factor = "auto" if scale == "auto" else number_of("--scale", scale)
@@ -262,24 +286,5 @@ def _mode_numbers(text: str, count: int) -> list[int]:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Entry point: exit code 2 for bad input, 1 for a failed computation, no traceback for either."""
-    try:
-        cli.main(arguments, prog_name="ffr-prep", standalone_mode=False)
-    except InputError as error:
-        _leave(str(error), 2)
-    except ComputationError as error:
-        _leave(str(error), 1)
-    except click.UsageError as error:
-        where = error.ctx.command_path if error.ctx else "ffr-prep"
-        _leave(f"{error.format_message()} ({where} --help tells more)", 2)
-    except OSError as error:
-        _leave(f"{error.filename2 or error.filename or 'file'}: {error.strerror or error}; choose another place", 2)
-    except MemoryError:
-        _leave("not enough memory: make the mesh coarser", 1)
-    except (click.Abort, KeyboardInterrupt):
-        _leave("interrupted; nothing was written", 1)
-
-
-def _leave(message: str, code: int) -> None:
-    click.echo(f"ffr-prep: {message}", err=True)
-    sys.exit(code)
+    """Entry point: exit code 2 for bad input, 1 for a failed computation or a signal, no traceback for either."""
+    run_command(cli, "ffr-prep", arguments)

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import click
 
-from ffr_prep.cli.options import PATH, check_writable, gone, reference_of
+from ffr_prep.cli.options import gone, reference_of
 from ffr_prep.cli.request import OUTPUT
 from ffr_prep.cli.terminal import filed, show
+from ffr_prep.common.command import INPUT_FILE, reserve
 
 _EXAMPLE = """\b
 Example:
@@ -18,7 +19,7 @@ Example:
 
 
 @click.command("convert", epilog=_EXAMPLE)
-@click.argument("body", type=PATH)
+@click.argument("body", type=INPUT_FILE)
 @OUTPUT
 @click.option("--reference", required=True, metavar="CONDITIONS", help="As in reduce, on the interfaces of BODY.")
 @gone("--without-stiffening", "it is --linear now")
@@ -33,7 +34,7 @@ def convert(body: Path, output: Path, reference: str, linear: bool) -> None:
     from ffr_prep.report.text import short_lines
 
     conditions = reference_of(reference)
-    check_writable(output)
+    reserve("-o", output)
     loaded = load_body(body)
     converted = with_reference(replace(loaded, stiffening=None) if linear else loaded, conditions)
     save_body(converted, output)

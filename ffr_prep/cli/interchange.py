@@ -7,10 +7,10 @@ from typing import Any
 
 import click
 
-from ffr_prep.cli.options import PATH
 from ffr_prep.cli.request import OUTPUT
 from ffr_prep.cli.settings import EntriesCommand, NotesCommand
 from ffr_prep.cli.terminal import filed, show
+from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, reserve
 from ffr_prep.interchange import formats
 
 _EXPORT = """\b
@@ -33,8 +33,10 @@ Example:
 
 
 @click.command("export", cls=EntriesCommand, registries=(formats.EXCHANGE_FORMATS,), epilog=_EXPORT)
-@click.argument("body", type=PATH)
-@click.option("-o", "--output", type=PATH, required=True, help="File to write; its suffix is that of a format below.")
+@click.argument("body", type=INPUT_FILE)
+@click.option(
+    "-o", "--output", type=OUTPUT_FILE, required=True, help="File to write; its suffix is that of a format below."
+)
 @click.option("--surface", is_flag=True, help="Also write the points of the surface as nodes.")
 def export_body(body: Path, output: Path, surface: bool, **settings: Any) -> None:
     """Write BODY in the format of another program, by the suffix of the file.
@@ -44,13 +46,14 @@ def export_body(body: Path, output: Path, surface: bool, **settings: Any) -> Non
     """
     from ffr_prep.body import load_body
 
+    reserve("-o", output)
     for lost in formats.export_body(load_body(body), output, surface, settings):
         click.echo(f"note        {lost}")
     filed(output)
 
 
 @click.command("import", cls=NotesCommand, registries=(formats.EXCHANGE_FORMATS,), epilog=_IMPORT)
-@click.argument("file", type=PATH)
+@click.argument("file", type=INPUT_FILE)
 @OUTPUT
 def import_body(file: Path, output: Path) -> None:
     """Read FILE, of another program and in SI units, and write it as a body file.
@@ -60,6 +63,7 @@ def import_body(file: Path, output: Path) -> None:
     from ffr_prep.body import save_body
     from ffr_prep.report.text import short_lines
 
+    reserve("-o", output)
     body = formats.import_body(file)
     save_body(body, output)
     show(short_lines(body))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -9,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffr_prep.cli.options import PATH, check_writable
+from ffr_prep.cli.options import TIME_LIMIT, tell_of_programs
 from ffr_prep.cli.request import REQUEST, reduce_to_file, request_of
 from ffr_prep.cli.settings import EntriesCommand
 from ffr_prep.cli.terminal import show, terminal_steps
+from ffr_prep.common.command import INPUT_FILE, reserve
 from ffr_prep.common.errors import InputError
 from ffr_prep.matrices.formats import MATRIX_FORMATS
 from ffr_prep.matrices.unit_systems import UNIT_SYSTEMS
@@ -43,13 +45,14 @@ Reference conditions and methods are those of `ffr-prep reduce`. The body is lin
 
 
 @click.command("reduce-matrices", cls=EntriesCommand, registries=(REDUCTIONS, MATRIX_FORMATS), epilog=NOTES)
-@click.argument("files", type=PATH, nargs=-1, required=True)
+@click.argument("files", type=INPUT_FILE, nargs=-1, required=True)
 @click.option(
     "--units", type=click.Choice(list(UNIT_SYSTEMS)), help="Of the numbers in FILES; default: as declared, or m-kg-s."
 )
 @click.option("--group", "groups", multiple=True, metavar="GROUP", help="See below; may be repeated.")
-@click.option("--surface", type=PATH, help="Mesh of the same solid, for drawing; in the length unit of FILES.")
+@click.option("--surface", type=INPUT_FILE, help="Mesh of the same solid, for drawing; in the length unit of FILES.")
 @REQUEST
+@TIME_LIMIT
 def reduce_matrices_command(
     files: tuple[Path, ...], units: str | None, groups: tuple[str, ...], surface: Path | None, **options: Any
 ) -> None:
@@ -61,7 +64,7 @@ def reduce_matrices_command(
     from ffr_prep.matrices.readers import read_matrices
 
     interfaces, request = request_of(options)
-    check_writable(options["output"])
+    reserve("-o", options["output"])
     steps = terminal_steps()
     steps("read the matrices")
     model = _named(read_matrices(files, units=units), groups)
@@ -99,15 +102,25 @@ def _named(model: MatrixModel, groups: Sequence[str]) -> MatrixModel:
 
 
 def _numbers(text: str) -> list[int]:
+    from ffr_prep.common.reading import check_count
+
     ends = [(int(first), int(last or first)) for first, _, last in (part.partition("-") for part in text.split(","))]
+    if wrong := [f"{first}-{last}" for first, last in ends if last < first]:
+        raise InputError(f"--group: the range {wrong[0]} runs backwards; write the smaller number first")
+    check_count(sum(last - first + 1 for first, last in ends), "nodes in a group")
+    if max(last for _, last in ends) >= 1 << 63:
+        raise InputError(f"--group: {max(last for _, last in ends)} is no number of a node")
     return [number for first, last in ends for number in range(first, last + 1)]
 
 
 def _place(text: str, words: Sequence[str]) -> list[float]:
     try:
-        return [float(word) for word in words]
+        place = [float(word) for word in words]
     except ValueError:
-        raise InputError(f"--group {text}: a point has three coordinates x,y,z in metres") from None
+        place = []
+    if not place or not all(map(math.isfinite, place)):
+        raise InputError(f"--group {text}: a point has three coordinates x,y,z in metres")
+    return place
 
 
 def _drawn(model: MatrixModel, surface: Path) -> MatrixModel:
@@ -118,6 +131,7 @@ def _drawn(model: MatrixModel, surface: Path) -> MatrixModel:
     length = model.source["units"].partition("-")[0]
     if length not in UNITS:
         raise InputError(f"--surface {surface}: meshes in {length} cannot be read; they may be in {', '.join(UNITS)}")
+    tell_of_programs([surface])
     mesh = read_mesh(surface, unit=length)
     points, triangles = surface_triangles(mesh)
     return with_surface(model, mesh.points[points], triangles)

@@ -6,16 +6,15 @@ option and what it may be.
 
 from __future__ import annotations
 
-import os
 import re
-import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ffr_prep.common.errors import InputError
+from ffr_prep.mesh.time_limit import USUAL, mesher_time_limit
 
 if TYPE_CHECKING:
     from ffr_prep.mesh.mesh import Mesh
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
     from ffr_prep.model.material import Solid
     from ffr_prep.model.reference import ReferenceConditions
 
-PATH = click.Path(path_type=Path)
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 _FAR = 10.0
@@ -38,6 +36,24 @@ def bundle(*options: Decorator) -> Decorator:
         return command
 
     return added
+
+
+TIME_LIMIT = click.option(
+    "--mesher-timeout",
+    type=float,
+    default=USUAL,
+    show_default=True,
+    expose_value=False,
+    callback=lambda context, _, seconds: context.with_resource(mesher_time_limit(seconds)),
+    help="Longest time that meshing a geometry may take [s].",
+)
+
+
+def tell_of_programs(paths: Iterable[Path]) -> None:
+    """Scripts of gmsh are programs; that one is run is said."""
+    for path in paths:
+        if path.suffix.lower() == ".geo":
+            click.echo(f"program     {path}, which gmsh runs: open only what you trust")
 
 
 def gone(option: str, remedy: str) -> Decorator:
@@ -121,17 +137,16 @@ def reference_of(text: str) -> ReferenceConditions:
 
 def _supports(path: Path) -> ReferenceConditions:
     """Prevented motions from a file: tables [[support]] with interface, motion and direction."""
+    from ffr_prep.common.reading import read_toml
     from ffr_prep.model.reference import Support, Supports
 
     try:
-        content = tomllib.loads(path.read_text())
+        content = read_toml(path, "reference conditions")
         entries = content.pop("support")
         supports = tuple(Support(e.pop("interface"), e.pop("motion"), tuple(e.pop("direction"))) for e in entries)
-    except FileNotFoundError:
-        raise InputError(f"reference conditions {path} do not exist") from None
     except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    except (tomllib.TOMLDecodeError, KeyError, TypeError, AttributeError, UnicodeDecodeError) as error:
+        raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise InputError(f"{path} is not a list of supports ({error!r}); `ffr-prep reduce --help` shows one") from None
     unknown = [*content, *(key for entry in entries for key in entry)]
     if unknown:
@@ -149,12 +164,3 @@ def check_points(interfaces: Sequence[InterfaceRegion], mesh: Mesh) -> None:
                 f"interface {interface.name!r}: its point {interface.point} is far from the body, which lies between "
                 f"({', '.join(f'{x:.4g}' for x in low)}) and ({', '.join(f'{x:.4g}' for x in high)}) m; give it in metres"
             )
-
-
-def check_writable(output: Path) -> None:
-    """Before the work, not after it."""
-    if output.is_dir():
-        raise InputError(f"--output {output} is a folder; name the body file to write, such as {output / 'rod.ffr'}")
-    output.parent.mkdir(parents=True, exist_ok=True)
-    if not os.access(output.parent, os.W_OK):
-        raise InputError(f"--output {output}: the folder {output.parent} cannot be written to")

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffr_prep.cli.options import PATH, bundle
+from ffr_prep.cli.options import bundle
 from ffr_prep.cli.settings import numbers
+from ffr_prep.common.command import OUTPUT_FILE
 from ffr_prep.common.errors import InputError
 from ffr_prep.reduction.registry import MODES, REDUCTIONS
 from ffr_prep.reduction.registry import reduction_of as reduction_made
@@ -44,7 +45,7 @@ reduction_options = bundle(
         metavar="LOW,HIGH,ERROR",
         help="Keep as many as the receptances in a band [Hz] need.",
     ),
-    click.option("--quality", type=PATH, help="Compare with the full model; folder for the pictures of it."),
+    click.option("--quality", type=OUTPUT_FILE, help="Compare with the full model; folder for the pictures of it."),
     click.option(
         "--band",
         callback=numbers(2),

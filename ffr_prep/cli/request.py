@@ -6,14 +6,16 @@ Heavy modules are imported where they are needed, so that help is immediate.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffr_prep.cli.options import PATH, bundle, interface_of, reference_of
+from ffr_prep.cli.options import bundle, interface_of, reference_of
 from ffr_prep.cli.reduction import band_of, draw_quality, reduction_of, reduction_options
 from ffr_prep.cli.terminal import Steps, filed, show
+from ffr_prep.common.command import OUTPUT_FILE
 from ffr_prep.common.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     from ffr_prep.pipelines.reduce import Request
     from ffr_prep.solvers.factor import Solver
 
-OUTPUT = click.option("-o", "--output", type=PATH, required=True, help="Body file to write.")
+OUTPUT = click.option("-o", "--output", type=OUTPUT_FILE, required=True, help="Body file to write.")
 SOLVER = bundle(
     click.option(
         "--solver",
@@ -33,6 +35,7 @@ SOLVER = bundle(
     ),
     click.option("--ranks", type=int, default=1, show_default=True, help="MPI processes of the solver slepc."),
 )
+WORDS = "ffr_prep.words"  # of the command that runs, in its context
 PARTS = (
     "Also cut the body into N parts along its long axis, or at distances X1,X2,... [m] from its end: for large "
     "deflections; a scene then moves the parts."
@@ -46,15 +49,28 @@ def _parts(_: click.Context, option: click.Parameter, text: str | None) -> int |
         raise InputError(f"--parts {text}: write a number of parts, or distances [m] such as 0.1,0.25") from None
 
 
+CUTS = click.option("--parts", callback=_parts, metavar="N or X1,X2,...", help=PARTS)
 REQUEST = bundle(
     OUTPUT,
     click.option("--name", help="Name of the body; default: the name of the file."),
     click.option("--interface", "interfaces", multiple=True, metavar="INTERFACE", help="See below; may be repeated."),
     click.option("--reference", default="mean-axis", show_default=True, metavar="CONDITIONS", help="See below."),
     reduction_options,
-    click.option("--parts", callback=_parts, metavar="N or X1,X2,...", help=PARTS),
+    CUTS,
     SOLVER,
 )
+
+
+def retold() -> list[str]:
+    """The words of the command that runs, but for the file that it writes and for parts, which may be other ones then."""
+    context = click.get_current_context(silent=True)
+    words, kept = iter([] if context is None else context.meta.get(WORDS, [])), []
+    for word in words:
+        if word in ("-o", "--output", "--parts"):
+            next(words, None)
+        elif not word.startswith(("-o", "--output=", "--parts=")):
+            kept.append(word)
+    return kept
 
 
 def solver_of(options: Mapping[str, Any]) -> Solver:
@@ -65,8 +81,8 @@ def solver_of(options: Mapping[str, Any]) -> Solver:
 
 
 def request_of(options: Mapping[str, Any]) -> tuple[Sequence[InterfaceRegion], Request]:
-    """The interfaces and the request of the options REQUEST, and of --linear and --stress where a command has them;
-    InputError for options that cannot be used.
+    """The interfaces and the request of the options REQUEST, and of --linear, --drawn-modes and --stress where a command has
+    them; InputError for options that cannot be used.
     """
     from ffr_prep.pipelines.reduce import Request
 
@@ -78,6 +94,7 @@ def request_of(options: Mapping[str, Any]) -> tuple[Sequence[InterfaceRegion], R
         parts=options["parts"],
         solver=solver_of(options),
         linear=options.get("linear", False),
+        drawn_modes=options.get("drawn_modes"),
         stress=options.get("stress", False),
     )
 
@@ -93,6 +110,7 @@ def reduce_to_file(
     from ffr_prep.pipelines.reduce import reduce
     from ffr_prep.report.text import short_lines
 
+    request = replace(request, provenance={**request.provenance, "command": retold()})
     body = reduce(model(), request, progress=steps, advance=steps.advance)
     steps("write the body file")
     save_body(body, output)

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffr_prep.cli.options import PATH, check_writable
-from ffr_prep.cli.request import OUTPUT, SOLVER, reduce_to_file, solver_of
+from ffr_prep.cli.options import TIME_LIMIT, tell_of_programs
+from ffr_prep.cli.request import CUTS, OUTPUT, SOLVER, reduce_to_file, solver_of
 from ffr_prep.cli.terminal import show, terminal_steps
+from ffr_prep.common.command import INPUT_FILE, reserve
 
 if TYPE_CHECKING:
     from ffr_prep.structures.frame import Frame
@@ -48,20 +49,24 @@ Solids tied to the frame, and other reductions:
 
 
 @click.command("reduce-structure", epilog=NOTES)
-@click.argument("structure", type=PATH)
+@click.argument("structure", type=INPUT_FILE)
 @OUTPUT
+@CUTS
 @SOLVER
+@TIME_LIMIT
 def reduce_structure_command(structure: Path, output: Path, **options: Any) -> None:
     """Reduce the beams and plates that STRUCTURE describes, a TOML file, to a flexible body and write it to a file."""
-    from ffr_prep.pipelines.structure_file import read_structure
+    from ffr_prep.pipelines.structure_file import geometry_files, read_structure
 
     solver = solver_of(options)
-    check_writable(output)
+    reserve("-o", output)
+    tell_of_programs(geometry_files(structure))
     steps = terminal_steps()
     loaded = read_structure(structure, steps)
     steps.end()
     show(frame_lines(loaded.frame))
-    request = replace(loaded.request, solver=solver, provenance={"source": {"file": structure.name}})
+    cuts = loaded.request.parts if options["parts"] is None else options["parts"]
+    request = replace(loaded.request, parts=cuts, solver=solver, provenance={"source": {"file": structure.name}})
     reduce_to_file(lambda: loaded.model(steps), request, output, steps)
 
 

@@ -6,7 +6,6 @@ mass-orthonormal coordinates with a diagonal stiffness; `body_from` changes from
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -20,6 +19,8 @@ import scipy.optimize
 from ffr_prep.body import BodyError, FlexibleBody, Interface, with_point
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.outputs import replacing
+from ffr_prep.common.reading import reading
 from ffr_prep.model.invariants import skew
 
 IDENTITY_TOLERANCE = 1e-6
@@ -265,23 +266,14 @@ def nodal_masses(rows: Array, target: Array) -> tuple[Array, float]:
 
 def read_lines(path: Path) -> list[str]:
     """The lines of a text file. Raises InputError for a file that does not exist or cannot be read."""
-    try:
+    with reading(path, "a text file"):
         return path.read_text(encoding="latin-1").splitlines()
-    except FileNotFoundError:
-        raise InputError(f"{path} does not exist") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror})") from None
 
 
 def write_lines(path: Path, lines: Sequence[str]) -> Path:
     """Write the file whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + ".part")
-    try:
-        temporary.write_text("\n".join([*lines, ""]), encoding="ascii")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with replacing(path) as part:
+        part.write_text("\n".join([*lines, ""]), encoding="ascii")
     return path
 
 

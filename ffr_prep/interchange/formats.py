@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.reading import reading
 from ffr_prep.common.registry import Registry, Setting, Target, arguments, loaded
 
 if TYPE_CHECKING:
@@ -98,7 +99,8 @@ def import_body(path: Path) -> FlexibleBody:
     entry = _format_of(path)
     if entry.read is None:
         raise InputError(f"{path}: {entry.name} can be written only")
-    body: FlexibleBody = loaded(entry.read)(path)
+    with reading(path, f"a file of {entry.name}"):
+        body: FlexibleBody = loaded(entry.read)(path)
     return body
 
 

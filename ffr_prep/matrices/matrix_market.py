@@ -14,13 +14,14 @@ from __future__ import annotations
 import csv
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
-import scipy.io
 import scipy.sparse as sp
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.reading import check_count, read_text
 from ffr_prep.matrices.model import MatrixModel
 from ffr_prep.matrices.node_table import NodeTable, model_of
 from ffr_prep.matrices.npz import arrays_of, sparse_of
@@ -34,7 +35,7 @@ def from_matrix_market(stiffness: Path, mass: Path, rows: Path) -> MatrixModel:
 
 def read_rows(path: Path) -> tuple[NodeTable, Array]:
     """The nodes, and number and component (D, 2) of each row."""
-    lines = list(csv.reader(path.read_text(encoding="utf-8-sig", errors="replace").splitlines()))
+    lines = list(csv.reader(read_text(path, "a table of rows").splitlines()))
     first = 1 if lines and lines[0] and not _is_integer(lines[0][0]) else 0
     points: dict[int, list[float]] = {}
     groups: dict[str, dict[int, None]] = {}
@@ -76,6 +77,44 @@ def _matrix(path: Path) -> sp.csr_array:
     if path.suffix.lower() == ".npz":
         return sparse_of(str(path), arrays_of(path))
     try:
-        return sp.csr_array(scipy.io.mmread(path))
-    except Exception as error:  # the reader raises whatever its parser meets
-        raise InputError(f"{path} is not a Matrix Market file ({error})") from None
+        with open(path, encoding="latin-1") as stream:
+            return _read(stream)
+    except (ValueError, IndexError) as error:
+        raise InputError(f"{path} is not a Matrix Market file of real numbers ({error})") from None
+
+
+def _read(stream: TextIO) -> sp.csr_array:
+    """The matrix of a file, whose indices are held against its size: SciPy's own reader does not bear wrong ones."""
+    words = stream.readline().lower().split()
+    if words[:2] != ["%%matrixmarket", "matrix"] or words[3] not in ("real", "double", "integer"):
+        raise ValueError("its first line is not '%%MatrixMarket matrix coordinate real ...'")
+    if words[4] not in ("general", "symmetric"):
+        raise ValueError(f"it is {words[4]}; general and symmetric matrices are read")
+    size = next(line for line in stream if line.strip() and not line.startswith("%"))
+    rows, columns, *entries = (int(word) for word in size.split())
+    if min(rows, columns) < 1 or rows != columns:
+        raise ValueError(f"it is {rows} x {columns}; the matrices of a body are square")
+    numbers = np.loadtxt(stream, ndmin=2, comments="%")
+    return (_coordinate if words[2] == "coordinate" else _dense)(numbers, rows, entries, words[4] == "symmetric")
+
+
+def _coordinate(numbers: Array, size: int, entries: list[int], symmetric: bool) -> sp.csr_array:
+    if numbers.shape != (*entries, 3):
+        raise ValueError(f"it has {numbers.shape} numbers where it announces {entries} entries")
+    places = numbers[:, :2].astype(np.int64) - 1
+    if not ((places >= 0) & (places < size) & (places + 1 == numbers[:, :2])).all():
+        raise ValueError(f"an entry stands outside the {size} x {size} matrix")
+    check_count(size, "rows of a matrix")
+    A = sp.csr_array(sp.coo_array((numbers[:, 2], (places[:, 0], places[:, 1])), shape=(size, size)))
+    return sp.csr_array(A + sp.triu(A.T, 1) + sp.tril(A.T, -1)) if symmetric else A
+
+
+def _dense(numbers: Array, size: int, entries: list[int], symmetric: bool) -> sp.csr_array:
+    """By columns; of a symmetric one the lower triangle."""
+    if entries or numbers.size != (size * (size + 1) // 2 if symmetric else size * size):
+        raise ValueError(f"{numbers.size} numbers do not fill a {size} x {size} matrix")
+    if not symmetric:
+        return sp.csr_array(numbers.reshape(size, size).T)
+    A = np.zeros((size, size))
+    A[np.triu_indices(size)] = numbers.ravel()
+    return sp.csr_array(A + np.triu(A, 1).T)

@@ -19,6 +19,7 @@ from ffr_prep.common.registry import choice
 from ffr_prep.matrices.nodal_inertia import DofMap
 from ffr_prep.matrices.unit_systems import UnitSystem
 
+_FAR = 1e100  # m; squares of coordinates must be finite
 _SAME_PLACE = 1e-6
 _SHOWN = 5
 _COMPONENTS = (
@@ -183,6 +184,8 @@ def with_group(model: MatrixModel, name: str, labels: Sequence[int]) -> MatrixMo
 
 def with_node(model: MatrixModel, name: str, position: Sequence[float]) -> MatrixModel:
     """The model with a name for the node at this position (3,) [m]; InputError where there is none."""
+    if not np.abs(np.asarray(position, float)).max() < _FAR:
+        raise InputError(f"group {name!r}: a node cannot be at {tuple(position)} m; give a place of finite coordinates")
     distance, node = cKDTree(model.points).query(np.asarray(position, float))
     if not distance <= _SAME_PLACE * np.linalg.norm(np.ptp(model.points, axis=0)):
         raise InputError(

@@ -22,6 +22,7 @@ import scipy.sparse as sp
 from ffr_prep.body import save_arrays
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.stored_arrays import read_arrays
 from ffr_prep.matrices.model import MatrixModel
 from ffr_prep.matrices.node_table import NodeTable, model_of
 
@@ -73,8 +74,8 @@ def arrays_of(path: Path) -> dict[str, Array]:
     if not zipfile.is_zipfile(path):
         raise InputError(f"{path} is damaged or not a .npz file; {_ADVICE}")
     try:
-        with np.load(path, allow_pickle=False) as stored:
-            return {key: stored[key] for key in stored.files}
+        with open(path, "rb") as stream:
+            return read_arrays(stream)
     except Exception as error:  # a damaged zip or array header can fail in any way the readers know
         raise InputError(f"{path} is damaged or not a .npz file ({error}); {_ADVICE}") from None
 

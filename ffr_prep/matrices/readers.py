@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.reading import reading
 from ffr_prep.common.registry import loaded
 from ffr_prep.matrices.formats import format_of
 from ffr_prep.matrices.model import MatrixModel, in_si
@@ -21,12 +23,12 @@ def read_matrices(files: Sequence[str | Path], *, units: str | None = None) -> M
     Raises InputError for files that cannot be used or do not fit each other.
     """
     paths = [Path(file) for file in files]
-    for path in paths:
-        if not path.is_file():
-            raise InputError(f"matrix file {path} does not exist")
     if units is not None and units not in UNIT_SYSTEMS:
         raise InputError(f"units {units!r} are not known; they are {', '.join(UNIT_SYSTEMS)}")
-    model: MatrixModel = loaded(format_of(paths).read)(*paths)
+    with ExitStack() as doors:
+        for path in paths:
+            doors.enter_context(reading(path, "a matrix file"))
+        model: MatrixModel = loaded(format_of(paths).read)(*paths)
     declared = units or model.source.get("units") or "m-kg-s"
     if declared not in UNIT_SYSTEMS:
         raise InputError(f"{paths[0]} declares the units {declared!r}; they must be one of {', '.join(UNIT_SYSTEMS)}")

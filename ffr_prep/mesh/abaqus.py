@@ -19,6 +19,7 @@ import numpy as np
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.reading import check_count, read_text
 from ffr_prep.mesh.file_mesh import FileMesh, supported_kind
 
 Row = list[str]
@@ -92,23 +93,24 @@ def _deck(path: Path, readers: Mapping[str, Callable[[_Deck, Mapping[str, str], 
 # ---- reading ------------------------------------------------------------------------------------------------------
 
 
-def _sections(path: Path) -> Iterator[tuple[str, dict[str, str], list[Row]]]:
+def _sections(path: Path, above: tuple[Path, ...] = ()) -> Iterator[tuple[str, dict[str, str], list[Row]]]:
     """Keyword, parameters (in upper case, values as written) and data rows, through included files."""
+    if path.resolve() in above:
+        raise InputError(f"it includes itself: {' -> '.join(one.name for one in (*above, path))}")
     for block in re.split(r"^\*(?!\*)", _without_comments(path), flags=re.MULTILINE)[1:]:
         header, _, data = re.sub(r",[ \t]*\n[ \t]*(?=[A-Za-z ]+=)", ",", block, count=1).partition("\n")
         keyword, *settings = (word.strip() for word in header.split(","))
         pairs = (setting.partition("=") for setting in settings)
         parameters = {name.strip().upper(): value.strip().strip('"') for name, _, value in pairs}
         if keyword.upper() == "INCLUDE":
-            yield from _sections(path.parent / parameters["INPUT"])
+            yield from _sections(path.parent / parameters["INPUT"], (*above, path.resolve()))
         else:
             yield keyword.upper(), parameters, [_row(line) for line in data.splitlines() if line.strip()]
 
 
 def _without_comments(path: Path) -> str:
-    if not path.is_file():
-        raise InputError(f"the included file {path} does not exist")
-    return "\n".join(line for line in path.read_text().splitlines() if not line.startswith("**"))
+    text = read_text(path, "an Abaqus input file")
+    return "\n".join(line for line in text.splitlines() if not line.startswith("**"))
 
 
 def _row(line: str) -> Row:
@@ -191,6 +193,7 @@ def _members(parameters: Mapping[str, str], rows: list[Row]) -> list[str]:
     if "GENERATE" not in parameters:
         return [word for row in rows for word in row]
     ranges = [(int(first), int(last), int(step[0]) if step else 1) for first, last, *step in rows]
+    check_count(sum(len(range(first, last + 1, step)) for first, last, step in ranges), "members of a set")
     return [str(number) for first, last, step in ranges for number in range(first, last + 1, step)]
 
 

@@ -14,22 +14,36 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.children import finished
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.registry import choice
 from ffr_prep.mesh import gmsh_process
 from ffr_prep.mesh.cells import node_order
 from ffr_prep.mesh.file_mesh import FileMesh, supported_kind
+from ffr_prep.mesh.time_limit import limit
 
 CAD_UNITS = {"m": "M", "cm": "CM", "mm": "MM", "in": "INCH"}
 
 _MESHES = (".msh", ".med", ".unv")
 _IGES = (".iges", ".igs")
+_SCRIPT = ".geo"
+_IGES_LINE = rb"[^\n]{72}[SC]"
+_SIGNATURES = {  # how files of data begin
+    ".msh": rb"\$(MeshFormat|Comments|NOD)\b",
+    ".med": rb"\x89HDF\r\n\x1a\n",
+    ".unv": rb"\s*-1\s*\n",
+    ".step": rb"\s*ISO-10303-21",
+    ".stp": rb"\s*ISO-10303-21",
+    ".iges": _IGES_LINE,
+    ".igs": _IGES_LINE,
+    ".brep": rb"\s*(DBRep_DrawableShape|CASCADE Topology)",
+}
 _WITH_UNIT = (".step", ".stp", *_IGES)
-_TIMEOUT = 3600.0
 _LIBRARIES = "libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1"
 
 
@@ -88,35 +102,61 @@ def _arrays(
     path: Path, *, dimension: int, unit: str | None, size: float | None, numbers: Mapping[str, float], order: int
 ) -> tuple[dict[str, Array], str | None]:
     """The arrays that the process writes, and the unit of their numbers, where it is known."""
+    suffix = path.suffix.lower()
+    _check_content(path)
     _check_geometry(path, unit, numbers)
-    declared = declared_unit(path) if path.suffix.lower() in _WITH_UNIT else None
-    job = {
-        "path": str(path.resolve()),
+    declared = declared_unit(path) if suffix in _WITH_UNIT else None
+    job: dict[str, Any] = {
         "dimension": dimension,
-        "generate": path.suffix.lower() not in _MESHES,
-        "unit": CAD_UNITS[declared or "m"],
+        "generate": suffix not in _MESHES,
+        "unit": CAD_UNITS[declared or unit or "m"],  # what a script merges comes in the unit of its own numbers
         "size": size,
         "numbers": dict(numbers),
         "order": order,
     }
     with tempfile.TemporaryDirectory(prefix="ffr-gmsh-") as folder:
         job_file, result = Path(folder, "job.json"), Path(folder, "result.npz")
-        job_file.write_text(json.dumps(job))
+        job_file.write_text(json.dumps(job | {"path": str(_alone(path, Path(folder)))}))
         _run_gmsh(path, job_file, result)
         with np.load(result) as stored:
             return dict(stored), unit or declared
+
+
+def _alone(path: Path, folder: Path) -> Path:
+    """Where gmsh finds a file that holds data: it would run options that stand beside it, and unknown endings as scripts."""
+    suffix = path.suffix.lower()
+    if suffix == _SCRIPT:
+        return path.resolve()
+    data = folder / f"{path.stem}{suffix}"
+    data.symlink_to(path.resolve())
+    return data
+
+
+def _check_content(path: Path) -> None:
+    """InputError for what is not what its ending says: gmsh runs content that it does not know as a script."""
+    suffix = path.suffix.lower()
+    if suffix != _SCRIPT and suffix not in _SIGNATURES:
+        raise InputError(f"{path}: gmsh is asked for {', '.join([_SCRIPT, *_SIGNATURES])} only; does its ending fit?")
+    with open(path, "rb") as stream:
+        start = stream.read(4096)
+    if suffix != _SCRIPT and not re.match(_SIGNATURES[suffix], start):
+        raise InputError(f"{path} is not what its ending says: a {suffix} file begins in another way; is it complete?")
 
 
 def _check_geometry(path: Path, unit: str | None, numbers: Mapping[str, float]) -> None:
     suffix = path.suffix.lower()
     if suffix in _IGES and unit not in (None, "mm"):
         raise InputError(f"{path} declares its unit and is converted to millimetres; leave out the unit {unit!r}")
-    if suffix == ".geo":
+    if suffix == _SCRIPT:
         if path.read_bytes().rpartition(b"\n")[2].strip():
             raise InputError(
                 f"the last line of {path} does not end with a line break, so gmsh would ignore it: add one"
             )
         _check_parameters(path, numbers)
+        if unit != "mm" and re.search(r"\.(iges|igs)[\"']", path.read_text(errors="replace"), re.IGNORECASE):
+            raise InputError(
+                f"{path} names an IGES file, which comes in millimetres: give the unit mm, in which all its lengths are then"
+            )
 
 
 def _check_parameters(path: Path, numbers: Mapping[str, float]) -> None:
@@ -135,24 +175,19 @@ def _run_gmsh(path: Path, job_file: Path, result: Path) -> None:
     # By its path, so that it also runs where the package is not installed; -P keeps its folder off sys.path.
     command = [sys.executable, "-P", gmsh_process.__file__, str(job_file), str(result)]
     try:
-        done = subprocess.run(
-            command,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=_TIMEOUT,
-            check=False,
-        )
+        done = finished(command, limit())
     except subprocess.TimeoutExpired:
         raise ComputationError(
-            f"gmsh did not finish {path} within {_TIMEOUT:g} s: choose a larger element size, or simplify the geometry"
+            f"gmsh did not finish {path} within {limit():g} s: choose a larger element size, simplify the geometry, or give "
+            "it more time (--mesher-timeout)"
         ) from None
-    said = _last_words(done.stdout + done.stderr)
+    said = _last_words(done.stdout + done.stderr).replace(str(job_file.parent), str(path.parent))
     if done.returncode == gmsh_process.UNLOADABLE:
         raise ComputationError(f"gmsh cannot be loaded ({said}); on Debian: apt-get install {_LIBRARIES}")
     if done.returncode == gmsh_process.UNREADABLE:
         raise InputError(f"gmsh cannot read {path}: {said}; is it complete, and does its ending name its format?")
+    if done.returncode == gmsh_process.TOO_FINE:
+        raise InputError(f"{path}: {said}")
     if done.returncode == gmsh_process.UNMESHED:
         raise ComputationError(f"gmsh could not mesh {path}: {said}; try another element size, or repair the geometry")
     if done.returncode:

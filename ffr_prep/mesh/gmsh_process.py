@@ -3,7 +3,8 @@
 Run as  python gmsh_process.py JOB.json RESULT.npz.  Gmsh is a large native library that may crash or exit; here that
 ends only this process. It runs on one thread, so the same file gives the same mesh bit for bit.
 
-Exit codes: 0 done, 2 the file cannot be read, 3 gmsh cannot be loaded, 4 meshing failed. Messages are on stderr.
+Exit codes: 0 done, 2 the file cannot be read, 3 gmsh cannot be loaded, 4 meshing failed, 5 the size of the elements makes
+more than could be used. Messages are on stderr.
 
 Source: C. Geuzaine, J.-F. Remacle, Int. J. Numer. Meth. Engng 79 (2009) 1309-1331; gmsh reference manual.
 """
@@ -18,11 +19,13 @@ from typing import Any
 
 import numpy as np
 
-UNREADABLE, UNLOADABLE, UNMESHED = 2, 3, 4
+UNREADABLE, UNLOADABLE, UNMESHED, TOO_FINE = 2, 3, 4, 5
 
 _HXT = 10
 _ELEMENTS_PER_TURN = 12
 _DIGITS = 12
+_TETRAHEDRA_PER_CUBE = 8.5  # regular ones, of an edge like that of the cube
+_MOST_ELEMENTS, _MOST_ALONG = 5e7, 2e4
 _IGES = (".iges", ".igs")
 _CAD = (".step", ".stp", ".brep", *_IGES)
 
@@ -41,6 +44,8 @@ def main() -> int:
     except Exception as error:  # gmsh raises nothing more specific
         return _failed(error, UNREADABLE)
     try:
+        if job["generate"] and (many := _too_many(gmsh, job)):
+            return _failed(many, TOO_FINE)
         if job["generate"]:
             _generate(gmsh, job)
         arrays, names = {1: _lines, 2: _surfaces, 3: _result}[job["dimension"]](gmsh)
@@ -54,7 +59,7 @@ def main() -> int:
     return 0
 
 
-def _failed(error: BaseException, code: int) -> int:
+def _failed(error: BaseException | str, code: int) -> int:
     print(error, file=sys.stderr)
     return code
 
@@ -75,6 +80,25 @@ def _open(gmsh: Any, job: dict[str, Any]) -> None:
     if job["path"].lower().endswith(_CAD):
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _ELEMENTS_PER_TURN)
     gmsh.open(job["path"])
+    if not gmsh.model.getEntities():
+        raise ValueError("nothing in it is a geometry or a mesh")
+
+
+def _too_many(gmsh: Any, job: dict[str, Any]) -> str:
+    """Why a size cannot be meant, if it makes so many elements that no mesh would come of it; empty if it can."""
+    if job["size"] is None or not gmsh.model.getEntities(job["dimension"]):
+        return ""
+    low, high = np.split(np.array(gmsh.model.getBoundingBox(-1, -1)), 2)
+    extent = max(high - low)
+    solids = [tag for _, tag in gmsh.model.occ.getEntities(3)] if job["dimension"] == 3 else []
+    filled = sum(gmsh.model.occ.getMass(3, tag) for tag in solids)  # of what OpenCASCADE does not know nothing
+    elements = _TETRAHEDRA_PER_CUBE * filled / job["size"] ** 3
+    if elements < _MOST_ELEMENTS and extent / job["size"] < _MOST_ALONG:
+        return ""
+    return (
+        f"elements of size {job['size']:g} would be far too many for a geometry of extent {extent:.5g}; "
+        "both are in the unit of the file"
+    )
 
 
 def _generate(gmsh: Any, job: dict[str, Any]) -> None:

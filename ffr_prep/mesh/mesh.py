@@ -18,6 +18,7 @@ from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.common.progress import Stages, no_stages
+from ffr_prep.common.reading import check_ordinary, reading
 from ffr_prep.common.registry import choice, loaded
 from ffr_prep.mesh.boundary import joined_by_faces, joined_by_nodes, outer_faces, whole_faces
 from ffr_prep.mesh.cells import FACE_TRIANGLES, KINDS
@@ -31,6 +32,7 @@ _DEGENERATE = 1e-10
 _COINCIDENT = 1e-9
 _DOUBTFUL_LENGTH = 20.0
 _SHOWN_PARTS = 5
+_FAR = 1e30  # products of coordinates must be finite
 
 
 @dataclass(frozen=True, repr=False)
@@ -106,11 +108,13 @@ def read_mesh(
     progress("read the mesh")
     entry = format_of(path)
     of_geometry = {"unit": unit, "size": size, "numbers": numbers, "order": order} if entry.geometry else {}
-    read: FileMesh = loaded(entry.read)(path, **of_geometry)
-    if not read.blocks:
-        raise InputError(f"{path} has no volume elements; only solids can be reduced, not surfaces or beams")
-    known = unit or read.unit
-    mesh = _in_metres(read, UNITS[known or "m"])
+    with reading(path, "a mesh or a geometry"):
+        read: FileMesh = loaded(entry.read)(path, **of_geometry)
+        if not read.blocks:
+            raise InputError(f"{path} has no volume elements; only solids can be reduced, not surfaces or beams")
+        _check_places(path, read)
+        known = unit or read.unit
+        mesh = _in_metres(read, UNITS[known or "m"])
     return mesh if known else replace(mesh, notes=(*mesh.notes, *_doubtful_unit(mesh)))
 
 
@@ -122,12 +126,21 @@ def check_request(path: Path, unit: str | None, size: float | None, numbers: Map
         raise InputError(f"element size {size} cannot be used; it must be positive")
     if order not in (1, 2):
         raise InputError(f"element order {order} cannot be used; it must be 1 or 2")
-    if not path.is_file():
-        raise InputError(f"mesh file {path} {'is a folder' if path.is_dir() else 'does not exist'}")
+    check_ordinary(path, "a mesh or a geometry")
     if size is not None and not format_of(path).geometry:
         raise InputError(f"{path} is meshed already, so an element size has no effect; leave it out")
     if numbers and not format_of(path).parameters:
         raise InputError(f"{path} has no parameters to set ({', '.join(numbers)}); only .geo scripts have")
+
+
+def _check_places(path: Path, read: FileMesh) -> None:
+    """InputError for nodes that there are not, and for places that are no numbers."""
+    used = [nodes for _, nodes in read.blocks] + [part for parts in read.faces.values() for part in parts]
+    for nodes in (*used, *read.nodes.values()):
+        if nodes.size and not 0 <= nodes.min() <= nodes.max() < len(read.points):
+            raise InputError(f"{path} refers to nodes that it does not define; is it complete?")
+    if not np.abs(read.points).max(initial=0.0) < _FAR:
+        raise InputError(f"{path} has nodes without a place: their coordinates are no finite numbers")
 
 
 def _in_metres(read: FileMesh, scale: float) -> Mesh:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.reading import read_text
 from ffr_prep.mesh.file_mesh import FileMesh, supported_kind
 
 _VOLUMES = {"tetra": "tet4", "tetra10": "tet10", "hexahedron": "hex8", "hexahedron20": "hex20", "hexahedron27": "hex27"}
@@ -54,7 +55,7 @@ def _read(path: Path) -> meshio.Mesh:
 
 def _read_bulk_data(path: Path) -> meshio.Mesh:
     """A Nastran file; the lines around the bulk data that meshio wants are ones that many programs leave out."""
-    text = path.read_text()
+    text = read_text(path, "Nastran bulk data")
     before = "" if re.search(r"^\s*BEGIN\s+BULK", text, re.MULTILINE) else "BEGIN BULK\n"
     with tempfile.TemporaryDirectory(prefix="ffr-nastran-") as folder:
         complete = Path(folder, "complete.bdf")

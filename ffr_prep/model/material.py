@@ -9,7 +9,6 @@ Source: T. C. T. Ting, Anisotropic Elasticity (1996), chapter 2.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -21,6 +20,7 @@ import numpy as np
 from ffr_prep.body import TENSOR
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.reading import read_toml
 
 Rows = tuple[tuple[float, ...], ...]
 
@@ -132,7 +132,7 @@ def orthotropic(
     compliance = np.diag([1 / E[0], 1 / E[1], 1 / E[2], 1 / G[0], 1 / G[1], 1 / G[2]])
     for (i, j), ratio in zip(((0, 1), (0, 2), (1, 2)), nu, strict=True):
         compliance[i, j] = compliance[j, i] = -ratio / E[i]
-    if not np.linalg.eigvalsh(_scaled(compliance)).min() > 0:
+    if not np.isfinite(_scaled(compliance)).all() or not np.linalg.eigvalsh(_scaled(compliance)).min() > 0:
         raise InputError(
             f"material {name!r}: Poisson's ratios nu12, nu13, nu23 = {nu} are impossible with the moduli {E} Pa (the "
             "elastic energy would be negative): is nu21 meant where nu12 = nu21 E1 / E2 stands?"
@@ -298,9 +298,11 @@ def _of_values(text: str, given: Mapping[str, Any], such: str) -> Solid:
 
 def _file(path: Path) -> dict[str, Any]:
     try:
-        given = tomllib.loads(path.read_text(encoding="utf-8"))
+        given = read_toml(path, "a material file")
         return given | {key: float(given[key]) for key in given.keys() & _NUMBERS}
-    except (OSError, ValueError, TypeError) as error:
+    except InputError:
+        raise
+    except (ValueError, TypeError, OverflowError) as error:
         raise InputError(f"material file {str(path)!r} cannot be read: {error}") from None
 
 

@@ -23,7 +23,7 @@ from ffr_prep.model.reference import ReferenceConditions, conditions_of_part, fu
 from ffr_prep.reduction.basis import Basis, Reduction, check_basis, factorised
 from ffr_prep.reduction.held_body import held_body, needs_held_body
 from ffr_prep.reduction.quality import assess, completed
-from ffr_prep.reduction.second_order import with_second_order
+from ffr_prep.reduction.second_order import check_size, with_second_order
 from ffr_prep.reduction.selection import Band
 from ffr_prep.solvers.factor import CHOLESKY, FreeBody, Solver, SupportedBody, solve_refined, supported
 from ffr_prep.solvers.threads import on_one_thread
@@ -40,6 +40,8 @@ class Request:
     reduction  : which deformation shapes it keeps, such as CraigBampton(10)
     linear     : leave out the load matrices, and with them the second-order displacement by which a simulation has elastic
                  bodies stiffen, and foreshorten, as they bend; bodies of matrices from outside are linear anyway
+    drawn_modes: how many of the lowest modes foreshorten the surface, all when not given. Of m modes m (m + 1) / 2 static
+                 problems are solved; of the others pictures, stress and points added later know the first order alone
     stress     : also keep section forces of beams and the stress at the surface per elastic coordinate
     quality    : compare the body with the full model over this band of frequencies, and keep what was found
     parts      : also cut the body into so many parts of equal length along its long axis; or at stations, distances [m] from
@@ -56,6 +58,7 @@ class Request:
     reference: ReferenceConditions
     reduction: Reduction
     linear: bool = False
+    drawn_modes: int | None = None
     stress: bool = False
     quality: Band | None = None
     parts: Cuts | None = None
@@ -63,6 +66,8 @@ class Request:
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if self.drawn_modes is not None and self.drawn_modes < 1:
+            raise InputError(f"drawn_modes is {self.drawn_modes}; give 1 or more, or linear=True")
         for what, given, such in (
             ("reference", self.reference, 'FixedTo("root")'),
             ("reduction", self.reduction, "CraigBampton(10)"),
@@ -137,12 +142,14 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
         raise InputError("no part of this model knows its stress: reduce it without")
     stiffening = None
     if basis.omega2.size and not (request.linear or model.unstressed):
+        check_size(basis.omega2.size, len(coupled.names), surface, request.drawn_modes)
         held = supported(body, L)
         progress("compute the load matrices")
         stiffening = stiffening_matrices(model, request, held, basis)
         if surface is not None:
             progress("compute the second order of the surface")
-            surface = with_second_order(surface, model, held, request.reference, basis, advance)
+            drawn = replace(basis, Z=basis.Z[:, : request.drawn_modes], omega2=basis.omega2[: request.drawn_modes])
+            surface = with_second_order(surface, model, held, request.reference, drawn, advance)
     made = FlexibleBody(
         name=request.name,
         omega2=basis.omega2,

@@ -23,7 +23,6 @@ Paths are relative to the file; SI units but for the numbers of the geometry, wh
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,6 +32,7 @@ from pydantic import ValidationError
 
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.progress import Stages, no_stages
+from ffr_prep.common.reading import read_toml, reading
 from ffr_prep.mesh.mesh import Mesh, read_mesh
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.cuts import CutPlane, Cuts
@@ -94,34 +94,43 @@ def read_structure(path: str | Path, progress: Stages = no_stages) -> Structure:
     path = Path(path)
     entry = _read(path)
     try:
-        members, shells = _members(entry), _shells(entry)
-        frame = named(_frame(entry, path.parent, members, shells, progress), **entry.nodes)
-        return Structure(
-            frame=frame,
-            interfaces=_regions(entry.interfaces),
-            solids={name: _solid(entry, of, path.parent, progress) for name, of in entry.solids.items()},
-            ties=tuple(entry.ties),
-            request=Request(
-                name=entry.name or path.stem,
-                reference=_reference(entry.reference),
-                reduction=reduction_of([vars(of) for of in entry.reduction], path.parent),
-                linear=entry.linear,
-                stress=entry.stress,
-                quality=None if entry.quality is None else Band(*entry.quality),
-                parts=_cuts(entry.parts),
-            ),
-        )
+        with reading(path, "a structure file"):
+            return _structure(path, entry, progress)
     except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+        raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
+
+
+def _structure(path: Path, entry: StructureEntry, progress: Stages) -> Structure:
+    members, shells = _members(entry), _shells(entry)
+    frame = named(_frame(entry, path.parent, members, shells, progress), **entry.nodes)
+    return Structure(
+        frame=frame,
+        interfaces=_regions(entry.interfaces),
+        solids={name: _solid(entry, of, path.parent, progress) for name, of in entry.solids.items()},
+        ties=tuple(entry.ties),
+        request=Request(
+            name=entry.name or path.stem,
+            reference=_reference(entry.reference),
+            reduction=reduction_of([vars(of) for of in entry.reduction], path.parent),
+            linear=entry.linear,
+            drawn_modes=entry.drawn_modes,
+            stress=entry.stress,
+            quality=None if entry.quality is None else Band(*entry.quality),
+            parts=_cuts(entry.parts),
+        ),
+    )
+
+
+def geometry_files(path: Path) -> list[Path]:
+    """The meshes and geometries that a structure file names. Raises InputError for a file that cannot be read."""
+    entry = _read(path)
+    named = [entry.geometry, *entry.solids.values()]
+    return [path.parent / of.file for of in named if of is not None]
 
 
 def _read(path: Path) -> StructureEntry:
     try:
-        return structure_schema().model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except FileNotFoundError:
-        raise InputError(f"structure file {path} does not exist") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} is not TOML: {error}") from None
+        return structure_schema().model_validate(read_toml(path, "a structure file"))
     except ValidationError as error:
         raise InputError(f"{path}: {'; '.join(map(_explained, error.errors()))}") from None
 

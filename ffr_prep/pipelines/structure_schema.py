@@ -224,6 +224,7 @@ class StructureEntry(Strict):
     reference: ReferenceEntry = MeanAxisEntry(kind="mean-axis")
     reduction: list[ReductionEntry]
     linear: bool = False
+    drawn_modes: int | None = None
     stress: bool = False
     quality: tuple[float, float] | None = None
     parts: int | list[float | CutEntry] | None = None

@@ -87,7 +87,7 @@ def motion_model(body: FlexibleBody) -> CoupledModel:
 
 
 def _provenance(body: FlexibleBody, conditions: ReferenceConditions) -> dict[str, Any]:
-    kept = {key: value for key, value in body.provenance.items() if key != "quality"}
+    kept = {key: value for key, value in body.provenance.items() if key not in ("quality", "command")}
     before = body.provenance.get("reference", {})
     warnings = [*body.provenance.get("warnings", []), *_losses(body, before)]
     return kept | {

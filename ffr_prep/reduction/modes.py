@@ -11,6 +11,7 @@ from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.solvers.factor import SupportedBody, solve_refined
 
 _DENSE = 600
+_WHOLE, _SHOWN_BY_MESH = 1500, 0.3  # free coordinates of which all modes may be wanted; share that a mesh can show
 _FIRST = 12
 
 
@@ -36,17 +37,29 @@ def normal_modes(model: CoupledModel, held: SupportedBody, count: int) -> tuple[
 def modes_up_to(model: CoupledModel, held: SupportedBody, frequency: float) -> tuple[Array, Array]:
     """All modes up to a frequency [Hz] under the supports, as `normal_modes` gives them.
 
-    Raises ComputationError when the iteration does not converge.
+    Raises InputError for a frequency with more modes than the mesh can show, ComputationError when the iteration does not
+    converge.
     """
     limit = (2 * np.pi * frequency) ** 2
     most = model.K.shape[0] - len(held.C)
     count = min(_FIRST, most)
     omega2, vectors = normal_modes(model, held, count)
     while count < most and omega2[-1] <= limit:
+        _check_frequency(frequency, omega2, limit, most)
         count = min(max(2 * count, _expected(omega2, limit)), most)
         omega2, vectors = normal_modes(model, held, count)
     kept = int(np.searchsorted(omega2, limit, side="right"))
     return omega2[:kept], vectors[:, :kept]
+
+
+def _check_frequency(frequency: float, omega2: Array, limit: float, most: int) -> None:
+    """The number of modes grows with the frequency at least in proportion."""
+    least = omega2.size * np.sqrt(limit / omega2[-1])
+    if most > _WHOLE and least > _SHOWN_BY_MESH * most:
+        raise InputError(
+            f"modes up to {frequency:g} Hz: these are {least:.0f} or more, of {most} that the mesh has and of which it shows "
+            f"far fewer; the first {omega2.size} end at {np.sqrt(omega2[-1]) / 2 / np.pi:.4g} Hz: ask for a lower frequency"
+        )
 
 
 def _expected(omega2: Array, limit: float) -> int:

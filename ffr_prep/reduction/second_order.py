@@ -12,8 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ffr_prep.body import Surface, compressed, compressed_beside, reach_of
+from ffr_prep.body import Surface, compressed, compressed_beside, reach_of, recoordinated
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import InputError
 from ffr_prep.common.progress import Advance
 from ffr_prep.model.model import Model
 from ffr_prep.model.reactions import known_loads, supports
@@ -23,13 +24,41 @@ from ffr_prep.reduction.basis import Basis
 from ffr_prep.solvers.factor import SupportedBody, solve_supported
 
 _PAIRS = 48  # solved at once
+MOST = 4e9  # bytes: what the load matrices of a body may have, and what its surface may take for a while; some minutes
+
+
+def check_size(n: int, interfaces: int, surface: Surface | None, drawn_modes: int | None) -> None:
+    """InputError where the second order of n modes would take more than `MOST` bytes: (12 + 6 I, n, n) load matrices, or,
+    on the surface, the fields of all pairs of modes a few times over, and their products with one another."""
+    size, drawn = 8.0 * (12 + 6 * interfaces) * n**2, min(n, drawn_modes or n)
+    if size > MOST:
+        raise InputError(
+            f"the load matrices of {n} modes and {interfaces} interfaces would have {size / 1e9:.1f} GB: ask for fewer "
+            "modes, cut the body into parts, or leave them out (linear)"
+        )
+    size = 0.0 if surface is None else _taken(drawn, surface)
+    if size > MOST:
+        raise InputError(
+            f"the surface needs {drawn * (drawn + 1) // 2} static problems and {size / 1e9:.1f} GB of memory for the second "
+            f"order of {drawn} modes: have only the lowest foreshorten it (drawn_modes), ask for fewer modes, cut the body "
+            "into parts, or leave out the second order (linear)"
+        )
+
+
+def _taken(n: int, surface: Surface) -> float:
+    beside = (surface.stress, None if surface.beams is None else surface.beams.modes)
+    values = surface.points.size + sum(of[..., 0].size for of in beside if of is not None)
+    pairs = n * (n + 1) // 2
+    return 32.0 * pairs * (values + pairs)
 
 
 def with_second_order(
     surface: Surface, model: Model, held: SupportedBody, conditions: ReferenceConditions, basis: Basis, advance: Advance
 ) -> Surface:
-    """The surface with its second-order displacement, and second-order stress where it has stress; held : the body under its
-    reference conditions."""
+    """The surface with its second-order displacement, and second-order stress where it has stress.
+
+    held : the body under its reference conditions; basis : of the modes that foreshorten, the first of those of the surface
+    """
     second, n = model.second(basis.Z), basis.omega2.size
     prescribed = _prescribed(model, held, conditions, second)
     shown = second.surface if surface.stress is None else second.stressed
@@ -58,17 +87,20 @@ def _blocks(n: int) -> list[range]:
 
 def _collected(surface: Surface, parts: Sequence[Surface], omega2: Array) -> Surface:
     """The surface with the fields of all pairs, in the place of the modes of `parts`."""
-    reach = reach_of(surface, omega2)
+    n, picked = surface.Phi.shape[2], slice(0, omega2.size)
+    among = np.eye(n)[picked]  # the amplitudes of these modes among all
+    reach = reach_of(surface.points, surface.Phi[..., picked], omega2)
     second = compressed(np.concatenate([part.Phi for part in parts], axis=-1), omega2)
     second_stress, beams = None, surface.beams
     if surface.stress is not None:
         stress = np.concatenate([part.stress for part in parts if part.stress is not None], axis=-1)
-        second_stress = compressed_beside(surface.stress, stress, omega2, reach, (slice(0, 6),))
+        field = compressed_beside(surface.stress[..., picked], stress, omega2, reach, (slice(0, 6),))
+        second_stress = recoordinated(field, among)
     if beams is not None:
         forces = np.concatenate([part.beams.modes for part in parts if part.beams is not None], axis=-1)
-        in_all = compressed_beside(beams.modes, forces, omega2, reach, (slice(0, 3), slice(3, 6)))
-        beams = replace(beams, second=in_all)
-    return replace(surface, second=second, second_stress=second_stress, beams=beams)
+        field = compressed_beside(beams.modes[..., picked], forces, omega2, reach, (slice(0, 3), slice(3, 6)))
+        beams = replace(beams, second=recoordinated(field, among))
+    return replace(surface, second=recoordinated(second, among), second_stress=second_stress, beams=beams)
 
 
 def _prescribed(model: Model, held: SupportedBody, conditions: ReferenceConditions, second: SecondOrder) -> Array:

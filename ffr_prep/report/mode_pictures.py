@@ -23,6 +23,7 @@ from matplotlib.patches import Rectangle
 from ffr_prep.body import FlexibleBody, Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.outputs import replacing
 
 COLOUR_MAP = "viridis"
 _LARGEST = 0.08  # of the diagonal of the body: deflection that is seen well and still looks like the body
@@ -274,6 +275,5 @@ def save_figure(figure: Figure, path: Path) -> None:
     """Write the figure as a PNG; an existing file is replaced only by a complete new one."""
     with mpl.rc_context({"font.family": "DejaVu Sans"}):
         FigureCanvasAgg(figure)
-        temporary = path.with_name(path.name + ".part")
-        figure.savefig(temporary, format="png", facecolor="white")
-        os.replace(temporary, path)
+        with replacing(path) as part:
+            figure.savefig(part, format="png", facecolor="white")

@@ -6,7 +6,8 @@ A load stresses the body; the stress sigma_0 changes its stiffness by
 
 which is linear in the load. One reduced matrix is stored for each unit load: the translational acceleration of the body
 frame (less gravity), its angular acceleration, the six products of its angular velocity, and the force and moment at
-each interface. A simulation combines them with the accelerations, rates and reactions of the moment. Each static problem
+each interface. They are second derivatives of what these loads work on, the second-order displacement
+(`ffr_prep.model.second_order`), which is what a simulation takes them for. Each static problem
 is solved under the body's reference conditions, so the reactions of the supports belong to the load; in the sum of all
 loads, which is in equilibrium, they cancel.
 

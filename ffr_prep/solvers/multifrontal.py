@@ -19,6 +19,9 @@ from numba import types
 from numba.extending import get_cython_function_address
 
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.compile_cache import check_compiled_code
+
+check_compiled_code()
 
 DONE = -1
 

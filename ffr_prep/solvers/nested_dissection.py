@@ -17,6 +17,9 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.compile_cache import check_compiled_code
+
+check_compiled_code()
 
 Tree = tuple[list[Array], list[list[int]]]
 

@@ -25,6 +25,7 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.children import ending_with_us
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.solvers import slepc_process
 
@@ -54,7 +55,7 @@ def started(A: sp.csr_array, ranks: int) -> SlepcProcess:
     folder = Path(owner.name)
     with open(folder / "errors.txt", "w") as errors:
         child = subprocess.Popen(
-            [*_command(ranks), str(folder / "command.json")],
+            ending_with_us([*_command(ranks), str(folder / "command.json")]),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=errors,

@@ -19,6 +19,9 @@ import scipy.sparse as sp
 from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.compile_cache import check_compiled_code
+
+check_compiled_code()
 
 Map = Callable[[Callable[..., Any], Iterable[Any]], Iterable[Any]]
 Given = ParamSpec("Given")

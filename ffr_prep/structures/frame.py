@@ -17,6 +17,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import extent_in_words
+from ffr_prep.common.reading import check_count
 from ffr_prep.common.registry import choice
 from ffr_prep.model.material import Material, check_isotropic
 from ffr_prep.structures.sections import Section
@@ -24,6 +25,9 @@ from ffr_prep.structures.sections import Section
 Vector = tuple[float, float, float]
 
 _SAME_PLACE = 1e-9
+
+_MOST_ELEMENTS = 10_000_000
+_FAR = 1e100  # m; squares of coordinates must be finite
 
 
 @dataclass(frozen=True)
@@ -148,6 +152,7 @@ def polyline(corners: Sequence[Vector] | Array, member: Member, *, elements: int
     if not np.isfinite(at).all():
         wrong = at[~np.isfinite(at).all(axis=1)][0]
         raise InputError(f"a polyline has the corner {wrong.tolist()}; it must be three finite numbers")
+    check_count(elements * (len(at) - 1), "elements of a polyline", _MOST_ELEMENTS)
     if elements < 1:
         raise InputError(f"a polyline of {elements} elements a leg cannot be built; ask for one or more")
     part = np.arange(elements)[:, None] / elements
@@ -168,6 +173,7 @@ def panel(corners: Sequence[Vector] | Array, shell: Shell, *, elements: tuple[in
         raise InputError(f"a panel needs four finite corners (x, y, z); it has {at.tolist()}")
     if len(elements) != 2 or min(elements) < 1:
         raise InputError(f"a panel of {elements} elements cannot be built; ask for one or more along both sides")
+    check_count(math.prod(elements), "elements of a panel", _MOST_ELEMENTS)
     x, y = (np.linspace(0.0, 1.0, count + 1) for count in elements)
     weights = np.stack([np.outer(1 - x, 1 - y), np.outer(x, 1 - y), np.outer(x, y), np.outer(1 - x, y)], axis=-1)
     number = np.arange(weights[..., 0].size).reshape(len(x), len(y))
@@ -249,6 +255,8 @@ def named(frame: Frame, **positions: Vector) -> Frame:
     groups = dict(frame.node_groups)
     tree = cKDTree(frame.points)
     for name, position in positions.items():
+        if not np.abs(np.asarray(position, float)).max() < _FAR:
+            raise InputError(f"node {name!r} cannot be at {tuple(position)} m; give a place of finite coordinates")
         distance, node = tree.query(np.asarray(position, float))
         if not distance <= _SAME_PLACE * _size(frame.points):
             raise InputError(

@@ -142,10 +142,10 @@ class C:
     assert found == {**dict.fromkeys(at_once, False), "gmsh": True, "ffr_dyn.equations.state_view": True}
 
 
-def test_the_inner_parts_of_numba_stay_behind_one_wall():
+def test_the_inner_parts_of_numba_stay_behind_walls():
     used = {module: {i.name for i in imports_of(module)} for module in MODULES}
     inner = {m for m, names in used.items() if any(n.startswith("numba.") and n != "numba.extending" for n in names)}
-    assert inner == {"ffr_dyn.kernels.simd.intrinsics"}
+    assert inner == {"ffr_dyn.kernels.simd.intrinsics", "ffr_prep.common.compile_cache"}
     below = {m for m, names in used.items() if top(m) == "ffr_dyn" and names & {"llvmlite", "numba.extending"}}
     assert below <= {module for module in MODULES if module.startswith("ffr_dyn.kernels.simd.")}
 
@@ -265,6 +265,12 @@ def test_functions_are_short():
 
 # The comparison with another code, which the benchmarks' own libraries bring, is all that a test has of them.
 OF_BENCHMARKS = {"test_against_exudyn.py"}
+
+
+def test_files_of_tests_have_names_of_their_own():
+    """pytest imports them by their names alone."""
+    names = [path.name for path in (ROOT / "tests").rglob("test_*.py")]
+    assert sorted(names) == sorted(set(names))
 
 
 def test_tests_do_without_benchmarks():

@@ -64,6 +64,7 @@ PLAIN = {
     "ffr_dyn.integrators.step",
     "ffr_dyn.integrators.tolerances",
     "ffr_dyn.integrators.stabilisation",
+    "ffr_dyn.integrators.within",
 }
 COMPILED = {
     ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path

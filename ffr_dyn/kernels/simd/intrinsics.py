@@ -15,6 +15,8 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic as _intrinsic
 
+from ffr_prep.common.compile_cache import is_sound
+
 __all__ = [
     "PLAIN",
     "AttributeTemplate",
@@ -65,7 +67,8 @@ def call_of(*kinds: Any) -> Any:
 
 
 def compiled_forms(function: Any) -> list[Path]:
-    """The files in which numba keeps compiled forms of a function; none where it does not tell."""
+    """The files in which numba keeps compiled forms of a function; none where it does not tell or one is damaged."""
     if not known:
         return []
-    return list(Path(FunctionCache(function).cache_path).glob(f"*.{function.__name__}-*.nbi"))
+    kept = list(Path(FunctionCache(function).cache_path).glob(f"*.{function.__name__}-*.nb[ic]"))
+    return [path for path in kept if path.suffix == ".nbi"] if all(map(is_sound, kept)) else []

@@ -5,7 +5,7 @@ A body's surface has points u = u_0 + Phi q (body axes). Nodal forces f_p do the
     sum_p f_p . delta(R + A u_p)    so that    F = sum f_p,   M = sum u_p x f_p,   Q = sum Phi_p^T f_p
 
 with f_p in body axes and M about the body's origin: the rigid resultant and the modal forces belong together (Shabana 2013,
-sec. 5.6). These loads do not add to the geometric stiffening of the body.
+sec. 5.6). These loads do no work on the second-order displacement of the body.
 """
 
 from __future__ import annotations

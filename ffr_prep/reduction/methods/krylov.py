@@ -53,6 +53,12 @@ class Krylov:
     def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
         """Raises InputError without interfaces, ComputationError where a frequency is a natural frequency of the body."""
         check_interfaces(model, "a basis of Krylov vectors")
+        asked, most = self.moments * len(self.frequencies) * model.C.shape[0], model.K.shape[0] - len(L)
+        if asked > most:
+            raise InputError(
+                f"Krylov vectors of {self.moments} moments at {len(self.frequencies)} frequencies: these are {asked} vectors "
+                f"for a model with {most} free degrees of freedom; ask for fewer"
+            )
         solvers = [_solver(model, body, L, frequency) for frequency in self.frequencies]
         return basis_of(model, L, *(block for solve in solvers for block in krylov_blocks(model, solve, self.moments)))
 

@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.reading import reading
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.reduction.basis import Basis, basis_of
 from ffr_prep.solvers.factor import FreeBody, factorise
@@ -47,12 +48,8 @@ class UserVectors:
 
 def read_user_vectors(path: Path) -> UserVectors:
     """The fields (N, 3, p) that a file of numpy (.npy) holds; InputError for a file that is none."""
-    try:
+    with reading(path, "an array of numpy (.npy)", Exception):
         return UserVectors(np.load(path, allow_pickle=False))
-    except FileNotFoundError:
-        raise InputError(f"user vectors {path}: the file does not exist") from None
-    except (ValueError, EOFError) as error:
-        raise InputError(f"user vectors {path}: it is not an array of numpy ({error})") from None
 
 
 def elastic_part(model: CoupledModel, vectors: Array) -> Array:

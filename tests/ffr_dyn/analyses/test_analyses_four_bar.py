@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from test_analyses_kinematic import bar
 
 from ffr_dyn.analyses.efforts import JointEffort, recorded
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.mixed import Causal, mixed
 from ffr_dyn.consistency.mobility import mobility
 from ffr_dyn.functions.formula import formula
@@ -71,7 +71,7 @@ def torque(t: np.ndarray) -> np.ndarray:
 @pytest.fixture(scope="module")
 def run():
     pushed = replace(four_bar(), forces=(Actuator("motor", "bearing", force=formula("0.2 + 0.6 * sin(12 * t)")),))
-    return forward(pushed, end=END, output_step=2 * STEP, method=RK4(STEP), stabilisation=Projection(1e-13))
+    return integrate(pushed, end=END, output_step=2 * STEP, method=RK4(STEP), stabilisation=Projection(1e-13))
 
 
 def known(run) -> Scene:

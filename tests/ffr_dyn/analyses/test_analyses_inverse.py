@@ -9,7 +9,7 @@ import pytest
 from synthetic import cloud
 from test_analyses_kinematic import bar, slider_crank
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.inverse import Dynamic, QuasiStatic, inverse
 from ffr_dyn.analyses.kinematic import kinematic
 from ffr_dyn.functions.rotation import rotation_matrix
@@ -87,7 +87,7 @@ def test_reactions_of_a_loose_joint_balance_the_free_body(kind):
         bodies=(*scene.bodies, Body("last", link, position=at, omega_bar=(0.5, 0.2, -0.3))),
         joints=(*scene.joints, Joint("loose", kind, "body0.b", "last.a", **more)),
     )
-    result = forward(scene, end=4 * h, output_step=h, method=RK4(h / 4))
+    result = integrate(scene, end=4 * h, output_step=h, method=RK4(h / 4))
     given = np.concatenate([result["loose.force"][2], result["loose.moment"][2]])
     np.testing.assert_allclose(given, wrench_of_motion(scene, result, 1, h), atol=2e-7)
 
@@ -107,7 +107,7 @@ def test_the_efforts_found_drive_the_freed_mechanism():
     free = slider_crank(0.2, 0.7)
     moment = harmonic(amplitude=2.0, frequency=1.0)
     pushed = replace(free, loads=(Load("torque", "crank.a", moment=(0, 0, moment)),))
-    run = forward(pushed, end=0.5, output_step=0.005, method=RK4(5e-4))
+    run = integrate(pushed, end=0.5, output_step=0.005, method=RK4(5e-4))
     scene = replace(free, drivers=(Driver("motor", "main", recorded(run.time, run["main.angle"], degree=7)),))
     back = inverse(scene, end=0.5, output_step=0.005, elastic=QuasiStatic())
     inside = slice(4, -4)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from synthetic import cloud
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.kinematic import kinematic
 from ffr_dyn.consistency.mobility import mobility
 from ffr_dyn.functions.time_functions import polynomial, table
@@ -80,7 +80,7 @@ def test_efforts_do_the_work_that_becomes_energy():
 def test_kinematics_agree_with_a_driven_forward_run():
     scene = slider_crank(0.2, 0.7, MOTOR)
     one = kinematic(scene, end=0.5, output_step=0.1)
-    other = forward(scene, end=0.5, output_step=0.1, method=RK4(1e-3))
+    other = integrate(scene, end=0.5, output_step=0.1, method=RK4(1e-3))
     for name in ("rod.R", "rod.v", "motor.force", "wrist.force", "guide.moment"):
         np.testing.assert_allclose(one[name], other[name], atol=1e-6, rtol=1e-6)
 
@@ -185,7 +185,10 @@ def test_a_driver_that_starts_at_rest_does_turn_a_scene_that_lies_in_two_planes(
         (Driver("motor", "A", start),),
         ground={"O": (0, 0, 0)},
     )
-    for result in (kinematic(rod, end=1.0, output_step=0.5), forward(rod, end=1.0, output_step=0.5, method=RK4(1e-2))):
+    for result in (
+        kinematic(rod, end=1.0, output_step=0.5),
+        integrate(rod, end=1.0, output_step=0.5, method=RK4(1e-2)),
+    ):
         np.testing.assert_allclose(result["A.angle"], [0, 0.5**4, 1], atol=1e-6)
 
 

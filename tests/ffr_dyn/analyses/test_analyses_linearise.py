@@ -11,7 +11,7 @@ from test_analyses_kinematic import slider_crank
 from test_analyses_static import flexible, hanging
 
 from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort, recorded, with_effort
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.linearise import as_result, linearise, table_of_modes
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
@@ -85,7 +85,9 @@ def test_a_damped_flexible_mechanism_decays():
     scene = flexible()
     found = linearise(scene_at(scene, static(scene)))
     assert found.stability_margin < 0
-    assert found.notes == ()
+    assert all(
+        "moving frame" in note for note in found.notes
+    )  # it is an equilibrium, of a body that bends by a seventh
 
 
 def test_a_closed_loop_swings_as_its_energy_says():
@@ -136,7 +138,7 @@ def test_a_small_forward_run_is_what_the_matrices_say():
     expected = found.C @ final + found.D[:, 0] * size
     times = np.linspace(0, end, 11)
     pushed = with_effort(start, hinge, times, np.full(11, size))
-    run, rest = (forward(s, end=end, output_step=end, method=RK4(5e-4)) for s in (pushed, start))
+    run, rest = (integrate(s, end=end, output_step=end, method=RK4(5e-4)) for s in (pushed, start))
     np.testing.assert_allclose([run[n][-1] - rest[n][-1] for n in outputs], expected, rtol=2e-4)
 
 

@@ -11,7 +11,7 @@ from test_analyses_kinematic import bar
 
 import ffr_prep as fp
 from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort, recorded, with_effort, with_units
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.inverse import QuasiStatic, inverse
 from ffr_dyn.analyses.inversion.bounded import Bounded
 from ffr_dyn.analyses.inversion.servo import at_moment, internal_values, servo
@@ -78,7 +78,9 @@ def chain(*loads: Load, drivers=(), third=None) -> Scene:
 @pytest.fixture(scope="module")
 def antonya():
     """The forward run; its step is half a millisecond."""
-    return forward(chain(TORQUE_2, TORQUE_3, FORCE_5), end=2.0, output_step=0.02, method=RK4(5e-4), stabilisation=FINE)
+    return integrate(
+        chain(TORQUE_2, TORQUE_3, FORCE_5), end=2.0, output_step=0.02, method=RK4(5e-4), stabilisation=FINE
+    )
 
 
 def test_forward_run_of_the_chain(antonya):
@@ -124,7 +126,7 @@ def test_the_chain_with_a_flexible_body():
     """Body 3 bends: the force on body 5 comes back as well."""
     beam = planar_beam("b3", 50.0, 0.1233, 5e5, 3, start=-25.0)
     free = chain(TORQUE_2, replace(TORQUE_3, marker="b3.tip"), FORCE_5, third=beam)
-    run = forward(free, end=0.2, output_step=5e-4, method=RK4(1.25e-4), stabilisation=FINE)
+    run = integrate(free, end=0.2, output_step=5e-4, method=RK4(1.25e-4), stabilisation=FINE)
     known = PointDriver("path", "ground.O", "b5.c", x=recorded(run.time, run["b5.R.x"], degree=7))
     scene = replace(free, loads=free.loads[:2], drivers=(known,))
     back = mixed(scene, unknown=(MarkerEffort("F", "b5.c", (1, 0, 0)),), end=0.2, output_step=5e-4, method=RK4(1.25e-4))
@@ -177,7 +179,7 @@ def test_round_trip_of_a_spatial_flexible_arm():
     push = 1 - np.cos(20 * times)
     given = [start["d1.effort"][0] + 0.8 * push, start["d2.effort"][0] - 0.5 * push]
     pushed = with_effort(with_effort(scene, shoulder, times, given[0]), elbow, times, given[1])
-    run = forward(pushed, end=0.3, output_step=5e-4, method=RK4(1.25e-4), stabilisation=FINE)
+    run = integrate(pushed, end=0.3, output_step=5e-4, method=RK4(1.25e-4), stabilisation=FINE)
     drivers = tuple(Driver(f"d_{n}", n, recorded(run.time, run[f"{n}.angle"], degree=7)) for n in ("shoulder", "elbow"))
     known = replace(scene, drivers=drivers)
     back = mixed(known, unknown=(shoulder, elbow), end=0.3, output_step=5e-4, method=RK4(1.25e-4))
@@ -217,7 +219,7 @@ def test_hub_angle_known_is_causal():
         one_link(Driver("turn", "bearing", angle)), unknown=(MOTOR,), end=0.8, output_step=1e-3, method=RK4(2.5e-4)
     )
     scene = with_effort(one_link(), MOTOR, found.time, found["motor.effort"])
-    run = forward(scene, end=0.8, output_step=0.05, method=RK4(2.5e-4))
+    run = integrate(scene, end=0.8, output_step=0.05, method=RK4(2.5e-4))
     np.testing.assert_allclose(run["bearing.angle"], found["bearing.angle"][::50], atol=1e-6)
 
 
@@ -234,7 +236,7 @@ def test_tip_path_known_needs_the_moment_before_the_motion():
     start = scene_at(one_link(), found, 0)
     fed = with_effort(start, MOTOR, found.time, moment)
     rows = round((found.time[-1] - found.time[0]) / 5e-3)
-    run = forward(
+    run = integrate(
         fed,
         start=found.time[0],
         end=found.time[0] + rows * 5e-3,
@@ -243,6 +245,12 @@ def test_tip_path_known_needs_the_moment_before_the_motion():
         stabilisation=FINE,
     )
     np.testing.assert_allclose(run["arm.tip.position.y"], found["arm.tip.position.y"], atol=4e-7)
+
+
+def test_an_arm_that_bends_too_far_is_told():
+    path = replace(TIP, y=rest_to_rest(0.8, 0.3))
+    notes = mixed(one_link(path), unknown=(MOTOR,), end=0.3, output_step=5e-3).attributes["notes"]
+    assert any("body 'arm' deforms" in note for note in notes), notes
 
 
 def test_causal_inversion_of_the_tip_path_is_refused():
@@ -283,7 +291,7 @@ def replayed(scene: Scene, found: Result, *efforts: JointEffort) -> Result:
         fed = with_effort(fed, effort, found.time, found[f"{effort.name}.effort"])
     h = found.time[1] - found.time[0]
     end = found.time[0] + (found.time.size - 1) * h
-    return forward(fed, start=found.time[0], end=end, output_step=h, method=RK4(h / 100), stabilisation=FINE)
+    return integrate(fed, start=found.time[0], end=end, output_step=h, method=RK4(h / 100), stabilisation=FINE)
 
 
 def jointed(arm: fp.FlexibleBody, *drivers) -> Scene:

@@ -11,7 +11,7 @@ import pytest
 from places import ROOT
 
 import ffr_prep as fp
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.scene.scene import Scene
 from ffr_dyn.scene_file.read import load_scene
@@ -67,7 +67,7 @@ def test_work_is_the_change_of_energy(name, tmp_path):
     scene, step = SCENES[name](tmp_path)
     errors = []
     for h in (step, step / 2):
-        result = forward(
+        result = integrate(
             scene, end=400 * step, output_step=20 * step, method=ROS2(h), outputs=("*.work", "*.power", "energy.*")
         )
         works = {name.removesuffix(".work"): result[name] for name in result.quantities if name.endswith(".work")}

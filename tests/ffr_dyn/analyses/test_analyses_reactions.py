@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from synthetic import cloud
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.integrators import RK4
 from ffr_dyn.integrators.stabilisation import Projection
@@ -57,7 +57,7 @@ def given(result, name: str, at: np.ndarray, row: int = 2) -> np.ndarray:
 
 
 def run(scene: Scene):
-    return forward(scene, end=4 * H, output_step=H, method=RK4(H / 4), stabilisation=Projection(1e-13))
+    return integrate(scene, end=4 * H, output_step=H, method=RK4(H / 4), stabilisation=Projection(1e-13))
 
 
 MORE = {

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.linearise import linearise
 from ffr_dyn.consistency.mobility import mobility
 from ffr_dyn.integrators import RK4
@@ -96,7 +96,7 @@ def andrews() -> Scene:
 
 
 def test_seven_angles_after_eight_turns_of_the_crank():
-    result = forward(andrews(), end=0.03, output_step=2.5e-4, method=RK4(1e-6), stabilisation=Projection(1e-13))
+    result = integrate(andrews(), end=0.03, output_step=2.5e-4, method=RK4(1e-6), stabilisation=Projection(1e-13))
     for name, expected in END.items():
         assert abs(result[f"{name}.angle"][-1] - expected) < 1e-9, name
     work = 0.033 * (result["beta.angle"] - result["beta.angle"][0])
@@ -130,7 +130,7 @@ def test_double_pendulum_for_five_seconds():
         ground={"O": (0, 0, 0)},
         gravity=(0, -9.81, 0),
     )
-    result = forward(scene, end=5.0, output_step=1.0, method=RK4(2e-4), stabilisation=Projection(1e-13))
+    result = integrate(scene, end=5.0, output_step=1.0, method=RK4(2e-4), stabilisation=Projection(1e-13))
     first, second = result["one.c.position"], result["two.c.position"] - result["one.c.position"]
     angles = np.arctan2([first[:, 0], second[:, 0]], [-first[:, 1], -second[:, 1]])
     np.testing.assert_allclose(angles[:, 1], (-0.62508769980639, -1.03458508568), atol=1e-9)
@@ -145,6 +145,6 @@ def test_stiff_spring_pendulum_for_two_seconds():
         ground={"O": (0, 0, 0)},
         gravity=(0, -9.81, 0),
     )
-    result = forward(scene, end=2.0, output_step=1.0, method=RK4(5e-5))
+    result = integrate(scene, end=2.0, output_step=1.0, method=RK4(5e-5))
     expected = [(-0.98629074, -0.16504631), (0.79350278, -0.60859605)]
     np.testing.assert_allclose(result["ball.c.position"][1:, :2], expected, atol=2e-7)

@@ -9,7 +9,7 @@ import pytest
 from synthetic import cloud
 from test_analyses_kinematic import bar, slider_crank
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
 from ffr_dyn.functions.formula import formula
@@ -75,7 +75,7 @@ def test_a_flexible_scene_stays_where_static_leaves_it():
     scene = flexible()
     result = static(scene)
     assert result.attributes["stable"]
-    run = forward(scene_at(scene, result), end=0.5, output_step=0.5, method=RK4(1e-3))
+    run = integrate(scene_at(scene, result), end=0.5, output_step=0.5, method=RK4(1e-3))
     for name in ("two.a.position", "one.q", "A.force", "spring.tension"):
         np.testing.assert_allclose(run[name][-1], result[name][0], atol=1e-7)
 

@@ -11,7 +11,7 @@ from ffr_gallery.spin_up import scene as spinning
 from synthetic import cloud
 
 from ffr_dyn.analyses.energy import EnergyWatch
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.functions.time_functions import harmonic, polynomial, user
 from ffr_dyn.integrators import RK4, ROS2, DormandPrince, HalfExplicit, Variational
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting
@@ -45,14 +45,14 @@ def test_an_explicit_step_beyond_the_assembled_limit_stops_and_tells_the_limit(k
         rf"energy has grown.*body 'b'.*beyond the stability of {kind.__name__}.*needs one below .* s; use that, or ROS2"
     )
     with pytest.raises(ComputationError, match=words):
-        forward(scene, end=2000 * h, output_step=rows * h, method=kind(h))
+        integrate(scene, end=2000 * h, output_step=rows * h, method=kind(h))
 
 
 def test_too_large_gains_stop_and_tell_what_gains_would_do():
     with pytest.raises(
         ComputationError, match=r"Baumgarte's gains of 600 1/s are too large for a step of 0\.005 s.*200 1/s"
     ):
-        forward(PENDULUM, method=RK4(5e-3), stabilisation=Baumgarte(600.0, 600.0), **RUN)
+        integrate(PENDULUM, method=RK4(5e-3), stabilisation=Baumgarte(600.0, 600.0), **RUN)
 
 
 def test_a_stiff_spring_beyond_the_step_stops_and_tells_its_rate():
@@ -60,8 +60,8 @@ def test_a_stiff_spring_beyond_the_step_stops_and_tells_its_rate():
     with pytest.raises(
         ComputationError, match=r"energy has grown.*'bar'.*1732 rad/s.*below 0\.0016 s; use that, or ROS2$"
     ):
-        forward(replace(HINGED, springs=(spring,), gravity=(0, -9.81, 0)), method=RK4(5e-3), **RUN)
-    forward(replace(HINGED, springs=(spring,), gravity=(0, -9.81, 0)), method=ROS2(5e-3), **RUN)
+        integrate(replace(HINGED, springs=(spring,), gravity=(0, -9.81, 0)), method=RK4(5e-3), **RUN)
+    integrate(replace(HINGED, springs=(spring,), gravity=(0, -9.81, 0)), method=ROS2(5e-3), **RUN)
 
 
 def test_an_implicit_method_that_loses_the_motion_stops():
@@ -70,7 +70,7 @@ def test_an_implicit_method_that_loses_the_motion_stops():
         PENDULUM, bodies=tuple(replace(b, omega_bar=(0, 0, 400.0)) for b in PENDULUM.bodies), gravity=(0, 0, 0)
     )
     with pytest.raises(ComputationError, match=r"energy has grown.*(ROS2|too long)"):
-        forward(spun, method=ROS2(5e-3), stabilisation=Drifting(), **RUN)
+        integrate(spun, method=ROS2(5e-3), stabilisation=Drifting(), **RUN)
 
 
 def test_a_beam_that_diverges_without_stiffening_stops():
@@ -79,7 +79,7 @@ def test_a_beam_that_diverges_without_stiffening_stops():
     with pytest.raises(
         ComputationError, match=r"'beam' has turned within itself by .* first frequency, without geometric"
     ):
-        forward(spun, end=60.0, output_step=1.0, method=ROS2(5e-3))
+        integrate(spun, end=60.0, output_step=1.0, method=ROS2(5e-3))
 
 
 # ---- with one -----------------------------------------------------------------------------------------------------------
@@ -133,7 +133,7 @@ HEALTHY = {
 @pytest.mark.parametrize("what", HEALTHY)
 def test_what_has_a_source_goes_on(what):
     scene, method = HEALTHY[what]
-    result = forward(scene, method=method, **RUN)
+    result = integrate(scene, method=method, **RUN)
     assert result.time[-1] == pytest.approx(2.0)
 
 
@@ -143,13 +143,13 @@ def test_what_rows_do_not_explain_is_looked_into(monkeypatch):
     look = EnergyWatch._looked_into
     monkeypatch.setattr(EnergyWatch, "_looked_into", lambda self, row: (looked.append(row.time), look(self, row))[1])
     scene, method = HEALTHY["is kicked between two rows"]
-    forward(scene, method=method, **RUN)
+    integrate(scene, method=method, **RUN)
     assert looked
 
 
 def test_a_step_that_rk4_bears_is_not_stopped():
     scene, omega = clamped()
     h = 0.3 * RK4.reach / omega
-    result = forward(scene, end=2000 * h, output_step=h, method=RK4(h))
+    result = integrate(scene, end=2000 * h, output_step=h, method=RK4(h))
     energy = result["energy.total"]
     assert energy.max() < 1.01 * energy[0]

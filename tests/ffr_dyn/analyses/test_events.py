@@ -10,7 +10,7 @@ from synthetic import cloud
 
 from ffr_dyn import cli
 from ffr_dyn.analyses.events import Event
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.run import run
 from ffr_dyn.integrators import RK4, ROS2, DormandPrince
 from ffr_dyn.integrators.stabilisation import Projection
@@ -55,14 +55,14 @@ def test_free_fall_to_the_last_digits(method):
         Event("top", "ball.v.y"),
         Event("never", "ball.c.position.y", 0.46),
     )
-    result = forward(THROWN, end=0.6, output_step=0.3, method=method, events=events)
+    result = integrate(THROWN, end=0.6, output_step=0.3, method=method, events=events)
     for name, expected in (("up", root[:1]), ("down", root[1:]), ("both", root), ("top", (0.3,)), ("never", ())):
         np.testing.assert_allclose(times(result, name), expected, rtol=0, atol=4e-16, err_msg=name)
     first = result.attributes["events"][0]
     assert first["rising"] is True
     np.testing.assert_allclose(first["x"][:2], (root[0], 0.35), rtol=0, atol=1e-15)
     assert times(result) == sorted(times(result))
-    plain = forward(THROWN, end=0.6, output_step=0.3, method=method)
+    plain = integrate(THROWN, end=0.6, output_step=0.3, method=method)
     np.testing.assert_array_equal(result["ball.R"], plain["ball.R"])
     assert "events" not in plain.attributes
 
@@ -72,7 +72,7 @@ def test_a_run_ends_at_an_event(tmp_path):
     after = Event("after", "ball.c.position.y", -1.001, direction="falling")
     before = Event("before", "ball.c.position.x", 0.2)
     path = tmp_path / "fall.nc"
-    result = forward(THROWN, end=3, output_step=0.1, method=RK4(0.05), events=(after, ground, before), path=path)
+    result = integrate(THROWN, end=3, output_step=0.1, method=RK4(0.05), events=(after, ground, before), path=path)
     end = 0.3 + np.sqrt(0.09 + 0.2)
     np.testing.assert_allclose(result.time, [*np.arange(9) / 10, end], atol=1e-15)
     np.testing.assert_allclose(result["ball.c.position"][-1], (end, -1, 0), atol=1e-14)
@@ -87,17 +87,17 @@ def test_a_python_function_and_a_quantity_give_the_same_moment():
         Event("quantity", "arm.b.position.y", -0.3, direction="falling"),
         Event("function", lambda t, state: state.position("arm.b")[1] + 0.3, 0.0, direction="falling"),
     )
-    result = forward(swinging(), end=0.6, output_step=0.1, method=ROS2(2e-3), events=events)
+    result = integrate(swinging(), end=0.6, output_step=0.1, method=ROS2(2e-3), events=events)
     one, two = times(result, "quantity"), times(result, "function")
     assert len(one) >= 1
     np.testing.assert_allclose(one, two, rtol=0, atol=1e-14)
 
 
 def test_events_converge_with_the_order_of_the_method():
-    fine = forward(swinging(), end=0.5, output_step=0.5, method=RK4(1e-4), stabilisation=Projection(1e-13),
+    fine = integrate(swinging(), end=0.5, output_step=0.5, method=RK4(1e-4), stabilisation=Projection(1e-13),
                    events=(EVENT,))  # fmt: skip
     errors = [
-        abs(times(forward(swinging(), end=0.5, output_step=0.5, method=RK4(h), stabilisation=Projection(1e-13),
+        abs(times(integrate(swinging(), end=0.5, output_step=0.5, method=RK4(h), stabilisation=Projection(1e-13),
                           events=(EVENT,)))[0] - times(fine)[0])
         for h in (1e-3, 5e-4)
     ]  # fmt: skip
@@ -109,15 +109,15 @@ EVENT = Event("low", "arm.b.position.y", -0.3, direction="falling")
 
 
 def test_events_of_a_method_that_chooses_its_steps():
-    fine = forward(swinging(), end=0.5, output_step=0.5, method=RK4(1e-4), events=(EVENT,))
-    result = forward(swinging(), end=0.5, output_step=0.1, method=DormandPrince(tolerances(1e-9)), events=(EVENT,))
+    fine = integrate(swinging(), end=0.5, output_step=0.5, method=RK4(1e-4), events=(EVENT,))
+    result = integrate(swinging(), end=0.5, output_step=0.1, method=DormandPrince(tolerances(1e-9)), events=(EVENT,))
     np.testing.assert_allclose(times(result), times(fine), atol=1e-8)
 
 
 def test_angles_are_unwound():
     """50 rad/s pass 10 rad once, at 0.2 s, and -1 rad never."""
     events = (Event("ten", "axle.angle", 10.0), Event("less", "axle.angle", -1.0), Event("c", "axle.angle", np.pi))
-    result = forward(SPUN, end=0.4, output_step=0.1, method=RK4(1e-3), events=events)
+    result = integrate(SPUN, end=0.4, output_step=0.1, method=RK4(1e-3), events=events)
     np.testing.assert_allclose(times(result, "ten"), [0.2], atol=1e-9)
     np.testing.assert_allclose(times(result, "c"), [np.pi / 50], atol=1e-9)
     assert times(result, "less") == []
@@ -130,9 +130,9 @@ def test_mistakes_are_named(tmp_path):
         Event("e", "ball.c.position.y", np.nan)
     for quantity in ("ball.c.positon.y", "ball.c.position", "ball.c.position.w"):
         with pytest.raises(InputError, match=r"no number of the scene; did you mean .*ball\.c\.position"):
-            forward(THROWN, end=0.1, output_step=0.1, method=RK4(0.1), events=(Event("e", quantity),))
+            integrate(THROWN, end=0.1, output_step=0.1, method=RK4(0.1), events=(Event("e", quantity),))
     with pytest.raises(InputError, match="cannot be resumed"):
-        forward(THROWN, end=0.1, output_step=0.1, method=RK4(0.1), events=(EVENT_UP,), resume=tmp_path / "r.nc")
+        integrate(THROWN, end=0.1, output_step=0.1, method=RK4(0.1), events=(EVENT_UP,), resume=tmp_path / "r.nc")
 
 
 EVENT_UP = Event("up", "ball.v.y")

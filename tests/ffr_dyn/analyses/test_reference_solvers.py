@@ -11,7 +11,7 @@ from planar_beam import planar_beam
 from synthetic import cloud
 from test_analyses_references import END, andrews
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.reference import IDA, SciPy, reference
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import RK4
@@ -71,7 +71,7 @@ def flexible_pendulum() -> Scene:
 )
 def test_other_solvers_find_the_same_motion(scene, tip, method, apart):
     end = 0.1 if tip.startswith("rod") else 0.25
-    ours = forward(scene, end=end, output_step=0.05, method=RK4(1e-4), stabilisation=Projection(1e-13))
+    ours = integrate(scene, end=end, output_step=0.05, method=RK4(1e-4), stabilisation=Projection(1e-13))
     theirs = reference(scene, end=end, output_step=0.05, method=method)
     np.testing.assert_allclose(theirs[tip], ours[tip], rtol=0, atol=apart)
     assert theirs["constraint.position"].max() < 1e-11
@@ -94,7 +94,7 @@ def test_drivers_redundant_rows_and_reactions(method):
         gravity=(0, 0, -9.81),
         plane="none",
     )
-    ours = forward(scene, end=0.4, output_step=0.1, method=RK4(1e-3), stabilisation=Projection(1e-13))
+    ours = integrate(scene, end=0.4, output_step=0.1, method=RK4(1e-3), stabilisation=Projection(1e-13))
     theirs = reference(scene, end=0.4, output_step=0.1, method=method)
     for name in ("low.force", "high.moment", "motor.moment", "low.angle"):
         np.testing.assert_allclose(theirs[name], ours[name], atol=2e-6, err_msg=name)

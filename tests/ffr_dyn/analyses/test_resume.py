@@ -17,7 +17,7 @@ from places import ROOT, TESTS
 from synthetic import cloud
 
 from ffr_dyn.analyses.checkpoint import Checkpoint, decode, encode
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.compile.first_use import ensure_compiled
 from ffr_dyn.functions.time_functions import harmonic
 from ffr_dyn.integrators import RK4, ROS2
@@ -57,7 +57,7 @@ def assert_same_bits(a, b):
 def whole(tmp_path_factory):
     """The run that nothing stopped."""
     path = tmp_path_factory.mktemp("whole") / "run.nc"
-    forward(SCENE, **SETTINGS, path=path)
+    integrate(SCENE, **SETTINGS, path=path)
     return load_result(path)
 
 
@@ -77,34 +77,34 @@ def stop_after(t: float):
 def test_a_stopped_run_goes_on_to_the_same_bits(tmp_path, whole, at):
     path = tmp_path / "run.nc"
     with pytest.raises(StoppedError):
-        forward(SCENE, **SETTINGS, path=path, progress=stop_after(at))
+        integrate(SCENE, **SETTINGS, path=path, progress=stop_after(at))
     assert load_result(path).time[-1] >= at
-    result = forward(SCENE, **SETTINGS, resume=path)
+    result = integrate(SCENE, **SETTINGS, resume=path)
     assert_same_bits(result, whole)
     assert_same_bits(load_result(path), whole)
 
 
 def test_a_run_to_a_later_end_is_the_long_run(tmp_path, whole):
     path = tmp_path / "run.nc"
-    forward(SCENE, **SETTINGS | {"end": 0.37}, path=path)
-    assert_same_bits(forward(SCENE, **SETTINGS, resume=path), whole)
+    integrate(SCENE, **SETTINGS | {"end": 0.37}, path=path)
+    assert_same_bits(integrate(SCENE, **SETTINGS, resume=path), whole)
     with pytest.raises(InputError, match=r"0\.5 s beyond this end"):
-        forward(SCENE, **SETTINGS | {"end": 0.5}, resume=path)
-    assert_same_bits(forward(SCENE, **SETTINGS, resume=path), whole)  # nothing is left to do
+        integrate(SCENE, **SETTINGS | {"end": 0.5}, resume=path)
+    assert_same_bits(integrate(SCENE, **SETTINGS, resume=path), whole)  # nothing is left to do
     assert_same_bits(load_result(path), whole)
     assert load_checkpoint(path) is not None
 
 
 def test_a_resumed_run_can_go_to_another_file(tmp_path, whole):
-    forward(SCENE, **SETTINGS | {"end": 0.2}, path=tmp_path / "a.nc")
+    integrate(SCENE, **SETTINGS | {"end": 0.2}, path=tmp_path / "a.nc")
     before = (tmp_path / "a.nc").read_bytes()
-    forward(SCENE, **SETTINGS, resume=tmp_path / "a.nc", path=tmp_path / "b.nc")
+    integrate(SCENE, **SETTINGS, resume=tmp_path / "a.nc", path=tmp_path / "b.nc")
     assert (tmp_path / "a.nc").read_bytes() == before
     assert_same_bits(load_result(tmp_path / "b.nc"), whole)
 
 
 def test_a_file_that_is_not_there_yet_is_a_run_from_the_start(tmp_path, whole):
-    assert_same_bits(forward(SCENE, **SETTINGS, resume=tmp_path / "none.nc"), whole)
+    assert_same_bits(integrate(SCENE, **SETTINGS, resume=tmp_path / "none.nc"), whole)
     assert_same_bits(load_result(tmp_path / "none.nc"), whole)
 
 
@@ -130,25 +130,25 @@ def test_counters_of_drift_and_projections_go_on(tmp_path, whole):
 )
 def test_another_scene_or_other_settings_are_refused(tmp_path, change):
     path = tmp_path / "run.nc"
-    forward(SCENE, **SETTINGS | {"end": 0.02}, path=path)
+    integrate(SCENE, **SETTINGS | {"end": 0.02}, path=path)
     before = path.read_bytes()
     with pytest.raises(InputError, match="another scene or of other settings"):
-        forward(**{"scene": SCENE} | SETTINGS | change, resume=path)
+        integrate(**{"scene": SCENE} | SETTINGS | change, resume=path)
     assert path.read_bytes() == before
 
 
 def test_files_that_cannot_be_continued_are_named(tmp_path, whole):
     with pytest.raises(InputError, match=r"plain\.nc has no checkpoint"):
-        forward(SCENE, **SETTINGS, resume=save_result(whole, tmp_path / "plain.nc"))
+        integrate(SCENE, **SETTINGS, resume=save_result(whole, tmp_path / "plain.nc"))
     (tmp_path / "text.nc").write_text("hello")
     with pytest.raises(InputError, match="damaged"):
-        forward(SCENE, **SETTINGS, resume=tmp_path / "text.nc")
+        integrate(SCENE, **SETTINGS, resume=tmp_path / "text.nc")
 
 
 def test_a_checkpoint_of_another_version_is_refused(tmp_path, monkeypatch):
     """One that lacks something that this version keeps, and one that has it in another shape."""
     path = tmp_path / "run.nc"
-    forward(SCENE, **SETTINGS | {"end": 0.02}, path=path)
+    integrate(SCENE, **SETTINGS | {"end": 0.02}, path=path)
     name = "machine.work.bodies.f"
     for change in ({}, {name: np.zeros(1)}):
 
@@ -157,9 +157,9 @@ def test_a_checkpoint_of_another_version_is_refused(tmp_path, monkeypatch):
             kept = {key: array for key, array in saved.arrays.items() if key != name}
             return replace(saved, arrays=kept | change)
 
-        monkeypatch.setattr("ffr_dyn.analyses.forward.decode", older)
+        monkeypatch.setattr("ffr_dyn.analyses.integration.decode", older)
         with pytest.raises(InputError, match="another version"):
-            forward(SCENE, **SETTINGS, resume=path)
+            integrate(SCENE, **SETTINGS, resume=path)
 
 
 def test_measuring_in_parts_gives_the_same_bits():
@@ -206,11 +206,11 @@ RUN = """
 import sys, time
 import test_resume as t
 from ffr_dyn.results import file as result_file
-from ffr_dyn.analyses import forward as f
+from ffr_dyn.analyses import integration as f
 start = result_file.ResultWriter.__init__
 result_file.ResultWriter.__init__ = lambda *a, **k: start(*a, **(k | {"interval": 0.0, "share": 1e9}))
 f.SECONDS_PER_CALL = 1e-9  # one row a call, so that a run of a hundred rows takes two seconds
-f.forward(t.SCENE, **t.SETTINGS, resume=sys.argv[1], progress=lambda reached: time.sleep(0.02))
+f.integrate(t.SCENE, **t.SETTINGS, resume=sys.argv[1], progress=lambda reached: time.sleep(0.02))
 """
 
 
@@ -242,7 +242,7 @@ def test_a_run_that_failed_tells_the_same_when_it_is_resumed(tmp_path):
     settings = SETTINGS | {"outputs": ("default",)}
     for _ in range(2):
         with pytest.raises(ComputationError, match=r"'bad' at t = 0\.50"):
-            forward(scene, **settings, resume=tmp_path / "run.nc")
+            integrate(scene, **settings, resume=tmp_path / "run.nc")
         assert load_result(tmp_path / "run.nc").time[-1] == pytest.approx(0.5)
 
 
@@ -252,8 +252,8 @@ def test_the_first_run_that_compiles_has_the_bits_of_all_later_ones(tmp_path):
     for package in ("ffr_dyn", "ffr_prep"):
         shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
     script = (
-        "import sys; from test_resume import SCENE, SETTINGS; from ffr_dyn.analyses.forward import forward;"
-        "sys.stdout.buffer.write(forward(SCENE, **SETTINGS)['one.R'].tobytes())"
+        "import sys; from test_resume import SCENE, SETTINGS; from ffr_dyn.analyses.integration import integrate;"
+        "sys.stdout.buffer.write(integrate(SCENE, **SETTINGS)['one.R'].tobytes())"
     )
     paths = {
         **os.environ,

@@ -18,7 +18,7 @@ from PIL import Image
 from places import ROOT
 from synthetic import cloud
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.kinematic import Kinematic
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.chart.diagram import COSTS, Diagram, Lost, Point, measures_of, quantities_of, run_variants, work_precision
@@ -132,9 +132,9 @@ def test_times_are_medians_within_their_spread_and_evaluations_are_counted(diagr
 
 
 def test_the_stopwatch_changes_nothing():
-    plain = forward(swinging(), end=0.1, output_step=0.05, method=ROS2(0.01))
+    plain = integrate(swinging(), end=0.1, output_step=0.05, method=ROS2(0.01))
     watch = Stopwatch()
-    found = forward(swinging(), end=0.1, output_step=0.05, method=ROS2(0.01), stopwatch=watch)
+    found = integrate(swinging(), end=0.1, output_step=0.05, method=ROS2(0.01), stopwatch=watch)
     np.testing.assert_array_equal(found["rod.q"], plain["rod.q"])
     assert watch.wall >= watch.last > 0
     assert watch.cpu > 0
@@ -176,7 +176,7 @@ def test_errors_below_the_floor_are_equal(diagram):
 
 def test_every_measure_reads_its_history():
     scene = swinging()
-    result = forward(scene, end=0.1, output_step=0.05, method=RK4(0.005), outputs=("*",))
+    result = integrate(scene, end=0.1, output_step=0.05, method=RK4(0.005), outputs=("*",))
     quantities = quantities_of(scene)
 
     def values(text: str) -> np.ndarray:

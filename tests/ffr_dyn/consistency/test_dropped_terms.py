@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ffr_prep as fp
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.dropped_terms import check_dropped, deflection
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
@@ -44,7 +44,7 @@ def pendulum(body: fp.FlexibleBody, *dropped: str) -> Scene:
 
 
 def tip(body: fp.FlexibleBody, *dropped: str) -> np.ndarray:
-    return forward(
+    return integrate(
         pendulum(body, *dropped), end=1.0, output_step=0.01, method=ROS2(2e-4), outputs=("rod.tip.position",)
     )["rod.tip.position"]
 

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 from ffr_gallery.scene_set import ALUMINIUM, GRAVITY, beam, case, pendulum, slider_crank, spin_up
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.cli import cli
 from ffr_dyn.consistency.assemble import assemble
@@ -514,8 +514,8 @@ def test_the_command_writes_a_scene_that_runs(tmp_path):
     assert (tmp_path / "c.png").stat().st_size > 1000
     made, how = load_scene(tmp_path / "out.toml")
     assert sum(body.model.n for body in made.bodies) < 28
-    result = forward(made, end=how.end, output_step=how.output_step, method=how.method)
-    reference = forward(scene, end=0.1, output_step=0.005, method=ROS3(0.0005))
+    result = integrate(made, end=how.end, output_step=how.output_step, method=how.method)
+    reference = integrate(scene, end=0.1, output_step=0.005, method=ROS3(0.0005))
     off = np.abs(result["slider.pin.position.x"] - reference["slider.pin.position.x"]).max()
     assert off < 1e-4 * np.ptp(reference["slider.pin.position.x"])
 
@@ -571,7 +571,7 @@ def test_a_body_becomes_flexible_and_rigid_again(adaptive):
 
 def test_outputs_stay_within_the_tolerance_and_continuous(adaptive):
     scene, result = adaptive
-    reference = forward(scene, end=0.42, output_step=2e-3, method=ROS3(2.5e-4))
+    reference = integrate(scene, end=0.42, output_step=2e-3, method=ROS3(2.5e-4))
     off = result["slider.pin.position.x"] - reference["slider.pin.position.x"]
     assert np.abs(off).max() < 5e-6
     np.testing.assert_allclose(result.time, reference.time, atol=1e-12)
@@ -606,7 +606,7 @@ def test_a_model_is_compiled_once_however_often_the_run_switches(monkeypatch):
 def test_a_scene_that_is_assembled_already_runs_to_the_same_bits():
     scene = slider_crank(40.0)
     one, other = (
-        forward(scene, end=0.02, output_step=0.002, method=ROS3(0.002), assembled=given)
+        integrate(scene, end=0.02, output_step=0.002, method=ROS3(0.002), assembled=given)
         for given in (None, assemble(scene))
     )
     np.testing.assert_array_equal(one["slider.pin.position"], other["slider.pin.position"])

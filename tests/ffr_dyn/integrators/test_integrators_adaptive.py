@@ -9,7 +9,7 @@ import pytest
 from synthetic import cloud
 from test_analyses_references import END, andrews
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.integrators import RK4, ROS3, AdaptiveROS3, DormandPrince, Tolerances, tolerances
 from ffr_dyn.integrators.stabilisation import Projection
@@ -36,7 +36,7 @@ def pendulum(stiffness: float = 400.0) -> Scene:
 
 @pytest.fixture(scope="module")
 def reference():
-    return forward(pendulum(), end=1.0, output_step=0.02, method=RK4(2e-5), stabilisation=Projection(1e-13))
+    return integrate(pendulum(), end=1.0, output_step=0.02, method=RK4(2e-5), stabilisation=Projection(1e-13))
 
 
 def apart(one, other) -> float:
@@ -48,7 +48,7 @@ def test_the_error_follows_the_tolerance(kind, reference):
     """Two powers of ten in the tolerance gain at least one and a half in the error, and rows hold the constraints."""
     errors = []
     for relative in (1e-4, 1e-6, 1e-8):
-        run = forward(pendulum(), end=1.0, output_step=0.02, method=kind(tolerances(relative)))
+        run = integrate(pendulum(), end=1.0, output_step=0.02, method=kind(tolerances(relative)))
         errors.append(apart(run, reference))
         assert errors[-1] < 100 * relative
         assert np.abs(run["constraint.position"]).max() < 1e-9
@@ -59,9 +59,9 @@ def test_the_error_follows_the_tolerance(kind, reference):
 @pytest.mark.parametrize("kind", KINDS)
 def test_rows_between_the_steps_are_as_good_as_the_steps(kind, reference):
     """Steps far longer than the rows' spacing: positions and velocities are interpolated."""
-    run = forward(pendulum(), end=0.1, output_step=2.5e-5, method=kind(tolerances(1e-6)))
+    run = integrate(pendulum(), end=0.1, output_step=2.5e-5, method=kind(tolerances(1e-6)))
     assert run.attributes["steps"] < 0.5 * run.time.size
-    fine = forward(pendulum(), end=0.1, output_step=2.5e-5, method=RK4(2.5e-5), stabilisation=Projection(1e-13))
+    fine = integrate(pendulum(), end=0.1, output_step=2.5e-5, method=RK4(2.5e-5), stabilisation=Projection(1e-13))
     assert apart(run, fine) < 2e-6
     assert np.abs(run["bar.q_dot"] - fine["bar.q_dot"]).max() < 3e-3 * np.abs(fine["bar.q_dot"]).max()
     assert np.abs(run["bar.omega_bar"] - fine["bar.omega_bar"]).max() < 1e-4
@@ -70,11 +70,11 @@ def test_rows_between_the_steps_are_as_good_as_the_steps(kind, reference):
 def test_stiff_modes_do_not_limit_the_linearly_implicit_method():
     """A thousand times the frequency: no more steps, and the motion of the stiff limit."""
     soft, stiff = (
-        forward(pendulum(stiffness), end=1.0, output_step=0.05, method=AdaptiveROS3(tolerances(1e-4)))
+        integrate(pendulum(stiffness), end=1.0, output_step=0.05, method=AdaptiveROS3(tolerances(1e-4)))
         for stiffness in (4e5, 4e11)
     )
     assert stiff.attributes["steps"] < 1.5 * soft.attributes["steps"]
-    rigid = forward(pendulum(4e11), end=1.0, output_step=0.05, method=ROS3(5e-4))
+    rigid = integrate(pendulum(4e11), end=1.0, output_step=0.05, method=ROS3(5e-4))
     assert apart(stiff, rigid) < 1e-3
 
 
@@ -82,14 +82,14 @@ def test_dzhanibekov_by_dormand_prince():
     """Torque-free top, I = (1, 2, 3), omega(0) = (0.001, 1, 0.001): closed form in elliptic functions, at t = 10 s."""
     top = rigid_body("top", mass=1.0, inertia=(1, 2, 3))
     scene = Scene((Body("top", top, omega_bar=(0.001, 1, 0.001)),))
-    run = forward(scene, end=10, output_step=10, method=DormandPrince(tolerances(1e-11)))
+    run = integrate(scene, end=10, output_step=10, method=DormandPrince(tolerances(1e-11)))
     expected = (-0.117326383719773, 0.993093912821562, 0.0677433399352767)
     np.testing.assert_allclose(run["top.omega_bar"][-1], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_andrews_squeezer(kind):
-    run = forward(
+    run = integrate(
         andrews(), end=0.03, output_step=2.5e-3, method=kind(tolerances(1e-7)), stabilisation=Projection(1e-12)
     )
     for name, expected in END.items():
@@ -98,21 +98,23 @@ def test_andrews_squeezer(kind):
 
 def test_a_jump_is_passed_with_small_steps_and_a_pole_is_not():
     jump = Load("jump", "bar.b", (0.0, lambda t: 50.0 * (t > 0.31), 0.0))
-    run = forward(replace(pendulum(), loads=(jump,)), end=0.6, output_step=0.02, method=AdaptiveROS3(tolerances(1e-5)))
-    fine = forward(replace(pendulum(), loads=(jump,)), end=0.6, output_step=0.02, method=RK4(5e-5))
+    run = integrate(
+        replace(pendulum(), loads=(jump,)), end=0.6, output_step=0.02, method=AdaptiveROS3(tolerances(1e-5))
+    )
+    fine = integrate(replace(pendulum(), loads=(jump,)), end=0.6, output_step=0.02, method=RK4(5e-5))
     assert run.attributes["refused_steps"] > 3
     assert apart(run, fine) < 1e-4
     pole = Load("pole", "bar.b", (0.0, lambda t: 1.0 / (0.31 - t) ** 3 if t != 0.31 else 1e300, 0.0))
     with pytest.raises(ComputationError, match=r"t = 0.3.*step has become too small.*smooth"):
-        forward(replace(pendulum(), loads=(pole,)), end=0.6, output_step=0.02, method=DormandPrince())
+        integrate(replace(pendulum(), loads=(pole,)), end=0.6, output_step=0.02, method=DormandPrince())
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_resumed_run_has_the_same_bits(kind, tmp_path):
     settings = {"output_step": 0.01, "method": kind(tolerances(1e-5)), "outputs": ("*",)}
-    whole = forward(pendulum(), end=0.5, **settings)
-    forward(pendulum(), end=0.2, **settings, path=tmp_path / "run.nc")
-    forward(pendulum(), end=0.5, **settings, resume=tmp_path / "run.nc")
+    whole = integrate(pendulum(), end=0.5, **settings)
+    integrate(pendulum(), end=0.2, **settings, path=tmp_path / "run.nc")
+    integrate(pendulum(), end=0.5, **settings, resume=tmp_path / "run.nc")
     again = load_result(tmp_path / "run.nc")
     for name in whole.quantities:
         assert whole[name].tobytes() == again[name].tobytes(), name

@@ -16,7 +16,7 @@ from test_dyn_references import GRAVITY, mass_point
 from test_dyn_singular import bricard, n_four_bar
 from test_resume import SCENE, StoppedError, assert_same_bits, stop_after
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.equations.inertia import mass_matrix
 from ffr_dyn.functions.time_functions import polynomial, user
@@ -53,14 +53,15 @@ def kind(request):
 
 
 def run(scene: Scene, method, end: float, **settings):
-    return forward(scene, end=end, output_step=end, method=method, **settings)
+    return integrate(scene, end=end, output_step=end, method=method, **settings)
 
 
 def errors(scene: Scene, kind: str, end: float, steps, names, stabilisation=FINE) -> np.ndarray:
     """(steps, names) largest errors at ten moments, from RK4 at a quarter of the finest step."""
-    truth = forward(scene, end=end, output_step=end / 10, method=RK4(steps[-1] / 4), stabilisation=FINE)
+    truth = integrate(scene, end=end, output_step=end / 10, method=RK4(steps[-1] / 4), stabilisation=FINE)
     runs = [
-        forward(scene, end=end, output_step=end / 10, method=KINDS[kind](h), stabilisation=stabilisation) for h in steps
+        integrate(scene, end=end, output_step=end / 10, method=KINDS[kind](h), stabilisation=stabilisation)
+        for h in steps
     ]
     return np.array([[np.abs(r[name] - truth[name])[1:].max() for name in names] for r in runs])
 
@@ -142,7 +143,7 @@ def test_energy_and_momenta_of_a_free_body_are_conserved_at_the_order(kind):
     scene = spinning()
 
     def drift(h: float) -> np.ndarray:
-        result = forward(scene, end=0.4, output_step=0.04, method=KINDS[kind](h))
+        result = integrate(scene, end=0.4, output_step=0.04, method=KINDS[kind](h))
         return np.array([np.ptp(result["energy.total"]), *np.ptp(momenta(scene, result), axis=0)])
 
     coarse, fine = drift(4e-3), drift(2e-3)
@@ -150,7 +151,7 @@ def test_energy_and_momenta_of_a_free_body_are_conserved_at_the_order(kind):
 
 
 def test_constraints_hold(kind):
-    result = forward(pendulum(), end=0.4, output_step=0.04, method=KINDS[kind](2e-3), stabilisation=Drifting())
+    result = integrate(pendulum(), end=0.4, output_step=0.04, method=KINDS[kind](2e-3), stabilisation=Drifting())
     position, velocity = result["constraint.position"].max(), result["constraint.velocity"].max()
     if kind == "half-explicit":
         assert 1e-13 < position < 1e-9  # the drift of its order, which projection takes away
@@ -165,9 +166,9 @@ def test_constraints_hold(kind):
 
 def test_the_variational_method_conserves_momenta_to_rounding():
     scene = spinning()
-    result = forward(scene, end=2.0, output_step=0.1, method=Variational(0.01, tolerance=1e-15))
+    result = integrate(scene, end=2.0, output_step=0.1, method=Variational(0.01, tolerance=1e-15))
     assert np.abs(np.ptp(momenta(scene, result), axis=0)).max() < 2e-9
-    other = forward(scene, end=2.0, output_step=0.1, method=ROS2(0.01))
+    other = integrate(scene, end=2.0, output_step=0.1, method=ROS2(0.01))
     assert np.abs(np.ptp(momenta(scene, other), axis=0)).max() > 1e-3
 
 
@@ -181,7 +182,7 @@ def rotor() -> Scene:
 def energies(method, revolutions: float) -> np.ndarray:
     """Relative error of the energy at a hundred moments of a run."""
     row = round(revolutions * 2 * np.pi / 3.0 / 0.05 / 100) * 0.05
-    total = forward(rotor(), end=100 * row, output_step=row, method=method)["energy.total"]
+    total = integrate(rotor(), end=100 * row, output_step=row, method=method)["energy.total"]
     return total / total[0] - 1.0
 
 
@@ -242,11 +243,11 @@ def test_a_singular_position_is_passed(kind):
 
 def test_a_stopped_run_goes_on_to_the_same_bits(tmp_path, kind):
     settings = {"end": 0.2, "output_step": 0.01, "method": KINDS[kind](1e-3)}
-    whole = forward(SCENE, **settings)
+    whole = integrate(SCENE, **settings)
     path = tmp_path / "run.nc"
     with pytest.raises(StoppedError):
-        forward(SCENE, **settings, path=path, progress=stop_after(0.05))
-    assert_same_bits(whole, forward(SCENE, **settings, resume=path))
+        integrate(SCENE, **settings, path=path, progress=stop_after(0.05))
+    assert_same_bits(whole, integrate(SCENE, **settings, resume=path))
 
 
 def stiff_ball(told: bool) -> Scene:
@@ -417,4 +418,4 @@ def test_bad_settings_of_a_scene_file_are_refused(tmp_path, method, settings, me
 def test_gains_of_accelerations_are_refused(kind):
     top = Scene((Body("top", rigid_body("top", mass=1.0, inertia=(1, 2, 3))),))
     with pytest.raises(InputError, match=f"{kind.__name__} holds positions or rates"):
-        forward(top, end=1.0, output_step=0.1, method=kind(0.01), stabilisation=Baumgarte(1.0, 1.0))
+        integrate(top, end=1.0, output_step=0.1, method=kind(0.01), stabilisation=Baumgarte(1.0, 1.0))

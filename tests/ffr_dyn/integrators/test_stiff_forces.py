@@ -11,7 +11,7 @@ from synthetic import cloud
 from test_dyn_forces import PAIRS, free_pair, loaded, symmetric
 from test_dyn_kernels import moved, random_state
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.compile.engine import new_engine
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.equations.forces import At, applied
@@ -214,7 +214,7 @@ def test_methods_keep_their_order(what, flexible, kind, order):
     scene = swinging(what, flexible)
 
     def end(step: float):
-        result = forward(scene, end=0.4, output_step=0.4, method=kind(step))
+        result = integrate(scene, end=0.4, output_step=0.4, method=kind(step))
         wanted = ("block.R", "block.p", "block.q") if flexible else ("block.R", "block.p")
         return np.concatenate([result[name][-1] for name in wanted])
 
@@ -237,7 +237,7 @@ def test_energy_does_not_grow_on_a_bushing_of_any_stiffness(kind, h_omega, flexi
         forces=(Bushing("s", "ground.o", "block.a", (stiffness,) * 6),),
         ground={"o": pin},
     )
-    result = forward(scene, end=1.0, output_step=0.01, method=kind(h))
+    result = integrate(scene, end=1.0, output_step=0.01, method=kind(h))
     total = result["energy.total"] + result["energy.springs"]
     assert total.max() <= total[0] * (1 + 1e-9)
     if h_omega >= 100.0:  # L-stable: what the step does not resolve is gone, but for the error of a step
@@ -258,10 +258,10 @@ def hanging(h_omega: float) -> Scene:
 @pytest.mark.parametrize(("kind", "order"), [(ROS2, 2), (ROS3, 3), (GeneralisedAlpha, 1.4), (HHT, 1.2)])
 def test_stiff_springs_are_as_good_as_joints(kind, order, h_omega):
     """On a motion that turns them: unresolved springs cost no order, and hardly any accuracy."""
-    joint, exact = hanging(0.0), forward(hanging(0.0), end=1.0, output_step=0.1, method=ROS3(1e-3))["block.R"]
+    joint, exact = hanging(0.0), integrate(hanging(0.0), end=1.0, output_step=0.1, method=ROS3(1e-3))["block.R"]
 
     def error(scene: Scene, step: float) -> float:
-        return np.abs(forward(scene, end=1.0, output_step=0.1, method=kind(step))["block.R"] - exact).max()
+        return np.abs(integrate(scene, end=1.0, output_step=0.1, method=kind(step))["block.R"] - exact).max()
 
     errors = np.array([error(hanging(h_omega), step) for step in (0.01, 0.005)])
     assert (errors < 1.5 * np.array([error(joint, step) for step in (0.01, 0.005)]) + 1e-6).all()
@@ -269,7 +269,7 @@ def test_stiff_springs_are_as_good_as_joints(kind, order, h_omega):
 
 
 def test_unresolved_springs_store_nothing_and_do_no_work():
-    result = forward(hanging(100.0), end=1.0, output_step=0.01, method=ROS3(0.005))
+    result = integrate(hanging(100.0), end=1.0, output_step=0.01, method=ROS3(0.005))
     total = result["energy.total"] + result["energy.springs"]
     assert total.max() - total[0] < 1e-5 * np.ptp(result["energy.kinetic"])
 
@@ -278,7 +278,7 @@ def test_a_stepper_takes_them_as_a_run_does():
     target = signal("target")
     forces = (Servo("at_elbow", "elbow", target, 100.0, 5.0), JointSpring("at_shoulder", "shoulder", damping=50.0))
     scene = arm(*forces)
-    run = forward(
+    run = integrate(
         scene, end=0.1, output_step=0.01, method=ROS2(1e-3), outputs=("lower.tip.position", "at_elbow.torque")
     )
     stepper = Stepper(scene, ROS2(1e-3), outputs=("lower.tip.position", "at_elbow.torque"))
@@ -294,7 +294,7 @@ def test_a_stepper_takes_them_as_a_run_does():
 
 def test_adaptive_steps_do_not_see_stiff_springs():
     found = {
-        h_omega: forward(hanging(h_omega), end=1.0, output_step=0.1, method=AdaptiveROS3(tolerances(1e-5)))
+        h_omega: integrate(hanging(h_omega), end=1.0, output_step=0.1, method=AdaptiveROS3(tolerances(1e-5)))
         for h_omega in (0.0, 100.0, 1e4)
     }
     for h_omega in (100.0, 1e4):
@@ -318,7 +318,7 @@ def arm(*forces) -> Scene:
 
 
 def tips(scene: Scene, kind, step: float):
-    return forward(scene, end=0.3, output_step=0.01, method=kind(step))["lower.tip.position"]
+    return integrate(scene, end=0.3, output_step=0.01, method=kind(step))["lower.tip.position"]
 
 
 @pytest.mark.parametrize("kind", [ROS2, ROS3, GeneralisedAlpha, HHT])
@@ -335,7 +335,7 @@ def test_servos_on_the_joints_of_a_light_arm_run_at_the_step_of_its_motion(kind,
     """And their torques are those of the motion, whatever kd times an error of a rate may be."""
     sway = harmonic(amplitude=-0.3, frequency=1.5, phase=np.pi / 2, mean=0.3)
     scene = arm(*(Servo(f"at_{joint}", joint, sway, 20 * kd, kd) for joint in ("shoulder", "elbow")))
-    coarse, fine = (forward(scene, end=0.3, output_step=0.01, method=kind(step)) for step in (1e-3, 5e-4))
+    coarse, fine = (integrate(scene, end=0.3, output_step=0.01, method=kind(step)) for step in (1e-3, 5e-4))
     assert np.abs(coarse["lower.tip.position"] - fine["lower.tip.position"]).max() < 1e-4 * 0.2
     torque, first = fine["at_shoulder.torque"], 3 if kind in (ROS2, ROS3) else 6
     assert np.abs(coarse["at_shoulder.torque"] - torque)[first:].max() < 0.1 * np.abs(torque).max()
@@ -343,7 +343,7 @@ def test_servos_on_the_joints_of_a_light_arm_run_at_the_step_of_its_motion(kind,
 
 def test_steps_that_a_method_chooses_are_those_of_the_motion():
     scene = arm(*(JointSpring(f"at_{joint}", joint, damping=5.0) for joint in ("shoulder", "elbow")))
-    found = forward(scene, end=0.3, output_step=0.01, method=AdaptiveROS3(tolerances(1e-4)))
+    found = integrate(scene, end=0.3, output_step=0.01, method=AdaptiveROS3(tolerances(1e-4)))
     assert found.attributes["steps"] < 300
     assert np.abs(found["lower.tip.position"] - tips(scene, ROS3, 2.5e-4)).max() < 1e-4
 
@@ -368,7 +368,7 @@ def test_dry_friction_stops_a_wheel_whatever_the_step(kind, excess, start):
     """Steps up to a thousand times creep inertia / friction, beyond which explicit ones keep it turning for ever."""
     h = 0.01
     friction = JointFriction("rub", "axle", coulomb=1.0, creep=h / excess)
-    result = forward(wheel(friction, speed=start), end=1.0, output_step=0.1, method=kind(h))
+    result = integrate(wheel(friction, speed=start), end=1.0, output_step=0.1, method=kind(h))
     assert abs(result["wheel.omega_bar"][-1, 2]) < 1e-9
     assert result["axle.angle"][-1] == pytest.approx(start**2 / 2, abs=0.3 * h * start)
 
@@ -378,7 +378,7 @@ def test_dry_friction_stops_a_wheel_whatever_the_step(kind, excess, start):
 def test_what_friction_holds_creeps(kind, excess):
     creep = 0.01 / excess
     forces = JointFriction("rub", "axle", coulomb=1.0, creep=creep), Actuator("pull", "axle", 0.5)
-    result = forward(wheel(*forces), end=1.0, output_step=0.1, method=kind(0.01))
+    result = integrate(wheel(*forces), end=1.0, output_step=0.1, method=kind(0.01))
     assert result["wheel.omega_bar"][-1, 2] == pytest.approx(creep * np.arctanh(0.5), rel=1e-6)
 
 
@@ -391,15 +391,15 @@ def test_no_stop_throws_back_faster_than_it_was_hit(kind, h_omega):
     for place in np.linspace(0.105, 0.115, 11):
         scene = replace(wheel(stop, speed=1.0), joints=(replace(wheel().joints[0], axis=(0, 0, 1)),))
         bodies = (replace(scene.bodies[0], rotation=(0, 0, -place)),)
-        result = forward(replace(scene, bodies=bodies), end=0.4, output_step=0.05, method=kind(h))
+        result = integrate(replace(scene, bodies=bodies), end=0.4, output_step=0.05, method=kind(h))
         assert np.abs(result["wheel.omega_bar"][:, 2]).max() < 1.2
 
 
 def test_a_function_whose_slopes_are_told_is_implicit():
     pull = Actuator("pull", "axle", function=lambda t, state: 3.0 - 1e5 * state.v[5])
     with pytest.raises(Exception, match=r"energy|finite"):
-        forward(wheel(pull), end=1.0, output_step=0.1, method=ROS2(0.01))
-    result = forward(wheel(replace(pull, damping=1e5)), end=1.0, output_step=0.1, method=ROS2(0.01))
+        integrate(wheel(pull), end=1.0, output_step=0.1, method=ROS2(0.01))
+    result = integrate(wheel(replace(pull, damping=1e5)), end=1.0, output_step=0.1, method=ROS2(0.01))
     np.testing.assert_allclose(result["wheel.omega_bar"][1:, 2], 3e-5, rtol=1e-6)
     with pytest.raises(InputError, match="damping is -1"):
         replace(pull, damping=-1.0)
@@ -434,17 +434,17 @@ def four_bar(damping: float, side: float = 1.0) -> Scene:
 @pytest.mark.parametrize("damping", [0.0, 1.0, 1e8])
 def test_stiff_forces_in_a_loop_make_no_row_dependent(damping):
     """The closure of the loop is as independent as it is: no singular position is suspected, nothing is projected again."""
-    result = forward(four_bar(damping), end=1.0, output_step=0.01, method=ROS2(1e-3))
+    result = integrate(four_bar(damping), end=1.0, output_step=0.01, method=ROS2(1e-3))
     assert not [note for note in result.attributes["notes"] if "singular" in note]
     assert result.attributes["largest_drift"][0] < 1e-7
-    explicit = forward(four_bar(0.0), end=1.0, output_step=0.01, method=ROS2(1e-3))
+    explicit = integrate(four_bar(0.0), end=1.0, output_step=0.01, method=ROS2(1e-3))
     np.testing.assert_allclose(result["two.R"], explicit["two.R"], atol=1e-7)  # its motion is driven
     assert abs(result.attributes["projections"] - explicit.attributes["projections"]) < 20
 
 
 def test_reactions_are_those_beside_forces_taken_explicitly():
     scene = replace(four_bar(0.3), springs=(SpringDamper("s", "ground.o", "three.b", 300.0, 2.0, 0.9),))
-    one, other = (forward(scene, end=0.2, output_step=0.02, method=kind) for kind in (ROS3(5e-4), RK4(5e-4)))
+    one, other = (integrate(scene, end=0.2, output_step=0.02, method=kind) for kind in (ROS3(5e-4), RK4(5e-4)))
     for name in ("A.force", "C.force", "D.moment", "dB.torque", "s.tension"):
         np.testing.assert_allclose(one[name], other[name], atol=2e-4 * np.abs(other[name]).max())
 
@@ -465,7 +465,7 @@ def test_redundant_rows_and_stiff_forces_go_together():
         scene, bodies=bodies, joints=joints, drivers=(), forces=forces, gravity=(9.81, 0, 0),
         ground={**scene.ground, "q": (0.5, 0, 0)},
     )  # fmt: skip
-    one, other = (forward(scene, end=0.5, output_step=0.05, method=kind) for kind in (ROS2(5e-4), RK4(5e-4)))
+    one, other = (integrate(scene, end=0.5, output_step=0.05, method=kind) for kind in (ROS2(5e-4), RK4(5e-4)))
     assert one.attributes["largest_drift"][0] < 1e-6
     np.testing.assert_allclose(one["two.R"], other["two.R"], atol=1e-6)
 
@@ -474,7 +474,7 @@ def test_planar_scenes_take_them_as_spatial_ones_do():
     forces = [JointSpring(f"at_{joint}", joint, stiffness=1.0, damping=0.5) for joint in ("shoulder", "elbow")]
     scene = replace(arm(*forces), springs=(SpringDamper("s", "ground.o", "lower.tip", 50.0, 5.0, 0.2),))
     flat, solid = (
-        forward(replace(scene, plane=plane), end=0.2, output_step=0.02, method=ROS2(1e-3)) for plane in ("z", "none")
+        integrate(replace(scene, plane=plane), end=0.2, output_step=0.02, method=ROS2(1e-3)) for plane in ("z", "none")
     )
     np.testing.assert_allclose(flat["lower.tip.position"], solid["lower.tip.position"], atol=1e-10)
 
@@ -482,6 +482,6 @@ def test_planar_scenes_take_them_as_spatial_ones_do():
 def test_a_bushing_between_two_flexible_bodies_keeps_them_together():
     scene = free_pair(Bushing("s", "one.b", "two.c", (1e7,) * 3 + (1e5,) * 3, axes_j=None))
     scene = replace(scene, bodies=(scene.bodies[0], replace(scene.bodies[1], position=(0, 0, 0), rotation=(0, 0, 0))))
-    result = forward(scene, end=0.5, output_step=0.05, method=ROS2(1e-3))
+    result = integrate(scene, end=0.5, output_step=0.05, method=ROS2(1e-3))
     total = result["energy.total"] + result["energy.springs"]
     assert (np.diff(total) <= 1e-9 * total[0]).all()

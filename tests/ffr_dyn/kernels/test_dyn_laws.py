@@ -10,7 +10,7 @@ from boxes import STEEL, box_mesh
 from synthetic import cloud
 
 import ffr_prep as fp
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.equations.inertia import mass_matrix
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.functions.time_functions import harmonic, polynomial
@@ -63,7 +63,7 @@ def momenta(scene: Scene, result) -> np.ndarray:
 @pytest.mark.parametrize("scene", [spinning(), pendulum()], ids=["free", "pendulum"])
 def test_energy_is_conserved_at_the_order_of_the_method(scene, method, step, order):
     def drift(h: float) -> float:
-        result = forward(scene, end=0.8, output_step=0.08, method=method(h), stabilisation=Projection(1e-10))
+        result = integrate(scene, end=0.8, output_step=0.08, method=method(h), stabilisation=Projection(1e-10))
         return float(np.ptp(result["energy.total"]) / result["energy.kinetic"].max())
 
     coarse, fine = drift(step), drift(step / 2)
@@ -76,7 +76,7 @@ def test_linear_and_angular_momentum_of_a_free_body_are_conserved(method, step, 
     scene = spinning()
 
     def drift(h: float) -> np.ndarray:
-        return np.ptp(momenta(scene, forward(scene, end=0.8, output_step=0.08, method=method(h))), axis=0)
+        return np.ptp(momenta(scene, integrate(scene, end=0.8, output_step=0.08, method=method(h))), axis=0)
 
     coarse, fine = drift(step), drift(step / 2)
     assert (fine < coarse / 2 ** (order - 0.3)).all()
@@ -88,9 +88,9 @@ def test_motion_converges_at_the_order_of_the_method(method):
     scene, order = pendulum(), method.order
 
     def at(h: float) -> np.ndarray:
-        return forward(scene, end=0.4, output_step=0.4, method=method(h))["two.a.position"][-1]
+        return integrate(scene, end=0.4, output_step=0.4, method=method(h))["two.a.position"][-1]
 
-    truth = forward(scene, end=0.4, output_step=0.4, method=RK4(2.5e-4))["two.a.position"][-1]
+    truth = integrate(scene, end=0.4, output_step=0.4, method=RK4(2.5e-4))["two.a.position"][-1]
     errors = [np.abs(at(h) - truth).max() for h in (4e-3, 2e-3)]
     assert errors[1] < errors[0] / 2 ** (order - 0.4)
 
@@ -104,10 +104,10 @@ def test_no_elastic_frequency_destabilises_the_implicit_methods(method):
         for b in scene.bodies
     )
     scene = replace(scene, bodies=stiff)
-    result = forward(scene, end=1.0, output_step=0.1, method=method(0.01))
+    result = integrate(scene, end=1.0, output_step=0.1, method=method(0.01))
     assert np.ptp(result["energy.total"]) < 0.05 * np.ptp(result["energy.gravity"])
     rigid = tuple(replace(b, model=as_rigid(b.model), q=None, q_dot=None, damping=0.0) for b in scene.bodies)
-    other = forward(replace(scene, bodies=rigid), end=1.0, output_step=0.1, method=method(0.01))
+    other = integrate(replace(scene, bodies=rigid), end=1.0, output_step=0.1, method=method(0.01))
     np.testing.assert_allclose(result["two.a.position"], other["two.a.position"], atol=2e-4)
 
 
@@ -126,7 +126,7 @@ def test_stiff_modes_that_move_a_joint_do_not_make_ros2_drift(beam_in_three_fram
     scene = Scene(tuple(bodies), tuple(joints), ground={"O": (0, 0, 0)}, gravity=GRAVITY)
 
     def run(h: float):
-        return forward(scene, end=0.1, output_step=0.1, method=ROS2(h), stabilisation=Projection(1e-7))
+        return integrate(scene, end=0.1, output_step=0.1, method=ROS2(h), stabilisation=Projection(1e-7))
 
     coarse, truth = run(1e-3), run(6.25e-5)
     assert coarse.attributes["projections"] <= 5
@@ -144,7 +144,7 @@ def test_a_very_stiff_body_moves_as_the_rigid_one():
     model = cloud(3, stiffness=3e4)
     flexible = Scene((Body("b", model, omega_bar=(1, 2, 3)),), gravity=GRAVITY)
     rigid = Scene((Body("b", as_rigid(model), omega_bar=(1, 2, 3)),), gravity=GRAVITY)
-    a, b = (forward(s, end=1.0, output_step=0.1, method=ROS2(1e-3)) for s in (flexible, rigid))
+    a, b = (integrate(s, end=1.0, output_step=0.1, method=ROS2(1e-3)) for s in (flexible, rigid))
     np.testing.assert_allclose(a["b.a.position"], b["b.a.position"], atol=1e-6)
 
 
@@ -172,7 +172,7 @@ def test_reference_conditions_change_the_motion_only_to_second_order_in_the_stra
             push = Load("push", "beam.right", (0, harmonic(amplitude=load, frequency=8.0), load / 2))
             pull = Load("pull", "beam.left", moment=(0, load / 4, load / 8))
             scene = Scene((Body("beam", body, stiffening=False),), loads=(push, pull))
-            result = forward(scene, end=0.02, output_step=0.002, method=RK4(2e-6))
+            result = integrate(scene, end=0.02, output_step=0.002, method=RK4(2e-6))
             ends.append(np.hstack([result["beam.left.position"], result["beam.right.position"]]))
         apart = np.array([np.abs(ends[0] - other).max() for other in ends[1:]])
         return apart, float(np.abs(result["beam.right.displacement"]).max())
@@ -203,7 +203,7 @@ def test_hanging_weight_is_carried_by_the_hinge():
         ground={"O": (0, 0, 0)},
         gravity=GRAVITY,
     )
-    result = forward(scene, end=0.1, output_step=0.05, method=RK4(1e-3))
+    result = integrate(scene, end=0.1, output_step=0.05, method=RK4(1e-3))
     np.testing.assert_allclose(result["hinge.force"], [[0, 2.0 * 9.81, 0]] * 3, atol=1e-9)
     np.testing.assert_allclose(result["hinge.moment"], 0, atol=1e-9)
 
@@ -217,7 +217,7 @@ def test_driven_link_turns_as_told_and_its_motor_does_the_work():
         ground={"O": (0, 0, 0)},
         gravity=GRAVITY,
     )
-    result = forward(scene, end=1.0, output_step=0.01, method=RK4(1e-3))
+    result = integrate(scene, end=1.0, output_step=0.01, method=RK4(1e-3))
     t = result.time
     angle = 0.5 * np.sin(2 * np.pi * t)
     second = -((2 * np.pi) ** 2) * angle
@@ -233,7 +233,7 @@ def test_crank_angle_is_unwound_over_many_turns():
         (Driver("motor", "hinge", polynomial(0.3, 40.0)),),
         ground={"O": (0, 0, 0)},
     )
-    result = forward(scene, end=2.0, output_step=0.1, method=RK4(1e-3))  # four radians a row
+    result = integrate(scene, end=2.0, output_step=0.1, method=RK4(1e-3))  # four radians a row
     np.testing.assert_allclose(result["hinge.angle"], 0.3 + 40.0 * result.time, atol=1e-6)
 
 
@@ -245,7 +245,7 @@ def test_driven_stroke_of_a_slider():
         (Driver("push", "guide", polynomial(0, 1, 2), coordinate="stroke"),),
         ground={"O": (0, 0, 0)},
     )
-    result = forward(scene, end=0.5, output_step=0.1, method=RK4(1e-2))
+    result = integrate(scene, end=0.5, output_step=0.1, method=RK4(1e-2))
     t = result.time
     np.testing.assert_allclose(result["guide.stroke"], t + 2 * t**2, atol=1e-9)
     np.testing.assert_allclose(result["push.force.x"], 12.0, atol=1e-9)
@@ -259,7 +259,7 @@ def test_spring_damper_decays_as_the_closed_form():
         springs=(SpringDamper("spring", "ground.O", "ball.c", k, c, free_length=1.0, preload=10.0),),
         ground={"O": (0, 0, 0)},
     )
-    result = forward(scene, end=1.0, output_step=0.05, method=RK4(1e-3))
+    result = integrate(scene, end=1.0, output_step=0.05, method=RK4(1e-3))
     t, rest = result.time, 1.0 - 10.0 / k
     delta, omega = c / 4.0, np.sqrt(k / 2.0 - (c / 4.0) ** 2)
     x = rest + (1.3 - rest) * np.exp(-delta * t) * (np.cos(omega * t) + delta / omega * np.sin(omega * t))
@@ -272,7 +272,7 @@ def test_forces_in_body_axes_follow_and_python_forces_equal_tables():
     spin = Body("ball", ball, omega_bar=(0, 0, 2.0))
 
     def run(load: Load):
-        return forward(Scene((spin,), loads=(load,)), end=1.0, output_step=0.1, method=RK4(5e-3))
+        return integrate(Scene((spin,), loads=(load,)), end=1.0, output_step=0.1, method=RK4(5e-3))
 
     follower = run(Load("f", "ball.c", (3.0, 0, 0), axes="body"))
     angle = 2.0 * follower.time
@@ -301,7 +301,7 @@ def test_python_force_sees_the_state():
         ground=ground,
         gravity=GRAVITY,
     )
-    a, b = (forward(s, end=0.3, output_step=0.1, method=RK4(2e-3)) for s in (own, built_in))
+    a, b = (integrate(s, end=0.3, output_step=0.1, method=RK4(2e-3)) for s in (own, built_in))
     np.testing.assert_allclose(a["b.a.position"], b["b.a.position"], atol=1e-12)
 
 
@@ -312,7 +312,7 @@ def test_drift_is_held_by_projection_and_by_baumgarte_and_reported_without():
     scene = pendulum()
 
     def worst(stabilisation) -> float:
-        result = forward(scene, end=2.0, output_step=0.5, method=RK4(4e-3), stabilisation=stabilisation)
+        result = integrate(scene, end=2.0, output_step=0.5, method=RK4(4e-3), stabilisation=stabilisation)
         assert result.attributes["largest_drift"][0] > 0
         return float(result["constraint.position"][-1])
 
@@ -322,5 +322,5 @@ def test_drift_is_held_by_projection_and_by_baumgarte_and_reported_without():
 
 
 def test_the_same_input_gives_the_same_bits():
-    a, b = (forward(pendulum(), end=0.2, output_step=0.02, method=ROS2(1e-3)) for _ in range(2))
+    a, b = (integrate(pendulum(), end=0.2, output_step=0.02, method=ROS2(1e-3)) for _ in range(2))
     assert all((a[name] == b[name]).all() for name in a.quantities)

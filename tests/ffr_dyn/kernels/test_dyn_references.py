@@ -7,7 +7,7 @@ import pytest
 from places import MESHES, REFERENCE
 
 import ffr_prep as fp
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.equations.inertia import quadratic_velocity
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import RK4, ROS2
@@ -41,7 +41,9 @@ def mass_point(name: str, mass: float = 1.0, **points):
 def test_dzhanibekov():
     """Torque-free top, I = (1, 2, 3), omega(0) = (0.001, 1, 0.001): closed form in elliptic functions, at t = 10 s."""
     body = rigid_body("top", mass=1.0, inertia=(1, 2, 3))
-    result = forward(Scene((Body("top", body, omega_bar=(0.001, 1, 0.001)),)), end=10, output_step=10, method=RK4(2e-3))
+    result = integrate(
+        Scene((Body("top", body, omega_bar=(0.001, 1, 0.001)),)), end=10, output_step=10, method=RK4(2e-3)
+    )
     expected = (-0.117326383719773, 0.993093912821562, 0.0677433399352767)
     np.testing.assert_allclose(result["top.omega_bar"][-1], expected, atol=1e-9)
 
@@ -55,7 +57,7 @@ def test_simple_pendulum():
         ground={"O": (0, 0, 0)},
         gravity=GRAVITY,
     )
-    result = forward(scene, end=10, output_step=10, method=RK4(1e-3), stabilisation=FINE)
+    result = integrate(scene, end=10, output_step=10, method=RK4(1e-3), stabilisation=FINE)
     expected = (-0.275087462576117, -0.961419205099125)
     np.testing.assert_allclose(result["bob.c.position"][-1, :2], expected, atol=2e-8)  # 1e-9 kg m^2 of inertia is in it
 
@@ -73,7 +75,7 @@ def test_double_pendulum():
         ground={"O": (0, 0, 0)},
         gravity=GRAVITY,
     )
-    result = forward(scene, end=1, output_step=1, method=RK4(2.5e-4), stabilisation=FINE)
+    result = integrate(scene, end=1, output_step=1, method=RK4(2.5e-4), stabilisation=FINE)
     one, two = result["first.c.position"][-1], result["second.c.position"][-1]
     angles = np.arctan2([one[0], two[0] - one[0]], [-one[1], one[1] - two[1]])
     np.testing.assert_allclose(angles, (-0.62508769980639, -1.03458508568), atol=1e-7)
@@ -88,7 +90,7 @@ def test_stiff_spring_pendulum():
         ground={"O": (0, 0, 0)},
         gravity=GRAVITY,
     )
-    result = forward(scene, end=1, output_step=1, method=RK4(5e-5))
+    result = integrate(scene, end=1, output_step=1, method=RK4(5e-5))
     np.testing.assert_allclose(result["ball.c.position"][-1, :2], (-0.98629074, -0.16504631), atol=2e-7)
 
 
@@ -115,7 +117,7 @@ def test_flexible_pendulum(kind, reference):
         ground={"O": (0, 0, 0)},
         gravity=GRAVITY,
     )
-    result = forward(scene, end=0.5, output_step=0.01, method=ROS2(2.5e-5))
+    result = integrate(scene, end=0.5, output_step=0.01, method=ROS2(2.5e-5))
     expected = np.loadtxt(REFERENCE / "pendulum_linear.csv", delimiter=",")
     np.testing.assert_allclose(result.time, expected[:, 0], atol=1e-12)
     assert np.abs(result["rod.tip.position"][:, :2] - expected[:, 1:3]).max() < 3e-4
@@ -148,7 +150,7 @@ def test_flexible_slider_crank(kind):
     """Against the linear floating-frame beam in the chord frame: mid-rod deflection within 5 % of its peak."""
     steel = Material("steel", 2e11, 0.3, 7870.0)
     rod = solid("slidercrank_rod.geo", steel, ("crankpin", "slider"), kind, SimplySupported("crankpin", "slider"))
-    result = forward(slider_crank(rod), end=0.084, output_step=4e-4, method=ROS2(1e-5))
+    result = integrate(slider_crank(rod), end=0.084, output_step=4e-4, method=ROS2(1e-5))
     middle = np.abs(rod.surface.points[:, 0] - 0.15) < 1e-6
     deflection = result["rod.q"] @ rod.surface.Phi[middle].mean(axis=0)[1]
     expected = np.loadtxt(REFERENCE / "slider_crank_linear.csv", delimiter=",")
@@ -183,5 +185,5 @@ def test_a_radial_rod_stretches_under_spin_as_its_quadratic_inertia_says(kL, str
     assert body.interface("tip").phi_t[0] @ q == pytest.approx(stretch, rel=2e-4)
     scene = Scene((Body("rod", body, omega_bar=omega, q=q),), (Joint("axle", "revolute", "ground.O", "rod.root"),),
                   ground={"O": (0, 0, 0)}, plane="none")  # fmt: skip
-    result = forward(scene, end=1e-3, output_step=1e-3, method=ROS2(1e-5))
+    result = integrate(scene, end=1e-3, output_step=1e-3, method=ROS2(1e-5))
     np.testing.assert_allclose(result["rod.tip.displacement"][-1, 0], stretch, rtol=2e-4)

@@ -15,7 +15,7 @@ from ffr_gallery.bodies import tried
 from ffr_gallery.singular_four_bar import time_of_alignment
 from scipy.integrate import solve_ivp
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.integrators import RK4, ROS2, ROS3, DormandPrince, HalfExplicit, Integrator, tolerances
 from ffr_dyn.integrators.stabilisation import Drifting
@@ -57,7 +57,7 @@ A02 = {
 @pytest.mark.parametrize("count", A02)
 def test_the_n_four_bar_passes_its_singular_positions(count, plane):
     """All links align in every half turn; there the mechanism has N + 1 degrees of freedom instead of one."""
-    result = forward(replace(n_four_bar(count), plane=plane), end=10.0, output_step=0.5, method=RK4(5e-4))
+    result = integrate(replace(n_four_bar(count), plane=plane), end=10.0, output_step=0.5, method=RK4(5e-4))
     for time, (x, y) in A02[count].items():
         row = int(np.argmin(np.abs(result.time - time)))
         np.testing.assert_allclose(result["s0.b.position"][row, :2], (x, y), rtol=0, atol=1e-4)
@@ -78,7 +78,7 @@ def passed(method: Integrator, steps: int, step: float, count: int = 2) -> tuple
     """Largest change of energy, and how far from its branch the mechanism is, after the first singular position."""
     outputs = ("energy.total", "s*.b.position")
     end = round(1.5 * steps) * step
-    result = forward(n_four_bar(count), end=end, output_step=step, method=method, outputs=outputs)
+    result = integrate(n_four_bar(count), end=end, output_step=step, method=method, outputs=outputs)
     tops = [result[f"s{k}.b.position"][-1, 1] for k in range(count + 1)]
     change = np.abs(result["energy.total"] - result["energy.total"][0]).max()
     return change, np.abs(np.array(tops) - height(count, end)).max()
@@ -160,7 +160,7 @@ def test_bricard_moves_as_it_should_and_says_that_one_row_is_redundant():
     assembled = assemble(scene)
     assert assembled.degrees_of_freedom == 1
     assert sum("redundant" in note for note in assembled.notes) == 1
-    result = forward(scene, end=2.0, output_step=0.5, method=RK4(5e-4))
+    result = integrate(scene, end=2.0, output_step=0.5, method=RK4(5e-4))
     P3 = result["r2.b.position"]
     np.testing.assert_allclose(P3[2], (0.51050146, -1.64916760, 0.14012311), rtol=0, atol=1e-6)
     np.testing.assert_allclose(P3[4], (-0.96934034, -1.22124689, 0.75427801), rtol=0, atol=1e-6)
@@ -179,7 +179,7 @@ def test_of_the_reactions_that_redundant_joints_leave_open_the_smallest_are_give
         loads=(Load("pull", "bar.c", force=(6.0, 0, 0)),),
         ground={"P": (0, 0, 0), "Q": (1, 0, 0)},
     )
-    result = forward(scene, end=1e-3, output_step=1e-3, method=RK4(1e-3))
+    result = integrate(scene, end=1e-3, output_step=1e-3, method=RK4(1e-3))
     left, right = result["left.force"][-1], result["right.force"][-1]
     np.testing.assert_allclose(left + right, (-6.0, 0, 0), rtol=0, atol=1e-9)
     np.testing.assert_allclose(left, right, rtol=0, atol=1e-6)

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.integrators.rk4 import RK4
 from ffr_dyn.kernels import integrator_api
 from ffr_dyn.kernels.entry_points import evaluate, solve
@@ -82,7 +82,7 @@ def test_the_method_that_the_interface_shows_swings_a_pendulum(tmp_path):
         do_step: ClassVar[Any] = euler_step
 
     def end(method: Any) -> np.ndarray:
-        run = forward(pendulum(), end=0.2, output_step=0.1, method=method)
+        run = integrate(pendulum(), end=0.2, output_step=0.1, method=method)
         return run["bob.centre.position"][-1]
 
     exact = end(RK4(1e-4))

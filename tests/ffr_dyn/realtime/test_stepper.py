@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from synthetic import cloud
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.time_functions import harmonic, polynomial, signal
@@ -56,7 +56,7 @@ def stepped(stepper: Stepper, count: int) -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize("method", [ROS2(1e-3), RK4(1e-3)], ids=repr)
 def test_steps_are_those_of_a_run_to_the_bit(method):
-    run = forward(arm(), end=0.2, output_step=0.01, method=method, outputs=("default", "*.acceleration"))
+    run = integrate(arm(), end=0.2, output_step=0.01, method=method, outputs=("default", "*.acceleration"))
     stepper = Stepper(arm(), method, outputs=("default", "*.acceleration"))
     for row in range(1, 21):
         outputs = stepped(stepper, 10)
@@ -103,7 +103,7 @@ def test_reactions_of_redundant_rows_are_those_of_a_run():
         plane="none",
     )
     assert assemble(scene).all_rows is not None
-    run = forward(scene, end=0.05, output_step=0.05, method=METHOD)
+    run = integrate(scene, end=0.05, output_step=0.05, method=METHOD)
     stepper = Stepper(scene, METHOD, outputs=("low.force", "high.moment", "low.force.z"))
     stepper.step(50)
     for name, values in stepper.outputs().items():
@@ -119,7 +119,7 @@ def test_reactions_of_redundant_rows_are_those_of_a_run():
 def test_a_parabola_given_step_by_step_is_the_parabola():
     """Bit for bit it cannot be: the coefficients are shifted at each step."""
     wanted = arm(forces=(Actuator("motor", "hinge", force=polynomial(0.3, -20, 150)),))
-    run = forward(wanted, end=0.1, output_step=0.1, method=METHOD)
+    run = integrate(wanted, end=0.1, output_step=0.1, method=METHOD)
     stepper = Stepper(TWISTED, METHOD, outputs=("default",))
     for _ in range(100):
         t = stepper.time
@@ -177,7 +177,7 @@ def test_a_servo_follows_an_input():
 def test_a_run_keeps_the_initial_value():
     given = arm(forces=(Actuator("motor", "hinge", force=signal("torque", 0.7)),))
     constant = arm(forces=(Actuator("motor", "hinge", force=0.7),))
-    first, second = (forward(s, end=0.05, output_step=0.05, method=METHOD) for s in (given, constant))
+    first, second = (integrate(s, end=0.05, output_step=0.05, method=METHOD) for s in (given, constant))
     np.testing.assert_array_equal(first["bob.c.position"], second["bob.c.position"])
 
 
@@ -240,7 +240,7 @@ def test_steps_leave_no_memory_behind():
 
 def test_every_quantity_but_work_can_be_an_output():
     names = [name for name in catalogue(assemble(arm()).system) if not name.endswith(".work")]
-    run = forward(arm(), end=0.01, output_step=0.01, method=METHOD, outputs=names)
+    run = integrate(arm(), end=0.01, output_step=0.01, method=METHOD, outputs=names)
     stepper = Stepper(arm(), METHOD, outputs=names)
     stepper.step(10)
     assert set(stepper.outputs()) == set(names)

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from test_animate import rotating_box
 
 import ffr_prep as fp
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.cli import cli
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import ROS2
@@ -262,7 +262,7 @@ SPIN = 30.0  # [rad/s], well below the first bending frequency of both bodies
 def settled(body, *parts):
     """The result of a body that has turned about the z axis until its vibration was damped out."""
     scene = Scene((Body("body", body, omega_bar=(0, 0, SPIN), damping=1.0),), *parts, ground={"O": (0, 0, 0)})
-    return forward(scene, end=0.2, output_step=0.2, method=ROS2(1e-4))
+    return integrate(scene, end=0.2, output_step=0.2, method=ROS2(1e-4))
 
 
 @pytest.mark.parametrize(("relief", "smallest", "largest"), [(True, 0.0, 0.003), (False, 0.5, 1.1)])
@@ -339,7 +339,7 @@ def test_section_forces_of_a_sagging_cantilever_and_the_reaction_of_its_joint(tm
     clamp = (Joint("clamp", "fixed", "ground.O", "beam.root"),)
     scene = Scene((Body("beam", beam, damping=1.0),), clamp, ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0))
     path = tmp_path / "run.nc"
-    result = forward(scene, end=2.0, output_step=0.5, method=ROS2(1e-3), path=path)
+    result = integrate(scene, end=2.0, output_step=0.5, method=ROS2(1e-3), path=path)
     p, l = STEEL.rho * section.A * 9.81, length / elements  # noqa: E741
     at_root = section_forces(result, "beam", 0)[-1, 0]
     expected = [0, -p * (length - l / 2), 0, 0, 0, -p * (length**2 / 2 - l**2 / 12)]

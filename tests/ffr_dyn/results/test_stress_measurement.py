@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ffr_prep as fp
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import flattened
 from ffr_dyn.functions.time_functions import harmonic
@@ -66,7 +66,7 @@ def swinging(boom, **changes) -> Scene:
 
 @pytest.fixture(scope="module")
 def run(boom):
-    return forward(swinging(boom), end=0.2, output_step=0.01, method=ROS2(1e-4))
+    return integrate(swinging(boom), end=0.2, output_step=0.01, method=ROS2(1e-4))
 
 
 def test_measured_stress_is_that_recovered_afterwards(run):
@@ -102,14 +102,14 @@ def test_they_have_units_and_are_saved(run, tmp_path):
 def test_a_planar_scene_stays_planar_and_measures_the_same(boom, run):
     """Measurements do not push anything across the plane."""
     assert flattened(swinging(boom), 0.0)[0].plane == "z"
-    spatial = forward(swinging(boom, plane="none"), end=0.2, output_step=0.01, method=ROS2(1e-4))
+    spatial = integrate(swinging(boom, plane="none"), end=0.2, output_step=0.01, method=ROS2(1e-4))
     for name in ("notch", "bending", "reach"):
         expected = spatial[f"measured.{name}"]
         np.testing.assert_allclose(run[f"measured.{name}"], expected, rtol=0, atol=1e-7 * np.abs(expected).max())
 
 
 def test_only_what_is_wanted_is_kept(boom):
-    kept = forward(swinging(boom), end=0.01, output_step=0.01, method=ROS2(1e-4), outputs=("measured.notch",))
+    kept = integrate(swinging(boom), end=0.01, output_step=0.01, method=ROS2(1e-4), outputs=("measured.notch",))
     assert list(kept.quantities) == ["measured.notch"]
 
 

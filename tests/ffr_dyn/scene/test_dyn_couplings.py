@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from synthetic import cloud
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.compile.engine import evaluate_at, new_engine
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.equations.constraint_rows import rows_at
@@ -116,7 +116,7 @@ def test_a_gear_train_runs_up_over_many_turns_as_its_reduced_inertia_says():
 
     ratio = -17 / 41
     scene = replace(train(ratio), loads=(Load("motor", "a.o", moment=(0, 0, 0.8)),))
-    result = forward(scene, end=3.0, output_step=0.01, method=RK4(2.5e-4))
+    result = integrate(scene, end=3.0, output_step=0.01, method=RK4(2.5e-4))
     expected = 0.8 / (0.02 + ratio**2 * 0.05) * result.time**2 / 2
     assert expected[-1] > 100
     np.testing.assert_allclose(result["ja.angle"], expected, rtol=0, atol=1e-7)
@@ -136,7 +136,7 @@ def test_a_rack_moves_by_the_pitch_radius_times_the_angle():
         couplings=(Coupling("rack_and_pinion", "turn.angle", "slide.stroke", 0.04),),
         ground=GROUND,
     )
-    result = forward(scene, end=2.0, output_step=0.1, method=RK4(1e-3))
+    result = integrate(scene, end=2.0, output_step=0.1, method=RK4(1e-3))
     np.testing.assert_allclose(result["slide.stroke"], 0.04 * 5.0 * result.time**2, rtol=0, atol=1e-9)
     torque = result["motor.moment"][-1, 2]
     assert torque == pytest.approx((0.02 + 2.0 * 0.04**2) * 10.0, rel=1e-9)
@@ -151,7 +151,7 @@ def test_a_screw_under_its_weight_turns_as_pitch_and_inertia_say():
         ground=GROUND,
         gravity=(0, 0, -9.81),
     )
-    result = forward(scene, end=1.5, output_step=0.1, method=RK4(1e-4))
+    result = integrate(scene, end=1.5, output_step=0.1, method=RK4(1e-4))
     lead = 0.2 / (2 * np.pi)
     expected = -3.0 * 9.81 / (3.0 + 0.004 / lead**2) * result.time**2 / 2
     np.testing.assert_allclose(result["thread.stroke"], expected, rtol=0, atol=1e-9)

@@ -11,7 +11,7 @@ from places import ROOT
 from synthetic import cloud
 from test_dyn_kernels import chain, moved, random_state
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.compile.engine import evaluate_at, load_at, new_engine
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.consistency.assemble import assemble
@@ -134,7 +134,7 @@ def test_all_loads_at_once_equal_the_sum_of_the_readable_ones():
 def test_powers_in_a_result_are_forces_times_velocities():
     scene = loaded(PAIRS["bushing"])
     scene = replace(scene, loads=(Load("push", "one.b", (1, 2, 3)),), joints=())
-    result = forward(scene, end=0.01, output_step=0.01, method=RK4(1e-3), outputs=POWERS)
+    result = integrate(scene, end=0.01, output_step=0.01, method=RK4(1e-3), outputs=POWERS)
     (push, bushing) = applied(scene, layout(scene), 0.01, *_end(scene, result))
     assert result["push.power"][-1] == pytest.approx(push.power, abs=1e-10)
     assert result["s.power"][-1] == pytest.approx(bushing.power, abs=1e-10)
@@ -219,7 +219,7 @@ def test_a_bushing_without_damping_conserves_energy_through_large_rotations():
     scene = free_pair(Bushing("s", "one.b", "two.c", symmetric(4, positive=True), **AXES))
 
     def drift(h: float) -> float:
-        result = forward(scene, end=1.0, output_step=0.05, method=RK4(h))
+        result = integrate(scene, end=1.0, output_step=0.05, method=RK4(h))
         assert np.linalg.norm(result["s.rotation"], axis=1).max() > 0.5
         return float(np.ptp(result["energy.total"] + result["energy.springs"]))
 
@@ -238,7 +238,7 @@ def test_a_bushing_without_damping_conserves_energy_through_large_rotations():
 )
 def test_a_tabulated_spring_stores_what_it_takes(spring):
     """Swinging beyond both ends of the table."""
-    result = forward(slider(spring, speed=4.0), end=4.0, output_step=0.05, method=RK4(2e-3))
+    result = integrate(slider(spring, speed=4.0), end=4.0, output_step=0.05, method=RK4(2e-3))
     assert np.ptp(result["guide.stroke"]) > 3.6
     total = result["energy.kinetic"] + result["energy.springs"]
     assert np.ptp(total) < 1e-6 * total[0]
@@ -262,7 +262,7 @@ def test_work_of_the_forces_is_the_change_of_energy():
     )
     turning = (JointFriction("r", "hinge", 0.5, 0.2), Servo("p", "hinge", polynomial(0, 2), 3.0, 1.0))
     scene = replace(scene, forces=(*scene.forces, *turning, Actuator("t", "hinge", 2.0)))
-    result = forward(scene, end=0.6, output_step=0.002, method=RK4(5e-4), outputs=POWERS)
+    result = integrate(scene, end=0.6, output_step=0.002, method=RK4(5e-4), outputs=POWERS)
     names = [f.name for f in (*scene.forces, *scene.springs, *scene.loads)]
     power = sum(result[f"{name}.power"] for name in names)
     assert all(np.abs(result[f"{name}.power"]).max() > 1e-3 for name in names)
@@ -309,7 +309,7 @@ def test_a_torsion_spring_swings_as_an_oscillator_through_many_turns():
     stiffness = 2.0
     omega = np.sqrt(stiffness / INERTIA)
     speed = 21.0 * omega
-    result = forward(
+    result = integrate(
         rotor(JointSpring("s", "hinge", stiffness), speed=speed), end=6.0, output_step=0.05, method=RK4(2e-3)
     )
     exact = 21.0 * np.sin(omega * result.time)
@@ -323,7 +323,7 @@ def test_a_torsion_spring_swings_as_an_oscillator_through_many_turns():
 
 def test_a_spring_wound_at_the_start_unwinds():
     scene = rotor(JointSpring("s", "hinge", 2.0, free=0.5, turns=3), angle=0.4)
-    result = forward(scene, end=3.0, output_step=0.05, method=RK4(5e-3))
+    result = integrate(scene, end=3.0, output_step=0.05, method=RK4(5e-3))
     amplitude = 6 * np.pi + 0.4 - 0.5
     exact = 0.5 + amplitude * np.cos(np.sqrt(2.0 / INERTIA) * result.time)
     np.testing.assert_allclose(result["s.angle"], exact, atol=2e-5)
@@ -346,9 +346,9 @@ def test_turns_are_counted_from_accepted_states_and_evaluating_changes_nothing()
 
 def test_a_resumed_run_goes_on_with_its_turns(tmp_path):
     scene, settings = rotor(JointSpring("s", "hinge", 2.0), speed=30.0), {"output_step": 0.05, "method": RK4(5e-3)}
-    whole = forward(scene, end=1.0, **settings)
-    forward(scene, end=0.5, **settings, path=tmp_path / "run.nc")
-    result = forward(scene, end=1.0, **settings, resume=tmp_path / "run.nc")
+    whole = integrate(scene, end=1.0, **settings)
+    integrate(scene, end=0.5, **settings, path=tmp_path / "run.nc")
+    result = integrate(scene, end=1.0, **settings, resume=tmp_path / "run.nc")
     assert whole["s.angle"].min() >= 0
     assert whole["s.angle"][10] > 2 * np.pi
     assert result["s.angle"].tobytes() == whole["s.angle"].tobytes()
@@ -364,7 +364,7 @@ def test_reactions_of_redundant_rows_see_the_same_turns():
         loads=(Load("side", "wheel.hub", function=lambda t, state: (0.0, 0.0, 0.0)),),
         ground={"o": (0, 0, 0), "e": (0, 0, 1)},
     )
-    result = forward(scene, end=2.0, output_step=0.1, method=RK4(1e-2))
+    result = integrate(scene, end=2.0, output_step=0.1, method=RK4(1e-2))
     assert result["s.angle"].max() > 3 * np.pi
     assert np.abs(result["hinge.moment"][:, 2] + result["other.moment"][:, 2]).max() < 1e-9
 
@@ -372,7 +372,7 @@ def test_reactions_of_redundant_rows_see_the_same_turns():
 def test_a_spring_along_a_guide_and_a_tabulated_one_have_the_same_period():
     for stiffness in (50.0, Curve([-1.0, 0.0, 2.0], [-50.0, 0.0, 100.0])):
         scene = slider(JointSpring("s", "guide", stiffness, free=0.1, coordinate="stroke"), at=0.4)
-        result = forward(scene, end=2.0, output_step=0.05, method=RK4(2e-3))
+        result = integrate(scene, end=2.0, output_step=0.05, method=RK4(2e-3))
         exact = 0.1 + 0.3 * np.cos(np.sqrt(50.0 / MASS) * result.time)
         np.testing.assert_allclose(result["guide.stroke"], exact, atol=1e-7)
 
@@ -390,7 +390,7 @@ def test_a_bushing_holds_a_block_with_six_frequencies():
             forces=(Bushing("s", "ground.o", "block.pin", stiffness),),
             ground={"o": (0, 0, 0)},
         )
-        result = forward(scene, end=1.0, output_step=0.05, method=RK4(5e-3))
+        result = integrate(scene, end=1.0, output_step=0.05, method=RK4(5e-3))
         found = np.hstack([result["s.displacement"], result["s.rotation"]])
         np.testing.assert_allclose(found[:, c], 0.3 * np.cos(omega[c] * result.time), atol=1e-6)
         assert np.abs(np.delete(found, c, axis=1)).max() < 1e-12
@@ -404,7 +404,7 @@ def test_a_bushing_in_turned_axes_and_with_preload_finds_its_equilibrium():
         "s", "ground.o", "block.pin", (100.0, 200.0, 400.0, 50, 50, 50), (40.0,) * 6, (10, 0, 0, 0, 0, 0), frame
     )
     scene = Scene((Body("block", block),), forces=(bushing,), ground={"o": (0, 0, 0)}, gravity=(0, 0, -9.81))
-    result = forward(scene, end=20.0, output_step=1.0, method=RK4(1e-2))
+    result = integrate(scene, end=20.0, output_step=1.0, method=RK4(1e-2))
     # the third column of the frame is the x axis, the second z, the first y
     np.testing.assert_allclose(result["s.displacement"][-1], [0.1, -weight / 200, 0], atol=1e-9)
     np.testing.assert_allclose(result["block.R"][-1], [0, 0.1, -weight / 200], atol=1e-9)
@@ -417,7 +417,7 @@ def test_dry_friction_stops_a_block_after_the_known_distance():
         JointFriction("f", "guide", friction, creep, coordinate="stroke"),
         JointFriction("f", "guide", 0.3, creep, normal=20.0, coordinate="stroke"),
     ):
-        result = forward(slider(law, speed=speed), end=1.0, output_step=0.01, method=RK4(5e-4), outputs=POWERS)
+        result = integrate(slider(law, speed=speed), end=1.0, output_step=0.01, method=RK4(5e-4), outputs=POWERS)
         exact = MASS / friction * (speed**2 / 2 + creep**2 * np.pi**2 / 12)
         assert result["guide.stroke"][-1] == pytest.approx(exact, abs=1e-6)
         assert result["f.power"].max() <= 0
@@ -425,7 +425,7 @@ def test_dry_friction_stops_a_block_after_the_known_distance():
 
 def test_a_stuck_block_creeps_no_faster_than_stated():
     law = JointFriction("f", "guide", 6.0, 1e-3, static=8.0, stribeck=0.1, coordinate="stroke")
-    result = forward(
+    result = integrate(
         slider(law, loads=(Load("pull", "block.pin", (0, 0, 4.0)),)), end=0.2, output_step=0.02, method=RK4(1e-4)
     )
     final = result["block.v"][-1, 2]
@@ -445,7 +445,7 @@ def test_stribecks_friction_falls_from_static_to_coulomb(rate):
 
 def test_friction_ends_where_the_surfaces_part():
     law = JointFriction("f", "guide", 0.3, 1e-3, polynomial(20.0, -40.0), coordinate="stroke")
-    result = forward(slider(law, speed=2.0), end=1.0, output_step=0.05, method=RK4(1e-3))
+    result = integrate(slider(law, speed=2.0), end=1.0, output_step=0.05, method=RK4(1e-3))
     t = np.minimum(result.time, 0.5)
     np.testing.assert_allclose(result["block.v"][:, 2], 2.0 - 0.3 / MASS * (20 * t - 20 * t**2), atol=1e-5)
 
@@ -453,7 +453,7 @@ def test_friction_ends_where_the_surfaces_part():
 def test_an_elastic_stop_sends_a_block_back_as_fast_and_a_damped_one_slower():
     def rebound(damping: float) -> float:
         stop = JointStop("f", "guide", 5e3, 0.01, lower=-1.0, upper=0.5, damping=damping, coordinate="stroke")
-        result = forward(slider(stop, speed=2.0), end=0.6, output_step=0.005, method=RK4(1e-4))
+        result = integrate(slider(stop, speed=2.0), end=0.6, output_step=0.005, method=RK4(1e-4))
         assert result["f.force"].max() == 0.0  # pushes back, never pulls
         assert result["f.force"].min() < -10
         return -result["block.v"][-1, 2]
@@ -464,7 +464,7 @@ def test_an_elastic_stop_sends_a_block_back_as_fast_and_a_damped_one_slower():
 
 def test_a_block_rests_on_a_stop_at_the_depth_that_carries_it():
     stop = JointStop("f", "guide", 1e3, 0.002, lower=0.0, damping=80.0, coordinate="stroke")
-    result = forward(slider(stop, at=0.01, gravity=(0, 0, -9.81)), end=3.0, output_step=0.1, method=RK4(1e-3))
+    result = integrate(slider(stop, at=0.01, gravity=(0, 0, -9.81)), end=3.0, output_step=0.1, method=RK4(1e-3))
     assert result["guide.stroke"][-1] == pytest.approx(-(MASS * 9.81 / 1e3 + 0.001), abs=1e-9)
 
 
@@ -472,7 +472,7 @@ def test_a_servo_settles_as_its_gains_say():
     """Critically damped: error (1 + w t) exp(-w t)."""
     w, target = 8.0, 7.0  # beyond a turn
     servo = Servo("p", "hinge", target, kp=INERTIA * w**2, kd=2 * INERTIA * w)
-    result = forward(rotor(servo), end=2.0, output_step=0.02, method=RK4(2e-3))
+    result = integrate(rotor(servo), end=2.0, output_step=0.02, method=RK4(2e-3))
     exact = target * (1 - (1 + w * result.time) * np.exp(-w * result.time))
     np.testing.assert_allclose(result["p.angle"], exact, atol=1e-6)
 
@@ -480,13 +480,13 @@ def test_a_servo_settles_as_its_gains_say():
 def test_a_servo_follows_a_moving_target_without_a_memory_of_its_rate():
     """Relative damping acts on the error's rate: a target at constant speed is followed exactly."""
     servo = Servo("p", "hinge", polynomial(0, 9.0), kp=20.0, kd=4.0)
-    result = forward(rotor(servo, speed=9.0), end=2.0, output_step=0.1, method=RK4(2e-3))
+    result = integrate(rotor(servo, speed=9.0), end=2.0, output_step=0.1, method=RK4(2e-3))
     np.testing.assert_allclose(result["p.angle"], 9.0 * result.time, atol=1e-9)
     assert np.abs(result["p.torque"]).max() < 1e-8
 
 
 def test_a_limited_servo_pushes_with_its_limit():
-    result = forward(
+    result = integrate(
         slider(Servo("p", "guide", 100.0, 50.0, limit=3.0, coordinate="stroke")),
         end=1.0,
         output_step=0.1,
@@ -504,7 +504,7 @@ FUNCTIONS = {
 
 @pytest.mark.parametrize(("force", "motion"), FUNCTIONS.values(), ids=list(FUNCTIONS))
 def test_an_actuator_accelerates_a_rotor(force, motion):
-    result = forward(rotor(Actuator("t", "hinge", force)), end=1.0, output_step=0.1, method=RK4(1e-2))
+    result = integrate(rotor(Actuator("t", "hinge", force)), end=1.0, output_step=0.1, method=RK4(1e-2))
     np.testing.assert_allclose(result["hinge.angle"], motion(result.time) / INERTIA, atol=1e-9)
 
 
@@ -513,13 +513,13 @@ def test_a_python_actuator_sees_the_state():
     by_hand = Actuator(
         "t", "guide", function=lambda t, state: -50 * state.position("block.pin")[2], coordinate="stroke"
     )
-    result = forward(slider(by_hand, at=0.3), end=1.0, output_step=0.05, method=RK4(2e-3))
+    result = integrate(slider(by_hand, at=0.3), end=1.0, output_step=0.05, method=RK4(2e-3))
     np.testing.assert_allclose(result["guide.stroke"], 0.3 * np.cos(np.sqrt(50 / MASS) * result.time), atol=1e-7)
 
 
 def test_a_driven_angle_is_counted_by_the_implicit_method_too():
     spring = JointSpring("s", "hinge", 2.0)
-    result = forward(rotor(spring, speed=21 * np.sqrt(2 / INERTIA)), end=3.0, output_step=0.05, method=ROS2(1e-3))
+    result = integrate(rotor(spring, speed=21 * np.sqrt(2 / INERTIA)), end=3.0, output_step=0.05, method=ROS2(1e-3))
     np.testing.assert_allclose(result["s.angle"], 21 * np.sin(np.sqrt(2 / INERTIA) * result.time), atol=2e-3)
     assert result["s.angle"].max() > 6 * np.pi
 
@@ -626,10 +626,10 @@ def test_a_modal_force_accelerates_as_the_mass_matrix_says():
 def test_an_accelerated_base_acts_as_gravity_against_it():
     """A pendulum in a frame accelerated by a swings as in the gravity g - a, to the last bit but rounding."""
     scene = replace(chain(2, 2, kind="spherical"), gravity=(0, -9.81, 0))
-    shaken = forward(
+    shaken = integrate(
         replace(scene, base_acceleration=(3.0, 0, lambda t: 1.0)), end=0.3, output_step=0.1, method=RK4(1e-3)
     )
-    tilted = forward(replace(scene, gravity=(-3.0, -9.81, -1.0)), end=0.3, output_step=0.1, method=RK4(1e-3))
+    tilted = integrate(replace(scene, gravity=(-3.0, -9.81, -1.0)), end=0.3, output_step=0.1, method=RK4(1e-3))
     np.testing.assert_allclose(shaken["two.R"], tilted["two.R"], rtol=0, atol=1e-12)
     np.testing.assert_allclose(shaken["one.q"], tilted["one.q"], rtol=0, atol=1e-12)
 
@@ -642,7 +642,7 @@ def test_a_shaken_oscillator_answers_as_the_closed_form_says():
         JointSpring("s", "guide", stiffness, coordinate="stroke"),
         base_acceleration=(0, 0, harmonic(amplitude=a, frequency=frequency)),
     )
-    result = forward(scene, end=2.0, output_step=0.05, method=RK4(1e-3))
+    result = integrate(scene, end=2.0, output_step=0.05, method=RK4(1e-3))
     t = result.time
     exact = -a / (w0**2 - w**2) * (np.sin(w * t) - w / w0 * np.sin(w0 * t))
     np.testing.assert_allclose(result["guide.stroke"], exact, atol=1e-9)
@@ -842,7 +842,7 @@ def weight_on_a_spring(**changes):
 def test_gravity_may_vary_with_time():
     """z'' + 25 z = -9.81 + 3 sin(2 pi t), from rest."""
     wave = harmonic(amplitude=3.0, frequency=1.0, mean=-9.81)
-    result = forward(weight_on_a_spring(gravity=(0, 0, wave)), end=2.0, output_step=0.05, method=RK4(1e-3))
+    result = integrate(weight_on_a_spring(gravity=(0, 0, wave)), end=2.0, output_step=0.05, method=RK4(1e-3))
     t, w0, w = result.time, 5.0, 2 * np.pi
     exact = -9.81 / w0**2 * (1 - np.cos(w0 * t)) + 3.0 / (w0**2 - w**2) * (np.sin(w * t) - w / w0 * np.sin(w0 * t))
     np.testing.assert_allclose(result["guide.stroke"], exact, atol=1e-9)
@@ -852,7 +852,7 @@ def test_varying_gravity_and_a_moving_base_add_up():
     """Gravity and base move together: a lift in free fall, whichever way it is said."""
     falls = harmonic(amplitude=3.0, frequency=1.0)
     scene = weight_on_a_spring(gravity=(0, 0, falls), base_acceleration=(0, 0, falls))
-    still = forward(scene, end=0.5, output_step=0.1, method=RK4(1e-3))
+    still = integrate(scene, end=0.5, output_step=0.1, method=RK4(1e-3))
     np.testing.assert_allclose(still["guide.stroke"], 0.0, atol=1e-12)
     steps = weight_on_a_spring(gravity=(0, 0, lambda t: -9.81 if t < 0.25 else 0.0))
     assert replace(steps, name="again").base_acceleration == steps.base_acceleration
@@ -882,7 +882,7 @@ def test_base_acceleration_needs_three_components():
 def test_a_failing_python_function_stops_the_run_and_is_named(force, message):
     scene = chain(0, 0, kind="revolute")
     with pytest.raises(ComputationError, match=message):
-        forward(replace(scene, forces=(force,)), end=0.02, output_step=0.005, method=RK4(5e-3))
+        integrate(replace(scene, forces=(force,)), end=0.02, output_step=0.005, method=RK4(5e-3))
     system = compile_scene(replace(scene, forces=(force,)))
     if "finite" in message:
         with pytest.raises(ComputationError, match=message):
@@ -923,7 +923,7 @@ def test_forces_on_joints_in_the_plane_keep_a_scene_planar():
     scene = arm()
     assert assemble(scene).system.scene.plane == "z"
     planar, spatial = (
-        forward(replace(scene, plane=plane), end=1.0, output_step=0.1, method=RK4(1e-3)) for plane in ("auto", "none")
+        integrate(replace(scene, plane=plane), end=1.0, output_step=0.1, method=RK4(1e-3)) for plane in ("auto", "none")
     )
     for name in ("guide.stroke", "hinge.angle", "coil.torque", "rub.force", "motor.torque"):
         np.testing.assert_allclose(planar[name], spatial[name], rtol=0, atol=1e-11)

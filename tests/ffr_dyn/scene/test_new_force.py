@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from places import ROOT
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.linearise import linearise
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
@@ -117,7 +117,7 @@ def test_its_kernel_equals_its_law(scene):
 
 def test_energy_is_kept_and_accounted_for(scene):
     outputs = ("default", "*.power", "*.work", "energy.*", "pull.*")
-    result = forward(scene, end=0.4, output_step=0.01, method=RK4(5e-4), outputs=outputs)
+    result = integrate(scene, end=0.4, output_step=0.01, method=RK4(5e-4), outputs=outputs)
     total = result["energy.total"] + result["energy.springs"]
     moved = np.ptp(result["energy.kinetic"])
     assert moved > 0.5

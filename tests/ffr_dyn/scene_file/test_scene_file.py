@@ -28,7 +28,7 @@ from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.functions.curves import Curve
 from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.time_functions import evaluate, harmonic, polynomial, table
-from ffr_dyn.integrators import RK4, ROS2
+from ffr_dyn.integrators import RK4, Within
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection
 from ffr_dyn.results.file import load_result
 from ffr_dyn.scene.couplings import Coupling
@@ -109,7 +109,7 @@ def test_numbers_may_be_formulas_of_parameters_and_have_units(tmp_path):
     assert bar.interface("b").position[0] == 1.0
     assert scene.springs[0].stiffness == 5000.0
     assert settings.output_step == 0.01
-    assert settings.method == ROS2(0.001)
+    assert settings.method == Within()
     assert settings.outputs == ("default", "*.power")
     assert evaluate(scene.loads[0].force[0], 1.0)[0] == 10.0
     assert scene.loads[0].force[1:] == [0.0, 0.0]
@@ -280,7 +280,7 @@ MOTOR = '[drivers.m]\njoint = "hinge"\nfunction = '
         ("[drivers]", MOTOR + '{table = [[0, 2, 1], [0, 1, 2]]}', ["drivers.m.function", "increasing"]),
         ("[drivers]", MOTOR + '{table = [[0, 1]]}', ["drivers.m", "table"]),
         ("[drivers]", MOTOR + '{polynomial = [1], formula = "t"}', ["exactly one of"]),
-        ("[drivers]", MOTOR + '{table_file = "none.csv"}', ["none.csv is not a file of two columns"]),
+        ("[drivers]", MOTOR + '{table_file = "none.csv"}', ["none.csv does not exist"]),
         ("[drivers]", MOTOR + '{harmonic = {amplitude = 1}}', ["frequency [Hz] or speed"]),
         ("[drivers]", MOTOR + 'true', ["drivers.m"]),
         ("[drivers]", MOTOR + '[1]', ["give a number, a formula or a table"]),
@@ -480,7 +480,7 @@ METHOD = {"start": 0.1, "end": 1.1, "output_step": 0.1, "method": RK4(1e-3)}
             start=0.1,
             end=1.1,
             output_step=0.1,
-            method=ROS2(0.01),
+            method=Within(),
             stabilisation=Projection(),
             outputs=("two.R",),
             analysis=Kinematic(),

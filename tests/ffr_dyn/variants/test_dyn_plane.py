@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ffr_prep as fp
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.consistency.assemble import assemble, flattened
 from ffr_dyn.functions.rotation import euler_parameters, rotation_matrix
 from ffr_dyn.functions.time_functions import harmonic, polynomial
@@ -71,7 +71,7 @@ def slider_crank(**changes) -> Scene:
 def test_motion_and_reactions_equal_the_spatial_ones(method, stiffening):
     scene = slider_crank(rod={"stiffening": stiffening})
     runs = [
-        forward(replace(scene, plane=plane), end=0.02, output_step=0.001, method=method) for plane in ("auto", "none")
+        integrate(replace(scene, plane=plane), end=0.02, output_step=0.001, method=method) for plane in ("auto", "none")
     ]
     planar, spatial = runs
     assert any("planar" in note for note in planar.attributes["notes"])
@@ -115,7 +115,7 @@ def test_the_plane_may_be_any_of_the_three(turn):
     )
     ground = {name: A @ at for name, at in scene.ground.items()}
     turned = replace(scene, bodies=bodies, joints=joints, ground=ground, gravity=A @ scene.gravity)
-    runs = [forward(s, end=0.01, output_step=0.001, method=ROS2(1e-4)) for s in (scene, turned)]
+    runs = [integrate(s, end=0.01, output_step=0.001, method=ROS2(1e-4)) for s in (scene, turned)]
     assert all(any("planar" in note for note in run.attributes["notes"]) for run in runs)
     np.testing.assert_allclose(runs[1]["rod.b.position"] @ A, runs[0]["rod.b.position"], rtol=0, atol=1e-10)
 
@@ -224,7 +224,7 @@ def test_rounding_of_high_modes_does_not_make_a_scene_spatial(link):
         assert not interface.phi_t[2].any()
         assert not interface.phi_r[:2].any()
     runs = [
-        forward(replace(scene, plane=plane), end=0.02, output_step=0.005, method=ROS2(1e-5))
+        integrate(replace(scene, plane=plane), end=0.02, output_step=0.005, method=ROS2(1e-5))
         for plane in ("auto", "none")
     ]
     for name in ("two.b.position", "one.q"):

@@ -286,3 +286,18 @@ def test_points_without_second_order_are_told():
     with pytest.raises(fp.InputError, match="second-order displacement of its point 'middle'"):
         assemble(replace(pendulum(model), loads=(load,)))
     assemble(pendulum(model))
+
+
+def test_damping_ratios_are_of_the_mean_axis_modes_by_frequency():
+    """Whatever the conditions are, and in whatever order the coordinates are computed."""
+    tips = []
+    for conditions in CONDITIONS:
+        body = rod(conditions)
+        damped = pendulum(body, damping=np.linspace(0.01, 0.3, body.n))
+        (converted,) = in_mean_axis_frames(damped).bodies
+        assert not np.all(np.diff(converted.model.omega2) > 0)
+        order = np.argsort(converted.model.omega2)
+        np.testing.assert_array_equal(converted.damping[order], damped.bodies[0].damping)
+        tips.append(fd.forward(damped, end=0.05, output_step=0.05, method=fd.ROS3(1e-3))["rod.right.position"])
+    for tip in tips[1:]:
+        np.testing.assert_allclose(tip, tips[0], rtol=0, atol=1e-9)

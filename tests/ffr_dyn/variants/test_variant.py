@@ -11,7 +11,7 @@ from boxes import STEEL, box_mesh
 from synthetic import cloud
 
 import ffr_prep as fp
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.equations.inertia import mass_matrix, quadratic_velocity
@@ -146,7 +146,7 @@ def test_the_compiled_equations_are_those_of_the_remaining_integrals(dropped):
     rng = np.random.default_rng(3)
     q, qd, w = 0.05 * rng.normal(size=4), rng.normal(size=4), np.array([1.0, -2, 0.5])
     scene = Scene((without_terms(Body("b", model, omega_bar=w, q=q, q_dot=qd), dropped),))
-    found = forward(scene, end=1e-6, output_step=1e-6, method=RK4(1e-6), outputs=("b.a", "b.alpha_bar", "b.q_ddot"))
+    found = integrate(scene, end=1e-6, output_step=1e-6, method=RK4(1e-6), outputs=("b.a", "b.alpha_bar", "b.q_ddot"))
     left = paper_form(model, dropped)
     force = quadratic_velocity(left, q, w, qd)
     force[6:] -= model.omega2 * q
@@ -160,7 +160,7 @@ def test_energy_is_conserved_whatever_is_left_out(dropped):
     body = without_terms(Body("b", cloud(4, stiffness=10.0), velocity=(1, 0, 0), omega_bar=(1, 2, 3)), dropped)
 
     def drift(step: float) -> float:
-        energy = forward(Scene((body,)), end=0.5, output_step=0.05, method=RK4(step), outputs=("energy.*",))
+        energy = integrate(Scene((body,)), end=0.5, output_step=0.05, method=RK4(step), outputs=("energy.*",))
         return float(np.abs(np.ptp(energy["energy.total"])))
 
     coarse, fine = drift(0.01), drift(0.005)

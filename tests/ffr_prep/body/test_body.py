@@ -10,6 +10,7 @@ import pytest
 
 from ffr_prep.body import BodyError, FlexibleBody, Interface, Surface, load_body, rigid_body, save_body, truncated
 from ffr_prep.body import file as body_file
+from ffr_prep.common.errors import ComputationError
 
 
 def some_body(n=3):
@@ -195,7 +196,7 @@ def test_a_failed_write_leaves_the_existing_file(tmp_path, monkeypatch):
         raise OSError("no space left on device")
 
     monkeypatch.setattr(body_file.np, "savez_compressed", full_disk)
-    with pytest.raises(OSError, match="no space left"):
+    with pytest.raises(ComputationError, match="no space left"):
         save_body(some_body(2), path)
     assert path.read_bytes() == before
     assert [p.name for p in tmp_path.iterdir()] == ["b.ffr"]

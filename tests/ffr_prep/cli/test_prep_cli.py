@@ -266,7 +266,7 @@ FAILURES = {
     "interface text": (bar, ["--interface", ":rigid"], "write NAME"),
     "reference": (bar, ["--reference", "clamped"], "write fixed:NAME"),
     "reference interface": (bar, ["--interface", "left", "--reference", "fixed:right"], "'right'"),
-    "reference file": (bar, ["--reference", "none.toml"], "none.toml do not exist"),
+    "reference file": (bar, ["--reference", "none.toml"], "none.toml does not exist"),
     "method": (bar, ["--method", "magic"], "magic is not known"),
     "option": (bar, ["--colour", "red"], "--colour"),
     "unit": (bar, ["--unit", "yd"], "'yd'"),
@@ -371,7 +371,7 @@ def test_reference_conditions(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[[support", "not a list of supports"),
+        ("[[support", "not a readable TOML"),
         ("x = 1", "not a list of supports"),
         ("support = 3", "not a list of supports"),
         (SUPPORTS.replace("direction", "towards"), "not a list of supports"),

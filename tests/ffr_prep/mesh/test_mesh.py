@@ -26,6 +26,7 @@ from ffr_prep.mesh.mesh import (
     surface_triangles,
 )
 from ffr_prep.mesh.shapes import jacobian_determinants
+from ffr_prep.mesh.time_limit import mesher_time_limit
 from ffr_prep.solids.assembly import assemble
 
 SIZE = np.array([2.0, 0.3, 0.2])
@@ -757,6 +758,66 @@ def test_a_gmsh_that_crashes_fails_or_cannot_be_loaded(worker, message, tmp_path
 def test_a_gmsh_that_does_not_end_is_stopped(tmp_path, monkeypatch):
     (tmp_path / "worker.py").write_text("import time; time.sleep(60)")
     monkeypatch.setattr(gmsh_source.gmsh_process, "__file__", str(tmp_path / "worker.py"))
-    monkeypatch.setattr(gmsh_source, "_TIMEOUT", 0.5)
-    with pytest.raises(ComputationError, match=r"within 0\.5 s"):
+    with mesher_time_limit(0.5), pytest.raises(ComputationError, match=r"within 0\.5 s"):
         read_mesh(MESHES / "box.geo")
+
+
+# ---- meshes are data, scripts are programs --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", [".msh", ".unv", ".med", ".step", ".Step", ".iges", ".brep"])
+def test_a_script_under_the_name_of_data_is_not_run(suffix, tmp_path):
+    trace, path = tmp_path / "trace", tmp_path / f"mesh{suffix}"
+    path.write_text(f'SystemCall "touch {trace}";\nSetFactory("OpenCASCADE");\nBox(1) = {{0, 0, 0, 1, 1, 1}};\n')
+    with pytest.raises(InputError, match="not what its ending says"):
+        read_mesh(path)
+    assert not trace.exists()
+
+
+def test_options_beside_a_mesh_are_not_run(tmp_path):
+    path, trace = tmp_path / "box.msh", tmp_path / "trace"
+    meshio.write(path, meshio.Mesh(*corner_tetrahedron()), file_format="gmsh")
+    (tmp_path / "box.msh.opt").write_text(f'SystemCall "touch {trace}";\n')
+    assert len(read_mesh(path).points) == 4
+    assert not trace.exists()
+
+
+def corner_tetrahedron():
+    return np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), [("tetra", np.arange(4)[None])]
+
+
+def test_what_a_script_starts_ends_with_its_time(tmp_path):
+    path = tmp_path / "endless.geo"
+    path.write_text('SystemCall "sleep 60";\nSetFactory("OpenCASCADE");\nBox(1) = {0, 0, 0, 1, 1, 1};\n')
+    with mesher_time_limit(3.0), pytest.raises(ComputationError, match="mesher-timeout"):
+        read_mesh(path)
+
+
+@pytest.mark.parametrize(("unit", "scale"), [(None, 1e-3), ("m", 1e-3), ("mm", 1e-3), ("cm", 1e-3)])
+def test_a_script_that_merges_a_step_file_scales_it_once(unit, scale, tmp_path):
+    """The STEP file declares millimetres, whatever the unit of the script's own numbers."""
+    gmsh.initialize()
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
+        gmsh.model.occ.addBox(0, 0, 0, 20, 3, 2)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(tmp_path / "box.step"))
+    finally:
+        gmsh.finalize()
+    script = tmp_path / "box.geo"
+    script.write_text('SetFactory("OpenCASCADE");\nMerge "box.step";\nPhysical Volume("body") = {1};\n')
+    mesh = read_mesh(script, unit=unit, order=1)
+    np.testing.assert_allclose(np.ptp(mesh.points, axis=0), scale * np.array([20, 3, 2]), rtol=1e-9)
+
+
+def test_a_script_with_an_iges_file_needs_millimetres(tmp_path):
+    (tmp_path / "part.geo").write_text('Merge "part.igs";\n')
+    with pytest.raises(InputError, match="give the unit mm"):
+        read_mesh(tmp_path / "part.geo")
+
+
+@pytest.mark.parametrize("size", [1e-5, 1e-9])
+def test_a_size_in_another_unit_is_told_at_once(size, tmp_path):
+    with mesher_time_limit(60.0), pytest.raises(InputError, match="in the unit of the file"):
+        read_mesh(MESHES / "connecting_rod.geo", unit="mm", size=size)

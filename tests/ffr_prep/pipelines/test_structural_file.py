@@ -226,7 +226,7 @@ def test_ties_that_cannot_be(tmp_path, old, new, says):
         ("linear = 3\n" + LINE, r"linear: Input should be a valid boolean.* \(it is 3\)"),
         ("stiffening = true\n" + LINE, "write linear = true to leave them out"),
         ("name = 'a'", "give a .geometry. file"),
-        ("name = ", "is not TOML"),
+        ("name = ", "is not a readable TOML"),
         (LINE.replace('"circle"', '"round"'), "members.bar.section: .*'round'"),
         (LINE.replace("d = 0.01", "d = nan"), "members.bar.section.circle.d: Input should be a finite number"),
         (LINE.replace("d = 0.01", "d = -0.01"), "bar.toml: section circle -0.01 m: d is -0.01 m"),

@@ -10,7 +10,7 @@ from test_prep_cli import assert_fails, run
 from test_structural import regions, space_frame
 
 import ffr_prep as fp
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
@@ -158,7 +158,7 @@ def test_the_motion_is_the_same(bodies):
     def tip(body):
         hinge = Joint("hinge", "revolute", "ground.O", "rod.left")
         scene = Scene((Body("rod", body),), (hinge,), ground={"O": (0, 0.01, 0.01)}, gravity=(0, -9.81, 0))
-        return forward(scene, end=0.3, output_step=0.1, method=ROS2(1e-4))["rod.right.position"]
+        return integrate(scene, end=0.3, output_step=0.1, method=ROS2(1e-4))["rod.right.position"]
 
     paths = [
         tip(body)

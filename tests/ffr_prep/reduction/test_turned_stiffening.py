@@ -12,7 +12,7 @@ from test_dyn_references import slider_crank
 from test_prep_cli import run
 
 import ffr_prep as fp
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.integrators import ROS2
 from ffr_prep.body import FlexibleBody, load_body, save_body, with_point
 from ffr_prep.body.planar import in_plane
@@ -207,7 +207,7 @@ def test_the_motion_of_a_slider_crank_is_the_same():
         body = replace(
             body, interfaces=tuple(replace(i, name=name) for i, name in zip(body.interfaces, names, strict=True))
         )
-        result = forward(slider_crank(body), end=0.05, output_step=1e-3, method=ROS2(2e-5))
+        result = integrate(slider_crank(body), end=0.05, output_step=1e-3, method=ROS2(2e-5))
         Phi = body.surface.Phi[[np.argmin(np.abs(body.surface.points[:, 0] - x)) for x in (0.0, 0.15, 0.3)]]
         ends = np.array([i.phi_t[1] for i in body.interfaces])
         return result["rod.q"] @ (Phi[1, 1] - ends.mean(axis=0))

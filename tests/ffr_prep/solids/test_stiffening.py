@@ -11,7 +11,7 @@ from places import REFERENCE
 from test_dyn_references import MESHES, slider_crank
 
 import ffr_prep as fp
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.consistency.assemble import flattened
 from ffr_dyn.functions.time_functions import user
 from ffr_dyn.integrators import RK4, ROS2, ROS3
@@ -87,7 +87,7 @@ def deflection(rod, result) -> np.ndarray:
 
 def test_flexible_slider_crank_with_stiffening(rod):
     """The geometrically exact beam, computed independently (see the data file): one per cent of the largest deflection."""
-    result = forward(slider_crank(rod), end=0.084, output_step=4e-4, method=ROS2(1e-5))
+    result = integrate(slider_crank(rod), end=0.084, output_step=4e-4, method=ROS2(1e-5))
     w = deflection(rod, result)
     exact = np.loadtxt(REFERENCE / "slider_crank_exact.csv", delimiter=",")
     peak = np.abs(exact[:, 1]).max()
@@ -100,7 +100,7 @@ def test_stiffening_can_be_left_out_in_the_scene(rod):
     scene = slider_crank(rod)
     without = replace(scene, bodies=tuple(replace(b, stiffening=False) for b in scene.bodies))
     results = [
-        forward(s, end=0.008, output_step=4e-4, method=ROS2(1e-5)) for s in (without, slider_crank(plain), scene)
+        integrate(s, end=0.008, output_step=4e-4, method=ROS2(1e-5)) for s in (without, slider_crank(plain), scene)
     ]
     np.testing.assert_array_equal(results[0]["rod.q"], results[1]["rod.q"])
     assert all(
@@ -112,7 +112,7 @@ def test_stiffening_can_be_left_out_in_the_scene(rod):
 def test_a_stiffened_rod_bends_in_the_plane_as_in_space(rod):
     scene = slider_crank(rod)
     flat, spatial = (
-        forward(replace(scene, plane=plane), end=0.02, output_step=4e-4, method=ROS2(2e-5))
+        integrate(replace(scene, plane=plane), end=0.02, output_step=4e-4, method=ROS2(2e-5))
         for plane in ("auto", "none")
     )
     assert np.abs(deflection(rod, spatial)).max() > 5e-4
@@ -124,7 +124,7 @@ def test_order_is_kept_with_stiffening(rod, method, step):
     scene = slider_crank(truncated(rod, 8))
 
     def end(h: float) -> np.ndarray:
-        return forward(scene, end=0.002, output_step=0.002, method=method(h))["rod.q"][-1]
+        return integrate(scene, end=0.002, output_step=0.002, method=method(h))["rod.q"][-1]
 
     truth = end(step / 8)
     errors = [np.abs(end(h) - truth).max() for h in (step, step / 2)]
@@ -174,7 +174,7 @@ def spun(blade, *, stiffening: bool, end: float = 15.0):
         (Driver("motor", "axle", user(spin_up)),),
         ground={"O": (0, 0, 0)},
     )
-    return forward(scene, end=end, output_step=0.1, method=ROS2(5e-3))
+    return integrate(scene, end=end, output_step=0.1, method=ROS2(5e-3))
 
 
 def test_spin_up_needs_stiffening_and_gets_it(blade):

@@ -10,7 +10,7 @@ from places import REFERENCE
 from test_dyn_references import slider_crank
 
 import ffr_prep as fp
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.functions.time_functions import user
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.scene.drivers import Driver
@@ -119,7 +119,7 @@ def test_pendulum_against_the_exact_beam(reference):
         ground={"O": (0, 0, 0)},
         gravity=(0.0, -9.81, 0.0),
     )
-    result = forward(scene, end=1.0, output_step=0.5, method=ROS2(5e-5))
+    result = integrate(scene, end=1.0, output_step=0.5, method=ROS2(5e-5))
     exact = [(0.1737356, -1.1873578), (-1.1997451, -0.0246135)]
     np.testing.assert_allclose(result["rod.tip.position"][1:, :2], exact, atol=3e-5)
 
@@ -134,7 +134,7 @@ def test_slider_crank_with_a_rod_under_pressure():
         ),
         fp.Request(name="rod", reference=SimplySupported("crankpin", "slider"), reduction=CraigBampton(10)),
     )
-    result = forward(slider_crank(body), end=0.084, output_step=4e-4, method=ROS2(5e-6))
+    result = integrate(slider_crank(body), end=0.084, output_step=4e-4, method=ROS2(5e-6))
     middle = np.abs(body.surface.points[:, 0] - 0.15) < 1e-9
     deflection = result["rod.q"] @ body.surface.Phi[middle].mean(axis=0)[1]
     exact = np.loadtxt(REFERENCE / "slider_crank_exact.csv", delimiter=",")
@@ -156,7 +156,7 @@ def test_spin_up_of_a_cantilever():
         (Driver("motor", "axis", user(spin_up)),),
         ground={"O": (0, 0, 0)},
     )
-    result = forward(scene, end=10.0, output_step=0.1, method=ROS2(2e-3))
+    result = integrate(scene, end=10.0, output_step=0.1, method=ROS2(2e-3))
     deflection = result["beam.q"] @ body.interface("tip").phi_t[1]
     np.testing.assert_allclose(deflection[[50, 68, 100]], [-0.468476, -0.573761, -0.362815], atol=1e-3)
 
@@ -248,6 +248,6 @@ def test_spin_up_with_three_bending_modes():
         (Driver("motor", "axis", user(spin_up)),),
         ground={"O": (0, 0, 0)},
     )
-    result = forward(scene, end=10.0, output_step=0.1, method=ROS2(2e-3))
+    result = integrate(scene, end=10.0, output_step=0.1, method=ROS2(2e-3))
     deflection = result["beam.q"] @ body.interface("tip").phi_t[1]
     np.testing.assert_allclose(deflection[[50, 68, 100]], [-0.468476, -0.573761, -0.362815], atol=1e-3)

@@ -13,7 +13,7 @@ from places import REFERENCE
 from test_dyn_references import slider_crank
 
 import ffr_prep as fp
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
@@ -453,7 +453,7 @@ def test_flexible_pendulum_of_beams():
         ground={"O": (0, 0, 0)},
         gravity=(0.0, -9.81, 0.0),
     )
-    result = forward(scene, end=0.5, output_step=0.01, method=ROS2(2.5e-5))
+    result = integrate(scene, end=0.5, output_step=0.01, method=ROS2(2.5e-5))
     expected = np.loadtxt(REFERENCE / "pendulum_linear.csv", delimiter=",")
     np.testing.assert_allclose(result.time, expected[:, 0], atol=1e-12)
     assert np.abs(result["rod.tip.position"][:, :2] - expected[:, 1:3]).max() < 4e-6
@@ -469,7 +469,7 @@ def test_flexible_slider_crank_of_beams():
     rod = fp.reduce(
         fp.from_frame(frame, ends), fp.Request(name="rod", reference=reference, reduction=CraigBampton(10), linear=True)
     )
-    result = forward(slider_crank(rod), end=0.084, output_step=4e-4, method=ROS2(5e-6))
+    result = integrate(slider_crank(rod), end=0.084, output_step=4e-4, method=ROS2(5e-6))
     expected = np.loadtxt(REFERENCE / "slider_crank_linear.csv", delimiter=",")
     assert np.abs(middle(rod, result, 0.15) - expected[:, 1]).max() < 3e-6
 

@@ -14,7 +14,7 @@ from places import REFERENCE
 from test_plates import rigid_coordinates, solved
 
 import ffr_prep as fp
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
@@ -235,7 +235,7 @@ def test_flexible_pendulum_of_plates(cut):
         ground={"O": (0, 0, 0)},
         gravity=(0.0, -9.81, 0.0),
     )
-    result = forward(scene, end=0.5, output_step=0.01, method=ROS2(1e-4))
+    result = integrate(scene, end=0.5, output_step=0.01, method=ROS2(1e-4))
     expected = np.loadtxt(REFERENCE / "pendulum_linear.csv", delimiter=",")
     root, middle, tip = (result[f"rod.{name}.position"][:, :2] for name in ("root", "middle", "tip"))
     along = (tip - root) / np.linalg.norm(tip - root, axis=1)[:, None]

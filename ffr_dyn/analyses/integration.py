@@ -1,0 +1,428 @@
+"""The equations of motion integrated from a start to an end: what `forward` does once or several times."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from ffr_dyn.analyses.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
+from ffr_dyn.analyses.energy import EnergyWatch
+from ffr_dyn.analyses.events import Event, Watcher
+from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
+from ffr_dyn.compile.workspace import new_record
+from ffr_dyn.consistency.assemble import Assembled, assemble
+from ffr_dyn.consistency.failure import failure
+from ffr_dyn.consistency.validity import doubts, extremes, meaningless
+from ffr_dyn.functions.stopwatch import Stopwatch
+from ffr_dyn.integrators import Integrator, methods
+from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation, excess_of_gains, gains
+from ffr_dyn.kernels.tables import (
+    AT,
+    EVALUATIONS,
+    FILLED,
+    LEAST,
+    NEXT,
+    NOW,
+    OK,
+    PHI,
+    PHI_DOT,
+    PROJECTIONS,
+    SPACING,
+    WHEN,
+    Record,
+    Work,
+)
+from ffr_dyn.results.file import ResultWriter, load_checkpoint, load_result
+from ffr_dyn.results.quantities import Entry, Memory, measure, needs_every_step, selected
+from ffr_dyn.results.result import Quantity, Result
+from ffr_dyn.scene.checks import several
+from ffr_dyn.scene.parts import described
+from ffr_dyn.scene.scene import Scene
+from ffr_dyn.scene.surfaces import surface_of
+from ffr_prep.body import Surface
+from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import ComputationError, InputError
+
+LOOKS = 10  # of a quantity that adds up, from row to row, where the method chooses its steps
+SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, file and keyboard
+
+
+@dataclass
+class _Run:
+    """What changes while a run goes on; `done` counts the steps."""
+
+    engine: Engine
+    energy: EnergyWatch
+    memory: Memory
+    parts: list[dict[str, Quantity]]
+    times: list[Array]
+    extremes: Array
+    done: int
+
+
+def integrate(
+    scene: Scene,
+    *,
+    end: float,
+    output_step: float,
+    method: Integrator,
+    start: float = 0.0,
+    stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
+    outputs: Sequence[str] = ("default",),
+    events: Sequence[Event] = (),
+    path: str | Path | None = None,
+    resume: str | Path | None = None,
+    progress: Callable[[float], None] | None = None,
+    stopwatch: Stopwatch | None = None,
+    assembled: Assembled | None = None,
+) -> Result:
+    """Integrate the equations of motion of a scene from `start` to `end` [s], keeping a row every `output_step` [s].
+
+    method      : RK4(step), ROS2(step), ...
+    outputs     : names or patterns of the quantities to keep (`ffr_dyn.results.quantities.selected`), such as "*.power"
+    events      : moments to find (`ffr_dyn.analyses.events`), listed in the result's attribute "events"; one may end the run
+    path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
+    resume      : a result file whose run goes on to the same bits; `end` may be later. A new file: a run from the start
+    progress    : called with the time reached, a few times a second
+    stopwatch   : takes the time of the integrator's compiled loop
+    assembled   : what `assemble` made of the scene at `start`, for programs that run it more than once
+
+    Raises InputError for a scene or settings that cannot be used, ComputationError when the run fails: with the time,
+    the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
+    """
+    check_output_step(output_step)
+    if isinstance(method, (str, type)):
+        raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
+    spacing = output_step / LOOKS if method.controlled else method.step
+    substeps, rows = _counts(end - start, output_step, spacing)
+    _check_step(scene, method)
+    _check_stabilisation(method, stabilisation)
+    events = several("events", events, (Event,))
+    assembled = assemble(scene, time=start) if assembled is None else assembled
+    wanted = selected(assembled.system, outputs)
+    span = (start, end, output_step)
+    mark = _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
+    header = _header(scene, assembled, method, stabilisation, span)
+    run = _begun(assembled, method, gains(stabilisation), start, spacing, wanted, resume, mark)
+    _check_resumed(run, substeps * rows, output_step / substeps)
+    watcher = _watcher(assembled, run, method, stabilisation, spacing, events, resume) if events else None
+    path = resume if path is None else path
+    watch = Stopwatch() if stopwatch is None else stopwatch
+    first = Result(run.times[0], run.parts[0], geometry(scene), header | {"status": "running"})
+    with nullcontext() if path is None else ResultWriter(path, first, checkpoint=_checkpoint(run, mark)) as writer:
+        for times, part in _advance(assembled, run, method, start, substeps, rows, wanted, watch, watcher):
+            if writer is not None:
+                writer.append(times, {name: quantity.values for name, quantity in part.items()}, _checkpoint(run, mark))
+            if progress is not None:
+                progress(float(times[-1]))
+        account = _account(scene, run, header["notes"]) | ({} if watcher is None else {"events": watcher.found})
+        if writer is not None:
+            writer.close("complete", header | account)
+    return _result(scene, run, header | account | {"status": "complete"})
+
+
+def check_output_step(output_step: float) -> None:
+    """Raises InputError for one that is none."""
+    if not 0 < output_step < np.inf:
+        raise InputError(f"the output step is {output_step} s; it must be positive and finite")
+
+
+def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
+    """(steps per output row, output rows)."""
+    if not 0 < span < np.inf:
+        raise InputError(f"the duration, from start to end, is {span} s; it must be positive and finite")
+    substeps, rows = round(output_step / step), round(span / output_step)
+    if substeps < 1 or abs(substeps * step - output_step) > 1e-9 * output_step:
+        better = output_step / max(1, round(output_step / step))
+        raise InputError(
+            f"the output step {output_step} s is not a multiple of the step {step} s; try a step of {better:.6g}"
+        )
+    if rows < 1 or abs(rows * output_step - span) > 1e-9 * span:
+        raise InputError(f"the duration {span} s is not a multiple of the output step {output_step} s")
+    return substeps, rows
+
+
+def _check_stabilisation(method: Integrator, stabilisation: Stabilisation) -> None:
+    """Refuse what is none, and gains of accelerations for a method that keeps constraints in another way."""
+    if not isinstance(stabilisation, get_args(Stabilisation)):
+        raise InputError(f"stabilisation is {stabilisation!r}; give Projection(), Baumgarte(alpha, beta) or Drifting()")
+    if isinstance(stabilisation, Baumgarte) and method.row_stages:
+        others = [kind.__name__ for kind in methods().values() if not kind.row_stages]
+        raise InputError(
+            f"Baumgarte's gains act on the accelerations of the constraints, and {type(method).__name__} holds positions or "
+            f"rates themselves; leave them out, or use one of {', '.join(others)}"
+        )
+
+
+def _check_step(scene: Scene, method: Integrator) -> None:
+    """Refuse an explicit step that cannot be stable for any state."""
+    fastest = max(scene.bodies, key=lambda body: body.model.omega2.max(initial=0.0))
+    omega = float(np.sqrt(fastest.model.omega2.max(initial=0.0)))
+    if method.step * omega > method.reach:
+        raise InputError(
+            f"{type(method).__name__} with a step of {method.step:g} s is unstable: body {fastest.name!r} has a mode of "
+            f"{omega / 2 / np.pi:.4g} Hz, which needs a step below {method.reach / omega:.2g} s (joints lower this further); "
+            "use ROS2, fewer modes or a smaller step"
+        )
+
+
+def _begun(
+    assembled: Assembled,
+    method: Integrator,
+    gained: tuple[float, float, float],
+    start: float,
+    spacing: float,
+    wanted: Mapping[str, Entry],
+    resume: str | Path | None,
+    mark: str,
+) -> _Run:
+    """The run at its start, or where the file to resume left it."""
+    system = assembled.system
+    engine = new_engine(system, assembled.x, assembled.v, method, gained, start=start, spacing=spacing)
+    energy = EnergyWatch(system, method, gained, spacing, lambda rows: with_all_reactions(assembled, rows))
+    if resume is not None and Path(resume).exists():
+        return _resumed(Path(resume), mark, engine, energy)
+    return _started(assembled, engine, energy, start, wanted)
+
+
+def _started(
+    assembled: Assembled, engine: Engine, energy: EnergyWatch, start: float, wanted: Mapping[str, Entry]
+) -> _Run:
+    """The run with its first row."""
+    first = new_record(assembled.system, 1)
+    status = record_row(engine, start, first, 0)
+    if status != OK:
+        raise failure(engine.system, engine.work, status, start)
+    first = with_all_reactions(assembled, first)
+    energy.look(first)
+    parts, memory = measure(assembled.system, first, {}, wanted)
+    return _Run(engine, energy, memory, [parts], [first.time], extremes(assembled.system, first), 0)
+
+
+def _advance(
+    assembled: Assembled,
+    run: _Run,
+    method: Integrator,
+    start: float,
+    substeps: int,
+    rows: int,
+    wanted: Mapping[str, Entry],
+    watch: Stopwatch,
+    watcher: Watcher | None = None,
+) -> Iterator[tuple[Array, dict[str, Quantity]]]:
+    """Yields (times, quantities) of output rows chunk after chunk, each about SECONDS_PER_CALL long.
+
+    Where a quantity adds up over the steps, or events are looked for, every step is looked at and only the output rows are
+    kept.
+    """
+    system, steps = assembled.system, run.engine.tables.clock.steps
+    looks = substeps if needs_every_step(wanted) or watcher is not None else 1
+    ends = False
+    count = 1
+    while run.done < rows * substeps:
+        chunk = new_record(system, looks * min(count, rows - run.done // substeps))
+        with watch:
+            status = fill_rows(run.engine, chunk, start, substeps // looks)
+        filled = int(steps[FILLED]) - int(steps[FILLED]) % looks
+        if filled:
+            kept = with_all_reactions(assembled, Record(*(column[:filled] for column in chunk)))
+            if watcher is not None:
+                kept, ends = watcher.look(kept)
+            run.energy.look(kept)
+            shown = _shown(kept.time.size, looks, ends)
+            every, run.memory = measure(system, kept, run.memory, wanted)
+            part = {name: replace(quantity, values=quantity.values[shown]) for name, quantity in every.items()}
+            times = kept.time[shown]
+            run.parts.append(part)
+            run.times.append(times)
+            run.extremes = np.maximum(run.extremes, extremes(system, kept))
+            if lost := meaningless(system.scene, run.extremes):
+                raise ComputationError(f"by t = {times[-1]:.6g} s {lost}")
+            run.done += filled // looks * substeps
+            yield times, part
+        if ends:
+            return
+        if status != OK:
+            cause = excess_of_gains(run.energy.gains, run.energy.spacing)
+            raise failure(run.engine.system, run.engine.work, status, reached(run.engine, start), cause)
+        count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
+
+
+def _shown(rows: int, looks: int, ends: bool) -> Array:
+    """Numbers of the output rows among those that were looked at; the row of an event that ends the run is one."""
+    shown = np.arange(looks - 1, rows, looks)
+    return np.union1d(shown, [rows - 1]) if ends else shown
+
+
+def _watcher(
+    assembled: Assembled,
+    run: _Run,
+    method: Integrator,
+    stabilisation: Stabilisation,
+    spacing: float,
+    events: Sequence[Event],
+    resume: str | Path | None,
+) -> Watcher:
+    """What looks for events from where the run stands."""
+    if resume is not None:
+        raise InputError(
+            "a run with events cannot be resumed: those of its first part are not in the file; run the whole"
+        )
+    watcher = Watcher(assembled, method, gains(stabilisation), spacing, events)
+    watcher.begin(run.engine, float(run.times[0][0]))
+    return watcher
+
+
+def reached(engine: Engine, start: float) -> float:
+    """Time of the engine's state [s], for a run from `start`."""
+    clock, control = engine.tables.clock, engine.tables.control
+    if control.numbers.size:
+        return float(control.numbers[NOW])
+    return start + int(clock.steps[NEXT]) * float(clock.time[SPACING])
+
+
+def with_all_reactions(assembled: Assembled, record: Record) -> Record:
+    """The record with reactions of the redundant rows too: at every state, the smallest that give its accelerations."""
+    if assembled.all_rows is None:
+        return record
+    system = assembled.all_rows
+    engine, one = new_engine(system, record.x[0], record.v[0]), new_record(system, 1)
+    names = [block.name for block in system.blocks]
+    numbers = [names.index(block.name) for block in assembled.system.blocks]
+    reaction = np.empty_like(record.reaction)
+    for row, moment in enumerate(record.time):
+        engine.x[:], engine.v[:] = record.x[row], record.v[row]
+        engine.work.loads.reference[:] = record.forces[row]
+        record_row(engine, moment, one, 0)
+        reaction[row] = one.reaction[0, numbers]
+    return record._replace(reaction=reaction)
+
+
+# ---- stopping and going on -------------------------------------------------------------------------------------------
+
+
+def _fingerprint(
+    assembled: Assembled,
+    method: Integrator,
+    stabilisation: Stabilisation,
+    start: float,
+    output_step: float,
+    wanted: Mapping[str, Entry],
+) -> str:
+    state = (assembled.x.tobytes(), assembled.v.tobytes())
+    return fingerprint(assembled.system.model, *state, method, stabilisation, start, output_step, list(wanted))
+
+
+KEY = "machine."  # before the names of an engine's tables in result files
+
+
+def _checkpoint(run: _Run, mark: str) -> Array:
+    arrays = {"extremes": run.extremes, **{KEY + key: array for key, array in _changing(run.engine)}}
+    return encode(Checkpoint(mark, run.done, arrays, run.memory))
+
+
+def _changing(engine: Engine) -> Iterator[tuple[str, Array]]:
+    """What of an engine's tables a run changes."""
+    for name in ("work", "stages", "clock", "control", "x", "v"):
+        yield from leaves(getattr(engine.tables, name), name)
+
+
+def _resumed(path: Path, mark: str, engine: Engine, energy: EnergyWatch) -> _Run:
+    """The run that a result file holds, ready to go on in the engine."""
+    content = load_checkpoint(path)
+    if content is None:
+        raise InputError(f"{path} has no checkpoint: it is not the result of a forward run; run from the start")
+    saved, earlier = decode(content), load_result(path)
+    if saved.fingerprint != mark:
+        raise InputError(
+            f"{path} is the result of another scene or of other settings (step, method, start, output step, outputs): its "
+            "run cannot be continued with these; run from the start, to another file if that one is still wanted"
+        )
+    changing = {KEY + name: array for name, array in _changing(engine)}
+    if any(name not in saved.arrays or saved.arrays[name].shape != array.shape for name, array in changing.items()):
+        raise InputError(
+            f"{path} was written by another version of ffr_dyn, whose runs this one cannot continue; run from the start, to "
+            "another file if that one is still wanted"
+        )
+    for name, array in changing.items():
+        array[...] = saved.arrays[name]
+    extremes_then = saved.arrays["extremes"].copy()
+    return _Run(engine, energy, saved.memory, [dict(earlier.quantities)], [earlier.time], extremes_then, saved.steps)
+
+
+def _check_resumed(run: _Run, steps: int, step: float) -> None:
+    if run.done > steps:
+        raise InputError(f"the run to be continued has gone {(run.done - steps) * step:g} s beyond this end already")
+
+
+# ---- the result -----------------------------------------------------------------------------------------------------
+
+
+def _header(
+    scene: Scene,
+    assembled: Assembled,
+    method: Integrator,
+    stabilisation: Stabilisation,
+    span: tuple[float, float, float],
+) -> dict[str, Any]:
+    start, end, output_step = span
+    return {
+        **described(scene),
+        "analysis": "forward dynamics",
+        "method": f"{method!r}",
+        "step": method.step,
+        "stabilisation": f"{stabilisation!r}",
+        "start": start,
+        "end": end,
+        "output_step": output_step,
+        "degrees_of_freedom": assembled.degrees_of_freedom,
+        "notes": list(assembled.notes),
+    }
+
+
+def geometry(scene: Scene) -> dict[str, Surface]:
+    """The surfaces of the bodies in their own frames."""
+    surfaces = {body.name: surface_of(body) for body in scene.bodies}
+    return {name: surface for name, surface in surfaces.items() if surface is not None}
+
+
+def _result(scene: Scene, run: _Run, attributes: dict[str, Any]) -> Result:
+    names = run.parts[0]
+    quantities = {
+        name: Quantity(np.concatenate([part[name].values for part in run.parts]), q.unit, q.axes, q.description)
+        for name, q in names.items()
+    }
+    return Result(np.concatenate(run.times), quantities, geometry(scene), attributes)
+
+
+def _account(scene: Scene, run: _Run, notes: list[str]) -> dict[str, Any]:
+    """What only the end of a run can tell."""
+    info, drift = run.engine.work.info, run.engine.work.drift
+    return {
+        "evaluations": int(info[EVALUATIONS]),
+        "projections": int(info[PROJECTIONS]),
+        **_steps(run.engine),
+        "largest_drift": [float(drift[PHI]), float(drift[PHI_DOT])],
+        "notes": [*notes, *_singular(run.engine.work), *doubts(scene, run.extremes)],
+    }
+
+
+def _steps(engine: Engine) -> dict[str, Any]:
+    """Steps that the method chose."""
+    control = engine.tables.control
+    return {"steps": int(control.counts[0]), "refused_steps": int(control.counts[1])} if control.numbers.size else {}
+
+
+def _singular(work: Work) -> list[str]:
+    least, time = work.independence[[LEAST, WHEN]]
+    if least >= AT:
+        return []
+    return [
+        f"the motion passes a singular position near t = {time:.6g} s, where constraints become dependent; it goes on along "
+        "its branch, and reactions there are large or not unique"
+    ]

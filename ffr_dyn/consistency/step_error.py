@@ -1,0 +1,131 @@
+"""What the length of the steps costs every output of a run: compared with runs of other steps, and with a twin.
+
+Two runs that damp a vibration which neither resolves agree on the wrong curve, so that their difference tells nothing. Hence
+the twin (`ffr_dyn.integrators.ros2.Twin`), which keeps its amplitude: with R of the run, at steps h and r h, order p,
+
+    s = max |R(h) - R(r h)| / (r^p - 1),    v = max |R(h) - T(h)|,    error = max(s, v),
+
+over all rows and components of an output. For ROS3, whose twin is of lower order, v = 1.6 sqrt(v1 v2):
+
+    v1 = min(max |R(h) - T(h/2)|, max |R(h) - (4 T(h/2) - T(h))/3|)    too large where vibration is resolved, by its phase
+    v2 = largest difference of the amplitudes of R(h) and T(h/2)       too small where it is resolved in part
+
+with amplitudes of what rows are off the curve through their neighbours, over windows of 16 rows: vibration that is not
+resolved looks like noise there. The factor was measured on the benchmark set (`python -m benchmarks.accuracy`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_dyn.results.result import Result
+from ffr_prep.common.arrays import Array
+
+VIBRATION = 4.5  # v over s beyond which a difference is vibration that the step does not resolve
+LITTLE = 1e-3  # of the largest range of its kind: an output that moves by less counts as if it moved by this
+ARM = 1e-6  # of the largest range of forces times that of positions, the same for moments
+MIDDLE, WINDOW = 1.6 * 1.5**0.5, 16  # of amplitudes of methods of order three
+NOISE = (70 / 36) ** 0.5  # by which rows without relation are farther off the curve than they are large
+COARSE = 0.01  # of the range, by which a row may be off the curve through its neighbours
+
+
+@dataclass(frozen=True)
+class StepError:
+    """Of an output, in its unit and as a part of its range; `vibrates` where most of it is vibration."""
+
+    error: float
+    of_range: float
+    vibrates: bool
+
+
+def step_errors(
+    run: Result, other: Result | None, ratio: float, order: int, twins: Sequence[Result] = ()
+) -> dict[str, StepError]:
+    """The error of every output of a run with the step h.
+
+    other : the same with the step `ratio` h, None where the twins have told enough;  order : of the method
+    twins : of the step h, and of h/2 for a method of higher order; () where vibration is not damped
+    """
+    scales, found = ranges(run), {}
+    for name, scale in scales.items():
+        y = run[name]
+        step = 0.0 if other is None else largest_difference(y, other[name]) * abs(1.0 / (ratio**order - 1.0))
+        vibration = _beside_twins(y, [twin[name] for twin in twins])
+        error = max(step, vibration)
+        found[name] = StepError(error, error / scale if scale > 0 else 0.0, vibration > VIBRATION * step)
+    return found
+
+
+def _beside_twins(y: Array, twins: Sequence[Array]) -> float:
+    if len(twins) < 2:
+        return largest_difference(y, twins[0]) if twins else 0.0
+    coarse, fine = twins
+    rows = min(len(coarse), len(fine))
+    near = min(largest_difference(y, fine), largest_difference(y, (4.0 * fine[:rows] - coarse[:rows]) / 3.0))
+    rows = min(len(y), len(fine))
+    if rows <= 4:
+        return near
+    amplitude = largest_difference(_amplitudes(y[:rows]), _amplitudes(fine[:rows]))
+    return min(near, MIDDLE * (near * amplitude) ** 0.5)
+
+
+def _amplitudes(y: Array) -> Array:
+    """(T - 4 or fewer, ...) of what rows are off the curve through their neighbours, over WINDOW rows."""
+    squares = _off_curve(y) ** 2
+    count = min(WINDOW, len(squares))
+    sums = np.cumsum(np.concatenate([np.zeros((1, *squares.shape[1:])), squares]), axis=0)
+    found: Array = np.sqrt(2.0 * (sums[count:] - sums[:-count]) / count) / NOISE
+    return found
+
+
+def _off_curve(y: Array) -> Array:
+    """(T - 4, ...) rows less the curve through the two before and the two after them."""
+    off: Array = y[2:-2] - (-y[:-4] + 4.0 * y[1:-3] + 4.0 * y[3:-1] - y[4:]) / 6.0
+    return off
+
+
+def largest_difference(one: Array, other: Array) -> float:
+    """Over the rows that both have; infinite where one is not finite."""
+    rows = min(len(one), len(other))
+    with np.errstate(all="ignore"):
+        found = float(np.abs(one[:rows] - other[:rows]).max(initial=0.0))
+    return found if np.isfinite(found) else np.inf
+
+
+def ranges(run: Result) -> dict[str, float]:
+    """Of every output but the violations of constraints: the largest range of a component, floored by those of its kind (the
+    last part of its name), where next to nothing moves."""
+    spans = {name: _range(q.values) for name, q in run.quantities.items() if not name.startswith("constraint.")}
+    largest: dict[str, float] = {}
+    for name, span in spans.items():
+        largest[_kind(name)] = max(span, largest.get(_kind(name), 0.0))
+    arm = ARM * largest.get("force", 0.0) * largest.get("position", 0.0)
+    floors = {kind: max(LITTLE * most, arm if kind == "moment" else 0.0) for kind, most in largest.items()}
+    return {name: max(span, floors[_kind(name)]) for name, span in spans.items()}
+
+
+def _kind(name: str) -> str:
+    first, _, last = name.rpartition(".")
+    if first == "energy":
+        return first
+    return {"R": "position", "v": "velocity", "p": "orientation"}.get(last, last)
+
+
+def _range(values: Array) -> float:
+    return float(np.ptp(values, axis=0).max(initial=0.0)) if len(values) else 0.0
+
+
+def too_coarse(run: Result) -> dict[str, float]:
+    """Outputs whose rows are too far apart to show what they do, and by how much of their range a row lies off the curve
+    through the two before and the two after it."""
+    found = {}
+    for name, scale in ranges(run).items():
+        y = run[name]
+        if scale > 0 and len(y) > 4:
+            share = float(np.abs(_off_curve(y)).max()) / scale
+            if share > COARSE:
+                found[name] = share
+    return found

@@ -1,0 +1,70 @@
+"""Vibrations that a step does not resolve: how long they last, which they are.
+
+By the modes of the scene as it stands at its start, its bodies coupled by the joints and driven as they are: with Z the free
+motions, Z^T M Z = 1, those of Z^T Omega^2 Z. What else holds the scene, such as springs and gravity, is slow beside them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from ffr_dyn.consistency.assemble import Assembled
+from ffr_dyn.consistency.evaluation import evaluate, evaluator, free_motions, total_mass_matrix
+from ffr_dyn.results.result import Result
+from ffr_prep.common.arrays import Array
+
+UNRESOLVED = 2.0  # h omega
+
+
+@dataclass(frozen=True, eq=False)
+class Vibrations:
+    """Of a scene at its start: omega (k,) [rad/s], ascending, damping ratios (k,), and motions (V, k) of unit mass."""
+
+    assembled: Assembled
+    omega: Array
+    ratio: Array
+    motions: Array
+
+
+def vibrations(assembled: Assembled, time: float) -> Vibrations:
+    """Raises ComputationError as an evaluation does."""
+    system = assembled.system
+    scene, place = system.scene, system.layout
+    now = evaluate(evaluator(system), time, assembled.x, assembled.v)
+    Z = free_motions(now.jacobian, total_mass_matrix(scene, place, assembled.x))
+    square, rate = np.zeros(place.v_size), np.zeros(place.v_size)
+    for b, body in enumerate(scene.bodies):
+        square[place.q_dot(b)] = body.model.omega2
+        rate[place.q_dot(b)] = 2.0 * body.damping * np.sqrt(body.model.omega2)
+    omega2, vectors = scipy.linalg.eigh(Z.T @ (square[:, None] * Z))
+    bent = omega2 > 1e-9 * omega2.max(initial=0.0)
+    omega, motions = np.sqrt(omega2[bent]), Z @ vectors[:, bent]
+    return Vibrations(assembled, omega, (rate @ motions**2) / (2.0 * omega), motions)
+
+
+def lasting(of: Vibrations, step: float) -> float:
+    """What the damping of the scene leaves, after a step of h [s], of the slowest vibration that such steps do not resolve:
+    exp(-zeta h omega), with the smallest damping ratio of them. 1 where there is none."""
+    beyond = of.omega * step > UNRESOLVED
+    if not beyond.any():
+        return 1.0
+    return float(np.exp(-of.ratio[beyond].min() * of.omega[beyond].min() * step))
+
+
+def leading(of: Vibrations, run: Result, twin: Result) -> float:
+    """[rad/s] of the vibration in which two runs differ most, by its velocity; 0 where they do not keep all "*.q"."""
+    place, bodies = of.assembled.system.layout, of.assembled.system.scene.bodies
+    flexible = [b for b in range(len(bodies)) if place.n[b]]
+    if not of.omega.size or any(f"{bodies[b].name}.q" not in run.quantities for b in flexible):
+        return 0.0
+    shapes, differences = [], []
+    for b in flexible:
+        body, own = bodies[b], of.motions[place.q_dot(b)]
+        off = run[f"{body.name}.q"] - twin[f"{body.name}.q"]
+        shapes.append(body.frame.C @ own if body.frame else own)
+        differences.append(off if body.frame or not body.kept else off[:, list(body.kept[0])])
+    amounts = np.linalg.lstsq(np.concatenate(shapes), np.concatenate(differences, axis=1).T, rcond=None)[0]
+    return float(of.omega[int(np.argmax(of.omega * np.abs(amounts).max(axis=1)))])

@@ -1,0 +1,66 @@
+"""Signals that end a process in order: Ctrl-C, SIGTERM and SIGHUP raise at the next safe place, files are closed on the way.
+
+Handlers belong to the main thread; elsewhere nothing changes.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+_ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+
+
+class Interrupted(KeyboardInterrupt):
+    """A signal has asked this process to end; the text is its name."""
+
+
+@contextmanager
+def ending_in_order() -> Iterator[None]:
+    """Every signal that asks the process to end raises `Interrupted` within the block."""
+
+    def end(number: int, frame: FrameType | None) -> None:
+        raise Interrupted(signal.Signals(number).name)
+
+    with _handled(end):
+        yield
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Signals that ask the process to end wait until the block has ended: for steps that must be done whole."""
+    waiting: list[int] = []
+    try:
+        with _handled(lambda number, frame: waiting.append(number)):
+            yield
+    finally:
+        for number in waiting[:1]:
+            signal.raise_signal(number)
+
+
+def ignore_further() -> None:
+    """What ends already is not ended again."""
+    if threading.current_thread() is threading.main_thread():
+        for number in _ENDING:
+            signal.signal(number, signal.SIG_IGN)
+
+
+@contextmanager
+def _handled(handler: Callable[[int, FrameType | None], Any]) -> Iterator[None]:
+    """Signals that the process does not ignore (as under nohup) go to a handler."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.getsignal(number) for number in _ENDING}
+    before = {number: known for number, known in before.items() if known not in (signal.SIG_IGN, None)}
+    for number in before:
+        signal.signal(number, handler)
+    try:
+        yield
+    finally:
+        for number, known in before.items():
+            signal.signal(number, known)

@@ -1,0 +1,111 @@
+"""The doors through which files come in: what is read is noted, checked for size, and never ends in a traceback."""
+
+from __future__ import annotations
+
+import stat
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.outputs import note_input
+
+_MOST_TOML, _MOST_TEXT = 1 << 25, 1 << 31  # bytes
+_DEEPEST = 40  # tables and lists within each other
+_LARGEST = 1 << 63
+_SHOWN = 200
+MANY = 50_000_000  # of numbers that are listed one by one
+
+
+@contextmanager
+def reading(path: str | Path, what: str, *damage: type[Exception]) -> Iterator[None]:
+    """A file is read within the block, as `what` it should be. Whatever goes wrong becomes an InputError that names it.
+
+    damage : errors by which a reader of a library says that the file is none of its kind. Any other that is not one of our
+             own is a mistake of the program, and the message asks for a report
+    """
+    check_ordinary(path, what)
+    try:
+        yield
+    except (InputError, ComputationError, KeyboardInterrupt):
+        raise
+    except RecursionError:
+        raise InputError(f"{path} is nested too deeply for {what}") from None
+    except OverflowError:
+        raise InputError(f"{path} holds a number that is too large for {what}") from None
+    except MemoryError:
+        raise InputError(f"{path} announces more than fits in memory: is it {what}, and complete?") from None
+    except Exception as error:
+        why = " ".join(f"{type(error).__name__}: {error}".split())[:_SHOWN]
+        if isinstance(error, damage):
+            raise InputError(f"{path} is not {what} ({why}); is it complete?") from None
+        raise InputError(
+            f"{path} cannot be read as {what} ({why}); is it complete? If it is sound, please report it with the file"
+        ) from error
+
+
+def check_ordinary(path: str | Path, what: str) -> None:
+    """InputError for what does not exist, or is no file with an end; notes the file as an input of the command."""
+    try:
+        mode = Path(path).stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        raise InputError(f"{path} does not exist; give {what}") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{str(path)[:_SHOWN]!r} cannot be read ({error})") from None
+    if not stat.S_ISREG(mode):
+        kind = "a folder" if stat.S_ISDIR(mode) else "no ordinary file"
+        raise InputError(f"{path} is {kind}; give {what}")
+    note_input(path)
+
+
+def read_text(path: str | Path, what: str, most: int = _MOST_TEXT) -> str:
+    """A text in UTF-8, or in Latin-1 where it is not that."""
+    with reading(path, what):
+        size = Path(path).stat().st_size
+        if size > most:
+            raise InputError(f"{path} has {size / 1e6:.0f} MB; {what} has at most {most / 1e6:.0f}")
+        content = Path(path).read_bytes()
+        try:
+            return content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            return content.decode("latin-1")
+
+
+def read_toml(path: str | Path, what: str) -> dict[str, Any]:
+    """A TOML file. Raises InputError for one that is none, is nested too deeply or has numbers that no integer holds."""
+    with reading(path, what):
+        text = Path(path).read_bytes()
+        if len(text) > _MOST_TOML:
+            raise InputError(f"{path} has {len(text) / 1e6:.0f} MB; {what} has at most {_MOST_TOML / 1e6:.0f}")
+        try:
+            tree = tomllib.loads(text.decode("utf-8"))
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError, ValueError) as error:  # numbers of too many digits
+            raise InputError(f"{path} is not a readable TOML file: {str(error)[:_SHOWN]}") from None
+        _check_tree(path, tree)
+        return tree
+
+
+def _check_tree(path: str | Path, tree: dict[str, Any]) -> None:
+    level: list[tuple[str, Any]] = [("", tree)]
+    for _ in range(_DEEPEST):
+        level = [pair for key, item in level for pair in _below(key, item)]
+        for key, item in level:
+            if type(item) is int and not -_LARGEST <= item < _LARGEST:
+                raise InputError(f"{path}: {key.strip('.')} is an integer beyond 64 bits; write it with a point")
+    if level:
+        raise InputError(f"{path}: {level[0][0][1:60]}... is nested more than {_DEEPEST} deep")
+
+
+def _below(key: str, item: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(item, dict):
+        yield from ((f"{key}.{name}", value) for name, value in item.items())
+    elif isinstance(item, list):
+        yield from ((key, value) for value in item)
+
+
+def check_count(count: int, what: str, most: int = MANY) -> None:
+    """InputError for so many of something that no memory holds them, before it is taken."""
+    if count > most:
+        raise InputError(f"{count} {what} are too many; there may be {most}")

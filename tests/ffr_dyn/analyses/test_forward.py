@@ -1,0 +1,162 @@
+"""A run knows its error, and finds the step for an accuracy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import cloud
+
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import integrate
+from ffr_dyn.analyses.registry import summary
+from ffr_dyn.consistency.step_error import largest_difference, ranges
+from ffr_dyn.functions.formula import formula
+from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, Within, tolerances
+from ffr_dyn.integrators.stabilisation import Projection
+from ffr_dyn.results.file import load_result
+from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.forces import Load
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Body, Scene
+from ffr_prep.common.errors import ComputationError, InputError
+
+SPAN = {"end": 0.5, "output_step": 0.01}
+
+
+def swinging(damping: float, stiffer: float = 1.0) -> Scene:
+    """A flexible body on a hinge, released with a spin: it begins with a shock."""
+    soft = cloud(4, seed=1)
+    body = Body("rod", replace(soft, omega2=stiffer**2 * soft.omega2), omega_bar=(0.0, 0.0, 6.0), damping=damping)
+    hinge = Joint("hinge", "revolute", "ground.O", "rod.a", axis=(0, 0, 1))
+    return Scene((body,), (hinge,), ground={"O": (0, 0, 0)}, gravity=(0.0, -9.81, 0.0))
+
+
+def driven() -> Scene:
+    scene = swinging(0.02)
+    still = replace(scene.bodies[0], omega_bar=(0.0, 0.0, 0.0))
+    return replace(scene, bodies=(still,), drivers=(Driver("motor", "hinge", formula("0.5*(1 - cos(3*t))")),))
+
+
+@pytest.fixture(scope="module")
+def truth():
+    made = {}
+
+    def of(scene, outputs=("default",)):
+        key = id(scene.drivers), scene.bodies[0].damping.tobytes()
+        if key not in made:
+            made[key] = integrate(
+                scene, **SPAN, method=RK4(0.01 / 2048), stabilisation=Projection(1e-12), outputs=outputs
+            )
+        return made[key]
+
+    return of
+
+
+@pytest.mark.parametrize("method", [ROS2(1e-3), ROS2(2.5e-4), ROS3(1e-3), RK4(2e-3)])
+@pytest.mark.parametrize("scene", [swinging(0.0), swinging(0.02), driven()], ids=["undamped", "damped", "driven"])
+def test_the_error_that_is_told_is_the_true_one(scene, method, truth):
+    found, true = forward(scene, **SPAN, method=method), truth(scene)
+    scales = ranges(found)
+    pairs = {
+        name: told / largest_difference(found[name], true[name])
+        for name, (told, share) in found.attributes["errors"].items()
+        if largest_difference(found[name], true[name]) > 1e-6 * scales[name]
+    }
+    assert pairs
+    assert min(pairs.values()) > 0.2
+    assert np.mean([0.3 <= pair <= 5 for pair in pairs.values()]) >= 0.8
+
+
+def test_what_rings_is_told_with_its_price():
+    found = forward(swinging(0.0, stiffer=100.0), **SPAN, method=ROS2(1e-3))
+    told = [note for note in found.attributes["notes"] if "does not resolve" in note]
+    assert len(told) == 1
+    assert "Hz" in told[0]
+    assert "rk4" in told[0]
+
+
+def test_without_a_step_the_accuracy_is_kept(truth):
+    scene = driven()
+    found, true = forward(scene, **SPAN), truth(scene)
+    scales = ranges(found)
+    for name in ("rod.b.position", "hinge.angle", "rod.p", "hinge.force", "rod.b.displacement"):
+        assert largest_difference(found[name], true[name]) <= 1.2e-3 * scales[name], name
+    finer = forward(scene, **SPAN, method=Within(1e-5))
+    assert finer.attributes["step"] < found.attributes["step"]
+    assert largest_difference(finer["rod.b.position"], true["rod.b.position"]) <= 1.2e-5 * scales["rod.b.position"]
+
+
+def test_the_run_of_a_found_step_is_that_of_the_step_given():
+    found = forward(driven(), **SPAN)
+    again = integrate(driven(), **SPAN, method=ROS2(found.attributes["step"]))
+    assert all(found[name].tobytes() == again[name].tobytes() for name in again.quantities)
+
+
+def test_forces_that_ring_do_not_hold_up_the_positions():
+    found = forward(swinging(0.0, stiffer=100.0), **SPAN)
+    errors = found.attributes["errors"]
+    assert errors["rod.b.position"][1] <= 1e-3
+    assert errors["hinge.force"][1] > 1e-3
+    assert found.attributes["step"] >= SPAN["output_step"] / 1024
+
+
+def test_the_error_is_in_the_file_and_in_the_summary(tmp_path):
+    path = tmp_path / "run.nc"
+    found = forward(driven(), **SPAN, path=path)
+    kept = load_result(path)
+    assert kept.attributes["errors"] == found.attributes["errors"]
+    assert any(line.startswith("accuracy     step: within") for line in summary(kept.attributes))
+    assert not list(tmp_path.glob("*.attributes"))
+
+
+def test_a_run_that_goes_on_keeps_its_step(tmp_path):
+    path = tmp_path / "run.nc"
+    first = forward(driven(), end=0.25, output_step=0.01, path=path)
+    on = forward(driven(), end=0.5, output_step=0.01, resume=path)
+    whole = integrate(driven(), end=0.5, output_step=0.01, method=ROS2(first.attributes["step"]))
+    assert on["rod.q"].tobytes() == whole["rod.q"].tobytes()
+
+
+def test_a_search_that_was_stopped_goes_on(tmp_path):
+    path = tmp_path / "run.nc"
+
+    class StoppedError(Exception):
+        pass
+
+    def stop(reached):
+        raise StoppedError
+
+    with pytest.raises(StoppedError):
+        forward(swinging(0.02), **SPAN, path=path, progress=stop)
+    found, whole = forward(swinging(0.02), **SPAN, resume=path), forward(swinging(0.02), **SPAN)
+    assert found.attributes["step"] == whole.attributes["step"]
+    assert found["rod.q"].tobytes() == whole["rod.q"].tobytes()
+    assert load_result(path)["rod.q"].tobytes() == whole["rod.q"].tobytes()
+
+
+def test_a_check_can_be_left_out_or_asked_for():
+    assert forward(driven(), **SPAN, method=ROS2(1e-3), check=False).attributes["errors"] == {}
+    assert forward(driven(), **SPAN, method=ROS2(1e-3), check=True).attributes["errors"]
+
+
+def test_a_method_that_chooses_its_steps_knows_its_error(truth):
+    found = forward(driven(), **SPAN, method=AdaptiveROS3(tolerances(1e-4)))
+    true = truth(driven())
+    told = found.attributes["errors"]["rod.b.position"][0]
+    assert 0.2 <= told / largest_difference(found["rod.b.position"], true["rod.b.position"]) <= 20
+
+
+def test_an_accuracy_that_means_nothing_is_refused():
+    for accuracy in (0.0, -1.0, 2.0, np.nan):
+        with pytest.raises(InputError, match="accuracy"):
+            Within(accuracy)
+    with pytest.raises(InputError, match="chooses its steps"):
+        forward(driven(), **SPAN, method=Within(1e-3, "dopri5"))
+
+
+def test_a_step_that_cannot_be_found_is_the_failure_of_the_run():
+    scene = replace(driven(), loads=(Load("push", "rod.b", force=(formula("sqrt(0.3 - t)"), 0.0, 0.0)),))
+    with pytest.raises(ComputationError, match=r"t = 0\.3"):
+        forward(scene, **SPAN)

@@ -1,0 +1,75 @@
+"""What the length of the steps costs: on histories made up, where the truth is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ffr_dyn.consistency.step_error import COARSE, ranges, step_errors, too_coarse
+from ffr_dyn.results.result import Quantity, Result
+
+TIME = np.linspace(0.0, 1.0, 201)
+
+
+def result(time=TIME, **histories) -> Result:
+    units = {"position": "m", "force": "N", "moment": "N m"}
+    named = {name.replace("_", "."): np.asarray(values) for name, values in histories.items()}
+    return Result(time, {n: Quantity(v, units.get(n.rpartition(".")[2], "1")) for n, v in named.items()}, {}, {})
+
+
+@pytest.mark.parametrize("order", [2, 3])
+@pytest.mark.parametrize("ratio", [2.0, 0.5, 5 / 3])
+def test_an_error_of_the_order_of_the_method_is_told_exactly(order, ratio):
+    true, shape = np.sin(3 * TIME), TIME**2
+    h = 0.1
+    run, other = (result(a_position=true + shape * step**order) for step in (h, ratio * h))
+    found = step_errors(run, other, ratio, order)["a.position"]
+    assert found.error == pytest.approx(h**order, rel=1e-9)
+    assert found.of_range == pytest.approx(h**order / np.ptp(true + shape * h**order), rel=1e-9)
+    assert not found.vibrates
+
+
+def test_vibration_that_runs_damp_away_is_seen_beside_the_twin():
+    smooth, vibration = np.sin(3 * TIME), 0.02 * np.cos(5000 * TIME)
+    run, other, twin = result(a_force=smooth), result(a_force=smooth), result(a_force=smooth + vibration)
+    assert step_errors(run, other, 2.0, 2)["a.force"].error == 0.0
+    found = step_errors(run, other, 2.0, 2, [twin])["a.force"]
+    assert found.error == pytest.approx(0.02, rel=1e-3)
+    assert found.vibrates
+
+
+def test_the_phase_of_a_twin_of_lower_order_is_no_error_of_the_run():
+    """Vibration with 20 rows to a period, which a method of order three resolves and its twin lets run late."""
+
+    def late(phase):
+        return np.sin(3 * TIME) + 0.1 * np.cos(2 * np.pi * 10 * TIME - phase * TIME)
+
+    run, other = result(a_position=late(1e-3)), result(a_position=late(8e-3))
+    twins = [result(a_position=late(1.2)), result(a_position=late(0.3))]
+    near = step_errors(run, other, 2.0, 3, twins[1:])["a.position"].error
+    found = step_errors(run, other, 2.0, 3, twins)["a.position"].error
+    true = np.abs(late(1e-3) - late(0.0)).max()
+    assert true <= found <= 0.3 * near
+
+
+def test_outputs_that_hardly_move_are_measured_by_their_kind():
+    run = result(a_position=TIME, b_position=1e-9 * TIME, a_force=TIME, a_moment=1e-12 * TIME, c_q=1e-5 * TIME)
+    scales = ranges(run)
+    assert scales["b.position"] == pytest.approx(1e-3)
+    assert scales["a.moment"] == pytest.approx(1e-6)
+    assert scales["c.q"] == pytest.approx(1e-5)
+
+
+def test_violations_of_constraints_are_no_outputs_of_a_motion():
+    assert "constraint.position" not in ranges(result(constraint_position=TIME))
+
+
+def test_rows_beyond_the_end_of_another_run_are_not_compared():
+    run, other = result(a_position=TIME), result(time=TIME[:-10], a_position=TIME[:-10])
+    assert step_errors(run, other, 2.0, 2)["a.position"].error == 0.0
+
+
+@pytest.mark.parametrize(("periods", "told"), [(2, False), (80, True)])
+def test_rows_that_do_not_show_a_motion_are_told(periods, told):
+    found = too_coarse(result(a_position=np.sin(2 * np.pi * periods * TIME)))
+    assert (found.get("a.position", 0.0) > COARSE) == told
