@@ -17,6 +17,7 @@ from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.failure import failure
+from ffr_dyn.consistency.following import apart, lost_driver, unfollowed
 from ffr_dyn.consistency.validity import doubts, extremes, meaningless
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import Integrator, methods
@@ -229,6 +230,7 @@ def _advance(
         with watch:
             status = fill_rows(run.engine, chunk, start, substeps // looks)
         filled = int(steps[FILLED]) - int(steps[FILLED]) % looks
+        _require_followed(assembled, run, method, chunk)
         if filled:
             kept = with_all_reactions(assembled, Record(*(column[:filled] for column in chunk)))
             if watcher is not None:
@@ -248,9 +250,23 @@ def _advance(
         if ends:
             return
         if status != OK:
+            now, step = reached(run.engine, start), run.energy.spacing
+            if lost := lost_driver(system, now - 1e-3 * step, now + step, jumps=method.controlled):
+                raise ComputationError(lost)
             cause = excess_of_gains(run.energy.gains, run.energy.spacing)
             raise failure(run.engine.system, run.engine.work, status, reached(run.engine, start), cause)
         count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
+
+
+def _require_followed(assembled: Assembled, run: _Run, method: Integrator, chunk: Record) -> None:
+    """Raises ComputationError where the steps so far do not follow the motion; a method that chooses them sees to that."""
+    if method.controlled:
+        return
+    spins = extremes(assembled.system, Record(*(column[: run.engine.tables.clock.steps[FILLED]] for column in chunk)))[
+        1
+    ]
+    if lost := unfollowed(assembled.system, run.engine.work, method.step, spins):
+        raise ComputationError(lost)
 
 
 def _shown(rows: int, looks: int, ends: bool) -> Array:
@@ -299,6 +315,8 @@ def with_all_reactions(assembled: Assembled, record: Record) -> Record:
         engine.x[:], engine.v[:] = record.x[row], record.v[row]
         engine.work.loads.reference[:] = record.forces[row]
         record_row(engine, moment, one, 0)
+        if open_now := apart(system, engine.work.rows.Phi, float(moment)):
+            raise ComputationError(open_now)
         reaction[row] = one.reaction[0, numbers]
     return record._replace(reaction=reaction)
 

@@ -46,7 +46,7 @@ def new_work(m: Model, *, keeps_terms: bool = False) -> Work:
         implicit=np.array([0.0, 0.0, 0.0, 1.0, 0.0]),
         info=np.zeros(3, dtype=np.int64),
         independence=np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
-        **_zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=2),
+        **_zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=4),
     )
 
 

@@ -14,6 +14,7 @@ from scipy.linalg import qr
 from scipy.sparse import csr_array, vstack
 
 from ffr_dyn.consistency.closing import TOLERANCE, close_positions, largest_turn, stacked, weights
+from ffr_dyn.consistency.following import size_of
 from ffr_dyn.consistency.row_space import Dependence, dependence, smallest_solution
 from ffr_dyn.equations.constraint_rows import Block, rows_at
 from ffr_dyn.equations.layout import Layout, moved, to_body_axes
@@ -134,6 +135,5 @@ def _rigid_part(place: Layout, step: Array) -> Array:
 
 def _extent(scene: Scene, place: Layout, step: Array) -> float:
     """Of a motion (V,): the largest turn [rad] of a body, or shift over the size of the largest body."""
-    points = [np.abs(point.position).max(initial=0.0) for body in scene.bodies for point in body.model.interfaces]
-    size, shift = max(points, default=0.0), max(float(np.abs(step[place.R_dot(b)]).max()) for b in range(len(place.n)))
-    return max(largest_turn(place, step), shift / size if size > 0 else 0.0)
+    shift = max(float(np.abs(step[place.R_dot(b)]).max()) for b in range(len(place.n)))
+    return max(largest_turn(place, step), shift / size_of(scene))

@@ -275,7 +275,7 @@ FAILED, EVALUATIONS, PROJECTIONS = range(3)
 # that a stage of a W-method goes on by, as by its displacements.
 BY_RATE, BY_PLACE, AHEAD, FRESH, BY_TIME = range(5)
 # Numbers of `Work.drift`.
-PHI, PHI_DOT = range(2)
+PHI, PHI_DOT, OPENED, MOMENT = range(4)
 # Numbers of `Work.independence` (see `ffr_dyn.kernels.singular_positions`).
 HERE, LEAST, WHEN, START, END, AT_START, CLOSEST, AT_LAST = range(8)
 
@@ -295,7 +295,7 @@ class Work(NamedTuple):
     diagonal: F1  # (1,) gamma h of the elastic diagonal that is in place (see `entry_points.set_diagonal`), or -1
     implicit: F1  # (5,) by the names above
     info: I1  # (3,) body or row that failed, how many evaluations, how many projections
-    drift: F1  # (2,) largest |Phi| and |Phi_dot| met
+    drift: F1  # (4,) largest |Phi| and |Phi_dot| met; the row of the first, and when it was [s]
     # (8,) least share of a row that others do not contain: now, least so far, and when; of a step its start and end [s],
     # the share at its start, the least of its stages, and that at the start of the step before (`kernels.singular_positions`)
     independence: F1
