@@ -17,7 +17,7 @@ from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.failure import failure
-from ffr_dyn.consistency.following import apart, lost_driver, unfollowed
+from ffr_dyn.consistency.following import apart, jumped, lost_driver, unfollowed
 from ffr_dyn.consistency.validity import doubts, extremes, meaningless
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import Integrator, methods
@@ -251,21 +251,26 @@ def _advance(
             return
         if status != OK:
             now, step = reached(run.engine, start), run.energy.spacing
-            if lost := lost_driver(system, now - 1e-3 * step, now + step, jumps=method.controlled):
+            near = np.array([now, now + step])
+            if (
+                lost := jumped(system, near)
+                if method.controlled
+                else lost_driver(system, now - 1e-3 * step, now + step)
+            ):
                 raise ComputationError(lost)
             cause = excess_of_gains(run.energy.gains, run.energy.spacing)
-            raise failure(run.engine.system, run.engine.work, status, reached(run.engine, start), cause)
+            raise failure(run.engine.system, run.engine.work, status, now, cause)
         count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
 
 
 def _require_followed(assembled: Assembled, run: _Run, method: Integrator, chunk: Record) -> None:
-    """Raises ComputationError where the steps so far do not follow the motion; a method that chooses them sees to that."""
+    """Raises ComputationError where the steps so far do not follow the motion; a method that chooses them leaves out jumps."""
+    rows = Record(*(column[: run.engine.tables.clock.steps[FILLED]] for column in chunk))
     if method.controlled:
-        return
-    spins = extremes(assembled.system, Record(*(column[: run.engine.tables.clock.steps[FILLED]] for column in chunk)))[
-        1
-    ]
-    if lost := unfollowed(assembled.system, run.engine.work, method.step, spins):
+        lost = jumped(assembled.system, np.append(run.times[-1][-1:], rows.time))
+    else:
+        lost = unfollowed(assembled.system, run.engine.work, method.step, rows)
+    if lost:
         raise ComputationError(lost)
 
 

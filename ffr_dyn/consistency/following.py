@@ -73,8 +73,8 @@ def lost_driver(system: System, start: float, end: float) -> str:
                 return _told_jump(block, word, time, jump)
             short = 0.1 * (end - start) / changes.sum() * _whole(system.scene, word)
             return (
-                f"{_called(block)} moves by {changes.sum():.3g} {_unit(word)} within the step that ends at t = {end:.6g} s: the "
-                "motion between the steps is more than the method follows; let it move more slowly, or use steps below "
+                f"{_called(block)} moves by {changes.sum():.3g} {_unit(word)} within the step that ends at t = {end:.6g} s: "
+                "the motion between the steps is more than the method follows; let it move more slowly, or use steps below "
                 f"{short:.2g} s"
             )
     return ""
@@ -82,8 +82,8 @@ def lost_driver(system: System, start: float, end: float) -> str:
 
 def _told_jump(block: Block, word: Word, time: float, jump: float) -> str:
     return (
-        f"{_called(block)} jumps by {jump:.4g} {_unit(word)} at t = {time:.6g} s, which no motion follows; give it a ramp that "
-        "lasts some steps"
+        f"{_called(block)} jumps by {jump:.4g} {_unit(word)} at t = {time:.6g} s, which no motion follows; give it a "
+        "ramp that lasts some steps"
     )
 
 

@@ -369,13 +369,15 @@ def _angle_function(scene: Scene, joint: Joint) -> TimeFunction | None:
 
 
 def _unwound(joint: Joint, driven: TimeFunction | None) -> Entry:
-    """The angle of a joint, which begins within half a turn, or with the whole turns of its driver."""
+    """The angle of a joint, which begins within half a turn; with the whole turns of its driver, if it has one."""
 
     def compute(view: View, last: Unwound | Worked | None) -> tuple[Array, Unwound]:
-        times, (angle, rate) = view.record.time, angles(view, joint)
-        if driven is not None and not isinstance(last, Unwound):
-            last = Unwound(evaluate(driven, float(times[0]))[0], float(rate[0]), float(times[0]))
-        return unwind(times, angle, rate, last if isinstance(last, Unwound) else None)
+        moments, (angle, rate) = view.record.time, angles(view, joint)
+        if driven is None:
+            return unwind(moments, angle, rate, last if isinstance(last, Unwound) else None)
+        asked = np.array([evaluate(driven, float(t))[0] for t in moments])
+        angle += 2 * np.pi * np.round((asked - angle) / (2 * np.pi))
+        return angle, Unwound(float(angle[-1]), float(rate[-1]), float(moments[-1]))
 
     return Entry("rad", (), "joint angle, unwound", compute)
 
