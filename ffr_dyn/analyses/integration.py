@@ -264,7 +264,7 @@ def _advance(
 
 
 def _require_followed(assembled: Assembled, run: _Run, method: Integrator, chunk: Record) -> None:
-    """Raises ComputationError where the steps so far do not follow the motion; a method that chooses them leaves out jumps."""
+    """Raises ComputationError where the steps so far do not follow the motion; one that chooses them may pass jumps over."""
     rows = Record(*(column[: run.engine.tables.clock.steps[FILLED]] for column in chunk))
     if method.controlled:
         lost = jumped(assembled.system, np.append(run.times[-1][-1:], rows.time))

@@ -47,7 +47,8 @@ def unfollowed(system: System, work: Work, step: float, rows: Record) -> str:
 
 def jumped(system: System, times: Array) -> str:
     """Which driver jumps between two of the times [s] of rows; empty where none does."""
-    for word, block in ((word, block) for block in system.blocks for word in block.words if word.function is not None):
+    said = [(block, word) for block in system.blocks for word in block.words if word.function is not None]
+    for block, word in said:
         value, rate, _ = np.array([drive_of(word, float(t)) for t in times]).T
         off = np.abs(np.diff(value) - 0.5 * (rate[1:] + rate[:-1]) * np.diff(times))
         for k in np.flatnonzero(off > FAST * _whole(system.scene, word)):
