@@ -230,7 +230,8 @@ def _advance(
         with watch:
             status = fill_rows(run.engine, chunk, start, substeps // looks)
         filled = int(steps[FILLED]) - int(steps[FILLED]) % looks
-        _require_followed(assembled, run, method, chunk)
+        if status == OK:
+            _require_followed(assembled, run, method, chunk)
         if filled:
             kept = with_all_reactions(assembled, Record(*(column[:filled] for column in chunk)))
             if watcher is not None:
