@@ -26,15 +26,18 @@ from ffr_dyn.kernels.tables import (
     AT,
     EVALUATIONS,
     FILLED,
-    LEAST,
+    FIRST_PASSED,
+    LOW,
+    LOW_AT,
+    MOST_PASSED,
     NEXT,
     NOW,
     OK,
+    PASSED,
     PHI,
     PHI_DOT,
     PROJECTIONS,
     SPACING,
-    WHEN,
     Record,
     Work,
 )
@@ -49,6 +52,7 @@ from ffr_prep.body import Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
+FEW = 4.0  # steps
 LOOKS = 10  # of a quantity that adds up, from row to row, where the method chooses its steps
 SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, file and keyboard
 
@@ -230,8 +234,7 @@ def _advance(
         with watch:
             status = fill_rows(run.engine, chunk, start, substeps // looks)
         filled = int(steps[FILLED]) - int(steps[FILLED]) % looks
-        if status == OK:
-            _require_followed(assembled, run, method, chunk)
+        _require_followed(assembled, run, method, start, chunk, status)
         if filled:
             kept = with_all_reactions(assembled, Record(*(column[:filled] for column in chunk)))
             if watcher is not None:
@@ -251,26 +254,25 @@ def _advance(
         if ends:
             return
         if status != OK:
-            now, step = reached(run.engine, start), run.energy.spacing
-            near = np.array([now, now + step])
-            if (
-                lost := jumped(system, near)
-                if method.controlled
-                else lost_driver(system, now - 1e-3 * step, now + step)
-            ):
-                raise ComputationError(lost)
             cause = excess_of_gains(run.energy.gains, run.energy.spacing)
-            raise failure(run.engine.system, run.engine.work, status, now, cause)
+            raise failure(run.engine.system, run.engine.work, status, reached(run.engine, start), cause)
         count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
 
 
-def _require_followed(assembled: Assembled, run: _Run, method: Integrator, chunk: Record) -> None:
-    """Raises ComputationError where the steps so far do not follow the motion; one that chooses them may pass jumps over."""
-    rows = Record(*(column[: run.engine.tables.clock.steps[FILLED]] for column in chunk))
-    if method.controlled:
-        lost = jumped(assembled.system, np.append(run.times[-1][-1:], rows.time))
+def _require_followed(
+    assembled: Assembled, run: _Run, method: Integrator, start: float, chunk: Record, status: int
+) -> None:
+    """Raises ComputationError where the steps so far do not follow the motion, or have failed for a driver."""
+    system, engine, now = assembled.system, run.engine, reached(run.engine, start)
+    rows = Record(*(column[: engine.tables.clock.steps[FILLED]] for column in chunk))
+    if method.controlled:  # its errors tell what it does not follow, but it may pass a jump over
+        ahead = now if status == OK else now + run.energy.spacing
+        lost = jumped(system, np.array([run.times[-1][-1], *rows.time, ahead]))
+    elif status != OK:
+        lost = lost_driver(system, now - method.step, now + method.step)
     else:
-        lost = unfollowed(assembled.system, run.engine.work, method.step, rows)
+        lost = unfollowed(system, engine.work, method.step, rows)
+        lost = lost and (jumped(system, np.concatenate([*run.times, rows.time])) or lost)
     if lost:
         raise ComputationError(lost)
 
@@ -432,7 +434,7 @@ def _account(scene: Scene, run: _Run, notes: list[str]) -> dict[str, Any]:
         "projections": int(info[PROJECTIONS]),
         **_steps(run.engine),
         "largest_drift": [float(drift[PHI]), float(drift[PHI_DOT])],
-        "notes": [*notes, *_singular(run.engine.work), *doubts(scene, run.extremes)],
+        "notes": [*notes, *_singular(run.engine.work, run.energy.spacing), *doubts(scene, run.extremes)],
     }
 
 
@@ -442,11 +444,19 @@ def _steps(engine: Engine) -> dict[str, Any]:
     return {"steps": int(control.counts[0]), "refused_steps": int(control.counts[1])} if control.numbers.size else {}
 
 
-def _singular(work: Work) -> list[str]:
-    least, time = work.independence[[LEAST, WHEN]]
-    if least >= AT:
+def _singular(work: Work, step: float) -> list[str]:
+    """A note on the singular positions that were passed, or are just being; a few steps [s] apart they are one."""
+    share = work.independence
+    count = int(share[PASSED])
+    times = share[FIRST_PASSED:][: min(count, MOST_PASSED)].tolist()
+    if share[LOW] < AT:
+        times.append(float(share[LOW_AT]))
+    apart = [time for k, time in enumerate(times) if k == 0 or time - times[k - 1] > FEW * step]
+    if not apart:
         return []
+    more = f" and {count - MOST_PASSED} times more" if count > MOST_PASSED else ""
+    what = "a singular position" if len(apart) == 1 else "singular positions"
     return [
-        f"the motion passes a singular position near t = {time:.6g} s, where constraints become dependent; it goes on along "
-        "its branch, and reactions there are large or not unique"
+        f"the motion passes {what} near t = {', '.join(f'{time:.6g}' for time in apart)} s{more}, where constraints become "
+        "dependent; it goes on along its branch, and reactions there are large or not unique"
     ]

@@ -265,7 +265,7 @@ def _needing(key: str) -> str:
 
 def frames(joint: Joint) -> tuple[Array, Array]:
     """Joint frames (3, 3) on markers i and j, columns f, g, h, in body axes."""
-    on_i = triad((0.0, 0.0, 1.0) if joint.axis is None else joint.axis, f"joint {joint.name!r}: axis")
+    on_i = triad(np.eye(3)[2] if joint.axis is None else joint.axis, f"joint {joint.name!r}: axis")
     if joint.axis_j is None:
         return on_i, on_i
     return on_i, triad(joint.axis_j, f"joint {joint.name!r}: axis_j")
