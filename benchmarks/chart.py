@@ -46,7 +46,7 @@ from benchmarks.scenes import (  # noqa: E402
 from ffr_dyn.chart.diagram import CPU, Diagram, Lost, Point, spread, work_precision  # noqa: E402
 from ffr_dyn.chart.draw import draw_chart  # noqa: E402
 from ffr_dyn.chart.measures import Measure, Quantity  # noqa: E402
-from ffr_dyn.chart.orders import orders  # noqa: E402
+from ffr_dyn.chart.orders import order_words, orders  # noqa: E402
 from ffr_dyn.chart.page import write_page  # noqa: E402
 from ffr_dyn.chart.reference import distance  # noqa: E402
 from ffr_dyn.chart.runner import Span, pool  # noqa: E402
@@ -261,7 +261,10 @@ def report(case: Case, found: Diagram) -> None:
             times = "".join(f"{1e3 * t:10.2f}" for t in point.cpu)
             print(f"    {point.label[:66]:68}{point.errors[measure.name] / found.scale(measure.name):10.1e}{times}")
         shown = {name: order for (name, _), order in orders(found, measure.name).items()}
-        print("    order at the finest steps: " + ", ".join(f"{name} {order:.1f}" for name, order in shown.items()))
+        print(
+            "    order at the finest steps: "
+            + ", ".join(f"{name} {order_words(order)}" for name, order in shown.items())
+        )
         ours, theirs = cost_at(found, measure.name, "ffr"), cost_at(found, measure.name, EXUDYN)
         print(f"    at {ACCURACY:g}: ours {1e3 * ours:.2f} ms, Exudyn {1e3 * theirs:.2f} ms, ratio {theirs / ours:.1f}")
     for lost in found.lost:

@@ -1,6 +1,10 @@
 """What `economise` finds for the benchmark set, against an exhaustive grid of models and against everything.
 
-    python -m benchmarks.economy [--no-grid] [case ...]
+    python -m benchmarks.economy [--no-grid | --statements] [case ...]
+
+First it prints whether what is said of a model is true: of verified ones whether they keep their tolerances within the error
+that the verification names, of those without verification whether they keep their tolerances; against everything with at
+least four times their steps, known to a tenth of the tolerance by convergence. `--statements` ends there.
 
 For every case and the tolerances 1e-2, 1e-3 and 1e-4 it prints: whether the true errors are within the tolerance; the
 processor time of the time loop of the chosen model; how many times as long other ways take:
@@ -28,7 +32,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -37,6 +41,7 @@ from ffr_gallery.scene_set import CASES, Case, case
 
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.run import run as whole_run
+from ffr_dyn.economy.cache import Ledger
 from ffr_dyn.economy.cost import of_run, per_evaluation, per_row
 from ffr_dyn.economy.model_choice import Choice, Part, orthonormal
 from ffr_dyn.economy.outputs import difference, largest
@@ -44,8 +49,10 @@ from ffr_dyn.economy.result import Economy
 from ffr_dyn.economy.run import Span, Trial, make, run
 from ffr_dyn.economy.search import economise
 from ffr_dyn.economy.steps import methods
+from ffr_dyn.economy.verification import Known, sharpened
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.scene.scene import Scene
+from ffr_dyn.variants.mean_axis import with_mean_axis_bodies
 from ffr_dyn.variants.variant import STIFFENING, basis_of
 from ffr_prep.body import truncated
 from ffr_prep.common.errors import ComputationError, InputError
@@ -60,6 +67,7 @@ REPEATS = (4, 20)  # at least, and at most while they take less than a second
 FLOOR = 16  # steps to a row, at least, that tell what no finer step will mend
 CLOCKED = 3  # models of the grid whose runs are timed, the cheapest by the cost model
 LOW, HIGH = 0.3, 5.0  # effectivity that is asked for
+SHARP, LONG = 0.1, 3e8  # of a tolerance, to which the truth is wanted, and what that may cost [us]
 
 
 @dataclass(frozen=True)
@@ -96,15 +104,73 @@ class Row:
 # ---- truth ----------------------------------------------------------------------------------------------------------
 
 
-def truth(scene: Scene, found: list[Economy], span: Span) -> Trial:
-    """Everything on, with the finest step of all verifications, or four times the steps of the finest model."""
-    finest = max(found, key=lambda one: one.choice.divisions * (3 if one.choice.method == "ros3" else 1))
-    if finest.verification is not None:
-        choice = finest.verification.choice
-    else:
-        everything = next(one.choice for one in finest.tried if one.what == "everything")
-        choice = replace(everything, divisions=2 * finest.choice.divisions)
-    return run(make(scene, choice, span), choice, span, finest.probe)
+def truth(scene: Scene, found: list[Economy], span: Span) -> Known:
+    """Everything on, with at least four times the steps of the finest model, known to a tenth of the least tolerance."""
+    of, least = found[0].probe, np.min([one.limits for one in found], axis=0)
+    ledger = Ledger(scene, span, of, lambda stage: None)
+    parts = [one.choice for one in found[0].tried if one.what == "everything"]
+    everything = parts[0] if parts else replace(full_model(found[0]), method="ros3")
+    finest = max(one.choice.divisions for one in found)
+    return sharpened(ledger, everything, SHARP * least, 4 * finest, LONG)
+
+
+@dataclass(frozen=True)
+class Statement:
+    """What is said of a model, and its true error, both in tolerances.
+
+    verified : None where no verification was asked for, else whether there is one
+    """
+
+    case: str
+    tolerance: float
+    verified: bool | None
+    said: float
+    true: float
+    known: float
+
+    @property
+    def is_true(self) -> bool:
+        """Within the tolerance; where verified, within the error that is named too, but for that of the truth."""
+        return self.true <= 1.0 and (not self.verified or self.true <= self.said + self.known)
+
+
+def statements(one: Case) -> Iterator[Statement]:
+    """Of all tolerances, verified and not."""
+    scene, span = with_mean_axis_bodies(one.scene()), Span(0.0, one.end, one.output_step)
+    how = {"end": one.end, "output_step": one.output_step}
+    asked = [(tolerance, verify) for tolerance in TOLERANCES for verify in (True, False)]
+    found = [economise(scene, one.outputs, tolerance=tolerance, verify=verify, **how) for tolerance, verify in asked]
+    sharp = truth(scene, found, span)
+    for (tolerance, _), economy in zip(asked, found, strict=True):
+        check, limits = economy.verification, economy.limits
+        true = true_error(scene, economy.choice, span, economy, sharp.trial) / limits
+        said = economy.error if check is None else check.error
+        is_known = None if check is None else check.is_known
+        yield Statement(one.name, tolerance, is_known, (said / limits).max(), true.max(), (sharp.own / limits).max())
+
+
+def tell_statements(cases: Iterable[Case]) -> None:
+    """Print them, and how many are true."""
+    found = []
+    print(f"{'case':17} {'tol':>6} {'model':11}{'said':>8}{'true':>8}{'known to':>10}  [tolerances]")
+    for one in cases:
+        for said in statements(one):
+            found.append(said)
+            words = {True: "verified", False: "estimated", None: "unverified"}[said.verified]
+            wrong = "" if said.is_true else "  WRONG"
+            print(
+                f"{said.case:17} {said.tolerance:6.0e} {words:11}{said.said:8.2g}{said.true:8.2g}{said.known:10.1g}{wrong}",
+                flush=True,
+            )
+    for words, verified in (
+        ("verified", True),
+        ("estimated where asked to verify", False),
+        ("without verification", None),
+    ):
+        listed = [said.is_true for said in found if said.verified is verified]
+        if listed:
+            print(f"{words}: {sum(listed)} of {len(listed)} true")
+    print()
 
 
 # ---- the grid -------------------------------------------------------------------------------------------------------
@@ -239,12 +305,12 @@ def unverified(one: Case, scene: Scene, tolerance: float) -> tuple[float, float]
 
 
 def rows_of(one: Case, *, with_grid: bool) -> Iterator[Row]:
-    scene, span = one.scene(), Span(0.0, one.end, one.output_step)
+    scene, span = with_mean_axis_bodies(one.scene()), Span(0.0, one.end, one.output_step)
     found = [
         economise(scene, one.outputs, end=one.end, output_step=one.output_step, tolerance=tolerance, verify=True)
         for tolerance in TOLERANCES
     ]
-    reference = truth(scene, found, span)
+    reference = truth(scene, found, span).trial
     grid = cheapest(scene, span, reference, found[-1]) if with_grid else {tolerance: [] for tolerance in TOLERANCES}
     for tolerance, economy in zip(TOLERANCES, found, strict=True):
         choice, everything = economy.choice, replace(reference.choice, accuracy=0.0)
@@ -366,10 +432,13 @@ def _searched(row: Row) -> float:
 
 
 def main() -> None:
+    names = [name for name in sys.argv[1:] if name not in ("--no-grid", "--statements")]
+    cases, rows = [case(name) for name in names] or CASES, []
+    tell_statements(cases)
+    if "--statements" in sys.argv:
+        return
     print(HEAD)
-    rows = []
-    names = [name for name in sys.argv[1:] if name != "--no-grid"]
-    for one in [case(name) for name in names] or CASES:
+    for one in cases:
         for row in rows_of(one, with_grid="--no-grid" not in sys.argv):
             rows.append(row)
             print(line(row), flush=True)

@@ -25,7 +25,7 @@ from ffr_dyn.pictures.stress_report import stress_report
 from ffr_dyn.results.result import Result
 
 SIZE = (1200, 720)
-MOMENT = 687 / 240 * TURN  # [s], where the rod is bent most
+MOMENT = 688 / 240 * TURN  # [s], where the rod is bent most
 ENLARGED, LIMIT = 500.0, 10e-6  # factor of the deformation, end of the colour bar [m]
 
 
@@ -39,7 +39,7 @@ def deformed(result: Result, path: Path) -> Path:
 
 
 def stressed(result: Result, path: Path) -> Path:
-    """The rod, coloured by its largest stress when the vibration of the start has decayed."""
+    """The rod, coloured by its largest stress of the third turn."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory() as folder:
         stress_report(result, folder, since=2 * TURN, count=3)

@@ -14,8 +14,8 @@ from ffr_dyn.analyses.outcome import result_of
 from ffr_dyn.analyses.registry import OfMoment
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import Assembled, assemble, turned
+from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import evaluator, record_states
-from ffr_dyn.consistency.validity import strained_in
 from ffr_dyn.equations.layout import initial_state
 from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
@@ -49,7 +49,8 @@ def assembly(
     assembled = assemble(scene, time=time)
     selected(assembled.system, outputs)
     at = evaluator(assembled.system)
-    record = record_states(at, np.array([time]), assembled.x[None], assembled.v[None])
+    rows = record_states(at, np.array([time]), assembled.x[None], assembled.v[None])
+    record = with_all_reactions(assembled, rows)
     notes = [note for note in assembled.notes if not note.startswith(("assembly moved", "assembly turned"))]
     attributes = {
         **described(scene),
@@ -57,10 +58,10 @@ def assembly(
         "method": "smallest changes in the norm of the mass matrix",
         "evaluations": int(at.work.info[EVALUATIONS]),
         "degrees_of_freedom": assembled.degrees_of_freedom,
-        "notes": [*changes(assembled), *notes, *strained_in(assembled.system, record)],
+        "notes": [*changes(assembled), *notes, *checked("assemble", assembled, record)],
         "status": "complete",
     }
-    return result_of(assembled.system, with_all_reactions(assembled, record), attributes, path, outputs)
+    return result_of(assembled.system, record, attributes, path, outputs)
 
 
 def changes(assembled: Assembled) -> list[str]:

@@ -18,7 +18,9 @@ import numpy as np
 from ffr_dyn.compile.engine import fill_rows, new_engine
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
-from ffr_dyn.consistency.evaluation import evaluator
+from ffr_dyn.consistency.balance import Account, add_rows, amiss
+from ffr_dyn.consistency.evaluation import evaluator, record_states
+from ffr_dyn.consistency.explicit_forces import candidates, fastest, told
 from ffr_dyn.consistency.tangent import chart, state_matrix
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
 from ffr_dyn.functions.rotation import rotation_matrix
@@ -60,7 +62,7 @@ class EnergyWatch:
     complete : gives a record the reactions of redundant rows
     begun    : [J] at the start, with what turned out to have a source later;  highest : [J] energy of gravity so far
     time, powers, work : of the last row, and of each force and driver [W] and [J]
-    anchor   : the last row with an energy that is no wonder
+    anchor   : the last row with an energy that is no wonder;  account : of all energy, both ways
     """
 
     system: System
@@ -74,11 +76,23 @@ class EnergyWatch:
     powers: Array = field(default_factory=lambda: np.zeros(0))
     work: Array = field(default_factory=lambda: np.zeros(0))
     anchor: _Row | None = None
+    account: Account = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.account = Account(self.system)
+
+    def amiss(self) -> list[str]:
+        """Notes on energy that forces and drivers do not account for, too little to stop the run."""
+        kind = type(self.method).__name__
+        if self.method.controlled:
+            return amiss(self.account, kind, "use smaller tolerances")
+        return amiss(self.account, f"{kind}, {self.method.step:.3g} s", "use a smaller step")
 
     def look(self, rows: Record) -> None:
         """Take note of the rows that follow. Raises ComputationError when their energy comes from nowhere."""
         with np.errstate(all="ignore"):
             energy, powers = rows.energy[:, 0] + rows.energy[:, 1], _powers(self.system, rows)
+            add_rows(self.account, rows, powers)
             if self.anchor is None:
                 self._begin(rows, energy, powers)
             given = self._given(rows, powers)
@@ -169,9 +183,11 @@ class EnergyWatch:
     def _cause(self, anchor: _Row) -> str:
         h, kind = self.spacing, type(self.method).__name__
         if self.method.controlled:
-            return "The tolerances of the steps are too large for this motion: use smaller ones, or ROS2"
+            return "The tolerances of the steps are too large for this motion: use smaller ones"
         if excess := excess_of_gains(self.gains, h):
             return excess
+        if stiff_forces := _too_stiff(self.system, self.method, anchor):
+            return stiff_forces[0]
         fastest = _fastest(self.system, anchor)
         if h * fastest > self.method.reach:
             stiff = any(force.stiff_coordinates for force in forces_of(self.system.scene))
@@ -183,7 +199,7 @@ class EnergyWatch:
         force = "a stop or a Python function" if self.method.takes_forces else "a stiff spring or stop"
         return (
             f"A step of {h:.3g} s of {kind} is too long for this motion, whose fastest rate is {fastest:.4g} 1/s ({force}, "
-            "fast rotation, or a mode that is loaded); use a smaller step, or projection if constraints drift"
+            f"fast rotation, or a mode that is loaded); use a smaller step{'' if self.gains[2] > 0 else ', or projection'}"
         )
 
 
@@ -204,6 +220,18 @@ def _finer(method: Integrator, step: float) -> Any:
     if method.controlled:
         return replace(kept, tolerances=replace(kept.tolerances, relative=kept.tolerances.relative / 100))
     return replace(kept, step=step)
+
+
+def _too_stiff(system: System, method: Integrator, row: _Row) -> list[str]:
+    """Notes on forces that the method takes explicitly, as they are at a row."""
+    forces, at = candidates(system, method), evaluator(system)
+    if not forces:
+        return []
+    try:
+        rows = record_states(at, np.array([row.time]), row.x[None], row.v[None])
+        return told(system, method, fastest(at, rows, forces))
+    except (ComputationError, np.linalg.LinAlgError):
+        return []
 
 
 def _by_body(system: System, row: _Row) -> Array:

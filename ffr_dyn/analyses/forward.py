@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from ffr_dyn.analyses.integration import check_output_step, integrate
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble
+from ffr_dyn.consistency.quasi_static import quasi_static
 from ffr_dyn.consistency.step_error import StepError, step_errors, too_coarse
 from ffr_dyn.consistency.unresolved import Vibrations, lasting, leading, vibrations
 from ffr_dyn.functions.stopwatch import Stopwatch
@@ -35,6 +36,8 @@ FIRST, FINEST, LEAP = 4, 1024, 8  # steps to an output row: of the first trial, 
 MARGIN = 2.0  # by which a trial aims below the accuracy
 SLOW = 0.7  # a ringing output's error falls slower than the step to this power
 QUICK = 1e7  # microseconds of the further runs, by `_cost`, up to which they are made unasked
+
+Beginning = Literal["as-given", "quasi-static"]  # the default and the other
 
 # What a step is to keep within the accuracy always, and what where it does not ring.
 PLACES = re.compile(r"\.(position|R|p|angle|stroke|orientation)$")
@@ -53,11 +56,18 @@ class Forward(OverTime):
         default=None,
         metadata=option("--check/--no-check", "Tell the error of every output by further runs; default: if short."),
     )
+    begin: Beginning = field(
+        default="as-given",
+        metadata=option(
+            "--quasi-static/--as-given", "Start with the deflections that the motion asks for; default: as given."
+        ),
+    )
 
     def perform(self, scene: Scene, settings: Settings, **how: Any) -> Result:
         own: dict[str, Any] = {
             "events": self.events,
             "check": self.check,
+            "begin": self.begin,
             "method": settings.method,
             "stabilisation": settings.stabilisation,
         }
@@ -95,6 +105,7 @@ def forward(
     outputs: Sequence[str] = ("default",),
     events: Sequence[Event] = (),
     check: bool | None = None,
+    begin: Beginning = "as-given",
     path: str | Path | None = None,
     resume: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
@@ -109,6 +120,8 @@ def forward(
     events      : moments to find (`ffr_dyn.analyses.events`), listed in the result's attribute "events"; one may end the run
     check       : whether further runs are made that tell the error of every output; by default where that takes seconds.
                   A step that is found is always checked
+    begin       : "quasi-static" for bodies that start with the deflections, and their rates, that the motion asks for
+                  (`ffr_dyn.consistency.quasi_static`) and do not ring; "as-given" with the scene's q and q_dot
     path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
     resume      : a result file whose run goes on to the same bits; `end` may be later. A new file: a run from the start
     progress    : called with the time reached, a few times a second
@@ -122,7 +135,7 @@ def forward(
     the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
     check_output_step(output_step)
-    assembled = assemble(scene, time=start) if assembled is None else assembled
+    assembled = _begun(assemble(scene, time=start) if assembled is None else assembled, start, begin)
     common: dict[str, Any] = {"start": start, "end": end, "output_step": output_step, "stabilisation": stabilisation}
     common |= {"outputs": outputs, "progress": progress, "stopwatch": stopwatch}
     runs = _Runs(scene, assembled, start, output_step, common)
@@ -136,6 +149,13 @@ def forward(
     trial = _Trial(method, 0 if method.controlled else round(output_step / method.step), result)
     told = _told(runs, _beside_twins(runs, trial)) if check else trial
     return _finished(runs, told, resume if path is None else path)
+
+
+def _begun(assembled: Assembled, start: float, begin: Beginning) -> Assembled:
+    """The state that a run begins in."""
+    if begin not in get_args(Beginning):
+        raise InputError(f"begin is {begin!r}; it must be one of {', '.join(map(repr, get_args(Beginning)))}")
+    return assembled if begin == "as-given" else quasi_static(assembled, start)
 
 
 def _resumed(

@@ -15,10 +15,11 @@ from ffr_dyn.analyses.energy import EnergyWatch
 from ffr_dyn.analyses.events import Event, Watcher
 from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.workspace import new_record
+from ffr_dyn.consistency import failure as failing
 from ffr_dyn.consistency.assemble import Assembled, assemble
-from ffr_dyn.consistency.failure import failure
-from ffr_dyn.consistency.following import apart, jumped, lost_driver, unfollowed
-from ffr_dyn.consistency.validity import doubts, extremes, meaningless
+from ffr_dyn.consistency.doubts import BALANCE, SINGULAR, Seen, ended, held, look, nothing_seen
+from ffr_dyn.consistency.following import STALLED, Lost, jumped, lost_driver, unfollowed
+from ffr_dyn.consistency.validity import meaningless
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import Integrator, methods
 from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation, excess_of_gains, gains
@@ -66,7 +67,7 @@ class _Run:
     memory: Memory
     parts: list[dict[str, Quantity]]
     times: list[Array]
-    extremes: Array
+    seen: Seen
     done: int
 
 
@@ -113,7 +114,7 @@ def integrate(
     span = (start, end, output_step)
     mark = _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
     header = _header(scene, assembled, method, stabilisation, span)
-    run = _begun(assembled, method, gains(stabilisation), start, spacing, wanted, resume, mark)
+    run = _begun(assembled, method, stabilisation, start, spacing, wanted, resume, mark)
     _check_resumed(run, substeps * rows, output_step / substeps)
     watcher = _watcher(assembled, run, method, stabilisation, spacing, events, resume) if events else None
     path = resume if path is None else path
@@ -125,7 +126,7 @@ def integrate(
                 writer.append(times, {name: quantity.values for name, quantity in part.items()}, _checkpoint(run, mark))
             if progress is not None:
                 progress(float(times[-1]))
-        account = _account(scene, run, header["notes"]) | ({} if watcher is None else {"events": watcher.found})
+        account = _account(run, header["notes"]) | ({} if watcher is None else {"events": watcher.found})
         if writer is not None:
             writer.close("complete", header | account)
     return _result(scene, run, header | account | {"status": "complete"})
@@ -179,7 +180,7 @@ def _check_step(scene: Scene, method: Integrator) -> None:
 def _begun(
     assembled: Assembled,
     method: Integrator,
-    gained: tuple[float, float, float],
+    stabilisation: Stabilisation,
     start: float,
     spacing: float,
     wanted: Mapping[str, Entry],
@@ -187,26 +188,28 @@ def _begun(
     mark: str,
 ) -> _Run:
     """The run at its start, or where the file to resume left it."""
-    system = assembled.system
+    system, gained = assembled.system, gains(stabilisation)
+    seen = nothing_seen(assembled, method, *held(system.scene, stabilisation))
     engine = new_engine(system, assembled.x, assembled.v, method, gained, start=start, spacing=spacing)
     energy = EnergyWatch(system, method, gained, spacing, lambda rows: with_all_reactions(assembled, rows))
     if resume is not None and Path(resume).exists():
-        return _resumed(Path(resume), mark, engine, energy)
-    return _started(assembled, engine, energy, start, wanted)
+        return _resumed(Path(resume), mark, engine, energy, seen)
+    return _started(assembled, engine, energy, seen, start, wanted)
 
 
 def _started(
-    assembled: Assembled, engine: Engine, energy: EnergyWatch, start: float, wanted: Mapping[str, Entry]
+    assembled: Assembled, engine: Engine, energy: EnergyWatch, seen: Seen, start: float, wanted: Mapping[str, Entry]
 ) -> _Run:
     """The run with its first row."""
     first = new_record(assembled.system, 1)
     status = record_row(engine, start, first, 0)
     if status != OK:
-        raise failure(engine.system, engine.work, status, start)
+        raise failing.failure(engine.system, engine.work, status, start)
     first = with_all_reactions(assembled, first)
     energy.look(first)
+    look(seen, first)
     parts, memory = measure(assembled.system, first, {}, wanted)
-    return _Run(engine, energy, memory, [parts], [first.time], extremes(assembled.system, first), 0)
+    return _Run(engine, energy, memory, [parts], [first.time], seen, 0)
 
 
 def _advance(
@@ -234,7 +237,10 @@ def _advance(
         with watch:
             status = fill_rows(run.engine, chunk, start, substeps // looks)
         filled = int(steps[FILLED]) - int(steps[FILLED]) % looks
-        _require_followed(assembled, run, method, start, chunk, status)
+        reached_rows = Record(*(column[: steps[FILLED]] for column in chunk))
+        lost = None if method.controlled else unfollowed(system, run.engine.work, method.step, reached_rows)
+        if cause := _driver_lost(run, method, start, reached_rows, status, lost):
+            raise ComputationError(cause)
         if filled:
             kept = with_all_reactions(assembled, Record(*(column[:filled] for column in chunk)))
             if watcher is not None:
@@ -246,35 +252,34 @@ def _advance(
             times = kept.time[shown]
             run.parts.append(part)
             run.times.append(times)
-            run.extremes = np.maximum(run.extremes, extremes(system, kept))
-            if lost := meaningless(system.scene, run.extremes):
-                raise ComputationError(f"by t = {times[-1]:.6g} s {lost}")
+            look(run.seen, kept)
+            if nonsense := meaningless(system.scene, run.seen.arrays["bodies"]):
+                raise ComputationError(f"by t = {times[-1]:.6g} s {nonsense}")
+            if lost is not None and status == OK and run.energy.gains[2] > 0:
+                raise ComputationError(lost.text)
             run.done += filled // looks * substeps
             yield times, part
         if ends:
             return
         if status != OK:
-            cause = excess_of_gains(run.energy.gains, run.energy.spacing)
-            raise failure(run.engine.system, run.engine.work, status, reached(run.engine, start), cause)
+            gained = run.energy.gains
+            settings = failing.Settings(method, gained[2] > 0, excess_of_gains(gained, run.energy.spacing))
+            raise failing.failure(run.engine.system, run.engine.work, status, reached(run.engine, start), settings)
         count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
 
 
-def _require_followed(
-    assembled: Assembled, run: _Run, method: Integrator, start: float, chunk: Record, status: int
-) -> None:
-    """Raises ComputationError where the steps so far do not follow the motion, or have failed for a driver."""
-    system, engine, now = assembled.system, run.engine, reached(run.engine, start)
-    rows = Record(*(column[: engine.tables.clock.steps[FILLED]] for column in chunk))
+def _driver_lost(run: _Run, method: Integrator, start: float, rows: Record, status: int, lost: Lost | None) -> str:
+    """Which driver is why the steps up to these rows do not follow the motion, or have failed; empty where none is."""
+    system, now = run.engine.system, reached(run.engine, start)
     if method.controlled:  # its errors tell what it does not follow, but it may pass a jump over
         ahead = now if status == OK else now + run.energy.spacing
-        lost = jumped(system, np.array([run.times[-1][-1], *rows.time, ahead]))
-    elif status != OK:
-        lost = lost_driver(system, now - method.step, now + method.step)
-    else:
-        lost = unfollowed(system, engine.work, method.step, rows)
-        lost = lost and (jumped(system, np.concatenate([*run.times, rows.time])) or lost)
-    if lost:
-        raise ComputationError(lost)
+        return jumped(system, np.array([run.times[-1][-1], *rows.time, ahead]))
+    if status != OK:
+        return lost_driver(system, now - method.step, now + method.step, STALLED)
+    if lost is None:
+        return ""
+    found = lost_driver(system, lost.time - method.step, lost.time)
+    return found or jumped(system, np.concatenate([*run.times, rows.time]))
 
 
 def _shown(rows: int, looks: int, ends: bool) -> Array:
@@ -311,22 +316,21 @@ def reached(engine: Engine, start: float) -> float:
 
 
 def with_all_reactions(assembled: Assembled, record: Record) -> Record:
-    """The record with reactions of the redundant rows too: at every state, the smallest that give its accelerations."""
+    """The record with reactions and violations of the redundant rows too: at every state, the smallest reactions that
+    give its accelerations."""
     if assembled.all_rows is None:
         return record
     system = assembled.all_rows
     engine, one = new_engine(system, record.x[0], record.v[0]), new_record(system, 1)
     names = [block.name for block in system.blocks]
     numbers = [names.index(block.name) for block in assembled.system.blocks]
-    reaction = np.empty_like(record.reaction)
+    reaction, violation = np.empty_like(record.reaction), np.empty_like(record.violation)
     for row, moment in enumerate(record.time):
         engine.x[:], engine.v[:] = record.x[row], record.v[row]
         engine.work.loads.reference[:] = record.forces[row]
         record_row(engine, moment, one, 0)
-        if open_now := apart(system, engine.work.rows.Phi, float(moment)):
-            raise ComputationError(open_now)
-        reaction[row] = one.reaction[0, numbers]
-    return record._replace(reaction=reaction)
+        reaction[row], violation[row] = one.reaction[0, numbers], one.violation[0]
+    return record._replace(reaction=reaction, violation=violation)
 
 
 # ---- stopping and going on -------------------------------------------------------------------------------------------
@@ -348,8 +352,13 @@ KEY = "machine."  # before the names of an engine's tables in result files
 
 
 def _checkpoint(run: _Run, mark: str) -> Array:
-    arrays = {"extremes": run.extremes, **{KEY + key: array for key, array in _changing(run.engine)}}
-    return encode(Checkpoint(mark, run.done, arrays, run.memory))
+    return encode(Checkpoint(mark, run.done, _arrays(run.engine, run.energy, run.seen), run.memory))
+
+
+def _arrays(engine: Engine, energy: EnergyWatch, seen: Seen) -> dict[str, Array]:
+    """All that a run changes, by name."""
+    machine = {KEY + key: array for key, array in _changing(engine)}
+    return {**seen.arrays, "account": energy.account.numbers, **machine}
 
 
 def _changing(engine: Engine) -> Iterator[tuple[str, Array]]:
@@ -358,7 +367,7 @@ def _changing(engine: Engine) -> Iterator[tuple[str, Array]]:
         yield from leaves(getattr(engine.tables, name), name)
 
 
-def _resumed(path: Path, mark: str, engine: Engine, energy: EnergyWatch) -> _Run:
+def _resumed(path: Path, mark: str, engine: Engine, energy: EnergyWatch, seen: Seen) -> _Run:
     """The run that a result file holds, ready to go on in the engine."""
     content = load_checkpoint(path)
     if content is None:
@@ -369,7 +378,7 @@ def _resumed(path: Path, mark: str, engine: Engine, energy: EnergyWatch) -> _Run
             f"{path} is the result of another scene or of other settings (step, method, start, output step, outputs): its "
             "run cannot be continued with these; run from the start, to another file if that one is still wanted"
         )
-    changing = {KEY + name: array for name, array in _changing(engine)}
+    changing = _arrays(engine, energy, seen)
     if any(name not in saved.arrays or saved.arrays[name].shape != array.shape for name, array in changing.items()):
         raise InputError(
             f"{path} was written by another version of ffr_dyn, whose runs this one cannot continue; run from the start, to "
@@ -377,8 +386,7 @@ def _resumed(path: Path, mark: str, engine: Engine, energy: EnergyWatch) -> _Run
         )
     for name, array in changing.items():
         array[...] = saved.arrays[name]
-    extremes_then = saved.arrays["extremes"].copy()
-    return _Run(engine, energy, saved.memory, [dict(earlier.quantities)], [earlier.time], extremes_then, saved.steps)
+    return _Run(engine, energy, saved.memory, [dict(earlier.quantities)], [earlier.time], seen, saved.steps)
 
 
 def _check_resumed(run: _Run, steps: int, step: float) -> None:
@@ -407,6 +415,7 @@ def _header(
         "end": end,
         "output_step": output_step,
         "degrees_of_freedom": assembled.degrees_of_freedom,
+        "computed": assembled.computed,
         "notes": list(assembled.notes),
     }
 
@@ -426,7 +435,7 @@ def _result(scene: Scene, run: _Run, attributes: dict[str, Any]) -> Result:
     return Result(np.concatenate(run.times), quantities, geometry(scene), attributes)
 
 
-def _account(scene: Scene, run: _Run, notes: list[str]) -> dict[str, Any]:
+def _account(run: _Run, notes: list[str]) -> dict[str, Any]:
     """What only the end of a run can tell."""
     info, drift = run.engine.work.info, run.engine.work.drift
     return {
@@ -434,7 +443,14 @@ def _account(scene: Scene, run: _Run, notes: list[str]) -> dict[str, Any]:
         "projections": int(info[PROJECTIONS]),
         **_steps(run.engine),
         "largest_drift": [float(drift[PHI]), float(drift[PHI_DOT])],
-        "notes": [*notes, *_singular(run.engine.work, run.energy.spacing), *doubts(scene, run.extremes)],
+        "notes": [
+            *notes,
+            *ended(
+                "forward",
+                run.seen,
+                {SINGULAR: _singular(run.engine.work, run.energy.spacing), BALANCE: run.energy.amiss()},
+            ),
+        ],
     }
 
 

@@ -19,9 +19,9 @@ from ffr_dyn.analyses.outcome import efforts, needed, only, result_of, with_quan
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
+from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import Evaluator, copied, evaluate, evaluator, joined, locked
 from ffr_dyn.consistency.mobility import require_driven
-from ffr_dyn.consistency.validity import strained_in
 from ffr_dyn.equations.layout import moved, to_global_axes
 from ffr_dyn.integrators import Integrator, Within
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
@@ -131,7 +131,7 @@ def _quasi_static(
         "method": "Newton-Raphson",
         "evaluations": int(at.work.info[EVALUATIONS]),
         "degrees_of_freedom": assembled.degrees_of_freedom,
-        "notes": [*assembled.notes, *strained_in(assembled.system, record)],
+        "notes": [*assembled.notes, *checked("inverse", assembled, record)],
         "status": "complete",
     }
     return result_of(assembled.system, record, attributes, path, outputs)

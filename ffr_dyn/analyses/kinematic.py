@@ -19,6 +19,7 @@ from ffr_dyn.analyses.integration import with_all_reactions
 from ffr_dyn.analyses.outcome import output_times, result_of
 from ffr_dyn.analyses.registry import OverTime
 from ffr_dyn.analyses.settings import Settings
+from ffr_dyn.consistency import doubts
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.evaluation import Evaluation, Evaluator, copied, evaluate, evaluator, joined, total_mass_matrix
 from ffr_dyn.consistency.mobility import named_motion, require_driven
@@ -91,7 +92,8 @@ def kinematic(
         if progress is not None:
             progress(float(time))
     record = _recorded(assembled, poses)
-    notes = [*assembled.notes, *_undeformed_notes(scene), *_singular_notes(followed)]
+    notes = [*assembled.notes, *_undeformed_notes(scene)]
+    notes += doubts.checked("kinematic", assembled, record, {doubts.SINGULAR: _singular_notes(followed)})
     attributes = {
         **described(scene),
         "analysis": "kinematic",

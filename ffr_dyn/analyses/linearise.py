@@ -23,10 +23,10 @@ from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
 from ffr_dyn.compile.engine import with_model
 from ffr_dyn.consistency.assemble import assemble, in_space
+from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
 from ffr_dyn.consistency.mobility import named_motion
 from ffr_dyn.consistency.tangent import Chart, chart, derivative, rates, sizes, state, state_matrix
-from ffr_dyn.consistency.validity import strained_in
 from ffr_dyn.equations.layout import to_global_axes
 from ffr_dyn.kernels.tables import LAW
 from ffr_dyn.results.file import save_result
@@ -144,7 +144,8 @@ def linearise(
     modes = modes / np.where((size := np.abs(modes).max(axis=0)) > 0, size, 1.0)
     leading = tuple(_leading(near, mode) for mode in modes.T)
     names = tuple(item if isinstance(item, str) else item.name for item in inputs)
-    notes = (*assembled.notes, *_stationary_notes(near), *strained_in(at.system, at.record))
+    evaluate(at, time, assembled.x, assembled.v)
+    notes = (*assembled.notes, *_stationary_notes(near), *checked("linearise", assembled, at.record))
     return Linearisation(A, B, C, D, near.Z, eigenvalues, modes, leading, names, tuple(outputs), error, notes)
 
 

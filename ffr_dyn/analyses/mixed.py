@@ -28,8 +28,8 @@ from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
+from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import joined, record_states
-from ffr_dyn.consistency.validity import strained_in
 from ffr_dyn.integrators import Integrator, Within
 from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.kernels.tables import EVALUATIONS, Record
@@ -222,6 +222,7 @@ def _not_collocated(
         us, states = _integrated(own, chosen, times, w, assembled.x, progress)
     record = _recorded(whole, times, us, states)
     system = whole.free.system
+    doubted = checked("mixed", replace(assembled, system=system, all_rows=None), record)
     attributes: dict[str, Any] = {
         **described(scene),
         "analysis": f"mixed dynamics, {'bounded' if isinstance(chosen, Bounded) else 'causal'}",
@@ -229,7 +230,7 @@ def _not_collocated(
         "evaluations": int(own.at.work.info[EVALUATIONS] + whole.free.work.info[EVALUATIONS]),
         "degrees_of_freedom": own.size,
         "internal_coordinates": list(own.names),
-        "notes": [*assembled.notes, *notes, *strained_in(system, record)],
+        "notes": [*assembled.notes, *notes, *doubted],
         "status": "complete",
     }
     found = _efforts_found(system, record, whole.own.unknown, us)

@@ -18,8 +18,8 @@ from ffr_dyn.analyses.ida import by_ida
 from ffr_dyn.analyses.integration import geometry, with_all_reactions
 from ffr_dyn.analyses.outcome import output_times
 from ffr_dyn.consistency.assemble import Assembled, assemble
+from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import Evaluator, accelerations, closed, copied, evaluator, joined
-from ffr_dyn.consistency.validity import strained_in
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.equations.motion import position_rates
 from ffr_dyn.kernels.tables import EVALUATIONS, Record
@@ -119,7 +119,7 @@ def reference(
         "output_step": output_step,
         "degrees_of_freedom": assembled.degrees_of_freedom,
         "evaluations": int(at.work.info[EVALUATIONS]),
-        "notes": [*assembled.notes, *strained_in(assembled.system, record)],
+        "notes": [*assembled.notes, *checked("forward", assembled, record)],
         "status": "complete",
     }
     result = Result(record.time, quantities, geometry(scene), attributes)

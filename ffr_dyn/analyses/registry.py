@@ -125,6 +125,8 @@ def summary(attributes: Mapping[str, Any]) -> list[str]:
         f"scene        {a['title']}: {a['analysis']}, {a['degrees_of_freedom']} degrees of freedom",
         f"method       {a['method']}, {a.get('evaluations', 0)} evaluations of the equations of motion",
     ]
+    if "computed" in a:
+        lines.append(f"computed     {a['computed']}")
     if "largest_drift" in a:
         position, velocity = a["largest_drift"]
         lines.append(

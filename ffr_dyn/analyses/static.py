@@ -19,6 +19,7 @@ from ffr_dyn.analyses.registry import OfMoment
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import held
 from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
+from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.equilibrium import Equilibrium, equilibrium
 from ffr_dyn.consistency.evaluation import (
     Evaluator,
@@ -30,7 +31,6 @@ from ffr_dyn.consistency.evaluation import (
 )
 from ffr_dyn.consistency.mobility import counted, named_motion
 from ffr_dyn.consistency.tangent import sizes
-from ffr_dyn.consistency.validity import strained_in
 from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
@@ -112,9 +112,9 @@ def _result(
     still = np.zeros(assembled.system.layout.v_size)
     for x in found.path[:-1]:  # forces count the turns of angles on the way
         evaluate(at, time, x, still)
-    record = record_states(at, np.array([time]), found.path[-1:], still[None])
+    record = with_all_reactions(assembled, record_states(at, np.array([time]), found.path[-1:], still[None]))
     stable = lowest > 0
-    notes = [*assembled.notes, *strained_in(assembled.system, record)]
+    notes = [*assembled.notes, *checked("static", assembled, record)]
     if not stable:
         notes.append(f"the equilibrium is unstable: its lowest stiffness per mass is {lowest:.4g} 1/s^2")
     attributes = {
@@ -130,5 +130,4 @@ def _result(
         "status": "complete",
     }
     attributes = {key: value for key, value in attributes.items() if value is not None}
-    record = with_all_reactions(assembled, record)
     return result_of(assembled.system, record, attributes, path, outputs)

@@ -125,7 +125,7 @@ def work_precision(
     tell: Callable[[str], None] = lambda line: None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Diagram:
-    """Run all methods on all models of a scene and compare them with a verified reference of the full scene.
+    """Run all methods on all models of a scene and compare them with a reference of the full scene.
 
     methods  : steps [s] or tolerances by method, None for a ladder that is chosen; default all methods
     models   : what is simplified; the reference has the full one
@@ -133,7 +133,7 @@ def work_precision(
     wanted   : relative error that the reference should have, see `reference`
     tell     : told how the reference is found;  progress : told how many variants are done, of how many
 
-    Raises InputError for what cannot be compared, ComputationError where no reference can be verified.
+    Raises InputError for what cannot be compared, ComputationError where not a single run of the reference is possible.
     """
     measures = measures or measures_of(scene, (), span.start)
     variants = grid(scene, models, dict.fromkeys(known_methods()) if methods is None else methods, span.output_step)

@@ -1,14 +1,15 @@
 """The run that errors are measured from: converged, and verified by another method.
 
-A method of order three is refined, halving its step, until two runs agree; then another method is refined likewise, and both
-must agree. The error estimate of the reference, its floor, is the greater of the distance between the last two runs of the
-chosen method and the distance between the methods: no error below it means anything.
+A method of order three is refined, halving its step, until two runs agree; then another method is refined likewise, or
+until it agrees with the first. The error estimate of the reference, its floor, is the greater of the distance between the
+last two runs of the chosen method and the distance between the methods: no error below it means anything, and where methods
+do not agree the floor is high. A method with a single run is known to the scale of what it shows.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from ffr_prep.common.errors import ComputationError
 
 ROUNDED = 1e-7  # below which a distance that does not fall any more is due to rounding
 WANTED = 1e-6
-POOR = 1e-2  # relative floor above which a reference is none
+POOR = 1e-2  # relative floor above which a reference is called poor
 FIRST_PARTS = 16  # steps per output step with which an implicit method starts
 
 
@@ -41,7 +42,7 @@ class Reference(Brief):
 
 @dataclass(frozen=True)
 class _Refined:
-    """The finest run of a method and its distance, by measure, from the one before."""
+    """The finest run of a method and its distance, by measure, from the one before, the scale where there is none."""
 
     variant: Variant
     outcome: Outcome
@@ -77,7 +78,7 @@ def reference(
     limit   : wall time [s] that a single run may take
     wanted  : distance of two runs, relative to the scale of each measure, at which refinement may stop
 
-    Raises ComputationError when methods do not agree within `POOR`, or not two runs of one are possible.
+    Raises ComputationError when not a single run is possible.
     """
     story: list[str] = []
 
@@ -85,17 +86,20 @@ def reference(
         story.append(line)
         tell(line)
 
-    found = []
+    found: list[_Refined] = []
     for method in methods:
         jobs = _Jobs(scene, span, measures, stabilisation, model, method, limit)
-        refined = _refine(jobs, pool, wanted, say)
+        refined = _refine(jobs, pool, wanted, say, found[0].outcome if found else None)
         if refined is not None:
             found.append(refined)
-    if len(found) < 2:
+    if not found:
         raise ComputationError(
-            "no verified reference: " + "; ".join(story) + ". Allow longer runs (--limit), or shorten the scene"
+            "no reference: " + "; ".join(story) + ". Allow longer runs (--limit), or shorten the scene"
         )
-    best, check = sorted(found, key=_badness)
+    if len(found) < len(methods):
+        say(f"not verified by another method: {found[0].variant.method} alone came to an end")
+    ranked = sorted(found, key=_badness)
+    best, check = ranked[0], ranked[-1]
     values, floors = _agreed(best, check, measures, say)
     return Reference(values, best.outcome.scales, floors, best.variant, check.variant, tuple(story))
 
@@ -103,7 +107,7 @@ def reference(
 def _agreed(
     best: _Refined, check: _Refined, measures: tuple[Measure, ...], say: Callable[[str], None]
 ) -> tuple[dict[str, Array], dict[str, float]]:
-    """Histories and the errors that they may have, by measure. ComputationError where two methods are too far apart."""
+    """Histories and the errors that they may have, by measure."""
     between = distances(best.outcome, check.outcome)
     floors = {name: max(between[name], best.distance[name]) for name in between}
     values = dict(best.outcome.values)
@@ -113,10 +117,9 @@ def _agreed(
         scale = best.outcome.scales[name]
         say(f"{name}: reference right to about {floor:.1e}" + (f", {floor / scale:.1e} of its scale" if scale else ""))
         if scale and floor > POOR * scale:
-            raise ComputationError(
-                f"no verified reference: {best.variant.label} and {check.variant.label} are {between[name]:.2g} apart in "
-                f"{name!r}, {floor / scale:.0%} of its scale; allow longer runs (--limit), or shorten the scene: a chaotic "
-                "or unstable motion has no long reference"
+            say(
+                f"{name}: a poor reference: {best.variant.label} and {check.variant.label} are {between[name]:.2g} apart; "
+                "allow longer runs (--limit), or shorten the scene: a chaotic or unstable motion has no long reference"
             )
     return values, floors
 
@@ -151,12 +154,15 @@ class _Jobs:
         return max(FIRST_PARTS // 2, explicit_parts(self.model.of(self.scene), self.span.output_step))
 
 
-def _refine(jobs: _Jobs, pool: Pool, wanted: float, say: Callable[[str], None]) -> _Refined | None:
-    """Halve the step until two runs agree, rounding takes over, or the next run would take too long.
-
-    None where there are no two runs.
+def _refine(
+    jobs: _Jobs, pool: Pool, wanted: float, say: Callable[[str], None], other: Outcome | None
+) -> _Refined | None:
+    """Halve the step until two runs agree, or one with the `other` method, rounding takes over, or the next run would take
+    too long. None where there is no run.
     """
-    parts, last, best = jobs.first(), None, None
+    parts = jobs.first()
+    last: Outcome | None = None
+    best: _Refined | None = None
     while True:
         job = jobs.job(parts)
         (_, outcome), *_ = pool.results(perform, [job])
@@ -165,14 +171,17 @@ def _refine(jobs: _Jobs, pool: Pool, wanted: float, say: Callable[[str], None]) 
             if last is not None or parts > 8 * jobs.first():
                 return best
         else:
-            if last is not None:
+            if last is None:
+                best = _Refined(job.variant, outcome, outcome.scales)
+            else:
                 found = _Refined(job.variant, outcome, distances(outcome, last))
                 worst = _badness(found)
                 say(f"{job.variant.label}: {worst:.1e} from twice the step, {outcome.wall[0]:.2g} s")
-                if best is not None and worst >= _badness(best) and worst < ROUNDED:
+                if best is not None and _badness(best) <= worst < ROUNDED:
                     return best
                 best = found
-                if worst < wanted:
+                near = other is not None and _badness(replace(found, distance=distances(outcome, other))) < wanted
+                if worst < wanted or near:
                     return best
             if 2.2 * outcome.wall[0] > jobs.limit:
                 return best

@@ -57,6 +57,8 @@ Terms that --drop leaves out: I3 I4 I5 I8 I9 (inertia integrals) and stiffening;
 )
 @click.option("--limit", default=60.0, show_default=True, type=click.FloatRange(0.0, min_open=True),
               help="Wall time [s] that one run may take.")  # fmt: skip
+@click.option("--wanted", default=1e-6, show_default=True, type=click.FloatRange(0.0, 1.0, min_open=True),
+              help="Relative error of the reference at which its refinement ends: a tenth of what you look for.")  # fmt: skip
 @click.option("--workers", type=click.IntRange(0), help="Local processes; default half the processors, 0: none, here.")
 @click.option("--cluster", metavar="ADDRESS", help="Scheduler of a Dask cluster that runs the variants instead.")
 @parameter_option
@@ -72,6 +74,7 @@ def chart(
     end: float | None,
     repeats: int,
     limit: float,
+    wanted: float,
     workers: int | None,
     cluster: str | None,
     parameters: tuple[str, ...],
@@ -79,9 +82,9 @@ def chart(
     """Speed against accuracy of SCENE: a work-precision diagram over methods, steps and models.
 
     Runs every method with falling steps on every model (modes kept x terms dropped x body files) and measures its errors
-    against a reference that is computed and verified first: a method of high order refined until nothing changes, and
-    another one that agrees. Writes <output>.png, .svg, .html (interactive, works offline) and .csv. A variant that fails is
-    listed with its reason. Variants that no other beats, the Pareto front, are ringed.
+    against a reference that is computed first: a method of high order refined until nothing changes, and another one that
+    verifies it; how far both are apart is drawn as a band. Writes <output>.png, .svg, .html (interactive, works offline) and
+    .csv. A variant that fails is listed with its reason. Variants that no other beats, the Pareto front, are ringed.
 
     Measures, methods, modes and terms may stand in the scene file, in [chart]; options go before them.
 
@@ -104,15 +107,16 @@ def chart(
         reserve("-o", output.with_name(output.name + suffix))
     span = Span(settings.end if end is None else end, settings.output_step, settings.start)
     asked = settings.chart
-    wanted = _methods(methods) if methods else {name: numbers or None for name, numbers in asked.methods} or None
+    compared = _methods(methods) if methods else {name: numbers or None for name, numbers in asked.methods} or None
     numbers = asked.modes if modes is None else _numbers(modes)
     left_out = tuple(tuple(text.split(",")) for text in drops) or asked.drops
     models = _models(loaded, numbers, left_out, bodies)
     chosen = measures_of(loaded, measures or asked.measures, span.start)
     with pool(workers, cluster) as where, counted(loaded.name) as update:
         found = work_precision(
-            loaded, span, where, measures=chosen, methods=wanted, models=models, stabilisation=settings.stabilisation,
-            repeats=repeats, limit=limit, tell=lambda line: click.echo(f"reference    {line}"), progress=update,
+            loaded, span, where, measures=chosen, methods=compared, models=models, stabilisation=settings.stabilisation,
+            repeats=repeats, limit=limit, wanted=wanted, tell=lambda line: click.echo(f"reference    {line}"),
+            progress=update,
         )  # fmt: skip
     for line in _report(found, against):
         click.echo(line)
@@ -164,7 +168,7 @@ def _models(
 
 def _report(found: Diagram, against: str) -> list[str]:
     """The Pareto front of every measure, and what failed."""
-    from ffr_dyn.chart.orders import orders
+    from ffr_dyn.chart.orders import order_words, orders
     from ffr_dyn.chart.variants import FULL
 
     lines = []
@@ -180,8 +184,8 @@ def _report(found: Diagram, against: str) -> list[str]:
             )
             lines.append(f"  {cost}  error {error:8.1e} {measure.unit}{relative}  {point.label}")
         shown = {method: order for (method, model), order in orders(found, measure.name).items() if model == FULL.label}
-        if any(order == order for order in shown.values()):
-            listed = ", ".join(f"{method} {order:.1f}" for method, order in shown.items() if order == order)
+        if shown:
+            listed = ", ".join(f"{method} {order_words(order)}" for method, order in shown.items())
             lines.append(f"  order at the finest steps: {listed}")
     lines += [f"failed       {lost.label}: {lost.reason}" for lost in found.lost]
     return [*lines, ""]

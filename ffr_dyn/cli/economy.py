@@ -58,10 +58,11 @@ def economise(
     from ffr_dyn.economy.report import as_text, write_report
     from ffr_dyn.economy.search import economise as search
     from ffr_dyn.scene_file.read import load_scene
-    from ffr_dyn.scene_file.write import save_scene
+    from ffr_dyn.scene_file.write import save_changed
 
     loaded, given = load_scene(scene, assignments(parameters))
-    settings = over_time(given, Forward(), ())
+    analysis = given.analysis if isinstance(given.analysis, Forward) else Forward()
+    settings = over_time(given, analysis, ())
     target = target or scene.with_suffix(".economised.toml")
     require_after("--end", end, settings.start)
     reserve("-o", target)
@@ -77,9 +78,10 @@ def economise(
         tolerance=tolerance,
         verify=verify,
         stabilisation=settings.stabilisation,
+        events=analysis.events,
         tell=lambda stage: click.echo(f"... {stage}", err=True),
     )
-    save_scene(found.scene, found.settings, target)
+    save_changed(found.scene, found.settings, target, scene, assignments(parameters))
     write_report(found, report)
     if chart is not None:
         draw(found, chart)

@@ -11,13 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array
 
+from ffr_dyn.closing.driven_angles import led_to_drivers
+from ffr_dyn.closing.independence import independent_blocks
+from ffr_dyn.closing.positions import close_positions, close_velocities, stacked
+from ffr_dyn.closing.row_space import independent
 from ffr_dyn.compile.scene_tables import System, compile_scene
-from ffr_dyn.consistency.closing import close_positions, close_velocities, stacked
-from ffr_dyn.consistency.driven_angles import led_to_drivers
 from ffr_dyn.consistency.dropped_terms import check_dropped
 from ffr_dyn.consistency.held_frequencies import held_frequencies
-from ffr_dyn.consistency.independence import independent_blocks
-from ffr_dyn.consistency.row_space import independent
+from ffr_dyn.consistency.sliding import sliding_notes
 from ffr_dyn.consistency.validity import deflections
 from ffr_dyn.equations.constraint_rows import Block, blocks_of, rows_at
 from ffr_dyn.equations.constraints import Row
@@ -25,7 +26,7 @@ from ffr_dyn.equations.layout import Layout, initial_state, layout, moved, to_gl
 from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction
 from ffr_dyn.scene.scene import Scene, require_scene
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
-from ffr_dyn.variants.plane import planar_forms
+from ffr_dyn.variants.plane import obstacles, planar_forms
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
@@ -47,6 +48,7 @@ class Assembled(Brief):
     x, v : positions and velocities (see `Layout`);  notes : what was changed and what is redundant, in words
     degrees_of_freedom : velocities left free by the constraints, elastic ones included
     redundant : (joint, row) pairs that follow from the other rows
+    computed : in the plane or in space, and why, in words
     """
 
     system: System
@@ -56,6 +58,7 @@ class Assembled(Brief):
     degrees_of_freedom: int
     notes: tuple[str, ...]
     redundant: tuple[tuple[str, str], ...] = ()
+    computed: str = ""
 
 
 def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
@@ -66,7 +69,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     """
     require_scene(scene)
     declared = scene
-    scene, blocks = flattened(scene, time)
+    scene, blocks, computed = _flattened(scene, time)
     place = layout(scene)
     left_out = [note for b, body in enumerate(scene.bodies) for note in check_dropped(body, place.active(b))]
     guess, v = initial_state(scene, place)
@@ -87,11 +90,13 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
             f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes without their rounding "
             "across it"
         )
+    notes += sliding_notes(scene)
     notes += held_frequencies(
         declared, [(x[place.R(b)], x[place.p(b)]) for b in range(len(place.n))], scene.plane, time
     )
     all_rows = compile_scene(scene, blocks, RELAXATION) if redundant else None
-    return Assembled(compile_scene(scene, kept), all_rows, x, v, _movable(place) - rows, tuple(notes), tuple(redundant))
+    free = _movable(place) - rows
+    return Assembled(compile_scene(scene, kept), all_rows, x, v, free, tuple(notes), tuple(redundant), computed)
 
 
 def shifted(scene: Scene, place: Layout, guess: Array, x: Array) -> list[str]:
@@ -132,19 +137,39 @@ def _movable(place: Layout) -> int:
 def flattened(scene: Scene, time: float) -> tuple[Scene, list[Block]]:
     """The scene as it is computed: second-order bodies in their mean-axis form, its plane decided, `plane` "x", "y", "z" or
     "none"; and its rows, those of a planar scene without the ones that no motion in the plane can change."""
-    scene = in_mean_axis_frames(scene)
+    return _flattened(scene, time)[:2]
+
+
+def plane_in_words(scene: Scene, time: float) -> str:
+    """Whether a scene is computed in the plane or in space, and why."""
+    return _flattened(scene, time)[2]
+
+
+def _flattened(scene: Scene, time: float) -> tuple[Scene, list[Block], str]:
+    """As `flattened` and `plane_in_words`."""
+    scene, found = in_mean_axis_frames(scene), dict[str, str]()
     for flat in planar_forms(scene):
         blocks = blocks_of(flat)
-        across, pure = _across(flat, blocks, time)
-        if pure or scene.plane == flat.plane:
-            numbers = iter(across)
-            return flat, [replace(b, words=tuple(word for word in b.words if not next(numbers))) for b in blocks]
-    return replace(scene, plane="none"), blocks_of(scene)
+        across, found[flat.plane] = _across(flat, blocks, time)
+        if not found[flat.plane] or scene.plane == flat.plane:
+            numbers, said = iter(across), ", as the scene says" * (scene.plane == flat.plane)
+            left = [replace(b, words=tuple(word for word in b.words if not next(numbers))) for b in blocks]
+            return flat, left, f"in the plane, normal {flat.plane}{said}"
+    return replace(scene, plane="none"), blocks_of(scene), _in_space(scene, found)
 
 
-def _across(scene: Scene, blocks: list[Block], time: float) -> tuple[list[bool], bool]:
-    """Which rows of a planar scene act across the plane only; and whether they hold every body in it and ask for no
-    motion, now or later, while all others act in the plane only.
+def _in_space(scene: Scene, found: dict[str, str]) -> str:
+    """Why no plane was found, in words; found : what keeps the joints from one, by its normal."""
+    if scene.plane == "none":
+        return "in space, as the scene says"
+    normal, said = next(((key, (what,)) for key, what in found.items()), None) or obstacles(scene)
+    more = f" (and {len(said) - 1} more)" if len(said) > 1 else ""
+    return f"in space: not in the plane with the normal {normal}, as {said[0]}{more}"
+
+
+def _across(scene: Scene, blocks: list[Block], time: float) -> tuple[list[bool], str]:
+    """Which rows of a planar scene act across the plane only; and, in words, what of them does not hold every body in it or
+    asks for motion, now or later, or which others do not act in the plane only; "" where there is nothing.
 
     Looked at in the position and with the motion that the scene declares, and at random in the plane around it.
     """
@@ -166,9 +191,23 @@ def _across(scene: Scene, blocks: list[Block], time: float) -> tuple[list[bool],
     across = most_inside <= ACROSS * most_outside
     mixed = ~across & (most_outside > ACROSS * most_inside)
     moving = np.array([_changes(word.function) for block in blocks for word in block.words], bool)
-    asked = (most_left[across] >= ASKED).any() or moving[across].any()
-    pure = not (mixed.any() or asked) and all(_columns_independent(J[across]) for J in jacobians)
-    return across.tolist(), bool(pure)
+    asked = across & ((most_left >= ASKED) | moving)
+    names = [block.name for block in blocks for _ in block.words]
+    for wrong, what in ((mixed, "acts both in the plane and across it"), (asked, "asks for motion across it")):
+        if wrong.any():
+            return across.tolist(), f"{names[int(np.argmax(wrong))]!r} {what}"
+    if lost := _driver_lost(blocks, across):
+        return across.tolist(), f"driver {lost!r} acts across it alone"
+    if not all(_columns_independent(J[across]) for J in jacobians):
+        return across.tolist(), "its joints leave a body free to move across it"
+    return across.tolist(), ""
+
+
+def _driver_lost(blocks: list[Block], across: Array) -> str:
+    """A driver all rows of which act across the plane: in the plane it would have no effort; empty where there is none."""
+    numbers = iter(across.tolist())
+    acts = [[next(numbers) for _ in block.words] for block in blocks]
+    return next((block.name for block, rows in zip(blocks, acts, strict=True) if block.driver and all(rows)), "")
 
 
 def _largest(row: Row, chosen: Array) -> float:

@@ -214,7 +214,7 @@ def _ahead(step: _Step, there: Balance, M: Array) -> float:
     following, size = step.next(there), step.y @ M @ step.y
     if step.shift == 0 and following @ M @ following > size:
         return -np.inf
-    return float(following @ M @ step.y / size)
+    return float(following @ M @ step.y / size) if size > 0 else 0.0
 
 
 def _bordered(K: Array, J: Array) -> Array:

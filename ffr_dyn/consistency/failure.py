@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.dropped_terms import remedy
+from ffr_dyn.integrators import ROS2, Integrator
 from ffr_dyn.kernels.tables import (
     AT,
     FAILED,
@@ -29,8 +32,19 @@ OPEN, LOST = 1e-2, 1e2  # m, -: of constraints, more than drift, and what follow
 HUGE = 1e12  # N, N m: no force of a machine; what made the state overflow
 
 
-def failure(system: System, work: Work, status: int, time: float, cause: str = "") -> BaseException:
-    """What to tell about a status of the kernels; `cause` of the settings, if one is known to lose any state."""
+@dataclass(frozen=True)
+class Settings:
+    """Those of a run: its method, None of a single evaluation; whether a projection holds the constraints; and why they lose
+    any state, where that is known."""
+
+    method: Integrator | None = None
+    projected: bool = False
+    cause: str = ""
+
+
+def failure(system: System, work: Work, status: int, time: float, settings: Settings = Settings()) -> BaseException:
+    """What to tell about a status of the kernels."""
+    cause = settings.cause
     at, where = f"at t = {time:.6g} s", int(work.info[FAILED])
     if system.user.cause is not None:
         if isinstance(system.user.cause, KeyboardInterrupt):
@@ -41,7 +55,7 @@ def failure(system: System, work: Work, status: int, time: float, cause: str = "
         return ComputationError(f"{at} the state of {_worst(system, work)} is no longer finite: {cause}")
     if status == NOT_FINITE or (lost and (status == SINGULAR_BODY or not _largest(system, work)[1] <= HUGE)):
         return ComputationError(
-            f"{at} the state of {_worst(system, work)} is no longer finite: {_overflow(system, work)}"
+            f"{at} the state of {_worst(system, work)} is no longer finite: {_overflow(system, work, settings)}"
         )
     if status == SINGULAR_BODY:
         body = system.scene.bodies[where]
@@ -60,13 +74,14 @@ def failure(system: System, work: Work, status: int, time: float, cause: str = "
             f"{', or the state is no longer finite' if lost else ''}"
         )
     if status == NOT_CONVERGED:
-        return ComputationError(f"{at} the iterations of the step do not converge, {_unconverged(system, where)}")
+        return ComputationError(
+            f"{at} the iterations of the step do not converge, {_unconverged(system, where, settings)}"
+        )
     if status == STEP_TOO_SMALL:
         return ComputationError(
             f"{at} the step has become too small: the motion is not smooth there (an impact, a jump of a force or of a "
-            "driver), the mechanism locks (a dead point that a driver goes beyond), or the tolerances are below what "
-            "rounding allows; smooth the jump, end the run before it, keep driven motions within reach, or use larger "
-            "tolerances"
+            f"driver), the mechanism locks{_dead_point(system)}, or the tolerances are below what rounding allows; smooth "
+            f"the jump, end the run before it, {_remedy(system, 'use larger tolerances')}"
         )
     return ComputationError(f"{at} the run stopped: {system.user.failure or 'unknown cause'}")
 
@@ -87,7 +102,7 @@ def _worst(system: System, work: Work) -> str:
     return "the scene"
 
 
-def _overflow(system: System, work: Work) -> str:
+def _overflow(system: System, work: Work, settings: Settings) -> str:
     """Why a state is not finite, and what to change."""
     name, value = _largest(system, work)
     if np.isnan(value):
@@ -98,13 +113,27 @@ def _overflow(system: System, work: Work) -> str:
     if (least < AT or work.drift[PHI] > OPEN) and work.drift[PHI] < LOST:
         return (
             f"its constraints came open by up to {work.drift[PHI]:.2g}, and were nearest to dependence at t = {when:.6g} s: "
-            "the mechanism locks there (a dead point that a driver goes beyond), or passes a singular position; keep driven "
-            "motions within reach, or use projection"
+            f"the mechanism locks there{_dead_point(system)}, or passes a singular position; "
+            f"{_remedy(system, 'use a smaller step' if settings.projected else 'use projection')}"
         )
+    if settings.method is None:
+        return "a force, an initial state or a driver is beyond all sense there; look at their numbers and units"
+    if settings.method.controlled:
+        return "the tolerances are too large, or a force is not finite; use smaller tolerances"
+    if settings.method.implicit:
+        return "the step is too large for a stop, a Python function or a fast rotation; use a smaller step"
     return (
-        "the step is too large for a mode or a stiff spring (use ROS2), for a stop or a fast rotation (use a smaller step), "
-        "or a force is not finite"
+        "the step is too large for a mode or a stiff spring (use ROS2, or a smaller step), or for a stop or a fast rotation "
+        "(use a smaller step)"
     )
+
+
+def _dead_point(system: System) -> str:
+    return " (a dead point that a driver goes beyond)" if system.scene.drivers else ""
+
+
+def _remedy(system: System, change: str) -> str:
+    return f"keep driven motions within reach, or {change}" if system.scene.drivers else change
 
 
 def _largest(system: System, work: Work) -> tuple[str, float]:
@@ -133,17 +162,18 @@ def _timed(count: int, row: Array, system: System, work: Work) -> Array:
     return timed
 
 
-def _unconverged(system: System, where: int) -> str:
+def _unconverged(system: System, where: int, settings: Settings) -> str:
     """Of a body, or after the bodies a constraint row: where, the likely cause and what to change."""
-    bodies = system.scene.bodies
+    bodies, other = system.scene.bodies, not isinstance(settings.method, ROS2)
     if where < len(bodies):
         return (
             f"worst in body {bodies[where].name!r}: the step is too large for its rotation or for a spring, damper, stop or "
-            "friction that acts on it; use a smaller step, ROS2, or a softer force"
+            f"friction that acts on it; use a smaller step{', ROS2' if other else ''}, or a softer force"
         )
     block = system.blocks[int(np.searchsorted(system.model.rows.start, where - len(bodies), side="right")) - 1]
+    change = f"use a smaller step{', or ROS2 to pass a singular position' if other else ''}"
     return (
-        f"worst in {block.name!r}: its constraint cannot be met, because the mechanism locks there (a dead point that a "
-        "driver goes beyond) or is singular, or because the step is too large or a stiff spring far from its free length; "
-        "keep driven motions within reach, use a smaller step, or pass a singular position with ROS2"
+        f"worst in {block.name!r}: its constraint cannot be met, because the mechanism locks there{_dead_point(system)} or "
+        "is singular, or because the step is too large or a stiff spring far from its free length; "
+        f"{_remedy(system, change)}"
     )

@@ -1,10 +1,12 @@
-"""Whether the steps of a run follow its motion: joints that open between them, drivers that are lost, redundant rows.
+"""Whether the steps of a run follow its motion: joints that open between them, drivers that are lost.
 
 A projection puts right what a step leaves open. Where that is much, what lies between the steps is not the motion that was
 asked for, however well the joints are closed at their ends.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,32 +19,41 @@ from ffr_prep.common.arrays import Array
 
 LOST = 0.1  # rad, or of the size of the largest body, that a row may open by within a step
 SPUN = 2.0  # rad that a body may turn by within one
-OPEN = 1e-4  # m, rad that a redundant row may be open by where the others are closed
 FAST = 0.3  # rad, or of that size, that a driver may move by within a step that is not followed
+STALLED = 1.0  # the same within two steps, of which one has failed
 SAMPLES = 65  # of a driver within a step
 HALVINGS = 30
 SUDDEN = 0.5  # of a change, which takes the smallest part of a step: a jump
 
 
-def unfollowed(system: System, work: Work, step: float, rows: Record) -> str:
-    """Why steps of a length [s] do not follow the motion up to these rows; empty where they do."""
+@dataclass(frozen=True)
+class Lost:
+    """When [s] the steps have lost the motion, and how, in words."""
+
+    time: float
+    text: str
+
+
+def unfollowed(system: System, work: Work, step: float, rows: Record) -> Lost | None:
+    """Where steps of a length [s] do not follow the motion up to these rows."""
     opened, time = float(work.drift[PHI]), float(work.drift[MOMENT])
     block, word = row_named(system, int(work.drift[OPENED])) if opened > 0 else (None, None)
     if block is not None and word is not None and not opened <= LOST * _whole(system.scene, word):
-        return lost_driver(system, time - step, time) or (
+        text = (
             f"at t = {time:.6g} s {_called(block)} is open by {opened:.3g} {_unit(word)} at the end of a step: the motion "
             f"between the steps is more than the method follows; use steps far shorter than {step:.3g} s"
         )
-    spins = [np.linalg.norm(rows.v[:, system.layout.omega(b)], axis=1) for b in range(len(system.layout.n))]
-    b, row = np.unravel_index(int(np.argmax(spins)), (len(spins), rows.time.size)) if rows.time.size else (0, 0)
-    if rows.time.size and step * spins[b][row] > SPUN:
-        time = float(rows.time[row])
-        return lost_driver(system, time - step, time) or (
-            f"at t = {time:.6g} s body {system.scene.bodies[b].name!r} turns by {step * spins[b][row]:.3g} rad within a step "
-            f"of {step:.3g} s: the motion between the steps is more than the method follows; use a step below "
-            f"{0.1 / spins[b][row]:.2g} s"
-        )
-    return ""
+        return Lost(time, text)
+    for b, body in enumerate(system.scene.bodies):
+        spins = np.linalg.norm(rows.v[:, system.layout.omega(b)], axis=1)
+        if step * spins.max(initial=0.0) > SPUN:
+            time, spin = float(rows.time[np.argmax(spins)]), float(spins.max())
+            text = (
+                f"at t = {time:.6g} s body {body.name!r} turns by {step * spin:.3g} rad within a step of {step:.3g} s: the "
+                f"motion between the steps is more than the method follows; use a step below {0.1 / spin:.2g} s"
+            )
+            return Lost(time, text)
+    return None
 
 
 def jumped(system: System, times: Array) -> str:
@@ -58,15 +69,16 @@ def jumped(system: System, times: Array) -> str:
     return ""
 
 
-def lost_driver(system: System, start: float, end: float) -> str:
-    """Which driver jumps within a step [s], or moves farther than it follows; empty where none does."""
+def lost_driver(system: System, start: float, end: float, far: float = FAST) -> str:
+    """Which driver jumps within a step [s], or moves farther than it follows (rad, or of the size of the largest body); empty
+    where none does."""
     times = np.linspace(max(start, 0.0), end, SAMPLES)
     for block in system.blocks:
         for word in block.words:
             if word.function is None:
                 continue
             changes = np.abs(np.diff([drive_of(word, t)[0] for t in times]))
-            if not changes.sum() > FAST * _whole(system.scene, word):
+            if not changes.sum() > far * _whole(system.scene, word):
                 continue
             k = int(np.argmax(changes))
             time, jump = _jump(word, float(times[k]), float(times[k + 1]))
@@ -97,19 +109,6 @@ def _jump(word: Word, early: float, late: float) -> tuple[float, float]:
     return late, drive_of(word, late)[0] - drive_of(word, early)[0]
 
 
-def apart(system: System, Phi: Array, time: float) -> str:
-    """Which redundant row is open, of all rows Phi (C,) at a time [s]; empty where none is."""
-    row = int(np.argmax(np.abs(Phi)))
-    if not abs(Phi[row]) > OPEN:
-        return ""
-    block, word = row_named(system, row)
-    return (
-        f"at t = {time:.6g} s {_called(block)} is open by {abs(Phi[row]):.3g} {_unit(word)} in its row '{word.text}', which "
-        "followed from the others at the start and does so no more: the mechanism locks there, or came upon another branch "
-        "in a singular position; use a smaller step, or joints that do not hold twice what one of them holds"
-    )
-
-
 def row_named(system: System, row: int) -> tuple[Block, Word]:
     """The block and word of a row of the tables."""
     starts = system.model.rows.start
@@ -117,15 +116,9 @@ def row_named(system: System, row: int) -> tuple[Block, Word]:
     return block, block.words[row - int(starts[system.blocks.index(block)])]
 
 
-def size_of(scene: Scene) -> float:
-    """[m] of the largest body, from its origin to an interface; one where there are none."""
-    points = (np.abs(point.position).max(initial=0.0) for body in scene.bodies for point in body.model.interfaces)
-    return max(points, default=0.0) or 1.0
-
-
 def _whole(scene: Scene, word: Word) -> float:
     """[m] or [rad], what a share of is meant."""
-    return size_of(scene) if _unit(word) == "m" else 1.0
+    return (max(body.model.size for body in scene.bodies) or 1.0) if _unit(word) == "m" else 1.0
 
 
 def _unit(word: Word) -> str:

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffr_dyn.consistency.assemble import assemble, flattened, in_space
+from ffr_dyn.closing.independence import redundant_drivers
+from ffr_dyn.consistency.assemble import assemble, flattened, in_space, plane_in_words
 from ffr_dyn.consistency.evaluation import free_motions, locked, total_mass_matrix, unit_rows
-from ffr_dyn.consistency.independence import redundant_drivers
 from ffr_dyn.equations.constraint_rows import Block, rows_at
 from ffr_dyn.equations.constraints import evaluate_word
 from ffr_dyn.equations.layout import Layout, layout
@@ -43,6 +43,7 @@ class Mobility(Brief):
     degrees_of_freedom : rigid and elastic;  elastic : number of elastic coordinates
     plane      : normal of a planar scene, "x", "y" or "z"; otherwise "none". A scene that declares no plane is looked at in
                  space all the same: motions and redundant rows are those that it has there
+    computed   : whether runs are computed in the plane or in space, and why, in words
     free       : rigid motions with all bodies undeformed; at a singular position more than the mechanism has elsewhere
     redundant  : (joint, row) pairs that follow from the other rows
     overdriven : drivers whose motion the joints and the other drivers fix already
@@ -52,6 +53,7 @@ class Mobility(Brief):
     degrees_of_freedom: int
     elastic: int
     plane: str
+    computed: str
     free: tuple[FreeMotion, ...]
     redundant: tuple[tuple[str, str], ...]
     overdriven: tuple[str, ...]
@@ -60,8 +62,7 @@ class Mobility(Brief):
     def lines(self) -> list[str]:
         """The report, a line each."""
         said = [counted(self.degrees_of_freedom, self.elastic, len(self.redundant))]
-        if self.plane != "none":
-            said.append(f"planar       normal {self.plane}: runs are computed in the plane, without rows across it")
+        said.append(f"computed     {self.computed}")
         said += [f"free         {motion.name}: moves {', '.join(motion.bodies)}" for motion in self.free]
         said += [f"redundant    {joint}: {row}" for joint, row in self.redundant]
         said += [f"overdriven   {driver}" for driver in self.overdriven]
@@ -83,7 +84,7 @@ def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobili
 
     Raises InputError when the scene cannot be assembled.
     """
-    plane, scene = flattened(scene, time)[0].plane, in_space(scene)
+    plane, computed, scene = flattened(scene, time)[0].plane, plane_in_words(scene, time), in_space(scene)
     over = overdriven(scene, time) if drivers and scene.drivers else ()
     bare = scene if drivers and not over else replace(scene, drivers=())
     assembled = assemble(bare, time=time)
@@ -95,7 +96,8 @@ def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobili
     Z = free_motions(jacobian[:, rigid], M[np.ix_(rigid, rigid)])
     motions = tuple(_motions(flat, place, assembled.x, assembled.v, rigid, Z))
     doubts = tuple(note for note in assembled.notes if note.startswith("body "))
-    return Mobility(assembled.degrees_of_freedom, sum(place.n), plane, motions, assembled.redundant, over, doubts)
+    elastic = sum(place.n)
+    return Mobility(assembled.degrees_of_freedom, elastic, plane, computed, motions, assembled.redundant, over, doubts)
 
 
 def overdriven(scene: Scene, time: float = 0.0) -> tuple[str, ...]:

@@ -63,13 +63,18 @@ def _beside_twins(y: Array, twins: Sequence[Array]) -> float:
     if len(twins) < 2:
         return largest_difference(y, twins[0]) if twins else 0.0
     coarse, fine = twins
-    rows = min(len(coarse), len(fine))
-    near = min(largest_difference(y, fine), largest_difference(y, (4.0 * fine[:rows] - coarse[:rows]) / 3.0))
+    near = nearest(y, coarse, fine)
     rows = min(len(y), len(fine))
     if rows <= 4:
         return near
     amplitude = largest_difference(_amplitudes(y[:rows]), _amplitudes(fine[:rows]))
     return min(near, MIDDLE * (near * amplitude) ** 0.5)
+
+
+def nearest(y: Array, coarse: Array, fine: Array) -> float:
+    """v1 of a history, beside twins of h and of h/2: no smaller than the true error, too large by the phase of the twins."""
+    rows = min(len(coarse), len(fine))
+    return min(largest_difference(y, fine), largest_difference(y, (4.0 * fine[:rows] - coarse[:rows]) / 3.0))
 
 
 def _amplitudes(y: Array) -> Array:

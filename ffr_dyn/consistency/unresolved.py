@@ -63,7 +63,9 @@ def leading(of: Vibrations, run: Result, twin: Result) -> float:
     shapes, differences = [], []
     for b in flexible:
         body, own = bodies[b], of.motions[place.q_dot(b)]
-        off = run[f"{body.name}.q"] - twin[f"{body.name}.q"]
+        q, other = run[f"{body.name}.q"], twin[f"{body.name}.q"]
+        rows = min(len(q), len(other))  # an event may have ended one of them
+        off = q[:rows] - other[:rows]
         shapes.append(body.frame.C @ own if body.frame else own)
         differences.append(off if body.frame or not body.kept else off[:, list(body.kept[0])])
     amounts = np.linalg.lstsq(np.concatenate(shapes), np.concatenate(differences, axis=1).T, rcond=None)[0]

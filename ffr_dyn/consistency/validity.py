@@ -39,7 +39,7 @@ def extremes(system: System, record: Record) -> Array:
         q, omega = record.x[:, system.layout.q(b)], record.v[:, system.layout.omega(b)]
         turn, stretch = deflections(body.model, q)
         turns.append(turn)
-        spins.append(np.sqrt((omega**2).sum(axis=1)).max(initial=0.0))
+        spins.append(np.linalg.norm(omega, axis=1).max(initial=0.0))
         stretches.append(stretch)
     return np.array([turns, spins, stretches])
 
@@ -73,18 +73,6 @@ def meaningless(scene: Scene, found: Array) -> str:
         f"body {scene.bodies[b].name!r} has turned within itself by {found[0, b]:.3g} rad, which linear elasticity says "
         f"nothing about: its motion diverges. {doubt}"
     )
-
-
-def doubts(scene: Scene, found: Array) -> list[str]:
-    """Notes on bodies that a run with these extremes (3, B) takes beyond its theory."""
-    turned, spun, stretched = found
-    return [*strained(scene, turned, stretched), *unstiffened(scene, spun)]
-
-
-def strained_in(system: System, record: Record) -> list[str]:
-    """Notes on bodies that recorded states deform too much for one moving frame."""
-    turned, _, stretched = extremes(system, record)
-    return strained(system.scene, turned, stretched)
 
 
 def strained(scene: Scene, turned: Array, stretched: Array) -> list[str]:
@@ -158,7 +146,7 @@ def in_enough_parts(
         if not more:
             return scene, result
         scene = make({name: count for name, count in (there | more).items() if count > 1})
-    raise ComputationError(f"after {ROUNDS} analyses still more parts are needed: {more}; allow a larger angle")
+    raise ComputationError(f"after {ROUNDS} analyses still more parts are needed: {more}; begin with so many")
 
 
 def unstiffened(scene: Scene, spun: Array) -> list[str]:

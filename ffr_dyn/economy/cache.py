@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
+from ffr_dyn.consistency.unresolved import Vibrations, lasting, vibrations
 from ffr_dyn.economy.cost import of_run, per_evaluation
 from ffr_dyn.economy.model_choice import Choice, Part
 from ffr_dyn.economy.outputs import Probe
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.run import Made, Span, Trial, cost, make, run
+from ffr_dyn.integrators.ros2 import Twin
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
@@ -40,6 +42,7 @@ class Ledger:
     policy: Policy = DEFAULT
     runs: dict[Choice, Trial] = field(default_factory=dict)
     wide: dict[Choice, Trial] = field(default_factory=dict)
+    twins: dict[Choice, Trial] = field(default_factory=dict)
     models: dict[tuple[tuple[Part, ...], str], Made] = field(default_factory=dict)
     spent: float = 0.0
     tried: list[Tried] = field(default_factory=list)
@@ -65,6 +68,20 @@ class Ledger:
             self.runs[choice] = run(self.made(choice), choice, self.span, self.of)
             self.spent += self.cost(self.runs[choice])
         return self.runs[choice]
+
+    def vibrations(self, choice: Choice) -> Vibrations:
+        """Of the model at the start."""
+        return vibrations(self.made(choice).assembled, self.span.start)
+
+    def twin(self, choice: Choice) -> Trial:
+        """A run of the model that keeps vibration which its steps do not resolve (`ffr_dyn.integrators.ros2.Twin`)."""
+        like = replace(choice, method="ros2")
+        if like not in self.twins:
+            step = self.span.output_step / like.divisions
+            method = Twin(step, lasting(self.vibrations(like), step))
+            self.twins[like] = run(self.made(like), like, self.span, self.of, method=method)
+            self.spent += self.cost(self.twins[like])
+        return self.twins[like]
 
     def over_two_rows(self, choice: Choice) -> Trial | None:
         """A run with every other output row, and steps twice as long; None where these rows are too few."""

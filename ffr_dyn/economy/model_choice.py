@@ -108,8 +108,9 @@ def rigid(choice: Choice) -> Choice:
 
 
 def held_in_plane(choice: Choice, flat: Scene) -> Choice | None:
-    """The choice with in-plane modes only, for the scene as it is assembled, where its joints keep it to a plane."""
-    if flat.plane not in AXES:
+    """The choice with in-plane modes only, for the scene as it is assembled, where its joints keep it to a plane; None where
+    they do not, or where modes are in-plane only when they are combined."""
+    if flat.plane not in AXES or any(body.frame for body in flat.bodies):
         return None
     parts = tuple(
         replace(part, modes=body.kept[0]) if body.kept else part
@@ -128,7 +129,7 @@ def in_plane(scene: Scene, choice: Choice, moved: Result, policy: Policy = DEFAU
     if scene.plane == "none":
         return None
     for form in planar_forms(scene):
-        if not _stays(form, moved, policy.in_plane):
+        if any(body.frame for body in form.bodies) or not _stays(form, moved, policy.in_plane):
             continue
         parts = tuple(
             replace(part, modes=tuple(k for k in part.modes if body.kept and k in body.kept[0]))

@@ -146,14 +146,24 @@ class Policy:
 
     # ---- verification
     unasked_verification: float = number(
-        2e6, "us", "a verification that costs less is made without being asked for", "some seconds are no bother"
+        5e6, "us", "a verification is allowed, and made without being asked for below", "some seconds are no bother"
     )
+    asked_verification: float = number(6e7, "us", "a verification is allowed that is asked for", "a minute")
+    reference_share: float = number(
+        0.25, "tolerance", "to which the reference must be known", "what a reference leaves of a tolerance to be used"
+    )
+    fall: float = number(0.9, "times", "the difference before: slower falling ones converge no better", ROUNDING)
+    resolved: float = number(0.6, "rad", "a vibration turns at most in a step of an explicit reference", SET)
+    lost: float = number(
+        0.3,
+        "amplitude",
+        "that an explicit reference may take of a vibration in all of the run",
+        "RK4: (h w)^6 / 144 a step",
+    )
+    lost_damping: float = number(0.05, "damping", "that an explicit reference may add", "RK4: (h w)^5 / 144 a radian")
     verification_attempts: int = number(4, "looks", "at models against the reference", ROUNDS)
     unexplained: float = number(
         0.25, "tolerance", "an error beyond what is left out by more is the step's, which is shortened too", SET
-    )
-    longest_reference_step: float = number(
-        6.0, "times", "the reference's, of a run that tells the error of the reference", SET
     )
 
     # ---- estimates along a motion

@@ -21,16 +21,19 @@ from ffr_prep.common.brief import Brief
 class Verification(Brief):
     """The errors of the chosen model against everything on and a finer step.
 
-    choice   : the reference;  error : (outputs,) of the chosen model;  own : (outputs,) of the reference, estimated
-    first    : (outputs,) error of the model that the estimates had chosen
-    attempts : how often that had to be refined
-    cost     : [us] of the reference and of the run that tells its own error, by the cost model
+    choice   : the reference;  own : (outputs,) its own error, by convergence
+    error    : (outputs,) of the chosen model: its distance from the reference, and the reference's own error
+    first    : (outputs,) distance of the model that the estimates had chosen
+    is_known : whether the reference is known to the share of the tolerances that a verification takes; or nothing is verified
+    attempts : how often the model had to be refined
+    cost     : [us] of the references and of the runs that tell their errors, by the cost model
     """
 
     choice: Choice
     error: Array
     first: Array
     own: Array
+    is_known: bool
     attempts: int
     cost: float
 

@@ -13,6 +13,7 @@ from ffr_dyn.economy.model_choice import Choice, applied
 from ffr_dyn.economy.outputs import Probe, histories, needed
 from ffr_dyn.economy.policy import DEFAULT, CostModel
 from ffr_dyn.functions.stopwatch import Stopwatch
+from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
@@ -80,15 +81,20 @@ def cost(trial: Trial, span: Span, model: CostModel = DEFAULT.cost) -> float:
 
 
 def simulated(
-    made: Made, choice: Choice, span: Span, outputs: tuple[str, ...], stopwatch: Stopwatch | None = None
+    made: Made,
+    choice: Choice,
+    span: Span,
+    outputs: tuple[str, ...],
+    stopwatch: Stopwatch | None = None,
+    method: Integrator | None = None,
 ) -> Result:
-    """A forward run of a model. Raises ComputationError as `forward` does."""
+    """A forward run of a model, by its own method unless another is given. Raises ComputationError as `forward` does."""
     return integrate(
         made.scene,
         start=span.start,
         end=span.end,
         output_step=span.output_step,
-        method=choice.integrator(span.output_step),
+        method=choice.integrator(span.output_step) if method is None else method,
         stabilisation=span.stabilisation,
         outputs=outputs,
         stopwatch=stopwatch,
@@ -96,12 +102,20 @@ def simulated(
     )
 
 
-def run(made: Made, choice: Choice, span: Span, of: Probe, outputs: tuple[str, ...] = ()) -> Trial:
-    """Run a model, keeping its states and what `outputs` name.
+def run(
+    made: Made,
+    choice: Choice,
+    span: Span,
+    of: Probe,
+    outputs: tuple[str, ...] = (),
+    method: Integrator | None = None,
+) -> Trial:
+    """Run a model, by its own method unless another is given, keeping its states and what `outputs` name.
 
     Raises ComputationError as `forward` does, and where the outputs are no longer finite.
     """
-    result = simulated(made, choice, span, (*needed(of, made.scene), *_states(made.scene), *outputs))
+    kept = (*needed(of, made.scene), *_states(made.scene), *outputs)
+    result = simulated(made, choice, span, kept, method=method)
     values = histories(of, made.scene, result)
     if not all(np.isfinite(one).all() for one in values):
         raise ComputationError("an output of the run is no longer finite")

@@ -21,9 +21,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import Forward
+from ffr_dyn.analyses.events import Event
+from ffr_dyn.analyses.forward import Forward, forward
 from ffr_dyn.analyses.settings import Settings
-from ffr_dyn.consistency.assemble import assemble
+from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.economy.cache import Ledger, Tried
 from ffr_dyn.economy.checks import frequencies, stiffening_loads
 from ffr_dyn.economy.contributions import Contributions, nothing, of_motion, of_omitted, own
@@ -37,11 +38,12 @@ from ffr_dyn.economy.rigid_start import PILOT, Ground, Rigid, started, unmoved
 from ffr_dyn.economy.run import Span, Trial, rings
 from ffr_dyn.economy.selection import Insufficient, Selection, gap, selected_model
 from ffr_dyn.economy.steps import Stepped, chosen_step
-from ffr_dyn.economy.verification import reference_cost, verified
+from ffr_dyn.economy.verification import apart, reference_cost, sharpened, unheard, verified
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.scene.scene import Scene
 from ffr_dyn.variants.mean_axis import with_mean_axis_bodies
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import ComputationError, InputError
 
 Histories = tuple[Array, ...]
 
@@ -77,6 +79,7 @@ def economise(
     start: float = 0.0,
     verify: bool | None = None,
     stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
+    events: Sequence[Event] = (),
     policy: Policy = DEFAULT,
     tell: Callable[[str], None] = lambda stage: None,
 ) -> Economy:
@@ -88,6 +91,7 @@ def economise(
                 written "rod.stress=1e6" (absolute) or "rod.stress=0.1%"
     tolerance : of outputs without their own: share of the range of the output over the run
     verify    : compare with a run of everything on and a finer step; by default where that takes some seconds only
+    events    : moments that the run with the model looks for; where one ends it, the model is one for the rows before
     policy    : the numbers that all decisions rest on
     tell      : called with the name of each stage
 
@@ -97,13 +101,36 @@ def economise(
     span, scene = Span(start, end, output_step, stabilisation), with_mean_axis_bodies(scene)
     tell("assemble")
     assembled = assemble(scene, time=start)
+    if any(event.stop for event in events):
+        span = _ended(scene, assembled, span, events)
     of = probe(assembled, [as_output(one, tolerance) for one in outputs], policy)
     ledger = Ledger(scene, span, of, tell, policy)
     stiff = started(ledger, assembled.system.scene)
     limits = stiff.limits
     omitted = None if limits is None else stiff.contributions(limits)
     found = None if omitted is None else _surely_rigid(ledger, stiff, omitted)
-    return _finished(ledger, _beside_everything(ledger, stiff, omitted, verify) if found is None else found, verify)
+    found = _beside_everything(ledger, stiff, omitted, verify) if found is None else found
+    economy = _finished(ledger, found, verify)
+    return replace(economy, settings=replace(economy.settings, end=end, analysis=Forward(tuple(events))))
+
+
+def _ended(scene: Scene, assembled: Assembled, span: Span, events: Sequence[Event]) -> Span:
+    """The span up to the last row before the event that ends the run."""
+    result = forward(
+        scene,
+        start=span.start,
+        end=span.end,
+        output_step=span.output_step,
+        stabilisation=span.stabilisation,
+        events=events,
+        assembled=assembled,
+    )
+    rows = int((result.time[-1] - span.start) / span.output_step * (1.0 + 1e-12))
+    if rows < 2:
+        raise InputError(
+            f"an event ends the run at {result.time[-1]:g} s, within two output rows; take a shorter output_step"
+        )
+    return replace(span, end=span.start + rows * span.output_step)
 
 
 # ---- rigid bodies -----------------------------------------------------------------------------------------------------
@@ -168,19 +195,20 @@ def _stepped(
     """
     choice = selection.choice
     beside = ledger.run(choice)
-    apart = difference(beside.values, ground.pilot.values)
+    off = difference(beside.values, ground.pilot.values)
     together = choice.method != ground.everything.method
     if together:
-        stepped = Stepped(beside, apart)
+        stepped = Stepped(beside, off)
     elif like is None:
-        stepped = _with_step(ledger, choice, largest(apart), ground.limits)
+        stepped = _with_any_step(ledger, ground, choice)
+        off = difference(ledger.run(stepped.trial.choice.stepped_as(choice)).values, ground.pilot.values)
     else:
         stepped = Stepped(ledger.run(choice.stepped_as(like.final.choice)), like.time)
     return Chosen(
         stepped.trial,
-        selection.left if together else largest(apart),
+        selection.left if together else largest(off),
         stepped.error,
-        largest(apart if together else total(apart, stepped.error)),
+        largest(off if together else total(off, stepped.error)),
         selection.terms,
         ground.everything,
         ground.spatial,
@@ -189,6 +217,20 @@ def _stepped(
         omitted,
         together,
     )
+
+
+def _with_any_step(ledger: Ledger, ground: Ground, choice: Choice) -> Stepped:
+    """The model with its step; with all terms, or all of everything, where it does not come through with shorter steps."""
+    parts = zip(choice.parts, ground.everything.parts, strict=True)
+    whole = tuple(replace(own, dropped=full.dropped, loads=full.loads) if own.count else own for own, full in parts)
+    failed = ComputationError("there is no model")
+    for model in dict.fromkeys((choice, replace(choice, parts=whole), ground.everything)):
+        try:
+            left = largest(difference(ledger.run(model).values, ground.pilot.values))
+            return _with_step(ledger, model, left, ground.limits)
+        except ComputationError as error:
+            failed = error
+    raise failed
 
 
 def _finer_ground(ledger: Ledger, ground: Ground, final: Trial, verify: bool | None) -> Ground | None:
@@ -217,14 +259,42 @@ def _is_verified(ledger: Ledger, everything: Choice, final: Trial, verify: bool 
     )
 
 
+def _heard(ledger: Ledger, found: Chosen) -> Chosen:
+    """With vibration that the steps damp away counted as error; where that is too much, with steps in which everything keeps
+    it, and as everything where the model does not. Where no verification follows, this is not seen otherwise."""
+    final, limits, step = found.final, found.limits, largest(found.time)
+    if final.choice.controlled:
+        return found
+    lost = unheard(ledger, final, step)
+    if (found.error + lost <= limits).all():
+        return replace(found, error=found.error + lost, time=_with(found.time, lost))
+    ledger.tell("steps that resolve vibration")
+    policy, fewest = ledger.policy, 2 * final.choice.divisions
+    whole = sharpened(ledger, found.everything, policy.omitted_share * limits, fewest, policy.asked_verification)
+    steps = final.choice.stepped_as(whole.trial.choice)
+    left = apart(ledger, steps, whole.trial)
+    is_enough = bool((left + whole.own <= limits).all())
+    same, left = (ledger.run(steps), left) if is_enough else (whole.trial, np.zeros(len(limits)))
+    time = _with(tuple(np.zeros_like(y) for y in same.values), whole.own)
+    return replace(found, final=same, model=left, time=time, error=left + whole.own, together=False)
+
+
+def _with(histories: Histories, least: Array) -> Histories:
+    """Histories whose largest sizes are no less than `least` (outputs,)."""
+    return tuple(np.where(np.abs(y) < small, small, y) for y, small in zip(histories, least, strict=True))
+
+
 # ---- the end ----------------------------------------------------------------------------------------------------------
 
 
 def _finished(ledger: Ledger, found: Chosen, verify: bool | None) -> Economy:
-    final, verification = found.final, None
+    is_verified, verification = _is_verified(ledger, found.everything, found.final, verify), None
+    found = found if is_verified else _heard(ledger, found)
+    final = found.final
     ledger.note(final, "chosen", found.error)
-    if _is_verified(ledger, found.everything, final, verify):
-        final, verification = verified(ledger, found.everything, found.limits, final, found.omitted)
+    if is_verified:
+        allowed = ledger.policy.asked_verification if verify else ledger.policy.unasked_verification
+        final, verification = verified(ledger, found.everything, found.limits, final, found.omitted, allowed)
     kept, omitted = _explained(ledger, found, final)
     names = [output.name for output in ledger.of.outputs]
     return Economy(
@@ -265,9 +335,10 @@ def _everything_in_space(found: Chosen, final: Trial) -> Choice:
 def _all_runs(ledger: Ledger, found: Chosen, verification: Verification | None) -> tuple[Tried, ...]:
     """Every run with its error, against the best that is known of the outputs."""
     truth = found.final.values if verification is None else ledger.runs[verification.choice].values
-    own = largest(found.time) if verification is None else np.zeros(len(found.limits))
+    floor = largest(found.time) if verification is None else np.zeros(len(found.limits))
+    own = 0.0 if verification is None else verification.own
     return tuple(
-        Tried(choice, "run", ledger.cost(trial), np.maximum(largest(difference(trial.values, truth)), own))
+        Tried(choice, "run", ledger.cost(trial), np.maximum(largest(difference(trial.values, truth)), floor) + own)
         for choice, trial in ledger.runs.items()
         if verification is None or choice != verification.choice
     )

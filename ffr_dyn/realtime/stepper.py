@@ -28,7 +28,8 @@ from ffr_dyn.compile.engine import new_engine, row_filler
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import Assembled, assemble
-from ffr_dyn.consistency.failure import failure
+from ffr_dyn.consistency.doubts import ended, held, look, nothing_seen
+from ffr_dyn.consistency.failure import Settings, failure
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation, gains
 from ffr_dyn.kernels.tables import MEASURED, NEXT, OK, PER_ROW
@@ -95,6 +96,7 @@ class Stepper(Brief):
         self._arrays = tuple(array for loop in self._loops for array in loop.arrays())
         self._set = {name: _Setting(self._loops, name) for name in self._system.inputs}
         self._outputs, self._computed = _outputs(self._loops[0], outputs, readers)
+        self._seen = nothing_seen(assembled, method, *held(scene, stabilisation))
         self._advance(0)
 
     def _title(self) -> str:
@@ -149,6 +151,13 @@ class Stepper(Brief):
             compute()
         return self._outputs
 
+    def doubts(self) -> list[str]:
+        """What is doubtful of the states at which this was asked, beside the notes of assembly: as the notes of `forward`
+        (the table in docs/analyses.md), but for the energy, and nothing is an error."""
+        record = self._loops[0].record
+        look(self._seen, record)
+        return [*self._seen.assembled.notes, *ended("stepper", self._seen)]
+
     def save(self) -> State:
         """The state, with inputs."""
         return State(self._mark, self._steps, tuple(array.copy() for array in self._arrays))
@@ -170,8 +179,9 @@ class Stepper(Brief):
         loop = self._loops[0]
         status = loop.run(self._start, self._steps, count)
         if status != OK:
+            settings = Settings(loop.method, float(loop.engine.tables.clock.gains[2]) > 0)
             reached = int(loop.engine.tables.clock.steps[NEXT])
-            raise failure(loop.engine.system, loop.work, status, self._start + reached * self._step)
+            raise failure(loop.engine.system, loop.work, status, self._start + reached * self._step, settings)
         self._steps += count
         for other in self._loops[1:]:
             _give_all_reactions(loop, other, self.time)
@@ -189,7 +199,7 @@ class _Loop:
         self.system, self.engine = system, new_engine(system, x, v, method, stabilised)
         self.record = new_record(system, 1)
         self.x, self.v, self.work = self.engine.x, self.engine.v, self.engine.work
-        self._method = method
+        self.method = method
         self._fill = row_filler(self.engine, self.record)
 
     def run(self, start: float, first: int, count: int) -> int:

@@ -39,7 +39,7 @@ from ffr_prep.body import QuadraticField, Surface, surface_arrays, surface_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.interrupts import undisturbed
-from ffr_prep.common.outputs import check_output, writing
+from ffr_prep.common.outputs import check_output, replacing, writing
 
 FORMAT = "ffr-result"
 FORMAT_VERSION = 1
@@ -69,13 +69,11 @@ def load_result(path: str | Path) -> Result:
 
 def with_attributes(path: str | Path, attributes: Mapping[str, Any]) -> None:
     """Give a finished result file other attributes, in one piece: it is replaced by its copy with them."""
-    path = Path(path)
-    copy = path.with_name(f"{path.name}.attributes")
-    shutil.copyfile(path, copy)
-    with h5py.File(copy, "r+") as file:
-        _write_attributes(file, attributes)
-        file.attrs["status"] = attributes.get("status", "complete")
-    os.replace(copy, path)
+    with replacing(path) as part:
+        shutil.copyfile(path, part)
+        with h5py.File(part, "r+", **_HOW) as file:
+            _write_attributes(file, attributes)
+            file.attrs["status"] = attributes.get("status", "complete")
 
 
 @contextmanager

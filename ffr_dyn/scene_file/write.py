@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, asdict, fields
 from pathlib import Path
@@ -27,7 +29,10 @@ from ffr_dyn.integrators import CONTROLLED, Controlled, Integrator, Within, meth
 from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation
 from ffr_dyn.scene.parts import as_declared, cut_joints
 from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.scene_file.parameters import flattened, overridden
+from ffr_dyn.scene_file.read import load_scene
 from ffr_dyn.scene_file.schema import Kind, fields_of_motion, formula_of, keys_of, nested_kinds, tables
+from ffr_dyn.scene_file.source import PATHS, read_source
 from ffr_dyn.scene_file.state_formula import StateFormula
 from ffr_prep.body import FlexibleBody, save_body
 from ffr_prep.common.errors import InputError
@@ -45,9 +50,70 @@ def save_scene(scene: Scene, settings: Settings | MomentSettings, path: str | Pa
     for body in bodies:
         if body.name in files:
             save_body(body.model, path.parent / files[body.name])
+    _replace(path, text)
+    return path
+
+
+def save_changed(
+    scene: Scene,
+    settings: Settings | MomentSettings,
+    path: str | Path,
+    original: str | Path,
+    given: Mapping[str, str] = {},
+) -> Path:
+    """Write a scene file as `save_scene` does, with the parameters of the file that the scene has been made from.
+
+    What the change has left as it was stands as in that file, in formulas of the parameters, so that these may be changed
+    still.
+
+    given : values, as text, of parameters in place of those in the original file
+    """
+    source, (first, how) = read_source(Path(original)), load_scene(original, given)
+    parameters = overridden(flattened(source.tree.pop("parameters", {})), given)
+    path = save_scene(scene, settings, path)
+    if not parameters:
+        return path
+    text = path.read_text(encoding="utf-8")
+    plain = tomllib.loads(text)
+    before = tomllib.loads(to_toml(first, how, {body.name: "" for body in first.bodies if not _is_plain(body.model)}))
+    tree = _as_given(plain, before, _moved(_without_marked(source.tree), path.parent))
+    _replace(path, "\n".join(_lines({"parameters": parameters, **tree}, ())) + "\n")
+    files = {name: entry["file"] for name, entry in plain["bodies"].items() if "file" in entry}
+    if tomllib.loads(to_toml(*load_scene(path), files)) != plain:
+        _replace(path, text)  # what is written must be the scene, with its formulas or without
+    return path
+
+
+def _replace(path: Path, text: str) -> None:
     with replacing(path) as part:
         part.write_text(text, encoding="utf-8")
-    return path
+
+
+def _as_given(new: Any, before: Any, text: Any) -> Any:
+    """A tree with the entries that have not changed as they were given."""
+    if new == before:
+        return text
+    if not all(isinstance(tree, dict) for tree in (new, before, text)):
+        return new
+    return {key: _as_given(item, before.get(key), text[key]) if key in text else item for key, item in new.items()}
+
+
+def _without_marked(tree: dict[str, Any]) -> dict[str, Any]:
+    """Without the bodies that have more markers: these stand among their points in what is written."""
+    marked = {entry.get("body") for entry in tree.get("markers", {}).values()}
+    ground = {} if "ground" in marked or "ground" not in tree else {"ground": tree["ground"]}
+    bodies = {name: entry for name, entry in tree.get("bodies", {}).items() if name not in marked}
+    return {key: item for key, item in tree.items() if key != "ground"} | {"bodies": bodies, **ground}
+
+
+def _moved(value: Any, folder: Path) -> Any:
+    """The tree with the paths in it relative to a folder."""
+    if isinstance(value, dict):
+        return {
+            key: os.path.relpath(item, folder) if key in PATHS and isinstance(item, str) else _moved(item, folder)
+            for key, item in value.items()
+        }
+    return [_moved(item, folder) for item in value] if isinstance(value, list) else value
 
 
 def to_toml(scene: Scene, settings: Settings | MomentSettings, files: Mapping[str, str] = {}) -> str:

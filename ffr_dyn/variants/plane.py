@@ -4,13 +4,14 @@ A scene is planar about a global axis when its joints hold every body in the pla
 against them: every body has a body axis along the normal and is symmetric about the plane through its origin, markers
 that are used lie in that plane, axes of joints are in the plane or along the normal, and so are forces. Then the in-plane
 motion and all reactions are those of the spatial scene, while a body has three rigid coordinates, no out-of-plane modes,
-and a revolute joint two rows.
+and a revolute joint two rows. What a mesh leaves of symmetry and places counts as nothing (`ffr_dyn.variants.aligned`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -19,13 +20,17 @@ from ffr_dyn.scene.drivers import PointDriver
 from ffr_dyn.scene.force_kinds import forces_of, in_bases
 from ffr_dyn.scene.own_frame import OwnFrame
 from ffr_dyn.scene.scene import Body, Scene, body_normal, marker_number, undeformed
-from ffr_dyn.variants.variant import used_interfaces, with_modes
+from ffr_dyn.variants.aligned import BESIDE, basis_in_plane, combined, levelled, size_of
+from ffr_dyn.variants.variant import used_interfaces, with_basis, with_modes
 from ffr_prep.body import FlexibleBody, FrameMarker, Interface, axial
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
+Marker = TypeVar("Marker", Interface, FrameMarker)
+
 AXES = "xyz"
-_ZERO = 1e-9
+_NOTHING = 1e-9  # of gravity and velocities
+_ZERO = 5e-8  # of the motion of a mode: what a symmetric mesh leaves; what it does to the motion goes with the square
 _MIXED = 1e-12  # of a mode of norm one
 # What the search for a plane understands; a scene with anything else is planar only when it is declared so.
 _KNOWN = {"bodies", "joints", "drivers", "couplings", "loads", "springs", "forces", "ground"}
@@ -40,26 +45,40 @@ def planar_forms(scene: Scene) -> Iterator[Scene]:
     """
     if scene.plane in AXES:
         normal = AXES.index(scene.plane)
+        scene = levelled(scene, normal)
         for obstacle in _across(scene, normal):
             raise InputError(f"the scene is declared planar with the normal {scene.plane}, but {obstacle}")
-        yield _in_plane(scene, normal, strict=False)
+        yield _in_plane(scene, normal)
     if scene.plane == "auto":
         for normal in range(3):
-            if not any(True for _ in _obstacles(scene, normal)):
-                yield _in_plane(scene, normal, strict=True)
+            level = levelled(scene, normal)
+            if not any(True for _ in _obstacles(level, normal)):
+                yield _in_plane(level, normal)
 
 
-def _in_plane(scene: Scene, normal: int, *, strict: bool) -> Scene:
+def obstacles(scene: Scene) -> tuple[str, tuple[str, ...]]:
+    """The normal of the plane that a scene is nearest to, and what keeps it from being computed in it, in words."""
+    level = [levelled(scene, normal) for normal in range(3)]
+    found = [tuple(_obstacles(form, normal)) for normal, form in enumerate(level)]
+    moving = [len(tuple(_across(form, normal))) for normal, form in enumerate(level)]
+    # A motion across it counts more than what only may leave it.
+    nearest = min((2, 1, 0), key=lambda normal: 2 * moving[normal] + len(found[normal]))
+    return AXES[nearest], found[nearest]
+
+
+def _in_plane(scene: Scene, normal: int) -> Scene:
     bodies, kept = [], {}
     for body in scene.bodies:
         k = body_normal(body, normal)
         used = used_interfaces(scene, body)
-        keep = np.flatnonzero(_stays(body.model, k, used) if strict else _mostly(body.model, k, used))
+        V = basis_in_plane(body, k)
+        body = body if V is None else combined(body, V)
+        keep = np.flatnonzero(_mostly(body.model, k, used))
         reduced = with_modes(body, keep.tolist())
-        model = _without_rounding(reduced.model, k, used)
-        frame = reduced.frame and _frame_in_plane(reduced.frame, reduced.model, k, used)
+        model = _flat(reduced.model, k, used)
+        frame = reduced.frame and _flat_frame(reduced.frame, k)
         bodies.append(replace(reduced, model=model, frame=frame, kept=(tuple(keep.tolist()), body.model.n)))
-        kept[body.name] = np.eye(body.model.n)[:, keep]
+        kept[body.name] = (np.eye(body.model.n) if V is None else V)[:, keep]
     return replace(scene, bodies=tuple(bodies), forces=in_bases(scene.forces, kept), plane=AXES[normal])
 
 
@@ -68,7 +87,7 @@ def _in_plane(scene: Scene, normal: int, *, strict: bool) -> Scene:
 
 def _across(scene: Scene, normal: int) -> Iterator[str]:
     """What makes a planar motion impossible, in words."""
-    if abs(scene.gravity[normal]) > _ZERO * np.linalg.norm(scene.gravity):
+    if abs(scene.gravity[normal]) > _NOTHING * np.linalg.norm(scene.gravity):
         yield f"gravity has the component {scene.gravity[normal]:g} m/s^2 along it"
     if not is_zero(scene.base_acceleration[normal]):
         yield "base_acceleration has a component along it"
@@ -76,9 +95,9 @@ def _across(scene: Scene, normal: int) -> Iterator[str]:
         k = body_normal(body, normal)
         if k < 0:
             yield f"no axis of body {body.name!r} is along it"
-        elif abs(body.velocity[normal]) > _ZERO * np.linalg.norm(body.velocity):
+        elif abs(body.velocity[normal]) > _NOTHING * np.linalg.norm(body.velocity):
             yield f"body {body.name!r} starts with a velocity along it"
-        elif np.abs(np.delete(body.omega_bar, k)).max() > _ZERO * np.linalg.norm(body.omega_bar):
+        elif np.abs(np.delete(body.omega_bar, k)).max() > _NOTHING * np.linalg.norm(body.omega_bar):
             yield f"body {body.name!r} starts with an angular velocity across it"
     for driver in scene.drivers:
         if isinstance(driver, PointDriver) and (driver.x, driver.y, driver.z)[normal] is not None:
@@ -92,40 +111,59 @@ def _obstacles(scene: Scene, normal: int) -> Iterator[str]:
         yield "there are forces of other kinds"
     for body in scene.bodies:
         k = body_normal(body, normal)
-        if not _symmetric(body, k, used_interfaces(scene, body)):
-            yield f"body {body.name!r} is not symmetric"
+        if k >= 0 and (aslant := _asymmetry(body, k, used_interfaces(scene, body))):
+            yield f"body {body.name!r} is not symmetric about it: {aslant}"
     for force in forces_of(scene):
         if not force.stays_in_plane(scene, normal):
             yield f"force {force.name!r} may act across"
     for joint in scene.joints:
         i, j = (undeformed(scene, marker_number(scene, name))[normal] for name in (joint.i, joint.j))
         if round(abs(i - j), 9) > 0:
-            yield f"joint {joint.name!r} runs aslant"
+            yield f"joint {joint.name!r} runs aslant: its points are {abs(i - j):.3g} m apart along the normal"
 
 
 # ---- symmetry of a body -------------------------------------------------------------------------------------------
 
 
-def _symmetric(part: Body, k: int, used: Sequence[str]) -> bool:
-    """Whether in-plane motion excites nothing across body axis k, neither rigid nor elastic."""
-    if k < 0:
-        return False
-    body = part.model
+def _asymmetry(part: Body, k: int, used: Sequence[str]) -> str:
+    """What of in-plane motion excites something across body axis k, rigid or elastic, in words; "" of a symmetric body."""
+    V = basis_in_plane(part, k)
+    body, length = part.model if V is None else with_basis(part.model, V), size_of(part.model)
+    places = {"its centre of mass": body.centre_of_mass[k]} | {name: body.interface(name).position[k] for name in used}
+    off = max(places, key=lambda name: abs(places[name]))
+    if abs(places[off]) > BESIDE * length:
+        return f"{off} is {places[off]:.3g} m beside its middle plane"
+    products = np.abs(np.delete(body.rr_dm[k], k)).max() / (body.mass * length**2)
+    if products > BESIDE:
+        return f"a product of inertia is {products:.2g} of its moments"
+    return _mixed_modes(body, k, used, second_order=part.stiffening and body.stiffening is not None)
+
+
+def _mixed_modes(body: FlexibleBody, k: int, used: Sequence[str], *, second_order: bool) -> str:
+    if not body.n:
+        return ""
+    size = _sizes(body, used)
+    along, across = _motion_along(body, k, used) / size, _motion_across(body, k, used) / size
+    mixed = np.minimum(along, across)
+    if mixed.max() >= _ZERO:
+        j = int(np.argmax(mixed))
+        way, hertz = "across" if along[j] > across[j] else "in", np.sqrt(body.omega2[j]) / (2 * np.pi)
+        return f"mode {j + 1} ({hertz:.4g} Hz) makes {mixed[j]:.2g} of its motion {way} the plane"
+    stays = _mostly(body, k, used)
+    if (coupling := _coupling(body, stays, k)) >= _ZERO:
+        return f"its mass couples modes in the plane and across it by {coupling:.2g}"
+    if second_order and not _splits(body, stays, k, used):
+        return "its second-order displacement couples modes in the plane and across it"
+    return ""
+
+
+def _coupling(body: FlexibleBody, stays: Array, k: int) -> float:
+    """Of the second moments, between modes that stay in the plane and others, and of those that stay across it."""
     a, b = (c for c in range(3) if c != k)
-    length = _length(body)
-    offsets = [body.r_dm[k] / body.mass, *(body.interface(name).position[k] for name in used)]
-    products = [body.rr_dm[a, k], body.rr_dm[b, k]]
-    if np.abs(offsets).max() > _ZERO * length or np.abs(products).max() > _ZERO * body.mass * length**2:
-        return False
-    stays, leaves = _stays(body, k, used), _leaves(body, k, used)
-    if (stays == leaves).any():
-        return False
-    if part.stiffening and body.stiffening is not None and not _splits(body, stays, k, used):
-        return False
     PP, turning = body.PP_dm, axial(body.PP_dm)
-    mixed = np.array([PP[a, a] + PP[b, b], turning[k]])[:, stays][:, :, leaves]
+    mixed = np.array([PP[a, a] + PP[b, b], turning[k]])[:, stays][:, :, ~stays]
     out = np.array([PP[a, k], PP[b, k], turning[a], turning[b]])[:, stays][:, :, stays]
-    return bool(max(np.abs(mixed).max(initial=0.0), np.abs(out).max(initial=0.0)) < _ZERO)
+    return float(max(np.abs(mixed).max(initial=0.0), np.abs(out).max(initial=0.0)))
 
 
 def _splits(body: FlexibleBody, stays: Array, k: int, used: Sequence[str]) -> bool:
@@ -152,16 +190,6 @@ def _keeps_apart(K: Array, along: Array, stays: Array) -> bool:
     return bool(np.abs(wrong).max(initial=0.0) <= 1e-6 * np.abs(K).max(initial=0.0))
 
 
-def _stays(body: FlexibleBody, k: int, used: Sequence[str]) -> Array:
-    """(n,) which modes have no momentum, and move no marker that is used, across the plane."""
-    return _motion_across(body, k, used) < _ZERO * _sizes(body, used)
-
-
-def _leaves(body: FlexibleBody, k: int, used: Sequence[str]) -> Array:
-    """(n,) which modes have no momentum, and move no marker that is used, in the plane."""
-    return _motion_along(body, k, used) < _ZERO * _sizes(body, used)
-
-
 def _motion_across(body: FlexibleBody, k: int, used: Sequence[str]) -> Array:
     a, b = (c for c in range(3) if c != k)
     turning = axial(body.rP_dm)
@@ -183,7 +211,7 @@ def _largest(
     turns: list[int],
 ) -> Array:
     """(n,) the largest of these that each mode makes, in units of 1/sqrt(mass)."""
-    shape, length = np.sqrt(body.mass), _length(body)
+    shape, length = np.sqrt(body.mass), size_of(body)
     parts = [part / shape for part in momenta]
     parts += [part / (shape * length) for part in moments]
     for name in used:
@@ -196,55 +224,39 @@ def _largest(
 def _sizes(body: FlexibleBody, used: Sequence[str]) -> Array:
     """(n,) of each mode: its largest translation, or rotation times the length of the body, at the markers that are used,
     or its mean displacement, which is one in units of 1/sqrt(mass)."""
-    shape, length = np.sqrt(body.mass), _length(body)
+    shape, length = np.sqrt(body.mass), size_of(body)
     ends = [body.interface(name) for name in used]
     motions = [np.ones((1, body.n)), *(i.phi_t * shape for i in ends), *(i.phi_r * shape * length for i in ends)]
     return np.abs(np.vstack(motions)).max(axis=0)
 
 
-def _length(body: FlexibleBody) -> float:
-    return float(np.sqrt(np.trace(body.rr_dm) / body.mass))
-
-
-def _without_rounding(body: FlexibleBody, k: int, used: Sequence[str]) -> FlexibleBody:
-    """The body with zeros where the symmetry of in-plane modes asks for them and only rounding is left.
+def _flat(body: FlexibleBody, k: int, used: Sequence[str]) -> FlexibleBody:
+    """The body with zeros for what in-plane modes do across the plane, which of a symmetric body is rounding.
 
     Rows of joints across the plane then vanish exactly, however large the modes are.
     """
     if not body.n:
         return body
     a, b = (c for c in range(3) if c != k)
-    size, length, shape = _sizes(body, used), _length(body), np.sqrt(body.mass)
-    pairs = np.sqrt(np.outer(size, size))
     P_dm, rP_dm, PP_dm = body.P_dm.copy(), body.rP_dm.copy(), body.PP_dm.copy()
-    _drop(P_dm[k], size * shape)
-    for c in (a, b):
-        for one, other in ((c, k), (k, c)):
-            _drop(rP_dm[one, other], size * shape * length)
-            _drop(PP_dm[one, other], pairs)
-    interfaces = tuple(
-        replace(i, phi_t=phi_t, phi_r=phi_r) if i.name in used else i
-        for i, (phi_t, phi_r) in ((i, _shapes_in_plane(i, body, k, size)) for i in body.interfaces)
-    )
+    P_dm[k] = 0.0
+    for part in (rP_dm, PP_dm):
+        part[[a, b, k, k], [k, k, a, b]] = 0.0
+    interfaces = tuple(_flat_marker(i, k) if i.name in used else i for i in body.interfaces)
     stiffening = None if body.stiffening is None else _matrices_in_plane(body.stiffening, _first_loads(body, used), k)
     return replace(body, P_dm=P_dm, rP_dm=rP_dm, PP_dm=PP_dm, interfaces=interfaces, stiffening=stiffening)
 
 
-def _shapes_in_plane(marker: Interface | FrameMarker, body: FlexibleBody, k: int, size: Array) -> tuple[Array, Array]:
-    """phi_t and phi_r of an interface, or of the frame, without the rounding across the plane."""
-    phi_t, phi_r, shape = marker.phi_t.copy(), marker.phi_r.copy(), np.sqrt(body.mass)
-    _drop(phi_t[k], size / shape)
-    for c in range(3):
-        if c != k:
-            _drop(phi_r[c], size / (shape * _length(body)))
-    return phi_t, phi_r
+def _flat_marker(marker: Marker, k: int) -> Marker:
+    """An interface, or the frame, that modes move in the plane only."""
+    phi_t, phi_r = marker.phi_t.copy(), marker.phi_r.copy()
+    phi_t[k] = phi_r[[c for c in range(3) if c != k]] = 0.0
+    return replace(marker, phi_t=phi_t, phi_r=phi_r)
 
 
-def _frame_in_plane(frame: OwnFrame, body: FlexibleBody, k: int, used: Sequence[str]) -> OwnFrame:
-    """The own frame of a body, without the rounding that moves it, or modes, across the plane."""
-    old = frame.marker
-    phi_t, phi_r = _shapes_in_plane(old, body, k, _sizes(body, used))
-    marker = replace(old, phi_t=phi_t, phi_r=phi_r, K=_matrices_in_plane(old.K, [0], k))
+def _flat_frame(frame: OwnFrame, k: int) -> OwnFrame:
+    """The own frame of a body that modes move in the plane only."""
+    marker = replace(_flat_marker(frame.marker, k), K=_matrices_in_plane(frame.marker.K, [0], k))
     return replace(frame, marker=marker, C=np.where(np.abs(frame.C) < _MIXED, 0.0, frame.C))
 
 
@@ -255,10 +267,6 @@ def _matrices_in_plane(matrices: Array, firsts: Sequence[int], k: int) -> Array:
     for first in firsts:
         K[[first + k, *(first + 3 + c for c in range(3) if c != k)]] = 0.0
     return K
-
-
-def _drop(part: Array, size: Array) -> None:
-    part[np.abs(part) < _ZERO * size] = 0.0
 
 
 def _mostly(body: FlexibleBody, k: int, used: Sequence[str]) -> Array:

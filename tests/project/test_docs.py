@@ -87,6 +87,9 @@ def test_the_main_job(tmp_path, monkeypatch):
     assert rod.mass == pytest.approx(0.688, abs=2e-3)
     result = load_result(tmp_path / "result.nc")
     last = result.time > 2 / 3 * result.time[-1]
-    assert np.abs(result["rod.middle.displacement.y"][last]).max() == pytest.approx(7.9e-6, rel=0.05)
-    assert np.abs(result["crank_pin.force"][last]).max() == pytest.approx(1.07e4, rel=0.03)
+    assert np.abs(result["rod.middle.displacement.y"][last]).max() == pytest.approx(7.84e-6, rel=0.01)
+    assert np.abs(result["crank_pin.force"][last]).max() == pytest.approx(1.063e4, rel=0.01)
+    first = result.time < 1 / 3 * result.time[-1]
+    for name in ("rod.middle.displacement", "crank_pin.force"):  # it starts as it goes on
+        assert np.abs(result[name][first]).max() == pytest.approx(np.abs(result[name][last]).max(), rel=1e-3)
     assert result["constraint.position"].max() < 1e-8

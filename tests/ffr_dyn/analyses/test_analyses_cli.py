@@ -58,6 +58,13 @@ def test_check(run):
     assert "0 rigid degrees of freedom" in run("check")[0]
 
 
+def test_forward_says_the_plane_and_takes_a_quasi_static_start(run):
+    said, file = run("forward", "--quasi-static")
+    assert "computed     in the plane, normal z" in said
+    assert "computed     in the plane, normal z" in run("check")[0]
+    np.testing.assert_allclose(load_result(file)["rod.omega_bar"][:, 2], 2.0, atol=1e-9)
+
+
 def test_kinematic_inverse_and_mixed_agree(run):
     moments = []
     for command in (

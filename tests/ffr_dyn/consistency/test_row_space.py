@@ -7,9 +7,9 @@ import pytest
 import scipy.sparse as sp
 from test_analyses_kinematic import bar
 
+from ffr_dyn.closing.row_space import dependence, independent, smallest_solution
 from ffr_dyn.compile.elimination import eliminate
 from ffr_dyn.consistency.assemble import assemble
-from ffr_dyn.consistency.row_space import dependence, independent, smallest_solution
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 

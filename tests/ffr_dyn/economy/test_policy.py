@@ -434,7 +434,7 @@ def finer(policy: Policy, scene: Scene, divisions: int, verify: bool, model: Cho
 
 def unasked_verification(policy: Policy, patch: Any) -> Any:
     decided = []
-    for cost in around(2e6):
+    for cost in around(5e6):
         patch.setattr(search, "reference_cost", lambda *a, cost=cost: cost)
         decided.append(search._is_verified(runs(policy), EVERYTHING, None, None))
     return decided
@@ -445,7 +445,54 @@ def verification_attempts(policy: Policy, patch: Any) -> Any:
     ledger = runs(policy, lambda choice: 0.0 if choice.parts == EVERYTHING.parts else 5.0)
     final = ledger.run(rigid(EVERYTHING))
     patch.setattr(verification, "_better", lambda *a: final)
-    return verification.verified(ledger, EVERYTHING, ONE, final, effects(1.0))[1].attempts
+    return verified_(ledger, final).attempts
+
+
+def verified_(ledger: Runs, final: Trial, allowed: float = 1e9) -> Any:
+    """A verification of made-up runs, which vibrate in nothing."""
+    ledger.vibrations = lambda choice: SimpleNamespace(omega=np.zeros(0))
+    ledger.twin = ledger.run
+    return verification.verified(ledger, EVERYTHING, ONE, final, effects(1.0), allowed)[1]
+
+
+def asked_verification(policy: Policy, patch: Any) -> Any:
+    """What a verification is allowed that is asked for, and one that is not."""
+    given: list[float] = []
+    patch.setattr(search, "_is_verified", lambda *a: True)
+    patch.setattr(search, "verified", lambda *a: given.append(a[-1]) or stop())
+    ledger = runs(policy)
+    found = SimpleNamespace(final=ledger.run(EVERYTHING), everything=EVERYTHING, error=ONE, limits=ONE, omitted=None)
+    for verify in (True, None):
+        try:
+            search._finished(ledger, found, verify)
+        except StoppedError:
+            continue
+    return given
+
+
+def reference_share(policy: Policy, patch: Any) -> Any:
+    """Whether an error of the reference is small enough."""
+    return [
+        verified_(runs(policy, lambda choice, share=share: share * (8 / choice.divisions) ** 3), LAST, 0.0).is_known
+        for share in around(0.25)
+    ]
+
+
+LAST = Trial(replace(EVERYTHING, divisions=4), Made(SCENE, None), (np.zeros((101, 1)),), 300, None)
+
+
+def fall(policy: Policy, patch: Any) -> Any:
+    """The error of a run that no step changes by less."""
+    ledger = runs(policy, lambda choice: float(choice.divisions != 4))
+    ledger.twin = ledger.run
+    return round(float(verification._known(ledger, replace(EVERYTHING, divisions=8)).own[0]), 6)
+
+
+def resolving(policy: Policy, omega: float, ratio: float) -> int:
+    """Divisions of an explicit reference."""
+    ledger = runs(policy)
+    ledger.vibrations = lambda choice: SimpleNamespace(omega=np.array([omega]), ratio=np.array([ratio]))
+    return verification._resolving(ledger, EVERYTHING)
 
 
 def unexplained(policy: Policy, patch: Any) -> Any:
@@ -455,22 +502,10 @@ def unexplained(policy: Policy, patch: Any) -> Any:
     def divisions(rest: float) -> int:
         ledger = runs(policy, lambda choice: 0.8 * (choice.parts != EVERYTHING.parts))
         final = ledger.run(rigid(EVERYTHING))
-        errors = [np.array([0.8 + rest])]
-        return verification._better(ledger, ONE, final, ledger.run(EVERYTHING), effects(1.0), errors).choice.divisions
+        looks = 1, np.array([0.8 + rest])
+        return verification._better(ledger, ONE, final, ledger.run(EVERYTHING), effects(1.0), looks).choice.divisions
 
     return [divisions(rest) for rest in around(0.25)]
-
-
-def longest_reference_step(policy: Policy, patch: Any) -> Any:
-    """Whether a run that is there tells the error of the reference."""
-
-    def there(divisions: int) -> bool:
-        ledger = runs(policy)
-        ledger.run(replace(EVERYTHING, divisions=divisions))
-        verification._coarser(ledger, replace(EVERYTHING, divisions=60))
-        return len(ledger.runs) == 1
-
-    return [there(divisions) for divisions in (9, 10)]
 
 
 # ---- figures: estimates ------------------------------------------------------------------------------------------------
@@ -664,7 +699,12 @@ FIGURES: dict[str, Figure] = {
     "unasked_verification": Figure(unasked_verification, [True, False]),
     "verification_attempts": Figure(verification_attempts, 3),
     "unexplained": Figure(unexplained, [1, 2]),
-    "longest_reference_step": Figure(longest_reference_step, [False, True]),
+    "asked_verification": Figure(asked_verification, [6e7, 5e6]),
+    "reference_share": Figure(reference_share, [True, False]),
+    "fall": Figure(fall, 9.0),
+    "resolved": Figure(lambda policy, patch: resolving(policy, 2e3, 1.0), 34),
+    "lost": Figure(lambda policy, patch: resolving(policy, 1e5, 0.0), 4709),
+    "lost_damping": Figure(lambda policy, patch: resolving(policy, 1e5, 0.001), 2683),
     "least_samples": Figure(samples, [24, 125]),
     "rows_per_sample": Figure(samples, [24, 125]),
     "remainder": Figure(remainder, [True, False]),
@@ -695,7 +735,7 @@ def moved(value: Any, factor: float) -> Any:
     return max(1, round(factor * value)) if isinstance(value, int) else factor * value
 
 
-MOVES = {"nearest_step": (10.0, 0.9)}  # equal steps tell no error
+MOVES = {"nearest_step": (10.0, 0.9), "fall": (0.5, 0.1)}  # equal steps tell no error, nor do rising ones
 
 
 def test_every_number_has_a_figure():

@@ -16,7 +16,7 @@ from ffr_dyn import cli
 from ffr_dyn.analyses.assemble import Assemble
 from ffr_dyn.analyses.checkpoint import fingerprint
 from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.forward import Forward, forward
 from ffr_dyn.analyses.inverse import Inverse
 from ffr_dyn.analyses.inversion.bounded import Bounded
 from ffr_dyn.analyses.kinematic import Kinematic
@@ -492,6 +492,7 @@ METHOD = {"start": 0.1, "end": 1.1, "output_step": 0.1, "method": RK4(1e-3)}
                 measures=("energy",), methods=(("ros2", (0.1, 1 / 3)), ("hht", ())), modes=(2, None), drops=(("I5",),)
             ),
         ),
+        Settings(**METHOD, stabilisation=Projection(), analysis=Forward(begin="quasi-static")),
         Settings(**METHOD, stabilisation=Projection(1e-7), analysis=Inverse()),
         Settings(**METHOD, stabilisation=Drifting(), analysis=Inverse(elastic="quasi-static")),
         Settings(**METHOD, stabilisation=Projection(), analysis=Mixed(EFFORTS)),

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import ffr_prep as fp
 from ffr_dyn.analyses.integration import integrate
-from ffr_dyn.consistency.assemble import assemble, flattened
+from ffr_dyn.consistency.assemble import assemble, flattened, plane_in_words
 from ffr_dyn.functions.rotation import euler_parameters, rotation_matrix
 from ffr_dyn.functions.time_functions import harmonic, polynomial
 from ffr_dyn.integrators import RK4, ROS2
@@ -17,6 +19,7 @@ from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.forces import Load, SpringDamper
 from ffr_dyn.scene.joints import Joint, frames
 from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.variants.variant import with_basis
 from ffr_prep.body import rigid_body
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
@@ -234,3 +237,128 @@ def test_rounding_of_high_modes_does_not_make_a_scene_spatial(link):
 @pytest.mark.parametrize(("angle", "plane"), [(1e-12, "z"), (1e-7, "none"), (1e-3, "none")])
 def test_a_body_that_is_really_spatial_stays_so(link, angle, plane):
     assert flattened(double_pendulum(turned_modes(link, angle)), 0.0)[0].plane == plane
+
+
+# ---- a hair off the plane ---------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["linear", "second order"])
+def square(request):
+    """A square bar whose double modes bend in any two planes."""
+    member = Member(rectangle(0.02, 0.02), ALUMINIUM, orientation=(0, 1, 0))
+    frame = named(polyline([(0, 0, 0), (1.0, 0, 0)], member, elements=8), a=(0, 0, 0), b=(1.0, 0, 0))
+    body = fp.reduce(
+        fp.from_frame(frame, [InterfaceRegion("a"), InterfaceRegion("b")]),
+        fp.Request(
+            name="link", reference=SimplySupported("a", "b"), reduction=CraigBampton(6), linear=not request.param
+        ),
+    )
+    V, order = np.eye(body.n), np.argsort(body.omega2, kind="stable")
+    for one, other in pairwise(order):
+        if abs(body.omega2[one] / body.omega2[other] - 1) < 1e-9:
+            V[np.ix_([one, other], [one, other])] = [[0.8, -0.6], [0.6, 0.8]]
+    assert (np.eye(body.n) != V).sum() > 6
+    return with_basis(body, V)
+
+
+def test_double_modes_are_aligned_with_the_plane(square):
+    scene = double_pendulum(square)
+    flat, _ = flattened(scene, 0.0)
+    assert flat.plane == "z"
+    assert flat.bodies[0].model.n < square.n
+    runs = [
+        integrate(replace(scene, plane=plane), end=0.05, output_step=0.005, method=ROS2(2e-5))
+        for plane in ("auto", "none")
+    ]
+    assert runs[0]["one.q"].shape == runs[1]["one.q"].shape
+    for name in ("two.b.position", "one.q", "two.q_dot"):
+        np.testing.assert_allclose(runs[0][name], runs[1][name], rtol=0, atol=1e-9 * np.abs(runs[1][name]).max())
+    for name in ("hip.force", "knee.force"):
+        a, b = (run[name][:, :2] for run in runs)
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-6 * np.abs(b).max())
+
+
+def test_a_deformed_start_is_that_of_the_scene(square):
+    """Elastic coordinates of the scene are those of its own modes."""
+    flat = flattened(double_pendulum(square), 0.0)[0].bodies[0]
+    q = flat.frame.C @ (1e-3 * np.arange(1.0, flat.model.n + 1))
+    scene = double_pendulum(square)
+    scene = replace(scene, bodies=(replace(scene.bodies[0], q=q), scene.bodies[1]))
+    first = integrate(scene, end=1e-4, output_step=1e-4, method=ROS2(1e-5))["one.q"][0]
+    np.testing.assert_allclose(first, q, atol=1e-12)
+
+
+@pytest.mark.parametrize("plane", ["auto", "z"])
+@pytest.mark.parametrize("beside", [1e-12, 1e-9, 1e-7])
+def test_bores_a_hair_off_are_in_the_plane(plane, beside):
+    """Of a four-bar, on the ground and in its links."""
+    side = beside * np.array([1.0, -0.7, 0.4, 0.2, -1.0])
+
+    def bar(name: str, length: float, one: float, other: float):
+        return rigid_body(
+            name, mass=1.0, inertia=(1e-3, 0.1, 0.1), centre_of_mass=(length / 2, 0, 0),
+            points={"a": (0, 0, one), "b": (length, 0, other)},
+        )  # fmt: skip
+
+    def linkage(side, **changes) -> Scene:
+        return Scene(
+            (
+                Body("left", bar("left", 1.0, 0.0, side[0]), rotation=(0, 0, np.pi / 2)),
+                Body("top", bar("top", 1.0, side[1], 0.0), position=(0, 1, side[2])),
+                Body("right", bar("right", 1.0, side[3], 0.0), position=(1, 0, 0), rotation=(0, 0, np.pi / 2)),
+            ),
+            (
+                Joint("o", "revolute", "ground.O", "left.a"),
+                Joint("a", "revolute", "left.b", "top.a"),
+                Joint("b", "revolute", "top.b", "right.b"),
+                Joint("p", "revolute", "ground.P", "right.a"),
+            ),
+            (Driver("motor", "o", polynomial(0.0, 1.0)),),
+            ground={"O": (0, 0, 0), "P": (1, 0, side[4])},
+            gravity=(0, -9.81, 0),
+            **changes,
+        )
+
+    found = assemble(linkage(side, plane=plane))
+    assert found.system.scene.plane == "z"
+    assert "normal z" in found.computed
+    runs = [
+        integrate(scene, end=0.1, output_step=0.01, method=RK4(1e-3))["top.b.position"]
+        for scene in (linkage(side, plane=plane), linkage(0 * side))
+    ]
+    np.testing.assert_allclose(runs[0][:, :2], runs[1][:, :2], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("make", "why"),
+    [
+        (lambda: slider_crank(gravity=(0, -9.81, 1.0)), "gravity has the component 1 m/s"),
+        (heavy_below, "body 'crank' is not symmetric about it: its centre of mass is 0.01 m beside"),
+        (
+            lambda: slider_crank(ground={"O": (0, 0, 1e-3), "P": (1.0, 0, 0)}),
+            r"joint 'main' runs aslant: its points are 0.001 m",
+        ),
+        (SPATIAL["a rod that may turn about itself"], "its joints leave a body free to move across it"),
+        (lambda: slider_crank(plane="none"), "in space, as the scene says"),
+    ],
+)
+def test_why_a_scene_is_computed_in_space(make, why):
+    assert re.search(why, plane_in_words(make(), 0.0))
+
+
+def test_a_mode_that_mixes_the_plane_is_named(link):
+    said = assemble(double_pendulum(turned_modes(link, 1e-3))).computed
+    assert re.search(r"in space: .* normal z, as body 'one' is not symmetric about it: (mode \d+ \(|a product)", said)
+
+
+def test_a_declared_plane_leaves_out_what_a_rough_mesh_does_across_it(link):
+    """Modes that leave the plane by thousandths: the motion differs by the square, and no row of a joint holds a mode."""
+    scene = double_pendulum(turned_modes(link, 1e-3))
+    flat, blocks = flattened(replace(scene, plane="z"), 0.0)
+    assert sum(len(block.words) for block in blocks) == 4
+    assert flat.bodies[0].model.n == 14
+    runs = [
+        integrate(replace(scene, plane=plane), end=0.02, output_step=0.005, method=ROS2(1e-5))["two.b.position"]
+        for plane in ("z", "none")
+    ]
+    np.testing.assert_allclose(runs[0][:, :2], runs[1][:, :2], atol=1e-6 * np.abs(runs[1]).max())

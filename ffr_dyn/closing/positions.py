@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import block_diag, csr_array
 
-from ffr_dyn.consistency.row_space import smallest_solution
+from ffr_dyn.closing.row_space import smallest_solution
 from ffr_dyn.equations.constraint_rows import Block, rows_at
 from ffr_dyn.equations.constraints import Row
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix

@@ -13,12 +13,12 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.sparse import csr_array, vstack
 
-from ffr_dyn.consistency.closing import TOLERANCE, close_positions, largest_turn, stacked, weights
-from ffr_dyn.consistency.following import size_of
-from ffr_dyn.consistency.row_space import Dependence, dependence, smallest_solution
+from ffr_dyn.closing.positions import TOLERANCE, close_positions, largest_turn, stacked, weights
+from ffr_dyn.closing.row_space import Dependence, dependence, smallest_solution
+from ffr_dyn.compile.row_tables import moving_bodies
 from ffr_dyn.equations.constraint_rows import Block, rows_at
 from ffr_dyn.equations.layout import Layout, moved, to_body_axes
-from ffr_dyn.scene.scene import Scene
+from ffr_dyn.scene.scene import Scene, markers
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -69,17 +69,55 @@ def dependence_in_motion(
     here = _dependence(scene, place, blocks, x, v, time)
     if not here.count:
         return here
-    found = list[Dependence]()
+    owners = np.repeat(np.arange(len(blocks)), [len(block.words) for block in blocks])
+    chosen = _involved(scene, blocks, set(owners[np.abs(here.combinations).max(axis=1) > TAKES_PART].tolist()))
+    best = _at_neighbours(scene, place, [blocks[k] for k in chosen], x, v, time)
+    if best is None or best.count > here.count:
+        return here
+    whole = np.zeros((owners.size, best.count))
+    whole[np.isin(owners, chosen)] = best.combinations
+    return Dependence(whole, best.least)
+
+
+def _involved(scene: Scene, blocks: list[Block], dependent: set[int]) -> list[int]:
+    """Numbers of the blocks that may be in a combination of rows that vanishes, from those that are in one at a position.
+
+    Forces in a mechanism that balance one another do not reach a body that hangs on by one pair of bodies alone; and what is
+    connected by the ground only has its own.
+    """
+    table = markers(scene)
+    pairs = [frozenset(moving_bodies(block, table, len(scene.bodies))) for block in blocks]
+    left = set(range(len(blocks)))
+    while True:
+        touching: dict[int, set[frozenset[int]]] = {}
+        for k in left:
+            for body in pairs[k]:
+                touching.setdefault(body, set()).add(pairs[k])
+        ends = set[frozenset[int]]().union(*(those for those in touching.values() if len(those) == 1))
+        hanging = {k for k in left if pairs[k] in ends} - dependent
+        if not hanging:
+            break
+        left -= hanging
+    found, bodies = set(dependent), frozenset().union(*(pairs[k] for k in dependent))
+    while more := {k for k in left - found if pairs[k] & bodies}:
+        found |= more
+        bodies = bodies.union(*(pairs[k] for k in more))
+    return sorted(found)
+
+
+def _at_neighbours(
+    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float
+) -> Dependence | None:
+    """How the rows depend on one another at the neighbour of x where they plainly do so least; None where nothing moves."""
+    found, joints = list[Dependence](), [block for block in blocks if not block.driver]
     for number, away in enumerate(AWAY):
-        near = _neighbour(scene, place, [b for b in blocks if not b.driver], x, v, time, number, away)
+        near = _neighbour(scene, place, joints, x, v, time, number, away)
         if near is not None:
             found.append(_dependence(scene, place, blocks, near, v, time))
-        plain = [one for one in found if one.least > CLEAR]
-        least = min((one.count for one in plain), default=here.count)
-        if sum(one.count == least for one in plain) >= AGREED:
+        counts = [one.count for one in found if one.least > CLEAR]
+        if counts.count(min(counts, default=0)) >= AGREED:
             break
-    best = max(found, key=lambda one: (one.least > CLEAR, -one.count, one.least), default=here)
-    return best if best.count <= here.count else here
+    return max(found, key=lambda one: (one.least > CLEAR, -one.count, one.least), default=None)
 
 
 def _dependence(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> Dependence:
@@ -97,8 +135,9 @@ def _neighbour(
     its steps are at right angles to the way from there: it turns the way into one that does go on.
     """
     W, J = _rigid(scene, place, blocks, x, v, time)[1:]
-    wanted = W @ np.random.default_rng(number).normal(size=place.v_size)
-    if number == 0 and (own := _rigid_part(place, to_body_axes(place, x, v))).any():
+    tied = _tied(place, J)
+    wanted = W @ (tied * np.random.default_rng(number).normal(size=place.v_size))
+    if number == 0 and (own := tied * _rigid_part(place, to_body_axes(place, x, v))).any():
         wanted = own
     way = wanted - W @ smallest_solution(csr_array(J @ W), J @ wanted)
     extent = _extent(scene, place, way)
@@ -125,6 +164,15 @@ def _rigid(
     return np.array([row.Phi for row in rows]), weights(scene, place, x, elastic=False), stacked(rows, place)
 
 
+def _tied(place: Layout, J: csr_array) -> Array:
+    """(V,) ones for the velocities of bodies that rows act on."""
+    acts, out = np.asarray(abs(J).sum(axis=0)).ravel() > 0, np.zeros(place.v_size)
+    for b, n in enumerate(place.n):
+        whole = slice(place.iv[b], place.iv[b] + 6 + n)
+        out[whole] = acts[whole].any()
+    return out
+
+
 def _rigid_part(place: Layout, step: Array) -> Array:
     """A motion (V,) without its elastic coordinates."""
     out = step.copy()
@@ -136,4 +184,4 @@ def _rigid_part(place: Layout, step: Array) -> Array:
 def _extent(scene: Scene, place: Layout, step: Array) -> float:
     """Of a motion (V,): the largest turn [rad] of a body, or shift over the size of the largest body."""
     shift = max(float(np.abs(step[place.R_dot(b)]).max()) for b in range(len(place.n)))
-    return max(largest_turn(place, step), shift / size_of(scene))
+    return max(largest_turn(place, step), shift / (max(body.model.size for body in scene.bodies) or 1.0))

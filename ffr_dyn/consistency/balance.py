@@ -1,0 +1,115 @@
+"""Whether forces and drivers account for the energy of a run, both ways: what has come, and what has gone.
+
+Kinetic, strain and gravity energy and that of undamped springs change by the work of all other forces, of drivers and of
+modal damping. The work is the trapezoid of their powers at the rows; what rows cannot tell of it is known by how much the
+powers bend from row to row, and nothing is said that is less than that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.kernels.tables import Record
+from ffr_dyn.results.power import measured_values
+from ffr_dyn.results.recorded_motion import View
+from ffr_dyn.scene.force_kinds import forces_of
+from ffr_dyn.scene.forces import JointStop
+from ffr_dyn.scene.forces.force import Force
+from ffr_prep.common.arrays import Array
+
+AMISS = 0.1  # of the largest kinetic, strain and spring energy: from where it is told
+SURE = 3.0  # times what rows leave open of the work
+QUIET = 1e-6  # m^2/s^2, twice the energy by mass that is not looked at
+# Numbers of an account [s], [J], [W]: see `Account`.
+TIME, BEGUN, WORK, OPEN, MOST, WORST, WHEN, POWER, BEFORE = range(9)
+
+
+@dataclass(frozen=True)
+class Account:
+    """What the rows of a run have shown so far.
+
+    numbers : (9,) time of the last row, energy at the start, work since, what rows leave open of it, largest energy of motion
+              and strain, largest difference between energy and work, its time, power of the last row and of the one before
+    """
+
+    system: System
+    numbers: Array = field(default_factory=lambda: np.full(9, np.nan))
+
+
+def add_rows(account: Account, rows: Record, powers: Array) -> None:
+    """Go on by the rows that follow; powers (T, F + drivers) of all forces and drivers."""
+    system, numbers = account.system, account.numbers
+    stored, power = _stored(system, rows), _power(system, rows, powers)
+    energy = rows.energy[:, 0] + rows.energy[:, 1] + stored
+    total = energy + rows.energy[:, 2]
+    if np.isnan(numbers[TIME]):
+        numbers[:] = [rows.time[0], total[0], 0.0, 0.0, energy[0], 0.0, rows.time[0], power[0], power[0]]
+    steps = np.diff(rows.time, prepend=numbers[TIME])
+    known = np.concatenate([numbers[[BEFORE, POWER]], power])
+    work = numbers[WORK] + np.cumsum(0.5 * steps * (known[1:-1] + known[2:]))
+    left_open = numbers[OPEN] + np.cumsum(steps * _left_open(known))
+    left = total - numbers[BEGUN] - work
+    sure = np.where(np.abs(left) > SURE * left_open, left, 0.0)
+    worst = int(np.argmax(np.abs(sure)))
+    if abs(sure[worst]) > abs(numbers[WORST]):
+        numbers[[WORST, WHEN]] = sure[worst], rows.time[worst]
+    numbers[MOST] = max(numbers[MOST], float(energy.max()))
+    numbers[[TIME, WORK, OPEN, POWER, BEFORE]] = rows.time[-1], work[-1], left_open[-1], known[-1], known[-2]
+
+
+def amiss(account: Account, method: str, remedy: str) -> list[str]:
+    """What of the energy of a run has no source, or has gone nowhere; `remedy` is a sentence without its end."""
+    scene, (most, worst, when) = account.system.scene, account.numbers[[MOST, WORST, WHEN]]
+    least = QUIET * sum(body.model.mass for body in scene.bodies)
+    if not abs(worst) > max(AMISS * most, least) or (account.system.model.base >= 0).any():
+        return []
+    if any(isinstance(force, JointStop) for force in forces_of(scene)):
+        return []  # an impact may fall between two rows
+    way = (
+        "has come that no force or driver has put in" if worst > 0 else "has gone that no force or driver has taken out"
+    )
+    cause = "what the steps do not resolve grows" if worst > 0 else "what the steps do not resolve is damped by them"
+    return [
+        f"by t = {when:.6g} s energy of {abs(worst):.3g} J {way}, {abs(worst) / most:.2g} of the most that was in motion and "
+        f"strain: {cause} ({method}); {remedy}"
+    ]
+
+
+def _left_open(known: Array) -> Array:
+    """(T,) [W] what the trapezoid may be off in the interval that ends at each of the last T of T + 2 powers: by the second
+    derivative where they are smooth, by all of a jump where they are not."""
+    growth = np.diff(known)
+    bend = np.abs(np.diff(growth))
+    smooth = bend < 0.5 * (np.abs(growth[1:]) + np.abs(growth[:-1]))
+    return np.where(smooth, bend / 12, bend / 2)
+
+
+def _stored(system: System, rows: Record) -> Array:
+    """(T,) [J] in springs without damping."""
+    view, total = View(system, rows), np.zeros(rows.time.size)
+    for k, force in enumerate(forces_of(system.scene)):
+        if _conserves(force):
+            count = len(force.place.initial) // 3
+            total += force.energy(measured_values(view, k, 0 if count == 1 else slice(0, count)))
+    return total
+
+
+def _power(system: System, rows: Record, powers: Array) -> Array:
+    """(T,) [W] of all that neither stores energy nor is gravity, modal damping included."""
+    counted = np.ones(powers.shape[1], bool)
+    counted[: len(forces_of(system.scene))] = [not _conserves(force) for force in forces_of(system.scene)]
+    total: Array = powers[:, counted].sum(axis=1)
+    for b, body in enumerate(system.scene.bodies):
+        rates = rows.v[:, system.layout.q_dot(b)]
+        total = total - rates**2 @ np.broadcast_to(2 * body.damping * np.sqrt(body.model.omega2), rates.shape[1:])
+    return total
+
+
+def _conserves(force: Force) -> bool:
+    """Kinds that store energy all have a `damping`: a number, a matrix or a curve."""
+    kind: Any = force
+    return force.stores_energy and not np.any(kind.damping)

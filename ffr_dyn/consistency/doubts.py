@@ -1,0 +1,243 @@
+"""What every analysis is looked at for, and what it does about it: a note of its result, or an error.
+
+`TABLE` says which, for each doubt and analysis; docs/analyses.md shows it. The rows of an analysis go through `look`, as many
+at a time as it has, and `ended` tells what they have shown. Doubts that a scene raises before anything moves are notes of
+assembly (`ffr_dyn.consistency.assemble`): redundant rows, modes that do not fit the joints, joints that slide along a body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.consistency.assemble import Assembled
+from ffr_dyn.consistency.evaluation import evaluate, evaluator
+from ffr_dyn.consistency.explicit_forces import candidates, fastest, told
+from ffr_dyn.consistency.validity import extremes, meaningless, strained, unstiffened
+from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
+from ffr_dyn.integrators import Integrator
+from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
+from ffr_dyn.kernels.tables import Record
+from ffr_dyn.results.power import driven
+from ffr_dyn.results.recorded_motion import View, dot
+from ffr_dyn.scene.drivers import Driver, PointDriver
+from ffr_dyn.scene.force_kinds import forces_of
+from ffr_dyn.scene.scene import Scene, joint_of
+from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import ComputationError
+
+NOTE, ERROR, NONE = "note", "error", "-"
+INTEGRATED = (
+    "forward",
+    "mixed",
+    "inverse",
+    "economise",
+)  # by `ffr_dyn.analyses.integration`, the second two where they are
+ANALYSES = (*INTEGRATED, "stepper", "kinematic", "static", "linearise", "assemble")
+
+
+def _verdicts(integrated: str, stepper: str, kinematic: str, static: str, moment: str) -> dict[str, str]:
+    """Of every analysis; `moment` of those that look at one moving state."""
+    return dict(zip(ANALYSES, [integrated] * 4 + [stepper, kinematic, static, moment, moment], strict=True))
+
+
+TABLE: dict[str, dict[str, str]] = {
+    "constraints open beyond the tolerance": _verdicts(NOTE, NOTE, NOTE, NOTE, NOTE),
+    "mechanism come apart": _verdicts(ERROR, NOTE, ERROR, ERROR, ERROR),
+    "driver not followed": _verdicts(ERROR, NOTE, ERROR, ERROR, ERROR),
+    "driver faster than the step": _verdicts(NOTE, NOTE, NONE, NONE, NONE),
+    "energy multiplied": _verdicts(ERROR, NONE, NONE, NONE, NONE),  # at once, by `ffr_dyn.analyses.energy`
+    "energy come or gone": _verdicts(NOTE, NONE, NONE, NONE, NONE),
+    "force too stiff for the step": _verdicts(NOTE, NOTE, NONE, NONE, NONE),
+    "deformed beyond the theory": _verdicts(NOTE, NOTE, NONE, NOTE, NOTE),
+    "deformed beyond any meaning": _verdicts(ERROR, NOTE, NONE, ERROR, ERROR),
+    "spin without stiffening": _verdicts(NOTE, NOTE, NONE, NONE, NOTE),
+    "singular position": _verdicts(NOTE, NOTE, NOTE, NONE, NONE),
+    "mass matrix nearly singular": _verdicts(NOTE, NOTE, NONE, NOTE, NOTE),
+}
+OPEN, APART, ASTRAY, QUICK, _, BALANCE, STIFF, STRAINED, MEANINGLESS, SPUN, SINGULAR, MASS = TABLE
+
+MET = 1e-8  # m, -: of constraints that Newton's method closes
+KEPT = 10.0  # times the tolerance of a projection
+# Of the size of the scene up to a metre: how far constraints come open in the step before a row, which a projection at the
+# beginning of the next one closes; and more than any drift that is of use.
+DRIFTED, TORN = 1e-5, 1e-2
+BESIDE = 0.1  # rad, by which a driven angle may differ
+TURNED = 0.1  # rad, or of the scene's size: h^2 times a driver's second derivative that a step bears
+DEPENDENT = 1e-8  # smallest eigenvalue of a mass matrix with ones on its diagonal
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What the rows of an analysis have shown so far, in arrays that change.
+
+    method    : of its steps; None where it has none
+    tolerance : that constraints are to be met with [m, -];  apart : from where a mechanism has come apart
+    arrays    : "bodies" (3, B) as `ffr_dyn.consistency.validity.extremes`; "open" (3,) the largest constraint left open, its
+                time, its number; "driven" (2, D) of each driver the largest difference from what it prescribes, and its
+                largest second derivative; "rates" (F,) [1/s] of the forces that the method takes explicitly; "x" (X,) of the
+                last row
+    """
+
+    assembled: Assembled
+    method: Integrator | None
+    tolerance: float
+    apart: float
+    arrays: dict[str, Array]
+
+    @property
+    def scene(self) -> Scene:
+        return self.assembled.system.scene
+
+
+def nothing_seen(
+    assembled: Assembled, method: Integrator | None = None, tolerance: float = MET, apart: float = TORN
+) -> Seen:
+    """Before the first row."""
+    scene = assembled.system.scene
+    sizes = {"bodies": (3, len(scene.bodies)), "open": (3,), "driven": (2, len(scene.drivers))}
+    sizes |= {"rates": (len(forces_of(scene)),), "x": (assembled.x.size,)}
+    return Seen(assembled, method, tolerance, apart, {name: np.zeros(size) for name, size in sizes.items()})
+
+
+def held(scene: Scene, stabilisation: Stabilisation) -> tuple[float, float]:
+    """(tolerance, apart) [m, -]: a projection holds the constraints; gains and drifting let them go as far as they do."""
+    size = min(1.0, _size(scene))
+    if isinstance(stabilisation, Projection):
+        return max(KEPT * stabilisation.tolerance, DRIFTED * size), TORN * size
+    return DRIFTED * size, np.inf
+
+
+def _size(scene: Scene) -> float:
+    return max(body.model.size for body in scene.bodies) or 1.0
+
+
+def look(seen: Seen, rows: Record) -> None:
+    """Take note of the rows that follow, whose violations are those of all rows, redundant ones included."""
+    system, arrays = seen.assembled.system, seen.arrays
+    arrays["bodies"][:] = np.maximum(arrays["bodies"], extremes(system, rows))
+    arrays["x"][:] = rows.x[-1]
+    worst = int(np.argmax(rows.violation[:, 0]))
+    if rows.violation[worst, 0] > max(seen.tolerance, arrays["open"][0]):
+        arrays["open"][:] = _opened(seen.assembled, rows, worst)
+    if seen.scene.drivers:
+        view = View(system, rows)
+        arrays["driven"][:] = np.maximum(arrays["driven"], np.array([_driven(view, d) for d in seen.scene.drivers]).T)
+    if seen.method is not None and (explicit := candidates(system, seen.method)):
+        arrays["rates"][:] = np.maximum(arrays["rates"], fastest(evaluator(system), rows, explicit))
+
+
+def _opened(assembled: Assembled, rows: Record, row: int) -> tuple[float, float, float]:
+    """The largest |Phi| of a row of the record, its time, and which of all constraint rows it is."""
+    at, time = evaluator(assembled.all_rows or assembled.system), float(rows.time[row])
+    Phi = np.abs(evaluate(at, time, rows.x[row], rows.v[row]).Phi)
+    return float(rows.violation[row, 0]), time, float(np.argmax(Phi))
+
+
+def _driven(view: View, driver: Driver | PointDriver) -> tuple[float, float]:
+    """How far an angle is from the one prescribed [rad], seen all around, and the largest second derivative of what is
+    prescribed; points and strokes are where their rows are closed."""
+    if not isinstance(driver, Driver) or driver.name not in [block.name for block in view.system.blocks]:
+        return 0.0, 0.0
+    prescribed = driven(view, driver)
+    growth = float(np.abs(prescribed[:, 2]).max())
+    if driver.coordinate != "angle":
+        return 0.0, growth
+    on_i, on_j = view.joint_frames(joint_of(view.system.scene, driver))
+    angle = np.arctan2(dot(on_i[:, :, 1], on_j[:, :, 0]), dot(on_i[:, :, 0], on_j[:, :, 0]))
+    off = np.remainder(angle - prescribed[:, 0] + np.pi, 2 * np.pi) - np.pi
+    return float(np.abs(off).max()), growth
+
+
+# ---- the end --------------------------------------------------------------------------------------------------------
+
+
+def checked(
+    analysis: str, assembled: Assembled, rows: Record, more: Mapping[str, Sequence[str]] | None = None
+) -> list[str]:
+    """The notes of an analysis that has all its rows at once and no steps. Raises ComputationError as `ended`."""
+    seen = nothing_seen(assembled)
+    look(seen, rows)
+    return ended(analysis, seen, more)
+
+
+def ended(analysis: str, seen: Seen, more: Mapping[str, Sequence[str]] | None = None) -> list[str]:
+    """The notes of an analysis; `more` are doubts that were found elsewhere.
+
+    Raises ComputationError for the first doubt that the table calls an error.
+    """
+    found = {**_found(seen), **(more or {})}
+    for doubt in (doubt for doubt, verdicts in TABLE.items() if verdicts[analysis] == ERROR):
+        for text in found.get(doubt, ()):
+            raise ComputationError(text)
+    return [text for doubt, verdicts in TABLE.items() if verdicts[analysis] == NOTE for text in found.get(doubt, ())]
+
+
+def _found(seen: Seen) -> dict[str, list[str]]:
+    """All doubts, with their texts."""
+    scene, (turned, spun, stretched) = seen.scene, seen.arrays["bodies"]
+    lost, quick = meaningless(scene, seen.arrays["bodies"]), list(_quick(seen))
+    return {
+        **_constraints(seen, quick),
+        ASTRAY: [
+            _astray(d, off) for d, off in zip(scene.drivers, seen.arrays["driven"][0], strict=True) if off > BESIDE
+        ],
+        QUICK: quick,
+        STIFF: [] if seen.method is None else told(seen.assembled.system, seen.method, seen.arrays["rates"]),
+        STRAINED: strained(scene, turned, stretched),
+        MEANINGLESS: [lost] if lost else [],
+        SPUN: unstiffened(scene, spun),
+        MASS: list(_dependent(seen.assembled.system, seen.arrays["x"])),
+    }
+
+
+def _constraints(seen: Seen, quick: list[str]) -> dict[str, list[str]]:
+    value, time, number = seen.arrays["open"]
+    if not value > seen.tolerance:
+        return {}
+    blocks = (seen.assembled.all_rows or seen.assembled.system).blocks
+    block, text = [(block, word.text) for block in blocks for word in block.words][int(number)]
+    change = "use a smaller step" if seen.apart < np.inf else "use projection, or a smaller step"
+    where = f"at t = {time:.6g} s the row '{text}' of {block.name!r} is open by {value:.2g}"
+    if value > seen.apart:
+        what = "the driver is not followed" if block.driver else "the mechanism has come apart"
+        return {APART: [f"{where}: {what}; {quick[0] if quick else change}"]}
+    return {OPEN: [f"{where}, the most of all, and more than {seen.tolerance:.1g}; {change}"]}
+
+
+def _astray(driver: Driver | PointDriver, off: float) -> str:
+    return (
+        f"driver {driver.name!r} is not followed: its joint is {off:.3g} rad from the angle prescribed; start nearer to it, "
+        "or use a smaller step"
+    )
+
+
+def _quick(seen: Seen) -> Iterator[str]:
+    if seen.method is None or seen.method.controlled:
+        return
+    for driver, growth in zip(seen.scene.drivers, seen.arrays["driven"][1], strict=True):
+        angular = isinstance(driver, Driver) and driver.coordinate == "angle"
+        step, bears = seen.method.step, TURNED if angular else TURNED * _size(seen.scene)
+        if step**2 * growth > bears:
+            yield (
+                f"driver {driver.name!r} is faster than the step: its motion changes by up to {step**2 * growth:.2g} "
+                f"{'rad' if angular else 'm'} more in one step of {step:.3g} s than in the one before; use one below "
+                f"{np.sqrt(bears / growth):.2g} s"
+            )
+
+
+def _dependent(system: System, x: Array) -> Iterator[str]:
+    place = system.layout
+    for b, body in enumerate(system.scene.bodies):
+        moving = [*place.active(b), *range(6, 6 + place.n[b])]
+        M = mass_matrix(kept_integrals(body), x[place.q(b)])[np.ix_(moving, moving)]
+        scale = 1.0 / np.sqrt(np.diag(M))
+        least = float(np.linalg.eigvalsh(scale[:, None] * M * scale)[0])
+        if not least > DEPENDENT:
+            yield (
+                f"the mass matrix of body {body.name!r} is nearly singular (smallest eigenvalue {least:.1g} of a diagonal of "
+                "ones): its accelerations have few digits; keep fewer modes"
+            )

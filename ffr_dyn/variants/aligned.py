@@ -1,0 +1,96 @@
+"""Scenes brought into the plane that they are a hair off: places that a mesh leaves beside it, double modes that mix it.
+
+Modes of equal frequency are any combinations of each other, as those in which a square bar bends. Of a body that is symmetric
+about the plane, what moves in it and what leaves it have no product in the part of the mass matrix across it, so that the
+eigenvectors of this part set them apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ffr_dyn.scene.own_frame import OwnFrame
+from ffr_dyn.scene.scene import Body, Scene, body_normal
+from ffr_dyn.variants.variant import used_interfaces, with_basis
+from ffr_prep.body import FlexibleBody, FrameMarker
+from ffr_prep.common.arrays import Array
+
+BESIDE = 1e-6  # of the size of a body: what a mesh leaves of a place in its plane
+DOUBLE = 1e-6  # of a squared frequency: what a mesh leaves between equal ones
+TURNED = 1e-12  # of a mode of norm one
+
+
+def size_of(body: FlexibleBody) -> float:
+    """[m] the radius of gyration of a body about its origin."""
+    return float(np.sqrt(np.trace(body.rr_dm) / body.mass))
+
+
+def levelled(scene: Scene, normal: int) -> Scene:
+    """The scene with places that are used in the middle plane of their body, and bodies at one height, where only a hair is
+    missing."""
+    near = BESIDE * max(size_of(body.model) for body in scene.bodies)
+    heights = _merged(
+        [*(body.position[normal] for body in scene.bodies), *(p[normal] for p in scene.ground.values())], near
+    )
+    bodies = tuple(_flat(scene, body, body_normal(body, normal), normal, next(heights)) for body in scene.bodies)
+    ground = {name: _with(point, normal, next(heights)) for name, point in scene.ground.items()}
+    return replace(scene, bodies=bodies, ground=ground)
+
+
+def _merged(heights: list[float], near: float) -> Iterator[float]:
+    """The heights, those that are near to each other made equal."""
+    order, last = np.argsort(heights, kind="stable"), -np.inf
+    merged = np.array(heights, float)
+    for k in order:
+        last = merged[k] = last if merged[k] - last <= near else merged[k]
+    return iter(merged.tolist())
+
+
+def _with(point: Array, axis: int, value: float) -> Array:
+    out = np.array(point, float)
+    out[axis] = value
+    return out
+
+
+def _flat(scene: Scene, body: Body, k: int, normal: int, height: float) -> Body:
+    position, near = _with(body.position, normal, height), BESIDE * size_of(body.model)
+    used = used_interfaces(scene, body) if k >= 0 else ()
+    hair = {i.name for i in body.model.interfaces if i.name in used and 0 < abs(i.position[k]) <= near}
+    if not hair:
+        return body if np.array_equal(position, body.position) else replace(body, position=position)
+    interfaces = tuple(
+        replace(i, position=_with(i.position, k, 0.0)) if i.name in hair else i for i in body.model.interfaces
+    )
+    return replace(body, position=position, model=replace(body.model, interfaces=interfaces))
+
+
+def basis_in_plane(body: Body, k: int) -> Array | None:
+    """(n, n) double modes of a body combined into those in the plane across body axis k and those across it, each in the
+    place of the one it is most of; None where nothing is to be turned."""
+    V = np.eye(body.model.n)
+    for group in _groups(body):
+        vectors = np.linalg.eigh(body.model.PP_dm[k, k][np.ix_(group, group)])[1]
+        if np.abs(vectors).max(axis=0).min() < 1.0 - TURNED:
+            V[np.ix_(group, group)] = vectors * np.sign(vectors[np.abs(vectors).argmax(axis=0), range(len(group))])
+    return None if (np.eye(body.model.n) == V).all() else V
+
+
+def _groups(body: Body) -> Iterator[list[int]]:
+    """Numbers of modes of equal frequency and damping, two or more."""
+    omega2 = body.model.omega2
+    order = np.argsort(omega2, kind="stable")
+    for group in np.split(order, np.flatnonzero(np.diff(omega2[order]) > DOUBLE * omega2[order][1:]) + 1):
+        if group.size > 1 and np.ptp(body.damping[group]) == 0:
+            yield group.tolist()
+
+
+def combined(body: Body, V: Array) -> Body:
+    """The body in the coordinates p, q = V p, with what it says of itself in its own."""
+    n = body.model.n
+    still = FrameMarker(np.zeros(3), np.zeros((3, n)), np.zeros((3, n)), np.zeros((6, n, n)))
+    own = OwnFrame(body.model, still, np.eye(n))
+    frame = (body.frame or own).combined(V)
+    return replace(body, model=with_basis(body.model, V), frame=frame, q=V.T @ body.q, q_dot=V.T @ body.q_dot)

@@ -1,0 +1,94 @@
+"""The quasi-static start: what begins in it does not ring."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_dyn_plane import rod, slider_crank
+
+import ffr_dyn as fd
+from ffr_dyn.analyses.integration import integrate
+from ffr_dyn.consistency.assemble import assemble
+from ffr_dyn.consistency.evaluation import total_mass_matrix
+from ffr_dyn.consistency.quasi_static import quasi_static
+from ffr_dyn.equations.layout import to_body_axes
+from ffr_prep.common.errors import InputError
+
+
+def rotor(speed: float, *, stiffening: bool, **changes) -> fd.Scene:
+    """A rod that a motor turns about one end."""
+    parts = {
+        "bodies": (fd.Body("rod", rod("rod", 0.8, stiffening=stiffening), omega_bar=(0, 0, speed), damping=0.0),),
+        "joints": (fd.Joint("hinge", "revolute", "ground.O", "rod.a"),),
+        "drivers": (fd.Driver("motor", "hinge", fd.polynomial(0, speed)),),
+        "ground": {"O": (0, 0, 0)},
+    }
+    return fd.Scene(**parts | changes)
+
+
+@pytest.mark.parametrize("stiffening", [False, True], ids=["linear", "second order"])
+@pytest.mark.parametrize("speed", [10.0, 200.0])
+def test_a_rotor_starts_in_its_steady_deflection(speed, stiffening):
+    """Also beyond its first frequency, 105 rad/s."""
+    scene = rotor(speed, stiffening=stiffening)
+    how = {"end": 0.02, "output_step": 1e-4, "method": fd.RK4(5e-6), "stabilisation": fd.Projection(1e-13)}
+    q = fd.forward(scene, begin="quasi-static", check=False, **how)["rod.q"]
+    assert np.ptp(q, axis=0).max() < 1e-6 * np.abs(q).max()
+    steady = fd.inverse(scene, end=0.02, output_step=0.02, elastic=fd.QuasiStatic())["rod.q"][0]
+    np.testing.assert_allclose(q[0], steady, atol=1e-6 * np.abs(q).max())
+
+
+@pytest.mark.parametrize("stiffening", [False, True], ids=["linear", "second order"])
+@pytest.mark.parametrize("plane", ["auto", "none"])
+def test_a_crank_that_starts_so_hardly_rings(plane, stiffening):
+    """In space three rows of its joints are redundant for rigid bodies. The motion is periodic, its loads are not quite."""
+    scene = slider_crank(rod={"stiffening": stiffening}, plane=plane, loads=())
+    turn = 2 * np.pi / 40
+    start = assemble(scene)
+    runs = [
+        integrate(scene, end=turn, output_step=turn / 300, method=fd.RK4(turn / 30000), assembled=state)["big.force"]
+        for state in (start, quasi_static(start, 0.0))
+    ]
+    shock, quiet = (np.abs(np.diff(force, 3, axis=0)).max() for force in runs)
+    assert quiet < 0.01 * shock
+    assert np.abs(runs[1][-1] - runs[1][0]).max() < 1e-3 * np.abs(runs[1]).max()
+
+
+def test_deflections_follow_a_free_motion():
+    """A pendulum that is let go: the force at its hinge is that of the rigid one, which shortens the rod by nothing."""
+    scene = rotor(0.0, stiffening=True, drivers=(), gravity=(0, -9.81, 0))
+    how = {"end": 0.1, "output_step": 1e-3, "method": fd.RK4(1e-5), "check": False}
+    rigid = fd.forward(fd.vary(scene, rigid=["rod"]), **how)["hinge.force"]
+    ringing, quiet = (fd.forward(scene, begin=word, **how)["hinge.force"] for word in ("as-given", "quasi-static"))
+    assert np.abs(ringing - rigid).max() > 0.1 * np.abs(rigid).max()
+    assert np.abs(quiet - rigid).max() < 1e-3 * np.abs(rigid).max()
+
+
+def test_a_free_body_keeps_its_momentum_and_ends_up_turning_steadily():
+    body = replace(rotor(0.0, stiffening=True).bodies[0], omega_bar=(0, 0, 100.0), velocity=(1.0, 2.0, 3.0))
+    start = assemble(fd.Scene((body,)))
+    settled = quasi_static(start, 0.0)
+    place, scene = start.system.layout, start.system.scene
+    momenta = [(total_mass_matrix(scene, place, s.x) @ to_body_axes(place, s.x, s.v))[:6] for s in (start, settled)]
+    np.testing.assert_allclose(*momenta, atol=1e-4 * np.abs(momenta[0]).max())
+    q = fd.forward(scene, end=0.01, output_step=1e-4, method=fd.RK4(5e-6), assembled=settled, check=False)["rod.q"]
+    assert np.ptp(q, axis=0).max() < 1e-3 * np.abs(q).max()
+
+
+@pytest.mark.parametrize(("frequency", "slow"), [(100.0, False), (20.0, False), (1.0, True)])
+def test_a_motion_as_fast_as_the_vibration_is_told(frequency, slow):
+    """A rod of 26 Hz that is shaken, an eighth of an oscillation after the start."""
+    motor, time = fd.Driver("m", "hinge", fd.harmonic(amplitude=1e-3, frequency=frequency)), 0.125 / frequency
+    shaken = rotor(0.0, stiffening=False, drivers=(motor,))
+    notes = quasi_static(assemble(shaken, time=time), time).notes
+    assert any("not slow" in note for note in notes) != slow
+
+
+def test_rigid_bodies_and_other_words():
+    scene = fd.vary(rotor(3.0, stiffening=False), rigid=["rod"])
+    start = assemble(scene)
+    assert quasi_static(start, 0.0) is start
+    with pytest.raises(InputError, match="begin is 'still'"):
+        fd.forward(scene, end=1.0, output_step=0.1, begin="still")
