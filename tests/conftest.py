@@ -16,6 +16,16 @@ threadpool_limits(1)
 
 
 @pytest.fixture(autouse=True)
+def signals_are_handled_as_before():
+    """A command that is interrupted in this process ignores what else asks it to end; other tests want to be asked."""
+    ending = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.getsignal(number) for number in ending]
+    yield
+    for number, handler in zip(ending, before, strict=True):
+        signal.signal(number, handler)
+
+
+@pytest.fixture(autouse=True)
 def broken_pipes_raise():
     """gmsh, where a test calls it in this process, lets a write to a dead child kill the process; undo that."""
     yield

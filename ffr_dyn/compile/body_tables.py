@@ -17,6 +17,7 @@ from ffr_dyn.kernels.tables import (
     IN_SHARED,
     IN_V,
     IN_X,
+    LANES,
     NORMAL,
     PP_PLAN,
     Bodies,
@@ -90,7 +91,8 @@ def tables_in_blocks(owners: Sequence[Hashable], make: Callable[[int], tuple[Arr
     pool, first = once([stored[owner][0] for owner in owners], owners)
     plans, first_plan = once([stored[owner][1] for owner in owners], owners)
     zero = np.array([not stored[owner][0].size for owner in owners], dtype=bool)
-    return Blocks(pool, np.where(zero, -1, first), plans.astype(np.int64), first_plan)
+    padded = np.concatenate([pool, np.zeros(LANES)])  # whole rows of lanes are read
+    return Blocks(padded, np.where(zero, -1, first), plans.astype(np.int64), first_plan)
 
 
 NO_BLOCKS = np.zeros(0), np.zeros(0, dtype=np.int64)

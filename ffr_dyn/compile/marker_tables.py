@@ -61,7 +61,8 @@ def _rows(normal: int, turns: bool) -> tuple[int, ...]:
     """Which of the six rows of a marker are needed: displacement, rotation where it turns; in the plane what keeps to it."""
     if normal < 0:
         return tuple(range(6 if turns else 3))
-    return (*sorted({0, 1, 2} - {normal}), 3 + normal)
+    in_plane = sorted({0, 1, 2} - {normal})
+    return (*in_plane, 3 + normal) if turns else (*in_plane,)
 
 
 def _turning(scene: Scene, blocks: tuple[Block, ...]) -> set[int]:

@@ -7,18 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from ffr_dyn.compile.body_tables import starts
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.functions.rotation import skew
 from ffr_dyn.kernels.tables import (
-    BEND_PLAN,
-    IN_BENDING,
-    IN_PP_DM,
     IN_Q,
     LANES,
     MOST_PASSED,
     NORMAL,
-    PP_PLAN,
-    SPACE,
     Bodies,
     BodyWork,
     LoadWork,
@@ -66,6 +62,7 @@ def _marker_work(m: Model, bodies: BodyWork) -> MarkerWork:
         kept=m.markers.phi.copy(),
         R=_identities(M),
         T=_identities(M),
+        bent=np.zeros(2 * (6 * int(m.bodies.where[:, N].max()) + LANES)),
         sorted=bodies.sorted,
         **_zeros(r=(M, 3), rd=(M, 3), rb=(M, 3), u=(M, 3), spin=(M, 3), turning=(M, 3), six=(3, 6)),
     )
@@ -75,27 +72,18 @@ def _zeros(**shapes: Any) -> dict[str, Array]:
     return {key: np.zeros(shape) for key, shape in shapes.items()}
 
 
-def _space(m: Model) -> int:
-    """What products in blocks take at most."""
-    bodies, second = m.bodies.where[:-1], m.markers.second
-    plans = [
-        *m.bodies.blocks[bodies[bodies[:, IN_PP_DM] >= 0, PP_PLAN] + SPACE],
-        *m.markers.blocks[second[second[:, IN_BENDING] >= 0, BEND_PLAN] + SPACE],
-    ]
-    return int(max(plans, default=0))
-
-
 def _body_work(m: Model, keeps_terms: bool) -> BodyWork:
     """Scratch of the bodies; the factors of rigid ones, which are constant, are in it."""
     B, E, n = m.bodies.mass.size, int(m.bodies.where[-1, IN_Q]), m.bodies.where[:, N]
     V, longest = 6 * B + E, int(n.max())
-    terms = int(n.sum()) if keeps_terms else longest
+    spaced = n[:-1] + LANES  # sums in whole rows of lanes end beyond the terms
+    terms = int(spaced.sum() if keeps_terms else spaced.max(initial=0))
     work = BodyWork(
         A=_identities(B + 1),
         dinv=np.ones(m.bodies.omega2.size),
-        terms=m.bodies.where[:-1, IN_Q] * keeps_terms,
+        terms=starts(spaced)[:-1] * keeps_terms,
         **_zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), inverse=(B, 2), g=9 * terms, l=3 * terms),
-        sorted=np.zeros(2 * _space(m) + 5 * longest),
+        sorted=np.zeros(17 * longest + 4 * LANES),
         **_zeros(H=3 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6)),
         **_zeros(more=V),
     )

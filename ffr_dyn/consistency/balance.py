@@ -8,7 +8,6 @@ powers bend from row to row, and nothing is said that is less than that.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -110,6 +109,5 @@ def _power(system: System, rows: Record, powers: Array) -> Array:
 
 
 def _conserves(force: Force) -> bool:
-    """Kinds that store energy all have a `damping`: a number, a matrix or a curve."""
-    kind: Any = force
-    return force.stores_energy and not np.any(kind.damping)
+    """Kinds that lose what they store have a `damping`: a number, a matrix or a curve."""
+    return force.stores_energy and not np.any(getattr(force, "damping", 0.0))

@@ -12,9 +12,9 @@ import math
 
 from ffr_dyn.kernels import planar, spatial
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.products import products
-from ffr_dyn.kernels.simd.slices import part, six_parts, three_parts
-from ffr_dyn.kernels.tables import BEND_PLAN, COUNT, IN_BENDING, IN_V, IN_X, NORMAL, SPACE, TURNS, N
+from ffr_dyn.kernels.products import contract
+from ffr_dyn.kernels.simd.slices import part, six_parts
+from ffr_dyn.kernels.tables import BEND_PLAN, COUNT, IN_BENDING, IN_V, IN_X, LANES, NORMAL, TURNS, N
 from ffr_dyn.kernels.vectors import add, copy, cross, dot, fill, get, in_plane, put, scale, to_body, to_global
 
 SMALL = 0.25  # rad^2: below, the functions of a rotation vector by their series, here to rounding
@@ -39,46 +39,31 @@ def elastic_motion(phi, normal, q, n):
 
 
 @kernel
-def bend_three(straight, now, rates, q, qd, n):
-    """(motion, rate, quadratic velocity part) by three rows (3 n,): undeformed, at q, and the rates of these."""
-    (s0, s1, s2), (p0, p1, p2), (r0, r1, r2) = three_parts(straight, n), three_parts(now, n), three_parts(rates, n)
-    m0, m1, m2, v0, v1, v2, g0, g1, g2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(n):
-        x, y = 0.5 * q[j], qd[j]
-        m0 += (s0[j] + p0[j]) * x
-        m1 += (s1[j] + p1[j]) * x
-        m2 += (s2[j] + p2[j]) * x
-        v0 += p0[j] * y
-        v1 += p1[j] * y
-        v2 += p2[j] * y
-        g0 += r0[j] * y
-        g1 += r1[j] * y
-        g2 += r2[j] * y
-    return (m0, m1, m2), (v0, v1, v2), (g0, g1, g2)
+def row_of(component, normal):
+    """Which of the six rows of a marker the components of second order are."""
+    if normal < 0:
+        return component
+    i, j, _ = in_plane(normal)
+    return i if component == 0 else (j if component == 1 else 3 + normal)
 
 
 @inlined
 def bend_marker(markers, w, k, n, normal, q, qd):
     """Shapes of marker k of a second-order body at q; w.six: elastic motion, its rate, - q_dot K q_dot."""
-    start, plan, six = markers.second[k, IN_BENDING], markers.second[k, BEND_PLAN], w.six
-    size, phi = markers.second[k, COUNT] * n, part(w.phi, markers.start[k], 6 * n)
-    straight, change, rates = part(markers.bending, start, size), part(w.sorted, 0, size), markers.blocks[plan + SPACE]
-    now = phi if normal < 0 else change  # in space its rows are the first of the six
-    products(markers.bending, start + size, markers.blocks, plan, q, qd, w.sorted)
-    for c in range(size):
-        now[c] = straight[c] + change[c]
-    fill(part(six, 0, 18), 0.0)
-    for at in range(0, size, 3 * n):
-        own, rows, slopes = part(straight, at, 3 * n), part(now, at, 3 * n), part(w.sorted, rates + at, 3 * n)
-        moved, rate, growth = bend_three(own, rows, slopes, q, qd, n)
-        first = 0 if at == 0 else 3
-        i, j, l = (first, first + 1, first + 2) if normal < 0 else in_plane(normal)  # noqa: E741
-        six[0, i], six[0, j], six[0, l] = moved
-        six[1, i], six[1, j], six[1, l] = rate
-        six[2, i], six[2, j], six[2, l] = growth
-    if normal >= 0:
-        for c, row in enumerate(in_plane(normal)):
-            copy(part(phi, row * n, n), part(change, c * n, n))
+    count, start, plan = markers.second[k, COUNT], markers.second[k, IN_BENDING], markers.second[k, BEND_PLAN]
+    size, phi = count * n, part(w.phi, markers.start[k], 6 * n)
+    straight, now, change = part(markers.bending, start, size), part(w.bent, 0, size), part(w.bent, size + LANES, size)
+    contract(markers.bending, start + size, markers.blocks, plan, q, qd, size, size, w.sorted, straight, now, change)
+    fill(part(w.six, 0, 18), 0.0)
+    for component in range(count):
+        row, at = row_of(component, normal), component * n
+        moved, rate, growth = 0.0, 0.0, 0.0
+        for j in range(n):
+            moved += (straight[at + j] + now[at + j]) * q[j]
+            rate += now[at + j] * qd[j]
+            growth += change[at + j] * qd[j]
+        w.six[0, row], w.six[1, row], w.six[2, row] = 0.5 * moved, rate, growth
+        copy(part(phi, row * n, n), part(now, at, n))
 
 
 @kernel
@@ -125,22 +110,27 @@ def put_rotation(R, c, a, theta, xx, yy, zz, xy, xz, yz):
     R[1, 0], R[2, 0], R[2, 1] = a * xy + c * z, a * xz - c * y, a * yz + c * x
 
 
+@kernel
+def put_six(six, row, moved, turned):
+    six[row, 0], six[row, 1], six[row, 2] = moved
+    six[row, 3], six[row, 4], six[row, 5] = turned
+
+
 @inlined
 def deform_marker(where, markers, w, x, v, k):
-    """Elastic motion of marker k, its rate and - q_dot K q_dot: each a displacement and a rotation. Of a second-order body,
-    its shapes."""
+    """w.six of marker k and, of a second-order body, its shapes."""
     b, six = markers.body[k], w.six
     n, normal = where[b, N], where[b, NORMAL]
     q, qd = part(x, where[b, IN_X] + 7, n), part(v, where[b, IN_V] + 6, n)
     if markers.second[k, IN_BENDING] >= 0:
         bend_marker(markers, w, k, n, normal, q, qd)
-        return (
-            ((six[0, 0], six[0, 1], six[0, 2]), (six[0, 3], six[0, 4], six[0, 5])),
-            ((six[1, 0], six[1, 1], six[1, 2]), (six[1, 3], six[1, 4], six[1, 5])),
-            ((six[2, 0], six[2, 1], six[2, 2]), (six[2, 3], six[2, 4], six[2, 5])),
-        )
-    phi, zero = shapes(markers, w.phi, k, n), (0.0, 0.0, 0.0)
-    return elastic_motion(phi, normal, q, n), elastic_motion(phi, normal, qd, n), (zero, zero)
+    else:
+        phi = shapes(markers, w.phi, k, n)
+        moved, turned = elastic_motion(phi, normal, q, n)
+        rate, turning = elastic_motion(phi, normal, qd, n)
+        put_six(six, 0, moved, turned)
+        put_six(six, 1, rate, turning)
+        put_six(six, 2, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 @inlined
@@ -152,14 +142,17 @@ def update_marker(where, markers, w, x, v, k):
         put(w.r, k, u)
         put(w.u, k, u)
         return
-    i, j = where[b, IN_X], where[b, IN_V]
+    n, i, j, six = where[b, N], where[b, IN_X], where[b, IN_V], w.six
     A, omega, ud, udd = w.A[b], get(w.omega, b), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    put(w.spin, k, omega)
-    if where[b, N] > 0:
-        (moved, theta), (ud, rate), (udd, growth) = deform_marker(where, markers, w, x, v, k)
-        u = add(u, moved)
-        if markers.second[k, TURNS] > 0:
-            turn_marker(w, k, theta, rate, growth, omega)
+    if n > 0:
+        deform_marker(where, markers, w, x, v, k)
+        u = add(u, (six[0, 0], six[0, 1], six[0, 2]))
+        ud, udd = (six[1, 0], six[1, 1], six[1, 2]), (six[2, 0], six[2, 1], six[2, 2])
+    if n > 0 and markers.second[k, TURNS] > 0:
+        theta, rate = (six[0, 3], six[0, 4], six[0, 5]), (six[1, 3], six[1, 4], six[1, 5])
+        turn_marker(w, k, theta, rate, (six[2, 3], six[2, 4], six[2, 5]), omega)
+    else:
+        put(w.spin, k, omega)
     spin = cross(omega, u)
     put(w.u, k, u)
     put(w.r, k, add((x[i], x[i + 1], x[i + 2]), to_global(A, u)))

@@ -34,7 +34,7 @@ def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s, normal):
     copy(part(undeformed, n, n), r1)
     copy(part(undeformed, 2 * n, n), part(rP, turning * n, n))
     at = bodies.where[b, PP_PLAN]
-    contract(bodies.PP_dm, start, bodies.blocks, at, q, qd, w.sorted, undeformed, part(g, 0, 3 * n), l)
+    contract(bodies.PP_dm, start, bodies.blocks, at, q, qd, 3 * n, n, w.sorted, undeformed, part(g, 0, 3 * n), l)
     copy(part(w.H, 3 * e + normal * n, n), h)
     f = part(w.f, bodies.where[b, IN_V] + 6, n)
     omega2, damping = part(bodies.omega2, c, n), part(bodies.two_zeta_omega, c, n)

@@ -37,7 +37,7 @@ def flexible_terms(bodies, w, b, q, qd, omega, gravity, second, s):
     n, e, start, c = bodies.where[b, N], bodies.where[b, IN_Q], bodies.where[b, IN_PP_DM], bodies.where[b, IN_SHARED]
     g, l = part(w.g, 9 * w.terms[b], 9 * n), part(w.l, 3 * w.terms[b], 3 * n)  # noqa: E741
     rP, P = part(bodies.rP_dm, 9 * c, 9 * n), part(bodies.P_dm, 3 * c, 3 * n)
-    contract(bodies.PP_dm, start, bodies.blocks, bodies.where[b, PP_PLAN], q, qd, w.sorted, rP, g, l)
+    contract(bodies.PP_dm, start, bodies.blocks, bodies.where[b, PP_PLAN], q, qd, 9 * n, 3 * n, w.sorted, rP, g, l)
     copy(part(w.H, 3 * e, 3 * n), part(g, 6 * n, 3 * n))
     ox, oy, oz = omega
     xx, yy, zz = oy * oy + oz * oz, ox * ox + oz * oz, ox * ox + oy * oy

@@ -56,21 +56,21 @@ RIGID, ELASTIC = (0, 1, 2, 3, 4, 5), (0, 1, 2, 6, 7, 8)
 
 @inlined
 def prepare(bodies, markers, rows, pattern, bw, mw, rw):
-    """What depends on the elastic diagonal alone. Of second-order bodies nothing at markers does: their shapes change (see
-    `couple_joint`), and their P_dm vanishes."""
+    """What depends on the elastic diagonal alone. Of second-order bodies the shapes at markers do not: see `couple_joint`."""
     where = bodies.where
     for b in range(bodies.mass.size):
         prepare_body(bodies, bw, b)
     for k in markers.joint:
         b = markers.body[k]
         n, shared = where[b, N], where[b, IN_SHARED]
-        if n > 0 and markers.second[k, IN_BENDING] < 0:
+        if n > 0:
             P_dm, dinv = part(bodies.P_dm, 3 * shared, 3 * n), part(bw.dinv, shared, n)
             prepare_marker(shapes(markers, mw.phi, k, n), P_dm, dinv, n, where[b, NORMAL], rw.P[k])
     for number in range(pattern.sample.size):
         p = pattern.sample[number]
-        marker = rows.marker[pattern.pair[p, LATER], pattern.pair[p, LATER_SIDE]]
-        if where[pattern.pair_body[p], N] > 0 and markers.second[marker, IN_BENDING] < 0:
+        b = pattern.pair_body[p]
+        n = where[b, N]
+        if n > 0:
             couple_elastic(bodies, markers, rows, pattern, bw, mw, rw, p)
 
 

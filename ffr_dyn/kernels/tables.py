@@ -47,12 +47,6 @@ OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED, NOT_CONVERGED, 
 LANES = 8  # rows of a joint side by side (see `ffr_dyn.kernels.simd.lanes`)
 STRIPS = 4  # rows of eight that products of a body are found in at a time
 
-# What the plan of a table in blocks begins with, and how many numbers it has of a block (see
-# `ffr_dyn.compile.symmetry_blocks`); loose products that are brought to their places at a time.
-BLOCKS, SORTED, LOOSE, LATE, EARLY, SPACE, HEAD = range(7)
-BLOCK_SIZE = 4
-AT_ONCE = 4
-
 # Which markers are brought up to date: those that joints or loads use, those of joints, all.
 IN_USE, OF_JOINTS, ALL = 0, 1, 2
 
@@ -107,7 +101,7 @@ class Markers(NamedTuple):
     start: I1  # (M,) in phi
     second: I2  # (M, 4) by the columns above
     # pooled; per marker of a second-order body the rows of phi that bend, and over q_i those of -K, in blocks: in space the
-    # first COUNT of the six, three or all, in the plane displacements in it and the rotation across
+    # first COUNT of the six, in the plane displacements in it and the rotation across
     bending: F1
     blocks: I1  # pooled; how they are stored
     active: I1  # markers that joints or loads use, updated at every evaluation
@@ -227,6 +221,7 @@ class MarkerWork(NamedTuple):
     spin: F2  # (M, 3) angular velocity, body axes
     turning: F2  # (M, 3) quadratic velocity part of the angular acceleration, body axes
     six: F2  # (3, 6) scratch: elastic motion, rate, quadratic velocity part of the second derivative
+    bent: F1  # scratch of one marker: rows at q, and their rates
     sorted: F1  # scratch of products by blocks
 
 

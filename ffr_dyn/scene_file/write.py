@@ -194,6 +194,8 @@ def _particular(analysis: OverTime | OfMoment) -> dict[str, Any]:
     hints, entry = get_type_hints(type(analysis)), {}
     for f in fields(analysis):
         value = getattr(analysis, f.name)
+        if isinstance(f.default, str) and value == f.default:
+            continue
         if names_key := f.metadata.get("names"):
             names = tuple(item for item in value if isinstance(item, str))
             others = tuple(item for item in value if not isinstance(item, str))

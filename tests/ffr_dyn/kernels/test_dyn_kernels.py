@@ -21,7 +21,7 @@ from ffr_dyn.functions.rotation import G_bar, rotation_matrix, skew
 from ffr_dyn.functions.time_functions import evaluate, harmonic, polynomial, table
 from ffr_dyn.integrators import RK4
 from ffr_dyn.kernels.functions import evaluate_functions
-from ffr_dyn.kernels.tables import BLOCKS, EARLY, HEAD, LANES, LATE, LOOSE, OK, SORTED, SPACE, Functions
+from ffr_dyn.kernels.tables import LANES, OK, Functions
 from ffr_dyn.scene.drivers import Driver, PointDriver
 from ffr_dyn.scene.joints import KINDS, Joint
 from ffr_dyn.scene.scene import Body, Scene
@@ -190,7 +190,7 @@ def test_a_symmetric_body_is_computed_in_blocks_and_equals_its_twin(planes, bloc
         gravity=(0.5, -9.81, 0.2),
     )
     system = compile_scene(scene)
-    assert system.model.bodies.blocks[BLOCKS] == blocks
+    assert system.model.bodies.blocks[0] == 2 * blocks  # those that are multiplied by q_dot, too, apart
     assert system.model.bodies.PP_dm.size < 0.6 * 9 * 24**2
     x, v = random_state(scene)
     engine = new_engine(system, x, v)
@@ -201,24 +201,20 @@ def test_a_symmetric_body_is_computed_in_blocks_and_equals_its_twin(planes, bloc
 
 
 def products_by_plan(pool, plan, q, q_dot, count, last):
-    """sum_i q_i table_i of all components, and sum_i q_dot_i of the last, from their blocks, as `products` finds them."""
-    n, early, space, at = q.size, plan[EARLY], plan[SPACE], 0
-    blocks, rest = np.split(plan[HEAD:], [4 * plan[BLOCKS]])
-    order, rest = np.split(rest, [n]) if plan[SORTED] else (np.arange(n), rest)
-    places, pairs = np.split(rest, [rest.size - 2 * plan[LOOSE]])
-    y, yd, places, pairs = np.zeros(space), np.zeros(space - early), list(places), pairs.reshape(-1, 2)
-    for first, inputs, once, both in blocks.reshape(-1, 4):
-        mine = order[first : first + inputs]
-        block = pool[at : at + inputs * (once + both) * LANES].reshape(inputs, -1, LANES)
-        for strip in range(once + both):
-            place = places.pop(0)
-            y[place : place + LANES] = q[mine] @ block[:, strip]
-            if strip >= once:
-                yd[place - early : place - early + LANES] = q_dot[mine] @ block[:, strip]
-        at += block.size
-    late = pairs[len(pairs) - plan[LATE] :] - early
-    y[pairs[:, 0]], yd[late[:, 0]] = y[pairs[:, 1]], yd[late[:, 1]]
-    return y[:count], yd[:last]
+    """sum_i q_i table_i of all components, and sum_i q_dot_i of the last, from their blocks, as `contract` finds them."""
+    n, (number, given, early) = q.size, plan[:3]
+    blocks = plan[3 : 3 + 4 * number].reshape(-1, 4)
+    order, place, late_place = (
+        np.split(plan[3 + 4 * number :], [n, n + count]) if not given else (np.arange(n), None, None)
+    )
+    found, late, at = np.zeros(count + 1), np.zeros(last + 1), 0
+    for first, inputs, out, width in blocks:
+        block = pool[at : at + inputs * width].reshape(inputs, width)
+        found[out : out + width] = q[order][first : first + inputs] @ block
+        if out >= early:
+            late[out - early : out - early + width] = q_dot[order][first : first + inputs] @ block
+        at += inputs * width
+    return (found[:-1], late[:-1]) if given else (found[place], late[late_place])
 
 
 @pytest.mark.parametrize("mixed", [True, False])
@@ -236,7 +232,7 @@ def test_blocks_give_the_products_of_the_whole_table(mixed):
     table[:, :4] += np.swapaxes(table[:, :4], 0, 2)
     table[:, 4:] -= np.swapaxes(table[:, 4:], 0, 2)
     pool, plan = in_blocks(table, 2, np.full(6, 1e-9))
-    assert plan[SORTED] == mixed
+    assert plan[1] == (not mixed)
     assert pool.size < 0.3 * table.size
     q, q_dot = rng.normal(size=(2, n))
     kept = np.where(np.abs(table) < 1e-9, 0.0, table)
@@ -257,8 +253,8 @@ def test_tables_lie_at_the_starts_of_cache_lines():
 def test_a_body_without_symmetry_and_one_of_few_modes_are_one_block():
     for body in (cloud(20), mirrored(8, 2)):
         bodies = compile_scene(Scene(bodies=(Body("one", body),))).model.bodies
-        assert bodies.blocks[BLOCKS] == 1
-        assert bodies.PP_dm.size == body.n * LANES * sum(-(-rows * body.n // LANES) for rows in (6, 3))
+        assert bodies.blocks[0] == 2
+        assert bodies.PP_dm.size == 9 * body.n**2 + LANES
 
 
 def test_equal_bodies_share_what_they_have_by_coordinate_unless_their_damping_differs():

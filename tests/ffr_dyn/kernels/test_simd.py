@@ -149,22 +149,21 @@ def test_sides_are_eliminated_and_coupled(flexible, plane):
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 32])
-@pytest.mark.parametrize("strips", [1, 2, 3, 4, 5, 9, 13])
-def test_products_of_a_table(count, strips):
-    rng = np.random.default_rng(count * strips)
-    table, x, xd = rng.normal(size=(count, strips, LANES)), *rng.normal(size=(2, count + 1))
-    places = 3 + LANES * rng.permutation(strips)
+@pytest.mark.parametrize("width", [1, 8, 24, 33, 72, 100])
+def test_products_of_a_table(count, width):
+    rng = np.random.default_rng(count * width)
+    table, x, xd = rng.normal(size=(count, width)), *rng.normal(size=(2, count + 1))
 
     @compiled
-    def run(count, strips, table, x, xd, alone, y, yd, plan):
-        multiply(count, strips, LANES * strips, table, 2, x, 1, alone, plan, 1)
-        multiply_both(count, strips, LANES * strips, table, 2, x, xd, 1, y, yd, 3, plan, 1)
+    def run(count, width, table, x, xd, alone, y, yd):
+        multiply(count, width, table, 2, x, 1, alone, 3)
+        multiply_both(count, width, table, 2, x, xd, 1, y, yd, 1, 2)
 
-    alone, y, yd = np.zeros((3, LANES * strips + 3))
-    run(count, strips, np.append([0.0, 0.0], table), x, xd, alone, y, yd, np.append([0], places))
-    for strip, place in enumerate(places):
-        for found, factors, at in ((alone, x, place), (y, x, place), (yd, xd, place - 3)):
-            np.testing.assert_allclose(found[at : at + LANES], factors[1:] @ table[:, strip], rtol=1e-12, atol=1e-13)
+    alone, y, yd = np.zeros((3, width + 2 * LANES))
+    run(count, width, np.concatenate([[0.0, 0.0], table.ravel(), np.zeros(LANES)]), x, xd, alone, y, yd)
+    np.testing.assert_allclose(alone[3 : 3 + width], x[1:] @ table, rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(y[1 : 1 + width], x[1:] @ table, rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(yd[2 : 2 + width], xd[1:] @ table, rtol=1e-12, atol=1e-13)
 
 
 # ---- another numba -----------------------------------------------------------------------------------------------------

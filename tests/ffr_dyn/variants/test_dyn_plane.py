@@ -313,7 +313,7 @@ def test_bores_a_hair_off_are_in_the_plane(plane, beside):
                 Joint("b", "revolute", "top.b", "right.b"),
                 Joint("p", "revolute", "ground.P", "right.a"),
             ),
-            (Driver("motor", "o", polynomial(0.0, 1.0)),),
+            (Driver("motor", "o", polynomial(np.pi / 2, 1.0)),),
             ground={"O": (0, 0, 0), "P": (1, 0, side[4])},
             gravity=(0, -9.81, 0),
             **changes,

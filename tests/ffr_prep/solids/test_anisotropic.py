@@ -210,7 +210,7 @@ def test_a_matrix_from_a_file(tmp_path):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (None, "cannot be read"),
+        (None, "does not exist"),
         ("E1 = 1e9\nrho = 1000", "'E2' missing"),
         ("elasticity = [[1]]\nrho = 1000\nE = 1", "unknown 'E'"),
         ("E = [1]\nnu = 0.3\nrho = 1000", "cannot be read"),
