@@ -17,7 +17,7 @@ from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency import failure as failing
 from ffr_dyn.consistency.assemble import Assembled, assemble
-from ffr_dyn.consistency.doubts import BALANCE, SINGULAR, Seen, ended, held, look, nothing_seen
+from ffr_dyn.consistency.doubts import BALANCE, SINGULAR, Seen, between_rows, ended, held, look, nothing_seen
 from ffr_dyn.consistency.following import STALLED, Lost, jumped, lost_driver, unfollowed
 from ffr_dyn.consistency.validity import meaningless
 from ffr_dyn.functions.stopwatch import Stopwatch
@@ -238,7 +238,7 @@ def _advance(
             status = fill_rows(run.engine, chunk, start, substeps // looks)
         filled = int(steps[FILLED]) - int(steps[FILLED]) % looks
         reached_rows = Record(*(column[: steps[FILLED]] for column in chunk))
-        lost = None if method.controlled else unfollowed(system, run.engine.work, method.step, reached_rows)
+        lost = None if method.controlled else unfollowed(run.engine.system, run.engine.work, method.step, reached_rows)
         if cause := _driver_lost(run, method, start, reached_rows, status, lost):
             raise ComputationError(cause)
         if filled:
@@ -275,7 +275,8 @@ def _driver_lost(run: _Run, method: Integrator, start: float, rows: Record, stat
         ahead = now if status == OK else now + run.energy.spacing
         return jumped(system, np.array([run.times[-1][-1], *rows.time, ahead]))
     if status != OK:
-        return lost_driver(system, now - method.step, now + method.step, STALLED)
+        early, late = now - method.step, now + method.step
+        return jumped(system, np.array([early, now, late])) or lost_driver(system, early, late, STALLED)
     if lost is None:
         return ""
     found = lost_driver(system, lost.time - method.step, lost.time)
@@ -448,7 +449,11 @@ def _account(run: _Run, notes: list[str]) -> dict[str, Any]:
             *ended(
                 "forward",
                 run.seen,
-                {SINGULAR: _singular(run.engine.work, run.energy.spacing), BALANCE: run.energy.amiss()},
+                {
+                    SINGULAR: _singular(run.engine.work, run.energy.spacing),
+                    BALANCE: run.energy.amiss(),
+                    **between_rows(run.seen, run.engine.system, run.engine.work, new_record(run.engine.system, 0)),
+                },
             ),
         ],
     }

@@ -87,14 +87,14 @@ def _involved(scene: Scene, blocks: list[Block], dependent: set[int]) -> list[in
     """
     table = markers(scene)
     pairs = [frozenset(moving_bodies(block, table, len(scene.bodies))) for block in blocks]
-    left = set(range(len(blocks)))
+    left, tied = set(range(len(blocks))), {pairs[k] for k in dependent}
     while True:
         touching: dict[int, set[frozenset[int]]] = {}
         for k in left:
             for body in pairs[k]:
                 touching.setdefault(body, set()).add(pairs[k])
         ends = set[frozenset[int]]().union(*(those for those in touching.values() if len(those) == 1))
-        hanging = {k for k in left if pairs[k] in ends} - dependent
+        hanging = {k for k in left if pairs[k] in ends - tied}
         if not hanging:
             break
         left -= hanging

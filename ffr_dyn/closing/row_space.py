@@ -66,6 +66,8 @@ def independent(A: csr_array) -> bool:
 
 def smallest_solution(A: csr_array, target: Array) -> Array:
     """(V,) the smallest z with A z = target (C,), by least squares where there is none."""
+    if not A.shape[0]:
+        return np.zeros(A.shape[1])
     rows, length = _unit_rows(A)
     factor, wanted = _factor(rows), target / length
     y, left, before = np.zeros_like(wanted), wanted, np.inf

@@ -18,7 +18,7 @@ from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 
 LOST = 0.1  # rad, or of the size of the largest body, that a row may open by within a step
-SPUN = 2.0  # rad that a body may turn by within one
+SPUN = 2.0  # rad that a body of a driven scene may turn by within one: rates that rows of results happen to see
 FAST = 0.3  # rad, or of that size, that a driver may move by within a step that is not followed
 STALLED = 1.0  # the same within two steps, of which one has failed
 SAMPLES = 65  # of a driver within a step
@@ -39,14 +39,15 @@ def unfollowed(system: System, work: Work, step: float, rows: Record) -> Lost | 
     opened, time = float(work.drift[PHI]), float(work.drift[MOMENT])
     block, word = row_named(system, int(work.drift[OPENED])) if opened > 0 else (None, None)
     if block is not None and word is not None and not opened <= LOST * _whole(system.scene, word):
+        how = f"{'not followed, ' * block.driver}open by {opened:.3g} {_unit(word)} at the end of a step"
         text = (
-            f"at t = {time:.6g} s {_called(block)} is open by {opened:.3g} {_unit(word)} at the end of a step: the motion "
+            f"at t = {time:.6g} s {_called(block)} is {how}: the motion "
             f"between the steps is more than the method follows; use steps far shorter than {step:.3g} s"
         )
         return Lost(time, text)
     for b, body in enumerate(system.scene.bodies):
         spins = np.linalg.norm(rows.v[:, system.layout.omega(b)], axis=1)
-        if step * spins.max(initial=0.0) > SPUN:
+        if system.scene.drivers and step * spins.max(initial=0.0) > SPUN:
             time, spin = float(rows.time[np.argmax(spins)]), float(spins.max())
             text = (
                 f"at t = {time:.6g} s body {body.name!r} turns by {step * spin:.3g} rad within a step of {step:.3g} s: the "

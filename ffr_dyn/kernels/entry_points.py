@@ -77,6 +77,7 @@ from ffr_dyn.kernels.tables import (
 from ffr_dyn.kernels.vectors import add_scaled, copy, fill
 
 PASSES = 10  # at most, where rows depend on one another
+GROSS = 1.0  # m, -: of a violation that no projection puts right
 UNMET = 1e3  # tolerances, beyond which a violation that the projection does not take back is no drift
 
 
@@ -416,9 +417,11 @@ def step(r: Tables, t: float, again: int) -> int:
 def close_row(r: Tables, t: float) -> int:
     """Bring the state at a row of results onto the constraints, as the next step would do."""
     status, tolerance = OK, r.clock.gains[TOLERANCE]
+    if r.work.diagonal[0] < 0.0:
+        set_diagonal(r, 0.0)  # a row may come before the first step
     if tolerance > 0.0:
         status = evaluate_rows_at(r, t, r.x, r.v)
-        if status == OK and largest(r.work.rows.Phi) > tolerance:
+        if status == OK and tolerance < largest(r.work.rows.Phi) < GROSS:
             status = stabilise(r, t, r.x, r.v)
     return status
 
