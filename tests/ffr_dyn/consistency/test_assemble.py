@@ -64,7 +64,7 @@ def welded(**axes) -> Scene:
     return Scene(
         (
             Body("a", bar("a", 1.0), rotation=slant),
-            Body("b", bar("b", 1.0), position=tip + [0.0, 0.01, 0.0], rotation=across),
+            Body("b", bar("b", 1.0), position=tip + np.array([0.0, 0.01, 0.0]), rotation=across),
         ),
         (Joint("clamp", "fixed", "ground.O", "a.a", **axes), Joint("weld", "fixed", "a.b", "b.a", **axes)),
         ground={"O": (0, 0, 0)},
