@@ -1,8 +1,8 @@
 """Driven angles on their own branch.
 
-The row of a driven angle, (-sin alpha f_i + cos alpha g_i) . f_j = 0, holds half a turn away as well. So where an angle is
-drawn far from its driver's value it is led there step by step, as a continuation in that value, with all joints closed
-(Allgower & Georg, Numerical Continuation Methods, 1990, ch. 2); and at the end it is looked at on which side f_j stands.
+Newton's method from far away may end anywhere, or nowhere. So where an angle is drawn far from its driver's value it is led
+there step by step, as a continuation in that value, with all joints closed (Allgower & Georg, Numerical Continuation Methods,
+1990, ch. 2): the shorter way round, and where that is blocked the other.
 """
 
 from __future__ import annotations
@@ -28,11 +28,10 @@ TURN = 2 * np.pi
 
 @dataclass(frozen=True)
 class DrivenAngle:
-    """Of a driver's word: its block and number there, its value, and how far on the joint has to turn [rad]."""
+    """Of a driver's word: its block and number there, its value and how far on the joint has to turn [rad]."""
 
     block: int
     word: int
-    name: str
     value: float
     left: float
 
@@ -46,7 +45,7 @@ def driven_angles(scene: Scene, place: Layout, blocks: list[Block], x: Array, ti
                 f, g = (now.axis(block.markers[0], word.axes[k]).r for k in (0, 1))
                 f_j, value = now.axis(block.markers[1], word.axes[2]).r, drive_of(word, time)[0]
                 left = value - float(np.arctan2(g @ f_j, f @ f_j))
-                found.append(DrivenAngle(at, number, block.name, value, left - TURN * round(left / TURN)))
+                found.append(DrivenAngle(at, number, value, left - TURN * round(left / TURN)))
     return found
 
 
@@ -58,15 +57,13 @@ def led_to_drivers(
     time: float,
     close: Callable[[list[Block], Array], Array],
 ) -> Array:
-    """`close(blocks, x)`, the positions that meet all rows, with driven angles on their side; x where they are drawn.
+    """`close(blocks, x)`, positions that meet all rows, in steps where driven angles at x are far from their drivers' values.
 
-    Raises InputError for a driver whose angle cannot be reached, and what `close` raises.
+    Raises what `close` does.
     """
     angles = driven_angles(scene, place, blocks, x, time)
     if all(abs(angle.left) <= FAR for angle in angles):
-        found = close(blocks, x)
-        if not _off(driven_angles(scene, place, blocks, found, time)):
-            return found
+        return close(blocks, x)
     errors = []
     for way in _ways(angles):
         found, count = x, int(np.ceil(max(abs(left) for left in way) / STEP))
@@ -75,15 +72,8 @@ def led_to_drivers(
                 found = close(_driven_to(blocks, angles, [(k / count - 1.0) * left for left in way]), found)
         except InputError as error:
             errors.append(error)
-            continue
-        if not (off := _off(driven_angles(scene, place, blocks, found, time))):
+        else:
             return found
-        errors.append(
-            InputError(
-                f"the mechanism cannot be assembled: driver {off[0].name!r} asks for an angle of {off[0].value:.4g} rad, "
-                "which its joint does not reach from where it is drawn; draw the bodies near that angle"
-            )
-        )
     raise errors[0]
 
 
@@ -103,8 +93,3 @@ def _driven_to(blocks: list[Block], angles: list[DrivenAngle], off: list[float])
         words[angle.word] = replace(words[angle.word], function=constant(angle.value + less))
         out[angle.block] = replace(out[angle.block], words=tuple(words))
     return out
-
-
-def _off(angles: list[DrivenAngle]) -> list[DrivenAngle]:
-    """Those on the wrong side."""
-    return [angle for angle in angles if not abs(angle.left) < np.pi / 2]
