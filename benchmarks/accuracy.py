@@ -27,8 +27,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from ffr_gallery.scene_set import CASES, Case
 
-from ffr_dyn.analyses.forward import DRIVING, PLACES
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.forward import DRIVING, PLACES, forward
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.step_error import largest_difference, ranges

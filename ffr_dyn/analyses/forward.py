@@ -220,7 +220,8 @@ def _told(runs: _Runs, trial: _Trial, earlier: Sequence[_Trial] = ()) -> _Trial:
 
 def _other(runs: _Runs, trial: _Trial, known: Mapping[int, Result]) -> tuple[Result, float]:
     """The run with another step, and the ratio of the steps: a longer step that was tried, or about twice the step, where
-    elastic forces are implicit and that is a part of a row, half of it otherwise; a tenth of the tolerance of a method that chooses its steps."""
+    elastic forces are implicit and that is a part of a row, half of it otherwise; a tenth of the tolerance of a method that
+    chooses its steps."""
     method: Any = trial.method
     if method.controlled:
         tolerances = replace(method.tolerances, relative=method.tolerances.relative / 10)
