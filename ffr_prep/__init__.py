@@ -45,8 +45,9 @@ _BY_MODULE = {
     "ffr_prep.matrices.part": "from_matrices",
     "ffr_prep.matrices.readers": "read_matrices",
     "ffr_prep.matrices.skfem_model": "from_skfem",
-    "ffr_prep.mesh.face_files": "faces found_faces",
-    "ffr_prep.mesh.faces": "Face Faces",
+    "ffr_prep.mesh.geometry.face_files": "faces found_faces",
+    "ffr_prep.mesh.geometry.face": "Face",
+    "ffr_prep.mesh.geometry.faces": "Faces",
     "ffr_prep.mesh.file_mesh": "FileMesh",
     "ffr_prep.mesh.formats": "register_mesh_format MeshFormat",
     "ffr_prep.mesh.mesh": "Block Mesh check_mesh read_mesh",
@@ -115,8 +116,9 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_prep.matrices.part import from_matrices as from_matrices
     from ffr_prep.matrices.readers import read_matrices as read_matrices
     from ffr_prep.matrices.skfem_model import from_skfem as from_skfem
-    from ffr_prep.mesh.face_files import faces as faces, found_faces as found_faces
-    from ffr_prep.mesh.faces import Face as Face, Faces as Faces
+    from ffr_prep.mesh.geometry.face_files import faces as faces, found_faces as found_faces
+    from ffr_prep.mesh.geometry.face import Face as Face
+    from ffr_prep.mesh.geometry.faces import Faces as Faces
     from ffr_prep.mesh.file_mesh import FileMesh as FileMesh
     from ffr_prep.mesh.formats import register_mesh_format as register_mesh_format, MeshFormat as MeshFormat
     from ffr_prep.mesh.mesh import Block as Block, Mesh as Mesh, check_mesh as check_mesh, read_mesh as read_mesh

@@ -70,7 +70,7 @@ def faces_command(
     PART is a CAD file (.step, .iges, .brep), a script of gmsh (.geo), or a mesh, on whose skin planes, cylinders and spheres
     are recognised. A bore that is several faces is one line.
     """
-    from ffr_prep.mesh.face_files import faces, found_faces
+    from ffr_prep.mesh.geometry.face_files import faces, found_faces
     from ffr_prep.report.faces import face_lines, face_picture, face_values
 
     for option, output in (("--picture", picture), ("--page", page)):

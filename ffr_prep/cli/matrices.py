@@ -126,7 +126,7 @@ def _place(text: str, words: Sequence[str]) -> list[float]:
 def _drawn(model: MatrixModel, surface: Path) -> MatrixModel:
     """The model with the boundary of a mesh to draw."""
     from ffr_prep.matrices.model import with_surface
-    from ffr_prep.mesh.faces import METRES
+    from ffr_prep.mesh.geometry.face import METRES
     from ffr_prep.mesh.mesh import read_mesh, surface_triangles
 
     length = model.source["units"].partition("-")[0]

@@ -101,7 +101,7 @@ def material_of(texts: Sequence[str]) -> Solid | Mapping[str, Solid]:
 
 def interface_of(text: str) -> InterfaceRegion:
     """NAME[=REGION][:rigid|mean][@x,y,z]."""
-    from ffr_prep.mesh.region_words import is_query
+    from ffr_prep.mesh.geometry.region_words import is_query
     from ffr_prep.model.coupled import InterfaceRegion
 
     parts = re.fullmatch(r"([^=:@]+)(?:=(.+?))?(?::(\w+))?(?:@([^@]+))?", text)

@@ -17,7 +17,7 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.matrices.nodal_inertia import DofMap
 from ffr_prep.matrices.unit_systems import UnitSystem
-from ffr_prep.mesh.node_regions import nodes_of_region
+from ffr_prep.mesh.geometry.node_regions import nodes_of_region
 
 _FAR = 1e100  # m; squares of coordinates must be finite
 _SAME_PLACE = 1e-6

@@ -26,7 +26,7 @@ from ffr_prep.mesh import gmsh_process
 from ffr_prep.mesh.cells import node_order
 from ffr_prep.mesh.file_mesh import DrawnFace, FileMesh, FileSkin, FileSolid, supported_kind
 from ffr_prep.mesh.formats import MOST_ELEMENTS
-from ffr_prep.mesh.step_text import face_labels, length_unit
+from ffr_prep.mesh.geometry.step_text import face_labels, length_unit
 from ffr_prep.mesh.time_limit import limit
 
 CAD_UNITS = {"m": "M", "cm": "CM", "mm": "MM", "in": "INCH"}

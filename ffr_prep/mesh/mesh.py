@@ -23,10 +23,10 @@ from ffr_prep.common.reading import check_ordinary, reading
 from ffr_prep.common.registry import choice, loaded
 from ffr_prep.mesh.boundary import groups_of_whole_faces, joined_by_faces, joined_by_nodes, outer_faces
 from ffr_prep.mesh.cells import FACE_TRIANGLES, KINDS, face_corners
-from ffr_prep.mesh.drawn import face_of
-from ffr_prep.mesh.faces import METRES, Face
 from ffr_prep.mesh.file_mesh import DrawnFace, FileMesh
 from ffr_prep.mesh.formats import MOST_ELEMENTS, format_of
+from ffr_prep.mesh.geometry.drawn import face_of
+from ffr_prep.mesh.geometry.face import METRES, Face
 
 _CHUNK = 4096
 _DEGENERATE = 1e-10

@@ -12,14 +12,15 @@ from ffr_prep.body import FlexibleBody, Surface, rigid_body
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import reading
-from ffr_prep.mesh.face_files import skin_faces
-from ffr_prep.mesh.faces import METRES, Faces
 from ffr_prep.mesh.file_mesh import FileSolid
 from ffr_prep.mesh.formats import format_of
+from ffr_prep.mesh.geometry.face import METRES
+from ffr_prep.mesh.geometry.face_files import skin_faces
+from ffr_prep.mesh.geometry.faces import Faces
+from ffr_prep.mesh.geometry.regions import found
+from ffr_prep.mesh.geometry.skin import mesh_faces
 from ffr_prep.mesh.gmsh_files import skin_from_gmsh
 from ffr_prep.mesh.mesh import Mesh, cad_settings, check_mesh, check_request, read_mesh
-from ffr_prep.mesh.regions import found
-from ffr_prep.mesh.skin import mesh_faces
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.invariants import inertia_integrals
 from ffr_prep.model.material import Material

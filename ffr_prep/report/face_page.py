@@ -16,8 +16,8 @@ import numpy as np
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.outputs import replacing
-from ffr_prep.mesh.faces import Faces, feature_in_words
-from ffr_prep.mesh.regions import query_for
+from ffr_prep.mesh.geometry.faces import Faces, feature_in_words
+from ffr_prep.mesh.geometry.regions import query_for
 
 
 def face_page(faces: Faces, path: str | Path, title: str = "faces") -> Path:

@@ -13,8 +13,9 @@ from scipy import ndimage
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import numbers
-from ffr_prep.mesh.faces import METRES, Face, Faces, feature_centre, surface_in_words, tidy
-from ffr_prep.mesh.regions import query_for
+from ffr_prep.mesh.geometry.face import METRES, Face
+from ffr_prep.mesh.geometry.faces import Faces, feature_centre, surface_in_words, tidy
+from ffr_prep.mesh.geometry.regions import query_for
 from ffr_prep.report.mode_pictures import Camera, camera_of, draw_triad, off_screen, save_figure, shot
 
 _SMALLEST = 60  # pixels of a face that is numbered

@@ -12,8 +12,8 @@ from ffr_prep.body.provenance import described
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.progress import Stages, no_stages
+from ffr_prep.mesh.geometry.skin import region_faces, with_regions
 from ffr_prep.mesh.mesh import Mesh, check_mesh, mesh_hash
-from ffr_prep.mesh.skin import region_faces, with_regions
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
 from ffr_prep.model.invariants import inertia_integrals
 from ffr_prep.model.model import Model
@@ -36,7 +36,7 @@ def from_mesh(
     """The model of a meshed solid, ready to be reduced or to be tied to others.
 
     material   : one, or one for each volume group
-    interfaces : at face or node groups of the mesh, or at faces found by what they are (`ffr_prep.mesh.region_words`)
+    interfaces : at groups of the mesh, or at faces found by what they are (`ffr_prep.mesh.geometry.region_words`)
     progress   : called with the name of each stage as it begins
 
     Raises InputError for input that cannot be used.

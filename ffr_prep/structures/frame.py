@@ -18,7 +18,7 @@ from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.common.reading import check_count
-from ffr_prep.mesh.node_regions import nodes_of_region
+from ffr_prep.mesh.geometry.node_regions import nodes_of_region
 from ffr_prep.model.material import Material, check_isotropic
 from ffr_prep.structures.sections import Section
 

@@ -11,7 +11,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.common.registry import choice
-from ffr_prep.mesh.faces import METRES
+from ffr_prep.mesh.geometry.face import METRES
 from ffr_prep.mesh.gmsh_files import LinesAndFaces, lines_and_faces
 from ffr_prep.mesh.mesh import check_request
 from ffr_prep.structures.frame import Frame, Member, Shell

@@ -13,12 +13,12 @@ from places import MESHES, REFERENCE
 
 import ffr_prep as fp
 from ffr_prep.common.errors import InputError
-from ffr_prep.mesh.faces import feature_centre
+from ffr_prep.mesh.geometry.faces import feature_centre
+from ffr_prep.mesh.geometry.region_words import Names, Query, parsed
+from ffr_prep.mesh.geometry.regions import found, query_for
+from ffr_prep.mesh.geometry.skin import mesh_faces, with_regions
+from ffr_prep.mesh.geometry.step_text import face_labels
 from ffr_prep.mesh.mesh import check_mesh, read_mesh, region_nodes
-from ffr_prep.mesh.region_words import Names, Query, parsed
-from ffr_prep.mesh.regions import found, query_for
-from ffr_prep.mesh.skin import mesh_faces, with_regions
-from ffr_prep.mesh.step_text import face_labels
 from ffr_prep.structures.frame import group_nodes
 
 PLATE = REFERENCE / "plate.step"  # four bores, by CadQuery

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,9 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ffr_prep.common.arrays import Array
-
-if TYPE_CHECKING:
-    from ffr_prep.mesh.faces import Face
+from ffr_prep.mesh.geometry.face import Face
 
 _ANGLE = 1e-3  # within which directions are the same [rad]
 _NOWHERE = np.full(3, np.nan)

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from ffr_prep.common.arrays import Array
-from ffr_prep.mesh.faces import Face, measures, normals_of, oriented_axis, with_side
+from ffr_prep.mesh.geometry.face import Face
+from ffr_prep.mesh.geometry.faces import measures, normals_of, oriented_axis, with_side
 
 _TILT, _STEPS = 0.05, 8  # of normals of chords towards the axis of a cylinder, squared; of the fit
 

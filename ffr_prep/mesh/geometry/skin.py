@@ -21,11 +21,12 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.boundary import groups_of_whole_faces
 from ffr_prep.mesh.cells import face_corners
-from ffr_prep.mesh.faces import Face, Faces, measures
-from ffr_prep.mesh.fits import recognised
+from ffr_prep.mesh.geometry.face import Face
+from ffr_prep.mesh.geometry.faces import Faces, measures
+from ffr_prep.mesh.geometry.fits import recognised
+from ffr_prep.mesh.geometry.region_words import Names, parsed
+from ffr_prep.mesh.geometry.regions import found, names_of
 from ffr_prep.mesh.mesh import Mesh, boundary_faces, facet_triangles, region_nodes
-from ffr_prep.mesh.region_words import Names, parsed
-from ffr_prep.mesh.regions import found, names_of
 
 _SHARP = np.cos(np.radians(35.0))  # of normals across an edge: twelve elements to the turn are not sharp
 _FLAT = 1e-6  # of 1 - cos, between facets of a plane

@@ -25,7 +25,7 @@ import re
 from dataclasses import dataclass
 
 from ffr_prep.common.errors import InputError
-from ffr_prep.mesh.faces import METRES
+from ffr_prep.mesh.geometry.face import METRES
 
 WORDS = ("plane", "bore", "cylinder", "cone", "sphere", "torus", "face")
 EXAMPLES = "cylinder r=6mm at 0,0,0 | plane z=0 | nearest 10,0,5 | surface_1+surface_2 | surface_1..4 | bore*"

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ffr_prep.common.arrays import Array
-from ffr_prep.mesh.faces import Faces
-from ffr_prep.mesh.region_words import Query
+from ffr_prep.mesh.geometry.faces import Faces
+from ffr_prep.mesh.geometry.region_words import Query
 
 _SAME, _TYPED = 1e-4, 1e-5  # within which a radius and a place that were typed are met, relatively
 _TURNED = 1e-3  # the same of directions [rad]

@@ -9,14 +9,15 @@ import numpy as np
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.reading import reading
-from ffr_prep.mesh.drawn import face_of
-from ffr_prep.mesh.faces import METRES, Faces
 from ffr_prep.mesh.file_mesh import FileSkin
 from ffr_prep.mesh.formats import format_of
+from ffr_prep.mesh.geometry.drawn import face_of
+from ffr_prep.mesh.geometry.face import METRES
+from ffr_prep.mesh.geometry.faces import Faces
+from ffr_prep.mesh.geometry.regions import found
+from ffr_prep.mesh.geometry.skin import mesh_faces
 from ffr_prep.mesh.gmsh_files import skin_from_gmsh
 from ffr_prep.mesh.mesh import cad_settings, check_request, doubtful_unit, facet_triangles, read_mesh
-from ffr_prep.mesh.regions import found
-from ffr_prep.mesh.skin import mesh_faces
 
 _RAY = np.array([0.5773, 0.2113, 0.7887]) / np.linalg.norm([0.5773, 0.2113, 0.7887])  # in no plane that a part may have
 _ITSELF = 1e-9  # of the size, within which a ray meets the triangle that it starts from

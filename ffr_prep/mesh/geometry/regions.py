@@ -1,4 +1,4 @@
-"""Which faces a region means (`ffr_prep.mesh.region_words` says what may be written)."""
+"""Which faces a region means (`ffr_prep.mesh.geometry.region_words` says what may be written)."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ import numpy as np
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.registry import choice
-from ffr_prep.mesh.faces import METRES, Face, Faces, feature_centre, feature_in_words, tidy
-from ffr_prep.mesh.misfits import across, fitting, kind_of, misfits, nearest, off_surface
-from ffr_prep.mesh.region_words import Names, Query, is_query, parsed
+from ffr_prep.mesh.geometry.face import METRES, Face
+from ffr_prep.mesh.geometry.faces import Faces, feature_centre, feature_in_words, tidy
+from ffr_prep.mesh.geometry.misfits import across, fitting, kind_of, misfits, nearest, off_surface
+from ffr_prep.mesh.geometry.region_words import Names, Query, is_query, parsed
 
 _SHOWN = 6
 

@@ -1,6 +1,6 @@
 """Which nodes a region means in a model that has nodes but no faces: frames, matrices from other programs.
 
-Names, sums, ranges and patterns are of groups of nodes; of the queries of `ffr_prep.mesh.region_words` there are
+Names, sums, ranges and patterns are of groups of nodes; of the queries of `ffr_prep.mesh.geometry.region_words` there are
 "nearest x,y,z", "plane z=0" (also "normal=... at ...") and "cylinder r=... axis=... at ...", which mean the nodes that lie
 there. Numbers without a unit are metres.
 """
@@ -15,7 +15,7 @@ import numpy as np
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.registry import choice
-from ffr_prep.mesh.region_words import Names, Query, parsed
+from ffr_prep.mesh.geometry.region_words import Names, Query, parsed
 
 _ON = 1e-5  # how far nodes may lie off, of the size of the model
 

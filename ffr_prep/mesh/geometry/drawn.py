@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from ffr_prep.common.arrays import Array
-from ffr_prep.mesh.faces import KINDS, Face, measures, oriented_axis, with_side
 from ffr_prep.mesh.file_mesh import DrawnFace
-from ffr_prep.mesh.fits import recognised
+from ffr_prep.mesh.geometry.face import KINDS, Face
+from ffr_prep.mesh.geometry.faces import measures, oriented_axis, with_side
+from ffr_prep.mesh.geometry.fits import recognised
 
 _EXACT = (
     1e-6  # of the size of a face, within which points of a free-form surface lie on a plane, a cylinder or a sphere

@@ -1,0 +1,1 @@
+"""The faces of parts: what they are, and how they are found by what they are."""
