@@ -90,7 +90,7 @@ def is_query(text: str) -> bool:
 def _term(text: str, unit: str) -> Query | Names:
     if is_query(text):
         return _query(text, unit)
-    found = re.fullmatch(r"(.*?)(\d+)\.\.(\d+)", text)
+    found = re.fullmatch(r"(.*?)(\d{1,9})\.\.(\d{1,9})", text)
     if found:
         first, last = int(found[2]), int(found[3])
         if not first <= last < first + 10_000:
