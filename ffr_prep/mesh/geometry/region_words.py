@@ -32,6 +32,7 @@ EXAMPLES = "cylinder r=6mm at 0,0,0 | plane z=0 | nearest 10,0,5 | surface_1+sur
 
 Point = tuple[float, float, float]
 
+_FAR = 1e9  # [m]
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _LENGTH = rf"{_NUMBER}\s*(?:mm|cm|m|in)?(?![\w.])"
 _POINT = rf"\(?\s*({_LENGTH})\s*,\s*({_LENGTH})\s*,\s*({_LENGTH})\s*\)?"
@@ -164,7 +165,10 @@ def _point(words: tuple[str, ...], unit: str) -> Point:
 def _length(text: str, unit: str) -> float:
     found = re.fullmatch(rf"({_NUMBER})\s*([a-z]*)", text.strip())
     assert found is not None  # it was matched as a length
-    return float(found[1]) * METRES[found[2] or unit]
+    length = float(found[1]) * METRES[found[2] or unit]
+    if not abs(length) < _FAR:
+        raise InputError(f"{text.strip()[:40]!r} is no length in a part; {_such()}")
+    return length
 
 
 def _such() -> str:

@@ -200,6 +200,7 @@ def test_pieces_of_one_cylinder_are_one_surface_and_near_takes_a_piece(parts):
         ("sphere r=3", "There is no sphere at all; there are: plane, cylinder"),
         ("nearest 0.01,0,1e5", "away from the body, whose size is 144.6 mm; numbers without a unit are mm"),
         ("nearest 0,0,0", "equally near"),
+        ("nearest 1e300,0,0", "'1e300' is no length in a part"),
         ("nearest 1,2", "write nearest x,y,z"),
         ("plane z=5 z=6", "says a second time"),
         ("plane here", "'here' is not understood; regions are such as"),
