@@ -76,11 +76,14 @@ class Solid:
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A body without a surface: the points (F, M, 3) [m] of its markers, and the pairs (E, 2) of them to be joined."""
+    """A body without a surface: the points (F, M, 3) [m] of its markers, and the pairs (E, 2) of them to be joined; its pose
+    R (F, 3) [m], A (F, 3, 3)."""
 
     name: str
     points: Array
     pairs: Array
+    R: Array
+    A: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,8 +206,7 @@ def film(
     Raises InputError for no rows, no body, an unknown marker, a scale, colour or limit that cannot be used, infinite
     values, and a colour by stress when no body has stress modes.
     """
-    if result.time.size == 0:
-        raise InputError("nothing to animate: the result has no rows")
+    _require_rows(result)
     return film_at(
         result,
         np.linspace(result.time[0], result.time[-1], frames),
@@ -225,6 +227,7 @@ def film_at(
     limit: float | None = None,
 ) -> Film:
     """As `film`, at the given times (F,) [s]."""
+    _require_rows(result)
     if not (scale == "auto" or (isinstance(scale, int | float) and 0 <= scale < math.inf)):
         raise InputError(f"scale is {scale!r}; it must be a number that is not negative, or 'auto'")
     if limit is not None and not 0 < limit < math.inf:
@@ -247,6 +250,11 @@ def film_at(
     deflection = max(deflections, default=0.0)
     shades = colouring(solids, len(times), colour, deflection, limit)
     return Film(times, solids, links, paths, factor, deflection, low, high, shades)
+
+
+def _require_rows(result: Result) -> None:
+    if result.time.size == 0:
+        raise InputError("nothing to animate: the result has no rows")
 
 
 # ---- colours ------------------------------------------------------------------------------------------------------
@@ -396,7 +404,8 @@ def _link(result: Result, name: str, times: Array) -> Link:
     if len(markers) < 2:
         histories.insert(0, result[f"{name}.R"])
     points = np.stack([_at(times, result.time, history, name) for history in histories], axis=1)
-    return Link(name, points, _spanning_tree(points[0]))
+    R = _at(times, result.time, result[f"{name}.R"], name)
+    return Link(name, points, _spanning_tree(points[0]), R, _rotations(times, result, name))
 
 
 def _spanning_tree(points: Array) -> Array:
