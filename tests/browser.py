@@ -82,7 +82,9 @@ class Page:
     def _note(self, event):
         kind, what = event.get("method"), event.get("params", {})
         if kind == "Runtime.exceptionThrown":
-            self.said.append(what["exceptionDetails"].get("exception", {}).get("description", what["exceptionDetails"]["text"]))
+            self.said.append(
+                what["exceptionDetails"].get("exception", {}).get("description", what["exceptionDetails"]["text"])
+            )
         elif kind == "Runtime.consoleAPICalled":
             self.said.append(str([of.get("value") for of in what["args"]]))
         elif kind == "Log.entryAdded":
@@ -127,6 +129,7 @@ class Page:
         return base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
 
     def close(self):
-        self._process.kill()
-        self._process.wait()
+        self._session = None
+        self.call("Browser.close")
+        self._process.wait(_PATIENCE)
         os.close(self._send), os.close(self._receive)

@@ -43,8 +43,10 @@ def morph(shapes: Array, weights: Array, most: int) -> Morph:
 
 
 def _rounded(shapes: Array, weights: Array) -> Morph:
-    scales = np.abs(shapes).max(axis=(0, 1), initial=0.0) / _LARGEST
-    return Morph(np.round(shapes / np.where(scales > 0, scales, 1.0)).astype(np.int16), scales, weights)
+    """With weights of at most one."""
+    largest, sizes = np.abs(weights).max(axis=0, initial=0.0), np.abs(shapes).max(axis=(0, 1), initial=0.0)
+    whole = np.round(shapes * (_LARGEST / np.where(sizes > 0, sizes, 1.0))).astype(np.int16)
+    return Morph(whole, largest * sizes / _LARGEST, weights / np.where(largest > 0, largest, 1.0))
 
 
 def beside(one: Morph, other: Morph) -> Morph:

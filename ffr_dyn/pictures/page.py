@@ -7,9 +7,10 @@ row of the result there are only poses and weights. The page's own policy forbid
 from __future__ import annotations
 
 import base64
+import hashlib
 import json
 import zlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from typing import Any
@@ -26,9 +27,10 @@ from ffr_prep.body import Surface, some_points
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.units import pretty, readable
 
-MOST_TRIANGLES = 100_000
-_MOST_HISTORIES = 400_000  # numbers of histories that can be plotted
+MOST_TRIANGLES = 60_000
+_MOST_HISTORIES = 200_000  # numbers of histories that can be plotted
 _NOT_PLOTTED = (".R", ".p", ".q", ".q_dot", ".q_ddot", ".orientation", ".omega_bar", ".v")
+_LARGEST = 32767
 _STOPS = 64  # of a colour map
 _SIDES = 8  # of a rod
 _THICK = 0.012  # of the size of the whole motion: the radius of a rod
@@ -93,7 +95,11 @@ class _Numbers:
         self._size = 0
 
     def keep(self, values: Array, kind: str = "f4") -> list[Any]:
-        """The reference [type, offset in bytes, length] under which the page finds the values."""
+        """The reference [type, offset in bytes, length] under which the page finds the values; of a history "h2", which is
+        rounded to whole numbers of the fourth."""
+        if kind == "h2":
+            scale = float(np.abs(values).max(initial=0.0)) / _LARGEST or 1.0
+            return ["h2", *self.keep(np.round(values / scale), "i2")[1:], scale]
         content = np.ascontiguousarray(values, "<" + kind).tobytes()
         key = kind.encode() + content
         if key not in self._known:
@@ -158,8 +164,8 @@ def _beside(beside: Connections, numbers: _Numbers) -> Item:
             "kind": joint.kind,
             "label": joint.label,
             "shown": True,
-            "at": numbers.keep(joint.at),
-            "axis": None if joint.axis is None else numbers.keep(joint.axis),
+            "at": numbers.keep(joint.at, "h2"),
+            "axis": None if joint.axis is None else numbers.keep(joint.axis, "h2"),
         }
         for joint in beside.joints
     ]
@@ -169,12 +175,12 @@ def _beside(beside: Connections, numbers: _Numbers) -> Item:
             "unit": arrow.unit,
             "shown": False,
             "largest": float(np.linalg.norm(arrow.vector, axis=1).max()),
-            "at": numbers.keep(arrow.at),
-            "vector": numbers.keep(arrow.vector),
+            "at": numbers.keep(arrow.at, "h2"),
+            "vector": numbers.keep(arrow.vector, "h2"),
         }
         for arrow in beside.arrows
     ]
-    markers = [{"name": name, "shown": False, "at": numbers.keep(at)} for name, at in beside.markers.items()]
+    markers = [{"name": name, "shown": False, "at": numbers.keep(at, "h2")} for name, at in beside.markers.items()]
     return {"joints": joints, "arrows": arrows, "markers": markers}
 
 
@@ -188,7 +194,7 @@ def _series(shown: Shown, numbers: _Numbers) -> list[Item]:
         room -= quantity.values.size
         if not wanted & set(own) and (name.endswith(_NOT_PLOTTED) or room < 0):
             continue
-        values, unit = numbers.keep(quantity.values), pretty(quantity.unit) or "1"
+        values, unit = numbers.keep(quantity.values, "h2"), pretty(quantity.unit) or "1"
         found += [
             {"name": one, "unit": unit, "values": values, "of": len(own), "column": k, "chosen": one in wanted}
             for k, one in enumerate(own)
@@ -242,22 +248,37 @@ def _bodies(shown: Shown, numbers: _Numbers) -> Item:
 
 def _same(surface: Surface) -> tuple[bytes, ...]:
     """Equal for surfaces with equal numbers."""
-    return tuple(np.asarray(of).tobytes() for of in (surface.points, surface.triangles, surface.Phi))
+    return tuple(
+        hashlib.sha256(np.asarray(of).tobytes()).digest() for of in (surface.points, surface.triangles, surface.Phi)
+    )
 
 
 def _pieces(film: Film) -> list[_Piece]:
     colours, found = iter(BODY_COLOURS * (1 + len(film.solids) + len(film.links))), list[_Piece]()
     share = MOST_TRIANGLES / max(1, sum(len(solid.surface.triangles) for solid in film.solids))
+    coarse = _coarsened(share)
     for solid in film.solids:
-        found += _of_solid(solid, next(colours), len(found), share)
+        found += _of_solid(solid, next(colours), len(found), coarse)
     return found + [_of_link(link, next(colours), len(found) + k, film.size) for k, link in enumerate(film.links)]
 
 
-def _of_solid(solid: Solid, colour: str, number: int, share: float) -> list[_Piece]:
+def _coarsened(share: float) -> Callable[[Surface], Surface]:
+    """Surfaces with about that share of their triangles; equal ones are worked on once."""
+    known: dict[Any, Surface] = {}
+
+    def found(surface: Surface) -> Surface:
+        key = _same(surface)
+        if key not in known:
+            known[key] = decimated(surface, share)[0]
+        return known[key]
+
+    return found if share < 1 else lambda surface: surface
+
+
+def _of_solid(solid: Solid, colour: str, number: int, coarse: Callable[[Surface], Surface]) -> list[_Piece]:
     """The body; of one in parts each part, whose deformation is seen from the frame of the first."""
     if solid.parts is None:
-        surface = solid.surface if share >= 1 else decimated(solid.surface, share)[0]
-        return [_Piece(solid.name, surface, _poses(solid.R, solid.A), solid.q, number, False, colour)]
+        return [_Piece(solid.name, coarse(solid.surface), _poses(solid.R, solid.A), solid.q, number, False, colour)]
     found = []
     for k in range(solid.parts.R.shape[1]):
         chosen = np.flatnonzero(solid.parts.of == k)
@@ -346,7 +367,7 @@ def _surface(group: Sequence[_Piece], numbers: _Numbers) -> tuple[Item, list[Ite
         "tensorScales": stress.scales.tolist(),
     }
     split = [np.split(of.weights, len(group)) for of in (deformed, stress)]
-    own = [{"weights": numbers.keep(w), "tensors": numbers.keep(t)} for w, t in zip(*split, strict=True)]
+    own = [{"weights": numbers.keep(w, "h2"), "tensors": numbers.keep(t, "h2")} for w, t in zip(*split, strict=True)]
     return item, own
 
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffr_dyn.pictures.film import Film, Solid, displaced
-from ffr_dyn.results.stress import values_at
+from ffr_dyn.pictures.film import Film, Solid, displaced, largest_value
 from ffr_dyn.scene.stress_sensors import MEASURES, TENSOR, Measure
 from ffr_prep.common.arrays import Array
 
@@ -65,7 +64,7 @@ def _offered(film: Film) -> Iterator[tuple[str, Shade]]:
     stressed = [solid for solid in flexible if solid.surface.stress is not None]
     for name in _OFFERED if stressed else ():
         of = MEASURES[name]
-        if high := max(_largest(solid, of) for solid in stressed):
+        if high := max(largest_value(solid, of, _some(len(solid.q))) for solid in stressed):
             yield name, _of_measure(of, name, high, frozenset(solid.name for solid in stressed))
 
 
@@ -77,11 +76,6 @@ def _of_measure(of: Measure, name: str, high: float, bodies: frozenset[str]) -> 
 
 def _some(count: int) -> Array:
     return np.unique(np.linspace(0, count - 1, min(count, _LOOKS)).astype(int))
-
-
-def _largest(solid: Solid, of: Measure) -> float:
-    q = solid.q[_some(len(solid.q))]
-    return float(np.abs(values_at(solid.surface, q, of)).max(initial=0.0))
 
 
 def _fastest(solid: Solid, times: Array) -> float:

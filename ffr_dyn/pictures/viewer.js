@@ -22,8 +22,9 @@ async function unpack() {
   numbers = await new Response(stream).arrayBuffer();
 }
 
-/** The array that a reference [type, offset, length] stands for. */
-function array([type, offset, length]) {
+/** The array that a reference [type, offset, length] stands for; h2: a history in whole numbers of a scale, the fourth. */
+function array([type, offset, length, scale]) {
+  if (type === "h2") return Float32Array.from(new Int16Array(numbers, offset, length), (whole) => whole * scale);
   return new { f4: Float32Array, i2: Int16Array, u4: Uint32Array, u1: Uint8Array }[type](numbers, offset, length);
 }
 
@@ -87,18 +88,21 @@ function pose(body, at) {
 
 // ---- WebGL ------------------------------------------------------------------------------------------------------------
 
-const gl = $("solid").getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
-const VERTEX = `#version 300 es
+// Smooth edges cost half the time where there is no graphics card.
+const gl = [true, false].reduce((found, card) =>
+  found || $("solid").getContext("webgl2", { antialias: card, failIfMajorPerformanceCaveat: card }), null);
+// Where the points are and what colours them, once for each point of a body: written to a buffer, from which it is drawn.
+const MOTION = `#version 300 es
 precision highp float; precision highp int; precision highp isampler2D;
 in vec3 point; in vec2 moduli;
 uniform isampler2D shapes, tensors;
 uniform int shapeCount, tensorCount, kind, measure; // kind: 0 plain, 1 displacement, 2 speed, 3 stress, 4 strain
 uniform vec3 weights[${MOST_SHAPES}]; // as drawn, as it is, its rate
 uniform float stresses[${MOST_TENSORS}];
-uniform mat3 A, A0, rateA, view;
-uniform vec3 R, R0, rateR, target, zoom;
-uniform float blend, lift;
-out vec3 eye; out float value;
+uniform mat3 A, A0, rateA;
+uniform vec3 R, R0, rateR;
+uniform float blend;
+out vec3 place; out float value;
 
 vec3 texel(isampler2D of, int k) { return vec3(texelFetch(of, ivec2(k % ${WIDTH}, k / ${WIDTH}), 0).xyz); }
 
@@ -143,43 +147,53 @@ void main() {
     if (kind == 4) { n = ((1.0 + moduli.y) * n - moduli.y * (n.x + n.y + n.z)) / moduli.x; s *= (1.0 + moduli.y) / moduli.x; }
     value = measured(n, s);
   }
-  eye = view * (mix(rest, R + A * drawn, blend) - target);
+  place = mix(rest, R + A * drawn, blend);
+}`;
+const VERTEX = `#version 300 es
+precision highp float;
+in vec3 point; in float field;
+uniform mat3 A, view; uniform vec3 R, target, zoom, colour; uniform float lift;
+uniform bool mapped; uniform vec2 range; uniform sampler2D map;
+out vec3 eye, base;
+void main() {
+  eye = view * (R + A * point - target);
+  base = mapped ? textureLod(map, vec2(clamp((field - range.x) / (range.y - range.x), 0.0, 1.0), 0.5), 0.0).rgb : colour;
   gl_Position = vec4(eye.xy * zoom.xy, -eye.z * zoom.z - lift, 1.0);
 }`;
 const FRAGMENT = `#version 300 es
 precision highp float;
-in vec3 eye; in float value;
-uniform vec4 colour; uniform bool shaded, mapped; uniform vec2 range; uniform sampler2D map;
+in vec3 eye, base;
+uniform bool shaded; uniform float opacity;
 out vec4 pixel;
 void main() {
-  vec4 base = mapped ? vec4(texture(map, vec2(clamp((value - range.x) / (range.y - range.x), 0.0, 1.0), 0.5)).rgb, 1.0) : colour;
   float light = 1.0;
   if (shaded) {
     vec3 normal = normalize(cross(dFdx(eye), dFdy(eye)));
     light = 0.45 + 0.35 * abs(normal.z) + 0.25 * max(0.0, dot(normal, vec3(-0.41, 0.61, 0.68)));
   }
-  pixel = vec4(base.rgb * light, base.a);
+  pixel = vec4(base * light, opacity);
 }`;
-let program;
-const uniforms = {};
+let blank; // a texture where no colour map is needed
+let motion, drawing; // programs, each with its uniforms
 
-function compiled() {
-  program = gl.createProgram();
-  for (const [kind, text] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
+function compiled(vertex, fragment, attributes, written) {
+  const program = gl.createProgram(), uniforms = {};
+  for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
     const shader = gl.createShader(kind);
     gl.shaderSource(shader, text);
     gl.compileShader(shader);
     if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
     gl.attachShader(program, shader);
   }
-  gl.bindAttribLocation(program, 0, "point");
-  gl.bindAttribLocation(program, 1, "moduli");
+  attributes.forEach((name, k) => gl.bindAttribLocation(program, k, name));
+  if (written) gl.transformFeedbackVaryings(program, written, gl.INTERLEAVED_ATTRIBS);
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
   for (let k = 0; k < gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); k++) {
     const name = gl.getActiveUniform(program, k).name;
     uniforms[name.replace("[0]", "")] = gl.getUniformLocation(program, name);
   }
+  return { program, uniforms };
 }
 
 function texture(inner, format, type, width, height, data, filter) {
@@ -206,33 +220,53 @@ function buffer(target, data) {
   return made;
 }
 
+/** Vertices with attributes [buffer, count, stride, offset], and the numbers of corners. */
+function vertices(attributes, corners) {
+  const made = gl.createVertexArray();
+  gl.bindVertexArray(made);
+  attributes.forEach(([source, count, stride, offset], k) => {
+    if (!source) return;
+    gl.bindBuffer(gl.ARRAY_BUFFER, source);
+    gl.enableVertexAttribArray(k);
+    gl.vertexAttribPointer(k, count, gl.FLOAT, false, stride, offset);
+  });
+  if (corners) gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, corners);
+  gl.bindVertexArray(null);
+  gl.bindBuffer(gl.ARRAY_BUFFER, null); // a buffer that is written to may be bound nowhere else
+  return made;
+}
+
+function loadSurface(surface) {
+  const points = buffer(gl.ARRAY_BUFFER, array(surface.points)), moduli = surface.moduli && buffer(gl.ARRAY_BUFFER, array(surface.moduli));
+  Object.assign(surface, { size: surface.points[2] / 3, count: surface.triangles[2], lines: surface.edges[2] });
+  const corners = new Uint32Array(surface.count + surface.lines);
+  corners.set(array(surface.triangles));
+  corners.set(array(surface.edges), surface.count);
+  surface.corners = buffer(gl.ELEMENT_ARRAY_BUFFER, corners);
+  surface.still = vertices([[points, 3, 0, 0], [moduli, 2, 0, 0]]);
+  surface.undeformed = vertices([[points, 3, 0, 0]], surface.corners);
+  surface.shapeTexture = shapesTexture(array(surface.shapes));
+  surface.tensorTexture = shapesTexture(array(surface.tensors));
+}
+
+/** Where a body's points are written to, four numbers each: place and what colours it. */
+function loadBody(body) {
+  const surface = about.surfaces[body.surface];
+  Object.assign(body, {
+    shown: true, pose: array(body.pose), weights: array(body.weights), tensors: array(body.tensors),
+    shade: [1, 3, 5].map((k) => parseInt(body.colour.slice(k, k + 2), 16) / 255),
+    moved: buffer(gl.ARRAY_BUFFER, new Float32Array(4 * surface.size)),
+  });
+  body.vertices = vertices([[body.moved, 3, 16, 0], [body.moved, 1, 16, 12]], surface.corners);
+}
+
 function load() {
   rows = array(about.times);
-  for (const surface of about.surfaces) {
-    surface.vertices = gl.createVertexArray();
-    gl.bindVertexArray(surface.vertices);
-    buffer(gl.ARRAY_BUFFER, array(surface.points));
-    gl.enableVertexAttribArray(0);
-    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
-    if (surface.moduli) {
-      buffer(gl.ARRAY_BUFFER, array(surface.moduli));
-      gl.enableVertexAttribArray(1);
-      gl.vertexAttribPointer(1, 2, gl.FLOAT, false, 0, 0);
-    }
-    surface.count = surface.triangles[2];
-    surface.lines = surface.edges[2];
-    const indices = new Uint32Array(surface.count + surface.lines);
-    indices.set(array(surface.triangles));
-    indices.set(array(surface.edges), surface.count);
-    buffer(gl.ELEMENT_ARRAY_BUFFER, indices);
-    surface.shapeTexture = shapesTexture(array(surface.shapes));
-    surface.tensorTexture = shapesTexture(array(surface.tensors));
-  }
-  for (const body of about.bodies)
-    Object.assign(body, {
-      shown: true, pose: array(body.pose), weights: array(body.weights), tensors: array(body.tensors),
-      shade: [1, 3, 5].map((k) => parseInt(body.colour.slice(k, k + 2), 16) / 255),
-    });
+  blank = texture(gl.RGB8, gl.RGB, gl.UNSIGNED_BYTE, 1, 1, new Uint8Array(3), gl.NEAREST);
+  motion = compiled(MOTION, "#version 300 es\nvoid main() {}", ["point", "moduli"], ["place", "value"]);
+  drawing = compiled(VERTEX, FRAGMENT, ["point", "field"]);
+  about.surfaces.forEach(loadSurface);
+  about.bodies.forEach(loadBody);
   for (const colour of about.colours)
     if (colour.map) colour.texture = texture(gl.RGB8, gl.RGB, gl.UNSIGNED_BYTE, colour.map[2] / 3, 1, array(colour.map), gl.LINEAR);
   for (const thing of [...about.joints, ...about.markers, ...about.arrows]) thing.at = array(thing.at);
@@ -242,83 +276,92 @@ function load() {
   for (const series of about.series) series.values = array(series.values);
 }
 
-/** Uniforms of a body at a time: pose, weights. */
-function setBody(body, at) {
+/** The points of a body at a time. */
+function move(body, at) {
   const surface = about.surfaces[body.surface], here = pose(body, at), there = pose(about.bodies[body.frame], at);
-  const count = surface.scales.length, parted = body.frame !== about.bodies.indexOf(body) || body.parted;
+  const { uniforms } = motion, count = surface.scales.length, tensors = surface.tensorScales, colour = colourOf(body);
   for (const key of ["A", "rateA"]) gl.uniformMatrix3fv(uniforms[key], false, here[key]);
   gl.uniformMatrix3fv(uniforms.A0, false, there.A);
-  gl.uniform3fv(uniforms.R, here.R);
-  gl.uniform3fv(uniforms.R0, there.R);
-  gl.uniform3fv(uniforms.rateR, here.rateR);
+  for (const [key, vector] of [["R", here.R], ["R0", there.R], ["rateR", here.rateR]]) gl.uniform3fv(uniforms[key], vector);
   const now = between(body.weights, count, at), rates = rate(body.weights, count, at), weights = new Float32Array(3 * MOST_SHAPES);
   surface.scales.forEach((scale, k) => {
-    const drawn = parted ? 1 : k < surface.linear ? state.scale : state.scale * state.scale;
+    const drawn = body.parted ? 1 : k < surface.linear ? state.scale : state.scale * state.scale;
     weights.set([scale * now[k] * drawn, scale * now[k], scale * rates[k]], 3 * k);
   });
   gl.uniform3fv(uniforms.weights, weights);
   gl.uniform1i(uniforms.shapeCount, count);
-  const tensors = between(body.tensors, surface.tensorScales.length, at).map((w, k) => w * surface.tensorScales[k]);
-  if (tensors.length) gl.uniform1fv(uniforms.stresses, tensors);
+  if (tensors.length) gl.uniform1fv(uniforms.stresses, between(body.tensors, tensors.length, at).map((w, k) => w * tensors[k]));
   gl.uniform1i(uniforms.tensorCount, tensors.length);
-  gl.uniform1f(uniforms.blend, parted ? state.scale : 1);
-  gl.activeTexture(gl.TEXTURE0);
-  gl.bindTexture(gl.TEXTURE_2D, surface.shapeTexture);
-  gl.activeTexture(gl.TEXTURE1);
-  gl.bindTexture(gl.TEXTURE_2D, surface.tensorTexture);
-  gl.bindVertexArray(surface.vertices);
-  return surface;
+  gl.uniform1f(uniforms.blend, body.parted ? state.scale : 1);
+  gl.uniform1i(uniforms.kind, colour ? colour.kind : 0);
+  gl.uniform1i(uniforms.measure, colour ? colour.measure : 0);
+  [surface.shapeTexture, surface.tensorTexture].forEach((of, k) => { gl.activeTexture(gl.TEXTURE0 + k); gl.bindTexture(gl.TEXTURE_2D, of); });
+  gl.bindVertexArray(surface.still);
+  gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, body.moved);
+  gl.beginTransformFeedback(gl.POINTS);
+  gl.drawArrays(gl.POINTS, 0, surface.size);
+  gl.endTransformFeedback();
+  body.rest = there;
 }
 
-function setColour(body) {
-  const colour = about.colours[state.colour], mapped = colour.kind > 0 && (colour.kind === 2 || colour.bodies.includes(body.name));
-  const high = state.limits[state.colour], low = colour.low < 0 ? -high : 0;
-  gl.uniform1i(uniforms.kind, mapped ? colour.kind : 0);
-  gl.uniform1i(uniforms.measure, colour.measure || 0);
-  gl.uniform1i(uniforms.mapped, mapped);
-  gl.uniform2f(uniforms.range, low, high);
-  gl.uniform4f(uniforms.colour, ...body.shade, body.faint ? 0.3 : 1);
-  gl.activeTexture(gl.TEXTURE2);
-  if (mapped) gl.bindTexture(gl.TEXTURE_2D, colour.texture);
+function moveAll(at) {
+  gl.useProgram(motion.program);
+  gl.uniform1i(motion.uniforms.shapes, 0);
+  gl.uniform1i(motion.uniforms.tensors, 1);
+  gl.enable(gl.RASTERIZER_DISCARD);
+  about.bodies.filter((body) => body.shown).forEach((body) => move(body, at));
+  gl.disable(gl.RASTERIZER_DISCARD);
+  gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, null);
+}
+
+/** What a body is coloured by; nothing where it has a colour of its own. */
+function colourOf(body) {
+  const colour = about.colours[state.colour];
+  return colour.kind === 2 || (colour.kind && colour.bodies.includes(body.name)) ? colour : null;
+}
+
+const IDENTITY = [1, 0, 0, 0, 1, 0, 0, 0, 1];
+
+/** One thing drawn: rest, where it is drawn undeformed; lift, towards the eye; map, what it is coloured by. */
+function paint(from, what, { rest, lift = 0, colour, opacity = 1, map, shaded = true }) {
+  const { uniforms } = drawing, translucent = opacity < 1, high = state.limits[state.colour];
+  gl[translucent ? "enable" : "disable"](gl.BLEND);
+  gl.depthMask(!translucent);
+  gl.uniformMatrix3fv(uniforms.A, false, rest ? rest.A : IDENTITY);
+  gl.uniform3fv(uniforms.R, rest ? rest.R : [0, 0, 0]);
+  gl.uniform1f(uniforms.lift, lift);
+  gl.uniform1i(uniforms.shaded, shaded);
+  gl.uniform1i(uniforms.mapped, Boolean(map));
+  gl.uniform3fv(uniforms.colour, colour);
+  gl.uniform1f(uniforms.opacity, opacity);
+  gl.bindTexture(gl.TEXTURE_2D, map ? map.texture : blank);
+  if (map) gl.uniform2f(uniforms.range, map.low < 0 ? -high : 0, high);
+  gl.bindVertexArray(from);
+  gl.drawElements(...what);
 }
 
 function drawSolids(at, width, height) {
+  moveAll(at);
   gl.viewport(0, 0, width, height);
   gl.clearColor(1, 1, 1, 1);
+  gl.depthMask(true);
   gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   gl.enable(gl.DEPTH_TEST);
   gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
-  gl.useProgram(program);
-  for (const [name, unit] of [["shapes", 0], ["tensors", 1], ["map", 2]]) gl.uniform1i(uniforms[name], unit);
-  const [right, up, towards] = camera.axes, depth = 2 * about.size + camera.reach;
+  gl.useProgram(drawing.program);
+  gl.activeTexture(gl.TEXTURE0);
+  const { uniforms } = drawing, [right, up, towards] = camera.axes;
+  gl.uniform1i(uniforms.map, 0);
   gl.uniformMatrix3fv(uniforms.view, false, [0, 1, 2].flatMap((c) => [right[c], up[c], towards[c]]));
   gl.uniform3fv(uniforms.target, camera.target);
-  gl.uniform3f(uniforms.zoom, height / width / camera.reach, 1 / camera.reach, 1 / depth);
-  for (const body of [...about.bodies].sort((a, b) => (a.faint || 0) - (b.faint || 0))) {
-    if (!body.shown) continue;
-    const surface = setBody(body, at);
-    setColour(body);
-    const faint = (translucent) => { gl[translucent ? "enable" : "disable"](gl.BLEND); gl.depthMask(!translucent); };
-    faint(body.faint);
-    gl.uniform1i(uniforms.shaded, 1);
-    gl.uniform1f(uniforms.lift, 0);
-    gl.drawElements(gl.TRIANGLES, surface.count, gl.UNSIGNED_INT, 0);
-    gl.uniform1i(uniforms.mapped, 0);
-    gl.uniform1i(uniforms.kind, 0);
-    if ($("ghost").checked && surface.scales.length) {
-      faint(true);
-      gl.uniform1f(uniforms.blend, 0);
-      gl.uniform1f(uniforms.lift, -1e-3);
-      gl.uniform4f(uniforms.colour, 0.5, 0.5, 0.5, 0.2);
-      gl.drawElements(gl.TRIANGLES, surface.count, gl.UNSIGNED_INT, 0);
-      gl.uniform1f(uniforms.blend, body.parted ? state.scale : 1);
-    }
-    faint(body.faint);
-    if (!$("edges").checked) continue;
-    gl.uniform1i(uniforms.shaded, 0);
-    gl.uniform1f(uniforms.lift, 5e-4);
-    gl.uniform4f(uniforms.colour, 0.13, 0.13, 0.13, body.faint ? 0.4 : 1);
-    gl.drawElements(gl.LINES, surface.lines, gl.UNSIGNED_INT, 4 * surface.count);
+  gl.uniform3f(uniforms.zoom, height / width / camera.reach, 1 / camera.reach, 1 / (2 * about.size + camera.reach));
+  for (const body of about.bodies.filter((one) => one.shown).sort((a, b) => a.faint - b.faint)) {
+    const surface = about.surfaces[body.surface], opacity = body.faint ? 0.3 : 1;
+    const faces = [gl.TRIANGLES, surface.count, gl.UNSIGNED_INT, 0], lines = [gl.LINES, surface.lines, gl.UNSIGNED_INT, 4 * surface.count];
+    paint(body.vertices, faces, { colour: body.shade, opacity, map: colourOf(body) });
+    if ($("edges").checked) paint(body.vertices, lines, { lift: 5e-4, colour: [0.13, 0.13, 0.13], opacity, shaded: false });
+    if ($("ghost").checked && surface.scales.length)
+      paint(surface.undeformed, faces, { rest: body.rest, lift: -1e-3, colour: [0.5, 0.5, 0.5], opacity: 0.2 });
   }
 }
 
@@ -399,7 +442,7 @@ function drawOver(at, width, height) {
     line(Array.from({ length: trace.points.length / 3 }, (_, k) => trace.points.subarray(3 * k, 3 * k + 3)), trace.colour);
   }
   const ground = about.triad;
-  frame(ground.at, [1, 0, 0, 0, 1, 0, 0, 0, 1], 0.1 * about.size, true);
+  frame(ground.at, IDENTITY, 0.1 * about.size, true);
   if ($("frames").checked)
     for (const body of about.bodies.filter((one) => one.shown)) {
       const { R, A } = pose(body, at);
@@ -667,7 +710,6 @@ function mouse() {
 async function start() {
   if (!gl) throw new Error("this browser draws no WebGL 2");
   await unpack();
-  compiled();
   load();
   state.time = rows[0];
   state.limits = about.colours.map((colour) => colour.high);
