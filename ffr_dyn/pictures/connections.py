@@ -57,7 +57,8 @@ def connections(result: Result) -> Connections:
 
 def _places(result: Result) -> dict[str, Array]:
     ending, ground = ".position", result.attributes.get("ground", {})
-    moving = {name.removesuffix(ending): result[name] for name in result.quantities if name.endswith(ending)}
+    names = [name.removesuffix(ending) for name in result.quantities if name.endswith(ending)]
+    moving = {name: result[name + ending] for name in names if "." in name}
     still = {f"ground.{name}": np.tile(np.asarray(at, float), (result.time.size, 1)) for name, at in ground.items()}
     return moving | still
 

@@ -149,10 +149,9 @@ def _histories(result: Result, places: dict[str, Places], quantity: str, folder:
     histories = Result(result.time, found)
     shown = [name for name in found if name.endswith(f".{quantity}")]
     words = measure(quantity).words
-    return [
-        write_csv(histories, folder / "history.csv"),
-        plot(histories, shown, folder / "history.png", title=f"{words[0].upper() + words[1:]} at {len(shown)} points"),
-    ]
+    title, picture = f"{words[0].upper() + words[1:]} at {len(shown)} points", folder / "history.png"
+    plot(histories, shown, picture, title=title)
+    return [write_csv(histories, folder / "history.csv"), picture]
 
 
 def _section_files(result: Result, body: str, points: Sequence[Sequence[float]], folder: Path) -> list[Path]:
@@ -161,10 +160,9 @@ def _section_files(result: Result, body: str, points: Sequence[Sequence[float]],
     element = nearest_element(beams_of(result, body), np.array(points[0], float)) if len(points) else bending.element
     histories = section_histories(result, body, element)
     middle = [name for name in histories.quantities if ".middle." in name]
-    return [
-        write_csv(histories, folder / f"{body}_section_forces.csv"),
-        plot(histories, middle, folder / f"{body}_section_forces.png", title=f"Section forces, element {element}"),
-    ]
+    picture = folder / f"{body}_section_forces.png"
+    plot(histories, middle, picture, title=f"Section forces, element {element}")
+    return [write_csv(histories, folder / f"{body}_section_forces.csv"), picture]
 
 
 # ---- picture ------------------------------------------------------------------------------------------------------

@@ -371,12 +371,17 @@ def test_every_folder_of_modules_is_a_package_and_is_installed():
     assert {name for name in on_disk if any(fnmatch.fnmatch(name, pattern) for pattern in find["include"])} == on_disk
 
 
-def test_the_packages_hold_nothing_but_modules():
-    """Anything else would be missing from an installed copy, but for the mark that says that types are given."""
+# What is neither a module nor the mark that says that types are given: parts of the page that shows films and scenes.
+OF_A_PAGE = {f"ffr_dyn/pictures/viewer.{kind}" for kind in ("css", "html", "js")}
+
+
+def test_the_packages_hold_modules_and_what_is_installed_with_them():
+    """Anything else would be missing from an installed copy."""
     files = [path for package in PACKAGES for path in (ROOT / package).rglob("*") if path.is_file()]
     others = [p.relative_to(ROOT).as_posix() for p in files if p.suffix != ".py" and "__pycache__" not in p.parts]
-    assert set(others) <= {f"{package}/py.typed" for package in PACKAGES}
-    assert PROJECT["tool"]["setuptools"]["package-data"] == {"*": ["py.typed"]}
+    assert set(others) <= {f"{package}/py.typed" for package in PACKAGES} | OF_A_PAGE
+    data = PROJECT["tool"]["setuptools"]["package-data"]
+    assert data == {"*": ["py.typed"], "ffr_dyn.pictures": ["viewer.css", "viewer.html", "viewer.js"]}
 
 
 MACHINE = re.compile(
