@@ -14,6 +14,7 @@ from ffr_dyn.cli.economy import economise
 from ffr_dyn.cli.parts import parts
 from ffr_dyn.cli.realtime import realtime
 from ffr_dyn.cli.run import run
+from ffr_dyn.cli.show import show
 from ffr_dyn.cli.stress import stress
 from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, reserve, run_command
 from ffr_prep.common.errors import InputError
@@ -23,6 +24,7 @@ EXAMPLE = """\b
 Example:
   ffr-prep reduce rod.geo --unit mm --material steel --interface big_eye --interface small_eye \\
            --reference simply-supported:big_eye,small_eye -o rod.ffr
+  ffr-dyn show slider_crank.toml -o out/scene.html
   ffr-dyn run slider_crank.toml -o out/result.nc
   ffr-dyn plot out/result.nc rod.small_eye.position.x -o out/slider.png
   ffr-dyn animate out/result.nc -o out/motion.gif --scale auto
@@ -162,12 +164,16 @@ def animate(result: Path, output: Path, scale: str, duration: float | None, colo
     click.echo(f"film     {output}")
 
 
-for command in (run, check, list_methods, stress, chart, economise, parts, realtime):
+for command in (run, check, show, list_methods, stress, chart, economise, parts, realtime):
     cli.add_command(command)
 
 
 def _attribute(key: str, value: Any) -> list[str]:
-    """An attribute in lines: numbers with their units on one, texts a line each."""
+    """An attribute in lines: numbers with their units on one, texts and what is named a line each."""
+    if key == "connections":
+        return [f"{name} ({of['kind']}): {', '.join(of['at']) or 'everywhere'}" for name, of in value.items()]
+    if isinstance(value, dict):
+        return [f"{name}: {of}" for name, of in value.items()]
     if key == "largest_drift":
         return [f"{value[0]:.3g} of positions, {value[1]:.3g} of rates"]
     if isinstance(value, list):

@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib.util
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -77,9 +78,9 @@ def animate(
     write = None if target is None else _writer(target)
     _check_settings(fps, duration, size)
     title, view = str(result.attributes.get("title", "")), camera and camera.axes() and camera
-    how = {"scale": scale, "traces": tuple(traces), "colour": colour, "limit": limit}
+    how: dict[str, Any] = {"scale": scale, "traces": tuple(traces), "colour": colour, "limit": limit}
     playing, frames = _pace(result, fps, duration)
-    make = lambda: _page(result, title, view, playing, tuple(plots), how)  # noqa: E731
+    make = partial(_page, result, title, view, playing, tuple(plots), how)
     if target and write:
         shown = film(result, frames, **how)
         with replacing(target) as part:

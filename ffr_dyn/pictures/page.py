@@ -30,7 +30,7 @@ from ffr_prep.common.units import pretty, readable
 MOST_TRIANGLES = 60_000
 _MOST_HISTORIES = 200_000  # numbers of histories that can be plotted
 _NOT_PLOTTED = (".R", ".p", ".q", ".q_dot", ".q_ddot", ".orientation", ".omega_bar", ".v")
-_LARGEST = 32767
+_LARGEST, _GREY = 32767, "#999999"
 _STOPS = 64  # of a colour map
 _SIDES = 8  # of a rod
 _THICK = 0.012  # of the size of the whole motion: the radius of a rod
@@ -49,7 +49,7 @@ class Shown:
     result   : histories that can be plotted, of the same rows; None where there is one row
     plots    : names of the components that are plotted at the start
     faint    : names of the bodies that are translucent
-    boxes    : what is switched on at the start: edges, ghost, names, frames
+    boxes    : what is switched on at the start: edges, ghost, names, frames, markers, forces
     moments  : words in place of the time at each row
     """
 
@@ -136,7 +136,7 @@ def _about(shown: Shown, camera: Camera, seconds: float, numbers: _Numbers) -> I
             {"name": name, "colour": colour, "shown": True, "points": numbers.keep(path)}
             for (name, path), colour in zip(film.traces.items(), TRACE_COLOURS * len(film.traces), strict=False)
         ],
-        **_beside(shown.beside, numbers),
+        **_beside(shown, numbers),
         "series": _series(shown, numbers),
     }
 
@@ -157,7 +157,8 @@ def _colour(shade: Shade, numbers: _Numbers) -> Item:
     }
 
 
-def _beside(beside: Connections, numbers: _Numbers) -> Item:
+def _beside(shown: Shown, numbers: _Numbers) -> Item:
+    beside = shown.beside
     joints = [
         {
             "name": joint.name,
@@ -173,14 +174,15 @@ def _beside(beside: Connections, numbers: _Numbers) -> Item:
         {
             "name": arrow.name,
             "unit": arrow.unit,
-            "shown": False,
+            "shown": "forces" in shown.boxes,
             "largest": float(np.linalg.norm(arrow.vector, axis=1).max()),
             "at": numbers.keep(arrow.at, "h2"),
             "vector": numbers.keep(arrow.vector, "h2"),
         }
         for arrow in beside.arrows
     ]
-    markers = [{"name": name, "shown": False, "at": numbers.keep(at, "h2")} for name, at in beside.markers.items()]
+    seen = "markers" in shown.boxes
+    markers = [{"name": name, "shown": seen, "at": numbers.keep(at, "h2")} for name, at in beside.markers.items()]
     return {"joints": joints, "arrows": arrows, "markers": markers}
 
 
@@ -224,7 +226,7 @@ def _bodies(shown: Shown, numbers: _Numbers) -> Item:
     groups: dict[Any, list[_Piece]] = {}
     for piece in pieces:
         groups.setdefault(_same(piece.surface), []).append(piece)
-    surfaces, bodies = [], {}
+    surfaces, bodies = list[Item](), dict[int, Item]()
     for number, group in enumerate(groups.values()):
         item, own = _surface(group, numbers)
         surfaces.append(item)
@@ -234,7 +236,7 @@ def _bodies(shown: Shown, numbers: _Numbers) -> Item:
         "bodies": [
             {
                 "name": piece.name,
-                "colour": piece.colour,
+                "colour": _GREY if piece.name in shown.faint else piece.colour,
                 "faint": piece.name in shown.faint,
                 "frame": piece.frame,
                 "parted": piece.parted,

@@ -368,6 +368,7 @@ function drawSolids(at, width, height) {
 // ---- lines and words over the bodies --------------------------------------------------------------------------------------
 
 const over = $("over").getContext("2d");
+let taken = []; // places of words in a picture
 let pixels; // point in space -> point on the screen
 
 function line(points, colour, width = 1.5, dash = []) {
@@ -378,6 +379,13 @@ function line(points, colour, width = 1.5, dash = []) {
   points.forEach((point, k) => over[k ? "lineTo" : "moveTo"](...pixels(point)));
   over.stroke();
   over.setLineDash([]);
+}
+
+/** Words beside a place, below those that stand there already. */
+function label(text, [x, y], colour = INK) {
+  while (taken.some(([a, b]) => Math.abs(a - x) < 60 && Math.abs(b - y) < 13)) y += 13;
+  taken.push([x, y]);
+  words(text, [x, y], colour);
 }
 
 function words(text, [x, y], colour = INK, align = "left") {
@@ -408,7 +416,7 @@ function frame(R, A, length, letters) {
   ["#D62728", "#2CA02C", "#1F77B4"].forEach((colour, k) => {
     const tip = add(R, [A[3 * k], A[3 * k + 1], A[3 * k + 2]], length);
     line([R, tip], colour, 2);
-    if (letters) words("xyz"[k], add(pixels(tip), [3, 3, 0]), colour);
+    if (letters) words("xyz"[k], pixels(tip).map((c) => c + 3), colour);
   });
 }
 
@@ -426,7 +434,7 @@ function drawJoint(joint, at, named) {
   if (joint.kind === "fixed") over.rect(x - 5, y - 5, 10, 10); else over.arc(x, y, 5, 0, 2 * Math.PI);
   over.fill();
   over.stroke();
-  if (named) words(joint.label, [x + 8, y - 8], "#8B1A8B");
+  if (named) label(joint.label, [x + 8, y - 8], "#8B1A8B");
 }
 
 function drawOver(at, width, height) {
@@ -435,6 +443,7 @@ function drawOver(at, width, height) {
     const from = add(point, camera.target, -1);
     return [width / 2 + half * dot(right, from), height / 2 - half * dot(up, from)];
   };
+  taken = [];
   over.clearRect(0, 0, width, height);
   over.font = "13px system-ui, sans-serif";
   for (const trace of about.traces) {
@@ -447,7 +456,7 @@ function drawOver(at, width, height) {
     for (const body of about.bodies.filter((one) => one.shown)) {
       const { R, A } = pose(body, at);
       frame(R, A, 0.06 * about.size, false);
-      if (named) words(body.name, add(pixels(R), [6, -6, 0]));
+      if (named) label(body.name, pixels(R).map((c, k) => c + [6, -6][k]));
     }
   for (const joint of about.joints) if (joint.shown) drawJoint(joint, at, named);
   for (const marker of about.markers) {
@@ -455,7 +464,7 @@ function drawOver(at, width, height) {
     const [x, y] = pixels(between(marker.at, 3, at));
     over.fillStyle = INK;
     over.fillRect(x - 2, y - 2, 4, 4);
-    if (named) words(marker.name, [x + 5, y + 12]);
+    if (named) label(marker.name, [x + 5, y + 12]);
   }
   for (const load of about.arrows) {
     if (!load.shown) continue;
@@ -463,7 +472,7 @@ function drawOver(at, width, height) {
     const largest = Math.max(...about.arrows.filter((o) => o.shown && o.unit === load.unit).map((o) => o.largest)) || 1;
     const to = add(from, vector, 0.25 * about.size / largest), colour = load.unit === "N" ? "#D55E00" : "#0072B2";
     arrow(from, to, colour, load.unit === "N" ? 1 : 2);
-    if (named) words(`${load.name} ${short(Math.hypot(...vector))} ${load.unit}`, add(pixels(to), [6, 4, 0]), colour);
+    if (named) label(`${load.name} ${short(Math.hypot(...vector))} ${load.unit}`, pixels(to).map((c) => c + 5), colour);
   }
   drawBar(width, height);
 }
@@ -683,6 +692,7 @@ function connect() {
   $("plots").onpointerdown = $("plots").onpointermove = (event) => {
     if (event.buttons) { play(false); seek(rows[0] + span() * (event.offsetX - LEFT) / ($("plots").clientWidth - LEFT - 12)); }
   };
+  if (rows.length < 2) document.querySelector("footer").style.display = "none";
   mouse();
   addEventListener("resize", () => { drawPlots(); redraw(); });
   addEventListener("keydown", (event) => {
