@@ -11,6 +11,7 @@ import click
 from ffr_dyn.cli.analyses import check, commands, list_methods
 from ffr_dyn.cli.chart import chart
 from ffr_dyn.cli.economy import economise
+from ffr_dyn.cli.export import export
 from ffr_dyn.cli.parts import parts
 from ffr_dyn.cli.realtime import realtime
 from ffr_dyn.cli.run import run
@@ -39,7 +40,7 @@ Example:
 FILM_EXAMPLE = """\b
 Example:
   ffr-dyn animate out/result.nc -o out/motion.gif --scale 50
-  ffr-dyn animate out/result.nc -o out/stress.html --colour von-mises --limit 60e6
+  ffr-dyn animate out/result.nc -o out/stress.html --colour von-mises --limit 60e6 --plot crank_pin.force
 """
 
 
@@ -146,13 +147,25 @@ def plot(result: Path, names: tuple[str, ...], output: Path, title: str | None, 
     "--colour", default="deformation", show_default=True, help="Of flexible bodies: deformation, body, von-mises, ..."
 )
 @click.option("--limit", type=float, help="End of the colour bar [m, Pa]; default: the largest value of the film.")
-def animate(result: Path, output: Path, scale: str, duration: float | None, colour: str, limit: float | None) -> None:
+@click.option("--plot", "plots", multiple=True, metavar="NAME", help="Of .html: a history beside the motion; repeat.")
+@click.option("--trace", "traces", multiple=True, metavar="MARKER", help="Draw the path of a marker; repeat.")
+def animate(
+    result: Path,
+    output: Path,
+    scale: str,
+    duration: float | None,
+    colour: str,
+    limit: float | None,
+    plots: tuple[str, ...],
+    traces: tuple[str, ...],
+) -> None:
     """A film of RESULT: deformed bodies, coloured by elastic displacement or stress, with the undeformed ghost.
 
     Colours by stress need bodies with stress modes (`ffr-prep reduce --stress`); `ffr-dyn stress --help` lists the
     quantities.
 
-    .html is one page that works offline and can be turned with the mouse.
+    .html is one page that works offline: the bodies can be turned with the mouse, joints and forces switched on,
+    histories plotted beside the motion.
     """
     from ffr_dyn.pictures import animate as animation
     from ffr_dyn.results.file import load_result
@@ -160,11 +173,12 @@ def animate(result: Path, output: Path, scale: str, duration: float | None, colo
     reserve("-o", output)
     factor: float | str = scale if scale == "auto" else _number(scale)
     loaded = load_result(result)
-    animation.animate(loaded, output, scale=factor, duration=duration, colour=colour, limit=limit)
+    how: dict[str, Any] = {"scale": factor, "duration": duration, "colour": colour, "limit": limit}
+    animation.animate(loaded, output, plots=plots, traces=traces, **how)
     click.echo(f"film     {output}")
 
 
-for command in (run, check, show, list_methods, stress, chart, economise, parts, realtime):
+for command in (run, check, show, export, list_methods, stress, chart, economise, parts, realtime):
     cli.add_command(command)
 
 

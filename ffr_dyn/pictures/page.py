@@ -208,7 +208,7 @@ def _series(shown: Shown, numbers: _Numbers) -> list[Item]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Piece:
+class Piece:
     """A surface that moves as one: poses (T, 7) R and p, elastic coordinates (T, n), and the number of the piece whose frame
     deformation is seen from."""
 
@@ -222,9 +222,9 @@ class _Piece:
 
 
 def _bodies(shown: Shown, numbers: _Numbers) -> Item:
-    pieces = _pieces(shown.film)
-    groups: dict[Any, list[_Piece]] = {}
-    for piece in pieces:
+    drawn = pieces(shown.film)
+    groups: dict[Any, list[Piece]] = {}
+    for piece in drawn:
         groups.setdefault(_same(piece.surface), []).append(piece)
     surfaces, bodies = list[Item](), dict[int, Item]()
     for number, group in enumerate(groups.values()):
@@ -243,7 +243,7 @@ def _bodies(shown: Shown, numbers: _Numbers) -> Item:
                 "pose": numbers.keep(piece.pose),
                 **bodies[id(piece)],
             }
-            for piece in pieces
+            for piece in drawn
         ],
     }
 
@@ -255,8 +255,9 @@ def _same(surface: Surface) -> tuple[bytes, ...]:
     )
 
 
-def _pieces(film: Film) -> list[_Piece]:
-    colours, found = iter(BODY_COLOURS * (1 + len(film.solids) + len(film.links))), list[_Piece]()
+def pieces(film: Film) -> list[Piece]:
+    """All that moves: bodies, each part of bodies in parts, rods for bodies without a surface."""
+    colours, found = iter(BODY_COLOURS * (1 + len(film.solids) + len(film.links))), list[Piece]()
     share = MOST_TRIANGLES / max(1, sum(len(solid.surface.triangles) for solid in film.solids))
     coarse = _coarsened(share)
     for solid in film.solids:
@@ -277,10 +278,10 @@ def _coarsened(share: float) -> Callable[[Surface], Surface]:
     return found if share < 1 else lambda surface: surface
 
 
-def _of_solid(solid: Solid, colour: str, number: int, coarse: Callable[[Surface], Surface]) -> list[_Piece]:
+def _of_solid(solid: Solid, colour: str, number: int, coarse: Callable[[Surface], Surface]) -> list[Piece]:
     """The body; of one in parts each part, whose deformation is seen from the frame of the first."""
     if solid.parts is None:
-        return [_Piece(solid.name, coarse(solid.surface), _poses(solid.R, solid.A), solid.q, number, False, colour)]
+        return [Piece(solid.name, coarse(solid.surface), _poses(solid.R, solid.A), solid.q, number, False, colour)]
     found = []
     for k in range(solid.parts.R.shape[1]):
         chosen = np.flatnonzero(solid.parts.of == k)
@@ -288,11 +289,11 @@ def _of_solid(solid: Solid, colour: str, number: int, coarse: Callable[[Surface]
         triangles = np.searchsorted(chosen, solid.surface.triangles[inside])
         surface = some_points(solid.surface, chosen, triangles)
         pose = _poses(solid.parts.R[:, k], solid.parts.A[:, k])
-        found.append(_Piece(solid.name, surface, pose, solid.q, number, True, colour))
+        found.append(Piece(solid.name, surface, pose, solid.q, number, True, colour))
     return found
 
 
-def _of_link(link: Link, colour: str, number: int, size: float) -> _Piece:
+def _of_link(link: Link, colour: str, number: int, size: float) -> Piece:
     """A body without a surface as rods between its markers, each end carried by its marker."""
     places = np.einsum("fij,fmi->fmj", link.A, link.points - link.R[:, None])
     still = places[0]
@@ -304,7 +305,7 @@ def _of_link(link: Link, colour: str, number: int, size: float) -> _Piece:
     if np.abs(moved).max(initial=0.0) < _RIGID * np.abs(still).max(initial=1e-300):
         Phi, moved = Phi[:, :, :0], moved[:, :0]
     pose = _poses(link.R, link.A)
-    return _Piece(link.name, Surface(surface.points, surface.triangles, Phi), pose, moved, number, False, colour)
+    return Piece(link.name, Surface(surface.points, surface.triangles, Phi), pose, moved, number, False, colour)
 
 
 def rods(points: Array, pairs: Array, radius: float) -> tuple[Surface, Array]:
@@ -348,7 +349,7 @@ def _poses(R: Array, A: Array) -> Array:
     return np.concatenate([R, p * np.cumprod([1.0, *flips])[:, None]], axis=1)
 
 
-def _surface(group: Sequence[_Piece], numbers: _Numbers) -> tuple[Item, list[Item]]:
+def _surface(group: Sequence[Piece], numbers: _Numbers) -> tuple[Item, list[Item]]:
     """A surface with the shapes of all bodies that have it, and of each body its weights."""
     surface, q = group[0].surface, np.concatenate([piece.q for piece in group])
     linear = morph(surface.Phi, q, MOST_SHAPES * 2 // 3)

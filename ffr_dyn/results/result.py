@@ -8,6 +8,7 @@ A `Result` is time, quantities with units and named axes, the surfaces of the bo
 from __future__ import annotations
 
 import csv
+import importlib
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -139,6 +140,39 @@ class Result(Brief):
             for labels in product(*(axis.labels for axis in self.quantity(name).axes)):
                 yield ".".join((name, *labels))
 
+    def to_xarray(self, names: Iterable[str] | None = None) -> Any:
+        """An `xarray.Dataset`: a variable for each quantity over `time` and its labelled axes, with `units` and `long_name`.
+
+        names : quantities or components; all when not given. Raises InputError where xarray is not installed.
+
+        Example: ``result.to_xarray()["rod.tip.position"].sel(xyz="x")``
+        """
+        xarray, found = _library("xarray"), {}
+        labels: dict[str, Any] = {"time": self.time}
+        for name in self.quantities if names is None else names:
+            of = self.quantity(name)
+            labels |= {axis.name: list(axis.labels) for axis in of.axes}
+            about = {"units": of.unit, "long_name": of.description}
+            found[name] = (("time", *(axis.name for axis in of.axes)), of.values, about)
+        whole = xarray.Dataset(
+            found, labels, {key: of for key, of in self.attributes.items() if isinstance(of, str | float | int)}
+        )
+        whole["time"].attrs["units"] = "s"
+        return whole
+
+    def to_pandas(self, names: Iterable[str] | None = None) -> Any:
+        """A `pandas.DataFrame`: a column for each component ("rod.tip.position.x") over the time [s].
+
+        `attrs["units"]` has their units by name.
+        names : quantities or components; all when not given. Raises InputError where pandas is not installed.
+        """
+        pandas, columns = _library("pandas"), list(self.components(names))
+        of = {name: self.quantity(name) for name in columns}
+        time = pandas.Index(self.time, name="time")
+        frame = pandas.DataFrame({name: quantity.values for name, quantity in of.items()}, index=time)
+        frame.attrs["units"] = {name: quantity.unit for name, quantity in of.items()}
+        return frame
+
     def _find(self, name: str) -> Quantity | None:
         if name in self.quantities:
             return self.quantities[name]
@@ -148,6 +182,13 @@ class Result(Brief):
             return None
         index = owner.axes[0].labels.index(label)
         return Quantity(owner.values[:, index], owner.unit, owner.axes[1:], owner.description)
+
+
+def _library(name: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise InputError(f"this needs the package {name}, which is not installed: pip install {name}") from None
 
 
 def table(result: Result, names: Iterable[str] | None = None) -> tuple[tuple[str, ...], Array]:

@@ -53,10 +53,9 @@ def test_an_assembled_scene_is_drawn_once_with_all_that_is_named():
     assert seen.faint == frozenset()
     about = Content(fd.show(crank()).text).about
     assert {body["name"] for body in about["bodies"]} == {"crank", "rod"}
-    forces = {"wave (Load)", "spring (SpringDamper)"}
     joints = {"bearing (revolute, driven by motor)", "pin (revolute)", "guide (point-on-line)"}
-    assert {joint["label"] for joint in about["joints"]} == joints | forces
-    assert {arrow["name"] for arrow in about["arrows"]} == {"gas.force"}
+    assert {joint["label"] for joint in about["joints"]} == joints | {"wave (Load)"}
+    assert {arrow["name"] for arrow in about["arrows"]} == {"gas.force", "spring.tension"}
     assert {marker["name"] for marker in about["markers"]} == {"crank.a", "crank.b", "rod.a", "rod.b", "ground.O"}
     assert {trace["name"] for trace in about["traces"]} == {"spring (SpringDamper)"}
 
