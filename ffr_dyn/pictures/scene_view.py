@@ -22,8 +22,9 @@ from ffr_dyn.results.quantities import measure
 from ffr_dyn.results.result import EULER_PARAMETERS, XYZ, Quantity, Result, mode_axis
 from ffr_dyn.scene.described import described
 from ffr_dyn.scene.joints import COINCIDENCE, Joint, words
-from ffr_dyn.scene.scene import Scene, marker_names, markers, require_scene
+from ffr_dyn.scene.scene import Body, Scene, marker_names, markers, require_scene
 from ffr_dyn.scene.surfaces import surface_of
+from ffr_prep.body import FlexibleBody
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.outputs import replacing
@@ -60,8 +61,13 @@ class SceneView:
         )
 
 
-def show(scene: Scene, path: str | Path | None = None, *, time: float = 0.0, camera: Camera | None = None) -> Viewer:
-    """A scene as it is before it runs: bodies, joints with their axes, drivers, forces, markers by name, the ground's points.
+def show(
+    scene: Scene | FlexibleBody, path: str | Path | None = None, *, time: float = 0.0, camera: Camera | None = None
+) -> Viewer:
+    """A scene, or a body alone, as it is before it runs.
+
+    Bodies, joints with their axes, drivers, forces, markers by name and the points of the ground are drawn.
+
 
     path   : .html, a page that can be turned with the mouse; .png, a picture
     time   : [s], at which the drivers are looked at
@@ -73,6 +79,8 @@ def show(scene: Scene, path: str | Path | None = None, *, time: float = 0.0, cam
 
     Example: ``fd.show(scene)`` in a notebook, ``fd.show(scene, "scene.html")`` elsewhere.
     """
+    if isinstance(scene, FlexibleBody):
+        scene = Scene((Body("body", scene),), name=scene.name or "body", plane="none")
     require_scene(scene)
     return drawn(scene_view(scene, time), path, camera)
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +53,12 @@ class StressReport:
     spots: tuple[HotSpot, ...]
     sections: dict[str, tuple[SectionPeak, ...]]
     files: tuple[Path, ...]
+
+    def _repr_html_(self) -> str:
+        """The report in words, and its pictures, for a notebook."""
+        pictures = [base64.b64encode(file.read_bytes()).decode() for file in self.files if file.suffix == ".png"]
+        shown = "".join(f'<img src="data:image/png;base64,{picture}" width="600">' for picture in pictures)
+        return f"<pre>{escape(chr(10).join(report_lines(self)))}</pre>{shown}"
 
 
 def stress_report(

@@ -90,6 +90,12 @@ def test_a_picture_is_drawn_and_other_files_are_refused(tmp_path):
         fd.show("crank.toml")
 
 
+def test_a_body_alone_is_drawn_with_its_points():
+    about = Content(fd.show(link(0.5)).text).about
+    assert [body["name"] for body in about["bodies"]] == ["body"]
+    assert {marker["name"] for marker in about["markers"]} == {"body.a", "body.b"}
+
+
 def test_a_window_needs_a_display(monkeypatch):
     from ffr_dyn.pictures.scene_view import open_window
 
