@@ -8,10 +8,10 @@ A `Result` is time, quantities with units and named axes, the surfaces of the bo
 from __future__ import annotations
 
 import csv
-import importlib
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from itertools import product
@@ -147,7 +147,9 @@ class Result(Brief):
 
         Example: ``result.to_xarray()["rod.tip.position"].sel(xyz="x")``
         """
-        xarray, found = _library("xarray"), {}
+        with _installed("xarray"):
+            import xarray
+        found: dict[str, Any] = {}
         labels: dict[str, Any] = {"time": self.time}
         for name in self.quantities if names is None else names:
             of = self.quantity(name)
@@ -166,7 +168,9 @@ class Result(Brief):
         `attrs["units"]` has their units by name.
         names : quantities or components; all when not given. Raises InputError where pandas is not installed.
         """
-        pandas, columns = _library("pandas"), list(self.components(names))
+        with _installed("pandas"):
+            import pandas
+        columns = list(self.components(names))
         of = {name: self.quantity(name) for name in columns}
         time = pandas.Index(self.time, name="time")
         frame = pandas.DataFrame({name: quantity.values for name, quantity in of.items()}, index=time)
@@ -184,9 +188,11 @@ class Result(Brief):
         return Quantity(owner.values[:, index], owner.unit, owner.axes[1:], owner.description)
 
 
-def _library(name: str) -> Any:
+@contextmanager
+def _installed(name: str) -> Iterator[None]:
+    """Around an import: InputError that names the package which is missing."""
     try:
-        return importlib.import_module(name)
+        yield
     except ImportError:
         raise InputError(f"this needs the package {name}, which is not installed: pip install {name}") from None
 

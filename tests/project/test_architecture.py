@@ -46,12 +46,14 @@ MESHERS_AND_PLOTTERS = {
     "imageio_ffmpeg",
     "matplotlib",
     "meshio",
+    "pandas",
     "plotly",
     "pyNastran",
     "pyvista",
     "skfem",
     "vtk",
     "vtkmodules",
+    "xarray",
 }
 HEAVY = {*MESHERS_AND_PLOTTERS, "PIL", "h5py", "numba", "pydantic", "scipy"}
 
@@ -338,7 +340,7 @@ def declared() -> set[str]:
     project = PROJECT["project"]
     optional = [
         requirement
-        for extra in ("chart", "video", "nastran", "pardiso", "ida")
+        for extra in ("chart", "video", "nastran", "pardiso", "ida", "tables")
         for requirement in project["optional-dependencies"][extra]
     ]
     return {distribution_name(requirement) for requirement in [*project["dependencies"], *optional]}
@@ -357,6 +359,8 @@ def test_every_library_is_declared_and_every_declared_one_is_used():
         "pypardiso": ["pypardiso"],
         "sksundae": ["scikit-sundae"],
         "dask": ["dask"],
+        "pandas": ["pandas"],
+        "xarray": ["xarray"],
     }
     owners = importlib.metadata.packages_distributions() | extras
     needed = {distribution_name(owners[name][0]) for name in third_party()}

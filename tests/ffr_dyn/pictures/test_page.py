@@ -45,9 +45,10 @@ class Content:
         body = self.about["bodies"][number]
         surface = self.about["surfaces"][body["surface"]]
         scales = np.array(surface["scales"])
-        shapes = self.array(*surface["shapes"]).reshape(-1, len(scales), 3)
+        shapes = self.array(*surface["shapes"]).reshape(surface["points"][2] // 3, len(scales), 3)
         linear = np.arange(len(scales)) < surface["linear"]
-        weights = self.array(*body["weights"]).reshape(-1, len(scales))[row] * scales
+        rows = len(self.array(*self.about["times"]))
+        weights = self.array(*body["weights"]).reshape(rows, len(scales))[row] * scales
         whole, first = (self.posed(self.about["bodies"][k], row) for k in (number, body["frame"]))
         points = self.array(*surface["points"]).reshape(-1, 3).astype(float)
         inner, outer = (1.0, scale) if body["parted"] else (scale, 1.0)
@@ -112,6 +113,15 @@ def test_parts_are_drawn_between_the_undeformed_whole_and_where_they_are(scale):
     page = content(result, scale=scale)
     drawn = np.concatenate([page.points(k, 6, scale) for k in (0, 1)])
     np.testing.assert_allclose(drawn, drawn_points(solid, 6, scale), rtol=0, atol=1e-3)
+
+
+def test_rigid_bodies_with_a_surface_move_without_shapes():
+    result = rotating_box(modes=0)
+    page = content(result)
+    assert page.about["surfaces"][0]["scales"] == []
+    assert [colour["words"] for colour in page.about["colours"]] == ["body", "speed"]
+    (solid,) = film_at(result, result.time).solids
+    np.testing.assert_allclose(page.points(0, 9, 1.0), drawn_points(solid, 9, 1.0), rtol=0, atol=1e-6)
 
 
 def test_few_shapes_do_what_many_did():
