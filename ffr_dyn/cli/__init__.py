@@ -187,7 +187,7 @@ def _attribute(key: str, value: Any) -> list[str]:
     if key == "connections":
         return [f"{name} ({of['kind']}): {', '.join(of['at']) or 'everywhere'}" for name, of in value.items()]
     if isinstance(value, dict):
-        return [f"{name}: {of}" for name, of in value.items()]
+        return [f"{name}: {', '.join(map(_short, of if isinstance(of, list) else [of]))}" for name, of in value.items()]
     if key == "largest_drift":
         return [f"{value[0]:.3g} of positions, {value[1]:.3g} of rates"]
     if isinstance(value, list):
@@ -197,6 +197,10 @@ def _attribute(key: str, value: Any) -> list[str]:
         if isinstance(value, float)
         else str(value)
     ]
+
+
+def _short(value: Any) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 def _number(text: str) -> float:

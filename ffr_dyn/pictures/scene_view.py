@@ -259,7 +259,8 @@ def _page(seen: SceneView, film: Film, camera: Camera) -> str:
 
 def _marked(seen: SceneView, film: Film) -> Film:
     """With names of joints and markers at their places, and axes of joints as lines."""
-    marks = dict(_merged([(marker, at[0]) for marker, at in seen.beside.markers.items()], film.size))
+    named = [(joint.label, joint.at[0]) for joint in seen.beside.joints]
+    marks = dict(_merged([*named, *((marker, at[0]) for marker, at in seen.beside.markers.items())], film.size))
     reach = 0.06 * film.size
     axes = {
         joint.label: joint.at[0] + reach * np.array([[-1.0], [1.0]]) * joint.axis[0]
@@ -271,13 +272,13 @@ def _marked(seen: SceneView, film: Film) -> Film:
 
 
 def _merged(places: Iterable[tuple[str, Array]], size: float) -> Iterator[tuple[str, Array]]:
-    """One name for points at one place: "crank.pin, rod.big_eye"."""
+    """One text for what is at one place, a line each."""
     left = list(places)
     while left:
         _, at = left[0]
         here = [name for name, other in left if np.linalg.norm(other - at) <= 1e-3 * size]
         left = [(name, other) for name, other in left if name not in here]
-        yield ", ".join(here), at
+        yield "\n".join(here), at
 
 
 def _write_picture(seen: SceneView, film: Film, camera: Camera, path: Path) -> None:

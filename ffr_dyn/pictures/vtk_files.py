@@ -19,10 +19,12 @@ from ffr_dyn.pictures.film import Film, Solid, displaced, film_at
 from ffr_dyn.results.result import Result
 from ffr_dyn.results.stress import values_at
 from ffr_dyn.scene.stress_sensors import MEASURES
+from ffr_prep.body import displacements
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.outputs import replacing
 
 _TRIANGLE, _LINE = 5, 3  # kinds of cells
+_BATCH = 400_000  # points times rows that are worked on at once
 _HOW: dict[str, Any] = {"libver": ("v108", "v108"), "locking": False}
 
 
@@ -56,25 +58,42 @@ def grid(film: Film) -> Grid:
     )
 
 
-def fields(film: Film, mesh: Grid, row: int) -> dict[str, Array]:
-    """displacement (P, 3) from the points of the mesh, elastic (P, 3), both [m] in global axes; von_mises (P,) [Pa]."""
-    elastic = [displaced(solid, row) @ solid.A[row].T for solid in film.solids]
-    places = [
-        solid.R[row] + solid.surface.points @ solid.A[row].T + u for solid, u in zip(film.solids, elastic, strict=True)
-    ]
-    places += [link.points[row] for link in film.links]
-    elastic += [np.zeros_like(link.points[row]) for link in film.links]
-    found = {"displacement": np.concatenate(places) - mesh.points, "elastic": np.concatenate(elastic)}
-    if any(solid.surface.stress is not None for solid in film.solids):
-        stress = [_von_mises(solid, row) for solid in film.solids]
-        found["von_mises"] = np.concatenate([*stress, *(np.zeros(len(link.points[row])) for link in film.links)])
-    return found
+def fields(film: Film, mesh: Grid) -> Iterator[dict[str, Array]]:
+    """For each row: displacement (P, 3) from the points of the mesh, elastic (P, 3), both [m] in global axes; von_mises (P,)
+    [Pa] where a body has stress modes."""
+    still = [np.zeros((len(link.points[0]), 3)) for link in film.links]
+    stressed = any(solid.surface.stress is not None for solid in film.solids)
+    pieces = max(1, len(film.times) * len(mesh.points) // _BATCH)
+    for rows in np.array_split(np.arange(len(film.times)), pieces):
+        local = [_elastic(solid, rows) for solid in film.solids]
+        stress = [_von_mises(solid, rows) for solid in film.solids] if stressed else []
+        for k, row in enumerate(rows):
+            elastic = [u[k] @ solid.A[row].T for solid, u in zip(film.solids, local, strict=True)]
+            places = [_at_rest(solid, row) + u for solid, u in zip(film.solids, elastic, strict=True)]
+            moved = np.concatenate([*places, *(link.points[row] for link in film.links)]) - mesh.points
+            found = {"displacement": moved, "elastic": np.concatenate([*elastic, *still])}
+            if stressed:
+                found["von_mises"] = np.concatenate([*(of[k] for of in stress), *(of[:, 0] for of in still)])
+            yield found
 
 
-def _von_mises(solid: Solid, row: int) -> Array:
+def _at_rest(solid: Solid, row: int) -> Array:
+    """(P, 3) undeformed points where the body is at a row."""
+    return np.asarray(solid.R[row] + solid.surface.points @ solid.A[row].T)
+
+
+def _elastic(solid: Solid, rows: Array) -> Array:
+    """(B, P, 3) elastic displacements at some rows, body axes."""
+    if solid.parts is not None:
+        return np.stack([displaced(solid, int(row)) for row in rows])
+    return displacements(solid.surface, solid.q[rows])
+
+
+def _von_mises(solid: Solid, rows: Array) -> Array:
+    """(B, P)."""
     if solid.surface.stress is None:
-        return np.zeros(len(solid.surface.points))
-    return values_at(solid.surface, solid.q[row : row + 1], MEASURES["von-mises"])[:, 0]
+        return np.zeros((len(rows), len(solid.surface.points)))
+    return values_at(solid.surface, solid.q[rows], MEASURES["von-mises"]).T
 
 
 def write_vtkhdf(result: Result, path: Path) -> Path:
@@ -86,14 +105,16 @@ def write_vtkhdf(result: Result, path: Path) -> Path:
         root.attrs["Version"] = np.array([2, 0], np.int64)
         root.attrs["Type"] = np.bytes_("UnstructuredGrid")
         _write_mesh(root, mesh)
-        _write_steps(root, result.time, mesh, tuple(fields(film, mesh, 0)))
-        data = root.create_group("PointData")
-        for row in range(rows):
-            for name, values in fields(film, mesh, row).items():
+        data, count = root.create_group("PointData"), len(mesh.points)
+        for row, found in enumerate(fields(film, mesh)):
+            for name, values in found.items():
                 if row == 0:
-                    shape = (rows * len(mesh.points), *values.shape[1:])
-                    data.create_dataset(name, shape, "f8", chunks=(len(mesh.points), *values.shape[1:]), compression=4)
-                data[name][row * len(mesh.points) : (row + 1) * len(mesh.points)] = values
+                    shape = (rows * count, *values.shape[1:])
+                    data.create_dataset(
+                        name, shape, "f4", chunks=(count, *values.shape[1:]), compression=1, shuffle=True
+                    )
+                data[name][row * count : (row + 1) * count] = values
+        _write_steps(root, result.time, mesh, tuple(data))
     return path
 
 
@@ -128,9 +149,9 @@ def write_pvd(result: Result, path: Path) -> Path:
     film = film_at(result, result.time, colour="body")
     mesh, folder, digits = grid(film), path.with_suffix(""), len(str(result.time.size))
     files = [f"{folder.name}/{row:0{digits}}.vtu" for row in range(result.time.size)]
-    for row, name in enumerate(files):
+    for name, found in zip(files, fields(film, mesh), strict=True):
         with replacing(path.parent / name) as part:
-            part.write_text("\n".join(_vtu(mesh, fields(film, mesh, row))), encoding="ascii")
+            part.write_text("\n".join(_vtu(mesh, found)), encoding="ascii")
     sets = [
         f'<DataSet timestep="{t!r}" file={quoteattr(name)}/>'
         for t, name in zip(result.time.tolist(), files, strict=True)

@@ -68,9 +68,9 @@ def test_stress_and_elastic_displacement_are_there(tmp_path):
     reader.SetStep(5)
     reader.Update()
     elastic = displaced(solid, 5) @ solid.A[5].T
-    np.testing.assert_allclose(array(reader.GetOutput(), "elastic"), elastic, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(array(reader.GetOutput(), "elastic"), elastic, rtol=0, atol=1e-6 * np.abs(elastic).max())
     stress = values_at(solid.surface, solid.q[5:6], MEASURES["von-mises"])[:, 0]
-    np.testing.assert_allclose(array(reader.GetOutput(), "von_mises"), stress, rtol=1e-12)
+    np.testing.assert_allclose(array(reader.GetOutput(), "von_mises"), stress, rtol=1e-6)
 
 
 @pytest.mark.parametrize("make", RESULTS.values(), ids=RESULTS.keys())
