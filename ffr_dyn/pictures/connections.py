@@ -12,6 +12,7 @@ from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.results.result import Result
 from ffr_prep.common.arrays import Array
 
+_ROUNDING = 1e-9  # of the largest force or moment, up to which there is none
 _VECTORS = (("force", "N"), ("moment", "N m"))
 
 
@@ -52,7 +53,13 @@ def connections(result: Result) -> Connections:
     shown = {name: of for name, of in told.items() if "axis" in of and of["kind"] != "driver"}
     joints = [_joint(result, name, of, markers) for name, of in shown.items() if of["at"][0] in markers]
     arrows = [arrow for name, of in told.items() for arrow in _arrows(result, name, of, markers)]
-    return Connections(tuple(joints), tuple(arrows), markers)
+    largest = {unit: max((_size(arrow) for arrow in arrows if arrow.unit == unit), default=0.0) for _, unit in _VECTORS}
+    seen = (arrow for arrow in arrows if _size(arrow) > _ROUNDING * largest[arrow.unit])
+    return Connections(tuple(joints), tuple(seen), markers)
+
+
+def _size(arrow: ArrowShown) -> float:
+    return float(np.abs(arrow.vector).max(initial=0.0))
 
 
 def _places(result: Result) -> dict[str, Array]:
@@ -93,7 +100,7 @@ def _arrows(result: Result, name: str, of: Mapping[str, Any], markers: Mapping[s
             found.append(ArrowShown(f"{name}.{what}", unit, at, _turned(result, body, np.asarray(given[what], float))))
     if f"{name}.tension" in result.quantities and of["at"][0] in markers and len(of["at"]) == 2:
         found.append(_pull(f"{name}.tension", result[f"{name}.tension"], markers[of["at"][0]], at))
-    return [arrow for arrow in found if np.isfinite(arrow.vector).all() and np.abs(arrow.vector).max(initial=0.0) > 0]
+    return [arrow for arrow in found if np.isfinite(arrow.vector).all()]
 
 
 def _pull(name: str, tension: Array, i: Array, j: Array) -> ArrowShown:

@@ -368,7 +368,7 @@ function drawSolids(at, width, height) {
 // ---- lines and words over the bodies --------------------------------------------------------------------------------------
 
 const over = $("over").getContext("2d");
-let taken = []; // places of words in a picture
+let taken = []; // places and widths of words in a picture
 let pixels; // point in space -> point on the screen
 
 function line(points, colour, width = 1.5, dash = []) {
@@ -383,8 +383,9 @@ function line(points, colour, width = 1.5, dash = []) {
 
 /** Words beside a place, below those that stand there already. */
 function label(text, [x, y], colour = INK) {
-  while (taken.some(([a, b]) => Math.abs(a - x) < 60 && Math.abs(b - y) < 13)) y += 13;
-  taken.push([x, y]);
+  const width = over.measureText(text).width;
+  while (taken.some(([a, b, wide]) => a < x + width && x < a + wide && Math.abs(b - y) < 13)) y += 13;
+  taken.push([x, y, width]);
   words(text, [x, y], colour);
 }
 
