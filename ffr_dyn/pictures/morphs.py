@@ -80,3 +80,14 @@ def sharp_edges(points: Array, triangles: Array, angle: float = 30.0) -> Array:
     pairs = normals[order[first]], normals[order[np.minimum(first + 1, len(order) - 1)]]
     smooth = (count == 2) & (np.einsum("ei,ei->e", *pairs) >= np.cos(np.radians(angle)))
     return np.asarray(edges[~smooth], np.int64).reshape(-1, 2)
+
+
+def is_closed(points: Array, triangles: Array) -> bool:
+    """Whether a triangulated surface bounds a body, and all triangles are seen from outside in one sense of rotation."""
+    ends = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    there, count = np.unique(ends, axis=0, return_counts=True)
+    back, _ = np.unique(ends[:, ::-1], axis=0, return_counts=True)
+    if not len(ends) or (count > 1).any() or not np.array_equal(there, back):
+        return False
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    return bool(np.einsum("ti,ti->", np.cross(a, b), c) > 0)

@@ -20,7 +20,7 @@ from matplotlib import colormaps
 
 from ffr_dyn.pictures.connections import Connections
 from ffr_dyn.pictures.film import BODY_COLOURS, TRACE_COLOURS, Camera, Film, Link, Solid
-from ffr_dyn.pictures.morphs import MOST_SHAPES, MOST_TENSORS, beside, morph, quadratic, sharp_edges
+from ffr_dyn.pictures.morphs import MOST_SHAPES, MOST_TENSORS, beside, is_closed, morph, quadratic, sharp_edges
 from ffr_dyn.pictures.shades import Shade
 from ffr_dyn.results.result import Result
 from ffr_prep.body import Surface, some_points
@@ -362,6 +362,7 @@ def _surface(group: Sequence[Piece], numbers: _Numbers) -> tuple[Item, list[Item
         "points": numbers.keep(surface.points),
         "triangles": numbers.keep(surface.triangles, "u4"),
         "edges": numbers.keep(sharp_edges(surface.points, surface.triangles), "u4"),
+        "closed": is_closed(surface.points, surface.triangles),
         "moduli": None if surface.moduli is None else numbers.keep(surface.moduli),
         "linear": len(linear.scales),
         "shapes": numbers.keep(np.moveaxis(deformed.shapes, 2, 1), "i2"),

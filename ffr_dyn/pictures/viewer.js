@@ -88,9 +88,10 @@ function pose(body, at) {
 
 // ---- WebGL ------------------------------------------------------------------------------------------------------------
 
-// Smooth edges cost half the time where there is no graphics card.
-const gl = [true, false].reduce((found, card) =>
-  found || $("solid").getContext("webgl2", { antialias: card, failIfMajorPerformanceCaveat: card }), null);
+// Where there is no graphics card smooth edges cost half the time, and a film is drawn with three quarters of the pixels.
+const smooth = $("solid").getContext("webgl2", { antialias: true, failIfMajorPerformanceCaveat: true });
+const gl = smooth || $("solid").getContext("webgl2", { antialias: false });
+const sharpness = () => (smooth || !state.playing ? 1 : 0.75);
 // Where the points are and what colours them, once for each point of a body: written to a buffer, from which it is drawn.
 const MOTION = `#version 300 es
 precision highp float; precision highp int; precision highp isampler2D;
@@ -102,7 +103,8 @@ uniform float stresses[${MOST_TENSORS}];
 uniform mat3 A, A0, rateA;
 uniform vec3 R, R0, rateR;
 uniform float blend;
-out vec3 place; out float value;
+uniform vec2 range; uniform sampler2D map;
+out vec3 place; out float value, shade; // red, green and blue as one whole number
 
 vec3 texel(isampler2D of, int k) { return vec3(texelFetch(of, ivec2(k % ${WIDTH}, k / ${WIDTH}), 0).xyz); }
 
@@ -148,16 +150,18 @@ void main() {
     value = measured(n, s);
   }
   place = mix(rest, R + A * drawn, blend);
+  vec3 colour = textureLod(map, vec2(clamp((value - range.x) / (range.y - range.x), 0.0, 1.0), 0.5), 0.0).rgb;
+  shade = dot(floor(255.0 * colour + 0.5), vec3(65536.0, 256.0, 1.0));
 }`;
 const VERTEX = `#version 300 es
 precision highp float;
-in vec3 point; in float field;
+in vec3 point; in float shade;
 uniform mat3 A, view; uniform vec3 R, target, zoom, colour; uniform float lift;
-uniform bool mapped; uniform vec2 range; uniform sampler2D map;
+uniform bool mapped;
 out vec3 eye, base;
 void main() {
   eye = view * (R + A * point - target);
-  base = mapped ? textureLod(map, vec2(clamp((field - range.x) / (range.y - range.x), 0.0, 1.0), 0.5), 0.0).rgb : colour;
+  base = mapped ? floor(mod(shade / vec3(65536.0, 256.0, 1.0), 256.0)) / 255.0 : colour;
   gl_Position = vec4(eye.xy * zoom.xy, -eye.z * zoom.z - lift, 1.0);
 }`;
 const FRAGMENT = `#version 300 es
@@ -249,22 +253,22 @@ function loadSurface(surface) {
   surface.tensorTexture = shapesTexture(array(surface.tensors));
 }
 
-/** Where a body's points are written to, four numbers each: place and what colours it. */
+/** Where a body's points are written to, five numbers each: place, what colours it, and the colour. */
 function loadBody(body) {
   const surface = about.surfaces[body.surface];
   Object.assign(body, {
     shown: true, pose: array(body.pose), weights: array(body.weights), tensors: array(body.tensors),
     shade: [1, 3, 5].map((k) => parseInt(body.colour.slice(k, k + 2), 16) / 255),
-    moved: buffer(gl.ARRAY_BUFFER, new Float32Array(4 * surface.size)),
+    moved: buffer(gl.ARRAY_BUFFER, new Float32Array(5 * surface.size)),
   });
-  body.vertices = vertices([[body.moved, 3, 16, 0], [body.moved, 1, 16, 12]], surface.corners);
+  body.vertices = vertices([[body.moved, 3, 20, 0], [body.moved, 1, 20, 16]], surface.corners);
 }
 
 function load() {
   rows = array(about.times);
   blank = texture(gl.RGB8, gl.RGB, gl.UNSIGNED_BYTE, 1, 1, new Uint8Array(3), gl.NEAREST);
-  motion = compiled(MOTION, "#version 300 es\nvoid main() {}", ["point", "moduli"], ["place", "value"]);
-  drawing = compiled(VERTEX, FRAGMENT, ["point", "field"]);
+  motion = compiled(MOTION, "#version 300 es\nvoid main() {}", ["point", "moduli"], ["place", "value", "shade"]);
+  drawing = compiled(VERTEX, FRAGMENT, ["point", "shade"]);
   about.surfaces.forEach(loadSurface);
   about.bodies.forEach(loadBody);
   for (const colour of about.colours)
@@ -295,7 +299,8 @@ function move(body, at) {
   gl.uniform1f(uniforms.blend, body.parted ? state.scale : 1);
   gl.uniform1i(uniforms.kind, colour ? colour.kind : 0);
   gl.uniform1i(uniforms.measure, colour ? colour.measure : 0);
-  [surface.shapeTexture, surface.tensorTexture].forEach((of, k) => { gl.activeTexture(gl.TEXTURE0 + k); gl.bindTexture(gl.TEXTURE_2D, of); });
+  gl.uniform2f(uniforms.range, colour && colour.low < 0 ? -state.limits[state.colour] : 0, state.limits[state.colour]);
+  [surface.shapeTexture, surface.tensorTexture, colour ? colour.texture : blank].forEach((of, k) => { gl.activeTexture(gl.TEXTURE0 + k); gl.bindTexture(gl.TEXTURE_2D, of); });
   gl.bindVertexArray(surface.still);
   gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, body.moved);
   gl.beginTransformFeedback(gl.POINTS);
@@ -308,6 +313,7 @@ function moveAll(at) {
   gl.useProgram(motion.program);
   gl.uniform1i(motion.uniforms.shapes, 0);
   gl.uniform1i(motion.uniforms.tensors, 1);
+  gl.uniform1i(motion.uniforms.map, 2);
   gl.enable(gl.RASTERIZER_DISCARD);
   about.bodies.filter((body) => body.shown).forEach((body) => move(body, at));
   gl.disable(gl.RASTERIZER_DISCARD);
@@ -322,20 +328,18 @@ function colourOf(body) {
 
 const IDENTITY = [1, 0, 0, 0, 1, 0, 0, 0, 1];
 
-/** One thing drawn: rest, where it is drawn undeformed; lift, towards the eye; map, what it is coloured by. */
-function paint(from, what, { rest, lift = 0, colour, opacity = 1, map, shaded = true }) {
-  const { uniforms } = drawing, translucent = opacity < 1, high = state.limits[state.colour];
+/** One thing drawn: rest, where it is drawn undeformed; lift, towards the eye; mapped, by the colour of each point. */
+function paint(from, what, { rest, lift = 0, colour, opacity = 1, mapped = false, shaded = true }) {
+  const { uniforms } = drawing, translucent = opacity < 1;
   gl[translucent ? "enable" : "disable"](gl.BLEND);
   gl.depthMask(!translucent);
   gl.uniformMatrix3fv(uniforms.A, false, rest ? rest.A : IDENTITY);
   gl.uniform3fv(uniforms.R, rest ? rest.R : [0, 0, 0]);
   gl.uniform1f(uniforms.lift, lift);
   gl.uniform1i(uniforms.shaded, shaded);
-  gl.uniform1i(uniforms.mapped, Boolean(map));
+  gl.uniform1i(uniforms.mapped, mapped);
   gl.uniform3fv(uniforms.colour, colour);
   gl.uniform1f(uniforms.opacity, opacity);
-  gl.bindTexture(gl.TEXTURE_2D, map ? map.texture : blank);
-  if (map) gl.uniform2f(uniforms.range, map.low < 0 ? -high : 0, high);
   gl.bindVertexArray(from);
   gl.drawElements(...what);
 }
@@ -349,16 +353,15 @@ function drawSolids(at, width, height) {
   gl.enable(gl.DEPTH_TEST);
   gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
   gl.useProgram(drawing.program);
-  gl.activeTexture(gl.TEXTURE0);
   const { uniforms } = drawing, [right, up, towards] = camera.axes;
-  gl.uniform1i(uniforms.map, 0);
   gl.uniformMatrix3fv(uniforms.view, false, [0, 1, 2].flatMap((c) => [right[c], up[c], towards[c]]));
   gl.uniform3fv(uniforms.target, camera.target);
   gl.uniform3f(uniforms.zoom, height / width / camera.reach, 1 / camera.reach, 1 / (2 * about.size + camera.reach));
   for (const body of about.bodies.filter((one) => one.shown).sort((a, b) => a.faint - b.faint)) {
     const surface = about.surfaces[body.surface], opacity = body.faint ? 0.3 : 1;
+    gl[surface.closed ? "enable" : "disable"](gl.CULL_FACE); // nobody sees the inside
     const faces = [gl.TRIANGLES, surface.count, gl.UNSIGNED_INT, 0], lines = [gl.LINES, surface.lines, gl.UNSIGNED_INT, 4 * surface.count];
-    paint(body.vertices, faces, { colour: body.shade, opacity, map: colourOf(body) });
+    paint(body.vertices, faces, { colour: body.shade, opacity, mapped: Boolean(colourOf(body)) });
     if ($("edges").checked) paint(body.vertices, lines, { lift: 5e-4, colour: [0.13, 0.13, 0.13], opacity, shaded: false });
     if ($("ghost").checked && surface.scales.length)
       paint(surface.undeformed, faces, { rest: body.rest, lift: -1e-3, colour: [0.5, 0.5, 0.5], opacity: 0.2 });
@@ -545,8 +548,8 @@ const redraw = () => { if (!wanted) { wanted = true; requestAnimationFrame(() =>
 
 function draw() {
   const stage = $("stage"), ratio = devicePixelRatio, width = stage.clientWidth, height = stage.clientHeight, at = place(state.time);
-  for (const canvas of [$("solid"), $("over")]) {
-    const size = [Math.round(width * ratio), Math.round(height * ratio)];
+  for (const [canvas, share] of [[$("solid"), ratio * sharpness()], [$("over"), ratio]]) {
+    const size = [Math.round(width * share), Math.round(height * share)];
     if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
   }
   drawSolids(at, $("solid").width, $("solid").height);
@@ -595,7 +598,7 @@ function play(on) {
   if (state.playing && state.time >= rows.at(-1)) state.time = rows[0];
   $("play").textContent = state.playing ? "❚❚" : "▶";
   last = undefined;
-  if (state.playing) requestAnimationFrame(tick);
+  if (state.playing) requestAnimationFrame(tick); else redraw();
 }
 
 function tick(now) {

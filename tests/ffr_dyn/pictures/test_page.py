@@ -17,7 +17,7 @@ from test_animate import box_surface, pendulum_of_markers, rotating_box
 
 import ffr_dyn as fd
 from ffr_dyn.pictures.film import displacements, drawn_points, film_at
-from ffr_dyn.pictures.morphs import morph, sharp_edges
+from ffr_dyn.pictures.morphs import is_closed, morph, sharp_edges
 from ffr_dyn.pictures.page import decimated, rods
 from ffr_dyn.results.result import EULER_PARAMETERS, XYZ, Quantity, Result, mode_axis
 from ffr_dyn.results.stress import values_at
@@ -144,6 +144,17 @@ def test_the_sharp_edges_of_a_box_are_its_twelve():
     assert len(edges) == 4 * 4 + 2 * 4
     along = surface.points[edges[:, 1]] - surface.points[edges[:, 0]]
     assert ((np.abs(along) > 1e-12).sum(axis=1) == 1).all()
+
+
+def test_a_box_is_closed_and_its_parts_are_not():
+    surface = box_surface(stations=5)
+    turned = surface.triangles[:, ::-1]
+    inside = [is_closed(surface.points, of) for of in (surface.triangles, turned)]
+    assert sorted(inside) == [False, True]
+    assert not is_closed(surface.points, surface.triangles[1:])
+    assert not is_closed(surface.points, np.concatenate([surface.triangles[1:], surface.triangles[:1, ::-1]]))
+    rod, _ = rods(np.array([[0.0, 0, 0], [1, 0, 0]]), np.array([[0, 1]]), 0.1)
+    assert is_closed(rod.points, rod.triangles)
 
 
 def test_free_edges_are_sharp():
@@ -293,7 +304,7 @@ def browser(tmp_path):
 
 MOVED = """(() => {
   draw();
-  const body = about.bodies[%d], size = about.surfaces[body.surface].size, found = new Float32Array(4 * size);
+  const body = about.bodies[%d], size = about.surfaces[body.surface].size, found = new Float32Array(5 * size);
   gl.bindBuffer(gl.ARRAY_BUFFER, body.moved);
   gl.getBufferSubData(gl.ARRAY_BUFFER, 0, found);
   gl.bindBuffer(gl.ARRAY_BUFFER, null);
@@ -303,7 +314,7 @@ MOVED = """(() => {
 
 def drawn(browser, number=0):
     """(P, 3) places of the points on the graphics card, and (P,) what colours them."""
-    found = np.reshape(browser.value(MOVED % number), (-1, 4))
+    found = np.reshape(browser.value(MOVED % number), (-1, 5))
     return found[:, :3], found[:, 3]
 
 
