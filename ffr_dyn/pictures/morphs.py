@@ -14,7 +14,7 @@ import numpy as np
 from ffr_prep.body import QuadraticField
 from ffr_prep.common.arrays import Array
 
-MOST_SHAPES, MOST_TENSORS = 60, 40  # as in viewer.js: what a vertex shader has room for
+MOST_SHAPES, MOST_TENSORS = 60, 40  # as in web/numbers.js: what a vertex shader has room for
 _LEFT_OUT = 1e-4  # of the size of a field, over its surface and all times, that shapes left out may have
 _LARGEST = 32767
 

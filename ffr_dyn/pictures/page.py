@@ -1,4 +1,4 @@
-"""A film as one self-contained page: the viewer (viewer.html, .css, .js), and all numbers, deflated. It fetches nothing.
+"""A film as one self-contained page: the viewer of the folder `web`, and all numbers, deflated. It fetches nothing.
 
 A surface is stored once, whichever bodies have it, with the shapes of its deformation and of its stress (`morphs`); of every
 row of the result there are only poses and weights. The page's own policy forbids requests.
@@ -36,6 +36,8 @@ _SIDES = 8  # of a rod
 _THICK = 0.012  # of the size of the whole motion: the radius of a rod
 _RIGID = 1e-6  # of a body's size, that markers of a rigid one move by rounding
 
+_SCRIPTS = ("numbers", "shaders", "solids", "overlay", "plots", "controls")
+
 Item = dict[str, Any]
 
 
@@ -68,15 +70,15 @@ def page(shown: Shown, camera: Camera, seconds: float) -> str:
     """The HTML; seconds : playing time of the whole film [s]."""
     numbers = _Numbers()
     about = json.dumps(_about(shown, camera, seconds, numbers), separators=(",", ":"), ensure_ascii=False)
-    here = files("ffr_dyn.pictures")
+    web = files("ffr_dyn.pictures").joinpath("web")
     parts = {
         "TITLE": _escaped(shown.title or "Motion of a multibody system"),
-        "STYLE": here.joinpath("viewer.css").read_text("utf-8"),
+        "STYLE": web.joinpath("page.css").read_text("utf-8"),
         "ABOUT": about.replace("<", "\\u003c"),
         "NUMBERS": base64.b64encode(zlib.compress(b"".join(numbers.parts), 9)).decode(),
-        "SCRIPT": here.joinpath("viewer.js").read_text("utf-8"),
+        "SCRIPT": "\n".join(web.joinpath(f"{name}.js").read_text("utf-8") for name in _SCRIPTS),
     }
-    text = here.joinpath("viewer.html").read_text("utf-8")
+    text = web.joinpath("page.html").read_text("utf-8")
     for key, value in parts.items():
         text = text.replace(f"@{key}@", value)
     return text

@@ -11,7 +11,7 @@ from ffr_dyn.pictures.film import Film, Solid, displaced, largest_value
 from ffr_dyn.scene.stress_sensors import MEASURES, TENSOR, Measure
 from ffr_prep.common.arrays import Array
 
-PLAIN, DISPLACEMENT, SPEED, STRESS, STRAIN = range(5)  # kinds, as in viewer.js
+PLAIN, DISPLACEMENT, SPEED, STRESS, STRAIN = range(5)  # kinds, as in web/shaders.js
 _ORDER = ("von-mises", "tresca", "signed-max-principal", "max-principal", "min-principal", *TENSOR)
 _OFFERED = ("von-mises", "signed-max-principal")
 _LOOKS = 48  # rows that are looked at for the range of what is offered beside what was asked for
@@ -19,7 +19,7 @@ _LOOKS = 48  # rows that are looked at for the range of what is offered beside w
 
 @dataclass(frozen=True, eq=False)
 class Shade:
-    """A field, as viewer.js makes it of what moves.
+    """A field, as web/shaders.js makes it of what moves.
 
     kind, measure : what it is, and which measure of stress or strain
     low, high     : of the colour bar, in `unit`; low is 0, or less for a measure with a sign

@@ -90,7 +90,8 @@ class Result(Brief):
     time       : (T,) [s], finite, not decreasing
     quantities : by dotted name; each has T rows
     geometry   : by body name; the surface that is drawn, in the body frame
-    attributes : plain JSON values: title, status ("running", "complete", "stopped: reason"), scene text, settings
+    attributes : plain JSON values: title, status ("running", "complete", "stopped: reason"), settings, and what connects
+                 which markers (`ffr_dyn.scene.described`)
 
     Raises InputError when lengths, names or axes contradict each other.
     """

@@ -376,7 +376,7 @@ def test_every_folder_of_modules_is_a_package_and_is_installed():
 
 
 # What is neither a module nor the mark that says that types are given: parts of the page that shows films and scenes.
-OF_A_PAGE = {f"ffr_dyn/pictures/viewer.{kind}" for kind in ("css", "html", "js")}
+OF_A_PAGE = {f"ffr_dyn/pictures/web/{path.name}" for path in (ROOT / "ffr_dyn/pictures/web").iterdir()}
 
 
 def test_the_packages_hold_modules_and_what_is_installed_with_them():
@@ -385,7 +385,8 @@ def test_the_packages_hold_modules_and_what_is_installed_with_them():
     others = [p.relative_to(ROOT).as_posix() for p in files if p.suffix != ".py" and "__pycache__" not in p.parts]
     assert set(others) <= {f"{package}/py.typed" for package in PACKAGES} | OF_A_PAGE
     data = PROJECT["tool"]["setuptools"]["package-data"]
-    assert data == {"*": ["py.typed"], "ffr_dyn.pictures": ["viewer.css", "viewer.html", "viewer.js"]}
+    assert data == {"*": ["py.typed"], "ffr_dyn.pictures": ["web/*"]}
+    assert {path.rpartition(".")[2] for path in OF_A_PAGE} == {"css", "html", "js"}
 
 
 MACHINE = re.compile(

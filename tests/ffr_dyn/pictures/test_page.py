@@ -415,3 +415,12 @@ def test_forces_are_drawn_as_arrows(browser, tmp_path):
     assert orange(browser) == 0
     browser.value("about.arrows.forEach((arrow) => { arrow.shown = true; }); draw()")
     assert orange(browser) > 50
+
+
+@needs_browser
+@pytest.mark.slow
+def test_a_notebook_shows_a_film_in_a_frame_of_its_own(browser, tmp_path):
+    text = f"<!DOCTYPE html><html><body>{fd.animate(rotating_box())._repr_html_()}</body></html>"
+    (tmp_path / "a.html").write_text(text, encoding="utf-8")
+    browser.open(tmp_path / "a.html")
+    browser.until("frames[0].document.body.dataset.ready === 'yes'")
