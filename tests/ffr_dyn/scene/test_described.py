@@ -12,13 +12,19 @@ def test_joints_drivers_and_forces_are_told_by_their_markers():
     bar = fd.rigid_body("bar", mass=1.0, inertia=np.eye(3), points={"a": (0, 0, 0), "b": (1, 0, 0)})
     scene = fd.Scene(
         (fd.Body("bar", bar),),
-        (fd.Joint("hinge", "revolute", "ground.O", "bar.a", axis=(0, 0, 2.0)), fd.Joint("stay", "distance", "ground.P", "bar.b", length=1.0)),
+        (
+            fd.Joint("hinge", "revolute", "ground.O", "bar.a", axis=(0, 0, 2.0)),
+            fd.Joint("stay", "distance", "ground.P", "bar.b", length=1.0),
+        ),
         (fd.Driver("motor", "hinge", 0.0),),
-        loads=(fd.Load("pull", "bar.b", force=(1, 0, 0), axes="body"), fd.Load("wave", "bar.b", force=(fd.polynomial(0, 1), 0, 0))),
+        loads=(
+            fd.Load("pull", "bar.b", force=(1, 0, 0), axes="body"),
+            fd.Load("wave", "bar.b", force=(fd.polynomial(0, 1), 0, 0)),
+        ),
         forces=(fd.JointSpring("coil", "hinge", stiffness=1.0),),
         ground={"O": (0, 0, 0), "P": (1, 1, 0)},
         name="bar",
-    )  # fmt: skip
+    )
     told = described(scene)
     assert json.loads(json.dumps(told)) == told
     assert told["title"] == "bar"
