@@ -100,8 +100,7 @@ def _page(
 
     result = _thinned(result)
     shown = film_at(result, result.time, **how)
-    boxes = ("edges", "ghost") if shown.scale > 1 else ("edges",)
-    content = Shown(shown, connections(result), shades(shown, how["colour"]), title, result, plots, boxes=boxes)
+    content = Shown(shown, connections(result), shades(shown, how["colour"]), title, result, plots)
     return page(content, camera or camera_for(shown), playing)
 
 
