@@ -17,6 +17,7 @@ from ffr_dyn.cli.realtime import realtime
 from ffr_dyn.cli.run import run
 from ffr_dyn.cli.show import show
 from ffr_dyn.cli.stress import stress
+from ffr_dyn.cli.sweep import sweep
 from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, reserve, run_command
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.registry import load_plugin
@@ -178,7 +179,7 @@ def animate(
     click.echo(f"film     {output}")
 
 
-for command in (run, check, show, export, list_methods, stress, chart, economise, parts, realtime):
+for command in (run, check, show, export, list_methods, stress, chart, economise, parts, realtime, sweep):
     cli.add_command(command)
 
 
