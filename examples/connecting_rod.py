@@ -94,7 +94,8 @@ def pictures(result: fd.Result, folder: Path) -> None:
     forces = ["crank_pin.force.x", "crank_pin.force.y", "piston_pin.force.x", "piston_pin.force.y", "motor.moment.z"]
     fd.plot(result, forces, folder / "reactions.png", title="Joint reactions and motor torque")
     fd.animate(result, folder / "motion.gif", scale="auto", fps=20)
-    fd.animate(result, folder / "motion.html", scale="auto", fps=20, colour="von-mises", limit=STRESS)
+    loads = ["crank_pin.force", "rod.middle.displacement.y"]
+    fd.animate(result, folder / "motion.html", scale="auto", colour="von-mises", limit=STRESS, plots=loads)
 
 
 def stresses(result: fd.Result, folder: Path) -> None:

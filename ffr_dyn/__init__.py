@@ -53,7 +53,10 @@ _BY_MODULE = {
     "ffr_dyn.consistency.mobility": "Mobility mobility",
     "ffr_dyn.consistency.validity": "in_enough_parts parts_needed",
     "ffr_dyn.pictures.animate": "animate",
+    "ffr_dyn.pictures.export": "export",
     "ffr_dyn.pictures.histories": "plot plot_path",
+    "ffr_dyn.pictures.scene_view": "show",
+    "ffr_dyn.pictures.viewer": "Viewer",
     "ffr_dyn.pictures.stress_report": "report_lines stress_report",
     "ffr_dyn.analyses.inversion.bounded": "Bounded",
     "ffr_dyn.analyses.efforts": "JointEffort MarkerEffort recorded with_effort",
@@ -148,7 +151,10 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_dyn.consistency.mobility import Mobility as Mobility, mobility as mobility
     from ffr_dyn.consistency.validity import in_enough_parts as in_enough_parts, parts_needed as parts_needed
     from ffr_dyn.pictures.animate import animate as animate
+    from ffr_dyn.pictures.export import export as export
     from ffr_dyn.pictures.histories import plot as plot, plot_path as plot_path
+    from ffr_dyn.pictures.scene_view import show as show
+    from ffr_dyn.pictures.viewer import Viewer as Viewer
     from ffr_dyn.pictures.stress_report import report_lines as report_lines, stress_report as stress_report
     from ffr_dyn.analyses.inversion.bounded import Bounded as Bounded
     from ffr_dyn.analyses.efforts import (

@@ -46,7 +46,7 @@ from ffr_dyn.results.file import ResultWriter, load_checkpoint, load_result
 from ffr_dyn.results.quantities import Entry, Memory, measure, needs_every_step, selected
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.checks import several
-from ffr_dyn.scene.parts import described
+from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene
 from ffr_dyn.scene.surfaces import surface_of
 from ffr_prep.body import Surface

@@ -27,7 +27,7 @@ from ffr_dyn.equations.layout import moved, to_global_axes
 from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
-from ffr_dyn.scene.parts import described
+from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Body, Scene, require_scene
 from ffr_prep.body import truncated
 from ffr_prep.common.arrays import Array

@@ -33,7 +33,7 @@ from ffr_dyn.results.file import save_result
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.checks import several
-from ffr_dyn.scene.parts import described
+from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief

@@ -36,8 +36,8 @@ from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.quantities import measure, selected
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.checks import several
+from ffr_dyn.scene.described import described
 from ffr_dyn.scene.drivers import Driver, PointDriver
-from ffr_dyn.scene.parts import described
 from ffr_dyn.scene.scene import GROUND, Scene, require_scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError

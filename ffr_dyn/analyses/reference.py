@@ -26,7 +26,7 @@ from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.quantities import measure, needs_every_step, selected
 from ffr_dyn.results.result import Result
-from ffr_dyn.scene.parts import described
+from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError

@@ -34,7 +34,7 @@ from ffr_dyn.consistency.tangent import sizes
 from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
-from ffr_dyn.scene.parts import described
+from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError

@@ -11,9 +11,11 @@ import click
 from ffr_dyn.cli.analyses import check, commands, list_methods
 from ffr_dyn.cli.chart import chart
 from ffr_dyn.cli.economy import economise
+from ffr_dyn.cli.export import export
 from ffr_dyn.cli.parts import parts
 from ffr_dyn.cli.realtime import realtime
 from ffr_dyn.cli.run import run
+from ffr_dyn.cli.show import show
 from ffr_dyn.cli.stress import stress
 from ffr_dyn.cli.sweep import sweep
 from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, reserve, run_command
@@ -24,6 +26,7 @@ EXAMPLE = """\b
 Example:
   ffr-prep reduce rod.geo --unit mm --material steel --interface big_eye --interface small_eye \\
            --reference simply-supported:big_eye,small_eye -o rod.ffr
+  ffr-dyn show slider_crank.toml -o out/scene.html
   ffr-dyn run slider_crank.toml -o out/result.nc
   ffr-dyn plot out/result.nc rod.small_eye.position.x -o out/slider.png
   ffr-dyn animate out/result.nc -o out/motion.gif --scale auto
@@ -38,7 +41,7 @@ Example:
 FILM_EXAMPLE = """\b
 Example:
   ffr-dyn animate out/result.nc -o out/motion.gif --scale 50
-  ffr-dyn animate out/result.nc -o out/stress.html --colour von-mises --limit 60e6
+  ffr-dyn animate out/result.nc -o out/stress.html --colour von-mises --limit 60e6 --plot crank_pin.force
 """
 
 
@@ -145,13 +148,25 @@ def plot(result: Path, names: tuple[str, ...], output: Path, title: str | None, 
     "--colour", default="deformation", show_default=True, help="Of flexible bodies: deformation, body, von-mises, ..."
 )
 @click.option("--limit", type=float, help="End of the colour bar [m, Pa]; default: the largest value of the film.")
-def animate(result: Path, output: Path, scale: str, duration: float | None, colour: str, limit: float | None) -> None:
+@click.option("--plot", "plots", multiple=True, metavar="NAME", help="Of .html: a history beside the motion; repeat.")
+@click.option("--trace", "traces", multiple=True, metavar="MARKER", help="Draw the path of a marker; repeat.")
+def animate(
+    result: Path,
+    output: Path,
+    scale: str,
+    duration: float | None,
+    colour: str,
+    limit: float | None,
+    plots: tuple[str, ...],
+    traces: tuple[str, ...],
+) -> None:
     """A film of RESULT: deformed bodies, coloured by elastic displacement or stress, with the undeformed ghost.
 
     Colours by stress need bodies with stress modes (`ffr-prep reduce --stress`); `ffr-dyn stress --help` lists the
     quantities.
 
-    .html is one page that works offline and can be turned with the mouse.
+    .html is one page that works offline: the bodies can be turned with the mouse, joints and forces switched on,
+    histories plotted beside the motion.
     """
     from ffr_dyn.pictures import animate as animation
     from ffr_dyn.results.file import load_result
@@ -159,16 +174,21 @@ def animate(result: Path, output: Path, scale: str, duration: float | None, colo
     reserve("-o", output)
     factor: float | str = scale if scale == "auto" else _number(scale)
     loaded = load_result(result)
-    animation.animate(loaded, output, scale=factor, duration=duration, colour=colour, limit=limit)
+    how: dict[str, Any] = {"scale": factor, "duration": duration, "colour": colour, "limit": limit}
+    animation.animate(loaded, output, plots=plots, traces=traces, **how)
     click.echo(f"film     {output}")
 
 
-for command in (run, check, list_methods, stress, chart, economise, parts, realtime, sweep):
+for command in (run, check, show, export, list_methods, stress, chart, economise, parts, realtime, sweep):
     cli.add_command(command)
 
 
 def _attribute(key: str, value: Any) -> list[str]:
-    """An attribute in lines: numbers with their units on one, texts a line each."""
+    """An attribute in lines: numbers with their units on one, texts and what is named a line each."""
+    if key == "connections":
+        return [f"{name} ({of['kind']}): {', '.join(of['at']) or 'everywhere'}" for name, of in value.items()]
+    if isinstance(value, dict):
+        return [f"{name}: {', '.join(map(_short, of if isinstance(of, list) else [of]))}" for name, of in value.items()]
     if key == "largest_drift":
         return [f"{value[0]:.3g} of positions, {value[1]:.3g} of rates"]
     if isinstance(value, list):
@@ -178,6 +198,10 @@ def _attribute(key: str, value: Any) -> list[str]:
         if isinstance(value, float)
         else str(value)
     ]
+
+
+def _short(value: Any) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 def _number(text: str) -> float:

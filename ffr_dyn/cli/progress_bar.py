@@ -1,7 +1,9 @@
-"""How far a long run has come: simulated time, percentage and remaining time on a terminal; silent in a pipe."""
+"""How far a long run has come: simulated time, percentage and remaining time, on a terminal or in a notebook; silent in a
+pipe."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TextIO
@@ -17,10 +19,16 @@ def progress(
 ) -> Iterator[Callable[[float], None]]:
     """Yields ``update(t)``, to be called with the simulated time t [s], from start to end, as often as one likes.
 
-    Written to stream (standard error by default), a few times a second, and only when that is a terminal.
+    Written to stream (standard error by default), a few times a second, and only when that is a terminal or the cell of a
+    notebook.
     """
-    with tqdm(desc=label, total=end, initial=start, file=stream, disable=None, bar_format=_FORMAT) as bar:
+    with tqdm(desc=label, total=end, initial=start, file=stream, disable=_unseen(), bar_format=_FORMAT) as bar:
         yield lambda t: _advance(bar, t)
+
+
+def _unseen() -> bool | None:
+    """No in a notebook, whose cells are no terminals and show the bar; else tqdm finds out (None)."""
+    return False if "ipykernel" in sys.modules else None
 
 
 def _advance(bar: tqdm, t: float) -> None:
@@ -30,7 +38,7 @@ def _advance(bar: tqdm, t: float) -> None:
 @contextmanager
 def counted(label: str, *, stream: TextIO | None = None) -> Iterator[Callable[[int, int], None]]:
     """Yields ``update(done, total)`` for work that is counted; the bar appears with the first call, on a terminal only."""
-    with tqdm(desc=label, total=0, file=stream, disable=None, leave=False) as bar:
+    with tqdm(desc=label, total=0, file=stream, disable=_unseen(), leave=False) as bar:
 
         def update(done: int, total: int) -> None:
             bar.total = total

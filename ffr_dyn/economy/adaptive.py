@@ -26,7 +26,7 @@ from ffr_dyn.economy.run import Made, Span, Trial, make, run, states
 from ffr_dyn.equations.layout import Layout, initial_state, moved, to_body_axes, to_global_axes
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.result import Axis, Quantity, Result
-from ffr_dyn.scene.parts import described
+from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.variants.mean_axis import with_mean_axis_bodies
 from ffr_prep.common.arrays import Array

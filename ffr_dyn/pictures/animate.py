@@ -1,7 +1,7 @@
-"""Animations of a result: GIF and MP4 rendered off-screen by pyvista, or an interactive page by plotly.
+"""Films of a result: a page with a viewer, or GIF and MP4 rendered off-screen by pyvista.
 
 The pictures show the deformed bodies, flexible ones coloured by their elastic displacement beside the translucent
-undeformed body, rigid ones plain; time and scale of the deformation are written in the picture. pyvista and plotly are
+undeformed body, rigid ones plain; time and scale of the deformation are written in the picture. pyvista and matplotlib are
 imported only when they are needed.
 """
 
@@ -9,20 +9,25 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
 
-from ffr_dyn.pictures.film import Camera, Film, camera_for, film
+from ffr_dyn.pictures.connections import connections
+from ffr_dyn.pictures.film import Camera, Film, camera_for, film, film_at
+from ffr_dyn.pictures.shades import shades
+from ffr_dyn.pictures.viewer import Viewer
 from ffr_dyn.results.result import Result
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.outputs import replacing
 
 _SHORTEST, _LONGEST = 3.0, 6.0
-_PAGE_FRAMES = 80
+_MOST_ROWS = 2000  # of a page
 
 
 @dataclass(frozen=True)
@@ -37,7 +42,7 @@ class _Show:
 
 def animate(
     result: Result,
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     scale: float | str = 1.0,
     fps: int = 25,
@@ -47,38 +52,70 @@ def animate(
     colour: str = "deformation",
     limit: float | None = None,
     traces: Iterable[str] = (),
-) -> Path:
-    """Animate the bodies of a result; the suffix of path decides: .gif, .mp4 (needs imageio-ffmpeg) or .html.
+    plots: Iterable[str] = (),
+) -> Viewer:
+    """A film of the bodies of a result: the viewer, which a notebook shows; written where a path is given.
 
-    scale    : factor of the drawn deformation; "auto": a round one for deflections of about 5 % of a body
-    fps      : pictures per second of playing time; a page holds at most 80 pictures, whatever the rate
+    path     : .html, the viewer as a page of its own; .gif, .mp4 (needs imageio-ffmpeg), pictures only
+    scale    : factor of the drawn deformation at the start; "auto": a round one for deflections of about 5 % of a body
+    fps      : pictures per second of playing time, of .gif and .mp4; the viewer shows all rows, of a long result 2000
     duration : playing time [s]; by default the simulated time, but at least 3 s and at most 6 s
-    camera   : by default chosen from the motion (`ffr_dyn.pictures.film.camera_for`); it does not move
-    size     : width and height of the picture [pixels], even numbers for .mp4; a page fills its window
+    camera   : by default chosen from the motion (`ffr_dyn.pictures.film.camera_for`)
+    size     : width and height of the picture [pixels], even numbers for .mp4; the viewer fills its window
     colour   : "deformation": flexible bodies by elastic displacement; a measure of stress or strain such as "von-mises"
                (`ffr_dyn.scene.stress_sensors.MEASURES`): bodies with stress modes by it; "body": every body in a colour of
-               its own
+               its own. The viewer offers them all, and speed
     limit    : end of the colour bar [m, Pa or 1]; the largest value of the film when not given
     traces   : markers ("rod.small_eye") whose paths are drawn
+    plots    : quantities ("crank_pin.force", "rod.tip.position.x") that the viewer plots beside the motion
 
     An existing file is replaced only by a complete new one. Raises InputError for settings or a result that cannot be
     drawn, ComputationError when this machine cannot render.
+
+    Example: ``fd.animate(result, "out/motion.html", scale=50, plots=["crank_pin.force"])``
     """
-    path = Path(path)
-    write = _writer(path)
+    target = None if path is None else Path(path)
+    write = None if target is None else _writer(target)
     _check_settings(fps, duration, size)
+    title, view = str(result.attributes.get("title", "")), camera and camera.axes() and camera
+    how: dict[str, Any] = {"scale": scale, "traces": tuple(traces), "colour": colour, "limit": limit}
     playing, frames = _pace(result, fps, duration)
-    if write is _write_page:
-        frames = min(frames, _PAGE_FRAMES)
-    shown = film(result, frames, scale=scale, traces=traces, colour=colour, limit=limit)
-    show = _Show(shown, playing / frames, camera or camera_for(shown), size)
-    with replacing(path) as part:
-        write(show, part)
-    return path
+    make = partial(_page, result, title, view, playing, tuple(plots), how)
+    if target and write:
+        shown = film(result, frames, **how)
+        with replacing(target) as part:
+            write(_Show(shown, playing / frames, view or camera_for(shown), size), part)
+        return Viewer(make, title)
+    text = make()
+    viewer = Viewer(lambda: text, title)
+    if target:
+        viewer.save(target)
+    return viewer
 
 
-def _writer(path: Path) -> Callable[[_Show, Path], None]:
-    writers = {".gif": _write_gif, ".mp4": _write_mp4, ".html": _write_page}
+def _page(
+    result: Result, title: str, camera: Camera | None, playing: float, plots: tuple[str, ...], how: dict[str, Any]
+) -> str:
+    from ffr_dyn.pictures.page import Shown, page  # here, because matplotlib is slow to load
+
+    result = _thinned(result)
+    shown = film_at(result, result.time, **how)
+    content = Shown(shown, connections(result), shades(shown, how["colour"]), title, result, plots)
+    return page(content, camera or camera_for(shown), playing)
+
+
+def _thinned(result: Result) -> Result:
+    """At most so many rows as a page holds, the first and the last among them."""
+    if result.time.size <= _MOST_ROWS:
+        return result
+    rows = np.unique(np.linspace(0, result.time.size - 1, _MOST_ROWS).astype(int))
+    kept = {name: replace(of, values=of.values[rows]) for name, of in result.quantities.items()}
+    return replace(result, time=result.time[rows], quantities=kept)
+
+
+def _writer(path: Path) -> Callable[[_Show, Path], None] | None:
+    """What writes pictures of this kind; None for a page."""
+    writers = {".gif": _write_gif, ".mp4": _write_mp4, ".html": None}
     kind = path.suffix.lower()
     if kind not in writers:
         raise InputError(f"{path}: animations are written as {', '.join(writers)}, not {kind or 'without a suffix'}")
@@ -105,7 +142,7 @@ def _pace(result: Result, fps: int, duration: float | None) -> tuple[float, int]
     return playing, max(2, round(playing * fps)) if simulated > 0 else 1
 
 
-# ---- the three kinds of file --------------------------------------------------------------------------------------
+# ---- pictures ------------------------------------------------------------------------------------------------------
 
 
 def _pictures(show: _Show) -> Iterator[Array]:
@@ -148,9 +185,3 @@ def _write_mp4(show: _Show, path: Path) -> None:
     for picture in _pictures(show):
         stream.send(picture)
     stream.close()
-
-
-def _write_page(show: _Show, path: Path) -> None:
-    from ffr_dyn.pictures.page import page
-
-    path.write_text(page(show.film, show.camera, show.seconds), encoding="utf-8")

@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from textwrap import wrap
+from typing import Any
 
 import numpy as np
 
@@ -38,6 +39,7 @@ _SEQUENTIAL, _STRESS, _DIVERGING = "viridis", "turbo", "coolwarm"
 _AUTOMATIC_SHARE = 0.05
 _PLANAR_TOLERANCE = 1e-6
 _TITLE_WIDTH = 13
+_BATCH = 400_000  # points times moments
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,11 +78,14 @@ class Solid:
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A body without a surface: the points (F, M, 3) [m] of its markers, and the pairs (E, 2) of them to be joined."""
+    """A body without a surface: the points (F, M, 3) [m] of its markers, and the pairs (E, 2) of them to be joined; its pose
+    R (F, 3) [m], A (F, 3, 3)."""
 
     name: str
     points: Array
     pairs: Array
+    R: Array
+    A: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,8 +208,7 @@ def film(
     Raises InputError for no rows, no body, an unknown marker, a scale, colour or limit that cannot be used, infinite
     values, and a colour by stress when no body has stress modes.
     """
-    if result.time.size == 0:
-        raise InputError("nothing to animate: the result has no rows")
+    _require_rows(result)
     return film_at(
         result,
         np.linspace(result.time[0], result.time[-1], frames),
@@ -225,6 +229,7 @@ def film_at(
     limit: float | None = None,
 ) -> Film:
     """As `film`, at the given times (F,) [s]."""
+    _require_rows(result)
     if not (scale == "auto" or (isinstance(scale, int | float) and 0 <= scale < math.inf)):
         raise InputError(f"scale is {scale!r}; it must be a number that is not negative, or 'auto'")
     if limit is not None and not 0 < limit < math.inf:
@@ -240,13 +245,18 @@ def film_at(
     links = tuple(_link(result, name, times) for name in _bodies(result) if name not in drawn)
     if not solids and not links:
         raise InputError("nothing to animate: the result has no body (quantities <body>.R and <body>.p)")
-    deflections = [float(max(displacements(solid, k).max() for k in range(len(times)))) for solid in solids]
+    deflections = [_largest_displacement(solid) for solid in solids]
     factor = _automatic_scale(solids, deflections) if scale == "auto" else float(scale)
     paths = {name: result[f"{name}.position"] for name in traces}
     low, high = _box(solids, links, paths, [factor * deflection for deflection in deflections])
     deflection = max(deflections, default=0.0)
     shades = colouring(solids, len(times), colour, deflection, limit)
     return Film(times, solids, links, paths, factor, deflection, low, high, shades)
+
+
+def _require_rows(result: Result) -> None:
+    if result.time.size == 0:
+        raise InputError("nothing to animate: the result has no rows")
 
 
 # ---- colours ------------------------------------------------------------------------------------------------------
@@ -282,7 +292,7 @@ def _stress_colouring(flexible: list[Solid], frames: int, of: Measure, limit: fl
     def values(solid: Solid, frame: int) -> Array:
         return values_at(solid.surface, solid.q[frame : frame + 1], of)[:, 0]
 
-    largest = max(float(np.abs(values(solid, k)).max()) for solid in stressed for k in range(frames))
+    largest = max(largest_value(solid, of, slice(0, frames)) for solid in stressed)
     high = limit or largest
     return measure_colours(of, high, frozenset(solid.name for solid in stressed), values) if high else None
 
@@ -330,6 +340,25 @@ def displacements(solid: Solid, frame: int) -> Array:
     """(P,) sizes of the elastic displacements u(q), not scaled [m]."""
     found: Array = np.linalg.norm(displaced(solid, frame), axis=1)
     return found
+
+
+def _largest_displacement(solid: Solid) -> float:
+    """Over points and times [m]."""
+    if solid.parts is not None:
+        return float(max(displacements(solid, k).max() for k in range(len(solid.q))))
+    found = (surface_displacements(solid.surface, q) for q in _in_batches(solid, solid.q))
+    return max(float(np.sqrt((u * u).sum(axis=-1).max(initial=0.0))) for u in found)
+
+
+def largest_value(solid: Solid, of: Measure, frames: Any = slice(None)) -> float:
+    """The largest size of a measure of stress or strain over points and some times [Pa or 1]."""
+    batches = _in_batches(solid, solid.q[frames])
+    return max(float(np.abs(values_at(solid.surface, q, of)).max(initial=0.0)) for q in batches)
+
+
+def _in_batches(solid: Solid, q: Array) -> list[Array]:
+    """The coordinates in pieces, for each of which the tensors of all points are some tens of megabytes."""
+    return np.array_split(q, max(1, len(q) * len(solid.surface.points) // _BATCH))
 
 
 def camera_for(shown: Film) -> Camera:
@@ -396,7 +425,8 @@ def _link(result: Result, name: str, times: Array) -> Link:
     if len(markers) < 2:
         histories.insert(0, result[f"{name}.R"])
     points = np.stack([_at(times, result.time, history, name) for history in histories], axis=1)
-    return Link(name, points, _spanning_tree(points[0]))
+    R = _at(times, result.time, result[f"{name}.R"], name)
+    return Link(name, points, _spanning_tree(points[0]), R, _rotations(times, result, name))
 
 
 def _spanning_tree(points: Array) -> Array:

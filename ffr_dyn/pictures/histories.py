@@ -5,6 +5,7 @@ The figures are made without pyplot: no global state, no window, the same bytes 
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -48,13 +49,28 @@ _METADATA: Mapping[str, dict[str, Any]] = {
 }
 
 
+class Drawing(Figure):
+    """A figure of matplotlib that a notebook shows without pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        content = io.BytesIO()
+        with mpl.rc_context(_STYLE):
+            self.savefig(content, format="png", dpi=80)
+        return content.getvalue()
+
+
 def plot(
-    result: Result, names: str | Iterable[str], path: str | Path, *, title: str | None = None, against: str = "time"
-) -> Path:
+    result: Result,
+    names: str | Iterable[str],
+    path: str | Path | None = None,
+    *,
+    title: str | None = None,
+    against: str = "time",
+) -> Drawing:
     """Draw the histories of quantities or components, stacked in one panel for each unit, over a common axis.
 
     names   : quantities ("rod.R": all components) or components ("rod.R.x")
-    path    : .png, .svg or .pdf
+    path    : .png, .svg or .pdf, where the figure is to be written
     against : "time", or the component to draw over, such as "crank_bearing.angle"
     Raises InputError for unknown names, no names, no rows, or another kind of file.
     """
@@ -65,7 +81,7 @@ def plot(
     for name in components:
         panels.setdefault(result.quantity(name).unit, []).append(name)
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(10.0, 1.3 + 2.5 * len(panels)), layout="constrained")
+        figure = Drawing(figsize=(10.0, 1.3 + 2.5 * len(panels)), layout="constrained")
         column = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         for axes, group in zip(column, panels.values(), strict=True):
             _draw_panel(axes, result, group, against)
@@ -75,11 +91,15 @@ def plot(
             column[-1].set_xlim(abscissa[0], abscissa[-1])
         figure.align_ylabels(column)
         figure.suptitle(title or "", fontweight="bold")
-        return _write(figure, path)
+        return _written(figure, path)
 
 
-def plot_path(result: Result, marker: str, path: str | Path, *, plane: str = "xy", title: str | None = None) -> Path:
+def plot_path(
+    result: Result, marker: str, path: str | Path | None = None, *, plane: str = "xy", title: str | None = None
+) -> Drawing:
     """Draw the path of a marker ("rod.small_eye") in a plane of the global frame ("xy", "zx", ...), coloured by time.
+
+    path : .png, .svg or .pdf, where the figure is to be written
 
     Raises InputError for an unknown marker, a plane that is not two different letters of xyz, no rows, or another kind
     of file.
@@ -92,13 +112,13 @@ def plot_path(result: Result, marker: str, path: str | Path, *, plane: str = "xy
     points = position.values[:, ["xyz".index(letter) for letter in plane]]
     factor, unit = readable(position.unit, float(np.ptp(points, axis=0).max()) or float(np.abs(points).max()))
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(8.0, 6.5), layout="constrained")
+        figure = Drawing(figsize=(8.0, 6.5), layout="constrained")
         axes = figure.subplots()
         _draw_path(figure, axes, points * factor, result.time)
         axes.set_xlabel(bracketed(plane[0], unit))
         axes.set_ylabel(bracketed(plane[1], unit))
         axes.set_title(title or f"path of {marker}", fontweight="bold")
-        return _write(figure, path)
+        return _written(figure, path)
 
 
 def _draw_panel(axes: Axes, result: Result, names: list[str], against: str) -> None:
@@ -167,11 +187,16 @@ def drawing(path: str | Path, size: tuple[float, float]) -> Iterator[Figure]:
         _write(figure, path)
 
 
-def _write(figure: Figure, path: str | Path) -> Path:
+def _written(figure: Drawing, path: str | Path | None) -> Drawing:
+    if path is not None:
+        _write(figure, path)
+    return figure
+
+
+def _write(figure: Figure, path: str | Path) -> None:
     path = Path(path)
     kind = path.suffix.lower()
     if kind not in _METADATA:
         raise InputError(f"{path}: pictures are written as {', '.join(_METADATA)}, not {kind or 'without a suffix'}")
     with replacing(path) as part:
         figure.savefig(part, format=kind[1:], dpi=130, metadata=_METADATA[kind])
-    return path

@@ -1,272 +1,380 @@
-"""An interactive animation in one self-contained page: plotly.js and all numbers are inside, so it works offline."""
+"""A film as one self-contained page: the viewer of the folder `web`, and all numbers, deflated. It fetches nothing.
+
+A surface is stored once, whichever bodies have it, with the shapes of its deformation and of its stress (`morphs`); of every
+row of the result there are only poses and weights. The page's own policy forbids requests.
+"""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator
-from dataclasses import replace
+import hashlib
+import json
+import zlib
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
-import plotly.io
 from matplotlib import colormaps
-from matplotlib.colors import to_hex
 
-from ffr_dyn.pictures.film import (
-    BODY_COLOURS,
-    TRACE_COLOURS,
-    Camera,
-    Colouring,
-    Film,
-    Link,
-    Solid,
-    drawn_points,
-    is_coloured,
-)
+from ffr_dyn.pictures.connections import Connections
+from ffr_dyn.pictures.film import BODY_COLOURS, TRACE_COLOURS, Camera, Film, Link, Solid
+from ffr_dyn.pictures.morphs import MOST_SHAPES, MOST_TENSORS, beside, is_closed, morph, quadratic, sharp_edges
+from ffr_dyn.pictures.shades import Shade
+from ffr_dyn.results.result import Result
 from ffr_prep.body import Surface, some_points
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.units import pretty, readable
 
-# Larger surfaces are simplified until all pictures together need no more numbers than this: some eight megabytes.
-_MOST_NUMBERS = 1_400_000
-_TITLE = "Motion of a multibody system"
-_INK = "#222222"
-# The default epsilons are for sides of about one: facets of some millimetres would have no normal.
-_MATTE: Any = {
-    "ambient": 0.55,
-    "diffuse": 0.6,
-    "specular": 0.15,
-    "roughness": 0.7,
-    "facenormalsepsilon": 1e-30,
-    "vertexnormalsepsilon": 1e-30,
-}
-_SINK = 0.002  # of the body's size
-_STOPS = 33  # of a colour map
-_FIELD_OF_VIEW = np.tan(np.pi / 8)
+MOST_TRIANGLES = 60_000
+_MOST_HISTORIES = 200_000  # numbers of histories that can be plotted
+_NOT_PLOTTED = (".R", ".p", ".q", ".q_dot", ".q_ddot", ".orientation", ".omega_bar", ".v")
+_LARGEST, _GREY = 32767, "#999999"
+_STOPS = 64  # of a colour map
+_SIDES = 8  # of a rod
+_THICK = 0.012  # of the size of the whole motion: the radius of a rod
+_RIGID = 1e-6  # of a body's size, that markers of a rigid one move by rounding
+
+_SCRIPTS = ("numbers", "shaders", "solids", "overlay", "plots", "controls")
 
 Item = dict[str, Any]
 
 
-def page(shown: Film, camera: Camera, seconds: float) -> str:
-    """The HTML text of a page with play, pause and a slider over the pictures of the film.
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What a page shows.
 
-    seconds : playing time of one picture [s]
+    film     : the bodies at the rows
+    beside   : joints, forces, markers at the same rows
+    shades   : what bodies may be coloured by; the first is that of the start
+    result   : histories that can be plotted, of the same rows; None where there is one row
+    plots    : names of the components that are plotted at the start
+    faint    : names of the bodies that are translucent
+    boxes    : what is switched on at the start: edges, ghost, names, frames, markers, forces
+    moments  : words in place of the time at each row
     """
-    shown = _simplified(shown)
-    light = _light(shown, camera)
-    moving = [_moving(shown, frame, light) for frame in range(shown.times.size)]
-    still = [*_paths(shown), _triad(shown)]
-    figure = {
-        "data": [*moving[0], *still],
-        "layout": _layout(shown, camera, seconds),
-        "frames": [
-            {"name": str(k), "data": items, "traces": list(range(len(items)))}
-            for k, items in enumerate([_changes(item) for item in items] for items in moving)
+
+    film: Film
+    beside: Connections
+    shades: Sequence[Shade]
+    title: str = ""
+    result: Result | None = None
+    plots: Iterable[str] = ()
+    faint: frozenset[str] = frozenset()
+    boxes: tuple[str, ...] = ("edges",)
+    moments: tuple[str, ...] = ()
+
+
+def page(shown: Shown, camera: Camera, seconds: float) -> str:
+    """The HTML; seconds : playing time of the whole film [s]."""
+    numbers = _Numbers()
+    about = json.dumps(_about(shown, camera, seconds, numbers), separators=(",", ":"), ensure_ascii=False)
+    web = files("ffr_dyn.pictures").joinpath("web")
+    parts = {
+        "TITLE": _escaped(shown.title or "Motion of a multibody system"),
+        "STYLE": web.joinpath("page.css").read_text("utf-8"),
+        "ABOUT": about.replace("<", "\\u003c"),
+        "NUMBERS": base64.b64encode(zlib.compress(b"".join(numbers.parts), 9)).decode(),
+        "SCRIPT": "\n".join(web.joinpath(f"{name}.js").read_text("utf-8") for name in _SCRIPTS),
+    }
+    text = web.joinpath("page.html").read_text("utf-8")
+    for key, value in parts.items():
+        text = text.replace(f"@{key}@", value)
+    return text
+
+
+def _escaped(text: str) -> str:
+    return text.replace("&", "&amp;").replace("<", "&lt;")
+
+
+class _Numbers:
+    """Arrays one after the other, each at a multiple of four bytes, equal ones once."""
+
+    def __init__(self) -> None:
+        self.parts: list[bytes] = []
+        self._known: dict[bytes, list[Any]] = {}
+        self._size = 0
+
+    def keep(self, values: Array, kind: str = "f4") -> list[Any]:
+        """The reference [type, offset in bytes, length] under which the page finds the values; of a history "h2", which is
+        rounded to whole numbers of the fourth."""
+        if kind == "h2":
+            scale = float(np.abs(values).max(initial=0.0)) / _LARGEST or 1.0
+            return ["h2", *self.keep(np.round(values / scale), "i2")[1:], scale]
+        content = np.ascontiguousarray(values, "<" + kind).tobytes()
+        key = kind.encode() + content
+        if key not in self._known:
+            self._known[key] = [kind, self._size, int(np.size(values))]
+            self.parts.append(content + bytes(-len(content) % 4))
+            self._size += len(self.parts[-1])
+        return self._known[key]
+
+
+# ---- what the viewer reads -------------------------------------------------------------------------------------------
+
+
+def _about(shown: Shown, camera: Camera, seconds: float, numbers: _Numbers) -> Item:
+    film, extent = shown.film, shown.film.high - shown.film.low
+    factor, unit = readable("s", float(np.abs(film.times).max()))
+    far = ((film.low > 0) | (film.high < 0)).any()
+    return {
+        **_bodies(shown, numbers),
+        "times": numbers.keep(film.times),
+        "seconds": seconds,
+        "clock": {"factor": factor, "unit": unit},
+        "moments": list(shown.moments),
+        "camera": {"direction": list(camera.direction), "up": list(camera.up)},
+        "centre": film.centre.tolist(),
+        "extent": extent.tolist(),
+        "size": film.size or 1.0,
+        "triad": {"at": (film.low if far else np.zeros(3)).tolist()},
+        "scale": film.scale,
+        "most": max(10.0, 10.0 * film.scale),
+        "colour": 0,
+        "colours": [_colour(shade, numbers) for shade in shown.shades],
+        "boxes": list(shown.boxes),
+        "traces": [
+            {"name": name, "colour": colour, "shown": True, "points": numbers.keep(path)}
+            for (name, path), colour in zip(film.traces.items(), TRACE_COLOURS * len(film.traces), strict=False)
+        ],
+        **_beside(shown, numbers),
+        "series": _series(shown, numbers),
+    }
+
+
+def _colour(shade: Shade, numbers: _Numbers) -> Item:
+    factor, unit = readable(shade.unit, max(abs(shade.low), abs(shade.high)))
+    stops = colormaps[shade.colour_map](np.linspace(0.0, 1.0, _STOPS))[:, :3] if shade.colour_map else None
+    return {
+        "words": shade.words,
+        "kind": shade.kind,
+        "measure": shade.measure,
+        "unit": unit,
+        "factor": factor,
+        "low": shade.low,
+        "high": shade.high,
+        "bodies": sorted(shade.bodies),
+        "map": None if stops is None else numbers.keep(np.round(255 * stops), "u1"),
+    }
+
+
+def _beside(shown: Shown, numbers: _Numbers) -> Item:
+    beside = shown.beside
+    joints = [
+        {
+            "name": joint.name,
+            "kind": joint.kind,
+            "label": joint.label,
+            "shown": True,
+            "at": numbers.keep(joint.at, "h2"),
+            "axis": None if joint.axis is None else numbers.keep(joint.axis, "h2"),
+        }
+        for joint in beside.joints
+    ]
+    arrows = [
+        {
+            "name": arrow.name,
+            "unit": arrow.unit,
+            "shown": "forces" in shown.boxes,
+            "largest": float(np.linalg.norm(arrow.vector, axis=1).max()),
+            "at": numbers.keep(arrow.at, "h2"),
+            "vector": numbers.keep(arrow.vector, "h2"),
+        }
+        for arrow in beside.arrows
+    ]
+    seen = "markers" in shown.boxes
+    markers = [{"name": name, "shown": seen, "at": numbers.keep(at, "h2")} for name, at in beside.markers.items()]
+    return {"joints": joints, "arrows": arrows, "markers": markers}
+
+
+def _series(shown: Shown, numbers: _Numbers) -> list[Item]:
+    """The histories that can be plotted: all components of quantities, until there is no more room."""
+    if shown.result is None:
+        return []
+    wanted, found, room = set(shown.result.components(shown.plots)), [], _MOST_HISTORIES
+    for name, quantity in shown.result.quantities.items():
+        own = list(shown.result.components([name]))
+        room -= quantity.values.size
+        if not wanted & set(own) and (name.endswith(_NOT_PLOTTED) or room < 0):
+            continue
+        values, unit = numbers.keep(quantity.values, "h2"), pretty(quantity.unit) or "1"
+        found += [
+            {"name": one, "unit": unit, "values": values, "of": len(own), "column": k, "chosen": one in wanted}
+            for k, one in enumerate(own)
+        ]
+    return found
+
+
+# ---- bodies ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A surface that moves as one: poses (T, 7) R and p, elastic coordinates (T, n), and the number of the piece whose frame
+    deformation is seen from."""
+
+    name: str
+    surface: Surface
+    pose: Array
+    q: Array
+    frame: int
+    parted: bool
+    colour: str
+
+
+def _bodies(shown: Shown, numbers: _Numbers) -> Item:
+    drawn = pieces(shown.film)
+    groups: dict[Any, list[Piece]] = {}
+    for piece in drawn:
+        groups.setdefault(_same(piece.surface), []).append(piece)
+    surfaces, bodies = list[Item](), dict[int, Item]()
+    for number, group in enumerate(groups.values()):
+        item, own = _surface(group, numbers)
+        surfaces.append(item)
+        bodies |= {id(piece): {**own[k], "surface": number} for k, piece in enumerate(group)}
+    return {
+        "surfaces": surfaces,
+        "bodies": [
+            {
+                "name": piece.name,
+                "colour": _GREY if piece.name in shown.faint else piece.colour,
+                "faint": piece.name in shown.faint,
+                "frame": piece.frame,
+                "parted": piece.parted,
+                "pose": numbers.keep(piece.pose),
+                **bodies[id(piece)],
+            }
+            for piece in drawn
         ],
     }
-    content = plotly.io.to_html(
-        figure,
-        config={"displaylogo": False, "responsive": True},
-        include_plotlyjs=True,
-        include_mathjax=False,
-        full_html=False,
-        auto_play=False,
-        default_height="100vh",
-        validate=False,
-        div_id="motion",
+
+
+def _same(surface: Surface) -> tuple[bytes, ...]:
+    """Equal for surfaces with equal numbers."""
+    return tuple(
+        hashlib.sha256(np.asarray(of).tobytes()).digest() for of in (surface.points, surface.triangles, surface.Phi)
     )
-    style = "html, body { margin: 0; height: 100%; background: white }"
-    head = f'<meta charset="utf-8"><title>{_TITLE}</title><style>{style}</style>'
-    return f'<!DOCTYPE html>\n<html lang="en">\n<head>{head}</head>\n<body>{content}</body>\n</html>\n'
 
 
-# ---- bodies -------------------------------------------------------------------------------------------------------
+def pieces(film: Film) -> list[Piece]:
+    """All that moves: bodies, each part of bodies in parts, rods for bodies without a surface."""
+    colours, found = iter(BODY_COLOURS * (1 + len(film.solids) + len(film.links))), list[Piece]()
+    share = MOST_TRIANGLES / max(1, sum(len(solid.surface.triangles) for solid in film.solids))
+    coarse = _coarsened(share)
+    for solid in film.solids:
+        found += _of_solid(solid, next(colours), len(found), coarse)
+    return found + [_of_link(link, next(colours), len(found) + k, film.size) for k, link in enumerate(film.links)]
 
 
-def _moving(shown: Film, frame: int, light: Item) -> list[Item]:
-    plain = iter(BODY_COLOURS * (1 + len(shown.solids) + len(shown.links)))
-    items = []
-    for solid in shown.solids:
-        colour = next(plain)
-        items.append(_body(shown, solid, frame, colour, light))
-        if solid.is_flexible and shown.scale > 0:
-            items.append(_ghost(solid, frame))
-    return items + [_rods(link, frame, next(plain)) for link in shown.links]
+def _coarsened(share: float) -> Callable[[Surface], Surface]:
+    """Surfaces with about that share of their triangles; equal ones are worked on once."""
+    known: dict[Any, Surface] = {}
+
+    def found(surface: Surface) -> Surface:
+        key = _same(surface)
+        if key not in known:
+            known[key] = decimated(surface, share)[0]
+        return known[key]
+
+    return found if share < 1 else lambda surface: surface
 
 
-def _body(shown: Film, solid: Solid, frame: int, colour: str, light: Item) -> Item:
-    item = {**_mesh(solid, drawn_points(solid, frame, shown.scale)), "name": solid.name, **light}
-    if shown.colouring is None or not is_coloured(shown, solid):
-        return {**item, "color": colour, "showlegend": True}
-    factor, _ = shown.colouring.readable()
-    intensity = _numbers(shown.colouring.values(solid, frame) * factor)
-    return {**item, "intensity": intensity, "coloraxis": "coloraxis", "showlegend": True}
+def _of_solid(solid: Solid, colour: str, number: int, coarse: Callable[[Surface], Surface]) -> list[Piece]:
+    """The body; of one in parts each part, whose deformation is seen from the frame of the first."""
+    if solid.parts is None:
+        return [Piece(solid.name, coarse(solid.surface), _poses(solid.R, solid.A), solid.q, number, False, colour)]
+    found = []
+    for k in range(solid.parts.R.shape[1]):
+        chosen = np.flatnonzero(solid.parts.of == k)
+        inside = np.isin(solid.surface.triangles, chosen).all(axis=1)
+        triangles = np.searchsorted(chosen, solid.surface.triangles[inside])
+        surface = some_points(solid.surface, chosen, triangles)
+        pose = _poses(solid.parts.R[:, k], solid.parts.A[:, k])
+        found.append(Piece(solid.name, surface, pose, solid.q, number, True, colour))
+    return found
 
 
-def _ghost(solid: Solid, frame: int) -> Item:
-    # In planar bending its sides lie in those of the body: let them sink a little, or the two would flicker.
-    item = _mesh(solid, solid.R[frame] + sunk(solid.surface, _SINK * solid.size) @ solid.A[frame].T)
-    return {**item, "name": f"{solid.name}, undeformed", "color": "#808080", "opacity": 0.18, "hoverinfo": "skip"}
+def _of_link(link: Link, colour: str, number: int, size: float) -> Piece:
+    """A body without a surface as rods between its markers, each end carried by its marker."""
+    places = np.einsum("fij,fmi->fmj", link.A, link.points - link.R[:, None])
+    still = places[0]
+    surface, owner = rods(still, link.pairs, _THICK * size or 1.0)
+    Phi = np.zeros((len(surface.points), 3, 3 * len(still)))
+    for c in range(3):
+        Phi[np.arange(len(owner)), c, 3 * owner + c] = 1.0
+    moved = (places - still).reshape(len(places), -1)
+    if np.abs(moved).max(initial=0.0) < _RIGID * np.abs(still).max(initial=1e-300):
+        Phi, moved = Phi[:, :, :0], moved[:, :0]
+    pose = _poses(link.R, link.A)
+    return Piece(link.name, Surface(surface.points, surface.triangles, Phi), pose, moved, number, False, colour)
 
 
-def _mesh(solid: Solid, points: Array) -> Item:
-    corners = {key: _numbers(column, "i4") for key, column in zip("ijk", solid.surface.triangles.T, strict=True)}
-    return {"type": "mesh3d", **_coordinates(points), **corners, "flatshading": True}
+def rods(points: Array, pairs: Array, radius: float) -> tuple[Surface, Array]:
+    """Prisms between pairs (E, 2) of points (M, 3), and a knob at each point; and the point (P,) that carries each corner."""
+    corners, triangles, owner = list[Array](), list[Array](), list[int]()
+    lines = [(a, b, points[b] - points[a], radius) for a, b in pairs]
+    lines += [(k, k, np.array([0.0, 0.0, 3.6 * radius]), 1.8 * radius) for k in range(len(points))]
+    for a, b, along, thick in lines:
+        if not along.any():
+            continue
+        shift = 0.5 * along if a == b else np.zeros(3)
+        ring = thick * _ring(along)
+        start, sides = len(owner), np.arange(_SIDES)
+        corners += [points[a] - shift + ring, points[b] + shift + ring]
+        owner += [int(a)] * _SIDES + [int(b)] * _SIDES
+        after = (sides + 1) % _SIDES
+        triangles += [start + np.stack(side, axis=1) for side in (
+            (sides, after, _SIDES + after), (sides, _SIDES + after, _SIDES + sides),
+            (0 * sides[2:], after[1:-1], sides[1:-1]), (_SIDES + 0 * sides[2:], _SIDES + sides[1:-1], _SIDES + after[1:-1]),
+        )]  # fmt: skip
+    found = Surface(np.concatenate(corners), np.concatenate(triangles), np.zeros((len(owner), 3, 0)))
+    return found, np.array(owner)
 
 
-def _rods(link: Link, frame: int, colour: str) -> Item:
-    points = link.points[frame]
-    gap = np.full((len(link.pairs), 1, 3), np.nan)
-    lines = np.concatenate([points[link.pairs], gap], axis=1).reshape(-1, 3) if len(link.pairs) else points
-    look = {"mode": "lines+markers", "line": {"width": 10, "color": colour}, "marker": {"size": 4, "color": _INK}}
-    return {"type": "scatter3d", **_coordinates(lines), **look, "name": link.name, "showlegend": True}
+def _ring(along: Array) -> Array:
+    """(sides, 3) points around a direction, at a distance of one."""
+    least = np.eye(3)[np.argmin(np.abs(along))]
+    a = np.cross(along, least)
+    a /= np.linalg.norm(a)
+    b = np.cross(along / np.linalg.norm(along), a)
+    turn = 2 * np.pi * np.arange(_SIDES)[:, None] / _SIDES
+    return np.asarray(np.cos(turn) * a + np.sin(turn) * b)
 
 
-def _changes(item: Item) -> Item:
-    """What a picture changes of an item: the rest is in the first one and need not be repeated."""
-    return {key: item[key] for key in ("type", "x", "y", "z", "intensity") if key in item}
+def _poses(R: Array, A: Array) -> Array:
+    """(T, 7): R, and Euler parameters that do not jump."""
+    from scipy.spatial.transform import Rotation
+
+    p = np.roll(Rotation.from_matrix(A).as_quat(), 1, axis=1)
+    flips = np.where(np.einsum("ti,ti->t", p[1:], p[:-1]) < 0, -1.0, 1.0)
+    return np.concatenate([R, p * np.cumprod([1.0, *flips])[:, None]], axis=1)
 
 
-# ---- what does not move -------------------------------------------------------------------------------------------
-
-
-def _paths(shown: Film) -> Iterator[Item]:
-    for (name, path), colour in zip(shown.traces.items(), TRACE_COLOURS * len(shown.traces), strict=False):
-        look = {"mode": "lines", "line": {"width": 4, "color": colour}, "hoverinfo": "skip"}
-        yield {"type": "scatter3d", **_coordinates(path), **look, "name": f"path of {name}", "showlegend": True}
-
-
-def _triad(shown: Film) -> Item:
-    """The axes of the ground, at its origin, or beside the bodies when the origin is far from them."""
-    far = ((shown.low > 0) | (shown.high < 0)).any()
-    origin, length = (shown.low if far else np.zeros(3)), 0.12 * shown.size
-    tips = origin + length * np.eye(3)
-    points = np.stack([np.tile(origin, (3, 1)), tips, np.full((3, 3), np.nan)], axis=1).reshape(-1, 3)
-    colours = [colour for colour in ("#D62728", "#2CA02C", "#1F77B4") for _ in range(3)]
-    text = [letter for axis in "xyz" for letter in ("", axis, "")]
-    look = {"mode": "lines+text", "line": {"width": 5, "color": colours}, "text": text, "textfont": {"size": 15}}
-    return {"type": "scatter3d", **_coordinates(points), **look, "hoverinfo": "skip", "showlegend": False}
-
-
-def _layout(shown: Film, camera: Camera, seconds: float) -> Item:
-    return {
-        "scene": _scene(shown, camera),
-        **({"coloraxis": _colour_axis(shown.colouring)} if shown.colouring else {}),
-        "font": {"family": "sans-serif", "size": 14, "color": _INK},
-        "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
-        "legend": {"x": 0.01, "y": 0.90, "bgcolor": "rgba(255,255,255,0.6)"},
-        "annotations": [_note(shown.scale_note())],
-        "updatemenus": [_buttons(seconds)],
-        "sliders": [_slider(shown)],
+def _surface(group: Sequence[Piece], numbers: _Numbers) -> tuple[Item, list[Item]]:
+    """A surface with the shapes of all bodies that have it, and of each body its weights."""
+    surface, q = group[0].surface, np.concatenate([piece.q for piece in group])
+    linear = morph(surface.Phi, q, MOST_SHAPES * 2 // 3)
+    bent = morph(*quadratic(surface.second, surface.Phi, q), MOST_SHAPES // 3)
+    deformed = beside(linear, bent)
+    tensor = np.zeros((len(surface.points), 6, q.shape[1])) if surface.stress is None else surface.stress
+    second, weights = quadratic(surface.second_stress, tensor, q)
+    stress = morph(np.concatenate([tensor, second], axis=2), np.concatenate([q, weights], axis=1), MOST_TENSORS)
+    item = {
+        "points": numbers.keep(surface.points),
+        "triangles": numbers.keep(surface.triangles, "u4"),
+        "edges": numbers.keep(sharp_edges(surface.points, surface.triangles), "u4"),
+        "closed": is_closed(surface.points, surface.triangles),
+        "moduli": None if surface.moduli is None else numbers.keep(surface.moduli),
+        "linear": len(linear.scales),
+        "shapes": numbers.keep(np.moveaxis(deformed.shapes, 2, 1), "i2"),
+        "scales": deformed.scales.tolist(),
+        "tensors": numbers.keep(np.moveaxis(stress.shapes, 2, 1), "i2"),
+        "tensorScales": stress.scales.tolist(),
     }
-
-
-def _colour_axis(colours: Colouring) -> Item:
-    factor, _ = colours.readable()
-    bar = {"title": {"text": colours.title("<br>")}, "len": 0.6, "thickness": 18}
-    stops = np.linspace(0.0, 1.0, _STOPS)
-    shades = [
-        [at, to_hex(shade)] for at, shade in zip(stops.tolist(), colormaps[colours.colour_map](stops), strict=True)
-    ]
-    return {"cmin": colours.low * factor, "cmax": colours.high * factor, "colorscale": shades, "colorbar": bar}
-
-
-def _scene(shown: Film, camera: Camera) -> Item:
-    pad = 0.03 * (shown.size or 1.0)
-    low, high = shown.low - pad, shown.high + pad
-    ratio = (high - low) / (high - low).max()
-    grid = {"gridcolor": "#E4E4E4", "showbackground": False, "zeroline": False, "showspikes": False}
-    axes = {
-        f"{letter}axis": {"range": [a, b], "nticks": 2 + round(5 * side), "title": {"text": f"{letter} [m]"}, **grid}
-        for letter, a, b, side in zip("xyz", low.tolist(), high.tolist(), ratio, strict=True)
-    }
-    return {"aspectmode": "manual", "aspectratio": _vector(ratio), "camera": _eye(camera, ratio), **axes}
-
-
-def _light(shown: Film, camera: Camera) -> Item:
-    """A lamp behind the eye, above and to the left."""
-    direction, right, up = camera.axes()
-    lamp = shown.centre + 1000.0 * (shown.size or 1.0) * (direction + 0.7 * up - 0.5 * right)
-    return {"lighting": _MATTE, "lightposition": _vector(lamp)}
-
-
-def _eye(camera: Camera, ratio: Array) -> Item:
-    """The eye so far away, in units of the longest side, that the box of these sides fills a wide window."""
-    direction, right, up = camera.axes()
-    half = 0.5 * ratio
-    reach = max(half @ np.abs(right) / 1.5, half @ np.abs(up) / 0.85)
-    distance = reach / _FIELD_OF_VIEW + half @ np.abs(direction)
-    return {"eye": _vector(distance * direction), "up": _vector(up), "center": _vector(np.zeros(3))}
-
-
-def _note(text: str) -> Item:
-    place = {"x": 0.01, "y": 0.98, "xref": "paper", "yref": "paper", "xanchor": "left", "yanchor": "top"}
-    return {"text": text, "showarrow": False, "font": {"size": 17}, **place}
-
-
-def _buttons(seconds: float) -> Item:
-    pace = {"frame": {"duration": round(1000 * seconds), "redraw": True}, "fromcurrent": True, **_AT_ONCE}
-    buttons = [
-        {"label": "▶ play", "method": "animate", "args": [None, pace]},
-        {"label": "❚❚ pause", "method": "animate", "args": [[None], _JUMP]},
-    ]
-    place = {"x": 0.01, "y": 0.02, "xanchor": "left", "yanchor": "bottom", "direction": "right"}
-    return {"type": "buttons", "buttons": buttons, "showactive": False, **place}
-
-
-def _slider(shown: Film) -> Item:
-    steps = [{"label": shown.clock(k), "method": "animate", "args": [[str(k)], _JUMP]} for k in range(shown.times.size)]
-    place = {"x": 0.22, "y": 0.10, "len": 0.74, "pad": {"t": 0, "b": 0}, "ticklen": 0, "minorticklen": 0}
-    return {
-        "steps": steps,
-        "currentvalue": {"prefix": "t = ", "font": {"size": 17, "color": _INK}},
-        "font": {"color": "rgba(0,0,0,0)"},
-        **place,
-    }
-
-
-_AT_ONCE: Any = {"transition": {"duration": 0}}
-_JUMP: Any = {"mode": "immediate", "frame": {"duration": 0, "redraw": True}, **_AT_ONCE}
-
-
-def sunk(surface: Surface, depth: float) -> Array:
-    """(P, 3) undeformed points, moved inwards by `depth` [m] along the mean normal of the triangles around each."""
-    a, b, c = (surface.points[corner] for corner in surface.triangles.T)
-    normals = np.zeros_like(surface.points)
-    for corner in surface.triangles.T:
-        np.add.at(normals, corner, np.cross(b - a, c - a))
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return surface.points - depth * normals / np.where(length > 0, length, 1.0)
-
-
-# ---- numbers ------------------------------------------------------------------------------------------------------
-
-
-def _coordinates(points: Array) -> Item:
-    return {key: _numbers(column) for key, column in zip("xyz", points.T, strict=True)}
-
-
-def _numbers(values: Array, kind: str = "f4") -> Item:
-    """A typed array as plotly.js reads it: little-endian bytes in base 64."""
-    return {"dtype": kind, "bdata": base64.b64encode(np.ascontiguousarray(values, "<" + kind).tobytes()).decode()}
-
-
-def _vector(values: Array) -> dict[str, float]:
-    return dict(zip("xyz", values.tolist(), strict=True))
-
-
-def _simplified(shown: Film) -> Film:
-    # Three coordinates of each point, seven numbers with a ghost and a colour.
-    per_frame = sum(len(solid.surface.points) * (7 if solid.is_flexible else 3) for solid in shown.solids)
-    if per_frame * shown.times.size <= _MOST_NUMBERS:
-        return shown
-    share = _MOST_NUMBERS / (per_frame * shown.times.size)
-    return replace(shown, solids=tuple(_decimated(solid, share) for solid in shown.solids))
-
-
-def _decimated(solid: Solid, share: float) -> Solid:
-    surface, nearest = decimated(solid.surface, share)
-    parts = solid.parts and replace(solid.parts, of=solid.parts.of[nearest])
-    return replace(solid, surface=surface, parts=parts)
+    split = [np.split(of.weights, len(group)) for of in (deformed, stress)]
+    own = [{"weights": numbers.keep(w, "h2"), "tensors": numbers.keep(t, "h2")} for w, t in zip(*split, strict=True)]
+    return item, own
 
 
 def decimated(surface: Surface, share: float) -> tuple[Surface, Array]:

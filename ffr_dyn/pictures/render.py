@@ -46,14 +46,16 @@ _SHIFT = (-0.04, -0.03)
 Update = Callable[[int], None]
 
 
-def pictures(shown: Film, camera: Camera, size: tuple[int, int]) -> Iterator[Array]:
-    """Yields for each time of the film a picture (height, width, 3) uint8.
+def pictures(
+    shown: Film, camera: Camera, size: tuple[int, int], faint: frozenset[str] = frozenset()
+) -> Iterator[Array]:
+    """Yields for each time of the film a picture (height, width, 3) uint8; faint : names of bodies that are translucent.
 
     Raises ComputationError, naming the packages that are missing, when this machine cannot render.
     """
     plotter = _plotter(size)
     try:
-        updates = _build(plotter, shown)
+        updates = _build(plotter, shown, faint)
         _aim(plotter, shown, camera, size)
         for frame in range(shown.times.size):
             for update in updates:
@@ -61,6 +63,17 @@ def pictures(shown: Film, camera: Camera, size: tuple[int, int]) -> Iterator[Arr
             yield _grab(plotter, size)
     finally:
         plotter.close()
+
+
+def window(shown: Film, camera: Camera, size: tuple[int, int], faint: frozenset[str]) -> None:
+    """A window with the first picture of a film, which can be turned, until it is closed."""
+    plotter = pv.Plotter(window_size=list(size))
+    plotter.set_background("white")
+    plotter.enable_parallel_projection()
+    for update in _build(plotter, shown, faint):
+        update(0)
+    _aim(plotter, shown, camera, size)
+    plotter.show()
 
 
 def _plotter(size: tuple[int, int]) -> Any:
@@ -114,18 +127,21 @@ def _aim(plotter: Any, shown: Film, camera: Camera, size: tuple[int, int]) -> No
 # ---- what is in the picture ---------------------------------------------------------------------------------------
 
 
-def _build(plotter: Any, shown: Film) -> list[Update]:
+def _build(plotter: Any, shown: Film, faint: frozenset[str]) -> list[Update]:
     updates: list[Update] = []
     plain = iter(BODY_COLOURS * (1 + len(shown.solids) + len(shown.links)))
     for solid in shown.solids:
         colour = next(plain)
+        if solid.name in faint:
+            updates.append(_ghost(plotter, solid))
+            continue
         if shown.colouring is not None and is_coloured(shown, solid):
             updates.append(_coloured_solid(plotter, shown, solid, shown.colouring))
         else:
             updates.append(_plain_solid(plotter, shown, solid, colour))
         if solid.is_flexible and shown.scale > 0:
             updates.append(_ghost(plotter, solid))
-    updates += [_tubes(plotter, link, next(plain)) for link in shown.links]
+    updates += [_tubes(plotter, link, next(plain), link.name in faint) for link in shown.links]
     for path, colour in zip(shown.traces.values(), TRACE_COLOURS * len(shown.traces), strict=False):
         plotter.add_mesh(pv.lines_from_points(path), color=colour, line_width=2.5, lighting=False)
     if shown.marks:
@@ -239,13 +255,15 @@ def _pose(actor: Any, solid: Solid, frame: int) -> None:
     actor.user_matrix = matrix
 
 
-def _tubes(plotter: Any, link: Link, colour: str) -> Update:
+def _tubes(plotter: Any, link: Link, colour: str, faint: bool) -> Update:
     cells = np.insert(link.pairs, 0, 2, axis=1).ravel()
     meshes = [pv.PolyData(np.array(link.points[0]))]
-    plotter.add_mesh(meshes[0], color=_INK, point_size=12, render_points_as_spheres=True)
+    look = {"opacity": 0.25} if faint else {"render_points_as_spheres": True}
+    plotter.add_mesh(meshes[0], color=_INK, point_size=12, **look)
     if cells.size:
         meshes.append(pv.PolyData(np.array(link.points[0]), lines=cells))
-        plotter.add_mesh(meshes[1], color=colour, line_width=9, render_lines_as_tubes=True)
+        look = {"opacity": 0.25} if faint else {"render_lines_as_tubes": True}
+        plotter.add_mesh(meshes[1], color=colour, line_width=9, **look)
 
     def update(frame: int) -> None:
         for mesh in meshes:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +53,12 @@ class StressReport:
     spots: tuple[HotSpot, ...]
     sections: dict[str, tuple[SectionPeak, ...]]
     files: tuple[Path, ...]
+
+    def _repr_html_(self) -> str:
+        """The report in words, and its pictures, for a notebook."""
+        pictures = [base64.b64encode(file.read_bytes()).decode() for file in self.files if file.suffix == ".png"]
+        shown = "".join(f'<img src="data:image/png;base64,{picture}" width="600">' for picture in pictures)
+        return f"<pre>{escape(chr(10).join(report_lines(self)))}</pre>{shown}"
 
 
 def stress_report(
@@ -149,10 +157,9 @@ def _histories(result: Result, places: dict[str, Places], quantity: str, folder:
     histories = Result(result.time, found)
     shown = [name for name in found if name.endswith(f".{quantity}")]
     words = measure(quantity).words
-    return [
-        write_csv(histories, folder / "history.csv"),
-        plot(histories, shown, folder / "history.png", title=f"{words[0].upper() + words[1:]} at {len(shown)} points"),
-    ]
+    title, picture = f"{words[0].upper() + words[1:]} at {len(shown)} points", folder / "history.png"
+    plot(histories, shown, picture, title=title)
+    return [write_csv(histories, folder / "history.csv"), picture]
 
 
 def _section_files(result: Result, body: str, points: Sequence[Sequence[float]], folder: Path) -> list[Path]:
@@ -161,10 +168,9 @@ def _section_files(result: Result, body: str, points: Sequence[Sequence[float]],
     element = nearest_element(beams_of(result, body), np.array(points[0], float)) if len(points) else bending.element
     histories = section_histories(result, body, element)
     middle = [name for name in histories.quantities if ".middle." in name]
-    return [
-        write_csv(histories, folder / f"{body}_section_forces.csv"),
-        plot(histories, middle, folder / f"{body}_section_forces.png", title=f"Section forces, element {element}"),
-    ]
+    picture = folder / f"{body}_section_forces.png"
+    plot(histories, middle, picture, title=f"Section forces, element {element}")
+    return [write_csv(histories, folder / f"{body}_section_forces.csv"), picture]
 
 
 # ---- picture ------------------------------------------------------------------------------------------------------

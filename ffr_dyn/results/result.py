@@ -11,6 +11,7 @@ import csv
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from itertools import product
@@ -89,7 +90,8 @@ class Result(Brief):
     time       : (T,) [s], finite, not decreasing
     quantities : by dotted name; each has T rows
     geometry   : by body name; the surface that is drawn, in the body frame
-    attributes : plain JSON values: title, status ("running", "complete", "stopped: reason"), scene text, settings
+    attributes : plain JSON values: title, status ("running", "complete", "stopped: reason"), settings, and what connects
+                 which markers (`ffr_dyn.scene.described`)
 
     Raises InputError when lengths, names or axes contradict each other.
     """
@@ -139,6 +141,43 @@ class Result(Brief):
             for labels in product(*(axis.labels for axis in self.quantity(name).axes)):
                 yield ".".join((name, *labels))
 
+    def to_xarray(self, names: Iterable[str] | None = None) -> Any:
+        """An `xarray.Dataset`: a variable for each quantity over `time` and its labelled axes, with `units` and `long_name`.
+
+        names : quantities or components; all when not given. Raises InputError where xarray is not installed.
+
+        Example: ``result.to_xarray()["rod.tip.position"].sel(xyz="x")``
+        """
+        with _installed("xarray"):
+            import xarray
+        found: dict[str, Any] = {}
+        labels: dict[str, Any] = {"time": self.time}
+        for name in self.quantities if names is None else names:
+            of = self.quantity(name)
+            labels |= {axis.name: list(axis.labels) for axis in of.axes}
+            about = {"units": of.unit, "long_name": of.description}
+            found[name] = (("time", *(axis.name for axis in of.axes)), of.values, about)
+        whole = xarray.Dataset(
+            found, labels, {key: of for key, of in self.attributes.items() if isinstance(of, str | float | int)}
+        )
+        whole["time"].attrs["units"] = "s"
+        return whole
+
+    def to_pandas(self, names: Iterable[str] | None = None) -> Any:
+        """A `pandas.DataFrame`: a column for each component ("rod.tip.position.x") over the time [s].
+
+        `attrs["units"]` has their units by name.
+        names : quantities or components; all when not given. Raises InputError where pandas is not installed.
+        """
+        with _installed("pandas"):
+            import pandas
+        columns = list(self.components(names))
+        of = {name: self.quantity(name) for name in columns}
+        time = pandas.Index(self.time, name="time")
+        frame = pandas.DataFrame({name: quantity.values for name, quantity in of.items()}, index=time)
+        frame.attrs["units"] = {name: quantity.unit for name, quantity in of.items()}
+        return frame
+
     def _find(self, name: str) -> Quantity | None:
         if name in self.quantities:
             return self.quantities[name]
@@ -148,6 +187,15 @@ class Result(Brief):
             return None
         index = owner.axes[0].labels.index(label)
         return Quantity(owner.values[:, index], owner.unit, owner.axes[1:], owner.description)
+
+
+@contextmanager
+def _installed(name: str) -> Iterator[None]:
+    """Around an import: InputError that names the package which is missing."""
+    try:
+        yield
+    except ImportError:
+        raise InputError(f"this needs the package {name}, which is not installed: pip install {name}") from None
 
 
 def table(result: Result, names: Iterable[str] | None = None) -> tuple[tuple[str, ...], Array]:

@@ -76,12 +76,6 @@ def cut_joints(bodies: Iterable[Any]) -> list[Joint]:
     return joints
 
 
-def described(scene: Any) -> dict[str, Any]:
-    """What every result says of its scene: the title, and the parts of bodies by the name of the whole."""
-    parts = {name: [part.name for part in of] for name, of in wholes(scene.bodies).items()}
-    return {"title": scene.name} | ({"parts": parts} if parts else {})
-
-
 def as_declared(bodies: Iterable[Any]) -> tuple[Any, ...]:
     """The bodies as they were declared: wholes in place of their parts; the inverse of `in_parts`.
 

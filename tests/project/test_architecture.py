@@ -46,12 +46,14 @@ MESHERS_AND_PLOTTERS = {
     "imageio_ffmpeg",
     "matplotlib",
     "meshio",
+    "pandas",
     "plotly",
     "pyNastran",
     "pyvista",
     "skfem",
     "vtk",
     "vtkmodules",
+    "xarray",
 }
 HEAVY = {*MESHERS_AND_PLOTTERS, "PIL", "h5py", "numba", "pydantic", "scipy"}
 
@@ -338,7 +340,7 @@ def declared() -> set[str]:
     project = PROJECT["project"]
     optional = [
         requirement
-        for extra in ("chart", "video", "nastran", "pardiso", "ida")
+        for extra in ("chart", "video", "nastran", "pardiso", "ida", "tables")
         for requirement in project["optional-dependencies"][extra]
     ]
     return {distribution_name(requirement) for requirement in [*project["dependencies"], *optional]}
@@ -357,6 +359,8 @@ def test_every_library_is_declared_and_every_declared_one_is_used():
         "pypardiso": ["pypardiso"],
         "sksundae": ["scikit-sundae"],
         "dask": ["dask"],
+        "pandas": ["pandas"],
+        "xarray": ["xarray"],
     }
     owners = importlib.metadata.packages_distributions() | extras
     needed = {distribution_name(owners[name][0]) for name in third_party()}
@@ -371,12 +375,18 @@ def test_every_folder_of_modules_is_a_package_and_is_installed():
     assert {name for name in on_disk if any(fnmatch.fnmatch(name, pattern) for pattern in find["include"])} == on_disk
 
 
-def test_the_packages_hold_nothing_but_modules():
-    """Anything else would be missing from an installed copy, but for the mark that says that types are given."""
+# What is neither a module nor the mark that says that types are given: parts of the page that shows films and scenes.
+OF_A_PAGE = {f"ffr_dyn/pictures/web/{path.name}" for path in (ROOT / "ffr_dyn/pictures/web").iterdir()}
+
+
+def test_the_packages_hold_modules_and_what_is_installed_with_them():
+    """Anything else would be missing from an installed copy."""
     files = [path for package in PACKAGES for path in (ROOT / package).rglob("*") if path.is_file()]
     others = [p.relative_to(ROOT).as_posix() for p in files if p.suffix != ".py" and "__pycache__" not in p.parts]
-    assert set(others) <= {f"{package}/py.typed" for package in PACKAGES}
-    assert PROJECT["tool"]["setuptools"]["package-data"] == {"*": ["py.typed"]}
+    assert set(others) <= {f"{package}/py.typed" for package in PACKAGES} | OF_A_PAGE
+    data = PROJECT["tool"]["setuptools"]["package-data"]
+    assert data == {"*": ["py.typed"], "ffr_dyn.pictures": ["web/*"]}
+    assert {path.rpartition(".")[2] for path in OF_A_PAGE} == {"css", "html", "js"}
 
 
 MACHINE = re.compile(

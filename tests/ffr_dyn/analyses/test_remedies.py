@@ -7,13 +7,17 @@ cover them; `UNCOVERED` counts, by module, those that still have no case. The nu
 from __future__ import annotations
 
 import ast
+import os
 import re
+import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import SimpleNamespace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -61,6 +65,7 @@ from ffr_dyn.integrators import (
     tolerances,
 )
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection
+from ffr_dyn.pictures.scene_view import open_window, scene_view
 from ffr_dyn.realtime.stepper import Stepper
 from ffr_dyn.results.file import load_result
 from ffr_dyn.results.result import Axis, Quantity, Result
@@ -123,6 +128,33 @@ def saved(name: str, make: Callable[..., object], end: float = 0.1, **more: obje
         path = Path(folder) / name
         make(DRIVEN, end=0.1, output_step=0.01, path=path)
         return run(DRIVEN, end=end, resume=path, **more)
+
+
+def written(function: Callable[..., object], thing: object, name: str, *more: object) -> object:
+    """What `function` writes of a thing to a file of that name."""
+    with TemporaryDirectory() as folder:
+        return function(thing, Path(folder) / name, *more)
+
+
+def window() -> object:
+    """A window on a machine that has none."""
+    with patch.dict(os.environ):
+        for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+            os.environ.pop(name, None)
+        return open_window(scene_view(HINGED))
+
+
+def tabled(library: object) -> object:
+    """A result as a table of pandas, which is installed or not (None)."""
+    with patch.dict(sys.modules, {"pandas": library}):
+        return Result([0.0], {}).to_pandas()
+
+
+def as_frame(columns: object, index: object) -> SimpleNamespace:
+    return SimpleNamespace(attrs={})
+
+
+PANDAS = SimpleNamespace(Index=lambda values, name: values, DataFrame=as_frame)
 
 
 def loaded(name: str) -> Result:
@@ -623,6 +655,14 @@ INPUT = [
     Case(lambda: Output("energy.total", -1.0), lambda: Output("energy.total", 1.0)),
     Case(lambda: Adaptation(enter=0.1, leave=0.2), lambda: Adaptation(enter=0.2, leave=0.1)),
     Case(lambda: Adaptation(rows=1), lambda: Adaptation(rows=2)),
+    Case(lambda: written(fd.export, run(HINGED), "a.stl"), lambda: written(fd.export, run(HINGED), "a.glb")),
+    Case(
+        lambda: written(fd.export, run(HINGED), "a.glb", ["bar.R"]),
+        lambda: written(fd.export, run(HINGED), "a.csv", ["bar.R"]),
+    ),
+    Case(lambda: written(fd.show, HINGED, "a.gif"), lambda: written(fd.show, HINGED, "a.html")),
+    Case(window, lambda: written(fd.show, HINGED, "a.html")),
+    Case(lambda: tabled(None), lambda: tabled(PANDAS)),
 ]
 CASES = RUNS + INPUT
 

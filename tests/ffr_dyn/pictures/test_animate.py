@@ -1,12 +1,9 @@
 """Animations: what is drawn is R + A(p)(u_0 + scale Phi q), and the files hold it."""
 
-import base64
 import importlib.util
-import shutil
 import subprocess
 import sys
 from dataclasses import replace
-from html.parser import HTMLParser
 from itertools import pairwise
 
 import numpy as np
@@ -14,7 +11,6 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from ffr_dyn.pictures import page
 from ffr_dyn.pictures.animate import animate
 from ffr_dyn.pictures.film import Camera, camera_for, displacements, drawn_points, film
 from ffr_dyn.results.result import EULER_PARAMETERS, XYZ, Quantity, Result, mode_axis
@@ -244,6 +240,12 @@ def test_other_kinds_of_file_are_refused(tmp_path, monkeypatch):
 SMALL = {"size": (240, 160), "duration": 0.5, "fps": 20}
 
 
+def filmed(result, path, **settings):
+    """The path of a film."""
+    animate(result, path, **settings)
+    return path
+
+
 def frames_of(path):
     with Image.open(path) as image:
         frames, delays = [], []
@@ -255,7 +257,8 @@ def frames_of(path):
 
 
 def test_a_gif_has_the_frames_the_speed_and_the_size_asked_for(tmp_path):
-    path = animate(rotating_box(), tmp_path / "new" / "a.gif", size=(240, 160), duration=1.0, fps=12, scale="auto")
+    path = tmp_path / "new" / "a.gif"
+    animate(rotating_box(), path, size=(240, 160), duration=1.0, fps=12, scale="auto")
     frames, delays = frames_of(path)
     assert len(frames) == 12
     assert sum(delays) == 1000
@@ -267,8 +270,8 @@ def test_a_gif_has_the_frames_the_speed_and_the_size_asked_for(tmp_path):
 
 
 def test_the_same_result_makes_the_same_gif(tmp_path):
-    first = animate(rotating_box(), tmp_path / "a.gif", **SMALL).read_bytes()
-    assert first == animate(rotating_box(), tmp_path / "b.gif", **SMALL).read_bytes()
+    first = filmed(rotating_box(), tmp_path / "a.gif", **SMALL).read_bytes()
+    assert first == filmed(rotating_box(), tmp_path / "b.gif", **SMALL).read_bytes()
 
 
 def middle_of(frames):
@@ -278,9 +281,9 @@ def middle_of(frames):
 
 def test_deformation_is_coloured_and_the_undeformed_body_is_a_ghost(tmp_path):
     still = rotating_box((0.0, 0.0, 0.0), amplitude=0.1)
-    plain = middle_of(frames_of(animate(still, tmp_path / "a.gif", colour="body", **SMALL))[0])
-    coloured = middle_of(frames_of(animate(still, tmp_path / "b.gif", **SMALL))[0])
-    alone = middle_of(frames_of(animate(still, tmp_path / "c.gif", scale=0.0, colour="body", **SMALL))[0])
+    plain = middle_of(frames_of(filmed(still, tmp_path / "a.gif", colour="body", **SMALL))[0])
+    coloured = middle_of(frames_of(filmed(still, tmp_path / "b.gif", **SMALL))[0])
+    alone = middle_of(frames_of(filmed(still, tmp_path / "c.gif", scale=0.0, colour="body", **SMALL))[0])
 
     def colours(images):
         saturation = np.ptp(images, axis=-1)
@@ -328,15 +331,15 @@ def test_markers_and_traces_are_drawn(tmp_path):
         red, green, blue = np.moveaxis(middle_of(frames), -1, 0)
         return ((red > 180) & (green < 130) & (blue < 60)).sum(axis=(1, 2))
 
-    bare = animate(pendulum_of_markers(), tmp_path / "a.gif", **SMALL)
-    traced = animate(pendulum_of_markers(), tmp_path / "b.gif", traces=["arm.tip"], **SMALL)
+    bare = filmed(pendulum_of_markers(), tmp_path / "a.gif", **SMALL)
+    traced = filmed(pendulum_of_markers(), tmp_path / "b.gif", traces=["arm.tip"], **SMALL)
     assert orange(frames_of(bare)[0]).max() == 0
     assert orange(frames_of(traced)[0]).min() > 30
     assert (middle_of(frames_of(bare)[0]) < 200).any(axis=-1).sum() > 500
 
 
 def test_a_result_at_one_time_is_one_picture(tmp_path):
-    assert len(frames_of(animate(rotating_box(rows=1), tmp_path / "a.gif", **SMALL))[0]) == 1
+    assert len(frames_of(filmed(rotating_box(rows=1), tmp_path / "a.gif", **SMALL))[0]) == 1
 
 
 def test_a_machine_that_cannot_render_is_told_what_it_lacks(tmp_path, monkeypatch):
@@ -358,120 +361,8 @@ def test_a_machine_that_cannot_render_is_told_what_it_lacks(tmp_path, monkeypatc
     assert [item.name for item in tmp_path.iterdir()] == ["a.gif"]
 
 
-# ---- page ---------------------------------------------------------------------------------------------------------
-
-
-class References(HTMLParser):
-    """Collects whatever a browser would fetch."""
-
-    def __init__(self):
-        super().__init__()
-        self.found = []
-
-    def handle_starttag(self, tag, attrs):
-        self.found += [(tag, key, value) for key, value in attrs if key in ("src", "href", "data", "srcset", "action")]
-
-
-def encoded(values):
-    return base64.b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode()
-
-
-def test_a_page_holds_everything_and_fetches_nothing(tmp_path):
-    result = rotating_box()
-    text = animate(result, tmp_path / "a.html", scale=20.0, traces=["rod.tip"], duration=2.0).read_text("utf-8")
-    text = text.replace("\\u002f", "/")  # plotly writes slashes so, lest they end its script
-    references = References()
-    references.feed(text)
-    assert references.found == []
-    assert "@import" not in text.split("<body>")[0]
-    shown = film(result, 50, scale=20.0)
-    (solid,) = shown.solids
-    for k in (0, 7, 49):
-        for column in drawn_points(solid, k, 20.0).T:
-            assert encoded(column) in text
-        assert encoded(displacements(solid, k) * 1e3) in text
-    assert encoded(result["rod.tip.position"][:, 0]) in text
-    assert "deformation \\u00d7 20" in text
-    assert '"name":"49"' in text
-    assert '"name":"50"' not in text
-
-
-def test_the_ghost_of_a_page_sinks_below_the_skin_of_the_body():
-    surface = box_surface()
-    points = page.sunk(surface, 0.01)
-    np.testing.assert_allclose(np.linalg.norm(points - surface.points, axis=1), 0.01, rtol=1e-12)
-    middle = (surface.points[:, 0] > 0.1) & (surface.points[:, 0] < 0.9)
-    assert (np.abs(points[middle, 1:]) < np.abs(surface.points[middle, 1:]) - 0.004).all()
-
-
-def test_a_page_has_at_most_eighty_pictures_and_little_more_than_plotly(tmp_path):
-    path = animate(rotating_box(), tmp_path / "a.html", duration=60.0)
-    text = path.read_text("utf-8")
-    assert '"name":"79"' in text
-    assert '"name":"80"' not in text
-    assert path.stat().st_size < 7e6
-    assert path.read_bytes() == animate(rotating_box(), tmp_path / "b.html", duration=60.0).read_bytes()
-
-
-def test_a_large_surface_is_simplified_for_a_page_to_some_of_its_points():
-    surface = box_surface(stations=400)
-    coarse, _ = page.decimated(surface, 0.25)
-    assert 0.2 < len(coarse.triangles) / len(surface.triangles) < 0.3
-    own = {tuple(point): k for k, point in enumerate(surface.points)}
-    kept = [own[tuple(point)] for point in coarse.points]
-    np.testing.assert_array_equal(coarse.Phi, surface.Phi[kept])
-    np.testing.assert_allclose(np.ptp(coarse.points, axis=0), np.ptp(surface.points, axis=0), atol=0.01)
-
-
-def test_a_page_of_a_large_surface_stays_small(tmp_path, monkeypatch):
-    monkeypatch.setattr(page, "_MOST_NUMBERS", 100_000)
-    result = replace(rotating_box(), geometry={"rod": box_surface(stations=400)})
-    assert animate(result, tmp_path / "a.html").stat().st_size < 5.5e6
-
-
 def test_nothing_heavy_is_loaded_before_it_is_needed():
     heavy = {"pyvista", "vtkmodules", "plotly", "matplotlib"}
     code = f"import sys, ffr_dyn.pictures.animate; sys.exit(str({heavy} & sys.modules.keys() or ''))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.stderr.strip() == ""
-
-
-BROWSER = shutil.which("chromium") or shutil.which("google-chrome") or shutil.which("chrome")
-FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--window-size=1000,800",
-    "--virtual-time-budget=8000",
-]
-
-
-def photograph(page_path, frame, folder):
-    """The page as a browser shows it with the slider at a picture."""
-    jump = f'Plotly.animate("motion", ["{frame}"], {{mode: "immediate", transition: {{duration: 0}}}})'
-    copy = folder / f"at{frame}.html"
-    script = f"<script>window.addEventListener('load', () => {jump})</script></body>"
-    copy.write_text(page_path.read_text("utf-8").replace("</body>", script), encoding="utf-8")
-    picture = folder / f"at{frame}.png"
-    own = [f"--user-data-dir={folder / 'browser'}", f"--screenshot={picture}", copy.as_uri()]
-    subprocess.run([BROWSER, *FLAGS, *own], check=True, capture_output=True, timeout=180)
-    return np.asarray(Image.open(picture).convert("RGB")).astype(int)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(BROWSER is None, reason="no chromium or google-chrome on this machine")
-def test_a_browser_draws_the_page_and_the_slider_moves_the_body(tmp_path):
-    path = animate(rotating_box(amplitude=0.05), tmp_path / "a.html", duration=1.0)
-    first, last = photograph(path, 0, tmp_path), photograph(path, 24, tmp_path)
-    scene = (slice(100, 550), slice(200, 750))
-    bodies = [(np.ptp(picture[scene], axis=-1) > 40) for picture in (first, last)]
-    for body in bodies:
-        assert body.sum() > 2000
-    assert (bodies[0] ^ bodies[1]).sum() > 2000

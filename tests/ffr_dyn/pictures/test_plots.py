@@ -145,7 +145,14 @@ def test_a_path_shows_two_coordinates_to_one_scale(result, figures, tmp_path, pl
 
 def test_a_marker_at_rest_has_a_path(tmp_path):
     still = Result(T, {"a.position": Quantity(np.ones((41, 3)), "m", (XYZ,))})
-    assert plot_path(still, "a", tmp_path / "a.png").exists()
+    plot_path(still, "a", tmp_path / "a.png")
+    assert (tmp_path / "a.png").exists()
+
+
+def test_without_a_path_a_figure_is_returned_that_notebooks_show(result):
+    for figure in (plot(result, "rod.eye.position"), plot_path(result, "rod.eye")):
+        assert figure.axes
+        assert figure._repr_png_().startswith(b"\x89PNG")
 
 
 # ---- files --------------------------------------------------------------------------------------------------------
@@ -153,19 +160,24 @@ def test_a_marker_at_rest_has_a_path(tmp_path):
 
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
 def test_the_same_result_makes_the_same_bytes(result, tmp_path, suffix):
-    first = plot(result, "rod.eye.position", tmp_path / "new" / f"a{suffix}").read_bytes()
-    assert first == plot(result, "rod.eye.position", tmp_path / f"b{suffix}").read_bytes()
+    paths = tmp_path / "new" / f"a{suffix}", tmp_path / f"b{suffix}"
+    for path in paths:
+        plot(result, "rod.eye.position", path)
+    first = paths[0].read_bytes()
+    assert first == paths[1].read_bytes()
     assert first.startswith({".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}[suffix])
 
 
 def test_pictures_are_large_and_not_empty(result, tmp_path):
-    image = Image.open(plot_path(result, "rod.eye", tmp_path / "a.png")).convert("RGB")
+    plot_path(result, "rod.eye", tmp_path / "a.png")
+    image = Image.open(tmp_path / "a.png").convert("RGB")
     assert min(image.size) >= 800
     assert len(image.getcolors(1 << 20)) > 100
 
 
 def test_a_failed_plot_leaves_the_old_picture(result, tmp_path, monkeypatch):
-    path = plot(result, "energy.kinetic", tmp_path / "a.png")
+    path = tmp_path / "a.png"
+    plot(result, "energy.kinetic", path)
     before = path.read_bytes()
 
     def fail(*_, **__):

@@ -1,0 +1,200 @@
+// Pictures, one after the other, and what steers them.
+
+let wanted = false;
+const redraw = () => { if (!wanted) { wanted = true; requestAnimationFrame(() => { wanted = false; draw(); }); } };
+
+function draw() {
+  const stage = $("stage"), ratio = devicePixelRatio, width = stage.clientWidth, height = stage.clientHeight, at = place(state.time);
+  for (const [canvas, share] of [[$("solid"), ratio * sharpness()], [$("over"), ratio]]) {
+    const size = [Math.round(width * share), Math.round(height * share)];
+    if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
+  }
+  drawSolids(at, $("solid").width, $("solid").height);
+  over.setTransform(ratio, 0, 0, ratio, 0, 0);
+  drawOver(at, width, height);
+  $("now").style.left = `${across(state.time)}px`;
+  $("time").value = state.time;
+  $("clock").textContent = about.moments[Math.round(at.row + at.share * (at.next - at.row))] || `${short(about.clock.factor * state.time)} ${about.clock.unit}`;
+  state.drawn += 1;
+}
+
+function look(direction, up) {
+  const towards = unit(direction), right = unit(cross(up, towards));
+  camera.axes = [right, cross(towards, right), towards];
+  camera.target = about.centre.slice();
+  const stage = $("stage"), reach = (axis) => 0.5 * dot(axis.map(Math.abs), about.extent) / 0.84;
+  camera.reach = Math.max(reach(camera.axes[1]), reach(right) * stage.clientHeight / Math.max(stage.clientWidth, 1)) || 1;
+  redraw();
+}
+
+function turn(dx, dy) {
+  const [right, up, towards] = camera.axes;
+  const by = (a, b, angle) => [add(a.map((c) => c * Math.cos(angle)), b, Math.sin(angle)), add(b.map((c) => c * Math.cos(angle)), a, -Math.sin(angle))];
+  const [right2, towards2] = by(right, towards, 0.008 * dx), [up2, towards3] = by(up, towards2, -0.008 * dy);
+  camera.axes = [unit(right2), unit(up2), unit(towards3)];
+  redraw();
+}
+
+// ---- controls -----------------------------------------------------------------------------------------------------------
+
+const VIEWS = { start: [about.camera.direction, about.camera.up], x: [[1, 0, 0], [0, 0, 1]], y: [[0, -1, 0], [0, 0, 1]], z: [[0, 0, 1], [0, 1, 0]], corner: [[0.75, -1, 0.6], [0, 0, 1]] };
+function seek(time) {
+  state.time = Math.min(Math.max(time, rows[0]), rows.at(-1));
+  redraw();
+}
+
+function step(by) {
+  play(false);
+  const at = place(state.time), row = at.share >= 1 ? at.next : at.row;
+  seek(rows[Math.min(Math.max(row + (by < 0 && at.share > 0 && at.share < 1 ? 0 : by), 0), rows.length - 1)]);
+}
+
+let last;
+function play(on) {
+  state.playing = on && span() > 0;
+  if (state.playing && state.time >= rows.at(-1)) state.time = rows[0];
+  $("play").textContent = state.playing ? "❚❚" : "▶";
+  last = undefined;
+  if (state.playing) requestAnimationFrame(tick); else redraw();
+}
+
+function tick(now) {
+  if (!state.playing) return;
+  if (last !== undefined) {
+    state.time += ((now - last) / 1000) * state.speed * span() / about.seconds;
+    if (state.time > rows.at(-1)) {
+      if (state.loop) state.time = rows[0] + ((state.time - rows[0]) % span());
+      else { state.time = rows.at(-1); play(false); }
+    }
+  }
+  last = now;
+  draw();
+  if (state.playing) requestAnimationFrame(tick);
+}
+
+function setScale(scale) {
+  if (!(scale >= 0)) return;
+  state.scale = scale;
+  $("scale").value = short(scale);
+  $("scaling").value = scale < 0.1 ? 0 : 100 * Math.log(scale / 0.1) / Math.log(about.most / 0.1);
+  redraw();
+}
+
+function setColouring(k) {
+  const colour = about.colours[k];
+  state.colour = k;
+  $("limit").disabled = !colour.map;
+  $("limit").value = colour.map ? short(state.limits[k] * colour.factor) : "";
+  $("unit").textContent = colour.unit || "";
+  redraw();
+}
+
+/** A list of things with a box each, and one for all. */
+function list(title, things, open) {
+  if (!things.length) return;
+  const whole = document.createElement("details"), head = document.createElement("summary"), all = document.createElement("input");
+  whole.open = open;
+  all.type = "checkbox";
+  all.checked = things.every((thing) => thing.shown !== false && thing.shown !== undefined);
+  head.append(all, ` ${title} (${things.length})`);
+  whole.append(head);
+  const boxes = things.map((thing) => {
+    const label = document.createElement("label"), box = document.createElement("input"), swatch = document.createElement("i");
+    box.type = "checkbox";
+    box.checked = thing.shown === true;
+    box.dataset.name = thing.name;
+    box.onchange = () => { thing.shown = box.checked; redraw(); };
+    swatch.className = "swatch";
+    swatch.style.background = thing.colour || "transparent";
+    label.append(box, " ", ...(thing.colour ? [swatch] : []), thing.label || thing.name);
+    label.title = thing.label || thing.name;
+    whole.append(label);
+    return box;
+  });
+  all.onclick = (event) => event.stopPropagation();
+  all.onchange = () => boxes.forEach((box) => { box.checked = all.checked; box.onchange(); });
+  $("lists").append(whole);
+}
+
+function lists() {
+  list("Bodies", about.bodies, true);
+  list("Joints", about.joints, about.joints.length < 20);
+  list("Forces, moments", about.arrows, false);
+  list("Markers", about.markers, false);
+  list("Paths", about.traces, true);
+  const whole = document.createElement("details"), select = document.createElement("select");
+  whole.open = true;
+  whole.innerHTML = "<summary>Plots</summary>";
+  select.id = "series";
+  select.multiple = true;
+  about.series.forEach((one, k) => select.add(new Option(`${one.name} [${one.unit}]`, k, false, one.chosen)));
+  select.onchange = () => { drawPlots(); redraw(); };
+  whole.append(select);
+  whole.hidden = !about.series.length || rows.length < 2;
+  $("lists").append(whole);
+}
+
+function connect() {
+  about.colours.forEach((colour, k) => $("colour").add(new Option(colour.words, k)));
+  for (const speed of [0.05, 0.1, 0.25, 0.5, 1, 2, 4, 8]) $("speed").add(new Option(speed, speed, speed === 1, speed === 1));
+  [$("time").min, $("time").max] = [rows[0], rows.at(-1)];
+  $("play").onclick = () => play(!state.playing);
+  $("back").onclick = () => step(-1);
+  $("forward").onclick = () => step(1);
+  $("loop").onclick = () => { state.loop = !state.loop; $("loop").ariaPressed = String(state.loop); };
+  $("speed").onchange = () => { state.speed = Number($("speed").value); };
+  $("time").oninput = () => { play(false); seek(Number($("time").value)); };
+  $("scale").onchange = () => setScale(Number($("scale").value));
+  $("scaling").oninput = () => { const s = Number($("scaling").value); setScale(s > 0 ? 0.1 * (about.most / 0.1) ** (s / 100) : 0); };
+  $("colour").onchange = () => setColouring(Number($("colour").value));
+  $("limit").onchange = () => { const v = Number($("limit").value) / about.colours[state.colour].factor; if (v > 0) state.limits[state.colour] = v; redraw(); };
+  for (const id of ["edges", "ghost", "names", "frames"]) { $(id).checked = about.boxes.includes(id); $(id).onchange = redraw; }
+  for (const button of $("views").querySelectorAll("button")) button.onclick = () => look(...VIEWS[button.dataset.view]);
+  $("plots").onpointerdown = $("plots").onpointermove = (event) => {
+    if (event.buttons) { play(false); seek(rows[0] + span() * (event.offsetX - LEFT) / ($("plots").clientWidth - LEFT - 12)); }
+  };
+  if (rows.length < 2) document.querySelector("footer").style.display = "none";
+  mouse();
+  addEventListener("resize", () => { drawPlots(); redraw(); });
+  addEventListener("keydown", (event) => {
+    if (/INPUT|SELECT|BUTTON/.test(event.target.tagName) && event.target.type !== "range") return;
+    const act = { " ": () => play(!state.playing), ArrowLeft: () => step(-1), ArrowRight: () => step(1) }[event.key];
+    if (act) { event.preventDefault(); act(); }
+  });
+}
+
+function mouse() {
+  const canvas = $("over");
+  canvas.onpointerdown = (event) => canvas.setPointerCapture(event.pointerId);
+  canvas.oncontextmenu = (event) => event.preventDefault();
+  canvas.onpointermove = (event) => {
+    if (!event.buttons) return;
+    if (event.buttons === 1 && !event.shiftKey) return turn(event.movementX, event.movementY);
+    const metres = 2 * camera.reach / canvas.clientHeight, [right, up] = camera.axes;
+    camera.target = add(add(camera.target, right, -metres * event.movementX), up, metres * event.movementY);
+    redraw();
+  };
+  canvas.onwheel = (event) => { event.preventDefault(); camera.reach *= Math.exp(0.001 * event.deltaY); redraw(); };
+  canvas.ondblclick = () => look(...VIEWS.start);
+}
+
+async function start() {
+  if (!gl) throw new Error("this browser draws no WebGL 2");
+  await unpack();
+  load();
+  state.time = rows[0];
+  state.limits = about.colours.map((colour) => colour.high);
+  connect();
+  lists();
+  setScale(about.scale);
+  $("colour").value = about.colour;
+  setColouring(about.colour);
+  drawPlots(); // before the view is fitted to what room is left
+  look(...VIEWS.start);
+  document.body.dataset.ready = "yes";
+}
+
+const ready = start().catch((error) => {
+  $("stage").textContent = `This film cannot be shown: ${error.message}.`;
+  throw error;
+});

@@ -1,0 +1,55 @@
+"""What every result says of its scene: title, parts, and what connects which points, so that it can be drawn."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ffr_dyn.scene.drivers import Driver, PointDriver
+from ffr_dyn.scene.force_kinds import forces_of
+from ffr_dyn.scene.forces.given import is_number
+from ffr_dyn.scene.joints import Joint, frames
+from ffr_dyn.scene.parts import wholes
+from ffr_dyn.scene.scene import Scene
+
+# Joints of these kinds have no axis to speak of.
+_WITHOUT_AXIS = ("spherical", "fixed", "distance", "orientation")
+
+
+def described(scene: Scene) -> dict[str, Any]:
+    """Plain JSON values: the title; the parts of bodies by the name of the whole; places (3,) of the ground's points [m]; and
+    by the name of a joint, driver or force the markers `at` which it is, and what of it is drawn.
+    """
+    parts = {name: [part.name for part in of] for name, of in wholes(scene.bodies).items()}
+    ground = {name: at.tolist() for name, at in scene.ground.items()}
+    found = {"parts": parts, "ground": ground, "connections": _connections(scene)}
+    return {"title": scene.name} | {key: value for key, value in found.items() if value}
+
+
+def _connections(scene: Scene) -> dict[str, Any]:
+    driven: dict[str, list[str]] = {}
+    for driver in scene.drivers:
+        if isinstance(driver, Driver):
+            driven.setdefault(driver.joint, []).append(driver.name)
+    joints = {joint.name: joint for joint in scene.joints}
+    found = {name: _joint(joint, driven.get(name, [])) for name, joint in joints.items()}
+    for driver in scene.drivers:
+        at = [driver.j] if isinstance(driver, PointDriver) else [joints[driver.joint].i, joints[driver.joint].j]
+        found[driver.name] = {"kind": "point driver" if len(at) == 1 else "driver", "at": at, "axis": None}
+    return found | {force.name: _force(force, scene) for force in forces_of(scene)}
+
+
+def _joint(joint: Joint, drivers: list[str]) -> dict[str, Any]:
+    axis = None if joint.kind in _WITHOUT_AXIS else frames(joint)[0][:, 2].tolist()
+    return {"kind": joint.kind, "at": [joint.i, joint.j], "axis": axis} | ({"drivers": drivers} if drivers else {})
+
+
+def _force(force: Any, scene: Scene) -> dict[str, Any]:
+    """Its markers; of a load its axes and what of it is constant and not zero."""
+    parts = {what: getattr(force, what, ()) for what in ("force", "moment")}
+    constant = {
+        what: [float(component) for component in of]
+        for what, of in parts.items()
+        if isinstance(of, tuple | list) and len(of) == 3 and all(map(is_number, of)) and any(of)
+    }
+    found: dict[str, Any] = {"kind": type(force).__name__, "at": list(force.place.markers(scene))}
+    return found | ({"constant": constant, "axes": force.axes} if constant else {})
