@@ -14,6 +14,7 @@ from ffr_prep.body.constructors import recombined, rigid_body, truncated, with_p
 from ffr_prep.body.file import content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
 from ffr_prep.body.frame_change import interface_motions, mass_of_motions
 from ffr_prep.body.mean_axis import FrameMarker, MeanAxisForm, idle_loads, mean_axis_form
+from ffr_prep.body.movable import immovable
 from ffr_prep.body.reduced import (
     SECTION_FORCES,
     TENSOR,
@@ -58,6 +59,7 @@ __all__ = [
     "cut_names",
     "displacements",
     "idle_loads",
+    "immovable",
     "interface_motions",
     "linear_surface",
     "load_body",

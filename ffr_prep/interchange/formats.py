@@ -95,7 +95,10 @@ def export_body(body: FlexibleBody, path: Path, surface: bool, settings: Mapping
 
 
 def import_body(path: Path) -> FlexibleBody:
-    """The body of a file, in the format of its suffix. Raises InputError for an unknown one, and what the format refuses."""
+    """The body of a file, in the format of its suffix.
+
+    Raises InputError for an unknown one, and what the format refuses.
+    """
     entry = _format_of(path)
     if entry.read is None:
         raise InputError(f"{path}: {entry.name} can be written only")

@@ -29,7 +29,6 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.interchange.common_format import (
     IDENTITY_TOLERANCE,
-    LUMPING_LIMIT,
     MISFIT_LIMIT,
     Bounds,
     Content,
@@ -58,6 +57,7 @@ from ffr_prep.interchange.mbdyn_records import (
 from ffr_prep.model.invariants import from_inertia
 
 Kind = Literal["legacy", "full"]
+LUMPING_LIMIT = 1.05  # of the trace of I9 against -2 M; where a mode is rotary inertia alone it is 1
 
 # The loads of record 19 (products xx, yy, zz, xy, yz, zx of the angular velocity, angular acceleration, acceleration)
 # among those of `FlexibleBody.stiffening`. Forces and moments at the interfaces follow in both.

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import scipy.linalg
 from boxes import STEEL, box_mesh
 from nodal_field import Field, field, in_coordinates, integrals, of_body, orthonormal, tilde
 from synthetic import cloud
@@ -152,7 +153,8 @@ def foreign(path, given: Field, *, Gr="axis-major", Ge="axis-major", at=NODES, c
     found["Ge"] = (together(found["Ge"][0], Ge), None)
     lines = [f" {len(at)} {given.n}   :No. nodes, No. modes: someone", "part", "new modal = arm", "refmod"]
     lines += [f"mass = {given.mass.sum():.11E}".replace("E", "D"), f"nelastq = {given.n}"]
-    lines += [f"ielastq ( {j + 1}) = Eigen Mode {j + 1} : 1.0 Hz" for j in given.modes]
+    hertz = np.sqrt(scipy.linalg.eigh(given.K, given.M(), eigvals_only=True)) / (2 * np.pi) if given.n else []
+    lines += [f"ielastq ( {j + 1}) = Eigen Mode {j + 1} : {f:.3f} Hz" for j, f in enumerate(hertz)]
     lines += ["end refmod", "frame"]
     for p in at:
         lines += [f"new node = {100 + p}", "rframe = body ref"]
