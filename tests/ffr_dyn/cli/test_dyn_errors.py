@@ -338,7 +338,7 @@ def test_missing_files_and_unknown_quantities_exit_with_two(monkeypatch, capsys,
 
 def test_a_failing_run_exits_with_one(monkeypatch, capsys, tmp_path):
     scene = tmp_path / "scene.toml"
-    scene.write_text(SCENE.replace("[0, -9.81, 0]", "[0, -1e100, 0]"))
+    scene.write_text(SCENE + '[loads.push]\nmarker = "bar.b"\nforce = [0, 1e300, 0]\n')
     code, said = run_cli(monkeypatch, capsys, "run", scene)
     assert code == 1
     assert "no longer finite" in said
