@@ -19,7 +19,7 @@ Formats:
 
 \b
 Example:
-  ffr-prep export rod.ffr --kind full -o rod.fem
+  ffr-prep export rod.ffr -o rod.fem
   ffr-prep export rod.ffr -o rod.SID_FEM
 """
 _IMPORT = """\b

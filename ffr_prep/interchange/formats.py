@@ -67,8 +67,8 @@ EXCHANGE_FORMATS: Registry[ExchangeFormat] = Registry(
                 Setting(
                     "kind",
                     ("legacy", "full"),
-                    "legacy",
-                    "Of a .fem file: lumped masses, or the inertia integrals, which a recent MBDyn reads.",
+                    "full",
+                    "Of a .fem file: the inertia integrals, which a recent MBDyn reads, or lumped masses for older ones.",
                 ),
             ),
         ),

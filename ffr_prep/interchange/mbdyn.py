@@ -86,10 +86,10 @@ TITLES = {
 # ---- writing ------------------------------------------------------------------------------------------------------
 
 
-def write_fem(body: FlexibleBody, path: str | Path, *, kind: Kind = "legacy", surface: bool = False) -> Path:
+def write_fem(body: FlexibleBody, path: str | Path, *, kind: Kind = "full", surface: bool = False) -> Path:
     """Write the body as FEM data of MBDyn's modal joint, SI units, 17 significant digits.
 
-    kind    : "full" writes the inertia integrals (records 12, 14 to 18) and the geometric stiffness (19), which a recent
+    kind    : "full", the default, writes the inertia integrals (records 12, 14 to 18) and the geometric stiffness (19), which a recent
               MBDyn reads, and loses nothing of them; "legacy" leaves the stiffness out and writes masses lumped at the
               nodes (records 11, 12), which come as close to the integrals as masses at these nodes can
     surface : also write the points of the surface as nodes, after the interfaces. The format has no triangles, no
@@ -106,7 +106,7 @@ def write_fem(body: FlexibleBody, path: str | Path, *, kind: Kind = "legacy", su
     return write_lines(Path(path), [*_head(body, at), *_texts(content)])
 
 
-def left_out(body: FlexibleBody, *, kind: Kind = "legacy") -> tuple[str, ...]:
+def left_out(body: FlexibleBody, *, kind: Kind = "full") -> tuple[str, ...]:
     """The losses of a file of this kind, in words."""
     lost = kind == "legacy" and body.stiffening is not None
     return ("the geometric stiffness of the body was left out",) if lost else ()
@@ -237,6 +237,13 @@ def _content(lines: list[str], path: Path) -> Content:
     motions = shapes(found[8], header)
     at = _Nodes(np.stack([given[k] for k in (5, 6, 7)], axis=1), motions[:, :3], motions[:, 3:])
     mass, r_dm, rr_dm = _rigid(given, at)
+    warnings: list[str] = []
+    if mass == 0 and header.n and given[9].diagonal().min() > 0:
+        mass, r_dm, rr_dm = _stand_in(given[9], at)
+        warnings = [
+            f"the file has no mass: {mass:.4g} kg at the middle of its nodes stand for it; where the frame is held fixed they "
+            "change nothing but the weight in reactions, elsewhere give the file its mass (record 12)"
+        ]
     limit = bounds(mass, rr_dm, given[9])
     lumped = _sums(given[11], at) if 11 in given else None
     P_dm = given[14] if 14 in given else _needed(lumped, 14)[0]
@@ -261,7 +268,7 @@ def _content(lines: list[str], path: Path) -> Content:
             "source": {"file": path.name, "format": "MBDyn FEM"},
             "inertia": {str(r): "record" if r in given else "lumped masses" for r in (12, 14, 16, 18)},
             "notes": ["every node became an interface of the kind 'node'", "the format has no surface to draw"],
-            "warnings": [*_lost(given), *of_r, *of_phi],
+            "warnings": [*warnings, *_lost(given), *of_r, *of_phi],
         },
         stiffening=_stiffening(found[19], header) if 19 in found else None,
     )
@@ -294,6 +301,14 @@ def _rigid(given: Mapping[int, Array], at: _Nodes) -> tuple[float, Array, Array]
     masses, inertia = _isotropic(given[11]), given[11][:, 3:].sum(axis=0)
     moment = np.einsum("p,pk,pl->kl", masses, at.positions, at.positions)
     return float(masses.sum()), masses @ at.positions, moment + from_inertia(np.diag(inertia))
+
+
+def _stand_in(M: Array, at: _Nodes) -> tuple[float, Array, Array]:
+    """Mass and moments as if all nodes had the same: the mass that the modes have where they move the nodes."""
+    moved = (at.phi_t**2).sum(axis=1).mean(axis=0)
+    mass = float(max((np.diag(M)[moved > 0] / moved[moved > 0]).max(initial=0.0), 1e-6 * np.trace(M)))
+    mean, rr = at.positions.mean(axis=0), np.einsum("pk,pl->kl", at.positions, at.positions) / len(at.positions)
+    return mass, mass * mean, mass * rr
 
 
 def _isotropic(lumped: Array) -> Array:
