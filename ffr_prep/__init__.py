@@ -50,6 +50,7 @@ _BY_MODULE = {
     "ffr_prep.model.material": "AnisotropicMaterial Material material orthotropic",
     "ffr_prep.model.model": "Model",
     "ffr_prep.model.reference": "FixedTo MeanAxis SimplySupported Support Supports UserConditions",
+    "ffr_prep.pipelines.file_materials": "file_materials",
     "ffr_prep.pipelines.reduce": "Request reduce",
     "ffr_prep.pipelines.structure_file": "Structure read_structure",
     "ffr_prep.pipelines.tied": "tied",
@@ -121,6 +122,7 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
         FixedTo as FixedTo, MeanAxis as MeanAxis, SimplySupported as SimplySupported, Support as Support,
         Supports as Supports, UserConditions as UserConditions,
     )
+    from ffr_prep.pipelines.file_materials import file_materials as file_materials
     from ffr_prep.pipelines.reduce import Request as Request, reduce as reduce
     from ffr_prep.pipelines.structure_file import Structure as Structure, read_structure as read_structure
     from ffr_prep.pipelines.tied import tied as tied

@@ -193,8 +193,8 @@ def bounds(mass: float, rr_dm: Array, M: Array) -> Bounds:
     if own.size and own.min() <= _TINY:
         k = int(own.argmin())
         raise InputError(
-            f"the modal mass of mode {k + 1} is {own[k]:g}; it must be positive: a mode without mass follows its loads at once, "
-            "and static elements are not computed. Give its nodes mass, or put the stiffness between bodies as a bushing"
+            f"the modal mass of mode {k + 1} is {own[k]:g}; it must be positive: a mode without mass follows its loads "
+            "at once, and static elements are not computed. Give its nodes mass, or make the stiffness a bushing"
         )
     weight = np.sqrt(own)
     spread = max(float(np.trace(rr_dm)), 1e-300)

@@ -89,7 +89,7 @@ TITLES = {
 def write_fem(body: FlexibleBody, path: str | Path, *, kind: Kind = "full", surface: bool = False) -> Path:
     """Write the body as FEM data of MBDyn's modal joint, SI units, 17 significant digits.
 
-    kind    : "full", the default, writes the inertia integrals (records 12, 14 to 18) and the geometric stiffness (19), which a recent
+    kind    : "full" writes the inertia integrals (records 12, 14 to 18) and the geometric stiffness (19), which a recent
               MBDyn reads, and loses nothing of them; "legacy" leaves the stiffness out and writes masses lumped at the
               nodes (records 11, 12), which come as close to the integrals as masses at these nodes can
     surface : also write the points of the surface as nodes, after the interfaces. The format has no triangles, no
@@ -241,8 +241,8 @@ def _content(lines: list[str], path: Path) -> Content:
     if mass == 0 and header.n and given[9].diagonal().min() > 0:
         mass, r_dm, rr_dm = _stand_in(given[9], at)
         warnings = [
-            f"the file has no mass: {mass:.4g} kg at the middle of its nodes stand for it; where the frame is held fixed they "
-            "change nothing but the weight in reactions, elsewhere give the file its mass (record 12)"
+            f"the file has no mass: {mass:.4g} kg at the middle of its nodes stand for it; where the frame is held "
+            "fixed they change nothing but the weight in reactions, elsewhere give the file its mass (record 12)"
         ]
     limit = bounds(mass, rr_dm, given[9])
     lumped = _sums(given[11], at) if 11 in given else None
