@@ -40,9 +40,11 @@ def joint_damper() -> Exhibit:
     dampers = np.geomspace(4.0, 100.0, 6)
     found = [servoed(each) for each in dampers]
     limits = np.array([RK4_LIMIT / fastest(each) for each in found])
-    borne = np.array(
-        [boundary(lambda h, s=each: bears(h, RK4, s), 0.3 * h, 3 * h, 8) for each, h in zip(found, limits, strict=True)]
-    )
+
+    def limit(damped: Scene, predicted: float) -> float:
+        return boundary(lambda step: bears(step, RK4, damped), 0.3 * predicted, 3 * predicted, 8)
+
+    borne = np.array([limit(each, step) for each, step in zip(found, limits, strict=True)])
     return Exhibit(
         "Dampers and servos at flexible joints",
         "an explicit force of a damper is unstable beyond 2.785 / (d sum of phi_r^2): a useful servo wants microseconds",
@@ -50,14 +52,22 @@ def joint_damper() -> Exhibit:
         (Claim("largest stable step of RK4", predicted, measured, 1.05, "s"),),
         (
             Proof("RK4, 10 % beyond the limit, runs (1) or not (0)", 1.0 - bears(1.1 * predicted), 0.5, True),
-            Proof("ROS2, a hundred times that step, stops (1) or not (0)", 1.0 - bears(100 * predicted, ROS2), 0.5, False),
+            Proof(
+                "ROS2, a hundred times that step, stops (1) or not (0)", 1.0 - bears(100 * predicted, ROS2), 0.5, False
+            ),
         ),
         (
             Panel(
-                "largest step of RK4, two beams, six modes each", "damping of the servo [N m s/rad]", "step [s]",
-                (Curve("2.785 / fastest decay", dampers, limits), Curve("measured", dampers, borne, points=True),
-                 Curve("ROS2 ran here", dampers[-3:], 100 * limits[-3:], points=True)),
-                (Mark("a useful servo", DAMPING),), log=(True, True),
+                "largest step of RK4, two beams, six modes each",
+                "damping of the servo [N m s/rad]",
+                "step [s]",
+                (
+                    Curve("2.785 / fastest decay", dampers, limits),
+                    Curve("measured", dampers, borne, points=True),
+                    Curve("ROS2 ran here", dampers[-3:], 100 * limits[-3:], points=True),
+                ),
+                (Mark("a useful servo", DAMPING),),
+                log=(True, True),
             ),
         ),
-    )  # fmt: skip
+    )

@@ -47,18 +47,24 @@ def joint_friction() -> Exhibit:
     }
     return Exhibit(
         "Friction with too long a step",
-        "friction near rest is a damper of torque / creep velocity: explicit steps beyond 2.785 I / that keep the wheel turning",
+        "smoothed friction at rest is a damper d = torque / creep: explicit steps beyond 2.785 I / d keep the wheel turning",
         "ROS2, ROS3 take friction implicitly: the wheel stands; a run with an explicit method says which step it bears",
         (Claim("largest step with which RK4 brings the wheel to rest", predicted, measured, 1.05, "s"),),
         (
             Proof("rate that is left with RK4, twice the limit", left(RK4(2 * predicted)), CREEP / 10, True, "rad/s"),
-            Proof("rate that is left with ROS2, eight times the limit", left(ROS2(8 * predicted)), AT_REST, False, "rad/s"),
+            Proof(
+                "rate that is left with ROS2, eight times the limit", left(ROS2(8 * predicted)), AT_REST, False, "rad/s"
+            ),
         ),
         (
             Panel(
-                "a wheel that friction stops", "time [s]", "rate [rad/s]",
+                "a wheel that friction stops",
+                "time [s]",
+                "rate [rad/s]",
                 tuple(Curve(label, times, np.abs(rates) + 1e-12) for label, (times, rates) in curves.items()),
-                (Mark("should stand from here", SPEED * INERTIA / TORQUE),), log=(False, True), bounds=(1e-8, 10.0),
+                (Mark("should stand from here", SPEED * INERTIA / TORQUE),),
+                log=(False, True),
+                bounds=(1e-8, 10.0),
             ),
         ),
-    )  # fmt: skip
+    )

@@ -83,6 +83,7 @@ def number_of(what: str, text: str) -> float:
 
 def own_or_given(path: Path, mesh: Mesh, unit: str | None, given: Solid | Mapping[str, Solid] | None) -> Any:
     """The material that was given, or else those of the mesh file; which are used is said where the file has any."""
+    from ffr_prep.model.material import Material
     from ffr_prep.pipelines.file_materials import file_materials, names_of_materials
 
     if given is not None:
@@ -91,7 +92,7 @@ def own_or_given(path: Path, mesh: Mesh, unit: str | None, given: Solid | Mappin
         return given
     found = file_materials(path, mesh, unit=unit)
     for group, one in found.items():
-        constants = f", E = {one.E:.6g} Pa, nu = {one.nu:g}" if hasattr(one, "E") else ""
+        constants = f", E = {one.E:.6g} Pa, nu = {one.nu:g}" if isinstance(one, Material) else ""
         click.echo(f"material    {group}: {one.name} of {path.name}{constants}, rho = {one.rho:.6g} kg/m^3")
     return found
 

@@ -259,13 +259,13 @@ RUNS = [
     ),
     Case(
         lambda: run(replace(CLOUD, springs=(FAR,)), RK4(1e-3)),
-        p(run, replace(CLOUD, springs=(FAR,)), RK4(1e-8), 1e-6, 1e-7),
+        p(run, replace(CLOUD, springs=(FAR,)), RK4(1e-8), 1e-7, 1e-8),
     ),
     Case(lambda: run(rubbing(1e4), ROS2(1e-2), 5.0, 5.0), p(run, rubbing(1e4), ROS2(5e-5), 0.01, 0.01)),
     Case(lambda: assembly(heavy(0.0)), p(assembly, heavy(0.1))),
     Case(lambda: run(shrinking(-0.2)), p(run, shrinking(0.0))),
     Case(lambda: assembly(flat("none")), p(assembly, flat("z"))),
-    Case(lambda: run(replace(CLOUD, springs=(FAR,))), p(run, replace(CLOUD, springs=(FAR,)), ROS2(1e-8), 1e-6, 1e-7)),
+    Case(lambda: run(replace(CLOUD, springs=(FAR,))), p(run, replace(CLOUD, springs=(FAR,)), ROS2(1e-8), 1e-7, 1e-8)),
     Case(locking(0.1, 0.5), locking(0.1, 0.1)),
     Case(p(pole, 0.6), p(pole, 0.3)),
     Case(
