@@ -29,8 +29,8 @@ from ffr_prep.common.front_door import front_door
 
 # No name here is that of a room, whose import would put the room in its place.
 _BY_MODULE = {
-    "ffr_prep.body": "BeamForces BodyError FlexibleBody FrameMarker Interface MeanAxisForm Surface load_body mean_axis_form "
-    "rigid_body save_body truncated with_point",
+    "ffr_prep.body": "BeamForces BodyError FlexibleBody FrameMarker Interface MeanAxisForm Surface damped load_body "
+    "mean_axis_form rigid_body save_body truncated with_point",
     "ffr_prep.common.errors": "ComputationError InputError",
     "ffr_prep.common.registry": "Setting",
     "ffr_prep.interchange.formats": "register_exchange_format ExchangeFormat",
@@ -88,7 +88,8 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     __version__: str
     from ffr_prep.body import (
         BeamForces as BeamForces, BodyError as BodyError, FlexibleBody as FlexibleBody, FrameMarker as FrameMarker,
-        Interface as Interface, MeanAxisForm as MeanAxisForm, Surface as Surface, load_body as load_body,
+        Interface as Interface, MeanAxisForm as MeanAxisForm, Surface as Surface, damped as damped,
+        load_body as load_body,
         mean_axis_form as mean_axis_form, rigid_body as rigid_body, save_body as save_body, truncated as truncated,
         with_point as with_point,
     )

@@ -91,6 +91,7 @@ def body_from(content: Content) -> FlexibleBody:
             ),
             stiffening=None if content.stiffening is None else V.T @ content.stiffening @ V,
             provenance=facts,
+            damping=None if content.D is None or not content.D.any() else V.T @ content.D @ V,
         )
     except BodyError as error:
         raise InputError(str(error)) from None
@@ -125,6 +126,20 @@ def normal_coordinates(M: Array, K: Array) -> tuple[Array, Array, list[str]]:
     values, V = scipy.linalg.eigh(K, M)
     V = V * np.where(V[np.abs(V).argmax(axis=0), np.arange(n)] < 0, -1.0, 1.0)
     return V, _not_negative(values), ["the modes of the file were combined: K v = omega^2 M v with its mass, stiffness"]
+
+
+def usable(D: Array, what: str, notes: list[str]) -> Array | None:
+    """The damping matrix of a file, symmetric; None, with a note, where it would feed vibration."""
+    if not D.any():
+        return None
+    symmetric = 0.5 * (D + D.T)
+    largest = np.abs(D).max()
+    if np.abs(D - symmetric).max() > IDENTITY_TOLERANCE * largest:
+        notes.append(f"the damping {what} is not symmetric; its symmetric part was taken")
+    if np.linalg.eigvalsh(symmetric)[0] < -IDENTITY_TOLERANCE * largest:
+        notes.append(f"dropped: the damping {what} has a negative eigenvalue, which would feed vibration")
+        return None
+    return symmetric
 
 
 def _symmetric(what: str, matrix: Array) -> Array:

@@ -42,6 +42,7 @@ from ffr_prep.interchange.common_format import (
     nodes,
     read_body,
     relative,
+    usable,
     write_lines,
 )
 from ffr_prep.interchange.mbdyn_records import (
@@ -74,6 +75,7 @@ TITLES = {
     10: "MODAL STIFFNESS MATRIX",
     11: "DIAGONAL OF LUMPED MASS MATRIX",
     12: "GLOBAL INERTIA",
+    13: "MODAL DAMPING MATRIX",
     14: "INVARIANT 3",
     15: "INVARIANT 4",
     16: "INVARIANT 8",
@@ -122,6 +124,7 @@ def _finite_elements(body: FlexibleBody, at: tuple[Interface, ...]) -> dict[int,
         8: motions.transpose(2, 0, 1),
         9: np.eye(body.n),
         10: np.diag(body.omega2),
+        **({} if body.damping is None else {13: body.damping}),
     }
 
 
@@ -222,7 +225,7 @@ def read_fem(path: str | Path) -> FlexibleBody:
 
     The numbers are taken to be in SI units. Integrals come from records 14, 16 and 18 where they are there, else from
     the lumped masses of record 11. Where record 9 is not the unit matrix or record 10 not diagonal, the modes are
-    combined. Damping and initial values are left out. provenance: "notes" (what was changed),
+    combined. Record 13 is the damping of the body; initial values are left out. provenance: "notes" (what was changed),
     "warnings" (what was lost or does not agree).
 
     Source: MBDyn Input File Format, modal joint. Raises InputError for a file that does not exist, is damaged,
@@ -233,11 +236,11 @@ def read_fem(path: str | Path) -> FlexibleBody:
 
 def _content(lines: list[str], path: Path) -> Content:
     header, found = records(lines)
+    warnings: list[str] = []
     given = {record: numbers(found[record], header) for record in COUNTS if record in found}
     motions = shapes(found[8], header)
     at = _Nodes(np.stack([given[k] for k in (5, 6, 7)], axis=1), motions[:, :3], motions[:, 3:])
     mass, r_dm, rr_dm = _rigid(given, at)
-    warnings: list[str] = []
     if mass == 0 and header.n and given[9].diagonal().min() > 0:
         mass, r_dm, rr_dm = _stand_in(given[9], at)
         warnings = [
@@ -249,6 +252,7 @@ def _content(lines: list[str], path: Path) -> Content:
     P_dm = given[14] if 14 in given else _needed(lumped, 14)[0]
     rP_dm, of_r = _first_moments(given, lumped, limit)
     PP_dm, of_phi = _second_moments(given, lumped, limit)
+    damping = usable(given[13], "record 13", warnings) if 13 in given else None
     title, labels = names(lines)
     return Content(
         name=unquote(title) or path.stem,
@@ -264,6 +268,7 @@ def _content(lines: list[str], path: Path) -> Content:
             Interface(unquote(labels.get(k + 1, label)), at.positions[k], at.phi_t[k], at.phi_r[k])
             for k, label in enumerate(header.labels)
         ),
+        D=damping,
         facts={
             "source": {"file": path.name, "format": "MBDyn FEM"},
             "inertia": {str(r): "record" if r in given else "lumped masses" for r in (12, 14, 16, 18)},
@@ -371,7 +376,7 @@ def _second_moments(
 
 def _lost(given: Mapping[int, Array]) -> list[str]:
     lost = []
-    for record, what in ((3, "initial modal displacements"), (4, "initial modal velocities"), (13, "modal damping")):
+    for record, what in ((3, "initial modal displacements"), (4, "initial modal velocities")):
         if record in given and given[record].any():
             lost.append(f"dropped: the {what} of record {record}")
     return lost

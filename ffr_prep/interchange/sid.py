@@ -31,7 +31,7 @@ import numpy as np
 from ffr_prep.body import FlexibleBody, Interface, axial
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-from ffr_prep.interchange.common_format import Content, bounds, nodes, read_body, real, write_lines
+from ffr_prep.interchange.common_format import Content, bounds, nodes, read_body, real, usable, write_lines
 from ffr_prep.interchange.sid_blocks import (
     Section,
     in_standard_order,
@@ -96,7 +96,7 @@ def blocks(body: FlexibleBody, layout: Layout) -> dict[str, tuple[Array, Array |
         "Oe": (centrifugal(body.rP_dm).T, (centrifugal(body.PP_dm) + K[PRODUCTS]).transpose(1, 2, 0)),
         "ksigma": (np.zeros((n, 1)), None),
         "Ke": (np.diag(body.omega2), None),
-        "De": (np.zeros((n, n)), None),
+        "De": (np.zeros((n, n)) if body.damping is None else body.damping, None),
     }
 
 
@@ -184,7 +184,7 @@ def read_sid(path: str | Path) -> FlexibleBody:
     The numbers are taken to be in SI units. The layouts of Gr and Ge are those that satisfy Gr_l + Gr_l^T =
     2 dJ/dq_l and Ge = 2 Cr.m1. Where Me is not the unit matrix or Ke not diagonal, the modes are combined. In Oe.m1
     geometric stiffness and mass stand as a sum: the part of the mass is that of masses at the nodes which fit all other
-    integrals best, and the sum stays exact. Damping is left out. provenance: "layout", "notes" (what was changed),
+    integrals best, and the sum stays exact. De is the damping of the body. provenance: "layout", "notes" (what was changed),
     "warnings" (what was lost or does not agree).
 
     Source: Wallrapp 1994. Raises InputError for a file that does not exist, is damaged, truncated or foreign, or
@@ -234,7 +234,7 @@ def _content(lines: list[str], path: Path) -> Content:
             ],
             **moments.facts(),
         },
-        D=found["De"].m0,
+        D=usable(found["De"].m0, "De", notes),
     )
     stiffening = np.concatenate([stiffness, np.zeros((6, n, n)), at.stiffening])
     return with_second_moments(content, stiffening, found, limit, moments.axes)

@@ -1,0 +1,152 @@
+"""The damping matrix of a body: what it is made of, where it goes, and what it does to the motion."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.linalg
+from boxes import STEEL, box_mesh
+from synthetic import cloud
+
+import ffr_dyn as fd
+import ffr_prep as fp
+from ffr_prep.body import FlexibleBody, load_body, save_body, truncated
+from ffr_prep.common.errors import InputError
+from ffr_prep.interchange.mbdyn import read_fem, write_fem
+from ffr_prep.interchange.sid import read_sid, write_sid
+
+
+def coupled(body: FlexibleBody, size: float = 3.0, seed: int = 0) -> FlexibleBody:
+    half = np.random.default_rng(seed).normal(size=(body.n, body.n))
+    return replace(body, damping=size * half @ half.T)
+
+
+@pytest.fixture(scope="module")
+def bar() -> FlexibleBody:
+    """A box, held at one end in its frame, of second order."""
+    mesh = box_mesh("hex8", (0.5, 0.03, 0.02), (6, 1, 1))
+    mesh = replace(mesh, points=mesh.points - [0.0, 0.015, 0.01])
+    model = fp.from_mesh(mesh, STEEL, [fp.InterfaceRegion("left"), fp.InterfaceRegion("right")])
+    return fp.reduce(model, fp.Request(name="bar", reference=fp.FixedTo("left"), reduction=fp.CraigBampton(4)))
+
+
+def held(body: FlexibleBody, **more) -> fd.Scene:
+    at = body.interfaces[0]
+    weld = fd.Joint("weld", "fixed", "ground.O", f"arm.{at.name}")
+    return fd.Scene((fd.Body("arm", body, **more),), (weld,), ground={"O": at.position}, plane="none")
+
+
+# ---- what it is ---------------------------------------------------------------------------------------------------
+
+
+def test_rayleigh_loss_factor_and_bands_are_those_of_the_modes():
+    body = cloud(3)
+    omega = np.sqrt(body.omega2)
+    f = body.frequencies
+    cases = [
+        (dict(alpha=2.0, beta=1e-3), 2.0 + 1e-3 * omega**2),
+        (dict(loss_factor=0.01), 0.01 * omega),
+        (dict(bands=[(f[0] + 1e-9, 0.01), (f[1] + 1e-9, 0.02)]), 2 * np.array([0.01, 0.02, 0.02]) * omega),
+    ]
+    for given, rates in cases:
+        np.testing.assert_allclose(fp.damped(body, **given).damping, np.diag(rates), rtol=1e-12)
+    twice = fp.damped(fp.damped(body, alpha=1.0), alpha=1.0)
+    np.testing.assert_allclose(twice.damping, fp.damped(body, alpha=2.0).damping)
+    assert fp.damped(body).damping is None
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        dict(alpha=-1.0),
+        dict(beta=np.nan),
+        dict(bands=[(2.0, 0.1), (1.0, 0.1)]),
+        dict(bands=[(1.0, -0.1)]),
+        dict(bands=["a"]),
+    ],
+)
+def test_damping_that_is_none_is_refused(given):
+    with pytest.raises(InputError, match="body 'cloud'"):
+        fp.damped(cloud(2), **given)
+    for matrix, said in (([[1.0, 0.5], [0.0, 1.0]], "not symmetric"), ([[1.0, 2.0], [2.0, 1.0]], "feed vibration")):
+        with pytest.raises(InputError, match=said):
+            replace(cloud(2), damping=matrix)
+
+
+def test_files_keep_it(tmp_path):
+    body = coupled(cloud(3))
+    D = body.damping
+    np.testing.assert_array_equal(load_body(save_body(body, tmp_path / "b.ffr")).damping, D)
+    for back in (read_sid(write_sid(body, tmp_path / "b.SID_FEM")), read_fem(write_fem(body, tmp_path / "b.fem"))):
+        np.testing.assert_allclose(back.damping, D, rtol=1e-13)
+        assert not [w for w in back.provenance["warnings"] if "damping" in w]
+    assert load_body(save_body(cloud(1), tmp_path / "c.ffr")).damping is None
+    np.testing.assert_array_equal(truncated(body, [0, 2]).damping, D[np.ix_([0, 2], [0, 2])])
+
+
+def test_the_power_that_is_lost_is_the_same_in_any_frame(bar):
+    """q_user = C q: the same deformation rates lose the same power."""
+    body = coupled(bar)
+    form = fp.mean_axis_form(body)
+    rates = np.random.default_rng(1).normal(size=(body.n, 5))
+    lost = np.einsum("it,ij,jt->t", form.C @ rates, body.damping, form.C @ rates)
+    np.testing.assert_allclose(np.einsum("it,ij,jt->t", rates, form.body.damping, rates), lost, rtol=1e-10)
+
+
+# ---- what it does -------------------------------------------------------------------------------------------------
+
+
+def test_eigenvalues_are_those_of_the_damped_body(bar):
+    """Held where its frame is, the body has the eigenvalues of its own modes and its damping matrix."""
+    body = coupled(bar, 30.0)
+    n = body.n
+    found = fd.linearise(held(body)).eigenvalues
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(body.omega2), -body.damping]])
+    expected = scipy.linalg.eigvals(A)
+    for value in expected:
+        assert np.abs(found - value).min() < 1e-7 * abs(value)
+
+
+@pytest.mark.parametrize(
+    ("method", "within"),
+    [(fd.RK4(1e-4), 1e-6), (fd.ROS2(1e-5), 1e-4), (fd.ROS3(1e-4), 1e-4), (fd.GeneralisedAlpha(2e-5), 1e-3)],
+)
+def test_the_decay_is_that_of_the_matrix(method, within):
+    body = coupled(cloud(3, stiffness=400.0), 3.0)
+    q = np.array([1e-3, -2e-3, 1e-3])
+    scene = held(replace(body, interfaces=(fixed_point(body),)), q=q)
+    run = fd.forward(scene, end=0.05, output_step=0.005, method=method, outputs=("*.q",))
+    A = np.block([[np.zeros((3, 3)), np.eye(3)], [-np.diag(body.omega2), -body.damping]])
+    expected = np.array([scipy.linalg.expm(t * A) @ np.r_[q, 0, 0, 0] for t in run.time])[:, :3]
+    np.testing.assert_allclose(run["arm.q"], expected, atol=within * np.abs(q).max())
+
+
+def fixed_point(body: FlexibleBody) -> fp.Interface:
+    """A point of the frame that no mode moves."""
+    return fp.Interface("frame", np.zeros(3), np.zeros((3, body.n)), np.zeros((3, body.n)))
+
+
+@pytest.mark.parametrize("method", [fd.ROS2(1e-3), fd.ROS3(1e-3)])
+def test_heavy_damping_is_implicit(method):
+    """Coordinates that creep, at steps of twenty of their time constants."""
+    body = coupled(cloud(3, stiffness=100.0), 2e4)
+    scene = held(replace(body, interfaces=(fixed_point(body),)), q=np.array([1e-3, 0.0, 0.0]))
+    run = fd.forward(scene, end=0.2, output_step=0.05, method=method, outputs=("*.q",))
+    assert np.abs(run["arm.q"]).max() < 2e-3
+
+
+def test_the_energy_balance_is_whole(bar):
+    body = coupled(bar, 20.0)
+    scene = replace(held(body), gravity=(0.0, 0.0, -9.81))
+    run = fd.forward(scene, end=0.05, output_step=5e-5, method=fd.ROS2(5e-6), outputs=("energy.*", "arm.damping.power"))
+    total = run["energy.kinetic"] + run["energy.strain"] + run["energy.gravity"]
+    power = run["arm.damping.power"]
+    lost = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(run.time) * (power[1:] + power[:-1]))])
+    assert lost[-1] < 0
+    np.testing.assert_allclose(total - total[0], lost, atol=2e-3 * np.abs(lost).max())
+
+
+def test_coordinates_of_the_plane_that_damping_couples_with_others_stay_in_space(bar):
+    diagonal = replace(bar, damping=np.diag(np.linspace(1.0, 2.0, bar.n)))
+    assert fd.assemble(replace(held(diagonal), plane="auto")).system.scene.plane != "none"
+    assert fd.assemble(replace(held(coupled(bar)), plane="auto")).system.scene.plane == "none"
