@@ -230,9 +230,7 @@ def group_nodes(model: MatrixModel, name: str) -> Array:
 
 def _real(name: str, A: sp.csr_array) -> sp.csr_array:
     if np.iscomplexobj(A.data):
-        raise InputError(
-            f"{name} is complex; give its real part; viscous damping is a matrix C of its own (docs/matrices.md)"
-        )
+        raise InputError(f"{name} is complex; give its real part: viscous damping is a matrix of its own, C")
     return sp.csr_array(A, dtype=float)
 
 

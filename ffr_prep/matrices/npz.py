@@ -3,8 +3,9 @@
 labels      (N,)   numbers of the nodes; optional, 1 ... N without it
 points      (N, 3) their coordinates
 dofs        (D, 2) number of the node and component 1 ... 6 of each row
-K, M, C     (D, D) stiffness, mass and, optionally, viscous damping: dense; or sparse as scipy.sparse.save_npz stores it, under K/data, K/indices, K/indptr, K/shape,
+K, M        (D, D) dense; or sparse as scipy.sparse.save_npz stores it, under K/data, K/indices, K/indptr, K/shape,
             K/format ("csr" or "csc"), or K/data, K/row, K/col, K/shape for "coo"; the same for M
+C           (D, D) viscous damping, likewise; optional
 group/NAME  (m,)   numbers of the nodes of a group; optional
 triangles   (T, 3) numbers of nodes, a surface to draw; optional
 units       text   such as "mm-t-s"; optional

@@ -229,5 +229,5 @@ def test_scene_files_add_damping(tmp_path):
         scene, _ = fd.load_scene(tmp_path / "s.toml")
         np.testing.assert_allclose(scene.bodies[0].model.damping, fp.damped(body, **given).damping)
     (tmp_path / "s.toml").write_text(text + "rayleigh = [-1, 0]\n")
-    with pytest.raises(InputError, match="alpha is -1.0; damping is a number from zero"):
+    with pytest.raises(InputError, match=r"alpha is -1\.0; damping is a number from zero"):
         fd.load_scene(tmp_path / "s.toml")
