@@ -5,7 +5,7 @@ the twin (`ffr_dyn.integrators.ros2.Twin`), which keeps its amplitude: with R of
 
     s = max |R(h) - R(r h)| / (r^p - 1),    v = max |R(h) - T(h)|,    error = max(s, v),
 
-over all rows and components of an output. For ROS3, whose twin is of lower order, v = 1.6 sqrt(v1 v2):
+over all rows and components of an output. For ROS3, whose twin is of lower order, v = 2.2 sqrt(v1 v2):
 
     v1 = min(max |R(h) - T(h/2)|, max |R(h) - (4 T(h/2) - T(h))/3|)    too large where vibration is resolved, by its phase
     v2 = largest difference of the amplitudes of R(h) and T(h/2)       too small where it is resolved in part
@@ -27,7 +27,7 @@ from ffr_prep.common.arrays import Array
 VIBRATION = 4.5  # v over s beyond which a difference is vibration that the step does not resolve
 LITTLE = 1e-3  # of the largest range of its kind: an output that moves by less counts as if it moved by this
 ARM = 1e-6  # of the largest range of forces times that of positions, the same for moments
-MIDDLE, WINDOW = 1.6 * 1.5**0.5, 16  # of amplitudes of methods of order three
+MIDDLE, WINDOW = 2.2 * 1.5**0.5, 16  # of amplitudes of methods of order three
 NOISE = (70 / 36) ** 0.5  # by which rows without relation are farther off the curve than they are large
 RATES = {"position": "velocity", "R": "v", "q": "q_dot"}
 COARSE = 0.01  # of the range, by which a row may be off the curve through its neighbours
