@@ -66,13 +66,6 @@ def from_matrices(
     def doubts(basis: Array) -> list[str]:
         return [] if m is not None else _doubts(nodal_integrals(model.points, model.dofs, model.M, ties @ basis)[1])
 
-    def damping(basis: Array) -> Array | None:
-        if model.C is None:
-            return None
-        Phi = ties @ basis
-        D = Phi.T @ (model.C @ Phi)
-        return np.asarray(0.5 * (D + D.T))
-
     return Model(
         coupled=coupled,
         inertia=inertia,
@@ -99,7 +92,7 @@ def from_matrices(
         },
         packages=("ffr", "numpy", "scipy"),
         doubts=doubts,
-        damping=damping,
+        damping=lambda basis: _damping(model, ties @ basis),
         massless=mass_is_singular(model),
         unstressed=True,
         diagnose=lambda: check_mechanisms(model, coupled, ties),
@@ -112,6 +105,13 @@ def surface_of_nodes(model: MatrixModel, Phi: Array) -> Surface | None:
         return None
     used, triangles = np.unique(model.triangles, return_inverse=True)
     return Surface(model.points[used], triangles.reshape(-1, 3), model.dofs.on_nodes(Phi)[used, :3])
+
+
+def _damping(model: MatrixModel, Phi: Array) -> Array | None:
+    if model.C is None:
+        return None
+    D = Phi.T @ (model.C @ Phi)
+    return np.asarray(0.5 * (D + D.T))
 
 
 def _damping_notes(model: MatrixModel) -> list[str]:
