@@ -90,6 +90,10 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
             f"{name}: {doubt}" for (name, m), x in zip(parts.items(), own, strict=True) for doubt in m.doubts(x @ basis)
         ]
 
+    def damping(basis: Array) -> Array | None:
+        found = [D for m, x in zip(models, own, strict=True) if (D := m.damping(x @ basis)) is not None]
+        return np.sum(found, axis=0) if found else None
+
     return Model(
         coupled=coupled,
         inertia=inertia,
@@ -104,6 +108,7 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
             "warnings": [f"{name}: {w}" for name, part in parts.items() for w in part.record.get("warnings", [])],
         },
         doubts=doubts,
+        damping=damping,
         unstressed=any(m.unstressed for m in models),
     )
 

@@ -231,3 +231,31 @@ def test_scene_files_add_damping(tmp_path):
     (tmp_path / "s.toml").write_text(text + "rayleigh = [-1, 0]\n")
     with pytest.raises(InputError, match=r"alpha is -1\.0; damping is a number from zero"):
         fd.load_scene(tmp_path / "s.toml")
+
+
+def test_parts_that_are_tied_keep_their_damping(full):
+    """A body of one part, tied to a bar of no damping: the damping of the part, in the shapes of the whole."""
+    model, _ = full
+    far = np.flatnonzero(np.isclose(model.points[:, 0], 0.5))
+    damped = replace(model, C=2e-6 * model.K, groups={**model.groups, "far": far})
+    region = [fp.InterfaceRegion("left"), fp.InterfaceRegion("far")]
+    mesh = box_mesh("hex8", (0.2, 0.03, 0.02), (2, 1, 1))
+    other = fp.from_mesh(replace(mesh, points=[*mesh.points, 0.5, 0.0, 0.0]), STEEL, [fp.InterfaceRegion("left")])
+    whole = fp.tied({"a": fp.from_matrices(damped, region), "b": other}, [("a.far", "b.left")])
+    body = fp.reduce(whole, fp.Request(name="arm", reference=fp.FixedTo("left"), reduction=fp.Eigenmodes(4)))
+    assert np.linalg.eigvalsh(2e-6 * np.diag(body.omega2) - body.damping).min() > 0  # the other part loses nothing
+    assert (np.diag(body.damping) > 0).all()
+
+
+def test_a_body_with_damping_is_held_against_its_joints(bar):
+    """The body that the check of reference conditions makes has other coordinates."""
+    ends = [fd.Joint(name, "revolute", f"ground.{name}", f"arm.{name}") for name in ("left", "right")]
+    ground = {i.name: i.position for i in bar.interfaces}
+    few = fp.reduce(
+        fp.from_mesh(box_mesh("hex8", (0.5, 0.03, 0.02), (6, 1, 1)), STEEL, [fp.InterfaceRegion(n) for n in ground]),
+        fp.Request(name="arm", reference=fp.FixedTo("left"), reduction=fp.Eigenmodes(2)),
+    )
+    ground = {i.name: i.position for i in few.interfaces}
+    scene = fd.Scene((fd.Body("arm", fp.damped(few, alpha=1.0)),), tuple(ends), ground=ground)
+    plain = fd.Scene((fd.Body("arm", few),), tuple(ends), ground=ground)
+    assert fd.assemble(scene).notes == fd.assemble(plain).notes
