@@ -338,6 +338,7 @@ TIE = Joint("tie", "distance", "ground.O", "bar.a", length=0.5)
 JOINT = p(Joint, "j", "revolute", "ground.O", "bar.a")
 HALF = {"end": 1.0, "output_step": 0.1}
 INPUT = [
+    Case(lambda: table((0.0, 1e-300, 1.0), (0.0, 1e10, 1.0)), p(table, (0.0, 1e-3, 1.0), (0.0, 1.0, 1.0))),
     Case(p(run, HINGED, "rk4"), p(run, HINGED, RK4(1e-3))),
     Case(p(run, HINGED, output_step=0.0), p(run, HINGED)),
     Case(p(run, HINGED, end=-1.0), p(run, HINGED)),
