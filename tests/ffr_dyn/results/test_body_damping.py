@@ -240,7 +240,9 @@ def test_parts_that_are_tied_keep_their_damping(full):
     damped = replace(model, C=2e-6 * model.K, groups={**model.groups, "far": far})
     region = [fp.InterfaceRegion("left"), fp.InterfaceRegion("far")]
     mesh = box_mesh("hex8", (0.2, 0.03, 0.02), (2, 1, 1))
-    other = fp.from_mesh(replace(mesh, points=mesh.points + np.array([0.5, 0.0, 0.0])), STEEL, [fp.InterfaceRegion("left")])
+    other = fp.from_mesh(
+        replace(mesh, points=mesh.points + np.array([0.5, 0.0, 0.0])), STEEL, [fp.InterfaceRegion("left")]
+    )
     whole = fp.tied({"a": fp.from_matrices(damped, region), "b": other}, [("a.far", "b.left")])
     body = fp.reduce(whole, fp.Request(name="arm", reference=fp.FixedTo("left"), reduction=fp.Eigenmodes(4)))
     assert np.linalg.eigvalsh(2e-6 * np.diag(body.omega2) - body.damping).min() > 0  # the other part loses nothing
