@@ -29,8 +29,8 @@ from ffr_prep.common.front_door import front_door
 
 # No name here is that of a room, whose import would put the room in its place.
 _BY_MODULE = {
-    "ffr_prep.body": "BeamForces BodyError FlexibleBody FrameMarker Interface MeanAxisForm Surface damped immovable load_body "
-    "mean_axis_form rigid_body save_body truncated with_point",
+    "ffr_prep.body": "BeamForces BodyError FlexibleBody FrameMarker Interface MeanAxisForm Surface damped immovable "
+    "load_body mean_axis_form rigid_body save_body truncated with_point",
     "ffr_prep.common.errors": "ComputationError InputError",
     "ffr_prep.common.registry": "Setting",
     "ffr_prep.interchange.formats": "register_exchange_format ExchangeFormat",

@@ -90,10 +90,6 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
             f"{name}: {doubt}" for (name, m), x in zip(parts.items(), own, strict=True) for doubt in m.doubts(x @ basis)
         ]
 
-    def damping(basis: Array) -> Array | None:
-        found = [D for m, x in zip(models, own, strict=True) if (D := m.damping(x @ basis)) is not None]
-        return np.sum(found, axis=0) if found else None
-
     return Model(
         coupled=coupled,
         inertia=inertia,
@@ -108,9 +104,14 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
             "warnings": [f"{name}: {w}" for name, part in parts.items() for w in part.record.get("warnings", [])],
         },
         doubts=doubts,
-        damping=damping,
+        damping=lambda basis: _damping(models, [x @ basis for x in own]),
         unstressed=any(m.unstressed for m in models),
     )
+
+
+def _damping(models: Sequence[Model], bases: Sequence[Array]) -> Array | None:
+    found = [D for m, basis in zip(models, bases, strict=True) if (D := m.damping(basis)) is not None]
+    return np.sum(found, axis=0) if found else None
 
 
 # ---- loads that pass through ties ---------------------------------------------------------------------------------
