@@ -62,9 +62,6 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
     rows = np.split(np.arange(X.shape[0]), np.cumsum([m.coupled.K.shape[0] for m in models])[:-1])
     own = [X[of] for of in rows]
 
-    def surfaces(basis: Array) -> Surface | None:
-        return merged([m.surface(x @ basis) for m, x in zip(models, own, strict=True)])
-
     def stressed(basis: Array) -> Surface | None:
         return merged([m.stressed(x @ basis) for m, x in zip(models, own, strict=True)])
 
@@ -93,7 +90,7 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
     return Model(
         coupled=coupled,
         inertia=inertia,
-        surface=surfaces,
+        surface=lambda basis: merged([m.surface(x @ basis) for m, x in zip(models, own, strict=True)]),
         stressed=stressed,
         stiffening=stiffening,
         second=second,
