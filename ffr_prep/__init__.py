@@ -32,8 +32,8 @@ from ffr_prep.common.front_door import front_door
 
 # No name here is that of a room, whose import would put the room in its place.
 _BY_MODULE = {
-    "ffr_prep.body": "BeamForces BodyError FlexibleBody FrameMarker Interface MeanAxisForm Surface load_body mean_axis_form "
-    "rigid_body save_body truncated with_point",
+    "ffr_prep.body": "BeamForces BodyError FlexibleBody FrameMarker Interface MeanAxisForm Surface damped immovable "
+    "load_body mean_axis_form rigid_body save_body truncated with_point",
     "ffr_prep.common.errors": "ComputationError InputError",
     "ffr_prep.common.registry": "Setting",
     "ffr_prep.interchange.formats": "register_exchange_format ExchangeFormat",
@@ -56,6 +56,7 @@ _BY_MODULE = {
     "ffr_prep.model.material": "AnisotropicMaterial Material material orthotropic",
     "ffr_prep.model.model": "Model",
     "ffr_prep.model.reference": "FixedTo MeanAxis SimplySupported Support Supports UserConditions",
+    "ffr_prep.pipelines.file_materials": "file_materials",
     "ffr_prep.pipelines.reduce": "Request reduce",
     "ffr_prep.pipelines.rigid": "rigid_part",
     "ffr_prep.pipelines.structure_file": "Structure read_structure",
@@ -96,7 +97,8 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     __version__: str
     from ffr_prep.body import (
         BeamForces as BeamForces, BodyError as BodyError, FlexibleBody as FlexibleBody, FrameMarker as FrameMarker,
-        Interface as Interface, MeanAxisForm as MeanAxisForm, Surface as Surface, load_body as load_body,
+        Interface as Interface, MeanAxisForm as MeanAxisForm, Surface as Surface, damped as damped, immovable as immovable,
+        load_body as load_body,
         mean_axis_form as mean_axis_form, rigid_body as rigid_body, save_body as save_body, truncated as truncated,
         with_point as with_point,
     )
@@ -133,6 +135,7 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
         FixedTo as FixedTo, MeanAxis as MeanAxis, SimplySupported as SimplySupported, Support as Support,
         Supports as Supports, UserConditions as UserConditions,
     )
+    from ffr_prep.pipelines.file_materials import file_materials as file_materials
     from ffr_prep.pipelines.reduce import Request as Request, reduce as reduce
     from ffr_prep.pipelines.rigid import rigid_part as rigid_part
     from ffr_prep.pipelines.structure_file import Structure as Structure, read_structure as read_structure

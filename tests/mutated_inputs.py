@@ -148,6 +148,34 @@ function = "0.1 * sin(2 * t)"
 marker = "two.b"
 force = [{table = [[0, 1, 2], [0, 1, 0]]}, "3 N", 0]
 """
+BULK = """SOL 101
+BEGIN BULK
+CORD2C,2,0,0.,0.,0.,0.,0.,1.,,
+,1.,0.,0.
+GRID*                  1               2             0.0             0.0*A
+*A                   0.0
+GRID,2,2,1.,0.,0.
+GRID           3       2     1.0    90.0     0.0
+GRID,4,,0.,0.,1.+0
+CTETRA         1       1       1       2       3       4
+SET1,3,1,THRU,4
+PSOLID,1,1
+MAT1,1,2.1+11,,.3,7850.
+ENDDATA
+"""
+FRD = """    1C
+    2C                             4                                     1
+ -1         1 0.00000E+00 0.00000E+00 0.00000E+00
+ -1         2 1.00000E+00 0.00000E+00 0.00000E+00
+ -1         3 0.00000E+00 1.00000E+00 0.00000E+00
+ -1         4 0.00000E+00 0.00000E+00 1.00000E+00
+ -3
+    3C                             1                                     1
+ -1         1    3    0    1
+ -2         1         2         3         4
+ -3
+ 9999
+"""
 STRUCTURE = """
 reference = {kind = "fixed", interface = "foot"}
 reduction = {method = "craig-bampton", modes = 2}
@@ -252,6 +280,8 @@ def _write_meshes(folder: Path, mesh, meshio) -> None:
     plain.write(folder / "mesh.vtu")
     corners.write(folder / "mesh.bdf")
     corners.write(folder / "mesh.vtk")
+    (folder / "fields.bdf").write_text(BULK)
+    (folder / "mesh.frd").write_text(FRD)
     plain.write(folder / "mesh.msh", file_format="gmsh", binary=False)
     corners.write(folder / "binary.msh", file_format="gmsh", binary=True)
     nodes = [f"{k}, {', '.join(map(str, at))}" for k, at in enumerate(mesh.points, 1)]
@@ -263,6 +293,12 @@ def _write_meshes(folder: Path, mesh, meshio) -> None:
         "1, 2, 3",
         "*SURFACE, NAME=SIDE",
         "PART, S1",
+        "*MATERIAL, NAME=STEEL",
+        "*ELASTIC",
+        "2.1e11, 0.3",
+        "*DENSITY",
+        "7850.,",
+        "*SOLID SECTION, ELSET=ALL, MATERIAL=STEEL",
         "",
     ]
     text = "\n".join(["*HEADING", "box", "*NODE", *nodes, "*ELEMENT, TYPE=C3D10, ELSET=ALL", *cells, *sets])
@@ -283,11 +319,18 @@ def formats() -> dict[str, tuple[tuple[str, ...], Callable[[Path], object]]]:
     from ffr_prep.matrices.readers import read_matrices
     from ffr_prep.mesh.mesh import check_mesh, read_mesh
     from ffr_prep.model.material import parse_material
+    from ffr_prep.pipelines.file_materials import file_materials, names_of_materials
     from ffr_prep.pipelines.structure_file import read_structure
     from ffr_prep.reduction.methods.user_vectors import read_user_vectors
 
     def beside(path: Path, *names: str) -> list[Path]:
         return [path.parent / name for name in names]
+
+    def with_materials(path: Path) -> None:
+        mesh = read_mesh(path)
+        check_mesh(mesh)
+        if names_of_materials(path):
+            file_materials(path, mesh)
 
     return {
         "body": (("body.ffr",), load_body),
@@ -305,8 +348,10 @@ def formats() -> dict[str, tuple[tuple[str, ...], Callable[[Path], object]]]:
         "rows": (("rows.csv",), lambda path: read_matrices([*beside(path, "K.mtx", "M.mtx"), path])),
         "Abaqus matrix": (("abaqus_K.mtx",), lambda path: read_matrices([path, *beside(path, "abaqus_M.mtx", "deck.inp")])),
         "Abaqus deck": (("deck.inp",), lambda path: read_matrices([*beside(path, "abaqus_K.mtx", "abaqus_M.mtx"), path])),
-        "Abaqus mesh": (("mesh.inp",), lambda path: check_mesh(read_mesh(path))),
-        "meshio": (("mesh.vtu", "mesh.bdf", "mesh.vtk"), lambda path: check_mesh(read_mesh(path))),
+        "Abaqus mesh": (("mesh.inp",), with_materials),
+        "Nastran": (("mesh.bdf", "fields.bdf"), with_materials),
+        "CalculiX": (("mesh.frd",), lambda path: check_mesh(read_mesh(path))),
+        "meshio": (("mesh.vtu", "mesh.vtk"), lambda path: check_mesh(read_mesh(path))),
         "gmsh": (("mesh.msh", "binary.msh"), lambda path: check_mesh(read_mesh(path))),
     }  # fmt: skip
 

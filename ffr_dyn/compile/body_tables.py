@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.compile.symmetry_blocks import in_blocks
-from ffr_dyn.equations.inertia import Integrals, kept_integrals
+from ffr_dyn.equations.inertia import Integrals, damping_matrix, kept_integrals
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.equations.second_order import second_moments
 from ffr_dyn.kernels.tables import (
+    IN_DAMPING,
     IN_PP_DM,
     IN_Q,
     IN_SHARED,
@@ -105,11 +106,14 @@ def body_tables(scene: Scene, place: Layout) -> Bodies:
     owners = [_owner(body) for body in scene.bodies]
     PP = _second_moments(scene, place, kept)
     omega2, column = once([i.omega2 for i in kept], owners)
-    damping, _ = once([2 * b.damping * np.sqrt(b.model.omega2) for b in scene.bodies], owners)
+    bounds, beside = zip(*(_damping(body) for body in scene.bodies), strict=True)
+    damping, _ = once(bounds, owners)
+    coupled, first = once(beside, owners)
     P, _ = once([i.P_dm for i in kept], owners)
     rP, _ = once([_nine(i.rP_dm) for i in kept], owners)
-    where = np.zeros((len(n) + 1, 8), dtype=np.int64)
-    where[-1, NORMAL] = -1
+    where = np.zeros((len(n) + 1, 9), dtype=np.int64)
+    where[:, IN_DAMPING] = where[-1, NORMAL] = -1
+    where[:-1, IN_DAMPING] = [start if part.size else -1 for start, part in zip(first, beside, strict=True)]
     where[:-1, [N, IN_X, IN_V, IN_Q]] = np.column_stack([n, place.ix, place.iv, starts(n)[:-1]])
     where[:-1, [IN_PP_DM, PP_PLAN]] = np.column_stack([PP.start, PP.first])
     where[:-1, [NORMAL, IN_SHARED]] = np.column_stack([place.normals, column])
@@ -123,8 +127,21 @@ def body_tables(scene: Scene, place: Layout) -> Bodies:
         PP_dm=PP.pool,
         omega2=omega2,
         two_zeta_omega=damping,
+        coupled_damping=coupled,
         blocks=PP.plans,
     )
+
+
+def _damping(body: Body) -> tuple[Array, Array]:
+    """(n,) a diagonal that is no less than the damping matrix, which implicit methods take for it, and (n n,) what it has too
+    much; empty where the matrix is diagonal."""
+    D = damping_matrix(body.model, body.damping)
+    diagonal = np.diag(D)
+    rest = D - np.diag(diagonal)
+    if not rest.any():
+        return diagonal, np.zeros(0)
+    bound = diagonal + np.abs(rest).sum(axis=1)
+    return bound, (np.diag(bound) - D).ravel()
 
 
 def _owner(body: Body) -> tuple[Hashable, ...]:

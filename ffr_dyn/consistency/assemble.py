@@ -13,6 +13,7 @@ from scipy.sparse import csr_array
 
 from ffr_dyn.closing.driven_angles import led_to_drivers
 from ffr_dyn.closing.independence import independent_blocks
+from ffr_dyn.closing.inertia_left import require_inertia
 from ffr_dyn.closing.positions import close_positions, close_velocities, stacked
 from ffr_dyn.closing.row_space import independent
 from ffr_dyn.compile.scene_tables import System, compile_scene
@@ -146,7 +147,13 @@ def plane_in_words(scene: Scene, time: float) -> str:
 
 
 def _flattened(scene: Scene, time: float) -> tuple[Scene, list[Block], str]:
-    """As `flattened` and `plane_in_words`."""
+    """As `flattened` and `plane_in_words`. Raises InputError for a body without the inertia to move."""
+    found = _in_plane_or_space(scene, time)
+    require_inertia(found[0])
+    return found
+
+
+def _in_plane_or_space(scene: Scene, time: float) -> tuple[Scene, list[Block], str]:
     scene, found = in_mean_axis_frames(scene), dict[str, str]()
     for flat in planar_forms(scene):
         blocks = blocks_of(flat)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.equations.inertia import damping_matrix
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.results.power import measured_values
 from ffr_dyn.results.recorded_motion import View
@@ -104,7 +105,7 @@ def _power(system: System, rows: Record, powers: Array) -> Array:
     total: Array = powers[:, counted].sum(axis=1)
     for b, body in enumerate(system.scene.bodies):
         rates = rows.v[:, system.layout.q_dot(b)]
-        total = total - rates**2 @ np.broadcast_to(2 * body.damping * np.sqrt(body.model.omega2), rates.shape[1:])
+        total = total - np.einsum("ti,ij,tj->t", rates, damping_matrix(body.model, body.damping), rates)
     return total
 
 

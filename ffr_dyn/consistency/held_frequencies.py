@@ -94,7 +94,7 @@ def _reference(scene: Scene, body: Body, blocks: list[Block]) -> FlexibleBody | 
             for name, six in zip(kept["interfaces"], shapes, strict=True)
             if name in positions
         ),
-        surface=None, stiffening=None, provenance={},
+        surface=None, stiffening=None, damping=None, provenance={},
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ import scipy.linalg
 
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.evaluation import evaluate, evaluator, free_motions, total_mass_matrix
+from ffr_dyn.equations.inertia import damping_matrix
 from ffr_dyn.results.result import Result
 from ffr_prep.common.arrays import Array
 
@@ -35,14 +36,14 @@ def vibrations(assembled: Assembled, time: float) -> Vibrations:
     scene, place = system.scene, system.layout
     now = evaluate(evaluator(system), time, assembled.x, assembled.v)
     Z = free_motions(now.jacobian, total_mass_matrix(scene, place, assembled.x))
-    square, rate = np.zeros(place.v_size), np.zeros(place.v_size)
+    square, rate = np.zeros(place.v_size), np.zeros((place.v_size, place.v_size))
     for b, body in enumerate(scene.bodies):
         square[place.q_dot(b)] = body.model.omega2
-        rate[place.q_dot(b)] = 2.0 * body.damping * np.sqrt(body.model.omega2)
+        rate[place.q_dot(b), place.q_dot(b)] = damping_matrix(body.model, body.damping)
     omega2, vectors = scipy.linalg.eigh(Z.T @ (square[:, None] * Z))
     bent = omega2 > 1e-9 * omega2.max(initial=0.0)
     omega, motions = np.sqrt(omega2[bent]), Z @ vectors[:, bent]
-    return Vibrations(assembled, omega, (rate @ motions**2) / (2.0 * omega), motions)
+    return Vibrations(assembled, omega, np.einsum("va,vw,wa->a", motions, rate, motions) / (2.0 * omega), motions)
 
 
 def lasting(of: Vibrations, step: float) -> float:

@@ -38,6 +38,7 @@ from ffr_dyn.consistency.evaluation import (
 )
 from ffr_dyn.consistency.second_order_loads import loads_that_act, second_order_forces
 from ffr_dyn.economy.policy import DEFAULT, Policy
+from ffr_dyn.equations.inertia import damping_matrix
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.kernels.tables import Record
 from ffr_prep.common.arrays import Array
@@ -185,7 +186,8 @@ def _oscillators(seen: Samples, D: Array, Z: Array, forces: Array) -> tuple[Arra
     own = D[elastic] ** 2
     mass = np.maximum(np.einsum("tvc,tvw,twc->tc", Z, seen.M, Z, optimize=True).mean(axis=0), 1e-9)
     force = np.einsum("tvc,tvk->tck", Z, forces, optimize=True) / mass[:, None]
-    omega2, damping = of_coordinates(bodies, bodies.omega2), of_coordinates(bodies, bodies.two_zeta_omega)
+    omega2 = of_coordinates(bodies, bodies.omega2)
+    damping = np.concatenate([np.diag(damping_matrix(b.model, b.damping)) for b in seen.system.scene.bodies])
     return force.reshape(len(Z), -1), omega2 @ own / mass, damping @ own / mass
 
 

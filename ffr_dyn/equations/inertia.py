@@ -41,6 +41,7 @@ class Integrals:
     omega2: Array
     I5: Array
     I6: Array
+    damping: Array | None
 
 
 def kept_integrals(body: Body) -> Integrals:
@@ -54,7 +55,8 @@ def kept_integrals(body: Body) -> Integrals:
         for part, symmetric, skewed in ((model.rP_dm, kept["I8"], kept["I4"]), (model.PP_dm, kept["I9"], kept["I5"]))
     )
     P, I5 = kept["I3"] * model.P_dm, kept["I5"] * model.I5
-    return Integrals(model.mass, model.r_dm, model.rr_dm, P, rP, PP + second_moments(body), model.omega2, I5, model.I6)
+    PP = PP + second_moments(body)
+    return Integrals(model.mass, model.r_dm, model.rr_dm, P, rP, PP, model.omega2, I5, model.I6, model.damping)
 
 
 @dataclass(frozen=True)
@@ -107,8 +109,14 @@ def quadratic_velocity(body: FlexibleBody | Integrals, q: Array, omega: Array, q
 
 
 def elastic_force(body: FlexibleBody | Integrals, damping: Array, q: Array, q_dot: Array) -> Array:
-    """(6 + n,) elastic and modal damping forces; damping (n,) ratios. Equation (14) of docs/notation.md."""
-    return np.concatenate([np.zeros(6), -body.omega2 * q - 2 * damping * np.sqrt(body.omega2) * q_dot])
+    """(6 + n,) elastic and damping forces; damping (n,) ratios. Equation (14) of docs/notation.md."""
+    return np.concatenate([np.zeros(6), -body.omega2 * q - damping_matrix(body, damping) @ q_dot])
+
+
+def damping_matrix(body: FlexibleBody | Integrals, ratios: Array) -> Array:
+    """(n, n) [1/s] of the ratios (n,) of a scene and of the matrix that the body has."""
+    own = np.diag(2 * ratios * np.sqrt(body.omega2))
+    return own if body.damping is None else own + body.damping
 
 
 def gravity_force(body: FlexibleBody | Integrals, q: Array, A: Array, gravity: Array) -> Array:

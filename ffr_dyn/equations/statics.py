@@ -18,7 +18,7 @@ import numpy as np
 from ffr_dyn.equations.constraint_rows import Block, drive_of
 from ffr_dyn.equations.forces import At, gravity_at
 from ffr_dyn.equations.forces_at_rest import add_force, damping_of, is_load
-from ffr_dyn.equations.inertia import gravity_force, kept_integrals
+from ffr_dyn.equations.inertia import damping_matrix, gravity_force, kept_integrals
 from ffr_dyn.equations.jets import WORDS, Jet, joint_coordinate
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.equations.placed import Sums, all_placed, curvature, nothing_on, pair
@@ -82,8 +82,8 @@ def damping(scene: Scene, place: Layout, t: float, x: Array) -> Array:
     now, D = At(scene, place, t, x, np.zeros(place.v_size)), np.zeros((place.v_size, place.v_size))
     total = nothing_on(all_placed(now), place.v_size)
     for b, body in enumerate(scene.bodies):
-        at = np.arange(place.iv[b] + 6, place.iv[b] + 6 + place.n[b])
-        D[at, at] = 2 * body.damping * np.sqrt(body.model.omega2)
+        at = slice(place.iv[b] + 6, place.iv[b] + 6 + place.n[b])
+        D[at, at] = damping_matrix(body.model, body.damping)
     for force in forces_of(scene):
         D += damping_of(total, now, force)
     return D

@@ -10,7 +10,7 @@ from ffr_dyn.kernels import planar, spatial
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.simd.slices import part
 from ffr_dyn.kernels.spatial import coupling
-from ffr_dyn.kernels.tables import IN_SHARED, IN_V, IN_X, NORMAL, N
+from ffr_dyn.kernels.tables import IN_DAMPING, IN_SHARED, IN_V, IN_X, NORMAL, N
 from ffr_dyn.kernels.vectors import cholesky_three, cross, dot, get, put, to_body, weighted_product
 
 
@@ -72,6 +72,8 @@ def inertia(gravity_field, bodies, w, x, v, b):
             s, pd, W, D = planar.flexible_terms(bodies, w, b, q, qd, omega[normal], gravity, W, s, normal)
         else:
             s, pd, W, D, D_axial = spatial.flexible_terms(bodies, w, b, q, qd, omega, gravity, W, s)
+        if bodies.where[b, IN_DAMPING] >= 0:
+            add_product(bodies.coupled_damping, bodies.where[b, IN_DAMPING], 1.0, qd, part(w.f, j + 6, n))
         put(w.s, b, s)
         fill_tensor(w.J[b], W)
         w.inverse[b, 1] = 0.5 / (W[0] + W[1] + W[2])
@@ -79,6 +81,17 @@ def inertia(gravity_field, bodies, w, x, v, b):
         planar.forces(part(w.f, j, 6), bodies.mass[b], s, pd, D[0] + D[1], omega, gravity, normal)
     else:
         spatial.forces(part(w.f, j, 6), bodies.mass[b], s, w.J[b], pd, D, D_axial, omega, gravity)
+
+
+@kernel
+def add_product(pool, start, factor, y, f):
+    """f (n,) += factor A y, A (n, n) symmetric, stored from `start` on."""
+    n = y.size
+    for j in range(n):
+        row, total = part(pool, start + j * n, n), 0.0
+        for k in range(n):
+            total += row[k] * y[k]
+        f[j] += factor * total
 
 
 @kernel

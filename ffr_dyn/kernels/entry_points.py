@@ -7,7 +7,7 @@ says otherwise; where something failed `work.info[FAILED]` says where. Those tha
 Twin: `ffr_dyn.equations.motion.equations_of_motion`.
 """
 
-from ffr_dyn.kernels.bodies import mass_times, normalise, reduce_forces
+from ffr_dyn.kernels.bodies import add_product, mass_times, normalise, reduce_forces
 from ffr_dyn.kernels.forces.applied import apply_loads, call_user, count_loads, gravity_field, keep_measured, power
 from ffr_dyn.kernels.forces.implicit import add_to_joints, keep_growth, set_targets, subtract_yield
 from ffr_dyn.kernels.functions import evaluate_functions
@@ -50,6 +50,7 @@ from ffr_dyn.kernels.tables import (
     FILLED,
     FRESH,
     HERE,
+    IN_DAMPING,
     IN_USE,
     IN_V,
     NEAR,
@@ -78,6 +79,7 @@ from ffr_dyn.kernels.vectors import add_scaled, copy, fill
 
 PASSES = 10  # at most, where rows depend on one another
 GROSS = 1.0  # m, -: of a violation that no projection puts right
+SETTLING, SETTLED = 60, 1e-11  # iterations with a damping matrix, and the relative change at which they end
 UNMET = 1e3  # tolerances, beyond which a violation that the projection does not take back is no drift
 
 
@@ -87,6 +89,10 @@ def has_loads(model: Model) -> bool:
 
 def has_dependent_rows(model: Model) -> bool:
     return model.relaxation > 0.0
+
+
+def has_coupled_damping(model: Model) -> bool:
+    return model.bodies.coupled_damping.size > 0
 
 
 def has_stiff_forces(model: Model) -> bool:
@@ -279,6 +285,33 @@ def solve_of_dependent_rows(r: Tables, target: Vector) -> int:
         add_scaled(bw.acc, bw.more, 1.0, bw.acc)
         gather_rows(m.rows.start, rw.step, rw.left)
         add_scaled(rw.lam, rw.lam, 1.0, rw.left)
+    return OK
+
+
+@entry_point(has_coupled_damping)
+def settle_damping(r: Tables, target: Vector) -> int:
+    """`solve` again until the left side has gamma h D of the damping matrix in place of the diagonal that dominates it.
+
+    The diagonal less the matrix is positive and less than what is on the left side, so that the iteration converges, the
+    faster the better the step resolves the damping; f has the last correction afterwards.
+    """
+    bodies, bw, gh = r.model.bodies, r.work.bodies, r.work.diagonal[0]
+    fill(bw.settled, 0.0)
+    for _ in range(SETTLING):
+        change, size = 0.0, 0.0
+        for b in range(bodies.mass.size):
+            n, j, start = bodies.where[b, N], bodies.where[b, IN_V] + 6, bodies.where[b, IN_DAMPING]
+            if start < 0:
+                continue
+            for k in range(j, j + n):
+                step = bw.acc[k] - bw.settled[k]
+                change, size = max(change, abs(step)), max(size, abs(bw.acc[k]))
+                bw.settled[k] = step
+            add_product(bodies.coupled_damping, start, gh, part(bw.settled, j, n), part(bw.f, j, n))
+            copy(part(bw.settled, j, n), part(bw.acc, j, n))
+        if change <= SETTLED * size:
+            break
+        solve(r, target)
     return OK
 
 

@@ -46,6 +46,7 @@ from ffr_dyn.kernels.entry_points import (
     project,
     pull_forces,
     set_diagonal,
+    settle_damping,
     solve,
     stabilise,
 )
@@ -247,5 +248,7 @@ def add_stiff_part(r, stage, v, r_x, gh, shares, factors):
 def solve_stage(r, stage):
     """`solve` of a linearly implicit method. Stiff forces remember three stages."""
     solve(r, r.stages.target)
+    if r.model.bodies.coupled_damping.size > 0:
+        settle_damping(r, r.stages.target)
     if r.model.stiff_count > 0 and stage < 3:
         follow_forces(r, stage, r.stages.target)

@@ -69,12 +69,13 @@ IN_SHARED = (
     6  # in omega2 and the other rows by coordinate, which equal bodies share: many stay in the processor's cache
 )
 PP_PLAN = 7  # in `blocks`
+IN_DAMPING = 8  # in coupled_damping, or -1 where damping is diagonal
 
 
 class Bodies(NamedTuple):
     """B bodies, E elastic coordinates in all."""
 
-    where: I2  # (B + 1, 8) sizes of a body and where its parts begin, by the columns above
+    where: I2  # (B + 1, 9) sizes of a body and where its parts begin, by the columns above
     mass: F1  # (B,)
     moments: F2  # (B, 9) first moment r_dm (3), second moment rr_dm (6)
     P_dm: F1  # pooled; per body 3 rows of n
@@ -83,7 +84,8 @@ class Bodies(NamedTuple):
     # blocks; in the plane n x 3 x n: two symmetric parts in it, and the axial component across
     PP_dm: F1
     omega2: F1  # pooled, n of all bodies that differ
-    two_zeta_omega: F1  # likewise
+    two_zeta_omega: F1  # likewise: the diagonal of the damping matrix and, with it, the sums over what is beside it
+    coupled_damping: F1  # pooled; per body n x n of what that diagonal has too much, where damping couples coordinates
     blocks: I1  # pooled; how PP_dm is stored (see `ffr_dyn.compile.symmetry_blocks`)
 
 
@@ -202,6 +204,7 @@ class BodyWork(NamedTuple):
     # likewise, is where the elastic accelerations will be
     rigid: F2
     more: F1  # (V,) scratch
+    settled: F1  # (V,) scratch where damping couples elastic coordinates
 
 
 class MarkerWork(NamedTuple):

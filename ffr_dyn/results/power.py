@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ffr_dyn.equations.inertia import damping_matrix
 from ffr_dyn.kernels.tables import MEASURED
 from ffr_dyn.results.recorded_motion import View, cross, dot
 from ffr_dyn.scene.drivers import Driver, PointDriver
@@ -62,12 +63,10 @@ def power(view: View, thing: Any) -> Array:
 
 
 def damping_power(view: View, b: int) -> Array:
-    """(T,) power of the modal damping of body b, never positive."""
+    """(T,) power of the damping of body b, never positive."""
     body = view.system.scene.bodies[b]
-    rates, total = view.q_dot(b), np.zeros(view.rows)
-    for j, factor in enumerate(2 * body.damping * np.sqrt(body.model.omega2)):
-        total -= factor * rates[:, j] ** 2
-    return total
+    rates = view.q_dot(b)
+    return -np.einsum("ti,ij,tj->t", rates, damping_matrix(body.model, body.damping), rates)
 
 
 def transmitted(view: View, joint: Joint) -> Array:

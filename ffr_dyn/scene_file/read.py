@@ -56,7 +56,7 @@ from ffr_dyn.scene_file.schema import (
 )
 from ffr_dyn.scene_file.source import Source, origin, origin_of_name, read_source
 from ffr_dyn.scene_file.state_formula import StateFormula, check_names
-from ffr_prep.body import BodyError, FlexibleBody, load_body, rigid_body, truncated, with_point
+from ffr_prep.body import BodyError, FlexibleBody, damped, load_body, rigid_body, truncated, with_point
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import reading
 
@@ -271,6 +271,9 @@ def _model(name: str, entry: BodyEntry) -> FlexibleBody:
     if entry.file is not None:
         model = load_body(entry.file)
         model = model if entry.modes is None else truncated(model, entry.modes)
+        alpha, beta = entry.rayleigh or (0.0, 0.0)
+        bands = [(frequency, ratio) for frequency, ratio in entry.damping_bands]
+        model = damped(model, alpha=alpha, beta=beta, loss_factor=entry.loss_factor, bands=bands)
         model = model if entry.stiffening else replace(model, stiffening=None)
         for point, at in points.items():
             model = with_point(model, point, at)

@@ -41,6 +41,7 @@ from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.sensors import Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.scene_file.values import (
     THREE,
+    TWO,
     In,
     Inertia,
     Metres,
@@ -228,6 +229,9 @@ class BodyEntry(Strict):
     q: list[Number] | None = None
     q_dot: list[Number] | None = None
     damping: Number | list[Number] = 0.0
+    rayleigh: Annotated[list[Number], TWO] | None = None
+    loss_factor: Annotated[float, Key(ge=0)] = 0.0
+    damping_bands: list[Annotated[list[Number], TWO]] = []
     stiffening: bool = True
     drop: list[Literal["I3", "I4", "I5", "I8", "I9"]] = []
 

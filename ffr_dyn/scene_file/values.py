@@ -54,6 +54,7 @@ def parameters_of(info: ValidationInfo) -> Mapping[str, Any]:
     return found
 
 
+TWO = Key(min_length=2, max_length=2)
 THREE = Key(min_length=3, max_length=3)
 
 Number = Annotated[float, In()]

@@ -136,7 +136,15 @@ def _asymmetry(part: Body, k: int, used: Sequence[str]) -> str:
     products = np.abs(np.delete(body.rr_dm[k], k)).max() / (body.mass * length**2)
     if products > BESIDE:
         return f"a product of inertia is {products:.2g} of its moments"
-    return _mixed_modes(body, k, used, second_order=part.stiffening and body.stiffening is not None)
+    mixed = _mixed_modes(body, k, used, second_order=part.stiffening and body.stiffening is not None)
+    return mixed or _mixed_damping(body, _mostly(body, k, used))
+
+
+def _mixed_damping(body: FlexibleBody, stays: Array) -> str:
+    if body.damping is None:
+        return ""
+    beside = np.abs(body.damping[np.ix_(stays, ~stays)]).max(initial=0.0) / np.abs(body.damping).max()
+    return f"its damping couples modes in the plane and across it by {beside:.2g}" if beside >= _ZERO else ""
 
 
 def _mixed_modes(body: FlexibleBody, k: int, used: Sequence[str], *, second_order: bool) -> str:

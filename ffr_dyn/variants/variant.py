@@ -78,6 +78,7 @@ def with_basis(model: FlexibleBody, V: Array) -> FlexibleBody:
         interfaces=tuple(replace(i, phi_t=i.phi_t @ V, phi_r=i.phi_r @ V) for i in model.interfaces),
         surface=model.surface and recombined(model.surface, V, model.surface.Phi @ V),
         stiffening=None if stiffening is None else np.einsum("ia,lij,jb->lab", V, stiffening, V, optimize=True),
+        damping=None if model.damping is None else V.T @ model.damping @ V,
     )
 
 

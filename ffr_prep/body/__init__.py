@@ -11,9 +11,11 @@ The numbered invariants I1...I9 and Shabana's S_bar family are read-only views o
 """
 
 from ffr_prep.body.constructors import recombined, rigid_body, truncated, with_point
+from ffr_prep.body.damping import damped
 from ffr_prep.body.file import content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
 from ffr_prep.body.frame_change import interface_motions, mass_of_motions
 from ffr_prep.body.mean_axis import FrameMarker, MeanAxisForm, idle_loads, mean_axis_form
+from ffr_prep.body.movable import immovable
 from ffr_prep.body.reduced import (
     SECTION_FORCES,
     TENSOR,
@@ -56,8 +58,10 @@ __all__ = [
     "compressed_beside",
     "content_hash",
     "cut_names",
+    "damped",
     "displacements",
     "idle_loads",
+    "immovable",
     "interface_motions",
     "linear_surface",
     "load_body",

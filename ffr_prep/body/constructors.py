@@ -74,6 +74,7 @@ def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
         interfaces=tuple(replace(i, phi_t=i.phi_t[:, keep], phi_r=i.phi_r[:, keep]) for i in body.interfaces),
         surface=body.surface and recombined(body.surface, np.eye(body.n)[:, keep], body.surface.Phi[:, :, keep]),
         stiffening=None if body.stiffening is None else body.stiffening[:, keep][:, :, keep],
+        damping=None if body.damping is None else body.damping[np.ix_(keep, keep)],
         parts=tuple(truncated(part, modes if np.ndim(modes) else min(int(modes), part.n)) for part in body.parts),
     )
 

@@ -26,9 +26,9 @@ from ffr_prep.common.outputs import note_input, replacing
 from ffr_prep.common.stored_arrays import read_arrays
 
 MAGIC = "ffr-body"
-# 2 adds stress modes and section forces, 3 the parts of a body that is cut. Files of before are read as bodies without them,
-# and a body without parts is written as before.
-WHOLE, IN_PARTS = 2, 3
+# 2 adds stress modes and section forces, 3 the parts of a body that is cut, 4 a damping matrix. Files of before are read as
+# bodies without them, and a body without parts and damping is written as before.
+WHOLE, IN_PARTS, DAMPED = 2, 3, 4
 
 
 def content_hash(*arrays: Array) -> str:
@@ -50,6 +50,7 @@ def save_body(body: FlexibleBody, path: str | Path) -> Path:
     for k, part in enumerate(body.parts):
         arrays |= {f"part/{k}/{key}": value for key, value in _arrays(part).items()}
     version = IN_PARTS if body.parts else WHOLE
+    version = DAMPED if any(one.damping is not None for one in (body, *body.parts)) else version
     meta = {"magic": MAGIC, "format_version": version, **_described(body)}
     if body.parts:
         meta["parts"] = [_described(part) for part in body.parts]
@@ -67,6 +68,8 @@ def _arrays(body: FlexibleBody) -> dict[str, Array]:
         arrays |= {f"surface/{key}": value for key, value in surface_arrays(body.surface).items()}
     if body.stiffening is not None:
         arrays["stiffening"] = body.stiffening
+    if body.damping is not None:
+        arrays["damping"] = body.damping
     return arrays
 
 
@@ -171,10 +174,8 @@ def _meta(stored: Mapping[str, Array]) -> dict[str, Any]:
     meta = json.loads(stored["meta"].tobytes())
     if not isinstance(meta, dict) or meta.get("magic") != MAGIC:
         raise BodyError("not a body file (foreign header); write one with ffr-prep reduce")
-    if meta["format_version"] > IN_PARTS:
-        raise BodyError(
-            f"body format {meta['format_version']}; this program reads up to {IN_PARTS}: update the program"
-        )
+    if meta["format_version"] > DAMPED:
+        raise BodyError(f"body format {meta['format_version']}; this program reads up to {DAMPED}: update the program")
     return meta
 
 
@@ -208,5 +209,6 @@ def _from_arrays(meta: Mapping[str, Any], arrays: Mapping[str, Array]) -> Flexib
         surface=surface,
         stiffening=arrays.get("stiffening"),
         provenance=meta["provenance"],
+        damping=arrays.get("damping"),
         **core,
     )

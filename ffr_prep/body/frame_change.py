@@ -42,6 +42,7 @@ def in_motions(body: FlexibleBody, Z: Array, omega2: Array, stiffening: Array | 
         interfaces=_interfaces(body, Z),
         surface=turned_surface(body, Z, omega2, stiffening),
         stiffening=stiffening,
+        damping=None if body.damping is None else Z[6:].T @ body.damping @ Z[6:],
     )
 
 

@@ -79,4 +79,5 @@ def combined(body: FlexibleBody, V: Array, omega2: Array) -> FlexibleBody:
         interfaces=tuple(replace(i, phi_t=i.phi_t @ V, phi_r=i.phi_r @ V) for i in body.interfaces),
         surface=body.surface and recombined(body.surface, V, body.surface.Phi @ V),
         stiffening=None if body.stiffening is None else V.T @ body.stiffening @ V,
+        damping=None if body.damping is None else V.T @ body.damping @ V,
     )

@@ -155,6 +155,8 @@ class FlexibleBody(Brief):
         (3) [m/s^2], its angular acceleration (3) [rad/s^2], the products xx, yy, zz, xy, xz, yz of its angular velocity
         (6) [rad^2/s^2], and for each of the I interfaces force (3) [N] and semitangential moment (3)
         [N m]; all in body axes. None where it was not computed
+    damping   : (n, n) symmetric damping matrix of the elastic coordinates [1/s], beside the ratios that a scene gives: from a
+        finite-element model, a file, or `damped`. None where there is none
     parts     : bodies that the body is cut into, one after the other, if it is: each in the same frame, undeformed, with the
         interfaces of the whole that lie in it and those at its cuts (`cut_names`). A scene moves them in place of the whole
     provenance: how the body was made; plain JSON values
@@ -176,6 +178,7 @@ class FlexibleBody(Brief):
     stiffening: Array | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
     parts: tuple[FlexibleBody, ...] = ()
+    damping: Array | None = None
 
     def __post_init__(self) -> None:
         n = np.size(self.omega2)
@@ -185,6 +188,9 @@ class FlexibleBody(Brief):
         object.__setattr__(self, "interfaces", tuple(self.interfaces))
         if self.stiffening is not None:
             _freeze(self, "stiffening", (12 + 6 * len(self.interfaces), n, n))
+        if self.damping is not None:
+            _freeze(self, "damping", (n, n))
+            _check_damping(self.name, self.damping)
         _check(self)
         object.__setattr__(self, "parts", tuple(self.parts))
         if self.parts:
@@ -197,6 +203,7 @@ class FlexibleBody(Brief):
         surface = self.surface
         holds = {
             "geometric stiffening": self.stiffening,
+            "damping": self.damping,
             "surface": surface,
             "foreshortening": surface and surface.second,
             "stress": surface and surface.stress,
@@ -403,6 +410,16 @@ def _check(body: FlexibleBody) -> None:
         raise BodyError(
             f"body {body.name!r}: no mass distribution has the principal moments of inertia {moments} kg m^2 "
             "(each must be at most the sum of the other two)"
+        )
+
+
+def _check_damping(name: str, D: Array) -> None:
+    largest = np.abs(D).max(initial=0.0)
+    if np.abs(D - D.T).max(initial=0.0) > _ORTHONORMAL_TOLERANCE * largest:
+        raise BodyError(f"body {name!r}: its damping matrix is not symmetric")
+    if largest and (least := np.linalg.eigvalsh(D)[0]) < -_ORTHONORMAL_TOLERANCE * largest:
+        raise BodyError(
+            f"body {name!r}: its damping matrix has the eigenvalue {least:.3g} 1/s, which would feed vibration"
         )
 
 

@@ -153,7 +153,13 @@ def mesh(mesh: Path, **options: Any) -> None:
     cls=EntriesCommand, registries=(REDUCTIONS,), epilog=f"{REDUCE_NOTES}{REGIONS}\n{REDUCTION_NOTES}\n{MATERIAL_NOTES}"
 )
 @_MESH
-@click.option("--material", "materials", multiple=True, required=True, metavar="MATERIAL", help="See below.")
+@click.option(
+    "--material",
+    "materials",
+    multiple=True,
+    metavar="MATERIAL",
+    help="See below; default: that of a .inp or .bdf file.",
+)
 @REQUEST
 @click.option("--linear", is_flag=True, help="Leave out the load matrices: linear elasticity, for what barely bends.")
 @click.option(
@@ -171,12 +177,14 @@ def reduce(mesh: Path, materials: tuple[str, ...], **options: Any) -> None:
     MESH is a geometry that is meshed here (.geo, .step, .iges, .brep) or a mesh of solids (.msh, .inp, .bdf, .vtu,
     .med, ...). Everything in the body is in SI units.
     """
+    from ffr_prep.cli.options import own_or_given
     from ffr_prep.mesh.mesh import read_mesh
+    from ffr_prep.pipelines.file_materials import CARRIERS
     from ffr_prep.report.text import mesh_lines
     from ffr_prep.solids.model import from_mesh
 
-    material, (interfaces, request) = material_of(materials), request_of(options)
-    settings = _mesh_settings(options)
+    (interfaces, request), settings = request_of(options), _mesh_settings(options)
+    given = material_of(materials) if materials or mesh.suffix.lower() not in CARRIERS else None
     reserve("-o", options["output"])
     tell_of_programs([mesh])
     steps = terminal_steps()
@@ -184,6 +192,7 @@ def reduce(mesh: Path, materials: tuple[str, ...], **options: Any) -> None:
     steps.end()
     show(mesh_lines(loaded))
     check_points(interfaces, loaded)
+    material = own_or_given(mesh, loaded, settings["unit"], given)
     source = {"file": mesh.name, **{key: settings[key] for key in ("unit", "size", "numbers", "order")}}
     source |= {key: value for key, value in (("glue", settings["glue"]), ("solids", list(settings["solids"]))) if value}
     request = replace(request, provenance={"source": source, "notes": list(loaded.notes)})

@@ -12,6 +12,7 @@ from ffr_prep.cli.settings import EntriesCommand, NotesCommand
 from ffr_prep.cli.terminal import filed, show
 from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, reserve
 from ffr_prep.interchange import formats
+from ffr_prep.matrices.unit_systems import UNIT_SYSTEMS
 
 _EXPORT = """\b
 Formats:
@@ -19,7 +20,7 @@ Formats:
 
 \b
 Example:
-  ffr-prep export rod.ffr --kind full -o rod.fem
+  ffr-prep export rod.ffr -o rod.fem
   ffr-prep export rod.ffr -o rod.SID_FEM
 """
 _IMPORT = """\b
@@ -54,17 +55,32 @@ def export_body(body: Path, output: Path, surface: bool, **settings: Any) -> Non
 
 @click.command("import", cls=NotesCommand, registries=(formats.EXCHANGE_FORMATS,), epilog=_IMPORT)
 @click.argument("file", type=INPUT_FILE)
+@click.option(
+    "--units",
+    type=click.Choice([*UNIT_SYSTEMS]),
+    default="m-kg-s",
+    show_default=True,
+    help="Of the numbers in FILE: length, mass, time.",
+)
+@click.option(
+    "--held",
+    is_flag=True,
+    help="For a file whose modes take up more than its mass: raise it; the body is to be held fixed.",
+)
 @OUTPUT
-def import_body(file: Path, output: Path) -> None:
-    """Read FILE, of another program and in SI units, and write it as a body file.
+def import_body(file: Path, units: str, held: bool, output: Path) -> None:
+    """Read FILE, of another program, and write it as a body file.
 
-    Every node becomes an interface. What could not be taken over is said; nothing is left out silently.
+    Every node becomes an interface. What could not be taken over is said; nothing is left out silently. Where the file has
+    no inertia for a motion, that is said too, here and before a run.
     """
     from ffr_prep.body import save_body
+    from ffr_prep.interchange.bare_inertia import held as held_fixed
     from ffr_prep.report.text import short_lines
 
     reserve("-o", output)
-    body = formats.import_body(file)
+    body = formats.import_body(file, units=units)
+    body = held_fixed(body) if held else body
     save_body(body, output)
     show(short_lines(body))
     for note in body.provenance["notes"]:

@@ -81,6 +81,22 @@ def number_of(what: str, text: str) -> float:
         raise InputError(f"{what}: {text!r} is not a number") from None
 
 
+def own_or_given(path: Path, mesh: Mesh, unit: str | None, given: Solid | Mapping[str, Solid] | None) -> Any:
+    """The material that was given, or else those of the mesh file; which are used is said where the file has any."""
+    from ffr_prep.model.material import Material
+    from ffr_prep.pipelines.file_materials import file_materials, names_of_materials
+
+    if given is not None:
+        if names := names_of_materials(path):
+            click.echo(f"note        --material is taken; not used: {', '.join(names)} of {path.name}")
+        return given
+    found = file_materials(path, mesh, unit=unit)
+    for group, one in found.items():
+        constants = f", E = {one.E:.6g} Pa, nu = {one.nu:g}" if isinstance(one, Material) else ""
+        click.echo(f"material    {group}: {one.name} of {path.name}{constants}, rho = {one.rho:.6g} kg/m^3")
+    return found
+
+
 def material_of(texts: Sequence[str]) -> Solid | Mapping[str, Solid]:
     """One material, or materials by group where a text is GROUP=MATERIAL."""
     from ffr_prep.model.material import parse_material

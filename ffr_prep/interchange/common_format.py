@@ -21,16 +21,17 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.outputs import replacing
 from ffr_prep.common.reading import reading
+from ffr_prep.interchange.bare_inertia import judged
 from ffr_prep.model.invariants import skew
 
 IDENTITY_TOLERANCE = 1e-6
-LUMPING_LIMIT = 0.5
 MISFIT_LIMIT = 0.05
 _ORTHONORMAL = 1e-9
 _DEPENDENT = 1e-12
 _TINY, _HUGE = 1e-60, 1e60  # beyond these, products overflow
 MANY_MOMENTS = 30_000_000
-_REAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([DEde][+-]?[0-9]+)?")
+# Fortran leaves the letter out where an exponent has three digits.
+_REAL = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?:[DEde]([+-]?[0-9]+)|([+-][0-9]{3}))?")
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,7 @@ class Content:
     PP_dm (3, 3, n, n) likewise but not yet mass-orthonormal; M, K (n, n) modal mass and stiffness;
     interfaces : the nodes; facts : for the provenance, with the lists "notes" and "warnings"
     stiffening : (12 + 6 N, n, n) geometric stiffness per load as in FlexibleBody, or None
+    D : (n, n) modal damping, or None
     """
 
     name: str
@@ -55,6 +57,7 @@ class Content:
     interfaces: tuple[Interface, ...]
     facts: dict[str, Any]
     stiffening: Array | None = None
+    D: Array | None = None
 
 
 def read_body(path: Path, content: Callable[[list[str], Path], Content]) -> FlexibleBody:
@@ -74,7 +77,7 @@ def body_from(content: Content) -> FlexibleBody:
     V, omega2, notes = normal_coordinates(content.M, content.K)
     facts = {**content.facts, "notes": [*content.facts["notes"], *notes]}
     try:
-        return FlexibleBody(
+        body = FlexibleBody(
             name=content.name,
             mass=content.mass,
             r_dm=content.r_dm,
@@ -88,9 +91,11 @@ def body_from(content: Content) -> FlexibleBody:
             ),
             stiffening=None if content.stiffening is None else V.T @ content.stiffening @ V,
             provenance=facts,
+            damping=None if content.D is None or not content.D.any() else V.T @ content.D @ V,
         )
     except BodyError as error:
         raise InputError(str(error)) from None
+    return judged(body)
 
 
 # ---- coordinates --------------------------------------------------------------------------------------------------
@@ -121,6 +126,20 @@ def normal_coordinates(M: Array, K: Array) -> tuple[Array, Array, list[str]]:
     values, V = scipy.linalg.eigh(K, M)
     V = V * np.where(V[np.abs(V).argmax(axis=0), np.arange(n)] < 0, -1.0, 1.0)
     return V, _not_negative(values), ["the modes of the file were combined: K v = omega^2 M v with its mass, stiffness"]
+
+
+def usable(D: Array, what: str, notes: list[str]) -> Array | None:
+    """The damping matrix of a file, symmetric; None, with a note, where it would feed vibration."""
+    if not D.any():
+        return None
+    symmetric = 0.5 * (D + D.T)
+    largest = np.abs(D).max()
+    if np.abs(D - symmetric).max() > IDENTITY_TOLERANCE * largest:
+        notes.append(f"the damping {what} is not symmetric; its symmetric part was taken")
+    if np.linalg.eigvalsh(symmetric)[0] < -IDENTITY_TOLERANCE * largest:
+        notes.append(f"dropped: the damping {what} has a negative eigenvalue, which would feed vibration")
+        return None
+    return symmetric
 
 
 def _symmetric(what: str, matrix: Array) -> Array:
@@ -154,17 +173,19 @@ def from_crossed(X: Array) -> Array:
     return np.swapaxes(X, 0, 1) + np.einsum("kl,...->kl...", np.eye(3), trace)
 
 
-def mended_trace(PP_dm: Array, M: Array) -> tuple[Array, float]:
+def mended_trace(PP_dm: Array, M: Array, axes: Sequence[int] = (0, 1, 2)) -> tuple[Array, float]:
     """(3, 3, n, n) PP_dm whose trace over the axes is the modal mass M, and by how much it was not (relative).
 
-    Lumped rotary inertia is in M but not in PP_dm; each axis takes a third of it. Within 1e-9 nothing changes.
+    Lumped rotary inertia is in M but not in PP_dm; each of the axes along which the body moves takes the same share of it.
+    Within 1e-9 nothing changes.
     """
     lack = M - np.einsum("kkij->ij", PP_dm)
     weight = np.sqrt(np.diag(M))
     off = float(np.abs(lack / np.outer(weight, weight)).max(initial=0.0))
     if off <= _ORTHONORMAL:
         return PP_dm, off
-    return PP_dm + np.einsum("kl,ij->klij", np.eye(3), lack) / 3, off
+    shares = np.diag(np.isin(range(3), axes) / len(axes))
+    return PP_dm + np.einsum("kl,ij->klij", shares, lack), off
 
 
 @dataclass(frozen=True)
@@ -186,7 +207,10 @@ def bounds(mass: float, rr_dm: Array, M: Array) -> Bounds:
     own = np.diag(M)
     if own.size and own.min() <= _TINY:
         k = int(own.argmin())
-        raise InputError(f"the modal mass of mode {k + 1} is {own[k]:g}; it must be positive")
+        raise InputError(
+            f"the modal mass of mode {k + 1} is {own[k]:g}; it must be positive: a mode without mass follows its loads "
+            "at once, and static elements are not computed. Give its nodes mass, or make the stiffness a bushing"
+        )
     weight = np.sqrt(own)
     spread = max(float(np.trace(rr_dm)), 1e-300)
     return Bounds(weight * np.sqrt(mass), weight * np.sqrt(spread), np.outer(weight, weight))
@@ -278,10 +302,14 @@ def write_lines(path: Path, lines: Sequence[str]) -> Path:
 
 
 def real(text: str, what: str) -> float:
-    """A real number with an exponent marked by D or E. Raises InputError for anything else, `what` in its message."""
-    if not _REAL.fullmatch(text):
+    """A real number with an exponent marked by D, E or, of three digits, its sign alone.
+
+    Raises InputError for anything else, `what` in its message.
+    """
+    match = _REAL.fullmatch(text)
+    if match is None:
         raise InputError(f"{what}: {text[:40]!r} is not a number")
-    value = float(text.upper().replace("D", "E"))
+    value = float(f"{match[1]}E{match[2] or match[3] or 0}")
     if abs(value) > _HUGE:
         raise InputError(f"{what}: {text[:40]} is too large")
     return value

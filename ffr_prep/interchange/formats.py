@@ -67,8 +67,8 @@ EXCHANGE_FORMATS: Registry[ExchangeFormat] = Registry(
                 Setting(
                     "kind",
                     ("legacy", "full"),
-                    "legacy",
-                    "Of a .fem file: lumped masses, or the inertia integrals, which a recent MBDyn reads.",
+                    "full",
+                    "Of a .fem file: the inertia integrals, which a recent MBDyn reads, or lumped masses for older ones.",
                 ),
             ),
         ),
@@ -94,14 +94,24 @@ def export_body(body: FlexibleBody, path: Path, surface: bool, settings: Mapping
     return () if entry.left_out is None else tuple(loaded(entry.left_out)(body, **given))
 
 
-def import_body(path: Path) -> FlexibleBody:
-    """The body of a file, in the format of its suffix. Raises InputError for an unknown one, and what the format refuses."""
+def import_body(path: Path, *, units: str = "m-kg-s") -> FlexibleBody:
+    """The body of a file, in the format of its suffix and in SI units.
+
+    units : of the numbers in the file, a name in `ffr_prep.matrices.unit_systems.UNIT_SYSTEMS`
+
+    Raises InputError for unknown ones, and what the format refuses.
+    """
+    from ffr_prep.interchange.body_units import in_si_units, large_in_words
+    from ffr_prep.matrices.unit_systems import UNIT_SYSTEMS
+
+    if units not in UNIT_SYSTEMS:
+        raise InputError(f"units {units!r} are not known; they are {', '.join(UNIT_SYSTEMS)}")
     entry = _format_of(path)
     if entry.read is None:
         raise InputError(f"{path}: {entry.name} can be written only")
     with reading(path, f"a file of {entry.name}"):
         body: FlexibleBody = loaded(entry.read)(path)
-    return body
+    return large_in_words(in_si_units(body, UNIT_SYSTEMS[units]), units)
 
 
 def _format_of(path: Path) -> ExchangeFormat:

@@ -29,7 +29,6 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.interchange.common_format import (
     IDENTITY_TOLERANCE,
-    LUMPING_LIMIT,
     MISFIT_LIMIT,
     Bounds,
     Content,
@@ -43,6 +42,7 @@ from ffr_prep.interchange.common_format import (
     nodes,
     read_body,
     relative,
+    usable,
     write_lines,
 )
 from ffr_prep.interchange.mbdyn_records import (
@@ -58,6 +58,7 @@ from ffr_prep.interchange.mbdyn_records import (
 from ffr_prep.model.invariants import from_inertia
 
 Kind = Literal["legacy", "full"]
+LUMPING_LIMIT = 1.05  # of the trace of I9 against -2 M; where a mode is rotary inertia alone it is 1
 
 # The loads of record 19 (products xx, yy, zz, xy, yz, zx of the angular velocity, angular acceleration, acceleration)
 # among those of `FlexibleBody.stiffening`. Forces and moments at the interfaces follow in both.
@@ -74,6 +75,7 @@ TITLES = {
     10: "MODAL STIFFNESS MATRIX",
     11: "DIAGONAL OF LUMPED MASS MATRIX",
     12: "GLOBAL INERTIA",
+    13: "MODAL DAMPING MATRIX",
     14: "INVARIANT 3",
     15: "INVARIANT 4",
     16: "INVARIANT 8",
@@ -86,7 +88,7 @@ TITLES = {
 # ---- writing ------------------------------------------------------------------------------------------------------
 
 
-def write_fem(body: FlexibleBody, path: str | Path, *, kind: Kind = "legacy", surface: bool = False) -> Path:
+def write_fem(body: FlexibleBody, path: str | Path, *, kind: Kind = "full", surface: bool = False) -> Path:
     """Write the body as FEM data of MBDyn's modal joint, SI units, 17 significant digits.
 
     kind    : "full" writes the inertia integrals (records 12, 14 to 18) and the geometric stiffness (19), which a recent
@@ -106,7 +108,7 @@ def write_fem(body: FlexibleBody, path: str | Path, *, kind: Kind = "legacy", su
     return write_lines(Path(path), [*_head(body, at), *_texts(content)])
 
 
-def left_out(body: FlexibleBody, *, kind: Kind = "legacy") -> tuple[str, ...]:
+def left_out(body: FlexibleBody, *, kind: Kind = "full") -> tuple[str, ...]:
     """The losses of a file of this kind, in words."""
     lost = kind == "legacy" and body.stiffening is not None
     return ("the geometric stiffness of the body was left out",) if lost else ()
@@ -122,6 +124,7 @@ def _finite_elements(body: FlexibleBody, at: tuple[Interface, ...]) -> dict[int,
         8: motions.transpose(2, 0, 1),
         9: np.eye(body.n),
         10: np.diag(body.omega2),
+        **({} if body.damping is None else {13: body.damping}),
     }
 
 
@@ -222,7 +225,7 @@ def read_fem(path: str | Path) -> FlexibleBody:
 
     The numbers are taken to be in SI units. Integrals come from records 14, 16 and 18 where they are there, else from
     the lumped masses of record 11. Where record 9 is not the unit matrix or record 10 not diagonal, the modes are
-    combined. Damping and initial values are left out. provenance: "notes" (what was changed),
+    combined. Record 13 is the damping of the body; initial values are left out. provenance: "notes" (what was changed),
     "warnings" (what was lost or does not agree).
 
     Source: MBDyn Input File Format, modal joint. Raises InputError for a file that does not exist, is damaged,
@@ -233,15 +236,23 @@ def read_fem(path: str | Path) -> FlexibleBody:
 
 def _content(lines: list[str], path: Path) -> Content:
     header, found = records(lines)
+    warnings: list[str] = []
     given = {record: numbers(found[record], header) for record in COUNTS if record in found}
     motions = shapes(found[8], header)
     at = _Nodes(np.stack([given[k] for k in (5, 6, 7)], axis=1), motions[:, :3], motions[:, 3:])
     mass, r_dm, rr_dm = _rigid(given, at)
+    if mass == 0 and header.n and given[9].diagonal().min() > 0:
+        mass, r_dm, rr_dm = _stand_in(given[9], at)
+        warnings = [
+            f"the file has no mass: {mass:.4g} kg at the middle of its nodes stand for it; where the frame is held "
+            "fixed they change nothing but the weight in reactions, elsewhere give the file its mass (record 12)"
+        ]
     limit = bounds(mass, rr_dm, given[9])
     lumped = _sums(given[11], at) if 11 in given else None
     P_dm = given[14] if 14 in given else _needed(lumped, 14)[0]
     rP_dm, of_r = _first_moments(given, lumped, limit)
     PP_dm, of_phi = _second_moments(given, lumped, limit)
+    damping = usable(given[13], "record 13", warnings) if 13 in given else None
     title, labels = names(lines)
     return Content(
         name=unquote(title) or path.stem,
@@ -257,11 +268,12 @@ def _content(lines: list[str], path: Path) -> Content:
             Interface(unquote(labels.get(k + 1, label)), at.positions[k], at.phi_t[k], at.phi_r[k])
             for k, label in enumerate(header.labels)
         ),
+        D=damping,
         facts={
             "source": {"file": path.name, "format": "MBDyn FEM"},
             "inertia": {str(r): "record" if r in given else "lumped masses" for r in (12, 14, 16, 18)},
             "notes": ["every node became an interface of the kind 'node'", "the format has no surface to draw"],
-            "warnings": [*_lost(given), *of_r, *of_phi],
+            "warnings": [*warnings, *_lost(given), *of_r, *of_phi],
         },
         stiffening=_stiffening(found[19], header) if 19 in found else None,
     )
@@ -294,6 +306,14 @@ def _rigid(given: Mapping[int, Array], at: _Nodes) -> tuple[float, Array, Array]
     masses, inertia = _isotropic(given[11]), given[11][:, 3:].sum(axis=0)
     moment = np.einsum("p,pk,pl->kl", masses, at.positions, at.positions)
     return float(masses.sum()), masses @ at.positions, moment + from_inertia(np.diag(inertia))
+
+
+def _stand_in(M: Array, at: _Nodes) -> tuple[float, Array, Array]:
+    """Mass and moments as if all nodes had the same: the mass that the modes have where they move the nodes."""
+    moved = (at.phi_t**2).sum(axis=1).mean(axis=0)
+    mass = float(max((np.diag(M)[moved > 0] / moved[moved > 0]).max(initial=0.0), 1e-6 * np.trace(M)))
+    mean, rr = at.positions.mean(axis=0), np.einsum("pk,pl->kl", at.positions, at.positions) / len(at.positions)
+    return mass, mass * mean, mass * rr
 
 
 def _isotropic(lumped: Array) -> Array:
@@ -356,7 +376,7 @@ def _second_moments(
 
 def _lost(given: Mapping[int, Array]) -> list[str]:
     lost = []
-    for record, what in ((3, "initial modal displacements"), (4, "initial modal velocities"), (13, "modal damping")):
+    for record, what in ((3, "initial modal displacements"), (4, "initial modal velocities")):
         if record in given and given[record].any():
             lost.append(f"dropped: the {what} of record {record}")
     return lost

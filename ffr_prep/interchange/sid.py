@@ -21,8 +21,7 @@ Everything else repeats them and is checked on reading.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterator
 from pathlib import Path
 from typing import get_args
 from urllib.parse import quote, unquote
@@ -32,27 +31,19 @@ import numpy as np
 from ffr_prep.body import FlexibleBody, Interface, axial
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-from ffr_prep.interchange.common_format import (
-    IDENTITY_TOLERANCE,
-    LUMPING_LIMIT,
-    MANY_MOMENTS,
-    Bounds,
-    Content,
-    bounds,
-    from_parts,
-    hold,
-    mended_trace,
-    moments,
-    nodal_masses,
-    nodes,
-    read_body,
-    real,
-    relative,
-    write_lines,
+from ffr_prep.interchange.common_format import Content, bounds, nodes, read_body, real, usable, write_lines
+from ffr_prep.interchange.sid_blocks import (
+    Section,
+    in_standard_order,
+    integer,
+    only,
+    part,
+    sections,
+    taylor,
+    value,
 )
-from ffr_prep.interchange.sid_blocks import Section, Taylor, integer, only, part, sections, taylor, value
 from ffr_prep.interchange.sid_identities import (
-    OE_ORDER,
+    PRODUCTS,
     Layout,
     centrifugal,
     check_repeated,
@@ -60,18 +51,16 @@ from ffr_prep.interchange.sid_identities import (
     lost_blocks,
     lumped_mass,
     of_accelerations,
-    of_mass,
     six,
     tensor,
 )
+from ffr_prep.interchange.sid_moments import first_moments, with_second_moments
 from ffr_prep.interchange.sid_nodes import read_nodes
+from ffr_prep.interchange.stated_frequencies import other_frequencies
 from ffr_prep.model.invariants import from_inertia, skew
 
 BLOCKS = ("mdCM", "J", "Ct", "Cr", "Me", "Gr", "Ge", "Oe", "ksigma", "Ke", "De")
 NAMES = "interfaces="
-_ENOUGH_NODES = 400
-# The products of the angular velocity that the columns of Oe belong to, among the loads of `FlexibleBody.stiffening`.
-PRODUCTS = [6, 7, 8, 9, 11, 10]
 
 
 def write_sid(body: FlexibleBody, path: str | Path, *, layout: Layout = "mode-major", surface: bool = False) -> Path:
@@ -107,7 +96,7 @@ def blocks(body: FlexibleBody, layout: Layout) -> dict[str, tuple[Array, Array |
         "Oe": (centrifugal(body.rP_dm).T, (centrifugal(body.PP_dm) + K[PRODUCTS]).transpose(1, 2, 0)),
         "ksigma": (np.zeros((n, 1)), None),
         "Ke": (np.diag(body.omega2), None),
-        "De": (np.zeros((n, n)), None),
+        "De": (np.zeros((n, n)) if body.damping is None else body.damping, None),
     }
 
 
@@ -195,7 +184,7 @@ def read_sid(path: str | Path) -> FlexibleBody:
     The numbers are taken to be in SI units. The layouts of Gr and Ge are those that satisfy Gr_l + Gr_l^T =
     2 dJ/dq_l and Ge = 2 Cr.m1. Where Me is not the unit matrix or Ke not diagonal, the modes are combined. In Oe.m1
     geometric stiffness and mass stand as a sum: the part of the mass is that of masses at the nodes which fit all other
-    integrals best, and the sum stays exact. Damping is left out. provenance: "layout", "notes" (what was changed),
+    integrals best, and the sum stays exact. De is the damping of the body. provenance: "layout", "notes" (what was changed),
     "warnings" (what was lost or does not agree).
 
     Source: Wallrapp 1994. Raises InputError for a file that does not exist, is damaged, truncated or foreign, or
@@ -208,34 +197,47 @@ def _content(lines: list[str], path: Path) -> Content:
     count, n, names = _first_line(lines)
     modal = part(part(sections(lines, 1), "part"), "modal")
     only(modal, ("refmod", "frame", *BLOCKS))
-    mass = _mass(part(modal, "refmod"), n)
+    notes = ["every node became an interface of the kind 'node'", "the format has no surface to draw"]
+    if not in_standard_order(modal, n):
+        notes.append("the indices of m1 are in the order (row, column, mode)")
+    refmod = part(modal, "refmod")
+    mass = _mass(refmod, n)
     found = {name: taylor(part(modal, name), *size, n) for name, size in _sizes(n).items()}
     at = read_nodes(part(modal, "frame"), count, n, names)
-    r_dm, P_dm = found["mdCM"].m0[:, 0], found["mdCM"].m1[:, :, 0]
-    rr_dm = from_inertia(tensor(found["J"].m0[:, 0]))
-    limit = bounds(mass, rr_dm, found["Me"].m0)
-    rP_dm = from_parts(from_inertia(tensor(found["J"].m1[:, :, 0])), found["Cr"].m0.T)
-    layout = check_repeated(P_dm, rP_dm, found, limit)
-    K = np.concatenate([of_accelerations(found), np.zeros((6, n, n)), at.stiffening])
+    M, K = found["Me"].m0, found["Ke"].m0
+    limit = bounds(mass, from_inertia(tensor(found["J"].m0[:, 0])), M)
+    moments = first_moments(mass, found)
+    layout = check_repeated(found, limit)
+    stiffness, left = of_accelerations(found, layout, limit)
     content = Content(
         name=unquote(modal.label) or path.stem,
         mass=mass,
-        r_dm=r_dm,
-        rr_dm=rr_dm,
-        P_dm=P_dm,
-        rP_dm=rP_dm,
-        PP_dm=_second_moments(found, limit),
-        M=found["Me"].m0,
-        K=found["Ke"].m0,
+        r_dm=moments.r_dm,
+        rr_dm=moments.rr_dm,
+        P_dm=moments.P_dm,
+        rP_dm=moments.rP_dm,
+        PP_dm=np.zeros((3, 3, n, n)),
+        M=M,
+        K=K,
         interfaces=at.interfaces,
         facts={
             "source": {"file": path.name, "format": "SID"},
             "layout": layout,
-            "notes": ["every node became an interface of the kind 'node'", "the format has no surface to draw"],
-            "warnings": [*at.lost, *lost_blocks(found), *lumped_mass(rP_dm, found, layout, limit)],
+            "notes": notes,
+            "warnings": [
+                *at.lost,
+                *lost_blocks(found),
+                *([] if moments.normal is not None else lumped_mass(found, layout, limit)),
+                *left,
+                *moments.warnings(),
+                *other_frequencies(refmod.values, M, K),
+            ],
+            **moments.facts(),
         },
+        D=usable(found["De"].m0, "De", notes),
     )
-    return _trace_of_mass(content, K, found, limit)
+    stiffening = np.concatenate([stiffness, np.zeros((6, n, n)), at.stiffening])
+    return with_second_moments(content, stiffening, found, limit, moments.axes)
 
 
 def _sizes(n: int) -> dict[str, tuple[int, int]]:
@@ -258,75 +260,3 @@ def _mass(refmod: Section, n: int) -> float:
     if integer(refmod, "nelastq") != n:
         raise InputError(f"{refmod} has nelastq = {integer(refmod, 'nelastq')}, but line 1 announces {n} modes")
     return real(value(refmod, "mass"), f"{refmod}: mass")
-
-
-# ---- what repeats, what contradicts, what is lost -----------------------------------------------------------------
-
-
-def _second_moments(found: Mapping[str, Taylor], limit: Bounds) -> Array:
-    """(3, 3, n, n) PP_dm from Oe.m1, Me and Cr.m1. Raises InputError where Oe.m1 is not symmetric in the modes."""
-    Oe1, M = found["Oe"].m1, found["Me"].m0
-    hold("Oe.m1(k,l,c) = Oe.m1(l,k,c)", Oe1 - Oe1.transpose(1, 0, 2), limit.third[:, :, None])
-    both = np.zeros((3, 3, *M.shape))
-    for column, (k, l) in enumerate(OE_ORDER):  # noqa: E741
-        both[k, l] = both[l, k] = 2 * (Oe1[:, :, column] + M) if k == l else Oe1[:, :, column]
-    return from_parts(both, of_mass(found["Cr"].m1).transpose(2, 1, 0))
-
-
-def _trace_of_mass(content: Content, K: Array, found: Mapping[str, Taylor], limit: Bounds) -> Content:
-    """The content with a PP_dm whose trace is Me, as the sum of Oe.m1 over xx, yy, zz = -2 Me demands, and with the
-    geometric stiffness K (12 + 6 N, n, n) where the file has any, the part in Oe.m1 included.
-
-    Raises InputError where neither geometric stiffness nor lumping explains what is lacking.
-    """
-    stiffened = relative(K, limit.third) > IDENTITY_TOLERANCE
-    PP_dm, off = mended_trace(content.PP_dm, content.M)
-    if off <= IDENTITY_TOLERANCE:
-        return replace(content, PP_dm=PP_dm, stiffening=K if stiffened else None)
-    identity = f"the identity sum of Oe.m1 over xx, yy, zz = -2 Me fails by {off:.1e} (relative)"
-    if stiffened:
-        PP_dm, misfit = _at_nodes(content)
-        K[PRODUCTS] = found["Oe"].m1.transpose(2, 0, 1) - centrifugal(PP_dm)
-        warning = (
-            f"geometric stiffness in Oe.m1 ({identity}): its sum with mass is kept, the part of the mass is that of nodal "
-            f"masses, off by {misfit:.1e}"
-        )
-    elif off > LUMPING_LIMIT:
-        raise InputError(
-            f"{identity}: too much for a lumped mass; Oe is damaged, of order 0, or holds geometric stiffness alone"
-        )
-    else:
-        warning = f"lumped mass: {identity}; each axis of PP_dm took a third"
-    warnings = [*content.facts["warnings"], warning]
-    facts = {**content.facts, "warnings": warnings}
-    return replace(content, PP_dm=PP_dm, facts=facts, stiffening=K if stiffened else None)
-
-
-def _at_nodes(content: Content) -> tuple[Array, float]:
-    """PP_dm of the masses at the nodes that come closest to all other integrals, and their relative misfit.
-
-    However large the misfit, it spoils terms of second order in the elastic coordinates of J alone.
-    """
-    n, count = len(content.M), len(content.interfaces)
-    at = content.interfaces[:: 1 + max(count // _ENOUGH_NODES, 9 * n * n * count // MANY_MOMENTS)]
-    positions = np.array([i.position for i in at]).reshape(-1, 3)
-    shapes = np.array([i.phi_t for i in at]).reshape(-1, 3, n)
-    P, rP, PP = moments(positions, shapes)
-    rr = np.einsum("pk,pl->klp", positions, positions)
-    limit = bounds(content.mass, content.rr_dm, content.M)
-    arm = np.sqrt(np.trace(content.rr_dm) / content.mass)
-    known = (
-        (np.ones((1, len(at))), np.array([content.mass]), content.mass),
-        (positions.T, content.r_dm, content.mass * arm),
-        (rr, content.rr_dm, content.mass * arm**2),
-        (P, content.P_dm, limit.first[:, None]),
-        (rP, content.rP_dm, limit.second[:, None]),
-        (np.einsum("kkijp->ijp", PP), content.M, limit.third[:, :, None]),
-        (axial(PP), axial(content.PP_dm), limit.third[:, :, None]),
-    )
-    rows = np.vstack([(one / scale).reshape(np.size(all_), len(at)) for one, all_, scale in known])
-    target = np.concatenate([(sum_ / np.reshape(scale, np.shape(scale)[:-1])).ravel() for _, sum_, scale in known])
-    masses, misfit = nodal_masses(rows, target)
-    lumped = PP @ masses
-    mixed = from_parts(lumped + lumped.swapaxes(0, 1), axial(content.PP_dm))
-    return mended_trace(mixed, content.M)[0], misfit

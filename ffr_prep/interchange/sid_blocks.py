@@ -7,8 +7,8 @@ A section opens with a word alone (`frame`) or with `new word = label`, and clos
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.interchange.common_format import IDENTITY_TOLERANCE, real, whole
 
-_ENTRY = re.compile(r"(m[01])\s*\(([0-9 ,\t]*)\)\s*=\s*(\S+)")
+_ENTRY = re.compile(r"(m[01])\s*\(([0-9 ,\t]*)\)\s*=\s*(\S+)", re.IGNORECASE)
 _KEYS = ("order", "nrow", "ncol", "nq", "nqn", "structure")
 
 
@@ -61,7 +61,7 @@ def sections(lines: Sequence[str], first: int) -> Section:
     root = Section("file", "", first + 1)
     open_sections = [root]
     for number, text in enumerate(lines[first:], start=first + 1):
-        line = text.strip()
+        line = text.strip(" \t\r\n\x1a\x00")  # the mark of the end of a file in old systems among them
         if line:
             _take(line, number, open_sections)
     if len(open_sections) > 1:
@@ -106,7 +106,7 @@ def _close(words: Sequence[str], number: int, open_sections: list[Section]) -> N
 def _entry(match: re.Match[str], number: int) -> Entry:
     matrix, indices, value = match.groups()
     index = tuple(whole(text.strip(), f"line {number}: index") - 1 for text in indices.split(","))
-    return Entry(matrix, index, real(value, f"line {number}: {matrix}"), number)
+    return Entry(matrix.lower(), index, real(value, f"line {number}: {matrix}"), number)
 
 
 def part(section: Section, word: str) -> Section:
@@ -135,6 +135,38 @@ def value(section: Section, key: str) -> str:
 def integer(section: Section, key: str) -> int:
     """The whole number of a `key = value` line. Raises InputError when it is missing or none."""
     return whole(value(section, key), f"{section}: {key}")
+
+
+def in_standard_order(modal: Section, n: int) -> bool:
+    """Puts the indices of all m1 into the order (row, mode, column), where a file has (row, column, mode) throughout.
+
+    Whether it had: blocks with one column tell the two orders apart. Raises InputError as `integer`.
+    """
+    found = [block for block in _blocks_below(modal) if any(entry.matrix == "m1" for entry in block.entries)]
+    if all(_fit(block, n, 2) for block in found) or not all(_fit(block, n, 1) for block in found):
+        return True
+    for block in found:
+        block.entries[:] = [
+            replace(e, index=(e.index[0], e.index[2], e.index[1])) if e.matrix == "m1" else e for e in block.entries
+        ]
+    return False
+
+
+def _blocks_below(section: Section) -> Iterator[Section]:
+    for inner in section.parts:
+        if inner.entries:
+            yield inner
+        yield from _blocks_below(inner)
+
+
+def _fit(block: Section, n: int, column: int) -> bool:
+    """Whether all indices of m1 lie within the block, the column standing at that place."""
+    columns = integer(block, "ncol")
+    return all(
+        len(e.index) == 3 and e.index[column] < columns and e.index[3 - column] < n
+        for e in block.entries
+        if e.matrix == "m1"
+    )
 
 
 # ---- Taylor blocks ------------------------------------------------------------------------------------------------
@@ -179,7 +211,8 @@ def _head(section: Section, rows: int, columns: int, n: int) -> tuple[int, int]:
 def _check_entry(section: Section, entry: Entry, order: int, structure: int) -> None:
     if entry.matrix == "m1" and order == 0:
         raise InputError(f"line {entry.line}: {_named(entry)} in {section}, whose order is 0")
-    if entry.matrix == "m0" and structure in (0, 4):
+    implied = float(structure == 4 and len(set(entry.index)) == 1)
+    if entry.matrix == "m0" and structure in (0, 4) and abs(entry.value - implied) > IDENTITY_TOLERANCE:
         kind = "zero" if structure == 0 else "unit"
         raise InputError(f"line {entry.line}: {_named(entry)} in {section}, whose structure {structure} says {kind}")
     if entry.matrix == "m0" and structure == 1 and len(set(entry.index)) > 1:

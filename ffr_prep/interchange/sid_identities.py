@@ -10,16 +10,17 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from ffr_prep.body import axial
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-from ffr_prep.interchange.common_format import IDENTITY_TOLERANCE, Bounds, hold, relative
+from ffr_prep.interchange.common_format import IDENTITY_TOLERANCE, Bounds, from_parts, hold, relative
 from ffr_prep.interchange.sid_blocks import Taylor
-from ffr_prep.model.invariants import skew
+from ffr_prep.model.invariants import from_inertia, skew
 
 Layout = Literal["mode-major", "axis-major"]
 
 J_ORDER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+# The products of the angular velocity that the columns of Oe belong to, among the loads of `FlexibleBody.stiffening`.
+PRODUCTS = [6, 7, 8, 9, 11, 10]
 OE_ORDER = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 
 
@@ -65,18 +66,21 @@ def of_mass(Cr1: Array) -> Array:
 # ---- what repeats and what is lost --------------------------------------------------------------------------------
 
 
-def check_repeated(P_dm: Array, rP_dm: Array, found: Mapping[str, Taylor], limit: Bounds) -> dict[str, str]:
-    """The layouts of Gr and Ge. Raises InputError where blocks that repeat each other differ."""
+def check_repeated(found: Mapping[str, Taylor], limit: Bounds) -> dict[str, str]:
+    """The layouts of Gr and Ge, which may repeat all of Cr.m1 or its part of the mass. Raises InputError where blocks that
+    repeat each other differ."""
+    J1 = tensor(found["J"].m1[:, :, 0])
+    P_dm, rP_dm = found["mdCM"].m1[:, :, 0], from_parts(from_inertia(J1), found["Cr"].m0.T)
     hold("Ct = transpose of mdCM.m1", found["Ct"].m0 - P_dm.T, limit.first[:, None])
     hold("Oe.m0 = centrifugal forces from J.m1", found["Oe"].m0 - centrifugal(rP_dm).T, limit.second[:, None])
-    J1 = tensor(found["J"].m1[:, :, 0])
-    twice = 2 * of_mass(found["Cr"].m1)
+    Cr1 = found["Cr"].m1
 
     def of_Gr(Gr: Array) -> float:
         return relative(Gr + Gr.transpose(2, 1, 0) - 2 * J1.transpose(0, 2, 1), limit.second[:, None])
 
     def of_Ge(Ge: Array) -> float:
-        return relative(Ge - twice, limit.third[:, :, None])
+        off = [relative(Ge - 2 * part, limit.third[:, :, None]) for part in (Cr1, of_mass(Cr1))]
+        return min(off)
 
     Gr = {layout: of_Gr(taken_apart(found["Gr"].m0, layout)) for layout in get_args(Layout)}
     Ge = {layout: of_Ge(taken_apart(found["Ge"].m0, layout)) for layout in get_args(Layout)}
@@ -91,27 +95,37 @@ def _fitting(identity: str, residuals: Mapping[str, float]) -> str:
     return best
 
 
-def of_accelerations(found: Mapping[str, Taylor]) -> Array:
+def of_accelerations(found: Mapping[str, Taylor], layout: Mapping[str, str], limit: Bounds) -> tuple[Array, list[str]]:
     """(6, n, n) geometric stiffness of the acceleration and the angular acceleration: Ct.m1, and what is symmetric in
-    the modes of Cr.m1."""
-    Cr1 = found["Cr"].m1
-    return np.concatenate([found["Ct"].m1.transpose(2, 0, 1), (Cr1 - of_mass(Cr1)).transpose(2, 0, 1)])
+    the modes of Cr.m1; and a warning where that is none.
+
+    FEMBS repeats all of Cr.m1 in Ge, where no stiffness belongs, in files that have none of accelerations either: its
+    symmetric part is then what lumping the mass has left.
+    """
+    Ct1, Cr1, Ge = found["Ct"].m1, found["Cr"].m1, taken_apart(found["Ge"].m0, layout["Ge"])
+    symmetric, bound = Cr1 - of_mass(Cr1), limit.third[:, :, None]
+    size, warnings = relative(symmetric, bound), []
+    repeated = relative(Ge - 2 * Cr1, bound) <= IDENTITY_TOLERANCE
+    if size > IDENTITY_TOLERANCE and repeated and not Ct1.any():
+        symmetric = np.zeros_like(Cr1)
+        warnings = [
+            f"dropped: the part of Cr.m1 that is symmetric in the modes ({size:.1e}, relative); Ge repeats it, so it is no "
+            "geometric stiffness, and no mass has it"
+        ]
+    return np.concatenate([Ct1.transpose(2, 0, 1), symmetric.transpose(2, 0, 1)]), warnings
 
 
 def lost_blocks(found: Mapping[str, Taylor]) -> list[str]:
-    """Warnings of what a body cannot hold: prestress, damping, higher orders."""
-    lost = []
-    for name, what in (("ksigma", "the prestress forces"), ("De", "the modal damping")):
-        if found[name].m0.any():
-            lost.append(f"dropped: {what} {name}")
+    """Warnings of what a body cannot hold: prestress, higher orders."""
+    lost = ["dropped: the prestress forces ksigma"] if found["ksigma"].m0.any() else []
     higher = [name for name in ("Me", "Gr", "Ge", "ksigma", "Ke", "De") if found[name].m1.any()]
     return [*lost, f"dropped: the terms of order 1 of {', '.join(higher)}"] if higher else lost
 
 
-def lumped_mass(rP_dm: Array, found: Mapping[str, Taylor], layout: Mapping[str, str], limit: Bounds) -> list[str]:
+def lumped_mass(found: Mapping[str, Taylor], layout: Mapping[str, str], limit: Bounds) -> list[str]:
     """A consistent mass has Gr_l - transpose = -2 skew(Cr_l); rotary inertia of nodes is in Cr only."""
     Gr = taken_apart(found["Gr"].m0, layout["Gr"])
-    off = relative(Gr - Gr.transpose(2, 1, 0) + 2 * skew(axial(rP_dm)).transpose(0, 2, 1), limit.second[:, None])
+    off = relative(Gr - Gr.transpose(2, 1, 0) + 2 * skew(found["Cr"].m0.T).transpose(0, 2, 1), limit.second[:, None])
     if off <= IDENTITY_TOLERANCE:
         return []
     return [f"lumped mass: the identity antisym(Gr_l) = -skew(Cr_l) fails by {off:.1e} (relative); Cr was taken"]

@@ -49,8 +49,8 @@ def _check_translations(model: MatrixModel) -> None:
 
 
 def check_symmetric(model: MatrixModel) -> None:
-    """Raises InputError where K or M is not symmetric."""
-    for name, A in (("K", model.K), ("M", model.M)):
+    """Raises InputError where K, M or C is not symmetric."""
+    for name, A in model.matrices.items():
         _check_symmetric(model, name, A)
 
 

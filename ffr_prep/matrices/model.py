@@ -45,6 +45,7 @@ class MatrixModel(Brief):
     triangles  : (T, 3) indices of nodes, a surface to draw; None without one
     source     : where it comes from, plain JSON values
     notes      : what was left out or changed on reading, in words
+    C          : (D, D) viscous damping [N s/m, N s, N m s], symmetric; None where there is none
 
     Raises InputError when sizes, rows and nodes do not fit each other.
     """
@@ -59,6 +60,7 @@ class MatrixModel(Brief):
     triangles: Array | None = None
     source: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    C: sp.csr_array | None = None
 
     def __post_init__(self) -> None:
         for key, kind in (("points", float), ("nodes", np.int64), ("components", np.int64)):
@@ -68,6 +70,8 @@ class MatrixModel(Brief):
         object.__setattr__(self, "labels", labels)
         for key in ("K", "M"):
             object.__setattr__(self, key, _real(key, sp.csr_array(getattr(self, key))))
+        if self.C is not None:
+            object.__setattr__(self, "C", _real("C", sp.csr_array(self.C)))
         object.__setattr__(self, "groups", {name: np.array(of, np.int64) for name, of in self.groups.items()})
         if self.triangles is not None:
             object.__setattr__(self, "triangles", np.array(self.triangles, np.int64).reshape(-1, 3))
@@ -83,6 +87,12 @@ class MatrixModel(Brief):
             ("source", str(self.source.get("format", "unknown"))),
             ("notes", listed(self.notes)),
         ]
+
+    @property
+    def matrices(self) -> dict[str, sp.csr_array]:
+        """Those that there are, by name."""
+        named = {"K": self.K, "M": self.M}
+        return named if self.C is None else {**named, "C": self.C}
 
     @property
     def dofs(self) -> DofMap:
@@ -129,6 +139,7 @@ def in_si(model: MatrixModel, units: UnitSystem) -> MatrixModel:
         points=model.points * units.length,
         K=sp.csr_array(inertia / units.time**2 * (S @ model.K @ S)),
         M=sp.csr_array(inertia * (S @ model.M @ S)),
+        C=None if model.C is None else sp.csr_array(inertia / units.time * (S @ model.C @ S)),
     )
 
 
@@ -159,6 +170,7 @@ def without_empty_rows(model: MatrixModel) -> MatrixModel:
         triangles=None if model.triangles is None else new[model.triangles],
         source=model.source,
         notes=(*model.notes, *_dropped(model, kept, used)),
+        C=None if model.C is None else sp.csr_array(model.C[kept][:, kept]),
     )
 
 
@@ -216,7 +228,7 @@ def group_nodes(model: MatrixModel, name: str) -> Array:
 
 def _real(name: str, A: sp.csr_array) -> sp.csr_array:
     if np.iscomplexobj(A.data):
-        raise InputError(f"{name} is complex; give its real part: damping belongs to the simulation, not to the body")
+        raise InputError(f"{name} is complex; give its real part: viscous damping is a matrix of its own, C")
     return sp.csr_array(A, dtype=float)
 
 
@@ -227,7 +239,7 @@ def _check_shapes(model: MatrixModel) -> None:
     if model.points.ndim != 2 or model.points.shape[1] != 3:
         raise InputError(f"nodes have the shape {model.points.shape}; they must be (N, 3): x, y, z of every node")
     rows = len(model.nodes)
-    for name, A in (("K", model.K), ("M", model.M)):
+    for name, A in model.matrices.items():
         if A.shape != (rows, rows):
             raise InputError(
                 f"{name} is {A.shape[0]} x {A.shape[1]}, but the table of nodal coordinates has {rows} rows: both must "

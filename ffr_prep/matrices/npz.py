@@ -5,6 +5,7 @@ points      (N, 3) their coordinates
 dofs        (D, 2) number of the node and component 1 ... 6 of each row
 K, M        (D, D) dense; or sparse as scipy.sparse.save_npz stores it, under K/data, K/indices, K/indptr, K/shape,
             K/format ("csr" or "csc"), or K/data, K/row, K/col, K/shape for "coo"; the same for M
+C           (D, D) viscous damping, likewise; optional
 group/NAME  (m,)   numbers of the nodes of a group; optional
 triangles   (T, 3) numbers of nodes, a surface to draw; optional
 units       text   such as "mm-t-s"; optional
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +26,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.stored_arrays import read_arrays
 from ffr_prep.matrices.model import MatrixModel
-from ffr_prep.matrices.node_table import NodeTable, model_of
+from ffr_prep.matrices.node_table import NodeTable, mirrored, model_of
 
 _GROUP = "group/"
 
@@ -45,7 +47,11 @@ def from_npz(path: Path) -> MatrixModel:
         triangles=arrays.get("triangles"),
     )
     source = {"format": "npz"} | ({"units": str(arrays["units"])} if "units" in arrays else {})
-    return model_of(path, table, rows, _matrix(path, arrays, "K"), _matrix(path, arrays, "M"), source)
+    model = model_of(path, table, rows, _matrix(path, arrays, "K"), _matrix(path, arrays, "M"), source)
+    if not any(key == "C" or key.startswith("C/") for key in arrays):
+        return model
+    C, notes = mirrored("C", _matrix(path, arrays, "C"))
+    return replace(model, C=C, notes=(*model.notes, *notes))
 
 
 def save_matrices(model: MatrixModel, path: str | Path) -> Path:
@@ -58,7 +64,7 @@ def save_matrices(model: MatrixModel, path: str | Path) -> Path:
         "units": np.array("m-kg-s"),
         **{_GROUP + name: model.labels[of] for name, of in model.groups.items()},
     }
-    for name, A in (("K", model.K), ("M", model.M)):
+    for name, A in model.matrices.items():
         parts = {"data": A.data, "indices": A.indices, "indptr": A.indptr, "shape": A.shape, "format": "csr"}
         arrays |= {f"{name}/{key}": np.array(part) for key, part in parts.items()}
     if model.triangles is not None:

@@ -27,7 +27,7 @@ from ffr_prep.matrices.checks import (
 )
 from ffr_prep.matrices.interfaces import couple_matrices, tie_matrices
 from ffr_prep.matrices.model import MatrixModel, model_hash, without_empty_rows
-from ffr_prep.matrices.nodal_inertia import nodal_integrals, scalar_integrals, scalar_mass
+from ffr_prep.matrices.nodal_inertia import nodal_integrals, rigid_motions, scalar_integrals, scalar_mass
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.invariants import InertiaIntegrals
 from ffr_prep.model.model import Model
@@ -83,11 +83,16 @@ def from_matrices(
                 "mass": "general, by rigid motions of the nodes" if m is None else "one scalar mass for x, y and z",
             },
             "interfaces": [described(interface) for interface in interfaces],
-            "notes": [*model.notes, "matrices from outside do not tell their stresses: the body is linear"],
+            "notes": [
+                *model.notes,
+                "matrices from outside do not tell their stresses: the body is linear",
+                *_damping_notes(model),
+            ],
             "warnings": precision_warnings(model),
         },
         packages=("ffr", "numpy", "scipy"),
         doubts=doubts,
+        damping=lambda basis: _damping(model, ties @ basis),
         massless=mass_is_singular(model),
         unstressed=True,
         diagnose=lambda: check_mechanisms(model, coupled, ties),
@@ -100,6 +105,22 @@ def surface_of_nodes(model: MatrixModel, Phi: Array) -> Surface | None:
         return None
     used, triangles = np.unique(model.triangles, return_inverse=True)
     return Surface(model.points[used], triangles.reshape(-1, 3), model.dofs.on_nodes(Phi)[used, :3])
+
+
+def _damping(model: MatrixModel, Phi: Array) -> Array | None:
+    if model.C is None:
+        return None
+    D = Phi.T @ (model.C @ Phi)
+    return np.asarray(0.5 * (D + D.T))
+
+
+def _damping_notes(model: MatrixModel) -> list[str]:
+    """Where C damps rigid motion, which no body does: its frame is moved by joints and forces alone."""
+    if model.C is None:
+        return []
+    rigid = rigid_motions(model.points, model.dofs)
+    of_rigid, of_all = abs(model.C @ rigid).max(), abs(model.C).max() * abs(rigid).max()
+    return ["C damps rigid motions too; of a body what deforms it is damped"] if of_rigid > 1e-9 * of_all else []
 
 
 def _doubts(defect: Array) -> list[str]:

@@ -80,7 +80,7 @@ def nodes_from_abaqus(path: Path) -> tuple[Array, Array, dict[str, Array]]:
 def _deck(path: Path, readers: Mapping[str, Callable[[_Deck, Mapping[str, str], list[Row]], None]]) -> _Deck:
     deck = _Deck()
     try:
-        for keyword, parameters, rows in _sections(path):
+        for keyword, parameters, rows in keyword_sections(path):
             if keyword in readers:
                 readers[keyword](deck, parameters, rows)
     except (ValueError, KeyError, IndexError, UnicodeDecodeError) as error:
@@ -93,7 +93,7 @@ def _deck(path: Path, readers: Mapping[str, Callable[[_Deck, Mapping[str, str], 
 # ---- reading ------------------------------------------------------------------------------------------------------
 
 
-def _sections(path: Path, above: tuple[Path, ...] = ()) -> Iterator[tuple[str, dict[str, str], list[Row]]]:
+def keyword_sections(path: Path, above: tuple[Path, ...] = ()) -> Iterator[tuple[str, dict[str, str], list[Row]]]:
     """Keyword, parameters (in upper case, values as written) and data rows, through included files."""
     if path.resolve() in above:
         raise InputError(f"it includes itself: {' -> '.join(one.name for one in (*above, path))}")
@@ -103,7 +103,7 @@ def _sections(path: Path, above: tuple[Path, ...] = ()) -> Iterator[tuple[str, d
         pairs = (setting.partition("=") for setting in settings)
         parameters = {name.strip().upper(): value.strip().strip('"') for name, _, value in pairs}
         if keyword.upper() == "INCLUDE":
-            yield from _sections(path.parent / parameters["INPUT"], (*above, path.resolve()))
+            yield from keyword_sections(path.parent / parameters["INPUT"], (*above, path.resolve()))
         else:
             yield keyword.upper(), parameters, [_row(line) for line in data.splitlines() if line.strip()]
 
@@ -121,7 +121,7 @@ def _read_nodes(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) -> 
     for number, *coordinates in rows:
         if int(number) in deck.nodes:
             raise InputError(f"node {number} is defined twice; write each part to a file of its own")
-        xyz = [float(x or 0) for x in coordinates[:3]]
+        xyz = [float(x.replace("D", "E").replace("d", "e") or 0) for x in coordinates[:3]]
         deck.nodes[int(number)] = xyz + [0.0] * (3 - len(xyz))
     if "NSET" in parameters:
         _extend(deck, deck.node_sets, parameters["NSET"], [row[0] for row in rows])

@@ -38,7 +38,7 @@ MESH_FORMATS: Registry[MeshFormat] = Registry(
     (
         MeshFormat(
             "meshio",
-            "Nastran (.bdf), VTK (.vtu) and whatever else meshio reads",
+            "VTK (.vtu) and whatever else meshio reads",
             "ffr_prep.mesh.meshio_files:from_meshio",
             (_ANY,),
         ),
@@ -47,6 +47,18 @@ MESH_FORMATS: Registry[MeshFormat] = Registry(
             ".inp: input files, of CalculiX as well",
             "ffr_prep.mesh.abaqus:from_abaqus",
             (".inp",),
+        ),
+        MeshFormat(
+            "Nastran",
+            ".bdf, .nas, .fem: bulk data in small, large or free fields",
+            "ffr_prep.mesh.nastran:from_nastran",
+            (".bdf", ".nas", ".fem"),
+        ),
+        MeshFormat(
+            "CalculiX results",
+            ".frd: the mesh of a file of results",
+            "ffr_prep.mesh.frd:from_frd",
+            (".frd",),
         ),
         MeshFormat(
             "gmsh",

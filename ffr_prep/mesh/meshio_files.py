@@ -1,11 +1,9 @@
-"""Meshes of other programs (Nastran, VTK, ...) that meshio reads, brought to plain arrays."""
+"""Meshes of other programs (VTK, ...) that meshio reads, brought to plain arrays."""
 
 from __future__ import annotations
 
 import contextlib
 import io
-import re
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -14,14 +12,12 @@ import numpy as np
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.reading import read_text
 from ffr_prep.mesh.file_mesh import FileMesh, supported_kind
 
 _VOLUMES = {"tetra": "tet4", "tetra10": "tet10", "hexahedron": "hex8", "hexahedron20": "hex20", "hexahedron27": "hex27"}
 _FACES = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4, "quad9": 4}
-_NASTRAN = (".bdf", ".nas", ".fem")
 _MOST_TAGS = 100
-_NO_NODE_TAGS = ("nastran:ref", "gmsh:dim_tags")
+_NO_NODE_TAGS = ("gmsh:dim_tags",)
 
 Groups = Mapping[str, Sequence[Array]]
 
@@ -29,7 +25,6 @@ Groups = Mapping[str, Sequence[Array]]
 def from_meshio(path: Path) -> FileMesh:
     """The mesh that meshio reads. Raises InputError for a file that it cannot read and for other element kinds."""
     read = _read(path)
-    _check_coordinate_systems(path, read)
     volumes = [k for k, block in enumerate(read.cells) if block.dim == 3]
     faces = [k for k, block in enumerate(read.cells) if block.type in _FACES]
     groups = dict(_cell_sets(path, read)) | dict(_tagged_cells(read))
@@ -47,29 +42,10 @@ def _read(path: Path) -> meshio.Mesh:
     """meshio's readers raise whatever comes, exit, and write to the terminal."""
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as said:
         try:
-            return _read_bulk_data(path) if path.suffix.lower() in _NASTRAN else meshio.read(path)
+            return meshio.read(path)
         except (Exception, SystemExit) as error:
             words = " ".join([f"{type(error).__name__}: {error}", *said.getvalue().split()])
     raise InputError(f"cannot read {path} as a mesh ({words}); is it complete, and does its ending name its format?")
-
-
-def _read_bulk_data(path: Path) -> meshio.Mesh:
-    """A Nastran file; the lines around the bulk data that meshio wants are ones that many programs leave out."""
-    text = read_text(path, "Nastran bulk data")
-    before = "" if re.search(r"^\s*BEGIN\s+BULK", text, re.MULTILINE) else "BEGIN BULK\n"
-    with tempfile.TemporaryDirectory(prefix="ffr-nastran-") as folder:
-        complete = Path(folder, "complete.bdf")
-        complete.write_text(before + text + "\nENDDATA\n")
-        return meshio.read(complete)
-
-
-def _check_coordinate_systems(path: Path, read: meshio.Mesh) -> None:
-    systems = np.unique(read.point_data.get("nastran:ref", [0]))
-    if systems.any():
-        raise InputError(
-            f"{path}: GRID points refer to coordinate system {systems[systems != 0][0]}; write the file with all "
-            "points in the basic coordinate system"
-        )
 
 
 def _in_space(path: Path, points: Array) -> Array:
@@ -102,7 +78,7 @@ def _cell_sets(path: Path, read: meshio.Mesh) -> Iterator[tuple[str, Sequence[Ar
 
 
 def _tagged_cells(read: meshio.Mesh) -> Iterator[tuple[str, Sequence[Array]]]:
-    """Groups by integer tags of cells, such as the property numbers of Nastran; many values are a numbering instead."""
+    """Groups by integer tags of cells; many values are a numbering instead."""
     for key, blocks in read.cell_data.items():
         tags = [np.asarray(tag) for tag in blocks]
         for value in _tag_values(tags):
@@ -126,7 +102,7 @@ def _tag_values(tags: Sequence[Array]) -> list[int]:
 
 
 def _short(key: str) -> str:
-    return "property" if key == "nastran:ref" else key.rpartition(":")[2]
+    return key.rpartition(":")[2]
 
 
 def _volume_groups(read: meshio.Mesh, volumes: Sequence[int], groups: Groups) -> dict[str, Array]:

@@ -32,6 +32,7 @@ class Model(Brief):
     record     : what the model is; JSON values
     packages   : whose versions are recorded
     doubts     : what the integrals of a basis (Z, n) cannot be trusted with, in words
+    damping    : (n, n) damping matrix of a basis (Z, n); None where the model has none
     massless   : some coordinates have no mass
     unstressed : stresses are not known, and with them neither `stiffening` nor `second`: the body is linear
     diagnose   : called when a computation has failed; raises InputError where the model is found to be the cause
@@ -48,6 +49,7 @@ class Model(Brief):
     record: Mapping[str, Any]
     packages: tuple[str, ...] = ("ffr", "numpy", "scipy", "scikit-fem")
     doubts: Callable[[Array], list[str]] = lambda _: []
+    damping: Callable[[Array], Array | None] = lambda _: None
     massless: bool = False
     unstressed: bool = False
     diagnose: Callable[[], None] = lambda: None

@@ -157,6 +157,7 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
         surface=surface,
         stiffening=stiffening,
         provenance=completed(record(model, request, model.doubts(basis.Z)), basis, assessed),
+        damping=model.damping(basis.Z),
         **vars(integrals),
     )
     return _with_held_body(made, model, body, progress)

@@ -62,9 +62,6 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
     rows = np.split(np.arange(X.shape[0]), np.cumsum([m.coupled.K.shape[0] for m in models])[:-1])
     own = [X[of] for of in rows]
 
-    def surfaces(basis: Array) -> Surface | None:
-        return merged([m.surface(x @ basis) for m, x in zip(models, own, strict=True)])
-
     def stressed(basis: Array) -> Surface | None:
         return merged([m.stressed(x @ basis) for m, x in zip(models, own, strict=True)])
 
@@ -93,7 +90,7 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
     return Model(
         coupled=coupled,
         inertia=inertia,
-        surface=surfaces,
+        surface=lambda basis: merged([m.surface(x @ basis) for m, x in zip(models, own, strict=True)]),
         stressed=stressed,
         stiffening=stiffening,
         second=second,
@@ -104,8 +101,14 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
             "warnings": [f"{name}: {w}" for name, part in parts.items() for w in part.record.get("warnings", [])],
         },
         doubts=doubts,
+        damping=lambda basis: _damping(models, [x @ basis for x in own]),
         unstressed=any(m.unstressed for m in models),
     )
+
+
+def _damping(models: Sequence[Model], bases: Sequence[Array]) -> Array | None:
+    found = [D for m, basis in zip(models, bases, strict=True) if (D := m.damping(basis)) is not None]
+    return np.sum(found, axis=0) if found else None
 
 
 # ---- loads that pass through ties ---------------------------------------------------------------------------------

@@ -197,6 +197,18 @@ def heavy(share: float) -> Scene:
     return Scene((Body("body", replace(model, P_dm=P_dm, rP_dm=rP_dm)),), plane="none")
 
 
+def shrinking(q: float) -> Scene:
+    """A body whose moments of inertia fall with its elastic coordinate, beyond what a mass can do."""
+    model = cloud(1)
+    model = replace(model, rP_dm=model.rP_dm + 10.0 * np.eye(3)[:, :, None])
+    return Scene((Body("body", model, q=(q,)),), plane="none")
+
+
+def flat(plane: str) -> Scene:
+    """A planar model in a scene of a plane or in space."""
+    return replace(HINGED, bodies=(Body("bar", replace(bar("bar"), provenance={"plane": "z"})),), plane=plane)
+
+
 def locking(speed: float, end: float) -> Callable[..., Result]:
     """The slider is pushed towards its outer dead point r + l = 0.9, 0.1 m away."""
     start = 0.2 * np.cos(0.3) + np.sqrt(0.49 - (0.2 * np.sin(0.3)) ** 2)
@@ -283,6 +295,8 @@ RUNS = [
     ),
     Case(lambda: run(rubbing(1e4), ROS2(1e-2), 5.0, 5.0), p(run, rubbing(1e4), ROS2(5e-5), 0.01, 0.01)),
     Case(lambda: assembly(heavy(0.0)), p(assembly, heavy(0.1))),
+    Case(lambda: run(shrinking(-0.2)), p(run, shrinking(0.0))),
+    Case(lambda: assembly(flat("none")), p(assembly, flat("z"))),
     Case(lambda: run(replace(CLOUD, springs=(FAR,))), p(run, replace(CLOUD, springs=(FAR,)), ROS2(1e-8), 1e-7, 1e-8)),
     Case(locking(0.1, 0.5), locking(0.1, 0.1)),
     Case(p(pole, 0.6), p(pole, 0.3)),

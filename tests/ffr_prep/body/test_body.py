@@ -152,7 +152,7 @@ def rewritten(path, change):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda meta, arrays: meta.update(format_version=99), "format 99; this program reads up to 3: update"),
+        (lambda meta, arrays: meta.update(format_version=99), "format 99; this program reads up to 4: update"),
         (lambda meta, arrays: arrays.pop("PP_dm"), "damaged.*'PP_dm'"),
         (lambda meta, arrays: meta.pop("name"), "damaged.*'name'"),
         (lambda meta, arrays: arrays.update(r_dm=np.zeros(4)), r"r_dm has shape \(4,\), not \(3,\)"),

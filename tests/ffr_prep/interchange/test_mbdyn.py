@@ -204,7 +204,7 @@ def test_the_records_of_a_reduced_mesh_repeat_each_other(tmp_path, beam):
 
 def test_lumped_masses_have_the_integrals_of_the_body(tmp_path):
     body = cloud(4)
-    found = parsed(write_fem(body, tmp_path / "b.fem", surface=True))
+    found = parsed(write_fem(body, tmp_path / "b.fem", kind="legacy", surface=True))
     assert tuple(found) == LEGACY
     masses = found[11].reshape(-1, 6)
     assert masses.min() >= 0
@@ -243,10 +243,10 @@ def test_a_reduced_mesh_comes_back(tmp_path, beam):
 
 
 def test_a_legacy_file_comes_back_as_near_as_its_masses_allow(tmp_path):
-    exact = read_fem(write_fem(cloud(4), tmp_path / "1.fem", surface=True))
+    exact = read_fem(write_fem(cloud(4), tmp_path / "1.fem", kind="legacy", surface=True))
     assert_same(exact, cloud(4), 1e-9)
     body = beam_with(MeanAxis(), Eigenmodes(4))
-    near = read_fem(write_fem(body, tmp_path / "2.fem", surface=True))
+    near = read_fem(write_fem(body, tmp_path / "2.fem", kind="legacy", surface=True))
     for key, scale in (("P_dm", body.mass), ("rP_dm", np.trace(body.rr_dm)), ("PP_dm", 1.0)):
         np.testing.assert_allclose(getattr(near, key), getattr(body, key), rtol=0, atol=0.02 * np.sqrt(scale))
     np.testing.assert_allclose(near.rr_dm, body.rr_dm, rtol=1e-12)
@@ -312,8 +312,8 @@ def test_what_is_lost_is_said(tmp_path):
     assert [re.findall(r"record \d+", warning)[0] for warning in body.provenance["warnings"]] == [
         "record 3",
         "record 4",
-        "record 13",
     ]
+    np.testing.assert_allclose(body.damping, np.eye(2), atol=1e-12)
     zeros = {3: np.zeros(2), 4: np.zeros(2), 13: np.zeros((2, 2))}
     quiet = read_fem(foreign(tmp_path / "b.fem", given, (*OWN, 3, 4, 11, 13), changes=zeros))
     assert quiet.provenance["warnings"] == []
@@ -556,7 +556,7 @@ def test_the_writer_refuses_and_leaves_files_alone(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="kind 'new' is not known"):
         write_fem(body, path, kind="new")
     with pytest.raises(InputError, match=r"masses at the 3 nodes miss its inertia integrals by .*surface points"):
-        write_fem(body, path)
+        write_fem(body, path, kind="legacy")
     with pytest.raises(InputError, match="has no surface to export"):
         write_fem(replace(body, surface=None), path, surface=True)
     with pytest.raises(InputError, match="neither interfaces nor surface points"):
@@ -564,7 +564,7 @@ def test_the_writer_refuses_and_leaves_files_alone(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(ffr_prep.interchange.common_format, "MANY_MOMENTS", 100)
         with pytest.raises(InputError, match="15 nodes with 4 modes are too many to lump the mass at"):
-            write_fem(body, path, surface=True)
+            write_fem(body, path, kind="legacy", surface=True)
 
     def failing(rows, target):
         raise RuntimeError("too many iterations")
@@ -572,7 +572,7 @@ def test_the_writer_refuses_and_leaves_files_alone(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(scipy.optimize, "nnls", failing)
         with pytest.raises(ComputationError, match="nodal masses: too many iterations"):
-            write_fem(body, path, surface=True)
+            write_fem(body, path, kind="legacy", surface=True)
     assert path.read_text() == "precious"
     assert list(tmp_path.iterdir()) == [path]
 
@@ -582,11 +582,32 @@ def test_the_writer_refuses_and_leaves_files_alone(tmp_path, monkeypatch):
 
 def test_export_and_import_commands(tmp_path, capsys):
     source, out = save_body(cloud(3), tmp_path / "b.ffr"), tmp_path / "c.ffr"
-    for options in (["--kind", "full"], ["--surface"]):
+    for options in ([], ["--kind", "full"], ["--kind", "legacy", "--surface"]):
         main(["export", str(source), "-o", str(tmp_path / "b.fem"), *options])
         main(["import", str(tmp_path / "b.fem"), "-o", str(out)])
         assert_same(load_body(out), cloud(3), 1e-9)
     with pytest.raises(SystemExit) as left:
-        main(["export", str(source), "-o", str(tmp_path / "b.fem")])
+        main(["export", str(source), "-o", str(tmp_path / "b.fem"), "--kind", "legacy"])
     assert left.value.code == 2
     assert "miss its inertia integrals" in capsys.readouterr().err
+
+
+# ---- bodies without mass ------------------------------------------------------------------------------------------
+
+
+def test_a_body_of_modal_mass_alone_gets_one_that_changes_nothing_where_it_is_held(tmp_path):
+    given = orthonormal(field(3))
+    none = {11: np.zeros((9, 6)), 12: np.zeros(13), **{k: np.zeros_like(v) for k, v in sums(given).items()}}
+    body = read_fem(foreign(tmp_path / "b.fem", given, (*OWN, 11), changes=none))
+    assert "the file has no mass" in body.provenance["warnings"][0]
+    np.testing.assert_allclose(body.omega2, np.diag(given.K), rtol=1e-9)
+    np.testing.assert_array_equal(body.P_dm, 0.0)
+    assert body.mass > 0
+
+
+def test_modes_without_mass_are_refused_with_the_reason(tmp_path):
+    given = orthonormal(field(3))
+    with pytest.raises(InputError, match=r"modal mass of mode 1 is 0; .*static elements are not computed.*bushing"):
+        read_fem(foreign(tmp_path / "b.fem", given, (*OWN, 11), changes={9: np.zeros((3, 3))}))
+    with pytest.raises(InputError, match="the mass is 0 kg"):
+        read_fem(foreign(tmp_path / "c.fem", given, (*OWN, 11), changes={9: np.zeros((3, 3)), 11: np.zeros((9, 6))}))

@@ -1,0 +1,41 @@
+"""What bodies must have to move: inertia against every rigid motion that the scene leaves them.
+
+Bodies from files of other programs may lack it (`ffr_prep.body.immovable`), or have it in one plane alone.
+"""
+
+from __future__ import annotations
+
+from ffr_dyn.equations.layout import layout
+from ffr_dyn.scene.scene import Body, Scene, body_normal
+from ffr_prep.body import immovable
+from ffr_prep.common.errors import InputError
+
+_AXES = "xyz"
+
+
+def require_inertia(scene: Scene) -> None:
+    """InputError for a body without inertia against a motion that it has in a scene whose plane is decided."""
+    place = layout(scene)
+    for b, body in enumerate(scene.bodies):
+        _require_plane(scene, body)
+        if body.dropped:  # `ffr_dyn.consistency.dropped_terms` looks at these
+            continue
+        if motion := immovable(body.model, place.active(b)):
+            raise InputError(
+                f"body {body.name!r} cannot move: it has no inertia left for {motion}; give it mass and inertia about all "
+                "axes, keep fewer modes, or, where it is held fixed, import it with --held"
+            )
+
+
+def _require_plane(scene: Scene, body: Body) -> None:
+    """A planar model moves in its plane."""
+    plane = body.model.provenance.get("plane")
+    if plane not in tuple(_AXES):
+        return
+    normal = body_normal(body, _AXES.index(scene.plane)) if scene.plane in tuple(_AXES) else -1
+    if normal != _AXES.index(plane):
+        raise InputError(
+            f"body {body.name!r} is a planar model, with inertia about its axis {plane} alone, but the scene is computed "
+            f'{"in space" if scene.plane == "none" else f"in the plane {scene.plane}"}: declare plane = "{plane}", or take a '
+            "model in space"
+        )

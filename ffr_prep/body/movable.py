@@ -1,0 +1,54 @@
+"""Whether a body can move: what its modes leave of the inertia against rigid motion.
+
+With the modes free to move, rigid motions have the inertia M_rr - M_rf M_fr (Phi is mass-orthonormal). No motion of a real
+mass makes that zero or negative; integrals of files that lump masses, or leave parts of them out, can.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ffr_prep.body.frame_change import mass_of_motions
+from ffr_prep.body.reduced import FlexibleBody
+from ffr_prep.common.arrays import Array
+
+_NOTHING = 1e-12
+_MOTIONS = (
+    "moving along x",
+    "moving along y",
+    "moving along z",
+    "turning about x",
+    "turning about y",
+    "turning about z",
+)
+
+
+def immovable(body: FlexibleBody, active: Sequence[int] = range(6)) -> str:
+    """The rigid motion that a body has no inertia left for, and why, in words; "" where it can move.
+
+    active : the rigid motions that are free: 0 to 2 translations, 3 to 5 rotations, in body axes
+
+    >>> immovable(rod)
+    'turning about x: it has none'
+    """
+    M, rigid = mass_of_motions(body), list(active)
+    own, coupled = M[np.ix_(rigid, rigid)], M[np.ix_(rigid, range(6, 6 + body.n))]
+    reach = np.sqrt(max(np.trace(body.rr_dm), 0.0)) or np.sqrt(body.mass)
+    scale = np.where(np.array(rigid) < 3, np.sqrt(body.mass), reach)
+    scaled = own / np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(scaled)
+    if values[0] <= _NOTHING:
+        return f"{_MOTIONS[rigid[int(np.abs(vectors[:, 0]).argmax())]]}: it has none"
+    root = np.linalg.cholesky(scaled)
+    taken, ways = np.linalg.eigh(_squared(np.linalg.solve(root, coupled / scale[:, None])))
+    if taken[-1] < 1 - _NOTHING:
+        return ""
+    worst = np.linalg.solve(root.T, ways[:, -1])
+    motion = _MOTIONS[rigid[int(np.abs(worst).argmax())]]
+    return f"{motion}: its modes take up {taken[-1]:.3g} times what the mass gives"
+
+
+def _squared(A: Array) -> Array:
+    return A @ A.T

@@ -1,0 +1,115 @@
+"""Nastran bulk data taken apart into cards: small, large and free fields, mixed as they come, with any continuation.
+
+A card is a name and its fields; a field is a text, "" where it is blank. Small fields are ten of eight columns, large ones (a
+name with *) six of which four have sixteen, free ones stand between commas. A line whose first field is blank, or begins with
++ or *, goes on with the card above it; the marks of continuation say nothing more and are passed over.
+
+Source: MSC Nastran Quick Reference Guide, section 5 (format of bulk data entries).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from ffr_prep.common.errors import InputError
+from ffr_prep.common.reading import check_ordinary, read_text
+
+# 1.5, 1.5E3, 1.5D3, 1.5+3; and 15, which a real field may hold as well
+_REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?")
+_BEGIN = re.compile(r"^\s*BEGIN\s*(?:BULK)?\b.*$", re.MULTILINE | re.IGNORECASE)
+_INCLUDE = re.compile(r"\s*INCLUDE\s+'?\"?([^'\"]+)", re.IGNORECASE)
+
+
+@dataclass
+class Card:
+    """A name in capitals, its data fields in turn, and the line on which it begins."""
+
+    name: str
+    fields: list[str]
+    line: int
+
+    def __str__(self) -> str:
+        return f"line {self.line}: {self.name} {self.fields[0] if self.fields else ''}".rstrip()
+
+    def text(self, k: int) -> str:
+        """Field k, counted from 1 behind the name; "" where it is blank or beyond the end."""
+        return self.fields[k - 1] if 0 < k <= len(self.fields) else ""
+
+    def integer(self, k: int, default: int | None = None) -> int:
+        """Field k as a whole number. Raises InputError for anything else."""
+        text = self.text(k)
+        if not text and default is not None:
+            return default
+        if not re.fullmatch(r"[+-]?\d{1,18}", text):
+            raise InputError(f"{self}: field {k + 1} is {text[:40]!r}, where a whole number belongs")
+        return int(text)
+
+    def real(self, k: int, default: float | None = None) -> float:
+        """Field k as a real number, whose exponent may go without its letter. Raises InputError for anything else."""
+        text = self.text(k)
+        if not text and default is not None:
+            return default
+        match = _REAL.fullmatch(text)
+        if match is None:
+            raise InputError(f"{self}: field {k + 1} is {text[:40]!r}, where a number belongs")
+        return float(f"{match[1]}E{match[2] or match[3] or 0}")
+
+
+def cards(path: Path, above: tuple[Path, ...] = ()) -> Iterator[Card]:
+    """The cards of a file, through the files that it includes; control before the bulk data is passed over.
+
+    Raises InputError for a file that cannot be read, includes itself, or begins with a continuation.
+    """
+    text = read_text(path, "Nastran bulk data")
+    bulk = list(_BEGIN.finditer(text))
+    first = text.count("\n", 0, bulk[0].end()) + 1 if bulk else 0
+    card: Card | None = None
+    for number, line in enumerate(text.splitlines()[first:], start=first + 1):
+        plain = line.partition("$")[0].rstrip().expandtabs(8)
+        if not plain:
+            continue
+        if found := _INCLUDE.match(plain):
+            if card:
+                yield card
+            card = None
+            yield from _included(path, found[1].strip(), above)
+            continue
+        if plain.split()[0].upper() == "ENDDATA":
+            break
+        name, fields = _fields(plain)
+        if name[:1] not in ("", "+", "*"):
+            if card:
+                yield card
+            card = Card(name.rstrip("*_").upper(), fields, number)
+        elif card is None:
+            raise InputError(f"{path}: line {number} goes on with a card, but there is none above it")
+        else:
+            card.fields += fields
+    if card:
+        yield card
+
+
+def _included(path: Path, name: str, above: tuple[Path, ...]) -> Iterator[Card]:
+    inner = path.parent / name
+    if inner.resolve() in (*above, path.resolve()):
+        raise InputError(f"{path} includes itself: {' -> '.join(one.name for one in (*above, path, inner))}")
+    check_ordinary(inner, f"bulk data, which {path} includes")
+    yield from cards(inner, (*above, path.resolve()))
+
+
+def _fields(line: str) -> tuple[str, list[str]]:
+    """The first field of a line, and its data fields: four or eight of them, however it is written."""
+    if "," in line:
+        name, *fields = (field.strip() for field in line.split(","))
+        count = 4 if name.endswith("*") or name.startswith("*") else 8
+        return name, _padded(fields[:count], count)
+    name = line[:8].strip()
+    width, count = (16, 4) if name.endswith("*") or name.startswith("*") else (8, 8)
+    return name, _padded([line[8 + width * k : 8 + width * (k + 1)].strip() for k in range(count)], count)
+
+
+def _padded(fields: list[str], count: int) -> list[str]:
+    return [*fields, *[""] * (count - len(fields))]
