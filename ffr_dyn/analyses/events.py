@@ -172,9 +172,8 @@ def _seen(system: System, event: Event) -> _Seen:
         name, at = head, known[head].axes[0].labels.index(label)
     else:
         close = get_close_matches(event.quantity, [*known, *(f"{n}.{c}" for n in known for c in "xyz")], 3)
-        raise InputError(
-            f"event {event.name!r}: {event.quantity!r} is no number of the scene; did you mean {', '.join(close)}?"
-        )
+        hint = f"did you mean {', '.join(close)}?" if close else f"there are: {', '.join(known)}"
+        raise InputError(f"event {event.name!r}: {event.quantity!r} is no number of the scene; {hint}")
     compute = known[name].compute
 
     def values(record: Record, memory: Any) -> tuple[Array, Any]:

@@ -10,15 +10,19 @@ import ast
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import command_cases
+import cost_cases
 import numpy as np
 import pytest
-from ffr_gallery.bodies import bar, pendulum
+import result_cases
+from ffr_gallery.bodies import bar
 from places import ROOT
+from remedy import CLOUD, DOUBLE, DRIVEN, GROUND, HINGED, TURNING, Case, run
 from synthetic import cloud
 from test_analyses_inverse import flexible_arm
 from test_analyses_kinematic import slider_crank
@@ -98,12 +102,6 @@ PARTS = {
 
 # ---- scenes -------------------------------------------------------------------------------------------------------------
 
-GROUND = {"O": (0, 0, 0), "P": (0.9, 0, 0), "Q": (1, 2, 0)}
-HINGED = Scene((Body("bar", bar("bar")),), (Joint("hinge", "revolute", "ground.O", "bar.a"),), ground=GROUND)
-TURNING = replace(HINGED, bodies=(replace(HINGED.bodies[0], omega_bar=(0, 0, 1.0)),))
-DRIVEN = replace(HINGED, drivers=(Driver("d", "hinge", 0.0),))
-DOUBLE = replace(pendulum(bar("upper"), bar("lower")), gravity=(0, -9.81, 0))
-CLOUD = Scene((Body("cloud", cloud(2)),), (Joint("hinge", "revolute", "ground.O", "cloud.a"),), ground=GROUND)
 FAR = SpringDamper("spring", "ground.P", "cloud.b", stiffness=1e14, free_length=2.0)
 FAST = Scene((Body("b", cloud(3, stiffness=1e4)),))
 
@@ -129,12 +127,6 @@ def loaded(name: str) -> Result:
     with TemporaryDirectory() as folder:
         run(HINGED, path=Path(folder) / "run.nc")
         return load_result(Path(folder) / name)
-
-
-def run(
-    scene: Scene, method: object = ROS2(1e-3), end: float = 0.1, output_step: float = 0.01, **more: object
-) -> Result:
-    return integrate(scene, end=end, output_step=output_step, method=method, **more)
 
 
 def pushed(size: float) -> Scene:
@@ -221,14 +213,6 @@ def stepper(**more: object) -> Stepper:
 
 
 # ---- the cases ------------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Case:
-    """What raises a text, and what the text says to do instead."""
-
-    raised: Callable[[], object]
-    mended: Callable[[], object]
 
 
 p = partial
@@ -623,7 +607,7 @@ INPUT = [
     Case(lambda: Adaptation(enter=0.1, leave=0.2), lambda: Adaptation(enter=0.2, leave=0.1)),
     Case(lambda: Adaptation(rows=1), lambda: Adaptation(rows=2)),
 ]
-CASES = RUNS + INPUT
+CASES = RUNS + INPUT + command_cases.CASES + cost_cases.CASES + result_cases.CASES
 
 
 # ---- the texts ------------------------------------------------------------------------------------------------------------
