@@ -15,11 +15,13 @@ from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import analysis_cases
 import command_cases
 import cost_cases
 import numpy as np
 import pytest
 import result_cases
+import scene_cases
 from ffr_gallery.bodies import bar
 from places import ROOT
 from remedy import CLOUD, DOUBLE, DRIVEN, GROUND, HINGED, TURNING, Case, run
@@ -87,7 +89,7 @@ from ffr_dyn.scene.scene import Body, Scene, marker_number
 from ffr_dyn.scene.sensors import Measurement, SectionMeasurement
 from ffr_prep.common.errors import ComputationError, InputError
 
-ERRORS = ("InputError", "ComputationError")
+ERRORS = ("InputError", "ComputationError", "OpenError")
 LEAST = 12  # letters of its own that a text has; one with fewer is made by a function
 
 # What is a part of a message, or one made elsewhere.
@@ -95,7 +97,7 @@ PARTS = {
     "analyses/energy.py": ("_told", "_cause"),
     "analyses/inversion/internal_dynamics.py": ("_unfit",),
     "consistency/explicit_forces.py": ("told",),
-    "consistency/failure.py": ("_overflow", "_unconverged"),
+    "consistency/failure.py": ("_locks", "_overflow", "_unconverged"),
     "consistency/validity.py": ("meaningless",),
     "integrators/stabilisation.py": ("excess_of_gains",),
 }
@@ -607,7 +609,15 @@ INPUT = [
     Case(lambda: Adaptation(enter=0.1, leave=0.2), lambda: Adaptation(enter=0.2, leave=0.1)),
     Case(lambda: Adaptation(rows=1), lambda: Adaptation(rows=2)),
 ]
-CASES = RUNS + INPUT + command_cases.CASES + cost_cases.CASES + result_cases.CASES
+CASES = (
+    RUNS
+    + INPUT
+    + command_cases.CASES
+    + cost_cases.CASES
+    + result_cases.CASES
+    + scene_cases.CASES
+    + analysis_cases.CASES
+)
 
 
 # ---- the texts ------------------------------------------------------------------------------------------------------------

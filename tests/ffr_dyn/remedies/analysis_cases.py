@@ -12,40 +12,45 @@ from unittest.mock import patch
 
 import h5py
 import numpy as np
-from remedy import DRIVEN, GROUND, HINGED, Case, run
+from ffr_gallery.bodies import bar
+from remedy import CLOUD, DOUBLE, DRIVEN, GROUND, HINGED, Case, run
 from synthetic import cloud
 from test_analyses_kinematic import slider_crank
 from test_analyses_mixed import (
-    MOTOR,
     PUSH,
-    TIP,
     bounded,
     cart_with_pendulum,
     cart_with_rod,
-    one_link,
-    rest_to_rest,
     spring_carts,
     two_carts,
 )
 from test_analyses_static import hanging
+from test_assemble import tied
 
 import ffr_dyn as fd
 from ffr_dyn.analyses import run as whole
 from ffr_dyn.analyses.checkpoint import decode, encode
-from ffr_dyn.analyses.inverse import inverse
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.inverse import Dynamic, QuasiStatic, inverse
 from ffr_dyn.analyses.inversion.bounded import Bounded
+from ffr_dyn.analyses.linearise import linearise
 from ffr_dyn.analyses.mixed import Causal, mixed
-from ffr_dyn.analyses.reference import IDA, reference
+from ffr_dyn.analyses.reference import IDA, SciPy, reference
 from ffr_dyn.analyses.settings import MomentSettings, Settings
 from ffr_dyn.analyses.static import static
+from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.consistency.assemble import assemble
+from ffr_dyn.consistency.force_jacobian import force_jacobian
+from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.time_functions import polynomial
-from ffr_dyn.integrators import ROS2
+from ffr_dyn.integrators import RK4, ROS2, DormandPrince, tolerances
+from ffr_dyn.integrators.stabilisation import Drifting
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.drivers import Driver
-from ffr_dyn.scene.forces import JointSpring, Load
+from ffr_dyn.scene.forces import Load
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.variants.variant import vary
 
 p = partial
 
@@ -107,9 +112,15 @@ def turned(speed: float) -> Result:
     return mixed(scene, unknown=(PUSH,), end=0.6, output_step=0.1, solution=Causal(1e-4, growth=1e9))
 
 
-def led(far: float, solution: object) -> Result:
-    tip = replace(TIP, y=rest_to_rest(far, 0.6))
-    return mixed(one_link(tip), unknown=(MOTOR,), end=0.6, output_step=0.05, solution=solution)
+def pulled(speed: float) -> Result:
+    """The slider of a crank of known motion, 0.1 m from its end, with a rod that hangs on it."""
+    base = slider_crank(0.2, 0.7, offset=0.3)
+    end = base.bodies[2].position
+    push = Driver("push", "guide", polynomial(end[0], speed), coordinate="stroke")
+    rod = Body("load", bar("load"), position=end, rotation=(0, 0, -np.pi / 2))
+    hinge = Joint("hinge", "revolute", "slider.c", "load.a")
+    scene = replace(base, bodies=(*base.bodies, rod), joints=(*base.joints, hinge), drivers=(push,))
+    return mixed(scene, unknown=(fd.JointEffort("m", "main"),), end=0.4, output_step=0.1, solution=Causal(1e-4))
 
 
 def cranked(effort: object) -> Result:
@@ -123,7 +134,7 @@ KNOWN = [
     Case(p(mixed, spring_carts(AT_END), unknown=(FIRST,), solution=Causal(), **SPAN),
          p(mixed, spring_carts(AT_END), unknown=(FIRST,), solution=BEYOND, **SPAN)),
     Case(p(hung, "spherical"), p(hung, "revolute")),
-    Case(p(led, 1.5, Causal(growth=1e300)), p(led, 0.2, BEYOND)),
+    Case(p(pulled, 0.1), p(pulled, -0.1)),
     Case(p(turned, 1.9), p(turned, 1.0)),
     Case(p(cranked, fd.JointEffort("f", "guide", "stroke")), p(cranked, fd.JointEffort("f", "main"))),
     Case(lambda: bounded(cart_with_rod(300.0, np.pi / 2, gravity=(0, -9.81, 0))),
@@ -138,11 +149,12 @@ def without_ida() -> Result:
         return reference(HINGED, method=IDA(), **SPAN)
 
 
-def fixed_twice(elastic: object, kind: str) -> Result:
-    """A crank on two hinges, one of which would do."""
-    model = cloud(2)
-    joints = (Joint("one", kind, "ground.O", "b.a"), Joint("two", "spherical", "ground.P", "b.b"))
-    scene = Scene((Body("b", model),), joints, (Driver("d", "one", 0.0),), ground=GROUND, plane="none")
+def doored(elastic: object) -> Result:
+    """A flexible door on two hinges, one of which would do."""
+    model = cloud(8)
+    a, b = (model.interface(name).position for name in "ab")
+    joints = tuple(Joint(f"h{k}", "revolute", f"ground.{k}", f"door.{k}", axis=b - a) for k in "ab")
+    scene = Scene((Body("door", model),), joints, (Driver("d", "ha", 0.0),), ground={"a": a, "b": b}, plane="none")
     return inverse(scene, elastic=elastic, **SPAN)
 
 
@@ -156,17 +168,97 @@ def pinned(far: tuple[float, float, float]) -> object:
 
 
 def pushed(angle: float) -> object:
-    """A slider-crank whose slider is driven."""
-    start = 0.2 * np.cos(angle) + np.sqrt(0.49 - (0.2 * np.sin(angle)) ** 2)
-    return assemble(
-        slider_crank(0.2, 0.7, Driver("push", "guide", polynomial(start, 0.1), coordinate="stroke"), start=angle)
+    """A crank at an angle, whose slider is driven."""
+    scene = slider_crank(0.2, 0.7, offset=angle)
+    reach = float(scene.bodies[2].position[0])
+    return assemble(replace(scene, drivers=(Driver("push", "guide", polynomial(reach, -0.1), coordinate="stroke"),)))
+
+
+def twisted(moment: float, begin: str) -> Result:
+    """A body by a moment, from its quasi-static deflections if there are any."""
+    scene = replace(CLOUD, loads=(Load("far", "cloud.b", moment=(0, 0, moment)),))
+    return forward(scene, end=0.01, output_step=0.01, method=ROS2(1e-3), begin=begin)
+
+
+def diverging(moment: float) -> Result:
+    return run(replace(CLOUD, loads=(Load("far", "cloud.b", moment=(0, 0, moment)),)), RK4(1e-4), end=0.3)
+
+
+def derived(law: Callable[..., object]) -> object:
+    scene = replace(HINGED, loads=(Load("gust", "bar.b", function=law),))
+    return force_jacobian(compile_scene(scene), 0.0, np.array([0, 0, 0, 1.0, 0, 0, 0]), np.zeros(6))
+
+
+def beside(t: float, state: object) -> tuple[float, float, float]:
+    """A force that has a value at rest alone."""
+    return (0, 0, 0) if state.omega_bar("bar")[2] == 0 else (np.nan, 0, 0)
+
+
+def spun(rate: float) -> Scene:
+    return replace(DOUBLE, bodies=tuple(replace(b, omega_bar=(0, 0, rate)) for b in DOUBLE.bodies), gravity=(0, 0, 0))
+
+
+def cut(tolerance: float, **more: object) -> Result:
+    return run(TUMBLING, DormandPrince(tolerances(tolerance)), **more)
+
+
+def felt(law: Callable[..., object]) -> object:
+    return linearise(replace(HINGED, loads=(Load("gust", "bar.b", function=law),)))
+
+
+def loose(tolerance: float) -> Result:
+    """A clamped body that vibrates."""
+    scene = Scene(
+        (Body("b", cloud(12, points=6, stiffness=150.0), q_dot=np.ones(12)),),
+        (Joint("clamp", "fixed", "ground.O", "b.a"),),
+        ground=GROUND,
     )
+    return run(scene, DormandPrince(tolerances(tolerance)), 0.5, 0.5)
 
 
-SPRUNG = replace(HINGED, forces=(JointSpring("s", "hinge", 1.0),))
+def locking() -> Scene:
+    """A slider that is pushed beyond its dead point, where it is after a second."""
+    scene = slider_crank(0.2, 0.7, offset=0.3)
+    reach = float(scene.bodies[2].position[0])
+    push = Driver("push", "guide", polynomial(reach, 0.1), coordinate="stroke")
+    return replace(scene, drivers=(push,))
+
+
+def shrinking(end: float) -> Result:
+    """Two bodies, whose points come together at half a second."""
+    return run(tied("distance", 0.5, length=formula("0.5 - t")), RK4(1e-2), end, 0.1)
+
+
+def given_up(end: float) -> Result:
+    return reference(locking(), method=IDA(1e-2, 1e-2), end=end, output_step=end)
+
+
+def far_off(tolerance: float) -> Result:
+    return reference(spun(50.0), method=SciPy("RK45", tolerance, tolerance), end=0.5, output_step=0.5)
+
+
+TUMBLING = Scene((Body("bar", bar("bar"), omega_bar=(300.0, 1e3, 0)),), plane="none")
+HUGE = replace(HINGED, bodies=(replace(HINGED.bodies[0], omega_bar=(0, 0, 1e200)),))
+APART = tuple((cloud(3).interface("b").position - cloud(3).interface("a").position).tolist())
+SPACE = replace(CLOUD, plane="none")
 OTHER = [
     Case(without_ida, p(reference, HINGED, method=IDA(), **SPAN)),
+    Case(p(given_up, 0.5), p(given_up, 0.05)),
+    Case(p(far_off, 0.99), p(far_off, 1e-3)),
+    Case(p(doored, QuasiStatic()), p(doored, Dynamic(ROS2(1e-3)))),
     Case(lambda: weighed(lambda t, state: 1 / 0), lambda: weighed(lambda t, state: (0.1, 0, 0))),
-    Case(p(pinned, (50.0, 0, 0)), lambda: pinned(tuple(cloud(3).interface("b").position - cloud(3).interface("a").position))),
-]  # fmt: skip
+    Case(lambda: weighed(lambda t, state: (np.nan, 0, 0)), lambda: weighed(lambda t, state: (0.1, 0, 0))),
+    Case(p(shrinking, 1.0), p(shrinking, 0.4)),
+    Case(lambda: derived(lambda t, state: 1 / 0), lambda: derived(lambda t, state: (0.1, 0, 0))),
+    Case(p(felt, beside), lambda: felt(lambda t, state: (0.1, 0, 0))),
+    Case(p(pinned, (50.0, 0, 0)), p(pinned, APART)),
+    Case(p(pushed, 0.0), p(pushed, 0.3)),
+    Case(lambda: assemble(vary(SPACE, drop=("I3",))), lambda: assemble(vary(SPACE, drop=("I3", "I4")))),
+    Case(p(twisted, 1e5, "quasi-static"), p(twisted, 1e5, "as-given")),
+    Case(p(diverging, 1e5), p(diverging, 1e2)),
+    Case(p(cut, 0.9, end=1.0, output_step=0.1), p(cut, 1e-6, end=0.01)),
+    Case(p(loose, 0.9), p(loose, 1e-3)),
+    Case(p(run, HUGE), p(run, HINGED)),
+    Case(lambda: run(locking(), RK4(1e-3), 0.5, stabilisation=Drifting()), lambda: run(locking(), RK4(1e-3))),
+]
 CASES = RESUMED + KNOWN + OTHER

@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
+from contextlib import chdir
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from subprocess import CompletedProcess
 from tempfile import TemporaryDirectory
+from unittest.mock import patch
 
 import numpy as np
 from remedy import CLOUD, DRIVEN, DRIVER, HINGED, SCENE, Case, command
+from test_parts_command import CLAMPED, STRIP
 
 import ffr_dyn as fd
 from ffr_dyn.analyses.events import Event
 from ffr_dyn.analyses.forward import Forward
 from ffr_dyn.analyses.mixed import Mixed
 from ffr_dyn.analyses.settings import Settings
+from ffr_dyn.cli import cli
 from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.operations import SQRT
 from ffr_dyn.functions.time_functions import operation, table
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.scene.forces import Load
 from ffr_dyn.scene_file.write import save_scene, to_toml
+from ffr_prep.body import load_body, save_body
+from ffr_prep.cli import cli as ffr_prep
+from ffr_prep.common.errors import InputError
 
 p = partial
 
@@ -42,6 +50,37 @@ KEPT = "run rod.toml -o run.nc"
 CHART = (
     "chart rod.toml -m position:rod.tip --method ros2=1e-2 --workers 0 --repeats 1 --wanted 1e-3 --against evaluations"
 )
+
+
+def charted(body: str) -> None:
+    """A chart of a swinging body, with another file for it."""
+    with TemporaryDirectory() as folder, chdir(folder):
+        save_scene(replace(CLOUD, gravity=(0, -9.81, 0)), FORWARD, "swing.toml")
+        words = CHART.replace("rod.toml -m position:rod.tip", "swing.toml -m position:cloud.b").replace("1e-2", "1e-3")
+        cli([*words.split(), "--body", body], standalone_mode=False)
+
+
+def parted(command: str) -> None:
+    """A strip that bends, in as many parts as it needs; its file says that it was made by the command."""
+    with TemporaryDirectory() as folder, chdir(folder):
+        Path("strip.toml").write_text(STRIP)
+        Path("scene.toml").write_text(CLAMPED)
+        ffr_prep(["reduce-structure", "strip.toml", "-o", "strip.ffr"], standalone_mode=False)
+        body = load_body("strip.ffr")
+        save_body(replace(body, provenance={**body.provenance, "command": command.split()}), "strip.ffr")
+        with patch("ffr_dyn.cli.parts.subprocess.run", here):
+            cli(["parts", "scene.toml", "--static", "--reduce"], standalone_mode=False)
+
+
+def here(words: list[str], *, check: bool) -> CompletedProcess[str]:
+    """ffr-prep in this process."""
+    try:
+        ffr_prep(words[3:], standalone_mode=False)
+    except InputError:
+        return CompletedProcess(words, 2)
+    return CompletedProcess(words, 0)
+
+
 COMMANDS = [
     words("run rod.toml -p mass", "run rod.toml -p mass=2", "parameters.mass = 1.0\n" + SCENE),
     words("run rod.toml -p mas=2", "run rod.toml -p mass=2", "parameters.mass = 1.0\n" + SCENE),
@@ -59,6 +98,8 @@ COMMANDS = [
         p(command, KEPT, "plot run.nc rod.tip --path xy -o path.png"),
     ),
     Case(p(command, CHART, text=STATIC), p(command, CHART)),
+    Case(p(charted, "clod"), p(charted, "cloud=swing.cloud.ffr")),
+    Case(p(parted, "reduce-structure far.toml"), p(parted, "reduce-structure strip.toml")),
     words(CHART + " --end -1", CHART + " --end 0.1"),
     words(CHART.replace("1e-2", "0"), CHART),
 ]
