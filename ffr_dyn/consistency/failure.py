@@ -27,6 +27,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 
 NEAR = 1e-3  # independence of constraints, 1 where they are at right angles: what is left of it near a dead point
+FAST = 1e5  # N/kg: a load beside the mass of the scene that moves it out of sight in a step
 HUGE = 1e12  # N, N m: no force of a machine; what made the state overflow
 
 
@@ -73,7 +74,7 @@ def failure(system: System, work: Work, status: int, time: float, settings: Sett
         )
     if status == NOT_CONVERGED:
         return ComputationError(
-            f"{at} the iterations of the step do not converge, {_unconverged(system, where, settings)}"
+            f"{at} the iterations of the step do not converge, {_unconverged(system, work, where, settings)}"
         )
     assert status == STEP_TOO_SMALL
     return ComputationError(
@@ -118,7 +119,8 @@ def _overflow(system: System, work: Work, settings: Settings) -> str:
     if np.isnan(value):
         return f"{name!r} has no value there; look at its formula, such as a root or a logarithm of what is negative"
     if value > HUGE:
-        return f"{name!r} exerts {value:.3g} N or N m; look at its numbers and their units"
+        change = ", or use a smaller step" if _follows(system, name) else ""
+        return f"{name!r} exerts {value:.3g} N or N m; look at its numbers and their units{change}"
     if settings.method is None:
         return (
             "a force, an initial state or a driver is beyond all sense there, or a solver has lost the motion before; look "
@@ -127,11 +129,27 @@ def _overflow(system: System, work: Work, settings: Settings) -> str:
     if settings.method.controlled:
         return "the tolerances are too large, or a force is not finite; use smaller tolerances"
     if settings.method.implicit:
-        return "the step is too large for a stop, a Python function or a fast rotation; use a smaller step"
+        return (
+            "the step is too large for a stop, a Python function or a fast rotation; use a smaller step"
+            f"{_beyond(system, work)}"
+        )
     return (
         "the step is too large for a mode or a stiff spring (use ROS2, or a smaller step), or for a stop or a fast rotation "
-        "(use a smaller step)"
+        f"(use a smaller step){_beyond(system, work)}"
     )
+
+
+def _follows(system: System, name: str) -> bool:
+    """Whether the force of that name has a function of the state, and is lost with it."""
+    rows = zip(forces_of(system.scene), system.model.loads.row, strict=True)
+    return any(force.name == name and row[USER] >= 0 for force, row in rows)
+
+
+def _beyond(system: System, work: Work) -> str:
+    """The largest load, where it is one that no step may follow."""
+    name, value = _largest(system, work)
+    mass = sum(body.model.mass for body in system.scene.bodies)
+    return f", or a smaller load than {name!r}, {value:.3g} N or N m" if value > FAST * mass else ""
 
 
 def _dead_point(system: System) -> str:
@@ -168,18 +186,19 @@ def _timed(count: int, row: Array, system: System, work: Work) -> Array:
     return timed
 
 
-def _unconverged(system: System, where: int, settings: Settings) -> str:
+def _unconverged(system: System, work: Work, where: int, settings: Settings) -> str:
     """Of a body, or after the bodies a constraint row: where, the likely cause and what to change."""
     bodies, other = system.scene.bodies, not isinstance(settings.method, ROS2)
     if where < len(bodies):
         return (
             f"worst in body {bodies[where].name!r}: the step is too large for its rotation or for a spring, damper, stop or "
             f"friction that acts on it; use a smaller step{', ROS2' if other else ''}, or a softer force"
+            f"{_beyond(system, work)}"
         )
     block = system.blocks[int(np.searchsorted(system.model.rows.start, where - len(bodies), side="right")) - 1]
     change = f"use a smaller step{', or ROS2 to pass a singular position' if other else ''}"
     return (
         f"worst in {block.name!r}: its constraint cannot be met, because the mechanism locks there{_dead_point(system)} or "
         "is singular, or because the step is too large or a stiff spring far from its free length; "
-        f"{_remedy(system, change)}"
+        f"{_remedy(system, change)}{_beyond(system, work)}"
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import chdir
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from subprocess import CompletedProcess
 from tempfile import TemporaryDirectory
@@ -52,6 +52,12 @@ CHART = (
 )
 
 
+@cache
+def chart() -> None:
+    """A chart, drawn once: several texts are mended to it."""
+    command(CHART)
+
+
 def charted(body: str) -> None:
     """A chart of a swinging body, with another file for it."""
     with TemporaryDirectory() as folder, chdir(folder):
@@ -97,11 +103,11 @@ COMMANDS = [
         p(command, KEPT, "plot run.nc rod.tip rod.hinge --path xy -o path.png"),
         p(command, KEPT, "plot run.nc rod.tip --path xy -o path.png"),
     ),
-    Case(p(command, CHART, text=STATIC), p(command, CHART)),
+    Case(p(command, CHART, text=STATIC), chart),
     Case(p(charted, "clod"), p(charted, "cloud=swing.cloud.ffr")),
     Case(p(parted, "reduce-structure far.toml"), p(parted, "reduce-structure strip.toml")),
-    words(CHART + " --end -1", CHART + " --end 0.1"),
-    words(CHART.replace("1e-2", "0"), CHART),
+    Case(p(command, CHART + " --end -1"), chart),
+    Case(p(command, CHART.replace("1e-2", "0")), chart),
 ]
 
 LOADED = '[loads.{name}]\nmarker = "rod.tip"\nforce = [0, {force}, 0]\n'
