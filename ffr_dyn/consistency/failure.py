@@ -26,7 +26,7 @@ from ffr_dyn.scene.force_kinds import forces_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 
-NEAR = 1e-3  # independence of constraints, 1 where they are at right angles: what is left of it near a dead point
+NEAR = 1e-2  # independence of constraints, 1 where they are at right angles: what is left of it near a dead point
 FAST = 1e5  # N/kg: a load beside the mass of the scene that moves it out of sight in a step
 HUGE = 1e12  # N, N m: no force of a machine; what made the state overflow
 
@@ -53,7 +53,7 @@ def failure(system: System, work: Work, status: int, time: float, settings: Sett
     if cause and (lost or status == NOT_FINITE):
         return ComputationError(f"{at} the state of {_worst(system, work)} is no longer finite: {cause}")
     if status == NOT_FINITE or lost:
-        locks = status == SINGULAR_CONSTRAINT and _locks(system, work, time, settings)
+        locks = status == SINGULAR_CONSTRAINT and _locks(system, work, settings)
         why = locks or _overflow(system, work, settings)
         return ComputationError(f"{at} the state of {_worst(system, work)} is no longer finite: {why}")
     if status == SINGULAR_BODY:
@@ -100,11 +100,11 @@ def _worst(system: System, work: Work) -> str:
     return "the scene"
 
 
-def _locks(system: System, work: Work, time: float, settings: Settings) -> str:
+def _locks(system: System, work: Work, settings: Settings) -> str:
     """That a driven mechanism has come to a dead point before, and what to change; empty where it has not."""
     least, when = work.independence[[LEAST, WHEN]]
     driven = any(word.function is not None for block in system.blocks for word in block.words)
-    if not (driven and least < NEAR and when < time):
+    if not (driven and least < NEAR):
         return ""
     change = "use a smaller step" if settings.projected else "use projection"
     return (

@@ -116,7 +116,8 @@ def run(
     """
     kept = (*needed(of, made.scene), *_states(made.scene), *outputs)
     result = simulated(made, choice, span, kept, method=method)
-    values = histories(of, made.scene, result)
+    with np.errstate(over="ignore", invalid="ignore"):  # told below
+        values = histories(of, made.scene, result)
     for output, one in zip(of.outputs, values, strict=True):
         if not np.isfinite(one).all():
             raise ComputationError(
