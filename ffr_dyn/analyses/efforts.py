@@ -18,7 +18,6 @@ from ffr_dyn.kernels.tables import LAW
 from ffr_dyn.scene.checks import check_marker, check_name, check_own_name
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces import Actuator, Load
-from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
@@ -76,16 +75,6 @@ def unit(effort: Effort) -> str:
     """Unit of the effort."""
     angular = effort.moment if isinstance(effort, MarkerEffort) else effort.coordinate == "angle"
     return "N m" if angular else "N"
-
-
-def joint_named(scene: Scene, name: str, who: str) -> Joint:
-    """The joint of that name; InputError says who asked."""
-    for joint in scene.joints:
-        if joint.name == name:
-            return joint
-    raise InputError(
-        f"{who}: there is no joint {name!r}; there are {', '.join(j.name for j in scene.joints) or 'none'}"
-    )
 
 
 def with_effort(scene: Scene, effort: Effort, times: Array, values: Array) -> Scene:

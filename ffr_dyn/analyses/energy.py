@@ -196,10 +196,16 @@ class EnergyWatch:
                 f"A step of {h:.3g} s is beyond the stability of {kind}: the scene vibrates with up to {fastest:.4g} "
                 f"rad/s, which needs one below {self.method.reach / fastest:.2g} s; use that{other}"
             )
+        projected = "" if self.gains[2] > 0 else ", or projection"
+        if self.system.scene.drivers and not fastest:
+            return (
+                f"Its drivers lead it through a dead point, or too fast for steps of {h:.3g} s: keep driven motions within "
+                f"reach, or use a smaller step{projected}"
+            )
         force = "a stop or a Python function" if self.method.takes_forces else "a stiff spring or stop"
         return (
             f"A step of {h:.3g} s of {kind} is too long for this motion, whose fastest rate is {fastest:.4g} 1/s ({force}, "
-            f"fast rotation, or a mode that is loaded); use a smaller step{'' if self.gains[2] > 0 else ', or projection'}"
+            f"fast rotation, or a mode that is loaded); use a smaller step{projected}"
         )
 
 
@@ -252,4 +258,4 @@ def _fastest(system: System, row: _Row) -> float:
         A, _ = state_matrix(chart(evaluator(system), row.time, row.x, row.v))
     except (ComputationError, np.linalg.LinAlgError):
         return 0.0
-    return float(np.abs(np.linalg.eigvals(A)).max(initial=0.0)) if np.isfinite(A).all() else 0.0
+    return float(np.abs(np.linalg.eigvals(A)).max(initial=0.0)) if A.size and np.isfinite(A).all() else 0.0

@@ -20,13 +20,14 @@ from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import Assembled
+from ffr_dyn.consistency.failure import Settings, failure
 from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.kernels.tables import OK, Record
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.recorded_motion import View
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.errors import InputError
 
 WIDTH = 4 * np.finfo(float).eps  # of a step, and relative: what brentq can reach
 
@@ -93,8 +94,7 @@ class Watcher:
     def begin(self, engine: Engine, time: float) -> None:
         """Take the state of a run's engine as what comes before the first row."""
         first = new_record(self._system, 1)
-        if record_row(engine, time, first, 0) != OK:
-            raise ComputationError(f"at t = {time:.6g} s the start has no accelerations")
+        record_row(engine, time, first, 0)  # with which the run has begun
         self._memory = [seen(first, None)[1] for seen in self._seen]
         self._last = first
 
@@ -153,8 +153,9 @@ class Watcher:
         time, end = float(rows.time[k]), new_record(self._system, 1)
         engine = new_engine(self._system, rows.x[k], rows.v[k], method, self._gains, start=time, spacing=length)
         engine.work.loads.reference[:] = rows.forces[k]
-        if fill_rows(engine, end, time, 1) != OK:
-            raise ComputationError(f"at t = {time:.6g} s an event cannot be located: a shorter step from there fails")
+        status = fill_rows(engine, end, time, 1)
+        if status != OK:
+            raise failure(self._system, engine.work, status, time, Settings(method, self._gains[2] > 0))
         return end
 
 
@@ -172,9 +173,8 @@ def _seen(system: System, event: Event) -> _Seen:
         name, at = head, known[head].axes[0].labels.index(label)
     else:
         close = get_close_matches(event.quantity, [*known, *(f"{n}.{c}" for n in known for c in "xyz")], 3)
-        raise InputError(
-            f"event {event.name!r}: {event.quantity!r} is no number of the scene; did you mean {', '.join(close)}?"
-        )
+        hint = f"did you mean {', '.join(close)}?" if close else f"there are: {', '.join(known)}"
+        raise InputError(f"event {event.name!r}: {event.quantity!r} is no number of the scene; {hint}")
     compute = known[name].compute
 
     def values(record: Record, memory: Any) -> tuple[Array, Any]:

@@ -37,7 +37,7 @@ from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import ComputationError, InputError
 
 STATIONARY = 1e-6  # of the accelerations in moving axes, relative to those of the applied forces
 
@@ -137,6 +137,10 @@ def linearise(
     if near.steps.size == 0:
         raise InputError("nothing is free to move: joints and drivers fix every motion; linearise with fewer drivers")
     A, error = state_matrix(near)
+    if not np.isfinite(A).all():
+        raise ComputationError(
+            f"at t = {time:.6g} s a force has no finite value beside the state that is linearised; look at its function"
+        )
     B = _columns(lambda u: rates(_fed(near, scene, inputs, u), assembled.x, assembled.v), len(inputs))
     C, D = _output_matrices(near, scene, inputs, outputs)
     eigenvalues, vectors = _eigen(A)

@@ -42,6 +42,7 @@ from ffr_dyn.scene.scene import GROUND, Scene, require_scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
+SHORTEST = 1e-8  # step of the internal dynamics, of the time between two rows: shorter ones go nowhere
 AT_ONCE = 2  # derivatives of known motions after which efforts that act on them directly appear
 
 
@@ -294,11 +295,14 @@ def _integrated(
         if own.size:
             solver = DOP853(right, float(before), w, float(time), rtol=causal.tolerance, atol=causal.tolerance * 1e-2)
             while solver.status == "running":
-                message = solver.step()
-            if solver.status == "failed":
-                raise ComputationError(
-                    f"at t = {solver.t:.6g} s the internal dynamics could not be integrated: {message}"
-                )
+                solver.step()
+                creeps = solver.status == "running" and solver.step_size < SHORTEST * (time - before)
+                if creeps or solver.status == "failed":
+                    raise ComputationError(
+                        f"at t = {solver.t:.6g} s the internal dynamics end: their rates grow without bound, as where the "
+                        "mechanism passes a position in which the unknown forces do not move what is known, or where a force "
+                        "jumps; let another force be unknown, or end the run before it"
+                    )
             w = solver.y
         moments.append(at_moment(own, float(time), w, moments[-1].x))
         if progress is not None:

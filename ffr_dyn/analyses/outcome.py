@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.analyses.efforts import joint_named
 from ffr_dyn.analyses.integration import geometry
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.functions.rotation import rotation_matrix
@@ -84,7 +83,7 @@ def efforts(scene: Scene, result: Result) -> dict[str, Quantity]:
     found: dict[str, Quantity] = {}
     for driver in scene.drivers:
         if isinstance(driver, Driver):
-            joint = joint_named(scene, driver.joint, f"driver {driver.name!r}")
+            joint = joint_of(scene, driver)
             axis = _axis_history(result, joint.i, frames(joint)[0][:, 2])
             angular = driver.coordinate == "angle"
             effort = (result[f"{driver.name}.{'moment' if angular else 'force'}"] * axis).sum(1)

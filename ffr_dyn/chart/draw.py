@@ -30,6 +30,7 @@ MARKERS = "os^Dv<>PXh*p"
 COLOURS = (*PALETTE, "#7B3294", "#8C510A", "#808080", "#A6D96A", "#B2182B")  # as many methods are told apart
 FRONT, FLOOR = "#222222", "#888888"
 FEW = (1.0, 0.3)  # decades of an axis, over which powers of ten are too few labels; and over which all ticks get one
+EXACT = 1e-16, 1e-12  # errors on the axis where none is above zero
 ABOVE = 0.03  # of the height of a panel, free for the rings around the highest points
 ROOM = 15  # entries of a legend for which a place of the grid is high enough
 ENDS: Any = {"marker": "|", "markersize": 7}  # of the bars from the least to the greatest time
@@ -116,9 +117,7 @@ def _panel(
         axes.axhline(diagram.limits[measure] / scale, **LIMIT)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    low, high = axes.get_ylim()
-    low = min(low, floor / scale / 3) if floor > 0 else low
-    axes.set_ylim(low, high * (high / low) ** ABOVE)
+    _scale_of_errors(axes, floor / scale)
     if floor > 0:
         below: Any = {"facecolor": "#EEEEEE", "edgecolor": FLOOR, "hatch": "///", "linewidth": 0, "zorder": 0}
         axes.axhspan(axes.get_ylim()[0], floor / scale, **below)
@@ -129,6 +128,15 @@ def _panel(
     axes.grid(True, which="major")
     axes.set_xlabel(COST_WORDS[against])
     axes.set_ylabel(error_words(diagram, measure))
+
+
+def _scale_of_errors(axes: Axes, floor: float) -> None:
+    low, high = axes.get_ylim()
+    if not 0 < low < high:  # a logarithm has no place for zero
+        axes.text(0.5, 0.5, "no error above zero", transform=axes.transAxes, ha="center")
+        low, high = EXACT
+    low = min(low, floor / 3) if floor > 0 else low
+    axes.set_ylim(low, high * (high / low) ** ABOVE)
 
 
 def error_words(diagram: Diagram, measure: str) -> str:

@@ -93,9 +93,8 @@ def reference(
         if refined is not None:
             found.append(refined)
     if not found:
-        raise ComputationError(
-            "no reference: " + "; ".join(story) + ". Allow longer runs (--limit), or shorten the scene"
-        )
+        change = ". Allow longer runs (--limit), or shorten the scene" if any("took longer" in s for s in story) else ""
+        raise ComputationError(f"no reference: {'; '.join(story)}{change}")
     if len(found) < len(methods):
         say(f"not verified by another method: {found[0].variant.method} alone came to an end")
     ranked = sorted(found, key=_badness)

@@ -132,7 +132,7 @@ def changed(settings: Settings | MomentSettings, changes: Mapping[str, Any]) -> 
     known = INTEGRATION if integrates else ("end",) if isinstance(settings, Settings) else ()
     for key in given:
         if key not in known:
-            raise InputError(f"--{key}: there is no {key} of a {word_of(type(settings.analysis))} analysis")
+            raise InputError(f"--{key}: a {word_of(type(settings.analysis))} analysis has no {key}; leave it out")
     if not isinstance(settings, Settings):
         return settings
     method = _method(settings, given) if integrates else settings.method

@@ -73,7 +73,7 @@ def close_velocities(scene: Scene, place: Layout, blocks: list[Block], x: Array,
     names = [block.name for block in blocks for _ in block.words]
     raise InputError(
         f"no velocities meet the joints and drivers: {names[int(np.argmax(left))]!r} is left at a rate of "
-        f"{left.max():.3g}; the mechanism may be locked or in a singular position at the start"
+        f"{left.max():.3g}; the mechanism may be locked or in a singular position at the start: start from another"
     )
 
 

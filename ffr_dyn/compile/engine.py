@@ -17,7 +17,7 @@ from ffr_dyn.kernels.entry_points import evaluate_exact, evaluate_loads, record_
 from ffr_dyn.kernels.simd.entry_point import ENTRY_POINTS
 from ffr_dyn.kernels.simd.force_kernel import kernel_of
 from ffr_dyn.kernels.simd.table_address import pack
-from ffr_dyn.kernels.tables import PER_ROW, Clock, Control, Model, Record, Tables, Work
+from ffr_dyn.kernels.tables import NOT_FINITE, OK, PER_ROW, Clock, Control, Model, Record, Tables, Work
 from ffr_dyn.scene.force_kinds import kernels_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
@@ -136,7 +136,8 @@ def load_at(engine: Engine, t: float, x: Array, v: Array) -> int:
 
 def record_row(engine: Engine, t: float, record: Record, row: int) -> int:
     """Evaluate the engine's state at time t as `evaluate_at` and keep it as a row. A status."""
-    return record_state(engine.tables, t, record, row)
+    status = record_state(engine.tables, t, record, row)
+    return NOT_FINITE if status == OK and not np.isfinite(record.vd[row]).all() else status
 
 
 def fill_rows(engine: Engine, record: Record, start: float, substeps: int) -> int:

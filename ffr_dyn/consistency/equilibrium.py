@@ -27,7 +27,7 @@ from ffr_dyn.consistency.evaluation import locked, total_mass_matrix, unit_rows
 from ffr_dyn.equations.layout import moved
 from ffr_dyn.equations.statics import Balance, balance
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import ComputationError
+from ffr_prep.common.errors import ComputationError, InputError
 
 ITERATIONS = 100
 LARGEST_STEP = 1.0  # rad, or part of the scene's size
@@ -139,10 +139,14 @@ class _Problem:
         lam = np.zeros(sum(len(block.words) for block in blocks)) if lam is None else lam
         try:
             now = balance(scene, place, blocks, self.time, x, lam, near, share)
-            finite = np.isfinite(now.forces).all() and np.isfinite(now.stiffness).all()
-        except (ZeroDivisionError, OverflowError, ValueError):  # of a function of time
-            finite = False
-        if not finite:
+        except (InputError, ComputationError):
+            raise
+        except Exception as error:  # of a formula, or of a function of the user's
+            raise ComputationError(
+                f"the forces are not finite near the equilibrium: {type(error).__name__}: {error}; look at the formulas and "
+                "functions of the scene"
+            ) from error
+        if not (np.isfinite(now.forces).all() and np.isfinite(now.stiffness).all()):
             raise ComputationError("the forces are not finite near the equilibrium; check loads and springs")
         if not across.size:
             return now

@@ -223,9 +223,13 @@ CLOSED = 1e-12  # of Phi [m, -] after a projection
 CORRECTIONS = 10
 
 
+class OpenError(ComputationError):
+    """A state that is not brought back onto its constraints."""
+
+
 def closed(at: Evaluator, time: float, x: Array, v: Array) -> tuple[Array, Array]:
     """(x, v) moved onto the constraints by the smallest motion in the norm of the mass matrix, Euler parameters of length
-    one. Raises ComputationError where that does not succeed."""
+    one. Raises OpenError where that does not succeed."""
     place = at.system.layout
     x = moved(place, x, np.zeros(place.v_size))
     for _ in range(CORRECTIONS):
@@ -234,6 +238,6 @@ def closed(at: Evaluator, time: float, x: Array, v: Array) -> tuple[Array, Array
             break
         x = moved(place, x, smallest_step(now.jacobian, evaluated_mass_matrix(at), -now.Phi))
     else:
-        raise ComputationError(f"at t = {time:.6g} s the state is too far off the constraints; use smaller tolerances")
+        raise OpenError(f"at t = {time:.6g} s the state is too far off the constraints; use smaller tolerances")
     inside = to_body_axes(place, x, v) + smallest_step(now.jacobian, evaluated_mass_matrix(at), -now.nu)
     return x, to_global_axes(place, x, inside)

@@ -10,13 +10,11 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.dropped_terms import remedy
 from ffr_dyn.integrators import ROS2, Integrator
 from ffr_dyn.kernels.tables import (
-    AT,
     FAILED,
     LAW,
     LEAST,
     NOT_CONVERGED,
     NOT_FINITE,
-    PHI,
     SINGULAR_BODY,
     SINGULAR_CONSTRAINT,
     STEP_TOO_SMALL,
@@ -28,7 +26,8 @@ from ffr_dyn.scene.force_kinds import forces_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 
-OPEN, LOST = 1e-2, 1e2  # m, -: of constraints, more than drift, and what follows from a lost state
+NEAR = 1e-2  # independence of constraints, 1 where they are at right angles: what is left of it near a dead point
+FAST = 1e5  # N/kg: a load beside the mass of the scene that moves it out of sight in a step
 HUGE = 1e12  # N, N m: no force of a machine; what made the state overflow
 
 
@@ -53,12 +52,10 @@ def failure(system: System, work: Work, status: int, time: float, settings: Sett
     lost = not _sound(work)
     if cause and (lost or status == NOT_FINITE):
         return ComputationError(f"{at} the state of {_worst(system, work)} is no longer finite: {cause}")
-    moved = any(word.function is not None for block in system.blocks for word in block.words)
-    beyond = not (_largest(system, work)[1] <= HUGE and (moved or work.drift[PHI] <= LOST))
-    if status == NOT_FINITE or (lost and (status == SINGULAR_BODY or beyond)):
-        return ComputationError(
-            f"{at} the state of {_worst(system, work)} is no longer finite: {_overflow(system, work, settings)}"
-        )
+    if status == NOT_FINITE or lost:
+        locks = status == SINGULAR_CONSTRAINT and _locks(system, work, settings)
+        why = locks or _overflow(system, work, settings)
+        return ComputationError(f"{at} the state of {_worst(system, work)} is no longer finite: {why}")
     if status == SINGULAR_BODY:
         body = system.scene.bodies[where]
         where_from = f" without {', '.join(body.dropped)}" if body.dropped else ""
@@ -72,20 +69,19 @@ def failure(system: System, work: Work, status: int, time: float, settings: Sett
         block = system.blocks[row]
         text = block.words[where - system.model.rows.start[row]].text
         return ComputationError(
-            f"{at} the row '{text}' of {block.name!r} cannot be met by any motion: it ties bodies that cannot move there"
-            f"{', or the state is no longer finite' if lost else ''}"
+            f"{at} the row '{text}' of {block.name!r} cannot be met by any motion: it ties bodies that cannot move there; "
+            "end the run before it, or use a joint that ties less"
         )
     if status == NOT_CONVERGED:
         return ComputationError(
-            f"{at} the iterations of the step do not converge, {_unconverged(system, where, settings)}"
+            f"{at} the iterations of the step do not converge, {_unconverged(system, work, where, settings)}"
         )
-    if status == STEP_TOO_SMALL:
-        return ComputationError(
-            f"{at} the step has become too small: the motion is not smooth there (an impact, a jump of a force or of a "
-            f"driver), the mechanism locks{_dead_point(system)}, or the tolerances are below what rounding allows; smooth "
-            f"the jump, end the run before it, {_remedy(system, 'use larger tolerances')}"
-        )
-    return ComputationError(f"{at} the run stopped: {system.user.failure or 'unknown cause'}")
+    assert status == STEP_TOO_SMALL
+    return ComputationError(
+        f"{at} the step has become too small: the motion is not smooth there (an impact, a jump of a force or of a driver), "
+        f"the mechanism locks{_dead_point(system)}, or the tolerances are below what rounding allows; smooth the jump, end "
+        f"the run before it, {_remedy(system, 'use larger tolerances')}"
+    )
 
 
 def _sound(work: Work) -> bool:
@@ -104,30 +100,56 @@ def _worst(system: System, work: Work) -> str:
     return "the scene"
 
 
+def _locks(system: System, work: Work, settings: Settings) -> str:
+    """That a driven mechanism has come to a dead point before, and what to change; empty where it has not."""
+    least, when = work.independence[[LEAST, WHEN]]
+    driven = any(word.function is not None for block in system.blocks for word in block.words)
+    if not (driven and least < NEAR):
+        return ""
+    change = "use a smaller step" if settings.projected else "use projection"
+    return (
+        f"its constraints were nearest to dependence at t = {when:.6g} s: the mechanism locks there{_dead_point(system)}, or "
+        f"passes a singular position; {_remedy(system, change)}"
+    )
+
+
 def _overflow(system: System, work: Work, settings: Settings) -> str:
     """Why a state is not finite, and what to change."""
     name, value = _largest(system, work)
     if np.isnan(value):
         return f"{name!r} has no value there; look at its formula, such as a root or a logarithm of what is negative"
     if value > HUGE:
-        return f"{name!r} exerts {value:.3g} N or N m; look at its numbers and their units"
-    least, when = work.independence[[LEAST, WHEN]]
-    if (least < AT or work.drift[PHI] > OPEN) and work.drift[PHI] < LOST:
-        return (
-            f"its constraints came open by up to {work.drift[PHI]:.2g}, and were nearest to dependence at t = {when:.6g} s: "
-            f"the mechanism locks there{_dead_point(system)}, or passes a singular position; "
-            f"{_remedy(system, 'use a smaller step' if settings.projected else 'use projection')}"
-        )
+        change = ", or use a smaller step" if _follows(system, name) else ""
+        return f"{name!r} exerts {value:.3g} N or N m; look at its numbers and their units{change}"
     if settings.method is None:
-        return "a force, an initial state or a driver is beyond all sense there; look at their numbers and units"
+        return (
+            "a force, an initial state or a driver is beyond all sense there, or a solver has lost the motion before; look "
+            "at their numbers and units, or use smaller tolerances"
+        )
     if settings.method.controlled:
         return "the tolerances are too large, or a force is not finite; use smaller tolerances"
     if settings.method.implicit:
-        return "the step is too large for a stop, a Python function or a fast rotation; use a smaller step"
+        return (
+            "the step is too large for a stop, a Python function or a fast rotation; use a smaller step"
+            f"{_beyond(system, work)}"
+        )
     return (
         "the step is too large for a mode or a stiff spring (use ROS2, or a smaller step), or for a stop or a fast rotation "
-        "(use a smaller step)"
+        f"(use a smaller step){_beyond(system, work)}"
     )
+
+
+def _follows(system: System, name: str) -> bool:
+    """Whether the force of that name has a function of the state, and is lost with it."""
+    rows = zip(forces_of(system.scene), system.model.loads.row, strict=True)
+    return any(force.name == name and row[USER] >= 0 for force, row in rows)
+
+
+def _beyond(system: System, work: Work) -> str:
+    """The largest load, where it is one that no step may follow."""
+    name, value = _largest(system, work)
+    mass = sum(body.model.mass for body in system.scene.bodies)
+    return f", or a smaller load than {name!r}, {value:.3g} N or N m" if value > FAST * mass else ""
 
 
 def _dead_point(system: System) -> str:
@@ -164,18 +186,19 @@ def _timed(count: int, row: Array, system: System, work: Work) -> Array:
     return timed
 
 
-def _unconverged(system: System, where: int, settings: Settings) -> str:
+def _unconverged(system: System, work: Work, where: int, settings: Settings) -> str:
     """Of a body, or after the bodies a constraint row: where, the likely cause and what to change."""
     bodies, other = system.scene.bodies, not isinstance(settings.method, ROS2)
     if where < len(bodies):
         return (
             f"worst in body {bodies[where].name!r}: the step is too large for its rotation or for a spring, damper, stop or "
             f"friction that acts on it; use a smaller step{', ROS2' if other else ''}, or a softer force"
+            f"{_beyond(system, work)}"
         )
     block = system.blocks[int(np.searchsorted(system.model.rows.start, where - len(bodies), side="right")) - 1]
     change = f"use a smaller step{', or ROS2 to pass a singular position' if other else ''}"
     return (
         f"worst in {block.name!r}: its constraint cannot be met, because the mechanism locks there{_dead_point(system)} or "
         "is singular, or because the step is too large or a stiff spring far from its free length; "
-        f"{_remedy(system, change)}"
+        f"{_remedy(system, change)}{_beyond(system, work)}"
     )

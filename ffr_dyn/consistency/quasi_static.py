@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffr_dyn.consistency.assemble import Assembled
-from ffr_dyn.consistency.evaluation import Evaluator, accelerations, closed, evaluate, evaluator
+from ffr_dyn.consistency.evaluation import Evaluator, OpenError, accelerations, closed, evaluate, evaluator
 from ffr_dyn.consistency.unresolved import Vibrations, vibrations
 from ffr_dyn.equations.layout import moved, to_body_axes, to_global_axes
 from ffr_prep.common.arrays import Array
@@ -84,7 +84,7 @@ def quasi_static(assembled: Assembled, time: float) -> Assembled:
         return assembled
     try:
         x, v, slow = _slow(_search(assembled, of), time, assembled.x, assembled.v, _apart(assembled, of))
-    except np.linalg.LinAlgError:
+    except (OpenError, np.linalg.LinAlgError):
         raise _failed(time) from None
     notes = [*assembled.notes, "starts with the deflections that the motion asks for"]
     if not slow:

@@ -116,9 +116,13 @@ def run(
     """
     kept = (*needed(of, made.scene), *_states(made.scene), *outputs)
     result = simulated(made, choice, span, kept, method=method)
-    values = histories(of, made.scene, result)
-    if not all(np.isfinite(one).all() for one in values):
-        raise ComputationError("an output of the run is no longer finite")
+    with np.errstate(over="ignore", invalid="ignore"):  # told below
+        values = histories(of, made.scene, result)
+    for output, one in zip(of.outputs, values, strict=True):
+        if not np.isfinite(one).all():
+            raise ComputationError(
+                f"the output {output.name!r} of the run is not finite; look at the units of its body"
+            )
     return Trial(choice, made, values, int(result.attributes["evaluations"]), result)
 
 

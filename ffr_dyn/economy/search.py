@@ -17,6 +17,7 @@ All decisions rest on evaluations of the equations and on a cost model, not on c
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -223,14 +224,16 @@ def _with_any_step(ledger: Ledger, ground: Ground, choice: Choice) -> Stepped:
     """The model with its step; with all terms, or all of everything, where it does not come through with shorter steps."""
     parts = zip(choice.parts, ground.everything.parts, strict=True)
     whole = tuple(replace(own, dropped=full.dropped, loads=full.loads) if own.count else own for own, full in parts)
-    failed = ComputationError("there is no model")
-    for model in dict.fromkeys((choice, replace(choice, parts=whole), ground.everything)):
-        try:
-            left = largest(difference(ledger.run(model).values, ground.pilot.values))
-            return _with_step(ledger, model, left, ground.limits)
-        except ComputationError as error:
-            failed = error
-    raise failed
+
+    def stepped(model: Choice) -> Stepped:
+        left = largest(difference(ledger.run(model).values, ground.pilot.values))
+        return _with_step(ledger, model, left, ground.limits)
+
+    *models, last = dict.fromkeys((choice, replace(choice, parts=whole), ground.everything))
+    for model in models:
+        with suppress(ComputationError):
+            return stepped(model)
+    return stepped(last)
 
 
 def _finer_ground(ledger: Ledger, ground: Ground, final: Trial, verify: bool | None) -> Ground | None:

@@ -188,7 +188,8 @@ def _cheapest(ledger: Ledger, coarse: Trial, needed: dict[str, int], limit: Arra
     if best is None:
         raise ComputationError(
             f"no integrator reaches the tolerance with steps down to 1/{policy.most_divisions} of the output step: errors "
-            f"stay above their limits with {max(needed.values())} steps from row to row"
+            f"stay above their limits with {max(needed.values())} steps from row to row; allow a larger "
+            "tolerance, or take a shorter output_step"
         )
     return best
 

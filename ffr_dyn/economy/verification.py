@@ -128,7 +128,10 @@ def sharpened(ledger: Ledger, model: Choice, wanted: Array, divisions: int, allo
             times = min(4, max(2, ceil(min(missing, 1e6) ** (1 / (3 if name == PILOT else 4)))))
             needed[name] = times * choice.divisions
     if best is None:
-        raise ComputationError("no step completes a run of everything that the model could be compared with")
+        raise ComputationError(
+            f"no step down to 1/{policy.most_divisions} of the output step completes a run of everything, with which the "
+            "model is compared; take a shorter output_step"
+        )
     return replace(best, cost=spent)
 
 

@@ -129,7 +129,7 @@ def _turning(across: Motion, along: Motion, speed: float, second: float) -> Moti
     return replace(
         across,
         r_dot=across.r_dot - speed * along.r,
-        bias=across.bias - second * along.r - speed**2 * across.r - 2 * speed * along.r_dot,
+        bias=across.bias - second * along.r - speed * speed * across.r - 2 * speed * along.r_dot,
     )
 
 
@@ -149,7 +149,7 @@ def _distance(now: Markers, word: Word, at: tuple[int, ...], drive: Drive) -> Ro
     add_part(now.place, parts, at_j, d @ at_j.jacobian / s)
     D, D_dot, D_bias = d @ d, 2 * d @ d_dot, 2 * (d_dot @ d_dot + d @ d_bias)
     nu = (D_dot / s - D * speed / s**2 - speed) / 2
-    bias = (D_bias / s - 2 * D_dot * speed / s**2 - D * second / s**2 + 2 * D * speed**2 / s**3 - second) / 2
+    bias = (D_bias / s - 2 * D_dot * speed / s**2 - D * second / s**2 + 2 * D * speed * speed / s**3 - second) / 2
     return Row(float(D / s - s) / 2, float(nu), float(-bias), parts, now.place.v_size)
 
 

@@ -235,7 +235,10 @@ def text_of(expression: Expression) -> str:
         return "t"
     if is_constant(expression):
         return repr(expression.data[0])
-    raise InputError("a table or another function of time is part of a formula; formulas in text cannot hold it")
+    raise InputError(
+        "a table or another function of time is part of a formula; formulas in text cannot hold it: write "
+        "it in terms of t"
+    )
 
 
 def _coded(function: TimeFunction) -> tuple[int, float]:

@@ -173,7 +173,7 @@ class ResultWriter:
         except (OSError, ComputationError) as error:
             self._give_up()
             raise InputError(
-                f"{self.path} cannot be written ({error.__cause__ or error}); choose another place or end the other run"
+                f"{self.path} cannot be written ({error.__cause__ or error}); choose another place, or make room there"
             ) from None
         self._published_at = time.monotonic()
         self._publishing_took = 0.0

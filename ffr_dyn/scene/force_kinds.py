@@ -74,7 +74,8 @@ def in_bases(forces: tuple[Any, ...], bases: Mapping[str, Array]) -> tuple[Any, 
                 values, V = getattr(force, name), bases[force.body]
                 if len(values) != len(V):
                     raise InputError(
-                        f"force {force.name!r} acts on modes of {force.body!r}, which another body file does not have"
+                        f"force {force.name!r} acts on modes of {force.body!r}, which another body file does not have: put "
+                        "that body into the scene itself, with values for its modes"
                     )
                 force = replace(force, **{name: values @ V})
         return force

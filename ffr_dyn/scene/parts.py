@@ -94,7 +94,8 @@ def _whole(name: str, parts: Sequence[Any]) -> Any:
     differing = [key for key in alike if any(not np.array_equal(getattr(p, key), getattr(first, key)) for p in parts)]
     if differing or any(np.any(part.q) or np.any(part.q_dot) for part in parts) or (ratios != ratios[:1]).any():
         raise InputError(
-            f"the parts of body {name!r} differ in pose or treatment, or are deformed: they are not one body"
+            f"the parts of body {name!r} differ in pose or treatment, or are deformed, and so are not one body; give all the "
+            "pose and the treatment of the whole"
         )
     given = {key: getattr(first, key) for key in alike} | {"damping": float(ratios[0]) if ratios.size else 0.0}
     return replace(first.part_of, model=replace(first.part_of.model, parts=[part.model for part in parts]), **given)

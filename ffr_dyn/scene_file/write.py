@@ -19,7 +19,6 @@ from ffr_dyn.functions.formula import Measured, Operation, text_of
 from ffr_dyn.functions.time_functions import (
     HARMONIC,
     OPERATION,
-    PIECEWISE,
     POLYNOMIAL,
     TimeFunction,
     constant,
@@ -310,7 +309,9 @@ def _data(value: Any, what: str) -> Any:
     if isinstance(value, int) and not isinstance(value, bool):
         return float(value)
     if callable(value):
-        raise InputError(f"{what} is a Python function, which a scene file cannot hold; use a formula or a table")
+        raise InputError(
+            f"{what} is a Python function, which a scene file cannot hold: give numbers or a name in its place"
+        )
     return value
 
 
@@ -324,8 +325,6 @@ def _function(function: TimeFunction, what: str) -> Any:
         return data[0] if len(data) == 1 else {"polynomial": data}
     if function.kind == HARMONIC:
         return {"harmonic": dict(zip(("mean", "amplitude", "speed", "phase"), data, strict=True))}
-    if function.kind != PIECEWISE:
-        raise InputError(f"{what} is a function of a kind that a scene file cannot hold")
     pieces, count = int(data[0]), int(data[1])
     rows = np.reshape(data[pieces + 3 :], (pieces, count)).tolist()
     return {"piecewise": {"breaks": data[2 : pieces + 3], "coefficients": rows}}

@@ -47,7 +47,10 @@ def planar_forms(scene: Scene) -> Iterator[Scene]:
         normal = AXES.index(scene.plane)
         scene = levelled(scene, normal)
         for obstacle in _across(scene, normal):
-            raise InputError(f"the scene is declared planar with the normal {scene.plane}, but {obstacle}")
+            raise InputError(
+                f"the scene is declared planar with the normal {scene.plane}, but {obstacle}; take that away, or "
+                'declare plane = "none"'
+            )
         yield _in_plane(scene, normal)
     if scene.plane == "auto":
         for normal in range(3):

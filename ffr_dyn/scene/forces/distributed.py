@@ -96,7 +96,7 @@ def affine(u: Array, Phi: Array, f: Array, slope: Array) -> Affine:
 def surface_of(body: FlexibleBody, name: str) -> Surface:
     """The surface on which the force of that name acts."""
     if body.surface is None:
-        raise InputError(f"force {name!r}: body {body.name!r} has no surface to act on")
+        raise InputError(f"force {name!r}: body {body.name!r} has no surface to act on; use loads at its interfaces")
     return body.surface
 
 

@@ -1,0 +1,164 @@
+"""What charts, the search for the cheapest model and variants of a scene say."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from functools import cache, partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from unittest.mock import patch
+
+from ffr_gallery.bodies import beam
+from remedy import CLOUD, DOUBLE, HINGED, Case, run, stressed
+from synthetic import cloud
+
+from ffr_dyn.analyses.events import Event
+from ffr_dyn.chart.diagram import Diagram, Lost, measures_of, work_precision
+from ffr_dyn.chart.draw import draw_chart
+from ffr_dyn.chart.reference import reference
+from ffr_dyn.chart.runner import Failure, Here, Job, Span, perform, pool
+from ffr_dyn.chart.variants import FULL, Variant, models_of
+from ffr_dyn.economy.model_choice import applied, full
+from ffr_dyn.economy.policy import Policy
+from ffr_dyn.economy.report import write_report
+from ffr_dyn.economy.result import Economy
+from ffr_dyn.economy.search import economise
+from ffr_dyn.integrators.stabilisation import Projection
+from ffr_dyn.scene.forces import SpringDamper
+from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.variants.variant import basis_of, stiffening_by, vary, with_model
+from ffr_prep.common.errors import ComputationError
+
+p = partial
+SWING = replace(CLOUD, gravity=(0, -9.81, 0), plane="none", bodies=(Body("cloud", stressed(cloud(2))),))
+CORNER = ",".join(str(x) for x in SWING.bodies[0].model.surface.points[0])
+BARE = replace(SWING, bodies=(Body("cloud", replace(cloud(2), surface=None)),))
+TIP = "cloud.b.position.y"
+
+# ---- charts -------------------------------------------------------------------------------------------------------------
+
+
+def lost(scene: Scene, *texts: str, step: float = 1e-3, end: float = 0.02, **more: object) -> object:
+    """A run of a chart. Raises what it was lost for."""
+    job = Job(scene, Variant("ros2", step), Span(end, 0.01), measures_of(scene, texts), repeats=1, **more)
+    outcome = perform(job)
+    if isinstance(outcome, Failure):
+        raise ComputationError(outcome.reason)
+    return outcome
+
+
+def measured(wrong: str, right: str, scene: Scene = SWING, other: Scene = SWING) -> Case:
+    return Case(p(lost, scene, wrong), p(lost, other, right))
+
+
+def referred(limit: float) -> object:
+    span, measures = Span(0.04, 0.01), measures_of(HINGED, ["position:bar.b"])
+    return reference(HINGED, span, measures, Projection(), Here(), limit=limit)
+
+
+@cache
+def diagram() -> Diagram:
+    span, measures = Span(0.04, 0.01), measures_of(SWING, ["position:cloud.b"])
+    methods = {"ros2": (5e-3, 2.5e-3)}
+    return work_precision(SWING, span, Here(), measures=measures, methods=methods, repeats=1, wanted=1e-3)
+
+
+def drawn(of: Diagram, name: str = "chart.png", **more: str) -> None:
+    with TemporaryDirectory() as folder:
+        draw_chart(of, Path(folder) / name, **more)
+
+
+def opened(**where: object) -> object:
+    with pool(**where) as found:
+        return found
+
+
+def without_dask(workers: int) -> object:
+    with patch.dict(sys.modules, {"dask": None}):
+        return opened(workers=workers)
+
+
+GONE = Lost("ros2", FULL.label, "ros2, step 1 s", "step", 1.0, "took longer than 1 s")
+CHARTS = [
+    measured("speed:cloud.b", "position:cloud.b"),
+    measured("cloud.b.positon", "cloud.b.position"),
+    measured("reaction:hing", "reaction:hinge"),
+    measured("deflection:cloud.b/a", "deflection:cloud.b/a,c"),
+    measured("deflection:cloud.b/a,a", "deflection:cloud.b/a,c"),
+    measured("deflection:cloud", "deflection:cloud.b", BARE, BARE),
+    measured("deflection:cloud", "deflection:cloud", BARE),
+    measured(f"stress:cloud@{CORNER}", f"stress:cloud@{CORNER}", CLOUD),
+    measured("stress:cloud@1", f"stress:cloud@{CORNER}"),
+    measured("deflection:clod", "deflection:cloud"),
+    measured("position:ground.O", "position:cloud.b"),
+    measured("position:cloud.d", "position:cloud.b"),
+    Case(p(lost, SWING, step=1e-5, end=2.0, limit=1e-9), p(lost, SWING, step=1e-3, limit=10.0)),
+    Case(p(referred, 1e-9), p(referred, 10.0)),
+    Case(p(opened, workers=-1), p(opened, workers=0)),
+    Case(p(without_dask, 1), p(without_dask, 0)),
+    Case(p(opened, cluster="tcp://localhost"), p(opened, workers=0)),
+    Case(p(models_of, DOUBLE, modes=(2, 4)), p(models_of, DOUBLE)),
+    Case(lambda: diagram().measure("energy"), lambda: diagram().measure("position:cloud.b")),
+    Case(lambda: drawn(diagram(), "chart.bmp"), lambda: drawn(diagram())),
+    Case(lambda: drawn(diagram(), against="money"), lambda: drawn(diagram(), against="wall")),
+    Case(lambda: drawn(replace(diagram(), points=(), lost=(GONE,))), lambda: drawn(diagram())),
+]
+
+# ---- the cheapest model -------------------------------------------------------------------------------------------------
+
+
+def economised(*outputs: object, scene: Scene = SWING, **more: object) -> Economy:
+    return economise(scene, outputs, **{"end": 0.2, "output_step": 0.02, "tolerance": 1e-2, "verify": False, **more})
+
+
+def asked(wrong: tuple[object, ...], right: tuple[object, ...], scene: Scene = SWING) -> Case:
+    return Case(p(economised, *wrong), p(economised, *right, scene=scene))
+
+
+def held(stiffness: float) -> Scene:
+    return replace(SWING, springs=(SpringDamper("rope", "ground.P", "cloud.b", stiffness, free_length=2.0),))
+
+
+def reported(name: str) -> None:
+    with TemporaryDirectory() as folder:
+        write_report(economised(TIP), Path(folder) / name)
+
+
+HELD = "cloud.a.position.y"
+SOON = (Event("end", lambda t, state: t - 0.03, stop=True),)
+LOUD = replace(SWING, bodies=(Body("cloud", stressed(cloud(2), 1e300)),))
+ECONOMY = [
+    asked((), (TIP,)),
+    asked((f"{TIP}=little",), (f"{TIP}=1%",)),
+    asked((TIP, TIP), (TIP,)),
+    asked((f"{TIP}=1e-12%",), (f"{TIP}=1%",)),
+    asked(("cloud.d.position.y",), (TIP,)),
+    asked(("clod.stress",), ("cloud.stress=5%",)),
+    Case(p(economised, "cloud.stress", scene=CLOUD), p(economised, "cloud.stress=5%")),
+    asked((HELD,), (f"{HELD}=1e-3",)),
+    Case(p(reported, "report.pdf"), p(reported, "report.txt")),
+    Case(lambda: applied(HINGED, full(DOUBLE, "ros2", 1)), lambda: applied(HINGED, full(HINGED, "ros2", 1))),
+    Case(p(economised, TIP, scene=held(1e20)), p(economised, TIP, scene=held(10.0))),
+    Case(p(economised, TIP, tolerance=1e-9, policy=Policy(most_divisions=2)),
+         p(economised, TIP, tolerance=1e-2, policy=Policy(most_divisions=64))),
+    Case(p(economised, TIP, verify=True, policy=Policy(most_divisions=2)),
+         p(economised, TIP, verify=True, output_step=0.01)),
+    Case(p(economised, TIP, events=SOON), p(economised, TIP, events=SOON, output_step=0.005)),
+    Case(p(economised, "cloud.stress", scene=LOUD), p(economised, "cloud.stress")),
+]  # fmt: skip
+
+# ---- variants -----------------------------------------------------------------------------------------------------------
+
+STRIP = Body("strip", beam("strip", 1.0, 1.0, 10.0, 2))
+LESS = replace(cloud(2), interfaces=cloud(2).interfaces[:2])
+VARIANTS = [
+    Case(p(basis_of, cloud(2), -1), p(basis_of, cloud(2), 1)),
+    Case(lambda: run(vary(SWING, drop=("I6",))), lambda: run(vary(SWING, drop=("I5", "I9")))),
+    Case(p(stiffening_by, STRIP, (99,)), p(stiffening_by, STRIP, (0,))),
+    Case(p(with_model, Body("cloud", cloud(2)), LESS), p(with_model, Body("cloud", LESS), cloud(2))),
+    Case(p(with_model, Body("c", cloud(2), damping=(0.1, 0.2)), cloud(3)),
+         p(with_model, Body("c", cloud(2), damping=0.1), cloud(3))),
+    Case(lambda: vary(SWING, modes={"clod": 1}), lambda: vary(SWING, modes={"cloud": 1})),
+]  # fmt: skip
+CASES = CHARTS + ECONOMY + VARIANTS
