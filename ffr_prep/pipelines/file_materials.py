@@ -19,7 +19,8 @@ from ffr_prep.common.reading import reading
 from ffr_prep.matrices.unit_systems import UNIT_SYSTEMS, UnitSystem
 from ffr_prep.mesh.abaqus import keyword_sections
 from ffr_prep.mesh.bulk_data import cards
-from ffr_prep.mesh.mesh import UNITS, Mesh
+from ffr_prep.mesh.geometry.face import METRES
+from ffr_prep.mesh.mesh import Mesh
 from ffr_prep.model.material import Material, Solid, orthotropic
 
 _ABAQUS, _NASTRAN = (".inp",), (".bdf", ".nas", ".fem")
@@ -72,13 +73,13 @@ def names_of_materials(path: Path) -> list[str]:
 
 def unit_system(path: Path, materials: list[_Constants], unit: str | None) -> str:
     """The name of the system of units with that length in which these are solids. Raises InputError for none or several."""
-    length = UNITS[unit or "m"]
+    length = METRES[unit or "m"]
     fitting = [name for name, system in _SYSTEMS.items() if all(_is_solid(one, system) for one in materials)]
     of_length = [name for name in fitting if _SYSTEMS[name].length == length]
     if len(of_length) == 1:
         return of_length[0]
     first = materials[0]
-    other = sorted({name.split("-")[0] for name in fitting} & set(UNITS))
+    other = sorted({name.split("-")[0] for name in fitting} & set(METRES))
     hint = (
         f"they are a solid's in {' or '.join(fitting)}: give --unit {other[0]}"
         if other
