@@ -65,6 +65,7 @@ _BY_MODULE = {
     "ffr_dyn.analyses.mixed": "Causal Mixed mixed",
     "ffr_dyn.analyses.reference": "IDA SciPy reference",
     "ffr_dyn.analyses.registry": "OfMoment OverTime option register_analysis",
+    "ffr_dyn.analyses.rotating.steady": "Steady steady",
     "ffr_dyn.analyses.run": "run",
     "ffr_dyn.analyses.settings": "Charted MomentSettings Settings",
     "ffr_dyn.analyses.assemble": "Assemble assembly",
@@ -164,6 +165,7 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_dyn.analyses.registry import (
         OfMoment as OfMoment, OverTime as OverTime, option as option, register_analysis as register_analysis
     )
+    from ffr_dyn.analyses.rotating.steady import Steady as Steady, steady as steady
     from ffr_dyn.analyses.run import run as run
     from ffr_dyn.analyses.settings import Charted as Charted, MomentSettings as MomentSettings, Settings as Settings
     from ffr_dyn.analyses.assemble import Assemble as Assemble, assembly as assembly

@@ -27,6 +27,7 @@ from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import Integrator, Within, stepped
 from ffr_dyn.integrators.ros2 import Twin
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
+from ffr_dyn.linear.steady_state import steadily
 from ffr_dyn.results.file import load_result, with_attributes
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
@@ -37,7 +38,7 @@ MARGIN = 2.0  # by which a trial aims below the accuracy
 SLOW = 0.7  # a ringing output's error falls slower than the step to this power
 QUICK = 1e7  # microseconds of the further runs, by `_cost`, up to which they are made unasked
 
-Beginning = Literal["as-given", "quasi-static"]  # the default and the other
+Beginning = Literal["as-given", "quasi-static", "steady"]  # the default and the others
 
 # What a step is to keep within the accuracy always, and what where it does not ring.
 PLACES = re.compile(r"\.(position|R|p|angle|stroke|orientation)$")
@@ -121,7 +122,8 @@ def forward(
     check       : whether further runs are made that tell the error of every output; by default where that takes seconds.
                   A step that is found is always checked
     begin       : "quasi-static" for bodies that start with the deflections, and their rates, that the motion asks for
-                  (`ffr_dyn.consistency.quasi_static`) and do not ring; "as-given" with the scene's q and q_dot
+                  (`ffr_dyn.consistency.quasi_static`) and do not ring; "steady" for a scene that turns evenly, in its steady
+                  motion (`ffr_dyn.linear.steady_state`); "as-given" with the scene's q and q_dot
     path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
     resume      : a result file whose run goes on to the same bits; `end` may be later. A new file: a run from the start
     progress    : called with the time reached, a few times a second
@@ -155,7 +157,8 @@ def _begun(assembled: Assembled, start: float, begin: Beginning) -> Assembled:
     """The state that a run begins in."""
     if begin not in get_args(Beginning):
         raise InputError(f"begin is {begin!r}; it must be one of {', '.join(map(repr, get_args(Beginning)))}")
-    return assembled if begin == "as-given" else quasi_static(assembled, start)
+    return {"as-given": lambda: assembled, "quasi-static": lambda: quasi_static(assembled, start),
+            "steady": lambda: steadily(assembled, start)}[begin]()
 
 
 def _resumed(
