@@ -60,7 +60,8 @@ class Forward(OverTime):
     begin: Beginning = field(
         default="as-given",
         metadata=option(
-            "--quasi-static/--as-given", "Start with the deflections that the motion asks for; default: as given."
+            "--as-given/--quasi-static/--steady",
+            "Start as given (default), with the deflections that the motion asks for, or turning evenly.",
         ),
     )
 

@@ -107,10 +107,15 @@ def _central(function: Callable[[Array], Array], steps: Array) -> Array:
     return np.array(columns).T
 
 
+def at_rest(near: Chart) -> bool:
+    """Whether nothing moves."""
+    return bool(np.abs(near.V / sizes(near.at)).max(initial=0.0) < AT_REST)
+
+
 def state_matrix(near: Chart) -> tuple[Array, float]:
     """A (2 d, 2 d) with d/dt (y, z) = A (y, z), and its error, relative: by differences, or of a scene at rest exactly."""
     d = near.steps.size
-    if np.abs(near.V / sizes(near.at)).max(initial=0.0) < AT_REST:
+    if at_rest(near):
         K, D = _at_rest(near)
         return np.block([[np.zeros((d, d)), np.eye(d)], [-near.Z.T @ K @ near.Z, -near.Z.T @ D @ near.Z]]), 0.0
 

@@ -44,6 +44,7 @@ NEUTRAL = 1e-13  # of a stiffness relative to the largest: rounding
 UNBALANCED = 1e-6  # of forces along motions without stiffness, relative to all
 VARIES, OPENS = 1e-7, 1e-7  # of forces and stiffness over a turn, relative; of rows, relative to the scene
 PHASES = 8  # of a turn, over which a mean is taken
+SAME = 1e-6  # of a state that is in its steady motion: of velocities and forces, relative
 TURNED = 1.0  # rad: how far on the scene is looked at again
 STEP = 1e-4  # m, rad: of differences, extrapolated
 
@@ -233,15 +234,51 @@ def steady_state(assembled: Assembled, time: float, start: Array | None = None) 
     varying = _varying(found)
     if varying <= VARIES:
         return found
-    turn = 2 * np.pi / machine.screws.fastest
-    phases = tuple(float(turn * k / PHASES) for k in range(PHASES))
-    found = _followed(replace(machine, phases=phases), found.x)
-    note = (
+    found = _followed(replace(machine, phases=_phases(machine)), found.x)
+    return replace(found, notes=(_varies(varying),))
+
+
+def steady_here(system: System, time: float, x: Array, v: Array) -> Steady | None:
+    """The steady motion that a state (x, v) on its constraints is in; None where it is in none."""
+    machine = Machine(system, time, screws_of(system.layout, x, v))
+    size = sizes_of(system)
+    apart = np.abs((v - velocities(machine.place, machine.screws, x)) / size).max(initial=0.0)
+    if apart > SAME * max(machine.screws.fastest, float(np.abs(v / size).max(initial=0.0))):
+        return None
+    for phases in ((0.0,), _phases(machine)):
+        found = _at(replace(machine, phases=phases), x)
+        applied = np.abs(np.linalg.solve(np.linalg.cholesky(found.about.M), found.about.forces)).max()
+        if np.abs(found.Z.T @ found.about.forces).max(initial=0.0) <= SAME * applied:
+            try:
+                _require_lasting(found)
+            except InputError:
+                return None
+            varying = _varying(found) if len(phases) == 1 else VARIES
+            return found if varying <= VARIES else replace(found, notes=(_varies(varying),))
+    return None
+
+
+def _at(machine: Machine, x: Array) -> Steady:
+    """The matrices at a state, balanced or not."""
+    count = sum(len(block.words) for block in machine.system.blocks) + locked(machine.place).size
+    about = matrices(machine, x, np.zeros(count))
+    about = matrices(machine, x, _multipliers(about, about.forces))
+    Z = free_motions(about.jacobian, about.M)
+    return Steady(machine, x, velocities(machine.place, machine.screws, x), about, Z, 0)
+
+
+def _phases(machine: Machine) -> tuple[float, ...]:
+    """[s] in a turn of the fastest body."""
+    fastest = machine.screws.fastest
+    return tuple(2 * np.pi / fastest * k / PHASES for k in range(PHASES)) if fastest else (0.0,)
+
+
+def _varies(varying: float) -> str:
+    return (
         "what acts on the turning bodies changes with their angle, as weight, loads and bearings do that are not the same "
-        f"all around, by up to {varying:.1g} of the stiffness or the forces: the steady motion has the means of a turn; "
-        "`periodic` finds the motion itself"
+        f"all around, by up to {varying:.1g} of the stiffness or the forces: the steady motion and its modes have the means "
+        "of a turn; `periodic` finds the motion itself"
     )
-    return replace(found, notes=(note,))
 
 
 def steadily(assembled: Assembled, time: float) -> Assembled:
@@ -271,8 +308,7 @@ def _followed(machine: Machine, x: Array) -> Steady:
 def _newton(machine: Machine, x: Array) -> Steady | None:
     """The steady motion near x, None where the steps do not come to an end."""
     place, size = machine.place, sizes_of(machine.system)
-    about = matrices(machine, x, np.zeros(sum(len(block.words) for block in machine.system.blocks) + locked(place).size))
-    about = matrices(machine, x, _multipliers(about, about.forces))
+    about = _at(machine, x).about
     for count in range(1, ITERATIONS + 1):
         Z = free_motions(about.jacobian, about.M)
         closing = smallest_step(about.jacobian, about.M, -about.Phi)
