@@ -33,7 +33,7 @@ from ffr_dyn.linear.eigen import Eigen, eigen
 from ffr_dyn.linear.matrices import reduced
 from ffr_dyn.linear.matrices import state_matrix as steady_matrix
 from ffr_dyn.linear.steady_state import Steady, screws_of, steady_here
-from ffr_dyn.linear.whirl import ONE_WAY, whirls
+from ffr_dyn.linear.whirl import ways_of, whirls
 from ffr_dyn.linear.words import in_words
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.quantities import catalogue
@@ -173,7 +173,9 @@ def linearise(
     where = assembled.system.scene, assembled.system.layout
     screws = screws_of(where[1], assembled.x, assembled.v)
     seen, whirl = whirls(*where, screws, assembled.x, solved.values, modes)
-    leading = in_words(*where, assembled.x, near.M, solved.values, modes)
+    ways = ways_of(seen, whirl)
+    rates_seen = np.where([bool(way) for way in ways], np.abs(seen), np.abs(solved.values))
+    leading = in_words(*where, assembled.x, near.M, modes, rates_seen, ways)
     names = tuple(item if isinstance(item, str) else item.name for item in inputs)
     evaluate(at, time, assembled.x, assembled.v)
     notes = (*assembled.notes, *_notes(near, steady), *checked("linearise", assembled, at.record))
@@ -363,6 +365,5 @@ def _lines_of_modes(
 
 def _whirling(seen: float, share: float) -> str:
     """What is told of a whirl; nothing of what does not turn, or moves to and fro."""
-    if not share > ONE_WAY:
-        return ""
-    return f"   {'forward' if seen > 0 else 'backward'} whirl, {abs(seen):.6g} Hz from the ground"
+    (way,) = ways_of(np.array([seen]), np.array([share]))
+    return f"   {way} whirl, {abs(seen):.6g} Hz from the ground" if way else ""

@@ -247,8 +247,7 @@ def steady_here(system: System, time: float, x: Array, v: Array) -> Steady | Non
         return None
     for phases in ((0.0,), _phases(machine)):
         found = _at(replace(machine, phases=phases), x)
-        applied = np.abs(np.linalg.solve(np.linalg.cholesky(found.about.M), found.about.forces)).max()
-        if np.abs(found.Z.T @ found.about.forces).max(initial=0.0) <= SAME * applied:
+        if np.abs(found.Z.T @ found.about.forces).max(initial=0.0) <= SAME * _size_of_forces(found):
             try:
                 _require_lasting(found)
             except InputError:
@@ -349,9 +348,8 @@ def _require_balance(found: Steady) -> None:
     left = Z.T @ about.forces
     U, values, _ = np.linalg.svd(Z.T @ about.K @ Z)
     loose = U[:, values <= NEUTRAL * values.max(initial=0.0)]
-    applied = np.abs(np.linalg.solve(np.linalg.cholesky(about.M), about.forces)).max()
     along = loose.T @ left
-    if np.abs(along).max(initial=0.0) <= UNBALANCED * applied:
+    if np.abs(along).max(initial=0.0) <= UNBALANCED * _size_of_forces(found):
         return
     system = found.machine.system
     motion = named_motion(system.scene, system.layout, found.x, Z @ loose @ along)
@@ -359,6 +357,14 @@ def _require_balance(found: Steady) -> None:
         f"no steady motion: what acts along {motion} speeds it up or slows it down; add a driver of constant speed, or leave "
         "out the force that does"
     )
+
+
+def _size_of_forces(found: Steady) -> float:
+    """Of all forces, or of those that would hold the scene's mass at its size from the axis; in the free motions' units."""
+    about, machine = found.about, found.machine
+    applied = np.abs(np.linalg.solve(np.linalg.cholesky(about.M), about.forces)).max()
+    held = machine.screws.fastest**2 * (sizes_of(machine.system) * np.sqrt(np.diag(about.M))).max()
+    return float(max(applied, held)) or 1.0
 
 
 # ---- the same at every angle ----------------------------------------------------------------------------------------
@@ -402,6 +408,5 @@ def _varying(found: Steady) -> float:
     K, there = Z.T @ first.K @ Z, Z.T @ again.K @ Z
     scale = np.sqrt(np.abs(np.diag(K)) + machine.screws.fastest**2)
     by_stiffness = np.abs((there - K) / np.outer(scale, scale)).max(initial=0.0)
-    applied = np.abs(np.linalg.solve(np.linalg.cholesky(first.M), first.forces)).max()
-    by_forces = np.abs(Z.T @ (again.forces - first.forces)).max(initial=0.0)
-    return float(max(by_stiffness, by_forces / applied if applied else 0.0))
+    by_forces = np.abs(Z.T @ (again.forces - first.forces)).max(initial=0.0) / _size_of_forces(found)
+    return float(max(by_stiffness, by_forces))

@@ -42,6 +42,13 @@ def whirls(scene: Scene, place: Layout, screws: Screws, x: Array, values: Array,
     return seen, share
 
 
+def ways_of(seen: Array, share: Array) -> list[str]:
+    """ "forward" or "backward" of each mode, "" where it is no whirl, or one that is nearly a line in the turning axes."""
+    return [
+        ("forward" if one > 0 else "backward") if part > ONE_WAY else "" for one, part in zip(seen, share, strict=True)
+    ]
+
+
 def _parts(body: Body, place: Layout, screws: Screws, x: Array, b: int, mode: Array) -> tuple[float, float]:
     """|z_+|^2 and |z_-|^2 of a body, summed over its points and its turning, with its mass."""
     A, speed = rotation_matrix(x[place.p(b)]), float(np.linalg.norm(screws.w[b]))

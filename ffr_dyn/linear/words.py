@@ -19,24 +19,31 @@ ALONG = 0.9  # of what moves, from where it has a direction
 ORDINALS = "first second third fourth fifth sixth seventh eighth ninth tenth".split()
 
 
-def in_words(scene: Scene, place: Layout, x: Array, M: Array, values: Array, modes: Array) -> tuple[str, ...]:
-    """A name for each mode (V, m) with its eigenvalue (m,), given by rising modulus; pairs have one name.
+def in_words(
+    scene: Scene, place: Layout, x: Array, M: Array, modes: Array, seen: Array, whirling: Sequence[str]
+) -> tuple[str, ...]:
+    """A name for each mode (V, m).
 
-    Elastic ones have the body that is strained most, what it does, and where; they are counted by what they are.
+    Elastic ones have the body that is strained most, what it does, and where; they are counted, by their frequencies, among
+    those that do the same.
+
+    seen     : (m,) [rad/s] frequencies, of a whirl that from the ground
+    whirling : "forward" or "backward" of each mode; "" where it is no whirl
     """
-    counts, found = Counter[str](), list[str]()
-    for number, (value, mode) in enumerate(zip(values, modes.T, strict=True)):
-        if number and value.imag > 0 and abs(value - values[number - 1].conj()) <= 1e-6 * abs(value):
-            found.append(found[-1])
-            continue
-        what = _elastic(scene, place, M, value, mode)
+    whats = []
+    for mode, rate, way in zip(modes.T, seen, whirling, strict=True):
+        what = _elastic(scene, place, M, rate, mode)
+        whats.append(what and (what[0], what[1], f", {way}" if way and what[1] == "bending" else what[2]))
+    found, counts, last = [""] * len(whats), Counter[tuple[str, ...]](), dict[tuple[str, ...], float]()
+    for k in np.argsort(seen, kind="stable"):
+        what, mode = whats[k], modes[:, k]
         if what is None:
             at = mode[int(np.argmax(np.abs(mode)))]
-            found.append(named_motion(scene, place, x, (mode * np.conj(at)).real))
+            found[k] = named_motion(scene, place, x, (mode * np.conj(at)).real)
             continue
-        body, family, direction = what
-        counts[body + family + direction] += 1
-        found.append(f"{body}: {_ordinal(counts[body + family + direction])} {family}{direction}")
+        counts[what] += not np.isclose(last.get(what, -1.0), seen[k], rtol=1e-6, atol=0.0)
+        last[what] = seen[k]
+        found[k] = f"{what[0]}: {_ordinal(counts[what])} {what[1]}{what[2]}"
     return tuple(found)
 
 
@@ -44,10 +51,10 @@ def _ordinal(count: int) -> str:
     return ORDINALS[count - 1] if count <= len(ORDINALS) else f"{count}th"
 
 
-def _elastic(scene: Scene, place: Layout, M: Array, value: complex, mode: Array) -> tuple[str, str, str] | None:
+def _elastic(scene: Scene, place: Layout, M: Array, rate: float, mode: Array) -> tuple[str, str, str] | None:
     """(body, what it does, ", " and the direction) of a mode that strains a body; None of one that moves bodies."""
     strain = [b.model.omega2 @ np.abs(mode[place.q_dot(k)]) ** 2 for k, b in enumerate(scene.bodies)]
-    moving = abs(value) ** 2 * float((mode.conj() @ M @ mode).real)
+    moving = rate**2 * float((mode.conj() @ M @ mode).real)
     if not sum(strain) > ELASTIC * moving or moving == 0:
         return None
     k = int(np.argmax(strain))
