@@ -29,8 +29,9 @@ LISTED = {
     "mixed": "Motion and unknown forces of SCENE, some motions of which are known.",
     "linearise": "Eigenvalues and state-space matrices of SCENE about its start, its equilibrium or its steady motion.",
     "steady": "Steady motion of SCENE: bodies deformed by even turning, at one speed or over a list of speeds.",
+    "campbell": "Campbell diagram of SCENE: frequencies and damping over the speed, critical speeds, limits of stability.",
 }
-_FOLDERS = {"steady": "rotating"}  # of the modules that do not lie beside this one
+_FOLDERS = dict.fromkeys(("steady", "campbell"), "rotating")  # of the modules that do not lie beside this one
 _REGISTERED: dict[str, type[Analysis]] = {}
 EVENTS_SHOWN = 20
 
