@@ -65,8 +65,10 @@ _BY_MODULE = {
     "ffr_dyn.analyses.mixed": "Causal Mixed mixed",
     "ffr_dyn.analyses.reference": "IDA SciPy reference",
     "ffr_dyn.analyses.registry": "OfMoment OverTime option register_analysis",
+    "ffr_dyn.pictures.bode": "draw_bode draw_nyquist",
     "ffr_dyn.pictures.campbell": "draw_campbell",
     "ffr_dyn.analyses.rotating.campbell": "Campbell campbell",
+    "ffr_dyn.analyses.rotating.response": "Response response",
     "ffr_dyn.analyses.rotating.steady": "Steady steady",
     "ffr_dyn.analyses.run": "run",
     "ffr_dyn.analyses.settings": "Charted MomentSettings Settings",
@@ -167,8 +169,10 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_dyn.analyses.registry import (
         OfMoment as OfMoment, OverTime as OverTime, option as option, register_analysis as register_analysis
     )
+    from ffr_dyn.pictures.bode import draw_bode as draw_bode, draw_nyquist as draw_nyquist
     from ffr_dyn.pictures.campbell import draw_campbell as draw_campbell
     from ffr_dyn.analyses.rotating.campbell import Campbell as Campbell, campbell as campbell
+    from ffr_dyn.analyses.rotating.response import Response as Response, response as response
     from ffr_dyn.analyses.rotating.steady import Steady as Steady, steady as steady
     from ffr_dyn.analyses.run import run as run
     from ffr_dyn.analyses.settings import Charted as Charted, MomentSettings as MomentSettings, Settings as Settings

@@ -46,6 +46,7 @@ from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 SHOWN = 12  # modes that a command prints
+BASE = {"base.x": 0, "base.y": 1, "base.z": 2}  # inputs: accelerations of the ground
 STATIONARY = 1e-6  # of the accelerations in moving axes, relative to those of the applied forces
 
 
@@ -100,6 +101,12 @@ class Linearisation(Brief):
         """Largest real part of an eigenvalue [1/s]: negative where all small motions decay."""
         return float(self.eigenvalues.real.max())
 
+    def to_statespace(self) -> Any:
+        """A `scipy.signal.StateSpace` of A, B, C, D; python-control takes its matrices: control.ss(s.A, s.B, s.C, s.D)."""
+        from scipy.signal import StateSpace
+
+        return StateSpace(self.A, self.B, self.C, self.D)
+
 
 @dataclass(frozen=True)
 class Linearise(OfMoment):
@@ -151,7 +158,8 @@ def linearise(
 ) -> Linearisation:
     """Linearise a scene about its assembled state at `time` [s], its drivers' positions and rates being those of the time.
 
-    inputs  : efforts, or names of loads of the scene (an input of one doubles the load)
+    inputs  : efforts, names of loads of the scene (an input of one doubles the load), or "base.x", "base.y", "base.z", an
+              acceleration of the ground, to whose frame all outputs refer
     outputs : names of components of a result, such as "rod.tip.position.y"
     For an equilibrium: ``linearise(scene_at(scene, static(scene)))``.
 
@@ -233,13 +241,21 @@ def _efforts(inputs: tuple[Effort | str, ...]) -> tuple[Effort, ...]:
 def _with_inputs(at: Evaluator, scene: Scene, inputs: tuple[Effort | str, ...], u: Array) -> Evaluator:
     """The evaluator with the inputs u, on top of the scene's own loads."""
     model, data = at.system.model, at.system.model.loads.data.copy()
+    gravity = model.gravity.copy()
     for item, amount in zip(inputs, u, strict=True):
-        if isinstance(item, str):
+        if _is_base(scene, item):
+            gravity[BASE[item]] -= amount
+        elif isinstance(item, str):
             first = model.loads.row[_load_number(scene, item), LAW]
             data[first : first + 6] *= 1.0 + amount
-    fed = replace(at, engine=with_model(at.engine, model._replace(loads=model.loads._replace(data=data))))
+    fed = replace(at, engine=with_model(at.engine, model._replace(loads=model.loads._replace(data=data), gravity=gravity)))
     sizes = [amount for item, amount in zip(inputs, u, strict=True) if not isinstance(item, str)]
     return sized(fed, _efforts(inputs), np.array(sizes))
+
+
+def _is_base(scene: Scene, item: Effort | str) -> bool:
+    """Whether an input is an acceleration of the base."""
+    return isinstance(item, str) and item in BASE and item not in [load.name for load in scene.loads]
 
 
 def _load_number(scene: Scene, name: str) -> int:

@@ -30,8 +30,9 @@ LISTED = {
     "linearise": "Eigenvalues and state-space matrices of SCENE about its start, its equilibrium or its steady motion.",
     "steady": "Steady motion of SCENE: bodies deformed by even turning, at one speed or over a list of speeds.",
     "campbell": "Campbell diagram of SCENE: frequencies and damping over the speed, critical speeds, limits of stability.",
+    "response": "Frequency response of SCENE: gain, phase and modes from an input to outputs; noise; Bode and Nyquist.",
 }
-_FOLDERS = dict.fromkeys(("steady", "campbell"), "rotating")  # of the modules that do not lie beside this one
+_FOLDERS = dict.fromkeys(("steady", "campbell", "response"), "rotating")  # of the modules that do not lie beside this one
 _REGISTERED: dict[str, type[Analysis]] = {}
 EVENTS_SHOWN = 20
 

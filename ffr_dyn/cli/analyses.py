@@ -15,6 +15,7 @@ from ffr_dyn.cli.run import (
     at_moment,
     changed,
     end_option,
+    file_option,
     keep_option,
     method_options,
     output_option,
@@ -88,7 +89,8 @@ def analysis_command(word: str) -> click.Command:
     from ffr_dyn.analyses.registry import OverTime, analyses, analysis
 
     made = analysis(word)
-    options = [scene_argument, output_option, parameter_option, *([keep_option] if made.keeps else [])]
+    named = any(f.metadata.get("flag") == "--output" for f in fields(made))
+    options = [scene_argument, file_option if named else output_option, parameter_option, *([keep_option] if made.keeps else [])]
     if issubclass(made, OverTime):
         options += [end_option, *(method_options if made.integrates else [])]
     else:
