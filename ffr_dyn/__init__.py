@@ -68,6 +68,7 @@ _BY_MODULE = {
     "ffr_dyn.pictures.bode": "draw_bode draw_nyquist",
     "ffr_dyn.pictures.campbell": "draw_campbell",
     "ffr_dyn.analyses.rotating.campbell": "Campbell campbell",
+    "ffr_dyn.analyses.rotating.periodic": "Periodic periodic",
     "ffr_dyn.analyses.rotating.response": "Response response",
     "ffr_dyn.analyses.rotating.steady": "Steady steady",
     "ffr_dyn.analyses.run": "run",
@@ -172,6 +173,7 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_dyn.pictures.bode import draw_bode as draw_bode, draw_nyquist as draw_nyquist
     from ffr_dyn.pictures.campbell import draw_campbell as draw_campbell
     from ffr_dyn.analyses.rotating.campbell import Campbell as Campbell, campbell as campbell
+    from ffr_dyn.analyses.rotating.periodic import Periodic as Periodic, periodic as periodic
     from ffr_dyn.analyses.rotating.response import Response as Response, response as response
     from ffr_dyn.analyses.rotating.steady import Steady as Steady, steady as steady
     from ffr_dyn.analyses.run import run as run

@@ -18,6 +18,7 @@ import numpy as np
 from ffr_dyn.analyses.events import Event
 from ffr_dyn.analyses.integration import check_output_step, integrate
 from ffr_dyn.analyses.registry import OverTime, option
+from ffr_dyn.analyses.rotating.periodic import periodically
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.quasi_static import quasi_static
@@ -38,7 +39,7 @@ MARGIN = 2.0  # by which a trial aims below the accuracy
 SLOW = 0.7  # a ringing output's error falls slower than the step to this power
 QUICK = 1e7  # microseconds of the further runs, by `_cost`, up to which they are made unasked
 
-Beginning = Literal["as-given", "quasi-static", "steady"]  # the default and the others
+Beginning = Literal["as-given", "quasi-static", "steady", "periodic"]  # the default and the others
 
 # What a step is to keep within the accuracy always, and what where it does not ring.
 PLACES = re.compile(r"\.(position|R|p|angle|stroke|orientation)$")
@@ -60,8 +61,9 @@ class Forward(OverTime):
     begin: Beginning = field(
         default="as-given",
         metadata=option(
-            "--as-given/--quasi-static/--steady",
-            "Start as given (default), with the deflections that the motion asks for, or turning evenly.",
+            "--as-given/--quasi-static/--steady/--periodic",
+            "Start as given (default), with the deflections that the motion asks for, turning evenly, or in the turn that "
+            "comes back to itself.",
         ),
     )
 
@@ -124,7 +126,8 @@ def forward(
                   A step that is found is always checked
     begin       : "quasi-static" for bodies that start with the deflections, and their rates, that the motion asks for
                   (`ffr_dyn.consistency.quasi_static`) and do not ring; "steady" for a scene that turns evenly, in its steady
-                  motion (`ffr_dyn.linear.steady_state`); "as-given" with the scene's q and q_dot
+                  motion (`ffr_dyn.linear.steady_state`); "periodic" for one driven evenly, in the turn that comes back to
+                  itself (`periodic`), with the step of the method; "as-given" with the scene's q and q_dot
     path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
     resume      : a result file whose run goes on to the same bits; `end` may be later. A new file: a run from the start
     progress    : called with the time reached, a few times a second
@@ -138,7 +141,7 @@ def forward(
     the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
     check_output_step(output_step)
-    assembled = _begun(assemble(scene, time=start) if assembled is None else assembled, start, begin)
+    assembled = _begun(assemble(scene, time=start) if assembled is None else assembled, start, begin, method)
     common: dict[str, Any] = {"start": start, "end": end, "output_step": output_step, "stabilisation": stabilisation}
     common |= {"outputs": outputs, "progress": progress, "stopwatch": stopwatch}
     runs = _Runs(scene, assembled, start, output_step, common)
@@ -154,12 +157,15 @@ def forward(
     return _finished(runs, told, resume if path is None else path)
 
 
-def _begun(assembled: Assembled, start: float, begin: Beginning) -> Assembled:
+def _begun(assembled: Assembled, start: float, begin: Beginning, method: Integrator | Within | None) -> Assembled:
     """The state that a run begins in."""
     if begin not in get_args(Beginning):
         raise InputError(f"begin is {begin!r}; it must be one of {', '.join(map(repr, get_args(Beginning)))}")
-    return {"as-given": lambda: assembled, "quasi-static": lambda: quasi_static(assembled, start),
-            "steady": lambda: steadily(assembled, start)}[begin]()
+    if begin == "quasi-static":
+        return quasi_static(assembled, start)
+    if begin == "periodic":
+        return periodically(assembled, start, None if isinstance(method, Within) else method)
+    return steadily(assembled, start) if begin == "steady" else assembled
 
 
 def _resumed(
