@@ -16,12 +16,12 @@ import numpy as np
 from ffr_dyn.compile.engine import fill_rows, new_engine
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
-from ffr_dyn.consistency.evaluation import closed, evaluator
+from ffr_dyn.consistency.evaluation import evaluate, evaluator
 from ffr_dyn.consistency.failure import failure
-from ffr_dyn.consistency.tangent import STEP, Chart, chart, sizes_of, state
-from ffr_dyn.equations.layout import to_body_axes
+from ffr_dyn.consistency.tangent import STEP, Chart, chart, sizes_of
+from ffr_dyn.equations.layout import moved, to_body_axes, to_global_axes
 from ffr_dyn.functions.rotation import rotation_matrix
-from ffr_dyn.functions.time_functions import evaluate
+from ffr_dyn.functions.time_functions import evaluate as value_of
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, gains
 from ffr_dyn.kernels.tables import OK, Record
@@ -32,18 +32,24 @@ from ffr_prep.common.errors import ComputationError, InputError
 
 PERIODS, KEPT = 60, 12  # of the mixing: at most, and how many are mixed
 NEWTONS = 8
-RETURNS = 1e-9  # of a period that ends where it began: rad, or relative to the scene; rates times the period
+CLOSED = 1e-12  # of constraints over a period: what a projection leaves open would be a kick at every return
+RETURNS = 1e-11  # of a period that ends where it began: rad, or relative to the scene; rates times the period
 STALLED = 0.7  # of a period's closing over that of KEPT periods before, from where mixing gives way to Newton's method
 DIFFERENCE = 1e-5  # the same, of the monodromy matrix; extrapolated
 LATER = 0.37  # s: when a driver is asked again whether it turns evenly
+CORRECTIONS, MET = 12, 1e-13  # of a deviation onto the constraints, and of Phi [m, -]
 AGAIN = 0.5  # rad, or the scene's size: of deviations beyond which a state does not count as come back
 
 
 @dataclass(frozen=True)
 class Turns:
-    """A compiled scene, its chart at a state, and one period [s] of `steps` steps of a method from the chart's time."""
+    """A compiled scene, its chart at a state, and one period [s] of `steps` steps of a method from the chart's time.
+
+    across : (V, C) motions across the free ones, M^-1 jacobian^T
+    """
 
     near: Chart
+    across: Array
     method: Integrator
     period: float
     steps: int
@@ -63,7 +69,8 @@ def turns(system: System, time: float, x: Array, v: Array, method: Integrator, p
     """The map over a period; the state (x, v) meets the constraints."""
     steps = max(1, round(period / method.step))
     near = chart(evaluator(system), time, x, v)
-    return Turns(near, replace(method, step=period / steps), period, steps)
+    jacobian = evaluate(near.at, time, x, v).jacobian
+    return Turns(near, np.linalg.solve(near.M, jacobian.T), replace(method, step=period / steps), period, steps)
 
 
 def period_of(scene: Scene, time: float) -> float:
@@ -71,7 +78,7 @@ def period_of(scene: Scene, time: float) -> float:
     rates = set[float]()
     for driver in scene.drivers:
         if isinstance(driver, Driver) and driver.coordinate == "angle":
-            now, later = (evaluate(driver.function, t) for t in (time, time + LATER))
+            now, later = (value_of(driver.function, t) for t in (time, time + LATER))
             if now[1] and now[1:] == later[1:] and now[2] == 0:
                 rates.add(abs(now[1]))
     if len(rates) == 1:
@@ -82,12 +89,34 @@ def period_of(scene: Scene, time: float) -> float:
 
 def after(of: Turns, x: Array, v: Array, rows: int = 1) -> Record:
     """`rows` states of the period that begins at (x, v), evenly, the last at its end."""
-    engine = new_engine(of.system, x, v, of.method, gains(Projection()), start=of.near.time, spacing=of.method.step)
+    engine = new_engine(of.system, x, v, of.method, gains(Projection(CLOSED)), start=of.near.time, spacing=of.method.step)
     record = new_record(of.system, rows)
     status = fill_rows(engine, record, of.near.time, of.steps // rows)
     if status != OK:
         raise failure(of.system, engine.work, status, of.near.time)
     return record
+
+
+def placed(of: Turns, s: Array) -> tuple[Array, Array]:
+    """(x, v) of the deviation s (2 d,): what `deviation` takes back to it, corrections being across the free motions.
+
+    Raises ComputationError where constraints cannot be met so.
+    """
+    near, place, d = of.near, of.system.layout, of.near.steps.size
+    y, V = near.Z @ s[:d], near.V + near.Z @ s[d:]
+    for _ in range(CORRECTIONS):
+        x = moved(place, near.x, y)
+        now = evaluate(near.at, near.time, x, to_global_axes(place, x, V))
+        if np.abs(now.Phi).max(initial=0.0) <= MET:
+            return x, to_global_axes(place, x, V + of.across @ _least(now.jacobian @ of.across, -now.nu))
+        y = y + of.across @ _least(now.jacobian @ of.across, -now.Phi)
+    raise ComputationError(
+        f"at t = {near.time:.6g} s the search for a periodic motion came to a state that the joints do not allow; begin nearer"
+    )
+
+
+def _least(matrix: Array, right: Array) -> Array:
+    return np.linalg.lstsq(matrix, right, rcond=1e-12)[0]
 
 
 def deviation(of: Turns, x: Array, v: Array) -> Array:
@@ -116,8 +145,7 @@ def _vector(A: Array) -> Array:
 
 def mapped(of: Turns, s: Array) -> Array:
     """(2 d,) the deviation a period later."""
-    d = of.near.steps.size
-    record = after(of, *state(of.near, s[:d], s[d:]))
+    record = after(of, *placed(of, s))
     return deviation(of, record.x[-1], record.v[-1])
 
 
@@ -139,9 +167,7 @@ def returned(of: Turns) -> Returned:
     if newton:
         s, more, error = _newton(of, s)
         periods += more
-    d = of.near.steps.size
-    x, v = closed(of.near.at, of.near.time, *state(of.near, s[:d], s[d:]))
-    return Returned(x, v, periods, error, newton)
+    return Returned(*placed(of, s), periods, error, newton)
 
 
 def _mixed(of: Turns) -> tuple[Array, int, float]:

@@ -20,12 +20,12 @@ from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
 from ffr_dyn.integrators import ROS3, Integrator
-from ffr_dyn.linear.turn_map import Turns, after, monodromy, period_of, returned, turns
+from ffr_dyn.linear.turn_map import Returned, Turns, after, monodromy, period_of, returned, turns
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.parts import described
 from ffr_dyn.scene.scene import Scene, require_scene
-from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.errors import InputError
 
 STEPS, ROWS = 1000, 100  # to a period, where no method is given; rows of the result
 
@@ -83,7 +83,7 @@ def periodic(
     require_scene(scene)
     assembled = assemble(scene, time=time)
     selected(assembled.system, outputs)
-    of, found, notes = _found(assembled, time, method, period)
+    of, found = _found(assembled, time, method, period)
     at = evaluator(assembled.system)
     count = min(ROWS, of.steps)
     of = replace(of, steps=of.steps // count * count) if of.steps % count else of
@@ -99,7 +99,7 @@ def periodic(
         "returns": found.error,
         "degrees_of_freedom": assembled.degrees_of_freedom,
         **(_multipliers(of, found.x, found.v) if floquet else {}),
-        "notes": [*assembled.notes, *notes, *checked("static", assembled, record)],
+        "notes": [*assembled.notes, *checked("static", assembled, record)],
         "status": "complete",
     }
     return result_of(assembled.system, record, attributes, path, outputs)
@@ -107,33 +107,21 @@ def periodic(
 
 def periodically(assembled: Assembled, time: float, method: Integrator | None) -> Assembled:
     """The scene in its periodic motion at `time` [s], for a run that begins in it. Raises as `periodic`."""
-    _, found, notes = _found(assembled, time, method, None)
-    said = (*assembled.notes, f"starts in its periodic motion, found in {found.periods} periods", *notes)
+    _, found = _found(assembled, time, method, None)
+    said = (*assembled.notes, f"starts in its periodic motion, found in {found.periods} periods")
     return replace(assembled, x=found.x, v=found.v, notes=said)
 
 
 def _found(
     assembled: Assembled, time: float, method: Integrator | None, period: float | None
-) -> tuple[Turns, Any, list[str]]:
-    """The map over a period, the periodic state, and what to say of it."""
+) -> tuple[Turns, Returned]:
+    """The map over a period, and the periodic state."""
     if period is not None and not 0 < period < np.inf:
         raise InputError(f"the period is {period} s; it must be positive and finite")
     length = period_of(assembled.system.scene, time) if period is None else period
     chosen = method if method is not None and not method.controlled else ROS3(length / STEPS)
-    x, v, notes = _settled(assembled, time)
-    of = turns(assembled.system, time, x, v, chosen, length)
-    return of, returned(of), notes
-
-
-def _settled(assembled: Assembled, time: float) -> tuple[Any, Any, list[str]]:
-    """The state to begin the search in: with the deflections that the motion asks for, where there are such."""
-    from ffr_dyn.consistency.quasi_static import quasi_static
-
-    try:
-        found = quasi_static(assembled, time)
-    except ComputationError:
-        return assembled.x, assembled.v, []
-    return found.x, found.v, []
+    of = turns(assembled.system, time, assembled.x, assembled.v, chosen, length)
+    return of, returned(of)
 
 
 def _multipliers(of: Turns, x: Any, v: Any) -> dict[str, Any]:
