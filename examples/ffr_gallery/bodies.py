@@ -19,18 +19,22 @@ GRAVITY = (0.0, -9.81, 0.0)
 POINTS = 30  # of the quadrature: exact for the polynomials that are used
 
 
-def beam(name: str, length: float, density: float, bending: float, modes: int, *, held: str = "root") -> FlexibleBody:
+def beam(
+    name: str, length: float, density: float, bending: float, modes: int, *, held: str = "root", spare: int = 6
+) -> FlexibleBody:
     """A slender beam along x that bends in the x-y plane, with geometric stiffening by its axial force.
 
     density : mass per length [kg/m];  bending : EI [N m^2]
     held    : by its frame: "root" clamped at interface "a", or "ends" on both interfaces "a" and "b"; "m" is the middle
+    spare   : shapes beyond `modes`: with six the last frequencies are right to 1e-3; with none, and two modes or more, a
+              force and a moment at the end bend it exactly
 
     The shapes are x^2 or x (L - x) times polynomials, made orthogonal by the eigenvalue problem of stiffness and mass. The
     axial forces of an acceleration along x, of rotation about y and z, and of a force at "b" stiffen (root held).
     """
     at, weight = np.polynomial.legendre.leggauss(POINTS)
     s, w = 0.5 * (at + 1), 0.5 * weight * length
-    shapes = [_shape(held, k) for k in range(modes + 6)]  # six more than modes: the last are right to 1e-3 then
+    shapes = [_shape(held, k) for k in range(modes + spare)]
     values, slopes, curves = (np.array([p.deriv(d)(s) for p in shapes]) / length**d for d in (0, 1, 2))
     M, K = density * (values * w) @ values.T, bending * (curves * w) @ curves.T
     scale = 1 / np.sqrt(np.diag(M))

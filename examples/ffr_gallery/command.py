@@ -26,7 +26,8 @@ def stability(names: tuple[str, ...], output: Path, quick: bool) -> None:
     failures and remedies are printed. Exit code 1 when one does not show what it claims.
 
     explicit-limit, index3-conditioning, drift, baumgarte, euler-angles, singular-four-bar, redundant-bricard, spin-up,
-    reference-conditions, large-deformation, numerical-damping, long-time-energy
+    reference-conditions, large-deformation, numerical-damping, long-time-energy, joint-damper, joint-friction, stiff-bushing,
+    start-shock, fast-driver, coarse-rows, shared-step, aligned-cranks, stiffening-by-load, bent-in-parts
     """
     from ffr_gallery.exhibit import draw, lines
     from ffr_gallery.exhibits import EXHIBITS, SHORT

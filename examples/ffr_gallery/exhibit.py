@@ -113,11 +113,11 @@ def _tick(holds: bool) -> str:
 
 
 def draw(exhibit: Exhibit, path: str | Path) -> Path:
-    """The panels side by side, as .png, .svg or .pdf."""
+    """The panels side by side over what fails and what holds, as .png, .svg or .pdf."""
     from ffr_dyn.pictures.histories import PALETTE, drawing
 
     count = len(exhibit.panels)
-    with drawing(path, (0.5 + 6.0 * count, 4.6)) as figure:
+    with drawing(path, (0.5 + 6.0 * count, 5.6)) as figure:
         for axes, panel in zip(figure.subplots(1, count, squeeze=False)[0], exhibit.panels, strict=True):
             for k, curve in enumerate(panel.curves):
                 style = {"marker": "o", "linestyle": ""} if curve.points else {}
@@ -127,12 +127,22 @@ def draw(exhibit: Exhibit, path: str | Path) -> Path:
                 axes.axvline(mark.at, label=mark.label, lw=1.4, **style)
             for of, scale in zip("xy", panel.log, strict=True):
                 getattr(axes, f"set_{of}scale")("log" if scale else "linear")
+                if not scale:
+                    axes.locator_params(axis=of, nbins=6)
             if panel.bounds is not None:
                 axes.set_ylim(*panel.bounds)
             axes.set(title=panel.title, xlabel=panel.x, ylabel=panel.y)
             axes.legend(fontsize=8.5)
         figure.suptitle("\n".join(wrap(exhibit.title, 48 * count)), fontweight="bold")
+        figure.supxlabel("\n".join(_said(exhibit, 78 * count)), fontsize=8.5, x=0.02, ha="left")
     return Path(path)
+
+
+def _said(exhibit: Exhibit, width: int) -> list[str]:
+    """The words under a picture, in lines no longer than `width`."""
+    numbers = [f"{c.text}: predicted {c.predicted:.4g}, measured {c.measured:.4g} {c.unit}" for c in exhibit.claims]
+    said = [f"Fails: {exhibit.failure}.", f"Holds: {exhibit.remedy}.", *numbers]
+    return [line for text in said for line in wrap(text, width)]
 
 
 def boundary(stable: Callable[[float], bool], low: float, high: float, count: int = 12) -> float:

@@ -13,11 +13,10 @@ from ffr_dyn.analyses.integration import with_all_reactions
 from ffr_dyn.analyses.outcome import result_of
 from ffr_dyn.analyses.registry import OfMoment
 from ffr_dyn.analyses.settings import MomentSettings
-from ffr_dyn.consistency.assemble import Assembled, assemble
+from ffr_dyn.consistency.assemble import Assembled, assemble, turned
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import evaluator, record_states
 from ffr_dyn.equations.layout import initial_state
-from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
@@ -52,7 +51,7 @@ def assembly(
     at = evaluator(assembled.system)
     rows = record_states(at, np.array([time]), assembled.x[None], assembled.v[None])
     record = with_all_reactions(assembled, rows)
-    notes = [note for note in assembled.notes if not note.startswith("assembly moved")]
+    notes = [note for note in assembled.notes if not note.startswith(("assembly moved", "assembly turned"))]
     attributes = {
         **described(scene),
         "analysis": "assembly",
@@ -71,11 +70,9 @@ def changes(assembled: Assembled) -> list[str]:
     x, v = initial_state(scene, place)
     found = []
     for b, body in enumerate(scene.bodies):
-        A, A0 = rotation_matrix(assembled.x[place.p(b)]), rotation_matrix(x[place.p(b)])
-        turn = np.arccos(np.clip(0.5 * (np.trace(A @ A0.T) - 1), -1, 1)) if np.abs(A - A0).max() > CHANGED else 0.0
         sizes = {
             "position by {:.4g} m": _change(assembled.x, x, place.R(b)),
-            "attitude by {:.4g} rad": turn,
+            "attitude by {:.4g} rad": turned(assembled.x[place.p(b)], x[place.p(b)]),
             "elastic coordinates by {:.4g}": _change(assembled.x, x, place.q(b)),
             "velocity by {:.4g} m/s": _change(assembled.v, v, place.R_dot(b)),
             "angular velocity by {:.4g} rad/s": _change(assembled.v, v, place.omega(b)),

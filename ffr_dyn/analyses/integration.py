@@ -17,7 +17,8 @@ from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency import failure as failing
 from ffr_dyn.consistency.assemble import Assembled, assemble
-from ffr_dyn.consistency.doubts import BALANCE, SINGULAR, Seen, ended, held, look, nothing_seen
+from ffr_dyn.consistency.doubts import BALANCE, SINGULAR, Seen, between_rows, ended, held, look, nothing_seen
+from ffr_dyn.consistency.following import STALLED, Lost, jumped, lost_driver, unfollowed
 from ffr_dyn.consistency.validity import meaningless
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import Integrator, methods
@@ -26,15 +27,18 @@ from ffr_dyn.kernels.tables import (
     AT,
     EVALUATIONS,
     FILLED,
-    LEAST,
+    FIRST_PASSED,
+    LOW,
+    LOW_AT,
+    MOST_PASSED,
     NEXT,
     NOW,
     OK,
+    PASSED,
     PHI,
     PHI_DOT,
     PROJECTIONS,
     SPACING,
-    WHEN,
     Record,
     Work,
 )
@@ -49,6 +53,7 @@ from ffr_prep.body import Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
+FEW = 4.0  # steps
 LOOKS = 10  # of a quantity that adds up, from row to row, where the method chooses its steps
 SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, file and keyboard
 
@@ -232,6 +237,10 @@ def _advance(
         with watch:
             status = fill_rows(run.engine, chunk, start, substeps // looks)
         filled = int(steps[FILLED]) - int(steps[FILLED]) % looks
+        reached_rows = Record(*(column[: steps[FILLED]] for column in chunk))
+        lost = None if method.controlled else unfollowed(run.engine.system, run.engine.work, method.step, reached_rows)
+        if cause := _driver_lost(run, method, start, reached_rows, status, lost):
+            raise ComputationError(cause)
         if filled:
             kept = with_all_reactions(assembled, Record(*(column[:filled] for column in chunk)))
             if watcher is not None:
@@ -244,8 +253,10 @@ def _advance(
             run.parts.append(part)
             run.times.append(times)
             look(run.seen, kept)
-            if lost := meaningless(system.scene, run.seen.arrays["bodies"]):
-                raise ComputationError(f"by t = {times[-1]:.6g} s {lost}")
+            if nonsense := meaningless(system.scene, run.seen.arrays["bodies"]):
+                raise ComputationError(f"by t = {times[-1]:.6g} s {nonsense}")
+            if lost is not None and status == OK and run.energy.gains[2] > 0:
+                raise ComputationError(lost.text)
             run.done += filled // looks * substeps
             yield times, part
         if ends:
@@ -255,6 +266,21 @@ def _advance(
             settings = failing.Settings(method, gained[2] > 0, excess_of_gains(gained, run.energy.spacing))
             raise failing.failure(run.engine.system, run.engine.work, status, reached(run.engine, start), settings)
         count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
+
+
+def _driver_lost(run: _Run, method: Integrator, start: float, rows: Record, status: int, lost: Lost | None) -> str:
+    """Which driver is why the steps up to these rows do not follow the motion, or have failed; empty where none is."""
+    system, now = run.engine.system, reached(run.engine, start)
+    if method.controlled:  # its errors tell what it does not follow, but it may pass a jump over
+        ahead = now if status == OK else now + run.energy.spacing
+        return jumped(system, np.array([run.times[-1][-1], *rows.time, ahead]))
+    if status != OK:
+        early, late = now - method.step, now + method.step
+        return jumped(system, np.array([early, now, late])) or lost_driver(system, early, late, STALLED)
+    if lost is None:
+        return ""
+    found = lost_driver(system, lost.time - method.step, lost.time)
+    return found or jumped(system, np.concatenate([*run.times, rows.time]))
 
 
 def _shown(rows: int, looks: int, ends: bool) -> Array:
@@ -420,7 +446,15 @@ def _account(run: _Run, notes: list[str]) -> dict[str, Any]:
         "largest_drift": [float(drift[PHI]), float(drift[PHI_DOT])],
         "notes": [
             *notes,
-            *ended("forward", run.seen, {SINGULAR: _singular(run.engine.work), BALANCE: run.energy.amiss()}),
+            *ended(
+                "forward",
+                run.seen,
+                {
+                    SINGULAR: _singular(run.engine.work, run.energy.spacing),
+                    BALANCE: run.energy.amiss(),
+                    **between_rows(run.seen, run.engine.system, run.engine.work, new_record(run.engine.system, 0)),
+                },
+            ),
         ],
     }
 
@@ -431,11 +465,19 @@ def _steps(engine: Engine) -> dict[str, Any]:
     return {"steps": int(control.counts[0]), "refused_steps": int(control.counts[1])} if control.numbers.size else {}
 
 
-def _singular(work: Work) -> list[str]:
-    least, time = work.independence[[LEAST, WHEN]]
-    if least >= AT:
+def _singular(work: Work, step: float) -> list[str]:
+    """A note on the singular positions that were passed, or are just being; a few steps [s] apart they are one."""
+    share = work.independence
+    count = int(share[PASSED])
+    times = share[FIRST_PASSED:][: min(count, MOST_PASSED)].tolist()
+    if share[LOW] < AT:
+        times.append(float(share[LOW_AT]))
+    apart = [time for k, time in enumerate(times) if k == 0 or time - times[k - 1] > FEW * step]
+    if not apart:
         return []
+    more = f" and {count - MOST_PASSED} times more" if count > MOST_PASSED else ""
+    what = "a singular position" if len(apart) == 1 else "singular positions"
     return [
-        f"the motion passes a singular position near t = {time:.6g} s, where constraints become dependent; it goes on along "
-        "its branch, and reactions there are large or not unique"
+        f"the motion passes {what} near t = {', '.join(f'{time:.6g}' for time in apart)} s{more}, where constraints become "
+        "dependent; it goes on along its branch, and reactions there are large or not unique"
     ]

@@ -136,7 +136,9 @@ class Linearise(OfMoment):
     def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
         time, path = settings.time, how["path"]
         if self.at_equilibrium and self.at_steady:
-            raise InputError("about the equilibrium or about the steady motion? give one of --at-equilibrium, --at-steady")
+            raise InputError(
+                "about the equilibrium or about the steady motion? give one of --at-equilibrium, --at-steady"
+            )
         at = scene_at(scene, static(scene, time=time)) if self.at_equilibrium else scene
         at = scene_at(scene, steady(scene, time=time)) if self.at_steady else at
         result = as_result(scene, linearise(at, time=time, inputs=self.inputs, outputs=self.quantities), time)
@@ -243,19 +245,21 @@ def _with_inputs(at: Evaluator, scene: Scene, inputs: tuple[Effort | str, ...], 
     model, data = at.system.model, at.system.model.loads.data.copy()
     gravity = model.gravity.copy()
     for item, amount in zip(inputs, u, strict=True):
-        if _is_base(scene, item):
+        if isinstance(item, str) and _is_base(scene, item):
             gravity[BASE[item]] -= amount
         elif isinstance(item, str):
             first = model.loads.row[_load_number(scene, item), LAW]
             data[first : first + 6] *= 1.0 + amount
-    fed = replace(at, engine=with_model(at.engine, model._replace(loads=model.loads._replace(data=data), gravity=gravity)))
+    fed = replace(
+        at, engine=with_model(at.engine, model._replace(loads=model.loads._replace(data=data), gravity=gravity))
+    )
     sizes = [amount for item, amount in zip(inputs, u, strict=True) if not isinstance(item, str)]
     return sized(fed, _efforts(inputs), np.array(sizes))
 
 
-def _is_base(scene: Scene, item: Effort | str) -> bool:
-    """Whether an input is an acceleration of the base."""
-    return isinstance(item, str) and item in BASE and item not in [load.name for load in scene.loads]
+def _is_base(scene: Scene, item: str) -> bool:
+    """Whether an input is an acceleration of the base, and no load of that name."""
+    return item in BASE and item not in [load.name for load in scene.loads]
 
 
 def _load_number(scene: Scene, name: str) -> int:

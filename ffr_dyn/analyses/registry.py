@@ -33,7 +33,9 @@ LISTED = {
     "response": "Frequency response of SCENE: gain, phase and modes from an input to outputs; noise; Bode and Nyquist.",
     "periodic": "The period of SCENE, driven evenly, that comes back to itself; Floquet's multipliers.",
 }
-_FOLDERS = dict.fromkeys(("steady", "campbell", "response", "periodic"), "rotating")  # of the modules that do not lie beside this one
+_FOLDERS = dict.fromkeys(
+    ("steady", "campbell", "response", "periodic"), "rotating"
+)  # of the modules that do not lie beside this one
 _REGISTERED: dict[str, type[Analysis]] = {}
 EVENTS_SHOWN = 20
 

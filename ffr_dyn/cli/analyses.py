@@ -90,7 +90,12 @@ def analysis_command(word: str) -> click.Command:
 
     made = analysis(word)
     named = any(f.metadata.get("flag") == "--output" for f in fields(made))
-    options = [scene_argument, file_option if named else output_option, parameter_option, *([keep_option] if made.keeps else [])]
+    options = [
+        scene_argument,
+        file_option if named else output_option,
+        parameter_option,
+        *([keep_option] if made.keeps else []),
+    ]
     if issubclass(made, OverTime):
         options += [end_option, *(method_options if made.integrates else [])]
     else:

@@ -13,6 +13,7 @@ from ffr_dyn.functions.rotation import skew
 from ffr_dyn.kernels.tables import (
     IN_Q,
     LANES,
+    MOST_PASSED,
     NORMAL,
     Bodies,
     BodyWork,
@@ -45,8 +46,8 @@ def new_work(m: Model, *, keeps_terms: bool = False) -> Work:
         diagonal=np.full(1, -1.0),
         implicit=np.array([0.0, 0.0, 0.0, 1.0, 0.0]),
         info=np.zeros(3, dtype=np.int64),
-        independence=np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
-        **_zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=2),
+        independence=np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, *np.zeros(MOST_PASSED)]),
+        **_zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=4),
     )
 
 

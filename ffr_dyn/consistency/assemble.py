@@ -1,7 +1,7 @@
 """Assembly: positions and velocities that meet the joints, from a rough guess; and which constraint rows are redundant.
 
 Corrections are the smallest in the norm of the mass matrix, so heavy bodies move least. Elastic coordinates are left
-alone wherever rigid motion suffices. (Haug 1989, ch. 4; Nikravesh 1988, ch. 5 for redundant rows by factorisation.)
+alone wherever rigid motion suffices. (Haug 1989, ch. 4.)
 """
 
 from __future__ import annotations
@@ -9,22 +9,21 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import qr
-from scipy.sparse import block_diag, csr_array
+from scipy.sparse import csr_array
 
+from ffr_dyn.closing.driven_angles import led_to_drivers
+from ffr_dyn.closing.independence import independent_blocks
+from ffr_dyn.closing.positions import close_positions, close_velocities, stacked
+from ffr_dyn.closing.row_space import independent
 from ffr_dyn.compile.scene_tables import System, compile_scene
 from ffr_dyn.consistency.dropped_terms import check_dropped
 from ffr_dyn.consistency.held_frequencies import held_frequencies
-from ffr_dyn.consistency.row_space import independent, smallest_solution
 from ffr_dyn.consistency.sliding import sliding_notes
 from ffr_dyn.consistency.validity import deflections
 from ffr_dyn.equations.constraint_rows import Block, blocks_of, rows_at
 from ffr_dyn.equations.constraints import Row
-from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
-from ffr_dyn.equations.layout import Layout, initial_state, layout
-from ffr_dyn.functions.rotation import G_bar, rotation_matrix
+from ffr_dyn.equations.layout import Layout, initial_state, layout, moved, to_global_axes
 from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction
-from ffr_dyn.scene.joints import DISTANCE
 from ffr_dyn.scene.scene import Scene, require_scene
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
 from ffr_dyn.variants.plane import obstacles, planar_forms
@@ -32,12 +31,10 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
-TOLERANCE = 1e-11  # of Phi [m, -] and of its rate
 ASKED = 1e-6  # of a row across the plane at random speeds of about one; modes carry rounding of 1e-9
-RANK_TOLERANCE = 1e-8  # of a row's independent part, relative to the row
-ITERATIONS = 100
+ACROSS = 1e-8  # of the largest entry of a row, what counts as zero
+SHIFTED = 1e-6  # m, rad, from where it is told that assembly moved a body
 RELAXATION = 1e-8  # of dependent rows, relative
-LARGEST_TURN = 0.5  # rad per iteration
 TORN = 0.5  # elastic displacement of an interface over the size of its body that no joint may ask for
 
 
@@ -76,7 +73,9 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     place = layout(scene)
     left_out = [note for b, body in enumerate(scene.bodies) for note in check_dropped(body, place.active(b))]
     guess, v = initial_state(scene, place)
-    x = close_positions(scene, place, blocks, guess, v, time)
+    x = led_to_drivers(
+        scene, place, blocks, guess, time, lambda rows, at: close_positions(scene, place, rows, at, v, time)
+    )
     _require_shape(scene, place, guess, x)
     kept, redundant = independent_blocks(scene, place, blocks, x, v, time)
     v = close_velocities(scene, place, blocks, x, v, time)
@@ -85,9 +84,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
         f"{block}: the row '{text}' is redundant; of the reactions that are possible the smallest are given"
         for block, text in redundant
     ] + left_out
-    shift = max(np.linalg.norm(x[place.R(b)] - guess[place.R(b)]) for b in range(len(scene.bodies)))
-    if shift > 1e-6:
-        notes.insert(0, f"assembly moved a body by {shift:.3g} m from where the scene puts it")
+    notes = shifted(scene, place, guess, x) + notes
     if scene.plane != "none":
         notes.append(
             f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes without their rounding "
@@ -100,6 +97,25 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     all_rows = compile_scene(scene, blocks, RELAXATION) if redundant else None
     free = _movable(place) - rows
     return Assembled(compile_scene(scene, kept), all_rows, x, v, free, tuple(notes), tuple(redundant), computed)
+
+
+def shifted(scene: Scene, place: Layout, guess: Array, x: Array) -> list[str]:
+    """A note on the bodies that assembly has moved or turned, the one moved most and the one turned most by name."""
+    shifts = [float(np.linalg.norm(x[place.R(b)] - guess[place.R(b)])) for b in range(len(place.n))]
+    turns = [turned(x[place.p(b)], guess[place.p(b)]) for b in range(len(place.n))]
+    count = sum(shift > SHIFTED or turn > SHIFTED for shift, turn in zip(shifts, turns, strict=True))
+    said = [
+        f"{word} body {scene.bodies[b].name!r} by {sizes[b]:.3g} {unit}"
+        for word, sizes, unit in (("moved", shifts, "m"), ("turned", turns, "rad"))
+        if sizes[b := int(np.argmax(sizes))] > SHIFTED
+    ]
+    more = f", the most of {count} bodies," if count > 1 else ""
+    return [f"assembly {' and '.join(said)}{more} from where the scene puts it"] if said else []
+
+
+def turned(p: Array, p0: Array) -> float:
+    """[rad] the angle between two attitudes, Euler parameters of length one."""
+    return 2.0 * float(np.arctan2(np.linalg.norm(np.outer(p, p0) - np.outer(p0, p)) / np.sqrt(2.0), abs(p @ p0)))
 
 
 def _require_shape(scene: Scene, place: Layout, guess: Array, x: Array) -> None:
@@ -162,17 +178,18 @@ def _across(scene: Scene, blocks: list[Block], time: float) -> tuple[list[bool],
     active = np.zeros(place.v_size, bool)
     for b, n in enumerate(place.n):
         active[[place.iv[b] + c for c in (*place.active(b), *range(6, 6 + n))]] = True
-    inside, outside, left = [], [], []
+    inside, outside, left, jacobians = [], [], [], []
     for scale in (0.0, 1e-2, 1e-2):
         step = np.where(active, scale * rng.normal(size=place.v_size), 0.0)
-        x, speeds = _moved(place, start, step), v + _to_global(place, start, 100 * step)
+        x, speeds = moved(place, start, step), v + to_global_axes(place, start, 100 * step)
         rows = rows_at(scene, place, blocks, x, speeds, time)
+        jacobians.append(stacked(rows, place)[:, ~active])
         inside.append([_largest(row, active) for row in rows])
         outside.append([_largest(row, ~active) for row in rows])
         left.append([max(abs(row.Phi), abs(row.nu), abs(row.gamma)) for row in rows])
     most_inside, most_outside, most_left = (np.array(part).max(axis=0) for part in (inside, outside, left))
-    across = most_inside <= RANK_TOLERANCE * most_outside
-    mixed = ~across & (most_outside > RANK_TOLERANCE * most_inside)
+    across = most_inside <= ACROSS * most_outside
+    mixed = ~across & (most_outside > ACROSS * most_inside)
     moving = np.array([_changes(word.function) for block in blocks for word in block.words], bool)
     asked = across & ((most_left >= ASKED) | moving)
     names = [block.name for block in blocks for _ in block.words]
@@ -181,8 +198,7 @@ def _across(scene: Scene, blocks: list[Block], time: float) -> tuple[list[bool],
             return across.tolist(), f"{names[int(np.argmax(wrong))]!r} {what}"
     if lost := _driver_lost(blocks, across):
         return across.tolist(), f"driver {lost!r} acts across it alone"
-    held = [row for row, k in zip(rows, across, strict=True) if k]
-    if not _columns_independent(stacked(held, place)[:, ~active]):
+    if not all(_columns_independent(J[across]) for J in jacobians):
         return across.tolist(), "its joints leave a body free to move across it"
     return across.tolist(), ""
 
@@ -216,168 +232,3 @@ def _changes(function: TimeFunction | None) -> bool:
 def in_space(scene: Scene) -> Scene:
     """The scene without a search for a plane: what could leave it counts, even where nothing pushes it out."""
     return replace(scene, plane="none") if scene.plane == "auto" else scene
-
-
-def close_positions(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> Array:
-    """Newton's method on Phi(x) = 0 with least-mass-norm steps; rigid motion first, elastic coordinates if they must."""
-    worst = 0.0
-    for elastic in (False, True):
-        moved = x.copy()
-        for _ in range(ITERATIONS):
-            rows = rows_at(scene, place, blocks, moved, v, time)
-            Phi = np.array([row.Phi for row in rows])
-            worst = np.abs(Phi).max(initial=0.0)
-            if worst < TOLERANCE:
-                return moved
-            moved = _moved(place, moved, _limited(place, _step(scene, place, moved, rows, -Phi, elastic)))
-    said = [(block.name, word) for block in blocks for word in block.words]
-    at = int(np.argmax(np.abs(Phi)))
-    name, word = said[at]
-    if word.kind == DISTANCE and not rows[at].jacobian.any():
-        raise InputError(
-            f"the mechanism cannot be assembled: the points of joint {name!r} coincide, and the line between them, of no "
-            "length, has no direction; place its bodies apart"
-        )
-    raise InputError(
-        f"the mechanism cannot be assembled: joint {name!r} stays open by {worst:.3g} after {ITERATIONS} iterations; "
-        "check the positions of the interfaces, the lengths of the bodies and the axes of the joints, or start closer"
-    )
-
-
-def close_velocities(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> Array:
-    """Velocities with Phi_q v + Phi_t = 0, nearest to v; rigid motion first."""
-    for elastic in (False, True):
-        rows = rows_at(scene, place, blocks, x, v, time)
-        nu = np.array([row.nu for row in rows])
-        step = _step(scene, place, x, rows, -nu, elastic)
-        moved = v + _to_global(place, x, step)
-        left = np.abs([row.nu for row in rows_at(scene, place, blocks, x, moved, time)])
-        if left.size == 0 or left.max() < 1e-9 * max(1.0, float(np.abs(nu).max())):
-            return moved
-    names = [block.name for block in blocks for _ in block.words]
-    raise InputError(
-        f"no velocities meet the joints and drivers: {names[int(np.argmax(left))]!r} is left at a rate of "
-        f"{left.max():.3g}; the mechanism may be locked or in a singular position at the start"
-    )
-
-
-def independent_blocks(
-    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float
-) -> tuple[list[Block], list[tuple[str, str]]]:
-    """Blocks without their redundant words, and the (block, word) pairs that were dropped.
-
-    Rows are redundant when they depend on others here *and* at a neighbouring position, so that a mechanism that
-    starts in a singular position keeps its rows. Raises InputError when a driver's row is redundant.
-    """
-    rows = rows_at(scene, place, blocks, x, v, time)
-    if not rows:
-        return blocks, []
-    keep = _independent(scene, place, x, rows)
-    if keep.size < len(rows):
-        nearby = _neighbour(scene, place, blocks, x, v, time, rows)
-        others = _independent(scene, place, nearby, rows_at(scene, place, blocks, nearby, v, time))
-        keep = others if others.size > keep.size else keep
-    said, chosen = [(block, word) for block in blocks for word in block.words], set(keep.tolist())
-    dropped = [said[k] for k in range(len(said)) if k not in chosen]
-    for block, _ in dropped:
-        if block.driver:
-            raise InputError(f"driver {block.name!r} prescribes a motion that the joints and other drivers already fix")
-    kept = iter(range(len(said)))
-    left = [replace(block, words=tuple(word for word in block.words if next(kept) in chosen)) for block in blocks]
-    return left, [(block.name, word.text) for block, word in dropped]
-
-
-# ---- linear algebra -----------------------------------------------------------------------------------------------
-
-
-def stacked(rows: list[Row], place: Layout) -> csr_array:
-    """(C, V) the Jacobian of the rows."""
-    starts = np.cumsum([0, *(sum(part.size for part in row.parts.values()) for row in rows)])
-    columns = [np.arange(k, k + part.size) for row in rows for k, part in row.parts.items()]
-    values = [part for row in rows for part in row.parts.values()]
-    nothing = np.zeros(0)
-    return csr_array(
-        (np.concatenate([nothing, *values]), np.concatenate([nothing.astype(int), *columns]), starts),
-        shape=(len(rows), place.v_size),
-    )
-
-
-def _weights(scene: Scene, place: Layout, x: Array, elastic: bool) -> csr_array:
-    """W^(1/2) (V, V) with W the inverse mass matrix; zero for coordinates that may not move."""
-    blocks, known = [], dict[tuple[int, bytes, tuple[int, ...]], Array]()
-    for b, body in enumerate(scene.bodies):
-        q, n = x[place.q(b)], place.n[b]
-        active = (*place.active(b), *range(6, 6 + n if elastic else 6))
-        key = id(body.model), q.tobytes(), active
-        if key not in known:
-            at = np.ix_(active, active)
-            values, vectors = np.linalg.eigh(mass_matrix(kept_integrals(body), q)[at])
-            known[key] = np.zeros((6 + n, 6 + n))
-            known[key][at] = vectors / np.sqrt(np.maximum(values, 1e-12 * values.max()))
-        blocks.append(known[key])
-    return csr_array(block_diag(blocks, format="csr"))
-
-
-def _step(scene: Scene, place: Layout, x: Array, rows: list[Row], target: Array, elastic: bool) -> Array:
-    """Smallest step (body axes) with J step = target, in the norm of the mass matrix."""
-    if not rows:
-        return np.zeros(place.v_size)
-    W = _weights(scene, place, x, elastic)
-    J = csr_array(stacked(rows, place) @ W)
-    return W @ smallest_solution(J, target)
-
-
-def _independent(scene: Scene, place: Layout, x: Array, rows: list[Row]) -> Array:
-    """Numbers of a largest set of independent rows: pivoted QR of the weighted Jacobian, rows scaled to length one."""
-    A = csr_array(stacked(rows, place) @ _weights(scene, place, x, elastic=True))
-    if independent(A):
-        return np.arange(len(rows))
-    J = A.toarray()
-    length = np.linalg.norm(J, axis=1)
-    J = J / np.where(length > 0, length, 1.0)[:, None]
-    _, R, pivots = qr(J.T, mode="economic", pivoting=True)
-    rank = int((np.abs(np.diag(R)) > RANK_TOLERANCE).sum())
-    return np.sort(pivots[:rank])
-
-
-def _neighbour(
-    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float, rows: list[Row]
-) -> Array:
-    """An assembled position a small free motion away from x (x itself where nothing can move)."""
-    W = _weights(scene, place, x, elastic=False)
-    _, values, basis = np.linalg.svd((stacked(rows, place) @ W).toarray())
-    rank = int((values > 1e-9 * values.max(initial=1.0)).sum())
-    direction = W @ (basis[rank:].T @ np.random.default_rng(0).normal(size=basis.shape[0] - rank))
-    if not direction.any():
-        return x
-    try:
-        return close_positions(
-            scene, place, blocks, _moved(place, x, 1e-3 * direction / np.abs(direction).max()), v, time
-        )
-    except InputError:
-        return x
-
-
-# ---- small motions ------------------------------------------------------------------------------------------------
-
-
-def _limited(place: Layout, step: Array) -> Array:
-    turn = max(np.linalg.norm(step[place.omega(b)]) for b in range(len(place.n)))
-    return step * min(1.0, LARGEST_TURN / turn) if turn > 0 else step
-
-
-def _to_global(place: Layout, x: Array, step: Array) -> Array:
-    out = step.copy()
-    for b in range(len(place.n)):
-        out[place.R_dot(b)] = rotation_matrix(x[place.p(b)]) @ step[place.R_dot(b)]
-    return out
-
-
-def _moved(place: Layout, x: Array, step: Array) -> Array:
-    out, shift = x.copy(), _to_global(place, x, step)
-    for b in range(len(place.n)):
-        p = x[place.p(b)] + 0.5 * G_bar(x[place.p(b)]).T @ step[place.omega(b)]
-        out[place.R(b)] += shift[place.R_dot(b)]
-        out[place.p(b)] = p / np.linalg.norm(p)
-        out[place.q(b)] += step[place.q_dot(b)]
-    return out

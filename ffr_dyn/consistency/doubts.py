@@ -16,11 +16,12 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.evaluation import evaluate, evaluator
 from ffr_dyn.consistency.explicit_forces import candidates, fastest, told
+from ffr_dyn.consistency.following import row_named, unfollowed
 from ffr_dyn.consistency.validity import extremes, meaningless, strained, unstiffened
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
-from ffr_dyn.kernels.tables import Record
+from ffr_dyn.kernels.tables import MOMENT, OPENED, PHI, Record, Work
 from ffr_dyn.results.power import driven
 from ffr_dyn.results.recorded_motion import View, dot
 from ffr_dyn.scene.drivers import Driver, PointDriver
@@ -150,6 +151,24 @@ def _driven(view: View, driver: Driver | PointDriver) -> tuple[float, float]:
     angle = np.arctan2(dot(on_i[:, :, 1], on_j[:, :, 0]), dot(on_i[:, :, 0], on_j[:, :, 0]))
     off = np.remainder(angle - prescribed[:, 0] + np.pi, 2 * np.pi) - np.pi
     return float(np.abs(off).max()), growth
+
+
+def between_rows(seen: Seen, system: System, work: Work, rows: Record) -> dict[str, list[str]]:
+    """What steps have left open and a projection has closed: the row that was open most, of those that an engine computes."""
+    method, opened, time = seen.method, float(work.drift[PHI]), float(work.drift[MOMENT])
+    if method is None or method.controlled or seen.apart == np.inf:
+        return {}
+    if lost := unfollowed(system, work, method.step, rows):
+        return {APART: [lost.text]}
+    if not opened > seen.tolerance:
+        return {}
+    block, word = row_named(system, int(work.drift[OPENED]))
+    return {
+        OPEN: [
+            f"at t = {time:.6g} s the row '{word.text}' of {block.name!r} is open by {opened:.2g} at the end of a step, "
+            f"before it is projected, and that is more than {seen.tolerance:.1g}; use a smaller step"
+        ]
+    }
 
 
 # ---- the end --------------------------------------------------------------------------------------------------------

@@ -53,7 +53,9 @@ def failure(system: System, work: Work, status: int, time: float, settings: Sett
     lost = not _sound(work)
     if cause and (lost or status == NOT_FINITE):
         return ComputationError(f"{at} the state of {_worst(system, work)} is no longer finite: {cause}")
-    if status == NOT_FINITE or (lost and (status == SINGULAR_BODY or not _largest(system, work)[1] <= HUGE)):
+    moved = any(word.function is not None for block in system.blocks for word in block.words)
+    beyond = not (_largest(system, work)[1] <= HUGE and (moved or work.drift[PHI] <= LOST))
+    if status == NOT_FINITE or (lost and (status == SINGULAR_BODY or beyond)):
         return ComputationError(
             f"{at} the state of {_worst(system, work)} is no longer finite: {_overflow(system, work, settings)}"
         )

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ffr_dyn.closing.independence import redundant_drivers
 from ffr_dyn.consistency.assemble import assemble, flattened, in_space, plane_in_words
 from ffr_dyn.consistency.evaluation import free_motions, locked, total_mass_matrix, unit_rows
 from ffr_dyn.equations.constraint_rows import Block, rows_at
@@ -84,7 +85,7 @@ def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobili
     Raises InputError when the scene cannot be assembled.
     """
     plane, computed, scene = flattened(scene, time)[0].plane, plane_in_words(scene, time), in_space(scene)
-    over = overdriven(scene, time) if drivers else ()
+    over = overdriven(scene, time) if drivers and scene.drivers else ()
     bare = scene if drivers and not over else replace(scene, drivers=())
     assembled = assemble(bare, time=time)
     flat, blocks = flattened(bare, time)
@@ -100,22 +101,11 @@ def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobili
 
 
 def overdriven(scene: Scene, time: float = 0.0) -> tuple[str, ...]:
-    """Drivers that add nothing to the joints and the other drivers at the assembled start of the scene without them."""
+    """Drivers that prescribe what the joints and the other drivers fix already, seen from the start without them."""
     flat, blocks = flattened(in_space(scene), time)
     place = layout(flat)
     assembled = assemble(replace(flat, drivers=()), time=time)
-    M = total_mass_matrix(flat, place, assembled.x)
-
-    def rank(chosen: list[Block]) -> int:
-        jacobian = _jacobian(flat, place, chosen, assembled.x, assembled.v, time)
-        return place.v_size - free_motions(jacobian, M).shape[1]
-
-    total = rank(blocks)
-    return tuple(
-        block.name
-        for block in blocks
-        if block.driver and total - rank([other for other in blocks if other is not block]) < len(block.words)
-    )
+    return redundant_drivers(flat, place, blocks, assembled.x, assembled.v, time)
 
 
 def require_driven(scene: Scene, time: float, analysis: str) -> None:

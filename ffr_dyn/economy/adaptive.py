@@ -15,7 +15,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ffr_dyn.analyses.integration import geometry
-from ffr_dyn.consistency.assemble import assemble, close_positions, close_velocities
+from ffr_dyn.closing.positions import close_positions, close_velocities
+from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.economy.contributions import effects_of
 from ffr_dyn.economy.model_choice import Choice, Part, full
 from ffr_dyn.economy.outputs import Output, Probe, as_output, limits, probe, ranges

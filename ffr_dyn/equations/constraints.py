@@ -4,7 +4,7 @@ Points and axes of markers come with value, rate, bias and Jacobian (`ffr_dyn.eq
 or a dot product of two of them, and the product rule gives the rest:
 
     coincidence  e_c . (r_j - r_i) = 0          dot-1  a_i . a_j = 0
-    dot-2        a_i . (r_j - r_i) = s(t)       driven angle  a_i(alpha(t)) . f_j = 0
+    dot-2        a_i . (r_j - r_i) = s(t)       driven angle  a_i(alpha(t)) . f_j = 0, f_j on its side
     distance     (|r_j - r_i|^2 - s(t)^2) / 2 s(t) = 0
     relation     factor_1 coordinate_1 + factor_2 coordinate_2 = s(t), coordinates of two joints: an angle is
                  atan2(g_i . f_j, f_i . f_j), a stroke h_i . (r_j - r_i)
@@ -109,11 +109,16 @@ def _dot_2(now: Markers, word: Word, at: tuple[int, ...], drive: Drive) -> Row:
 
 
 def _driven_angle(now: Markers, word: Word, at: tuple[int, ...], drive: Drive) -> Row:
+    """The sine of what f_j is off; beyond a quarter of a turn two less the sine, which goes on to grow."""
     (alpha, speed, second), (axis_i, axis_i2, axis_j) = drive, word.axes
     along = np.cos(alpha) * axis_i + np.sin(alpha) * axis_i2
     across = -np.sin(alpha) * axis_i + np.cos(alpha) * axis_i2
-    turning = _turning(now.axis(at[0], across), now.axis(at[0], along), speed, second)
-    return _dot(now.place, turning, [(now.axis(at[1], axis_j), 1.0)])
+    f, f_j = now.axis(at[0], along), now.axis(at[1], axis_j)
+    row = _dot(now.place, _turning(now.axis(at[0], across), f, speed, second), [(f_j, 1.0)])
+    if f.r @ f_j.r >= 0:
+        return row
+    back = _sum(row, -1.0, row, 0.0)
+    return replace(back, Phi=back.Phi + float(np.copysign(2.0, row.Phi)))
 
 
 def _turning(across: Motion, along: Motion, speed: float, second: float) -> Motion:

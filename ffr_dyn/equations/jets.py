@@ -115,8 +115,11 @@ def _dot_2(at: Pair, word: Word, s: float) -> Jet:
 
 
 def _driven_angle(at: Pair, word: Word, s: float) -> Jet:
-    across = -np.sin(s) * word.axes[0] + np.cos(s) * word.axes[1]
-    return dot(at.axis_i(across), at.axis_j(word.axes[2]))
+    f_j, along = at.axis_j(word.axes[2]), np.cos(s) * word.axes[0] + np.sin(s) * word.axes[1]
+    sine = dot(at.axis_i(-np.sin(s) * word.axes[0] + np.cos(s) * word.axes[1]), f_j)
+    if dot(at.axis_i(along), f_j).value >= 0:
+        return sine
+    return Jet(float(np.copysign(2.0, sine.value)) - sine.value, -sine.first, -sine.second)
 
 
 def _distance(at: Pair, word: Word, s: float) -> Jet:

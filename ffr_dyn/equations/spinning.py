@@ -1,8 +1,8 @@
 """Bodies in steady motion, each as in one screw: what their inertia does to small motions relative to it.
 
-In a steady motion every body keeps its shape and moves as a rigid one, R_dot = u + w x R with constant u, w of its own, so
-that its velocities [A^T R_dot, omega_bar] = [V, omega] are constant in its axes. With small motions y = [a, phi, eta] from there
-(R moves by A a, A turns to A exp(phi~), q by eta) and their rates the body has the velocities
+In a steady motion every body keeps its shape and moves as a rigid one, R_dot = u + w x R with constant u, w of its
+own, so that its velocities [A^T R_dot, omega_bar] = [V, omega] are constant in its axes. With small motions y = [a,
+phi, eta] from there (R moves by A a, A turns to A exp(phi~), q by eta) and their rates the body has the velocities
 
     w(y) + y_dot + ...,     w(y) = [exp(-phi~) (V + omega x a), exp(-phi~) omega, 0],
 

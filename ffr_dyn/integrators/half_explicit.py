@@ -28,7 +28,6 @@ from ffr_dyn.kernels.integrator_api import (
     NOT_CONVERGED,
     NOT_FINITE,
     OK,
-    PHI,
     TIGHTER,
     TOLERANCE,
     CompiledFunction,
@@ -48,7 +47,9 @@ from ffr_dyn.kernels.integrator_api import (
     largest_motion,
     method_step,
     normalise,
+    note_drift,
     position_rates,
+    row_of_largest,
     set_diagonal,
     solve,
     stabilise,
@@ -158,7 +159,7 @@ def half_explicit_step(r: Tables, t: float, again: int) -> int:
         status = evaluate_rows_at(r, t + C[k + 1] * h, s.x[AHEAD], s.v[STAGE])
         if status == OK:
             keep_rows_ahead(r)
-            position = largest(r.work.rows.Phi)
+            position, opened = largest(r.work.rows.Phi), row_of_largest(r.work.rows.Phi)
             status = evaluate(r, t + C[k] * h, s.x[STAGE], s.v[STAGE])
         if status == OK:
             if k == 0:
@@ -169,7 +170,7 @@ def half_explicit_step(r: Tables, t: float, again: int) -> int:
         add_scaled(s.v[AHEAD], s.v[AHEAD], h * A[(STAGES + 1) * k], s.v[k])
         copy(s.x[STAGE], s.x[AHEAD])
         copy(s.v[STAGE], s.v[AHEAD])
-    r.work.drift[PHI] = max(r.work.drift[PHI], position)
+    note_drift(r.work.drift, position, opened, t + h)
     number[0] = 1.0 if position <= violation_allowed(r) or r.clock.gains[TOLERANCE] == 0.0 else 0.0
     copy(r.x, s.x[STAGE])
     copy(r.v, s.v[STAGE])

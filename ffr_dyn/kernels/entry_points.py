@@ -30,6 +30,7 @@ from ffr_dyn.kernels.system import (
     evaluate_joints,
     factorise_bodies,
     largest,
+    note_drift,
     prepare,
     row_of_largest,
     to_body_axes,
@@ -76,6 +77,7 @@ from ffr_dyn.kernels.tables import (
 from ffr_dyn.kernels.vectors import add_scaled, copy, fill
 
 PASSES = 10  # at most, where rows depend on one another
+GROSS = 1.0  # m, -: of a violation that no projection puts right
 UNMET = 1e3  # tolerances, beyond which a violation that the projection does not take back is no drift
 
 
@@ -347,7 +349,8 @@ def stabilise(r: Tables, t: float, x: Vector, v: Vector) -> int:
         position, velocity = largest(w.rows.Phi), largest(w.rows.nu)
         if attempt == 0:
             before = position
-            w.drift[PHI], w.drift[PHI_DOT] = max(w.drift[PHI], position), max(w.drift[PHI_DOT], velocity)
+            note_drift(w.drift, position, row_of_largest(w.rows.Phi), t)
+            w.drift[PHI_DOT] = max(w.drift[PHI_DOT], velocity)
         allowed = tolerance * (TIGHTER if w.independence[HERE] < NEAR else 1.0)
         if attempt == 4 and position > UNMET * tolerance and position > 0.01 * before:
             w.info[FAILED] = r.model.bodies.mass.size + row_of_largest(w.rows.Phi)
@@ -411,6 +414,19 @@ def step(r: Tables, t: float, again: int) -> int:
 
 
 @entry_point()
+def close_row(r: Tables, t: float) -> int:
+    """Bring the state at a row of results onto the constraints, as the next step would do."""
+    status, tolerance = OK, r.clock.gains[TOLERANCE]
+    if r.work.diagonal[0] < 0.0:
+        set_diagonal(r, 0.0)  # a row may come before the first step
+    if tolerance > 0.0:
+        status = evaluate_rows_at(r, t, r.x, r.v)
+        if status == OK and tolerance < largest(r.work.rows.Phi) < GROSS:
+            status = stabilise(r, t, r.x, r.v)
+    return status
+
+
+@entry_point()
 def run(r: Tables, start: float, out: Record) -> int:
     """Fill the rows of a record by steps of equal length; step number 0 began at the time `start`."""
     h, steps = r.clock.time[SPACING], r.clock.steps
@@ -421,7 +437,9 @@ def run(r: Tables, start: float, out: Record) -> int:
             if status != OK:
                 return status
             steps[NEXT] += 1
-        status = record_state(r, start + steps[NEXT] * h, out, row)
+        status = close_row(r, start + steps[NEXT] * h)
+        if status == OK:
+            status = record_state(r, start + steps[NEXT] * h, out, row)
         if status != OK:
             return status
         steps[FILLED] += 1

@@ -63,7 +63,15 @@ from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.simd.entry_point import CompiledFunction
 from ffr_dyn.kernels.simd.slices import part
 from ffr_dyn.kernels.solution import add_reactions, constraint_rates
-from ffr_dyn.kernels.system import acceleration_target, finite, largest, to_body_axes, to_velocity_rates
+from ffr_dyn.kernels.system import (
+    acceleration_target,
+    finite,
+    largest,
+    note_drift,
+    row_of_largest,
+    to_body_axes,
+    to_velocity_rates,
+)
 from ffr_dyn.kernels.tables import (
     AHEAD,
     BY_PLACE,
@@ -162,9 +170,11 @@ __all__ = [
     "method_step",
     "multiple",
     "normalise",
+    "note_drift",
     "part",
     "position_rates",
     "project",
+    "row_of_largest",
     "scale",
     "set_diagonal",
     "six_rows",

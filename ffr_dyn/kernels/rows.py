@@ -61,7 +61,10 @@ def dot_2(w, i, j, a0, drive):
 
 @kernel
 def driven_angle(w, i, j, f, g, fj0, drive):
-    """(-sin(alpha) f_i + cos(alpha) g_i) . f_j = 0: f_j stands at the angle alpha(t) in the plane of f_i, g_i."""
+    """(-sin(alpha) f_i + cos(alpha) g_i) . f_j = 0: f_j stands at the angle alpha(t) in the plane of f_i, g_i.
+
+    The sine of what it is off; beyond a quarter of a turn two less the sine, which goes on to grow.
+    """
     alpha, speed, second = drive
     sine, cosine = math.sin(alpha), math.cos(alpha)
     along = add(scale(cosine, f), scale(sine, g))
@@ -73,8 +76,10 @@ def driven_angle(w, i, j, f, g, fj0, drive):
     prescribed = add(scale(-second, gl), scale(-speed * speed, gi))
     bias = add(bi, add(prescribed, scale(-2.0 * speed, dl)))
     gamma = -dot(bias, gj) - 2.0 * dot(rate, dj) - dot(gi, bj)
-    nu = dot(rate, gj) + dot(gi, dj)
-    return dot(gi, gj), nu, gamma, axis_side(w, i, ai, gj), axis_side(w, j, aj, gi)
+    nu, Phi, side = dot(rate, gj) + dot(gi, dj), dot(gi, gj), 1.0
+    if dot(gl, gj) < 0.0:
+        nu, Phi, gamma, side = -nu, math.copysign(2.0, Phi) - Phi, -gamma, -1.0
+    return Phi, nu, gamma, axis_side(w, i, ai, scale(side, gj)), axis_side(w, j, aj, scale(side, gi))
 
 
 @kernel

@@ -16,10 +16,16 @@ from ffr_dyn.kernels.tables import (
     AT_START,
     CLOSEST,
     END,
+    FIRST_PASSED,
     HERE,
+    HIGH,
     LEAST,
+    LOW,
+    LOW_AT,
+    MOST_PASSED,
     NEXT,
     OK,
+    PASSED,
     SPACING,
     START,
     TOLERANCE,
@@ -38,6 +44,10 @@ LENGTHS = (
     *(1.0, 0.7, 0.3),
 )
 ENOUGH = 0.25 * CLOSER
+PASSED_BELOW = (
+    1e-3  # independence that tells of a singular position (the square of a distance), in a dip of so many times:
+)
+DIP = 100.0
 STAGES_END = 0.95  # of a step: what lies behind belongs to the next one
 
 
@@ -46,10 +56,27 @@ def note_independence(share, t):
     """Keep the independence of rows that have been evaluated at time t."""
     if share[HERE] < share[LEAST]:
         share[LEAST], share[WHEN] = share[HERE], t
+    note_passing(share, t)
     if t == share[START]:
         share[AT_START] = share[HERE]
     if t <= share[END]:
         share[CLOSEST] = min(share[CLOSEST], share[HERE])
+
+
+@inlined
+def note_passing(share, t):
+    """Keep the time t of the least independence between two high ones: a singular position that was passed."""
+    here, low = share[HERE], share[LOW]
+    if here > DIP * low:
+        if low < PASSED_BELOW and share[HIGH] > DIP * low:
+            number = int(share[PASSED])
+            if number < MOST_PASSED:
+                share[FIRST_PASSED + number] = share[LOW_AT]
+            share[PASSED] += 1.0
+        share[HIGH], share[LOW] = here, here
+    elif here < low:
+        share[LOW], share[LOW_AT] = here, t
+    share[HIGH] = max(share[HIGH], here)
 
 
 @inlined

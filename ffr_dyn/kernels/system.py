@@ -38,9 +38,12 @@ from ffr_dyn.kernels.tables import (
     LANES,
     LATER,
     LATER_SIDE,
+    MOMENT,
     NORMAL,
     NOT_FINITE,
     OK,
+    OPENED,
+    PHI,
     PHIPHI,
     TARGET,
     N,
@@ -175,6 +178,13 @@ def largest(values):
         if not abs(values[k]) <= result:  # NaN is largest
             result = abs(values[k])
     return result
+
+
+@kernel
+def note_drift(drift, position, row, t):
+    """Keep by how much the constraints are open at time t, most of all in a row, where that is more than before."""
+    if position > drift[PHI]:
+        drift[PHI], drift[OPENED], drift[MOMENT] = position, row, t
 
 
 @kernel

@@ -275,9 +275,10 @@ FAILED, EVALUATIONS, PROJECTIONS = range(3)
 # that a stage of a W-method goes on by, as by its displacements.
 BY_RATE, BY_PLACE, AHEAD, FRESH, BY_TIME = range(5)
 # Numbers of `Work.drift`.
-PHI, PHI_DOT = range(2)
+PHI, PHI_DOT, OPENED, MOMENT = range(4)
 # Numbers of `Work.independence` (see `ffr_dyn.kernels.singular_positions`).
-HERE, LEAST, WHEN, START, END, AT_START, CLOSEST, AT_LAST = range(8)
+HERE, LEAST, WHEN, START, END, AT_START, CLOSEST, AT_LAST, LOW, LOW_AT, HIGH, PASSED, FIRST_PASSED = range(13)
+MOST_PASSED = 64
 
 
 class Work(NamedTuple):
@@ -295,9 +296,10 @@ class Work(NamedTuple):
     diagonal: F1  # (1,) gamma h of the elastic diagonal that is in place (see `entry_points.set_diagonal`), or -1
     implicit: F1  # (5,) by the names above
     info: I1  # (3,) body or row that failed, how many evaluations, how many projections
-    drift: F1  # (2,) largest |Phi| and |Phi_dot| met
-    # (8,) least share of a row that others do not contain: now, least so far, and when; of a step its start and end [s],
-    # the share at its start, the least of its stages, and that at the start of the step before (`kernels.singular_positions`)
+    drift: F1  # (4,) largest |Phi| and |Phi_dot| met; the row of the first, and when it was [s]
+    # (76,) least share of a row that others do not contain: now, least so far, and when; of a step its start and end [s],
+    # the share at its start, the least of its stages, that at the start of the step before (`kernels.singular_positions`);
+    # the least since it was high, when, and the largest since it was low; how many singular positions were passed, and when
     independence: F1
 
 

@@ -1,8 +1,8 @@
 """Eigenvalues of M y_ddot + C y_dot + K y = 0 in mass-orthonormal coordinates, with those that are zero told exactly.
 
-A motion that nothing holds, such as a free spin, has the eigenvalue zero twice, with one vector: rounding makes of such a pair
-a slow growth and a slow decay. So null spaces are divided out one after the other (a staircase) before the rest is solved.
-(Golub & Van Loan 2013, section 7.6.)
+A motion that nothing holds, such as a free spin, has the eigenvalue zero twice, with one vector: rounding makes of
+such a pair a slow growth and a slow decay. So null spaces are divided out one after the other (a staircase) before
+the rest is solved. (Golub & Van Loan 2013, section 7.6.)
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""The machine near a steady motion, in minimal coordinates: y along the free motions, seen from axes that move with the bodies.
+"""The machine near a steady motion, in minimal coordinates: y along the free motions, seen from axes that move with
+the bodies.
 
     y_ddot + C y_dot + K y = forces,    C = Z^T (G + D) Z,  K = Z^T K Z,  Z^T M Z = 1
 
@@ -32,8 +33,8 @@ def reduced(found: Steady) -> Reduced:
 
 
 def state_matrix(found: Steady, of: Reduced) -> Array:
-    """(2 d, 2 d) A of (y, z), z the changes of the velocities in body axes along the free motions: y_dot, and what the turning
-    of the axes makes of y."""
+    """(2 d, 2 d) A of (y, z), z the changes of the velocities in body axes along the free motions: y_dot, and what
+    the turning of the axes makes of y."""
     d, turning = len(of.K), np.zeros_like(found.about.M)
     place = found.machine.place
     inside = to_body_axes(place, found.x, found.v)

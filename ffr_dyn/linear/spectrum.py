@@ -45,9 +45,7 @@ class Spectrum:
         ways = ways_of(self.seen, self.whirl)
         rates = np.where([bool(way) for way in ways], np.abs(self.seen), np.abs(self.values))
         system = self.found.machine.system
-        return in_words(
-            system.scene, system.layout, self.found.x, self.found.about.M, self.shapes, rates, ways
-        )
+        return in_words(system.scene, system.layout, self.found.x, self.found.about.M, self.shapes, rates, ways)
 
     def only(self, numbers: Array) -> Spectrum:
         return replace(

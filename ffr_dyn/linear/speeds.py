@@ -66,7 +66,9 @@ def at_speed(scene: Scene, speed: float, turn: str = "", time: float = 0.0) -> S
     """
     names = [driver.name for driver in scene.drivers if isinstance(driver, Driver)]
     if not turn and len(names) > 1:
-        raise InputError(f"the scene has the drivers {', '.join(names)}; say which of them has the speed (turn, --turn)")
+        raise InputError(
+            f"the scene has the drivers {', '.join(names)}; say which of them has the speed (turn, --turn)"
+        )
     chosen = turn or (names[0] if names else "")
     if chosen in names:
         turned = (_turned(d, speed, time) if d.name == chosen else d for d in scene.drivers)

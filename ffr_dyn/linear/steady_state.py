@@ -1,8 +1,8 @@
 """Steady motions of a scene: every body keeps its shape and moves in a screw of its own, and all forces balance.
 
-The screws are those of the assembled scene: what drivers of constant speed, or the velocities of the scene, ask for. With T_0,
-the kinetic energy of the screws (`ffr_dyn.equations.spinning`), the condition is that of an equilibrium in the amended potential
-V - T_0,
+The screws are those of the assembled scene: what drivers of constant speed, or the velocities of the scene, ask for.
+With T_0, the kinetic energy of the screws (`ffr_dyn.equations.spinning`), the condition is that of an equilibrium in
+the amended potential V - T_0,
 
     d(T_0 - V) - Phi_q^T lam = 0,      Phi = 0,
 
@@ -10,8 +10,8 @@ solved by Newton's method with the exact tangent; what is free to go on turning 
 critical speeds the amended potential has no minimum, so the state is followed from rest where Newton's method does not reach
 it at once, and not sought downhill. Forces that see velocities are differentiated by differences.
 
-A scene that turns meets its ground, gravity and bearings anew at every angle. Rows that then do not hold are no steady motion;
-forces and stiffness that vary are taken as their means of a turn, and a note says so.
+A scene that turns meets its ground, gravity and bearings anew at every angle. Rows that then do not hold are no
+steady motion; forces and stiffness that vary are taken as their means of a turn, and a note says so.
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ from ffr_dyn.scene.forces.force import Force
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
-ITERATIONS, TOLERANCE = 20, 1e-9  # of Newton's steps; of the last, rad or relative to the scene: the next would be its square
+ITERATIONS = 20  # of Newton's method
+TOLERANCE = 1e-9  # of its last step, rad or relative to the scene: the next would be its square
 LARGEST = 0.5  # of a step, the same
 LEAST_SHARE = 1e-3  # of the speed, by which it is followed
 NEUTRAL = 1e-13  # of a stiffness relative to the largest: rounding
@@ -187,8 +188,11 @@ def _by_velocities(machine: Machine, force: Force, time: float, x: Array) -> tup
     if np.abs(shaken - at_rest).max() <= 1e-14 * np.abs(shaken).max():
         return still, none, none
     columns = np.flatnonzero(shaken)
-    moving, resting = (_derivative(lambda y, v=v: rated(y, v), columns, 1.0, still.size) for v in (now.v, still))
-    return added(still), -_derivative(added, columns, STEP, still.size), resting - moving
+
+    def slopes(of: Array) -> Array:
+        return _derivative(lambda rate: rated(rate, of), columns, 1.0, still.size)
+
+    return added(still), -_derivative(added, columns, STEP, still.size), slopes(still) - slopes(now.v)
 
 
 def _derivative(function: Callable[[Array], Array], columns: Array, step: float, size: int) -> Array:

@@ -1,15 +1,17 @@
 """Periodic motions of driven scenes: the state that a period brings back, and what becomes of small deviations from it.
 
-With P the map of a state over one period by the compiled loop, and deviations in minimal coordinates (`ffr_dyn.consistency.tangent`),
-a periodic motion is a fixed point s = P(s). A motion that settles is found by Anderson's mixing of successive periods, which for
-a linear map is GMRES on s - P(s) = 0 and needs about as many periods as there are deviations that decay slowly; what does not
-settle by itself is found by Newton's method, whose matrix, of differences, is the monodromy matrix. Its eigenvalues are Floquet's
-multipliers: small motions grow where one is larger than one. (Walker & Ni, SIAM J. Numer. Anal. 49 (2011) 1715-1735; Seydel 2010.)
+With P the map of a state over one period by the compiled loop, and deviations in minimal coordinates
+(`ffr_dyn.consistency.tangent`), a periodic motion is a fixed point s = P(s). A motion that settles is found by
+Anderson's mixing of successive periods, which for a linear map is GMRES on s - P(s) = 0 and needs about as many
+periods as there are deviations that decay slowly; what does not settle by itself is found by Newton's method, whose
+matrix, of differences, is the monodromy matrix. Its eigenvalues are Floquet's multipliers: small motions grow where
+one is larger than one. (Walker & Ni, SIAM J. Numer. Anal. 49 (2011) 1715-1735; Seydel 2010.)
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -70,11 +72,13 @@ def turns(system: System, time: float, x: Array, v: Array, method: Integrator, p
     steps = max(1, round(period / method.step))
     near = chart(evaluator(system), time, x, v)
     jacobian = evaluate(near.at, time, x, v).jacobian
-    return Turns(near, np.linalg.solve(near.M, jacobian.T), replace(method, step=period / steps), period, steps)
+    shortened: Any = method
+    return Turns(near, np.linalg.solve(near.M, jacobian.T), replace(shortened, step=period / steps), period, steps)
 
 
 def period_of(scene: Scene, time: float) -> float:
-    """[s] of a turn of the only angle that a driver turns evenly at a time [s]. InputError where there is none, or several."""
+    """[s] of a turn of the only angle that a driver turns evenly at a time [s]. InputError where there is none, or
+    several."""
     rates = set[float]()
     for driver in scene.drivers:
         if isinstance(driver, Driver) and driver.coordinate == "angle":
@@ -89,7 +93,9 @@ def period_of(scene: Scene, time: float) -> float:
 
 def after(of: Turns, x: Array, v: Array, rows: int = 1) -> Record:
     """`rows` states of the period that begins at (x, v), evenly, the last at its end."""
-    engine = new_engine(of.system, x, v, of.method, gains(Projection(CLOSED)), start=of.near.time, spacing=of.method.step)
+    engine = new_engine(
+        of.system, x, v, of.method, gains(Projection(CLOSED)), start=of.near.time, spacing=of.method.step
+    )
     record = new_record(of.system, rows)
     status = fill_rows(engine, record, of.near.time, of.steps // rows)
     if status != OK:
@@ -111,7 +117,8 @@ def placed(of: Turns, s: Array) -> tuple[Array, Array]:
             return x, to_global_axes(place, x, V + of.across @ _least(now.jacobian @ of.across, -now.nu))
         y = y + of.across @ _least(now.jacobian @ of.across, -now.Phi)
     raise ComputationError(
-        f"at t = {near.time:.6g} s the search for a periodic motion came to a state that the joints do not allow; begin nearer"
+        f"at t = {near.time:.6g} s the search for a periodic motion came to a state that the joints do not allow; "
+        "begin nearer"
     )
 
 

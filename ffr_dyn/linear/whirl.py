@@ -21,8 +21,9 @@ LEAST = 1e-6  # of a turning relative to the fastest body's: what counts as turn
 
 
 def whirls(scene: Scene, place: Layout, screws: Screws, x: Array, values: Array, modes: Array) -> tuple[Array, Array]:
-    """Frequencies (m,) [rad/s] seen from the ground of modes (V, m) with eigenvalues (m,), positive where the whirl is forward;
-    and the share (m,) of their amplitude that whirls that way: 1 for a circle, 1/2 for a line in the turning axes.
+    """Frequencies (m,) [rad/s] seen from the ground of modes (V, m) with eigenvalues (m,), positive where the whirl
+    is forward; and the share (m,) of their amplitude that whirls that way: 1 for a circle, 1/2 for a line in the
+    turning axes.
 
     Modes of what does not turn, and of real eigenvalues, have the frequency that they have, and no share (nan).
     """
@@ -61,7 +62,9 @@ def _parts(body: Body, place: Layout, screws: Screws, x: Array, b: int, mode: Ar
     if known and surface is not None and q.size:
         u = u + surface.Phi @ q
     radius = np.sqrt(np.trace(model.rr_dm) / model.mass)
-    c = np.concatenate([np.stack([u @ f, u @ g]) / np.sqrt(len(points)), radius * np.array([[turn @ f], [turn @ g]])], 1)
+    c = np.concatenate(
+        [np.stack([u @ f, u @ g]) / np.sqrt(len(points)), radius * np.array([[turn @ f], [turn @ g]])], 1
+    )
     return (
         float(model.mass * (np.abs(c[0] + 1j * c[1]) ** 2).sum()),
         float(model.mass * (np.abs(c[0] - 1j * c[1]) ** 2).sum()),

@@ -16,7 +16,7 @@ from ffr_prep.common.arrays import Array
 ELASTIC = 0.2  # of a mode's energy is strain from where it is named by the shape of a body
 SLENDER = 2.5  # longest extent over the next, from where a body bends like a beam
 ALONG = 0.9  # of what moves, from where it has a direction
-ORDINALS = "first second third fourth fifth sixth seventh eighth ninth tenth".split()
+ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 
 
 def in_words(

@@ -28,7 +28,7 @@ from ffr_dyn.compile.engine import new_engine, row_filler
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import Assembled, assemble
-from ffr_dyn.consistency.doubts import ended, held, look, nothing_seen
+from ffr_dyn.consistency.doubts import between_rows, ended, held, look, nothing_seen
 from ffr_dyn.consistency.failure import Settings, failure
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation, gains
@@ -154,9 +154,10 @@ class Stepper(Brief):
     def doubts(self) -> list[str]:
         """What is doubtful of the states at which this was asked, beside the notes of assembly: as the notes of `forward`
         (the table in docs/analyses.md), but for the energy, and nothing is an error."""
-        record = self._loops[0].record
-        look(self._seen, record)
-        return [*self._seen.assembled.notes, *ended("stepper", self._seen)]
+        loop = self._loops[0]
+        look(self._seen, loop.record)
+        steps = between_rows(self._seen, loop.engine.system, loop.work, loop.record)
+        return [*self._seen.assembled.notes, *ended("stepper", self._seen, steps)]
 
     def save(self) -> State:
         """The state, with inputs."""

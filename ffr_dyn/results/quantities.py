@@ -14,6 +14,7 @@ from difflib import get_close_matches
 import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.functions.time_functions import TimeFunction, evaluate
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.results.power import (
     Worked,
@@ -28,10 +29,11 @@ from ffr_dyn.results.power import (
 from ffr_dyn.results.recorded_motion import View, dot, times, to_axes
 from ffr_dyn.results.result import EULER_PARAMETERS, XYZ, Axis, Quantity, mode_axis
 from ffr_dyn.scene.couplings import Coupling
+from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces.places import Measured
 from ffr_dyn.scene.joints import COORDINATES, Joint
-from ffr_dyn.scene.scene import marker_names, markers, measured_body
+from ffr_dyn.scene.scene import Scene, marker_names, markers, measured_body
 from ffr_dyn.scene.sensors import Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.scene.stress_sensors import measured_modes
 from ffr_dyn.scene.surfaces import surface_of
@@ -348,7 +350,7 @@ def _measured(view: View, m: Measurement) -> Array:
 def _joint_coordinates(system: System) -> Named:
     for joint in system.scene.joints:
         if "angle" in COORDINATES[joint.kind]:
-            yield f"{joint.name}.angle", _unwound(joint)
+            yield f"{joint.name}.angle", _unwound(joint, _angle_function(system.scene, joint))
             rate = _entry("rad/s", (), "rate of the joint angle", lambda view, j=joint: angles(view, j)[1])  # type: ignore[misc]
             yield f"{joint.name}.angle_rate", rate
         if "stroke" in COORDINATES[joint.kind]:
@@ -360,9 +362,22 @@ def _joint_coordinates(system: System) -> Named:
                 )
 
 
-def _unwound(joint: Joint) -> Entry:
+def _angle_function(scene: Scene, joint: Joint) -> TimeFunction | None:
+    """The function of time that drives the angle of a joint."""
+    drivers = (driver for driver in scene.drivers if isinstance(driver, Driver) and driver.coordinate == "angle")
+    return next((driver.function for driver in drivers if driver.joint == joint.name), None)
+
+
+def _unwound(joint: Joint, driven: TimeFunction | None) -> Entry:
+    """The angle of a joint, which begins within half a turn; with the whole turns of its driver, if it has one."""
+
     def compute(view: View, last: Unwound | Worked | None) -> tuple[Array, Unwound]:
-        return unwind(view.record.time, *angles(view, joint), last if isinstance(last, Unwound) else None)
+        moments, (angle, rate) = view.record.time, angles(view, joint)
+        if driven is None:
+            return unwind(moments, angle, rate, last if isinstance(last, Unwound) else None)
+        asked = np.array([evaluate(driven, float(t))[0] for t in moments])
+        angle += 2 * np.pi * np.round((asked - angle) / (2 * np.pi))
+        return angle, Unwound(float(angle[-1]), float(rate[-1]), float(moments[-1]))
 
     return Entry("rad", (), "joint angle, unwound", compute)
 

@@ -140,7 +140,8 @@ class Result(Brief):
                 yield ".".join((name, *labels))
 
     def to_statespace(self) -> Any:
-        """A `scipy.signal.StateSpace` of a linearised scene; python-control takes its matrices: control.ss(s.A, s.B, s.C, s.D).
+        """A `scipy.signal.StateSpace` of a linearised scene; python-control takes its matrices,
+        `control.ss(s.A, s.B, s.C, s.D)`.
 
         Raises InputError for the result of another analysis, or one without inputs or outputs.
         """

@@ -222,8 +222,9 @@ class Joint:
 
     kind   : spherical, revolute, cylindrical, translational, universal, fixed, planar, point-on-line, point-on-plane,
              orientation, parallel, perpendicular, distance or screw
-    axis   : (3,) joint axis in the axes of i's body (or a (3, 3) joint frame); for a universal joint the arm on i
-    axis_j : the same for j; by default equal to `axis`, except for the universal joint, which needs it
+    axis   : (3,) joint axis in the axes of i's body (or a (3, 3) joint frame), default z; for a universal joint the arm on i
+    axis_j : the same for j; by default equal to `axis`, except for the universal joint, which needs it. A fixed joint without
+             both keeps the attitudes of its bodies to each other as the scene draws them; its points are brought together
     length : [m] of a distance joint: a positive number or a function of time
     pitch  : [m] per turn of a screw, positive for a right-hand thread
     """
@@ -233,7 +234,7 @@ class Joint:
     i: str
     j: str
     _: KW_ONLY
-    axis: Annotated[Any, Direction()] = (0.0, 0.0, 1.0)
+    axis: Annotated[Any, Direction()] = None
     axis_j: Annotated[Any, Direction()] = None
     length: Annotated[Any, OfTime("m")] = None
     pitch: Annotated[Any, In("m")] = None
@@ -264,7 +265,7 @@ def _needing(key: str) -> str:
 
 def frames(joint: Joint) -> tuple[Array, Array]:
     """Joint frames (3, 3) on markers i and j, columns f, g, h, in body axes."""
-    on_i = triad(joint.axis, f"joint {joint.name!r}: axis")
+    on_i = triad(np.eye(3)[2] if joint.axis is None else joint.axis, f"joint {joint.name!r}: axis")
     if joint.axis_j is None:
         return on_i, on_i
     return on_i, triad(joint.axis_j, f"joint {joint.name!r}: axis_j")

@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from typing import Any, get_args
 
@@ -111,6 +111,7 @@ class Body(Brief):
         return rows + ([("left out", listed(left_out))] if left_out else [])
 
 
+_PARALLEL = 1e-9  # of entries of a rotation, what is no turn
 _UNITS = ("m", "e0..e3", "m/s", "rad/s")
 
 
@@ -176,6 +177,7 @@ class Scene(Brief):
             raise InputError("a scene needs at least one body")
         _check_names(self)
         _check_joints(self)
+        object.__setattr__(self, "joints", tuple(_as_drawn(self, joint) for joint in self.joints))
         for driver in self.drivers:
             if isinstance(driver, Driver):
                 driver_word(driver, joint_of(self, driver))
@@ -368,6 +370,17 @@ def _check_names(scene: Scene) -> None:
             raise InputError(
                 f"{name!r} cannot be a name: use letters, digits, '_' and '-'; {', '.join(map(repr, RESERVED))} are taken"
             )
+
+
+def _as_drawn(scene: Scene, joint: Joint) -> Joint:
+    """The joint; a fixed one without axes with those that keep its bodies turned to each other as they are drawn."""
+    if joint.kind != "fixed" or joint.axis is not None or joint.axis_j is not None:
+        return joint
+    on = (markers(scene)[marker_number(scene, end)][0] for end in (joint.i, joint.j))
+    A_i, A_j = (rotation_matrix(scene.bodies[b].rotation) if b < len(scene.bodies) else np.eye(3) for b in on)
+    turn = A_j.T @ A_i
+    parallel = np.abs(turn - np.eye(3)).max() < _PARALLEL
+    return joint if parallel else replace(joint, axis=np.eye(3).tolist(), axis_j=turn.tolist())
 
 
 def _check_joints(scene: Scene) -> None:

@@ -14,7 +14,8 @@ from ffr_gallery.index3_conditioning import index3_conditioning
 
 from ffr_dyn import cli
 
-QUICK = ("index3-conditioning", "redundant-bricard", "reference-conditions", "numerical-damping", "euler-angles")
+QUICK = ("index3-conditioning", "redundant-bricard", "reference-conditions", "numerical-damping", "euler-angles",
+         "joint-friction", "start-shock", "coarse-rows", "aligned-cranks", "stiffening-by-load", "fast-driver")  # fmt: skip
 
 MADE = Exhibit(
     "Title", "it fails", "it holds", (Claim("a number", 2.0, 2.1, 1.1, "m"),),

@@ -31,8 +31,8 @@ FLOORS = {
         "report", "pipelines", "cli",
     ),
     "ffr_dyn": (
-        "functions", "scene", "variants", "equations", "kernels", "integrators", "compile", "results", "consistency",
-        "linear", "pictures", "analyses", "realtime", "scene_file", "chart", "economy", "cli",
+        "functions", "scene", "variants", "equations", "kernels", "integrators", "compile", "closing", "results",
+        "consistency", "linear", "pictures", "analyses", "realtime", "scene_file", "chart", "economy", "cli",
     ),
 }  # fmt: skip
 MOST_FLAT, MOST_IN_A_FOLDER = 12, 20

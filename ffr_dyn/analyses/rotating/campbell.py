@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -30,7 +31,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 MODES = 10
-SECANTS, MET = 12, 1e-10  # of a crossing: steps, and of a speed relative to the range
+SECANTS, MET = 12, 1e-8  # of a crossing: steps, and of a speed relative to the range
 GROWS = 1e-9  # of a real part relative to the frequency: what is no rounding
 
 
@@ -39,11 +40,14 @@ class Campbell(OfMoment):
     """Vibrations at every speed, followed by their shapes; where they cross multiples of the speed; where they grow."""
 
     keeps: ClassVar[bool] = False
-    example: ClassVar[str] = "ffr-dyn campbell rotor.toml --speed 0..500 --order 1 --picture out/campbell.png -o out/rotor.nc"
+    example: ClassVar[str] = (
+        "ffr-dyn campbell rotor.toml --speed 0..500 --order 1 --picture out/campbell.png -o out/rotor.nc"
+    )
     speeds: tuple[str, ...] = field(default=(), metadata={**SPEEDS, "required": True})
     turn: str = field(default="", metadata=TURN)
     orders: tuple[str, ...] = field(
-        default=("1",), metadata=option("--order", "Multiple of the speed that excites; default: 1; repeat.", metavar="K")
+        default=("1",),
+        metadata=option("--order", "Multiple of the speed that excites; default: 1; repeat.", metavar="K"),
     )
     modes: int = field(default=MODES, metadata=option("--modes", "How many vibrations, from the slowest."))
     picture: str = field(default="", metadata=option("--picture", "Draw the diagram, .png or .svg.", metavar="FILE"))
@@ -164,7 +168,7 @@ def _crossings(
     """Speeds where a measure of a vibration is zero, each between two of the list."""
     measured = [measure(speed, one, m) for speed, one in zip(speeds, spectra, strict=True)]
     found = []
-    for k, (low, high) in enumerate(zip(measured, measured[1:], strict=False)):
+    for k, (low, high) in enumerate(pairwise(measured)):
         if (low < 0 < high) or (low > 0 > high and not upward):
             found.append(_between(at, (speeds[k], speeds[k + 1]), (low, high), spectra[k], m, measure))
     return found

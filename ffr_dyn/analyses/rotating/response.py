@@ -22,12 +22,12 @@ from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.parts import described
 from ffr_dyn.scene.scene import Scene, marker_names, require_scene
-from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 About = Literal["start", "equilibrium", "steady"]
 PARTS = 12
 COMPONENTS = "xyz"
+SHARE = 0.01  # of a gain by one mode, from where it is told; outputs of rounding have more than its inverse
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,8 @@ def response(
     input    : an effort, the name of a load (one doubles it), or in words: "joint.moment" or "joint.force" along a joint
                coordinate, "driver.moment" in the place of a driver, which then holds what it held, "body.point.force.x" or
                ".moment.z" at a marker, "base.x", an acceleration of the base
-    outputs  : quantities ("rod.tip.acceleration": its components) or components; with a base as input, accelerations of markers
+    outputs  : quantities ("rod.tip.acceleration": its components) or components; with a base as input, accelerations
+    of markers
                are absolute, as accelerometers have them, so that the gain is the transmissibility
     band_of  : (low, high) [Hz];  frequencies : [Hz], instead; by default the band of the first vibrations
     psd      : (frequency [Hz], one-sided density [input^2/Hz]) of a noise at the input, linear in between, zero outside
@@ -160,7 +161,9 @@ def _fed(scene: Scene, given: str | Effort, time: float) -> tuple[Scene, str | E
     joints = {joint.name for joint in scene.joints}
     kinds = {"moment": "angle", "force": "stroke"}
     if head in drivers and kinds.get(what) == drivers[head].coordinate:
-        return _released(scene, drivers[head], time), JointEffort("input", drivers[head].joint, drivers[head].coordinate)
+        return _released(scene, drivers[head], time), JointEffort(
+            "input", drivers[head].joint, drivers[head].coordinate
+        )
     if head in joints and what in kinds:
         return scene, JointEffort("input", head, kinds[what])
     marker, _, rest = given.rpartition(".force.") if ".force." in given else given.rpartition(".moment.")
@@ -278,10 +281,10 @@ def response_lines(result: Result) -> list[str]:
     parts = result["parts"] @ np.array([1, 1j]) if len(a["modes"]) else np.zeros((f.size, gain.shape[1], 0))
     for k, name in enumerate(a["outputs"]):
         top = int(np.argmax(gain[:, k]))
-        lines.append(f"output       {name}: gain {gain[0, k]:.5g} at {f[0]:.4g} Hz, at most {gain[top, k]:.5g} at {f[top]:.5g} Hz")
-        shares = np.abs(parts[top, k])
-        for mode in np.argsort(-shares, kind="stable")[:3]:
-            if shares[mode] > 0.01 * gain[top, k]:
-                lines.append(f"             {100 * shares[mode] / gain[top, k]:5.1f} % there by {a['modes'][mode]}")
+        where = f"gain {gain[0, k]:.5g} at {f[0]:.4g} Hz, at most {gain[top, k]:.5g} at {f[top]:.5g} Hz"
+        lines.append(f"output       {name}: {where}")
+        shares = np.abs(parts[top, k]) / gain[top, k] if gain[top, k] else 0.0 * np.abs(parts[top, k])
+        most = [m for m in np.argsort(-shares, kind="stable")[:3] if SHARE < shares[m] < 1 / SHARE]
+        lines += [f"             {100 * shares[m]:5.1f} % there by {a['modes'][m]}" for m in most]
     lines += [f"rms          {name}: {value:.6g}" for name, value in a.get("rms", {}).items()]
     return lines + [f"note         {note}" for note in a["notes"]]

@@ -55,7 +55,8 @@ def steady(
     outputs: Sequence[str] = ("default",),
     path: str | Path | None = None,
 ) -> Result:
-    """The steady motion of a scene at `time` [s], a row for every speed [rad/s], with all reactions and the efforts of drivers.
+    """The steady motion of a scene at `time` [s], a row for every speed [rad/s], with all reactions and the efforts
+    of drivers.
 
     speeds  : of what `turn` names; without any, one row with the velocities that drivers and scene have
     turn    : a driver, or the coordinate of a joint ("hinge.angle") that is to turn evenly; by default the only driver, or
@@ -68,8 +69,8 @@ def steady(
         found = fd.steady(scene, speeds=(0.0, 50.0, 100.0))
         found["speed"], found["blade.tip.displacement"]
 
-    Raises InputError for a scene that cannot turn so, or that something speeds up or brakes; ComputationError where no balance
-    is found.
+    Raises InputError for a scene that cannot turn so, or that something speeds up or brakes; ComputationError where
+    no balance is found.
     """
     require_scene(scene)
     found = list(steady_states(scene, speeds, turn, time))

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_analyses_kinematic import bar
 
 from ffr_dyn.analyses.forward import forward
+from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.mobility import mobility
 from ffr_dyn.functions.formula import formula
+from ffr_dyn.functions.rotation import euler_parameters, rotation_matrix
 from ffr_dyn.integrators import RK4
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
@@ -51,3 +55,35 @@ def test_a_distance_that_starts_at_zero_or_below_is_refused(analysis, length):
 def test_a_distance_that_shrinks_to_zero_stops_the_run_there():
     with pytest.raises(ComputationError, match=r"at t = 0\.49\d* s the row 'distance of the points' of 'tie'"):
         forward(tied("distance", 0.5, length=formula("0.5 - t")), end=0.6, output_step=0.1, method=RK4(1e-3))
+
+
+def welded(**axes) -> Scene:
+    """A bar clamped at a slant, with another at right angles to it at its end, drawn a bit off."""
+    slant, across = (0.0, 0.3, 0.5), np.array([0.0, 0.3, 0.5 + np.pi / 2])
+    tip = rotation_matrix(euler_parameters(slant, "slant")) @ [1.0, 0, 0]
+    return Scene(
+        (
+            Body("a", bar("a", 1.0), rotation=slant),
+            Body("b", bar("b", 1.0), position=tip + np.array([0.0, 0.01, 0.0]), rotation=across),
+        ),
+        (Joint("clamp", "fixed", "ground.O", "a.a", **axes), Joint("weld", "fixed", "a.b", "b.a", **axes)),
+        ground={"O": (0, 0, 0)},
+    )
+
+
+def test_a_fixed_joint_keeps_attitudes_as_they_are_drawn_and_brings_points_together():
+    scene = welded()
+    assembled = assemble(scene)
+    place = assembled.system.layout
+    for b, body in enumerate(scene.bodies):
+        np.testing.assert_allclose(assembled.x[place.p(b)], body.rotation, rtol=0, atol=1e-12)
+    assert assembled.degrees_of_freedom == 0
+    assert any("assembly moved body 'b' by 0.01 m" in note for note in assembled.notes)
+    again = replace(scene, bodies=tuple(replace(body, rotation=(0, 0, 0)) for body in scene.bodies))
+    assert again.joints == scene.joints  # the scene has decided
+
+
+def test_a_fixed_joint_with_an_axis_brings_both_frames_together():
+    assembled = assemble(welded(axis=(0, 0, 1)))
+    for b in range(2):
+        np.testing.assert_allclose(np.abs(assembled.x[assembled.system.layout.p(b)]), (1, 0, 0, 0), rtol=0, atol=1e-10)

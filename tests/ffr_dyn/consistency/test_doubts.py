@@ -133,7 +133,7 @@ OF_ITS_OWN = Actuator("own", "hinge", function=lambda t, state: -30.0 * state.om
 RAISED = [
     (
         doubts.APART,
-        r"'angle' of 'drive' is open .* not followed; .* faster than the step.* one below",
+        r"driver 'drive' moves by 1\.91 rad within the step .* more than the method follows; .* use steps below",
         partial(forward, driven(2.0, 100.0), 1e-2),
         partial(forward, driven(2.0, 100.0), 2e-4, 10, 50),
     ),

@@ -1,4 +1,4 @@
-"""Bodies in steady motion: the derivatives of their kinetic energy against differences, and against the equations of motion."""
+"""Bodies in steady motion: derivatives of their kinetic energy against differences, and the equations of motion."""
 
 from __future__ import annotations
 

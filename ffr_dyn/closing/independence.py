@@ -1,0 +1,187 @@
+"""Which constraint rows follow from the others, not at one position but along the motion.
+
+In a singular position rows depend on one another that are needed everywhere else. So where they do, neighbouring
+positions are made by free motions in several directions, and the rows are as dependent as where they are least so. Drivers
+may be anywhere there: their rows count, their values do not. (Nikravesh 1988, ch. 5, factorises at one position.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import qr
+from scipy.sparse import csr_array, vstack
+
+from ffr_dyn.closing.positions import TOLERANCE, close_positions, largest_turn, stacked, weights
+from ffr_dyn.closing.row_space import Dependence, dependence, smallest_solution
+from ffr_dyn.compile.row_tables import moving_bodies
+from ffr_dyn.equations.constraint_rows import Block, rows_at
+from ffr_dyn.equations.layout import Layout, moved, to_body_axes
+from ffr_dyn.scene.scene import Scene, markers
+from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import InputError
+
+AWAY = (0.1, 0.05, 0.2, 0.1, 0.05, 0.2, 0.4, 0.1)  # rad, or of the size of the largest body: to a neighbouring position
+AGREED = 2  # neighbours that end the search
+NOTHING = 1e-6  # of a motion, what counts as none
+ITERATIONS = 40
+CLEAR = 1e-5  # length of the shortest combination of rows that does not vanish, where it is plain which do
+TAKES_PART = 1e-6  # of a row in a combination that vanishes
+
+
+def independent_blocks(
+    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float
+) -> tuple[list[Block], list[tuple[str, str]]]:
+    """Blocks without their redundant words, and the (block, word) pairs that were dropped.
+
+    Raises InputError when a driver's row is redundant.
+    """
+    N = dependence_in_motion(scene, place, blocks, x, v, time).combinations
+    for name in _drivers_in(N, blocks):
+        raise InputError(f"driver {name!r} prescribes a motion that the joints and other drivers already fix")
+    said = [(block, word) for block in blocks for word in block.words]
+    # what is left of the combinations in these rows is as regular as can be, and so are the rows that are kept
+    out = set(qr(N.T, mode="r", pivoting=True)[1][: N.shape[1]].tolist()) if N.size else set[int]()
+    numbers = iter(range(len(said)))
+    left = [replace(block, words=tuple(word for word in block.words if next(numbers) not in out)) for block in blocks]
+    return left, [(said[k][0].name, said[k][1].text) for k in sorted(out)]
+
+
+def redundant_drivers(
+    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float
+) -> tuple[str, ...]:
+    """Drivers with a row that follows from the joints and the other drivers."""
+    return _drivers_in(dependence_in_motion(scene, place, blocks, x, v, time).combinations, blocks)
+
+
+def _drivers_in(N: Array, blocks: list[Block]) -> tuple[str, ...]:
+    owners = [block for block in blocks for _ in block.words]
+    parts = np.abs(N).max(axis=1, initial=0.0)
+    found = (block.name for block, part in zip(owners, parts, strict=True) if block.driver and part > TAKES_PART)
+    return tuple(dict.fromkeys(found))
+
+
+def dependence_in_motion(
+    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float
+) -> Dependence:
+    """How the rows depend on one another at x or, if they do so less, at its neighbours."""
+    here = _dependence(scene, place, blocks, x, v, time)
+    if not here.count:
+        return here
+    owners = np.repeat(np.arange(len(blocks)), [len(block.words) for block in blocks])
+    chosen = _involved(scene, blocks, set(owners[np.abs(here.combinations).max(axis=1) > TAKES_PART].tolist()))
+    best = _at_neighbours(scene, place, [blocks[k] for k in chosen], x, v, time)
+    if best is None or best.count > here.count:
+        return here
+    whole = np.zeros((owners.size, best.count))
+    whole[np.isin(owners, chosen)] = best.combinations
+    return Dependence(whole, best.least)
+
+
+def _involved(scene: Scene, blocks: list[Block], dependent: set[int]) -> list[int]:
+    """Numbers of the blocks that may be in a combination of rows that vanishes, from those that are in one at a position.
+
+    Forces in a mechanism that balance one another do not reach a body that hangs on by one pair of bodies alone; and what is
+    connected by the ground only has its own.
+    """
+    table = markers(scene)
+    pairs = [frozenset(moving_bodies(block, table, len(scene.bodies))) for block in blocks]
+    left, tied = set(range(len(blocks))), {pairs[k] for k in dependent}
+    while True:
+        touching: dict[int, set[frozenset[int]]] = {}
+        for k in left:
+            for body in pairs[k]:
+                touching.setdefault(body, set()).add(pairs[k])
+        ends = set[frozenset[int]]().union(*(those for those in touching.values() if len(those) == 1))
+        hanging = {k for k in left if pairs[k] in ends - tied}
+        if not hanging:
+            break
+        left -= hanging
+    found, bodies = set(dependent), frozenset().union(*(pairs[k] for k in dependent))
+    while more := {k for k in left - found if pairs[k] & bodies}:
+        found |= more
+        bodies = bodies.union(*(pairs[k] for k in more))
+    return sorted(found)
+
+
+def _at_neighbours(
+    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float
+) -> Dependence | None:
+    """How the rows depend on one another at the neighbour of x where they plainly do so least; None where nothing moves."""
+    found, joints = list[Dependence](), [block for block in blocks if not block.driver]
+    for number, away in enumerate(AWAY):
+        near = _neighbour(scene, place, joints, x, v, time, number, away)
+        if near is not None:
+            found.append(_dependence(scene, place, blocks, near, v, time))
+        counts = [one.count for one in found if one.least > CLEAR]
+        if counts.count(min(counts, default=0)) >= AGREED:
+            break
+    return max(found, key=lambda one: (one.least > CLEAR, -one.count, one.least), default=None)
+
+
+def _dependence(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> Dependence:
+    rows = rows_at(scene, place, blocks, x, v, time)
+    return dependence(csr_array(stacked(rows, place) @ weights(scene, place, x, elastic=True)))
+
+
+def _neighbour(
+    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float, number: int, away: float
+) -> Array | None:
+    """A position that meets the rows, a free motion away from x: the one that is under way, or one at random; None where
+    there is none.
+
+    Where first-order motions do not go on, as most do not in a singular position, Newton's method would lead back to x, so
+    its steps are at right angles to the way from there: it turns the way into one that does go on.
+    """
+    W, J = _rigid(scene, place, blocks, x, v, time)[1:]
+    tied = _tied(place, J)
+    wanted = W @ (tied * np.random.default_rng(number).normal(size=place.v_size))
+    if number == 0 and (own := tied * _rigid_part(place, to_body_axes(place, x, v))).any():
+        wanted = own
+    way = wanted - W @ smallest_solution(csr_array(J @ W), J @ wanted)
+    extent = _extent(scene, place, way)
+    if not extent > NOTHING * _extent(scene, place, wanted):
+        return None
+    way *= away / extent
+    found = moved(place, x, way)
+    for _ in range(ITERATIONS):
+        Phi, W, J = _rigid(scene, place, blocks, found, v, time)
+        if np.abs(Phi).max(initial=0.0) < TOLERANCE:
+            return close_positions(scene, place, blocks, found, v, time)
+        A = csr_array(vstack([J, csr_array(way[None] / np.linalg.norm(way))]) @ W)
+        step = W @ smallest_solution(A, np.append(-Phi, 0.0))
+        step *= min(1.0, away / max(_extent(scene, place, step), 1e-300))
+        way, found = way + step, moved(place, found, step)
+    return None
+
+
+def _rigid(
+    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float
+) -> tuple[Array, csr_array, csr_array]:
+    """Phi (C,), W^(1/2) of rigid motions, Jacobian."""
+    rows = rows_at(scene, place, blocks, x, v, time)
+    return np.array([row.Phi for row in rows]), weights(scene, place, x, elastic=False), stacked(rows, place)
+
+
+def _tied(place: Layout, J: csr_array) -> Array:
+    """(V,) ones for the velocities of bodies that rows act on."""
+    acts, out = np.asarray(abs(J).sum(axis=0)).ravel() > 0, np.zeros(place.v_size)
+    for b, n in enumerate(place.n):
+        whole = slice(place.iv[b], place.iv[b] + 6 + n)
+        out[whole] = acts[whole].any()
+    return out
+
+
+def _rigid_part(place: Layout, step: Array) -> Array:
+    """A motion (V,) without its elastic coordinates."""
+    out = step.copy()
+    for b in range(len(place.n)):
+        out[place.q_dot(b)] = 0.0
+    return out
+
+
+def _extent(scene: Scene, place: Layout, step: Array) -> float:
+    """Of a motion (V,): the largest turn [rad] of a body, or shift over the size of the largest body."""
+    shift = max(float(np.abs(step[place.R_dot(b)]).max()) for b in range(len(place.n)))
+    return max(largest_turn(place, step), shift / (max(body.model.size for body in scene.bodies) or 1.0))

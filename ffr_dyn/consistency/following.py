@@ -1,0 +1,131 @@
+"""Whether the steps of a run follow its motion: joints that open between them, drivers that are lost.
+
+A projection puts right what a step leaves open. Where that is much, what lies between the steps is not the motion that was
+asked for, however well the joints are closed at their ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.equations.constraint_rows import Block, drive_of
+from ffr_dyn.kernels.tables import MOMENT, OPENED, PHI, Record, Work
+from ffr_dyn.scene.joints import COINCIDENCE, DISTANCE, DOT_2, RELATION, Word
+from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
+
+LOST = 0.1  # rad, or of the size of the largest body, that a row may open by within a step
+SPUN = 2.0  # rad that a body of a driven scene may turn by within one: rates that rows of results happen to see
+FAST = 0.3  # rad, or of that size, that a driver may move by within a step that is not followed
+STALLED = 1.0  # the same within two steps, of which one has failed
+SAMPLES = 65  # of a driver within a step
+HALVINGS = 30
+SUDDEN = 0.5  # of a change, which takes the smallest part of a step: a jump
+
+
+@dataclass(frozen=True)
+class Lost:
+    """When [s] the steps have lost the motion, and how, in words."""
+
+    time: float
+    text: str
+
+
+def unfollowed(system: System, work: Work, step: float, rows: Record) -> Lost | None:
+    """Where steps of a length [s] do not follow the motion up to these rows."""
+    opened, time = float(work.drift[PHI]), float(work.drift[MOMENT])
+    block, word = row_named(system, int(work.drift[OPENED])) if opened > 0 else (None, None)
+    if block is not None and word is not None and not opened <= LOST * _whole(system.scene, word):
+        how = f"{'not followed, ' * block.driver}open by {opened:.3g} {_unit(word)} at the end of a step"
+        text = (
+            f"at t = {time:.6g} s {_called(block)} is {how}: the motion "
+            f"between the steps is more than the method follows; use steps far shorter than {step:.3g} s"
+        )
+        return Lost(time, text)
+    for b, body in enumerate(system.scene.bodies):
+        spins = np.linalg.norm(rows.v[:, system.layout.omega(b)], axis=1)
+        if system.scene.drivers and step * spins.max(initial=0.0) > SPUN:
+            time, spin = float(rows.time[np.argmax(spins)]), float(spins.max())
+            text = (
+                f"at t = {time:.6g} s body {body.name!r} turns by {step * spin:.3g} rad within a step of {step:.3g} s: the "
+                f"motion between the steps is more than the method follows; use a step below {0.1 / spin:.2g} s"
+            )
+            return Lost(time, text)
+    return None
+
+
+def jumped(system: System, times: Array) -> str:
+    """Which driver jumps between two of the times [s] of rows; empty where none does."""
+    said = [(block, word) for block in system.blocks for word in block.words if word.function is not None]
+    for block, word in said:
+        value, rate, _ = np.array([drive_of(word, float(t)) for t in times]).T
+        off = np.abs(np.diff(value) - 0.5 * (rate[1:] + rate[:-1]) * np.diff(times))
+        for k in np.flatnonzero(off > FAST * _whole(system.scene, word)):
+            time, jump = _jump(word, float(times[k]), float(times[k + 1]))
+            if abs(jump) > SUDDEN * off[k]:
+                return _told_jump(block, word, time, jump)
+    return ""
+
+
+def lost_driver(system: System, start: float, end: float, far: float = FAST) -> str:
+    """Which driver jumps within a step [s], or moves farther than it follows (rad, or of the size of the largest body); empty
+    where none does."""
+    times = np.linspace(max(start, 0.0), end, SAMPLES)
+    for block in system.blocks:
+        for word in block.words:
+            if word.function is None:
+                continue
+            changes = np.abs(np.diff([drive_of(word, t)[0] for t in times]))
+            if not changes.sum() > far * _whole(system.scene, word):
+                continue
+            k = int(np.argmax(changes))
+            time, jump = _jump(word, float(times[k]), float(times[k + 1]))
+            if abs(jump) > SUDDEN * changes.sum():
+                return _told_jump(block, word, time, jump)
+            short = 0.1 * (end - start) / changes.sum() * _whole(system.scene, word)
+            return (
+                f"{_called(block)} moves by {changes.sum():.3g} {_unit(word)} within the step that ends at t = {end:.6g} s: "
+                "the motion between the steps is more than the method follows; let it move more slowly, or use steps below "
+                f"{short:.2g} s"
+            )
+    return ""
+
+
+def _told_jump(block: Block, word: Word, time: float, jump: float) -> str:
+    return (
+        f"{_called(block)} jumps by {jump:.4g} {_unit(word)} at t = {time:.6g} s, which no motion follows; give it a "
+        "ramp that lasts some steps"
+    )
+
+
+def _jump(word: Word, early: float, late: float) -> tuple[float, float]:
+    """When [s] and by how much a prescribed motion changes most between two times, in the smallest part of them."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (early + late)
+        low, mid, high = (drive_of(word, t)[0] for t in (early, middle, late))
+        early, late = (early, middle) if abs(mid - low) > abs(high - mid) else (middle, late)
+    return late, drive_of(word, late)[0] - drive_of(word, early)[0]
+
+
+def row_named(system: System, row: int) -> tuple[Block, Word]:
+    """The block and word of a row of the tables."""
+    starts = system.model.rows.start
+    block = system.blocks[int(np.searchsorted(starts, row, side="right")) - 1]
+    return block, block.words[row - int(starts[system.blocks.index(block)])]
+
+
+def _whole(scene: Scene, word: Word) -> float:
+    """[m] or [rad], what a share of is meant."""
+    return (max(body.model.size for body in scene.bodies) or 1.0) if _unit(word) == "m" else 1.0
+
+
+def _unit(word: Word) -> str:
+    strokes = word.kind == RELATION and all(kind == "stroke" for _, kind in word.relation)
+    return "m" if strokes or word.kind in (COINCIDENCE, DOT_2, DISTANCE) else "rad"
+
+
+def _called(block: Block) -> str:
+    return f"{'driver' if block.driver else 'joint'} {block.name!r}"
