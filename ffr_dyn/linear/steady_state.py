@@ -6,9 +6,9 @@ the amended potential V - T_0,
 
     d(T_0 - V) - Phi_q^T lam = 0,      Phi = 0,
 
-solved by Newton's method with the exact tangent; what is free to go on turning has no stiffness and stays where it is. Above
-critical speeds the amended potential has no minimum, so the state is followed from rest where Newton's method does not reach
-it at once, and not sought downhill. Forces that see velocities are differentiated by differences.
+solved by Newton's method with the exact tangent (of Python forces that look at velocities by differences); what is
+free to go on turning has no stiffness and stays where it is. Above critical speeds the amended potential has no
+minimum, so the state is followed from rest where Newton's method does not reach it at once, and not sought downhill.
 
 A scene that turns meets its ground, gravity and bearings anew at every angle. Rows that then do not hold are no
 steady motion; forces and stiffness that vary are taken as their means of a turn, and a note says so.
@@ -27,20 +27,26 @@ from ffr_dyn.consistency.evaluation import free_motions, locked, smallest_step, 
 from ffr_dyn.consistency.mobility import named_motion
 from ffr_dyn.consistency.tangent import sizes_of
 from ffr_dyn.equations.forces import At, applied_by
+from ffr_dyn.equations.forces_at_rest import Watched
+from ffr_dyn.equations.forces_in_motion import add_velocities
 from ffr_dyn.equations.inertia import kept_integrals
 from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes
+from ffr_dyn.equations.placed import Sums, all_placed, nothing_on
 from ffr_dyn.equations.spinning import spinning
 from ffr_dyn.equations.statics import balance, damping
 from ffr_dyn.functions.rotation import from_vector, product, rotation_matrix
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces.force import Force
+from ffr_dyn.scene.forces.places import AtMarker, OnBody
+from ffr_dyn.scene.scene import markers
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
 ITERATIONS = 20  # of Newton's method
 TOLERANCE = 1e-9  # of its last step, rad or relative to the scene: the next would be its square
 LARGEST = 0.5  # of a step, the same
-LEAST_SHARE = 1e-3  # of the speed, by which it is followed
+LEAST_SHARE = 0.01  # of the speed, by which it is followed
+BALANCED = 1e-13  # of forces relative to all, and of rows [m, -]: what is left of a balance by rounding
 NEUTRAL = 1e-13  # of a stiffness relative to the largest: rounding
 UNBALANCED = 1e-6  # of forces along motions without stiffness, relative to all
 VARIES, OPENS = 1e-7, 1e-7  # of forces and stiffness over a turn, relative; of rows, relative to the scene
@@ -160,45 +166,65 @@ def _loads(machine: Machine, later: float, x: Array) -> tuple[Array, Array, Arra
         none = np.zeros(sum(len(block.words) for block in system.blocks))
         at = balance(system.scene, place, system.blocks, time, x, none, {})
         forces, K = forces + at.forces, K + at.stiffness
-    for force in forces_of(system.scene) if machine.screws.fastest or machine.screws.u.any() else ():
-        more = _by_velocities(machine, force, time, x)
-        forces, K, D = forces + more[0], K + more[1], D + more[2]
-    return forces, K, D
+    if not (machine.screws.fastest or machine.screws.u.any()):
+        return forces, K, D
+    now = At(system.scene, place, time, x, velocities(place, machine.screws, x))
+    total = nothing_on(all_placed(replace(now, v=np.zeros(place.v_size))), place.v_size)
+    for force in forces_of(system.scene):
+        if not _sees_velocities(now, force):
+            continue
+        if isinstance(force.place, (AtMarker, OnBody)) or _looks(now, force):
+            _add_by_differences(total, D, machine.screws, now, force)
+        else:
+            add_velocities(total, D, now, force, _ends(machine.screws, now, force))
+    return forces + total.forces, K - total.tangent, D
 
 
-def _by_velocities(machine: Machine, force: Force, time: float, x: Array) -> tuple[Array, Array, Array]:
-    """What the velocities of the screws add to a force (V,), to its stiffness and to its damping (V, V)."""
-    place, still = machine.place, np.zeros(machine.place.v_size)
-    now = At(machine.system.scene, place, time, x, velocities(place, machine.screws, x))
+def _ends(screws: Screws, now: At, force: Force) -> tuple[Array, Array]:
+    """(2, 3) u and w of the markers of a force; the ground's are zero."""
+    numbers = [markers(now.scene)[number][0] for number in force.place.ends(now.scene)]
+    u, w = (np.concatenate([one, np.zeros((1, 3))]) for one in (screws.u, screws.w))
+    return u[numbers], w[numbers]
+
+
+def _sees_velocities(now: At, force: Force) -> bool:
+    """Whether a force changes with velocities: asked once, at others than those of the motion."""
+    still = applied_by(replace(now, v=np.zeros(now.v.size)), force).generalised
+    shaken = applied_by(replace(now, v=now.v + np.cos(np.arange(now.v.size))), force).generalised
+    return bool(np.abs(shaken - still).max(initial=0.0) > 1e-14 * np.abs(shaken).max(initial=0.0))
+
+
+def _looks(now: At, force: Force) -> bool:
+    """Whether the law of a force on coordinates looks at the state of the scene."""
+    watched = Watched(now.scene, now.place, now.t, now.x, now.v, [])
+    applied_by(watched, force)
+    return bool(watched.looks)
+
+
+def _add_by_differences(total: Sums, D: Array, screws: Screws, now: At, force: Force) -> None:
+    """What velocities add to a force of any kind, to its tangent and to the damping (V, V)."""
+    place, still = now.place, np.zeros(now.v.size)
 
     def given(at: At) -> Array:
         return applied_by(at, force).generalised
 
     def added(y: Array) -> Array:
-        there = moved(place, x, y)
-        moving = replace(now, x=there, v=velocities(place, machine.screws, there))
+        there = moved(place, now.x, y)
+        moving = replace(now, x=there, v=velocities(place, screws, there))
         return given(moving) - given(replace(moving, v=still))
 
-    def rated(rate: Array, of: Array) -> Array:
-        return given(replace(now, v=of + to_global_axes(place, x, rate)))
+    def rated(of: Array) -> Array:
+        return _derivative(lambda rate: given(replace(now, v=of + to_global_axes(place, now.x, rate))), 1.0, still.size)
 
-    shaken = rated(np.cos(np.arange(still.size)), now.v)
-    at_rest = given(replace(now, v=still))
-    none = np.zeros((still.size, still.size))
-    if np.abs(shaken - at_rest).max() <= 1e-14 * np.abs(shaken).max():
-        return still, none, none
-    columns = np.flatnonzero(shaken)
-
-    def slopes(of: Array) -> Array:
-        return _derivative(lambda rate: rated(rate, of), columns, 1.0, still.size)
-
-    return added(still), -_derivative(added, columns, STEP, still.size), slopes(still) - slopes(now.v)
+    total.forces[:] += added(still)
+    total.tangent[:] += _derivative(added, STEP, still.size)
+    D += rated(still) - rated(now.v)
 
 
-def _derivative(function: Callable[[Array], Array], columns: Array, step: float, size: int) -> Array:
-    """(V, V) derivative of V = size numbers by as many at zero, its `columns`, by extrapolated central differences."""
+def _derivative(function: Callable[[Array], Array], step: float, size: int) -> Array:
+    """(V, V) derivative of V = size numbers by as many at zero, by extrapolated central differences."""
     found = np.zeros((size, size))
-    for k in columns:
+    for k in range(size):
         coarse, fine = np.zeros(size), np.zeros(size)
         coarse[k], fine[k] = step, 0.5 * step
         apart, near = (function(y) - function(-y) for y in (coarse, fine))
@@ -314,6 +340,9 @@ def _newton(machine: Machine, x: Array) -> Steady | None:
     about = _at(machine, x).about
     for count in range(1, ITERATIONS + 1):
         Z = free_motions(about.jacobian, about.M)
+        steady = Steady(machine, x, velocities(place, machine.screws, x), about, Z, count)
+        if _balanced(steady):
+            return steady
         closing = smallest_step(about.jacobian, about.M, -about.Phi)
         y = closing + Z @ _solved(Z.T @ about.K @ Z, Z.T @ (about.forces - about.K @ closing))
         length = float(np.abs(y / size).max())
@@ -323,10 +352,17 @@ def _newton(machine: Machine, x: Array) -> Steady | None:
         x = moved(place, x, min(1.0, LARGEST / length) * y if length else y)
         about = matrices(machine, x, lam)
         if length < TOLERANCE:
-            steady = Steady(machine, x, velocities(place, machine.screws, x), about, Z, count)
+            steady = replace(steady, x=x, v=velocities(place, machine.screws, x), about=about)
             _require_balance(steady)
             return steady
     return None
+
+
+def _balanced(found: Steady) -> bool:
+    """Whether nothing is left to do but rounding, as of what is straight at its critical speed."""
+    left = np.abs(found.Z.T @ found.about.forces).max(initial=0.0)
+    open_rows = np.abs(found.about.Phi).max(initial=0.0)
+    return bool(left <= BALANCED * _size_of_forces(found) and open_rows <= BALANCED)
 
 
 def _multipliers(about: Matrices, forces: Array) -> Array:

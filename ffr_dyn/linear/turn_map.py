@@ -39,6 +39,7 @@ RETURNS = 1e-11  # of a period that ends where it began: rad, or relative to the
 STALLED = 0.7  # of a period's closing over that of KEPT periods before, from where mixing gives way to Newton's method
 DIFFERENCE = 1e-5  # the same, of the monodromy matrix; extrapolated
 LATER = 0.37  # s: when a driver is asked again whether it turns evenly
+REPEATS = 1e-7  # of the second period, the same: drivers and loads that come back
 CORRECTIONS, MET = 12, 1e-13  # of a deviation onto the constraints, and of Phi [m, -]
 AGAIN = 0.5  # rad, or the scene's size: of deviations beyond which a state does not count as come back
 
@@ -91,15 +92,14 @@ def period_of(scene: Scene, time: float) -> float:
     raise InputError(f"the period is not known: {what}; give it in seconds (period, --period)")
 
 
-def after(of: Turns, x: Array, v: Array, rows: int = 1) -> Record:
-    """`rows` states of the period that begins at (x, v), evenly, the last at its end."""
-    engine = new_engine(
-        of.system, x, v, of.method, gains(Projection(CLOSED)), start=of.near.time, spacing=of.method.step
-    )
+def after(of: Turns, x: Array, v: Array, rows: int = 1, later: float = 0.0) -> Record:
+    """`rows` states of the period that begins at (x, v), evenly, the last at its end; or of one that begins `later` [s]."""
+    start = of.near.time + later
+    engine = new_engine(of.system, x, v, of.method, gains(Projection(CLOSED)), start=start, spacing=of.method.step)
     record = new_record(of.system, rows)
-    status = fill_rows(engine, record, of.near.time, of.steps // rows)
+    status = fill_rows(engine, record, start, of.steps // rows)
     if status != OK:
-        raise failure(of.system, engine.work, status, of.near.time)
+        raise failure(of.system, engine.work, status, start)
     return record
 
 
@@ -174,7 +174,15 @@ def returned(of: Turns) -> Returned:
     if newton:
         s, more, error = _newton(of, s)
         periods += more
-    return Returned(*placed(of, s), periods, error, newton)
+    x, v = placed(of, s)
+    again = after(of, x, v, later=of.period)
+    apart = float(np.abs((deviation(of, again.x[-1], again.v[-1]) - s) / of.scale).max(initial=0.0))
+    if apart > max(REPEATS, 1e3 * error):
+        raise ComputationError(
+            f"what acts on the scene does not repeat itself after {of.period:.6g} s: the period after the first ends "
+            f"{apart:.2g} of the scene's size off; give a period in which drivers and loads all come back"
+        )
+    return Returned(x, v, periods + 1, error, newton)
 
 
 def _mixed(of: Turns) -> tuple[Array, int, float]:

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ffr_dyn.analyses.registry import OfMoment, option
-from ffr_dyn.analyses.rotating.steady import SPEEDS, TURN
+from ffr_dyn.analyses.rotating.steady import GROWS, SPEEDS, TURN
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import assemble, in_space
 from ffr_dyn.linear.spectrum import Spectrum, followed, spectrum
@@ -32,7 +32,6 @@ from ffr_prep.common.errors import InputError
 
 MODES = 10
 SECANTS, MET = 12, 1e-8  # of a crossing: steps, and of a speed relative to the range
-GROWS = 1e-9  # of a real part relative to the frequency: what is no rounding
 
 
 @dataclass(frozen=True)
@@ -108,6 +107,8 @@ def campbell(
     spectra = [at(values[0], None)]
     for speed in values[1:]:
         spectra.append(followed(spectra[-1], at(speed, spectra[-1])))
+    if not spectra[0].values.size:
+        raise InputError("nothing vibrates: joints and the driver fix every motion, or what they leave is free")
     middle = spectra[len(spectra) // 2]
     whirling = np.nan_to_num(middle.whirl) > ONE_WAY
     order = np.argsort(np.where(whirling, np.abs(spectra[0].seen), np.abs(spectra[0].values)), kind="stable")[:modes]

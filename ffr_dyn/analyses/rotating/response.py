@@ -217,7 +217,6 @@ def _as_result(
 ) -> Result:
     outputs = Axis("of", tuple(name.replace(".", " ") for name in linear.outputs))
     names = _mode_names(linear, found)
-    modes = Axis("part_of", tuple(f"{k + 1}" for k in range(len(names))))
     parts = Axis("part", ("re", "im"))
     H = found.H
     quantities = {
@@ -225,10 +224,11 @@ def _as_result(
         "gain": Quantity(np.abs(H), "1", (outputs,), "output over input"),
         "phase": Quantity(np.degrees(np.unwrap(np.angle(H), axis=0)), "deg", (outputs,), "of the output"),
         "transfer": Quantity(np.stack([H.real, H.imag], axis=2), "1", (outputs, parts), "transfer function"),
-        "parts": Quantity(
-            np.stack([found.parts.real, found.parts.imag], axis=3), "1", (outputs, modes, parts), "by modes"
-        ),
     }
+    if names:
+        modes = Axis("part_of", tuple(f"{k + 1}" for k in range(len(names))))
+        split = np.stack([found.parts.real, found.parts.imag], axis=3)
+        quantities["parts"] = Quantity(split, "1", (outputs, modes, parts), "transfer functions of single modes")
     more: dict[str, Any] = {}
     if psd:
         f, s = np.array(sorted(psd)).T

@@ -19,6 +19,7 @@ from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
+from ffr_dyn.linear.spectrum import spectrum
 from ffr_dyn.linear.speeds import at_speed, speed_list
 from ffr_dyn.linear.steady_state import Steady as Found
 from ffr_dyn.linear.steady_state import steady_state
@@ -27,6 +28,7 @@ from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.parts import described
 from ffr_dyn.scene.scene import Scene, require_scene
 
+GROWS = 1e-7  # of a real part relative to the eigenvalue: what is no rounding
 TURN = option("--turn", "What has the speed: a driver, or a joint coordinate such as hinge.angle.", metavar="NAME")
 SPEEDS = option("--speed", "Speed: 314 [rad/s], '3000 rpm', 0..500, '0..6000 rpm:13'; repeat.", metavar="SPEED")
 
@@ -43,7 +45,8 @@ class Steady(OfMoment):
         return steady(scene, speeds=speed_list(self.speeds), turn=self.turn, **settings.span, **how)
 
     def report(self, result: Result) -> list[str]:
-        return [*super().report(result), *(f"speed        {speed:.6g} rad/s" for speed in result["speed"])]
+        speeds = ", ".join(f"{speed:.6g}" for speed in result["speed"])
+        return [*super().report(result), f"speeds       {speeds} rad/s"]
 
 
 def steady(
@@ -76,22 +79,37 @@ def steady(
     found = list(steady_states(scene, speeds, turn, time))
     assembled = found[0][0]
     selected(assembled.system, outputs)
-    rows, notes = [], list[str]()
+    rows, notes, stable = [], list[str](), True
     for at, state in found:
         one = record_states(evaluator(at.system), np.array([time]), state.x[None], state.v[None])
         rows.append(with_all_reactions(at, one))
         notes += [*at.notes, *state.notes, *checked("static", at, rows[-1])]
+        grown = growing(state)
+        stable &= not grown
+        notes += [grown] if grown else []
     attributes = {
         **described(scene),
         "analysis": "steady motion",
         "method": f"Newton's method, {sum(state.steps for _, state in found)} steps",
         "degrees_of_freedom": assembled.degrees_of_freedom,
+        "stable": int(stable),
         "notes": list(dict.fromkeys(notes)),
         "status": "complete",
     }
     plain = result_of(assembled.system, joined(rows), attributes, None, outputs)
     values = np.array(list(speeds) or [found[0][1].machine.screws.fastest])
     return with_quantities(plain, {"speed": Quantity(values, "rad/s", (), "of what turns")}, path)
+
+
+def growing(found: Found) -> str:
+    """What grows about a steady motion, in words; "" where nothing does."""
+    one = spectrum(found)
+    faster = one.values.real > GROWS * np.maximum(np.abs(one.values), 1e-300)
+    if not faster.any():
+        return ""
+    k = int(np.argmax(np.where(faster, one.values.real, -np.inf)))
+    speed = found.machine.screws.fastest
+    return f"at {speed:.6g} rad/s the steady motion is unstable: {one.names[k]} grows by {one.values[k].real:.4g} 1/s"
 
 
 def steady_states(
