@@ -73,9 +73,26 @@ def spectrum(found: Steady) -> Spectrum:
     return Spectrum(found, values, modes, seen, whirl)
 
 
+def _with_still_ones(now: Spectrum, count: int) -> Spectrum:
+    """With vibrations that stand still in the turning axes at just this speed, as at a critical one, so that there
+    are `count`."""
+    missing = count - now.values.size
+    if missing <= 0:
+        return now
+    shapes = np.concatenate([now.shapes, np.zeros((len(now.shapes), missing))], axis=1)
+    seen = np.append(now.seen, np.full(missing, now.found.machine.screws.fastest))
+    return replace(
+        now,
+        values=np.append(now.values, np.zeros(missing)),
+        shapes=shapes,
+        seen=seen,
+        whirl=np.append(now.whirl, np.full(missing, np.nan)),
+    )
+
+
 def followed(before: Spectrum, now: Spectrum) -> Spectrum:
     """The vibrations at another speed in the order of those before, each by the conjugate that goes on from it."""
-    M = now.found.about.M
+    now, M = _with_still_ones(now, before.values.size), now.found.about.M
     same = np.abs(before.shapes.conj().T @ M @ now.shapes) ** 2
     turned = np.abs(before.shapes.conj().T @ M @ now.shapes.conj()) ** 2
     size = np.abs(before.values)[:, None] + np.abs(now.values)[None]
@@ -88,4 +105,5 @@ def followed(before: Spectrum, now: Spectrum) -> Spectrum:
     found, turn = now.only(columns), (costs[1] < costs[0])[np.sort(rows), columns]
     turn &= found.values.imag != 0
     values = np.where(turn, found.values.conj(), found.values)
-    return replace(found, values=values, shapes=np.where(turn, found.shapes.conj(), found.shapes))
+    shapes = np.where(turn, found.shapes.conj(), found.shapes)
+    return replace(found, values=values, shapes=np.where(shapes.any(axis=0), shapes, before.shapes))

@@ -58,7 +58,8 @@ def _speed(text: str) -> float:
 def at_speed(scene: Scene, speed: float, turn: str = "", time: float = 0.0) -> Scene:
     """The scene with a driver turning evenly at a speed [rad/s], from where it is at `time` [s].
 
-    turn : name of the driver, or the joint coordinate that is turned, such as "hinge.angle"; without it the only driver of
+    turn : name of the driver, with whose rate the velocities of all bodies are scaled, or the joint coordinate that
+    is turned, such as "hinge.angle"; without it the only driver of
            the scene, or, where there is none, the velocities of the scene as they are but for their size: its largest spin
            has the speed
 
@@ -72,8 +73,13 @@ def at_speed(scene: Scene, speed: float, turn: str = "", time: float = 0.0) -> S
     chosen = turn or (names[0] if names else "")
     if chosen in names:
         turned = (_turned(d, speed, time) if d.name == chosen else d for d in scene.drivers)
-        return replace(scene, drivers=tuple(turned))
+        before = next(_rate(d, time) for d in scene.drivers if d.name == chosen)
+        return replace(_times(scene, speed / before) if before else scene, drivers=tuple(turned))
     return _with_driver(scene, chosen, speed, time) if chosen else _scaled(scene, speed)
+
+
+def _rate(driver: Any, time: float) -> float:
+    return evaluate(as_time_function(driver.function, "function of time"), time)[1]
 
 
 def _turned(driver: Any, speed: float, time: float) -> Any:
@@ -101,6 +107,10 @@ def _scaled(scene: Scene, speed: float) -> Scene:
         raise InputError(
             "nothing turns in the scene: give a driver, or bodies with omega_bar, or say which joint turns (turn, --turn)"
         )
-    share = speed / largest
+    return _times(scene, speed / largest)
+
+
+def _times(scene: Scene, share: float) -> Scene:
+    """The scene with all velocities of its bodies times a share: of what no joint ties to what is driven."""
     bodies = (replace(b, velocity=share * b.velocity, omega_bar=share * b.omega_bar) for b in scene.bodies)
     return replace(scene, bodies=tuple(bodies))

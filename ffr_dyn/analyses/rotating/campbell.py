@@ -112,20 +112,20 @@ def campbell(
     middle = spectra[len(spectra) // 2]
     whirling = np.nan_to_num(middle.whirl) > ONE_WAY
     order = np.argsort(np.where(whirling, np.abs(spectra[0].seen), np.abs(spectra[0].values)), kind="stable")[:modes]
-    spectra, whirling = [one.only(order) for one in spectra], whirling[order]
     names = middle.only(order).names
     critical = [
-        {"speed": speed, "order": float(k), "mode": names[m], "axes": "ground" if whirling[m] else "turning"}
-        for m in range(len(order))
+        {"speed": speed, "order": float(k), "mode": name, "axes": "ground" if whirling[m] else "turning"}
+        for m, name in zip(order.tolist(), names, strict=True)
         for k in orders
         for speed in _crossings(at, values, spectra, m, _off_order(bool(whirling[m]), float(k)))
     ]
     limits = [
-        {"speed": speed, "mode": names[m]}
-        for m in range(len(order))
+        {"speed": speed, "mode": name}
+        for m, name in zip(order.tolist(), names, strict=True)
         for speed in _crossings(at, values, spectra, m, _growth, upward=True)
     ]
-    found = _as_result(scene, time, values, spectra, names, whirling, critical, limits)
+    kept = [one.only(order) for one in spectra]
+    found = _as_result(scene, time, values, kept, names, whirling[order], critical, limits)
     if path is not None:
         save_result(found, path)
     return found
