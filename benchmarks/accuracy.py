@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from ffr_gallery.scene_set import CASES, Case
 
-from ffr_dyn.analyses.forward import DRIVING, PLACES
+from ffr_dyn.analyses.forward import DRIVING, PLACES, forward
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.step_error import largest_difference, ranges
@@ -89,11 +89,11 @@ def examined(scene: Scene, case: Case, method: str) -> Found:
     """Raises InputError where the reference is too long."""
     span = {"end": case.end, "output_step": case.output_step}
     watch, alone, checked = Stopwatch(), Stopwatch(), Stopwatch()
-    found = integrate(scene, **span, method=Within(ACCURACY, method), stopwatch=watch)
+    found = forward(scene, **span, method=Within(ACCURACY, method), stopwatch=watch)
     step = found.attributes["step"]
     made = method_named(method)(step)
-    integrate(scene, **span, method=made, stopwatch=alone)
-    integrate(scene, **span, method=made, check=True, stopwatch=checked)
+    integrate(scene, **span, method=made, stabilisation=Projection(1e-8 * ACCURACY), stopwatch=alone)
+    forward(scene, **span, method=made, stabilisation=Projection(1e-8 * ACCURACY), check=True, stopwatch=checked)
     true = reference(scene, span, step)
     pairs, silent = compared(found, true)
     for count in STEPS:
@@ -105,7 +105,7 @@ def examined(scene: Scene, case: Case, method: str) -> Found:
 
 def given(scene: Scene, span: dict[str, float], method: str, count: int) -> Result | None:
     try:
-        return integrate(scene, **span, method=method_named(method)(span["output_step"] / count), check=True)
+        return forward(scene, **span, method=method_named(method)(span["output_step"] / count), check=True)
     except ComputationError:
         return None
 

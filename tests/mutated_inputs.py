@@ -388,6 +388,9 @@ def _words(name: str, seed: int, first: int, last: int, folder: Path) -> Iterato
     """What a process says of its inputs, and how long each took; the last word may be that it hangs or has died."""
     command = [sys.executable, __file__, name, *map(str, (seed, first, last, folder))]
     environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
+    environment["PYTHONPATH"] = str(
+        Path(__file__).parent.parent
+    )  # before this folder, which has rooms of the same names
     with open(folder.parent / f"{name}.log", "a") as log:
         child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, env=environment, text=True, bufsize=1)
     assert child.stdout is not None

@@ -36,6 +36,10 @@ from ffr_prep.common.errors import ComputationError, InputError
 
 FIRST, FINEST, LEAP = 4, 1024, 8  # steps to an output row: of the first trial, at most, and times more in the next one
 MARGIN = 2.0  # by which a trial aims below the accuracy
+PROJECTED = (
+    1e-8  # of the accuracy [m, -], that constraints are closed to: 1e-9 m moved forces by up to 1e-3 of their range
+)
+NEAR = {2: 4}  # times the step at most, by order (others: 2), of a run beside which the error of another is told
 SLOW = 0.7  # a ringing output's error falls slower than the step to this power
 QUICK = 1e7  # microseconds of the further runs, by `_cost`, up to which they are made unasked
 
@@ -119,7 +123,8 @@ def forward(
     """Integrate the equations of motion of a scene from `start` to `end` [s], keeping a row every `output_step` [s].
 
     method      : RK4(step), ROS2(step), ...; or `Within(accuracy)`, the default with 1e-3: the step is found that keeps
-                  positions and angles within the accuracy, relative to their ranges, and forces where they do not ring
+                  positions and angles within the accuracy, relative to their ranges, and forces where they do not ring;
+                  constraints are projected to 1e-8 of it, or closer
     outputs     : names or patterns of the quantities to keep (`ffr_dyn.results.quantities.selected`), such as "*.power"
     events      : moments to find (`ffr_dyn.analyses.events`), listed in the result's attribute "events"; one may end the run
     check       : whether further runs are made that tell the error of every output; by default where that takes seconds.
@@ -144,9 +149,12 @@ def forward(
     assembled = _begun(assemble(scene, time=start) if assembled is None else assembled, start, begin, method)
     common: dict[str, Any] = {"start": start, "end": end, "output_step": output_step, "stabilisation": stabilisation}
     common |= {"outputs": outputs, "progress": progress, "stopwatch": stopwatch}
+    wanted = Within() if method is None else method
+    if isinstance(wanted, Within):
+        common["stabilisation"] = _tight(stabilisation, wanted.accuracy)
     runs = _Runs(scene, assembled, start, output_step, common)
     kept = {"events": events, "path": path, "resume": resume}
-    method, count = _resumed(resume, Within() if method is None else method, output_step)
+    method, count = _resumed(resume, wanted, output_step)
     if isinstance(method, Within):
         return _searched(runs, method, kept, count)
     result = runs.run(method, **kept)
@@ -155,6 +163,13 @@ def forward(
     trial = _Trial(method, 0 if method.controlled else round(output_step / method.step), result)
     told = _told(runs, _beside_twins(runs, trial)) if check else trial
     return _finished(runs, told, resume if path is None else path)
+
+
+def _tight(stabilisation: Stabilisation, accuracy: float) -> Stabilisation:
+    """A projection that is no floor of what is to be kept within the accuracy."""
+    if not isinstance(stabilisation, Projection):
+        return stabilisation
+    return Projection(min(stabilisation.tolerance, PROJECTED * accuracy))
 
 
 def _begun(assembled: Assembled, start: float, begin: Beginning, method: Integrator | Within | None) -> Assembled:
@@ -214,14 +229,18 @@ def _told(runs: _Runs, trial: _Trial, earlier: Sequence[_Trial] = ()) -> _Trial:
 
 
 def _other(runs: _Runs, trial: _Trial, known: Mapping[int, Result]) -> tuple[Result, float]:
-    """The run with another step, and the ratio of the steps: about twice the step where elastic forces are implicit and
-    twice the step is a part of a row, half of it otherwise; a tenth of the tolerance of a method that chooses its steps."""
+    """The run with another step, and the ratio of the steps: a longer step that was tried, or about twice the step, where
+    elastic forces are implicit and that is a part of a row, half of it otherwise; a tenth of the tolerance of a method that
+    chooses its steps."""
     method: Any = trial.method
     if method.controlled:
         tolerances = replace(method.tolerances, relative=method.tolerances.relative / 10)
         return runs.run(replace(method, tolerances=tolerances)), 10.0 ** (-1.0 / method.order)
     if method.implicit and trial.count > 1:
-        fewer = (trial.count + 1) // 2
+        fewer = max(
+            (count for count in known if trial.count <= NEAR.get(method.order, 2) * count),
+            default=(trial.count + 1) // 2,
+        )
         try:
             coarse = known.get(fewer) or runs.run(replace(method, step=runs.output_step / fewer))
             return coarse, trial.count / fewer

@@ -5,7 +5,7 @@ the twin (`ffr_dyn.integrators.ros2.Twin`), which keeps its amplitude: with R of
 
     s = max |R(h) - R(r h)| / (r^p - 1),    v = max |R(h) - T(h)|,    error = max(s, v),
 
-over all rows and components of an output. For ROS3, whose twin is of lower order, v = 1.6 sqrt(v1 v2):
+over all rows and components of an output. For ROS3, whose twin is of lower order, v = 2.2 sqrt(v1 v2):
 
     v1 = min(max |R(h) - T(h/2)|, max |R(h) - (4 T(h/2) - T(h))/3|)    too large where vibration is resolved, by its phase
     v2 = largest difference of the amplitudes of R(h) and T(h/2)       too small where it is resolved in part
@@ -27,8 +27,9 @@ from ffr_prep.common.arrays import Array
 VIBRATION = 4.5  # v over s beyond which a difference is vibration that the step does not resolve
 LITTLE = 1e-3  # of the largest range of its kind: an output that moves by less counts as if it moved by this
 ARM = 1e-6  # of the largest range of forces times that of positions, the same for moments
-MIDDLE, WINDOW = 1.6 * 1.5**0.5, 16  # of amplitudes of methods of order three
+MIDDLE, WINDOW = 2.2 * 1.5**0.5, 16  # of amplitudes of methods of order three
 NOISE = (70 / 36) ** 0.5  # by which rows without relation are farther off the curve than they are large
+RATES = {"position": "velocity", "R": "v", "q": "q_dot"}
 COARSE = 0.01  # of the range, by which a row may be off the curve through its neighbours
 
 
@@ -124,13 +125,28 @@ def _range(values: Array) -> float:
 
 
 def too_coarse(run: Result) -> dict[str, float]:
-    """Outputs whose rows are too far apart to show what they do, and by how much of their range a row lies off the curve
-    through the two before and the two after it."""
+    """Outputs whose rows are too far apart to show what they do, and by how much of their range.
+
+    Where a result has the rate of an output, too, what it changes by from row to row is held against the mean of the rates
+    (half of what they differ by counts), which finds even a vibration that rows catch in the same phase again and again;
+    every row of other outputs against the curve through the two before and the two after.
+    """
     found = {}
     for name, scale in ranges(run).items():
         y = run[name]
         if scale > 0 and len(y) > 4:
-            share = float(np.abs(_off_curve(y)).max()) / scale
+            share = float(np.abs(_off_neighbours(run, name)).max()) / scale
             if share > COARSE:
                 found[name] = share
+    return found
+
+
+def _off_neighbours(run: Result, name: str) -> Array:
+    """What rows are off what those beside them say."""
+    of, _, last = name.rpartition(".")
+    y, rate = run[name], f"{of}.{RATES.get(last, '')}"
+    if rate not in run.quantities:
+        return _off_curve(y)
+    w, spacing = run[rate], np.diff(run.time).reshape(-1, *(1,) * (y.ndim - 1))
+    found: Array = 0.5 * (np.diff(y, axis=0) - 0.5 * spacing * (w[:-1] + w[1:]))
     return found

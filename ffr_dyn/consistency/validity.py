@@ -19,7 +19,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
 ROUNDS = 4  # analyses, each with more parts; mostly the second has enough
-MEANINGLESS = 100.0  # elastic rotation [rad]
+MEANINGLESS = np.pi  # elastic rotation [rad]: half a turn of an end against the other
 STRAINED = 0.1  # elastic rotation [rad] beyond which linear elasticity in the moving frame is doubtful
 # The same for a body with a second-order displacement. A cantilever under a force at its end, against the exact beam: its tip
 # is off by 0.1 % of its deflection at 0.2 rad, and 16 times less in twice as many parts.

@@ -78,7 +78,8 @@ def harmonic(*, amplitude: float, frequency: float, phase: float = 0.0, mean: fl
 def table(times: Array, values: Array) -> TimeFunction:
     """Not-a-knot cubic spline through (times, values), twice differentiable; holds its end values outside.
 
-    Raises InputError unless there are two or more times, increasing, with as many values.
+    Raises InputError unless there are two or more times, increasing, with as many values,
+    that a spline can go through.
     """
     from scipy.interpolate import CubicSpline
 
@@ -86,7 +87,14 @@ def table(times: Array, values: Array) -> TimeFunction:
     if t.ndim != 1 or t.shape != y.shape or t.size < 2 or not (np.diff(t) > 0).all():
         raise InputError("a table needs two or more increasing times and as many values")
     _numbers("table", (*t, *y))
-    return piecewise(t, CubicSpline(t, y).c[::-1].T)
+    try:
+        with np.errstate(all="ignore"):
+            c = CubicSpline(t, y).c
+    except ValueError:  # slopes that are no numbers
+        c = np.full((4, 1), np.nan)
+    if not np.isfinite(c).all():
+        raise InputError("a table rises too steeply between two of its rows for a spline: check its times and values")
+    return piecewise(t, c[::-1].T)
 
 
 def piecewise(breaks: Array, coefficients: Array) -> TimeFunction:

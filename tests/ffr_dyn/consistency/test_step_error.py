@@ -73,3 +73,10 @@ def test_rows_beyond_the_end_of_another_run_are_not_compared():
 def test_rows_that_do_not_show_a_motion_are_told(periods, told):
     found = too_coarse(result(a_position=np.sin(2 * np.pi * periods * TIME)))
     assert (found.get("a.position", 0.0) > COARSE) == told
+
+
+@pytest.mark.parametrize(("rows", "told"), [(25.0, False), (10 / 9, True), (1.0, True)])
+def test_a_rate_finds_a_vibration_that_rows_catch_in_the_same_phase_again_and_again(rows, told):
+    omega = 2 * np.pi * (TIME.size - 1) / rows
+    found = too_coarse(result(a_position=TIME + np.sin(omega * TIME), a_velocity=1 + omega * np.cos(omega * TIME)))
+    assert (found.get("a.position", 0.0) > COARSE) == told
