@@ -130,9 +130,8 @@ def forward(
     check       : whether further runs are made that tell the error of every output; by default where that takes seconds.
                   A step that is found is always checked
     begin       : "quasi-static" for bodies that start with the deflections, and their rates, that the motion asks for
-                  (`ffr_dyn.consistency.quasi_static`) and do not ring; "steady" for a scene that turns evenly, in its steady
-                  motion (`ffr_dyn.linear.steady_state`); "periodic" for one driven evenly, in the turn that comes back to
-                  itself (`periodic`), with the step of the method; "as-given" with the scene's q and q_dot
+                  and do not ring; "steady" or "periodic" for machines that are driven evenly, in the motion of `steady` or
+                  `periodic`; "as-given" with the scene's q and q_dot
     path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
     resume      : a result file whose run goes on to the same bits; `end` may be later. A new file: a run from the start
     progress    : called with the time reached, a few times a second

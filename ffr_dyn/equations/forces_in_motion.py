@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from ffr_dyn.equations.forces import At
-from ffr_dyn.equations.forces_at_rest import STEP, differences, law_on
+from ffr_dyn.equations.forces_at_rest import differences, law_on
 from ffr_dyn.equations.jets import FIRST, SECOND, coordinates, pair_motion
 from ffr_dyn.equations.placed import Sums, pair
 from ffr_dyn.scene.forces.force import Force
@@ -40,14 +40,13 @@ def add_velocities(total: Sums, damping: Array, now: At, force: Force, screws: t
     def added(step: Array) -> Array:
         return law_on(force, now, c + step, rate) - law_on(force, now, c + step, still)
 
-    extra = added(still)
-    slopes, unit = differences(added, range(c.size), c.size), np.abs(rate).max() * STEP or STEP
-    moving, resting = (
-        differences(lambda one, of=of: law_on(force, now, c, of + one * unit / STEP), range(c.size), c.size)
-        * STEP
-        / unit
-        for of in (rate, still)
-    )
+    unit = float(np.abs(rate).max()) or 1.0  # of differences of the rates, beside which the law is nearly straight
+
+    def by_rate(of: Array) -> Array:
+        return differences(lambda one: law_on(force, now, c, of + unit * one), range(c.size), c.size) / unit
+
+    extra, slopes = added(still), differences(added, range(c.size), c.size)
+    moving, resting = by_rate(rate), by_rate(still)
     second = g.T @ slopes @ g + g.T @ moving @ by_motion + np.tensordot(extra, S, 1)
     total.add_on_pair(ends, extra @ g, second)
     along = total.gradient(ends, g)
