@@ -9,11 +9,12 @@
     result["rod.tip.position"]  # (rows, 3) [m]; print(result) says what there is
     fd.plot(result, ["rod.tip.position", "hinge.force"], "pendulum.png")
 
-A *scene* is declared: bodies, joints, drivers, couplings, forces, measurements, each with its own name; points are named
-"body.interface" or "ground.point". An *analysis* is a function of a scene that returns a `Result`: `assemble`, `kinematic`,
-`static`, `forward`, `inverse`, `mixed`, `linearise`, `reference`. Integrators, functions of time and pictures are functions
-and small declarations beside them. All quantities are in SI units. What cannot be used raises `InputError`, which says what
-to change; what could not be computed raises `ComputationError`.
+A *scene* is declared: bodies, joints, drivers, couplings, forces, measurements, each with its own name; points are
+named "body.interface" or "ground.point". An *analysis* is a function of a scene that returns a `Result`: `assemble`,
+`kinematic`, `static`, `steady`, `forward`, `periodic`, `inverse`, `mixed`, `linearise`, `campbell`, `response`,
+`reference`. Integrators, functions of time and pictures are functions and small declarations beside them. All
+quantities are in SI units. What cannot be used raises `InputError`, which says what to change; what could not be
+computed raises `ComputationError`.
 
 Everything a user needs is here, in `ffr_dyn.__all__`, and is loaded when it is first asked for. The modules below this one
 are private: they move and change without notice.
@@ -65,9 +66,16 @@ _BY_MODULE = {
     "ffr_dyn.analyses.inverse": "Dynamic Inverse QuasiStatic inverse",
     "ffr_dyn.analyses.kinematic": "Kinematic kinematic",
     "ffr_dyn.analyses.linearise": "Linearisation Linearise linearise",
+    "ffr_dyn.analyses.rotating.mode_motion": "mode_motion",
     "ffr_dyn.analyses.mixed": "Causal Mixed mixed",
     "ffr_dyn.analyses.reference": "IDA SciPy reference",
     "ffr_dyn.analyses.registry": "OfMoment OverTime option register_analysis",
+    "ffr_dyn.pictures.bode": "draw_bode draw_nyquist",
+    "ffr_dyn.pictures.campbell": "draw_campbell",
+    "ffr_dyn.analyses.rotating.campbell": "Campbell campbell",
+    "ffr_dyn.analyses.rotating.periodic": "Periodic periodic",
+    "ffr_dyn.analyses.rotating.response": "Response response",
+    "ffr_dyn.analyses.rotating.steady": "Steady steady",
     "ffr_dyn.analyses.run": "run",
     "ffr_dyn.analyses.settings": "Charted MomentSettings Settings",
     "ffr_dyn.analyses.assemble": "Assemble assembly",
@@ -174,6 +182,13 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_dyn.analyses.registry import (
         OfMoment as OfMoment, OverTime as OverTime, option as option, register_analysis as register_analysis
     )
+    from ffr_dyn.pictures.bode import draw_bode as draw_bode, draw_nyquist as draw_nyquist
+    from ffr_dyn.pictures.campbell import draw_campbell as draw_campbell
+    from ffr_dyn.analyses.rotating.campbell import Campbell as Campbell, campbell as campbell
+    from ffr_dyn.analyses.rotating.mode_motion import mode_motion as mode_motion
+    from ffr_dyn.analyses.rotating.periodic import Periodic as Periodic, periodic as periodic
+    from ffr_dyn.analyses.rotating.response import Response as Response, response as response
+    from ffr_dyn.analyses.rotating.steady import Steady as Steady, steady as steady
     from ffr_dyn.analyses.run import run as run
     from ffr_dyn.analyses.settings import Charted as Charted, MomentSettings as MomentSettings, Settings as Settings
     from ffr_dyn.analyses.assemble import Assemble as Assemble, assembly as assembly

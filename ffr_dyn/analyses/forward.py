@@ -18,6 +18,7 @@ import numpy as np
 from ffr_dyn.analyses.events import Event
 from ffr_dyn.analyses.integration import check_output_step, integrate
 from ffr_dyn.analyses.registry import OverTime, option
+from ffr_dyn.analyses.rotating.periodic import periodically
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.quasi_static import quasi_static
@@ -27,6 +28,7 @@ from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import Integrator, Within, stepped
 from ffr_dyn.integrators.ros2 import Twin
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
+from ffr_dyn.linear.steady_state import steadily
 from ffr_dyn.results.file import load_result, with_attributes
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
@@ -41,7 +43,7 @@ NEAR = {2: 4}  # times the step at most, by order (others: 2), of a run beside w
 SLOW = 0.7  # a ringing output's error falls slower than the step to this power
 QUICK = 1e7  # microseconds of the further runs, by `_cost`, up to which they are made unasked
 
-Beginning = Literal["as-given", "quasi-static"]  # the default and the other
+Beginning = Literal["as-given", "quasi-static", "steady", "periodic"]  # the default and the others
 
 # What a step is to keep within the accuracy always, and what where it does not ring.
 PLACES = re.compile(r"\.(position|R|p|angle|stroke|orientation)$")
@@ -63,7 +65,9 @@ class Forward(OverTime):
     begin: Beginning = field(
         default="as-given",
         metadata=option(
-            "--quasi-static/--as-given", "Start with the deflections that the motion asks for; default: as given."
+            "--as-given/--quasi-static/--steady/--periodic",
+            "Start as given (default), with the deflections that the motion asks for, turning evenly, or in the turn that "
+            "comes back to itself.",
         ),
     )
 
@@ -126,7 +130,8 @@ def forward(
     check       : whether further runs are made that tell the error of every output; by default where that takes seconds.
                   A step that is found is always checked
     begin       : "quasi-static" for bodies that start with the deflections, and their rates, that the motion asks for
-                  (`ffr_dyn.consistency.quasi_static`) and do not ring; "as-given" with the scene's q and q_dot
+                  and do not ring; "steady" or "periodic" for machines that are driven evenly, in the motion of `steady` or
+                  `periodic`; "as-given" with the scene's q and q_dot
     path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
     resume      : a result file whose run goes on to the same bits; `end` may be later. A new file: a run from the start
     progress    : called with the time reached, a few times a second
@@ -140,7 +145,7 @@ def forward(
     the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
     check_output_step(output_step)
-    assembled = _begun(assemble(scene, time=start) if assembled is None else assembled, start, begin)
+    assembled = _begun(assemble(scene, time=start) if assembled is None else assembled, start, begin, method)
     common: dict[str, Any] = {"start": start, "end": end, "output_step": output_step, "stabilisation": stabilisation}
     common |= {"outputs": outputs, "progress": progress, "stopwatch": stopwatch}
     wanted = Within() if method is None else method
@@ -166,11 +171,15 @@ def _tight(stabilisation: Stabilisation, accuracy: float) -> Stabilisation:
     return Projection(min(stabilisation.tolerance, PROJECTED * accuracy))
 
 
-def _begun(assembled: Assembled, start: float, begin: Beginning) -> Assembled:
+def _begun(assembled: Assembled, start: float, begin: Beginning, method: Integrator | Within | None) -> Assembled:
     """The state that a run begins in."""
     if begin not in get_args(Beginning):
         raise InputError(f"begin is {begin!r}; it must be one of {', '.join(map(repr, get_args(Beginning)))}")
-    return assembled if begin == "as-given" else quasi_static(assembled, start)
+    if begin == "quasi-static":
+        return quasi_static(assembled, start)
+    if begin == "periodic":
+        return periodically(assembled, start, None if isinstance(method, Within) else method)
+    return steadily(assembled, start) if begin == "steady" else assembled
 
 
 def _resumed(

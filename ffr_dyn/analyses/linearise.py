@@ -18,6 +18,7 @@ import numpy as np
 from ffr_dyn.analyses.efforts import Effort, sized, with_units
 from ffr_dyn.analyses.outcome import result_of
 from ffr_dyn.analyses.registry import OfMoment, option
+from ffr_dyn.analyses.rotating.steady import steady
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
@@ -25,10 +26,15 @@ from ffr_dyn.compile.engine import with_model
 from ffr_dyn.consistency.assemble import assemble, in_space
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
-from ffr_dyn.consistency.mobility import named_motion
-from ffr_dyn.consistency.tangent import Chart, chart, derivative, rates, sizes, state, state_matrix
+from ffr_dyn.consistency.tangent import Chart, at_rest, chart, derivative, rates, sizes, state, state_matrix
 from ffr_dyn.equations.layout import to_global_axes
 from ffr_dyn.kernels.tables import LAW
+from ffr_dyn.linear.eigen import Eigen, eigen
+from ffr_dyn.linear.matrices import reduced
+from ffr_dyn.linear.matrices import state_matrix as steady_matrix
+from ffr_dyn.linear.steady_state import Steady, screws_of, steady_here
+from ffr_dyn.linear.whirl import ways_of, whirls
+from ffr_dyn.linear.words import in_words
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.result import Axis, Quantity, Result
@@ -39,6 +45,8 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import ComputationError, InputError
 
+SHOWN = 12  # modes that a command prints
+BASE = {"base.x": 0, "base.y": 1, "base.z": 2}  # inputs: accelerations of the ground
 STATIONARY = 1e-6  # of the accelerations in moving axes, relative to those of the applied forces
 
 
@@ -49,8 +57,13 @@ class Linearisation(Brief):
     A (2d, 2d), B (2d, inputs), C (outputs, 2d), D (outputs, inputs);  inputs, outputs : names
     Z           : (V, d) free motions, in body axes [A^T R_dot, omega_bar, q_dot]
     eigenvalues : (2d,) [1/s] by rising modulus;  modes : (V, 2d) the motions of the bodies that belong to them
-    leading     : what moves most in each mode
-    error       : relative difference of A from step halving; zero at rest, where A is exact
+    leading     : what moves in each mode: "rod: first bending, y" of one that strains a body, else the coordinate
+    free        : how many eigenvalues are zero, which come first: motions that nothing holds, two for each
+    driven      : drivers, whose motions are none of the degrees of freedom
+    seen        : (2d,) [Hz] frequencies seen from the ground, of scenes that turn: positive where the whirl is forward
+    whirl       : (2d,) share of the amplitude that whirls so, 1 for a circle and 1/2 for a line in the turning axes; nan of
+                  what does not turn
+    error       : relative difference of A from step halving; zero at rest and in steady motion, where A is exact
     """
 
     A: Array
@@ -61,10 +74,15 @@ class Linearisation(Brief):
     eigenvalues: Array
     modes: Array
     leading: tuple[str, ...]
+    free: int
+    driven: tuple[str, ...]
+    seen: Array
+    whirl: Array
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     error: float
     notes: tuple[str, ...]
+    near: Chart = field(repr=False)
 
     @property
     def frequencies(self) -> Array:
@@ -82,6 +100,12 @@ class Linearisation(Brief):
     def stability_margin(self) -> float:
         """Largest real part of an eigenvalue [1/s]: negative where all small motions decay."""
         return float(self.eigenvalues.real.max())
+
+    def to_statespace(self) -> Any:
+        """A `scipy.signal.StateSpace` of A, B, C, D; python-control takes its matrices: control.ss(s.A, s.B, s.C, s.D)."""
+        from scipy.signal import StateSpace
+
+        return StateSpace(self.A, self.B, self.C, self.D)
 
 
 @dataclass(frozen=True)
@@ -104,18 +128,31 @@ class Linearise(OfMoment):
         metadata=option("--at-equilibrium/--at-start", "About the static equilibrium, or (default) the start."),
     )
 
+    at_steady: bool = field(
+        default=False,
+        metadata=option("--at-steady/--at-any", "About the steady motion with the scene's drivers and velocities."),
+    )
+
     def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
         time, path = settings.time, how["path"]
+        if self.at_equilibrium and self.at_steady:
+            raise InputError(
+                "about the equilibrium or about the steady motion? give one of --at-equilibrium, --at-steady"
+            )
         at = scene_at(scene, static(scene, time=time)) if self.at_equilibrium else scene
+        at = scene_at(scene, steady(scene, time=time)) if self.at_steady else at
         result = as_result(scene, linearise(at, time=time, inputs=self.inputs, outputs=self.quantities), time)
         if path is not None:
             save_result(result, path)
         return result
 
     def report(self, result: Result) -> list[str]:
-        values = result["eigenvalues"][0]
-        columns = values, result["frequencies"][0], result["damping_ratios"][0], result.attributes["leading"]
-        return [*_lines_of_modes(*columns), *(f"note         {note}" for note in result.attributes["notes"])]
+        a = result.attributes
+        columns = (result[name][0] for name in ("eigenvalues", "frequencies", "damping_ratios", "seen", "whirl"))
+        lines = _lines_of_modes(*columns, leading=a["leading"], free=a["free"])
+        more = [f"... and {len(lines) - SHOWN} more in the file"] if len(lines) > SHOWN else []
+        driven = [f"driven       {name}" for name in a["driven"]]
+        return [*lines[:SHOWN], *more, *driven, *(f"note         {note}" for note in a["notes"])]
 
 
 def linearise(
@@ -123,7 +160,8 @@ def linearise(
 ) -> Linearisation:
     """Linearise a scene about its assembled state at `time` [s], its drivers' positions and rates being those of the time.
 
-    inputs  : efforts, or names of loads of the scene (an input of one doubles the load)
+    inputs  : efforts, names of loads of the scene (an input of one doubles the load), or "base.x", "base.y", "base.z", an
+              acceleration of the ground, to whose frame all outputs refer
     outputs : names of components of a result, such as "rod.tip.position.y"
     For an equilibrium: ``linearise(scene_at(scene, static(scene)))``.
 
@@ -136,36 +174,50 @@ def linearise(
     near = chart(at, time, assembled.x, assembled.v)
     if near.steps.size == 0:
         raise InputError("nothing is free to move: joints and drivers fix every motion; linearise with fewer drivers")
+    steady = None if at_rest(near) else steady_here(assembled.system, time, assembled.x, assembled.v)
+    A, error, solved = _solved(near, steady)
+    B = _columns(lambda u: rates(_fed(near, scene, inputs, u), assembled.x, assembled.v), len(inputs))
+    C, D = _output_matrices(near, scene, inputs, outputs)
+    modes = near.Z @ solved.vectors
+    modes = modes / np.where((size := np.abs(modes).max(axis=0)) > 0, size, 1.0)
+    where = assembled.system.scene, assembled.system.layout
+    screws = screws_of(where[1], assembled.x, assembled.v)
+    seen, whirl = whirls(*where, screws, assembled.x, solved.values, modes)
+    ways = ways_of(seen, whirl)
+    rates_seen = np.where([bool(way) for way in ways], np.abs(seen), np.abs(solved.values))
+    leading = in_words(*where, assembled.x, near.M, modes, rates_seen, ways)
+    names = tuple(item if isinstance(item, str) else item.name for item in inputs)
+    evaluate(at, time, assembled.x, assembled.v)
+    notes = (*assembled.notes, *_notes(near, steady), *checked("linearise", assembled, at.record))
+    driven = tuple(driver.name for driver in scene.drivers)
+    return Linearisation(
+        A, B, C, D, near.Z, solved.values, modes, leading, solved.free, driven, seen / (2 * np.pi), whirl, names,
+        tuple(outputs), error, notes, near,
+    )  # fmt: skip
+
+
+def _solved(near: Chart, steady: Steady | None) -> tuple[Array, float, Eigen]:
+    """A, its error, and its eigenvalues; about a steady motion and at rest from exact matrices."""
+    if steady is not None:
+        steady = replace(steady, Z=near.Z)
+        of = reduced(steady)
+        return steady_matrix(steady, of), 0.0, eigen(of.K, of.C)
+    d = near.steps.size
     A, error = state_matrix(near)
     if not np.isfinite(A).all():
         raise ComputationError(
-            f"at t = {time:.6g} s a force has no finite value beside the state that is linearised; look at its function"
+            f"at t = {near.time:.6g} s a force has no finite value beside the state that is linearised; look at its function"
         )
-    B = _columns(lambda u: rates(_fed(near, scene, inputs, u), assembled.x, assembled.v), len(inputs))
-    C, D = _output_matrices(near, scene, inputs, outputs)
-    eigenvalues, vectors = _eigen(A)
-    modes = near.Z @ vectors[: near.steps.size]
-    modes = modes / np.where((size := np.abs(modes).max(axis=0)) > 0, size, 1.0)
-    leading = tuple(_leading(near, mode) for mode in modes.T)
-    names = tuple(item if isinstance(item, str) else item.name for item in inputs)
-    evaluate(at, time, assembled.x, assembled.v)
-    notes = (*assembled.notes, *_stationary_notes(near), *checked("linearise", assembled, at.record))
-    return Linearisation(A, B, C, D, near.Z, eigenvalues, modes, leading, names, tuple(outputs), error, notes)
-
-
-def _eigen(A: Array) -> tuple[Array, Array]:
+    if at_rest(near):
+        return A, error, eigen(-A[d:, :d], -A[d:, d:])
     values, vectors = np.linalg.eig(A)
     order = np.lexsort((np.sign(values.imag), np.round(np.abs(values), 9)))
-    return values[order], vectors[:, order]
+    return A, error, Eigen(values[order], vectors[:d, order], 0)
 
 
-def _leading(near: Chart, mode: Array) -> str:
-    """Named at the phase where the mode is largest."""
-    at = mode[int(np.argmax(np.abs(mode)))]
-    return named_motion(near.at.system.scene, near.at.system.layout, near.x, (mode * np.conj(at)).real)
-
-
-def _stationary_notes(near: Chart) -> list[str]:
+def _notes(near: Chart, steady: Steady | None) -> list[str]:
+    if steady is not None:
+        return list(steady.notes)
     at, place = near.at, near.at.system.layout
     v = to_global_axes(place, near.x, near.V)
     left = near.Z @ rates(near, near.x, v)[near.steps.size :] / sizes(at)
@@ -195,13 +247,23 @@ def _efforts(inputs: tuple[Effort | str, ...]) -> tuple[Effort, ...]:
 def _with_inputs(at: Evaluator, scene: Scene, inputs: tuple[Effort | str, ...], u: Array) -> Evaluator:
     """The evaluator with the inputs u, on top of the scene's own loads."""
     model, data = at.system.model, at.system.model.loads.data.copy()
+    gravity = model.gravity.copy()
     for item, amount in zip(inputs, u, strict=True):
-        if isinstance(item, str):
+        if isinstance(item, str) and _is_base(scene, item):
+            gravity[BASE[item]] -= amount
+        elif isinstance(item, str):
             first = model.loads.row[_load_number(scene, item), LAW]
             data[first : first + 6] *= 1.0 + amount
-    fed = replace(at, engine=with_model(at.engine, model._replace(loads=model.loads._replace(data=data))))
+    fed = replace(
+        at, engine=with_model(at.engine, model._replace(loads=model.loads._replace(data=data), gravity=gravity))
+    )
     sizes = [amount for item, amount in zip(inputs, u, strict=True) if not isinstance(item, str)]
     return sized(fed, _efforts(inputs), np.array(sizes))
+
+
+def _is_base(scene: Scene, item: str) -> bool:
+    """Whether an input is an acceleration of the base, and no load of that name."""
+    return item in BASE and item not in [load.name for load in scene.loads]
 
 
 def _load_number(scene: Scene, name: str) -> int:
@@ -266,6 +328,8 @@ def as_result(scene: Scene, found: Linearisation, time: float = 0.0) -> Result:
         "eigenvalues": Quantity(parts[None], "1/s", (modes, complex_parts), "eigenvalues of A"),
         "frequencies": Quantity(found.frequencies[None], "Hz", (modes,), "of the damped vibration"),
         "damping_ratios": Quantity(found.damping_ratios[None], "1", (modes,), "-Re / modulus of the eigenvalues"),
+        "seen": Quantity(found.seen[None], "Hz", (modes,), "from the ground, positive of forward whirls"),
+        "whirl": Quantity(found.whirl[None], "1", (modes,), "share of the amplitude that whirls so"),
     }
     matrices = (
         ("B", found.B, (states, found.inputs)),
@@ -285,6 +349,8 @@ def as_result(scene: Scene, found: Linearisation, time: float = 0.0) -> Result:
         "degrees_of_freedom": d,
         "stability_margin": found.stability_margin,
         "leading": list(found.leading),
+        "free": found.free,
+        "driven": list(found.driven),
         "inputs": list(found.inputs),
         "outputs": list(found.outputs),
         "notes": list(found.notes),
@@ -302,14 +368,26 @@ def _labels(names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def table_of_modes(found: Linearisation) -> list[str]:
-    """A line for each mode: frequency, damping ratio, real part, and what moves most; one of each conjugate pair."""
+    """A line for each mode: frequency, damping ratio, real part, and what moves; one of each conjugate pair, free motions
+    first. Of scenes that turn, also the whirl and its frequency from the ground."""
     parts = np.column_stack([found.eigenvalues.real, found.eigenvalues.imag])
-    return _lines_of_modes(parts, found.frequencies, found.damping_ratios, found.leading)
+    columns = parts, found.frequencies, found.damping_ratios, found.seen, found.whirl
+    return _lines_of_modes(*columns, leading=found.leading, free=found.free)
 
 
-def _lines_of_modes(parts: Array, frequencies: Array, ratios: Array, leading: Sequence[str]) -> list[str]:
-    return [
-        f"{frequency:12.6g} Hz   damping {ratio:9.3g}   real part {real:11.4g} 1/s   {name}"
-        for (real, imag), frequency, ratio, name in zip(parts, frequencies, ratios, leading, strict=True)
+def _lines_of_modes(
+    parts: Array, frequencies: Array, ratios: Array, seen: Array, whirl: Array, *, leading: Sequence[str], free: int
+) -> list[str]:
+    still = [f"{'free':>12}                                                    {name}" for name in leading[:free:2]]
+    rows = zip(parts[free:], frequencies[free:], ratios[free:], seen[free:], whirl[free:], leading[free:], strict=True)
+    return still + [
+        f"{frequency:12.6g} Hz   damping {ratio:9.3g}   real part {real:11.4g} 1/s   {name}{_whirling(ground, share)}"
+        for (real, imag), frequency, ratio, ground, share, name in rows
         if imag >= 0
     ]
+
+
+def _whirling(seen: float, share: float) -> str:
+    """What is told of a whirl; nothing of what does not turn, or moves to and fro."""
+    (way,) = ways_of(np.array([seen]), np.array([share]))
+    return f"   {way} whirl, {abs(seen):.6g} Hz from the ground" if way else ""

@@ -27,8 +27,15 @@ LISTED = {
     "static": "Static equilibrium of SCENE, downhill from its start, with reactions and stability.",
     "inverse": "Forces that drive SCENE along its prescribed motion, and all reactions.",
     "mixed": "Motion and unknown forces of SCENE, some motions of which are known.",
-    "linearise": "Eigenvalues and state-space matrices of SCENE about its start or its equilibrium.",
+    "linearise": "Eigenvalues and state-space matrices of SCENE about its start, its equilibrium or its steady motion.",
+    "steady": "Steady motion of SCENE: bodies deformed by even turning, at one speed or over a list of speeds.",
+    "campbell": "Campbell diagram of SCENE: frequencies and damping over the speed, critical speeds, limits of stability.",
+    "response": "Frequency response of SCENE: gain, phase and modes from an input to outputs; noise; Bode and Nyquist.",
+    "periodic": "The period of SCENE, driven evenly, that comes back to itself; Floquet's multipliers.",
 }
+_FOLDERS = dict.fromkeys(
+    ("steady", "campbell", "response", "periodic"), "rotating"
+)  # of the modules that do not lie beside this one
 _REGISTERED: dict[str, type[Analysis]] = {}
 EVENTS_SHOWN = 20
 
@@ -114,7 +121,8 @@ def analysis(word: str) -> type[Any]:
         close = get_close_matches(word, analyses(), 1)
         hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(analyses())}"
         raise InputError(f"there is no analysis {word!r}; {hint}")
-    kind: type[Any] = getattr(import_module(f"ffr_dyn.analyses.{word}"), word.capitalize())
+    module = ".".join(["ffr_dyn.analyses", *([_FOLDERS[word]] if word in _FOLDERS else []), word])
+    kind: type[Any] = getattr(import_module(module), word.capitalize())
     return kind
 
 

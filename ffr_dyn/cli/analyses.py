@@ -15,6 +15,7 @@ from ffr_dyn.cli.run import (
     at_moment,
     changed,
     end_option,
+    file_option,
     keep_option,
     method_options,
     output_option,
@@ -88,7 +89,13 @@ def analysis_command(word: str) -> click.Command:
     from ffr_dyn.analyses.registry import OverTime, analyses, analysis
 
     made = analysis(word)
-    options = [scene_argument, output_option, parameter_option, *([keep_option] if made.keeps else [])]
+    named = any(f.metadata.get("flag") == "--output" for f in fields(made))
+    options = [
+        scene_argument,
+        file_option if named else output_option,
+        parameter_option,
+        *([keep_option] if made.keeps else []),
+    ]
     if issubclass(made, OverTime):
         options += [end_option, *(method_options if made.integrates else [])]
     else:
@@ -107,7 +114,10 @@ def analysis_command(word: str) -> click.Command:
 
 def _own_options(made: Any) -> Iterator[Any]:
     for f in fields(made):
-        if "flag" in f.metadata:
+        if isinstance(f.default, str) and "/" in f.metadata.get("flag", ""):
+            for word in f.metadata["flag"].split("/"):
+                yield click.option(word, f.name, flag_value=word.lstrip("-"), default=None, help=f.metadata["help"])
+        elif "flag" in f.metadata:
             several = "/" not in f.metadata["flag"] and get_type_hints(made)[f.name] not in (int, float, str)
             kind = None if several or "/" in f.metadata["flag"] else get_type_hints(made)[f.name]
             yield click.option(
@@ -139,9 +149,6 @@ def _analyse(made: Any, scene: Path, given: Mapping[str, Any]) -> None:
 
 def _value(made: Any, f: Field[Any], given: Any) -> Any:
     """The value of a field from what its option gives."""
-    if isinstance(given, bool):
-        words = [word.lstrip("-") for word in f.metadata["flag"].split("/")]
-        return given if isinstance(f.default, bool) else words[not given]
     if not _is_force(made, f):
         return given
     return tuple(force_of(text) if "=" in text or not f.metadata.get("names") else text for text in given)

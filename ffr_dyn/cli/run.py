@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 
 scene_argument = click.argument("scene", type=INPUT_FILE)
 output_option = click.option("-o", "--output", type=OUTPUT_FILE, help="Result file (netCDF); default: <scene>.nc.")
+# Of analyses whose --output is a quantity.
+file_option = click.option(
+    "-o", "--file", "output", type=OUTPUT_FILE, help="Result file (netCDF); default: <scene>.nc."
+)
 parameter_option = click.option(
     "-p", "--parameter", "parameters", multiple=True, metavar="NAME=VALUE", help="A parameter of the scene file."
 )

@@ -14,9 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, free_motions, smallest_step, total_mass_matrix
-from ffr_dyn.equations.inertia import Integrals, kept_integrals, mass_matrix
+from ffr_dyn.equations.inertia import kept_integrals
 from ffr_dyn.equations.layout import moved, to_body_axes, to_global_axes
+from ffr_dyn.equations.spinning import by_deflections
 from ffr_dyn.equations.statics import balance, damping
 from ffr_dyn.functions.rotation import rotation_matrix, skew
 from ffr_prep.common.arrays import Array
@@ -105,10 +107,15 @@ def _central(function: Callable[[Array], Array], steps: Array) -> Array:
     return np.array(columns).T
 
 
+def at_rest(near: Chart) -> bool:
+    """Whether nothing moves."""
+    return bool(np.abs(near.V / sizes(near.at)).max(initial=0.0) < AT_REST)
+
+
 def state_matrix(near: Chart) -> tuple[Array, float]:
     """A (2 d, 2 d) with d/dt (y, z) = A (y, z), and its error, relative: by differences, or of a scene at rest exactly."""
     d = near.steps.size
-    if np.abs(near.V / sizes(near.at)).max(initial=0.0) < AT_REST:
+    if at_rest(near):
         K, D = _at_rest(near)
         return np.block([[np.zeros((d, d)), np.eye(d)], [-near.Z.T @ K @ near.Z, -near.Z.T @ D @ near.Z]]), 0.0
 
@@ -130,14 +137,8 @@ def _at_rest(near: Chart) -> tuple[Array, Array]:
         K[place.R_dot(b), turn] -= skew(left[place.R_dot(b)])
         K[turn, turn] -= 0.5 * skew(left[turn])
         at = slice(place.iv[b], place.iv[b] + 6 + place.n[b])
-        K[at, place.q_dot(b)] += _by_shape(kept_integrals(scene.bodies[b]), x[place.q(b)], now.acceleration[at])
+        K[at, place.q_dot(b)] += by_deflections(kept_integrals(scene.bodies[b]), x[place.q(b)], now.acceleration[at])
     return K, damping(scene, place, time, x)
-
-
-def _by_shape(integrals: Integrals, q: Array, acceleration: Array) -> Array:
-    """(6 + n, n) derivative of M(q) acceleration by q; the steps may be large, as M is quadratic."""
-    columns = [mass_matrix(integrals, q + step) - mass_matrix(integrals, q - step) for step in np.eye(q.size)]
-    return 0.5 * np.array([M @ acceleration for M in columns]).reshape(q.size, acceleration.size).T
 
 
 def _period(near: Chart) -> float:
@@ -149,8 +150,13 @@ def _period(near: Chart) -> float:
 
 
 def sizes(at: Evaluator) -> Array:
+    """(V,) what counts as a movement of one, of a compiled scene with memory."""
+    return sizes_of(at.system)
+
+
+def sizes_of(system: System) -> Array:
     """(V,) what counts as a movement of one: a radian, the size of the scene; of an elastic coordinate, that over sqrt(m)."""
-    place, scene = at.system.layout, at.system.scene
+    place, scene = system.layout, system.scene
     points = [i.position for body in scene.bodies for i in body.model.interfaces]
     extent = max((float(np.linalg.norm(p)) for p in points), default=0.0)
     inertia = [np.sqrt(np.trace(body.model.rr_dm) / body.model.mass) for body in scene.bodies]

@@ -79,7 +79,7 @@ def applied(scene: Scene, place: Layout, t: float, x: Array, v: Array) -> list[A
     Equation (23) of docs/notation.md.
     """
     now = At(scene, place, t, x, v)
-    return [_applied(now, force) for force in forces_of(scene)]
+    return [applied_by(now, force) for force in forces_of(scene)]
 
 
 def gravity_at(scene: Scene, t: float) -> Array:
@@ -98,7 +98,8 @@ def gravity_forces(scene: Scene, place: Layout, t: float, x: Array) -> Array:
     return np.concatenate(parts)
 
 
-def _applied(now: At, load: Force) -> Applied:
+def applied_by(now: At, load: Force) -> Applied:
+    """One load."""
     place = load.place
     coordinate: Any = None
     rate: Any = None

@@ -26,7 +26,7 @@ STEP = 1e-6  # m, rad: of differences of laws by what they are functions of
 
 
 @dataclass(frozen=True)
-class _Watched(At):
+class Watched(At):
     """Notes whether a law looks at the state."""
 
     looks: list[bool]
@@ -56,7 +56,7 @@ def _add_at_marker(total: Sums, now: At, force: Force) -> None:
     place: Any = force.place
     marker = total.placed[place.ends(now.scene)[0]]
     turned = marker.A if place.axes == "body" else np.eye(3)
-    watched = _Watched(now.scene, now.place, now.t, now.x, now.v, [])
+    watched = Watched(now.scene, now.place, now.t, now.x, now.v, [])
     given = force.law(watched, None, None).reshape(2, 3)
     wrench = np.ravel(given @ turned.T)
     total.add_wrench(marker, wrench)
@@ -99,18 +99,18 @@ def _add_on_coordinates(
         angle = float(c[0])
         angles[force.name] = angle + 2 * np.pi * round((near.get(force.name, angle) - angle) / (2 * np.pi))
         c[0] = angles[force.name]
-    watched = _Watched(now.scene, now.place, now.t, now.x, now.v, [])
+    watched = Watched(now.scene, now.place, now.t, now.x, now.v, [])
     still, gradients = np.zeros(c.size), np.array([jet.first for jet in jets])
-    given = _law(force, watched, c, still)
-    slopes = _differences(lambda step: _law(force, now, c + step, still), range(c.size), c.size)
+    given = law_on(force, watched, c, still)
+    slopes = differences(lambda step: law_on(force, now, c + step, still), range(c.size), c.size)
     second = gradients.T @ slopes @ gradients + sum(f * jet.second for f, jet in zip(given, jets, strict=True))
     total.add_on_pair(ends, given @ gradients, second)
     if watched.looks:
-        by_state = _by_state(now, lambda there: _law(force, there, c, still), range(now.place.v_size))
+        by_state = _by_state(now, lambda there: law_on(force, there, c, still), range(now.place.v_size))
         total.tangent[:] += total.gradient(ends, gradients).T @ by_state
 
 
-def _law(force: Force, now: At, c: Array, rate: Array) -> Array:
+def law_on(force: Force, now: At, c: Array, rate: Array) -> Array:
     """(K,) the force on K coordinates."""
     return np.ravel(force.law(now, c, rate) if c.size > 1 else force.law(now, float(c[0]), float(rate[0])))
 
@@ -121,10 +121,10 @@ def _by_state(now: At, law: Callable[[At], Array], columns: Iterable[int]) -> Ar
     def at(step: Array) -> Array:
         return law(replace(now, x=moved(now.place, now.x, step)))
 
-    return _differences(at, columns, now.place.v_size)
+    return differences(at, columns, now.place.v_size)
 
 
-def _differences(function: Callable[[Array], Array], columns: Iterable[int], size: int) -> Array:
+def differences(function: Callable[[Array], Array], columns: Iterable[int], size: int) -> Array:
     """(K, size) derivative of K numbers at zero by `size` others, of these the columns, by central differences."""
     found = np.zeros((np.size(function(np.zeros(size))), size))
     for k in columns:
@@ -140,8 +140,8 @@ def _differences(function: Callable[[Array], Array], columns: Iterable[int], siz
 def damping_of(total: Sums, now: At, force: Force) -> Array:
     """(V, V) less the derivative of a force by the velocities [A^T R_dot, omega_bar, q_dot]."""
     way, rates, law = _along(total, now, force)
-    D = way.T @ _differences(lambda rate: law(now, rate), range(len(rates)), len(rates)) @ rates
-    watched, still = _Watched(now.scene, now.place, now.t, now.x, now.v, []), np.zeros(len(rates))
+    D = way.T @ differences(lambda rate: law(now, rate), range(len(rates)), len(rates)) @ rates
+    watched, still = Watched(now.scene, now.place, now.t, now.x, now.v, []), np.zeros(len(rates))
     law(watched, still)
     if watched.looks and not isinstance(force.place, OnBody):
         D += way.T @ _by_speed(now, lambda there: law(there, still))
@@ -151,7 +151,7 @@ def damping_of(total: Sums, now: At, force: Force) -> Array:
 def _by_speed(now: At, law: Callable[[At], Array]) -> Array:
     """(K, V) derivative of K numbers by the velocities of bodies, by differences."""
     size = now.place.v_size
-    return _differences(lambda y: law(replace(now, v=to_global_axes(now.place, now.x, y))), range(size), size)
+    return differences(lambda y: law(replace(now, v=to_global_axes(now.place, now.x, y))), range(size), size)
 
 
 def _along(total: Sums, now: At, force: Force) -> tuple[Array, Array, Callable[[At, Array], Array]]:
@@ -170,4 +170,4 @@ def _along(total: Sums, now: At, force: Force) -> tuple[Array, Array, Callable[[
     jets = coordinates(scene, pair(*(total.placed[number] for number in ends)), place)
     way = total.gradient(ends, np.array([jet.first for jet in jets]).reshape(-1, SIZE))
     c = np.array([float(jet.value) for jet in jets])
-    return way, way, lambda there, rate: _law(force, there, c, rate) if c.size else c
+    return way, way, lambda there, rate: law_on(force, there, c, rate) if c.size else c

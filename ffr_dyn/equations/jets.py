@@ -81,6 +81,11 @@ class Pair:
         return _axis(self.on_j @ a0, SECOND)
 
 
+def pair_motion(r_i: Array, r_j: Array, u: Array, w: Array) -> Array:
+    """(12,) velocities of two markers at r_i, r_j (3,) that screws R_dot = u + w x R, u and w (2, 3), carry."""
+    return np.concatenate([u[0] + np.cross(w[0], r_i), w[0], u[1] + np.cross(w[1], r_j), w[1]])
+
+
 _STILL = np.zeros((3, SIZE, SIZE))
 
 

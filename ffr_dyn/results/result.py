@@ -178,6 +178,18 @@ class Result(Brief):
         frame.attrs["units"] = {name: quantity.unit for name, quantity in of.items()}
         return frame
 
+    def to_statespace(self) -> Any:
+        """A `scipy.signal.StateSpace` of a linearised scene; python-control takes its matrices,
+        `control.ss(s.A, s.B, s.C, s.D)`.
+
+        Raises InputError for the result of another analysis, or one without inputs or outputs.
+        """
+        if not {"A", "B", "C", "D"} <= self.quantities.keys():
+            raise InputError("only a linearised scene with inputs and outputs is a state space; see `linearise`")
+        from scipy.signal import StateSpace
+
+        return StateSpace(*(self[name][0] for name in "ABCD"))
+
     def _find(self, name: str) -> Quantity | None:
         if name in self.quantities:
             return self.quantities[name]

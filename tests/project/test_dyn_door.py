@@ -67,7 +67,7 @@ def test_a_name_loads_its_room_alone():
 
 # ---- the pages use the door alone -----------------------------------------------------------------------------------
 
-PAGES = ("analyses", "chart", "economy", "forces", "integrators", "realtime", "scene_file", "stress")
+PAGES = ("analyses", "chart", "economy", "forces", "integrators", "realtime", "rotating", "scene_file", "stress")
 
 
 @pytest.mark.parametrize("page", PAGES)

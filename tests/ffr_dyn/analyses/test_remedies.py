@@ -108,6 +108,9 @@ PARTS = {
 
 # ---- scenes -------------------------------------------------------------------------------------------------------------
 
+EVENLY = replace(HINGED, drivers=(Driver("d", "hinge", fd.polynomial(0.0, 5.0)),))
+DRAGGED = replace(TURNING, forces=(fd.JointSpring("drag", "hinge", damping=1.0),))
+MOMENT = fd.MomentSettings()
 FAR = SpringDamper("spring", "ground.P", "cloud.b", stiffness=1e14, free_length=2.0)
 FAST = Scene((Body("b", cloud(3, stiffness=1e4)),))
 
@@ -650,6 +653,66 @@ INPUT = [
     Case(
         lambda: forward(CLOUD, end=0.1, output_step=0.01, begin="still"),
         lambda: forward(CLOUD, end=0.1, output_step=0.01, begin="as-given"),
+    ),
+    Case(lambda: fd.steady(HINGED, speeds=(1.0,)), lambda: fd.steady(HINGED, speeds=(1.0,), turn="hinge.angle")),
+    Case(
+        lambda: fd.steady(HINGED, speeds=(1.0,), turn="hing"),
+        lambda: fd.steady(HINGED, speeds=(1.0,), turn="hinge.angle"),
+    ),
+    Case(lambda: fd.Steady(speeds=("fast",)).perform(HINGED, fd.MomentSettings()), lambda: fd.steady(DRIVEN)),
+    Case(
+        lambda: fd.campbell(CLOUD, speeds=(1.0,), turn="hinge"),
+        lambda: fd.campbell(CLOUD, speeds=(1.0, 2.0), turn="hinge"),
+    ),
+    Case(
+        lambda: fd.campbell(EVENLY, speeds=(1.0, 2.0)),
+        lambda: fd.campbell(CLOUD, speeds=(1.0, 2.0), turn="hinge"),
+    ),
+    Case(
+        lambda: fd.response(HINGED, input="hing.moment", outputs=["bar.b.position.x"]),
+        lambda: fd.response(HINGED, input="hinge.moment", outputs=["bar.b.position.x"], frequencies=[1.0]),
+    ),
+    Case(
+        lambda: fd.response(HINGED, input="hinge.moment", outputs=[]),
+        lambda: fd.response(HINGED, input="hinge.moment", outputs=["bar.b.position.x"], frequencies=[1.0]),
+    ),
+    Case(
+        lambda: fd.response(HINGED, input="hinge.moment", outputs=["bar.b.position.x"], about="rest"),
+        lambda: fd.response(HINGED, input="hinge.moment", outputs=["bar.b.position.x"], frequencies=[1.0]),
+    ),
+    Case(lambda: fd.periodic(HINGED), lambda: fd.periodic(EVENLY)),
+    Case(lambda: fd.periodic(EVENLY, period=-1.0), lambda: fd.periodic(EVENLY)),
+    Case(lambda: fd.periodic(EVENLY, period=0.3), lambda: fd.periodic(EVENLY)),
+    Case(lambda: fd.Steady(speeds=("inf",)).perform(EVENLY, MOMENT), lambda: fd.steady(EVENLY)),
+    Case(lambda: fd.steady(DRAGGED), lambda: fd.steady(TURNING)),
+    Case(
+        lambda: fd.Linearise(at_equilibrium=True, at_steady=True).perform(TURNING, MOMENT, path=None),
+        lambda: fd.Linearise(at_steady=True).perform(TURNING, MOMENT, path=None),
+    ),
+    Case(
+        lambda: fd.Campbell(speeds=("1..2",), turn="hinge", orders=("a",)).perform(CLOUD, MOMENT, path=None),
+        lambda: fd.Campbell(speeds=("1..2:2",), turn="hinge").perform(CLOUD, MOMENT, path=None),
+    ),
+    Case(
+        lambda: fd.Response(input="base.x", quantities=("bar.b.position.x",), band="3").perform(
+            HINGED, MOMENT, path=None
+        ),
+        lambda: fd.Response(input="base.x", quantities=("bar.b.position.x",), band="1..2").perform(
+            HINGED, MOMENT, path=None
+        ),
+    ),
+    Case(
+        lambda: fd.Response(input="base.x", quantities=("bar.b.position.x",), psd=("3",)).perform(
+            HINGED, MOMENT, path=None
+        ),
+        lambda: fd.Response(input="base.x", quantities=("bar.b.position.x",), psd=("3:1", "4:1")).perform(
+            HINGED, MOMENT, path=None
+        ),
+    ),
+    Case(lambda: fd.mode_motion(fd.linearise(HINGED), 9), lambda: fd.mode_motion(fd.linearise(HINGED), 1)),
+    Case(
+        lambda: fd.assembly(CLOUD).to_statespace(),
+        lambda: fd.linearise(CLOUD, inputs=(fd.JointEffort("m", "hinge"),), outputs=("hinge.angle",)).to_statespace(),
     ),
     Case(lambda: Output("energy.total", -1.0), lambda: Output("energy.total", 1.0)),
     Case(lambda: Adaptation(enter=0.1, leave=0.2), lambda: Adaptation(enter=0.2, leave=0.1)),

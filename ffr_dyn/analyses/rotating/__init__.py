@@ -1,0 +1,1 @@
+"""Analyses of machines that rotate and vibrate."""

@@ -1,0 +1,257 @@
+"""Campbell diagrams: frequencies and damping of a turning scene over its speed, critical speeds, limits of stability.
+
+The steady motion at each speed begins where the last one ended; its vibrations are followed by their shapes
+(`ffr_dyn.linear.spectrum`). Where a frequency crosses a multiple of the speed, or a vibration begins to grow, is found by the
+secant method on steady motions in between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ffr_dyn.analyses.registry import OfMoment, option
+from ffr_dyn.analyses.rotating.steady import GROWS, SPEEDS, TURN
+from ffr_dyn.analyses.settings import MomentSettings
+from ffr_dyn.consistency.assemble import assemble, in_space
+from ffr_dyn.linear.spectrum import Spectrum, followed, spectrum
+from ffr_dyn.linear.speeds import at_speed, speed_list
+from ffr_dyn.linear.steady_state import steady_state
+from ffr_dyn.linear.whirl import ONE_WAY
+from ffr_dyn.results.file import save_result
+from ffr_dyn.results.result import Axis, Quantity, Result
+from ffr_dyn.scene.described import described
+from ffr_dyn.scene.scene import Scene, require_scene
+from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import InputError
+
+MODES = 10
+SECANTS, MET = 12, 1e-8  # of a crossing: steps, and of a speed relative to the range
+
+
+@dataclass(frozen=True)
+class Campbell(OfMoment):
+    """Vibrations at every speed, followed by their shapes; where they cross multiples of the speed; where they grow."""
+
+    keeps: ClassVar[bool] = False
+    example: ClassVar[str] = (
+        "ffr-dyn campbell rotor.toml --speed 0..500 --order 1 --picture out/campbell.png -o out/rotor.nc"
+    )
+    speeds: tuple[str, ...] = field(default=(), metadata={**SPEEDS, "required": True})
+    turn: str = field(default="", metadata=TURN)
+    orders: tuple[str, ...] = field(
+        default=("1",),
+        metadata=option("--order", "Multiple of the speed that excites; default: 1; repeat.", metavar="K"),
+    )
+    modes: int = field(default=MODES, metadata=option("--modes", "How many vibrations, from the slowest."))
+    picture: str = field(default="", metadata=option("--picture", "Draw the diagram, .png or .svg.", metavar="FILE"))
+
+    def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
+        orders = tuple(_order(text) for text in self.orders)
+        found = campbell(
+            scene, speeds=speed_list(self.speeds), turn=self.turn, orders=orders, modes=self.modes, time=settings.time,
+            path=how["path"],
+        )  # fmt: skip
+        if self.picture:
+            from ffr_dyn.pictures.campbell import draw_campbell
+
+            draw_campbell(found, self.picture)
+        return found
+
+    def report(self, result: Result) -> list[str]:
+        return campbell_lines(result)
+
+
+def _order(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"order {text!r} is no number: write a multiple of the speed, such as 1 or 2") from None
+
+
+def campbell(
+    scene: Scene,
+    *,
+    speeds: Sequence[float],
+    turn: str = "",
+    orders: Sequence[float] = (1.0,),
+    modes: int = MODES,
+    time: float = 0.0,
+    path: str | Path | None = None,
+) -> Result:
+    """Frequencies and damping of a scene over a list of rising speeds [rad/s]: a row for each.
+
+    turn   : what has the speed, as of `steady`;  orders : multiples of the speed that excite;  modes : how many, from the
+             slowest at the first speed
+
+    The result has `speed` [rad/s], and of each vibration `frequencies` [Hz] in the turning axes, `seen` [Hz] from the ground,
+    positive where the whirl is forward, `damping_ratios` and `growth` [1/s]. Its attributes have the `names` of the
+    vibrations; `critical`, a list of {speed, order, mode, axes}, where a frequency crosses an order: from the ground of what
+    whirls, in the turning axes of what does not; and `limits`, a list of {speed, mode}, where one begins to grow.
+
+        found = fd.campbell(scene, speeds=np.linspace(0, 500, 21))
+        fd.draw_campbell(found, "campbell.png")
+
+    Raises InputError for fewer than two speeds, or speeds that do not rise; and as `steady` does.
+    """
+    require_scene(scene)
+    values = [float(speed) for speed in speeds]
+    if len(values) < 2 or not (np.diff(values) > 0).all():
+        raise InputError(f"the speeds are {values}; give two or more that rise, such as 0..500")
+    at = _at_speeds(scene, turn, time)
+    spectra = [at(values[0], None)]
+    for speed in values[1:]:
+        spectra.append(followed(spectra[-1], at(speed, spectra[-1])))
+    if not spectra[0].values.size:
+        raise InputError("nothing vibrates: joints and the driver fix every motion, or what they leave is free")
+    middle = spectra[len(spectra) // 2]
+    whirling = np.nan_to_num(middle.whirl) > ONE_WAY
+    order = np.argsort(np.where(whirling, np.abs(spectra[0].seen), np.abs(spectra[0].values)), kind="stable")[:modes]
+    names = middle.only(order).names
+    critical = [
+        {"speed": speed, "order": float(k), "mode": name, "axes": "ground" if whirling[m] else "turning"}
+        for m, name in zip(order.tolist(), names, strict=True)
+        for k in orders
+        for speed in _crossings(at, values, spectra, m, _off_order(bool(whirling[m]), float(k)))
+    ]
+    limits = [
+        {"speed": speed, "mode": name}
+        for m, name in zip(order.tolist(), names, strict=True)
+        for speed in _crossings(at, values, spectra, m, _growth, upward=True)
+    ]
+    kept = [one.only(order) for one in spectra]
+    found = _as_result(scene, time, values, kept, names, whirling[order], critical, limits)
+    if path is not None:
+        save_result(found, path)
+    return found
+
+
+def _at_speeds(scene: Scene, turn: str, time: float) -> Callable[[float, Spectrum | None], Spectrum]:
+    def at(speed: float, near: Spectrum | None) -> Spectrum:
+        assembled = assemble(in_space(at_speed(scene, speed, turn, time)), time=time)
+        return spectrum(steady_state(assembled, time, near.found.x if near else None))
+
+    return at
+
+
+# ---- crossings ------------------------------------------------------------------------------------------------------
+
+Measure = Callable[[float, Spectrum, int], float]
+
+
+def _off_order(ground: bool, order: float) -> Measure:
+    """How far a frequency is from a multiple of the speed [rad/s]."""
+
+    def off(speed: float, one: Spectrum, m: int) -> float:
+        return float(abs(one.seen[m] if ground else one.values[m].imag) - order * speed)
+
+    return off
+
+
+def _growth(speed: float, one: Spectrum, m: int) -> float:
+    value = one.values[m]
+    return float(value.real - GROWS * abs(value))
+
+
+def _crossings(
+    at: Callable[[float, Spectrum | None], Spectrum],
+    speeds: Sequence[float],
+    spectra: Sequence[Spectrum],
+    m: int,
+    measure: Measure,
+    upward: bool = False,
+) -> list[float]:
+    """Speeds where a measure of a vibration is zero, each between two of the list."""
+    measured = [measure(speed, one, m) for speed, one in zip(speeds, spectra, strict=True)]
+    found = []
+    for k, (low, high) in enumerate(pairwise(measured)):
+        if (low < 0 < high) or (low > 0 > high and not upward):
+            found.append(_between(at, (speeds[k], speeds[k + 1]), (low, high), spectra[k], m, measure))
+    return found
+
+
+def _between(
+    at: Callable[[float, Spectrum | None], Spectrum],
+    ends: tuple[float, float],
+    values: tuple[float, float],
+    near: Spectrum,
+    m: int,
+    measure: Measure,
+) -> float:
+    """By false position, of which a point that stays counts half (Illinois)."""
+    (a, b), (fa, fb) = ends, values
+    width, kept = b - a, 0
+    for _ in range(SECANTS):
+        c = b - fb * (b - a) / (fb - fa)
+        fc = measure(c, followed(near, at(c, near)), m)
+        if fc == 0 or abs(b - a) <= MET * width:
+            return c
+        if fc * fb < 0:
+            a, fa, kept = b, fb, 0
+        else:
+            fa, kept = (0.5 * fa if kept else fa), 1
+        step, b, fb = abs(c - b), c, fc
+        if step <= MET * width:
+            return c
+    return b
+
+
+# ---- as a result ----------------------------------------------------------------------------------------------------
+
+
+def _as_result(
+    scene: Scene,
+    time: float,
+    speeds: Sequence[float],
+    spectra: Sequence[Spectrum],
+    names: Sequence[str],
+    whirling: Array,
+    critical: list[dict[str, Any]],
+    limits: list[dict[str, Any]],
+) -> Result:
+    values, seen = np.array([one.values for one in spectra]), np.array([one.seen for one in spectra])
+    modes = Axis("vibration", tuple(str(k + 1) for k in range(len(names))))
+    modulus = np.abs(values)
+    ratios = np.where(modulus > 0, -values.real / np.where(modulus > 0, modulus, 1.0), 0.0)
+    notes = dict.fromkeys(note for one in spectra for note in one.found.notes)
+    quantities = {
+        "speed": Quantity(np.array(speeds), "rad/s", (), "of what turns"),
+        "frequencies": Quantity(np.abs(values.imag) / (2 * np.pi), "Hz", (modes,), "in the turning axes"),
+        "seen": Quantity(seen / (2 * np.pi), "Hz", (modes,), "from the ground, positive of forward whirls"),
+        "damping_ratios": Quantity(ratios, "1", (modes,), "-Re / modulus of the eigenvalues"),
+        "growth": Quantity(values.real, "1/s", (modes,), "real parts of the eigenvalues"),
+    }
+    attributes = {
+        **described(scene),
+        "analysis": "Campbell diagram",
+        "method": "exact tangents, vibrations followed by their shapes",
+        "names": list(names),
+        "whirling": [int(one) for one in whirling],
+        "critical": critical,
+        "limits": limits,
+        "notes": list(notes),
+        "status": "complete",
+    }
+    return Result(np.full(len(speeds), time), quantities, {}, attributes)
+
+
+def campbell_lines(result: Result) -> list[str]:
+    """The table of a Campbell diagram: every vibration at the first, a middle and the last speed, critical speeds, limits."""
+    a, speeds = result.attributes, result["speed"]
+    rows = sorted({0, len(speeds) // 2, len(speeds) - 1})
+    shown = np.where(np.array(a["whirling"], bool), np.abs(result["seen"]), result["frequencies"])
+    lines = ["speed        " + "".join(f"{speeds[row]:12.6g}" for row in rows) + " rad/s"]
+    for m, name in enumerate(a["names"]):
+        axes = "from the ground" if a["whirling"][m] else "in turning axes"
+        lines.append("vibration    " + "".join(f"{shown[row, m]:12.6g}" for row in rows) + f" Hz {axes}   {name}")
+    lines += [
+        f"critical     {one['speed']:.6g} rad/s ({one['speed'] * 30 / np.pi:.6g} rpm), order {one['order']:g}: {one['mode']}"
+        for one in sorted(a["critical"], key=lambda one: one["speed"])
+    ]
+    lines += [f"unstable     from {one['speed']:.6g} rad/s: {one['mode']}" for one in a["limits"]]
+    return lines + [f"note         {note}" for note in a["notes"]]

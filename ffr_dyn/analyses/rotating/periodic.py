@@ -1,0 +1,135 @@
+"""Periodic motions: the turn of a driven machine that comes back to itself, and Floquet's multipliers about it.
+
+How it is found, `ffr_dyn.linear.turn_map` says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ffr_dyn.analyses.integration import with_all_reactions
+from ffr_dyn.analyses.outcome import result_of
+from ffr_dyn.analyses.registry import OfMoment, option
+from ffr_dyn.analyses.settings import MomentSettings
+from ffr_dyn.consistency.assemble import Assembled, assemble
+from ffr_dyn.consistency.doubts import checked
+from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
+from ffr_dyn.integrators import ROS3, Integrator
+from ffr_dyn.linear.turn_map import Returned, Turns, after, monodromy, period_of, returned, turns
+from ffr_dyn.results.quantities import selected
+from ffr_dyn.results.result import Result
+from ffr_dyn.scene.described import described
+from ffr_dyn.scene.scene import Scene, require_scene
+from ffr_prep.common.errors import InputError
+
+STEPS, ROWS = 1000, 100  # to a period, where no method is given; rows of the result
+
+
+@dataclass(frozen=True)
+class Periodic(OfMoment):
+    """A period of the motion that repeats itself, as of a machine driven evenly, and whether it is stable."""
+
+    example: ClassVar[str] = "ffr-dyn periodic engine.toml --floquet -o out/turn.nc"
+    period: float = field(default=0.0, metadata=option("--period", "[s]; default: a turn of the driver."))
+    step: float = field(default=0.0, metadata=option("--step", "[s] of ros3; default: a thousandth of the period."))
+    floquet: bool = field(
+        default=False, metadata=option("--floquet/--no-floquet", "Also Floquet's multipliers: takes many periods.")
+    )
+
+    def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
+        method = ROS3(self.step) if self.step else None
+        period = self.period or None
+        return periodic(scene, period=period, method=method, floquet=self.floquet, **settings.span, **how)
+
+    def report(self, result: Result) -> list[str]:
+        a = result.attributes
+        lines = [*super().report(result), f"period       {a['period']:.9g} s"]
+        largest = [f"{re:.6g} {im:+.6g}i" for re, im in a.get("multipliers", [])[:6]]
+        if largest:
+            lines.append(f"multipliers  {', '.join(largest)}: {'stable' if a['stable'] else 'unstable'}")
+        return lines
+
+
+def periodic(
+    scene: Scene,
+    *,
+    period: float | None = None,
+    method: Integrator | None = None,
+    floquet: bool = False,
+    time: float = 0.0,
+    outputs: Sequence[str] = ("default",),
+    path: str | Path | None = None,
+) -> Result:
+    """A period of the motion that comes back to itself, from `time` [s] on, in a hundred rows and one.
+
+    period  : [s]; by default a turn of the driver that turns evenly
+    method  : with its step, which is shortened to a part of the period; by default ROS3 with a thousandth of it
+    floquet : also Floquet's multipliers, at the cost of four periods for every state variable
+    outputs : names or patterns of the quantities to keep, as in `forward`
+
+    The attributes have the `period`, `periods` (how many were computed), `returns` (by how much the end is off the
+    beginning, relative) and, with floquet, `multipliers` (pairs of real and imaginary parts, the largest first) and `stable`.
+
+        turn = fd.periodic(engine)
+        turn["main_bearing.force"]
+
+    Raises InputError where the period is not known; ComputationError where no such motion is found.
+    """
+    require_scene(scene)
+    assembled = assemble(scene, time=time)
+    selected(assembled.system, outputs)
+    of, found = _found(assembled, time, method, period)
+    at = evaluator(assembled.system)
+    count = min(ROWS, of.steps)
+    of = replace(of, steps=of.steps // count * count) if of.steps % count else of
+    first = record_states(at, np.array([time]), found.x[None], found.v[None])
+    record = with_all_reactions(assembled, joined([first, after(of, found.x, found.v, count)]))
+    attributes = {
+        **described(scene),
+        "analysis": "periodic motion",
+        "method": f"{'Newton' if found.newton else 'Anderson'}'s method on turns of {type(of.method).__name__}, step "
+        f"{of.method.step:.6g} s, {found.periods} periods",
+        "period": of.period,
+        "periods": found.periods,
+        "returns": found.error,
+        "degrees_of_freedom": assembled.degrees_of_freedom,
+        **(_multipliers(of, found.x, found.v) if floquet else {}),
+        "notes": [*assembled.notes, *checked("static", assembled, record)],
+        "status": "complete",
+    }
+    return result_of(assembled.system, record, attributes, path, outputs)
+
+
+def periodically(assembled: Assembled, time: float, method: Integrator | None) -> Assembled:
+    """The scene in its periodic motion at `time` [s], for a run that begins in it. Raises as `periodic`."""
+    _, found = _found(assembled, time, method, None)
+    said = (*assembled.notes, f"starts in its periodic motion, found in {found.periods} periods")
+    return replace(assembled, x=found.x, v=found.v, notes=said)
+
+
+def _found(
+    assembled: Assembled, time: float, method: Integrator | None, period: float | None
+) -> tuple[Turns, Returned]:
+    """The map over a period, and the periodic state."""
+    if period is not None and not 0 < period < np.inf:
+        raise InputError(f"the period is {period} s; it must be positive and finite")
+    length = period_of(assembled.system.scene, time) if period is None else period
+    chosen = method if method is not None and not method.controlled else ROS3(length / STEPS)
+    of = turns(assembled.system, time, assembled.x, assembled.v, chosen, length)
+    return of, returned(of)
+
+
+def _multipliers(of: Turns, x: Any, v: Any) -> dict[str, Any]:
+    """Floquet's multipliers about a periodic state, the largest first."""
+    again = turns(of.system, of.near.time, x, v, of.method, of.period)
+    values = np.linalg.eigvals(monodromy(again, np.zeros(2 * again.near.steps.size)))
+    values = values[np.argsort(-np.abs(values), kind="stable")]
+    return {
+        "multipliers": [[float(value.real), float(value.imag)] for value in values],
+        "stable": int(np.abs(values).max(initial=0.0) <= 1 + 1e-6),
+    }

@@ -1,0 +1,290 @@
+"""Frequency response of a linearised scene: from an input to outputs, mode by mode, and the response to noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from ffr_dyn.analyses.efforts import Effort, JointEffort, MarkerEffort
+from ffr_dyn.analyses.linearise import BASE, Linearisation, linearise
+from ffr_dyn.analyses.registry import OfMoment, option
+from ffr_dyn.analyses.rotating.steady import steady
+from ffr_dyn.analyses.settings import MomentSettings
+from ffr_dyn.analyses.states import scene_at
+from ffr_dyn.analyses.static import static
+from ffr_dyn.linear.transfer import Transfer, band, mean_square, transfer
+from ffr_dyn.results.file import save_result
+from ffr_dyn.results.result import Axis, Quantity, Result
+from ffr_dyn.scene.described import described
+from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.scene import Scene, marker_names, require_scene
+from ffr_prep.common.errors import InputError
+
+About = Literal["start", "equilibrium", "steady"]
+PARTS = 12
+COMPONENTS = "xyz"
+SHARE = 0.01  # of a gain by one mode, from where it is told; outputs of rounding have more than its inverse
+
+
+@dataclass(frozen=True)
+class Response(OfMoment):
+    """Gain and phase over the frequency, the modes that make them, and what noise does; Bode and Nyquist pictures."""
+
+    keeps: ClassVar[bool] = False
+    example: ClassVar[str] = (
+        "ffr-dyn response arm.toml --input hinge.moment --output arm.tip.acceleration --band 1..500 --bode out/arm.png"
+    )
+    input: str = field(
+        default="",
+        metadata=option(
+            "--input", "joint.moment, joint.force, body.point.force.x, driver.moment, base.x, or a load.",
+            metavar="NAME", required=True,
+        ),
+    )  # fmt: skip
+    quantities: tuple[str, ...] = field(
+        default=(),
+        metadata=option("--output", "Quantity, such as rod.tip.acceleration or .y of it; repeat.", required=True),
+    )
+    band: str = field(default="", metadata=option("--band", "Frequencies [Hz], such as 1..500.", metavar="LOW..HIGH"))
+    psd: tuple[str, ...] = field(
+        default=(), metadata=option("--psd", "Noise at the input: Hz:density, linear between; repeat.", metavar="F:S")
+    )
+    about: About = field(
+        default="start",
+        metadata=option("--start/--equilibrium/--steady", "About the start, the equilibrium, the steady motion."),
+    )
+    bode: str = field(default="", metadata=option("--bode", "Draw gain and phase.", metavar="FILE"))
+    nyquist: str = field(default="", metadata=option("--nyquist", "Draw the locus.", metavar="FILE"))
+
+    def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
+        from ffr_dyn.pictures.bode import draw_bode, draw_nyquist
+
+        found = response(
+            scene, input=self.input, outputs=self.quantities, band_of=_band(self.band), psd=_psd(self.psd),
+            about=self.about, time=settings.time, path=how["path"],
+        )  # fmt: skip
+        for draw, file in ((draw_bode, self.bode), (draw_nyquist, self.nyquist)):
+            if file:
+                draw(found, file)
+        return found
+
+    def report(self, result: Result) -> list[str]:
+        return response_lines(result)
+
+
+def _band(text: str) -> tuple[float, float] | None:
+    if not text:
+        return None
+    low, _, high = text.partition("..")
+    try:
+        found = float(low), float(high)
+    except ValueError:
+        found = (0.0, 0.0)
+    if not 0 < found[0] < found[1] < np.inf:
+        raise InputError(f"band {text!r}: write the lowest and the highest frequency [Hz], such as 1..500")
+    return found
+
+
+def _psd(texts: Sequence[str]) -> tuple[tuple[float, float], ...]:
+    try:
+        return tuple((float(f), float(s)) for f, _, s in (text.partition(":") for text in texts))
+    except ValueError:
+        raise InputError(f"psd {list(texts)}: write frequency [Hz] and density, such as 10:1e-3") from None
+
+
+def response(
+    scene: Scene,
+    *,
+    input: str | Effort,
+    outputs: Sequence[str],
+    band_of: tuple[float, float] | None = None,
+    frequencies: Sequence[float] = (),
+    psd: Sequence[tuple[float, float]] = (),
+    about: About = "start",
+    time: float = 0.0,
+    path: str | Path | None = None,
+) -> Result:
+    """How outputs of a scene answer a small harmonic input, a row for every frequency.
+
+    input    : an effort, the name of a load (one doubles it), or in words: "joint.moment" or "joint.force" along a joint
+               coordinate, "driver.moment" in the place of a driver, which then holds what it held, "body.point.force.x" or
+               ".moment.z" at a marker, "base.x", an acceleration of the base
+    outputs  : quantities ("rod.tip.acceleration": its components) or components; with a base as input, accelerations
+    of markers
+               are absolute, as accelerometers have them, so that the gain is the transmissibility
+    band_of  : (low, high) [Hz];  frequencies : [Hz], instead; by default the band of the first vibrations
+    psd      : (frequency [Hz], one-sided density [input^2/Hz]) of a noise at the input, linear in between, zero outside
+    about    : the scene's "start", its "equilibrium" or its "steady" motion
+
+    The result has `frequency` [Hz], and of each output `gain`, `phase` [deg], `transfer` (real and imaginary), and `parts` of
+    it by the modes that do most, named in the attribute "modes"; with a psd `density` and the attribute "rms".
+
+        found = fd.response(scene, input="hinge.moment", outputs=("arm.tip.acceleration.y",))
+        fd.draw_bode(found, "bode.png")
+
+    Raises InputError for inputs and outputs that do not exist.
+    """
+    require_scene(scene)
+    free, effort = _fed(_about(scene, about, time), input, time)
+    linear = linearise(free, time=time, inputs=(effort,), outputs=_components(free, outputs, time))
+    absolute = [float(_is_absolute(effort, name)) for name in linear.outputs]
+    D = linear.D + np.array(absolute)[:, None]
+    low, high = band_of if band_of else (None, None)
+    if psd and not band_of:
+        low, high = (min(f for f, _ in psd) or None), max(f for f, _ in psd)
+    at = np.array(frequencies, float) if len(frequencies) else band(linear.eigenvalues, low, high)
+    found = transfer(linear.A, linear.B, linear.C, D, at, PARTS)
+    result = _as_result(scene, linear, found, effort, tuple(psd), time)
+    if path is not None:
+        save_result(result, path)
+    return result
+
+
+def _about(scene: Scene, about: About, time: float) -> Scene:
+    if about not in ("start", "equilibrium", "steady"):
+        raise InputError(f"about is {about!r}; it must be one of 'start', 'equilibrium', 'steady'")
+    if about == "start":
+        return scene
+    return scene_at(scene, static(scene, time=time) if about == "equilibrium" else steady(scene, time=time))
+
+
+def _fed(scene: Scene, given: str | Effort, time: float) -> tuple[Scene, str | Effort]:
+    """The scene with the input free to act, and the input."""
+    if not isinstance(given, str) or given in BASE or given in [load.name for load in scene.loads]:
+        return scene, given
+    head, _, what = given.partition(".")
+    drivers = {d.name: d for d in scene.drivers if isinstance(d, Driver)}
+    joints = {joint.name for joint in scene.joints}
+    kinds = {"moment": "angle", "force": "stroke"}
+    if head in drivers and kinds.get(what) == drivers[head].coordinate:
+        return _released(scene, drivers[head], time), JointEffort(
+            "input", drivers[head].joint, drivers[head].coordinate
+        )
+    if head in joints and what in kinds:
+        return scene, JointEffort("input", head, kinds[what])
+    marker, _, rest = given.rpartition(".force.") if ".force." in given else given.rpartition(".moment.")
+    if marker in marker_names(scene) and rest in COMPONENTS and len(rest) == 1:
+        direction = tuple(float(c == rest) for c in COMPONENTS)
+        return scene, MarkerEffort("input", marker, direction, moment=".moment." in given)
+    raise InputError(
+        f"input {given!r} is not understood: write joint.moment, joint.force, driver.moment, body.point.force.x, "
+        f"body.point.moment.x, base.x, or the name of a load; joints are {', '.join(sorted(joints)) or 'none'}, drivers "
+        f"{', '.join(drivers) or 'none'}"
+    )
+
+
+def _released(scene: Scene, driver: Driver, time: float) -> Scene:
+    """The scene without a driver, which goes on with the effort that it has."""
+    from ffr_dyn.analyses.assemble import assembly
+    from ffr_dyn.scene.forces import Actuator
+
+    held = assembly(scene, time=time)
+    effort = float(held[f"{driver.name}.effort"][0])
+    left = replace(scene_at(scene, held), drivers=tuple(d for d in scene.drivers if d is not driver))
+    if not effort:
+        return left
+    added = Actuator(f"{driver.name}_held", driver.joint, force=effort, coordinate=driver.coordinate)
+    return replace(left, forces=(*left.forces, added))
+
+
+def _components(scene: Scene, outputs: Sequence[str], time: float) -> tuple[str, ...]:
+    """Every component of the outputs. InputError where there are none."""
+    from ffr_dyn.analyses.assemble import assembly
+
+    if not outputs or isinstance(outputs, str):
+        raise InputError("response needs outputs: names of quantities in a list, such as rod.tip.acceleration")
+    known = assembly(scene, time=time, outputs=("default", "*.acceleration", "*.angular_velocity", "*.a"))
+    found: list[str] = []
+    for name in outputs:
+        try:
+            found += known.components([name])
+        except InputError:
+            found.append(name)  # another quantity, which linearise knows or names what is near
+    return tuple(found)
+
+
+def _is_absolute(effort: str | Effort, name: str) -> bool:
+    """Whether the base adds its own acceleration to an output."""
+    return isinstance(effort, str) and effort in BASE and name.endswith(f".acceleration.{effort[-1]}")
+
+
+def _as_result(
+    scene: Scene, linear: Linearisation, found: Transfer, effort: str | Effort, psd: tuple[Any, ...], time: float
+) -> Result:
+    outputs = Axis("of", tuple(name.replace(".", " ") for name in linear.outputs))
+    names = _mode_names(linear, found)
+    parts = Axis("part", ("re", "im"))
+    H = found.H
+    quantities = {
+        "frequency": Quantity(found.frequencies, "Hz", (), "of the input"),
+        "gain": Quantity(np.abs(H), "1", (outputs,), "output over input"),
+        "phase": Quantity(np.degrees(np.unwrap(np.angle(H), axis=0)), "deg", (outputs,), "of the output"),
+        "transfer": Quantity(np.stack([H.real, H.imag], axis=2), "1", (outputs, parts), "transfer function"),
+    }
+    if names:
+        modes = Axis("part_of", tuple(f"{k + 1}" for k in range(len(names))))
+        split = np.stack([found.parts.real, found.parts.imag], axis=3)
+        quantities["parts"] = Quantity(split, "1", (outputs, modes, parts), "transfer functions of single modes")
+    more: dict[str, Any] = {}
+    if psd:
+        f, s = np.array(sorted(psd)).T
+        density = np.abs(H) ** 2 * np.interp(found.frequencies, f, s, left=0.0, right=0.0)[:, None]
+        quantities["density"] = Quantity(density, "1/Hz", (outputs,), "one-sided, of the output squared")
+        rms = np.sqrt(mean_square(found.frequencies, density))
+        more["rms"] = dict(zip(linear.outputs, rms.tolist(), strict=True))
+    attributes = {
+        **described(scene),
+        "analysis": "frequency response",
+        "method": "linearised",
+        "input": effort if isinstance(effort, str) else _told(effort),
+        "outputs": list(linear.outputs),
+        "modes": names,
+        "notes": [*linear.notes, *_undamped(found, psd)],
+        "status": "complete",
+        **more,
+    }
+    return Result(np.full(found.frequencies.size, time), quantities, {}, attributes)
+
+
+def _told(effort: Effort) -> str:
+    if isinstance(effort, JointEffort):
+        return f"{effort.joint}.{'moment' if effort.coordinate == 'angle' else 'force'}"
+    along = ",".join(f"{c:g}" for c in effort.direction)
+    return f"{effort.marker}.{'moment' if effort.moment else 'force'}:{along}"
+
+
+def _mode_names(linear: Linearisation, found: Transfer) -> list[str]:
+    """The names of the modes whose parts there are, by their eigenvalues."""
+    nearest = [int(np.argmin(np.abs(linear.eigenvalues - value))) for value in found.values]
+    return [linear.leading[k] for k in nearest]
+
+
+def _undamped(found: Transfer, psd: tuple[Any, ...]) -> list[str]:
+    bare = found.values[np.abs(found.values.real) <= 1e-9 * np.abs(found.values)]
+    inside = [v for v in bare if found.frequencies[0] <= abs(v.imag) / (2 * np.pi) <= found.frequencies[-1]]
+    if not psd or not inside:
+        return []
+    return [
+        f"the vibration of {abs(inside[0].imag) / 2 / np.pi:.5g} Hz has no damping: noise excites it without bound, and the "
+        "rms means nothing; give bodies or joints damping"
+    ]
+
+
+def response_lines(result: Result) -> list[str]:
+    """What a command tells: every output at rest and at its largest, the modes that do most there, and the rms."""
+    a, f, gain = result.attributes, result["frequency"], result["gain"]
+    lines = [f"input        {a['input']}, {f.size} frequencies from {f[0]:.4g} to {f[-1]:.4g} Hz"]
+    parts = result["parts"] @ np.array([1, 1j]) if len(a["modes"]) else np.zeros((f.size, gain.shape[1], 0))
+    for k, name in enumerate(a["outputs"]):
+        top = int(np.argmax(gain[:, k]))
+        where = f"gain {gain[0, k]:.5g} at {f[0]:.4g} Hz, at most {gain[top, k]:.5g} at {f[top]:.5g} Hz"
+        lines.append(f"output       {name}: {where}")
+        shares = np.abs(parts[top, k]) / gain[top, k] if gain[top, k] else 0.0 * np.abs(parts[top, k])
+        most = [m for m in np.argsort(-shares, kind="stable")[:3] if SHARE < shares[m] < 1 / SHARE]
+        lines += [f"             {100 * shares[m]:5.1f} % there by {a['modes'][m]}" for m in most]
+    lines += [f"rms          {name}: {value:.6g}" for name, value in a.get("rms", {}).items()]
+    return lines + [f"note         {note}" for note in a["notes"]]

@@ -1,0 +1,124 @@
+"""Steady motions: the shape in which a scene turns evenly, at one speed or over a list of speeds.
+
+What a steady motion is and how it is found, `ffr_dyn.linear.steady_state` says. Each speed begins where the last one ended.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ffr_dyn.analyses.integration import with_all_reactions
+from ffr_dyn.analyses.outcome import result_of, with_quantities
+from ffr_dyn.analyses.registry import OfMoment, option
+from ffr_dyn.analyses.settings import MomentSettings
+from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
+from ffr_dyn.consistency.doubts import checked
+from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
+from ffr_dyn.linear.spectrum import spectrum
+from ffr_dyn.linear.speeds import at_speed, speed_list
+from ffr_dyn.linear.steady_state import Steady as Found
+from ffr_dyn.linear.steady_state import steady_state
+from ffr_dyn.results.quantities import selected
+from ffr_dyn.results.result import Quantity, Result
+from ffr_dyn.scene.described import described
+from ffr_dyn.scene.scene import Scene, require_scene
+
+GROWS = 1e-7  # of a real part relative to the eigenvalue: what is no rounding
+TURN = option("--turn", "What has the speed: a driver, or a joint coordinate such as hinge.angle.", metavar="NAME")
+SPEEDS = option("--speed", "Speed: 314 [rad/s], '3000 rpm', 0..500, '0..6000 rpm:13'; repeat.", metavar="SPEED")
+
+
+@dataclass(frozen=True)
+class Steady(OfMoment):
+    """Bodies deformed as turning asks for, joints closed: a row for each speed, or one as drivers and velocities are."""
+
+    example: ClassVar[str] = "ffr-dyn steady blades.toml --turn motor --speed '0..750 rpm:4' -o out/steady.nc"
+    speeds: tuple[str, ...] = field(default=(), metadata=SPEEDS)
+    turn: str = field(default="", metadata=TURN)
+
+    def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
+        return steady(scene, speeds=speed_list(self.speeds), turn=self.turn, **settings.span, **how)
+
+    def report(self, result: Result) -> list[str]:
+        speeds = ", ".join(f"{speed:.6g}" for speed in result["speed"])
+        return [*super().report(result), f"speeds       {speeds} rad/s"]
+
+
+def steady(
+    scene: Scene,
+    *,
+    speeds: Sequence[float] = (),
+    turn: str = "",
+    time: float = 0.0,
+    outputs: Sequence[str] = ("default",),
+    path: str | Path | None = None,
+) -> Result:
+    """The steady motion of a scene at `time` [s], a row for every speed [rad/s], with all reactions and the efforts
+    of drivers.
+
+    speeds  : of what `turn` names; without any, one row with the velocities that drivers and scene have
+    turn    : a driver, or the coordinate of a joint ("hinge.angle") that is to turn evenly; by default the only driver, or
+              else the scene's own velocities, scaled until the largest spin is the speed
+    outputs : names or patterns of the quantities to keep beside the efforts, as in `forward`
+
+    Every body turns about an axis that stays, and keeps its shape: a rotor in bearings, a blade on a hub; not a crank drive.
+    What changes with the angle (weight across the axis, for one) is taken as its mean of a turn, which a note tells.
+
+        found = fd.steady(scene, speeds=(0.0, 50.0, 100.0))
+        found["speed"], found["blade.tip.displacement"]
+
+    Raises InputError for a scene that cannot turn so, or that something speeds up or brakes; ComputationError where
+    no balance is found.
+    """
+    require_scene(scene)
+    found = list(steady_states(scene, speeds, turn, time))
+    assembled = found[0][0]
+    selected(assembled.system, outputs)
+    rows, notes, stable = [], list[str](), True
+    for at, state in found:
+        one = record_states(evaluator(at.system), np.array([time]), state.x[None], state.v[None])
+        rows.append(with_all_reactions(at, one))
+        notes += [*at.notes, *state.notes, *checked("static", at, rows[-1])]
+        grown = growing(state)
+        stable &= not grown
+        notes += [grown] if grown else []
+    attributes = {
+        **described(scene),
+        "analysis": "steady motion",
+        "method": f"Newton's method, {sum(state.steps for _, state in found)} steps",
+        "degrees_of_freedom": assembled.degrees_of_freedom,
+        "stable": int(stable),
+        "notes": list(dict.fromkeys(notes)),
+        "status": "complete",
+    }
+    plain = result_of(assembled.system, joined(rows), attributes, None, outputs)
+    values = np.array(list(speeds) or [found[0][1].machine.screws.fastest])
+    return with_quantities(plain, {"speed": Quantity(values, "rad/s", (), "of what turns")}, path)
+
+
+def growing(found: Found) -> str:
+    """What grows about a steady motion, in words; "" where nothing does."""
+    one = spectrum(found)
+    faster = one.values.real > GROWS * np.maximum(np.abs(one.values), 1e-300)
+    if not faster.any():
+        return ""
+    k = int(np.argmax(np.where(faster, one.values.real, -np.inf)))
+    speed = found.machine.screws.fastest
+    return f"at {speed:.6g} rad/s the steady motion is unstable: {one.names[k]} grows by {one.values[k].real:.4g} 1/s"
+
+
+def steady_states(
+    scene: Scene, speeds: Sequence[float], turn: str = "", time: float = 0.0
+) -> Iterator[tuple[Assembled, Found]]:
+    """The scene in space and its steady state, at every speed, each beginning where the last one ended."""
+    last = None
+    for one in [at_speed(scene, float(speed), turn, time) for speed in speeds] or [scene]:
+        assembled = assemble(in_space(one), time=time)
+        found = steady_state(assembled, time, last)
+        last = found.x
+        yield assembled, found

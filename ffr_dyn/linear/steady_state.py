@@ -1,0 +1,452 @@
+"""Steady motions of a scene: every body keeps its shape and moves in a screw of its own, and all forces balance.
+
+The screws are those of the assembled scene: what drivers of constant speed, or the velocities of the scene, ask for.
+With T_0, the kinetic energy of the screws (`ffr_dyn.equations.spinning`), the condition is that of an equilibrium in
+the amended potential V - T_0,
+
+    d(T_0 - V) - Phi_q^T lam = 0,      Phi = 0,
+
+solved by Newton's method with the exact tangent (of Python forces that look at velocities by differences); what is
+free to go on turning has no stiffness and stays where it is. Above critical speeds the amended potential has no
+minimum, so the state is followed from rest where Newton's method does not reach it at once, and not sought downhill.
+
+A scene that turns meets its ground, gravity and bearings anew at every angle. Rows that then do not hold are no
+steady motion; forces and stiffness that vary are taken as their means of a turn, and a note says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.consistency.assemble import Assembled
+from ffr_dyn.consistency.evaluation import free_motions, locked, smallest_step, total_mass_matrix, unit_rows
+from ffr_dyn.consistency.mobility import named_motion
+from ffr_dyn.consistency.tangent import sizes_of
+from ffr_dyn.equations.forces import At, applied_by
+from ffr_dyn.equations.forces_at_rest import Watched
+from ffr_dyn.equations.forces_in_motion import add_velocities
+from ffr_dyn.equations.inertia import kept_integrals
+from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes
+from ffr_dyn.equations.placed import Sums, all_placed, nothing_on
+from ffr_dyn.equations.spinning import spinning
+from ffr_dyn.equations.statics import balance, damping
+from ffr_dyn.functions.rotation import from_vector, product, rotation_matrix
+from ffr_dyn.scene.force_kinds import forces_of
+from ffr_dyn.scene.forces.force import Force
+from ffr_dyn.scene.forces.places import AtMarker, OnBody
+from ffr_dyn.scene.scene import markers
+from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import ComputationError, InputError
+
+ITERATIONS = 20  # of Newton's method
+TOLERANCE = 1e-9  # of its last step, rad or relative to the scene: the next would be its square
+LARGEST = 0.5  # of a step, the same
+LEAST_SHARE = 0.01  # of the speed, by which it is followed
+BALANCED = 1e-13  # of forces relative to all, and of rows [m, -]: what is left of a balance by rounding
+NEUTRAL = 1e-13  # of a stiffness relative to the largest: rounding
+UNBALANCED = 1e-6  # of forces along motions without stiffness, relative to all
+VARIES, OPENS = 1e-7, 1e-7  # of forces and stiffness over a turn, relative; of rows, relative to the scene
+PHASES = 8  # of a turn, over which a mean is taken
+SAME = 1e-6  # of a state that is in its steady motion: of velocities and forces, relative
+TURNED = 1.0  # rad: how far on the scene is looked at again
+STEP = 1e-4  # m, rad: of differences, extrapolated
+
+
+@dataclass(frozen=True)
+class Screws:
+    """Motions R_dot = u + w x R of all bodies: u [m/s] and w [rad/s] (B, 3), global axes."""
+
+    u: Array
+    w: Array
+
+    def times(self, share: float) -> Screws:
+        return Screws(share * self.u, share * self.w)
+
+    @property
+    def fastest(self) -> float:
+        """[rad/s]"""
+        return float(np.linalg.norm(self.w, axis=1).max())
+
+
+def screws_of(place: Layout, x: Array, v: Array) -> Screws:
+    """The screws in which the frames of the bodies move at a state."""
+    count = range(len(place.n))
+    w = np.array([rotation_matrix(x[place.p(b)]) @ v[place.omega(b)] for b in count])
+    return Screws(np.array([v[place.R_dot(b)] - np.cross(w[b], x[place.R(b)]) for b in count]), w)
+
+
+def velocities(place: Layout, screws: Screws, x: Array) -> Array:
+    """(V,) velocities of bodies that keep their shape, global axes."""
+    v = np.zeros(place.v_size)
+    for b in range(len(place.n)):
+        v[place.R_dot(b)] = screws.u[b] + np.cross(screws.w[b], x[place.R(b)])
+        v[place.omega(b)] = rotation_matrix(x[place.p(b)]).T @ screws.w[b]
+    return v
+
+
+def carried(place: Layout, screws: Screws, x: Array, time: float) -> Array:
+    """(X,) where the screws carry the bodies in a time [s]."""
+    out = x.copy()
+    for b in range(len(place.n)):
+        u, w = screws.u[b], screws.w[b]
+        square = w @ w
+        centre, along = (np.cross(w, u) / square, w * (w @ u) / square) if square else (np.zeros(3), u)
+        turn = from_vector(w * time)
+        out[place.R(b)] = centre + rotation_matrix(turn) @ (x[place.R(b)] - centre) + along * time
+        out[place.p(b)] = product(turn, x[place.p(b)])
+    return out
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A compiled scene at a time [s] whose bodies move in screws; `phases` (P,) [s] over which forces are averaged."""
+
+    system: System
+    time: float
+    screws: Screws
+    phases: tuple[float, ...] = (0.0,)
+
+    @property
+    def place(self) -> Layout:
+        return self.system.layout
+
+
+@dataclass(frozen=True)
+class Matrices:
+    """About a motion, in body axes: forces (V,) but those of the constraints; Phi (C,), jacobian (C, V) of the rows.
+
+    M, G, D, K : (V, V) mass, gyroscopic, damping and stiffness matrix, centrifugal part and multipliers (C,) included
+    """
+
+    forces: Array
+    Phi: Array
+    jacobian: Array
+    M: Array
+    G: Array
+    D: Array
+    K: Array
+    lam: Array
+
+
+def matrices(machine: Machine, x: Array, lam: Array) -> Matrices:
+    """At the positions x (X,), with the multipliers lam (C,)."""
+    system, place = machine.system, machine.place
+    across, rows = locked(place), sum(len(block.words) for block in system.blocks)
+    at = balance(system.scene, place, system.blocks, machine.time, x, lam[:rows], {})
+    Phi = np.concatenate([at.Phi, np.zeros(across.size)])
+    jacobian = np.concatenate([at.jacobian, unit_rows(across, place.v_size)])
+    forces, K, D = at.forces, at.stiffness, np.zeros_like(at.stiffness)
+    own = [_loads(machine, time, carried(place, machine.screws, x, time)) for time in machine.phases]
+    if len(own) > 1:
+        only = balance(system.scene, place, system.blocks, machine.time, x, np.zeros(rows), {})
+        forces, K = 0 * forces, K - only.stiffness
+    for more_forces, more_K, more_D in own:
+        forces, K, D = forces + more_forces / len(own), K + more_K / len(own), D + more_D / len(own)
+    G = np.zeros_like(K)
+    inside = to_body_axes(place, x, velocities(place, machine.screws, x))
+    for b, body in enumerate(system.scene.bodies):
+        one = slice(place.iv[b], place.iv[b] + 6 + place.n[b])
+        part = spinning(kept_integrals(body), x[place.q(b)], inside[place.R_dot(b)], inside[place.omega(b)])
+        forces[one] += part.force
+        K[one, one] -= part.hessian
+        G[one, one] = part.gyroscopic
+    return Matrices(forces, Phi, jacobian, total_mass_matrix(system.scene, place, x), G, D, K, lam)
+
+
+def _loads(machine: Machine, later: float, x: Array) -> tuple[Array, Array, Array]:
+    """Forces (V,), stiffness and damping (V, V) at a phase: of one phase alone, what velocities add to forces at rest."""
+    system, place, time = machine.system, machine.place, machine.time + later
+    forces, K = np.zeros(place.v_size), np.zeros((place.v_size, place.v_size))
+    D = damping(system.scene, place, time, x)
+    if len(machine.phases) > 1:
+        none = np.zeros(sum(len(block.words) for block in system.blocks))
+        at = balance(system.scene, place, system.blocks, time, x, none, {})
+        forces, K = forces + at.forces, K + at.stiffness
+    if not (machine.screws.fastest or machine.screws.u.any()):
+        return forces, K, D
+    now = At(system.scene, place, time, x, velocities(place, machine.screws, x))
+    total = nothing_on(all_placed(replace(now, v=np.zeros(place.v_size))), place.v_size)
+    for force in forces_of(system.scene):
+        if not _sees_velocities(now, force):
+            continue
+        if isinstance(force.place, (AtMarker, OnBody)) or _looks(now, force):
+            _add_by_differences(total, D, machine.screws, now, force)
+        else:
+            add_velocities(total, D, now, force, _ends(machine.screws, now, force))
+    return forces + total.forces, K - total.tangent, D
+
+
+def _ends(screws: Screws, now: At, force: Force) -> tuple[Array, Array]:
+    """(2, 3) u and w of the markers of a force; the ground's are zero."""
+    numbers = [markers(now.scene)[number][0] for number in force.place.ends(now.scene)]
+    u, w = (np.concatenate([one, np.zeros((1, 3))]) for one in (screws.u, screws.w))
+    return u[numbers], w[numbers]
+
+
+def _sees_velocities(now: At, force: Force) -> bool:
+    """Whether a force changes with velocities: asked once, at others than those of the motion."""
+    still = applied_by(replace(now, v=np.zeros(now.v.size)), force).generalised
+    shaken = applied_by(replace(now, v=now.v + np.cos(np.arange(now.v.size))), force).generalised
+    return bool(np.abs(shaken - still).max(initial=0.0) > 1e-14 * np.abs(shaken).max(initial=0.0))
+
+
+def _looks(now: At, force: Force) -> bool:
+    """Whether the law of a force on coordinates looks at the state of the scene."""
+    watched = Watched(now.scene, now.place, now.t, now.x, now.v, [])
+    applied_by(watched, force)
+    return bool(watched.looks)
+
+
+def _add_by_differences(total: Sums, D: Array, screws: Screws, now: At, force: Force) -> None:
+    """What velocities add to a force of any kind, to its tangent and to the damping (V, V)."""
+    place, still = now.place, np.zeros(now.v.size)
+
+    def given(at: At) -> Array:
+        return applied_by(at, force).generalised
+
+    def added(y: Array) -> Array:
+        there = moved(place, now.x, y)
+        moving = replace(now, x=there, v=velocities(place, screws, there))
+        return given(moving) - given(replace(moving, v=still))
+
+    def rated(of: Array) -> Array:
+        return _derivative(lambda rate: given(replace(now, v=of + to_global_axes(place, now.x, rate))), 1.0, still.size)
+
+    total.forces[:] += added(still)
+    total.tangent[:] += _derivative(added, STEP, still.size)
+    D += rated(still) - rated(now.v)
+
+
+def _derivative(function: Callable[[Array], Array], step: float, size: int) -> Array:
+    """(V, V) derivative of V = size numbers by as many at zero, by extrapolated central differences."""
+    found = np.zeros((size, size))
+    for k in range(size):
+        coarse, fine = np.zeros(size), np.zeros(size)
+        coarse[k], fine[k] = step, 0.5 * step
+        apart, near = (function(y) - function(-y) for y in (coarse, fine))
+        found[:, k] = (8 * near - apart) / (6 * step)
+    return found
+
+
+# ---- the balance ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Steady:
+    """A steady motion: positions x (X,), velocities v (V,), the matrices about it, and free motions Z (V, d), Z^T M Z = 1.
+
+    steps : of Newton's method;  notes : what is left out of it
+    """
+
+    machine: Machine
+    x: Array
+    v: Array
+    about: Matrices
+    Z: Array
+    steps: int
+    notes: tuple[str, ...] = ()
+
+
+def steady_state(assembled: Assembled, time: float, start: Array | None = None) -> Steady:
+    """The steady motion with the velocities of an assembled scene at `time` [s]; `start` (X,) is where to begin to look.
+
+    Raises InputError for a scene whose joints do not allow it, and for a motion that something drives or brakes;
+    ComputationError where the bodies find no balance.
+    """
+    system = assembled.system
+    machine = Machine(system, time, screws_of(system.layout, assembled.x, assembled.v))
+    found = _followed(machine, assembled.x if start is None else start)
+    _require_lasting(found)
+    varying = _varying(found)
+    if varying <= VARIES:
+        return found
+    found = _followed(replace(machine, phases=_phases(machine)), found.x)
+    return replace(found, notes=(_varies(varying),))
+
+
+def steady_here(system: System, time: float, x: Array, v: Array) -> Steady | None:
+    """The steady motion that a state (x, v) on its constraints is in; None where it is in none."""
+    machine = Machine(system, time, screws_of(system.layout, x, v))
+    size = sizes_of(system)
+    apart = np.abs((v - velocities(machine.place, machine.screws, x)) / size).max(initial=0.0)
+    if apart > SAME * max(machine.screws.fastest, float(np.abs(v / size).max(initial=0.0))):
+        return None
+    for phases in ((0.0,), _phases(machine)):
+        found = _at(replace(machine, phases=phases), x)
+        if np.abs(found.Z.T @ found.about.forces).max(initial=0.0) <= SAME * _size_of_forces(found):
+            try:
+                _require_lasting(found)
+            except InputError:
+                return None
+            varying = _varying(found) if len(phases) == 1 else VARIES
+            return found if varying <= VARIES else replace(found, notes=(_varies(varying),))
+    return None
+
+
+def _at(machine: Machine, x: Array) -> Steady:
+    """The matrices at a state, balanced or not."""
+    count = sum(len(block.words) for block in machine.system.blocks) + locked(machine.place).size
+    about = matrices(machine, x, np.zeros(count))
+    about = matrices(machine, x, _multipliers(about, about.forces))
+    Z = free_motions(about.jacobian, about.M)
+    return Steady(machine, x, velocities(machine.place, machine.screws, x), about, Z, 0)
+
+
+def _phases(machine: Machine) -> tuple[float, ...]:
+    """[s] in a turn of the fastest body."""
+    fastest = machine.screws.fastest
+    return tuple(2 * np.pi / fastest * k / PHASES for k in range(PHASES)) if fastest else (0.0,)
+
+
+def _varies(varying: float) -> str:
+    return (
+        "what acts on the turning bodies changes with their angle, as weight, loads and bearings do that are not the same "
+        f"all around, by up to {varying:.1g} of the stiffness or the forces: the steady motion and its modes have the means "
+        "of a turn; `periodic` finds the motion itself"
+    )
+
+
+def steadily(assembled: Assembled, time: float) -> Assembled:
+    """The scene in its steady motion at `time` [s], for a run that begins in it. Raises as `steady_state`."""
+    found = steady_state(assembled, time)
+    notes = (*assembled.notes, "starts in its steady motion", *found.notes)
+    return replace(assembled, x=found.x, v=found.v, notes=notes)
+
+
+def _followed(machine: Machine, x: Array) -> Steady:
+    """By Newton's method, or by shares of the speed that grow."""
+    share, size, now, steps = 0.0, 1.0, x, 0
+    while True:
+        goal = min(share + size, 1.0)
+        found = _newton(replace(machine, screws=machine.screws.times(goal)), now)
+        if found is not None and goal == 1.0:
+            return replace(found, steps=steps + found.steps)
+        if found is not None:
+            share, size, now, steps = goal, 2 * size, found.x, steps + found.steps
+        elif (size := size / 4) < LEAST_SHARE:
+            raise ComputationError(
+                f"no steady motion was found at {machine.screws.fastest:.6g} rad/s; from rest it could be followed to "
+                f"{share * machine.screws.fastest:.4g} rad/s: a body may be too soft for more, or a joint near a dead point"
+            )
+
+
+def _newton(machine: Machine, x: Array) -> Steady | None:
+    """The steady motion near x, None where the steps do not come to an end."""
+    place, size = machine.place, sizes_of(machine.system)
+    about = _at(machine, x).about
+    for count in range(1, ITERATIONS + 1):
+        Z = free_motions(about.jacobian, about.M)
+        steady = Steady(machine, x, velocities(place, machine.screws, x), about, Z, count)
+        if _balanced(steady):
+            return steady
+        closing = smallest_step(about.jacobian, about.M, -about.Phi)
+        y = closing + Z @ _solved(Z.T @ about.K @ Z, Z.T @ (about.forces - about.K @ closing))
+        length = float(np.abs(y / size).max())
+        if not np.isfinite(length):
+            return None
+        lam = _multipliers(about, about.forces - about.K @ y)
+        x = moved(place, x, min(1.0, LARGEST / length) * y if length else y)
+        about = matrices(machine, x, lam)
+        if length < TOLERANCE:
+            steady = replace(steady, x=x, v=velocities(place, machine.screws, x), about=about)
+            _require_balance(steady)
+            return steady
+    return None
+
+
+def _balanced(found: Steady) -> bool:
+    """Whether nothing is left to do but rounding, as of what is straight at its critical speed."""
+    left = np.abs(found.Z.T @ found.about.forces).max(initial=0.0)
+    open_rows = np.abs(found.about.Phi).max(initial=0.0)
+    return bool(left <= BALANCED * _size_of_forces(found) and open_rows <= BALANCED)
+
+
+def _multipliers(about: Matrices, forces: Array) -> Array:
+    """(C,) of the rows, that leave the least of the forces (V,) in the norm of the inverse mass matrix."""
+    if not len(about.jacobian):
+        return np.zeros(0)
+    yielding = np.linalg.solve(about.M, about.jacobian.T)
+    return np.linalg.lstsq(about.jacobian @ yielding, yielding.T @ forces, rcond=None)[0]
+
+
+def _solved(K: Array, forces: Array) -> Array:
+    """(d,) the smallest motion that balances them; none along what has no stiffness."""
+    if not forces.size:
+        return forces
+    U, values, W = np.linalg.svd(K)
+    stiff = values > NEUTRAL * values.max()
+    return W[stiff].T @ ((U.T @ forces)[stiff] / values[stiff])
+
+
+def _require_balance(found: Steady) -> None:
+    """InputError where forces act along a motion that nothing holds: it speeds up or slows down."""
+    about, Z = found.about, found.Z
+    left = Z.T @ about.forces
+    U, values, _ = np.linalg.svd(Z.T @ about.K @ Z)
+    loose = U[:, values <= NEUTRAL * values.max(initial=0.0)]
+    along = loose.T @ left
+    if np.abs(along).max(initial=0.0) <= UNBALANCED * _size_of_forces(found):
+        return
+    system = found.machine.system
+    motion = named_motion(system.scene, system.layout, found.x, Z @ loose @ along)
+    raise InputError(
+        f"no steady motion: what acts along {motion} speeds it up or slows it down; add a driver of constant speed, or leave "
+        "out the force that does"
+    )
+
+
+def _size_of_forces(found: Steady) -> float:
+    """Of all forces, or of those that would hold the scene's mass at its size from the axis; in the free motions' units."""
+    about, machine = found.about, found.machine
+    applied = np.abs(np.linalg.solve(np.linalg.cholesky(about.M), about.forces)).max()
+    held = machine.screws.fastest**2 * (sizes_of(machine.system) * np.sqrt(np.diag(about.M))).max()
+    return float(max(applied, held)) or 1.0
+
+
+# ---- the same at every angle ----------------------------------------------------------------------------------------
+
+
+def _later(found: Steady) -> tuple[Machine, Array]:
+    """The machine when its fastest body has turned on by a radian, and the positions (X,) then."""
+    machine, fastest = found.machine, found.machine.screws.fastest
+    later = TURNED / fastest if fastest else 0.0
+    return replace(machine, time=machine.time + later), carried(machine.place, machine.screws, found.x, later)
+
+
+def _require_lasting(found: Steady) -> None:
+    """InputError where the rows do not hold as the bodies move on in their screws."""
+    machine, x = _later(found)
+    about = matrices(machine, x, found.about.lam)
+    size = sizes_of(machine.system)
+    opened = np.abs(about.Phi)
+    turned = np.abs(about.jacobian @ (found.Z / np.abs(found.Z / size[:, None]).max(axis=0, initial=1e-300))).max(
+        axis=1, initial=0.0
+    )
+    bad = np.maximum(opened, turned)
+    if bad.max(initial=0.0) <= OPENS * max(1.0, float(size.max())):
+        return
+    names = [block.name for block in machine.system.blocks for _ in block.words]
+    worst = int(np.argmax(bad[: len(names)])) if names else 0
+    raise InputError(
+        f"no steady motion: with every body turning on at a constant speed, {names[worst]!r} does not hold; a machine whose "
+        "bodies do not all turn evenly, about axes that stay, has a periodic motion: `periodic`"
+    )
+
+
+def _varying(found: Steady) -> float:
+    """How much forces and stiffness change over a radian, relative."""
+    machine, x = _later(found)
+    if machine.time == found.machine.time:
+        return 0.0
+    first, Z = found.about, found.Z
+    again = matrices(machine, x, np.zeros_like(first.lam))
+    again = matrices(machine, x, _multipliers(again, again.forces))
+    K, there = Z.T @ first.K @ Z, Z.T @ again.K @ Z
+    scale = np.sqrt(np.abs(np.diag(K)) + machine.screws.fastest**2)
+    by_stiffness = np.abs((there - K) / np.outer(scale, scale)).max(initial=0.0)
+    by_forces = np.abs(Z.T @ (again.forces - first.forces)).max(initial=0.0) / _size_of_forces(found)
+    return float(max(by_stiffness, by_forces))

@@ -1,0 +1,72 @@
+"""Transfer functions of a linear system, part by part of its modes, and its response to noise.
+
+    H(i w) = C (i w - A)^-1 B + D = D + sum_k (C r_k) (l_k B) / (l_k r_k (i w - lambda_k))
+
+for right and left eigenvectors r_k, l_k of A. A stationary noise with the one-sided density S(f) at the input has the density
+|H|^2 S at an output, and its root mean square is the root of the integral over f. (Preumont 1994, Random Vibration, ch. 5.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eig
+
+from ffr_prep.common.arrays import Array
+
+POINTS, AROUND = 400, 41  # frequencies of a band, and those around each resonance
+BESIDE = 1e-3  # of an undamped frequency, as wide as its resonance is taken
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """frequencies (F,) [Hz];  H (F, O) of O outputs to one input;  parts (F, O, K) of it by the modes numbered `modes` (K,),
+    of each pair the eigenvalue (K,) [1/s] with the positive frequency in `values`."""
+
+    frequencies: Array
+    H: Array
+    parts: Array
+    modes: Array
+    values: Array
+
+
+def transfer(A: Array, B: Array, C: Array, D: Array, frequencies: Array, count: int) -> Transfer:
+    """From the input of B (S, 1) to the outputs of C (O, S); with the parts of the `count` modes that do most."""
+    s = 2j * np.pi * frequencies
+    one = np.eye(len(A))
+    H = np.array([(C @ np.linalg.solve(at * one - A, B) + D)[:, 0] for at in s]).reshape(s.size, len(C))
+    values, left, right = eig(A, left=True, right=True)
+    scale = np.einsum("sk,sk->k", left.conj(), right)
+    chosen = np.flatnonzero((values.imag > 0) & (np.abs(scale) > 1e-12))
+    residues = (C @ right[:, chosen]) * (left[:, chosen].conj().T @ B)[:, 0] / scale[chosen]
+    pole = s[:, None, None] - values[chosen]
+    twin = s[:, None, None] - values[chosen].conj()
+    parts = residues / pole + residues.conj() / twin
+    size = np.abs(parts).max(axis=(0, 1), initial=0.0) / np.maximum(np.abs(H).max(initial=0.0), 1e-300)
+    most = np.sort(np.argsort(-size, kind="stable")[:count])
+    most = most[np.argsort(np.abs(values[chosen][most]), kind="stable")]
+    return Transfer(frequencies, H, parts[:, :, most], chosen[most], values[chosen][most])
+
+
+def band(values: Array, low: float | None = None, high: float | None = None) -> Array:
+    """(F,) [Hz] evenly spaced by their logarithms from low to high, and close to every eigenvalue (m,) [1/s] in between.
+
+    By default from a tenth of the lowest frequency to three times the sixth, or the highest if there are fewer.
+    """
+    own = np.sort(np.abs(values[np.abs(values.imag) > 0])) / (2 * np.pi)
+    first = low if low is not None else (own[0] / 10 if own.size else 0.1)
+    last = high if high is not None else (3 * own[::2][:6][-1] if own.size else 100.0)
+    points = [np.geomspace(first, max(last, first * (1 + 1e-9)), POINTS)]
+    angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, AROUND + 2)[1:-1]
+    for value in values[values.imag > 0]:
+        width = max(abs(value.real), BESIDE * abs(value.imag) if value.real == 0 else 0.0, 1e-9 * abs(value.imag))
+        points.append((abs(value.imag) + width * np.tan(angles)) / (2 * np.pi))
+    found = np.unique(np.concatenate(points))
+    return found[(found >= first) & (found <= last)]
+
+
+def mean_square(frequencies: Array, density: Array) -> Array:
+    """(O,) integral of densities (F, O) over frequencies (F,)."""
+    found: Array = np.trapezoid(density, frequencies, axis=0)
+    return found

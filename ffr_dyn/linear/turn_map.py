@@ -1,0 +1,241 @@
+"""Periodic motions of driven scenes: the state that a period brings back, and what becomes of small deviations from it.
+
+With P the map of a state over one period by the compiled loop, and deviations in minimal coordinates
+(`ffr_dyn.consistency.tangent`), a periodic motion is a fixed point s = P(s). A motion that settles is found by
+Anderson's mixing of successive periods, which for a linear map is GMRES on s - P(s) = 0 and needs about as many
+periods as there are deviations that decay slowly; what does not settle by itself is found by Newton's method, whose
+matrix, of differences, is the monodromy matrix. Its eigenvalues are Floquet's multipliers: small motions grow where
+one is larger than one. (Walker & Ni, SIAM J. Numer. Anal. 49 (2011) 1715-1735; Seydel 2010.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ffr_dyn.compile.engine import fill_rows, new_engine
+from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.compile.workspace import new_record
+from ffr_dyn.consistency.evaluation import evaluate, evaluator
+from ffr_dyn.consistency.failure import failure
+from ffr_dyn.consistency.tangent import STEP, Chart, chart, sizes_of
+from ffr_dyn.equations.layout import moved, to_body_axes, to_global_axes
+from ffr_dyn.functions.rotation import rotation_matrix
+from ffr_dyn.functions.time_functions import evaluate as value_of
+from ffr_dyn.integrators import Integrator
+from ffr_dyn.integrators.stabilisation import Projection, gains
+from ffr_dyn.kernels.tables import OK, Record
+from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import ComputationError, InputError
+
+PERIODS, KEPT = 60, 12  # of the mixing: at most, and how many are mixed
+NEWTONS = 8
+CLOSED = 1e-12  # of constraints over a period: what a projection leaves open would be a kick at every return
+RETURNS = 1e-11  # of a period that ends where it began: rad, or relative to the scene; rates times the period
+STALLED = 0.7  # of a period's closing over that of KEPT periods before, from where mixing gives way to Newton's method
+DIFFERENCE = 1e-5  # the same, of the monodromy matrix; extrapolated
+LATER = 0.37  # s: when a driver is asked again whether it turns evenly
+REPEATS = 1e-7  # of the second period, the same: drivers and loads that come back
+CORRECTIONS, MET = 12, 1e-13  # of a deviation onto the constraints, and of Phi [m, -]
+AGAIN = 0.5  # rad, or the scene's size: of deviations beyond which a state does not count as come back
+
+
+@dataclass(frozen=True)
+class Turns:
+    """A compiled scene, its chart at a state, and one period [s] of `steps` steps of a method from the chart's time.
+
+    across : (V, C) motions across the free ones, M^-1 jacobian^T
+    """
+
+    near: Chart
+    across: Array
+    method: Integrator
+    period: float
+    steps: int
+
+    @property
+    def system(self) -> System:
+        return self.near.at.system
+
+    @property
+    def scale(self) -> Array:
+        """(2 d,) of deviations that count as one: those that move something by its size, and by its size in a period."""
+        steps = self.near.steps / STEP
+        return np.concatenate([steps, steps / self.period])
+
+
+def turns(system: System, time: float, x: Array, v: Array, method: Integrator, period: float) -> Turns:
+    """The map over a period; the state (x, v) meets the constraints."""
+    steps = max(1, round(period / method.step))
+    near = chart(evaluator(system), time, x, v)
+    jacobian = evaluate(near.at, time, x, v).jacobian
+    shortened: Any = method
+    return Turns(near, np.linalg.solve(near.M, jacobian.T), replace(shortened, step=period / steps), period, steps)
+
+
+def period_of(scene: Scene, time: float) -> float:
+    """[s] of a turn of the only angle that a driver turns evenly at a time [s]. InputError where there is none, or
+    several."""
+    rates = set[float]()
+    for driver in scene.drivers:
+        if isinstance(driver, Driver) and driver.coordinate == "angle":
+            now, later = (value_of(driver.function, t) for t in (time, time + LATER))
+            if now[1] and now[1:] == later[1:] and now[2] == 0:
+                rates.add(abs(now[1]))
+    if len(rates) == 1:
+        return 2 * np.pi / rates.pop()
+    what = "no driver turns a joint evenly" if not rates else "drivers turn at different speeds"
+    raise InputError(f"the period is not known: {what}; give it in seconds (period, --period)")
+
+
+def after(of: Turns, x: Array, v: Array, rows: int = 1, later: float = 0.0) -> Record:
+    """`rows` states of the period that begins at (x, v), evenly, the last at its end; or of one that begins `later` [s]."""
+    start = of.near.time + later
+    engine = new_engine(of.system, x, v, of.method, gains(Projection(CLOSED)), start=start, spacing=of.method.step)
+    record = new_record(of.system, rows)
+    status = fill_rows(engine, record, start, of.steps // rows)
+    if status != OK:
+        raise failure(of.system, engine.work, status, start)
+    return record
+
+
+def placed(of: Turns, s: Array) -> tuple[Array, Array]:
+    """(x, v) of the deviation s (2 d,): what `deviation` takes back to it, corrections being across the free motions.
+
+    Raises ComputationError where constraints cannot be met so.
+    """
+    near, place, d = of.near, of.system.layout, of.near.steps.size
+    y, V = near.Z @ s[:d], near.V + near.Z @ s[d:]
+    for _ in range(CORRECTIONS):
+        x = moved(place, near.x, y)
+        now = evaluate(near.at, near.time, x, to_global_axes(place, x, V))
+        if np.abs(now.Phi).max(initial=0.0) <= MET:
+            return x, to_global_axes(place, x, V + of.across @ _least(now.jacobian @ of.across, -now.nu))
+        y = y + of.across @ _least(now.jacobian @ of.across, -now.Phi)
+    raise ComputationError(
+        f"at t = {near.time:.6g} s the search for a periodic motion came to a state that the joints do not allow; "
+        "begin nearer"
+    )
+
+
+def _least(matrix: Array, right: Array) -> Array:
+    return np.linalg.lstsq(matrix, right, rcond=1e-12)[0]
+
+
+def deviation(of: Turns, x: Array, v: Array) -> Array:
+    """(2 d,) minimal coordinates of a state near the chart's. Raises ComputationError for one that is not near."""
+    near, place = of.near, of.system.layout
+    y, V = np.zeros(place.v_size), to_body_axes(place, x, v)
+    for b in range(len(place.n)):
+        A0, A = rotation_matrix(near.x[place.p(b)]), rotation_matrix(x[place.p(b)])
+        y[place.R_dot(b)] = A0.T @ (x[place.R(b)] - near.x[place.R(b)])
+        y[place.omega(b)] = _vector(A0.T @ A)
+        y[place.q_dot(b)] = x[place.q(b)] - near.x[place.q(b)]
+    if np.abs(y / sizes_of(of.system)).max() > AGAIN:
+        raise ComputationError(
+            f"after a period of {of.period:.6g} s the scene is not where it began: the period is not that of its drivers and "
+            "loads, or a body goes on turning; give another period"
+        )
+    return np.concatenate([near.W.T @ y, near.W.T @ (V - near.V)])
+
+
+def _vector(A: Array) -> Array:
+    """Rotation vector (3,) of a rotation of less than half a turn."""
+    axial = 0.5 * np.array([A[2, 1] - A[1, 2], A[0, 2] - A[2, 0], A[1, 0] - A[0, 1]])
+    sine, cosine = float(np.linalg.norm(axial)), 0.5 * (float(np.trace(A)) - 1)
+    return axial * (np.arctan2(sine, cosine) / sine) if sine > 0 else axial
+
+
+def mapped(of: Turns, s: Array) -> Array:
+    """(2 d,) the deviation a period later."""
+    record = after(of, *placed(of, s))
+    return deviation(of, record.x[-1], record.v[-1])
+
+
+@dataclass(frozen=True)
+class Returned:
+    """A periodic state (x, v); periods computed; by how much it does not return, relative; whether by Newton's method."""
+
+    x: Array
+    v: Array
+    periods: int
+    error: float
+    newton: bool
+
+
+def returned(of: Turns) -> Returned:
+    """The periodic state near the chart's. Raises ComputationError where there is none."""
+    s, periods, error = _mixed(of)
+    newton = not error <= RETURNS
+    if newton:
+        s, more, error = _newton(of, s)
+        periods += more
+    x, v = placed(of, s)
+    again = after(of, x, v, later=of.period)
+    apart = float(np.abs((deviation(of, again.x[-1], again.v[-1]) - s) / of.scale).max(initial=0.0))
+    if apart > max(REPEATS, 1e3 * error):
+        raise ComputationError(
+            f"what acts on the scene does not repeat itself after {of.period:.6g} s: the period after the first ends "
+            f"{apart:.2g} of the scene's size off; give a period in which drivers and loads all come back"
+        )
+    return Returned(x, v, periods + 1, error, newton)
+
+
+def _mixed(of: Turns) -> tuple[Array, int, float]:
+    """By Anderson's mixing: the deviation, how many periods, and the last closing."""
+    scale = of.scale
+    points, images, errors = list[Array](), list[Array](), list[float]()
+    s = np.zeros(scale.size)
+    for count in range(1, PERIODS + 1):
+        image = mapped(of, s * scale) / scale
+        points, images = [*points, s][-KEPT:], [*images, image][-KEPT:]
+        errors.append(float(np.abs(image - s).max(initial=0.0)))
+        if errors[-1] <= RETURNS or (count > KEPT and errors[-1] > STALLED * errors[-1 - KEPT]):
+            break
+        s = _best(np.array(points), np.array(images))
+    best = int(np.argmin(errors[-len(points) :]))
+    return points[best] * scale, len(errors), errors[-len(points) :][best]
+
+
+def _best(points: Array, images: Array) -> Array:
+    """(2 d,) where the affine map through what is known of it has the least closing, mapped once."""
+    closings = images - points
+    steps = np.diff(closings, axis=0)
+    shares = np.linalg.lstsq(steps.T, closings[-1], rcond=1e-12)[0] if len(steps) else np.zeros(0)
+    found: Array = images[-1] - shares @ np.diff(images, axis=0)
+    return found
+
+
+def monodromy(of: Turns, s: Array) -> Array:
+    """(2 d, 2 d) derivative of the map at a deviation, in units of `scale`, by extrapolated central differences."""
+    scale, columns = of.scale, []
+    for k in range(s.size):
+        step = np.zeros(s.size)
+        step[k] = DIFFERENCE * scale[k]
+        far, close = (
+            (mapped(of, s + factor * step) - mapped(of, s - factor * step)) / (2 * factor * DIFFERENCE * scale)
+            for factor in (1.0, 0.5)
+        )
+        columns.append((4 * close - far) / 3)
+    return np.array(columns).T
+
+
+def _newton(of: Turns, s: Array) -> tuple[Array, int, float]:
+    scale, periods, error = of.scale, 0, np.inf
+    for _ in range(NEWTONS):
+        closing = (mapped(of, s) - s) / scale
+        error = float(np.abs(closing).max(initial=0.0))
+        periods += 1
+        if error <= RETURNS:
+            return s, periods, error
+        M = monodromy(of, s)
+        periods += 4 * s.size
+        s = s + scale * np.linalg.lstsq(np.eye(s.size) - M, closing, rcond=1e-10)[0]
+    raise ComputationError(
+        f"no motion of period {of.period:.6g} s was found: after {NEWTONS} of Newton's steps a period still ends {error:.2g} "
+        "of the scene's size from where it began; give a period that fits drivers and loads, or begin nearer to the motion"
+    )

@@ -1,0 +1,187 @@
+"""Campbell diagrams, frequency responses, modes with names, and their commands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from test_analyses_cli import DRIVER, SCENE
+from test_dyn_plane import rod
+from test_quasi_static import rotor
+
+import ffr_dyn as fd
+from ffr_dyn.analyses.linearise import table_of_modes
+from ffr_dyn.cli import cli
+
+
+def jeffcott(internal: float = 0.0, external: float = 0.0, speed: float = 1.0) -> fd.Scene:
+    """A disc of 2 kg on a shaft of 800 N/m that turns with it, damped inside, and outside by the air."""
+    disc = fd.rigid_body("disc", mass=2.0, inertia=(0.1, 0.1, 0.2), points={"c": (0, 0, 0)})
+    hub = fd.rigid_body("hub", mass=1e-3, inertia=(1e-4, 1e-4, 1e-4), points={"c": (0, 0, 0)})
+    K, C = np.diag([800.0, 800, 8e4, 5e3, 5e3, 5e3]), np.diag([internal, internal, 0, 0, 0, 0])
+    still = np.diag([external, external, 0, 0, 0, 0])
+    return fd.Scene(
+        (fd.Body("hub", hub), fd.Body("disc", disc, omega_bar=(0, 0, speed))),
+        (fd.Joint("bearing", "revolute", "ground.O", "hub.c"),),
+        (fd.Driver("motor", "bearing", fd.polynomial(0.0, speed)),),
+        forces=(
+            fd.Bushing("shaft", "hub.c", "disc.c", K, C),
+            fd.Bushing("air", "ground.O", "disc.c", np.zeros((6, 6)), still),
+        ),
+        ground={"O": (0, 0, 0)},
+    )
+
+
+def test_critical_speeds_and_whirls_of_a_jeffcott_rotor(tmp_path):
+    """Forward and backward at sqrt(k/m) from the ground, at every speed; its critical speed is that."""
+    found = fd.campbell(jeffcott(), speeds=(0.0, 15.0, 40.0), modes=2)
+    own = np.sqrt(800 / 2)
+    seen = np.sort(found["seen"][1:], axis=1) * 2 * np.pi
+    np.testing.assert_allclose(seen, np.tile([-own, own], (2, 1)), rtol=1e-9)
+    critical = [one["speed"] for one in found.attributes["critical"]]
+    np.testing.assert_allclose(critical, own, rtol=1e-7)
+    assert {one["axes"] for one in found.attributes["critical"]} == {"ground"}
+    assert found.attributes["limits"] == []
+    assert fd.draw_campbell(found, tmp_path / "campbell.svg").stat().st_size > 1000
+
+
+def test_damping_inside_is_unstable_above_a_limit():
+    """speed < sqrt(k/m) (1 + c_external / c_internal), nearly, of small damping."""
+    found = fd.campbell(jeffcott(0.4, 0.2), speeds=(5.0, 26.0, 47.0), modes=2)
+    (limit,) = found.attributes["limits"]
+    assert limit["speed"] == pytest.approx(np.sqrt(800 / 2) * 1.5, rel=1e-4)
+    unstable = fd.steady(jeffcott(0.4, 0.2), speeds=(20.0, 40.0))
+    assert not unstable.attributes["stable"]
+    assert "unstable" in unstable.attributes["notes"][-1]
+
+
+def test_modes_have_names_and_free_spins_are_no_vibrations():
+    speed = 100.0
+    scene = fd.Scene(
+        (fd.Body("rod", rod("rod", 0.8, stiffening=True), omega_bar=(0, 0, speed)),),
+        (fd.Joint("hinge", "revolute", "ground.O", "rod.a"),),
+        ground={"O": (0, 0, 0)},
+    )
+    found = fd.linearise(fd.scene_at(scene, fd.steady(scene)))
+    assert (found.free, found.error) == (2, 0.0)
+    assert found.leading[0] == "hinge.angle"
+    assert {"rod: first bending, y", "rod: first bending, z"} <= set(found.leading)
+    lines = table_of_modes(found)
+    assert "free" in lines[0]
+    assert not any("whirl" in line for line in lines)
+    assert fd.linearise(rotor(speed, stiffening=True)).driven == ("motor",)
+
+
+def test_a_mode_moves_through_a_period():
+    found = fd.linearise(rotor(0.0, stiffening=True))
+    motion = fd.mode_motion(found, 0)
+    assert motion.time[-1] == pytest.approx(2 * np.pi / abs(found.eigenvalues[0].imag))
+    np.testing.assert_allclose(motion["rod.q"][0], motion["rod.q"][-1], atol=1e-12)
+    assert np.ptp(motion["rod.b.position"], axis=0).max() > 1e-3
+
+
+def test_the_response_of_a_clamped_beam_and_its_parts():
+    """The parts of all modes add up, at rest to the flexibility; noise by the closed form of one mode."""
+    beam = fd.Body("rod", rod("rod", 0.8), damping=0.02)
+    scene = fd.Scene((beam,), (fd.Joint("clamp", "fixed", "ground.O", "rod.a"),), ground={"O": (0, 0, 0)})
+    found = fd.response(
+        scene,
+        input="rod.b.force.y",
+        outputs=["rod.b.position.y", "rod.b.acceleration"],
+        psd=((1.0, 0.5), (4000.0, 0.5)),
+    )
+    H = found["transfer"] @ [1, 1j]
+    parts = (found["parts"] @ [1, 1j]).sum(axis=2)
+    np.testing.assert_allclose(parts[:, 0], H[:, 0], atol=1e-5 * np.abs(H[:, 0]).max())
+    load = fd.Load("push", "rod.b", force=(0, 1e-3, 0))
+    bent = fd.static(replace(scene, loads=(load,)))["rod.b.position"][0, 1] / 1e-3
+    assert found["gain"][0, 0] == pytest.approx(bent, rel=1e-2)
+    linear = fd.linearise(scene)
+    peak = 2 * np.pi * found["frequency"][np.argmax(found["gain"][:, 0])]
+    first = np.argmin(np.abs(linear.eigenvalues - 1j * peak))
+    omega, zeta = np.abs(linear.eigenvalues[first]), linear.damping_ratios[first]
+    share = np.abs(H[:, 0]).max() * 2 * zeta * omega**2
+    rms = np.sqrt(0.5 / 4 * share**2 / (2 * zeta * omega**3) * 2 / 2)
+    assert found.attributes["rms"]["rod.b.position.y"] == pytest.approx(rms, rel=0.02)
+    assert found.attributes["outputs"][1:] == [f"rod.b.acceleration.{c}" for c in "xyz"]
+
+
+def test_what_stands_on_a_shaking_base_is_moved_with_it():
+    """At a low frequency the transmissibility is one; at the resonance of a sprung mass sqrt(1 + 4 z^2) / 2 z."""
+    mass = fd.rigid_body("m", mass=2.0, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
+    spring = fd.JointSpring("spring", "rail", stiffness=50.0, damping=2.0, coordinate="stroke")
+    scene = fd.Scene(
+        (fd.Body("m", mass),),
+        (fd.Joint("rail", "translational", "ground.O", "m.c", axis=(1, 0, 0)),),
+        forces=(spring,),
+        ground={"O": (0, 0, 0)},
+    )
+    omega, zeta = 5.0, 2.0 / (2 * 2.0 * 5.0)
+    found = fd.response(scene, input="base.x", outputs=["m.c.acceleration.x"], frequencies=[1e-4, omega / (2 * np.pi)])
+    np.testing.assert_allclose(found["gain"][:, 0], [1.0, np.sqrt(1 + 4 * zeta**2) / (2 * zeta)], rtol=1e-6)
+
+
+def test_a_moment_takes_the_place_of_a_driver_and_holds_what_it_held():
+    """A hinged rod under its weight that a motor holds at 0.3 rad: J theta'' = m g l/2 sin theta theta + moment."""
+    scene = fd.Scene(
+        (fd.Body("rod", fd.rigid_body("rod", mass=1.0, inertia=(0.01, 1 / 3, 1 / 3), centre_of_mass=(1, 0, 0),
+                                      points={"a": (0, 0, 0), "b": (2, 0, 0)})),),
+        (fd.Joint("hinge", "revolute", "ground.O", "rod.a"),),
+        (fd.Driver("motor", "hinge", 0.3),),
+        ground={"O": (0, 0, 0)},
+        gravity=(0, -9.81, 0),
+    )  # fmt: skip
+    w = 7.0
+    found = fd.response(scene, input="motor.moment", outputs=["hinge.angle"], frequencies=[w / (2 * np.pi)])
+    assert found["gain"][0, 0] == pytest.approx(1 / (4 / 3 * w**2 + 9.81 * np.sin(0.3)), rel=1e-6)
+
+
+def test_a_state_space_is_that_of_scipy():
+    found = fd.linearise(
+        rotor(0.0, stiffening=False, drivers=()), inputs=(fd.JointEffort("m", "hinge"),), outputs=("hinge.angle",)
+    )
+    space = found.to_statespace()
+    np.testing.assert_array_equal(space.A, found.A)
+    assert space.D.shape == (1, 1)
+
+
+# ---- from the command line ----------------------------------------------------------------------------------------------
+
+COMMANDS = [
+    (["steady", "--speed", "0..10:3"], "speeds       0, 5, 10 rad/s"),
+    (["response", "--input", "hinge.moment", "--output", "rod.tip.acceleration", "--bode", "PICTURE"], "gain "),
+    (["periodic"], "period       3.14159265 s"),
+]
+
+
+@pytest.mark.parametrize(("words", "said"), COMMANDS, ids=[words[0] for words, _ in COMMANDS])
+def test_commands(tmp_path, words, said):
+    free = words[0] == "response"
+    file, picture = tmp_path / "rod.toml", tmp_path / "picture.png"
+    file.write_text(SCENE.replace("gravity = [0, -9.81, 0]", "") + ("" if free else DRIVER))
+    given = [str(picture) if word == "PICTURE" else word for word in words]
+    done = CliRunner().invoke(cli, [given[0], str(file), *given[1:]], catch_exceptions=False)
+    assert said in done.output
+    assert done.exit_code == 0
+    assert (tmp_path / "rod.nc").exists()
+    assert picture.exists() == ("PICTURE" in words)
+
+
+KINDS = {
+    "steady": 'speeds = ["0..10:3"]',
+    "campbell": 'speeds = ["0..10:3"]\nturn = "motor"\norders = ["1", "2"]',
+    "response": 'input = "motor.moment"\nquantities = ["rod.tip.position"]\nabout = "steady"\nband = "1..3"',
+    "periodic": "period = 3.0\nfloquet = true",
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_scene_file_holds_them_there_and_back(tmp_path, kind):
+    file = tmp_path / "rod.toml"
+    text = SCENE.replace('[analysis]\nend = 0.5\noutput_step = 0.05\nstep = 0.005\nmethod = "rk4"\n', "")
+    file.write_text(f'{text}{DRIVER}[analysis]\nkind = "{kind}"\n{KINDS[kind]}\n')
+    scene, settings = fd.load_scene(file)
+    fd.save_scene(scene, settings, tmp_path / "again.toml")
+    assert fd.load_scene(tmp_path / "again.toml")[1] == settings

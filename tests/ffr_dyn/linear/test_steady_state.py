@@ -1,0 +1,138 @@
+"""Steady motions: closed forms, the equations of motion, and what is none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_analyses_kinematic import bar, slider_crank
+from test_quasi_static import rotor
+
+import ffr_dyn as fd
+from ffr_dyn.consistency.assemble import assemble, in_space
+from ffr_dyn.consistency.evaluation import evaluate, evaluator
+from ffr_dyn.consistency.tangent import chart, state_matrix
+from ffr_dyn.equations.layout import to_body_axes
+from ffr_dyn.linear.eigen import eigen
+from ffr_dyn.linear.matrices import reduced
+from ffr_dyn.linear.matrices import state_matrix as steady_matrix
+from ffr_dyn.linear.steady_state import carried, screws_of, steady_here, steady_state
+
+
+def governor(speed: float, length: float = 1.0) -> fd.Scene:
+    """A bar on a hinge across a vertical spindle that turns: it swings out, cos(angle) = m g l / 2 dJ speed^2, dJ
+    across less along."""
+    spindle = fd.rigid_body("spindle", mass=1.0, inertia=(0.1, 0.1, 0.1), points={"o": (0, 0, 0), "pin": (0, 0, 0)})
+    out = fd.Body("arm", bar("arm", length), rotation=(0, 0.5, 0))
+    joints = (
+        fd.Joint("bearing", "revolute", "ground.O", "spindle.o"),
+        fd.Joint("pin", "revolute", "spindle.pin", "arm.a", axis=(0, 1, 0)),
+    )
+    motor = fd.Driver("motor", "bearing", fd.polynomial(0.0, speed))
+    return fd.Scene(
+        (fd.Body("spindle", spindle), out), joints, (motor,), ground={"O": (0, 0, 0)}, gravity=(0, 0, -9.81)
+    )
+
+
+def test_a_governor_swings_out_and_vibrates_as_it_should():
+    """At the angle a from the vertical, J_across theta'' = -speed^2 sin^2 a (J_across - J_along) theta."""
+    speed = 6.0
+    found = steady_state(assemble(in_space(governor(speed))), 0.0)
+    tip = fd.steady(governor(speed))["arm.b.position"][0]
+    across, along = 1 / 3, 0.01 / 12  # moments of inertia
+    cosine = 0.5 * 9.81 / speed**2 / (across - along)
+    assert -tip[2] == pytest.approx(cosine, rel=1e-8)
+    values = eigen(*(lambda of: (of.K, of.C))(reduced(found))).values
+    assert np.abs(values.imag).max() == pytest.approx(
+        speed * np.sqrt((1 - cosine**2) * (across - along) / across), rel=1e-8
+    )
+    assert found.notes == ()
+    hanging = fd.steady(
+        replace(
+            governor(speed), bodies=(governor(speed).bodies[0], fd.Body("arm", bar("arm", 1.0), rotation=(0, 1.5, 0)))
+        )
+    )
+    assert not hanging.attributes["stable"]
+    assert "pin.angle grows" in hanging.attributes["notes"][-1]
+
+
+@pytest.mark.parametrize("stiffening", [False, True], ids=["linear", "second order"])
+def test_accelerations_in_moving_axes_vanish(stiffening):
+    """By the compiled equations, beyond the first frequency."""
+    assembled = assemble(in_space(rotor(150.0, stiffening=stiffening)))
+    found, place = steady_state(assembled, 0.0), assembled.system.layout
+    now = evaluate(evaluator(assembled.system), 0.0, found.x, found.v)
+    left, V = now.acceleration.copy(), to_body_axes(place, found.x, found.v)
+    left[:3] -= np.cross(V[3:6], V[:3])
+    assert np.abs(left).max() < 1e-8 * max(150.0**2, np.abs(now.acceleration).max())
+    np.testing.assert_allclose(found.about.lam, now.lam, atol=1e-7 * np.abs(now.lam).max())
+
+
+def test_the_exact_state_matrix_is_that_of_differences():
+    assembled = assemble(in_space(rotor(150.0, stiffening=True)))
+    found = steady_state(assembled, 0.0)
+    near = chart(evaluator(assembled.system), 0.0, found.x, found.v)
+    same = replace(found, Z=near.Z)
+    A, _ = state_matrix(near)
+    exact = steady_matrix(same, reduced(same))
+    assert np.abs(A - exact).max() < 1e-5 * np.abs(exact).max()
+
+
+def test_dampers_to_the_ground_push_what_turns():
+    """A whirling mass of internal and external damping c_i, c_e: K of the turning axes has the skew part c_e Omega."""
+    c, speed = 4.0, 30.0
+    disc = fd.rigid_body("disc", mass=2.0, inertia=(0.1, 0.1, 0.2), points={"c": (0, 0, 0)})
+    K, C = np.diag([800.0, 800, 800, 50, 50, 0]), np.diag([c, c, c, 0.5, 0.5, 0])
+    scene = fd.Scene(
+        (fd.Body("disc", disc, omega_bar=(0, 0, speed)),),
+        forces=(fd.Bushing("bearing", "ground.O", "disc.c", K, C),),
+        ground={"O": (0, 0, 0)},
+    )
+    assembled = assemble(in_space(scene))
+    found = steady_here(assembled.system, 0.0, assembled.x, assembled.v)
+    assert found is not None
+    across = found.about.K[:2, :2]
+    np.testing.assert_allclose(across, [[800 - 2 * speed**2, -c * speed], [c * speed, 800 - 2 * speed**2]], atol=1e-5)
+    values = eigen(*(lambda of: (of.K, of.C))(reduced(found))).values
+    expected = np.roots([2.0, c, 800.0])[0]  # of the ground, where it turns or not
+    seen = values + 1j * speed * np.array([[1], [-1]])
+    assert np.abs(seen - expected).min() < 1e-6 * abs(expected)
+
+
+def test_screws_carry_bodies():
+    place = (assembled := assemble(in_space(governor(6.0)))).system.layout
+    screws = screws_of(place, assembled.x, assembled.v)
+    turned = carried(place, screws, assembled.x, 2 * np.pi / 6.0)
+    np.testing.assert_allclose(np.abs(turned), np.abs(assembled.x), atol=1e-12)
+
+
+def test_weight_across_the_axis_is_taken_as_its_mean():
+    scene = rotor(200.0, stiffening=True)
+    plain = fd.steady(scene)["rod.q"]
+    heavy = fd.steady(replace(scene, gravity=(0, -9.81, 0)))
+    assert "means of a turn" in heavy.attributes["notes"][-1]
+    np.testing.assert_allclose(heavy["rod.q"], plain, atol=1e-9 * np.abs(plain).max())
+
+
+def test_a_crank_drive_has_no_steady_motion():
+    with pytest.raises(fd.InputError, match="does not hold"):
+        fd.steady(slider_crank(0.1, 0.3, fd.Driver("motor", "main", fd.polynomial(0.3, 5.0))))
+
+
+def test_a_friction_that_brakes_has_none_either():
+    wheel = fd.rigid_body("wheel", mass=1.0, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
+    scene = fd.Scene(
+        (fd.Body("wheel", wheel, omega_bar=(0, 0, 5.0)),),
+        (fd.Joint("hinge", "revolute", "ground.O", "wheel.c"),),
+        forces=(fd.JointSpring("drag", "hinge", damping=0.3),),
+        ground={"O": (0, 0, 0)},
+    )
+    with pytest.raises(fd.InputError, match=r"what acts along hinge\.angle speeds it up or slows it down"):
+        fd.steady(scene)
+
+
+def test_a_run_begins_in_it_and_stays():
+    how = {"end": 0.02, "output_step": 1e-3, "method": fd.RK4(5e-6), "check": False}
+    q = fd.forward(rotor(200.0, stiffening=True), begin="steady", **how)["rod.q"]
+    assert np.ptp(q, axis=0).max() < 1e-7 * np.abs(q).max()

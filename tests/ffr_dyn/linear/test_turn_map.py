@@ -1,0 +1,86 @@
+"""Periodic motions: linear oscillators in closed form, Mathieu's equation, long runs, and what has no period."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from test_analyses_kinematic import bar
+from test_dyn_plane import slider_crank as flexible_crank
+
+import ffr_dyn as fd
+from ffr_dyn.functions.time_functions import evaluate
+
+FORCED = 3.0  # rad/s
+
+
+def oscillator(damping: float = 0.4) -> fd.Scene:
+    mass = fd.rigid_body("m", mass=2.0, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
+    push = fd.Load("push", "m.c", force=(fd.harmonic(amplitude=1.5, frequency=FORCED / (2 * np.pi)), 0, 0))
+    return fd.Scene(
+        (fd.Body("m", mass),),
+        (fd.Joint("rail", "translational", "ground.O", "m.c", axis=(1, 0, 0)),),
+        forces=(fd.JointSpring("spring", "rail", stiffness=50.0, damping=damping, coordinate="stroke"),),
+        loads=(push,),
+        ground={"O": (0, 0, 0)},
+    )
+
+
+@pytest.mark.parametrize("damping", [0.4, 0.0])
+def test_the_forced_oscillation_of_a_linear_oscillator(damping):
+    """Also without damping, where no run settles."""
+    period = 2 * np.pi / FORCED
+    found = fd.periodic(oscillator(damping), period=period, method=fd.RK4(period / 1000))
+    x = found["m.R.x"]
+    H = 1.5 / (50.0 - 2 * FORCED**2 + 1j * damping * FORCED)
+    wave = H * np.exp(1j * FORCED * found.time)
+    # Of a sine or a cosine: the phase of the force is the library's.
+    fit = np.linalg.lstsq(np.stack([wave.real, wave.imag], 1), x, rcond=None)
+    assert np.hypot(*fit[0]) == pytest.approx(1.0, rel=1e-8)
+    np.testing.assert_allclose(np.stack([wave.real, wave.imag], 1) @ fit[0], x, atol=1e-9)
+
+
+def test_multipliers_of_mathieus_equation():
+    """A pendulum whose hinge shakes: theta'' + (g + a w^2 cos w t)/l theta = 0 about its rest, l = 2 L / 3."""
+    w, amplitude = 8.0, 0.4
+    shaking = fd.harmonic(amplitude=amplitude * w**2, frequency=w / (2 * np.pi))
+    scene = fd.Scene(
+        (fd.Body("rod", bar("rod", 2.0), rotation=(0, 0, -np.pi / 2)),),
+        (fd.Joint("A", "revolute", "ground.O", "rod.a"),),
+        ground={"O": (0, 0, 0)},
+        gravity=(0, -9.81, 0),
+        base_acceleration=(0, shaking, 0),
+    )
+    period = 2 * np.pi / w
+    found = fd.periodic(scene, period=period, method=fd.RK4(period / 2000), floquet=True)
+
+    def rates(t, y):
+        return [y[1], -(9.81 + evaluate(shaking, t)[0]) / (4 / 3) * y[0]]
+
+    ends = [solve_ivp(rates, (0, period), y, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1] for y in np.eye(2)]
+    expected = np.linalg.eigvals(np.array(ends).T)
+    values = [complex(*pair) for pair in found.attributes["multipliers"]]
+    np.testing.assert_allclose(sorted(np.abs(values)), sorted(np.abs(expected)), rtol=1e-6)
+    assert np.prod(values) == pytest.approx(1.0, abs=1e-7)
+
+
+def test_a_driven_machine_ends_where_a_long_run_does():
+    scene = flexible_crank(loads=())
+    found = fd.periodic(scene)
+    assert found.attributes["returns"] < 1e-10
+    step, period = found.attributes["period"] / 1000, found.attributes["period"]
+    how = {"output_step": period / 100, "method": fd.ROS3(step), "stabilisation": fd.Projection(1e-12), "check": False}
+    again = fd.forward(scene, end=period, begin="periodic", **how)
+    np.testing.assert_allclose(again["rod.q"], found["rod.q"], atol=1e-8 * np.abs(found["rod.q"]).max())
+    np.testing.assert_allclose(again["rod.q"][-1], again["rod.q"][0], atol=1e-7 * np.abs(found["rod.q"]).max())
+
+
+def test_a_period_that_is_none_is_an_error():
+    with pytest.raises(fd.InputError, match="the period is not known"):
+        fd.periodic(oscillator())
+    with pytest.raises(fd.InputError, match="positive and finite"):
+        fd.periodic(oscillator(), period=-1.0)
+    with pytest.raises(fd.ComputationError, match="not where it began"):
+        fd.periodic(flexible_crank(), period=0.013)
+    with pytest.raises(fd.ComputationError, match="does not repeat itself"):
+        fd.periodic(flexible_crank())
