@@ -74,6 +74,10 @@ _BY_MODULE = {
     "ffr_dyn.realtime.stepper": "Stepper",
     "ffr_dyn.scene_file.read": "load_scene",
     "ffr_dyn.scene_file.write": "save_scene to_toml",
+    "ffr_dyn.studies.plan": "Study load_study study",
+    "ffr_dyn.studies.sweep": "sweep",
+    "ffr_dyn.studies.table": "Table load_table",
+    "ffr_dyn.studies.draw": "plot_study",
     "ffr_dyn.chart.diagram": "Diagram measures_of work_precision",
     "ffr_dyn.chart.draw": "draw_chart",
     "ffr_dyn.chart.orders": "orders",
@@ -173,6 +177,10 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_dyn.realtime.stepper import Stepper as Stepper
     from ffr_dyn.scene_file.read import load_scene as load_scene
     from ffr_dyn.scene_file.write import save_scene as save_scene, to_toml as to_toml
+    from ffr_dyn.studies.plan import Study as Study, load_study as load_study, study as study
+    from ffr_dyn.studies.sweep import sweep as sweep
+    from ffr_dyn.studies.table import Table as Table, load_table as load_table
+    from ffr_dyn.studies.draw import plot_study as plot_study
     from ffr_dyn.chart.diagram import Diagram as Diagram, measures_of as measures_of, work_precision as work_precision
     from ffr_dyn.chart.draw import draw_chart as draw_chart
     from ffr_dyn.chart.orders import orders as orders

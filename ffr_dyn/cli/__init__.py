@@ -15,6 +15,7 @@ from ffr_dyn.cli.parts import parts
 from ffr_dyn.cli.realtime import realtime
 from ffr_dyn.cli.run import run
 from ffr_dyn.cli.stress import stress
+from ffr_dyn.cli.sweep import sweep
 from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, reserve, run_command
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.registry import load_plugin
@@ -162,7 +163,7 @@ def animate(result: Path, output: Path, scale: str, duration: float | None, colo
     click.echo(f"film     {output}")
 
 
-for command in (run, check, list_methods, stress, chart, economise, parts, realtime):
+for command in (run, check, list_methods, stress, chart, economise, parts, realtime, sweep):
     cli.add_command(command)
 
 

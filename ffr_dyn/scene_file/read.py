@@ -63,15 +63,20 @@ from ffr_prep.common.reading import reading
 WHOLE = ("name", "gravity", "ground", "base_acceleration", "plane")  # fields of a scene that are no tables of entries
 
 
-def load_scene(path: str | Path, parameters: Mapping[str, str] = {}) -> tuple[Scene, Settings | MomentSettings]:
+def load_scene(
+    path: str | Path, parameters: Mapping[str, str] = {}, bodies: Mapping[str, str | Path] = {}
+) -> tuple[Scene, Settings | MomentSettings]:
     """Read a scene file.
 
     parameters : values, as text, in place of those in the file, such as {"crank.length": "0.15"}
+    bodies     : body files in place of those in the file, by the names of the bodies
 
     Raises InputError that names the file, the entry, its value and what is expected, with the nearest known name.
     """
     with reading(path, "a scene file"):
         entry, source = _read(Path(path), parameters)
+        for name, file in bodies.items():
+            entry.bodies[name].file = Path(file)
         settings = _settings(entry.analysis, entry.outputs, source)
         return _scene(entry, source), _with_chart(settings, entry.chart, source)
 

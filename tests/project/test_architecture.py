@@ -32,7 +32,7 @@ FLOORS = {
     ),
     "ffr_dyn": (
         "functions", "scene", "variants", "equations", "kernels", "integrators", "compile", "closing", "results",
-        "consistency", "pictures", "analyses", "realtime", "scene_file", "chart", "economy", "cli",
+        "consistency", "pictures", "analyses", "realtime", "scene_file", "chart", "economy", "studies", "cli",
     ),
 }  # fmt: skip
 MOST_FLAT, MOST_IN_A_FOLDER = 12, 20

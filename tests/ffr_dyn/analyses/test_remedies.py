@@ -670,10 +670,13 @@ def test_a_text_is_raised_and_its_remedy_works(number):
     CASES[number].mended()
 
 
+UNCOVERED: dict[str, int] = {}  # texts without a case, by module: new ones are written with one
+
+
 def test_every_text_has_a_case():
     said = [message(k) for k in range(len(CASES))]
-    missing = [(m, t.pattern) for m, found in texts().items() for t in found if not any(map(t.search, said))]
-    assert missing == []
+    missing = {m: [t.pattern for t in found if not any(map(t.search, said))] for m, found in texts().items()}
+    assert {m: without for m, without in missing.items() if len(without) > UNCOVERED.get(m, 0)} == {}
 
 
 @pytest.mark.parametrize("kind", [RK4, ROS2, GeneralisedAlpha])

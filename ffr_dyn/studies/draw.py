@@ -1,0 +1,179 @@
+"""Pictures of a study: outputs over parameters, response surfaces, tornado, pairs, convergence of means."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ffr_dyn.studies.table import Table
+from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import InputError
+
+LEVELS = 20
+LIKELY = 1.96  # standard errors of a mean that hold it with 95 % probability
+FEW = 12  # values of a parameter, up to which they are thought to be chosen, and drawn as lines
+
+
+def plot_study(table: Table, folder: str | Path, outputs: Sequence[str] = ()) -> list[Path]:
+    """Draw outputs (default: all) of a study as PNG files in a folder; returns their paths.
+
+        <output>.png           over every parameter
+        <output>-surface.png   over the two parameters that it changes with most, where there are two
+        <output>-tornado.png   by how much every parameter changes it, from its least to its greatest value
+        <output>-mean.png      its mean over the first runs with 95 % confidence, and its distribution
+        pairs.png              all parameters and outputs against each other
+
+    The tornado is that of a linear fit; R^2 in its title says how linear the output is. Raises InputError for unknown names.
+    """
+    names = list(outputs) or list(table.outputs)
+    for name in names:
+        if name not in table.outputs:
+            raise InputError(f"the table has no output {name!r}; there are {', '.join(table.outputs)}")
+    varied = {name: values for name, values in _numbers(table).items() if np.ptp(values) > 0}
+    if not varied:
+        raise InputError("no parameter of the study has several values that are numbers: there is nothing to draw over")
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    return list(_drawn(table, names, varied, folder))
+
+
+def _drawn(table: Table, names: list[str], varied: dict[str, Array], folder: Path) -> Iterator[Path]:
+    for name in names:
+        done = np.isfinite(table.outputs[name])
+        y, x = table.outputs[name][done], {key: values[done] for key, values in varied.items()}
+        if y.size < 2:
+            continue
+        changes, share = tornado(x, y)
+        yield _over_parameters(folder / f"{name}.png", name, x, y)
+        yield _tornado(folder / f"{name}-tornado.png", name, changes, share)
+        yield _mean(folder / f"{name}-mean.png", name, table.outputs[name])
+        if len(x) > 1:
+            first, second = sorted(changes, key=lambda key: -abs(changes[key]))[:2]
+            if _spans(x[first], x[second]):
+                yield _surface(folder / f"{name}-surface.png", name, (first, x[first]), (second, x[second]), y)
+    yield _pairs(folder / "pairs.png", {**varied, **{name: table.outputs[name] for name in names}})
+
+
+def _numbers(table: Table) -> dict[str, Array]:
+    return {name: values for name, values in table.parameters.items() if isinstance(values, np.ndarray)}
+
+
+def tornado(parameters: dict[str, Array], y: Array) -> tuple[dict[str, float], float]:
+    """(by how much a linear fit changes from the least to the greatest value of every parameter, R^2 of the fit)."""
+    span = {name: float(np.ptp(values)) for name, values in parameters.items()}
+    columns = [(values - values.mean()) / (span[name] or 1.0) for name, values in parameters.items()]
+    A = np.column_stack([np.ones(y.size), *columns])
+    fit = np.linalg.lstsq(A, y, rcond=None)[0]
+    spread = float(((y - y.mean()) ** 2).sum())
+    share = 1.0 - float(((y - A @ fit) ** 2).sum()) / spread if spread > 0 else 1.0
+    return dict(zip(parameters, fit[1:].tolist(), strict=True)), share
+
+
+def _spans(x: Array, y: Array) -> bool:
+    """Whether points are no line, so that they can be triangulated."""
+    at = (
+        np.unique(np.column_stack([x / np.ptp(x), y / np.ptp(y)]), axis=0)
+        if np.ptp(x) and np.ptp(y)
+        else np.zeros((0, 2))
+    )
+    return len(at) > 3 and np.linalg.svd(at - at.mean(axis=0), compute_uv=False)[1] > 1e-6
+
+
+# ---- one picture ----------------------------------------------------------------------------------------------------
+
+
+def _over_parameters(path: Path, name: str, x: dict[str, Array], y: Array) -> Path:
+    from ffr_dyn.pictures.histories import PALETTE, drawing
+
+    with drawing(path, (4.4 * len(x), 3.8)) as figure:
+        for axes, (key, values) in zip(
+            figure.subplots(1, len(x), squeeze=False, sharey=True)[0], x.items(), strict=True
+        ):
+            chosen = np.unique(values)
+            if chosen.size <= FEW:
+                axes.boxplot(
+                    [y[values == one] for one in chosen],
+                    positions=chosen,
+                    widths=0.06 * np.ptp(chosen),
+                    manage_ticks=False,
+                )
+            else:
+                axes.plot(values, y, ".", color=PALETTE[0], markersize=3)
+            axes.set_xlabel(key)
+        figure.supylabel(name)
+    return path
+
+
+def _tornado(path: Path, name: str, changes: dict[str, float], share: float) -> Path:
+    from ffr_dyn.pictures.histories import PALETTE, drawing
+
+    keys = sorted(changes, key=lambda key: abs(changes[key]))
+    with drawing(path, (6.4, 1.6 + 0.4 * len(keys))) as figure:
+        axes = figure.subplots()
+        axes.barh(keys, [changes[key] for key in keys], color=[PALETTE[changes[key] < 0] for key in keys])
+        axes.axvline(0.0, color="0.3", lw=0.8)
+        axes.set(title=f"linear fit, R² = {share:.3f}", xlabel=f"change of {name}, least to greatest value")
+    return path
+
+
+def _surface(path: Path, name: str, first: tuple[str, Array], second: tuple[str, Array], y: Array) -> Path:
+    from ffr_dyn.pictures.histories import drawing
+
+    at, number = np.unique(np.column_stack([first[1], second[1]]), axis=0, return_inverse=True)
+    mean = np.bincount(number.ravel(), weights=y) / np.bincount(number.ravel())
+    with drawing(path, (6.4, 4.8)) as figure:
+        axes = figure.subplots()
+        filled = axes.tricontourf(at[:, 0], at[:, 1], mean, levels=LEVELS)
+        figure.colorbar(filled, ax=axes, label=name)
+        axes.plot(at[:, 0], at[:, 1], "k.", markersize=2)
+        axes.set(xlabel=first[0], ylabel=second[0])
+    return path
+
+
+def _mean(path: Path, name: str, y: Array) -> Path:
+    from ffr_dyn.pictures.histories import PALETTE, drawing
+
+    number, mean, error = running_mean(y)
+    with drawing(path, (9.6, 3.8)) as figure:
+        left, right = figure.subplots(1, 2)
+        left.plot(number, mean, color=PALETTE[0], label="mean")
+        left.fill_between(
+            number, mean - LIKELY * error, mean + LIKELY * error, color=PALETTE[0], alpha=0.25, label="95 %"
+        )
+        left.set(xlabel="runs", ylabel=name)
+        left.legend()
+        right.hist(y[np.isfinite(y)], bins="auto", color=PALETTE[1])
+        right.set(xlabel=name, ylabel="runs")
+    return path
+
+
+def running_mean(y: Array) -> tuple[Array, Array, Array]:
+    """(number of runs, mean of the first so many, its standard error), from two runs on; failed runs are left out."""
+    y = y[np.isfinite(y)]
+    number = np.arange(1, y.size + 1)
+    mean = np.cumsum(y) / number
+    squares = np.cumsum((y - y.mean()) ** 2) - number * (mean - y.mean()) ** 2
+    error = np.sqrt(np.maximum(squares, 0.0) / np.maximum(number - 1, 1) / number)
+    return number[1:], mean[1:], error[1:]
+
+
+def _pairs(path: Path, columns: dict[str, Array]) -> Path:
+    from ffr_dyn.pictures.histories import PALETTE, drawing
+
+    names, count = list(columns), len(columns)
+    with drawing(path, (1.8 * count + 1, 1.8 * count + 1)) as figure:
+        grid: Any = figure.subplots(count, count, squeeze=False)
+        for i, below in enumerate(names):
+            for j, along in enumerate(names):
+                axes = grid[i][j]
+                if i == j:
+                    axes.hist(columns[along][np.isfinite(columns[along])], bins=20, color=PALETTE[1])
+                else:
+                    axes.plot(columns[along], columns[below], ".", color=PALETTE[0], markersize=2)
+                axes.tick_params(labelsize=6)
+                axes.set_xlabel(along if i == count - 1 else "", fontsize=8)
+                axes.set_ylabel(below if j == 0 else "", fontsize=8)
+    return path

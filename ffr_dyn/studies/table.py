@@ -1,0 +1,188 @@
+"""The table of a study: a row for every run, appended as runs end, and a netCDF file of it all.
+
+Rows go to a journal beside the table, a line of JSON each, on the disk as they come: whatever ends a study, what was computed
+is there, and a line that was cut off is computed again. The file itself is made from all rows in the order of the
+runs, so that it does not depend on who computed what when. xarray opens it: dimension "run", parameters as coordinates.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import h5py
+import numpy as np
+
+from ffr_dyn.studies.plan import Study, mark
+from ffr_dyn.studies.runs import Row
+from ffr_prep.common.arrays import Array
+from ffr_prep.common.brief import Brief, Rows
+from ffr_prep.common.errors import InputError
+from ffr_prep.common.outputs import replacing
+from ffr_prep.common.reading import reading
+
+_HOW: dict[str, Any] = {"libver": ("v108", "v108"), "locking": False}
+RUN = "run"
+MESSAGE = "message"
+SECTION = "ffr_study"
+
+
+@dataclass(frozen=True, repr=False)
+class Table(Brief):
+    """The rows of a study.
+
+    parameters : by name, a value of every run, numbers (N,) or texts
+    outputs    : by name (N,), NaN for runs that failed or were not done
+    messages   : why a run has failed; empty for the others
+    """
+
+    parameters: Mapping[str, Any]
+    outputs: Mapping[str, Array]
+    messages: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.messages)
+
+    def __getitem__(self, name: str) -> Any:
+        found = self.outputs.get(name, self.parameters.get(name))
+        if found is None:
+            raise InputError(f"the table has no {name!r}; there are {', '.join([*self.parameters, *self.outputs])}")
+        return found
+
+    @property
+    def failed(self) -> Array:
+        """Numbers of the runs with a message."""
+        return np.flatnonzero([bool(message) for message in self.messages])
+
+    def _title(self) -> str:
+        return f"Table of {len(self)} runs, {self.failed.size} of which failed"
+
+    def _rows(self) -> Rows:
+        varied = [(name, f"{len(set(values))} values") for name, values in self.parameters.items()]
+        found = {name: y[np.isfinite(y)] for name, y in self.outputs.items()}
+        return varied + [(name, f"{y.min():.6g} to {y.max():.6g}") for name, y in found.items() if y.size]
+
+
+def table(study: Study, rows: Mapping[int, Row]) -> Table:
+    """Of the rows that there are."""
+    count = len(study.points)
+    outputs = {one.name: np.full(count, np.nan) for one in study.outputs}
+    messages = [""] * count
+    for number, row in rows.items():
+        messages[number] = row.message
+        for name, value in row.values.items():
+            outputs[name][number] = value
+    columns = {name: [point[name] for point in study.points] for name in study.parameters}
+    return Table({name: _column(values) for name, values in columns.items()}, outputs, tuple(messages))
+
+
+def _column(values: list[Any]) -> Any:
+    return values if any(isinstance(one, str) for one in values) else np.array(values, dtype=float)
+
+
+# ---- the journal ----------------------------------------------------------------------------------------------------
+
+
+def journal_of(path: str | Path) -> Path:
+    """Beside the table."""
+    return Path(f"{path}.journal")
+
+
+class Journal:
+    """Rows as they come; opened for a study, whose rows it may have already.
+
+    Raises InputError for the journal of another study.
+    """
+
+    def __init__(self, path: str | Path, study: Study) -> None:
+        self.rows: dict[int, Row] = {}
+        self._path, begun = journal_of(path), {"study": mark(study), "runs": len(study.points)}
+        sound = self._read(begun) if self._path.exists() else 0
+        self._file = open(self._path, "r+b" if self._path.exists() else "w+b")  # noqa: SIM115 - held while runs end
+        self._file.truncate(sound)
+        self._file.seek(sound)
+        if not sound:
+            self._write(begun)
+
+    def _read(self, begun: Mapping[str, Any]) -> int:
+        """The length of what is whole."""
+        sound, lines = 0, self._path.read_bytes().split(b"\n")[:-1]
+        for k, line in enumerate(lines):
+            try:
+                entry = json.loads(line)
+            except ValueError:
+                break
+            if k == 0 and entry != begun:
+                raise InputError(
+                    f"{self._path} is of another study, or of this one before it was changed: name another output, or remove "
+                    "it to begin anew"
+                )
+            if k:
+                row = Row(int(entry["run"]), entry["values"], entry["message"])
+                self.rows[row.number] = row
+            sound += len(line) + 1
+        return sound
+
+    def add(self, rows: list[Row]) -> None:
+        """Rows that are done, on the disk when this returns. Raises OSError where they cannot be kept."""
+        for row in rows:
+            self.rows[row.number] = row
+            self._write({"run": row.number, "values": dict(row.values), "message": row.message}, flush=False)
+        self._flush()
+
+    def _write(self, entry: Mapping[str, Any], flush: bool = True) -> None:
+        self._file.write(json.dumps(entry).encode() + b"\n")
+        if flush:
+            self._flush()
+
+    def _flush(self) -> None:
+        self._file.flush()
+        os.fsync(self._file.fileno())
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+
+# ---- the file -------------------------------------------------------------------------------------------------------
+
+
+def save_table(made: Table, path: str | Path) -> None:
+    """Write a table (netCDF-4), whole or not at all."""
+    with replacing(path) as part, h5py.File(part, "w", **_HOW) as file:
+        file.attrs[SECTION] = 1
+        _variable(file, RUN, np.arange(len(made), dtype=np.int64)).make_scale(RUN)
+        for name, values in {**made.parameters, **made.outputs, MESSAGE: list(made.messages)}.items():
+            data = _variable(file, name, values)
+            data.dims[0].attach_scale(file[RUN])
+            if name not in made.parameters:
+                data.attrs["coordinates"] = " ".join(made.parameters)
+            else:
+                data.attrs["parameter"] = 1
+
+
+def _variable(file: h5py.File, name: str, values: Any) -> h5py.Dataset:
+    if isinstance(values, list):
+        return file.create_dataset(name, data=[str(one) for one in values], dtype=h5py.string_dtype())
+    return file.create_dataset(name, data=values)
+
+
+def load_table(path: str | Path) -> Table:
+    """Read a table. Raises InputError for a file that is none."""
+    with reading(path, "the table of a study", OSError, KeyError), h5py.File(path, "r", locking=False) as file:
+        if SECTION not in file.attrs:
+            raise InputError(f"{path} is not the table of a study; ffr-dyn sweep writes one")
+        found = {name: _values(data) for name, data in file.items() if name not in (RUN, MESSAGE)}
+        parameters = {name: values for name, values in found.items() if "parameter" in file[name].attrs}
+        outputs = {name: values for name, values in found.items() if name not in parameters}
+        return Table(parameters, outputs, tuple(_values(file[MESSAGE])))
+
+
+def _values(data: h5py.Dataset) -> Any:
+    return list(data.asstr()[:]) if h5py.check_string_dtype(data.dtype) else data[:]

@@ -1,0 +1,215 @@
+"""Studies: every row is the run of its parameters, whatever stops a study; what is wrong is said before or in its row."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from places import ROOT
+
+import ffr_dyn as fd
+from ffr_dyn.studies.draw import running_mean, tornado
+from ffr_dyn.studies.measures import measured
+from ffr_dyn.studies.table import Journal, journal_of
+from ffr_prep.common.errors import ComputationError, InputError
+
+SCENE = """
+gravity = [0, "-g", 0]
+[parameters]
+g = 9.81
+length = 1.0
+idle = 3.0
+[analysis]
+end = 0.2
+output_step = 0.01
+step = 1e-3
+[ground]
+O = [0, 0, 0]
+[bodies.bar]
+mass = 1.0
+inertia = [0.01, 0.1, 0.1]
+centre_of_mass = ["length", 0, 0]
+points = {a = [0, 0, 0]}
+[joints.hinge]
+kind = "revolute"
+i = "ground.O"
+j = "bar.a"
+"""
+STUDY = """
+scene = "bar.toml"
+[parameters]
+g = [1, 5, 9.81]
+length = {from = 0.5, to = 2.0, count = 4}
+[outputs]
+angle = "hinge.angle: last"
+force = "hinge.force: largest"
+weight = "= force / g"
+work = "evaluations"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path) -> Path:
+    (tmp_path / "bar.toml").write_text(SCENE)
+    (tmp_path / "study.toml").write_text(STUDY)
+    return tmp_path
+
+
+def test_every_row_is_the_run_of_its_parameters(folder):
+    table = fd.sweep(folder / "study.toml", folder / "t.nc", workers=0)
+    assert len(table) == 12
+    for k in (0, 5, 11):
+        g, length = table["g"][k], table["length"][k]
+        scene, settings = fd.load_scene(folder / "bar.toml", {"g": str(g), "length": str(length)})
+        result = fd.forward(scene, **settings.span, method=settings.method, check=False)
+        force = np.linalg.norm(result["hinge.force"], axis=1).max()
+        assert table["angle"][k] == result["hinge.angle"][-1]
+        assert table["force"][k] == force
+        assert table["weight"][k] == pytest.approx(force / g, rel=1e-15)
+    read = fd.load_table(folder / "t.nc")
+    assert all(np.array_equal(read[name], table[name]) for name in ("g", "length", "angle", "force", "weight", "work"))
+    assert not journal_of(folder / "t.nc").exists()
+    assert "12 runs" in repr(table)
+
+
+def test_the_file_has_dimensions_and_coordinates(folder):
+    fd.sweep(folder / "study.toml", folder / "t.nc", workers=0)
+    with h5py.File(folder / "t.nc") as file:
+        assert file["force"].dims[0][0] == file["run"]
+        assert file["force"].attrs["coordinates"] == "g length"
+
+
+def test_a_study_that_was_stopped_goes_on_to_the_same_bits(folder):
+    """Stopped after some rows, with the last line of its journal cut off; and by workers."""
+    fd.sweep(folder / "study.toml", folder / "whole.nc", workers=0)
+
+    def stop(done: int, total: int) -> None:
+        if done >= 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fd.sweep(folder / "study.toml", folder / "t.nc", workers=0, progress=stop)
+    journal = journal_of(folder / "t.nc")
+    journal.write_bytes(journal.read_bytes()[:-7])
+    with Journal(folder / "t.nc", fd.load_study(folder / "study.toml")) as opened:
+        assert len(opened.rows) == 4
+    done: list[int] = []
+    fd.sweep(folder / "study.toml", folder / "t.nc", workers=0, progress=lambda k, total: done.append(k))
+    assert done[0] == 5
+    assert done[-1] == 12
+    assert (folder / "t.nc").read_bytes() == (folder / "whole.nc").read_bytes()
+
+
+def test_workers_make_the_same_file(folder):
+    pytest.importorskip("dask.distributed")
+    fd.sweep(folder / "study.toml", folder / "whole.nc", workers=0)
+    fd.sweep(folder / "study.toml", folder / "t.nc", workers=2)
+    assert (folder / "t.nc").read_bytes() == (folder / "whole.nc").read_bytes()
+
+
+@pytest.mark.slow
+def test_a_killed_command_goes_on(folder):
+    study = (folder / "study.toml").read_text().replace("count = 4", "count = 40")
+    (folder / "study.toml").write_text(study)
+    command = [sys.executable, "-m", "ffr_dyn.cli", "sweep", str(folder / "study.toml"), "-o", str(folder / "t.nc")]
+    command += ["--workers", "0"]
+    first = subprocess.Popen(command, cwd=ROOT)
+    while not journal_of(folder / "t.nc").exists() or len(journal_of(folder / "t.nc").read_bytes()) < 2000:
+        time.sleep(0.05)
+    first.send_signal(signal.SIGKILL)
+    first.wait()
+    subprocess.run(command, cwd=ROOT, check=True)
+    fd.sweep(folder / "study.toml", folder / "whole.nc", workers=0)
+    assert (folder / "t.nc").read_bytes() == (folder / "whole.nc").read_bytes()
+
+
+def test_a_run_that_fails_is_a_row_with_its_message(folder):
+    study = fd.study(folder / "bar.toml", {"length": [1.0, 1e400, 2.0]}, {"angle": "hinge.angle: last"})
+    table = fd.sweep(study, folder / "t.nc", workers=0)
+    assert table.failed.tolist() == [1]
+    assert "bar" in table.messages[1]
+    assert np.isnan(table["angle"][1])
+    assert np.isfinite(table["angle"][[0, 2]]).all()
+    with pytest.raises(ComputationError, match="no run has succeeded; the first says"):
+        fd.sweep(fd.study(folder / "bar.toml", {"g": [1, 2]}, {"x": "hinge.torque: last"}), folder / "u.nc", workers=0)
+
+
+@pytest.mark.parametrize(("changed", "says"), [
+    (("g = [1", "gg = [1"), "no parameter 'gg' .*did you mean 'g'"),
+    (("g = [1", "idle = [1"), "'idle' changes nothing"),
+    (("g = [1, 5, 9.81]", "g = []"), r"parameters.g = \[\]: give"),
+    (("count = 4", "count = 1000000000000"), "there cannot be 1000000000000 values"),
+    (("hinge.angle: last", "hinge.angle: lats"), "did you mean 'last'"),
+    (("hinge.angle: last", "hinge.angle"), "write it as QUANTITY"),
+    (("scene =", "scenes ="), "did you mean 'scene'"),
+    (('"bar.toml"', '"rab.toml"'), "rab.toml.* does not exist"),
+])  # fmt: skip
+def test_what_a_study_file_says_wrongly_is_named(folder, changed, says):
+    (folder / "study.toml").write_text(STUDY.replace(*changed))
+    with pytest.raises(InputError, match=says):
+        fd.load_study(folder / "study.toml")
+
+
+@pytest.mark.parametrize(("line", "says"), [
+    ("reduce rod.geo --set d=${diameter}", "no body 'bar' from a file"),
+])  # fmt: skip
+def test_lines_that_make_bodies_are_looked_at(folder, line, says):
+    with pytest.raises(InputError, match=says):
+        fd.study(folder / "bar.toml", {"diameter": [1, 2]}, {"angle": "hinge.angle: last"}, bodies={"bar": line})
+
+
+def test_the_journal_of_another_study_is_refused(folder):
+    with Journal(folder / "t.nc", fd.load_study(folder / "study.toml")):
+        pass
+    other = fd.study(folder / "bar.toml", {"g": [1, 2]}, {"angle": "hinge.angle: last"})
+    with pytest.raises(InputError, match="is of another study"):
+        fd.sweep(other, folder / "t.nc", workers=0)
+
+
+def test_pictures_are_drawn(folder):
+    table = fd.sweep(folder / "study.toml", folder / "t.nc", workers=0)
+    names = {path.name for path in fd.plot_study(table, folder / "p", ["force"])}
+    assert names == {"force.png", "force-tornado.png", "force-mean.png", "force-surface.png", "pairs.png"}
+    with pytest.raises(InputError, match="no output 'fource'"):
+        fd.plot_study(table, folder / "p", ["fource"])
+
+
+def test_a_tornado_of_a_linear_output_has_its_slopes():
+    random = np.random.default_rng(0)
+    x = {"a": random.uniform(0, 2, 50), "b": random.uniform(1, 4, 50)}
+    changes, share = tornado(x, 3 * x["a"] - x["b"] + 7)
+    assert changes["a"] == pytest.approx(3 * np.ptp(x["a"]))
+    assert changes["b"] == pytest.approx(-np.ptp(x["b"]))
+    assert share == pytest.approx(1.0)
+
+
+def test_a_running_mean_has_the_standard_errors_of_its_runs():
+    y = np.array([1.0, np.nan, 4.0, 2.0, 7.0])
+    number, mean, error = running_mean(y)
+    kept = y[np.isfinite(y)]
+    assert number.tolist() == [2, 3, 4]
+    np.testing.assert_allclose(mean, [kept[:n].mean() for n in number])
+    np.testing.assert_allclose(error, [kept[:n].std(ddof=1) / n**0.5 for n in number])
+
+
+def test_measures_are_what_they_are_called(folder):
+    scene, settings = fd.load_scene(folder / "bar.toml")
+    result = fd.forward(scene, **settings.span, method=settings.method, check=True)
+    from ffr_dyn.studies.measures import values
+
+    force = result["hinge.force"]
+    expected = {
+        "hinge.force.y: least": force[:, 1].min(), "hinge.force: greatest": force.max(),
+        "hinge.force.y: mean": force[:, 1].mean(),
+        "hinge.force: rms": np.sqrt((force**2).sum(axis=1).mean()), "hinge.force: range": np.ptp(force, axis=0).max(),
+        "hinge.angle: first": result["hinge.angle"][0], "hinge.force: error": result.attributes["errors"]["hinge.force"][0],
+    }  # fmt: skip
+    outputs = tuple(measured(f"o{k}", text) for k, text in enumerate(expected))
+    found = values(outputs, result, {})
+    np.testing.assert_allclose(list(found.values()), list(expected.values()), rtol=1e-14)
