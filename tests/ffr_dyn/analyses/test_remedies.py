@@ -21,6 +21,7 @@ import numpy as np
 import pytest
 import result_cases
 import scene_cases
+import study_cases
 from ffr_gallery.bodies import bar
 from places import ROOT
 from remedy import CLOUD, DOUBLE, DRIVEN, GROUND, HINGED, TURNING, Case, run
@@ -617,6 +618,7 @@ CASES = (
     + result_cases.CASES
     + scene_cases.CASES
     + analysis_cases.CASES
+    + study_cases.CASES
 )
 
 
