@@ -25,6 +25,7 @@ import numpy as np
 import pytest
 import result_cases
 import scene_cases
+import study_cases
 from ffr_gallery.bodies import bar
 from places import ROOT
 from remedy import CLOUD, DOUBLE, DRIVEN, GROUND, HINGED, TURNING, Case, run
@@ -734,6 +735,7 @@ CASES = (
     + result_cases.CASES
     + scene_cases.CASES
     + analysis_cases.CASES
+    + study_cases.CASES
 )
 
 
@@ -787,10 +789,13 @@ def test_a_text_is_raised_and_its_remedy_works(number):
     CASES[number].mended()
 
 
+UNCOVERED: dict[str, int] = {}  # texts without a case, by module: new ones are written with one
+
+
 def test_every_text_has_a_case():
     said = [message(k) for k in range(len(CASES))]
-    missing = [(m, t.pattern) for m, found in texts().items() for t in found if not any(map(t.search, said))]
-    assert missing == []
+    missing = {m: [t.pattern for t in found if not any(map(t.search, said))] for m, found in texts().items()}
+    assert {m: without for m, without in missing.items() if len(without) > UNCOVERED.get(m, 0)} == {}
 
 
 @pytest.mark.parametrize("kind", [RK4, ROS2, GeneralisedAlpha])

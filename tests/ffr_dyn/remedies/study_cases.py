@@ -1,0 +1,112 @@
+"""What studies say of their files, their samples and their tables."""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Callable
+from contextlib import chdir
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from unittest.mock import patch
+
+import numpy as np
+from remedy import Case
+from test_parts_command import CLAMPED
+from test_sweep import SCENE
+
+import ffr_dyn as fd
+from ffr_dyn.studies.draw import plot_study
+from ffr_dyn.studies.plan import study
+from ffr_dyn.studies.sampling import Axis, Spread, points, spaced
+from ffr_dyn.studies.table import Journal, Table, load_table
+
+p = partial
+ANGLE = {"angle": "hinge.angle: last"}
+G = {"g": [5.0, 9.81]}
+
+
+def inside(made: Callable[..., object], *given: object, **more: object) -> object:
+    """In a folder with the scenes."""
+    with TemporaryDirectory() as folder, chdir(folder):
+        Path("bar.toml").write_text(SCENE)
+        Path("strip.toml").write_text(CLAMPED)
+        return made(*given, **more)
+
+
+def asked(parameters: object, outputs: object = ANGLE, **more: object) -> Callable[[], object]:
+    return p(inside, study, "bar.toml", parameters, outputs, **more)
+
+
+def made(bodies: dict[str, str]) -> Callable[[], object]:
+    return p(inside, study, "strip.toml", {"d": [1, 2]}, {"x": "strip.tip.position.x: last"}, bodies=bodies)
+
+
+def swept(outputs: dict[str, str] = ANGLE, *, space: bool = True, another: bool = False) -> object:
+    """A sweep, on a full disk, or to the place of another one that has begun."""
+
+    def sweep() -> object:
+        if another:
+            with Journal("t.nc", study("bar.toml", {"g": [1, 2]}, ANGLE)):
+                pass
+        full = patch.object(Journal, "add", side_effect=OSError(errno.ENOSPC, "No space left on device"))
+        with full if not space else patch.object(Path, "cwd", Path.cwd):
+            return fd.sweep(study("bar.toml", G, outputs), "t.nc", workers=0)
+
+    return inside(sweep)
+
+
+def read(*, study: bool) -> object:
+    def load() -> Table:
+        scene, settings = fd.load_scene("bar.toml")
+        fd.forward(scene, **settings.span, method=settings.method, check=False, path="run.nc")
+        fd.sweep(fd.study("bar.toml", G, ANGLE), "table.nc", workers=0)
+        return load_table("table.nc" if study else "run.nc")
+
+    return inside(load)
+
+
+def drawn(values: object, *outputs: str) -> object:
+    table = Table({"g": values}, {"angle": np.array([1.0, 2.0, 4.0])}, ("", "", ""))
+    return inside(plot_study, table, "pictures", outputs)
+
+
+def sampled(spread: Spread, **more: object) -> object:
+    return points({"x": spread}, **{"samples": 4, **more})
+
+
+TABLE = Table({"g": [1.0]}, {"angle": np.ones(1)}, ("",))
+NORMAL = Spread("normal", (0.0, 1.0))
+NUMBERS = np.array([1.0, 2.0, 3.0])
+LINE = "reduce-structure d.toml --set d=${d}"
+SHORT, LONG = Axis((1, 2)), Axis((1, 2, 3))
+FULL = {name: spaced(0, 1, 1000) for name in "abcd"}
+CASES = [
+    Case(asked({}), asked(G)),
+    Case(asked(G, {}), asked(G)),
+    Case(asked({"g": []}), asked(G)),
+    Case(asked({"g": {"from": 1, "to": 2, "count": 3, "spacing": "even"}}),
+         asked({"g": {"from": 1, "to": 2, "count": 3, "spacing": "log"}})),
+    Case(asked({"g h": [1]}), asked(G)),
+    Case(asked({"gg": [1]}), asked(G)),
+    Case(asked({**G, "idle": [1]}), asked(G)),
+    Case(made({"stripe": LINE}), made({"strip": LINE})),
+    Case(made({"strip": f"modes {LINE}"}), made({"strip": LINE})),
+    Case(asked(G, {"angle": "hinge.angle"}), asked(G)),
+    Case(p(spaced, 0, 1, 0), p(spaced, 0, 1, 2)),
+    Case(p(spaced, 0, 1, 2, logarithmic=True), p(spaced, 0.1, 1, 2, logarithmic=True)),
+    Case(p(points, {"a": SHORT, "b": LONG}, paired=True), p(points, {"a": SHORT, "b": SHORT}, paired=True)),
+    Case(p(points, {"x": NORMAL}), p(points, {"x": NORMAL}, samples=4)),
+    Case(p(points, FULL), p(points, {"a": NORMAL, "b": NORMAL}, samples=4)),
+    Case(p(sampled, Spread("uniform", (1.0, np.nan))), p(sampled, Spread("uniform", (1.0, 2.0)))),
+    Case(p(sampled, Spread("normal", (1.0,))), p(sampled, NORMAL)),
+    Case(p(sampled, Spread("gauss", (0.0, 1.0))), p(sampled, NORMAL)),
+    Case(p(sampled, NORMAL, sampling="random"), p(sampled, NORMAL, sampling="monte-carlo")),
+    Case(p(swept, {"x": "hinge.torque: last"}), swept),
+    Case(p(swept, space=False), swept),
+    Case(p(swept, another=True), swept),
+    Case(p(TABLE.__getitem__, "angel"), p(TABLE.__getitem__, "angle")),
+    Case(p(read, study=False), p(read, study=True)),
+    Case(p(drawn, NUMBERS, "angel"), p(drawn, NUMBERS, "angle")),
+    Case(p(drawn, ["a", "b", "c"], "angle"), p(drawn, NUMBERS, "angle")),
+]  # fmt: skip
