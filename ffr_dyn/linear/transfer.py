@@ -2,8 +2,9 @@
 
     H(i w) = C (i w - A)^-1 B + D = D + sum_k (C r_k) (l_k B) / (l_k r_k (i w - lambda_k))
 
-for right and left eigenvectors r_k, l_k of A. A stationary noise with the one-sided density S(f) at the input has the density
-|H|^2 S at an output, and its root mean square is the root of the integral over f. (Preumont 1994, Random Vibration, ch. 5.)
+for right and left eigenvectors r_k, l_k of A; where derivatives of the input act too, B and D are polynomials in i w.
+A stationary noise with the one-sided density S(f) at the input has the density |H|^2 S at an output, and its root mean
+square is the root of the integral over f. (Preumont 1994, Random Vibration, ch. 5.)
 """
 
 from __future__ import annotations
@@ -32,17 +33,21 @@ class Transfer:
 
 
 def transfer(A: Array, B: Array, C: Array, D: Array, frequencies: Array, count: int) -> Transfer:
-    """From the input of B (S, 1) to the outputs of C (O, S); with the parts of the `count` modes that do most."""
+    """From an input to the outputs of C (O, S); with the parts of the `count` modes that do most.
+
+    B (S, P), D (O, P) : shares of the input and of its first P - 1 derivatives
+    """
     s = 2j * np.pi * frequencies
-    one = np.eye(len(A))
-    H = np.array([(C @ np.linalg.solve(at * one - A, B) + D)[:, 0] for at in s]).reshape(s.size, len(C))
+    one, powers = np.eye(len(A)), s[:, None] ** np.arange(B.shape[1])
+    H = np.array([C @ np.linalg.solve(at * one - A, B @ u) + D @ u for at, u in zip(s, powers, strict=True)])
+    H = H.reshape(s.size, len(C))
     values, left, right = eig(A, left=True, right=True)
     scale = np.einsum("sk,sk->k", left.conj(), right)
     chosen = np.flatnonzero((values.imag > 0) & (np.abs(scale) > 1e-12))
-    residues = (C @ right[:, chosen]) * (left[:, chosen].conj().T @ B)[:, 0] / scale[chosen]
+    seen, fed = C @ right[:, chosen] / scale[chosen], left[:, chosen].conj().T @ B
     pole = s[:, None, None] - values[chosen]
     twin = s[:, None, None] - values[chosen].conj()
-    parts = residues / pole + residues.conj() / twin
+    parts = seen * (powers @ fed.T)[:, None] / pole + seen.conj() * (powers @ fed.conj().T)[:, None] / twin
     size = np.abs(parts).max(axis=(0, 1), initial=0.0) / np.maximum(np.abs(H).max(initial=0.0), 1e-300)
     most = np.sort(np.argsort(-size, kind="stable")[:count])
     most = most[np.argsort(np.abs(values[chosen][most]), kind="stable")]

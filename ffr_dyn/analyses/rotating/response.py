@@ -16,6 +16,7 @@ from ffr_dyn.analyses.rotating.steady import steady
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
+from ffr_dyn.linear.prescribed import prescribed
 from ffr_dyn.linear.transfer import Transfer, band, mean_square, transfer
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.result import Axis, Quantity, Result
@@ -27,6 +28,7 @@ from ffr_prep.common.errors import InputError
 About = Literal["start", "equilibrium", "steady"]
 PARTS = 12
 COMPONENTS = "xyz"
+EFFORTS = {"angle": "moment", "stroke": "force"}
 SHARE = 0.01  # of a gain by one mode, from where it is told; outputs of rounding have more than its inverse
 
 
@@ -41,7 +43,7 @@ class Response(OfMoment):
     input: str = field(
         default="",
         metadata=option(
-            "--input", "joint.moment, joint.force, body.point.force.x, driver.moment, base.x, or a load.",
+            "--input", "joint.moment, joint.force, body.point.force.x, driver.moment, driver.angle, base.x, or a load.",
             metavar="NAME", required=True,
         ),
     )  # fmt: skip
@@ -111,7 +113,8 @@ def response(
     """How outputs of a scene answer a small harmonic input, a row for every frequency.
 
     input    : an effort, the name of a load (one doubles it), or in words: "joint.moment" or "joint.force" along a joint
-               coordinate, "driver.moment" in the place of a driver, which then holds what it held, "body.point.force.x" or
+               coordinate, "driver.moment" in the place of a driver, which then holds what it held, "driver.angle" or
+               "driver.stroke", a change of what a driver prescribes, "body.point.force.x" or
                ".moment.z" at a marker, "base.x", an acceleration of the base
     outputs  : quantities ("rod.tip.acceleration": its components) or components; with a base as input, accelerations
     of markers
@@ -129,16 +132,20 @@ def response(
     Raises InputError for inputs and outputs that do not exist.
     """
     require_scene(scene)
-    free, effort = _fed(_about(scene, about, time), input, time)
-    linear = linearise(free, time=time, inputs=(effort,), outputs=_components(free, outputs, time))
+    at = _about(scene, about, time)
+    acts, moved = _moved(at, input)
+    free, effort = _fed(at, acts, time)
+    linear = linearise(free, time=time, inputs=(effort,), outputs=(*_components(free, outputs, time), *moved))
+    linear = _by_motion(linear, at, time) if moved else linear
     absolute = [float(_is_absolute(effort, name)) for name in linear.outputs]
     D = linear.D + np.array(absolute)[:, None]
     low, high = band_of if band_of else (None, None)
     if psd and not band_of:
         low, high = (min(f for f, _ in psd) or None), max(f for f, _ in psd)
-    at = np.array(frequencies, float) if len(frequencies) else band(linear.eigenvalues, low, high)
-    found = transfer(linear.A, linear.B, linear.C, D, at, PARTS)
-    result = _as_result(scene, linear, found, effort, tuple(psd), time)
+    f = np.array(frequencies, float) if len(frequencies) else band(linear.eigenvalues, low, high)
+    found = transfer(linear.A, linear.B, linear.C, D, f, PARTS)
+    told = str(input) if moved or isinstance(effort, str) else _told(effort)
+    result = _as_result(scene, linear, found, told, tuple(psd), time)
     if path is not None:
         save_result(result, path)
     return result
@@ -152,6 +159,25 @@ def _about(scene: Scene, about: About, time: float) -> Scene:
     return scene_at(scene, static(scene, time=time) if about == "equilibrium" else steady(scene, time=time))
 
 
+def _moved(scene: Scene, given: str | Effort) -> tuple[str | Effort, tuple[str, ...]]:
+    """Of a driver's motion, the effort that stands in its place and the coordinate that it moves; else what is given."""
+    for driver in scene.drivers:
+        if isinstance(driver, Driver) and given == f"{driver.name}.{driver.coordinate}":
+            return f"{driver.name}.{EFFORTS[driver.coordinate]}", (f"{driver.joint}.{driver.coordinate}",)
+    return given, ()
+
+
+def _by_motion(free: Linearisation, held: Scene, time: float) -> Linearisation:
+    """The scene under the motion of a driver, from that without the driver, whose coordinate is its last output: B and D of
+    the motion and its two derivatives."""
+    A, B, C, D = prescribed(free.A, free.B, free.C[:-1], free.D[:-1], free.C[-1])
+    own, words = np.zeros(0, complex), tuple[str, ...]()
+    if len(A):
+        of_held = linearise(held, time=time)
+        own, words = of_held.eigenvalues, of_held.leading
+    return replace(free, A=A, B=B, C=C, D=D, eigenvalues=own, leading=words, outputs=free.outputs[:-1])
+
+
 def _fed(scene: Scene, given: str | Effort, time: float) -> tuple[Scene, str | Effort]:
     """The scene with the input free to act, and the input."""
     if not isinstance(given, str) or given in BASE or given in [load.name for load in scene.loads]:
@@ -159,7 +185,7 @@ def _fed(scene: Scene, given: str | Effort, time: float) -> tuple[Scene, str | E
     head, _, what = given.partition(".")
     drivers = {d.name: d for d in scene.drivers if isinstance(d, Driver)}
     joints = {joint.name for joint in scene.joints}
-    kinds = {"moment": "angle", "force": "stroke"}
+    kinds = {effort: coordinate for coordinate, effort in EFFORTS.items()}
     if head in drivers and kinds.get(what) == drivers[head].coordinate:
         return _released(scene, drivers[head], time), JointEffort(
             "input", drivers[head].joint, drivers[head].coordinate
@@ -171,9 +197,9 @@ def _fed(scene: Scene, given: str | Effort, time: float) -> tuple[Scene, str | E
         direction = tuple(float(c == rest) for c in COMPONENTS)
         return scene, MarkerEffort("input", marker, direction, moment=".moment." in given)
     raise InputError(
-        f"input {given!r} is not understood: write joint.moment, joint.force, driver.moment, body.point.force.x, "
-        f"body.point.moment.x, base.x, or the name of a load; joints are {', '.join(sorted(joints)) or 'none'}, drivers "
-        f"{', '.join(drivers) or 'none'}"
+        f"input {given!r} is not understood: write joint.moment, joint.force, driver.moment, driver.angle, driver.stroke, "
+        "body.point.force.x, body.point.moment.x, base.x, or the name of a load; "
+        f"joints are {', '.join(sorted(joints)) or 'none'}, drivers {', '.join(drivers) or 'none'}"
     )
 
 
@@ -213,7 +239,7 @@ def _is_absolute(effort: str | Effort, name: str) -> bool:
 
 
 def _as_result(
-    scene: Scene, linear: Linearisation, found: Transfer, effort: str | Effort, psd: tuple[Any, ...], time: float
+    scene: Scene, linear: Linearisation, found: Transfer, told: str, psd: tuple[Any, ...], time: float
 ) -> Result:
     outputs = Axis("of", tuple(name.replace(".", " ") for name in linear.outputs))
     names = _mode_names(linear, found)
@@ -240,7 +266,7 @@ def _as_result(
         **described(scene),
         "analysis": "frequency response",
         "method": "linearised",
-        "input": effort if isinstance(effort, str) else _told(effort),
+        "input": told,
         "outputs": list(linear.outputs),
         "modes": names,
         "notes": [*linear.notes, *_undamped(found, psd)],

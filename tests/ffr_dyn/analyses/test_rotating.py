@@ -151,6 +151,60 @@ def test_what_stands_on_a_shaking_base_is_moved_with_it():
     np.testing.assert_allclose(found["gain"][:, 0], [1.0, np.sqrt(1 + 4 * zeta**2) / (2 * zeta)], rtol=1e-6)
 
 
+def test_what_a_driver_moves_follows_it():
+    """A disc on a spring and a damper on a shaft that a motor turns: (k + i w c) / (k + i w c - J w^2), at the shaft one."""
+    disc = fd.rigid_body("disc", mass=1.0, inertia=(0.1, 0.1, 0.2), points={"c": (0, 0, 0)})
+    spring = fd.JointSpring("spring", "coupling", stiffness=80.0, damping=0.5)
+    scene = fd.Scene(
+        (fd.Body("shaft", disc), fd.Body("disc", disc)),
+        (
+            fd.Joint("bearing", "revolute", "ground.O", "shaft.c"),
+            fd.Joint("coupling", "revolute", "shaft.c", "disc.c"),
+        ),
+        (fd.Driver("motor", "bearing", 0.0),),
+        forces=(spring,),
+        ground={"O": (0, 0, 0)},
+    )
+    f = np.array([0.0, 1.0, 3.2, 20.0])
+    names = ["disc.omega_bar.z", "coupling.angle", "bearing.angle"]
+    found = fd.response(scene, input="motor.angle", outputs=names, frequencies=f)
+    w = 2 * np.pi * f
+    follows = (80 + 0.5j * w) / (80 + 0.5j * w - 0.2 * w**2)
+    expected = np.stack([1j * w * follows, follows - 1, np.ones(f.size)], axis=1)
+    np.testing.assert_allclose(found["transfer"] @ [1, 1j], expected, rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(found["parts"][:, 1, 0] @ [1, 1j], follows, rtol=1e-7)
+    assert found.attributes["input"] == "motor.angle"
+    assert found.attributes["modes"] == ["coupling.angle"]
+    alone = replace(scene, bodies=scene.bodies[:1], joints=scene.joints[:1], forces=())
+    np.testing.assert_allclose(
+        fd.response(alone, input="motor.angle", outputs=["shaft.omega_bar.z"], frequencies=f)["gain"][:, 0], w
+    )
+
+
+def test_the_rms_of_noise_is_that_of_a_long_run_within_its_confidence_interval():
+    """The mean square of a Gaussian record of T has the variance 1/T times the integral of the squared density."""
+    level, T, low, high = 3.0, 1000.0, 0.2, 3.0
+    mass = fd.rigid_body("m", mass=2.0, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
+    scene = fd.Scene(
+        (fd.Body("m", mass),),
+        (fd.Joint("rail", "translational", "ground.O", "m.c", axis=(1, 0, 0)),),
+        forces=(fd.JointSpring("spring", "rail", stiffness=50.0, damping=2.0, coordinate="stroke"),),
+        ground={"O": (0, 0, 0)},
+    )
+    found = fd.response(scene, input="rail.force", outputs=["rail.stroke"], psd=((low, level), (high, level)))
+    rms, density = found.attributes["rms"]["rail.stroke"], found["density"][:, 0]
+    variance = np.trapezoid(density**2, found["frequency"]) / T
+    half = 1.96 * np.sqrt(variance) / (2 * rms**2)
+    f, random = np.arange(low, high, 1 / T), np.random.default_rng(5)
+    a, b = random.normal(scale=np.sqrt(level / T), size=(2, f.size))
+    t = np.arange(0.0, T + 20.1, 0.02)
+    angle = 2 * np.pi * f * t[:, None]
+    push = fd.Load("push", "m.c", force=(fd.recorded(t, np.cos(angle) @ a + np.sin(angle) @ b), 0, 0))
+    run = fd.forward(replace(scene, loads=(push,)), end=T + 20, output_step=0.02, method=fd.RK4(0.01), check=False)
+    assert half < 0.06
+    assert abs(np.sqrt(np.mean(run["rail.stroke"][run.time > 20.0] ** 2)) / rms - 1) < half
+
+
 def test_a_moment_takes_the_place_of_a_driver_and_holds_what_it_held():
     """A hinged rod under its weight that a motor holds at 0.3 rad: J theta'' = m g l/2 sin theta theta + moment."""
     scene = fd.Scene(
