@@ -3,9 +3,11 @@
 With P the map of a state over one period by the compiled loop, and deviations in minimal coordinates
 (`ffr_dyn.consistency.tangent`), a periodic motion is a fixed point s = P(s). A motion that settles is found by
 Anderson's mixing of successive periods, which for a linear map is GMRES on s - P(s) = 0 and needs about as many
-periods as there are deviations that decay slowly; what does not settle by itself is found by Newton's method, whose
-matrix, of differences, is the monodromy matrix. Its eigenvalues are Floquet's multipliers: small motions grow where
-one is larger than one. (Walker & Ni, SIAM J. Numer. Anal. 49 (2011) 1715-1735; Seydel 2010.)
+periods as there are deviations that decay slowly. Most of them are computed with steps COARSER times as long, whose map Q
+finds s = Q(s) + (P - Q)(s_k) after every period of the right steps: two or three of these suffice (defect correction).
+What does not settle by itself is found by Newton's method, whose matrix, of differences, is the monodromy matrix. Its
+eigenvalues are Floquet's multipliers: small motions grow where one is larger than one. (Walker & Ni, SIAM J. Numer. Anal.
+49 (2011) 1715-1735; Stetter, Numer. Math. 29 (1978) 425-443; Seydel 2010.)
 """
 
 from __future__ import annotations
@@ -32,8 +34,15 @@ from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
+ROWS = 100  # that a period's record has, or as many as steps
 PERIODS, KEPT = 60, 12  # of the mixing: at most, and how many are mixed
 NEWTONS = 8
+COARSER, FEWEST = (
+    5,
+    100,
+)  # times the steps, of periods that correct others, and how many steps a period then has at least
+ROUGH, FINER = 1e-6, 1e-3  # closings of coarse periods: at first, and relative to the closing that they correct
+CORRECTED, FALLING = 6, 0.1  # periods that are corrected: at most, and by how much each must close better
 CLOSED = 1e-12  # of constraints over a period: what a projection leaves open would be a kick at every return
 RETURNS = 1e-11  # of a period that ends where it began: rad, or relative to the scene; rates times the period
 STALLED = 0.7  # of a period's closing over that of KEPT periods before, from where mixing gives way to Newton's method
@@ -71,6 +80,7 @@ class Turns:
 def turns(system: System, time: float, x: Array, v: Array, method: Integrator, period: float) -> Turns:
     """The map over a period; the state (x, v) meets the constraints."""
     steps = max(1, round(period / method.step))
+    steps = steps if steps < ROWS else -(-steps // ROWS) * ROWS
     near = chart(evaluator(system), time, x, v)
     jacobian = evaluate(near.at, time, x, v).jacobian
     shortened: Any = method
@@ -92,7 +102,7 @@ def period_of(scene: Scene, time: float) -> float:
     raise InputError(f"the period is not known: {what}; give it in seconds (period, --period)")
 
 
-def after(of: Turns, x: Array, v: Array, rows: int = 1, later: float = 0.0) -> Record:
+def after(of: Turns, x: Array, v: Array, *, rows: int = 1, later: float = 0.0) -> Record:
     """`rows` states of the period that begins at (x, v), evenly, the last at its end; or of one that begins `later` [s]."""
     start = of.near.time + later
     engine = new_engine(of.system, x, v, of.method, gains(Projection(CLOSED)), start=start, spacing=of.method.step)
@@ -158,47 +168,99 @@ def mapped(of: Turns, s: Array) -> Array:
 
 @dataclass(frozen=True)
 class Returned:
-    """A periodic state (x, v); periods computed; by how much it does not return, relative; whether by Newton's method."""
+    """A periodic state (x, v) and the record of its period, evenly, from after the beginning to the end; how many periods
+    were computed, coarse ones being parts of one; by how much it does not return, relative; whether by Newton's method."""
 
     x: Array
     v: Array
-    periods: int
+    record: Record
+    periods: float
     error: float
     newton: bool
 
 
 def returned(of: Turns) -> Returned:
     """The periodic state near the chart's. Raises ComputationError where there is none."""
-    s, periods, error = _mixed(of)
+    coarse = _coarser(of)
+    return (_corrected(of, coarse) if coarse else None) or _in_fine_steps(of)
+
+
+def _in_fine_steps(of: Turns) -> Returned:
+    s, _, periods, error = _mixed(of, _Known([], []), np.zeros(of.scale.size), RETURNS)
+    s = s * of.scale
     newton = not error <= RETURNS
     if newton:
         s, more, error = _newton(of, s)
         periods += more
     x, v = placed(of, s)
+    record = after(of, x, v, rows=min(ROWS, of.steps))
+    _check_repeats(of, x, v, deviation(of, record.x[-1], record.v[-1]), error)
+    return Returned(x, v, record, periods + 2, error, newton)
+
+
+def _check_repeats(of: Turns, x: Array, v: Array, image: Array, error: float) -> None:
+    """That the second period does with a state what the first does, which maps it to a deviation."""
     again = after(of, x, v, later=of.period)
-    apart = float(np.abs((deviation(of, again.x[-1], again.v[-1]) - s) / of.scale).max(initial=0.0))
+    apart = float(np.abs((deviation(of, again.x[-1], again.v[-1]) - image) / of.scale).max(initial=0.0))
     if apart > max(REPEATS, 1e3 * error):
         raise ComputationError(
             f"what acts on the scene does not repeat itself after {of.period:.6g} s: the period after the first ends "
             f"{apart:.2g} of the scene's size off; give a period in which drivers and loads all come back"
         )
-    return Returned(x, v, periods + 1, error, newton)
 
 
-def _mixed(of: Turns) -> tuple[Array, int, float]:
-    """By Anderson's mixing: the deviation, how many periods, and the last closing."""
-    scale = of.scale
-    points, images, errors = list[Array](), list[Array](), list[float]()
-    s = np.zeros(scale.size)
-    for count in range(1, PERIODS + 1):
-        image = mapped(of, s * scale) / scale
-        points, images = [*points, s][-KEPT:], [*images, image][-KEPT:]
-        errors.append(float(np.abs(image - s).max(initial=0.0)))
-        if errors[-1] <= RETURNS or (count > KEPT and errors[-1] > STALLED * errors[-1 - KEPT]):
+@dataclass(frozen=True)
+class _Known:
+    """What is known of a map: points and their images (2 d,), in units of the scale."""
+
+    points: list[Array]
+    images: list[Array]
+
+
+def _coarser(of: Turns) -> Turns | None:
+    """The map with longer steps; None where these are too few."""
+    steps, coarse = of.steps // COARSER, COARSER * of.method.step
+    method: Any = of.method
+    return replace(of, steps=steps, method=replace(method, step=coarse)) if steps >= FEWEST else None
+
+
+def _corrected(of: Turns, coarse: Turns) -> Returned | None:
+    """By defect correction; None where coarse steps do not carry it."""
+    known, shift, tolerance = _Known([], []), np.zeros(of.scale.size), ROUGH
+    periods, errors = 0.0, list[float]()
+    while len(errors) < CORRECTED:
+        try:
+            s, image, count, error = _mixed(coarse, known, shift, tolerance)
+            x, v = placed(of, s * of.scale)
+            record = after(of, x, v, rows=min(ROWS, of.steps))
+            closed = deviation(of, record.x[-1], record.v[-1]) / of.scale
+        except ComputationError:
+            return None
+        periods += 1 + count / COARSER
+        errors.append(float(np.abs(closed - s).max(initial=0.0)))
+        if errors[-1] <= RETURNS:
+            _check_repeats(coarse, x, v, image * of.scale, errors[-1])
+            return Returned(x, v, record, periods + 1 / COARSER, errors[-1], newton=False)
+        if not error <= tolerance or (len(errors) > 1 and errors[-1] > FALLING * errors[-2]):
+            return None
+        shift, tolerance = closed - image, FINER * errors[-1]
+    return None
+
+
+def _mixed(of: Turns, known: _Known, shift: Array, tolerance: float) -> tuple[Array, Array, int, float]:
+    """By Anderson's mixing, the state that the map and a shift (2 d,) bring back: its deviation and its image in units of
+    the scale, how many periods, and the last closing. What is known of the map is used, and grows."""
+    scale, errors = of.scale, list[float]()
+    while len(errors) < PERIODS:
+        points, images = np.array(known.points[-KEPT:]), np.array(known.images[-KEPT:])
+        s = _best(points, images + shift) if len(points) else np.zeros(scale.size)
+        known.points.append(s)
+        known.images.append(mapped(of, s * scale) / scale)
+        errors.append(float(np.abs(known.images[-1] + shift - s).max(initial=0.0)))
+        if errors[-1] <= tolerance or (len(errors) > KEPT and errors[-1] > STALLED * errors[-1 - KEPT]):
             break
-        s = _best(np.array(points), np.array(images))
-    best = int(np.argmin(errors[-len(points) :]))
-    return points[best] * scale, len(errors), errors[-len(points) :][best]
+    best = int(np.argmin(errors[-KEPT:])) - min(KEPT, len(errors))
+    return known.points[best], known.images[best], len(errors), errors[best]
 
 
 def _best(points: Array, images: Array) -> Array:

@@ -20,14 +20,14 @@ from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
 from ffr_dyn.integrators import ROS3, Integrator
-from ffr_dyn.linear.turn_map import Returned, Turns, after, monodromy, period_of, returned, turns
+from ffr_dyn.linear.turn_map import Returned, Turns, monodromy, period_of, returned, turns
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene, require_scene
 from ffr_prep.common.errors import InputError
 
-STEPS, ROWS = 1000, 100  # to a period, where no method is given; rows of the result
+STEPS = 1000  # to a period, where no method is given
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def periodic(
     floquet : also Floquet's multipliers, at the cost of four periods for every state variable
     outputs : names or patterns of the quantities to keep, as in `forward`
 
-    The attributes have the `period`, `periods` (how many were computed), `returns` (by how much the end is off the
+    The attributes have the `period`, `periods` (how many were computed, one of five times the steps counting as a fifth), `returns` (by how much the end is off the
     beginning, relative) and, with floquet, `multipliers` (pairs of real and imaginary parts, the largest first) and `stable`.
 
         turn = fd.periodic(engine)
@@ -85,15 +85,13 @@ def periodic(
     selected(assembled.system, outputs)
     of, found = _found(assembled, time, method, period)
     at = evaluator(assembled.system)
-    count = min(ROWS, of.steps)
-    of = replace(of, steps=of.steps // count * count) if of.steps % count else of
     first = record_states(at, np.array([time]), found.x[None], found.v[None])
-    record = with_all_reactions(assembled, joined([first, after(of, found.x, found.v, count)]))
+    record = with_all_reactions(assembled, joined([first, found.record]))
     attributes = {
         **described(scene),
         "analysis": "periodic motion",
         "method": f"{'Newton' if found.newton else 'Anderson'}'s method on turns of {type(of.method).__name__}, step "
-        f"{of.method.step:.6g} s, {found.periods} periods",
+        f"{of.method.step:.6g} s, {found.periods:.3g} periods",
         "period": of.period,
         "periods": found.periods,
         "returns": found.error,
@@ -108,7 +106,7 @@ def periodic(
 def periodically(assembled: Assembled, time: float, method: Integrator | None) -> Assembled:
     """The scene in its periodic motion at `time` [s], for a run that begins in it. Raises as `periodic`."""
     _, found = _found(assembled, time, method, None)
-    said = (*assembled.notes, f"starts in its periodic motion, found in {found.periods} periods")
+    said = (*assembled.notes, f"starts in its periodic motion, found in {found.periods:.3g} periods")
     return replace(assembled, x=found.x, v=found.v, notes=said)
 
 

@@ -68,11 +68,21 @@ def test_a_driven_machine_ends_where_a_long_run_does():
     scene = flexible_crank(loads=())
     found = fd.periodic(scene)
     assert found.attributes["returns"] < 1e-10
+    assert found.attributes["periods"] < 6
     step, period = found.attributes["period"] / 1000, found.attributes["period"]
     how = {"output_step": period / 100, "method": fd.ROS3(step), "stabilisation": fd.Projection(1e-12), "check": False}
     again = fd.forward(scene, end=period, begin="periodic", **how)
     np.testing.assert_allclose(again["rod.q"], found["rod.q"], atol=1e-8 * np.abs(found["rod.q"]).max())
     np.testing.assert_allclose(again["rod.q"][-1], again["rod.q"][0], atol=1e-7 * np.abs(found["rod.q"]).max())
+
+
+@pytest.mark.parametrize("steps", [37, 460, 1037])
+def test_rows_reach_the_end_of_the_period(steps):
+    """Whatever part of it a step is, and whether or not there are coarser ones."""
+    period = 2 * np.pi / FORCED
+    found = fd.periodic(oscillator(), period=period, method=fd.ROS3(period / steps))
+    assert found.time[-1] == pytest.approx(period, rel=1e-12)
+    assert found["m.R.x"][-1] == pytest.approx(found["m.R.x"][0], abs=1e-11)
 
 
 def test_a_period_that_is_none_is_an_error():
