@@ -9,6 +9,8 @@ import numpy as np
 from ffr_dyn.pictures.histories import PALETTE, drawing
 from ffr_dyn.results.result import Result
 
+LEAST = 0.1  # % of damping that the picture shows, so that it does not enlarge rounding
+
 
 def draw_campbell(result: Result, path: str | Path) -> Path:
     """Draw a Campbell diagram, as `campbell` returns it, and the damping over the speed: .png, .svg or .pdf.
@@ -38,6 +40,8 @@ def draw_campbell(result: Result, path: str | Path) -> Path:
             lower.axvline(one["speed"], color="#D55E00", linewidth=1.0)
         upper.set_ylim(0, 1.05 * float(shown.max(initial=1e-12)))
         upper.set_ylabel("frequency [Hz]")
+        low, high = lower.get_ylim()
+        lower.set_ylim(min(low, -LEAST), max(high, LEAST))
         lower.set_ylabel("damping [%]")
         lower.set_xlabel("speed [rad/s]")
         upper.legend(loc="upper left", bbox_to_anchor=(1.0, 1.02))

@@ -72,8 +72,9 @@ def periodic(
     floquet : also Floquet's multipliers, at the cost of four periods for every state variable
     outputs : names or patterns of the quantities to keep, as in `forward`
 
-    The attributes have the `period`, `periods` (how many were computed, one of five times the steps counting as a fifth), `returns` (by how much the end is off the
-    beginning, relative) and, with floquet, `multipliers` (pairs of real and imaginary parts, the largest first) and `stable`.
+    The attributes have the `period`, `periods` (how many were computed, one of five times the steps counting as a fifth),
+    `returns` (by how much the end is off the beginning, relative) and, with floquet, `multipliers` (pairs of real and
+    imaginary parts, the largest first) and `stable`.
 
         turn = fd.periodic(engine)
         turn["main_bearing.force"]
