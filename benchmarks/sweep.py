@@ -2,9 +2,9 @@
 
     python -m benchmarks.sweep [RUNS [BODIES]]     # by default 1000 runs with 20 bodies; the goal speaks of 10000 with 200
 
-A slider-crank with eight coordinates over six parameters, four of them of its rod, on two workers. Pure time: of reductions
-and of runs (file of the scene read, bodies loaded, run) one after another in this process, measured on a sample, over two. Then
-the same study with a worker killed every 20 s, and with the command itself killed once: the tables must be equal to the bit.
+A slider-crank with eight coordinates over six parameters, four of them of its rod, on two workers. Pure time is that of all
+reductions and runs (scene read, bodies loaded, run) one after another in this process, by a sample, over two. Then the same
+study with a worker killed every 20 s, and with the command itself killed once: the tables must be equal to the bit.
 """
 
 from __future__ import annotations
