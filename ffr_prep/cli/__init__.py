@@ -22,6 +22,7 @@ from ffr_prep.cli.options import (
     material_of,
     number_of,
     numbers_of,
+    reference_lines,
     tell_of_programs,
 )
 from ffr_prep.cli.reduction import NOTES as REDUCTION_NOTES
@@ -58,6 +59,8 @@ Interfaces: where the body meets joints and forces.
 Reference conditions: how the body frame is attached to the deforming body.
   fixed:NAME                     the frame moves with this interface: bodies clamped at one place, blades, robot links
   simply-supported:PIN,ROLLER    the frame follows the line between two interfaces: rods with a pin at each end
+  "fixed:plane z=0"              a region, as told below: the interface that lies there, or one more that is made
+                                 there ("support", mean); two of them: "simply-supported:plane x=0; plane x=50"
   mean-axis                      the frame follows the mean motion of the mass: free bodies, spacecraft, anything
   FILE.toml                      your own choice, a table for each prevented motion:
                                    [[support]]
@@ -182,6 +185,7 @@ def reduce(mesh: Path, materials: tuple[str, ...], **options: Any) -> None:
     from ffr_prep.pipelines.file_materials import CARRIERS
     from ffr_prep.report.text import mesh_lines
     from ffr_prep.solids.model import from_mesh
+    from ffr_prep.solids.reference_regions import at_regions
 
     (interfaces, request), settings = request_of(options), _mesh_settings(options)
     given = material_of(materials) if materials or mesh.suffix.lower() not in CARRIERS else None
@@ -192,12 +196,14 @@ def reduce(mesh: Path, materials: tuple[str, ...], **options: Any) -> None:
     steps.end()
     show(mesh_lines(loaded))
     check_points(interfaces, loaded)
+    every, reference = at_regions(loaded, interfaces, request.reference)
+    show(reference_lines(request.reference, reference, interfaces))
     material = own_or_given(mesh, loaded, settings["unit"], given)
     source = {"file": mesh.name, **{key: settings[key] for key in ("unit", "size", "numbers", "order")}}
     source |= {key: value for key, value in (("glue", settings["glue"]), ("solids", list(settings["solids"]))) if value}
-    request = replace(request, provenance={"source": source, "notes": list(loaded.notes)})
+    request = replace(request, reference=reference, provenance={"source": source, "notes": list(loaded.notes)})
     reduce_to_file(
-        lambda: from_mesh(loaded, material, interfaces, progress=steps),
+        lambda: from_mesh(loaded, material, every, progress=steps),
         request,
         options["output"],
         steps,

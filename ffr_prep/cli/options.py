@@ -140,10 +140,11 @@ def reference_of(text: str) -> ReferenceConditions:
     from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
 
     kind, _, names = text.partition(":")
-    interfaces = [name.strip() for name in names.split(",") if name.strip()]
+    between = ";" if ";" in names else ","
+    interfaces = [names.strip()] if kind == "fixed" else [name.strip() for name in names.split(between) if name.strip()]
     if text == "mean-axis":
         return MeanAxis()
-    if kind == "fixed" and len(interfaces) == 1:
+    if kind == "fixed" and interfaces[0]:
         return FixedTo(interfaces[0])
     if kind == "simply-supported" and len(interfaces) == 2:
         return SimplySupported(interfaces[0], interfaces[1])
@@ -152,6 +153,21 @@ def reference_of(text: str) -> ReferenceConditions:
     raise InputError(
         f"--reference {text}: write fixed:NAME, simply-supported:PIN,ROLLER, mean-axis or a FILE.toml (see --help)"
     )
+
+
+def reference_lines(
+    asked: ReferenceConditions, meant: ReferenceConditions, interfaces: Sequence[InterfaceRegion]
+) -> list[str]:
+    """Which interfaces, of those asked for or made, stand for the regions that the reference conditions have named."""
+    from ffr_prep.model.reference import named_interfaces
+
+    pairs = dict(zip(named_interfaces(asked), named_interfaces(meant), strict=True))
+    own = {interface.name for interface in interfaces}
+    return [
+        f"reference   {region}: {'there lies' if name in own else 'a mean interface is made there,'} {name!r}"
+        for region, name in pairs.items()
+        if region != name
+    ]
 
 
 def _supports(path: Path) -> ReferenceConditions:
