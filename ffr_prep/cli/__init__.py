@@ -45,6 +45,7 @@ Example:
            --reference simply-supported:big_eye,small_eye --modes 10 -o rod.ffr
   ffr-prep info rod.ffr
   ffr-prep modes rod.ffr -o out/modes
+  ffr-dyn --help                           # what moves the body
 """
 REDUCE_NOTES = """\b
 Interfaces: where the body meets joints and forces.

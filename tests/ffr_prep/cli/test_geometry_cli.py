@@ -70,6 +70,30 @@ def test_a_rigid_body_of_the_same_file(folder, tmp_path, capsys):
     assert "a rigid body: it does not deform" in capsys.readouterr().out
 
 
+def test_reference_conditions_say_which_interface_lies_at_their_region(folder, tmp_path, capsys):
+    body, pin = tmp_path / "plate.ffr", "pin=cylinder r=6mm at -45,-25,5"
+    coarse = (
+        "reduce",
+        folder / "plate.step",
+        "--size",
+        30,
+        "--order",
+        1,
+        "--material",
+        "steel",
+        "--modes",
+        2,
+        "--linear",
+    )
+    for region, said in (
+        ("bore r=6mm near -45,-25,5", "there lies 'pin'"),
+        ("plane x=-60", "a mean interface is made there, 'support'"),
+    ):
+        run(*coarse, "--interface", pin, "--reference", f"fixed:{region}", "-o", body)
+        assert f"reference   {region}: {said}" in capsys.readouterr().out
+    assert [(one.name, one.kind) for one in load_body(body).interfaces] == [("pin", "rigid"), ("support", "mean")]
+
+
 def test_faces_as_json_and_by_query(folder, capsys):
     run("faces", folder / "plate4.step", "--json")
     values = json.loads(capsys.readouterr().out)
@@ -93,6 +117,7 @@ def test_solids_are_glued_or_chosen(folder, capsys):
     ("arguments", "message"),
     [
         (("faces", "nowhere.step"), "does not exist"),
+        (("info", "plate4.step"), "is not a body file but, by its ending, a CAD file"),
         (("faces", "plate4.step", "--unit", "m"), "declares that its numbers are mm"),
         (("faces", "plate4.step", "--find", "bore r=7"), "finds no face. Near are"),
         (("faces", "plate4.msh", "--glue"), "meshed already"),
