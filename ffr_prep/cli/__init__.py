@@ -23,6 +23,7 @@ from ffr_prep.cli.options import (
     number_of,
     numbers_of,
     reference_lines,
+    regions_of,
     tell_of_programs,
 )
 from ffr_prep.cli.reduction import NOTES as REDUCTION_NOTES
@@ -175,20 +176,30 @@ def mesh(mesh: Path, **options: Any) -> None:
 @click.option(
     "--stress", is_flag=True, help="Also keep the stress at the surface, which ffr-dyn stress and animate show."
 )
-def reduce(mesh: Path, materials: tuple[str, ...], **options: Any) -> None:
+@click.option(
+    "--region",
+    "regions",
+    multiple=True,
+    metavar="NAME=REGION",
+    help='Keep which triangles of the surface a region has, for a pressure with triangles = "NAME"; repeat.',
+)
+def reduce(mesh: Path, materials: tuple[str, ...], regions: tuple[str, ...], **options: Any) -> None:
     """Reduce MESH to a flexible body and write it to a file.
 
     MESH is a geometry that is meshed here (.geo, .step, .iges, .brep) or a mesh of solids (.msh, .inp, .bdf, .vtu,
     .med, ...). Everything in the body is in SI units.
     """
     from ffr_prep.cli.options import own_or_given
+    from ffr_prep.mesh.geometry.skin import with_regions
     from ffr_prep.mesh.mesh import read_mesh
     from ffr_prep.pipelines.file_materials import CARRIERS
     from ffr_prep.report.text import mesh_lines
     from ffr_prep.solids.model import from_mesh
     from ffr_prep.solids.reference_regions import at_regions
+    from ffr_prep.solids.surface_regions import region_triangles
 
     (interfaces, request), settings = request_of(options), _mesh_settings(options)
+    named = regions_of(regions)
     given = material_of(materials) if materials or mesh.suffix.lower() not in CARRIERS else None
     reserve("-o", options["output"])
     tell_of_programs([mesh])
@@ -197,6 +208,7 @@ def reduce(mesh: Path, materials: tuple[str, ...], **options: Any) -> None:
     steps.end()
     show(mesh_lines(loaded))
     check_points(interfaces, loaded)
+    with_regions(loaded, list(named.values()))  # refused before anything is computed
     every, reference = at_regions(loaded, interfaces, request.reference)
     show(reference_lines(request.reference, reference, interfaces))
     material = own_or_given(mesh, loaded, settings["unit"], given)
@@ -209,6 +221,9 @@ def reduce(mesh: Path, materials: tuple[str, ...], **options: Any) -> None:
         options["output"],
         steps,
         options["quality"],
+        (lambda body: {name: region_triangles(loaded, body, at).tolist() for name, at in named.items()})
+        if named
+        else None,
     )
 
 

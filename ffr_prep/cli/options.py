@@ -129,6 +129,18 @@ def interface_of(text: str) -> InterfaceRegion:
     return InterfaceRegion(name, region, kind or "rigid", None if point is None else _point(text, point))
 
 
+def regions_of(texts: Sequence[str]) -> dict[str, str]:
+    """Regions of the surface by name, each NAME=REGION; InputError for a text without a name and for a name given twice."""
+    pairs = [re.fullmatch(r"([^=\s]+)=(.+)", text) for text in texts]
+    for text, pair in zip(texts, pairs, strict=True):
+        if pair is None:
+            raise InputError(f'--region {text}: give it a name, such as --region "top={text}"')
+    named = {pair[1]: pair[2] for pair in pairs if pair}
+    if len(named) < len(texts):
+        raise InputError(f"--region: a name is given twice: {', '.join(texts)}")
+    return named
+
+
 def _point(text: str, point: str) -> tuple[float, float, float]:
     values = [number_of(f"--interface {text}", value) for value in point.split(",")]
     if len(values) != 3:

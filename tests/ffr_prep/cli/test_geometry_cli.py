@@ -89,9 +89,11 @@ def test_reference_conditions_say_which_interface_lies_at_their_region(folder, t
         ("bore r=6mm near -45,-25,5", "there lies 'pin'"),
         ("plane x=-60", "a mean interface is made there, 'support'"),
     ):
-        run(*coarse, "--interface", pin, "--reference", f"fixed:{region}", "-o", body)
+        named = ("--region", "top=plane z=10", "--region", "hole=bore r=6 near 45,25,0")
+        run(*coarse, *named, "--interface", pin, "--reference", f"fixed:{region}", "-o", body)
         assert f"reference   {region}: {said}" in capsys.readouterr().out
     assert [(one.name, one.kind) for one in load_body(body).interfaces] == [("pin", "rigid"), ("support", "mean")]
+    assert sorted(load_body(body).provenance["regions"]) == ["hole", "top"]
 
 
 def test_faces_as_json_and_by_query(folder, capsys):
@@ -128,6 +130,14 @@ def test_solids_are_glued_or_chosen(folder, capsys):
         (("rigid", "plate4.step", "--density", "1", "--interface", "a=top", "-o", "a.ffr"), "there is no face 'top'"),
         (("mesh", "plate4.step", "--size", "0.01"), "A size of"),
         (("mesh", "plate4.step", "--most-elements", "0"), "most_elements is 0"),
+        (
+            ("reduce", "plate4.step", "--material", "steel", "--region", "bore r=6", "-o", "a.ffr"),
+            'give it a name, such as --region "top=bore r=6"',
+        ),
+        (
+            ("reduce", "plate4.step", "--material", "steel", "--region", "a=bore*", "--region", "a=b", "-o", "a.ffr"),
+            "a name is given twice",
+        ),
         (
             ("reduce", "plate4.step", "--material", "steel", "--interface", "bore r=6", "-o", "a.ffr"),
             'give it a name as well, such as --interface "bore=bore r=6"',
