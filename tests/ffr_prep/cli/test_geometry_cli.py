@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 
 import numpy as np
@@ -92,6 +93,12 @@ def test_reference_conditions_say_which_interface_lies_at_their_region(folder, t
         named = ("--region", "top=plane z=10", "--region", "hole=bore r=6 near 45,25,0")
         run(*coarse, *named, "--interface", pin, "--reference", f"fixed:{region}", "-o", body)
         assert f"reference   {region}: {said}" in capsys.readouterr().out
+    run("info", body)
+    told = capsys.readouterr().out
+    assert re.search(r"^regions     top: \d+ triangles of the surface\n {12}hole: ", told, re.M)
+    assert "command     ffr-prep reduce " in told
+    assert "--region 'hole=bore r=6 near 45,25,0'" in told  # as a shell takes it
+    assert max(map(len, told.splitlines())) < 500
     assert [(one.name, one.kind) for one in load_body(body).interfaces] == [("pin", "rigid"), ("support", "mean")]
     assert sorted(load_body(body).provenance["regions"]) == ["hole", "top"]
 
