@@ -95,7 +95,7 @@ def test_reference_conditions_say_which_interface_lies_at_their_region(folder, t
         assert f"reference   {region}: {said}" in capsys.readouterr().out
     run("info", body)
     told = capsys.readouterr().out
-    assert re.search(r"^regions     top: \d+ triangles of the surface\n {12}hole: ", told, re.M)
+    assert re.search(r"^regions     hole: \d+ triangles of the surface\n {12}top: \d+ triangles", told, re.M)
     assert "command     ffr-prep reduce " in told
     assert "--region 'hole=bore r=6 near 45,25,0'" in told  # as a shell takes it
     assert max(map(len, told.splitlines())) < 500
