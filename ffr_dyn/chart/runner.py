@@ -21,6 +21,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -248,6 +249,16 @@ def default_workers() -> int:
     return max(1, processors // 2)
 
 
+def _started(cluster: Callable[..., Any]) -> Any:
+    """A cluster of local processes. Raises ComputationError where they do not come up, as when one is killed meanwhile."""
+    try:
+        return cluster(threads_per_worker=1, dashboard_address=":0", silence_logs=50)
+    except RuntimeError as error:
+        raise ComputationError(
+            f"the workers did not start ({error}); try again, or run here with --workers 0"
+        ) from None
+
+
 @contextmanager
 def _client(workers: int | None, cluster: str | None) -> Iterator[Any]:
     try:
@@ -261,10 +272,7 @@ def _client(workers: int | None, cluster: str | None) -> Iterator[Any]:
     with dask.config.set(quiet):
         if cluster is None:
             count = default_workers() if workers is None else workers
-            with (
-                LocalCluster(n_workers=count, threads_per_worker=1, dashboard_address=None, silence_logs=50) as local,  # type: ignore[no-untyped-call]
-                Client(local) as client,  # type: ignore[no-untyped-call]
-            ):
+            with _started(partial(LocalCluster, n_workers=count)) as local, Client(local) as client:  # type: ignore[no-untyped-call]
                 yield client
             return
         try:

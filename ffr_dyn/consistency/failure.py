@@ -8,6 +8,8 @@ import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.dropped_terms import remedy
+from ffr_dyn.consistency.following import row_named
+from ffr_dyn.equations.constraint_rows import drive_of
 from ffr_dyn.integrators import ROS2, Integrator
 from ffr_dyn.kernels.tables import (
     FAILED,
@@ -23,6 +25,7 @@ from ffr_dyn.kernels.tables import (
     Work,
 )
 from ffr_dyn.scene.force_kinds import forces_of
+from ffr_dyn.scene.joints import DISTANCE
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 
@@ -52,7 +55,7 @@ def failure(system: System, work: Work, status: int, time: float, settings: Sett
     lost = not _sound(work)
     if cause and (lost or status == NOT_FINITE):
         return ComputationError(f"{at} the state of {_worst(system, work)} is no longer finite: {cause}")
-    if status == NOT_FINITE or lost:
+    if status == NOT_FINITE or (lost and not (status == SINGULAR_CONSTRAINT and _shrunk(system, where, time))):
         locks = status == SINGULAR_CONSTRAINT and _locks(system, work, settings)
         why = locks or _overflow(system, work, settings)
         return ComputationError(f"{at} the state of {_worst(system, work)} is no longer finite: {why}")
@@ -65,12 +68,10 @@ def failure(system: System, work: Work, status: int, time: float, settings: Sett
             f"motion; {change}"
         )
     if status == SINGULAR_CONSTRAINT:
-        row = int(np.searchsorted(system.model.rows.start, where, side="right")) - 1
-        block = system.blocks[row]
-        text = block.words[where - system.model.rows.start[row]].text
+        block, word = row_named(system, where)
         return ComputationError(
-            f"{at} the row '{text}' of {block.name!r} cannot be met by any motion: it ties bodies that cannot move there; "
-            "end the run before it, or use a joint that ties less"
+            f"{at} the row '{word.text}' of {block.name!r} cannot be met by any motion: it ties bodies that cannot move "
+            "there; end the run before it, or use a joint that ties less"
         )
     if status == NOT_CONVERGED:
         return ComputationError(
@@ -82,6 +83,13 @@ def failure(system: System, work: Work, status: int, time: float, settings: Sett
         f"the mechanism locks{_dead_point(system)}, or the tolerances are below what rounding allows; smooth the jump, end "
         f"the run before it, {_remedy(system, 'use larger tolerances')}"
     )
+
+
+def _shrunk(system: System, row: int, time: float) -> bool:
+    """Whether a row is of a distance that is prescribed to vanish about now, and with it the direction of the line."""
+    _, word = row_named(system, row)
+    size = max(body.model.size for body in system.scene.bodies) or 1.0
+    return word.kind == DISTANCE and word.function is not None and abs(drive_of(word, time)[0]) < NEAR * size
 
 
 def _sound(work: Work) -> bool:

@@ -352,7 +352,8 @@ def _followed(machine: Machine, x: Array) -> Steady:
         elif (size := size / 4) < LEAST_SHARE:
             raise ComputationError(
                 f"no steady motion was found at {machine.screws.fastest:.6g} rad/s; from rest it could be followed to "
-                f"{share * machine.screws.fastest:.4g} rad/s: a body may be too soft for more, or a joint near a dead point"
+                f"{share * machine.screws.fastest:.4g} rad/s: a body may be too soft for more, a joint near a dead point, "
+                "or a load larger than what holds it"
             )
 
 
@@ -366,7 +367,7 @@ def _newton(machine: Machine, x: Array) -> Steady | None:
         if _balanced(steady):
             return steady
         closing = smallest_step(about.jacobian, about.M, -about.Phi)
-        y = closing + Z @ _solved(Z.T @ about.K @ Z, Z.T @ (about.forces - about.K @ closing))
+        y = closing + Z @ _solved(steady, Z.T @ (about.forces - about.K @ closing))
         length = float(np.abs(y / size).max())
         if not np.isfinite(length):
             return None
@@ -395,13 +396,18 @@ def _multipliers(about: Matrices, forces: Array) -> Array:
     return np.linalg.lstsq(about.jacobian @ yielding, yielding.T @ forces, rcond=None)[0]
 
 
-def _solved(K: Array, forces: Array) -> Array:
-    """(d,) the smallest motion that balances them; none along what has no stiffness."""
+def _solved(near: Steady, forces: Array) -> Array:
+    """(d,) the smallest free motion that balances them; none along what has no stiffness."""
     if not forces.size:
         return forces
-    U, values, W = np.linalg.svd(K)
-    stiff = values > NEUTRAL * values.max()
+    U, values, W = np.linalg.svd(near.Z.T @ near.about.K @ near.Z)
+    stiff = values > _neutral(near, values)
     return W[stiff].T @ ((U.T @ forces)[stiff] / values[stiff])
+
+
+def _neutral(near: Steady, values: Array) -> float:
+    """Stiffness of free motions below which it is rounding, beside the largest and beside that of inertia."""
+    return NEUTRAL * max(float(values.max(initial=0.0)), near.machine.screws.fastest**2)
 
 
 def _require_balance(found: Steady) -> None:
@@ -409,7 +415,7 @@ def _require_balance(found: Steady) -> None:
     about, Z = found.about, found.Z
     left = Z.T @ about.forces
     U, values, _ = np.linalg.svd(Z.T @ about.K @ Z)
-    loose = U[:, values <= NEUTRAL * values.max(initial=0.0)]
+    loose = U[:, values <= _neutral(found, values)]
     along = loose.T @ left
     if np.abs(along).max(initial=0.0) <= UNBALANCED * _size_of_forces(found):
         return

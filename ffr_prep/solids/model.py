@@ -18,6 +18,7 @@ from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
 from ffr_prep.model.invariants import inertia_integrals
 from ffr_prep.model.model import Model
 from ffr_prep.model.region_rotations import region_stiffening
+from ffr_prep.model.ties import check_names
 from ffr_prep.reduction.basis import Basis
 from ffr_prep.reduction.mesh_resolution import element_edges
 from ffr_prep.solids.assembly import Materials, assemble
@@ -86,6 +87,7 @@ def from_mesh(
 
 def with_interfaces(mesh: Mesh, interfaces: Sequence[InterfaceRegion]) -> Mesh:
     """The mesh with a group for the region of each interface."""
+    check_names(interfaces)
     for interface in interfaces:
         try:
             mesh = with_regions(mesh, [interface.region or interface.name])

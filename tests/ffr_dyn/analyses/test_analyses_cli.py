@@ -197,8 +197,8 @@ def test_a_command_goes_before_the_file(run_file):
     ("analysis", "command", "words"),
     [
         (AT_A_TIME["static"], ["inverse"], "no times"),
-        (AT_A_TIME["static"], ["run", "--end", "1"], "no end of a static"),
-        (KINDS["kinematic"] + "\nend = 0.5\noutput_step = 0.05\n", ["run", "--step", "0.1"], "no step of a kinematic"),
+        (AT_A_TIME["static"], ["run", "--end", "1"], "static analysis has no end"),
+        (KINDS["kinematic"] + "\nend = 0.5\noutput_step = 0.05\n", ["run", "--step", "0.1"], "kinematic analysis has no"),
         (AT_A_TIME["linearise"], ["run", "--resume"], "only a forward run"),
         (KINDS["inverse"] + "\n" + TIMES, ["run", "--resume"], "only a forward run"),
         (TIMES, ["mixed"], "--unknown"),

@@ -111,6 +111,48 @@ PARTS = {
 
 EVENLY = replace(HINGED, drivers=(Driver("d", "hinge", fd.polynomial(0.0, 5.0)),))
 DRAGGED = replace(TURNING, forces=(fd.JointSpring("drag", "hinge", damping=1.0),))
+CRANKED = slider_crank(0.2, 0.7, Driver("motor", "main", fd.polynomial(0.3, 5.0)))
+SWAYING = replace(
+    HINGED,
+    forces=(fd.JointSpring("s", "hinge", stiffness=100.0, damping=5.0),),
+    loads=(Load("sway", "bar.b", force=(0, harmonic(amplitude=1.0, frequency=1.3), 0)),),
+)
+
+
+def swung(damping: float) -> Scene:
+    """A bar on a spring, swung with its natural frequency."""
+    spring = fd.JointSpring("s", "hinge", stiffness=(2 * np.pi * 1.3) ** 2 / 3, damping=damping)
+    moment = Load("l", "bar.b", moment=(0, 0, harmonic(amplitude=1.0, frequency=1.3)))
+    return replace(HINGED, forces=(spring,), loads=(moment,))
+
+
+def struck(damping: float) -> Scene:
+    """A bar between two stops, swung so that it strikes them again and again, at random where little damps it."""
+    spring = fd.JointSpring("s", "hinge", stiffness=3.0, damping=damping)
+    stop = fd.JointStop("stop", "hinge", stiffness=2e4, entry=1e-3, lower=-0.1, upper=0.12)
+    moment = Load("l", "bar.b", moment=(0, 0, harmonic(amplitude=20.0 if damping < 1 else 6.0, frequency=1.3)))
+    return replace(HINGED, forces=(spring, stop), loads=(moment,))
+
+
+def governor(moment: float) -> Scene:
+    """An arm that an axle of constant speed lifts, against a moment [N m]."""
+    return Scene(
+        (Body("axle", bar("axle")), Body("arm", bar("arm"), position=(1, 0, 0))),
+        (
+            Joint("turn", "revolute", "ground.O", "axle.a"),
+            Joint("lift", "revolute", "axle.b", "arm.a", axis=(0, 1, 0)),
+        ),
+        (Driver("motor", "turn", fd.polynomial(0.0, 5.0)),),
+        loads=(Load("push", "arm.b", moment=(0, moment, 0), axes="body"),),
+        ground=GROUND,
+    )
+
+
+TWICE_DRIVEN = replace(
+    DOUBLE,
+    gravity=(0, 0, 0),
+    drivers=(Driver("first", "hinge0", fd.polynomial(0.0, 5.0)), Driver("second", "hinge1", 0.0)),
+)
 MOMENT = fd.MomentSettings()
 FAR = SpringDamper("spring", "ground.P", "cloud.b", stiffness=1e14, free_length=2.0)
 FAST = Scene((Body("b", cloud(3, stiffness=1e4)),))
@@ -686,6 +728,12 @@ INPUT = [
     Case(lambda: fd.periodic(EVENLY, period=0.3), lambda: fd.periodic(EVENLY)),
     Case(lambda: fd.Steady(speeds=("inf",)).perform(EVENLY, MOMENT), lambda: fd.steady(EVENLY)),
     Case(lambda: fd.steady(DRAGGED), lambda: fd.steady(TURNING)),
+    Case(lambda: fd.steady(governor(1000.0)), lambda: fd.steady(governor(1.0))),
+    Case(lambda: fd.periodic(swung(0.0), period=1 / 1.3), lambda: fd.periodic(swung(1.0), period=1 / 1.3)),
+    Case(lambda: fd.periodic(struck(0.05), period=1 / 1.3), lambda: fd.periodic(struck(5.0), period=1 / 1.3)),
+    Case(lambda: fd.steady(CRANKED), lambda: fd.periodic(CRANKED)),
+    Case(lambda: fd.periodic(SWAYING, period=1.0), lambda: fd.periodic(SWAYING, period=1 / 1.3)),
+    Case(lambda: fd.steady(TWICE_DRIVEN, speeds=(1.0,)), lambda: fd.steady(TWICE_DRIVEN, speeds=(1.0,), turn="first")),
     Case(
         lambda: fd.Linearise(at_equilibrium=True, at_steady=True).perform(TURNING, MOMENT, path=None),
         lambda: fd.Linearise(at_steady=True).perform(TURNING, MOMENT, path=None),

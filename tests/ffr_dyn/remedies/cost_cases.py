@@ -17,7 +17,7 @@ from ffr_dyn.analyses.events import Event
 from ffr_dyn.chart.diagram import Diagram, Lost, measures_of, work_precision
 from ffr_dyn.chart.draw import draw_chart
 from ffr_dyn.chart.reference import reference
-from ffr_dyn.chart.runner import Failure, Here, Job, Span, perform, pool
+from ffr_dyn.chart.runner import Failure, Here, Job, Span, _started, perform, pool
 from ffr_dyn.chart.variants import FULL, Variant, models_of
 from ffr_dyn.economy.model_choice import applied, full
 from ffr_dyn.economy.policy import Policy
@@ -57,6 +57,10 @@ def referred(limit: float) -> object:
     return reference(HINGED, span, measures, Projection(), Here(), limit=limit)
 
 
+def broken(**_: object) -> object:
+    raise RuntimeError("Nanny failed to start.")
+
+
 @cache
 def diagram() -> Diagram:
     span, measures = Span(0.04, 0.01), measures_of(SWING, ["position:cloud.b"])
@@ -81,6 +85,7 @@ def without_dask(workers: int) -> object:
 
 GONE = Lost("ros2", FULL.label, "ros2, step 1 s", "step", 1.0, "took longer than 1 s")
 CHARTS = [
+    Case(lambda: _started(broken), lambda: _started(lambda **_: "cluster")),
     measured("speed:cloud.b", "position:cloud.b"),
     measured("cloud.b.positon", "cloud.b.position"),
     measured("reaction:hing", "reaction:hinge"),
