@@ -56,7 +56,7 @@ def plate(rows: int = 400, modes: int = 20, side: int = 100) -> Result:
 
 def played(page: Page, path: Path) -> float:
     """Pictures a second."""
-    page.open(path)
+    page.open(path.resolve())
     page.value("play(true)")
     time.sleep(3.0)  # the first pictures take longer
     drawn, began = page.value("state.drawn"), time.monotonic()

@@ -17,7 +17,8 @@ chooses its shapes; a number, `UpTo` or `Accuracy` says how many modes. Bodies a
 `with_reference` return others.
 
 `faces` tells what surfaces a part has; `InterfaceRegion("pin", "cylinder r=6mm at 0,0,0")` finds one by what it is, and
-`found_faces` tells which; `face_picture` and `face_page` show them. `rigid_part` makes a rigid body of a geometry.
+`found_faces` tells which; `face_picture` and `face_page` show them; `region_triangles` are
+where a pressure acts. `rigid_part` makes a rigid body of a geometry.
 
 `register_reduction`, `register_mesh_format`, `register_matrix_format` and `register_exchange_format` add to what command
 line and files offer (CONTRIBUTING.md shows how). `dir(ffr_prep)` lists all names; `help(ffr_prep.reduce)` and the like
@@ -81,6 +82,7 @@ _BY_MODULE = {
     "ffr_prep.report.mode_pictures": "mode_pictures",
     "ffr_prep.report.quality_pictures": "quality_pictures",
     "ffr_prep.solids.model": "from_mesh",
+    "ffr_prep.solids.surface_regions": "region_triangles",
     "ffr_prep.solvers.factor": "Solver",
     "ffr_prep.structures.frame": "Frame Member Shell joined named panel polyline triangulated",
     "ffr_prep.structures.frame_geometry": "read_frame",
@@ -160,6 +162,7 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_prep.report.mode_pictures import mode_pictures as mode_pictures
     from ffr_prep.report.quality_pictures import quality_pictures as quality_pictures
     from ffr_prep.solids.model import from_mesh as from_mesh
+    from ffr_prep.solids.surface_regions import region_triangles as region_triangles
     from ffr_prep.solvers.factor import Solver as Solver
     from ffr_prep.structures.frame import (
         Frame as Frame, Member as Member, Shell as Shell, joined as joined, named as named, panel as panel,

@@ -91,6 +91,7 @@ class _Runs:
     start: float
     output_step: float
     how: dict[str, Any]
+    begin: Beginning
 
     @cached_property
     def vibrations(self) -> Vibrations:
@@ -151,7 +152,7 @@ def forward(
     wanted = Within() if method is None else method
     if isinstance(wanted, Within):
         common["stabilisation"] = _tight(stabilisation, wanted.accuracy)
-    runs = _Runs(scene, assembled, start, output_step, common)
+    runs = _Runs(scene, assembled, start, output_step, common, begin)
     kept = {"events": events, "path": path, "resume": resume}
     method, count = _resumed(resume, wanted, output_step)
     if isinstance(method, Within):
@@ -281,7 +282,11 @@ def _worst(errors: Mapping[str, StepError]) -> str:
     name = max(errors, key=lambda one: errors[one].of_range)
     places = max((e.of_range for one, e in errors.items() if PLACES.search(one)), default=None)
     rest = "" if places is None or PLACES.search(name) else f"; positions and angles within {_percent(places)}"
-    return f"step: within {_percent(errors[name].of_range)} of the range of {name}{rest}"
+    return f"step: within {_of_the_range(errors[name].of_range)} of {name}{rest}"
+
+
+def _of_the_range(share: float) -> str:
+    return f"{_percent(share)} of the range" if share < 1 else f"{float(f'{share:.2g}'):g} times the range"
 
 
 def _percent(share: float) -> str:
@@ -301,10 +306,14 @@ def _unresolved(runs: _Runs, trial: _Trial, ringing: Set[str]) -> list[str]:
     step = (1.2 if of.ratio[-1] > 0 else 0.25) / of.omega[-1]
     times = (4 / step) / ((4 if method.order > 2 else 2) / method.step)
     return [
-        f"vibration{words} that a step of {method.step:.3g} s does not resolve carries {_percent(told[name].of_range)} of "
-        f"the range of {name}{_others(len(told) - 1)}; rk4 with a step of {step:.2g} s resolves it, for about "
-        f"{max(times, 1):.2g} times the time of this run"
+        f"vibration{words} that a step of {method.step:.3g} s does not resolve carries "
+        f"{_of_the_range(told[name].of_range)} of {name}{_others(len(told) - 1)}; rk4 with a step of {step:.2g} s resolves "
+        f"it, for about {max(times, 1):.2g} times the time of this run{_without_shock(runs.begin)}"
     ]
+
+
+def _without_shock(begin: Beginning) -> str:
+    return '; if it is the start that excites it, begin = "quasi-static" leaves it out' if begin == "as-given" else ""
 
 
 def _coarse(result: Result) -> list[str]:

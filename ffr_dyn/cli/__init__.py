@@ -31,6 +31,22 @@ Example:
   ffr-dyn plot out/result.nc rod.small_eye.position.x -o out/slider.png
   ffr-dyn animate out/result.nc -o out/motion.gif --scale auto
   ffr-dyn stress out/result.nc -o out/stress
+
+\b
+A small scene, swing.toml; docs/scene_file.md has every entry, docs/first_steps.md the way from a STEP file to a film:
+  gravity = [0, -9.81, 0]
+  [analysis]
+  end = 0.5                                # [s]
+  output_step = 0.005
+  [ground]
+  wall = [0, 0, 0]
+  [bodies.rod]
+  file = "rod.ffr"
+  [joints.hinge]
+  kind = "revolute"
+  i = "ground.wall"
+  j = "rod.big_eye"
+  axis = [0, 0, 1]
 """
 
 PLOT_EXAMPLE = """\b

@@ -40,6 +40,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.interrupts import undisturbed
 from ffr_prep.common.outputs import check_output, replacing, writing
+from ffr_prep.common.reading import not_of_its_ending
 
 FORMAT = "ffr-result"
 FORMAT_VERSION = 1
@@ -90,9 +91,8 @@ def _reading(path: Path) -> Iterator[h5py.File]:
     except Exception as error:  # HDF5 and what reads it fail in any way
         if isinstance(error, InputError) and str(path) in str(error):
             raise
-        raise InputError(
-            f"{path} is damaged, truncated or not a result file ({error}); run the analysis again"
-        ) from None
+        fault = f"is damaged, truncated or not a result file ({error}); run the analysis again"
+        raise InputError(not_of_its_ending(path, "a result file", fault)) from None
 
 
 def load_checkpoint(path: str | Path) -> Array | None:

@@ -23,6 +23,7 @@ from ffr_prep.body.reduced import (
 )
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.outputs import note_input, replacing
+from ffr_prep.common.reading import not_of_its_ending
 from ffr_prep.common.stored_arrays import read_arrays
 
 MAGIC = "ffr-body"
@@ -144,9 +145,8 @@ def load_body(path: str | Path) -> FlexibleBody:
         raise BodyError(f"{path}: {error}") from None
     except Exception as error:  # a damaged zip, array header or field can fail in any way the readers know
         what = "no zip file" if not is_zipfile(path) else str(error) or type(error).__name__
-        raise BodyError(
-            f"{path} is damaged, truncated or not a body file ({what}); make it again with ffr-prep reduce"
-        ) from None
+        fault = f"is damaged, truncated or not a body file ({what}); make it again with ffr-prep reduce"
+        raise BodyError(not_of_its_ending(path, "a body file", fault)) from None
 
 
 def _header(body: FlexibleBody, meta: Mapping[str, Any]) -> str:

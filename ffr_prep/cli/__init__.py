@@ -22,6 +22,8 @@ from ffr_prep.cli.options import (
     material_of,
     number_of,
     numbers_of,
+    reference_lines,
+    regions_of,
     tell_of_programs,
 )
 from ffr_prep.cli.reduction import NOTES as REDUCTION_NOTES
@@ -44,6 +46,7 @@ Example:
            --reference simply-supported:big_eye,small_eye --modes 10 -o rod.ffr
   ffr-prep info rod.ffr
   ffr-prep modes rod.ffr -o out/modes
+  ffr-dyn --help                           # what moves the body
 """
 REDUCE_NOTES = """\b
 Interfaces: where the body meets joints and forces.
@@ -58,6 +61,8 @@ Interfaces: where the body meets joints and forces.
 Reference conditions: how the body frame is attached to the deforming body.
   fixed:NAME                     the frame moves with this interface: bodies clamped at one place, blades, robot links
   simply-supported:PIN,ROLLER    the frame follows the line between two interfaces: rods with a pin at each end
+  "fixed:plane z=0"              a region, as told below: the interface that lies there, or one more that is made
+                                 there ("support", mean); two of them: "simply-supported:plane x=0; plane x=50"
   mean-axis                      the frame follows the mean motion of the mass: free bodies, spacecraft, anything
   FILE.toml                      your own choice, a table for each prevented motion:
                                    [[support]]
@@ -171,19 +176,30 @@ def mesh(mesh: Path, **options: Any) -> None:
 @click.option(
     "--stress", is_flag=True, help="Also keep the stress at the surface, which ffr-dyn stress and animate show."
 )
-def reduce(mesh: Path, materials: tuple[str, ...], **options: Any) -> None:
+@click.option(
+    "--region",
+    "regions",
+    multiple=True,
+    metavar="NAME=REGION",
+    help='Keep which triangles of the surface a region has, for a pressure with triangles = "NAME"; repeat.',
+)
+def reduce(mesh: Path, materials: tuple[str, ...], regions: tuple[str, ...], **options: Any) -> None:
     """Reduce MESH to a flexible body and write it to a file.
 
     MESH is a geometry that is meshed here (.geo, .step, .iges, .brep) or a mesh of solids (.msh, .inp, .bdf, .vtu,
     .med, ...). Everything in the body is in SI units.
     """
     from ffr_prep.cli.options import own_or_given
+    from ffr_prep.mesh.geometry.skin import with_regions
     from ffr_prep.mesh.mesh import read_mesh
     from ffr_prep.pipelines.file_materials import CARRIERS
     from ffr_prep.report.text import mesh_lines
     from ffr_prep.solids.model import from_mesh
+    from ffr_prep.solids.reference_regions import at_regions
+    from ffr_prep.solids.surface_regions import region_triangles
 
     (interfaces, request), settings = request_of(options), _mesh_settings(options)
+    named = regions_of(regions)
     given = material_of(materials) if materials or mesh.suffix.lower() not in CARRIERS else None
     reserve("-o", options["output"])
     tell_of_programs([mesh])
@@ -192,16 +208,22 @@ def reduce(mesh: Path, materials: tuple[str, ...], **options: Any) -> None:
     steps.end()
     show(mesh_lines(loaded))
     check_points(interfaces, loaded)
+    with_regions(loaded, list(named.values()))  # refused before anything is computed
+    every, reference = at_regions(loaded, interfaces, request.reference)
+    show(reference_lines(request.reference, reference, interfaces))
     material = own_or_given(mesh, loaded, settings["unit"], given)
     source = {"file": mesh.name, **{key: settings[key] for key in ("unit", "size", "numbers", "order")}}
     source |= {key: value for key, value in (("glue", settings["glue"]), ("solids", list(settings["solids"]))) if value}
-    request = replace(request, provenance={"source": source, "notes": list(loaded.notes)})
+    request = replace(request, reference=reference, provenance={"source": source, "notes": list(loaded.notes)})
     reduce_to_file(
-        lambda: from_mesh(loaded, material, interfaces, progress=steps),
+        lambda: from_mesh(loaded, material, every, progress=steps),
         request,
         options["output"],
         steps,
         options["quality"],
+        (lambda body: {name: region_triangles(loaded, body, at).tolist() for name, at in named.items()})
+        if named
+        else None,
     )
 
 

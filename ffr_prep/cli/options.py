@@ -129,6 +129,18 @@ def interface_of(text: str) -> InterfaceRegion:
     return InterfaceRegion(name, region, kind or "rigid", None if point is None else _point(text, point))
 
 
+def regions_of(texts: Sequence[str]) -> dict[str, str]:
+    """Regions of the surface by name, each NAME=REGION; InputError for a text without a name and for a name given twice."""
+    pairs = [re.fullmatch(r"([^=\s]+)=(.+)", text) for text in texts]
+    for text, pair in zip(texts, pairs, strict=True):
+        if pair is None:
+            raise InputError(f'--region {text}: give it a name, such as --region "top={text}"')
+    named = {pair[1]: pair[2] for pair in pairs if pair}
+    if len(named) < len(texts):
+        raise InputError(f"--region: a name is given twice: {', '.join(texts)}")
+    return named
+
+
 def _point(text: str, point: str) -> tuple[float, float, float]:
     values = [number_of(f"--interface {text}", value) for value in point.split(",")]
     if len(values) != 3:
@@ -140,10 +152,11 @@ def reference_of(text: str) -> ReferenceConditions:
     from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
 
     kind, _, names = text.partition(":")
-    interfaces = [name.strip() for name in names.split(",") if name.strip()]
+    between = ";" if ";" in names else ","
+    interfaces = [names.strip()] if kind == "fixed" else [name.strip() for name in names.split(between) if name.strip()]
     if text == "mean-axis":
         return MeanAxis()
-    if kind == "fixed" and len(interfaces) == 1:
+    if kind == "fixed" and interfaces[0]:
         return FixedTo(interfaces[0])
     if kind == "simply-supported" and len(interfaces) == 2:
         return SimplySupported(interfaces[0], interfaces[1])
@@ -152,6 +165,21 @@ def reference_of(text: str) -> ReferenceConditions:
     raise InputError(
         f"--reference {text}: write fixed:NAME, simply-supported:PIN,ROLLER, mean-axis or a FILE.toml (see --help)"
     )
+
+
+def reference_lines(
+    asked: ReferenceConditions, meant: ReferenceConditions, interfaces: Sequence[InterfaceRegion]
+) -> list[str]:
+    """Which interfaces, of those asked for or made, stand for the regions that the reference conditions have named."""
+    from ffr_prep.model.reference import named_interfaces
+
+    pairs = dict(zip(named_interfaces(asked), named_interfaces(meant), strict=True))
+    own = {interface.name for interface in interfaces}
+    return [
+        f"reference   {region}: {'there lies' if name in own else 'a mean interface is made there,'} {name!r}"
+        for region, name in pairs.items()
+        if region != name
+    ]
 
 
 def _supports(path: Path) -> ReferenceConditions:

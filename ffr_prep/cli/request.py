@@ -19,6 +19,7 @@ from ffr_prep.common.command import OUTPUT_FILE
 from ffr_prep.common.errors import InputError
 
 if TYPE_CHECKING:
+    from ffr_prep.body import FlexibleBody
     from ffr_prep.model.coupled import InterfaceRegion
     from ffr_prep.model.model import Model
     from ffr_prep.pipelines.reduce import Request
@@ -100,11 +101,17 @@ def request_of(options: Mapping[str, Any]) -> tuple[Sequence[InterfaceRegion], R
 
 
 def reduce_to_file(
-    model: Callable[[], Model], request: Request, output: Path, steps: Steps, pictures: Path | None = None
+    model: Callable[[], Model],
+    request: Request,
+    output: Path,
+    steps: Steps,
+    pictures: Path | None = None,
+    regions: Callable[[FlexibleBody], Mapping[str, list[int]]] | None = None,
 ) -> None:
     """Make the model, reduce it, write the body file, and say what is in it and what it took.
 
     pictures : folder for those of the quality report
+    regions  : triangles of the surface by name, for pressures
     """
     from ffr_prep.body import save_body
     from ffr_prep.pipelines.reduce import reduce
@@ -112,6 +119,8 @@ def reduce_to_file(
 
     request = replace(request, provenance={**request.provenance, "command": retold()})
     body = reduce(model(), request, progress=steps, advance=steps.advance)
+    if regions is not None:
+        body = replace(body, provenance={**body.provenance, "regions": regions(body)})
     steps("write the body file")
     save_body(body, output)
     steps.end()

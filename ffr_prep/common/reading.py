@@ -16,6 +16,13 @@ _MOST_TOML, _MOST_TEXT = 1 << 25, 1 << 31  # bytes
 _DEEPEST = 40  # tables and lists within each other
 _LARGEST = 1 << 63
 _SHOWN = 200
+_CAD = "a CAD file, of which `ffr-prep reduce` makes a body"
+_ENDINGS = {
+    ".ffr": "a body file, which a scene names (file = ...) and `ffr-prep info` describes",
+    ".nc": "a result file, which `ffr-dyn info`, `plot` and `animate` show",
+    ".toml": "a text such as a scene, which `ffr-dyn run` analyses",
+    **dict.fromkeys((".step", ".stp", ".iges", ".igs", ".brep", ".geo"), _CAD),
+}
 MANY = 50_000_000  # of numbers that are listed one by one
 
 
@@ -44,6 +51,12 @@ def reading(path: str | Path, what: str, *damage: type[Exception]) -> Iterator[N
         raise InputError(
             f"{path} cannot be read as {what} ({why}); is it complete? If it is sound, please report it with the file"
         ) from error
+
+
+def not_of_its_ending(path: str | Path, what: str, fault: str) -> str:
+    """Why a file cannot be read as `what`, a kind of file: for one whose ending is of another kind that, else the fault."""
+    kind = _ENDINGS.get(Path(path).suffix.lower(), what)
+    return f"{path} {fault}" if kind.startswith(what) else f"{path} is not {what} but, by its ending, {kind}"
 
 
 def check_ordinary(path: str | Path, what: str) -> None:
@@ -82,7 +95,9 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
         try:
             tree = tomllib.loads(text.decode("utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError, ValueError) as error:  # numbers of too many digits
-            raise InputError(f"{path} is not a readable TOML file: {str(error)[:_SHOWN]}") from None
+            fault = f"is not a readable TOML file: {str(error)[:_SHOWN]}"
+            ours = what if Path(path).suffix.lower() != ".toml" else "a text"
+            raise InputError(not_of_its_ending(path, ours, fault)) from None
         _check_tree(path, tree)
         return tree
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.reading import not_of_its_ending
 from ffr_prep.mesh.file_mesh import FileMesh, supported_kind
 
 _VOLUMES = {"tetra": "tet4", "tetra10": "tet10", "hexahedron": "hex8", "hexahedron20": "hex20", "hexahedron27": "hex27"}
@@ -45,7 +46,8 @@ def _read(path: Path) -> meshio.Mesh:
             return meshio.read(path)
         except (Exception, SystemExit) as error:
             words = " ".join([f"{type(error).__name__}: {error}", *said.getvalue().split()])
-    raise InputError(f"cannot read {path} as a mesh ({words}); is it complete, and does its ending name its format?")
+    fault = f"cannot be read as a mesh ({words}); is it complete, and does its ending name its format?"
+    raise InputError(not_of_its_ending(path, "a mesh", fault))
 
 
 def _in_space(path: Path, points: Array) -> Array:

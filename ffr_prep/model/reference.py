@@ -50,16 +50,20 @@ def conditions_of_part(conditions: ReferenceConditions, interfaces: Collection[s
     """The conditions for a part of a body with these interfaces: as they are where it has all that they name, and mean axis
     where it has not, or where they are on the nodes of the whole.
     """
+    named = named_interfaces(conditions)
+    return conditions if named and set(named) <= set(interfaces) else MeanAxis()
+
+
+def named_interfaces(conditions: ReferenceConditions) -> tuple[str, ...]:
+    """The interfaces that the conditions name, in the order in which they do; none where they are on mass or nodes."""
     match conditions:
         case FixedTo(interface=name):
-            named = {name}
+            return (name,)
         case SimplySupported(pin=pin, roller=roller):
-            named = {pin, roller}
+            return pin, roller
         case Supports(supports=supports):
-            named = {support.interface for support in supports}
-        case _:
-            return MeanAxis()
-    return conditions if named <= set(interfaces) else MeanAxis()
+            return tuple(support.interface for support in supports)
+    return ()
 
 
 # ---- the choices --------------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -46,6 +47,7 @@ def body_lines(body: FlexibleBody) -> Iterator[str]:
     yield f"body        {body.name}, {body.n} elastic coordinates"
     yield from _mass_lines(body)
     yield from _interface_lines(body)
+    yield from _region_lines(body.provenance)
     yield from _choice_lines(body.provenance)
     yield from mode_lines(body)
     yield from integral_lines(body)
@@ -59,6 +61,7 @@ def short_lines(body: FlexibleBody) -> Iterator[str]:
     """A body in a few lines."""
     yield f"mass        {body.mass:.6g} kg, centre of mass {vector_in_words(body.centre_of_mass, _size(body))} m"
     yield from _interface_lines(body)
+    yield from _region_lines(body.provenance)
     if body.n:
         shown = ", ".join(f"{f:.4g}" for f in body.frequencies[:6])
         yield f"modes       {body.n}: {shown}{', ...' if body.n > 6 else ''} Hz"
@@ -113,6 +116,12 @@ def _region_in_words(provenance: Mapping[str, Any], name: str) -> str:
             faces = "+".join(entry.get("faces", ()))
             return f": {entry['region']}" + (f" ({faces})" if faces not in ("", entry["region"]) else "")
     return ""
+
+
+def _region_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
+    """The regions of the surface that a body keeps for pressures."""
+    for k, (name, triangles) in enumerate(provenance.get("regions", {}).items()):
+        yield f"{'regions' if k == 0 else '':12}{name}: {len(triangles)} triangles of the surface"
 
 
 def part_lines(body: FlexibleBody) -> Iterator[str]:
@@ -251,8 +260,12 @@ def _origin_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
             "warnings",
             "quality",
             "held_body",
+            "regions",
+            "command",
         ):
             yield f"{key:12}{settings_in_words(value)}"
+    if provenance.get("command"):
+        yield f"command     ffr-prep {shlex.join(map(str, provenance['command']))}"
     for warning in provenance.get("warnings", []):
         yield f"warning     {warning}"
 

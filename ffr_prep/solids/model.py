@@ -44,7 +44,7 @@ def from_mesh(
     """
     progress("check the mesh")
     check_mesh(mesh)
-    plain, mesh = mesh, _with_interfaces(mesh, interfaces)
+    plain, mesh = mesh, with_interfaces(mesh, interfaces)
     progress("assemble stiffness and mass")
     matrices = assemble(mesh, material)
     progress("tie the interfaces")
@@ -85,7 +85,7 @@ def from_mesh(
     )
 
 
-def _with_interfaces(mesh: Mesh, interfaces: Sequence[InterfaceRegion]) -> Mesh:
+def with_interfaces(mesh: Mesh, interfaces: Sequence[InterfaceRegion]) -> Mesh:
     """The mesh with a group for the region of each interface."""
     check_names(interfaces)
     for interface in interfaces:

@@ -26,6 +26,7 @@ from ffr_dyn.scene.forces.places import OnBody
 from ffr_prep.body import FlexibleBody, Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.registry import choice
 
 
 @register_force
@@ -34,8 +35,9 @@ class Pressure(Force):
     """Pressure [Pa] on triangles of a body's surface; positive pushes against their outward normals.
 
     pressure  : a number or one for each point of the surface (P,), linear over each triangle
-    triangles : None for all, numbers of triangles, or a Python function of their centres (T, 3) [m], undeformed in the body
-                frame, that returns which (T,) are loaded
+    triangles : None for all, numbers of triangles, the name of a region that the body keeps (`ffr-prep reduce --region`),
+                or a Python function of their centres (T, 3) [m], undeformed in the body frame, that returns which (T,) are
+                loaded
     function  : factor over time: a number, a time function or a Python function
     follower  : True: area and normal follow the elastic deformation, to first order in q; False: they stay those of
                 the undeformed body, fixed to its frame
@@ -50,7 +52,7 @@ class Pressure(Force):
     name: str
     body: str
     pressure: Annotated[Any, float | list[float]]
-    triangles: Annotated[Any, list[int]] = None
+    triangles: Annotated[Any, list[int] | str] = None
     function: Annotated[Any, OfTime()] = 1.0
     follower: bool = False
 
@@ -59,7 +61,7 @@ class Pressure(Force):
         check_function(self.function, f"{who}: function")
         shape = np.shape(self.pressure)
         object.__setattr__(self, "pressure", check_array(self.pressure, shape[:1], f"{who}: pressure"))
-        if self.triangles is not None and not callable(self.triangles):
+        if self.triangles is not None and not (isinstance(self.triangles, str) or callable(self.triangles)):
             object.__setattr__(self, "triangles", indices(self.triangles, f"{who}: triangles"))
 
     @property
@@ -121,9 +123,20 @@ class Pressure(Force):
         if callable(self.triangles):
             centres = surface.points[surface.triangles].mean(axis=1)
             chosen = np.flatnonzero(np.broadcast_to(self.triangles(centres), count))
+        elif isinstance(self.triangles, str):
+            chosen = self._of_region(body, self.triangles)
         else:
             chosen = np.arange(count) if self.triangles is None else self.triangles
         if chosen.size == 0 or chosen.max() >= count:
             what = "no triangle" if chosen.size == 0 else f"triangle {chosen.max()}"
             raise InputError(f"pressure {self.name!r} acts on {what}; the surface of {body.name!r} has {count}")
         return chosen
+
+    def _of_region(self, body: FlexibleBody, region: str) -> Array:
+        known: Mapping[str, list[int]] = body.provenance.get("regions", {})
+        if region not in known:
+            raise InputError(
+                f"pressure {self.name!r}: body {body.name!r} keeps no region {region!r}; {choice(region, known)}. "
+                f'`ffr-prep reduce --region "{region}=plane z=0"` keeps one'
+            )
+        return np.array(known[region], np.int64)

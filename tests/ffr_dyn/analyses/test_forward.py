@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from synthetic import cloud
 
-from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.forward import _of_the_range, forward
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.registry import summary
 from ffr_dyn.consistency.step_error import largest_difference, ranges
@@ -76,6 +76,15 @@ def test_what_rings_is_told_with_its_price():
     assert len(told) == 1
     assert "Hz" in told[0]
     assert "rk4" in told[0]
+    assert 'begin = "quasi-static"' in told[0]
+
+
+def test_an_error_beyond_the_range_is_told_in_ranges():
+    """Not in thousands of per cent, and without advice that has been followed."""
+    found = forward(swinging(0.0, stiffer=100.0), **SPAN, method=ROS2(1e-3), begin="quasi-static")
+    assert not any('begin = "quasi-static"' in note for note in found.attributes["notes"])
+    assert _of_the_range(0.015) == "1.5 % of the range"
+    assert _of_the_range(412.3) == "410 times the range"
 
 
 def test_without_a_step_the_accuracy_is_kept(truth):

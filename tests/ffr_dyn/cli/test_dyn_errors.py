@@ -385,3 +385,23 @@ def test_module_runs_as_a_command():
     done = subprocess.run([sys.executable, "-m", "ffr_dyn.cli", "--help"], capture_output=True, text=True, cwd=ROOT)
     assert done.returncode == 0
     assert "animate" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("command", "name", "message"),
+    [
+        (["show"], "plate.ffr", "plate.ffr is not a scene file but, by its ending, a body file, which a scene names"),
+        (["run"], "plate.step", "not a scene file but, by its ending, a CAD file, of which `ffr-prep reduce` makes"),
+        (["run"], "plate.nc", "not a scene file but, by its ending, a result file"),
+        (["info"], "plate.ffr", "plate.ffr is not a result file but, by its ending, a body file"),
+        (["info"], "plate.toml", "not a result file but, by its ending, a text such as a scene, which `ffr-dyn run`"),
+        (["info"], "plate.nc", "plate.nc is damaged, truncated or not a result file"),
+        (["run"], "plate.toml", "plate.toml is not a readable TOML file"),
+    ],
+)
+def test_a_file_of_another_kind_is_told_by_its_ending(command, name, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / name).write_bytes(b"ISO-10303-21;\n\xb4")
+    code, said = run_cli(monkeypatch, capsys, *command, name)
+    assert code == 2
+    assert message in said

@@ -82,6 +82,7 @@ SCENES = [
          lambda: run(replace(HINGED, loads=(Load("p", "bar.b", force=(0, 1.0, 0)),)))),
     Case(p(tied, "bar.a"), p(tied, "ground.O")),
     Case(p(forced, Pressure("p", "cloud", [1.0])), p(forced, Pressure("p", "cloud", [1.0] * SIZE))),
+    Case(p(forced, Pressure("p", "cloud", 1.0, triangles="top")), p(forced, Pressure("p", "cloud", 1.0))),
     Case(p(forced, Pressure("p", "cloud", 1.0, triangles=[9])), p(forced, Pressure("p", "cloud", 1.0, triangles=[0]))),
     Case(p(geared, np.pi), p(geared, 22 / 7)),
     Case(p(flat, "z"), p(flat, "none")),

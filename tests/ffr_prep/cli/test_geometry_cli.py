@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 
 import numpy as np
@@ -70,6 +71,38 @@ def test_a_rigid_body_of_the_same_file(folder, tmp_path, capsys):
     assert "a rigid body: it does not deform" in capsys.readouterr().out
 
 
+def test_reference_conditions_say_which_interface_lies_at_their_region(folder, tmp_path, capsys):
+    body, pin = tmp_path / "plate.ffr", "pin=cylinder r=6mm at -45,-25,5"
+    coarse = (
+        "reduce",
+        folder / "plate.step",
+        "--size",
+        30,
+        "--order",
+        1,
+        "--material",
+        "steel",
+        "--modes",
+        2,
+        "--linear",
+    )
+    for region, said in (
+        ("bore r=6mm near -45,-25,5", "there lies 'pin'"),
+        ("plane x=-60", "a mean interface is made there, 'support'"),
+    ):
+        named = ("--region", "top=plane z=10", "--region", "hole=bore r=6 near 45,25,0")
+        run(*coarse, *named, "--interface", pin, "--reference", f"fixed:{region}", "-o", body)
+        assert f"reference   {region}: {said}" in capsys.readouterr().out
+    run("info", body)
+    told = capsys.readouterr().out
+    assert re.search(r"^regions     hole: \d+ triangles of the surface\n {12}top: \d+ triangles", told, re.M)
+    assert "command     ffr-prep reduce " in told
+    assert "--region 'hole=bore r=6 near 45,25,0'" in told  # as a shell takes it
+    assert max(map(len, told.splitlines())) < 500
+    assert [(one.name, one.kind) for one in load_body(body).interfaces] == [("pin", "rigid"), ("support", "mean")]
+    assert sorted(load_body(body).provenance["regions"]) == ["hole", "top"]
+
+
 def test_faces_as_json_and_by_query(folder, capsys):
     run("faces", folder / "plate4.step", "--json")
     values = json.loads(capsys.readouterr().out)
@@ -93,6 +126,7 @@ def test_solids_are_glued_or_chosen(folder, capsys):
     ("arguments", "message"),
     [
         (("faces", "nowhere.step"), "does not exist"),
+        (("info", "plate4.step"), "is not a body file but, by its ending, a CAD file"),
         (("faces", "plate4.step", "--unit", "m"), "declares that its numbers are mm"),
         (("faces", "plate4.step", "--find", "bore r=7"), "finds no face. Near are"),
         (("faces", "plate4.msh", "--glue"), "meshed already"),
@@ -103,6 +137,14 @@ def test_solids_are_glued_or_chosen(folder, capsys):
         (("rigid", "plate4.step", "--density", "1", "--interface", "a=top", "-o", "a.ffr"), "there is no face 'top'"),
         (("mesh", "plate4.step", "--size", "0.01"), "A size of"),
         (("mesh", "plate4.step", "--most-elements", "0"), "most_elements is 0"),
+        (
+            ("reduce", "plate4.step", "--material", "steel", "--region", "bore r=6", "-o", "a.ffr"),
+            'give it a name, such as --region "top=bore r=6"',
+        ),
+        (
+            ("reduce", "plate4.step", "--material", "steel", "--region", "a=bore*", "--region", "a=b", "-o", "a.ffr"),
+            "a name is given twice",
+        ),
         (
             ("reduce", "plate4.step", "--material", "steel", "--interface", "bore r=6", "-o", "a.ffr"),
             'give it a name as well, such as --interface "bore=bore r=6"',

@@ -265,7 +265,7 @@ FAILURES = {
     "interface kind": (bar, ["--interface", "left:soft"], "kind is 'soft'"),
     "interface text": (bar, ["--interface", ":rigid"], "write NAME"),
     "reference": (bar, ["--reference", "clamped"], "write fixed:NAME"),
-    "reference interface": (bar, ["--interface", "left", "--reference", "fixed:right"], "'right'"),
+    "reference interface": (bar, ["--interface", "left", "--reference", "fixed:rigt"], "'rigt'; there are: 'left'"),
     "reference file": (bar, ["--reference", "none.toml"], "none.toml does not exist"),
     "method": (bar, ["--method", "magic"], "magic is not known"),
     "option": (bar, ["--colour", "red"], "--colour"),
@@ -363,6 +363,8 @@ direction = [1.0, 0.0, 0.0]
 def test_reference_conditions(tmp_path):
     assert reference_of("mean-axis") == MeanAxis()
     assert reference_of("fixed:left") == FixedTo("left")
+    assert reference_of("fixed:bore r=6 at 1,2,0") == FixedTo("bore r=6 at 1,2,0")
+    assert reference_of("simply-supported:a at 1,2,0; b") == SimplySupported("a at 1,2,0", "b")
     assert reference_of("simply-supported:left, right") == SimplySupported("left", "right")
     (tmp_path / "r.toml").write_text(SUPPORTS)
     assert reference_of(str(tmp_path / "r.toml")) == Supports((Support("left", "translation", (1.0, 0.0, 0.0)),))

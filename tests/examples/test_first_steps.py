@@ -1,0 +1,79 @@
+"""docs/first_steps.md as it is written there: a new user's way from a STEP file of another program to film and stress."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from places import REFERENCE, ROOT
+
+from ffr_dyn.results.file import load_result
+
+PAGE = (ROOT / "docs" / "first_steps.md").read_text(encoding="utf-8")
+COMMANDS = re.findall(r"```sh\n(.*?)```", PAGE, re.S)[0]
+PROGRAM = re.findall(r"```python\n(.*?)```", PAGE, re.S)[0]
+PAGES = ("faces.html", "scene.html", "film.html")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with the STEP file alone."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(REFERENCE / "plate.step", tmp_path)
+    return tmp_path
+
+
+def assert_made(folder):
+    """Pages that ask for nothing, of a size that can be sent, and the picture of the stress."""
+    for name in PAGES:
+        text = (folder / name).read_text(encoding="utf-8")
+        assert not re.search(r"""(?:src|href)\s*=\s*["']?https?:""", text)
+        assert len(text) < 2e6
+    assert (folder / "stress" / "plate.png").stat().st_size > 10_000
+    assert (folder / "stress" / "hot_spots.csv").stat().st_size > 100
+
+
+def typed(commands):
+    """The commands of a text for the shell, without what stands in a file that they write."""
+    alone = re.sub(r"<<END(.*?)\n.*?^END\n", r"\1\n", commands.replace("\\\n", " "), flags=re.S | re.M)
+    return [line.partition(" #")[0].strip() for line in alone.splitlines() if line.strip()]
+
+
+def test_the_commands(folder):
+    assert len(typed(COMMANDS)) <= 12
+    path = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
+    called = ["bash", "-euc", COMMANDS]
+    done = subprocess.run(called, env={**os.environ, "PATH": path}, capture_output=True, text=True, check=False)
+    assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
+    assert_made(folder)
+    for said in ("bore r 6", "pin  rigid  at (-0.045, -0.025, 0.005) m", "accuracy", "hot spots", "plate.tip.position"):
+        assert said in done.stdout
+    offered = done.stdout.partition("\nmesh ")[0]  # by `faces`
+    assert {region in offered for region in re.findall(r"cylinder r=6mm at [-\d,]+", COMMANDS)} == {True}
+    result = load_result(folder / "plate.nc")
+    assert_swings(result)
+
+
+def test_the_program(folder):
+    assert len([line for line in PROGRAM.splitlines() if line.strip()]) <= 25
+    space: dict = {}
+    exec(compile(PROGRAM, "docs/first_steps.md", "exec"), space)
+    assert_made(folder)
+    assert_swings(space["result"])
+
+
+def assert_swings(result):
+    """As a rigid plate of this shape does: its tip stays at its distance, and falls in the time that energy says."""
+    tip = result["plate.tip.position"]
+    np.testing.assert_allclose(np.linalg.norm(tip, axis=1), np.hypot(0.09, 0.05), rtol=1e-4)
+    total, kinetic = result["energy.total"], result["energy.kinetic"]
+    assert np.ptp(total) < 1e-3 * kinetic.max()
+    errors = {name: of_range for name, (_, of_range) in result.attributes["errors"].items()}
+    assert errors["plate.tip.position"] < 1e-3
+    assert errors["hinge.force"] < 1e-3
