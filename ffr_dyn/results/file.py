@@ -91,8 +91,11 @@ def _reading(path: Path) -> Iterator[h5py.File]:
     except Exception as error:  # HDF5 and what reads it fail in any way
         if isinstance(error, InputError) and str(path) in str(error):
             raise
-        fault = f"is damaged, truncated or not a result file ({error}); run the analysis again"
-        raise InputError(not_of_its_ending(path, "a result file", fault)) from None
+        raise InputError(not_of_its_ending(path, "a result file", _damaged(error))) from None
+
+
+def _damaged(error: Exception) -> str:
+    return f"is damaged, truncated or not a result file ({error}); run the analysis again"
 
 
 def load_checkpoint(path: str | Path) -> Array | None:

@@ -58,7 +58,9 @@ SCENES = {"connecting_rod.py": connecting_rod, "pendulum.toml": pendulum}
 
 def test_every_example_with_a_motion_is_here():
     files = [path for path in EXAMPLES.iterdir() if path.suffix in (".py", ".toml")]
-    assert {path.name for path in files if "ffr_dyn" in (text := path.read_text()) or "[analysis]" in text} == {*SCENES}
+    assert {path.name for path in files if "forward(" in (text := path.read_text()) or "[analysis]" in text} == {
+        *SCENES
+    }
 
 
 @pytest.mark.parametrize("name", SCENES)

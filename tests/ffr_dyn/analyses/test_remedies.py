@@ -99,6 +99,7 @@ LEAST = 12  # letters of its own that a text has; one with fewer is made by a fu
 
 # What is a part of a message, or one made elsewhere.
 PARTS = {
+    "results/file.py": ("_damaged",),
     "analyses/energy.py": ("_told", "_cause"),
     "analyses/inversion/internal_dynamics.py": ("_unfit",),
     "consistency/explicit_forces.py": ("told",),
