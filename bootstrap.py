@@ -125,7 +125,9 @@ def test(*, slow: bool) -> int:
     passed = [check(title, command) for title, command in CHECKS.items()]
     selection = ["-m", ""] if slow else []
     print("pytest", flush=True)
-    tests = subprocess.run([str(_program("python")), "-m", "pytest", *selection], cwd=HOME)
+    # A process on every core, each of which does whole files, with one thread: together they would wait for each other.
+    command = [str(_program("python")), "-m", "pytest", "-n", "auto", "--dist", "loadfile", *selection]
+    tests = subprocess.run(command, cwd=HOME, env={**os.environ, "OMP_NUM_THREADS": "1"})
     if tests.returncode < 0:
         print(f"\npytest was ended by signal {-tests.returncode}: its tests are not complete.", flush=True)
     return 0 if all(passed) and tests.returncode == 0 else 1
