@@ -28,7 +28,8 @@ def progress(
 
 def _unseen() -> bool | None:
     """No in a notebook, whose cells are no terminals and show the bar; else tqdm finds out (None)."""
-    return False if "ipykernel" in sys.modules else None
+    shell = sys.modules.get("IPython")
+    return False if shell is not None and hasattr(shell.get_ipython(), "kernel") else None
 
 
 def _advance(bar: tqdm, t: float) -> None:

@@ -291,12 +291,12 @@ def test_an_environment_that_cannot_be_made_says_so(machine):
 def test_the_tests_come_last(machine):
     assert bootstrap.test(slow=False) == 0
     assert [Path(command[0]).name for command in machine.commands] == ["ruff", "ruff", "mypy", "python"]
-    assert machine.commands[-1][1:] == ["-m", "pytest"]
+    assert machine.commands[-1][1:] == ["-m", "pytest", "-n", "auto", "--dist", "loadfile"]
 
 
 def test_slow_selects_every_test(machine):
     bootstrap.test(slow=True)
-    assert machine.commands[-1][1:] == ["-m", "pytest", "-m", ""]
+    assert machine.commands[-1][-2:] == ["-m", ""]
 
 
 @pytest.mark.parametrize(
