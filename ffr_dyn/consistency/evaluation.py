@@ -190,11 +190,21 @@ def evaluated_mass_matrix(at: Evaluator) -> Array:
 
 
 def _weights(M: Array) -> Array:
-    """(V, V) lower triangle whose square is M; motions without inertia, as about the axis of a thin rod, get a little."""
+    """(V, V) lower triangle whose square is M; motions without inertia, as about the axis of a thin rod, get a little.
+
+    Raises ComputationError for a matrix that is far from positive.
+    """
     try:
         return np.linalg.cholesky(M)
     except np.linalg.LinAlgError:
-        return np.linalg.cholesky(M + np.diag(NO_INERTIA * np.maximum(np.diag(M), np.diag(M).max())))
+        little = NO_INERTIA * np.maximum(np.diag(M), np.diag(M).max())
+    try:
+        return np.linalg.cholesky(M + np.diag(little))
+    except np.linalg.LinAlgError:
+        raise ComputationError(
+            "the mass matrix of the scene is not positive: a body is deformed beyond what its modes can tell; make its load "
+            "smaller, or cut it into parts"
+        ) from None
 
 
 def free_motions(jacobian: Array, M: Array) -> Array:

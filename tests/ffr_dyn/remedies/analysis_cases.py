@@ -12,7 +12,7 @@ from unittest.mock import patch
 
 import h5py
 import numpy as np
-from ffr_gallery.bodies import bar
+from ffr_gallery.bodies import bar, beam
 from remedy import CLOUD, DOUBLE, DRIVEN, GROUND, HINGED, Case, run
 from synthetic import cloud
 from test_analyses_kinematic import slider_crank
@@ -258,7 +258,21 @@ TUMBLING = Scene((Body("bar", bar("bar"), omega_bar=(300.0, 1e3, 0)),), plane="n
 HUGE = replace(HINGED, bodies=(replace(HINGED.bodies[0], omega_bar=(0, 0, 1e200)),), plane="none")
 APART = tuple((cloud(3).interface("b").position - cloud(3).interface("a").position).tolist())
 SPACE = replace(CLOUD, plane="none")
+
+
+def coiled(moment: float) -> Scene:
+    """A clamped beam of length and stiffness one, bent by a moment at its end."""
+    return Scene(
+        (Body("beam", beam("beam", 1.0, 1.0, 1.0, 4, spare=0)),),
+        (Joint("clamp", "fixed", "ground.O", "beam.a"),),
+        loads=(Load("moment", "beam.b", moment=(0, 0, moment)),),
+        ground=GROUND,
+        plane="z",
+    )
+
+
 OTHER = [
+    Case(partial(static, coiled(6.0)), partial(static, coiled(0.1))),
     Case(without_ida, p(reference, HINGED, method=IDA(), **SPAN)),
     Case(p(given_up, 0.5), p(given_up, 0.05)),
     Case(p(far_off, 0.99), p(far_off, 1e-3)),
