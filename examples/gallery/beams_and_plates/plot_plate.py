@@ -1,0 +1,22 @@
+"""
+Modes of a cantilever plate
+===========================
+
+A square plate, clamped along one edge, ν = 0.3. Its frequencies are λ/a² √(D/ρh) with D = E h³/12(1 − ν²).
+
+λ = 3.4917, 8.5246, 21.429, 27.331, 31.111: A. W. Leissa, *Journal of Sound and Vibration* 31 (1973) 257–293.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import ffr_prep as fp
+
+a, h, steel = 1.0, 0.005, fp.Material("steel", 2.1e11, 0.3, 7850.0)
+frame = fp.panel([(0, 0, 0), (a, 0, 0), (a, a, 0), (0, a, 0)], fp.Shell(h, steel), elements=(16, 16))
+model = fp.from_frame(frame, [fp.InterfaceRegion("edge", "plane x=0")])
+plate = fp.reduce(model, fp.Request(name="plate", reference=fp.FixedTo("edge"), reduction=fp.CraigBampton(5)))
+found = np.sqrt(plate.omega2) * a**2 / np.sqrt(steel.E * h**2 / (12 * (1 - steel.nu**2) * steel.rho))
+print(found)
+surface = plate.surface
+print(surface.points.shape, surface.triangles.shape, surface.Phi.shape)

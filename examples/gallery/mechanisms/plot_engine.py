@@ -1,0 +1,48 @@
+"""
+Crank mechanism of an engine
+============================
+
+A connecting rod is meshed from its geometry, reduced, and runs at 4000 rev/min between a crank and a piston. The film colours it by
+its stress; click to turn it.
+
+At the top dead centre the inertia of the piston pulls at the pin with m r ω² (1 + r/l), by the kinematics of the rigid mechanism:
+4620 N, which a rod so stiff gives within a per cent. F. Grammel, C. B. Biezeno, *Technische Dynamik*, 1953.
+"""
+
+import numpy as np
+
+import ffr_dyn as fd
+import ffr_prep as fp
+
+r, l, speed, m = 0.045, 0.150, 4000 * np.pi / 30, 0.45
+mesh = fp.read_mesh("meshes/connecting_rod.geo", unit="mm", size=14)
+ends = [fp.InterfaceRegion("big_eye"), fp.InterfaceRegion("small_eye")]
+request = fp.Request(
+    name="rod", reference=fp.SimplySupported("big_eye", "small_eye"), reduction=fp.CraigBampton(4), stress=True
+)
+rod = fp.reduce(fp.from_mesh(mesh, fp.material("steel"), ends), request)
+crank = fd.rigid_body("crank", mass=1.2, inertia=(1e-3, 1e-3, 2e-3), points={"bearing": (0, 0, 0), "pin": (r, 0, 0)})
+piston = fd.rigid_body("piston", mass=m, inertia=(3e-4,) * 3, points={"pin": (0, 0, 0)})
+bodies = [
+    fd.Body("crank", crank),
+    fd.Body("rod", rod, position=(r, 0, 0), damping=0.01),
+    fd.Body("piston", piston, position=(r + l, 0, 0)),
+]
+pairs = {
+    "bearing": "ground.O crank.bearing",
+    "crank_pin": "crank.pin rod.big_eye",
+    "piston_pin": "rod.small_eye piston.pin",
+}
+joints = [fd.Joint(name, "revolute", *pair.split()) for name, pair in pairs.items()]
+joints.append(fd.Joint("cylinder", "translational", "ground.O", "piston.pin", axis=(1, 0, 0)))
+motor = fd.Driver("motor", "bearing", fd.polynomial(0, speed))
+scene = fd.Scene(bodies, joints, [motor], ground={"O": (0, 0, 0)}, plane="z")
+
+# %%
+# A turn that comes back to itself.
+turn = fd.periodic(scene)
+fd.animate(turn, colour="von-mises", scale="auto", plots=["piston_pin.force"])
+
+# %%
+print(turn["piston_pin.force.x"][[0, -1]], m * r * speed**2 * (1 + r / l))
+assert abs(turn["piston_pin.force.x"][0] / (m * r * speed**2 * (1 + r / l)) + 1) < 0.01
