@@ -84,7 +84,7 @@ sphinx_gallery_conf = {
     "doc_module": ("ffr_dyn", "ffr_prep"),
     "download_all_examples": False,
     "remove_config_comments": True,
-    "plot_gallery": os.environ.get("FFR_SITE_GALLERY", "run") == "run",
+    
     "show_memory": False,
     "min_reported_time": 0,
     "copyfile_regex": "",
