@@ -31,6 +31,9 @@ class JointEffort:
     """A moment [N m] along a joint's angle, or a force [N] along its stroke: on j's body, its opposite on i's body.
 
     Power is effort times the rate of the coordinate. Raises InputError for another coordinate.
+
+    joint : name of the joint
+    coordinate : "angle" or "stroke"
     """
 
     name: str
@@ -48,6 +51,8 @@ class JointEffort:
 class MarkerEffort:
     """A force [N] (or, with `moment`, a moment [N m]) on a marker along a fixed direction.
 
+    marker : "body.interface"
+    moment : true for a moment [N m] in place of a force
     direction : (3,), made a unit vector;  axes : "global", or "body" for one that turns with the marker's body
     """
 

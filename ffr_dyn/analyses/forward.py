@@ -52,7 +52,10 @@ DRIVING = re.compile(r"\.(displacement|rotation|force|moment|effort|torque|tensi
 
 @dataclass(frozen=True)
 class Forward(OverTime):
-    """From start to end; without a step the one is found that keeps the accuracy. Events are moments to find."""
+    """From start to end; without a step the one is found that keeps the accuracy.
+
+    events : moments to find, by name
+    """
 
     resumable: ClassVar[bool] = True
     integrates: ClassVar[bool] = True

@@ -62,6 +62,8 @@ class Causal:
 class Mixed(OverTime):
     """Forces away from the known motions are found by integration where that is stable, else as the bounded solution, which
     adds times before and after the run. Unknown forces are given by name; see `mixed`.
+
+    solution : how forces away from the known motions are found: "causal" or "bounded"; default: as the scene allows
     """
 
     integrates: ClassVar[bool] = True

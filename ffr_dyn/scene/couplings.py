@@ -20,6 +20,10 @@ class Coupling:
     the pitch radius [m]. Angles may turn any number of times.
 
     Raises InputError for a ratio that is zero or not finite.
+
+    first, second : joint coordinates, "joint.angle" or "joint.stroke"
+    ratio : of the second to the first, not zero: [-], [m], or [1/m]
+    offset : of the second where the first is zero [rad] or [m]
     """
 
     name: str

@@ -17,6 +17,8 @@ from ffr_prep.common.errors import InputError
 class Driver:
     """Prescribes `coordinate` ("angle" [rad] or "stroke" [m]) of a joint as a function of time.
 
+    joint : name of the joint
+    coordinate : "angle" or "stroke"
     function : a number, a time function, or a Python function that gives (value, rate, second derivative)
 
     The angle turns f_j from f_i towards g_i, about h_i; the stroke is the distance of j from i along h_i.
@@ -41,6 +43,7 @@ class Driver:
 class PointDriver:
     """Prescribes where marker `j` is, seen from marker `i`: components of r_j - r_i in global axes [m] over time.
 
+    i, j : markers; j is the one that is moved
     x, y, z : numbers, time functions or Python functions that give (value, rate, second derivative); None leaves a
               component free
 

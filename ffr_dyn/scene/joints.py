@@ -220,6 +220,7 @@ register_joint("screw", screw, ("angle", "stroke"), needs=("pitch",))
 class Joint:
     """Two markers, `i` and `j` ("body.interface", or "ground.point"), tied by the words of `kind`.
 
+    i, j    : its two markers; angle and stroke of the joint are those of j seen from i
     kind   : spherical, revolute, cylindrical, translational, universal, fixed, planar, point-on-line, point-on-plane,
              orientation, parallel, perpendicular, distance or screw
     axis   : (3,) joint axis in the axes of i's body (or a (3, 3) joint frame), default z; for a universal joint the arm on i

@@ -30,6 +30,7 @@ class Bushing(Force):
 
         (F, M) = -stiffness (d, psi) - damping (d_dot, psi_dot) + preload
 
+    i, j : its two markers
     stiffness : (6, 6) symmetric, its diagonal (6,), or six entries of which each is a number or a `Curve` of the force over
                 its displacement [N/m, N m/rad]
     damping   : (6, 6) symmetric without negative eigenvalues, or its diagonal (6,) [N s/m, N m s/rad]

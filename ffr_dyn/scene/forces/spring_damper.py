@@ -23,7 +23,8 @@ class SpringDamper(Force):
 
     stiffness : [N/m], or a `Curve` of the force [N] over l - free_length [m]
     damping   : [N s/m], not negative, or a `Curve` of the force [N] over dl/dt [m/s]
-    free_length [m], not negative; preload [N]
+    free_length : length without force [m], not negative;  preload : tension at that length [N]
+    i, j : its two markers
 
     While both points are at one place the force has no direction, and is zero.
     """
