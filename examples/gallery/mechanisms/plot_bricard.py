@@ -3,11 +3,11 @@ Bricard's mechanism
 ===================
 
 Five rods of 1 m and six hinges whose axes are at right angles in turn. Counted, it cannot move: 30 coordinates and 30
-constraints. But one constraint follows from the others in every position, and so it moves. Codes that factorise the constraints fail here;
-`fd.mobility` finds the redundant rows, and the run leaves them out.
+constraints. But one constraint follows from the others in every position, and so it moves. Codes that factorise the
+constraints fail here; `fd.mobility` finds the redundant rows, and the run leaves them out.
 
-Positions of the third hinge after 1 s and 2 s under gravity: IFToMM benchmark A04 (M. González et al., *Multibody System
-Dynamics* 16, 2006), to eight digits by an integration in a single coordinate.
+Source of the mechanism: IFToMM benchmark A04 (M. González et al., *Multibody System Dynamics* 16, 2006). The positions
+of the third hinge after 1 s and 2 s under gravity come from an integration in a single coordinate, to eight digits.
 """
 
 import matplotlib.pyplot as plt

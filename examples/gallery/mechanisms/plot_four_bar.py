@@ -2,11 +2,14 @@
 Four-bar: Chebyshev's straight line
 ===================================
 
-Chebyshev's lambda linkage has a crank of 1, a coupler and a rocker of 2.5, and pivots that are 2 apart. The coupler, drawn out
-to twice its length, ends in a point that runs along a line of length 4 for half a turn of the crank, and comes back in an arc.
+Chebyshev's lambda linkage has a crank of 1, a coupler and a rocker of 2.5, and pivots that are 2 apart. The coupler,
+drawn out to twice its length, ends in a point that runs along a line of length 4 for half a turn of the crank, and
+comes back in an arc.
 
-With the crank at 90°, 180° and 270° the point is at (4, 4), (2, 4) and (0, 4), and between them near the line. The whole curve
-is that of two circles that meet, here written with complex numbers. P. L. Chebyshev, 1878.
+With the crank at 90°, 180° and 270° the point is at (4, 4), (2, 4) and (0, 4), and between them near the line. The
+whole curve is that of two circles that meet, here written with complex numbers.
+
+Source: P. L. Chebyshev, 1878; closed form.
 """
 
 import matplotlib.pyplot as plt

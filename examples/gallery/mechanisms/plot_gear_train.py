@@ -2,11 +2,13 @@
 Planetary gear
 ==============
 
-A sun, three planets and a ring that stands still. Gears are couplings of joint angles, measured from the carrier: a
-sun of 20 teeth, planets of 20 and a ring of 60.
+A sun, three planets and a ring that stands still. Gears are couplings of joint angles, measured from the carrier: a sun
+of 20 teeth, planets of 20 and a ring of 60.
 
-Willis (1841): with the ring held the sun turns 1 + z_ring/z_sun = 4 times as fast as the carrier. A torque M on the sun then
+With the ring held the sun turns 1 + z_ring/z_sun = 4 times as fast as the carrier. A torque M on the sun then
 accelerates the carrier by 4 M / J, with J the inertia of all gears seen from the carrier.
+
+Source: R. Willis, *Principles of Mechanism*, 1841; closed form.
 """
 
 import numpy as np

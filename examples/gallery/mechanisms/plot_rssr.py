@@ -2,11 +2,13 @@
 RSSR: a four-bar in space
 =========================
 
-A crank about the axis z moves a rocker about the axis y by way of a bar with a ball at either end. The bar needs no body of
-its own: a *distance* joint keeps the balls apart by its length.
+A crank about the axis z moves a rocker about the axis y by way of a bar with a ball at either end. The bar needs no
+body of its own: a *distance* joint keeps the balls apart by its length.
 
-With the ball of the crank at A(θ) and that of the rocker at B(ψ), |B − A| = l is an equation h cos(ψ − α) = k, solved in
-closed form: R. S. Hartenberg, J. Denavit, *Kinematic Synthesis of Linkages*, 1964, chapter 12.
+With the ball of the crank at A(θ) and that of the rocker at B(ψ), a distance of l between them is an equation h cos(ψ −
+α) = k, solved in closed form.
+
+Source: R. S. Hartenberg, J. Denavit, *Kinematic Synthesis of Linkages*, 1964, chapter 12; closed form.
 """
 
 import matplotlib.pyplot as plt

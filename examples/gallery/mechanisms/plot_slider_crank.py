@@ -2,13 +2,16 @@
 Slider-crank with a rod of two elements
 =======================================
 
-The example of the textbooks: a rigid crank, a connecting rod of two beam elements under simply supported reference conditions,
-and a slider of half the rod's mass. A. A. Shabana, *Dynamics of Multibody Systems*, chapter 5.
+The example of the textbooks: a rigid crank, a connecting rod of two beam elements under simply supported reference
+conditions, and a slider of half the rod's mass.
 
-Two known numbers. The inertia shape integral of a node at the end of an element is half the mass of the element, and 1/12 of
-mass times length for its rotation. And the middle of the rod leaves its chord by 4.6592 mm at most in the first 84 ms, as a
-geometrically exact beam does; a linear rod would by 5.63 mm, as it does not know that the slider's inertia presses it to 8 %
-of its buckling load.
+Two known numbers. The inertia shape integral of a node at the end of an element is half the mass of the element, and
+1/12 of mass times length for its rotation. And the middle of the rod leaves its chord by 4.6592 mm at most in the first
+84 ms, as a geometrically exact beam does; a linear rod would by 5.63 mm, as it does not know that the slider's inertia
+presses it to 8 % of its buckling load.
+
+Source: A. A. Shabana, *Dynamics of Multibody Systems*, chapter 5, for the reference conditions and integrals; the
+deflection by a geometrically exact beam of high order, right to 5·10⁻⁷ m.
 """
 
 import numpy as np
