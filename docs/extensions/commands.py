@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from collections.abc import Iterator
 
@@ -68,7 +69,7 @@ def _marked(text: str) -> str:
 def _prose(text: str) -> list[str]:
     """Paragraphs; those that click leaves as they are (marked by a backspace) are blocks of their own."""
     lines: list[str] = []
-    for paragraph in re.split(r"\n\s*\n", text):
+    for paragraph in re.split(r"\n\s*\n", inspect.cleandoc(text)):
         kept = re.sub(r"^\s*\x08\n", "", paragraph) if "\x08" in paragraph else None
         lines += [_marked(paragraph.strip()), ""] if kept is None else ["```text", kept.rstrip(), "```", ""]
     return lines

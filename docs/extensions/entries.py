@@ -92,7 +92,7 @@ def _kind(of: dict[str, Any]) -> str:
         return _list(of)
     if of.get("type") == "object":
         held = of.get("additionalProperties", {})
-        return "table of " + _kind(held) if isinstance(held, dict) and held else "table"
+        return "table of " + _many(_kind(held)) if isinstance(held, dict) and held else "table"
     return WORDS.get(of.get("type", ""), "any") + unit
 
 
@@ -109,4 +109,9 @@ def _list(of: dict[str, Any]) -> str:
     if "prefixItems" in of:
         return "list of " + " and ".join(map(_kind, of["prefixItems"]))
     number = f"{of['minItems']} " if of.get("minItems") == of.get("maxItems") and "minItems" in of else ""
-    return f"list of {number}{_kind(of.get('items', {}))}"
+    return f"list of {number}{_many(_kind(of.get('items', {})))}"
+
+
+def _many(kind: str) -> str:
+    """The same of more than one: "number [m]" -> "numbers [m]"."""
+    return re.sub(r"^(number|text|list|table|whole number)\b", r"\1s", kind)

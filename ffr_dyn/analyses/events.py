@@ -44,6 +44,8 @@ class Event:
 
     An event is seen when the quantity is on the two sides of the value at the two ends of a step of the integrator: twice
     within a step is not.
+
+    >>> landing = fd.Event("landing", "rod.tip.position.y", 0.0, direction="falling", stop=True)
     """
 
     name: str

@@ -24,6 +24,8 @@ class Coupling:
     first, second : joint coordinates, "joint.angle" or "joint.stroke"
     ratio : of the second to the first, not zero: [-], [m], or [1/m]
     offset : of the second where the first is zero [rad] or [m]
+
+    >>> gear = fd.Coupling("gear", "pinion.angle", "wheel.angle", ratio=-20 / 40)
     """
 
     name: str

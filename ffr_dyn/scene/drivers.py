@@ -24,6 +24,8 @@ class Driver:
     The angle turns f_j from f_i towards g_i, about h_i; the stroke is the distance of j from i along h_i.
 
     Raises InputError for a function that is none of these.
+
+    >>> motor = fd.Driver("motor", "hinge", fd.polynomial(0, 150))  # 150 rad/s
     """
 
     name: str
@@ -48,6 +50,8 @@ class PointDriver:
               component free
 
     Raises InputError when all are free.
+
+    >>> path = fd.PointDriver("path", "ground.wall", "slider.pin", x=fd.harmonic(amplitude=0.01, frequency=5.0))
     """
 
     name: str

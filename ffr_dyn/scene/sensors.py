@@ -21,6 +21,8 @@ class Measurement:
     what : position [m], velocity [m/s] or acceleration [m/s^2]: the difference of the two global vectors; distance [m];
            orientation: Euler parameters of j's axes in those of i
     axes : in which the difference is given: "global" or the name of a body
+
+    >>> travel = fd.Measurement("travel", "ground.wall", "rod.tip", axes="crank")
     """
 
     name: str
@@ -48,6 +50,8 @@ class StressMeasurement:
            "max-principal", "xx", "strain-xx", ... (`ffr_dyn.scene.stress_sensors.MEASURES`)
 
     The body needs stress modes (`ffr-prep reduce --stress`).
+
+    >>> notch = fd.StressMeasurement("notch", "rod", (0.15, 0, 0.012))
     """
 
     name: str
@@ -72,6 +76,8 @@ class SectionMeasurement:
     place : in the element: "first" end, "middle" or "last" end
 
     The body needs section forces (`ffr-prep reduce-structure` with stress = true).
+
+    >>> root = fd.SectionMeasurement("root", "arm", (0, 0, 0), what="moment", place="first")
     """
 
     name: str

@@ -23,8 +23,9 @@ def meanings(docstring: str | None) -> dict[str, str]:
 
 
 def prose(docstring: str | None) -> str:
-    """The docstring without its lists."""
-    return "\n\n".join(block for block in blocks(docstring) if isinstance(block, str))
+    """The docstring without its lists and examples."""
+    said = (block for block in blocks(docstring) if isinstance(block, str))
+    return "\n\n".join(block for block in said if not block.startswith(">>> "))
 
 
 def blocks(docstring: str | None) -> list[str | dict[tuple[str, ...], str]]:

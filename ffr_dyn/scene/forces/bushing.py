@@ -37,6 +37,8 @@ class Bushing(Force):
     preload   : (6,) force [N] and moment [N m] on j at rest
     axes, axes_j : the axes on i and on j as (3, 3) frames (columns) or as (3,) third axes, in the axes of their bodies;
                 axes_j by default equal to axes
+
+    >>> mount = fd.Bushing("mount", "ground.wall", "rod.hinge", stiffness=[1e6, 1e6, 1e6, 500, 500, 500])
     """
 
     word = "bushing"

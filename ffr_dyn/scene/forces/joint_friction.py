@@ -31,6 +31,8 @@ class JointFriction(Force):
     static  : friction at rest, not below coulomb: both, with stribeck, or neither
     stribeck : velocity [m/s] over which friction falls from static to coulomb (Stribeck 1902)
     viscous : force over the rate [N s/m]
+
+    >>> bearing = fd.JointFriction("bearing", "hinge", coulomb=0.3, creep=1e-3)
     """
 
     word = "joint-friction"

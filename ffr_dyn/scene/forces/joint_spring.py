@@ -22,6 +22,8 @@ class JointSpring(Force):
     coordinate : "angle" or "stroke"
     stiffness : [N/m], or a `Curve` of the force over c - free;  damping : [N s/m], not negative, or a `Curve` over dc/dt
     free      : coordinate without force [m];  preload : [N], positive pulls back;  turns : whole turns at the start
+
+    >>> spring = fd.JointSpring("spring", "hinge", stiffness=20.0, damping=0.1)
     """
 
     word = "joint-spring"

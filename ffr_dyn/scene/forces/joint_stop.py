@@ -25,6 +25,8 @@ class JointStop(Force):
     entry     : [m] depth over which the stiffness grows from zero: the force is stiffness depth^2 / (2 entry) down to it,
                 stiffness (depth - entry / 2) below
     turns     : whole turns of an angle at the start
+
+    >>> stop = fd.JointStop("stop", "hinge", stiffness=1e4, entry=0.01, lower=-1.0, upper=1.0)
     """
 
     word = "joint-stop"

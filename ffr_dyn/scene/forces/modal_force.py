@@ -24,6 +24,8 @@ class ModalForce(Force):
 
     body : name of a flexible body
     values : (n,) [1/sqrt(kg) N];  function : a number, a time function or a Python function of time
+
+    >>> shaker = fd.ModalForce("shaker", "rod", values=[1.0, 0, 0, 0], function=fd.harmonic(amplitude=1.0, frequency=50.0))
     """
 
     word = "modal-force"

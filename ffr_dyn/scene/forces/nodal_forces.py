@@ -38,6 +38,8 @@ class NodalForces(Force):
     points   : (N,) numbers of the points in the body's surface
     function : a number, a time function or a Python function of time
     axes     : "global", or "body" for forces that turn with the body's frame
+
+    >>> field = fd.NodalForces("field", "rod", points=[0, 1], forces=[[0, 0, 1.0], [0, 0, 1.0]])
     """
 
     word = "nodal-forces"

@@ -42,6 +42,8 @@ class Pressure(Force):
     function  : factor over time: a number, a time function or a Python function
     follower  : True: area and normal follow the elastic deformation, to first order in q; False: they stay those of
                 the undeformed body, fixed to its frame
+
+    >>> wind = fd.Pressure("wind", "blade", pressure=2e3, follower=True)
     """
 
     word = "pressure"

@@ -25,6 +25,8 @@ class Servo(Force):
     limit  : largest force [N]; default: none;  turns : whole turns at the start
     joint : name of the joint
     coordinate : "angle" or "stroke"
+
+    >>> control = fd.Servo("control", "hinge", target=0.5, kp=400.0, kd=20.0, limit=50.0)
     """
 
     word = "servo"

@@ -27,6 +27,8 @@ class SpringDamper(Force):
     i, j : its two markers
 
     While both points are at one place the force has no direction, and is zero.
+
+    >>> spring = fd.SpringDamper("return", "ground.wall", "rod.tip", stiffness=2000.0, damping=5.0, free_length=0.2)
     """
 
     table = "springs"
