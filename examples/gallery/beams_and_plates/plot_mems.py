@@ -6,7 +6,7 @@ A shuttle of polysilicon hangs on a folded flexure, eight beams of 200 × 2 × 2
 to a plate at the distance g pulls it by ε A V²/2(g − y)². Beyond a third of the gap no spring holds it, and it snaps to
 the plate: the largest voltage is given by V² = 8 k g³/27 ε A.
 
-Source: S. D. Senturia, *Microsystem Design*, 2001, sections 6.4 and 9; closed form.
+Source: S. D. Senturia, *Microsystem Design*, 2001, section 6.4; closed form.
 """
 
 import matplotlib.pyplot as plt

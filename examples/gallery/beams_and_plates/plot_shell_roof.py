@@ -3,9 +3,9 @@ Shell roof of Scordelis and Lo
 ==============================
 
 A roof of 50 ft, part of a cylinder of 25 ft and 80°, rests on diaphragms at both ends and carries its own weight: a
-standard test of shell elements. Conditions of one's own hold the ends across the axis; the shapes are the static
-deflections under accelerations, of which gravity is one. The middle of the free edge sinks by 0.3024 ft; pounds and
-feet.
+standard test of shell elements. User conditions hold the ends across the axis. The shapes of the body are its static
+deflections under accelerations, of which gravity is one, so that its weight is borne as in the full model. The middle
+of the free edge sinks by 0.3024 ft. Units are pounds and feet.
 
 Source: A. C. Scordelis, K. S. Lo, *ACI Journal* 61 (1964) 539–561; the number of R. H. MacNeal, R. L. Harder, *Finite
 Elements in Analysis and Design* 1 (1985) 3–20.

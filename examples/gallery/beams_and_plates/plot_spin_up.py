@@ -3,8 +3,8 @@ Spin-up of a beam
 =================
 
 A cantilever of 10 m is brought to 6 rad/s within 15 s. Its first frequency is 3.8 rad/s, so without geometric
-stiffening the beam would leave its axis; in fact the centrifugal force makes it stiffer the faster it turns. This is
-where early programs failed. The largest deflection is 0.573761 m, at 6.8 s, and the steady stretch 0.5143 mm.
+stiffening the beam would leave its axis; in fact the centrifugal force makes it stiffer the faster it turns. Programs
+that left this out failed here. The largest deflection is 0.573761 m, at 6.8 s, and the steady stretch 0.5143 mm.
 
 Source: J. C. Simo, L. Vu-Quoc, *Journal of Applied Mechanics* 53 (1986) 849–863; T. R. Kane, R. R. Ryan, A. K.
 Banerjee, *Journal of Guidance, Control, and Dynamics* 10 (1987) 139–151; the numbers by a geometrically exact beam of

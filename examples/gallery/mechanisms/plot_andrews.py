@@ -3,7 +3,8 @@ Andrews' squeezing mechanism
 ============================
 
 Seven bodies in a plane, ten revolute joints and one spring. A constant moment of 0.033 N m turns the crank two times
-and a half in 0.03 s. The mechanism is closed three times over, and stiff: the classic test of codes.
+and a half in 0.03 s. The mechanism is closed three times over: the classic test of programs
+for mechanisms.
 
 Source of the data and of the angle of the crank after 0.03 s: F. Mazzia, C. Magherini, *Test Set for Initial Value
 Problem Solvers*, University of Bari; W. Schiehlen (ed.), *Multibody Systems Handbook*, 1990; IFToMM benchmark A03.

@@ -3,7 +3,7 @@ Bricard's mechanism
 ===================
 
 Five rods of 1 m and six hinges whose axes are at right angles in turn. Counted, it cannot move: 30 coordinates and 30
-constraints. But one constraint follows from the others in every position, and so it moves. Codes that factorise the
+constraints. But one constraint follows from the others in every position, and so it moves. Programs that factorise the
 constraints fail here; `fd.mobility` finds the redundant rows, and the run leaves them out.
 
 Source of the mechanism: IFToMM benchmark A04 (M. González et al., *Multibody System Dynamics* 16, 2006). The positions

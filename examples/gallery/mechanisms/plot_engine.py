@@ -38,6 +38,7 @@ scene = fd.Scene(bodies, joints, [motor], ground={"O": (0, 0, 0)}, plane="z")
 # %%
 # A turn that comes back to itself.
 turn = fd.periodic(scene)
+drawing = fd.plot(turn, ["piston_pin.force", "bearing.force"])
 fd.animate(turn, colour="von-mises", scale="auto", plots=["piston_pin.force"])
 
 # %%

@@ -2,15 +2,15 @@
 Flexible pendulum
 =================
 
-A strip of 1.2 m, 0.2 m wide and 9 mm thick, swings from the horizontal. Such a pendulum verified an early program for
-real-time simulation in the floating frame of reference. Its middle leaves the chord by 1.6 mm, and the tension of the
-swing shifts the frequency of that vibration: the load matrices of the body bring this in.
+A strip of 1.2 m, 0.2 m wide and 9 mm thick, swings from the horizontal. A pendulum of this kind was the test of a
+program for real-time simulation in the floating frame of reference. Its middle leaves the chord by 1.6 mm, and the
+tension of the swing shifts the frequency of that vibration: the load matrices of the body bring this in.
 
 Tip at 0.5, 1 and 2 s and the largest deflection: (0.17374, −1.18736), (−1.19975, −0.02461), (1.19574, −0.10095) m, and
 1.600 mm.
 
-Source: the pendulum after T. Rantalainen, 2007 (thesis); the numbers by a geometrically exact beam of high order, right
-to 3·10⁻⁶ m.
+Source: the pendulum after the thesis of Rantalainen, 2007; the numbers by a geometrically exact beam of high order,
+right to 3·10⁻⁶ m.
 """
 
 import matplotlib.pyplot as plt

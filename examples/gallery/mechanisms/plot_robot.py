@@ -35,6 +35,7 @@ scene = fd.Scene(bodies, joints, forces=servos, ground={"O": (0, 0, 0)}, gravity
 
 # %%
 result = fd.forward(scene, end=2.5, output_step=0.02, method=fd.ROS3(2e-3))
+drawing = fd.plot(result, ["waist.angle", "shoulder.angle", "elbow.angle"])
 fd.animate(result, traces=["arm.tip"], plots=["elbow.angle"])
 
 # %%

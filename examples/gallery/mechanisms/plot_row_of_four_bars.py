@@ -2,10 +2,9 @@
 A row of four-bars through its singular positions
 =================================================
 
-Three cranks of 1 m and 1 kg and two couplers make two parallelograms side by side, of which one is redundant. Twice a
-turn all bars lie in a line, where the mechanism could fold in other ways: three motions are free at once. A run has to
-go through there and stay a row of parallelograms, which is a pendulum: φ̈ = c sin φ/J with J = (N + 1)/3 + N and c =
-g((N + 1)/2 + N) for N loops.
+Three cranks of 1 m and 1 kg and two couplers make two parallelograms side by side. Twice a turn all bars lie in a line,
+where the mechanism could fold in other ways: three motions are free at once. A run has to go through there and stay a
+row of parallelograms, which is a pendulum: φ̈ = c sin φ/J with J = (N + 1)/3 + N and c = g((N + 1)/2 + N) for N loops.
 
 Source: IFToMM benchmark A02 (M. González et al., *Multibody System Dynamics* 16, 2006), N = 2; the place of the first
 pin after 5, 10 and 20 s by the pendulum's equation, to ten digits: (−0.8113104610, −0.5846155453), (0.3284581115,
