@@ -27,6 +27,7 @@ extensions = [
     "sphinx_gallery.gen_gallery",
     "made",
     "mathml",
+    "offline",
     "repository",
 ]
 exclude_patterns = ["extensions", "gallery/**/*.ipynb", "gallery/**/*.py"]

@@ -59,7 +59,9 @@ def test_the_version_is_the_same_everywhere():
 
 def test_the_recipe_and_the_oldest_versions_are_those_of_the_project():
     wanted = bounds(PROJECT["dependencies"])
-    recipe = (ROOT / "recipe" / "meta.yaml").read_text(encoding="utf-8").partition("  run:\n")[2].partition("\ntest:")[0]
+    recipe = (
+        (ROOT / "recipe" / "meta.yaml").read_text(encoding="utf-8").partition("  run:\n")[2].partition("\ntest:")[0]
+    )
     run = bounds(re.findall(r"^    - (.*)$", recipe, re.M))
     assert run.pop("python") == PROJECT["requires-python"]
     assert run == {OTHER_NAMES.get(name, name): bound for name, bound in wanted.items()}
@@ -94,11 +96,21 @@ def made(tmp_path_factory):
 def test_the_distributions_hold_what_they_should(made):
     (wheel,), (source,) = made.glob("*.whl"), made.glob("*.tar.gz")
     names = zipfile.ZipFile(wheel).namelist()
-    assert {name.partition("/")[0] for name in names if ".dist-info" not in name} == {"ffr_prep", "ffr_dyn", "ffr_gallery"}
+    assert {name.partition("/")[0] for name in names if ".dist-info" not in name} == {
+        "ffr_prep",
+        "ffr_dyn",
+        "ffr_gallery",
+    }
     assert "ffr_dyn/py.typed" in names
     assert [name for name in names if name.startswith("ffr_dyn/pictures/web/")]
     inside = {name.partition("/")[2] for name in tarfile.open(source).getnames()}
-    for path in ("bootstrap.py", "docs/conf.py", "tests/places.py", "examples/gallery/mechanisms/plot_pendulum.py", "LICENSE"):
+    for path in (
+        "bootstrap.py",
+        "docs/conf.py",
+        "tests/places.py",
+        "examples/gallery/mechanisms/plot_pendulum.py",
+        "LICENSE",
+    ):
         assert path in inside
     assert [name for name in inside if name.startswith(("docs/made", "docs/gallery", "build/"))] == []
 
