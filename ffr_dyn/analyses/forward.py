@@ -135,8 +135,8 @@ def forward(
     outputs     : names or patterns of the quantities to keep (`ffr_dyn.results.quantities.selected`), such as "*.power"
     events      : moments to find (`ffr_dyn.analyses.events`), listed in the result's attribute "events"; one may end the run
     check       : whether further runs tell the error of every output; default: where that takes seconds, or finds the step
-    begin       : "quasi-static": with the deflections that the motion asks for, which do not ring; "steady", "periodic": in the
-                  motion of these analyses, of machines driven evenly; "as-given": with the scene's q and q_dot
+    begin       : "quasi-static": with the deflections that the motion asks for, which do not ring; "steady", "periodic": in
+                  the motion of these analyses, of machines driven evenly; "as-given": with the scene's q and q_dot
     path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
     resume      : a result file whose run goes on to the same bits; `end` may be later. A new file: a run from the start
     progress    : called with the time reached, a few times a second

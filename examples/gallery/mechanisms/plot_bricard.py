@@ -36,5 +36,7 @@ result = fd.forward(scene, end=2.0, output_step=0.02, method=fd.RK4(5e-4))
 plt.plot(result.time, result["r2.b.position"])
 plt.plot([1, 2], EXACT, "ko")
 plt.gca().set(xlabel="time [s]", ylabel="third hinge [m], x y z")
+fd.animate(result, colour="body", traces=["r2.b"])
 
+# %%
 assert np.abs(result["r2.b.position"][[50, 100]] - EXACT).max() < 1e-6

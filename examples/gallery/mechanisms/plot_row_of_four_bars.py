@@ -36,5 +36,7 @@ pin = result["crank0.b.position"] @ (1, 1j, 0)
 plt.plot(result.time, pin.real, result.time, pin.imag)
 plt.plot([5, 10, 20], np.real(EXACT), "ko", [5, 10, 20], np.imag(EXACT), "ks")
 plt.gca().set(xlabel="time [s]", ylabel="first pin, x and y [m]")
+fd.animate(result, colour="body")
 
+# %%
 assert np.abs(pin[[250, 500, 1000]] - EXACT).max() < 1e-5
