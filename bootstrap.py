@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
-"""Set up everything on a machine that has only git and python3, then run the demonstration or the tests.
+"""Set up everything on a machine that has only git and python3, then run the demonstration, the site or the tests.
 
   python3 bootstrap.py demo      the connecting rod example, from its geometry to its animation
-  python3 bootstrap.py test      style, types and tests; with --slow also the longer tests
+  python3 bootstrap.py site      the documentation, with its gallery executed; with --links also the addresses of others
+  python3 bootstrap.py test      style, types, site and tests; with --slow also the longer tests
 
 System packages that are missing are installed first (Debian and Ubuntu; as root or through sudo), then the project and
 its libraries go into the folder .venv next to this file. What is there already is kept, so the second time starts at
 once, and a set-up that was interrupted is completed by running it again.
 
-Exit status: 0 all went well, 1 a test or the demonstration failed, 2 this machine lacks something that the message names.
+Exit status: 0 all went well, 1 a test, the site or the demonstration failed, 2 this machine lacks something that the message names.
 
 It runs before anything is installed: nothing but Python 3.8 and its standard library here.
 """
@@ -48,6 +49,7 @@ LIBRARIES = {
 BROWSERS = ("chromium", "google-chrome", "chrome")
 
 CHECKS = {"ruff check": ("ruff", "check"), "ruff format": ("ruff", "format", "--check"), "mypy": ("mypy",)}
+SITE = Path("build") / "site"
 LINES_OF_AN_ERROR = 15
 SIGNS_OF_NO_NETWORK = (
     "Temporary failure",
@@ -81,7 +83,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.command == "demo":
             set_up(extras=(), browser=False)
             return demo()
-        set_up(extras=("bench", "test") if options.slow else ("test",), browser=options.slow)
+        if options.command == "site":
+            set_up(extras=("docs",), browser=False)
+            return site(links=options.links)
+        set_up(extras=("bench", "docs", "test") if options.slow else ("docs", "test"), browser=options.slow)
         return test(slow=options.slow)
     except SetUpError as error:
         print(f"\n{error}", file=sys.stderr)
@@ -92,10 +97,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description="Set up the project, then run its demonstration or its tests.")
+    parser = argparse.ArgumentParser(description="Set up the project, then run its demonstration, its site or its tests.")
     commands = parser.add_subparsers(dest="command", required=True)
     commands.add_parser("demo", help="run the connecting rod example")
-    tests = commands.add_parser("test", help="check style and types, and run the tests")
+    pages = commands.add_parser("site", help="build the documentation, its gallery executed")
+    pages.add_argument("--links", action="store_true", help="also ask for the addresses of others that pages name")
+    tests = commands.add_parser("test", help="check style and types, build the site and run the tests")
     tests.add_argument("--slow", action="store_true", help="also the longer tests")
     return parser
 
@@ -120,9 +127,23 @@ def demo() -> int:
     return 1 if subprocess.run([str(_program("python")), "examples/connecting_rod.py"], cwd=HOME).returncode else 0
 
 
+def site(*, links: bool) -> int:
+    """The pages, and where to open them."""
+    kinds = ("html", "linkcheck") if links else ("html",)
+    passed = [check("site" if kind == "html" else "links", _pages(kind)) for kind in kinds]
+    print(f"{HOME / SITE / 'html' / 'index.html'}")
+    return 0 if all(passed) else 1
+
+
+def _pages(kind: str) -> list[str]:
+    """The command that makes the pages: all warnings are collected, and any of them fails."""
+    strict = ["--quiet", "--nitpicky", "--fail-on-warning", "--keep-going", "--jobs", "auto"]
+    return ["python", "-m", "sphinx", *strict, "--builder", kind, "docs", str(SITE / kind)]
+
+
 def test(*, slow: bool) -> int:
     """Every check, and the tests last: their closing line ends the output."""
-    passed = [check(title, command) for title, command in CHECKS.items()]
+    passed = [check(title, command) for title, command in {**CHECKS, "site": _pages("html")}.items()]
     selection = ["-m", ""] if slow else []
     print("pytest", flush=True)
     # A process on every core, each of which does whole files, with one thread: together they would wait for each other.
