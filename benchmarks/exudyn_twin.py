@@ -232,7 +232,7 @@ def _add_joints(mbs: Any, scene: Scene, markers: Mapping[str, int]) -> None:
         ("translational", 0): items.ObjectJointPrismaticX,
     }
     for joint in scene.joints:
-        axis = int(np.argmax(np.abs(joint.axis)))
+        axis = 2 if joint.axis is None else int(np.argmax(np.abs(joint.axis)))
         mbs.AddObject(makers[joint.kind, axis](markerNumbers=[markers[joint.i], markers[joint.j]]))
 
 

@@ -2,14 +2,13 @@
 Exchange with MBDyn
 ===================
 
-The FEM data of MBDyn's modal joint (`.fem`) hold modes, inertia integrals and geometric stiffness. Written and read back, a
-connecting rod in a fast slider-crank bends as before: by what a geometrically exact beam does, less than a per cent off.
+The FEM data of MBDyn's modal joint (`.fem`) hold modes, inertia integrals and geometric stiffness. Written and read
+back, a connecting rod in a fast slider-crank bends as before: by what a geometrically exact beam does, less than a per
+cent off.
 
-Sources: MBDyn Input File Format, modal joint; the number, the deflection of the rod's middle from the chord between its ends 20 ms
-after the start: a planar geometrically exact beam of high order, Radau IIA, right to 5e-7 m.
+Sources: MBDyn Input File Format, modal joint; the number, the deflection of the rod's middle from the chord between its
+ends 20 ms after the start: a planar geometrically exact beam of high order, Radau IIA, right to 5e-7 m.
 """
-
-import tempfile
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -21,7 +20,7 @@ at = {"a": (0, 0, 0), "middle": (0.15, 0, 0), "b": (0.3, 0, 0)}
 line = fp.polyline([at["a"], at["b"]], fp.Member(fp.circle(0.006), fp.Material("steel", 2e11, 0.3, 7870)), elements=20)
 model = fp.from_frame(fp.named(line, **at), [fp.InterfaceRegion(name) for name in at])
 rod = fp.reduce(model, fp.Request(name="rod", reference=fp.SimplySupported("a", "b"), reduction=fp.CraigBampton(8)))
-file = fp.write_fem(rod, tempfile.mkdtemp() + "/rod.fem")
+file = fp.write_fem(rod, "out/rod.fem")
 crank = fd.rigid_body("crank", mass=0.1, inertia=(1e-4, 1e-4, 1e-4), points={"hub": (0, 0, 0), "pin": (0.15, 0, 0)})
 slider = fd.rigid_body("slider", mass=rod.mass / 2, inertia=(1e-5, 1e-5, 1e-5), points={"pin": (0, 0, 0)})
 pairs = {"bearing": ("ground.O", "crank.hub"), "pin": ("crank.pin", "rod.a"), "wrist": ("rod.b", "slider.pin")}

@@ -2,19 +2,18 @@
 Stress at a hole
 ================
 
-A strip with a hole is pulled at its ends. A body that is reduced with its stress modes knows where it is stressed most, and how
-much: at the edge of the hole, across the pull. In a strip of five times the diameter of the hole that is 3.15 times the
-stress far away.
+A strip with a hole is pulled at its ends. A body that is reduced with its stress modes knows where it is stressed most,
+and how much: at the edge of the hole, across the pull. In a strip of five times the diameter of the hole that is 3.15
+times the stress far away.
 
-Source: W. D. Pilkey, Peterson's Stress Concentration Factors, 2nd ed. 1997, chart 4.1, after R. C. J. Howland, Philosophical
-Transactions of the Royal Society A 229 (1930) 49-86: (2 + 0.284 s - 0.600 s^2 + 1.32 s^3) / s, s = 1 - d / w.
+Source: W. D. Pilkey, Peterson's Stress Concentration Factors, 2nd ed. 1997, chart 4.1, after R. C. J. Howland,
+Philosophical Transactions of the Royal Society A 229 (1930) 49-86: (2 + 0.284 s - 0.600 s^2 + 1.32 s^3) / s, s = 1 - d
+/ w.
 """
 
-import tempfile
 from pathlib import Path
 
 import matplotlib.pyplot as plt
-import numpy as np
 
 import ffr_dyn as fd
 import ffr_prep as fp
@@ -24,11 +23,13 @@ GEOMETRY = """SetFactory("OpenCASCADE"); Mesh.MeshSizeFromCurvature = 40;
 Box(1) = {-100, -50, 0, 200, 100, 3}; Cylinder(2) = {0, 0, 0, 0, 0, 3, 10};
 strip() = BooleanDifference{ Volume{1}; Delete; }{ Volume{2}; Delete; }; Physical Volume("strip") = {strip()};
 """
-file = Path(tempfile.mkdtemp()) / "strip.geo"
-file.write_text(GEOMETRY)
+Path("out").mkdir(exist_ok=True)
+Path("out/strip.geo").write_text(GEOMETRY)
 regions = [fp.InterfaceRegion(name, f"plane x={x}mm", kind="mean") for name, x in (("left", -100), ("right", 100))]
 request = fp.Request(name="strip", reference=fp.FixedTo("left"), reduction=fp.CraigBampton(0), stress=True)
-strip = fp.reduce(fp.from_mesh(fp.read_mesh(file, unit="mm", size=10), fp.material("steel"), regions), request)
+strip = fp.reduce(
+    fp.from_mesh(fp.read_mesh("out/strip.geo", unit="mm", size=10), fp.material("steel"), regions), request
+)
 clamp = fd.Joint("clamp", "fixed", "ground.wall", "strip.left")
 pull = fd.Load("pull", "strip.right", force=(30e3, 0, 0))  # N: 100 MPa
 scene = fd.Scene([fd.Body("strip", strip)], [clamp], loads=[pull], ground={"wall": (-0.1, 0, 0.0015)})

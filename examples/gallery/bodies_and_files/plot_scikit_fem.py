@@ -3,10 +3,11 @@ A body from scikit-fem
 ======================
 
 Stiffness and mass matrices that you assemble with another finite-element library become a body like any other. Here
-scikit-fem assembles a slender bar of quadratic hexahedra; the body, in its mean-axis frame, has the frequencies of a free beam.
+scikit-fem assembles a slender bar of quadratic hexahedra; the body, in its mean-axis frame, has the frequencies of a
+free beam.
 
-Source: R. D. Blevins, Formulas for Natural Frequency and Mode Shape, 1979, table 8-1: u^2 / (2 pi L^2) sqrt(E I / m) with
-cos u cosh u = 1, u = 4.73004074, 7.85320462, 10.9956078.
+Source: R. D. Blevins, Formulas for Natural Frequency and Mode Shape, 1979, table 8-1: u^2 / (2 pi L^2) sqrt(E I / m)
+with cos u cosh u = 1, u = 4.73004074, 7.85320462, 10.9956078.
 """
 
 import matplotlib.pyplot as plt

@@ -3,13 +3,12 @@ Exchange by SID
 ===============
 
 Standard input data (SID) carries a flexible body to other multibody programs. Written and read back, the body moves as
-before: a strip of metal, hinged and released from the horizontal. Its tip after half a second is that of a geometrically exact beam.
+before: a strip of metal, hinged and released from the horizontal. Its tip after half a second is that of a
+geometrically exact beam.
 
-Sources: O. Wallrapp, Standardization of flexible body modeling in multibody system codes, Mechanics of Structures and Machines
-22 (1994) 283-304; the number: a planar geometrically exact beam of high order, Radau IIA, right to 3e-6 m.
+Sources: O. Wallrapp, Standardization of flexible body modeling in multibody system codes, Mechanics of Structures and
+Machines 22 (1994) 283-304; the number: a planar geometrically exact beam of high order, Radau IIA, right to 3e-6 m.
 """
-
-import tempfile
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -22,7 +21,7 @@ line = fp.polyline([(0, 0, 0), (1.2, 0, 0)], fp.Member(fp.rectangle(0.2, 0.009),
 ends = [fp.InterfaceRegion("hinge"), fp.InterfaceRegion("tip")]
 request = fp.Request(name="rod", reference=fp.SimplySupported("hinge", "tip"), reduction=fp.CraigBampton(8))
 rod = fp.reduce(fp.from_frame(fp.named(line, hinge=(0, 0, 0), tip=(1.2, 0, 0)), ends), request)
-file = fp.write_sid(rod, tempfile.mkdtemp() + "/rod.SID_FEM")
+file = fp.write_sid(rod, "out/rod.SID_FEM")
 
 tips = []
 for body in (rod, fp.read_sid(file)):

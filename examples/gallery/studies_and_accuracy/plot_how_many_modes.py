@@ -2,12 +2,12 @@
 How many modes
 ==============
 
-A clamped beam with an interface at its other end: the static shapes of the interface, and so many modes of the beam that is held
-at both ends (Craig and Bampton). The error of the first frequency is known for the continuous beam; the reduced
-body has just this error, so that a handful of modes is plenty. `fp.Accuracy` finds the number by itself.
+A clamped beam with an interface at its other end: the static shapes of the interface, and so many modes of the beam
+that is held at both ends (Craig and Bampton). The error of the first frequency is known for the continuous beam; the
+reduced body has just this error, so that a handful of modes is plenty. `fp.Accuracy` finds the number by itself.
 
-Source: R. R. Craig, M. C. C. Bampton, Coupling of substructures for dynamic analyses, AIAA Journal 6 (1968) 1313-1319; the errors
-are those of the Ritz matrices in closed form, by this project, to eight digits.
+Source: R. R. Craig, M. C. C. Bampton, Coupling of substructures for dynamic analyses, AIAA Journal 6 (1968) 1313-1319;
+the errors are those of the Ritz matrices in closed form, by this project, to eight digits.
 """
 
 import matplotlib.pyplot as plt
@@ -30,5 +30,4 @@ plt.semilogy(EXACT.keys(), EXACT.values(), "ko", fillstyle="none", label="contin
 plt.semilogy(errors.keys(), errors.values(), "x", label="reduced body")
 plt.gca().set(xlabel="modes in each plane, beside the static shapes", ylabel="relative error of the first frequency")
 plt.legend()
-print(errors)
 assert np.allclose(list(errors.values()), list(EXACT.values()), rtol=0.03)

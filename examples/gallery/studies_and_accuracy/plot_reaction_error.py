@@ -2,11 +2,12 @@
 An error bar on a reaction
 ==========================
 
-A run tells of each of its outputs what the length of its steps costs. A rod swings from the horizontal, with steps that are too long
-on purpose; the force of its hinge has the closed form beside it, and the run's own estimate holds the true error.
+A run tells of each of its outputs what the length of its steps costs. A rod swings from the horizontal, with steps that
+are too long on purpose; the force of its hinge has the closed form beside it, and the run's own estimate holds the true
+error.
 
-Source: pendulum by elliptic functions, F. W. J. Olver et al., NIST Handbook of Mathematical Functions 2010, section 22.19:
-sin(a/2) = k sn(w t + K(k)), k = sin(a0/2); the force along the rod is m g cos a + m c a'^2.
+Source: pendulum by elliptic functions, F. W. J. Olver et al., NIST Handbook of Mathematical Functions 2010, section
+22.19: sin(a/2) = k sn(w t + K(k)), k = sin(a0/2); the force along the rod is m g cos a + m c a'^2.
 """
 
 import matplotlib.pyplot as plt
@@ -29,7 +30,9 @@ along, across = m * g * np.cos(a) + m * c * rate**2, m * g * np.sin(a) * (1 - m 
 exact = np.column_stack([across * np.cos(a) - along * np.sin(a), across * np.sin(a) + along * np.cos(a)])  # N
 own = found["hinge.force"][:, :2]
 plt.plot(found.time, exact[:, 1], "k:", label="closed form")
-plt.fill_between(found.time, own[:, 1] - error, own[:, 1] + error, alpha=0.4, label=f"run, ± {error:.2g} N by its own estimate")
+plt.fill_between(
+    found.time, own[:, 1] - error, own[:, 1] + error, alpha=0.4, label=f"run, ± {error:.2g} N by its own estimate"
+)
 plt.gca().set(xlabel="time [s]", ylabel="vertical force of the hinge [N]")
 plt.legend()
 true = np.abs(own - exact).max()

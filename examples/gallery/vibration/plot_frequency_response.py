@@ -2,11 +2,12 @@
 Frequency response of a cantilever
 ==================================
 
-A force at the tip of an undamped cantilever and the motion of the tip: the receptance of the Euler-Bernoulli beam is known in
-closed form. Sixteen modes (eight in each plane) and the static shapes of the interfaces follow it over three resonances.
+A force at the tip of an undamped cantilever and the motion of the tip: the receptance of the Euler-Bernoulli beam is
+known in closed form. Sixteen modes (eight in each plane) and the static shapes of the interfaces follow it over three
+resonances.
 
-Source: R. E. D. Bishop, D. C. Johnson, The Mechanics of Vibration, Cambridge University Press 1960, table of beam receptances:
-(sin u cosh u - cos u sinh u) / (EI b^3 (1 + cos u cosh u)), u = b L, b^4 = m w^2 / EI.
+Source: R. E. D. Bishop, D. C. Johnson, The Mechanics of Vibration, Cambridge University Press 1960, table of beam
+receptances: (sin u cosh u - cos u sinh u) / (EI b^3 (1 + cos u cosh u)), u = b L, b^4 = m w^2 / EI.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 Random vibration of a mast
 ==========================
 
-A light mast with a heavy head stands on a base that shakes at random: white noise of 0.01 g^2/Hz up to twenty times the first frequency.
-One vibration dominates, so the acceleration of the head has the root mean square of Miles' equation.
+A light mast with a heavy head stands on a base that shakes at random: white noise of 0.01 g^2/Hz up to twenty times the
+first frequency. One vibration dominates, so the acceleration of the head has the root mean square of Miles' equation.
 
 Source: J. W. Miles, On structural fatigue under random loading, Journal of the Aeronautical Sciences 21 (1954) 753-762:
 rms^2 = (pi/2) f Q S, Q = 1 / (2 z); with the force of the damper, 1 + 4 z^2 times that.

@@ -2,12 +2,12 @@
 Stable inversion: a tip that follows its path
 =============================================
 
-The tip of a flexible arm is to move along a smooth path and to stand still before and after it. The moment of the hub that does
-this begins *before* the tip moves, because the arm has to bend first: the solution that stays bounded, found over all times
-at once. Fed into an ordinary forward run, the moment moves the tip along its path.
+The tip of a flexible arm is to move along a smooth path and to stand still before and after it. The moment of the hub
+that does this begins *before* the tip moves, because the arm has to bend first: the solution that stays bounded, found
+over all times at once. Fed into an ordinary forward run, the moment moves the tip along its path.
 
-Source: S. Devasia, D. Chen, B. Paden, Nonlinear inversion-based output tracking, IEEE Transactions on Automatic Control 41
-(1996) 930-942.
+Source: S. Devasia, D. Chen, B. Paden, Nonlinear inversion-based output tracking, IEEE Transactions on Automatic Control
+41 (1996) 930-942.
 """
 
 import matplotlib.pyplot as plt
