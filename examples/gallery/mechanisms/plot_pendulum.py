@@ -17,7 +17,10 @@ import ffr_dyn as fd
 length, mass, gravity = 1.0, 2.0, 9.81
 about_centre = mass * length**2 / 12
 rod = fd.rigid_body(
-    "rod", mass=mass, inertia=[1e-4, about_centre, about_centre], points={"pin": (-length / 2, 0, 0), "tip": (length / 2, 0, 0)}
+    "rod",
+    mass=mass,
+    inertia=[1e-4, about_centre, about_centre],
+    points={"pin": (-length / 2, 0, 0), "tip": (length / 2, 0, 0)},
 )
 
 # %%
