@@ -22,11 +22,10 @@ version = release = version_of("ffr")
 
 extensions = [
     "myst_parser",
-    "sphinx.ext.autodoc",
-    "sphinx.ext.napoleon",
     "sphinx_copybutton",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
+    "made",
     "mathml",
     "repository",
 ]
@@ -46,9 +45,6 @@ suppress_warnings = ["toc.empty_glob", "config.cache"]
 copybutton_prompt_text = r">>> |\.\.\. |\$ "
 copybutton_prompt_is_regexp = True
 
-autodoc_member_order = "bysource"
-autodoc_typehints = "signature"
-autodoc_preserve_defaults = True
 
 linkcheck_timeout = 20
 linkcheck_retries = 2
@@ -62,7 +58,7 @@ def _examples() -> str:
     """A copy of examples/gallery in which each folder holds the meshes, as the checkout does; what examples write stays there."""
     copy = ROOT / "build" / "gallery"
     shutil.rmtree(copy, ignore_errors=True)
-    shutil.copytree(ROOT / "examples" / "gallery", copy, ignore=shutil.ignore_patterns("__pycache__", "out"))
+    shutil.copytree(ROOT / "examples" / "gallery", copy, ignore=shutil.ignore_patterns("__pycache__", "out", "README.md"))
     for folder in TITLES:
         (copy / folder / "meshes").symlink_to(ROOT / "meshes")
     return str(copy)
@@ -84,7 +80,7 @@ sphinx_gallery_conf = {
     "doc_module": ("ffr_dyn", "ffr_prep"),
     "download_all_examples": False,
     "remove_config_comments": True,
-    "plot_gallery": os.environ.get("FFR_SITE_GALLERY", "run") == "run",
+    
     "show_memory": False,
     "min_reported_time": 0,
     "copyfile_regex": "",

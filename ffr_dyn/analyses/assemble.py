@@ -29,7 +29,10 @@ CHANGED = 1e-9  # m, rad, m/s, rad/s and elastic coordinates, from where a chang
 
 @dataclass(frozen=True)
 class Assemble(OfMoment):
-    """Corrections are the smallest in the norm of the mass matrix: heavy bodies move least."""
+    """Corrections are the smallest in the norm of the mass matrix: heavy bodies move least.
+
+    >>> result = fd.run(scene, fd.MomentSettings(analysis=fd.Assemble()))
+    """
 
     def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
         return assembly(scene, **settings.span, **how)
@@ -45,6 +48,8 @@ def assembly(
     The notes tell what was changed of each body: by how much it was shifted and turned, and its velocities.
 
     Raises InputError as `assemble` does, ComputationError when there are no accelerations.
+
+    >>> result = fd.assembly(scene)
     """
     assembled = assemble(scene, time=time)
     selected(assembled.system, outputs)

@@ -31,6 +31,11 @@ class JointEffort:
     """A moment [N m] along a joint's angle, or a force [N] along its stroke: on j's body, its opposite on i's body.
 
     Power is effort times the rate of the coordinate. Raises InputError for another coordinate.
+
+    joint : name of the joint
+    coordinate : "angle" or "stroke"
+
+    >>> torque = fd.JointEffort("torque", "hinge")
     """
 
     name: str
@@ -48,7 +53,11 @@ class JointEffort:
 class MarkerEffort:
     """A force [N] (or, with `moment`, a moment [N m]) on a marker along a fixed direction.
 
+    marker : "body.interface"
+    moment : true for a moment [N m] in place of a force
     direction : (3,), made a unit vector;  axes : "global", or "body" for one that turns with the marker's body
+
+    >>> push = fd.MarkerEffort("push", "rod.tip", direction=(1, 0, 0))
     """
 
     name: str
@@ -78,7 +87,10 @@ def unit(effort: Effort) -> str:
 
 
 def with_effort(scene: Scene, effort: Effort, times: Array, values: Array) -> Scene:
-    """The scene with an effort of the values (T,) at times (T,) [s], splined, held outside; to be run forward."""
+    """The scene with an effort of the values (T,) at times (T,) [s], splined, held outside; to be run forward.
+
+    >>> forward = fd.with_effort(scene, torque, result.time, result["torque.effort"])
+    """
     if isinstance(effort, JointEffort):
         return _with_actuator(scene, effort, recorded(times, values))
     return replace(scene, loads=(*scene.loads, _load(effort, lambda c: recorded(times, c * np.asarray(values)))))
@@ -138,6 +150,8 @@ def recorded(times: Array, values: Array, *, rates: Array | None = None, degree:
             by 1/h instead of 1/h^2, h apart, and is as good at the ends as inside
 
     Raises InputError for too few rows.
+
+    >>> torque = fd.recorded(result.time, result["motor.effort"])
     """
     from scipy.interpolate import PPoly, make_interp_spline
 

@@ -36,6 +36,7 @@ WIDTH = 4 * np.finfo(float).eps  # of a step, and relative: what brentq can reac
 class Event:
     """A moment at which `quantity` passes `value`.
 
+    value : in the unit of the quantity
     quantity  : a component of a result, such as "rod.tip.position.y" or "hinge.angle", or a Python function (t, state) ->
                 number; `state` is a `ffr_dyn.equations.state_view.StateView`
     direction : "rising", "falling" or "either"
@@ -43,6 +44,8 @@ class Event:
 
     An event is seen when the quantity is on the two sides of the value at the two ends of a step of the integrator: twice
     within a step is not.
+
+    >>> landing = fd.Event("landing", "rod.tip.position.y", 0.0, direction="falling", stop=True)
     """
 
     name: str

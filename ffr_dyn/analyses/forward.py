@@ -52,7 +52,12 @@ DRIVING = re.compile(r"\.(displacement|rotation|force|moment|effort|torque|tensi
 
 @dataclass(frozen=True)
 class Forward(OverTime):
-    """From start to end; without a step the one is found that keeps the accuracy. Events are moments to find."""
+    """From start to end; without a step the one is found that keeps the accuracy.
+
+    events : moments to find, by name
+
+    >>> result = fd.run(scene, fd.Settings(start=0, end=1, output_step=0.01, method=fd.Within(), analysis=fd.Forward(check=True)))
+    """
 
     resumable: ClassVar[bool] = True
     integrates: ClassVar[bool] = True
@@ -144,6 +149,8 @@ def forward(
 
     Raises InputError for a scene or settings that cannot be used, ComputationError when the run fails: with the time,
     the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
+
+    >>> result = fd.forward(scene, end=2.0, output_step=0.01)
     """
     check_output_step(output_step)
     assembled = _begun(assemble(scene, time=start) if assembled is None else assembled, start, begin, method)

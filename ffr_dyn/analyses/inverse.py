@@ -40,7 +40,10 @@ DIFFERENCE = 1e-6
 
 @dataclass(frozen=True)
 class Dynamic:
-    """Elastic coordinates are integrated; `method` is that of `forward`."""
+    """Elastic coordinates are integrated; `method` is that of `forward`.
+
+    >>> result = fd.inverse(scene, end=0.2, output_step=1e-3, elastic=fd.Dynamic(fd.ROS2(1e-4)))
+    """
 
     method: Integrator | Within | None = None
     stabilisation: Stabilisation = Projection()  # noqa: RUF009 - frozen
@@ -48,12 +51,18 @@ class Dynamic:
 
 @dataclass(frozen=True)
 class QuasiStatic:
-    """Elastic coordinates follow the motion without vibration."""
+    """Elastic coordinates follow the motion without vibration.
+
+    >>> result = fd.inverse(scene, end=0.2, output_step=1e-3, elastic=fd.QuasiStatic())
+    """
 
 
 @dataclass(frozen=True)
 class Inverse(OverTime):
-    """Method, step and stabilisation are of dynamic elastic coordinates."""
+    """Method, step and stabilisation are of dynamic elastic coordinates.
+
+    >>> result = fd.run(scene, fd.Settings(start=0, end=1, output_step=0.01, method=fd.Within(), analysis=fd.Inverse("quasi-static")))
+    """
 
     integrates: ClassVar[bool] = True
     stabilised: ClassVar[bool] = True
@@ -87,6 +96,9 @@ def inverse(
     outputs : names or patterns of the quantities to keep beside the efforts, as in `forward`
 
     Raises InputError when a rigid motion is left free or prescribed twice; ComputationError when the run fails.
+
+    >>> result = fd.inverse(scene, end=0.2, output_step=1e-3)
+    >>> result["motor.effort"]
     """
     require_driven(undeformed(scene), start, "inverse dynamics")
     if isinstance(elastic, QuasiStatic):

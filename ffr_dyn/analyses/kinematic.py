@@ -55,7 +55,10 @@ class _Pose:
 
 @dataclass(frozen=True)
 class Kinematic(OverTime):
-    """With the reactions that the motion needs."""
+    """With the reactions that the motion needs.
+
+    >>> result = fd.run(scene, fd.Settings(start=0, end=1, output_step=0.01, method=fd.Within(), analysis=fd.Kinematic()))
+    """
 
     def perform(self, scene: Scene, settings: Settings, **how: Any) -> Result:
         return kinematic(scene, **settings.span, **how)
@@ -78,6 +81,8 @@ def kinematic(
     Raises InputError when a rigid motion is left free or prescribed twice, ComputationError when the mechanism locks: the
     message gives the time and the joint at its dead point. Positions that are nearly or exactly singular on the way, where
     the motion could branch, are told in the notes.
+
+    >>> result = fd.kinematic(scene, end=0.2, output_step=1e-3)
     """
     rigid = undeformed(scene)
     require_driven(rigid, start, "a kinematic analysis")

@@ -64,6 +64,9 @@ class Linearisation(Brief):
     whirl       : (2d,) share of the amplitude that whirls so, 1 for a circle and 1/2 for a line in the turning axes; nan of
                   what does not turn
     error       : relative difference of A from step halving; zero at rest and in steady motion, where A is exact
+
+    >>> found = fd.linearise(scene)
+    >>> np.abs(found.eigenvalues) / (2 * np.pi)  # [Hz]
     """
 
     A: Array
@@ -110,7 +113,10 @@ class Linearisation(Brief):
 
 @dataclass(frozen=True)
 class Linearise(OfMoment):
-    """Inputs are efforts and names of loads; quantities such as "rod.tip.position.y" are what comes out."""
+    """Inputs are efforts and names of loads; quantities such as "rod.tip.position.y" are what comes out.
+
+    >>> result = fd.run(scene, fd.MomentSettings(analysis=fd.Linearise(at_equilibrium=True)))
+    """
 
     keeps: ClassVar[bool] = False
     example: ClassVar[str] = (
@@ -166,6 +172,8 @@ def linearise(
     For an equilibrium: ``linearise(scene_at(scene, static(scene)))``.
 
     Raises InputError when nothing is free to move, or for a name that does not exist.
+
+    >>> found = fd.linearise(scene, inputs=(fd.JointEffort("torque", "hinge"),), outputs=("rod.tip.position.y",))
     """
     several("inputs", inputs, (*get_args(Effort), str)), several("outputs", outputs, (str,))
     fed = with_units(in_space(scene), _efforts(inputs))

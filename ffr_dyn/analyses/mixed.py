@@ -52,6 +52,8 @@ class Causal:
 
     tolerance : relative, of a step
     growth    : refuse internal dynamics that would magnify an error by more than this over the run
+
+    >>> result = fd.mixed(scene, unknown=(torque,), end=0.5, output_step=1e-3, solution=fd.Causal(tolerance=1e-8))
     """
 
     tolerance: float = 1e-10
@@ -62,6 +64,10 @@ class Causal:
 class Mixed(OverTime):
     """Forces away from the known motions are found by integration where that is stable, else as the bounded solution, which
     adds times before and after the run. Unknown forces are given by name; see `mixed`.
+
+    solution : how forces away from the known motions are found: "causal" or "bounded"; default: as the scene allows
+
+    >>> analysis = fd.Mixed(unknown=(fd.JointEffort("torque", "hinge"),), known=("path",))
     """
 
     integrates: ClassVar[bool] = True
@@ -114,6 +120,9 @@ def mixed(
 
     Raises InputError when motions and forces do not fit (the combination that is undetermined is told), ComputationError when
     the run fails or a causal one is asked for and cannot be trusted.
+
+    >>> torque = fd.JointEffort("torque", "hinge")
+    >>> result = fd.mixed(scene, unknown=(torque,), end=0.5, output_step=1e-3)
     """
     require_scene(scene)
     names, unknown = _known(scene, known), several("unknown", unknown, get_args(Effort))

@@ -41,6 +41,8 @@ class SciPy:
     (implicit, order 5; Hairer & Wanner 1996), "LSODA" (Petzold 1983), ...
 
     rtol, atol : its tolerances, of positions, velocities and elastic coordinates alike
+
+    >>> result = fd.reference(scene, end=0.5, output_step=0.01, method=fd.SciPy("Radau"))
     """
 
     solver: str = "DOP853"
@@ -60,6 +62,8 @@ class IDA:
     rtol, atol : its tolerances of positions, velocities and elastic coordinates; multipliers are not controlled
 
     It comes with the package scikit-sundae (`pip install ffr[ida]`).
+
+    >>> result = fd.reference(scene, end=0.5, output_step=0.01, method=fd.IDA(rtol=1e-10))
     """
 
     rtol: float = 1e-8
@@ -92,6 +96,8 @@ def reference(
     """Forward dynamics by a solver of SciPy or SUNDIALS; the arguments and the result are those of `forward`.
 
     Raises InputError for a scene or settings that cannot be used, ComputationError when the solver gives up.
+
+    >>> exact = fd.reference(scene, end=0.5, output_step=0.01)
     """
     times = output_times(start, end, output_step)
     assembled = assemble(scene, time=start)

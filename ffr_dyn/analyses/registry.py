@@ -44,6 +44,8 @@ def option(flag: str, help: str, *, metavar: str | None = None, required: bool =
     """Metadata of a field that is an option of the command: "--name", or "--yes/--no" for one of two values.
 
     required : that a scene file gives it;  names : key of the file for entries that are names of things of the scene
+
+    >>> metadata = fd.option("--speed", "Speed [rad/s].", metavar="W")  # of a field of an analysis
     """
     return {"flag": flag, "help": help, "metavar": metavar, "required": required, **more}
 
@@ -74,6 +76,8 @@ class OverTime(Analysis):
     """An analysis from a start to an end (with `Settings`).
 
     integrates : whether it takes a method;  stabilised : and a stabilisation of the constraints
+
+    >>> issubclass(fd.Forward, fd.OverTime)
     """
 
     integrates: ClassVar[bool] = False
@@ -82,7 +86,10 @@ class OverTime(Analysis):
 
 @dataclass(frozen=True)
 class OfMoment(Analysis):
-    """An analysis at one time (with `MomentSettings`)."""
+    """An analysis at one time (with `MomentSettings`).
+
+    >>> issubclass(fd.Static, fd.OfMoment)
+    """
 
 
 Kind = TypeVar("Kind", bound=type[Analysis])
@@ -92,6 +99,8 @@ def register_analysis(kind: Kind) -> Kind:
     """Make an analysis known by the name of its class in lower case; a decorator for code of one's own.
 
     Raises InputError for a word that is taken, and for a class that is no analysis.
+
+    >>> fd.register_analysis(Survey)  # a frozen dataclass derived from fd.OfMoment
     """
     if not issubclass(kind, (OverTime, OfMoment)):
         raise InputError(f"{kind.__name__} is no analysis: derive it from OverTime or OfMoment")

@@ -24,6 +24,9 @@ def run(
     """Analyse a scene as its settings say; `path`, `resume` and `progress` are those of `forward`.
 
     Raises InputError for what the analysis cannot do, and when another than a forward run is to be resumed.
+
+    >>> scene, settings = fd.load_scene("scene.toml")
+    >>> result = fd.run(scene, settings)
     """
     how: dict[str, Any] = {"path": path}
     if isinstance(settings, Settings):

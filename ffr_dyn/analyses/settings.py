@@ -20,6 +20,8 @@ class Charted:
     methods  : (name, steps [s] or tolerances), without numbers where a ladder is to be chosen; () for all methods
     modes    : elastic coordinates to keep of every flexible body, None for all
     drops    : terms to leave out, one set after the other, beside none
+
+    >>> chart = fd.Charted(measures=("deflection:rod",), modes=(2, 4, None))
     """
 
     _: KW_ONLY
@@ -31,7 +33,10 @@ class Charted:
 
 @dataclass(frozen=True)
 class Settings:
-    """An analysis over a time [s]; `method` and `stabilisation` are of those that integrate, `chart` of forward dynamics."""
+    """An analysis over a time [s]; `method` and `stabilisation` are of those that integrate, `chart` of forward dynamics.
+
+    >>> result = fd.run(scene, fd.Settings(start=0.0, end=1.0, output_step=0.01, method=fd.ROS2(1e-3)))
+    """
 
     _: KW_ONLY
     start: float
@@ -51,7 +56,10 @@ class Settings:
 
 @dataclass(frozen=True)
 class MomentSettings:
-    """An analysis at one `time` [s]."""
+    """An analysis at one `time` [s].
+
+    >>> result = fd.run(scene, fd.MomentSettings(analysis=fd.Static()))
+    """
 
     _: KW_ONLY
     time: float = 0.0

@@ -13,7 +13,10 @@ from ffr_dyn.scene.scene import Body, Scene, require_scene
 
 
 def scene_at(scene: Scene, result: Result, row: int = -1) -> Scene:
-    """The scene with its bodies where a row of a result has them, moving as they do there."""
+    """The scene with its bodies where a row of a result has them, moving as they do there.
+
+    >>> later = fd.scene_at(scene, result)  # as it is at the end
+    """
     return replace(scene, bodies=tuple(_body_at(body, result, row) for body in scene.bodies))
 
 
@@ -27,7 +30,10 @@ _HISTORIES = {"position": "R", "rotation": "p", "velocity": "v", "omega_bar": "o
 
 
 def held(scene: Scene, time: float) -> Scene:
-    """The scene with every driver and every length that is a function of time held at its value at `time` [s], at rest."""
+    """The scene with every driver and every length that is a function of time held at its value at `time` [s], at rest.
+
+    >>> result = fd.forward(fd.held(scene, 0.1), end=1.0, output_step=0.01)
+    """
     require_scene(scene)
     at_rest = replace(
         scene,

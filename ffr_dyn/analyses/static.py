@@ -45,7 +45,10 @@ ROUNDING = 1e-13  # of a stiffness, relative to the largest
 
 @dataclass(frozen=True)
 class Static(OfMoment):
-    """The drivers are held still, and so is what depends on the time."""
+    """The drivers are held still, and so is what depends on the time.
+
+    >>> result = fd.run(scene, fd.MomentSettings(analysis=fd.Static()))
+    """
 
     def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
         return static(scene, **settings.span, **how)
@@ -62,6 +65,8 @@ def static(
     stiffness per mass [1/s^2].
 
     Raises InputError for a motion that nothing holds, with its name; ComputationError when no equilibrium is found.
+
+    >>> result = fd.static(scene)
     """
     assembled = assemble(in_space(held(scene, time)), time=time)
     selected(assembled.system, outputs)

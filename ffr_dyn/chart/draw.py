@@ -66,6 +66,8 @@ def draw_chart(
     """Draw errors over a cost ("cpu", "wall" or "evaluations"): a panel for every measure of every diagram, in columns.
 
     Raises InputError for another kind of file, another cost, or a diagram without points.
+
+    >>> fd.draw_chart(diagram, "chart.png", against="evaluations")
     """
     shown = [diagrams] if isinstance(diagrams, Diagram) else list(diagrams)
     path = Path(path)

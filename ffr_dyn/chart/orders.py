@@ -31,7 +31,10 @@ def order_words(order: float) -> str:
 
 
 def orders(diagram: Diagram, measure: str) -> dict[tuple[str, str], float]:
-    """The observed order of every line (series, model) of a diagram whose methods take steps."""
+    """The observed order of every line (series, model) of a diagram whose methods take steps.
+
+    >>> fd.orders(diagram, "deflection:rod")
+    """
     found = {}
     for series, model in dict.fromkeys((point.series, point.model) for point in diagram.points):
         line = [p for p in diagram.points if (p.series, p.model) == (series, model) and p.kind == "step"]

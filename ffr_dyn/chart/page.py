@@ -23,7 +23,10 @@ Item = dict[str, Any]
 
 
 def write_page(diagram: Diagram, path: str | Path) -> Path:
-    """Write the page, atomically: lines with every variant's numbers under the mouse, and menus for measure and cost."""
+    """Write the page, atomically: lines with every variant's numbers under the mouse, and menus for measure and cost.
+
+    >>> fd.write_page(diagram, "chart.html")
+    """
     path = Path(path)
     with replacing(path) as part:
         part.write_text(page(diagram), encoding="utf-8")

@@ -50,7 +50,10 @@ _CONNECT = 10.0  # s to wait for the scheduler of a cluster
 
 @dataclass(frozen=True)
 class Span:
-    """From `start` to `end` with a row every `output_step` [s]."""
+    """From `start` to `end` with a row every `output_step` [s].
+
+    >>> with fd.pool() as workers: diagram = fd.work_precision(scene, fd.Span(0.5, 1e-3), workers)
+    """
 
     end: float
     output_step: float
@@ -233,6 +236,8 @@ def pool(workers: int | None = None, cluster: str | None = None) -> Iterator[Poo
     """Where to run: a cluster by its scheduler's address, local processes (default: half the processors), or with 0 here.
 
     Raises InputError where Dask is missing or no scheduler answers.
+
+    >>> with fd.pool(workers=2) as workers: diagram = fd.work_precision(scene, fd.Span(0.5, 1e-3), workers)
     """
     if workers == 0 and cluster is None:
         yield Here()

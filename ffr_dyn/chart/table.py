@@ -35,7 +35,10 @@ def rows(diagram: Diagram) -> Iterator[list[object]]:
 
 
 def write_table(diagram: Diagram, path: str | Path) -> Path:
-    """Write the table as comma-separated values (RFC 4180), atomically."""
+    """Write the table as comma-separated values (RFC 4180), atomically.
+
+    >>> fd.write_table(diagram, "chart.csv")
+    """
     path = Path(path)
     with replacing(path) as part, open(part, "w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)

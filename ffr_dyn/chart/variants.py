@@ -25,7 +25,10 @@ EXPLICIT_REACH = 1.5  # step times highest circular frequency of a body at which
 
 @dataclass(frozen=True)
 class Model:
-    """What is simplified in a scene: the arguments of `ffr_dyn.variants.variant.vary`, with the words for it."""
+    """What is simplified in a scene: the arguments of `ffr_dyn.variants.variant.vary`, with the words for it.
+
+    >>> model = fd.Model("4 modes", modes=4, drop=("I9",))
+    """
 
     label: str = "full model"
     modes: Modes | Mapping[str, Modes] | None = None
@@ -84,6 +87,8 @@ def models_of(
 
     A number that no body has stands for the largest that one has, and is left out where all modes are asked for as well.
     Raises InputError where modes or terms vary and no body is flexible.
+
+    >>> models = fd.models_of(scene, modes=(2, 4, None))
     """
     numbers, chosen = tuple(modes), tuple(tuple(terms) for terms in drops)
     if not any(body.model.n for body in scene.bodies) and (numbers != (None,) or any(chosen)):

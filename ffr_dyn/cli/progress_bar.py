@@ -21,6 +21,8 @@ def progress(
 
     Written to stream (standard error by default), a few times a second, and only when that is a terminal or the cell of a
     notebook.
+
+    >>> with fd.progress("swing", 2.0) as told: fd.forward(scene, end=2.0, output_step=0.01, progress=told)
     """
     with tqdm(desc=label, total=end, initial=start, file=stream, disable=_unseen(), bar_format=_FORMAT) as bar:
         yield lambda t: _advance(bar, t)

@@ -33,6 +33,8 @@ def begin_compiling(*kinds: type[Integrator], model: Model | None = None, forces
 
     model  : tables of the scene; without them, of one with applied loads
     forces : kernels of the scene's forces
+
+    >>> fd.begin_compiling(fd.ROS2)
     """
     functions = _of_scene(model) + [step for step in _steps() if any(kind.do_step is step for kind in kinds)]
     if any(kind.controlled for kind in kinds):

@@ -50,6 +50,8 @@ class Assembled(Brief):
     degrees_of_freedom : velocities left free by the constraints, elastic ones included
     redundant : (joint, row) pairs that follow from the other rows
     computed : in the plane or in space, and why, in words
+
+    >>> fd.assemble(scene).degrees_of_freedom
     """
 
     system: System
@@ -67,6 +69,8 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
 
     Raises InputError when the joints cannot be closed, naming the joint that stays open furthest, or when a driver
     contradicts the joints.
+
+    >>> x = fd.assemble(scene).x
     """
     require_scene(scene)
     declared = scene

@@ -48,6 +48,8 @@ class Mobility(Brief):
     redundant  : (joint, row) pairs that follow from the other rows
     overdriven : drivers whose motion the joints and the other drivers fix already
     doubts     : bodies whose modes do not fit the joints, or that cannot do without the inertia terms they leave out
+
+    >>> fd.mobility(scene).degrees_of_freedom
     """
 
     degrees_of_freedom: int
@@ -83,6 +85,8 @@ def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobili
     """Mobility of a scene, assembled at `time` [s]; without its drivers if asked so.
 
     Raises InputError when the scene cannot be assembled.
+
+    >>> print(fd.mobility(scene))
     """
     plane, computed, scene = flattened(scene, time)[0].plane, plane_in_words(scene, time), in_space(scene)
     over = overdriven(scene, time) if drivers and scene.drivers else ()

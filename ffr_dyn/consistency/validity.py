@@ -116,6 +116,8 @@ def parts_needed(scene: Scene, result: Result, angle: float = BENT) -> dict[str,
     linear body. A result in parts knows better where a body bends: the number may grow once.
 
     Raises InputError for an angle that is not positive and a result without the elastic coordinates.
+
+    >>> fd.parts_needed(scene, result)  # {"rod": 3}
     """
     if not angle > 0:
         raise InputError(f"the angle is {angle} rad; it must be positive")
@@ -137,6 +139,8 @@ def in_enough_parts(
     analyse : such as `static`, or a forward run; its result keeps `*.q`
 
     Raises InputError as `parts_needed`; ComputationError where ever more parts are needed.
+
+    >>> scene, result = fd.in_enough_parts(make, lambda scene: fd.static(scene))
     """
     scene = make({})
     for _ in range(ROUNDS):

@@ -42,6 +42,8 @@ class Adaptation:
     enter : share of a tolerance above which a mode that is left out enters
     leave : share below which a mode that is there leaves; well below `enter`, so that it does not come back at once
     rows  : output rows between two looks
+
+    >>> settings = fd.Adaptation(enter=0.2, leave=0.05)
     """
 
     enter: float = 0.3
@@ -91,6 +93,8 @@ def adaptive_forward(
     each body), energy.switched (energy that switches have added since the start, negative where they took some away).
 
     Raises InputError and ComputationError as `economise`.
+
+    >>> result = fd.adaptive_forward(scene, ["rod.tip.position"], end=0.5, output_step=1e-3)
     """
     span, scene = Span(start, end, output_step, stabilisation), with_mean_axis_bodies(scene)
     of = probe(assemble(scene, time=start), [as_output(one, tolerance) for one in outputs], policy)

@@ -32,6 +32,8 @@ class Output:
                 largest von Mises stress on the surface of a body
     tolerance : largest error at any output time
     absolute  : whether the tolerance is in the unit of the output, or else a share of its range over the run
+
+    >>> found = fd.economise(scene, [fd.Output("rod.tip.position", 1e-3)], end=0.5, output_step=1e-3)
     """
 
     name: str

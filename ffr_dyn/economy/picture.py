@@ -52,7 +52,10 @@ class OutputMeasure:
 
 
 def diagram(found: Economy) -> Diagram:
-    """The runs of a search with their processor times, which takes some repetitions of each, and their errors."""
+    """The runs of a search with their processor times, which takes some repetitions of each, and their errors.
+
+    >>> fd.draw_chart(fd.diagram(found), "search.png")
+    """
     measures = tuple(
         OutputMeasure(output.name, unit, float(scale))
         for output, unit, scale in zip(found.probe.outputs, found.probe.units, found.scales, strict=True)

@@ -282,7 +282,10 @@ def _notes(found: Economy) -> list[str]:
 
 
 def as_text(found: Economy) -> str:
-    """The report in columns, for a terminal."""
+    """The report in columns, for a terminal.
+
+    >>> print(fd.as_text(found))
+    """
     return "\n".join(line for table in tables(found) for line in _plain(table))
 
 
@@ -346,7 +349,10 @@ def _section(table: Table) -> str:
 
 
 def write_report(found: Economy, path: str | Path) -> Path:
-    """Write the report as .html (with the chart), .md or .txt. Raises InputError for another kind of file."""
+    """Write the report as .html (with the chart), .md or .txt. Raises InputError for another kind of file.
+
+    >>> fd.write_report(found, "economy.html")
+    """
     from ffr_dyn.economy.picture import draw
 
     path = Path(path)

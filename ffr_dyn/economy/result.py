@@ -56,6 +56,8 @@ class Economy(Brief):
     unmoved      : names of outputs that no model changes
     frequencies  : of the model beside those of everything;  stiffening : what stiffens bodies, and how much
     policy       : the numbers of the search
+
+    >>> print(fd.as_text(found))  # of what `fd.economise` returned
     """
 
     original: Scene

@@ -98,6 +98,8 @@ def economise(
 
     Raises InputError for outputs that do not exist or stay zero and for tolerances that cannot be met or told;
     ComputationError when no run of the scene comes to an end.
+
+    >>> found = fd.economise(scene, ["rod.tip.position"], end=0.5, output_step=1e-3, tolerance=1e-3)
     """
     span, scene = Span(start, end, output_step, stabilisation), with_mean_axis_bodies(scene)
     tell("assemble")

@@ -18,6 +18,8 @@ class Curve(Brief):
 
     Between the points it is the monotone cubic of Fritsch and Carlson (1980), which does not overshoot; through two
     points it is a line. Raises InputError unless there are two or more increasing places and as many values.
+
+    >>> buffer = fd.SpringDamper("buffer", "ground.wall", "rod.tip", stiffness=fd.Curve([-0.01, 0, 0.01], [-500, 0, 100]))
     """
 
     at: Any

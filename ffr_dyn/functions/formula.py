@@ -57,6 +57,8 @@ def formula(text: str, parameters: Mapping[str, Any] = {}, what: str = "formula"
     """The function of time that a formula describes, with exact derivatives.
 
     Raises InputError that names `what`, the place in the text and the nearest known name.
+
+    >>> push = fd.formula("100 * sin(2 * pi * f * t)", {"f": 5.0})
     """
     found = parse(text, parameters, what)
     if isinstance(found, TimeFunction):

@@ -30,6 +30,8 @@ class TimeFunction(Brief):
 
     operands : what an operation of a formula (data: its number, its parameter) works on
     name     : of an input of the scene, see `signal`
+
+    >>> isinstance(fd.polynomial(0, 150), fd.TimeFunction)
     """
 
     kind: int
@@ -40,12 +42,18 @@ class TimeFunction(Brief):
 
 
 def constant(value: float) -> TimeFunction:
-    """The same value at all times."""
+    """The same value at all times.
+
+    >>> speed = fd.constant(150.0)
+    """
     return polynomial(value)
 
 
 def polynomial(*coefficients: float) -> TimeFunction:
-    """c0 + c1 t + c2 t^2 + ...; `polynomial(0, 150)` is a crank that turns at 150 rad/s."""
+    """c0 + c1 t + c2 t^2 + ...; `polynomial(0, 150)` is a crank that turns at 150 rad/s.
+
+    >>> angle = fd.polynomial(0, 150)
+    """
     return TimeFunction(POLYNOMIAL, _numbers("polynomial", coefficients))
 
 
@@ -71,7 +79,10 @@ def _by_name(function: Callable[P, TimeFunction]) -> Callable[P, TimeFunction]:
 
 @_by_name
 def harmonic(*, amplitude: float, frequency: float, phase: float = 0.0, mean: float = 0.0) -> TimeFunction:
-    """mean + amplitude sin(2 pi frequency t + phase); frequency [Hz], phase [rad]."""
+    """mean + amplitude sin(2 pi frequency t + phase); frequency [Hz], phase [rad].
+
+    >>> shake = fd.harmonic(amplitude=0.01, frequency=5.0)
+    """
     return TimeFunction(HARMONIC, _numbers("harmonic", (mean, amplitude, 2 * np.pi * frequency, phase)))
 
 
@@ -80,6 +91,8 @@ def table(times: Array, values: Array) -> TimeFunction:
 
     Raises InputError unless there are two or more times, increasing, with as many values,
     that a spline can go through.
+
+    >>> angle = fd.table(np.array([0.0, 0.5, 1.0]), np.array([0.0, 0.2, 0.0]))
     """
     from scipy.interpolate import CubicSpline
 
@@ -98,7 +111,10 @@ def table(times: Array, values: Array) -> TimeFunction:
 
 
 def piecewise(breaks: Array, coefficients: Array) -> TimeFunction:
-    """Piecewise polynomial: coefficients (pieces, k), ascending powers of (t - start of the piece)."""
+    """Piecewise polynomial: coefficients (pieces, k), ascending powers of (t - start of the piece).
+
+    >>> ramp = fd.piecewise(np.array([0.0, 1.0, 2.0]), np.array([[0.0, 1.0], [1.0, 0.0]]))
+    """
     pieces, count = np.shape(coefficients)
     return TimeFunction(
         PIECEWISE, (float(pieces), float(count), *map(float, breaks), *map(float, np.ravel(coefficients)))
@@ -106,7 +122,10 @@ def piecewise(breaks: Array, coefficients: Array) -> TimeFunction:
 
 
 def user(function: Callable[[float], object]) -> TimeFunction:
-    """A Python function t -> value, or t -> (value, rate, second derivative) where it drives a joint coordinate."""
+    """A Python function t -> value, or t -> (value, rate, second derivative) where it drives a joint coordinate.
+
+    >>> push = fd.user(lambda t: 100.0 * np.exp(-t))
+    """
     return TimeFunction(USER, (0.0,), function)
 
 
@@ -114,6 +133,8 @@ def signal(name: str, value: float = 0.0) -> TimeFunction:
     """An input of the scene, by name: it has its initial value until a `ffr_dyn.realtime.stepper.Stepper` sets another.
 
     The same signal may stand in several places. Raises InputError for a name that is no word, or a value not finite.
+
+    >>> motor = fd.Actuator("motor", "hinge", force=fd.signal("torque", 2.0))
     """
     if not isinstance(name, str) or not name.isidentifier():
         raise InputError(f"{name!r} cannot be the name of an input: use letters, digits and '_', a letter first")

@@ -28,7 +28,10 @@ from ffr_prep.common.errors import InputError
 
 
 class Integrator(Protocol):
-    """What `forward` needs of a method."""
+    """What `forward` needs of a method.
+
+    >>> isinstance(fd.ROS2(1e-3), fd.Integrator)
+    """
 
     @property
     def step(self) -> float:
@@ -91,6 +94,8 @@ def register_integrator(name: str, method: type[Any]) -> None:
     """Make a method of one's own known to scene files, commands and charts.
 
     Raises InputError for a name that is taken, and for a class without what `Integrator` asks for.
+
+    >>> fd.register_integrator("euler", Euler)
     """
     asked = [
         *Integrator.__annotations__,

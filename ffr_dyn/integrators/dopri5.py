@@ -106,6 +106,8 @@ class DormandPrince:
     For scenes without stiff modes: no step is stable above some 3.3 / omega_max of the assembled system.
 
     tolerances : what an error may be
+
+    >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.DormandPrince(fd.tolerances(1e-8)))
     """
 
     tolerances: Tolerances = Tolerances()  # noqa: RUF009 - frozen

@@ -241,6 +241,8 @@ class GeneralisedAlpha:
     iterations      : Newton corrections that a step may take
     scaled          : judge corrections as motions. Otherwise as accelerations and multipliers, which is how index 3 is lost
                       at small steps: their rounding errors grow as 1/h^2
+
+    >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.GeneralisedAlpha(1e-3, spectral_radius=0.6))
     """
 
     step: float
@@ -282,6 +284,8 @@ class HHT:
     step  : time step [s]
     alpha : numerical damping of what the step does not resolve, 0 (none: the trapezoidal rule) ... 1/3
     form, tolerance, iterations : as of `GeneralisedAlpha`
+
+    >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.HHT(1e-3, alpha=0.05))
     """
 
     step: float

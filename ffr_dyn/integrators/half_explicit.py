@@ -184,6 +184,8 @@ class HalfExplicit:
     Explicit: the step is limited as that of `RK4`. Five evaluations a step.
 
     step : time step [s]
+
+    >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.HalfExplicit(1e-4))
     """
 
     step: float

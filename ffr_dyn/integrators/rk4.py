@@ -68,6 +68,8 @@ class RK4:
     *assembled* system, which exceeds the largest frequency of a free body; see `ROS2` where that is too small.
 
     step : time step [s]
+
+    >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.RK4(1e-4))
     """
 
     step: float

@@ -104,6 +104,8 @@ class ROS2:
     Modes with h Omega > 1 are damped numerically; those the step resolves are right to second order.
 
     step : time step [s]
+
+    >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.ROS2(1e-3))
     """
 
     step: float

@@ -129,6 +129,8 @@ class ROS3:
     Modes with h Omega > 1 are damped numerically; those the step resolves are right to third order.
 
     step : time step [s]
+
+    >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.ROS3(1e-3))
     """
 
     step: float
@@ -153,6 +155,8 @@ class AdaptiveROS3:
     """ROS3 with steps chosen by the error of each.
 
     tolerances : what an error may be
+
+    >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.AdaptiveROS3(fd.tolerances(1e-6)))
     """
 
     tolerances: Tolerances = Tolerances()  # noqa: RUF009 - frozen

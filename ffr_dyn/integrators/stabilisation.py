@@ -20,6 +20,8 @@ class Projection:
     over (see `ffr_dyn.kernels.singular_positions`).
 
     tolerance : of Phi [m, -], positive
+
+    >>> result = fd.forward(scene, end=1.0, output_step=0.01, stabilisation=fd.Projection(1e-11))
     """
 
     tolerance: float = 1e-9
@@ -34,6 +36,8 @@ class Baumgarte:
     """Phi_ddot + 2 alpha Phi_dot + beta^2 Phi = 0 in place of Phi_ddot = 0 (Baumgarte 1972).
 
     alpha, beta : [1/s], positive; beta = alpha is critical damping. Gains near 1 / step make any method unstable.
+
+    >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.RK4(1e-4), stabilisation=fd.Baumgarte(20.0, 20.0))
     """
 
     alpha: float
@@ -49,7 +53,10 @@ class Baumgarte:
 
 @dataclass(frozen=True)
 class Drifting:
-    """No stabilisation: the drift is reported, not held."""
+    """No stabilisation: the drift is reported, not held.
+
+    >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.RK4(1e-4), stabilisation=fd.Drifting())
+    """
 
 
 Stabilisation = Projection | Baumgarte | Drifting

@@ -22,6 +22,8 @@ class Tolerances:
                that the step takes
 
     The error at the end of a run is usually some ten times larger. Raises InputError for values that are not positive.
+
+    >>> method = fd.DormandPrince(fd.Tolerances(1e-8, position=1e-9))
     """
 
     relative: float = 1e-6
@@ -38,5 +40,8 @@ class Tolerances:
 
 
 def tolerances(relative: float) -> Tolerances:
-    """All tolerances in the proportions of the default ones."""
+    """All tolerances in the proportions of the default ones.
+
+    >>> method = fd.AdaptiveROS3(fd.tolerances(1e-5))
+    """
     return Tolerances(relative, position=0.1 * relative, velocity=relative, elastic=0.01 * relative)

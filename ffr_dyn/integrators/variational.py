@@ -350,6 +350,8 @@ class Variational:
     step       : time step [s]
     tolerance  : of the last correction of the velocities, relative
     iterations : Newton corrections that a step may take
+
+    >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.Variational(1e-3))
     """
 
     step: float

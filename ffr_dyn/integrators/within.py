@@ -18,6 +18,8 @@ class Within:
 
     accuracy : from 1e-8 to 1;  method : of fixed steps, by its name
     settings : (name, value) of what the method takes beside its step
+
+    >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.Within(1e-5, "ros3"))
     """
 
     accuracy: float = 1e-3

@@ -73,6 +73,8 @@ def animate(
     drawn, ComputationError when this machine cannot render.
 
     Example: ``fd.animate(result, "out/motion.html", scale=50, plots=["crank_pin.force"])``
+
+    >>> fd.animate(result, "film.html", scale="auto")
     """
     target = None if path is None else Path(path)
     write = None if target is None else _writer(target)

@@ -16,6 +16,8 @@ def draw_bode(result: Result, path: str | Path) -> Path:
         fd.draw_bode(fd.response(scene, input="hinge.moment", outputs=["arm.tip.acceleration"]), "bode.png")
 
     Raises InputError for another kind of file.
+
+    >>> fd.draw_bode(result, "bode.png")
     """
     f = result["frequency"]
     with drawing(path, (10.0, 7.0)) as figure:
@@ -37,6 +39,8 @@ def draw_nyquist(result: Result, path: str | Path) -> Path:
         fd.draw_nyquist(fd.response(scene, input="hinge.moment", outputs=["arm.tip.acceleration.y"]), "locus.png")
 
     Raises InputError for another kind of file.
+
+    >>> fd.draw_nyquist(result, "nyquist.png")
     """
     with drawing(path, (8.0, 7.0)) as figure:
         axes = figure.subplots()

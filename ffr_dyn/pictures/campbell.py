@@ -21,6 +21,8 @@ def draw_campbell(result: Result, path: str | Path) -> Path:
         fd.draw_campbell(fd.campbell(scene, speeds=range(0, 500, 25)), "campbell.png")
 
     Raises InputError for another kind of file.
+
+    >>> fd.draw_campbell(result, "campbell.png")
     """
     a, speed = result.attributes, result["speed"]
     whirling = np.array(a["whirling"], bool)

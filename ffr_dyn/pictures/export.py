@@ -37,6 +37,8 @@ def export(result: Result, path: str | Path, names: Iterable[str] | None = None)
     Raises InputError for another suffix, unknown names, or names where they have no meaning.
 
     Example: ``fd.export(result, "out/motion.vtkhdf")``
+
+    >>> fd.export(result, "motion.vtkhdf")
     """
     path = Path(path)
     if path.suffix.lower() not in WRITERS:

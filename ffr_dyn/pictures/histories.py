@@ -73,6 +73,8 @@ def plot(
     path    : .png, .svg or .pdf, where the figure is to be written
     against : "time", or the component to draw over, such as "crank_bearing.angle"
     Raises InputError for unknown names, no names, no rows, or another kind of file.
+
+    >>> fd.plot(result, ["rod.tip.position", "hinge.force"], "pendulum.png")
     """
     components = list(result.components([names] if isinstance(names, str) else names))
     if not components or result.time.size == 0:
@@ -103,6 +105,8 @@ def plot_path(
 
     Raises InputError for an unknown marker, a plane that is not two different letters of xyz, no rows, or another kind
     of file.
+
+    >>> fd.plot_path(result, "rod.tip", "path.png", plane="xy")
     """
     if len(plane) != 2 or len(set(plane)) != 2 or not set(plane) <= set("xyz"):
         raise InputError(f"plane {plane!r} is not two different letters of x, y, z")

@@ -78,6 +78,8 @@ def show(
     the title says why. Raises InputError for another kind of file, ComputationError when this machine cannot render.
 
     Example: ``fd.show(scene)`` in a notebook, ``fd.show(scene, "scene.html")`` elsewhere.
+
+    >>> fd.show(scene, "scene.html")
     """
     if isinstance(scene, FlexibleBody):
         scene = Scene((Body("body", scene),), name=scene.name or "body", plane="none")

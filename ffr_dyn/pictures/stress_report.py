@@ -83,6 +83,8 @@ def stress_report(
     in colour, and of beams <body>_section_forces.csv and .png of the element nearest to the first point, or else of the
     one with the largest bending moment.
     Raises InputError for names and points that do not exist, ComputationError when this machine cannot render.
+
+    >>> report = fd.stress_report(result, "stress")
     """
     folder, result = Path(folder), with_wholes(result if since is None else _later(result, since))
     bodies = stressed_bodies(result) if body is None else (body,)
@@ -98,7 +100,10 @@ def stress_report(
 
 
 def report_lines(report: StressReport) -> Iterator[str]:
-    """The report in words."""
+    """The report in words.
+
+    >>> print(*fd.report_lines(report), sep="\\n")  # of what `fd.stress_report` returned
+    """
     of = measure(report.quantity)
     factor, unit = readable(of.unit, abs(report.spots[0].value))
     yield f"hot spots   {of.words} [{unit or '1'}], place in the body frame [m], time [s]"

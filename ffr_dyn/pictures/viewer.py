@@ -15,6 +15,8 @@ class Viewer:
     """A page that shows a film or a scene, made when it is first needed.
 
     `save` writes it, a notebook shows it, `text` is its HTML.
+
+    >>> fd.animate(result).save("film.html")
     """
 
     make: Callable[[], str] = field(repr=False)

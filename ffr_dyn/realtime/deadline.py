@@ -31,6 +31,8 @@ class Timing(Brief):
 
     seconds  : (N,) [s] of each: set inputs, step, outputs
     deadline : [s] that a step may take;  step : [s] of simulated time;  title, method : what was stepped
+
+    >>> timing = fd.measure_steps(scene, fd.ROS2(1e-3), duration=10.0)
     """
 
     seconds: Array
@@ -86,6 +88,8 @@ def measure_steps(
 
     Python's garbage collector stands still meanwhile. Raises InputError for times that are not positive, ComputationError
     where a step fails.
+
+    >>> print(fd.measure_steps(scene, fd.ROS2(1e-3), duration=10.0, deadline=1e-3))
     """
     deadline = method.step if deadline is None else deadline
     count = _steps(duration, deadline, method)

@@ -65,6 +65,8 @@ class Stepper(Brief):
 
     Raises InputError for a scene, method or outputs that cannot be used, ComputationError when the start has no
     accelerations.
+
+    >>> stepper = fd.Stepper(scene, fd.ROS2(1e-3), outputs=("hinge.angle",))
     """
 
     def __init__(

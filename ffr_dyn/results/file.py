@@ -55,14 +55,20 @@ _MARKS = ("Conventions", "ffr_format", "ffr_format_version", "json_attributes")
 
 
 def save_result(result: Result, path: str | Path) -> Path:
-    """Write the result to one file, atomically: an existing file is replaced only by a complete new one."""
+    """Write the result to one file, atomically: an existing file is replaced only by a complete new one.
+
+    >>> fd.save_result(result, "result.nc")
+    """
     writer = ResultWriter(path, result)
     writer.close(result.attributes.get("status", "complete"))
     return writer.path
 
 
 def load_result(path: str | Path) -> Result:
-    """Read a result file. Raises InputError for a missing, damaged, truncated, foreign or newer file."""
+    """Read a result file. Raises InputError for a missing, damaged, truncated, foreign or newer file.
+
+    >>> result = fd.load_result("result.nc")
+    """
     path = Path(path)
     with _reading(path) as file:
         return _read(file)

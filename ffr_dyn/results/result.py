@@ -40,7 +40,10 @@ def _check_name(kind: str, name: str) -> None:
 
 @dataclass(frozen=True, repr=False)
 class Axis(Brief):
-    """A labelled axis of a quantity, such as x, y, z. Labels are unique, not empty, and contain no dot."""
+    """A labelled axis of a quantity, such as x, y, z. Labels are unique, not empty, and contain no dot.
+
+    >>> axis = fd.Axis("component", ("x", "y", "z"))
+    """
 
     name: str
     labels: tuple[str, ...]
@@ -68,6 +71,8 @@ class Quantity(Brief):
     """A history: values (T, ...) with a unit and one axis for each dimension after time.
 
     unit : in SI symbols, such as "m", "N m", "m/s", "m sqrt(kg)"; "1" for a number
+
+    >>> result.quantity("rod.tip.position").unit
     """
 
     values: Array
@@ -94,6 +99,9 @@ class Result(Brief):
                  which markers (`ffr_dyn.scene.described`)
 
     Raises InputError when lengths, names or axes contradict each other.
+
+    >>> result = fd.load_result("result.nc")
+    >>> result["rod.tip.position"]  # (rows, 3) [m]
     """
 
     time: Array
@@ -220,7 +228,10 @@ def table(result: Result, names: Iterable[str] | None = None) -> tuple[tuple[str
 
 
 def write_csv(result: Result, path: str | Path, names: Iterable[str] | None = None) -> Path:
-    """Write `table` as comma-separated values (RFC 4180, shortest digits that read back exactly), atomically."""
+    """Write `table` as comma-separated values (RFC 4180, shortest digits that read back exactly), atomically.
+
+    >>> fd.write_csv(result, "tip.csv", ["rod.tip.position"])
+    """
     headings, rows = table(result, names)
     path = Path(path)
     with replacing(path) as part, open(part, "w", newline="", encoding="utf-8") as stream:

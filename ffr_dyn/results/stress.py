@@ -109,7 +109,10 @@ class HotSpot:
 
 
 def peaks(result: Result, body: str, quantity: str = "von-mises") -> tuple[Array, Array]:
-    """(P,) the value of largest size that the measure takes at each surface point, with its sign, and (P,) its row."""
+    """(P,) the value of largest size that the measure takes at each surface point, with its sign, and (P,) its row.
+
+    >>> values, rows = fd.peaks(result, "rod")
+    """
     surface, q, of = stressed_surface(result, body), _coordinates(result, body), measure(quantity)
     count = len(surface.points)
     values, rows = np.zeros(count), np.zeros(count, np.int64)
@@ -131,6 +134,8 @@ def hot_spots(
     count  : at most; two on one body are apart by a tenth of its size
 
     Raises InputError for an unknown measure or body and for bodies without stress modes.
+
+    >>> spots = fd.hot_spots(result, "von-mises", count=3)
     """
     if count < 1:
         raise InputError(f"asked for {count} hot spots; ask for one or more")
@@ -156,6 +161,8 @@ def stress_histories(result: Result, body: str, places: Mapping[str, Array], qua
 
     For each place: <body>.<place>.stress and .strain (tensors in body axes; no strain of anisotropic materials) and
     .<quantity>. Raises InputError for an unknown body or measure, and a place far from the body.
+
+    >>> notch = fd.stress_histories(result, "rod", {"notch": np.array([0.15, 0, 0.012])})
     """
     surface, q, of = stressed_surface(result, body), _coordinates(result, body), measure(quantity)
     found: dict[str, Quantity] = {}
@@ -191,6 +198,8 @@ def section_forces(result: Result, body: str, element: int) -> Array:
     """(T, 3, 6) N, Qy, Qz [N], Mx, My, Mz [N m] at the first end, middle and last end of a beam element, its axes.
 
     Raises InputError for a body without beams or an element that does not exist.
+
+    >>> fd.section_forces(result, "arm", 0)[:, 0, 0]  # N at the first end of the first element
     """
     beams = beams_of(result, body)
     if not 0 <= element < len(beams.modes):
@@ -204,7 +213,10 @@ def _in_element(beams: BeamForces, element: int, q: Array) -> Array:
 
 
 def section_histories(result: Result, body: str, element: int) -> Result:
-    """Section forces of an element as named histories: <body>.element_3.middle.force and .moment (first, middle, last)."""
+    """Section forces of an element as named histories: <body>.element_3.middle.force and .moment (first, middle, last).
+
+    >>> fd.plot(fd.section_histories(result, "arm", 0), "*")
+    """
     values = section_forces(result, body, element)
     found: dict[str, Quantity] = {}
     for k, place in enumerate(PLACES):
@@ -227,7 +239,10 @@ class SectionPeak:
 
 
 def section_peaks(result: Result, body: str) -> tuple[SectionPeak, ...]:
-    """For each section force its value of largest size over elements, their places and time."""
+    """For each section force its value of largest size over elements, their places and time.
+
+    >>> worst = fd.section_peaks(result, "arm")
+    """
     beams, q = beams_of(result, body), _coordinates(result, body)
     best: list[SectionPeak | None] = [None] * 6
     for element in range(len(beams.modes)):

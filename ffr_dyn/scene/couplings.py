@@ -20,6 +20,12 @@ class Coupling:
     the pitch radius [m]. Angles may turn any number of times.
 
     Raises InputError for a ratio that is zero or not finite.
+
+    first, second : joint coordinates, "joint.angle" or "joint.stroke"
+    ratio : of the second to the first, not zero: [-], [m], or [1/m]
+    offset : of the second where the first is zero [rad] or [m]
+
+    >>> gear = fd.Coupling("gear", "pinion.angle", "wheel.angle", ratio=-20 / 40)
     """
 
     name: str

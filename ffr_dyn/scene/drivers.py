@@ -17,11 +17,15 @@ from ffr_prep.common.errors import InputError
 class Driver:
     """Prescribes `coordinate` ("angle" [rad] or "stroke" [m]) of a joint as a function of time.
 
+    joint : name of the joint
+    coordinate : "angle" or "stroke"
     function : a number, a time function, or a Python function that gives (value, rate, second derivative)
 
     The angle turns f_j from f_i towards g_i, about h_i; the stroke is the distance of j from i along h_i.
 
     Raises InputError for a function that is none of these.
+
+    >>> motor = fd.Driver("motor", "hinge", fd.polynomial(0, 150))  # 150 rad/s
     """
 
     name: str
@@ -41,10 +45,13 @@ class Driver:
 class PointDriver:
     """Prescribes where marker `j` is, seen from marker `i`: components of r_j - r_i in global axes [m] over time.
 
+    i, j : markers; j is the one that is moved
     x, y, z : numbers, time functions or Python functions that give (value, rate, second derivative); None leaves a
               component free
 
     Raises InputError when all are free.
+
+    >>> path = fd.PointDriver("path", "ground.wall", "slider.pin", x=fd.harmonic(amplitude=0.01, frequency=5.0))
     """
 
     name: str

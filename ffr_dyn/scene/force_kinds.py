@@ -24,6 +24,8 @@ def register_force(kind: Kind) -> Kind:
     """Make a kind of force known to scenes, scene files and documentation; a decorator of its class.
 
     Raises InputError for a word that another kind has.
+
+    >>> fd.register_force(CubicSpring)
     """
     new: Any = kind
     for other in FORCES:

@@ -194,6 +194,8 @@ def register_joint(
     coordinates : of "angle" (which needs both h axes parallel) and "stroke", those that it has
     needs       : of "axis_j", "length" and "pitch", the fields of `Joint` that must be given
     Raises InputError for a kind that there is.
+
+    >>> fd.register_joint("pin-in-slot", pin_in_slot, coordinates=("angle",))
     """
     if kind in KINDS and KINDS[kind].__qualname__ != sentence.__qualname__:
         raise InputError(f"there is a kind of joint {kind!r} already; give the other one another name")
@@ -220,6 +222,7 @@ register_joint("screw", screw, ("angle", "stroke"), needs=("pitch",))
 class Joint:
     """Two markers, `i` and `j` ("body.interface", or "ground.point"), tied by the words of `kind`.
 
+    i, j    : its two markers; angle and stroke of the joint are those of j seen from i
     kind   : spherical, revolute, cylindrical, translational, universal, fixed, planar, point-on-line, point-on-plane,
              orientation, parallel, perpendicular, distance or screw
     axis   : (3,) joint axis in the axes of i's body (or a (3, 3) joint frame), default z; for a universal joint the arm on i
@@ -227,6 +230,8 @@ class Joint:
              both keeps the attitudes of its bodies to each other as the scene draws them; its points are brought together
     length : [m] of a distance joint: a positive number or a function of time
     pitch  : [m] per turn of a screw, positive for a right-hand thread
+
+    >>> hinge = fd.Joint("hinge", "revolute", "ground.wall", "rod.hinge", axis=(0, 0, 1))
     """
 
     name: str

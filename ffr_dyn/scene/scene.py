@@ -55,6 +55,8 @@ class Body(Brief):
                motion are then those of: the frame to which the scene and results refer
 
     Pose and motion are a first guess: assembly makes them meet the joints.
+
+    >>> rod = fd.Body("rod", fd.load_body("rod.ffr"), position=(0.1, 0, 0), damping=0.01)
     """
 
     name: str
@@ -132,6 +134,8 @@ class Scene(Brief):
     plane   : "auto" finds out whether the scene is planar and then computes in the plane alone (see
               `ffr_dyn.variants.plane`); "x", "y" or "z", its normal, declares it, so that modes mostly in the plane are
               kept and the rest is left out even where it is small only; "none" computes in space
+
+    >>> scene = fd.Scene([rod], [hinge], ground={"wall": (0, 0, 0)}, gravity=(0, -9.81, 0))
     """
 
     bodies: tuple[Body, ...]

@@ -17,9 +17,12 @@ WHAT = ("position", "velocity", "acceleration", "distance", "orientation")
 class Measurement:
     """What marker `j` does, seen from marker `i` ("body.interface" or "ground.point").
 
+    i, j : markers: j is seen from i
     what : position [m], velocity [m/s] or acceleration [m/s^2]: the difference of the two global vectors; distance [m];
            orientation: Euler parameters of j's axes in those of i
     axes : in which the difference is given: "global" or the name of a body
+
+    >>> travel = fd.Measurement("travel", "ground.wall", "rod.tip", axes="crank")
     """
 
     name: str
@@ -41,10 +44,14 @@ class Measurement:
 class StressMeasurement:
     """Stress or strain at the surface point of a body that is nearest to `point` [m], in the body frame.
 
+    body : name of a flexible body
+    point : in the body frame [m]; the nearest point of the surface is taken
     what : "stress" [Pa] or "strain", the six components in body axes; or one number made of them: "von-mises", "tresca",
            "max-principal", "xx", "strain-xx", ... (`ffr_dyn.scene.stress_sensors.MEASURES`)
 
     The body needs stress modes (`ffr-prep reduce --stress`).
+
+    >>> notch = fd.StressMeasurement("notch", "rod", (0.15, 0, 0.012))
     """
 
     name: str
@@ -63,10 +70,14 @@ class SectionMeasurement:
     """Section forces of the beam element nearest to `point` [m], in the body frame: what its part towards the last end exerts
     on the other.
 
+    body : name of a flexible body with beams
+    point : in the body frame [m]; the nearest beam element is taken
     what  : "force": N, Qy, Qz [N], or "moment": Mx, My, Mz [N m], in element axes
     place : in the element: "first" end, "middle" or "last" end
 
     The body needs section forces (`ffr-prep reduce-structure` with stress = true).
+
+    >>> root = fd.SectionMeasurement("root", "arm", (0, 0, 0), what="moment", place="first")
     """
 
     name: str

@@ -72,6 +72,8 @@ def load_scene(
     bodies     : body files in place of those in the file, by the names of the bodies
 
     Raises InputError that names the file, the entry, its value and what is expected, with the nearest known name.
+
+    >>> scene, settings = fd.load_scene("scene.toml", {"crank.length": "60 mm"})
     """
     with reading(path, "a scene file"):
         entry, source = _read(Path(path), parameters)

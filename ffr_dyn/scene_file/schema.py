@@ -209,9 +209,26 @@ def _one_of(models: Sequence[type[BaseModel]], words: Sequence[str]) -> Any:
 class BodyEntry(Strict):
     """A flexible body from a file, or a rigid one from its mass and named points.
 
-    inertia is about the centre of mass; instead of inertia and centre_of_mass, the integrals r_dm and rr_dm (first and second
-    moments about the origin) may be given. Points of a body from a file are put on its surface, at the nearest node. `drop`
-    names inertia terms that the equations of motion leave out (see `ffr_dyn.variants.variant`).
+    file : body file of `ffr-prep`, relative to the scene file
+    modes : keep the first so many modes; default: all
+    mass : [kg] of a rigid body
+    inertia : of a rigid body about its centre of mass, body axes [kg m^2]: three principal values, or 3 x 3
+    centre_of_mass : of a rigid body, in its frame [m]
+    r_dm : first moment of mass about the origin [kg m], in place of centre_of_mass
+    rr_dm : second moment about the origin, the integral of r r^T [kg m^2], in place of inertia
+    points : named points in the body frame [m]; of a body from a file, the nearest nodes of its surface
+    position : origin of the body frame, global [m]; a first guess that assembly corrects
+    rotation : rotation vector [rad], or four Euler parameters, scalar first; a first guess
+    velocity : of the origin, global [m/s]
+    omega_bar : angular velocity, body axes [rad/s]
+    q : elastic coordinates at the start [m sqrt(kg)]; default: zero
+    q_dot : their rates [m sqrt(kg)/s]; default: zero
+    damping : modal damping ratio [-], one for all modes or a list; of a second-order body, of the modes of its mean-axis form
+    rayleigh : alpha [1/s] and beta [s] of the damping matrix alpha M + beta K
+    loss_factor : of the material [-]: each mode is damped by half of it
+    damping_bands : pairs of frequency [Hz], ascending, and damping ratio [-] of the modes up to there
+    stiffening : true: moves to second order, if the body has load matrices; false: linear
+    drop : inertia terms that the equations of motion leave out
     """
 
     file: Path | None = None
@@ -247,14 +264,23 @@ class BodyEntry(Strict):
 
 
 class MarkerEntry(Strict):
-    """One more point of a body, or of the ground: joints, loads and measurements know it as "body.name"."""
+    """One more point of a body, or of the ground: joints, loads and measurements know it as "body.name".
+
+    body : name of the body, or "ground"
+    point : where it is, in the axes of the body [m]
+    """
 
     body: str
     point: Metres
 
 
 class StabilisationEntry(Strict):
-    """How the constraints are kept; see `ffr_dyn.integrators.stabilisation`."""
+    """How the constraints are kept; see `ffr_dyn.integrators.stabilisation`.
+
+    kind : "projection" back to the constraints, "baumgarte" feedback, or "none"
+    tolerance : of projection: how far constraints may be left [m, -]
+    alpha, beta : gains of "baumgarte", for rates and for positions [1/s]
+    """
 
     kind: Literal["projection", "baumgarte", "none"] = "projection"
     tolerance: Annotated[Number, Key(gt=0)] = 1e-9
@@ -269,7 +295,13 @@ class StabilisationEntry(Strict):
 
 
 class TolerancesEntry(Strict):
-    """What the error of a step may be: absolute values, plus `relative` of each coordinate's size; see `Tolerances`."""
+    """What the error of a step may be: absolute values, plus `relative` of each coordinate's size; see `Tolerances`.
+
+    relative : of each coordinate's size [-]
+    position : absolute, of points [m] and rotations [rad]
+    velocity : absolute, of points [m/s] and angular velocities [rad/s]
+    elastic : absolute, of elastic displacements [m]
+    """
 
     relative: Annotated[Number, Key(gt=0)] = 1e-6
     position: Annotated[float, In("m"), Key(gt=0)] = 1e-7
@@ -278,16 +310,37 @@ class TolerancesEntry(Strict):
 
 
 class _Span(Strict):
+    """A time with rows of the result.
+
+    start, end : of the run [s]
+    output_step : a row of the result every so many seconds [s]
+    """
+
     end: Seconds
     output_step: Annotated[float, In("s"), Key(gt=0)]
     start: Seconds = 0.0
 
 
 class _Moment(Strict):
+    """One time.
+
+    time : of the analysis [s]: functions of time are taken there
+    """
+
     time: Seconds = 0.0
 
 
 class _Integrated(_Span):
+    """A run by a method with steps.
+
+    method : integrator, by its name: docs/integrators.md tells which serves
+    step : [s] of a method with steps of one length; default: found, so that the accuracy is kept
+    accuracy : relative error that the found step keeps [-]; default: 1e-3
+    tolerances : of a method that chooses its steps
+    settings : of the method, beside its step: {spectral_radius = 0.6}
+    stabilisation : how constraints are kept
+    """
+
     method: str = "ros2"
     step: Annotated[float, In("s"), Key(gt=0)] | None = None
     accuracy: Annotated[Number, Key(ge=1e-8, le=1)] | None = None
@@ -335,12 +388,18 @@ def _analysis_model(word: str, made: Any) -> type[BaseModel]:
     for f in fields(made):
         keys[f.name] = _own_key(f, hints[f.name])
         if names := f.metadata.get("names"):
-            keys[names] = (list[str], [])
+            keys[names] = (Annotated[list[str], Key(description=f"names of {names} of the scene, beside these")], [])
     return create_model(f"{made.__name__}Entry", __base__=base, __doc__=made.__doc__, **keys)
 
 
 def _own_key(f: Field[Any], hint: Any) -> tuple[Any, Any]:
-    """Type and default of the key for a field of an analysis."""
+    """Type and default of the key for a field of an analysis, with what its option says of it."""
+    given, default = _bare_key(f, hint)
+    said = f.metadata.get("help")
+    return (Annotated[given, Key(description=said.replace("; repeat", ""))] if said else given), default
+
+
+def _bare_key(f: Field[Any], hint: Any) -> tuple[Any, Any]:
     default = ... if f.default is MISSING or f.metadata.get("required") else f.default
     if kinds := nested_kinds(hint):
         if holds_several(hint):
@@ -356,7 +415,13 @@ def _own_key(f: Field[Any], hint: Any) -> tuple[Any, Any]:
 
 
 class _ChartEntry(Strict):
-    """What `ffr-dyn chart` compares: steps [s] or tolerances by method, empty lists where they are to be chosen."""
+    """What `ffr-dyn chart` compares: steps [s] or tolerances by method, empty lists where they are to be chosen.
+
+    measures : what the error is of, such as "deflection:rod"; default: those that fit the scene
+    methods : steps [s] or tolerances for each method; an empty list where they are to be chosen; default: all methods
+    modes : numbers of modes to compare, or "all"
+    drop : sets of terms to leave out, one after the other
+    """
 
     measures: list[str] = []
     methods: dict[str, list[Annotated[Number, Key(gt=0)]]] = {}
@@ -365,6 +430,26 @@ class _ChartEntry(Strict):
 
 
 class _SceneBase(Strict):
+    """A scene.
+
+    name : title of the scene, in results and pictures
+    include : other scene files that are merged into this one, relative to it
+    parameters : numbers and texts with units for formulas, and for "${name}" in any text
+    inputs : values that another program sets while it steps the scene, by name, with what they start from
+    outputs : quantities or patterns that the result keeps; "default" stands for the usual ones
+    gravity : acceleration of free fall, global axes [m/s^2]: numbers or functions of time
+    base_acceleration : of the ground, global axes [m/s^2]: numbers or functions of time
+    plane : "auto" finds whether the motion is planar and computes it in that plane; an axis says which plane's normal it is; "none" does not look
+    ground : named points of the ground, global [m]
+    bodies : bodies by name
+    markers : further points of bodies by name
+    analysis : what is computed
+    chart : what `ffr-dyn chart` compares
+    joints, drivers, couplings : joints, prescribed motions and gears, by name
+    loads, springs, forces : forces by name: of loads, of springs along a line, and all others, which say their kind
+    measurements : quantities that the scene names
+    """
+
     name: str = "scene"
     include: list[str] = []
     parameters: dict[str, Any] = {}

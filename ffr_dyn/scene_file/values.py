@@ -65,7 +65,14 @@ Inertia = Annotated[list[Annotated[float, In("kg m^2")]], THREE]
 
 
 class HarmonicEntry(Strict):
-    """mean + amplitude sin(2 pi frequency t + phase); `speed` [rad/s] may stand for 2 pi frequency [Hz]."""
+    """mean + amplitude sin(2 pi frequency t + phase); `speed` [rad/s] may stand for 2 pi frequency [Hz].
+
+    amplitude : in the unit of the function
+    frequency : [Hz]
+    speed : [rad/s], in place of the frequency
+    phase : at t = 0 [rad]
+    mean : added to it
+    """
 
     amplitude: Number
     frequency: Annotated[float, In("Hz")] | None = None
@@ -81,14 +88,26 @@ class HarmonicEntry(Strict):
 
 
 class PiecewiseEntry(Strict):
-    """Polynomials between `breaks`: for each piece its coefficients, ascending powers of (t - start of the piece)."""
+    """Polynomials between `breaks`: for each piece its coefficients, ascending powers of (t - start of the piece).
+
+    breaks : increasing times [s], one more than there are pieces
+    coefficients : for each piece, as many numbers
+    """
 
     breaks: list[Number]
     coefficients: list[list[Number]]
 
 
 class FunctionEntry(Strict):
-    """A function of time by one of these; `table` is times and values, `table_file` two CSV columns of them."""
+    """A function of time by one of these; `table` is times and values, `table_file` two CSV columns of them.
+
+    formula : of t and the parameters: "0.1 * sin(2 * pi * t)"
+    polynomial : coefficients of ascending powers of t
+    harmonic : a sine
+    table : times [s] and values, joined by a cubic spline
+    table_file : CSV file with the columns time [s] and value
+    piecewise : polynomials one after the other
+    """
 
     formula: str | None = None
     polynomial: list[Number] | None = None
@@ -194,7 +213,11 @@ OfTime = of_time()
 
 
 class CurveEntry(Strict):
-    """`values` over the increasing places `at`: a smooth curve through the points, straight beyond them."""
+    """`values` over the increasing places `at`: a smooth curve through the points, straight beyond them.
+
+    at : increasing places, in the unit of what the force depends on
+    values : the force there
+    """
 
     at: list[Number]
     values: list[Number]

@@ -41,7 +41,10 @@ _BARE = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
 
 
 def save_scene(scene: Scene, settings: Settings | MomentSettings, path: str | Path) -> Path:
-    """Write a scene file, and beside it a body file <file>.<body>.ffr for every flexible body."""
+    """Write a scene file, and beside it a body file <file>.<body>.ffr for every flexible body.
+
+    >>> fd.save_scene(scene, settings, "scene.toml")
+    """
     path = Path(path)
     bodies = as_declared(scene.bodies)
     files = {body.name: f"{path.stem}.{body.name}.ffr" for body in bodies if not _is_plain(body.model)}
@@ -121,6 +124,8 @@ def to_toml(scene: Scene, settings: Settings | MomentSettings, files: Mapping[st
     files : by name of a flexible body, the file in which it is kept
 
     Raises InputError for what a file cannot hold: Python functions, flexible bodies without a file, a deformed body in parts.
+
+    >>> print(fd.to_toml(scene, settings))
     """
     top = {"name": scene.name, "gravity": scene.gravity, "base_acceleration": scene.base_acceleration}
     top["plane"] = scene.plane

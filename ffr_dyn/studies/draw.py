@@ -27,6 +27,8 @@ def plot_study(table: Table, folder: str | Path, outputs: Sequence[str] = ()) ->
         pairs.png              all parameters and outputs against each other
 
     The tornado is that of a linear fit; R^2 in its title says how linear the output is. Raises InputError for unknown names.
+
+    >>> fd.plot_study(fd.load_table("study.nc"), "pictures")
     """
     names = list(outputs) or list(table.outputs)
     for name in names:

@@ -73,6 +73,9 @@ class Study(Brief):
     recipes    : by body, a line of ffr-prep in which "${name}" stands for a parameter;  folder: of the files in them
     outputs    : what a run is reduced to
     histories  : whether the result file of every run is kept, too
+
+    >>> study = fd.load_study("study.toml")
+    >>> len(study.points)
     """
 
     scene: Path
@@ -92,6 +95,8 @@ def load_study(path: str | Path) -> Study:
     """Read a study file and look at it: parameters that exist and change something, outputs that are written as such.
 
     Raises InputError that names the entry, its value and what is expected.
+
+    >>> study = fd.load_study("study.toml")
     """
     path = Path(path)
     tree = read_toml(path, "a study file")
@@ -127,6 +132,8 @@ def study(
     """A study of a scene file, in the words of a study file (this module's first lines); raises InputError as `load_study`.
 
     fd.study("crank.toml", {"load": [10, 50, 100]}, {"force": "pin.force: largest"})
+
+    >>> study = fd.study("scene.toml", {"speed": [100, 150, 200]}, {"tip": "last(rod.tip.position.y)"})
     """
     if not parameters:
         raise InputError("parameters: there are none; name at least one with its values, such as load = [10, 50]")

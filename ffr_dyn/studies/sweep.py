@@ -45,6 +45,8 @@ def sweep(
     ComputationError where no run succeeds.
 
         table = fd.sweep("study.toml", "study.nc"); table["force"]
+
+    >>> table = fd.sweep("study.toml", "study.nc", workers=2)
     """
     made = study if isinstance(study, Study) else load_study(study)
     path = Path(path)

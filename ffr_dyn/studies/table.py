@@ -38,6 +38,9 @@ class Table(Brief):
     parameters : by name, a value of every run, numbers (N,) or texts
     outputs    : by name (N,), NaN for runs that failed or were not done
     messages   : why a run has failed; empty for the others
+
+    >>> table = fd.load_table("study.nc")
+    >>> table.outputs["tip"]
     """
 
     parameters: Mapping[str, Any]
@@ -174,7 +177,10 @@ def _variable(file: h5py.File, name: str, values: Any) -> h5py.Dataset:
 
 
 def load_table(path: str | Path) -> Table:
-    """Read a table. Raises InputError for a file that is none."""
+    """Read a table. Raises InputError for a file that is none.
+
+    >>> table = fd.load_table("study.nc")
+    """
     with reading(path, "the table of a study", OSError, KeyError), h5py.File(path, "r", locking=False) as file:
         if SECTION not in file.attrs:
             raise InputError(f"{path} is not the table of a study; ffr-dyn sweep writes one")

@@ -86,6 +86,8 @@ def with_modes(body: Body, keep: Modes, interfaces: Iterable[str] | None = None)
     """The body with fewer elastic coordinates, chosen as in `basis_of`; it starts in the nearest state (least mass).
 
     Damping ratios become those of the damping matrix in the new coordinates, without what couples these.
+
+    >>> rod = fd.with_modes(rod, 4)
     """
     if not isinstance(keep, (int, np.integer)):
         at = np.asarray(keep, int)
@@ -105,7 +107,10 @@ def _damping(body: Body, model: FlexibleBody, V: Array) -> Array:
 
 
 def without_terms(body: Body, terms: Iterable[str]) -> Body:
-    """The body whose equations leave out the named `TERMS`, beside those that they leave out already."""
+    """The body whose equations leave out the named `TERMS`, beside those that they leave out already.
+
+    >>> rod = fd.without_terms(rod, ("I5", "I9"))
+    """
     names = tuple(terms)
     for name in names:
         if name not in TERMS:
@@ -168,6 +173,8 @@ def vary(
     models : by body name, another body for it (see `with_model`); modes are kept of that one
 
     Forces on elastic coordinates are expressed in the new ones. Raises InputError for names that do not exist.
+
+    >>> cheaper = fd.vary(scene, modes=4, drop=("I9",))
     """
     names = [body.name for body in scene.bodies]
     rigid = tuple(rigid)

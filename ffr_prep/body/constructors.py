@@ -26,6 +26,8 @@ def rigid_body(
     mass [kg]; inertia (3, 3) or its diagonal (3,) about the centre of mass, in body axes [kg m^2]; centre_of_mass (3,)
     [m] in the body frame; points: named points (3,) [m] in the body frame at which joints and forces may attach.
     Raises BodyError for a mass that is not positive, or an inertia that no mass distribution can have.
+
+    >>> crank = fd.rigid_body("crank", mass=1.2, inertia=[1e-3, 1e-3, 2e-3], points={"pin": (0.05, 0, 0)})
     """
     if not 0 < mass < np.inf:
         raise BodyError(f"body {name!r}: mass is {mass} kg; it must be positive")
@@ -55,6 +57,8 @@ def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
     """The body with only its first ``modes`` elastic coordinates, or those whose indices are listed; so are its parts.
 
     Raises BodyError for a mode that does not exist or is listed twice.
+
+    >>> small = fd.truncated(body, 4)
     """
     if np.ndim(modes) == 0 and not 0 <= int(modes) <= body.n:
         raise BodyError(f"body {body.name!r} has {body.n} modes; asked to keep the first {int(modes)}")
@@ -121,6 +125,8 @@ def with_point(body: FlexibleBody, name: str, position: ArrayLike) -> FlexibleBo
 
     Raises BodyError when the body has no surface, when it has load matrices and its surface no second-order displacement,
     or the position is farther from it than half the size of the body.
+
+    >>> body = fd.with_point(body, "middle", (0.08, 0, 0))
     """
     if body.surface is None:
         raise BodyError(f"body {body.name!r} has no surface to put the point {name!r} on")

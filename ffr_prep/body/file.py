@@ -45,6 +45,8 @@ def save_body(body: FlexibleBody, path: str | Path) -> Path:
     """Write the body to one file, atomically: an existing file is replaced only by a complete new one.
 
     Raises BodyError when the provenance is not JSON; other errors as in `replacing`.
+
+    >>> fd.save_body(body, "rod.ffr")
     """
     path = Path(path)
     arrays = _arrays(body)
@@ -132,7 +134,10 @@ def surface_of(arrays: Mapping[str, Array]) -> Surface:
 
 
 def load_body(path: str | Path) -> FlexibleBody:
-    """Read a body file. Raises BodyError for a missing, damaged, truncated, foreign or newer file."""
+    """Read a body file. Raises BodyError for a missing, damaged, truncated, foreign or newer file.
+
+    >>> rod = fd.load_body("rod.ffr")
+    """
     path = Path(path)
     note_input(path)
     try:

@@ -41,7 +41,10 @@ _FRAME = "the frame"  # no name of an interface of the body, while it is one
 @dataclass(frozen=True, repr=False)
 class FrameMarker(Brief):
     """A frame that moves with the elastic field: pivot (3,) [m], phi_t, phi_r (3, n) as of an interface, and K (6, n, n) of
-    unit forces and moments at it."""
+    unit forces and moments at it.
+
+    >>> frame = fp.mean_axis_form(body).frame
+    """
 
     pivot: Array
     phi_t: Array
@@ -51,7 +54,11 @@ class FrameMarker(Brief):
 
 @dataclass(frozen=True, repr=False)
 class MeanAxisForm(Brief):
-    """A body in its mean-axis frame, the frame that it had before, and C (n, n) with q before = C q."""
+    """A body in its mean-axis frame, the frame that it had before, and C (n, n) with q before = C q.
+
+    >>> form = fp.mean_axis_form(body)
+    >>> form.body.omega2
+    """
 
     body: FlexibleBody
     frame: FrameMarker
@@ -62,6 +69,8 @@ def mean_axis_form(body: FlexibleBody) -> MeanAxisForm:
     """The mean-axis form of a body with load matrices; of the same body the same object.
 
     Raises InputError for a body without load matrices, ComputationError where rounding is too large.
+
+    >>> form = fp.mean_axis_form(fp.load_body("rod.ffr"))
     """
     if body.stiffening is None or not body.n:
         raise InputError(

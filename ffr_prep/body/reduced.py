@@ -20,7 +20,11 @@ _PARTS_TOLERANCE = 1e-9
 
 
 class BodyError(InputError):
-    """A body or a body file that cannot be used; the message says what is wrong and what to do."""
+    """A body or a body file that cannot be used; the message says what is wrong and what to do.
+
+    >>> try: body = fp.load_body("rod.ffr")
+    ... except fp.BodyError as error: print(error)
+    """
 
 
 @dataclass(frozen=True, repr=False)
@@ -31,6 +35,8 @@ class Interface(Brief):
     phi_t    : (3, n) [1/sqrt(kg)], translation of the node per elastic coordinate
     phi_r    : (3, n) [rad/(m sqrt(kg))], infinitesimal rotation of the node per elastic coordinate
     kind     : "rigid" (RBE2), "mean" (RBE3) or "node"
+
+    >>> tip = body.interface("tip")
     """
 
     name: str
@@ -79,6 +85,8 @@ class BeamForces(Brief):
                 last end exerts on the other, in element axes [N/(m sqrt(kg)), N/sqrt(kg)]
     second    : what is quadratic in the elastic coordinates of the same forces, in axes that turn with the sections; None
                 where it was not computed
+
+    >>> body.surface.beams  # of a frame reduced with stress=True
     """
 
     positions: Array
@@ -106,6 +114,8 @@ class Surface(Brief):
     moduli : (P, 2) Young's modulus [Pa] and Poisson's ratio at the points, which give the strain; with the stress. Zeros
              where the material is anisotropic, of which strain is not recovered
     beams  : section forces of beam elements; None where there are none
+
+    >>> body.surface.points.shape
     """
 
     points: Array
@@ -163,6 +173,9 @@ class FlexibleBody(Brief):
 
     Raises BodyError when the integrals contradict each other (shape, symmetry, orthonormality, negative mass), and for parts
     that do not make up the whole.
+
+    >>> body = fd.load_body("rod.ffr")
+    >>> np.sqrt(body.omega2) / (2 * np.pi)  # frequencies [Hz]
     """
 
     name: str

@@ -2,8 +2,16 @@
 
 
 class InputError(ValueError):
-    """What the user gave cannot be used. The message names the thing, its value and the remedy."""
+    """What the user gave cannot be used. The message names the thing, its value and the remedy.
+
+    >>> try: rod = fd.load_body("rod.ffr")
+    ... except fd.InputError as error: print(error)
+    """
 
 
 class ComputationError(RuntimeError):
-    """The input was acceptable but the computation failed. The message says where, how far off and what to try."""
+    """The input was acceptable but the computation failed. The message says where, how far off and what to try.
+
+    >>> try: result = fd.static(scene)
+    ... except fd.ComputationError as error: print(error)
+    """

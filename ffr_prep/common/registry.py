@@ -44,6 +44,8 @@ class Setting:
     help     : in one line
     least    : of an int
     argument : what the function or class of the entry calls it, where that is another name
+
+    >>> setting = fp.Setting("moments", int, 2, "How many moments are matched.", least=1)
     """
 
     name: str
@@ -109,7 +111,10 @@ def loaded(target: Target) -> Any:
 
 
 def load_plugin(path: str | Path) -> None:
-    """Run a file of Python, once, which registers entries. Raises InputError for a file that fails."""
+    """Run a file of Python, once, which registers entries. Raises InputError for a file that fails.
+
+    >>> fd.load_plugin("own.py")
+    """
     path = Path(path)
     name = f"ffr_plugin:{path.resolve()}"
     if name in sys.modules:

@@ -26,6 +26,8 @@ class ExchangeFormat:
     read     : of a path, returns the body; None where the format can only be written
     left_out : of body and settings, returns in words what the file will not hold; None where there is nothing to say
     settings : of writing
+
+    >>> entry = fp.ExchangeFormat("own", "Own text.", (".own",), write="own:write", read="own:read")
     """
 
     name: str
@@ -77,7 +79,10 @@ EXCHANGE_FORMATS: Registry[ExchangeFormat] = Registry(
 
 
 def register_exchange_format(entry: ExchangeFormat) -> None:
-    """Offer a format to `ffr-prep export` and `import`. Raises InputError for a name that is taken."""
+    """Offer a format to `ffr-prep export` and `import`. Raises InputError for a name that is taken.
+
+    >>> fp.register_exchange_format(fp.ExchangeFormat("own", "Own text.", (".own",), "own:write", None))
+    """
     EXCHANGE_FORMATS.register(entry)
 
 

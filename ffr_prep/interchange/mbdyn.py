@@ -99,6 +99,8 @@ def write_fem(body: FlexibleBody, path: str | Path, *, kind: Kind = "full", surf
 
     Source: MBDyn Input File Format, modal joint. Raises InputError for an unknown kind, a body without nodes, a missing
     surface, and where lumped masses miss the integrals by more than MISFIT_LIMIT.
+
+    >>> fp.write_fem(body, "rod.fem")
     """
     if kind not in get_args(Kind):
         raise InputError(f"kind {kind!r} is not known; take legacy or full")
@@ -230,6 +232,8 @@ def read_fem(path: str | Path) -> FlexibleBody:
 
     Source: MBDyn Input File Format, modal joint. Raises InputError for a file that does not exist, is damaged,
     truncated or foreign, or whose records contradict each other, naming line, record or identity, and by how much.
+
+    >>> body = fp.read_fem("rod.fem")
     """
     return read_body(Path(path), _content)
 

@@ -72,6 +72,8 @@ def write_sid(body: FlexibleBody, path: str | Path, *, layout: Layout = "mode-ma
               kinds of interfaces and no provenance
 
     Source: Wallrapp 1994. Raises InputError for an unknown layout, a body without nodes, or a missing surface.
+
+    >>> fp.write_sid(body, "rod.SID_FEM")
     """
     if layout not in get_args(Layout):
         raise InputError(f"layout {layout!r} is not known; take mode-major or axis-major")
@@ -189,6 +191,8 @@ def read_sid(path: str | Path) -> FlexibleBody:
 
     Source: Wallrapp 1994. Raises InputError for a file that does not exist, is damaged, truncated or foreign, or
     whose blocks contradict each other, naming line, block or identity, and by how much.
+
+    >>> body = fp.read_sid("rod.SID_FEM")
     """
     return read_body(Path(path), _content)
 

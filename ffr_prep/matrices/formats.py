@@ -18,6 +18,8 @@ class MatrixFormat:
     suffixes : of each file, in their order, those that it may have, in lower case
     read     : function, or "package.module:function", of the paths that returns a `MatrixModel` in the unit of the files
     help     : whose files they are
+
+    >>> entry = fp.MatrixFormat("own", ((".own",),), read="own:read", help="K and M of own.")
     """
 
     name: str
@@ -62,7 +64,10 @@ MATRIX_FORMATS: Registry[MatrixFormat] = Registry(
 
 
 def register_matrix_format(entry: MatrixFormat) -> None:
-    """Offer a format to `read_matrices`, and so to the command line. Raises InputError for a name that is taken."""
+    """Offer a format to `read_matrices`, and so to the command line. Raises InputError for a name that is taken.
+
+    >>> fp.register_matrix_format(fp.MatrixFormat("own", ((".own",),), "own:read", "K and M of own."))
+    """
     MATRIX_FORMATS.register(entry)
 
 

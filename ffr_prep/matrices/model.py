@@ -48,6 +48,8 @@ class MatrixModel(Brief):
     C          : (D, D) viscous damping [N s/m, N s, N m s], symmetric; None where there is none
 
     Raises InputError when sizes, rows and nodes do not fit each other.
+
+    >>> model = fp.read_matrices(["part.npz"])
     """
 
     points: Array
@@ -186,7 +188,10 @@ def _dropped(model: MatrixModel, kept: Array, used: Array) -> list[str]:
 
 
 def with_group(model: MatrixModel, name: str, labels: Sequence[int]) -> MatrixModel:
-    """The model with a name for the nodes of these numbers; InputError for a number that no node has."""
+    """The model with a name for the nodes of these numbers; InputError for a number that no node has.
+
+    >>> model = fp.with_group(model, "tip", [101, 102])
+    """
     index = {label: k for k, label in enumerate(model.labels.tolist())}
     missing = [label for label in labels if label not in index]
     if missing:
@@ -195,7 +200,10 @@ def with_group(model: MatrixModel, name: str, labels: Sequence[int]) -> MatrixMo
 
 
 def with_node(model: MatrixModel, name: str, position: Sequence[float]) -> MatrixModel:
-    """The model with a name for the node at this position (3,) [m]; InputError where there is none."""
+    """The model with a name for the node at this position (3,) [m]; InputError where there is none.
+
+    >>> model = fp.with_node(model, "tip", (1.0, 0, 0))
+    """
     if not np.abs(np.asarray(position, float)).max() < _FAR:
         raise InputError(f"group {name!r}: a node cannot be at {tuple(position)} m; give a place of finite coordinates")
     distance, node = cKDTree(model.points).query(np.asarray(position, float))
@@ -208,7 +216,10 @@ def with_node(model: MatrixModel, name: str, position: Sequence[float]) -> Matri
 
 
 def with_surface(model: MatrixModel, points: Array, triangles: Array) -> MatrixModel:
-    """The model with a surface to draw: triangles (T, 3) on points (P, 3) [m], each of which is at a node."""
+    """The model with a surface to draw: triangles (T, 3) on points (P, 3) [m], each of which is at a node.
+
+    >>> model = fp.with_surface(model, points, triangles)
+    """
     used, local = np.unique(triangles, return_inverse=True)
     distance, node = cKDTree(model.points).query(points[used])
     far = int(np.argmax(distance))

@@ -55,7 +55,10 @@ def from_npz(path: Path) -> MatrixModel:
 
 
 def save_matrices(model: MatrixModel, path: str | Path) -> Path:
-    """Write a model to a .npz file in SI units, atomically."""
+    """Write a model to a .npz file in SI units, atomically.
+
+    >>> fp.save_matrices(model, "part.npz")
+    """
     path = Path(path)
     arrays = {
         "labels": model.labels,

@@ -48,6 +48,8 @@ def from_matrices(
     Consistent and lumped masses are both fine; coordinates without mass only in a body of matrices alone.
 
     Raises InputError for matrices that are not those of a free body.
+
+    >>> model = fp.from_matrices(fp.read_matrices(["part.npz"]), [fp.InterfaceRegion("tip")])
     """
     progress("check the matrices")
     model = without_empty_rows(given)

@@ -21,6 +21,8 @@ def read_matrices(files: Sequence[str | Path], *, units: str | None = None) -> M
     units : of the numbers in the files, a name in UNIT_SYSTEMS; m-kg-s when not given and the file says nothing
 
     Raises InputError for files that cannot be used or do not fit each other.
+
+    >>> model = fp.read_matrices(["part.npz"])
     """
     paths = [Path(file) for file in files]
     if units is not None and units not in UNIT_SYSTEMS:

@@ -39,6 +39,8 @@ def from_skfem(
     interfaces weigh all nodes alike, as those of all matrices.
 
     Raises InputError for another basis, matrices of another size or not symmetric, and a name used twice.
+
+    >>> given = fp.from_skfem(basis, K, M)
     """
     element = _check_basis(basis)
     for name, A in (("K", K), ("M", M)):

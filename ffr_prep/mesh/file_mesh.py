@@ -68,6 +68,8 @@ class FileMesh:
     notes   : what was left out or changed, in words
     unit    : of the numbers, where the file declares one
     drawn   : the faces of the geometry that the mesh was made of, where there was one
+
+    >>> mesh = fp.FileMesh(points, (("tetra", cells),), {}, {}, {})  # what a reader of a mesh format returns
     """
 
     points: Array

@@ -22,6 +22,8 @@ class MeshFormat:
     suffixes   : in lower case, with the dot
     geometry   : whether the file is meshed on reading
     parameters : whether it has numbers that may be changed by name
+
+    >>> fp.register_mesh_format(fp.MeshFormat("own", "Own meshes.", "own:read", (".own",)))
     """
 
     name: str
@@ -86,7 +88,10 @@ MESH_FORMATS: Registry[MeshFormat] = Registry(
 
 
 def register_mesh_format(entry: MeshFormat) -> None:
-    """Offer a format to `read_mesh`, command line and structure files. Raises InputError for a name that is taken."""
+    """Offer a format to `read_mesh`, command line and structure files. Raises InputError for a name that is taken.
+
+    >>> fp.register_mesh_format(fp.MeshFormat("own", "Own meshes.", "own:read", (".own",)))
+    """
     MESH_FORMATS.register(entry)
 
 

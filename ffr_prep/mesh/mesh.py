@@ -42,6 +42,8 @@ class Block(Brief):
     """Volume elements of one kind: "tet4", "tet10", "hex8", "hex20" or "hex27".
 
     nodes : (E, k) indices into Mesh.points, in the node order of meshio (VTK).
+
+    >>> block = fp.Block("tet4", np.array([[0, 1, 2, 3]]))
     """
 
     kind: str
@@ -60,6 +62,9 @@ class Mesh(Brief):
     notes         : what was left out or changed on reading, in words
     drawn         : of a geometry, each face with its facets as in face_groups
     unit          : in which the file has its lengths, for texts such as "cylinder r=6 at 0,0,0"
+
+    >>> mesh = fp.read_mesh("rod.geo")
+    >>> mesh.points.shape
     """
 
     points: Array
@@ -115,6 +120,8 @@ def read_mesh(
     groups are named surface_1, volume_1, ... and by the names in the file.
 
     Raises InputError for a file or an argument that cannot be used, ComputationError when meshing fails.
+
+    >>> mesh = fp.read_mesh("rod.step", unit="mm", size=5.0)
     """
     path, numbers = Path(path), dict(numbers or {})
     check_request(path, unit, size, numbers, order)
@@ -307,6 +314,8 @@ def check_mesh(mesh: Mesh) -> None:
     Guarded: no elements, indices and coordinates that are not valid, nodes that no element uses, groups that are empty,
     coincident nodes, elements that are repeated, degenerate or inverted, and parts that are not connected or hang
     together by nodes or edges only.
+
+    >>> fp.check_mesh(fp.read_mesh("rod.msh"))
     """
     _check_numbers(mesh)
     _check_groups(mesh)

@@ -36,6 +36,8 @@ class InterfaceRegion:
              group) when not given
 
     Raises InputError for another kind.
+
+    >>> pin = fp.InterfaceRegion("pin", "cylinder r=6mm at 0,0,0")
     """
 
     name: str

@@ -33,6 +33,8 @@ class CutPlane:
     """A plane through a point [m]; the next part lies on the side to which the normal points.
 
     Raises InputError for three numbers that are none, and a normal without a direction.
+
+    >>> plane = fp.CutPlane((0.5, 0, 0), (1, 0, 0))
     """
 
     point: Vector

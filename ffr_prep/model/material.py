@@ -35,6 +35,8 @@ class Material:
     E : Young's modulus [Pa]; nu : Poisson's ratio [-]; rho : density [kg/m^3]
 
     Raises InputError for values no solid can have: E and rho must be positive, nu between -1 and 0.5.
+
+    >>> steel = fp.Material("steel", E=210e9, nu=0.3, rho=7850.0)
     """
 
     name: str
@@ -73,6 +75,8 @@ class AnisotropicMaterial:
                  of the material and another direction in its first plane, of any length
 
     Raises InputError for a matrix that is not symmetric and positive definite, and for axes that are no rotation.
+
+    >>> ply = fp.AnisotropicMaterial("ply", elasticity=C, rho=1600.0)  # C (6, 6) [Pa]
     """
 
     name: str
@@ -126,6 +130,8 @@ def orthotropic(
     nu : (nu12, nu13, nu23), where nu12 is the contraction along 2 under tension along 1, so nu21 = nu12 E2 / E1
 
     Raises InputError for constants that no solid can have.
+
+    >>> wood = fp.orthotropic("pine", E=(11e9, 0.9e9, 0.5e9), nu=(0.4, 0.4, 0.4), G=(0.7e9, 0.6e9, 0.1e9), rho=500.0)
     """
     if not (np.array([*E, *G]) > 0).all():
         raise InputError(f"material {name!r}: E {E} and G {G} must be positive [Pa]")
@@ -226,7 +232,10 @@ _ALIASES = {
 
 
 def material(name: str) -> Material:
-    """The material of that name in the library; InputError lists the nearest names."""
+    """The material of that name in the library; InputError lists the nearest names.
+
+    >>> steel = fp.material("steel")
+    """
     key = name.strip().lower().replace("_", " ")
     key = _ALIASES.get(key, key)
     if key not in _LIBRARY:

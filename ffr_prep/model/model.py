@@ -37,6 +37,8 @@ class Model(Brief):
     unstressed : stresses are not known, and with them neither `stiffening` nor `second`: the body is linear
     diagnose   : called when a computation has failed; raises InputError where the model is found to be the cause
     cut        : the models of the parts that a body is cut into; None where the model cannot be cut
+
+    >>> model = fp.from_mesh(fp.read_mesh("rod.geo"), fp.material("steel"))
     """
 
     coupled: CoupledModel

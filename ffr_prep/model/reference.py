@@ -71,7 +71,10 @@ def named_interfaces(conditions: ReferenceConditions) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class FixedTo:
-    """The body frame moves with one interface: its six coordinates vanish."""
+    """The body frame moves with one interface: its six coordinates vanish.
+
+    >>> request = fp.Request(name="rod", reference=fp.FixedTo("hinge"), reduction=fp.CraigBampton(8))
+    """
 
     interface: str
 
@@ -85,6 +88,8 @@ class SimplySupported:
     """The x' axis of the elastic field passes through two interfaces.
 
     The pin does not move and does not turn about the chord pin -> roller; the roller moves along the chord only.
+
+    >>> request = fp.Request(name="rod", reference=fp.SimplySupported("hinge", "tip"), reduction=fp.CraigBampton(8))
     """
 
     pin: str
@@ -106,7 +111,10 @@ class SimplySupported:
 
 @dataclass(frozen=True)
 class Support:
-    """One prevented motion of an interface: "translation" along or "rotation" about a direction."""
+    """One prevented motion of an interface: "translation" along or "rotation" about a direction.
+
+    >>> support = fp.Support("hinge", "translation", (1, 0, 0))
+    """
 
     interface: str
     motion: str
@@ -121,7 +129,10 @@ class Support:
 
 @dataclass(frozen=True)
 class Supports:
-    """Any choice of prevented motions: six make the body statically determinate, more restrict its deformation."""
+    """Any choice of prevented motions: six make the body statically determinate, more restrict its deformation.
+
+    >>> reference = fp.Supports(tuple(fp.Support("hinge", what, axis) for what in ("translation", "rotation") for axis in axes))
+    """
 
     supports: tuple[Support, ...]
 
@@ -132,7 +143,10 @@ class Supports:
 
 @dataclass(frozen=True)
 class MeanAxis:
-    """The elastic field has no mean translation and no mean rotation over the mass: L = T^T M (Tisserand)."""
+    """The elastic field has no mean translation and no mean rotation over the mass: L = T^T M (Tisserand).
+
+    >>> request = fp.Request(name="rod", reference=fp.MeanAxis(), reduction=fp.Rubin(8))
+    """
 
     def rows(self, model: CoupledModel) -> Array:
         """(6, Z)."""
@@ -144,6 +158,8 @@ class UserConditions:
     """Functionals on the nodal displacements, given as an array or made from the nodes' positions.
 
     on_nodes : (r, N, 3), or a function of the positions (N, 3) [m] that returns it
+
+    >>> reference = fp.UserConditions(lambda points: rows_on(points))
     """
 
     on_nodes: Array | Callable[[Array], Array]

@@ -52,6 +52,8 @@ class Request:
     provenance : JSON values kept with the body, beside what is recorded anyway
 
     Raises InputError for a reference or reduction that is a name and not an object.
+
+    >>> request = fp.Request(name="rod", reference=fp.FixedTo("hinge"), reduction=fp.CraigBampton(8), stress=True)
     """
 
     name: str
@@ -86,6 +88,8 @@ def reduce(
     advance  : called within long stages with the share that is done and with how far that is in words
 
     Raises InputError for input that cannot be used and ComputationError for a computation that failed.
+
+    >>> body = fp.reduce(model, fp.Request(name="rod", reference=fp.FixedTo("hinge"), reduction=fp.CraigBampton(8)))
     """
     if model.massless and request.quality:
         raise InputError(

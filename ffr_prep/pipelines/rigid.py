@@ -50,6 +50,8 @@ def rigid_part(
     Mass, centre and inertia of CAD files are those of the CAD library, exact; of meshes those of their elements.
 
     Raises InputError for a density that is not positive, a file or a region that cannot be used.
+
+    >>> crank = fp.rigid_part("crank.step", 7850.0, [fp.InterfaceRegion("pin", "cylinder r=6mm at 0,0,0")])
     """
     path, numbers = Path(path), dict(numbers or {})
     if not 0 < density < np.inf:

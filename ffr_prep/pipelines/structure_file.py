@@ -68,6 +68,8 @@ class Structure:
 
     solids : by name, the mesh, its material or one for each volume, and its interfaces
     ties   : pairs of interfaces "part.interface" that are joined; the frame is the part "frame"
+
+    >>> structure = fp.read_structure("tower.toml")
     """
 
     frame: Frame
@@ -90,6 +92,8 @@ def read_structure(path: str | Path, progress: Stages = no_stages) -> Structure:
 
     Raises InputError for a file that cannot be read, unknown or missing entries, and whatever the frame's parts refuse;
     ComputationError when meshing fails.
+
+    >>> structure = fp.read_structure("tower.toml")
     """
     path = Path(path)
     entry = _read(path)

@@ -53,6 +53,8 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
 
     Raises InputError for an unknown name, an interface in two ties, a tie of two mean interfaces, parts that nothing joins,
     parts with coordinates that have no mass, and names of interfaces that repeat.
+
+    >>> model = fp.tied({"beam": beam, "bracket": bracket}, [("beam.end", "bracket.face")])
     """
     models = list(parts.values())
     _check_ties(parts, ties)

@@ -41,6 +41,8 @@ class Basis:
 
     dropped  : number of proposed vectors that depended on the others
     warnings : what makes the basis doubtful, in words
+
+    >>> basis.omega2  # of what a reduction's `basis` returned
     """
 
     Z: Array
@@ -50,7 +52,10 @@ class Basis:
 
 
 class Reduction(Protocol):
-    """The one method of every reduction, which is a frozen dataclass of its settings."""
+    """The one method of every reduction, which is a frozen dataclass of its settings.
+
+    >>> isinstance(fp.CraigBampton(8), fp.Reduction)
+    """
 
     def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
         """The basis under the reference conditions L (r, Z), with the factorised stiffness of the model."""
@@ -65,7 +70,10 @@ def factorised(model: CoupledModel, solver: Solver = CHOLESKY, advance: Advance 
 
 
 def basis_of(model: CoupledModel, L: Array, *vectors: Array) -> Basis:
-    """The basis of the space of all vectors (Z, p) under the reference conditions L (r, Z); earlier ones have precedence."""
+    """The basis of the space of all vectors (Z, p) under the reference conditions L (r, Z); earlier ones have precedence.
+
+    >>> basis = fp.basis_of(model.coupled, L, vectors)
+    """
     Q, dropped = orthonormalised(model.M, *(in_frame(model, L, V) for V in vectors))
     if len(L) <= 6 and Q.size:
         again = in_frame(model, L, Q)

@@ -46,6 +46,8 @@ def with_reference(body: FlexibleBody, conditions: ReferenceConditions) -> Flexi
     Raises InputError for conditions on the nodes of a mesh, for conditions that name an
     unknown interface or leave a rigid motion, and for load matrices that do not determine those in the new frame
     (`ffr_prep.reduction.turned_stiffening`).
+
+    >>> moved = fp.with_reference(body, fp.FixedTo("tip"))
     """
     if isinstance(conditions, UserConditions):
         raise InputError("conditions on the nodes of the mesh need the mesh: reduce it again, or use interfaces")

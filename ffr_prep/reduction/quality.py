@@ -63,6 +63,8 @@ class Quality:
     reference_error  : bound on the error of the receptances taken as those of the full model
     flexibility_error: largest of the static flexibility of the free body; NaN without interfaces
     displacement_errors, stress_errors : (12,) under the unit accelerations; NaN where nothing deforms
+
+    >>> fp.quality_of(body.provenance).receptance_errors
     """
 
     band: tuple[float, float]
@@ -226,7 +228,10 @@ def completed(provenance: Mapping[str, Any], basis: Basis, quality: Quality | No
 
 
 def quality_of(provenance: Mapping[str, Any]) -> Quality | None:
-    """The quality kept in the provenance of a body; None where it was not assessed."""
+    """The quality kept in the provenance of a body; None where it was not assessed.
+
+    >>> quality = fp.quality_of(body.provenance)
+    """
     kept = provenance.get("quality")
     if kept is None:
         return None

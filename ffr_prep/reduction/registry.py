@@ -29,6 +29,8 @@ class ReductionMethod:
     help     : what it keeps, and what it is for
     selects  : whether its argument `modes` says how many normal modes it keeps: --modes, --frequency or --accuracy
     settings : what else it can be given
+
+    >>> fp.register_reduction(fp.ReductionMethod("own", "own:Own", "Shapes of one's own."))
     """
 
     name: str
@@ -103,7 +105,10 @@ REDUCTIONS: Registry[ReductionMethod] = Registry(
 
 
 def register_reduction(entry: ReductionMethod) -> None:
-    """Offer a reduction to command line and structure files. Raises InputError for a name that is taken."""
+    """Offer a reduction to command line and structure files. Raises InputError for a name that is taken.
+
+    >>> fp.register_reduction(fp.ReductionMethod("own", "own:Own", "Shapes of one's own."))
+    """
     REDUCTIONS.register(entry)
 
 

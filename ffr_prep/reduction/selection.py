@@ -17,7 +17,10 @@ _POINTS = 200
 
 @dataclass(frozen=True)
 class Band:
-    """A range of frequencies [Hz]; InputError unless 0 < low < high."""
+    """A range of frequencies [Hz]; InputError unless 0 < low < high.
+
+    >>> request = fp.Request(name="rod", reference=fp.MeanAxis(), reduction=fp.Rubin(8), quality=fp.Band(1.0, 2000.0))
+    """
 
     low: float
     high: float
@@ -36,6 +39,8 @@ class UpTo:
     """All modes up to a frequency [Hz]; InputError unless it is positive.
 
     Their number is not known beforehand, so up to two or three runs of the eigenvalue iteration are made.
+
+    >>> reduction = fp.CraigBampton(fp.UpTo(2000.0))
     """
 
     frequency: float
@@ -59,6 +64,8 @@ class Accuracy:
     of 2 per cent, a tolerance of 0.1 means frequencies within 0.1 per cent.
 
     Raises InputError unless 0 < tolerance < 1.
+
+    >>> modes = fp.Accuracy(fp.Band(1.0, 2000.0), 0.01)
     """
 
     band: Band

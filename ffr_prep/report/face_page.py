@@ -21,7 +21,10 @@ from ffr_prep.mesh.geometry.regions import query_for
 
 
 def face_page(faces: Faces, path: str | Path, title: str = "faces") -> Path:
-    """Write the page; returns its path. A click picks a feature, with Alt one face; Shift adds to what is picked."""
+    """Write the page; returns its path. A click picks a feature, with Alt one face; Shift adds to what is picked.
+
+    >>> fp.face_page(fp.faces("plate.step"), "faces.html")
+    """
     path = Path(path)
     with replacing(path) as part:
         part.write_text(page_of(faces, title), encoding="utf-8")

@@ -83,6 +83,8 @@ def face_picture(faces: Faces, path: str | Path, title: str = "") -> Path:
     """Two views of a part, from opposite sides, with the numbers of its faces; returns the path of the PNG.
 
     Raises ComputationError where this machine cannot render.
+
+    >>> fp.face_picture(fp.faces("plate.step"), "faces.png")
     """
     path, pv = Path(path), off_screen()
     figure = Figure(figsize=(16.0, 6.4), dpi=110)

@@ -59,6 +59,8 @@ def mode_pictures(
 
     Raises InputError for a body without modes or surface or for modes it does not have, ComputationError where this
     machine cannot render.
+
+    >>> fp.mode_pictures(body, "modes")
     """
     folder = Path(folder)
     numbers = list(range(1, min(body.n, 6) + 1)) if modes is None else list(modes)

@@ -23,6 +23,8 @@ def quality_pictures(body: FlexibleBody, folder: str | Path) -> list[Path]:
     """Draw "receptances.png" (where there are interfaces) and "errors.png" into a folder; returns the files.
 
     Raises InputError for a body whose quality was not assessed.
+
+    >>> fp.quality_pictures(body, "quality")
     """
     quality = quality_of(body.provenance)
     if quality is None:

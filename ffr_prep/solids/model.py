@@ -41,6 +41,8 @@ def from_mesh(
     progress   : called with the name of each stage as it begins
 
     Raises InputError for input that cannot be used.
+
+    >>> model = fp.from_mesh(fp.read_mesh("rod.geo"), fp.material("steel"), [fp.InterfaceRegion("big_eye")])
     """
     progress("check the mesh")
     check_mesh(mesh)

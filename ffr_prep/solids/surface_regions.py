@@ -26,6 +26,8 @@ def region_triangles(mesh: Mesh, body: FlexibleBody, region: str) -> Array:
 
     top = region_triangles(mesh, plate, "plane z=10mm")
     wind = fd.Pressure("wind", "plate", 1e3, triangles=top)
+
+    >>> wind = fd.Pressure("wind", "blade", pressure=2e3, triangles=fp.region_triangles(mesh, body, "suction_side"))
     """
     facets = face_group(with_regions(mesh, [region]), region)
     corners = np.concatenate([np.zeros((0, 3), np.int64), *_outer_triangles(mesh, facets)])

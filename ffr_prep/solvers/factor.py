@@ -50,6 +50,8 @@ class Solver:
     ranks : processes of "slepc"
 
     Raises InputError for another name or number of processes.
+
+    >>> request = fp.Request(name="rod", reference=fp.MeanAxis(), reduction=fp.Rubin(8), solver=fp.Solver("pardiso"))
     """
 
     name: str = "cholesky"

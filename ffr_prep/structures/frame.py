@@ -38,6 +38,8 @@ class Member:
                   section's height, is its part across the beam; a round section needs none
 
     Raises InputError for an orientation that is not a direction.
+
+    >>> member = fp.Member(fp.tube(0.04, 0.002), fp.material("aluminium"))
     """
 
     section: Section
@@ -60,6 +62,8 @@ class Shell:
                 0 leaves the rotary inertia of the thickness out
 
     Raises InputError for a thickness that is not positive and a negative gyration.
+
+    >>> sheet = fp.Shell(2e-3, fp.material("aluminium"))
     """
 
     thickness: float
@@ -91,6 +95,8 @@ class Frame(Brief):
     shell_of       : (T + Q,) index into shells, triangles first
 
     Raises InputError for arrays of other shapes and coordinates that are not finite.
+
+    >>> frame = fp.polyline([(0, 0, 0), (1, 0, 0)], fp.Member(fp.circle(0.02), fp.material("steel")), elements=10)
     """
 
     points: Array
@@ -145,6 +151,8 @@ def polyline(corners: Sequence[Vector] | Array, member: Member, *, elements: int
     """Straight beams from corner to corner (P, 3) [m], each of `elements` elements of equal length.
 
     Raises InputError for fewer than two corners, one that is not finite, or no elements.
+
+    >>> frame = fp.polyline([(0, 0, 0), (1, 0, 0)], fp.Member(fp.circle(0.02), fp.material("steel")), elements=10)
     """
     at = np.asarray(corners, float)
     if at.ndim != 2 or at.shape[1] != 3 or len(at) < 2:
@@ -167,6 +175,8 @@ def panel(corners: Sequence[Vector] | Array, shell: Shell, *, elements: tuple[in
     """A flat plate between four corners (4, 3) [m] of n x m quadrilaterals: n along the first side, m along the second.
 
     `triangulated` makes triangles of them. Raises InputError for other than four finite corners, or no elements.
+
+    >>> plate = fp.panel([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], fp.Shell(2e-3, fp.material("steel")), elements=(8, 8))
     """
     at = np.asarray(corners, float)
     if at.shape != (4, 3) or not np.isfinite(at).all():
@@ -191,7 +201,10 @@ def panel(corners: Sequence[Vector] | Array, shell: Shell, *, elements: tuple[in
 
 
 def triangulated(frame: Frame) -> Frame:
-    """The frame with every quadrilateral cut into two triangles along its shorter diagonal."""
+    """The frame with every quadrilateral cut into two triangles along its shorter diagonal.
+
+    >>> frame = fp.triangulated(plate)
+    """
     a, b, c, d = frame.points[frame.quadrilaterals].transpose(1, 0, 2)
     other = np.linalg.norm(b - d, axis=1) < (1 - _SAME_PLACE) * np.linalg.norm(a - c, axis=1)
     cuts = np.where(other[:, None, None], [[(0, 1, 3), (1, 2, 3)]], [[(0, 1, 2), (0, 2, 3)]])
@@ -206,7 +219,10 @@ def triangulated(frame: Frame) -> Frame:
 
 
 def joined(*frames: Frame) -> Frame:
-    """One frame of several: nodes at the same place become one, and beams and plates meet there rigidly."""
+    """One frame of several: nodes at the same place become one, and beams and plates meet there rigidly.
+
+    >>> tower = fp.joined(legs, braces)
+    """
     points = np.vstack([frame.points for frame in frames])
     first = np.cumsum([0, *(len(frame.points) for frame in frames)])
     kept, new = _merged(points)
@@ -251,6 +267,8 @@ def named(frame: Frame, **positions: Vector) -> Frame:
     """The frame with names for the nodes at these positions [m].
 
     Raises InputError where there is no node.
+
+    >>> frame = fp.named(frame, root=(0, 0, 0), tip=(1, 0, 0))
     """
     groups = dict(frame.node_groups)
     tree = cKDTree(frame.points)

@@ -41,6 +41,8 @@ def read_frame(
 
     Raises InputError for a file or an argument that cannot be used, curves without a member, surfaces without a shell,
     and members and shells without anything; ComputationError when meshing fails.
+
+    >>> frame = fp.read_frame("tower.geo", {"legs": fp.Member(fp.tube(0.1, 0.005), fp.material("steel"))})
     """
     path, numbers = Path(path), dict(numbers or {})
     members, shells = dict(members or {}), dict(shells or {})

@@ -60,6 +60,8 @@ def from_frame(frame: Frame, interfaces: Sequence[InterfaceRegion] = (), *, prog
     progress   : called with the name of each stage as it begins
 
     Raises InputError for input that cannot be used.
+
+    >>> model = fp.from_frame(frame, [fp.InterfaceRegion("root"), fp.InterfaceRegion("tip")])
     """
     progress("check the frame")
     check_frame(frame)

@@ -32,6 +32,8 @@ class NodalIntegrals(Brief):
     P_dm  : (3, 6N) integral of N dm [kg, kg m]
     rP_dm : (3, 3, 6N) integral of u_0k N_l dm at [k, l] [kg m, kg m^2]
     PP_dm : (3, 3) sparse matrices (6N, 6N), integrals of N_k^T N_l dm at [k][l] [kg, kg m, kg m^2]
+
+    >>> integrals = fp.nodal_integrals(frame)
     """
 
     q_0: Array
@@ -117,6 +119,8 @@ def nodal_integrals(frame: Frame) -> NodalIntegrals:
     """The inertia integrals of a frame in its nodal coordinates.
 
     Raises InputError for a frame that cannot be used.
+
+    >>> mass = fp.nodal_integrals(frame).mass
     """
     check_frame(frame)
     parts, count = families(frame), len(frame.points)

@@ -40,6 +40,8 @@ class Section:
                   second moments when not given
 
     Raises InputError for constants that no section has.
+
+    >>> section = fp.Section("channel", A=4e-4, Iy=2e-8, Iz=6e-8, J=1e-9)
     """
 
     name: str
@@ -74,7 +76,10 @@ class Section:
 
 
 def rectangle(b: float, h: float) -> Section:
-    """Solid rectangle, width b along z', height h along y' [m]; torsion by the series of Timoshenko and Goodier."""
+    """Solid rectangle, width b along z', height h along y' [m]; torsion by the series of Timoshenko and Goodier.
+
+    >>> section = fp.rectangle(0.02, 0.04)
+    """
     name = f"rectangle {b:g} x {h:g} m"
     _check_lengths(name, b=b, h=h)
     short, long = sorted((b, h))
@@ -84,7 +89,10 @@ def rectangle(b: float, h: float) -> Section:
 
 
 def circle(d: float) -> Section:
-    """Solid circle of diameter d [m]."""
+    """Solid circle of diameter d [m].
+
+    >>> section = fp.circle(0.02)
+    """
     name = f"circle {d:g} m"
     _check_lengths(name, d=d)
     second = math.pi * d**4 / 64
@@ -92,7 +100,10 @@ def circle(d: float) -> Section:
 
 
 def tube(d: float, t: float) -> Section:
-    """Round tube of outer diameter d and wall t [m]; drawn as a solid bar."""
+    """Round tube of outer diameter d and wall t [m]; drawn as a solid bar.
+
+    >>> section = fp.tube(0.04, 0.002)
+    """
     name = f"tube {d:g} x {t:g} m"
     _check_lengths(name, d=d, t=t)
     if 2 * t >= d:
@@ -108,6 +119,8 @@ def i_section(h: float, b: float, web: float, flange: float) -> Section:
     """Doubly symmetric I of height h (along y'), width b (along z'), web and flange thickness [m], sharp corners.
 
     Torsion as thin strips, the sum of s t^3 / 3; shear along y' is carried by the web, along z' by the flanges.
+
+    >>> section = fp.i_section(0.2, 0.1, 5.6e-3, 8.5e-3)
     """
     name = f"I {h:g} x {b:g} x {web:g} x {flange:g} m"
     _check_lengths(name, h=h, b=b, web=web, flange=flange)
@@ -126,7 +139,10 @@ def i_section(h: float, b: float, web: float, flange: float) -> Section:
 def general(
     name: str, *, A: float, Iy: float, Iz: float, J: float, ky: float = math.inf, kz: float = math.inf
 ) -> Section:
-    """A section by its constants (see Section); without shear factors it is rigid in shear."""
+    """A section by its constants (see Section); without shear factors it is rigid in shear.
+
+    >>> section = fp.general("rail", A=7.7e-3, Iy=3.0e-5, Iz=5.1e-6, J=2.2e-6)
+    """
     return Section(name, A, Iy, Iz, J, ky, kz)
 
 
@@ -134,17 +150,26 @@ def general(
 
 
 def shear_rigid(section: Section) -> Section:
-    """The section of an Euler-Bernoulli beam: no shear deformation."""
+    """The section of an Euler-Bernoulli beam: no shear deformation.
+
+    >>> section = fp.shear_rigid(fp.rectangle(0.02, 0.04))
+    """
     return replace(section, ky=math.inf, kz=math.inf)
 
 
 def shifted(section: Section, y: float, z: float) -> Section:
-    """The section with its centroid at (y, z) from the line through the nodes, in element axes [m]."""
+    """The section with its centroid at (y, z) from the line through the nodes, in element axes [m].
+
+    >>> section = fp.shifted(fp.rectangle(0.02, 0.04), 0.0, 0.02)
+    """
     return replace(section, offset=(float(y), float(z)))
 
 
 def with_mass_moments(section: Section, Iy: float, Iz: float) -> Section:
-    """The section with other second moments of the mass; (x, 0) with a small x leaves bending without rotary inertia."""
+    """The section with other second moments of the mass; (x, 0) with a small x leaves bending without rotary inertia.
+
+    >>> section = fp.with_mass_moments(fp.circle(0.02), 1e-8, 1e-8)
+    """
     return replace(section, mass_moments=(float(Iy), float(Iz)))
 
 

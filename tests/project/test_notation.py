@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 from places import ROOT
 
-NUMBERED = re.compile(r"^\*\*\((\d+)\)\*\* .*\[`([\w.]+)`\]\(\.\./([\w/]+\.py)\)$", re.M)
+NUMBERED = re.compile(r"^\*\*\((\d+)\)\*\* .*\[`([\w.]+)`\]\(\.\./([\w/]+\.py)\); test: ", re.M)
+HELD = re.compile(r"; test: \[`(\w+)`\]\(\.\./(tests/[\w/]+\.py)\)$", re.M)
 CITED = re.compile(r"Equation \((\d+)\) of docs/notation\.md")
 EQUATIONS = NUMBERED.findall((ROOT / "docs" / "notation.md").read_text(encoding="utf-8"))
 MODULES = sorted(path for package in ("ffr_prep", "ffr_dyn") for path in (ROOT / package).rglob("*.py"))
@@ -46,6 +47,13 @@ def test_the_function_of_an_equation_cites_it(number, name, path):
     assert inspect.isfunction(function)
     assert CITED.findall(inspect.getdoc(function) or "") == [number]
     assert inspect.getsourcefile(function) == str(ROOT / path)
+
+
+def test_every_equation_names_a_test_that_holds_it():
+    held = HELD.findall((ROOT / "docs" / "notation.md").read_text(encoding="utf-8"))
+    assert len(held) == len(EQUATIONS)
+    for name, path in held:
+        assert re.search(rf"^def {name}\(", (ROOT / path).read_text(encoding="utf-8"), re.M)
 
 
 def test_no_docstring_cites_an_equation_that_is_not_its_own():

@@ -57,6 +57,8 @@ class Bounded:
     before, after : times [s] added to the known motion; default: 25 e-folds of the slowest motion that grows (before it) or
                     decays (after it), at most twice as long as the motion
     parts         : of an output step, for collocation
+
+    >>> result = fd.mixed(scene, unknown=(torque,), end=0.5, output_step=1e-3, solution=fd.Bounded(before=0.2, after=0.2))
     """
 
     _: KW_ONLY

@@ -36,7 +36,10 @@ SECANTS, MET = 12, 1e-8  # of a crossing: steps, and of a speed relative to the 
 
 @dataclass(frozen=True)
 class Campbell(OfMoment):
-    """Vibrations at every speed, followed by their shapes; where they cross multiples of the speed; where they grow."""
+    """Vibrations at every speed, followed by their shapes; where they cross multiples of the speed; where they grow.
+
+    >>> result = fd.run(scene, fd.MomentSettings(analysis=fd.Campbell(speeds=("0..500",), turn="motor")))
+    """
 
     keeps: ClassVar[bool] = False
     example: ClassVar[str] = (
@@ -98,6 +101,8 @@ def campbell(
         fd.draw_campbell(found, "campbell.png")
 
     Raises InputError for fewer than two speeds, or speeds that do not rise; and as `steady` does.
+
+    >>> result = fd.campbell(scene, speeds=np.linspace(0, 500, 26), turn="motor")
     """
     require_scene(scene)
     values = [float(speed) for speed in speeds]

@@ -27,6 +27,8 @@ def mode_motion(found: Linearisation, number: int, *, size: float = 0.05) -> Res
         fd.animate(fd.mode_motion(fd.linearise(scene), 0), "mode.gif", scale=1)
 
     Raises InputError for a number that there is not.
+
+    >>> fd.animate(fd.mode_motion(fd.linearise(scene), 1), "mode.html")
     """
     if not 0 <= number < found.eigenvalues.size:
         raise InputError(f"mode {number}: there are modes 0 to {found.eigenvalues.size - 1}")

@@ -32,7 +32,10 @@ STEPS = 1000  # to a period, where no method is given
 
 @dataclass(frozen=True)
 class Periodic(OfMoment):
-    """A period of the motion that repeats itself, as of a machine driven evenly, and whether it is stable."""
+    """A period of the motion that repeats itself, as of a machine driven evenly, and whether it is stable.
+
+    >>> result = fd.run(scene, fd.MomentSettings(analysis=fd.Periodic(period=0.02)))
+    """
 
     example: ClassVar[str] = "ffr-dyn periodic engine.toml --floquet -o out/turn.nc"
     period: float = field(default=0.0, metadata=option("--period", "[s]; default: a turn of the driver."))
@@ -80,6 +83,8 @@ def periodic(
         turn["main_bearing.force"]
 
     Raises InputError where the period is not known; ComputationError where no such motion is found.
+
+    >>> result = fd.periodic(scene, period=0.02)
     """
     require_scene(scene)
     assembled = assemble(scene, time=time)

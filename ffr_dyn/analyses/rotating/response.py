@@ -34,7 +34,10 @@ SHARE = 0.01  # of a gain by one mode, from where it is told; outputs of roundin
 
 @dataclass(frozen=True)
 class Response(OfMoment):
-    """Gain and phase over the frequency, the modes that make them, and what noise does; Bode and Nyquist pictures."""
+    """Gain and phase over the frequency, the modes that make them, and what noise does; Bode and Nyquist pictures.
+
+    >>> result = fd.run(scene, fd.MomentSettings(analysis=fd.Response(input="hinge.moment", band="1..500")))
+    """
 
     keeps: ClassVar[bool] = False
     example: ClassVar[str] = (
@@ -130,6 +133,8 @@ def response(
         fd.draw_bode(found, "bode.png")
 
     Raises InputError for inputs and outputs that do not exist.
+
+    >>> result = fd.response(scene, input="hinge.moment", outputs=["rod.tip.acceleration.y"], band_of=(1.0, 500.0))
     """
     require_scene(scene)
     at = _about(scene, about, time)

@@ -35,7 +35,10 @@ SPEEDS = option("--speed", "Speed: 314 [rad/s], '3000 rpm', 0..500, '0..6000 rpm
 
 @dataclass(frozen=True)
 class Steady(OfMoment):
-    """Bodies deformed as turning asks for, joints closed: a row for each speed, or one as drivers and velocities are."""
+    """Bodies deformed as turning asks for, joints closed: a row for each speed, or one as drivers and velocities are.
+
+    >>> result = fd.run(scene, fd.MomentSettings(analysis=fd.Steady(speeds=("0..500",), turn="motor")))
+    """
 
     example: ClassVar[str] = "ffr-dyn steady blades.toml --turn motor --speed '0..750 rpm:4' -o out/steady.nc"
     speeds: tuple[str, ...] = field(default=(), metadata=SPEEDS)
@@ -74,6 +77,8 @@ def steady(
 
     Raises InputError for a scene that cannot turn so, or that something speeds up or brakes; ComputationError where
     no balance is found.
+
+    >>> result = fd.steady(scene, speeds=[100.0, 200.0], turn="motor")
     """
     require_scene(scene)
     found = list(steady_states(scene, speeds, turn, time))

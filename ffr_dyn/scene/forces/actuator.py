@@ -19,10 +19,14 @@ from ffr_dyn.scene.forces.places import OnJoint
 class Actuator(Force):
     """A force [N] or torque [N m] on a joint coordinate.
 
+    joint : name of the joint
+    coordinate : "angle" or "stroke"
     force    : a number, a time function (constant, harmonic, table, ...) or a Python function of time
     function : added to it, a Python function (t, state) -> number; `state` is a `ffr_dyn.equations.state_view.StateView`
     stiffness, damping : how much the function falls with the coordinate and its rate, or more [N/m], [N s/m]: implicit
         methods, which cannot see it, then bear any step. They change no force
+
+    >>> motor = fd.Actuator("motor", "hinge", force=fd.harmonic(amplitude=2.0, frequency=5.0))
     """
 
     word = "actuator"

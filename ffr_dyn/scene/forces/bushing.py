@@ -30,12 +30,15 @@ class Bushing(Force):
 
         (F, M) = -stiffness (d, psi) - damping (d_dot, psi_dot) + preload
 
+    i, j : its two markers
     stiffness : (6, 6) symmetric, its diagonal (6,), or six entries of which each is a number or a `Curve` of the force over
                 its displacement [N/m, N m/rad]
     damping   : (6, 6) symmetric without negative eigenvalues, or its diagonal (6,) [N s/m, N m s/rad]
     preload   : (6,) force [N] and moment [N m] on j at rest
     axes, axes_j : the axes on i and on j as (3, 3) frames (columns) or as (3,) third axes, in the axes of their bodies;
                 axes_j by default equal to axes
+
+    >>> mount = fd.Bushing("mount", "ground.wall", "rod.hinge", stiffness=[1e6, 1e6, 1e6, 500, 500, 500])
     """
 
     word = "bushing"

@@ -64,6 +64,8 @@ class Force(ABC):
     stores_energy  : it has an `energy`
     given    : how many components are given from outside, so that analyses can size them, 0 where the state makes the force;
                the numbers of its law begin with a factor for each, then their functions of time or -1
+
+    >>> fd.register_force(CubicSpring)  # a frozen dataclass derived from fd.Force: CONTRIBUTING.md shows one
     """
 
     name: str

@@ -22,13 +22,17 @@ class JointFriction(Force):
 
         -normal (coulomb + (static - coulomb) exp(-(c_dot / stribeck)^2)) tanh(c_dot / creep) - viscous c_dot
 
+    joint : name of the joint
+    coordinate : "angle" or "stroke"
     coulomb : friction force [N] with normal = 1, or coefficient of friction with `normal` [N] (times radius for an angle)
     normal  : a number not below zero, a time function or a Python function of time, below zero while the surfaces are
               apart. It is given: the joint's reaction does not enter
     creep   : [m/s]; a load below friction is not held but creeps, at creep atanh(load / coulomb)
-    static, stribeck : friction at rest, not below coulomb, and the velocity [m/s] over which it falls (Stribeck 1902);
-              both or neither
-    viscous : [N s/m]
+    static  : friction at rest, not below coulomb: both, with stribeck, or neither
+    stribeck : velocity [m/s] over which friction falls from static to coulomb (Stribeck 1902)
+    viscous : force over the rate [N s/m]
+
+    >>> bearing = fd.JointFriction("bearing", "hinge", coulomb=0.3, creep=1e-3)
     """
 
     word = "joint-friction"

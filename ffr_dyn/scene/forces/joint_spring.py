@@ -18,8 +18,12 @@ from ffr_prep.common.arrays import Array
 class JointSpring(Force):
     """-(stiffness (c - free) + damping dc/dt + preload) on a joint coordinate c: a torsion spring, or one along a guide.
 
+    joint : name of the joint
+    coordinate : "angle" or "stroke"
     stiffness : [N/m], or a `Curve` of the force over c - free;  damping : [N s/m], not negative, or a `Curve` over dc/dt
     free      : coordinate without force [m];  preload : [N], positive pulls back;  turns : whole turns at the start
+
+    >>> spring = fd.JointSpring("spring", "hinge", stiffness=20.0, damping=0.1)
     """
 
     word = "joint-spring"

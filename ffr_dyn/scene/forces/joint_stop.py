@@ -18,10 +18,15 @@ from ffr_prep.common.errors import InputError
 class JointStop(Force):
     """End stops: one-sided spring-dampers beyond `lower` and `upper` [m] of a joint coordinate. They never pull.
 
+    joint : name of the joint
+    coordinate : "angle" or "stroke"
+    lower, upper : values of the coordinate where the stops begin [m]; default: no stop on that side
     stiffness : [N/m];  damping : [N s/m], grows from zero over the depth `entry`
     entry     : [m] depth over which the stiffness grows from zero: the force is stiffness depth^2 / (2 entry) down to it,
                 stiffness (depth - entry / 2) below
     turns     : whole turns of an angle at the start
+
+    >>> stop = fd.JointStop("stop", "hinge", stiffness=1e4, entry=0.01, lower=-1.0, upper=1.0)
     """
 
     word = "joint-stop"

@@ -29,6 +29,8 @@ class Load(Force):
     function : instead of these, a Python function (t, state) -> (3,) force or (6,) force and moment; `state` is a
         `ffr_dyn.equations.state_view.StateView`
     axes : "global", or "body" for a follower load
+
+    >>> gas = fd.Load("gas", "piston.crown", force=(fd.harmonic(amplitude=-500.0, frequency=25.0), 0, 0))
     """
 
     table = "loads"

@@ -22,7 +22,10 @@ from ffr_prep.common.errors import InputError
 class ModalForce(Force):
     """Forces on the elastic coordinates themselves, times a function of time: no resultant, no moment.
 
+    body : name of a flexible body
     values : (n,) [1/sqrt(kg) N];  function : a number, a time function or a Python function of time
+
+    >>> shaker = fd.ModalForce("shaker", "rod", values=[1.0, 0, 0, 0], function=fd.harmonic(amplitude=1.0, frequency=50.0))
     """
 
     word = "modal-force"

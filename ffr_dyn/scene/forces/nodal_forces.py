@@ -33,9 +33,13 @@ from ffr_prep.common.errors import InputError
 class NodalForces(Force):
     """Forces (N, 3) [N] at points of a body's surface, times a function of time.
 
+    body : name of a flexible body
+    forces : (N, 3) components on each point [N]
     points   : (N,) numbers of the points in the body's surface
     function : a number, a time function or a Python function of time
     axes     : "global", or "body" for forces that turn with the body's frame
+
+    >>> field = fd.NodalForces("field", "rod", points=[0, 1], forces=[[0, 0, 1.0], [0, 0, 1.0]])
     """
 
     word = "nodal-forces"

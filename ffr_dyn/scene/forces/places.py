@@ -121,7 +121,10 @@ class Place(ABC):
 
 @dataclass(frozen=True)
 class AtMarker(Place):
-    """A marker; axes "global", or "body" for those of its body."""
+    """A marker; axes "global", or "body" for those of its body.
+
+    >>> place = fd.AtMarker("rod.tip", axes="body")
+    """
 
     marker: str
     axes: str = "global"
@@ -141,7 +144,10 @@ class AtMarker(Place):
 
 @dataclass(frozen=True)
 class AlongLine(Place):
-    """The line between two markers; without direction, and without force, while both points are at one place."""
+    """The line between two markers; without direction, and without force, while both points are at one place.
+
+    >>> place = fd.AlongLine("ground.wall", "rod.tip")  # the property `place` of a force of one's own
+    """
 
     way = "length"
     initial = (0.0, 0.0, 0.0)
@@ -160,7 +166,10 @@ class AlongLine(Place):
 
 @dataclass(frozen=True)
 class OnJoint(Place):
-    """The `angle` [rad] or `stroke` [m] of a joint, for the force `who`; turns : whole turns of the angle at the start."""
+    """The `angle` [rad] or `stroke` [m] of a joint, for the force `who`; turns : whole turns of the angle at the start.
+
+    >>> place = fd.OnJoint("spring", "hinge", "angle")
+    """
 
     who: str
     joint: str
@@ -213,7 +222,10 @@ class OnJoint(Place):
 
 @dataclass(frozen=True)
 class BetweenAxes(Place):
-    """Markers of two bodies, with axes (3, 3) in columns on both, for the force `who`."""
+    """Markers of two bodies, with axes (3, 3) in columns on both, for the force `who`.
+
+    >>> place = fd.BetweenAxes("mount", "ground.wall", "rod.hinge", np.eye(3), np.eye(3))
+    """
 
     way = "six"
     rank = 1
@@ -240,7 +252,10 @@ class BetweenAxes(Place):
 
 @dataclass(frozen=True)
 class OnBody(Place):
-    """A body through its basis, for the force `who`; axes "global" or "body": where directions of forces stay."""
+    """A body through its basis, for the force `who`; axes "global" or "body": where directions of forces stay.
+
+    >>> place = fd.OnBody("wind", "blade")
+    """
 
     rank = 2
 

@@ -34,6 +34,7 @@ from ffr_prep.common.registry import choice
 class Pressure(Force):
     """Pressure [Pa] on triangles of a body's surface; positive pushes against their outward normals.
 
+    body : name of a flexible body
     pressure  : a number or one for each point of the surface (P,), linear over each triangle
     triangles : None for all, numbers of triangles, the name of a region that the body keeps (`ffr-prep reduce --region`),
                 or a Python function of their centres (T, 3) [m], undeformed in the body frame, that returns which (T,) are
@@ -41,6 +42,8 @@ class Pressure(Force):
     function  : factor over time: a number, a time function or a Python function
     follower  : True: area and normal follow the elastic deformation, to first order in q; False: they stay those of
                 the undeformed body, fixed to its frame
+
+    >>> wind = fd.Pressure("wind", "blade", pressure=2e3, follower=True)
     """
 
     word = "pressure"

@@ -21,7 +21,12 @@ class Servo(Force):
     """Position control of a joint coordinate c: kp (target - c) + kd (target_dot - dc/dt), held within +-limit.
 
     target : a number, a time function, or a Python function t -> value or (value, rate, second derivative)
-    kp [N/m], kd [N s/m]: not negative;  limit [N]: largest force, by default none;  turns : whole turns at the start
+    kp, kd : gains of position [N/m] and rate [N s/m], not negative
+    limit  : largest force [N]; default: none;  turns : whole turns at the start
+    joint : name of the joint
+    coordinate : "angle" or "stroke"
+
+    >>> control = fd.Servo("control", "hinge", target=0.5, kp=400.0, kd=20.0, limit=50.0)
     """
 
     word = "servo"

@@ -23,9 +23,12 @@ class SpringDamper(Force):
 
     stiffness : [N/m], or a `Curve` of the force [N] over l - free_length [m]
     damping   : [N s/m], not negative, or a `Curve` of the force [N] over dl/dt [m/s]
-    free_length [m], not negative; preload [N]
+    free_length : length without force [m], not negative;  preload : tension at that length [N]
+    i, j : its two markers
 
     While both points are at one place the force has no direction, and is zero.
+
+    >>> spring = fd.SpringDamper("return", "ground.wall", "rod.tip", stiffness=2000.0, damping=5.0, free_length=0.2)
     """
 
     table = "springs"

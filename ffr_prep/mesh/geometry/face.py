@@ -24,6 +24,8 @@ class Face(Brief):
     hollow : whether material lies outside of a curved face, as around a bore; None where that is not known
     label, colour : that the file has for it, or "": the colour as #rrggbb
     groups, solids : that it belongs to
+
+    >>> fp.faces("plate.step").faces[0].area  # [m^2]
     """
 
     name: str

@@ -41,6 +41,8 @@ def faces(
     cylinders and spheres, none of which reaches over the border of a group of the mesh. All lengths are in metres.
 
     Raises InputError for a file that cannot be used, ComputationError where it cannot be meshed.
+
+    >>> print(fp.faces("plate.step"))
     """
     path, numbers = Path(path), dict(numbers or {})
     check_request(path, unit, size, numbers, 1)
@@ -59,6 +61,8 @@ def found_faces(faces: Faces, region: str) -> tuple[str, ...]:
 
     What may be written is told by `ffr-prep faces --help`; numbers without a unit are in that of the file. Raises InputError
     for a region that means nothing, or several surfaces without saying "all".
+
+    >>> fp.found_faces(fp.faces("plate.step"), "cylinder r=6mm at 45,25,5")
     """
     return tuple(faces.faces[k].name for k in found(faces, region))
 

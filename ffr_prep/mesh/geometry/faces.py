@@ -33,6 +33,8 @@ class Faces(Brief):
     size      : the diagonal of the box around all [m]
     features  : the numbers of the faces of each feature
     table     : the faces as arrays
+
+    >>> faces = fp.faces("plate.step")
     """
 
     faces: tuple[Face, ...]

@@ -14,7 +14,10 @@ from ffr_prep.solvers.factor import FreeBody
 
 @dataclass(frozen=True)
 class AttachmentModes:
-    """Static response of the free body to a unit force along, and a unit moment about, each axis at each interface."""
+    """Static response of the free body to a unit force along, and a unit moment about, each axis at each interface.
+
+    >>> reduction = fp.Union((fp.Eigenmodes(6), fp.AttachmentModes()))
+    """
 
     def basis(self, model: CoupledModel, body: FreeBody, L: np.ndarray) -> Basis:
         """Raises InputError without interfaces."""

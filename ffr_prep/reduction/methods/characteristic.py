@@ -28,6 +28,8 @@ class CharacteristicModes:
     interface_modes : elastic modes of the condensed stiffness and mass: a number, or `UpTo` a frequency
 
     For many interfaces. Forces at the interfaces then bend the body less than they should, the more the fewer are kept.
+
+    >>> reduction = fp.CharacteristicModes(modes=8, interface_modes=6)
     """
 
     modes: Selection

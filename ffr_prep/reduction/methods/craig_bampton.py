@@ -26,6 +26,8 @@ class CraigBampton:
     modes : a number, `UpTo` a frequency or to an `Accuracy`
 
     The reference conditions are imposed on the sum, so with six of them n = modes + 6 interfaces - 6.
+
+    >>> request = fp.Request(name="rod", reference=fp.FixedTo("hinge"), reduction=fp.CraigBampton(modes=8))
     """
 
     modes: Selection

@@ -19,6 +19,8 @@ class Eigenmodes:
     """Normal modes of the body under its reference conditions; free-free modes for the mean axis.
 
     modes : a number, `UpTo` a frequency or to an `Accuracy`
+
+    >>> request = fp.Request(name="rod", reference=fp.FixedTo("hinge"), reduction=fp.Eigenmodes(6))
     """
 
     modes: Selection

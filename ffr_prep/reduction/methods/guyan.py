@@ -17,6 +17,8 @@ class Guyan:
     """The static shapes of every interface coordinate alone: stiffness exact at the interfaces, inertia approximate.
 
     The same as `CraigBampton` without modes; good far below the first frequency with the interfaces fixed.
+
+    >>> request = fp.Request(name="rod", reference=fp.FixedTo("hinge"), reduction=fp.Guyan())
     """
 
     def basis(self, model: CoupledModel, body: FreeBody, L: np.ndarray) -> Basis:

@@ -22,6 +22,8 @@ class InertiaRelief:
     The interfaces are held, so with the static shapes of the interfaces (`CraigBampton`, `Rubin`, `Guyan`) every steady
     deformation under gravity, acceleration and spin is exact, whichever interfaces carry the load. A body without
     interfaces is free. Loads that nothing but the supports carry give no vector.
+
+    >>> reduction = fp.Union((fp.CraigBampton(6), fp.InertiaRelief()))
     """
 
     def basis(self, model: CoupledModel, body: FreeBody, L: np.ndarray) -> Basis:

@@ -39,6 +39,8 @@ class Krylov:
     frequencies : where the receptances are matched [Hz]; each other than zero costs a factorisation of K - omega^2 M
 
     Raises InputError for less than one block, for no frequency and for a negative one.
+
+    >>> request = fp.Request(name="rod", reference=fp.MeanAxis(), reduction=fp.Krylov(2))
     """
 
     moments: int

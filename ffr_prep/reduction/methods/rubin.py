@@ -25,6 +25,8 @@ class Rubin:
     What the static response adds to the modes is the residual flexibility of all modes above. Its inertia is kept, as
     Rubin does; MacNeal neglects it, which would leave shapes without mass. As the interfaces are free, fewer modes than
     with `CraigBampton` are needed where joints leave them nearly free.
+
+    >>> request = fp.Request(name="rod", reference=fp.MeanAxis(), reduction=fp.Rubin(8))
     """
 
     modes: Selection

@@ -14,7 +14,10 @@ from ffr_prep.solvers.factor import FreeBody
 
 @dataclass(frozen=True)
 class Union:
-    """The space of several reductions together; vectors that depend on those of earlier ones are dropped and counted."""
+    """The space of several reductions together; vectors that depend on those of earlier ones are dropped and counted.
+
+    >>> reduction = fp.Union((fp.CraigBampton(6), fp.InertiaRelief()))
+    """
 
     parts: tuple[Reduction, ...]
 

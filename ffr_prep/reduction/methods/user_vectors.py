@@ -27,6 +27,8 @@ class UserVectors:
 
     Nodes that a rigid interface ties follow it as closely as they can; rotations of nodes, where a model has them, take
     the values of least strain energy.
+
+    >>> reduction = fp.Union((fp.CraigBampton(4), fp.UserVectors(shapes)))
     """
 
     on_nodes: Array | Callable[[Array], Array]
