@@ -36,8 +36,8 @@ from ffr_prep.common.errors import InputError  # noqa: E402
 SCENE = """
 gravity = [0, -9.81, 0]
 [analysis]
-end = 10000.0
-output_step = 0.01
+end = 1e6
+output_step = 0.1
 step = 1e-3
 [ground]
 O = [0, 0, 0]
@@ -72,6 +72,7 @@ def inputs(total: int, folder: Path) -> bool:
 
 def start(scene: Path, output: Path, *options: str, limit: int | None = None) -> subprocess.Popen[str]:
     def limited() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # which a shell in the background has its children ignore
         if limit is not None:
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
@@ -115,7 +116,7 @@ def losses(kills: int, disks: int, folder: Path) -> bool:
         now = kept(output)
         lost += now < rows
         rows = now
-    end = f"{0.01 * (rows + 9):.6g}"
+    end = f"{0.1 * (rows + 9):.9g}"
     for path in (output, whole):
         start(scene, path, "--end", end, "--resume").communicate()
     one, other = load_result(output), load_result(whole)

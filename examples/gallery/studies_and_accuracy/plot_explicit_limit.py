@@ -7,8 +7,8 @@ With a step beyond it the vibration grows until the run stops with a sentence; l
 One of the twenty-two exhibits that `ffr-dyn stability` computes: drift, Baumgarte's gains, singular positions, stiff
 joints, start shocks ...
 
-Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed. 1996, section IV.2: |R(i y)| <= 1 up
-to y = 2 sqrt(2).
+Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed. 1996, section IV.2: the stability function
+R(i y) is at most 1 in size up to y = 2 sqrt(2).
 """
 
 import matplotlib.pyplot as plt
