@@ -16,6 +16,7 @@ import skfem
 from skfem.helpers import dot
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
+import ffr_dyn as fd
 import ffr_prep as fp
 
 along, across = np.linspace(0, 1, 31), np.linspace(0, 0.01, 2)
@@ -34,4 +35,11 @@ for k, frequency in enumerate(body.frequencies[::2]):
     plt.plot(body.surface.points[order, 0], shape, label=f"{frequency:.2f} Hz, exact {exact[k]:.2f} Hz")
 plt.gca().set(xlabel="x [m]", ylabel="size of the displacement [1/√kg]", title="bending modes of the free bar")
 plt.legend()
+
+# %%
+# The body, as scenes draw it:
+fd.show(body)
+
+# %%
+# Frequencies of the free beam:
 assert np.allclose(body.frequencies, np.repeat(exact, 2), rtol=2e-3), body.frequencies / np.repeat(exact, 2)

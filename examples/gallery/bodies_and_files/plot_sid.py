@@ -32,5 +32,12 @@ plt.plot(*tips[0].T[:2], label="as reduced")
 plt.plot(*tips[1][::4].T[:2], "ko", fillstyle="none", label="written and read back")
 plt.gca().set(xlabel="x [m]", ylabel="y [m]", aspect="equal", title="path of the tip")
 plt.legend()
+
+# %%
+# The strip that was read back, as it is before it moves:
+fd.show(scene)
+
+# %%
+# Both move alike, and as the exact beam does:
 assert np.allclose(*tips, atol=1e-9)
 assert np.allclose(tips[1][-1], (0.1737356, -1.1873578, 0), atol=1e-5), tips[1][-1]

@@ -15,20 +15,15 @@ from scipy.special import ellipk
 import ffr_dyn as fd
 
 length, mass, gravity = 1.0, 2.0, 9.81
-about_centre = mass * length**2 / 12
-rod = fd.rigid_body(
-    "rod",
-    mass=mass,
-    inertia=[1e-4, about_centre, about_centre],
-    points={"pin": (-length / 2, 0, 0), "tip": (length / 2, 0, 0)},
-)
+inertia = [1e-4, mass * length**2 / 12, mass * length**2 / 12]
+ends = {"pin": (-length / 2, 0, 0), "tip": (length / 2, 0, 0)}
+rod = fd.rigid_body("rod", mass=mass, inertia=inertia, points=ends)
 
 # %%
 # The rod starts at rest: its position is given for t = 0, and assembly closes the joint.
 hinge = fd.Joint("hinge", "revolute", "ground.wall", "rod.pin", axis=(0, 0, 1))
-scene = fd.Scene(
-    [fd.Body("rod", rod, position=(length / 2, 0, 0))], [hinge], ground={"wall": (0, 0, 0)}, gravity=(0, -gravity, 0)
-)
+body = fd.Body("rod", rod, position=(length / 2, 0, 0))
+scene = fd.Scene([body], [hinge], ground={"wall": (0, 0, 0)}, gravity=(0, -gravity, 0))
 result = fd.forward(scene, end=4.0, output_step=0.005, method=fd.RK4(1e-3))
 
 # %%

@@ -35,5 +35,12 @@ upper.plot(found.time, found["motor.effort"], found.time[::10], moment[::10], "k
 upper.set(ylabel="moment of the motor [N m]")
 lower.plot(found.time, 1e3 * found["arm.tip.displacement.y"], found.time[::10], 1e3 * lag[::10], "ko", fillstyle="none")
 lower.set(xlabel="time [s]", ylabel="deflection [mm]")
+
+# %%
+# The arm as it moves, with ten times its deflection:
+fd.animate(found, scale=10)
+
+# %%
+# Moment and deflection of the closed forms:
 assert np.allclose(found["motor.effort"], moment, atol=5e-3 * max(moment))
 assert np.allclose(found["arm.tip.displacement.y"], lag, atol=5e-3 * max(lag))
