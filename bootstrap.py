@@ -9,7 +9,8 @@ System packages that are missing are installed first (Debian and Ubuntu; as root
 its libraries go into the folder .venv next to this file. What is there already is kept, so the second time starts at
 once, and a set-up that was interrupted is completed by running it again.
 
-Exit status: 0 all went well, 1 a test, the site or the demonstration failed, 2 this machine lacks something that the message names.
+Exit status: 0 all went well, 1 a test, the site or the demonstration failed, 2 this machine lacks something that the
+message names.
 
 It runs before anything is installed: nothing but Python 3.8 and its standard library here.
 """
@@ -97,7 +98,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description="Set up the project, then run its demonstration, its site or its tests.")
+    parser = argparse.ArgumentParser(
+        description="Set up the project, then run its demonstration, its site or its tests."
+    )
     commands = parser.add_subparsers(dest="command", required=True)
     commands.add_parser("demo", help="run the connecting rod example")
     pages = commands.add_parser("site", help="build the documentation, its gallery executed")

@@ -1,7 +1,7 @@
-"""The site: pages of this folder, gallery of examples/gallery, reference from the code. `python3 bootstrap.py site` builds it.
+"""The site: pages of this folder, gallery of examples/gallery, reference from the code; `python3 bootstrap.py site`.
 
-Every example is executed; a warning, an example that fails and a link that leads nowhere fail the build. The pages load nothing
-from elsewhere: search, formulas and viewers work without a network.
+Every example is executed; a warning, an example that fails and a link that leads nowhere fail the build. The pages load
+nothing from elsewhere: search, formulas and viewers work without a network.
 """
 
 import os
@@ -55,10 +55,12 @@ TITLES = ("mechanisms", "beams_and_plates", "vibration", "bodies_and_files", "st
 
 
 def _examples() -> str:
-    """A copy of examples/gallery in which each folder holds the meshes, as the checkout does; what examples write stays there."""
+    """A copy of examples/gallery whose folders hold the meshes, as the checkout does; what examples write stays there."""
     copy = ROOT / "build" / "gallery"
     shutil.rmtree(copy, ignore_errors=True)
-    shutil.copytree(ROOT / "examples" / "gallery", copy, ignore=shutil.ignore_patterns("__pycache__", "out", "README.md"))
+    shutil.copytree(
+        ROOT / "examples" / "gallery", copy, ignore=shutil.ignore_patterns("__pycache__", "out", "README.md")
+    )
     for folder in TITLES:
         (copy / folder / "meshes").symlink_to(ROOT / "meshes")
     return str(copy)
@@ -80,7 +82,6 @@ sphinx_gallery_conf = {
     "doc_module": ("ffr_dyn", "ffr_prep"),
     "download_all_examples": False,
     "remove_config_comments": True,
-    
     "show_memory": False,
     "min_reported_time": 0,
     "copyfile_regex": "",

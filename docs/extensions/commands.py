@@ -39,14 +39,16 @@ def _section(command: click.Command, context: click.Context) -> str:
     usage = " ".join([context.command_path, *command.collect_usage_pieces(context)])
     lines = [f"({anchor(context.command_path)})=", f"## `{context.command_path}`", "", *_prose(command.help or "")]
     lines += ["", "```text", usage, "```", ""]
-    options = [option for option in command.get_params(context) if isinstance(option, click.Option) and not option.hidden]
+    options = [
+        option for option in command.get_params(context) if isinstance(option, click.Option) and not option.hidden
+    ]
     if options:
         lines += ["| option | meaning |", "|---|---|", *(_row(option, context) for option in options), ""]
     return "\n".join([*lines, *_prose(command.epilog or ""), ""])
 
 
 def anchor(path: str) -> str:
-    """"ffr-dyn run" -> "ffr-dyn-run"."""
+    """ "ffr-dyn run" -> "ffr-dyn-run"."""
     return path.replace(" ", "-")
 
 

@@ -72,7 +72,9 @@ def _said(docstring: str | None) -> list[str]:
     lines: list[str] = []
     for block in blocks(docstring):
         if isinstance(block, dict):
-            lines += [f"* {', '.join(f'`{name}`' for name in names)}: {_letters(text)}" for names, text in block.items()]
+            lines += [
+                f"* {', '.join(f'`{name}`' for name in names)}: {_letters(text)}" for names, text in block.items()
+            ]
         elif all(OTHERS.match(line) for line in block.split("\n")):
             language = "python" if ">>>" in block or " = " in block else "text"
             lines += [f"```{language}", inspect.cleandoc(block), "```"]

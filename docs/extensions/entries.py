@@ -11,9 +11,9 @@ from typing import Any
 EXAMPLES = Path(__file__).resolve().parent.parent / "reference" / "examples.toml"
 HEAD = """# Entries of a scene file
 
-Made from the declarations in the code, as is the [JSON schema](../scene.schema.json). [The scene file](../scene_file.md) tells how its parts
-work together. A number may be given as text with a unit of the same dimension or as a formula of the parameters; units are those that a plain number
-has. Keys without a default must be given.
+Made from the declarations in the code, as is the [JSON schema](../scene.schema.json). [The scene file](../scene_file.md)
+tells how its parts work together. A number may be given as text with a unit of the same dimension or as a formula of the
+parameters; units are those that a plain number has. Keys without a default must be given.
 
 """
 AT_THE_TOP = "Scene"
@@ -25,11 +25,13 @@ def page(schema: dict[str, Any]) -> str:
     definitions = {AT_THE_TOP: schema, **schema["$defs"]}
     places, examples = _places(schema), _examples()
     order = [AT_THE_TOP, *places, *sorted(set(definitions) - set(places) - {AT_THE_TOP})]
-    return HEAD + "\n".join(_section(name, definitions[name], places.get(name), examples.get(name, "")) for name in order)
+    return HEAD + "\n".join(
+        _section(name, definitions[name], places.get(name), examples.get(name, "")) for name in order
+    )
 
 
 def title(name: str) -> str:
-    """"JointSpringEntry" -> "Joint spring"."""
+    """ "JointSpringEntry" -> "Joint spring"."""
     words = re.findall(r"[A-Z][a-z]*", name.removesuffix("Entry"))
     return " ".join(words).capitalize()
 
@@ -53,7 +55,7 @@ def _section(name: str, entry: dict[str, Any], place: str | None, example: str) 
     lines = [f"({name})=", f"## {title(name)}", ""]
     kind = entry.get("properties", {}).get("kind", {}).get("const")
     if place:
-        lines += [f"`{place}`" + (f" with `kind = \"{kind}\"`" if kind else ""), ""]
+        lines += [f"`{place}`" + (f' with `kind = "{kind}"`' if kind else ""), ""]
     lines += [_text(entry.get("description", "")), "", "| key | value | default | meaning |", "|---|---|---|---|"]
     required = entry.get("required", [])
     for key, of in entry["properties"].items():

@@ -52,7 +52,9 @@ def sources(app: Sphinx) -> Iterator[tuple[str, dict[str, Any], str]]:
     links = {link for of in app.env.metadata.values() for link in of.get("programs", "").split()}
     for path in sorted({link.partition("#")[0] for link in links}):
         text = (ROOT / path).read_text(encoding="utf-8")
-        shown = highlight(text, PythonLexer(), HtmlFormatter(linenos="inline", nowrap=False, cssclass="highlight source"))
+        shown = highlight(
+            text, PythonLexer(), HtmlFormatter(linenos="inline", nowrap=False, cssclass="highlight source")
+        )
         definitions = _definitions(text)
         for line, name in definitions:
             shown = _anchored(shown, line, name)

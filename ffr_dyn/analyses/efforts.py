@@ -57,6 +57,8 @@ class MarkerEffort:
     moment : true for a moment [N m] in place of a force
     direction : (3,), made a unit vector;  axes : "global", or "body" for one that turns with the marker's body
 
+    Raises InputError for a direction of no length, and other axes.
+
     >>> push = fd.MarkerEffort("push", "rod.tip", direction=(1, 0, 0))
     """
 

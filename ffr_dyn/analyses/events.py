@@ -45,6 +45,8 @@ class Event:
     An event is seen when the quantity is on the two sides of the value at the two ends of a step of the integrator: twice
     within a step is not.
 
+    Raises InputError for another direction, and a value that is not finite.
+
     >>> landing = fd.Event("landing", "rod.tip.position.y", 0.0, direction="falling", stop=True)
     """
 

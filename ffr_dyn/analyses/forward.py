@@ -56,7 +56,8 @@ class Forward(OverTime):
 
     events : moments to find, by name
 
-    >>> result = fd.run(scene, fd.Settings(start=0, end=1, output_step=0.01, method=fd.Within(), analysis=fd.Forward(check=True)))
+    >>> analysis = fd.Forward(check=True)
+    >>> result = fd.run(scene, fd.Settings(start=0, end=1, output_step=0.01, method=fd.Within(), analysis=analysis))
     """
 
     resumable: ClassVar[bool] = True
@@ -133,19 +134,17 @@ def forward(
                   constraints are projected to 1e-8 of it, or closer
     outputs     : names or patterns of the quantities to keep (`ffr_dyn.results.quantities.selected`), such as "*.power"
     events      : moments to find (`ffr_dyn.analyses.events`), listed in the result's attribute "events"; one may end the run
-    check       : whether further runs are made that tell the error of every output; by default where that takes seconds.
-                  A step that is found is always checked
-    begin       : "quasi-static" for bodies that start with the deflections, and their rates, that the motion asks for
-                  and do not ring; "steady" or "periodic" for machines that are driven evenly, in the motion of `steady` or
-                  `periodic`; "as-given" with the scene's q and q_dot
+    check       : whether further runs tell the error of every output; default: where that takes seconds, or finds the step
+    begin       : "quasi-static": with the deflections that the motion asks for, which do not ring; "steady", "periodic": in
+                  the motion of these analyses, of machines driven evenly; "as-given": with the scene's q and q_dot
     path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
     resume      : a result file whose run goes on to the same bits; `end` may be later. A new file: a run from the start
     progress    : called with the time reached, a few times a second
     stopwatch   : takes the time of the integrator's compiled loop, in all runs
     assembled   : what `assemble` made of the scene at `start`, for programs that run it more than once
 
-    The result's attribute "errors" has [error in its unit, error over range] of every output but the violations of
-    constraints; "accuracy" says the worst in a sentence. Notes tell what rings and which rows are too coarse.
+    The result's attribute "errors" has [error in its unit, error over range] of every output, "accuracy" says the worst in a
+    sentence. Notes tell what rings and which rows are too coarse.
 
     Raises InputError for a scene or settings that cannot be used, ComputationError when the run fails: with the time,
     the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.

@@ -61,7 +61,8 @@ class QuasiStatic:
 class Inverse(OverTime):
     """Method, step and stabilisation are of dynamic elastic coordinates.
 
-    >>> result = fd.run(scene, fd.Settings(start=0, end=1, output_step=0.01, method=fd.Within(), analysis=fd.Inverse("quasi-static")))
+    >>> analysis = fd.Inverse("quasi-static")
+    >>> result = fd.run(scene, fd.Settings(start=0, end=1, output_step=0.01, method=fd.Within(), analysis=analysis))
     """
 
     integrates: ClassVar[bool] = True

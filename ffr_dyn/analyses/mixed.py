@@ -67,6 +67,8 @@ class Mixed(OverTime):
 
     solution : how forces away from the known motions are found: "causal" or "bounded"; default: as the scene allows
 
+    Raises InputError without unknown forces.
+
     >>> analysis = fd.Mixed(unknown=(fd.JointEffort("torque", "hinge"),), known=("path",))
     """
 

@@ -42,6 +42,8 @@ class SciPy:
 
     rtol, atol : its tolerances, of positions, velocities and elastic coordinates alike
 
+    Raises InputError for another solver.
+
     >>> result = fd.reference(scene, end=0.5, output_step=0.01, method=fd.SciPy("Radau"))
     """
 

@@ -43,6 +43,8 @@ class Adaptation:
     leave : share below which a mode that is there leaves; well below `enter`, so that it does not come back at once
     rows  : output rows between two looks
 
+    Raises InputError unless 0 < leave < enter <= 1 and rows is two or more.
+
     >>> settings = fd.Adaptation(enter=0.2, leave=0.05)
     """
 

@@ -33,6 +33,8 @@ class Output:
     tolerance : largest error at any output time
     absolute  : whether the tolerance is in the unit of the output, or else a share of its range over the run
 
+    Raises InputError for a tolerance that is not positive.
+
     >>> found = fd.economise(scene, [fd.Output("rod.tip.position", 1e-3)], end=0.5, output_step=1e-3)
     """
 

@@ -242,6 +242,8 @@ class GeneralisedAlpha:
     scaled          : judge corrections as motions. Otherwise as accelerations and multipliers, which is how index 3 is lost
                       at small steps: their rounding errors grow as 1/h^2
 
+    Raises InputError for a spectral radius outside [0, 1], and another form.
+
     >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.GeneralisedAlpha(1e-3, spectral_radius=0.6))
     """
 
@@ -284,6 +286,8 @@ class HHT:
     step  : time step [s]
     alpha : numerical damping of what the step does not resolve, 0 (none: the trapezoidal rule) ... 1/3
     form, tolerance, iterations : as of `GeneralisedAlpha`
+
+    Raises InputError for alpha outside [0, 1/3], and another form.
 
     >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.HHT(1e-3, alpha=0.05))
     """

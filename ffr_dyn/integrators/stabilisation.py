@@ -21,6 +21,8 @@ class Projection:
 
     tolerance : of Phi [m, -], positive
 
+    Raises InputError for a tolerance that is not positive.
+
     >>> result = fd.forward(scene, end=1.0, output_step=0.01, stabilisation=fd.Projection(1e-11))
     """
 
@@ -36,6 +38,8 @@ class Baumgarte:
     """Phi_ddot + 2 alpha Phi_dot + beta^2 Phi = 0 in place of Phi_ddot = 0 (Baumgarte 1972).
 
     alpha, beta : [1/s], positive; beta = alpha is critical damping. Gains near 1 / step make any method unstable.
+
+    Raises InputError for gains that are not positive.
 
     >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.RK4(1e-4), stabilisation=fd.Baumgarte(20.0, 20.0))
     """

@@ -19,6 +19,8 @@ class Within:
     accuracy : from 1e-8 to 1;  method : of fixed steps, by its name
     settings : (name, value) of what the method takes beside its step
 
+    Raises InputError for an accuracy outside [1e-8, 1].
+
     >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.Within(1e-5, "ros3"))
     """
 

@@ -42,6 +42,8 @@ def _check_name(kind: str, name: str) -> None:
 class Axis(Brief):
     """A labelled axis of a quantity, such as x, y, z. Labels are unique, not empty, and contain no dot.
 
+    Raises InputError for labels that are not so.
+
     >>> axis = fd.Axis("component", ("x", "y", "z"))
     """
 
@@ -71,6 +73,8 @@ class Quantity(Brief):
     """A history: values (T, ...) with a unit and one axis for each dimension after time.
 
     unit : in SI symbols, such as "m", "N m", "m/s", "m sqrt(kg)"; "1" for a number
+
+    Raises InputError for values whose shape is not that of the axes.
 
     >>> result.quantity("rod.tip.position").unit
     """

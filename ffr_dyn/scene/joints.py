@@ -231,6 +231,9 @@ class Joint:
     length : [m] of a distance joint: a positive number or a function of time
     pitch  : [m] per turn of a screw, positive for a right-hand thread
 
+    Raises InputError for an unknown kind, and for arms, length or pitch that the kind needs and has not, or has
+    not and is given.
+
     >>> hinge = fd.Joint("hinge", "revolute", "ground.wall", "rod.hinge", axis=(0, 0, 1))
     """
 

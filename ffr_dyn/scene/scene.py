@@ -56,6 +56,8 @@ class Body(Brief):
 
     Pose and motion are a first guess: assembly makes them meet the joints.
 
+    Raises InputError for a model that is none, negative damping, and terms to drop that do not exist.
+
     >>> rod = fd.Body("rod", fd.load_body("rod.ffr"), position=(0.1, 0, 0), damping=0.01)
     """
 

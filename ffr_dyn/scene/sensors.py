@@ -22,6 +22,8 @@ class Measurement:
            orientation: Euler parameters of j's axes in those of i
     axes : in which the difference is given: "global" or the name of a body
 
+    Raises InputError for another word.
+
     >>> travel = fd.Measurement("travel", "ground.wall", "rod.tip", axes="crank")
     """
 
@@ -76,6 +78,8 @@ class SectionMeasurement:
     place : in the element: "first" end, "middle" or "last" end
 
     The body needs section forces (`ffr-prep reduce-structure` with stress = true).
+
+    Raises InputError for other words.
 
     >>> root = fd.SectionMeasurement("root", "arm", (0, 0, 0), what="moment", place="first")
     """

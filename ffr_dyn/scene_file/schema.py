@@ -439,7 +439,8 @@ class _SceneBase(Strict):
     outputs : quantities or patterns that the result keeps; "default" stands for the usual ones
     gravity : acceleration of free fall, global axes [m/s^2]: numbers or functions of time
     base_acceleration : of the ground, global axes [m/s^2]: numbers or functions of time
-    plane : "auto" finds whether the motion is planar and computes it in that plane; an axis says which plane's normal it is; "none" does not look
+    plane : "auto" finds whether the motion is planar, and computes it in its plane; "x", "y" or "z": it is, with this
+        normal; "none" does not look
     ground : named points of the ground, global [m]
     bodies : bodies by name
     markers : further points of bodies by name

@@ -109,6 +109,8 @@ def _damping(body: Body, model: FlexibleBody, V: Array) -> Array:
 def without_terms(body: Body, terms: Iterable[str]) -> Body:
     """The body whose equations leave out the named `TERMS`, beside those that they leave out already.
 
+    Raises InputError for a term that does not exist.
+
     >>> rod = fd.without_terms(rod, ("I5", "I9"))
     """
     names = tuple(terms)

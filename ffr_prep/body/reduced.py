@@ -115,6 +115,8 @@ class Surface(Brief):
              where the material is anisotropic, of which strain is not recovered
     beams  : section forces of beam elements; None where there are none
 
+    Raises BodyError for parts that do not fit each other.
+
     >>> body.surface.points.shape
     """
 

@@ -1,7 +1,7 @@
 """What a docstring says of each name: its lists "name : meaning", from which schemas and pages are made.
 
-An item is `name : text` or `name, other : text` at the margin of the docstring; lines that are indented further go on with it. Two items may
-share a line, with `;` and two spaces between them.
+An item is `name : text` or `name, other : text` at the margin of the docstring; lines that are indented further go on with
+it. Two items may share a line, with `;` and two spaces between them.
 """
 
 from __future__ import annotations
@@ -32,9 +32,7 @@ def blocks(docstring: str | None) -> list[str | dict[tuple[str, ...], str]]:
     """Paragraphs, and lists as names -> meaning, in the order in which they stand."""
     found: list[str | dict[tuple[str, ...], str]] = []
     for paragraph in re.split(r"\n\s*\n", cleandoc(docstring or "")):
-        for part in _runs(paragraph.rstrip()):
-            if part:
-                found.append(_items(part) if _ITEM.match(part) else part)
+        found += [_items(part) if _ITEM.match(part) else part for part in _runs(paragraph.rstrip()) if part]
     return found
 
 

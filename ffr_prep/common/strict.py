@@ -12,7 +12,7 @@ from ffr_prep.common.docstrings import meanings, prose
 
 
 class Strict(BaseModel):
-    """Unknown keys are mistakes; numbers must be finite. What the docstring says of a key is its description in the schema."""
+    """Unknown keys are mistakes; numbers must be finite. What the docstring says of a key describes it in the schema."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
@@ -34,7 +34,7 @@ class Strict(BaseModel):
         said = {key: text for base in reversed(cls.__mro__) for key, text in meanings(_own_doc(base)).items()}
         for key, entry in made.get("properties", {}).items():
             if "const" in entry:
-                entry["description"] = f"\"{entry['const']}\": which of the entries that may stand here this one is"
+                entry["description"] = f'"{entry["const"]}": which of the entries that may stand here this one is'
             elif key in said:
                 entry["description"] = said[key]
         if cls.__doc__:

@@ -218,6 +218,8 @@ def with_node(model: MatrixModel, name: str, position: Sequence[float]) -> Matri
 def with_surface(model: MatrixModel, points: Array, triangles: Array) -> MatrixModel:
     """The model with a surface to draw: triangles (T, 3) on points (P, 3) [m], each of which is at a node.
 
+    Raises InputError for a point that is at no node.
+
     >>> model = fp.with_surface(model, points, triangles)
     """
     used, local = np.unique(triangles, return_inverse=True)

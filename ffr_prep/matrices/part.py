@@ -40,14 +40,12 @@ _DOUBTFUL = 0.1
 def from_matrices(
     given: MatrixModel, interfaces: Sequence[InterfaceRegion] = (), *, progress: Stages = no_stages
 ) -> Model:
-    """The model of matrices from outside, ready to be reduced or to be tied to others.
+    """The model of matrices from outside, to be reduced or tied. Raises InputError if they are not those of a free body.
 
     interfaces : at groups of nodes; one node gives its six coordinates, several follow rigidly or in the mean
     progress   : called with the name of each stage as it begins
 
     Consistent and lumped masses are both fine; coordinates without mass only in a body of matrices alone.
-
-    Raises InputError for matrices that are not those of a free body.
 
     >>> model = fp.from_matrices(fp.read_matrices(["part.npz"]), [fp.InterfaceRegion("tip")])
     """

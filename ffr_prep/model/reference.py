@@ -113,6 +113,8 @@ class SimplySupported:
 class Support:
     """One prevented motion of an interface: "translation" along or "rotation" about a direction.
 
+    Raises InputError for another motion, and a direction of no length.
+
     >>> support = fp.Support("hinge", "translation", (1, 0, 0))
     """
 
@@ -131,7 +133,8 @@ class Support:
 class Supports:
     """Any choice of prevented motions: six make the body statically determinate, more restrict its deformation.
 
-    >>> reference = fp.Supports(tuple(fp.Support("hinge", what, axis) for what in ("translation", "rotation") for axis in axes))
+    >>> held = [fp.Support("hinge", "translation", axis) for axis in np.eye(3)]
+    >>> reference = fp.Supports((*held, *(fp.Support("hinge", "rotation", axis) for axis in np.eye(3))))
     """
 
     supports: tuple[Support, ...]

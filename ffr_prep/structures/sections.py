@@ -102,6 +102,8 @@ def circle(d: float) -> Section:
 def tube(d: float, t: float) -> Section:
     """Round tube of outer diameter d and wall t [m]; drawn as a solid bar.
 
+    Raises InputError for a wall that leaves no bore.
+
     >>> section = fp.tube(0.04, 0.002)
     """
     name = f"tube {d:g} x {t:g} m"
@@ -119,6 +121,8 @@ def i_section(h: float, b: float, web: float, flange: float) -> Section:
     """Doubly symmetric I of height h (along y'), width b (along z'), web and flange thickness [m], sharp corners.
 
     Torsion as thin strips, the sum of s t^3 / 3; shear along y' is carried by the web, along z' by the flanges.
+
+    Raises InputError unless 2 flange < h and web < b.
 
     >>> section = fp.i_section(0.2, 0.1, 5.6e-3, 8.5e-3)
     """

@@ -290,7 +290,8 @@ def test_an_environment_that_cannot_be_made_says_so(machine):
 
 def test_the_tests_come_last(machine):
     assert bootstrap.test(slow=False) == 0
-    assert [Path(command[0]).name for command in machine.commands] == ["ruff", "ruff", "mypy", "python"]
+    assert [Path(command[0]).name for command in machine.commands] == ["ruff", "ruff", "mypy", "python", "python"]
+    assert machine.commands[-2][1:3] == ["-m", "sphinx"]
     assert machine.commands[-1][1:] == ["-m", "pytest", "-n", "auto", "--dist", "loadfile"]
 
 
@@ -300,7 +301,7 @@ def test_slow_selects_every_test(machine):
 
 
 @pytest.mark.parametrize(
-    ("options", "extras", "browser"), [([], ("test",), False), (["--slow"], ("bench", "test"), True)]
+    ("options", "extras", "browser"), [([], ("docs", "test"), False), (["--slow"], ("bench", "docs", "test"), True)]
 )
 def test_the_longer_tests_need_a_browser_and_the_benchmarks(machine, monkeypatch, options, extras, browser):
     asked = []
@@ -309,7 +310,21 @@ def test_the_longer_tests_need_a_browser_and_the_benchmarks(machine, monkeypatch
     assert asked == [{"extras": extras, "browser": browser}]
 
 
-@pytest.mark.parametrize("word", ["check", "format", "pytest"])
+@pytest.mark.parametrize(("options", "builders"), [([], ["html"]), (["--links"], ["html", "linkcheck"])])
+def test_the_site_is_built_and_its_addresses_asked_for_on_request(machine, options, builders, capsys):
+    assert bootstrap.main(["site", *options]) == 0
+    made = machine.ran("sphinx")
+    assert [command[command.index("--builder") + 1] for command in made] == builders
+    assert all("--fail-on-warning" in command for command in made)
+    assert "index.html" in capsys.readouterr().out
+
+
+def test_a_site_with_a_warning_fails(machine):
+    machine.bad = {"sphinx"}
+    assert bootstrap.main(["site"]) == 1
+
+
+@pytest.mark.parametrize("word", ["check", "format", "sphinx", "pytest"])
 def test_any_failed_check_fails(machine, word):
     machine.bad = {word}
     assert bootstrap.test(slow=False) == 1

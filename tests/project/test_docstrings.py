@@ -1,4 +1,4 @@
-"""Public names explain themselves: what they are, which errors they raise, in which units numbers are, and an example that can be called."""
+"""Public names explain themselves: what they are, which errors they raise, and an example that can be called."""
 
 from __future__ import annotations
 
@@ -64,7 +64,9 @@ def test_errors_that_it_raises_itself_are_named(name):
         for node in ast.walk(tree)
         if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and isinstance(node.exc.func, ast.Name)
     }
-    assert {word for word in raised & {"InputError", "ComputationError", "BodyError"} if word not in thing.__doc__} == set()
+    assert {
+        word for word in raised & {"InputError", "ComputationError", "BodyError"} if word not in thing.__doc__
+    } == set()
 
 
 # ---- lists in docstrings --------------------------------------------------------------------------------------------

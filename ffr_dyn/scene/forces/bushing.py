@@ -38,6 +38,9 @@ class Bushing(Force):
     axes, axes_j : the axes on i and on j as (3, 3) frames (columns) or as (3,) third axes, in the axes of their bodies;
                 axes_j by default equal to axes
 
+    Raises InputError for damping that is not positive semidefinite, for a bushing between a marker and itself,
+    and for numbers of another form.
+
     >>> mount = fd.Bushing("mount", "ground.wall", "rod.hinge", stiffness=[1e6, 1e6, 1e6, 500, 500, 500])
     """
 

@@ -32,6 +32,8 @@ class JointFriction(Force):
     stribeck : velocity [m/s] over which friction falls from static to coulomb (Stribeck 1902)
     viscous : force over the rate [N s/m]
 
+    Raises InputError for static without stribeck, and for numbers that are not positive where they must be.
+
     >>> bearing = fd.JointFriction("bearing", "hinge", coulomb=0.3, creep=1e-3)
     """
 

@@ -26,6 +26,8 @@ class JointStop(Force):
                 stiffness (depth - entry / 2) below
     turns     : whole turns of an angle at the start
 
+    Raises InputError without a stop, and for lower not below upper.
+
     >>> stop = fd.JointStop("stop", "hinge", stiffness=1e4, entry=0.01, lower=-1.0, upper=1.0)
     """
 

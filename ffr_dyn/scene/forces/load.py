@@ -30,6 +30,8 @@ class Load(Force):
         `ffr_dyn.equations.state_view.StateView`
     axes : "global", or "body" for a follower load
 
+    Raises InputError for other axes, and for a force or moment that has not three components.
+
     >>> gas = fd.Load("gas", "piston.crown", force=(fd.harmonic(amplitude=-500.0, frequency=25.0), 0, 0))
     """
 

@@ -39,6 +39,8 @@ class NodalForces(Force):
     function : a number, a time function or a Python function of time
     axes     : "global", or "body" for forces that turn with the body's frame
 
+    Raises InputError for other axes, and for forces that are not as many as points.
+
     >>> field = fd.NodalForces("field", "rod", points=[0, 1], forces=[[0, 0, 1.0], [0, 0, 1.0]])
     """
 

@@ -168,6 +168,8 @@ class AlongLine(Place):
 class OnJoint(Place):
     """The `angle` [rad] or `stroke` [m] of a joint, for the force `who`; turns : whole turns of the angle at the start.
 
+    Raises InputError for another coordinate, and for turns that are no whole number, or are given for a stroke.
+
     >>> place = fd.OnJoint("spring", "hinge", "angle")
     """
 

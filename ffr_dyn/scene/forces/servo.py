@@ -26,6 +26,8 @@ class Servo(Force):
     joint : name of the joint
     coordinate : "angle" or "stroke"
 
+    Raises InputError for a limit that is not positive.
+
     >>> control = fd.Servo("control", "hinge", target=0.5, kp=400.0, kd=20.0, limit=50.0)
     """
 

@@ -28,6 +28,8 @@ class SpringDamper(Force):
 
     While both points are at one place the force has no direction, and is zero.
 
+    Raises InputError for a spring between a marker and itself.
+
     >>> spring = fd.SpringDamper("return", "ground.wall", "rod.tip", stiffness=2000.0, damping=5.0, free_length=0.2)
     """
 

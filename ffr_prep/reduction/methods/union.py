@@ -16,6 +16,8 @@ from ffr_prep.solvers.factor import FreeBody
 class Union:
     """The space of several reductions together; vectors that depend on those of earlier ones are dropped and counted.
 
+    Raises InputError for no reduction at all.
+
     >>> reduction = fp.Union((fp.CraigBampton(6), fp.InertiaRelief()))
     """
 

@@ -1,4 +1,4 @@
-"""The reference of the site is complete: every key of a scene file has its meaning, a place on the page, and an example that is valid."""
+"""The reference of the site: every key of a scene file has its meaning, a place on the page, and an example."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_every_key_is_on_the_page(page, name):
 @pytest.mark.parametrize("name", ENTRIES)
 def test_the_examples_of_an_entry_have_all_of_its_keys_and_are_valid(name, tmp_path, monkeypatch):
     keys = set(ENTRIES[name]["properties"])
-    given = [snippet for snippet in snippets(name)]
+    given = list(snippets(name))
     assert keys - set().union(*(keys_given(part, keys) for part in given)) <= {"kind"}
     (tmp_path / "angle.csv").write_text("0, 0\n1, 0.1\n2, 0\n", encoding="utf-8")
     monkeypatch.chdir(tmp_path)

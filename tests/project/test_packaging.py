@@ -1,0 +1,121 @@
+"""What is published: one version and one list of dependencies everywhere; a wheel that works in a bare environment."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tarfile
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+from places import ROOT
+
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+OTHER_NAMES = {"gmsh": "python-gmsh", "matplotlib": "matplotlib-base"}  # of conda-forge
+SCENE = """
+gravity = [0, -9.81, 0]
+[analysis]
+end = 0.1
+output_step = 0.01
+step = 1e-3
+[ground]
+wall = [0, 0, 0]
+[bodies.rod]
+mass = 1.0
+inertia = [1e-4, 0.1, 0.1]
+points = {pin = [-0.5, 0, 0]}
+position = [0.5, 0, 0]
+[joints.hinge]
+kind = "revolute"
+i = "ground.wall"
+j = "rod.pin"
+"""
+PROGRAM = """
+import ffr_dyn as fd, ffr_prep as fp
+member = fp.Member(fp.circle(0.02), fp.material("steel"))
+frame = fp.named(fp.polyline([(0, 0, 0), (1, 0, 0)], member, elements=4), root=(0, 0, 0))
+model = fp.from_frame(frame, [fp.InterfaceRegion("root")])
+body = fp.reduce(model, fp.Request(name="beam", reference=fp.FixedTo("root"), reduction=fp.Eigenmodes(2)))
+assert abs(body.omega2[0] ** 0.5 / (1.87510407**2 * (2.1e11 * 0.01**2 / 4 / body.mass * 3.14159265 * 0.01**2) ** 0.5) - 1) < 0.05
+print(fp.__file__)
+"""
+
+
+def bounds(dependencies: list[str]) -> dict[str, str]:
+    """Name -> the rest of a requirement."""
+    return {re.split(r"[\[<>= ]", text)[0]: re.sub(r"^[\w-]+(\[\w+\])? ?", "", text) for text in dependencies}
+
+
+def test_the_version_is_the_same_everywhere():
+    version = PROJECT["version"]
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f'set version = "{version}"' in (ROOT / "recipe" / "meta.yaml").read_text(encoding="utf-8")
+    assert f"## {version} " in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_the_recipe_and_the_oldest_versions_are_those_of_the_project():
+    wanted = bounds(PROJECT["dependencies"])
+    recipe = (ROOT / "recipe" / "meta.yaml").read_text(encoding="utf-8").partition("  run:\n")[2].partition("\ntest:")[0]
+    run = bounds(re.findall(r"^    - (.*)$", recipe, re.M))
+    assert run.pop("python") == PROJECT["requires-python"]
+    assert run == {OTHER_NAMES.get(name, name): bound for name, bound in wanted.items()}
+    lines = (ROOT / "constraints-oldest.txt").read_text(encoding="utf-8").splitlines()
+    oldest = dict(line.split("==") for line in lines if not line.startswith("#"))
+    assert {name: f">={version}" for name, version in oldest.items()}.keys() == wanted.keys()
+    for name, version in oldest.items():
+        assert (version + ".0").startswith(re.findall(r">=([\d.]+)", wanted[name])[0])
+
+
+# ---- slow: from a wheel, outside the checkout -----------------------------------------------------------------------
+
+
+def run(*command: object, cwd: Path) -> str:
+    """What a command prints; the packages of the checkout are not on its path."""
+    clean = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "VIRTUAL_ENV")}
+    done = subprocess.run(list(map(str, command)), cwd=cwd, env=clean, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Folder of the wheel and the source distribution."""
+    pytest.importorskip("build")
+    folder = tmp_path_factory.mktemp("dist")
+    run(sys.executable, "-m", "build", "--outdir", folder, ROOT, cwd=folder)
+    return folder
+
+
+@pytest.mark.slow
+def test_the_distributions_hold_what_they_should(made):
+    (wheel,), (source,) = made.glob("*.whl"), made.glob("*.tar.gz")
+    names = zipfile.ZipFile(wheel).namelist()
+    assert {name.partition("/")[0] for name in names if ".dist-info" not in name} == {"ffr_prep", "ffr_dyn", "ffr_gallery"}
+    assert "ffr_dyn/py.typed" in names
+    assert [name for name in names if name.startswith("ffr_dyn/pictures/web/")]
+    inside = {name.partition("/")[2] for name in tarfile.open(source).getnames()}
+    for path in ("bootstrap.py", "docs/conf.py", "tests/places.py", "examples/gallery/mechanisms/plot_pendulum.py", "LICENSE"):
+        assert path in inside
+    assert [name for name in inside if name.startswith(("docs/made", "docs/gallery", "build/"))] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("extras", ["", "[tables]"])
+def test_the_wheel_works_in_a_bare_environment(made, tmp_path, extras):
+    (wheel,) = made.glob("*.whl")
+    run(sys.executable, "-m", "venv", tmp_path / "bare", cwd=tmp_path)
+    programs = tmp_path / "bare" / "bin"
+    run(programs / "python", "-m", "pip", "install", "--quiet", f"{wheel}{extras}", cwd=tmp_path)
+    (tmp_path / "swing.toml").write_text(SCENE, encoding="utf-8")
+    for command in ("ffr-prep", "ffr-dyn"):
+        assert PROJECT["version"] in run(programs / command, "--version", cwd=tmp_path)
+    run(programs / "ffr-dyn", "run", "swing.toml", "-o", "swing.nc", cwd=tmp_path)
+    assert "hinge.force" in run(programs / "ffr-dyn", "info", "swing.nc", cwd=tmp_path)
+    run(programs / "ffr-dyn", "plot", "swing.nc", "hinge.force", "-o", "force.png", cwd=tmp_path)
+    run(programs / "ffr-dyn", "animate", "swing.nc", "-o", "film.html", cwd=tmp_path)
+    found = run(programs / "python", "-c", PROGRAM, cwd=tmp_path).strip()
+    assert found.startswith(str(tmp_path))
