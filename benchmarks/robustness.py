@@ -96,10 +96,12 @@ def losses(kills: int, disks: int, folder: Path) -> bool:
     scene, output, whole, random = folder / "scene.toml", folder / "x.nc", folder / "whole.nc", np.random.default_rng(1)
     scene.write_text(SCENE)
     said: Counter[str] = Counter()
-    rows = 0
+    rows, began = 0, time.monotonic()
+    start(scene, folder / "first.nc", "--end", "1.0").communicate()
+    longest = 2.0 + time.monotonic() - began  # s, so that most are hit while they write rows
     for k in range(kills):
         run = start(scene, output, "--resume")
-        time.sleep(float(random.uniform(0.0, 3.0)))
+        time.sleep(float(random.uniform(0.0, longest)))
         run.send_signal(SIGNALS[k % len(SIGNALS)])
         run.communicate()
         said[f"{SIGNALS[k % len(SIGNALS)].name} -> {run.returncode}"] += 1
