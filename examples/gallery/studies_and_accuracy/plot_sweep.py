@@ -6,8 +6,8 @@ A box is clamped at one end and pulled down at the other. Its length and its hei
 sweep meshes and reduces it anew for every pair, runs the scene, and keeps a row for each. Runs that fail are rows with
 a message, and a sweep that was stopped goes on where it was.
 
-Source: W. C. Young, R. G. Budynas, Roark's Formulas for Stress and Strain, 7th ed. 2002, tables 8.1 and 8.10: F L^3 /
-(3 E I) and 6 F L / (5 G A) of shear.
+Source: W. C. Young, R. G. Budynas, Roark's Formulas for Stress and Strain, 7th ed. 2002, table 8.1, case 1a, and
+section 8.10: F L^3 / (3 E I), and 6 F L / (5 G A) of shear.
 """
 
 from pathlib import Path

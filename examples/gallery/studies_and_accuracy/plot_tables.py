@@ -4,10 +4,10 @@ Results in xarray and pandas
 
 A result is a netCDF-4 file: xarray opens it with names and units, pandas makes a table of it. The pendulum is the first
 benchmark of the IFToMM, a mass of 1 kg on a rod of 1 m, released from the horizontal; its place after ten seconds is
-known to fifteen digits.
+known in closed form.
 
 Source: IFToMM Technical Committee for Multibody Dynamics, Library of Computational Benchmark Problems, A01 simple
-pendulum: (-0.275087462576, -0.961419205099) m at 10 s, and the period 2.367841947576 s.
+pendulum; by elliptic functions it is at (-0.275087462576, -0.961419205099) m after 10 s.
 """
 
 import matplotlib.pyplot as plt

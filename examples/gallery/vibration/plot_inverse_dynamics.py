@@ -6,7 +6,7 @@ A slender arm is turned by half a radian and brought to rest. How large is the m
 arm bend meanwhile? The motion is slow beside the first vibration, so the moment is that of the rigid arm, J times the
 angular acceleration, and the tip lags by the deflection of a cantilever under a load that grows along it.
 
-Source: W. C. Young, R. G. Budynas, Roark's Formulas for Stress and Strain, 7th ed. 2002, table 8.1, case 2c: 11 w L^4 /
+Source: W. C. Young, R. G. Budynas, Roark's Formulas for Stress and Strain, 7th ed. 2002, table 8.1, case 2a: 11 w L^4 /
 (120 E I), with the load w = rho A a L at the tip under the angular acceleration a.
 """
 

@@ -7,7 +7,7 @@ base, is stable where the multipliers of the monodromy matrix (Floquet) lie with
 Mathieu's equation y'' + (a - 2 q cos 2x) y = 0 with a = -4 g / (l w^2), q = 2 A / l for the amplitude A and the reduced
 length l; the pendulum stands from where the characteristic value a0(q) comes down to a.
 
-Sources: A. Stephenson, On an induced stability, Philosophical Magazine 15 (1908) 233-236; N. W. McLachlan, Theory and
+Sources: A. Stephenson, On induced stability, Philosophical Magazine 15 (1908) 233-236; N. W. McLachlan, Theory and
 Application of Mathieu Functions, Oxford 1947.
 """
 
