@@ -30,7 +30,7 @@ scene = fd.Scene(bodies, joints, [crank], ground={"O": (0, 0, 0)})
 
 outputs = ["rod.middle.position.x=4e-5", "rod.middle.position.y=4e-5"]  # m: a hundredth of the deflection
 found = fd.economise(scene, outputs, end=0.05, output_step=5e-4, verify=True)
-print(fd.as_text(found).partition("BODIES")[0])
+print(fd.as_text(found).partition("cost of a run")[0])
 run = fd.run(found.scene, found.settings)
 a, middle, b = (run[f"rod.{name}.position"][:, :2] @ (1, 1j) for name in at)  # places as complex numbers
 offset = ((middle - a) / (b - a)).imag * 0.3
