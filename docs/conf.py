@@ -27,6 +27,7 @@ extensions = [
     "sphinx_gallery.gen_gallery",
     "made",
     "mathml",
+    "offline",
     "repository",
 ]
 exclude_patterns = ["extensions", "gallery/**/*.ipynb", "gallery/**/*.py"]
@@ -86,5 +87,6 @@ sphinx_gallery_conf = {
     "min_reported_time": 0,
     "copyfile_regex": "",
     "show_signature": False,
+    "write_computation_times": False,  # a table that loads its script from elsewhere
     "nested_sections": True,
 }

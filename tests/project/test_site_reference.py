@@ -6,13 +6,20 @@ import json
 import re
 import sys
 import tomllib
+from importlib import import_module
+from types import SimpleNamespace
 from typing import Any
 
+import click
 import pytest
 from places import ROOT
 from pydantic import TypeAdapter
 
+import ffr_dyn
+import ffr_prep
+from ffr_dyn.cli import cli as dyn_cli
 from ffr_dyn.scene_file.schema import scene_entry
+from ffr_prep.cli import cli as prep_cli
 
 SCHEMA: dict[str, Any] = json.loads((ROOT / "docs" / "scene.schema.json").read_text(encoding="utf-8"))
 ENTRIES = {"Scene": SCHEMA, **SCHEMA["$defs"]}
@@ -23,13 +30,18 @@ INSIDE_MIXED = {"JointEffortEntry", "MarkerEffortEntry", "CausalEntry", "Bounded
 
 
 @pytest.fixture(scope="module")
-def page():
+def makers():
+    """What makes the pages of the site."""
     sys.path.insert(0, str(ROOT / "docs" / "extensions"))
     try:
-        from entries import page
+        return SimpleNamespace(**{name: import_module(name) for name in ("commands", "doors", "entries")})
     finally:
         sys.path.pop(0)
-    return page(SCHEMA)
+
+
+@pytest.fixture(scope="module")
+def page(makers):
+    return makers.entries.page(SCHEMA)
 
 
 def snippets(name: str) -> list[dict[str, Any]]:
@@ -85,3 +97,30 @@ def test_no_example_is_of_nothing():
 def test_links_of_the_page_lead_to_its_sections(page):
     anchors = set(re.findall(r"^\((\w+)\)=$", page, re.M))
     assert set(re.findall(r"\]\(#(\w+)\)", page)) <= anchors
+
+
+# ---- commands and public names --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("name", "group"), [("ffr-prep", prep_cli), ("ffr-dyn", dyn_cli)])
+def test_every_command_and_option_is_on_the_page(makers, name, group):
+    page = makers.commands.page(name, group)
+    context = click.Context(group, info_name=name)
+    for word in group.list_commands(context):
+        command = group.get_command(context, word)
+        assert f"## `{name} {word}`" in page
+        options = [of for of in command.params if isinstance(of, click.Option) and not of.hidden]
+        assert [of.opts for of in options if not any(flag in page for flag in of.opts)] == []
+
+
+@pytest.mark.parametrize(("package", "alias"), [(ffr_prep, "fp"), (ffr_dyn, "fd")])
+def test_every_public_name_is_on_the_page(makers, package, alias):
+    page = makers.doors.page(package, alias)
+    named = set(re.findall(rf"^`{{4}}{{py:\w+}} {package.__name__}\.(\w+)", page, re.M))
+    assert named == set(package.__all__) - {"__version__"}
+
+
+def test_signatures_are_short_and_types_left_out(makers):
+    text = makers.doors._signature(ffr_dyn.forward)
+    assert text.startswith("(scene, *, end, output_step, method=None, start=0.0, stabilisation=...")
+    assert "Integrator" not in text
