@@ -18,11 +18,12 @@ LOG = getLogger(__name__)
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = {"CONTRIBUTING.md": "about/contributing.md", "CHANGELOG.md": "about/changelog.md"}
 TEXTS = re.compile(r"\]\((?:\.\./)+([A-Z]+\.md)(#[\w-]+)?\)")
+EXAMPLES = re.compile(r"\]\((?:\.\./)+examples/gallery/(\w+)(?:/(plot_\w+)\.py)?\)")
 PROGRAMS = re.compile(r"\[`([^`]+)`\]\((?:\.\./)+([\w/]+\.py)\)")
 
 
 def inward(app: Sphinx, docname: str, source: list[str]) -> None:
-    """Let links to texts of `PAGES` lead to their pages, and links to programs to the line that they name."""
+    """Let links to texts and examples lead to their pages, and links to programs to the line that they name."""
     up = "../" * docname.count("/")
 
     def text(found: re.Match[str]) -> str:
@@ -35,8 +36,11 @@ def inward(app: Sphinx, docname: str, source: list[str]) -> None:
         shown.add(f"{path}#{anchor}")
         return f'<a href="{up}source/{path.removesuffix(".py")}.html#{anchor}"><code>{name}</code></a>'
 
+    def example(found: re.Match[str]) -> str:
+        return f"]({up}gallery/{found[1]}/{found[2] or 'index'}.rst)"
+
     shown: set[str] = set()
-    source[0] = PROGRAMS.sub(program, TEXTS.sub(text, source[0]))
+    source[0] = PROGRAMS.sub(program, EXAMPLES.sub(example, TEXTS.sub(text, source[0])))
     if shown:
         app.env.metadata[docname]["programs"] = " ".join(sorted(shown))
 
