@@ -2,7 +2,8 @@
 
 In a page a block of `toml` whose first line is a file name (`# swing.toml`) is that file; `console` is commands (`$ ...`), each with
 the lines of its output that the page shows; `python` is one program, and `text` after it what it prints. In a shown line
-`...` stands for anything and numbers are compared to 2 %. `<!-- files of PAGE -->` takes the files of another page.
+`...` stands for anything and numbers are compared to 2 %. `<!-- files of PAGE -->` takes the files of another page;
+`<!-- needs PACKAGES -->` names what is not installed everywhere.
 """
 
 from __future__ import annotations
@@ -86,16 +87,19 @@ def test_lines_are_compared_by_words_and_numbers():
 def typed(command: str, shown: list[str]) -> None:
     path = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
     called = ["bash", "-ec", command]
-    done = subprocess.run(called, env={**os.environ, "PATH": path}, capture_output=True, text=True, check=False)
-    said = done.stdout + done.stderr
-    assert (done.returncode, "Traceback" in said) == (0, False), f"{command}\n{said}"
-    assert_shown(said, shown)
+    done = subprocess.run(
+        called, env={**os.environ, "PATH": path}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
+    )
+    assert (done.returncode, "Traceback" in done.stdout) == (0, False), f"{command}\n{done.stdout}"
+    assert_shown(done.stdout, shown)
 
 
 @pytest.mark.parametrize(
     "page", [pytest.param(page, marks=[pytest.mark.slow] * (page.stem in SLOW), id=page.stem) for page in PAGES]
 )
 def test_the_page(page, tmp_path, monkeypatch):
+    for package in " ".join(re.findall(r"<!-- needs (.+?) -->", page.read_text(encoding="utf-8"))).split():
+        pytest.importorskip(package)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "meshes").symlink_to(ROOT / "meshes")
     shutil.copy(REFERENCE / "plate.step", tmp_path)
