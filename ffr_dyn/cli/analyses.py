@@ -115,8 +115,8 @@ def analysis_command(word: str) -> click.Command:
 def _own_options(made: Any) -> Iterator[Any]:
     for f in fields(made):
         if isinstance(f.default, str) and "/" in f.metadata.get("flag", ""):
-            for word in f.metadata["flag"].split("/"):
-                yield click.option(word, f.name, flag_value=word.lstrip("-"), default=None, help=f.metadata["help"])
+            for word, said in zip(f.metadata["flag"].split("/"), f.metadata["help"].split(" | "), strict=True):
+                yield click.option(word, f.name, flag_value=word.lstrip("-"), default=None, help=said)
         elif "flag" in f.metadata:
             several = "/" not in f.metadata["flag"] and get_type_hints(made)[f.name] not in (int, float, str)
             kind = None if several or "/" in f.metadata["flag"] else get_type_hints(made)[f.name]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffr_dyn.cli.run import assignments, parameter_option, require_after, scene_argument
+from ffr_dyn.cli.run import assignments, begins_as_given, parameter_option, require_after, scene_argument
 from ffr_prep.common.command import OUTPUT_FILE, reserve
 from ffr_prep.common.errors import InputError
 
@@ -105,6 +105,8 @@ def chart(
     output = output or scene.with_suffix(".chart")
     for suffix in SUFFIXES:
         reserve("-o", output.with_name(output.name + suffix))
+    for line in begins_as_given(settings.analysis):
+        click.echo(line)
     span = Span(settings.end if end is None else end, settings.output_step, settings.start)
     asked = settings.chart
     compared = _methods(methods) if methods else {name: numbers or None for name, numbers in asked.methods} or None

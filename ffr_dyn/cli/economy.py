@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ffr_dyn.cli.run import assignments, over_time, parameter_option, require_after, scene_argument
+from ffr_dyn.cli.run import assignments, begins_as_given, over_time, parameter_option, require_after, scene_argument
 from ffr_prep.common.command import OUTPUT_FILE, reserve
 
 EXAMPLE = """\b
@@ -69,6 +69,8 @@ def economise(
     report = report or target.with_suffix(".html")
     reserve("--report", report, (".html", ".md", ".txt"))
     reserve("--chart", chart, (".png", ".svg"))
+    for line in begins_as_given(analysis):
+        click.echo(line)
     found = search(
         loaded,
         outputs,

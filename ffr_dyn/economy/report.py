@@ -80,7 +80,7 @@ def _verdict(found: Economy) -> str:
             return f"NOT within its tolerances{again}: against the full model {_largest(apart)}."
         return (
             f"Estimated, not verified{again}: in the time allowed the reference is known to {known:.2g} of a tolerance, "
-            f"where a verification takes {found.policy.reference_share:g}. Larger tolerances and fewer outputs take less; "
+            f"where a verification needs {found.policy.reference_share:g}. Larger tolerances and fewer outputs take less; "
             "damping helps, since undamped modes ring at every step."
         )
     if worst > 1:

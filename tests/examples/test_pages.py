@@ -1,9 +1,9 @@
 """The tutorials and how-tos as they are written: what they have typed runs in order, and prints what they show.
 
-In a page a block of `toml` whose first line is a file name (`# swing.toml`) is that file; `console` is commands (`$ ...`), each with
-the lines of its output that the page shows; `python` is one program, and `text` after it what it prints. In a shown line
-`...` stands for anything and numbers are compared to 2 %. `<!-- files of PAGE -->` takes the files of another page;
-`<!-- needs PACKAGES -->` names what is not installed everywhere.
+In a page a block of `toml` whose first line is a file name (`# swing.toml`) is that file; `console` is commands (`$ ...`),
+each with the lines of its output that the page shows; `python` is one program, and `text` after it what it prints. In a
+shown line `...` stands for anything and numbers are compared to 2 %. `<!-- files of PAGE -->` takes the files of another
+page; `<!-- needs PACKAGES -->` names what is not installed everywhere.
 """
 
 from __future__ import annotations
@@ -88,7 +88,12 @@ def typed(command: str, shown: list[str]) -> None:
     path = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
     called = ["bash", "-ec", command]
     done = subprocess.run(
-        called, env={**os.environ, "PATH": path}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
+        called,
+        env={**os.environ, "PATH": path},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
     )
     assert (done.returncode, "Traceback" in done.stdout) == (0, False), f"{command}\n{done.stdout}"
     assert_shown(done.stdout, shown)
