@@ -22,7 +22,9 @@ import numpy as np
 import pytest
 from places import REFERENCE, ROOT
 
-PAGES = sorted(path for room in ("tutorials", "howto") for path in (ROOT / "docs" / room).glob("*.md"))
+PAGES = sorted(
+    path for room in ("tutorials", "howto") for path in (ROOT / "docs" / room).glob("*.md") if path.stem != "index"
+)
 SLOW = ()  # stems of pages that run for more than some fifteen seconds
 NUMBER = r"(?<![\w.])[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?"
 DIGITS = r"([-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?)"
