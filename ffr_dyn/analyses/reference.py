@@ -91,7 +91,7 @@ def reference(
 ) -> Result:
     """Forward dynamics by a solver of SciPy or SUNDIALS; the arguments and the result are those of `forward`.
 
-    Raises InputError for a scene or settings that cannot be used, ComputationError when the solver stops early.
+    Raises InputError for a scene or settings that cannot be used, ComputationError when the solver gives up.
     """
     times = output_times(start, end, output_step)
     assembled = assemble(scene, time=start)
