@@ -105,8 +105,6 @@ def chart(
     output = output or scene.with_suffix(".chart")
     for suffix in SUFFIXES:
         reserve("-o", output.with_name(output.name + suffix))
-    for line in begins_as_given(settings.analysis):
-        click.echo(line)
     span = Span(settings.end if end is None else end, settings.output_step, settings.start)
     asked = settings.chart
     compared = _methods(methods) if methods else {name: numbers or None for name, numbers in asked.methods} or None
@@ -120,7 +118,7 @@ def chart(
             repeats=repeats, limit=limit, wanted=wanted, tell=lambda line: click.echo(f"reference    {line}"),
             progress=update,
         )  # fmt: skip
-    for line in _report(found, against):
+    for line in (*begins_as_given(settings.analysis), *_report(found, against)):
         click.echo(line)
     for path in _write(found, output, against):
         click.echo(f"written      {path}")
