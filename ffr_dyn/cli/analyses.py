@@ -14,7 +14,6 @@ from ffr_dyn.cli.run import (
     assignments,
     at_moment,
     changed,
-    end_option,
     file_option,
     keep_option,
     method_options,
@@ -24,6 +23,7 @@ from ffr_dyn.cli.run import (
     perform,
     resume_option,
     scene_argument,
+    span_options,
     time_option,
     with_options,
 )
@@ -97,7 +97,7 @@ def analysis_command(word: str) -> click.Command:
         *([keep_option] if made.keeps else []),
     ]
     if issubclass(made, OverTime):
-        options += [end_option, *(method_options if made.integrates else [])]
+        options += [*span_options, *(method_options if made.integrates else [])]
     else:
         options.append(time_option)
     options += [resume_option] * made.resumable
@@ -140,7 +140,7 @@ def _analyse(made: Any, scene: Path, given: Mapping[str, Any]) -> None:
     analysis = replace(settings.analysis, **own) if isinstance(settings.analysis, made) else made(**own)
     keep = given.get("keep", ())
     if issubclass(made, OverTime):
-        found: Any = over_time(settings, analysis, keep)
+        found: Any = over_time(settings, analysis, keep, given["end"], given["output_step"])
     else:
         found = at_moment(settings, analysis, given["time"], keep)
     changes = {key: given[key] for key in INTEGRATION if key in given}
