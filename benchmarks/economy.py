@@ -108,7 +108,7 @@ def truth(scene: Scene, found: list[Economy], span: Span) -> Known:
     """Everything on, with at least four times the steps of the finest model, known to a tenth of the least tolerance."""
     of, least = found[0].probe, np.min([one.limits for one in found], axis=0)
     ledger = Ledger(scene, span, of, lambda stage: None)
-    parts = [one.choice for one in found[0].tried if one.what == "everything"]
+    parts = [one.choice for one in found[0].tried if one.what == "full model"]
     everything = parts[0] if parts else replace(full_model(found[0]), method="ros3")
     finest = max(one.choice.divisions for one in found)
     return sharpened(ledger, everything, SHARP * least, 4 * finest, LONG)

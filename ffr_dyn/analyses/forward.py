@@ -72,8 +72,8 @@ class Forward(OverTime):
         default="as-given",
         metadata=option(
             "--as-given/--quasi-static/--steady/--periodic",
-            "Start as given (default), with the deflections that the motion asks for, turning evenly, or in the turn that "
-            "comes back to itself.",
+            "Start with the deflections of the scene (default). | Start with the quasi-static deflections of the motion: "
+            "no shock. | Start in the steady motion. | Start in the periodic motion.",
         ),
     )
 

@@ -70,7 +70,7 @@ def by_ida(
         done = solver.step(time, tstop=time)
         if not done.success or not np.isfinite(done.y).all():
             raise ComputationError(
-                f"IDA gave up before t = {time:.6g} s: {done.message}; use other tolerances or another method, or "
+                f"IDA stopped before t = {time:.6g} s: {done.message}; use other tolerances or another method, or "
                 "end before a position in which the mechanism locks"
             )
         yield time, *closed(at, time, done.y[part.x].copy(), done.y[part.v].copy())

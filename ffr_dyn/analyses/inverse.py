@@ -69,7 +69,7 @@ class Inverse(OverTime):
     stabilised: ClassVar[bool] = True
     elastic: Literal["dynamic", "quasi-static"] = field(
         default="dynamic",
-        metadata=option("--quasi-static/--dynamic", "Elastic coordinates follow without vibration; default: dynamic."),
+        metadata=option("--quasi-static/--dynamic", "Bodies deform without vibration. | Bodies vibrate (default)."),
     )
 
     def perform(self, scene: Scene, settings: Settings, **how: Any) -> Result:

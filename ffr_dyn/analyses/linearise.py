@@ -335,7 +335,7 @@ def as_result(scene: Scene, found: Linearisation, time: float = 0.0) -> Result:
         "A": Quantity(found.A[None], "1", (states, columns), "state matrix"),
         "eigenvalues": Quantity(parts[None], "1/s", (modes, complex_parts), "eigenvalues of A"),
         "frequencies": Quantity(found.frequencies[None], "Hz", (modes,), "of the damped vibration"),
-        "damping_ratios": Quantity(found.damping_ratios[None], "1", (modes,), "-Re / modulus of the eigenvalues"),
+        "damping_ratios": Quantity(found.damping_ratios[None], "1", (modes,), "of the modes; negative where they grow"),
         "seen": Quantity(found.seen[None], "Hz", (modes,), "from the ground, positive of forward whirls"),
         "whirl": Quantity(found.whirl[None], "1", (modes,), "share of the amplitude that whirls so"),
     }

@@ -165,7 +165,7 @@ def _by_scipy(assembled: Assembled, at: Evaluator, times: Array, method: SciPy) 
             **implicit,
         )
         if not done.success:
-            raise ComputationError(f"{method.solver} gave up at t = {done.t[-1]:.6g} s: {done.message}")
+            raise ComputationError(f"{method.solver} stopped at t = {done.t[-1]:.6g} s: {done.message}")
         step = float(np.diff(done.t).max())
         x, v = closed(at, float(end), *np.split(done.y[:, -1], [place.x_size]))
         yield float(end), x, v

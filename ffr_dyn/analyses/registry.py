@@ -24,14 +24,14 @@ LISTED = {
     "forward": "Forward dynamics of SCENE, whatever analysis its file asks for; see `ffr-dyn run --help`.",
     "kinematic": "Positions, velocities and accelerations of SCENE, whose drivers prescribe all motion; bodies undeformed.",
     "assemble": "Positions and velocities of SCENE that meet joints and drivers, and what was changed of each body for it.",
-    "static": "Static equilibrium of SCENE, downhill from its start, with reactions and stability.",
+    "static": "Static equilibrium of SCENE, with reactions and stability.",
     "inverse": "Forces that drive SCENE along its prescribed motion, and all reactions.",
     "mixed": "Motion and unknown forces of SCENE, some motions of which are known.",
     "linearise": "Eigenvalues and state-space matrices of SCENE about its start, its equilibrium or its steady motion.",
-    "steady": "Steady motion of SCENE: bodies deformed by even turning, at one speed or over a list of speeds.",
+    "steady": "Steady motion of SCENE: bodies that rotate at a constant speed, deformed by it; at one speed or several.",
     "campbell": "Campbell diagram of SCENE: frequencies and damping over the speed, critical speeds, limits of stability.",
     "response": "Frequency response of SCENE: gain, phase and modes from an input to outputs; noise; Bode and Nyquist.",
-    "periodic": "The period of SCENE, driven evenly, that comes back to itself; Floquet's multipliers.",
+    "periodic": "Periodic motion of SCENE under drivers that turn evenly, and Floquet's multipliers: is it stable?",
 }
 _FOLDERS = dict.fromkeys(
     ("steady", "campbell", "response", "periodic"), "rotating"
@@ -41,7 +41,8 @@ EVENTS_SHOWN = 20
 
 
 def option(flag: str, help: str, *, metavar: str | None = None, required: bool = False, **more: Any) -> dict[str, Any]:
-    """Metadata of a field that is an option of the command: "--name", or "--yes/--no" for one of two values.
+    """Metadata of a field that is an option of the command: "--name", or "--yes/--no" for one of two values, or
+    "--one/--two/--three" for one of several texts, whose help is "of the first | of the second | of the third".
 
     required : that a scene file gives it;  names : key of the file for entries that are names of things of the scene
 
@@ -147,7 +148,7 @@ def summary(attributes: Mapping[str, Any]) -> list[str]:
     if "largest_drift" in a:
         position, velocity = a["largest_drift"]
         lines.append(
-            f"constraints  left by at most {position:.1e} (rate {velocity:.1e}); {a['projections']} projections"
+            f"constraints  open by at most {position:.1e} (rate {velocity:.1e}); {a['projections']} projections"
         )
     if "accuracy" in a:
         lines.append(f"accuracy     {a['accuracy']}")

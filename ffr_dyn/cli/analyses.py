@@ -14,7 +14,6 @@ from ffr_dyn.cli.run import (
     assignments,
     at_moment,
     changed,
-    end_option,
     file_option,
     keep_option,
     method_options,
@@ -24,6 +23,7 @@ from ffr_dyn.cli.run import (
     perform,
     resume_option,
     scene_argument,
+    span_options,
     time_option,
     with_options,
 )
@@ -97,7 +97,7 @@ def analysis_command(word: str) -> click.Command:
         *([keep_option] if made.keeps else []),
     ]
     if issubclass(made, OverTime):
-        options += [end_option, *(method_options if made.integrates else [])]
+        options += [*span_options, *(method_options if made.integrates else [])]
     else:
         options.append(time_option)
     options += [resume_option] * made.resumable
@@ -115,8 +115,8 @@ def analysis_command(word: str) -> click.Command:
 def _own_options(made: Any) -> Iterator[Any]:
     for f in fields(made):
         if isinstance(f.default, str) and "/" in f.metadata.get("flag", ""):
-            for word in f.metadata["flag"].split("/"):
-                yield click.option(word, f.name, flag_value=word.lstrip("-"), default=None, help=f.metadata["help"])
+            for word, said in zip(f.metadata["flag"].split("/"), f.metadata["help"].split(" | "), strict=True):
+                yield click.option(word, f.name, flag_value=word.lstrip("-"), default=None, help=said)
         elif "flag" in f.metadata:
             several = "/" not in f.metadata["flag"] and get_type_hints(made)[f.name] not in (int, float, str)
             kind = None if several or "/" in f.metadata["flag"] else get_type_hints(made)[f.name]
@@ -140,7 +140,7 @@ def _analyse(made: Any, scene: Path, given: Mapping[str, Any]) -> None:
     analysis = replace(settings.analysis, **own) if isinstance(settings.analysis, made) else made(**own)
     keep = given.get("keep", ())
     if issubclass(made, OverTime):
-        found: Any = over_time(settings, analysis, keep)
+        found: Any = over_time(settings, analysis, keep, given["end"], given["output_step"])
     else:
         found = at_moment(settings, analysis, given["time"], keep)
     changes = {key: given[key] for key in INTEGRATION if key in given}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffr_dyn.cli.run import assignments, parameter_option, require_after, scene_argument
+from ffr_dyn.cli.run import assignments, begins_as_given, parameter_option, require_after, scene_argument
 from ffr_prep.common.command import OUTPUT_FILE, reserve
 from ffr_prep.common.errors import InputError
 
@@ -118,7 +118,7 @@ def chart(
             repeats=repeats, limit=limit, wanted=wanted, tell=lambda line: click.echo(f"reference    {line}"),
             progress=update,
         )  # fmt: skip
-    for line in _report(found, against):
+    for line in (*begins_as_given(settings.analysis), *_report(found, against)):
         click.echo(line)
     for path in _write(found, output, against):
         click.echo(f"written      {path}")

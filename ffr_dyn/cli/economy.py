@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ffr_dyn.cli.run import assignments, over_time, parameter_option, require_after, scene_argument
+from ffr_dyn.cli.run import assignments, begins_as_given, over_time, parameter_option, require_after, scene_argument
 from ffr_prep.common.command import OUTPUT_FILE, reserve
 
 EXAMPLE = """\b
@@ -31,7 +31,7 @@ Example:
 @click.option("--tolerance", type=float, default=1e-3, show_default=True, help="Share of the range of other outputs.")
 @click.option("--end", type=float, help="End of the run [s], instead of the scene's.")
 @click.option(
-    "--verify/--no-verify", default=None, help="Run everything with a finer step to check; default: if short."
+    "--verify/--no-verify", default=None, help="Run the full model with a finer step to check; default: if short."
 )
 @click.option("-o", "target", type=OUTPUT_FILE, help="Scene file to write; default: <scene>.economised.toml.")
 @click.option("--report", type=OUTPUT_FILE, help="Report: .html (with chart), .md or .txt; default: .html.")
@@ -49,7 +49,7 @@ def economise(
 ) -> None:
     """The cheapest model of SCENE that keeps the named outputs within their tolerances, as a scene file and a report.
 
-    SCENE is modelled with everything that could matter: flexible bodies with many modes, geometric stiffening, all terms.
+    SCENE is the full model, with all that could matter: flexible bodies with many modes, geometric stiffening, all terms.
     What is not needed goes: bodies become rigid, modes, inertia terms and stiffening are left out, the computation is done in
     the plane, the step is as long as it may be. Every error is estimated and, where that is quick, verified.
     """
@@ -69,6 +69,8 @@ def economise(
     report = report or target.with_suffix(".html")
     reserve("--report", report, (".html", ".md", ".txt"))
     reserve("--chart", chart, (".png", ".svg"))
+    for line in begins_as_given(analysis):
+        click.echo(line)
     found = search(
         loaded,
         outputs,

@@ -39,7 +39,10 @@ Example:
     "--static", "at_rest", is_flag=True, help="Look at the static equilibrium, not at the analysis of the file."
 )
 @click.option(
-    "--reduce", "reduced", is_flag=True, help="Reduce the bodies again, in place of their files, till it is enough."
+    "--reduce",
+    "reduced",
+    is_flag=True,
+    help="Reduce the bodies again, in place of their files, until the parts suffice.",
 )
 def parts(scene: Path, parameters: tuple[str, ...], angle: str, at_rest: bool, reduced: bool) -> None:
     """How many parts the flexible bodies of SCENE need, and the commands of ffr-prep that make them.

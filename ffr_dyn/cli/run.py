@@ -33,7 +33,10 @@ keep_option = click.option(
     "--keep", multiple=True, metavar="NAME", help="Quantities to keep, instead of the scene's; * and ? match."
 )
 time_option = click.option("--time", type=float, help="[s], for what depends on time; default: the scene's, or 0.")
-end_option = click.option("--end", type=float, help="End of the run [s], instead of the scene's.")
+span_options = (
+    click.option("--end", type=float, help="End of the run [s], instead of the scene's."),
+    click.option("--output-step", type=float, help="A row of the result every ... [s], instead of the scene's."),
+)
 method_options = (
     click.option(
         "--step", type=float, help="Time step [s], instead of the scene's, or of one that keeps the accuracy."
@@ -45,7 +48,8 @@ method_options = (
 resume_option = click.option(
     "--resume", is_flag=True, help="Go on where the result file ends, as if the run had never stopped."
 )
-INTEGRATION = ("end", "step", "accuracy", "tolerance", "method")
+SPAN = ("end", "output_step")
+INTEGRATION = (*SPAN, "step", "accuracy", "tolerance", "method")
 
 
 def with_options(*options: Callable[..., Any]) -> Callable[..., Any]:
@@ -67,7 +71,9 @@ Example:
 
 
 @click.command(epilog=RUN_EXAMPLE)
-@with_options(scene_argument, output_option, parameter_option, keep_option, end_option, *method_options, resume_option)
+@with_options(
+    scene_argument, output_option, parameter_option, keep_option, *span_options, *method_options, resume_option
+)
 def run(
     scene: Path, output: Path | None, parameters: tuple[str, ...], keep: tuple[str, ...], resume: bool, **changes: Any
 ) -> None:
@@ -101,16 +107,34 @@ def require_after(option: str, end: float | None, start: float) -> None:
         raise InputError(f"{option} {end:g}: give a time after the start, {start:g} s")
 
 
-def over_time(settings: Settings | MomentSettings, analysis: OverTime, keep: tuple[str, ...]) -> Settings:
-    """The settings of a file with another analysis. InputError where the file's own has no times."""
+def begins_as_given(analysis: Any) -> list[str]:
+    """A note where the forward dynamics of a file begins in another state than the scene's, which not every command does."""
+    begin = getattr(analysis, "begin", "as-given")
+    return [f'note         starts as the scene gives it: begin = "{begin}" is of `run` alone'] * (begin != "as-given")
+
+
+def over_time(
+    settings: Settings | MomentSettings,
+    analysis: OverTime,
+    keep: tuple[str, ...],
+    end: float | None = None,
+    output_step: float | None = None,
+) -> Settings:
+    """The settings of a file with another analysis. InputError where neither the file nor the options have times."""
     from ffr_dyn.analyses.registry import word_of
-    from ffr_dyn.analyses.settings import MomentSettings
+    from ffr_dyn.analyses.settings import MomentSettings, Settings
+    from ffr_dyn.integrators import Within
 
     if isinstance(settings, MomentSettings):
-        raise InputError(
-            f"the scene file asks for a {word_of(type(settings.analysis))} analysis, which has no times; "
-            f"{word_of(type(analysis))} analysis needs an [analysis] with end and output_step"
-        )
+        if end is None or output_step is None:
+            raise InputError(
+                f"the scene file asks for a {word_of(type(settings.analysis))} analysis, which has no times: a "
+                f"{word_of(type(analysis))} analysis needs an [analysis] with end and output_step, or --end and --output-step"
+            )
+        return Settings(
+            start=settings.time, end=end, output_step=output_step, method=Within(), outputs=keep or settings.outputs,
+            analysis=analysis,
+        )  # fmt: skip
     return replace(settings, analysis=analysis, outputs=keep or settings.outputs)
 
 
@@ -133,14 +157,15 @@ def changed(settings: Settings | MomentSettings, changes: Mapping[str, Any]) -> 
 
     given = {key: value for key, value in changes.items() if value is not None}
     integrates = isinstance(settings, Settings) and settings.analysis.integrates
-    known = INTEGRATION if integrates else ("end",) if isinstance(settings, Settings) else ()
+    known = INTEGRATION if integrates else SPAN if isinstance(settings, Settings) else ()
     for key in given:
         if key not in known:
-            raise InputError(f"--{key}: a {word_of(type(settings.analysis))} analysis has no {key}; leave it out")
+            word = key.replace("_", "-")
+            raise InputError(f"--{word}: a {word_of(type(settings.analysis))} analysis has no {word}; leave it out")
     if not isinstance(settings, Settings):
         return settings
     method = _method(settings, given) if integrates else settings.method
-    return replace(settings, end=given.get("end", settings.end), method=method)
+    return replace(settings, **{key: given[key] for key in SPAN if key in given}, method=method)
 
 
 def _method(settings: Settings, given: Mapping[str, Any]) -> Integrator | Within:

@@ -11,7 +11,7 @@ from ffr_prep.common.errors import InputError
 
 _NOTES = """\b
 Quantities:
-  von-mises, tresca                                      sizes of the stress
+  von-mises, tresca                                      magnitudes of the stress
   signed-max-principal, max-principal, min-principal     tension is positive
   xx, yy, zz, xy, xz, yz                                 components in the axes of the body
   strain-max-principal, strain-xx, ...                   the same of the strain, but for the sizes

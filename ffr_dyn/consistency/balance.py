@@ -74,8 +74,8 @@ def amiss(account: Account, method: str, remedy: str) -> list[str]:
     )
     cause = "what the steps do not resolve grows" if worst > 0 else "what the steps do not resolve is damped by them"
     return [
-        f"by t = {when:.6g} s energy of {abs(worst):.3g} J {way}, {abs(worst) / most:.2g} of the most that was in motion and "
-        f"strain: {cause} ({method}); {remedy}"
+        f"by t = {when:.6g} s energy of {abs(worst):.3g} J {way}, {abs(worst) / most:.2g} of the largest kinetic and strain "
+        f"energy: {cause} ({method}); {remedy}"
     ]
 
 

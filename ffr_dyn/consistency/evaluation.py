@@ -202,8 +202,8 @@ def _weights(M: Array) -> Array:
         return np.linalg.cholesky(M + np.diag(little))
     except np.linalg.LinAlgError:
         raise ComputationError(
-            "the mass matrix of the scene is not positive: a body is deformed beyond what its modes can tell; make its load "
-            "smaller, or cut it into parts"
+            "the mass matrix of the scene is not positive: a body is deformed further than its modes can represent; make its "
+            "load smaller, or cut it into parts"
         ) from None
 
 

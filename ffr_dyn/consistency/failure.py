@@ -131,7 +131,7 @@ def _overflow(system: System, work: Work, settings: Settings) -> str:
         return f"{name!r} exerts {value:.3g} N or N m; look at its numbers and their units{change}"
     if settings.method is None:
         return (
-            "a force, an initial state or a driver is beyond all sense there, or a solver has lost the motion before; look "
+            "a force, an initial state or a driver is far too large there, or a solver has lost the motion before; look "
             "at their numbers and units, or use smaller tolerances"
         )
     if settings.method.controlled:

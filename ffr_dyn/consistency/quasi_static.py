@@ -86,7 +86,7 @@ def quasi_static(assembled: Assembled, time: float) -> Assembled:
         x, v, slow = _slow(_search(assembled, of), time, assembled.x, assembled.v, _apart(assembled, of))
     except (OpenError, np.linalg.LinAlgError):
         raise _failed(time) from None
-    notes = [*assembled.notes, "starts with the deflections that the motion asks for"]
+    notes = [*assembled.notes, "starts with the quasi-static deflections of the motion"]
     if not slow:
         notes.append(
             f"the motion at the start is not slow beside the lowest vibration, {of.omega[0] / 2 / np.pi:.4g} Hz: "

@@ -86,7 +86,7 @@ def adaptive_forward(
 ) -> Result:
     """Integrate a scene from `start` to `end` [s] with bodies rigid and modes absent while the outputs allow it.
 
-    outputs   : as of `economise`; for relative tolerances their ranges are taken from one coarse run of everything
+    outputs   : as of `economise`; for relative tolerances their ranges are taken from one coarse run of the full model
     divisions : steps from one output row to the next
     policy    : numbers of the estimates
 

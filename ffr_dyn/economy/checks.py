@@ -1,4 +1,4 @@
-"""Looks at a finished model from other sides: its linearised frequencies beside those of everything, and what stiffens it.
+"""Looks at a finished model from other sides: linearised frequencies beside those of the full model, and what stiffens it.
 
 A mode driven one-way tells what is missing from a motion, not that the motion itself has a wrong frequency: a body with one
 stretching mode of several vibrates too fast against what it carries. The frequencies of the linearised system show that.
@@ -31,7 +31,7 @@ INERTIAL = (
 
 @dataclass(frozen=True)
 class Frequency:
-    """A frequency [Hz] of the linearised model, and the nearest one of everything."""
+    """A frequency [Hz] of the linearised model, and the nearest one of the full model."""
 
     model: float
     everything: float
@@ -43,7 +43,7 @@ class Frequency:
 
 
 def frequencies(final: Trial, made: Made, everything: Choice, original: Scene, policy: Policy) -> tuple[Frequency, ...]:
-    """The lowest vibrations of the model half-way through its run, beside everything in the same position; none for a model
+    """The lowest vibrations of the model half-way through its run, beside the full model in the same position; none for one
     without vibration. Of small motions about that position, with the stiffness and the inertia there, without rates."""
     if not final.choice.count:
         return ()

@@ -109,7 +109,7 @@ def of_shapes(ledger: Ledger, pilot: Trial, limit: Array, seen: Samples) -> Cont
 
 
 def of_omitted(ledger: Ledger, trial: Trial, everything: Choice, limit: Array) -> Contributions:
-    """Contributions of what everything has and a run lacks, driven one-way by its motion.
+    """Contributions of what the full model has and a run lacks, driven one-way by its motion.
 
     Of a body in shapes, the part of each mode that its shapes do not hold.
     """

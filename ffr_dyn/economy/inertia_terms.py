@@ -2,7 +2,7 @@
 
 All forces of a term are linear in its integrals; those of stiffening come load by load. Each drives the modes one-way as
 passive oscillators, and the outputs change in proportion. What a term does to the large motion of a free body by way of its
-rigid coordinates is not seen; the model without the terms is run beside everything before it is believed.
+rigid coordinates is not seen; the model without the terms is run beside the full model before it is believed.
 """
 
 from __future__ import annotations

@@ -82,7 +82,7 @@ def probe(assembled: Assembled, outputs: Sequence[Output], policy: Policy = DEFA
     """Find the outputs among the quantities of a scene. Raises InputError for names that do not exist or repeat, and for
     tolerances that no run meets."""
     if not outputs:
-        raise InputError("name at least one output, such as rod.tip.position.y: without it no model is good or bad")
+        raise InputError("name at least one output, such as rod.tip.position.y: without it no model can be judged")
     names = [output.name for output in outputs]
     for name in names:
         if names.count(name) > 1:

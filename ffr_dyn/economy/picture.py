@@ -78,7 +78,7 @@ def _reference(found: Economy) -> Reference:
     verified = found.verification
     scales = {name: float(scale) for name, scale in zip(names, found.scales, strict=True)}
     own = np.zeros(len(names)) if verified is None else verified.own
-    variant = Variant(found.choice.method, 1.0) if verified is None else _variant(found, verified.choice, "everything")
+    variant = Variant(found.choice.method, 1.0) if verified is None else _variant(found, verified.choice, "full model")
     story = ("estimated errors: there was no verification",) if verified is None else ("verification of the search",)
     nothing = {name: np.zeros((0, 1)) for name in names}
     return Reference(nothing, scales, dict(zip(names, map(float, own), strict=True)), variant, variant, story)

@@ -65,9 +65,12 @@ class Policy:
         0.25, "tolerance", "modes that all together do less, by the estimate alone, are left out without a run", SET
     )
     rigid_tried: float = number(
-        1.0, "tolerance", "where modes do less by the estimate, a run of rigid bodies is made beside everything", SET
+        1.0,
+        "tolerance",
+        "where modes do less by the estimate, a run of rigid bodies is made beside the full model",
+        SET,
     )
-    rigid_share: float = number(0.5, "tolerance", "that rigid bodies may take when run beside everything", SET)
+    rigid_share: float = number(0.5, "tolerance", "that rigid bodies may take when run beside the full model", SET)
     nearly_rigid: float = number(
         10.0, "tolerance", "where modes do less by the estimate, two stages are tried at any tolerance", SET
     )
@@ -82,15 +85,15 @@ class Policy:
     )
     bold_modes_share: float = number(0.15, "tolerance", "the same of a first try in two stages", SET)
     terms_share: float = number(0.15, "tolerance", "for inertia terms and stiffening loads left out", SET)
-    omitted_share: float = number(0.5, "tolerance", "for all that is left out, measured beside everything", SET)
+    omitted_share: float = number(0.5, "tolerance", "for all that is left out, measured beside the full model", SET)
     whole_share: float = number(0.85, "tolerance", "for what is left out and the step together, by the estimates", SET)
     least_step_share: float = number(0.2, "tolerance", "for the step, whatever is left out", SET)
 
     # ---- the choice of modes
     needed_modes: float = number(
-        0.8, "of all modes", "where as many are needed, they are ranked by the motion of everything", SET
+        0.8, "of all modes", "where as many are needed, they are ranked by the motion of the full model", SET
     )
-    model_attempts: int = number(5, "runs", "of models beside everything, before everything is the model", ROUNDS)
+    model_attempts: int = number(5, "runs", "of models beside the full model, before that itself is chosen", ROUNDS)
     more_modes: float = number(1.2, "times", "as many directions, at least, after those that were not enough", SET)
     stalled: float = number(
         0.9, "of the error before", "above it more modes have not helped: something comes by way of another body", SET
@@ -100,10 +103,10 @@ class Policy:
     )
     coarse_tolerance: float = number(5e-3, "of the range", "from here up a model in two stages is tried first", SET)
     two_stages: float = number(
-        0.75, "tolerance", "two stages as near everything in four are believed, step and all", SET
+        0.75, "tolerance", "two stages as near the full model in four are believed, step and all", SET
     )
     two_stages_ringing: float = number(
-        0.5, "tolerance", "the same where something vibrates undamped: everything errs by its step as well", SET
+        0.5, "tolerance", "the same where something vibrates undamped: the full model errs by its step as well", SET
     )
     two_stages_reach: float = number(
         2.5, "of what is believed", "a run of two stages with more modes is worth it below", SET
@@ -141,7 +144,7 @@ class Policy:
     finer_ringing: float = number(2.0, "times", "the same where something vibrates undamped", SET)
     finer_ringing_cost: float = number(1.3, "final runs", "that this look may cost", SET)
     finer_verified: float = number(
-        4.0, "times", "the same where a verification needs the run of everything anyway", SET
+        4.0, "times", "the same where a verification needs the run of the full model anyway", SET
     )
 
     # ---- verification
@@ -190,7 +193,7 @@ class Policy:
 
     # ---- what the report and the chart show
     shown_rows: int = number(6, "rows", "of what is nearest to mattering", READING)
-    shown_frequencies: int = number(6, "frequencies", "beside those of everything", READING)
+    shown_frequencies: int = number(6, "frequencies", "beside those of the full model", READING)
     rigid_frequency: float = number(1e-3, "of the lowest mode", "a slower small motion is none that vibrates", ROUNDING)
     load_samples: int = number(24, "states", "at which the loads that stiffen are looked at", SET)
     needed_stiffening: float = number(1e-4, "of a stiffness", "a load that changes more is called needed", SET)

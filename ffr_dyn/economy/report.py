@@ -52,7 +52,7 @@ def _summary(found: Economy) -> Table:
         ("integrator", _integrator(choice, settings.output_step / choice.divisions)),
         ("stabilisation", repr(settings.stabilisation)),
         ("elastic coordinates", f"{choice.count} of {sum(b.model.n for b in found.original.bodies)}"),
-        ("cost of a run", f"{found.cost / 1e6:.3g} s, everything with the same step {found.before / 1e6:.3g} s: "
+        ("cost of a run", f"{found.cost / 1e6:.3g} s, the full model with the same step {found.before / 1e6:.3g} s: "
                           f"{found.before / found.cost:.1f} times as much (cost model)"),
         ("cost of the search", f"{found.search_cost / found.cost:.1f} runs of the chosen model"),
     ]  # fmt: skip
@@ -69,22 +69,27 @@ def _verdict(found: Economy) -> str:
     verified = found.verification
     if verified is None:
         worst = float((found.error / found.limits).max())
-        return f"All outputs are estimated to stay within their tolerances; the nearest takes {worst:.2g} of its own."
+        return f"Estimated: all outputs are within their tolerances; {_largest(worst)}."
     worst = float((verified.error / found.limits).max())
-    again = f" after {verified.attempts} refinements of what the estimates had chosen" if verified.attempts else ""
+    refined = f"{verified.attempts} refinement{'s' * (verified.attempts > 1)}"
+    again = f" after {refined} of the model that the estimates had chosen" if verified.attempts else ""
     if not verified.is_known:
         known = float((verified.own / found.limits).max())
         apart = float(((verified.error - verified.own) / found.limits).max())
         if apart > 1 and known < apart:
-            return f"NOT within its tolerances: {apart:.2g} times the tolerance of an output from everything{again}."
+            return f"NOT within its tolerances{again}: against the full model {_largest(apart)}."
         return (
             f"Estimated, not verified{again}: in the time allowed the reference is known to {known:.2g} of a tolerance, "
-            f"where a verification takes {found.policy.reference_share:g}. Larger tolerances and fewer outputs take less; "
+            f"where a verification needs {found.policy.reference_share:g}. Larger tolerances and fewer outputs take less; "
             "damping helps, since undamped modes ring at every step."
         )
     if worst > 1:
-        return f"NOT within its tolerances: the verification finds {worst:.2g} times the tolerance of an output{again}."
-    return f"Verified{again}: all outputs are within their tolerances; the nearest takes {worst:.2g} of its own."
+        return f"NOT within its tolerances{again}: in the verification {_largest(worst)}."
+    return f"Verified{again}: all outputs are within their tolerances; {_largest(worst)}."
+
+
+def _largest(of_tolerance: float) -> str:
+    return f"the largest error is {of_tolerance:.2g} times its tolerance"
 
 
 def _outputs(found: Economy) -> Table:
@@ -108,20 +113,22 @@ def _outputs(found: Economy) -> Table:
         rows.append(row)
     text = "Largest errors over the run: of what is left out of the model, of the step, and of both together."
     if found.together:
-        text += " One run beside everything told the errors of the step with those of what is left out."
+        text += " One run beside the full model gives the error of the step together with that of what is left out."
     if verified:
         own = ", ".join(f"{value:.1g}" for value in verified.own)
         last = (
-            "the last two of the chosen model, with the error of the reference"
+            "the last two columns add it, and are of the chosen model"
             if verified.attempts
-            else "with it the last two"
+            else "the last two columns add it"
         )
         text += (
-            f" True by everything, {verified.choice.method} with {verified.choice.divisions} steps to a row, whose own error "
-            f"is {own}; {last}."
+            f" True errors are those against the full model by {verified.choice.method} with {verified.choice.divisions} "
+            f"steps to a row, whose own error is {own}; {last}."
         )
         text += (
-            " All columns before are of the model that the estimates had chosen at first." if verified.attempts else ""
+            " The columns before them are of the model that the estimates had chosen at first."
+            if verified.attempts
+            else ""
         )
     return Table("Outputs", text, columns, tuple(rows))
 
@@ -141,9 +148,9 @@ def _bodies(found: Economy) -> Table:
             " ".join(kept) if flexible else "-", " ".join(dropped) or "-" if flexible else "-", _stiffening(found, b),
         ))  # fmt: skip
     text = (
-        "Quasi-static: all its frequencies are above what the step resolves, so it deforms without vibrating. Shapes "
-        "are made of several modes, of which a few carry the deformation of this motion. Modes are counted from 1, in the "
-        "order of `ffr-prep info`."
+        "Quasi-static: all frequencies of the body are above what the step resolves, so it deforms without vibrating. A "
+        "shape is a combination of modes; a few hold the deformation of this motion. Modes are counted from 1, as in "
+        "`ffr-prep info`."
     )
     columns = ("body", "modelled", "elastic coordinates", "terms kept", "terms dropped", "stiffening")
     return Table("Bodies", text, columns, tuple(rows))
@@ -176,8 +183,8 @@ def _nearest(found: Economy) -> Table:
     out = [("left out", *row) for row in _leading(found, found.effects, most=True)]
     kept = [("kept", *row) for row in _leading(found, found.kept, most=False)]
     text = (
-        "What the omitted modes would do, driven by the computed motion, the largest first; and those that stay and do the "
-        "least. In units of the tolerance."
+        "What the omitted modes would do to the outputs, the largest first; and what the kept modes do, the smallest first. "
+        "In units of the tolerance."
     )
     return Table("Nearest to mattering", text, ("", "mode", "output", "share"), (*out, *kept))
 
@@ -195,8 +202,8 @@ def _terms(found: Economy) -> Table:
     listed += [("kept", one) for one in sorted((one for one in here if one not in out), key=size)[: most // 2]]
     rows = tuple((state, *_said(found, one)) for state, one in listed)
     text = (
-        "What inertia terms and the stiffening by each load do along the motion of everything, by way of the modes. The "
-        "model without those dropped was run beside everything: the errors above hold them."
+        "What each inertia term and the stiffening by each load do to the outputs, along the motion of the full model. In "
+        "units of the tolerance. The errors above include those of the dropped ones."
     )
     return Table("Terms nearest to mattering", text, ("", "term", "output", "share"), rows)
 
@@ -232,10 +239,10 @@ def _checks(found: Economy) -> Iterator[Table]:
     if found.frequencies:
         shifts = tuple((f"{f.model:.5g}", f"{f.everything:.5g}", f"{100 * f.shift:+.2g} %") for f in found.frequencies)
         text = (
-            "Of small motions half-way through the run, and the nearest of everything there: a shift by more "
-            "than some per cent means vibration at a wrong frequency, which the contributions of omitted modes do not show."
+            "Frequencies of small motions half-way through the run, beside the nearest of the full model. A shift by more "
+            "than some per cent means vibration at a wrong frequency, which the table of omitted modes does not show."
         )
-        yield Table("Frequencies [Hz]", text, ("model", "everything", "shift"), shifts)
+        yield Table("Frequencies [Hz]", text, ("model", "full model", "shift"), shifts)
     if found.stiffening:
         listed = [one for one in found.stiffening if one.share > 0][: 2 * found.policy.shown_rows]
         least = found.policy.needed_stiffening
@@ -253,8 +260,8 @@ def _tried(found: Economy) -> Table:
         method = f"{one.choice.method}/{steps}"
         rows.append((one.what, coordinates, method, f"{one.cost / found.cost:.2f}", f"{worst:.3g}"))
     text = (
-        "Cost in runs of the chosen model. Error in tolerances: of trials beside everything with the same step, of the "
-        "chosen model with its step."
+        "Cost: in runs of the chosen model. Error: in units of the tolerance; of trials against the full model with the same "
+        "step, of the chosen model with the error of its step."
     )
     return Table("Models tried", text, ("model", "coordinates by body", "integrator", "cost", "error"), tuple(rows))
 

@@ -19,7 +19,7 @@ from ffr_prep.common.brief import Brief
 
 @dataclass(frozen=True, repr=False)
 class Verification(Brief):
-    """The errors of the chosen model against everything on and a finer step.
+    """The errors of the chosen model against the full model and a finer step.
 
     choice   : the reference;  own : (outputs,) its own error, by convergence
     error    : (outputs,) of the chosen model: its distance from the reference, and the reference's own error
@@ -45,16 +45,16 @@ class Economy(Brief):
     choice, scene, settings : the model;  scene is ready to run with `ffr_dyn.analyses.run.run(scene, settings)`
     limits       : (outputs,) tolerances in the units of the outputs;  scales : (outputs,) their ranges
     model_error, time_error, error : (outputs,) estimates: of what is left out, of the step, of both together
-    together     : whether one run beside everything told both errors, which stand as that of the step then
+    together     : whether one run beside the full model told both errors, which stand as that of the step then
     effects      : what each mode left out does to each output, driven one-way by the final model's motion
     kept         : what each mode that stays does
     terms        : what inertia terms and stiffening by each load do to each output, kept or not
-    before, cost : [us] of a run of everything with the same step, and of the chosen model
+    before, cost : [us] of a run of the full model with the same step, and of the chosen model
     search_cost  : [us] of all runs and estimates beyond those of one verification, by the cost model
-    tried        : what was tried and how far it was from everything with the same step
+    tried        : what was tried and how far it was from the full model with the same step
     runs         : all runs made, with their errors against the reference, or else the chosen run less its estimated error
     unmoved      : names of outputs that no model changes
-    frequencies  : of the model beside those of everything;  stiffening : what stiffens bodies, and how much
+    frequencies  : of the model beside those of the full model;  stiffening : what stiffens bodies, and how much
     policy       : the numbers of the search
 
     >>> print(fd.as_text(found))  # of what `fd.economise` returned

@@ -1,4 +1,4 @@
-"""Where a search starts: the plane, rigid bodies with a coarse step, and what they forget."""
+"""Where a search starts: the plane, rigid bodies with a coarse step, and what they leave out."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
-SCOUT, PILOT = "ros2", "ros3"  # methods of coarse runs of rigid bodies, and of everything
+SCOUT, PILOT = "ros2", "ros3"  # methods of coarse runs of rigid bodies, and of the full model
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Ground:
     """Where a search starts.
 
     everything : all modes, in the plane where there is one, with the step of the pilot;  spatial : the same in space
-    pilot      : run of everything
+    pilot      : run of the full model
     limits, scales : (outputs,) tolerances in the units of the outputs, and their ranges
     """
 
@@ -79,12 +79,12 @@ class Rigid:
             return None
 
     def ground(self) -> Ground:
-        """With a run of everything beside that of rigid bodies."""
-        self.ledger.tell("everything, coarse step")
+        """With a run of the full model beside that of rigid bodies."""
+        self.ledger.tell("full model, coarse step")
         pilot = least(self.ledger.run, self.everything, self.everything.divisions, self.ledger.policy)
         scales = ranges(pilot.values)
         bound = limits(self.ledger.of, scales, self.ledger.policy)
-        self.ledger.note(pilot, "everything", np.zeros(len(bound)))
+        self.ledger.note(pilot, "full model", np.zeros(len(bound)))
         return Ground(pilot.choice, self.spatial, pilot, bound, scales)
 
 

@@ -5,11 +5,11 @@ It costs little more than a few runs of the model it finds:
 1. all bodies rigid, steps over two rows, in the plane where the joints keep the scene to one;
 2. every mode driven one-way by that motion (`drive`): what each of them does to each output. Where they do next to nothing,
    rigid bodies are the model, and nothing else is run;
-3. else everything with the coarse step, and along its motion what each inertia term and the stiffening by each load do;
-4. the modes and terms that must stay (`selection`), in a run beside that of everything, which measures what is left out; in
-   two stages where tolerances are coarse: if that is near everything in four, it is the model, step and all;
-5. integrator and step (`steps`); where the step turns out much finer, everything and the model once more with a finer one;
-6. if wanted, a run with everything on and a finer step, against which all errors are verified (`verification`).
+3. else the full model with the coarse step, and along its motion what each inertia term and the stiffening by each load do;
+4. the modes and terms that must stay (`selection`), in a run beside that of the full model, which measures what is left out;
+   in two stages where tolerances are coarse: if that is near the full model in four, it is the model, step and all;
+5. integrator and step (`steps`); where the step turns out much finer, both models once more with a finer one;
+6. if wanted, a run with the full model and a finer step, against which all errors are verified (`verification`).
 
 All decisions rest on evaluations of the equations and on a cost model, not on clocks: the same scene gives the same model.
 """
@@ -54,7 +54,7 @@ class Chosen:
     """A model with its step, and histories (T, k) of its estimated errors: of what is left out, and of the step.
 
     everything, spatial, limits, scales : as of `Ground`;  omitted : what modes do, driven by the rigid motion
-    together : whether one run beside everything told both, as `time`; `model` is an estimate then
+    together : whether one run beside the full model told both, as `time`; `model` is an estimate then
     """
 
     final: Trial
@@ -86,12 +86,12 @@ def economise(
 ) -> Economy:
     """The cheapest model found whose outputs stay within their tolerances over a forward run, with its estimated errors.
 
-    scene     : with everything flexible, all modes and all terms that could matter; second-order bodies are taken in their
-                mean-axis form, in which modes are told apart best: its frame and modes are those of the model found
+    scene     : the full model: all bodies flexible, all modes and all terms that could matter; second-order bodies are taken
+                in their mean-axis form, in which modes are told apart best: its frame and modes are those of the model found
     outputs   : names such as "rod.tip.position.y" or "rod.stress", with their own tolerances where they are `Output`s or
                 written "rod.stress=1e6" (absolute) or "rod.stress=0.1%"
     tolerance : of outputs without their own: share of the range of the output over the run
-    verify    : compare with a run of everything on and a finer step; by default where that takes some seconds only
+    verify    : compare with a run of the full model and a finer step; by default where that takes some seconds only
     events    : moments that the run with the model looks for; where one ends it, the model is one for the rows before
     policy    : the numbers that all decisions rest on
     tell      : called with the name of each stage
@@ -140,7 +140,7 @@ def _ended(scene: Scene, assembled: Assembled, span: Span, events: Sequence[Even
 
 
 def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chosen | None:
-    """Rigid bodies, where the estimate of what they forget is far below the tolerances; None where it is not."""
+    """Rigid bodies, where the estimate of what they leave out is far below the tolerances; None where it is not."""
     limits, model = stiff.limits, omitted.effect.sum(axis=0)
     if limits is None or (model > ledger.policy.surely_rigid * limits).any():
         return None
@@ -167,11 +167,11 @@ def _with_step(ledger: Ledger, choice: Choice, model: Array, limits: Array) -> S
     return chosen_step(ledger, choice, limit)
 
 
-# ---- beside everything ------------------------------------------------------------------------------------------------
+# ---- beside the full model ------------------------------------------------------------------------------------------------
 
 
 def _beside_everything(ledger: Ledger, stiff: Rigid, omitted: Contributions | None, verify: bool | None) -> Chosen:
-    """The cheapest model beside a coarse run of everything, and its step; looked at again with a finer one where the step
+    """The cheapest model beside a coarse run of the full model, and its step; looked at again with a finer one where the step
     turns out much finer, since a coarse step damps the vibration of fast modes, and with it what they do."""
     ground = stiff.ground()
     omitted = stiff.contributions(ground.limits) if omitted is None else omitted
@@ -194,7 +194,7 @@ def _stepped(
 ) -> Chosen:
     """The model with the step it needs, or with that of a model much like it, whose error is taken over.
 
-    A model of another method than everything has its step, and its run beside that tells all of its error.
+    A model of another method than the full model has its step, and its run beside that tells all of its error.
     """
     choice = selection.choice
     beside = ledger.run(choice)
@@ -223,7 +223,7 @@ def _stepped(
 
 
 def _with_any_step(ledger: Ledger, ground: Ground, choice: Choice) -> Stepped:
-    """The model with its step; with all terms, or all of everything, where it does not come through with shorter steps."""
+    """The model with its step; with all terms, or the full model, where it does not come through with shorter steps."""
     parts = zip(choice.parts, ground.everything.parts, strict=True)
     whole = tuple(replace(own, dropped=full.dropped, loads=full.loads) if own.count else own for own, full in parts)
 
@@ -253,7 +253,7 @@ def _finer_ground(ledger: Ledger, ground: Ground, final: Trial, verify: bool | N
         divisions = max((one.divisions for one in finer if ledger.cost_of(one) <= allowed), default=1)
     if divisions < least * ground.coarsest:
         return None
-    ledger.tell("everything, finer step")
+    ledger.tell("full model, finer step")
     everything = replace(ground.everything, divisions=divisions)
     return replace(ground, everything=everything, pilot=ledger.run(everything))
 
@@ -265,8 +265,8 @@ def _is_verified(ledger: Ledger, everything: Choice, final: Trial, verify: bool 
 
 
 def _heard(ledger: Ledger, found: Chosen) -> Chosen:
-    """With vibration that the steps damp away counted as error; where that is too much, with steps in which everything keeps
-    it, and as everything where the model does not. Where no verification follows, this is not seen otherwise."""
+    """With vibration that the steps damp away counted as error; where that is too much, with steps in which the full model
+    keeps it, and as the full model where the model does not. Where no verification follows, this is not seen otherwise."""
     final, limits, step = found.final, found.limits, largest(found.time)
     if final.choice.controlled:
         return found

@@ -1,4 +1,4 @@
-"""The modes and terms that a model needs: predicted by what they do to the outputs, then run once beside everything."""
+"""The modes and terms that a model needs: predicted by what they do to the outputs, then run once beside the full model."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Ranking:
 
 @dataclass(frozen=True)
 class Selection:
-    """A model, and what terms do along the motion of everything, known where modes were looked at.
+    """A model, and what terms do along the motion of the full model, known where modes were looked at.
 
     left : (outputs,) what modes left out do, by the estimate
     """
@@ -121,7 +121,7 @@ def selected_model(
 
 def _rankings(ledger: Ledger, ground: Ground, omitted: Contributions) -> tuple[list[Ranking], tuple[TermEffect, ...]]:
     """What modes do, driven by the rigid motion or, where nearly all are needed, in the full one; principal shapes; terms."""
-    ledger.tell("modes and terms along the motion of everything")
+    ledger.tell("modes and terms along the motion of the full model")
     seen = own(ledger, ground.pilot)
     needed = (omitted.effect > ledger.policy.modes_share * ground.limits / max(1, len(omitted.body))).any(axis=1)
     found = omitted
@@ -141,7 +141,7 @@ def _enough(
     effects: tuple[TermEffect, ...],
     beyond: Insufficient | None,
 ) -> Choice:
-    """The model that a run beside everything shows to be enough; everything where the number of attempts does not do."""
+    """The model that a run beside the full model shows to be enough; the full model where the attempts do not suffice."""
     policy = ledger.policy
     scale, count, terms = 1.0, 0, policy.terms_share
     before: float = np.inf
@@ -190,8 +190,8 @@ def _in_two_stages(ledger: Ledger, ground: Ground, ranking: Ranking, effects: tu
 
 
 def _directly(ledger: Ledger, ground: Ground, model: Choice) -> float:
-    """How far the model in two stages is from everything in four, over what is believed: its step is told then with what is
-    left out."""
+    """How far the model in two stages is from the full model in four, over what is believed: its step is told then with
+    what is left out."""
     error = gap(ledger, ground, replace(model, method=SCOUT), f"{_said(model)}, two stages")
     policy, careful = ledger.policy, rings(ground.pilot) and not _is_coarse(ledger, ground)
     part = policy.two_stages_ringing if careful else policy.two_stages
@@ -212,7 +212,7 @@ def _said(model: Choice) -> str:
 
 
 def gap(ledger: Ledger, ground: Ground, choice: Choice, what: str) -> Array:
-    """(outputs,) how far a model is from everything with the same coarse step; infinite where its run fails."""
+    """(outputs,) how far a model is from the full model with the same coarse step; infinite where its run fails."""
     try:
         trial = ledger.run(choice)
     except (ComputationError, InputError):

@@ -1,4 +1,4 @@
-"""The chosen model against everything on, whose own error is known; refined until it is within its tolerances.
+"""The chosen model against the full model, whose own error is known; refined until it is within its tolerances.
 
 A reference R(h) has the error max(s, v), with the largest differences d1 of R(h) and R(2h), d2 of R(2h) and R(4h):
 
@@ -53,7 +53,7 @@ def verified(
     )
     while True:
         is_known, error = _is_known(reference, final, ledger.policy.reference_share * limits), _error(final, reference)
-        ledger.note(final, "verified" if is_known else "beside everything", error)
+        ledger.note(final, "verified" if is_known else "beside the full model", error)
         if (error <= limits + (0.0 if is_known else reference.own)).all():
             break
         if attempts + 1 == ledger.policy.verification_attempts:
@@ -129,7 +129,7 @@ def sharpened(ledger: Ledger, model: Choice, wanted: Array, divisions: int, allo
             needed[name] = times * choice.divisions
     if best is None:
         raise ComputationError(
-            f"no step down to 1/{policy.most_divisions} of the output step completes a run of everything, with which the "
+            f"no step down to 1/{policy.most_divisions} of the output step completes a run of the full model, with which the "
             "model is compared; take a shorter output_step"
         )
     return replace(best, cost=spent)
@@ -219,8 +219,8 @@ def half(choice: Choice) -> Choice:
 def _better(
     ledger: Ledger, limits: Array, final: Trial, coarse: Trial, omitted: Contributions, looks: tuple[int, Array]
 ) -> Trial:
-    """A better model: of a finer step where that is what is wrong, or else chosen anew beside everything with that step, and
-    of a finer step too where what is left out does not explain the error.
+    """A better model: of a finer step where that is what is wrong, or else chosen anew beside the full model with that step,
+    and of a finer step too where what is left out does not explain the error.
 
     looks : how many there were, and the error (outputs,) of the last
     """

@@ -138,6 +138,14 @@ class Result(Brief):
         """The values of a quantity (T, ...), or of one component (T,). InputError suggests close names."""
         return self.quantity(name).values
 
+    def __contains__(self, name: object) -> bool:
+        """Whether there is a quantity, or a component of one, of that name."""
+        return isinstance(name, str) and self._find(name) is not None
+
+    def __iter__(self) -> Iterator[str]:
+        """The names of the quantities."""
+        return iter(self.quantities)
+
     def quantity(self, name: str) -> Quantity:
         """The quantity of that name, or one component of it as a quantity. InputError suggests close names."""
         found = self._find(name)

@@ -63,7 +63,8 @@ class Table(Brief):
         return np.flatnonzero([bool(message) for message in self.messages])
 
     def _title(self) -> str:
-        return f"Table of {len(self)} runs, {self.failed.size} of which failed"
+        failed = f", {self.failed.size} of which failed" if self.failed.size else ""
+        return f"Table of {len(self)} runs{failed}"
 
     def _rows(self) -> Rows:
         varied = [(name, f"{len(set(values))} values") for name, values in self.parameters.items()]

@@ -20,13 +20,15 @@ from ffr_dyn.scene_file.read import load_scene
 from ffr_prep.body import load_body, save_body
 
 DOORS = ("ffr_prep", "ffr_dyn")
+ROOMS = ("docs", "docs/tutorials", "docs/howto")
+PAGES = [f"{room}/{path.name}" for room in ROOMS for path in sorted((ROOT / room).glob("*.md"))]
 
 
 def code(page: str, language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", (ROOT / page).read_text(encoding="utf-8"), re.S)
 
 
-@pytest.mark.parametrize("page", ["README.md", *(f"docs/{path.name}" for path in sorted((ROOT / "docs").glob("*.md")))])
+@pytest.mark.parametrize("page", ["README.md", *PAGES])
 def test_programs_use_the_front_doors_alone(page):
     """Everything else in the packages is private."""
     imports = [

@@ -228,7 +228,7 @@ def _as_result(
         "speed": Quantity(np.array(speeds), "rad/s", (), "of what turns"),
         "frequencies": Quantity(np.abs(values.imag) / (2 * np.pi), "Hz", (modes,), "in the turning axes"),
         "seen": Quantity(seen / (2 * np.pi), "Hz", (modes,), "from the ground, positive of forward whirls"),
-        "damping_ratios": Quantity(ratios, "1", (modes,), "-Re / modulus of the eigenvalues"),
+        "damping_ratios": Quantity(ratios, "1", (modes,), "of the vibrations; negative where they grow"),
         "growth": Quantity(values.real, "1/s", (modes,), "real parts of the eigenvalues"),
     }
     attributes = {

@@ -1,4 +1,4 @@
-"""Periodic motions: the turn of a driven machine that comes back to itself, and Floquet's multipliers about it.
+"""Periodic motions: the turn of a driven machine that repeats itself, and Floquet's multipliers about it.
 
 How it is found, `ffr_dyn.linear.turn_map` says.
 """
@@ -68,7 +68,7 @@ def periodic(
     outputs: Sequence[str] = ("default",),
     path: str | Path | None = None,
 ) -> Result:
-    """A period of the motion that comes back to itself, from `time` [s] on, in a hundred rows and one.
+    """A period of the motion that repeats itself, from `time` [s] on, in a hundred rows and one.
 
     period  : [s]; by default a turn of the driver that turns evenly
     method  : with its step, which is shortened to a part of the period; by default ROS3 with a thousandth of it

@@ -60,7 +60,10 @@ class Response(OfMoment):
     )
     about: About = field(
         default="start",
-        metadata=option("--start/--equilibrium/--steady", "About the start, the equilibrium, the steady motion."),
+        metadata=option(
+            "--start/--equilibrium/--steady",
+            "Linearise about the start (default). | About the static equilibrium. | About the steady motion.",
+        ),
     )
     bode: str = field(default="", metadata=option("--bode", "Draw gain and phase.", metavar="FILE"))
     nyquist: str = field(default="", metadata=option("--nyquist", "Draw the locus.", metavar="FILE"))

@@ -188,6 +188,9 @@ def test_a_command_goes_before_the_file(run_file):
     assert failed is None
     assert set(load_result(file).quantities) == {"rod.tip.position", "motor.effort", "motor.power", "hinge.angle_rate"}
     assert load_result(file)["rod.tip.position.x"][0] == pytest.approx(2 * np.cos(0.5), abs=1e-9)
+    failed, _, file = run_file(AT_A_TIME["static"], "kinematic", "--end", "0.1", "--output-step", "0.05")
+    assert failed is None
+    np.testing.assert_allclose(load_result(file).time, (0, 0.05, 0.1))
     failed, said, _ = run_file(AT_A_TIME["static"], "check", "-p", "m=3", "--time", "0.2")
     assert failed is None
     assert "0 rigid degrees of freedom" in said
@@ -198,6 +201,8 @@ def test_a_command_goes_before_the_file(run_file):
     [
         (AT_A_TIME["static"], ["inverse"], "no times"),
         (AT_A_TIME["static"], ["run", "--end", "1"], "static analysis has no end"),
+        (AT_A_TIME["static"], ["inverse", "--end", "1"], "or --end and --output-step"),
+        (AT_A_TIME["static"], ["run", "--output-step", "1"], "static analysis has no output-step"),
         (KINDS["kinematic"] + "\nend = 0.5\noutput_step = 0.05\n", ["run", "--step", "0.1"], "kinematic analysis has no"),
         (AT_A_TIME["linearise"], ["run", "--resume"], "only a forward run"),
         (KINDS["inverse"] + "\n" + TIMES, ["run", "--resume"], "only a forward run"),

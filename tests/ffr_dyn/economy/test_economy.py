@@ -116,7 +116,7 @@ def test_a_complete_model_leaves_no_residual_and_a_rigid_one_leaves_it_in_the_mo
     "reference", [SimplySupported("a", "b"), FixedTo("a"), MeanAxis()], ids=["simple", "fixed", "mean"]
 )
 def test_the_estimate_of_a_rigid_pendulum_is_right_whatever_its_frame(reference):
-    """What rigid motion forgets: estimated by driving the modes one-way, true by running them."""
+    """What rigid motion leaves out: estimated by driving the modes one-way, true by running them."""
     rod = beam("rod", 1.2, rectangle(0.2, 0.009), replace(ALUMINIUM, E=7e9, rho=5540.0), 4, reference)
     hinge = Joint("hinge", "revolute", "ground.O", "rod.a")
     scene = Scene((Body("rod", rod),), (hinge,), ground={"O": rod.interface("a").position}, gravity=GRAVITY)
@@ -354,7 +354,7 @@ def test_a_coarse_tolerance_is_met_by_two_stages_at_once(fast):
         "verified",
     ]
     np.testing.assert_allclose(fast.error, fast.tried[-2].error)
-    assert "One run beside everything" in as_text(fast)
+    assert "One run beside the full model" in as_text(fast)
     assert (fast.error / fast.verification.first > 0.3).all()
 
 
@@ -489,7 +489,7 @@ def test_what_is_said_of_a_model_is_true(name, verify):
     scene = with_mean_axis_bodies(made())
     found = economise(scene, outputs, end=end, output_step=step, tolerance=tolerance, verify=verify)
     ledger, span = Ledger(scene, Span(0.0, end, step), found.probe, lambda stage: None), found.choice.divisions
-    everything = next(one.choice for one in found.tried if one.what == "everything")
+    everything = next(one.choice for one in found.tried if one.what == "full model")
     resolving = int(np.ceil(ledger.vibrations(everything).omega.max() * step / 0.3))
     steps = [("rk4", max(resolving, 4 * span))] if resolving < 1000 else [("ros3", max(4 * span, 256))]
     truth = ledger.run(replace(everything, method=steps[0][0], divisions=steps[0][1]))

@@ -72,6 +72,15 @@ def test_a_component_is_a_column_of_its_quantity():
     assert result.quantity("rod.tip stress Ω.y.tip").unit == "Pa"
 
 
+def test_a_result_is_asked_for_names():
+    result = sample()
+    assert list(result) == list(result.quantities)
+    assert "rod.q" in result
+    assert "rod.q.2" in result
+    assert "rod.q.x" not in result
+    assert 1 not in result
+
+
 def test_an_unknown_name_suggests_close_ones():
     with pytest.raises(InputError, match=r"rod\.smal_eye\.position.*did you mean rod\.small_eye\.position"):
         sample()["rod.smal_eye.position"]

@@ -1,0 +1,127 @@
+"""The tutorials and how-tos as they are written: what they have typed runs in order, and prints what they show.
+
+In a page a block of `toml` whose first line is a file name (`# swing.toml`) is that file; `console` is commands (`$ ...`),
+each with the lines of its output that the page shows; `python` is one program, and `text` after it what it prints. In a
+shown line `...` stands for anything and numbers are compared to 2 %. `<!-- files of PAGE -->` takes the files of another
+page; `<!-- needs PACKAGES -->` names what is not installed everywhere.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from places import REFERENCE, ROOT
+
+PAGES = sorted(
+    path for room in ("tutorials", "howto") for path in (ROOT / "docs" / room).glob("*.md") if path.stem != "index"
+)
+SLOW = ()  # stems of pages that run for more than some fifteen seconds
+NUMBER = r"(?<![\w.])[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?"
+DIGITS = r"([-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?)"
+
+
+def blocks(page: Path) -> list[tuple[str, str]]:
+    """(language, text) of the blocks of a page, in order; files of the pages that it names come first."""
+    text = page.read_text(encoding="utf-8")
+    borrowed = [block for name in re.findall(r"<!-- files of (\S+) -->", text) for block in blocks(page.parent / name)]
+    own = re.findall(r"^```(\w+)\n(.*?)^```$", text, re.S | re.M)
+    return [block for block in borrowed if file_name(block)] + own
+
+
+def file_name(block: tuple[str, str]) -> str:
+    """The name of the file that a block is; none if it is none."""
+    found = re.match(r"# (\S+\.(?:toml|csv|geo))\n", block[1])
+    return found.group(1) if found and block[0] in ("toml", "text") else ""
+
+
+def commands(text: str) -> list[tuple[str, list[str]]]:
+    """(command, lines of output shown) of a block of a console."""
+    made: list[tuple[str, list[str]]] = []
+    for line in text.replace("\\\n", " ").splitlines():
+        if line.startswith("$ "):
+            made.append((line[2:], []))
+        elif line.strip():
+            made[-1][1].append(line)
+    return made
+
+
+def pattern(shown: str) -> str:
+    """A regular expression for a shown line, with a group for each number."""
+    pieces = []
+    for piece in shown.split("..."):
+        words = re.split(f"({NUMBER})", " ".join(piece.split()))
+        pieces.append("".join(DIGITS if k % 2 else re.escape(word) for k, word in enumerate(words)))
+    return ".*".join(pieces)
+
+
+def shows(line: str, shown: str) -> bool:
+    """Whether a line of output is what is shown."""
+    found = re.fullmatch(pattern(shown), " ".join(line.split()))
+    wanted = [float(number) for piece in shown.split("...") for number in re.findall(NUMBER, piece)]
+    return bool(found) and np.allclose([float(number) for number in found.groups()], wanted, rtol=0.02, atol=0)
+
+
+def assert_shown(output: str, shown: list[str]) -> None:
+    """Lines that are shown are in the output, in this order."""
+    lines = iter(output.splitlines())
+    for one in (line for line in shown if line.strip() != "..."):
+        assert any(shows(line, one) for line in lines), f"not printed: {one}\n{output}"
+
+
+def test_lines_are_compared_by_words_and_numbers():
+    assert shows("mass   0.2004 kg, 12 modes", "mass 0.2 kg, 12 modes")
+    assert not shows("mass 0.21 kg", "mass 0.2 kg")
+    assert not shows("mass 0.2 g", "mass 0.2 kg")
+    assert shows("time read 0.3 s, write 0.4 s", "time ... write 0.4 s")
+    assert commands("$ a \\\n b\n1\n\n2\n$ c\n") == [("a   b", ["1", "2"]), ("c", [])]
+
+
+def typed(command: str, shown: list[str]) -> None:
+    path = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
+    called = ["bash", "-ec", command]
+    done = subprocess.run(
+        called,
+        env={**os.environ, "PATH": path},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, "Traceback" in done.stdout) == (0, False), f"{command}\n{done.stdout}"
+    assert_shown(done.stdout, shown)
+
+
+@pytest.mark.parametrize(
+    "page", [pytest.param(page, marks=[pytest.mark.slow] * (page.stem in SLOW), id=page.stem) for page in PAGES]
+)
+def test_the_page(page, tmp_path, monkeypatch):
+    for package in " ".join(re.findall(r"<!-- needs (.+?) -->", page.read_text(encoding="utf-8"))).split():
+        pytest.importorskip(package)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "meshes").symlink_to(ROOT / "meshes")
+    shutil.copy(REFERENCE / "plate.step", tmp_path)
+    space, printed = {"__name__": page.stem}, ""
+    for block in blocks(page):
+        language, text = block
+        if file_name(block):
+            (tmp_path / file_name(block)).write_text(text, encoding="utf-8")
+        elif language == "console":
+            for command, shown in commands(text):
+                typed(command, shown)
+        elif language == "python":
+            with contextlib.redirect_stdout(io.StringIO()) as out:
+                exec(compile(text, str(page), "exec"), space)
+            printed = out.getvalue()
+        elif language == "text":
+            assert_shown(printed, text.splitlines())
+    plt.close("all")
