@@ -279,7 +279,7 @@ def _output_matrices(
     near: Chart, scene: Scene, inputs: tuple[Effort | str, ...], outputs: tuple[str, ...]
 ) -> tuple[Array, Array]:
     d = near.steps.size
-    quantities = _quantities(near, outputs)
+    quantities = quantities_of(near, outputs)
     if not outputs:
         return np.zeros((0, 2 * d)), np.zeros((0, len(inputs)))
 
@@ -293,7 +293,7 @@ def _output_matrices(
     return C, _columns(lambda u: measured(_fed(near, scene, inputs, u), np.zeros(2 * d)), len(inputs))
 
 
-def _quantities(near: Chart, outputs: tuple[str, ...]) -> list[str]:
+def quantities_of(near: Chart, outputs: tuple[str, ...]) -> list[str]:
     """The quantities of the scene of which the outputs are components; what is none of them a result will name."""
     names = catalogue(near.at.system)
     found = [max((n for n in names if f"{output}.".startswith(f"{n}.")), key=len, default="") for output in outputs]

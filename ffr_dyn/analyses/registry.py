@@ -31,10 +31,11 @@ LISTED = {
     "steady": "Steady motion of SCENE: bodies deformed by even turning, at one speed or over a list of speeds.",
     "campbell": "Campbell diagram of SCENE: frequencies and damping over the speed, critical speeds, limits of stability.",
     "response": "Frequency response of SCENE: gain, phase and modes from an input to outputs; noise; Bode and Nyquist.",
+    "forced": "Harmonic response of SCENE with all that is nonlinear: amplitudes over the frequency, jumps, stability.",
     "periodic": "The period of SCENE, driven evenly, that comes back to itself; Floquet's multipliers.",
 }
 _FOLDERS = dict.fromkeys(
-    ("steady", "campbell", "response", "periodic"), "rotating"
+    ("steady", "campbell", "response", "forced", "periodic"), "rotating"
 )  # of the modules that do not lie beside this one
 _REGISTERED: dict[str, type[Analysis]] = {}
 EVENTS_SHOWN = 20
