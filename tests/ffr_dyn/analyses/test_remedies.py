@@ -158,6 +158,11 @@ def swayed(scene: Scene = SPRUNG, **how: object) -> object:
     return fd.forced(scene, **{**usual, **how})
 
 
+_HALF = np.random.default_rng(0).normal(size=(8, 8))
+_HEAVY = replace(cloud(8, stiffness=100.0), damping=2e4 * _HALF @ _HALF.T)
+LOSSY = replace(CLOUD, bodies=(Body("cloud", _HEAVY, q=np.full(8, 1e-3)),))
+
+
 def followed(slope: float, end: float = 1.0) -> object:
     """The branch u = 1 + sin(slope p)."""
 
@@ -804,6 +809,7 @@ INPUT = [
             input="hinge.moment", amplitude=1.0, quantities=("hinge.angle",), band="1..1.01", steps=80
         ).perform(SPRUNG, MOMENT, path=None),
     ),
+    Case(partial(run, LOSSY, GeneralisedAlpha(1e-3)), partial(run, LOSSY, ROS2(1e-3))),
     Case(lambda: followed(200.0), lambda: followed(200.0, 0.01)),
     Case(lambda: torn(1.0), lambda: torn(0.4)),
     Case(lambda: fd.periodic(HINGED), lambda: fd.periodic(EVENLY)),
