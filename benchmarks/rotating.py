@@ -37,6 +37,7 @@ from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.rubin import Rubin
 from ffr_prep.structures.frame import Frame, Member, named, polyline
 from ffr_prep.structures.sections import Section, circle, rectangle, shear_rigid, tube
 
@@ -127,10 +128,10 @@ def _disc(mass: float, along: float, across: float) -> FlexibleBody:
 
 
 def _reduced(
-    frame: Frame, points: dict[str, tuple[float, float, float]], modes: int, reference: object
+    frame: Frame, points: dict[str, tuple[float, float, float]], reduction: object, reference: object
 ) -> FlexibleBody:
     regions = [InterfaceRegion(name) for name in points]
-    request = fp.Request(name="shaft", reference=reference, reduction=CraigBampton(modes))
+    request = fp.Request(name="shaft", reference=reference, reduction=reduction)
     return fp.reduce(fp.from_frame(named(frame, **points), regions), request)
 
 
@@ -143,7 +144,7 @@ def overhung() -> Iterator[Figure]:
     of.M[[-2, -1], [-2, -1]] += mass, across
     of.G[-1, -1] += along
     frame = polyline([(0, 0, 0), (length, 0, 0)], Member(section, STEEL), elements=64)
-    body = _reduced(frame, {"root": (0, 0, 0), "tip": (length, 0, 0)}, 16, MeanAxis())
+    body = _reduced(frame, {"root": (0, 0, 0), "tip": (length, 0, 0)}, CraigBampton(16), MeanAxis())
     joints = (
         fd.Joint("bearing", "revolute", "ground.O", "shaft.root", axis=(1, 0, 0)),
         fd.Joint("hub", "fixed", "shaft.tip", "disc.c"),
@@ -167,8 +168,8 @@ def overhung() -> Iterator[Figure]:
 
 # Nelson & McVaugh 1976: where a stretch begins [cm], inner and outer radius [cm]. All are tenths of inches but the end, in print
 # at 35.50: 14 inches are 35.56, with which the second critical speeds are theirs to 0.04 %, and not to 0.3 %. Their disc's
-# polar inertia, 0.0020, has another digit in a computation that has its data in the same table: 0.00203 (of the two third
-# critical speeds one is theirs to 0.01 % then, the other to 0.44 %).
+# polar inertia, 0.0020, has another digit in a computation that has its data in the same table: 0.00203 (of the third
+# critical speeds the backward one is theirs to 0.01 % then, the forward one to 0.44 %).
 STRETCHES = [
     (0.0, 0, 0.51), (1.27, 0, 1.02), (5.08, 0, 0.76), (7.62, 0, 2.03), (8.89, 0, 2.03), (10.16, 0, 3.30), (10.67, 1.52, 3.30),
     (11.43, 1.78, 2.54), (12.70, 0, 2.54), (13.46, 0, 1.27), (16.51, 0, 1.27), (19.05, 0, 1.52), (22.86, 0, 1.52),
@@ -192,8 +193,10 @@ def nelson_mcvaugh() -> Iterator[Figure]:
             which.append(len(members) - 1)
     frame = Frame(np.array(points), np.array(pairs), tuple(members), np.array(which))
     at = {"disc": 0.0889, "left": 0.1651, "right": 0.2870}
-    body = _reduced(frame, {name: (x, 0, 0) for name, x in at.items()}, 40, MeanAxis())
-    disc = fd.Body("disc", _disc(DISC_MASS, DISC_ALONG, DISC_ACROSS), position=(at["disc"], 0, 0), omega_bar=(1.0, 0, 0))
+    body = _reduced(frame, {name: (x, 0, 0) for name, x in at.items()}, CraigBampton(40), MeanAxis())
+    disc = fd.Body(
+        "disc", _disc(DISC_MASS, DISC_ALONG, DISC_ACROSS), position=(at["disc"], 0, 0), omega_bar=(1.0, 0, 0)
+    )
     springs = tuple(
         fd.Bushing(f"at_{side}", f"ground.{side}", f"shaft.{side}", np.diag([0, BEARING, BEARING, 0, 0, 0]))
         for side in ("left", "right")
@@ -335,7 +338,8 @@ def rotating_flaps(speed: float) -> Array:
 def responses() -> Iterator[Figure]:
     """A clamped beam against the full model, up to 200 Hz; noise against a long run."""
     section, length, material = circle(0.02), 1.0, Material("steel", 2.1e11, 0.3, 7850.0)
-    body = beam(section, material, length, 60, FixedTo("root"))
+    frame = polyline([(0, 0, 0), (length, 0, 0)], Member(section, material), elements=128)  # 200 Hz is near a zero
+    body = _reduced(frame, {"root": (0, 0, 0), "tip": (length, 0, 0)}, Rubin(12), FixedTo("root"))
     scene = fd.Scene(
         (fd.Body("beam", body, damping=0.0),),
         (fd.Joint("clamp", "fixed", "ground.O", "beam.root"),),
