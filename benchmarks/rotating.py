@@ -166,9 +166,9 @@ def overhung() -> Iterator[Figure]:
         yield Figure(f"overhung disc at {hertz:g} Hz: four whirls with their direction", off, 1e-4)
 
 
-# Nelson & McVaugh 1976: where a stretch begins [cm], inner and outer radius [cm]. All are tenths of inches but the end, in print
-# at 35.50: 14 inches are 35.56, with which the second critical speeds are theirs to 0.04 %, and not to 0.3 %. Their disc's
-# polar inertia, 0.0020, has another digit in a computation that has its data in the same table: 0.00203 (of the third
+# Nelson & McVaugh 1976: where a stretch begins [cm], inner and outer radius [cm]. All are tenths of inches but the end, in
+# print at 35.50: 14 inches are 35.56, with which the second critical speeds are theirs to 0.04 %, and not to 0.3 %. Their
+# disc's polar inertia, 0.0020, has another digit in a computation with the data of the same table: 0.00203 (of the third
 # critical speeds the backward one is theirs to 0.01 % then, the forward one to 0.44 %).
 STRETCHES = [
     (0.0, 0, 0.51), (1.27, 0, 1.02), (5.08, 0, 0.76), (7.62, 0, 2.03), (8.89, 0, 2.03), (10.16, 0, 3.30), (10.67, 1.52, 3.30),

@@ -810,6 +810,10 @@ INPUT = [
         ).perform(SPRUNG, MOMENT, path=None),
     ),
     Case(partial(run, LOSSY, GeneralisedAlpha(1e-3)), partial(run, LOSSY, ROS2(1e-3))),
+    Case(
+        lambda: fd.Linearise(film="m.html", mode=9).perform(TURNING, MOMENT, path=None),
+        lambda: fd.mode_motion(fd.linearise(TURNING), 0),
+    ),
     Case(lambda: followed(200.0), lambda: followed(200.0, 0.01)),
     Case(lambda: torn(1.0), lambda: torn(0.4)),
     Case(lambda: fd.periodic(HINGED), lambda: fd.periodic(EVENLY)),

@@ -309,6 +309,20 @@ def test_commands(tmp_path, words, said):
     assert picture.exists() == ("PICTURE" in words)
 
 
+def test_a_mode_is_drawn_and_all_are_in_the_file(tmp_path):
+    file, film = tmp_path / "rod.toml", tmp_path / "mode.html"
+    file.write_text(SCENE)
+    words = ["linearise", str(file), "--at-equilibrium", "--film", str(film), "--mode"]
+    done = CliRunner().invoke(cli, [*words, "1"], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    assert film.stat().st_size > 1000
+    kept = fd.load_result(tmp_path / "rod.nc")
+    assert kept.quantities["modes"].axes[0].labels[:4] == ("rod x", "rod y", "rod z", "rod turn x")
+    np.testing.assert_allclose(np.abs(kept["modes"][0] @ [1, 1j]).max(axis=0), 1.0)
+    with pytest.raises(fd.InputError, match=r"mode 9: the modes that are told are 1 to 1"):
+        CliRunner().invoke(cli, [*words, "9"], catch_exceptions=False, standalone_mode=False)
+
+
 KINDS = {
     "steady": 'speeds = ["0..10:3"]',
     "campbell": 'speeds = ["0..10:3"]\nturn = "motor"\norders = ["1", "2"]',
