@@ -58,6 +58,12 @@ MATRIX_FORMATS: Registry[MatrixFormat] = Registry(
             "Abaqus, with VISCOUS DAMPING, which dashpots and Rayleigh's damping make",
         ),
         MatrixFormat(
+            "JOB.sti JOB.mas JOB.dof JOB.inp",
+            ((".sti",), (".mas",), (".dof",), (".inp",)),
+            f"{_ROOM}.calculix:from_calculix",
+            "CalculiX, *FREQUENCY, SOLVER=MATRIXSTORAGE without *BOUNDARY; the nodes and node sets of the input file",
+        ),
+        MatrixFormat(
             "MATRICES.op4 MODEL.bdf",
             ((".op4",), (".bdf", ".dat", ".nas")),
             f"{_ROOM}.nastran:from_op4",
