@@ -244,6 +244,22 @@ def test_scene_files_add_damping(tmp_path):
         fd.load_scene(tmp_path / "s.toml")
 
 
+@pytest.mark.parametrize("to", ["arm.left", "ground.O"])
+def test_dashpots_at_interfaces_are_rows_of_the_damping_matrix(bar, to):
+    """Along x between two interfaces of the body, or from one to the ground: c phi phi^T of the body held at the left."""
+    body = replace(bar, stiffening=None)
+    ends = [i.position for i in body.interfaces]
+    dashpot = fd.SpringDamper("dashpot", to, "arm.right", stiffness=0.0, damping=300.0, free_length=0.0)
+    scene = replace(held(body), springs=(dashpot,))
+    line = ends[1] - ends[0]
+    along = line / np.linalg.norm(line) @ (body.interfaces[1].phi_t - body.interfaces[0].phi_t)
+    wanted = fd.linearise(held(replace(body, damping=300.0 * np.outer(along, along)))).eigenvalues
+    found = fd.linearise(scene).eigenvalues
+    for value in wanted:
+        assert np.abs(found - value).min() < 1e-7 * abs(value)
+    assert (found.real < -1).any()
+
+
 def test_parts_that_are_tied_keep_their_damping(full):
     """A body of one part, tied to a bar of no damping: the damping of the part, in the shapes of the whole."""
     model, _ = full
