@@ -11,7 +11,7 @@
 
 A *scene* is declared: bodies, joints, drivers, couplings, forces, measurements, each with its own name; points are
 named "body.interface" or "ground.point". An *analysis* is a function of a scene that returns a `Result`: `assemble`,
-`kinematic`, `static`, `steady`, `forward`, `periodic`, `inverse`, `mixed`, `linearise`, `campbell`, `response`,
+`kinematic`, `static`, `steady`, `forward`, `periodic`, `inverse`, `mixed`, `linearise`, `campbell`, `response`, `forced`,
 `reference`. Integrators, functions of time and pictures are functions and small declarations beside them. All
 quantities are in SI units. What cannot be used raises `InputError`, which says what to change; what could not be
 computed raises `ComputationError`.
@@ -75,6 +75,8 @@ _BY_MODULE = {
     "ffr_dyn.analyses.rotating.campbell": "Campbell campbell",
     "ffr_dyn.analyses.rotating.periodic": "Periodic periodic",
     "ffr_dyn.analyses.rotating.response": "Response response",
+    "ffr_dyn.analyses.rotating.forced": "Forced forced",
+    "ffr_dyn.pictures.forced": "draw_forced",
     "ffr_dyn.analyses.rotating.steady": "Steady steady",
     "ffr_dyn.analyses.run": "run",
     "ffr_dyn.analyses.settings": "Charted MomentSettings Settings",
@@ -188,6 +190,8 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_dyn.analyses.rotating.mode_motion import mode_motion as mode_motion
     from ffr_dyn.analyses.rotating.periodic import Periodic as Periodic, periodic as periodic
     from ffr_dyn.analyses.rotating.response import Response as Response, response as response
+    from ffr_dyn.analyses.rotating.forced import Forced as Forced, forced as forced
+    from ffr_dyn.pictures.forced import draw_forced as draw_forced
     from ffr_dyn.analyses.rotating.steady import Steady as Steady, steady as steady
     from ffr_dyn.analyses.run import run as run
     from ffr_dyn.analyses.settings import Charted as Charted, MomentSettings as MomentSettings, Settings as Settings

@@ -33,7 +33,7 @@ from ffr_prep.common.front_door import front_door
 
 # No name here is that of a room, whose import would put the room in its place.
 _BY_MODULE = {
-    "ffr_prep.body": "BeamForces BodyError FlexibleBody FrameMarker Interface MeanAxisForm Surface damped immovable "
+    "ffr_prep.body": "BeamForces BodyError Damping FlexibleBody FrameMarker Interface MeanAxisForm Surface damped immovable "
     "load_body mean_axis_form rigid_body save_body truncated with_point",
     "ffr_prep.common.errors": "ComputationError InputError",
     "ffr_prep.common.registry": "Setting",
@@ -98,7 +98,8 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     # isort: off
     __version__: str
     from ffr_prep.body import (
-        BeamForces as BeamForces, BodyError as BodyError, FlexibleBody as FlexibleBody, FrameMarker as FrameMarker,
+        BeamForces as BeamForces, BodyError as BodyError, Damping as Damping, FlexibleBody as FlexibleBody,
+        FrameMarker as FrameMarker,
         Interface as Interface, MeanAxisForm as MeanAxisForm, Surface as Surface, damped as damped, immovable as immovable,
         load_body as load_body,
         mean_axis_form as mean_axis_form, rigid_body as rigid_body, save_body as save_body, truncated as truncated,

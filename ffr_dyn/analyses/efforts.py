@@ -13,7 +13,8 @@ import numpy as np
 
 from ffr_dyn.compile.engine import with_model
 from ffr_dyn.consistency.evaluation import Evaluator
-from ffr_dyn.functions.time_functions import TimeFunction, constant, piecewise
+from ffr_dyn.functions.operations import MULTIPLY
+from ffr_dyn.functions.time_functions import TimeFunction, constant, operation, piecewise
 from ffr_dyn.kernels.tables import LAW
 from ffr_dyn.scene.checks import check_marker, check_name, check_own_name
 from ffr_dyn.scene.force_kinds import forces_of
@@ -93,9 +94,18 @@ def with_effort(scene: Scene, effort: Effort, times: Array, values: Array) -> Sc
 
     >>> forward = fd.with_effort(scene, torque, result.time, result["torque.effort"])
     """
+    return with_function(scene, effort, recorded(times, values))
+
+
+def with_function(scene: Scene, effort: Effort, size: TimeFunction) -> Scene:
+    """The scene with an effort that is a function of time."""
     if isinstance(effort, JointEffort):
-        return _with_actuator(scene, effort, recorded(times, values))
-    return replace(scene, loads=(*scene.loads, _load(effort, lambda c: recorded(times, c * np.asarray(values)))))
+        return _with_actuator(scene, effort, size)
+
+    def component(c: float) -> TimeFunction:
+        return size if c == 1.0 else operation(MULTIPLY, constant(c), size)
+
+    return replace(scene, loads=(*scene.loads, _load(effort, component)))
 
 
 def with_units(scene: Scene, efforts: tuple[Effort, ...]) -> Scene:

@@ -139,6 +139,11 @@ class Linearise(OfMoment):
         metadata=option("--at-steady/--at-any", "About the steady motion with the scene's drivers and velocities."),
     )
 
+    film: str = field(default="", metadata=option("--film", "Film of a mode, .html, .gif or .mp4.", metavar="FILE"))
+    mode: int = field(
+        default=1, metadata=option("--mode", "Which mode the film shows, by its line in what is printed.")
+    )
+
     def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
         time, path = settings.time, how["path"]
         if self.at_equilibrium and self.at_steady:
@@ -147,7 +152,10 @@ class Linearise(OfMoment):
             )
         at = scene_at(scene, static(scene, time=time)) if self.at_equilibrium else scene
         at = scene_at(scene, steady(scene, time=time)) if self.at_steady else at
-        result = as_result(scene, linearise(at, time=time, inputs=self.inputs, outputs=self.quantities), time)
+        found = linearise(at, time=time, inputs=self.inputs, outputs=self.quantities)
+        if self.film:
+            _draw(found, self.mode, self.film)
+        result = as_result(scene, found, time)
         if path is not None:
             save_result(result, path)
         return result
@@ -159,6 +167,20 @@ class Linearise(OfMoment):
         more = [f"... and {len(lines) - SHOWN} more in the file"] if len(lines) > SHOWN else []
         driven = [f"driven       {name}" for name in a["driven"]]
         return [*lines[:SHOWN], *more, *driven, *(f"note         {note}" for note in a["notes"])]
+
+
+def _draw(found: Linearisation, line: int, path: str) -> None:
+    """The film of the mode in a line of the table, from 1."""
+    from ffr_dyn.analyses.rotating.mode_motion import mode_motion
+    from ffr_dyn.pictures.animate import animate
+
+    numbers = [
+        *range(0, found.free, 2),
+        *(k for k, v in enumerate(found.eigenvalues) if k >= found.free and v.imag >= 0),
+    ]
+    if not 1 <= line <= len(numbers):
+        raise InputError(f"mode {line}: the modes that are told are 1 to {len(numbers)}")
+    animate(mode_motion(found, numbers[line - 1]), path)
 
 
 def linearise(
@@ -287,7 +309,7 @@ def _output_matrices(
     near: Chart, scene: Scene, inputs: tuple[Effort | str, ...], outputs: tuple[str, ...]
 ) -> tuple[Array, Array]:
     d = near.steps.size
-    quantities = _quantities(near, outputs)
+    quantities = quantities_of(near, outputs)
     if not outputs:
         return np.zeros((0, 2 * d)), np.zeros((0, len(inputs)))
 
@@ -301,7 +323,7 @@ def _output_matrices(
     return C, _columns(lambda u: measured(_fed(near, scene, inputs, u), np.zeros(2 * d)), len(inputs))
 
 
-def _quantities(near: Chart, outputs: tuple[str, ...]) -> list[str]:
+def quantities_of(near: Chart, outputs: tuple[str, ...]) -> list[str]:
     """The quantities of the scene of which the outputs are components; what is none of them a result will name."""
     names = catalogue(near.at.system)
     found = [max((n for n in names if f"{output}.".startswith(f"{n}.")), key=len, default="") for output in outputs]
@@ -331,6 +353,7 @@ def as_result(scene: Scene, found: Linearisation, time: float = 0.0) -> Result:
     modes = Axis("eigenvalue", tuple(str(k + 1) for k in range(2 * d)))
     complex_parts = Axis("part", ("re", "im"))
     parts = np.column_stack([found.eigenvalues.real, found.eigenvalues.imag])
+    motions, shapes = Axis("motion", _motions(found)), np.stack([found.modes.real, found.modes.imag], axis=2)
     quantities = {
         "A": Quantity(found.A[None], "1", (states, columns), "state matrix"),
         "eigenvalues": Quantity(parts[None], "1/s", (modes, complex_parts), "eigenvalues of A"),
@@ -338,6 +361,7 @@ def as_result(scene: Scene, found: Linearisation, time: float = 0.0) -> Result:
         "damping_ratios": Quantity(found.damping_ratios[None], "1", (modes,), "of the modes; negative where they grow"),
         "seen": Quantity(found.seen[None], "Hz", (modes,), "from the ground, positive of forward whirls"),
         "whirl": Quantity(found.whirl[None], "1", (modes,), "share of the amplitude that whirls so"),
+        "modes": Quantity(shapes[None], "1", (motions, modes, complex_parts), "motions of the bodies, body axes"),
     }
     matrices = (
         ("B", found.B, (states, found.inputs)),
@@ -365,6 +389,17 @@ def as_result(scene: Scene, found: Linearisation, time: float = 0.0) -> Result:
         "status": "complete",
     }
     return Result(np.array([time]), quantities, {}, attributes)
+
+
+def _motions(found: Linearisation) -> tuple[str, ...]:
+    """Of each body its shift and its turning, and its elastic coordinates."""
+    system = found.near.at.system
+    named = zip(system.scene.bodies, system.layout.n, strict=True)
+    own = [
+        (body.name, ("x", "y", "z", "turn x", "turn y", "turn z", *(f"q{k + 1}" for k in range(n))))
+        for body, n in named
+    ]
+    return tuple(f"{body} {motion}".replace(".", " ") for body, motions in own for motion in motions)
 
 
 _AXES = {True: "input", False: "output"}

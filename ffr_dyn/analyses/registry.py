@@ -31,10 +31,11 @@ LISTED = {
     "steady": "Steady motion of SCENE: bodies that rotate at a constant speed, deformed by it; at one speed or several.",
     "campbell": "Campbell diagram of SCENE: frequencies and damping over the speed, critical speeds, limits of stability.",
     "response": "Frequency response of SCENE: gain, phase and modes from an input to outputs; noise; Bode and Nyquist.",
+    "forced": "Harmonic response of SCENE with all that is nonlinear: amplitudes over the frequency, jumps, stability.",
     "periodic": "Periodic motion of SCENE under drivers that turn evenly, and Floquet's multipliers: is it stable?",
 }
 _FOLDERS = dict.fromkeys(
-    ("steady", "campbell", "response", "periodic"), "rotating"
+    ("steady", "campbell", "response", "forced", "periodic"), "rotating"
 )  # of the modules that do not lie beside this one
 _REGISTERED: dict[str, type[Analysis]] = {}
 EVENTS_SHOWN = 20

@@ -13,6 +13,7 @@ from ffr_dyn.equations.constraint_rows import drive_of
 from ffr_dyn.integrators import ROS2, Integrator
 from ffr_dyn.kernels.tables import (
     FAILED,
+    IN_DAMPING,
     LAW,
     LEAST,
     NOT_CONVERGED,
@@ -197,6 +198,11 @@ def _timed(count: int, row: Array, system: System, work: Work) -> Array:
 def _unconverged(system: System, work: Work, where: int, settings: Settings) -> str:
     """Of a body, or after the bodies a constraint row: where, the likely cause and what to change."""
     bodies, other = system.scene.bodies, not isinstance(settings.method, ROS2)
+    if where < len(bodies) and system.model.bodies.where[where, IN_DAMPING] >= 0:
+        return (
+            f"worst in body {bodies[where].name!r}: the step is too large for its damping matrix, which couples its "
+            "coordinates; use ROS2 or ROS3, or a smaller step"
+        )
     if where < len(bodies):
         return (
             f"worst in body {bodies[where].name!r}: the step is too large for its rotation or for a spring, damper, stop or "

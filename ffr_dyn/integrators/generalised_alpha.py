@@ -58,6 +58,7 @@ from ffr_dyn.kernels.integrator_api import (
     position_rates,
     project,
     set_diagonal,
+    settle_damping,
     solve,
     stabilise,
     unconverged,
@@ -105,7 +106,7 @@ def start(r, t, lag, square, single):
         fill(r.work.bodies.f, 0.0)
         fill(s.target, 0.0)
         correct(r, s.v[CORRECTION], s.target)
-        solve(r, s.target)
+        solve_damped(r)
         velocity_rates(r, s.v[CORRECTION])
         add_scaled(s.v[A_NOW], s.v[NOW], 1.0, s.v[CORRECTION])
     copy(s.v[BEFORE], s.v[NOW])
@@ -118,6 +119,14 @@ def set_factors(r, square, single):
     """What is implicit in the matrix of the iteration."""
     set_diagonal(r, square**0.5)  # in which the elastic damping is right to a few per cent
     weigh_forces(r, single, square)
+
+
+@inlined
+def solve_damped(r):
+    """`solve` with all of a damping matrix that couples coordinates: its diagonal alone would not do where it is heavy."""
+    solve(r, r.stages.target)
+    if r.model.bodies.coupled_damping.size > 0:
+        settle_damping(r, r.stages.target)
 
 
 @inlined
@@ -144,7 +153,7 @@ def newton(r, h, square, single):
     stabilised = s.numbers[STABILISED] > 0.0
     for k in range(s.target.size):
         s.target[k] = -rows.nu[k] / single if stabilised else -rows.Phi[k] / square
-    solve(r, s.target)
+    solve_damped(r)
     velocity_rates(r, s.v[CORRECTION])
     add_scaled(s.v[NEXT], s.v[NEXT], 1.0, s.v[CORRECTION])
     if stabilised:

@@ -178,6 +178,7 @@ __all__ = [
     "row_of_largest",
     "scale",
     "set_diagonal",
+    "settle_damping",
     "six_rows",
     "solve",
     "solve_stage",

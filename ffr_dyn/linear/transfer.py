@@ -32,13 +32,14 @@ class Transfer:
     values: Array
 
 
-def transfer(A: Array, B: Array, C: Array, D: Array, frequencies: Array, count: int) -> Transfer:
+def transfer(A: Array, B: Array, C: Array, D: Array, frequencies: Array, count: int, order: int = 0) -> Transfer:
     """From an input to the outputs of C (O, S); with the parts of the `count` modes that do most.
 
     B (S, P), D (O, P) : shares of the input and of its first P - 1 derivatives
+    order              : which derivative of that the input is
     """
     s = 2j * np.pi * frequencies
-    one, powers = np.eye(len(A)), s[:, None] ** np.arange(B.shape[1])
+    one, powers = np.eye(len(A)), s[:, None] ** (np.arange(B.shape[1]) - float(order))
     H = np.array([C @ np.linalg.solve(at * one - A, B @ u) + D @ u for at, u in zip(s, powers, strict=True)])
     H = H.reshape(s.size, len(C))
     values, left, right = eig(A, left=True, right=True)

@@ -286,6 +286,38 @@ def monodromy(of: Turns, s: Array) -> Array:
     return np.array(columns).T
 
 
+@dataclass(frozen=True)
+class FloquetModes:
+    """Small motions y = exp(exponent t) p(t), p periodic, about a periodic motion: multipliers and exponents [1/s] (2 d,),
+    the largest multiplier first, and shapes (V, 2 d), p at the beginning of the period.
+
+    rates : (2 d,) [rad/s] of the shapes there
+
+    A frequency is known but for multiples of that of the period; it is the one nearest to the rate at the beginning.
+    """
+
+    multipliers: Array
+    exponents: Array
+    shapes: Array
+    rates: Array
+
+
+def floquet_modes(of: Turns) -> FloquetModes:
+    """About the state of the chart, which a period brings back."""
+    d = of.near.steps.size
+    values, vectors = np.linalg.eig(monodromy(of, np.zeros(2 * d)))
+    order = np.argsort(-np.abs(values), kind="stable")
+    values, vectors = values[order], (vectors[:, order].T * of.scale).T
+    y, z = vectors[:d], vectors[d:]
+    size = np.maximum((np.abs(y) ** 2).sum(axis=0), 1e-300)
+    spin = (y.conj() * z).sum(axis=0).imag / size
+    base = 2 * np.pi / of.period
+    logarithm = np.log(np.where(values, values, 1e-300).astype(complex)) / of.period
+    exponents = logarithm + 1j * base * np.round((spin - logarithm.imag) / base)
+    rates = np.sqrt((np.abs(z) ** 2).sum(axis=0) / size)
+    return FloquetModes(values, exponents, of.near.Z @ y, rates)
+
+
 def _newton(of: Turns, s: Array) -> tuple[Array, int, float]:
     scale, periods, error = of.scale, 0, np.inf
     for _ in range(NEWTONS):

@@ -11,7 +11,7 @@ The numbered invariants I1...I9 and Shabana's S_bar family are read-only views o
 """
 
 from ffr_prep.body.constructors import recombined, rigid_body, truncated, with_point
-from ffr_prep.body.damping import damped
+from ffr_prep.body.damping import Damping, damped, with_damping
 from ffr_prep.body.file import content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
 from ffr_prep.body.frame_change import interface_motions, mass_of_motions
 from ffr_prep.body.mean_axis import FrameMarker, MeanAxisForm, idle_loads, mean_axis_form
@@ -46,6 +46,7 @@ __all__ = [
     "TENSOR",
     "BeamForces",
     "BodyError",
+    "Damping",
     "FlexibleBody",
     "FrameMarker",
     "Interface",
@@ -79,5 +80,6 @@ __all__ = [
     "surface_of",
     "truncated",
     "values",
+    "with_damping",
     "with_point",
 ]

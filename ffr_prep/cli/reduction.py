@@ -16,7 +16,7 @@ from ffr_prep.reduction.registry import MODES, REDUCTIONS
 from ffr_prep.reduction.registry import reduction_of as reduction_made
 
 if TYPE_CHECKING:
-    from ffr_prep.body import FlexibleBody
+    from ffr_prep.body import Damping, FlexibleBody
     from ffr_prep.reduction.basis import Reduction
     from ffr_prep.reduction.selection import Band
 
@@ -53,6 +53,49 @@ reduction_options = bundle(
         help="Frequencies [Hz] of that comparison; default: those of --accuracy.",
     ),
 )
+
+
+damping_options = bundle(
+    click.option(
+        "--rayleigh",
+        callback=numbers(2),
+        metavar="ALPHA,BETA",
+        help="Damping alpha M + beta K, in 1/s and s: 2.0,1e-6.",
+    ),
+    click.option(
+        "--loss-factor", type=float, default=0.0, help="Of the material: damping that loses as much at each mode."
+    ),
+    click.option(
+        "--damping",
+        callback=numbers(),
+        metavar="Z1,Z2,...",
+        help="Damping ratios of the modes, the last of all others: 0.01.",
+    ),
+    click.option(
+        "--damping-band",
+        "damping_bands",
+        multiple=True,
+        callback=lambda _, __, texts: [_band_of_damping(text) for text in texts],
+        metavar="HZ:RATIO",
+        help="Damping ratio of the modes up to a frequency, the last beyond, too: 100:0.005; repeat, ascending.",
+    ),
+)
+
+
+def _band_of_damping(text: str) -> tuple[float, float]:
+    try:
+        frequency, ratio = map(float, text.split(":"))
+    except ValueError:
+        raise InputError(f"--damping-band {text}: write a frequency in Hz and a ratio, such as 100:0.005") from None
+    return frequency, ratio
+
+
+def damping_of(options: Mapping[str, Any]) -> Damping:
+    """The damping that the options describe; InputError for what is none."""
+    from ffr_prep.body import Damping
+
+    alpha, beta = options["rayleigh"] or (0.0, 0.0)
+    return Damping(alpha, beta, options["loss_factor"], options["damping_bands"], options["damping"] or ())
 
 
 def reduction_of(options: Mapping[str, Any]) -> Reduction:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ffr_prep.cli.options import bundle, interface_of, reference_of
-from ffr_prep.cli.reduction import band_of, draw_quality, reduction_of, reduction_options
+from ffr_prep.cli.reduction import band_of, damping_of, damping_options, draw_quality, reduction_of, reduction_options
 from ffr_prep.cli.terminal import Steps, filed, show
 from ffr_prep.common.command import OUTPUT_FILE
 from ffr_prep.common.errors import InputError
@@ -57,6 +57,7 @@ REQUEST = bundle(
     click.option("--interface", "interfaces", multiple=True, metavar="INTERFACE", help="See below; may be repeated."),
     click.option("--reference", default="mean-axis", show_default=True, metavar="CONDITIONS", help="See below."),
     reduction_options,
+    damping_options,
     CUTS,
     SOLVER,
 )
@@ -93,6 +94,7 @@ def request_of(options: Mapping[str, Any]) -> tuple[Sequence[InterfaceRegion], R
         reduction=reduction_of(options),
         quality=band_of(options),
         parts=options["parts"],
+        damping=damping_of(options),
         solver=solver_of(options),
         linear=options.get("linear", False),
         drawn_modes=options.get("drawn_modes"),

@@ -38,6 +38,10 @@ Without a file: [[polylines]] with member, corners and elements, [[panels]] with
 flange), general (A, Iy, Iz, J, ky, kz). References: fixed, simply-supported (pin, roller), mean-axis, supports.
 
 \b
+Damping: damping = {rayleigh = [2.0, 1e-6]}, in 1/s and s, or loss_factor = 0.01, ratios = [0.01] of the modes in their
+order, bands = [[100, 0.005], [1000, 0.02]] up to 100 Hz, to 1000 Hz and beyond.
+
+\b
 Solids tied to the frame, and other reductions:
   ties = [["frame.tip", "eye.bore"]]
   reduction = [{method = "craig-bampton", modes = 10}, {method = "krylov", moments = 2, match = [0, 120]}]

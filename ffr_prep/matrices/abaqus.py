@@ -26,14 +26,16 @@ from ffr_prep.mesh.abaqus import nodes_from_abaqus
 _SUPPORTED = 1e30
 
 
-def from_abaqus_matrices(stiffness: Path, mass: Path, deck: Path) -> MatrixModel:
-    """The model of two matrix files and an input file, in its unit. Raises InputError for files that cannot be used."""
+def from_abaqus_matrices(stiffness: Path, mass: Path, *last: Path) -> MatrixModel:
+    """The model of two matrix files, perhaps one of viscous damping, and an input file, in its unit. Raises InputError for
+    files that cannot be used."""
+    *damping, deck = last
     labels, points, groups = nodes_from_abaqus(deck)
     table = NodeTable(labels, points, groups)
-    entries = {path: _entries(path) for path in (stiffness, mass)}
+    entries = {path: _entries(path) for path in (stiffness, mass, *damping)}
     widths = {len(entry[0]) for entry in entries.values()}
     if widths not in ({3}, {5}):
-        raise InputError(f"{stiffness} and {mass} are in different formats: write both by one *MATRIX OUTPUT")
+        raise InputError(f"{stiffness} and {mass} are in different formats: write all by one *MATRIX OUTPUT")
     if np.abs(entries[stiffness][:, -1]).max() >= _SUPPORTED:
         raise InputError(
             f"{stiffness} holds stiffnesses of {np.abs(entries[stiffness][:, -1]).max():.0e}, by which Abaqus marks boundary "
@@ -42,13 +44,13 @@ def from_abaqus_matrices(stiffness: Path, mass: Path, deck: Path) -> MatrixModel
     source = {"format": "Abaqus"}
     if widths == {3}:
         size = max(_check_numbers(path, entry) for path, entry in entries.items())
-        K, M = (_coordinate(entry, size) for entry in entries.values())
-        rows = _ascending(deck, table, size)
-        return model_of(stiffness, table, rows, K, M, source, ["rows are taken in ascending order of nodes"])
+        K, M, *C = (_coordinate(entry, size) for entry in entries.values())
+        rows, notes = _ascending(deck, table, size), ["rows are taken in ascending order of nodes"]
+        return model_of(stiffness, table, rows, K, M, source, notes, *C)
     for path, entry in entries.items():
         _check_labels(path, entry)
-    rows, (K, M) = _labelled(list(entries.values()))
-    return model_of(stiffness, table, rows, K, M, source)
+    rows, (K, M, *C) = _labelled(list(entries.values()))
+    return model_of(stiffness, table, rows, K, M, source, (), *C)
 
 
 def _entries(path: Path) -> Array:
@@ -92,11 +94,11 @@ def _labelled(parts: list[Array]) -> tuple[Array, list[sp.csr_array]]:
     pairs = [entry[:, columns].astype(np.int64) for entry in parts for columns in ((0, 1), (2, 3))]
     rows, places = np.unique(np.vstack(pairs), axis=0, return_inverse=True)
     ends = np.cumsum([len(pair) for pair in pairs])[:-1]
-    i_K, j_K, i_M, j_M = np.split(places.ravel(), ends)
+    of = np.split(places.ravel(), ends)
     shape = (len(rows), len(rows))
-    places_of = ((i_K, j_K), (i_M, j_M))
+    places_of = zip(of[::2], of[1::2], strict=True)
     return rows, [
-        sp.csr_array(sp.coo_array((entry[:, 4], of), shape=shape)) for entry, of in zip(parts, places_of, strict=True)
+        sp.csr_array(sp.coo_array((entry[:, 4], at), shape=shape)) for entry, at in zip(parts, places_of, strict=True)
     ]
 
 

@@ -42,10 +42,22 @@ MATRIX_FORMATS: Registry[MatrixFormat] = Registry(
             "Matrix Market (or scipy's save_npz) and a line node,component,x,y,z for each row",
         ),
         MatrixFormat(
+            "K.mtx M.mtx C.mtx DOFS.csv",
+            ((".mtx", ".npz"), (".mtx", ".npz"), (".mtx", ".npz"), (".csv",)),
+            f"{_ROOM}.matrix_market:from_matrix_market",
+            "the same with viscous damping",
+        ),
+        MatrixFormat(
             "STIF.mtx MASS.mtx MODEL.inp",
             ((".mtx",), (".mtx",), (".inp",)),
             f"{_ROOM}.abaqus:from_abaqus_matrices",
             "Abaqus, *MATRIX OUTPUT, STIFFNESS, MASS; the nodes and node sets of the input file",
+        ),
+        MatrixFormat(
+            "STIF.mtx MASS.mtx DMPV.mtx MODEL.inp",
+            ((".mtx",), (".mtx",), (".mtx",), (".inp",)),
+            f"{_ROOM}.abaqus:from_abaqus_matrices",
+            "Abaqus, with VISCOUS DAMPING, which dashpots and Rayleigh's damping make",
         ),
         MatrixFormat(
             "JOB.sti JOB.mas JOB.dof JOB.inp",
@@ -57,7 +69,7 @@ MATRIX_FORMATS: Registry[MatrixFormat] = Registry(
             "MATRICES.op4 MODEL.bdf",
             ((".op4",), (".bdf", ".dat", ".nas")),
             f"{_ROOM}.nastran:from_op4",
-            "Nastran, KGG and MGG (pip install 'ffr[nastran]')",
+            "Nastran, KGG, MGG and, where it is there, BGG (pip install 'ffr[nastran]')",
         ),
         MatrixFormat(
             "MODEL.op2",

@@ -27,10 +27,13 @@ from ffr_prep.matrices.node_table import NodeTable, model_of
 from ffr_prep.matrices.npz import arrays_of, sparse_of
 
 
-def from_matrix_market(stiffness: Path, mass: Path, rows: Path) -> MatrixModel:
-    """The model of two matrices and a table, in the unit of the files. Raises InputError for files that cannot be used."""
+def from_matrix_market(stiffness: Path, mass: Path, *last: Path) -> MatrixModel:
+    """The model of two matrices, perhaps one of viscous damping, and a table, in the unit of the files. Raises InputError
+    for files that cannot be used."""
+    *damping, rows = last
     table, dofs = read_rows(rows)
-    return model_of(rows, table, dofs, _matrix(stiffness), _matrix(mass), {"format": "Matrix Market"})
+    C = _matrix(damping[0]) if damping else None
+    return model_of(rows, table, dofs, _matrix(stiffness), _matrix(mass), {"format": "Matrix Market"}, C=C)
 
 
 def read_rows(path: Path) -> tuple[NodeTable, Array]:

@@ -120,7 +120,7 @@ def component_in_words(component: int) -> str:
 
 def model_hash(model: MatrixModel) -> str:
     """A short hash of nodes, matrices and map."""
-    sparse = [part for A in (model.K, model.M) for part in (A.indptr, A.indices, A.data)]
+    sparse = [part for A in model.matrices.values() for part in (A.indptr, A.indices, A.data)]
     return content_hash(model.points, model.nodes, model.components, *sparse)
 
 

@@ -1,4 +1,4 @@
-"""Matrices of Nastran: OUTPUT4 files with the bulk data, or OP2 files, of the g-set (KGG, MGG).
+"""Matrices of Nastran: OUTPUT4 files with the bulk data, or OP2 files, of the g-set (KGG, MGG, and BGG of dampers).
 
 Needs pyNastran, an optional extra. Rows follow the internal sequence of the grid points: six for a grid point, one for a
 scalar point; scalar points must have neither stiffness nor mass. KAA and MAA are taken when they have as many rows as the
@@ -25,7 +25,7 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.matrices.model import MatrixModel
 from ffr_prep.matrices.node_table import NodeTable, mirrored, model_of
 
-_PAIRS = (("KGG", "MGG"), ("KAA", "MAA"))
+_SETS = (("KGG", "MGG", "BGG"), ("KAA", "MAA", "BAA"))  # stiffness, mass and, optional, viscous damping
 _GRID, _SCALAR = 1, 2
 
 
@@ -75,28 +75,31 @@ def from_op2(path: Path) -> MatrixModel:
 
 def model_of_nastran(path: Path, found: Mapping[str, Any], grids: GridTable, source: Mapping[str, Any]) -> MatrixModel:
     """The model of matrices by name, as pyNastran holds them in `data`, and the points of the g-set."""
-    stiffness, mass = _pair(path, found)
-    for name in (stiffness, mass):
+    names = _names(path, found)
+    for name in names:
         if isinstance(found[name].data, list):
             raise InputError(f"{path} holds {name} {len(found[name].data)} times; write one model to a file")
-    K, M = (sp.csr_array(found[name].data) for name in (stiffness, mass))
+    matrices = tuple(sp.csr_array(found[name].data) for name in names)
     widths = np.where(grids.kinds == _GRID, 6, 1)
-    if not K.shape[0] == M.shape[0] == widths.sum():
+    if {A.shape[0] for A in matrices} != {int(widths.sum())}:
+        sizes = ", ".join(f"{name} has {A.shape[0]} rows" for name, A in zip(names, matrices, strict=True))
         raise InputError(
-            f"{path}: {stiffness} has {K.shape[0]} rows and {mass} {M.shape[0]}, but the {len(widths)} points have "
+            f"{path}: {sizes}, but the {len(widths)} points have "
             f"{widths.sum()} degrees of freedom: write KGG and MGG of this model, before supports and reductions"
         )
     _check_systems(path, grids)
     of_grids = np.repeat(grids.kinds == _GRID, widths)
-    _check_scalar_points(path, grids, np.repeat(grids.labels, widths), of_grids, (mirrored("K", K)[0], M))
+    _check_scalar_points(
+        path, grids, np.repeat(grids.labels, widths), of_grids, (mirrored("K", matrices[0])[0], *matrices[1:])
+    )
     grid = grids.kinds == _GRID
     labels = grids.labels[grid]
     rows = np.stack([np.repeat(labels, 6), np.tile(np.arange(1, 7), len(labels))], axis=1)
     kept = np.flatnonzero(of_grids)
     table = NodeTable(labels, grids.points[grid], grids.groups)
-    return model_of(
-        path, table, rows, K[kept][:, kept], M[kept][:, kept], {**source, "matrices": f"{stiffness}, {mass}"}
-    )
+    K, M, *C = (A[kept][:, kept] for A in matrices)
+    left = ["K4GG, the structural damping, is left out: give a loss factor"] if "K4GG" in found else []
+    return model_of(path, table, rows, K, M, {**source, "matrices": ", ".join(names)}, left, *C)
 
 
 # ---- points -------------------------------------------------------------------------------------------------------
@@ -176,10 +179,10 @@ def _reading(path: Path) -> Iterator[None]:
         raise InputError(f"pyNastran cannot read {path} ({type(error).__name__}: {error})") from None
 
 
-def _pair(path: Path, found: Mapping[str, Any]) -> tuple[str, str]:
-    for pair in _PAIRS:
-        if all(name in found for name in pair):
-            return pair
+def _names(path: Path, found: Mapping[str, Any]) -> tuple[str, ...]:
+    for names in _SETS:
+        if all(name in found for name in names[:2]):
+            return names if names[2] in found else names[:2]
     raise InputError(
         f"{path} holds {', '.join(sorted(found)) or 'no matrices'}; it must hold KGG and MGG (or KAA and MAA)"
     )

@@ -41,6 +41,7 @@ def model_of(
     M: sp.sparray,
     source: Mapping[str, Any],
     notes: Sequence[str] = (),
+    C: sp.sparray | None = None,
 ) -> MatrixModel:
     """The model of numbers of nodes and components 1 ... 6 of each row (D, 2); InputError for a node not in the table."""
     index = {label: k for k, label in enumerate(table.labels.tolist())}
@@ -48,6 +49,7 @@ def model_of(
         labels, counts = np.unique(table.labels, return_counts=True)
         raise InputError(f"{path}: node {labels[counts > 1][0]} is defined twice")
     (K, K_notes), (M, M_notes) = mirrored("K", K), mirrored("M", M)
+    C, C_notes = (None, []) if C is None else mirrored("C", C)
     try:
         return MatrixModel(
             points=table.points,
@@ -59,7 +61,8 @@ def model_of(
             groups={name: _indices(index, of, f"group {name!r}") for name, of in table.groups.items()},
             triangles=None if table.triangles is None else _indices(index, table.triangles, "the surface"),
             source=source,
-            notes=(*notes, *K_notes, *M_notes),
+            notes=(*notes, *K_notes, *M_notes, *C_notes),
+            C=C,
         )
     except InputError as error:
         raise InputError(f"{path}: {error}") from None

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +25,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.stored_arrays import read_arrays
 from ffr_prep.matrices.model import MatrixModel
-from ffr_prep.matrices.node_table import NodeTable, mirrored, model_of
+from ffr_prep.matrices.node_table import NodeTable, model_of
 
 _GROUP = "group/"
 
@@ -47,11 +46,8 @@ def from_npz(path: Path) -> MatrixModel:
         triangles=arrays.get("triangles"),
     )
     source = {"format": "npz"} | ({"units": str(arrays["units"])} if "units" in arrays else {})
-    model = model_of(path, table, rows, _matrix(path, arrays, "K"), _matrix(path, arrays, "M"), source)
-    if not any(key == "C" or key.startswith("C/") for key in arrays):
-        return model
-    C, notes = mirrored("C", _matrix(path, arrays, "C"))
-    return replace(model, C=C, notes=(*model.notes, *notes))
+    C = _matrix(path, arrays, "C") if any(key == "C" or key.startswith("C/") for key in arrays) else None
+    return model_of(path, table, rows, _matrix(path, arrays, "K"), _matrix(path, arrays, "M"), source, C=C)
 
 
 def save_matrices(model: MatrixModel, path: str | Path) -> Path:

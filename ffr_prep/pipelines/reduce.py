@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ffr_prep.body import FlexibleBody, Interface
+from ffr_prep.body import Damping, FlexibleBody, Interface, with_damping
 from ffr_prep.body.provenance import described
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
@@ -29,6 +29,7 @@ from ffr_prep.solvers.factor import CHOLESKY, FreeBody, Solver, SupportedBody, s
 from ffr_prep.solvers.threads import on_one_thread
 
 _MASSLESS = 1e-9
+UNDAMPED = Damping()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +49,7 @@ class Request:
                  its end, or `CutPlane`s. Each is reduced like the whole (`FlexibleBody.parts`) and a scene moves them in its
                  place, which large deflections ask for. A part has the reference conditions if it has the interfaces that
                  they name, and else its mean axis
+    damping    : damping that the body gets, beside that of the model
     solver     : what factorises the stiffness and finds the modes
     provenance : JSON values kept with the body, beside what is recorded anyway
 
@@ -64,6 +66,7 @@ class Request:
     stress: bool = False
     quality: Band | None = None
     parts: Cuts | None = None
+    damping: Damping = UNDAMPED
     solver: Solver = CHOLESKY
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
@@ -99,7 +102,8 @@ def reduce(
         raise InputError("this model cannot be cut into parts: meshes of solids and frames of beams and plates can")
     try:
         whole = _reduced(model, request, progress, advance)
-        return replace(whole, parts=tuple(_parts(model, request, progress, advance)))
+        whole = replace(whole, parts=tuple(_parts(model, request, progress, advance)))
+        return with_damping(whole, request.damping)
     except ComputationError:
         model.diagnose()
         raise

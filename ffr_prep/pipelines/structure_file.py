@@ -30,6 +30,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from ffr_prep.body import Damping
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.common.reading import read_toml, reading
@@ -42,6 +43,7 @@ from ffr_prep.model.reference import FixedTo, MeanAxis, ReferenceConditions, Sim
 from ffr_prep.pipelines.reduce import Request
 from ffr_prep.pipelines.structure_schema import (
     CutEntry,
+    DampingEntry,
     InterfaceEntry,
     MemberEntry,
     PanelEntry,
@@ -121,8 +123,14 @@ def _structure(path: Path, entry: StructureEntry, progress: Stages) -> Structure
             stress=entry.stress,
             quality=None if entry.quality is None else Band(*entry.quality),
             parts=_cuts(entry.parts),
+            damping=_damping(entry.damping),
         ),
     )
+
+
+def _damping(entry: DampingEntry) -> Damping:
+    alpha, beta = entry.rayleigh
+    return Damping(alpha, beta, entry.loss_factor, entry.bands, entry.ratios)
 
 
 def geometry_files(path: Path) -> list[Path]:

@@ -208,6 +208,15 @@ class CutEntry(Strict):
     normal: Vector
 
 
+class DampingEntry(Strict):
+    """Damping of the body: Rayleigh's alpha [1/s] and beta [s], a loss factor, ratios by frequency [Hz] and by mode."""
+
+    rayleigh: tuple[float, float] = (0.0, 0.0)
+    loss_factor: float = 0.0
+    bands: list[tuple[float, float]] = []
+    ratios: list[float] = []
+
+
 class StructureEntry(Strict):
     """The whole file."""
 
@@ -228,6 +237,7 @@ class StructureEntry(Strict):
     drawn_modes: int | None = None
     stress: bool = False
     quality: tuple[float, float] | None = None
+    damping: DampingEntry = DampingEntry()
     parts: int | list[float | CutEntry] | None = None
 
     @model_validator(mode="before")

@@ -50,6 +50,7 @@ def body_lines(body: FlexibleBody) -> Iterator[str]:
     yield from _region_lines(body.provenance)
     yield from _choice_lines(body.provenance)
     yield from mode_lines(body)
+    yield from damping_lines(body)
     yield from integral_lines(body)
     yield from ability_lines(body)
     yield from part_lines(body)
@@ -65,6 +66,7 @@ def short_lines(body: FlexibleBody) -> Iterator[str]:
     if body.n:
         shown = ", ".join(f"{f:.4g}" for f in body.frequencies[:6])
         yield f"modes       {body.n}: {shown}{', ...' if body.n > 6 else ''} Hz"
+    yield from damping_lines(body)
     yield from part_lines(body)
     yield from quality_lines(body)
     for warning in body.provenance.get("warnings", []):
@@ -143,6 +145,17 @@ def mode_lines(body: FlexibleBody) -> Iterator[str]:
     if body.n > _MOST_MODES:
         yield f"{'':9}{body.n - _MOST_MODES} more up to {body.frequencies[-1]:.6g} Hz"
     yield f"{'sum':>7}  {'':15}  " + " ".join(f"{total:7.2f}" for total in shares.sum(axis=0))
+
+
+def damping_lines(body: FlexibleBody) -> Iterator[str]:
+    """The damping ratios that the matrix of a body gives its modes, and whether it couples them."""
+    if body.damping is None:
+        return
+    rates, omega = np.diag(body.damping), np.sqrt(body.omega2)
+    ratios = rates / np.where(omega > 0, 2 * omega, np.inf)
+    beside = np.abs(body.damping - np.diag(rates)).max(initial=0.0)
+    coupled = ", coupled with each other" if beside > _NOISE * rates.max() else ""
+    yield f"damping     ratios {ratios.min():.3g} to {ratios.max():.3g} of the modes{coupled}"
 
 
 def ability_lines(body: FlexibleBody) -> Iterator[str]:

@@ -2,20 +2,35 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
-from ffr_dyn.analyses.linearise import Linearisation
 from ffr_dyn.analyses.outcome import result_of
 from ffr_dyn.consistency.evaluation import record_states
-from ffr_dyn.consistency.tangent import sizes
+from ffr_dyn.consistency.tangent import Chart, sizes
 from ffr_dyn.equations.layout import moved, to_global_axes
 from ffr_dyn.results.result import Result
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 ROWS = 48
 
 
-def mode_motion(found: Linearisation, number: int, *, size: float = 0.05) -> Result:
+class Modes(Protocol):
+    """What is asked of a `ffr_dyn.analyses.linearise.Linearisation`."""
+
+    @property
+    def eigenvalues(self) -> Array: ...
+    @property
+    def modes(self) -> Array: ...
+    @property
+    def leading(self) -> tuple[str, ...]: ...
+    @property
+    def near(self) -> Chart: ...
+
+
+def mode_motion(found: Modes, number: int, *, size: float = 0.05) -> Result:
     """One period of a mode in 49 rows, the last as the first: poses and elastic coordinates of all bodies.
 
     number : of the eigenvalue, from 0, as in `found.eigenvalues`;  size : of the largest movement [rad, or of the

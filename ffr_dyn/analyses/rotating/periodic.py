@@ -5,7 +5,7 @@ How it is found, `ffr_dyn.linear.turn_map` says.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -20,14 +20,17 @@ from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
 from ffr_dyn.integrators import ROS3, Integrator
-from ffr_dyn.linear.turn_map import Returned, Turns, monodromy, period_of, returned, turns
+from ffr_dyn.linear.turn_map import Returned, Turns, floquet_modes, period_of, returned, turns
+from ffr_dyn.linear.words import in_words
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene, require_scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 STEPS = 1000  # to a period, where no method is given
+SHOWN = 12  # modes that a command prints
 
 
 @dataclass(frozen=True)
@@ -52,10 +55,7 @@ class Periodic(OfMoment):
     def report(self, result: Result) -> list[str]:
         a = result.attributes
         lines = [*super().report(result), f"period       {a['period']:.9g} s"]
-        largest = [f"{re:.6g} {im:+.6g}i" for re, im in a.get("multipliers", [])[:6]]
-        if largest:
-            lines.append(f"multipliers  {', '.join(largest)}: {'stable' if a['stable'] else 'unstable'}")
-        return lines
+        return lines + (floquet_lines(a) if "multipliers" in a else [])
 
 
 def periodic(
@@ -77,7 +77,8 @@ def periodic(
 
     The attributes have the `period`, `periods` (how many were computed, one of five times the steps counting as a fifth),
     `returns` (by how much the end is off the beginning, relative) and, with floquet, `multipliers` (pairs of real and
-    imaginary parts, the largest first) and `stable`.
+    imaginary parts, the largest first), `exponents` (growth [1/s] and circular frequency [rad/s] of each), `leading` (what
+    moves in each, as of `linearise`) and `stable`.
 
         turn = fd.periodic(engine)
         turn["main_bearing.force"]
@@ -128,12 +129,31 @@ def _found(
     return of, returned(of)
 
 
-def _multipliers(of: Turns, x: Any, v: Any) -> dict[str, Any]:
-    """Floquet's multipliers about a periodic state, the largest first."""
+def _multipliers(of: Turns, x: Array, v: Array) -> dict[str, Any]:
+    """Floquet's multipliers about a periodic state, the largest first, with their exponents and what moves."""
     again = turns(of.system, of.near.time, x, v, of.method, of.period)
-    values = np.linalg.eigvals(monodromy(again, np.zeros(2 * again.near.steps.size)))
-    values = values[np.argsort(-np.abs(values), kind="stable")]
+    found = floquet_modes(again)
+    scene, place = of.system.scene, of.system.layout
+    names = in_words(scene, place, x, again.near.M, found.shapes, found.rates, [""] * found.multipliers.size)
     return {
-        "multipliers": [[float(value.real), float(value.imag)] for value in values],
-        "stable": int(np.abs(values).max(initial=0.0) <= 1 + 1e-6),
+        "multipliers": _pairs(found.multipliers),
+        "exponents": _pairs(found.exponents),
+        "leading": list(names),
+        "stable": int(np.abs(found.multipliers).max(initial=0.0) <= 1 + 1e-6),
     }
+
+
+def _pairs(values: Array) -> list[list[float]]:
+    return [[float(value.real), float(value.imag)] for value in values]
+
+
+def floquet_lines(attributes: Mapping[str, Any]) -> list[str]:
+    """A line for each of the first dozen Floquet modes, one of each conjugate pair."""
+    lines = []
+    both = zip(attributes["multipliers"], attributes["exponents"], attributes["leading"], strict=True)
+    for (re, im), (growth, rate), name in both:
+        if rate >= 0:
+            frequency = f"{rate / (2 * np.pi):12.6g} Hz   growth {growth:11.4g} 1/s   "
+            lines.append(f"{frequency}multiplier {re:.6g} {im:+.6g}i   {name}")
+    more = [f"... and {len(lines) - SHOWN} more in the file"] if len(lines) > SHOWN else []
+    return lines[:SHOWN] + more

@@ -9,9 +9,10 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from ffr_dyn.analyses.efforts import Effort, JointEffort, MarkerEffort
-from ffr_dyn.analyses.linearise import BASE, Linearisation, linearise
+from ffr_dyn.analyses.efforts import Effort
+from ffr_dyn.analyses.linearise import Linearisation, linearise
 from ffr_dyn.analyses.registry import OfMoment, option
+from ffr_dyn.analyses.rotating.inputs import Acting, absolute_order, acting, components, told
 from ffr_dyn.analyses.rotating.steady import steady
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import scene_at
@@ -21,14 +22,11 @@ from ffr_dyn.linear.transfer import Transfer, band, mean_square, transfer
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.described import described
-from ffr_dyn.scene.drivers import Driver
-from ffr_dyn.scene.scene import Scene, marker_names, require_scene
+from ffr_dyn.scene.scene import Scene, require_scene
 from ffr_prep.common.errors import InputError
 
 About = Literal["start", "equilibrium", "steady"]
 PARTS = 12
-COMPONENTS = "xyz"
-EFFORTS = {"angle": "moment", "stroke": "force"}
 SHARE = 0.01  # of a gain by one mode, from where it is told; outputs of rounding have more than its inverse
 
 
@@ -72,7 +70,7 @@ class Response(OfMoment):
         from ffr_dyn.pictures.bode import draw_bode, draw_nyquist
 
         found = response(
-            scene, input=self.input, outputs=self.quantities, band_of=_band(self.band), psd=_psd(self.psd),
+            scene, input=self.input, outputs=self.quantities, band_of=band_in_words(self.band), psd=_psd(self.psd),
             about=self.about, time=settings.time, path=how["path"],
         )  # fmt: skip
         for draw, file in ((draw_bode, self.bode), (draw_nyquist, self.nyquist)):
@@ -84,7 +82,8 @@ class Response(OfMoment):
         return response_lines(result)
 
 
-def _band(text: str) -> tuple[float, float] | None:
+def band_in_words(text: str) -> tuple[float, float] | None:
+    """LOW..HIGH [Hz]; None of no text. InputError for another."""
     if not text:
         return None
     low, _, high = text.partition("..")
@@ -120,11 +119,12 @@ def response(
 
     input    : an effort, the name of a load (one doubles it), or in words: "joint.moment" or "joint.force" along a joint
                coordinate, "driver.moment" in the place of a driver, which then holds what it held, "driver.angle" or
-               "driver.stroke", a change of what a driver prescribes, "body.point.force.x" or
-               ".moment.z" at a marker, "base.x", an acceleration of the base
-    outputs  : quantities ("rod.tip.acceleration": its components) or components; with a base as input, accelerations
-    of markers
-               are absolute, as accelerometers have them, so that the gain is the transmissibility
+               "driver.stroke", a change of what a driver prescribes, "driver.angle_rate" and "driver.angle_acceleration", of
+               its rates, "body.point.force.x" or ".moment.z" at a marker, "base.x", an acceleration of the base,
+               "base.x.velocity" and "base.x.displacement"
+    outputs  : quantities ("rod.tip.acceleration": its components) or components; with a base as input, accelerations of
+               markers are absolute, as accelerometers have them, so that the gain is the transmissibility; of its
+               displacement and velocity, positions and velocities of markers as well
     band_of  : (low, high) [Hz];  frequencies : [Hz], instead; by default the band of the first vibrations
     psd      : (frequency [Hz], one-sided density [input^2/Hz]) of a noise at the input, linear in between, zero outside
     about    : the scene's "start", its "equilibrium" or its "steady" motion
@@ -140,26 +140,26 @@ def response(
     >>> result = fd.response(scene, input="hinge.moment", outputs=["rod.tip.acceleration.y"], band_of=(1.0, 500.0))
     """
     require_scene(scene)
-    at = _about(scene, about, time)
-    acts, moved = _moved(at, input)
-    free, effort = _fed(at, acts, time)
-    linear = linearise(free, time=time, inputs=(effort,), outputs=(*_components(free, outputs, time), *moved))
-    linear = _by_motion(linear, at, time) if moved else linear
-    absolute = [float(_is_absolute(effort, name)) for name in linear.outputs]
-    D = linear.D + np.array(absolute)[:, None]
+    at = about_state(scene, about, time)
+    acts = acting(at, input, time)
+    names = (*components(acts.scene, outputs, time, "response"), *acts.moved)
+    linear = linearise(acts.scene, time=time, inputs=(acts.effort,), outputs=names)
+    linear = _by_motion(linear, at, time) if acts.driver else _by_base(linear, acts)
     low, high = band_of if band_of else (None, None)
     if psd and not band_of:
         low, high = (min(f for f, _ in psd) or None), max(f for f, _ in psd)
     f = np.array(frequencies, float) if len(frequencies) else band(linear.eigenvalues, low, high)
-    found = transfer(linear.A, linear.B, linear.C, D, f, PARTS)
-    told = str(input) if moved or isinstance(effort, str) else _told(effort)
-    result = _as_result(scene, linear, found, told, tuple(psd), time)
+    if acts.order and not f.min() > 0:
+        raise InputError(f"frequencies {list(frequencies)}: at 0 Hz a velocity has no displacement; give positive ones")
+    found = transfer(linear.A, linear.B, linear.C, linear.D, f, PARTS, acts.order or 0)
+    result = _as_result(scene, linear, found, told(acts, input), tuple(psd), time)
     if path is not None:
         save_result(result, path)
     return result
 
 
-def _about(scene: Scene, about: About, time: float) -> Scene:
+def about_state(scene: Scene, about: About, time: float) -> Scene:
+    """The scene at its start, its equilibrium or in its steady motion. InputError for another word."""
     if about not in ("start", "equilibrium", "steady"):
         raise InputError(f"about is {about!r}; it must be one of 'start', 'equilibrium', 'steady'")
     if about == "start":
@@ -167,12 +167,16 @@ def _about(scene: Scene, about: About, time: float) -> Scene:
     return scene_at(scene, static(scene, time=time) if about == "equilibrium" else steady(scene, time=time))
 
 
-def _moved(scene: Scene, given: str | Effort) -> tuple[str | Effort, tuple[str, ...]]:
-    """Of a driver's motion, the effort that stands in its place and the coordinate that it moves; else what is given."""
-    for driver in scene.drivers:
-        if isinstance(driver, Driver) and given == f"{driver.name}.{driver.coordinate}":
-            return f"{driver.name}.{EFFORTS[driver.coordinate]}", (f"{driver.joint}.{driver.coordinate}",)
-    return given, ()
+def _by_base(linear: Linearisation, acts: Acting) -> Linearisation:
+    """With what the base itself adds to outputs that are absolute: of its acceleration to accelerations alone; of its
+    displacement and velocity B and D of the displacement and its two derivatives."""
+    orders = [absolute_order(acts.effort, name) for name in linear.outputs]
+    added = np.array([[float(order == k) for k in range(3)] for order in orders]).reshape(-1, 3)
+    if acts.order is None:
+        return replace(linear, D=linear.D + added[:, 2:])
+    B, D = np.zeros((len(linear.A), 3)), added
+    B[:, 2:], D[:, 2:] = linear.B, added[:, 2:] + linear.D
+    return replace(linear, B=B, D=D)
 
 
 def _by_motion(free: Linearisation, held: Scene, time: float) -> Linearisation:
@@ -186,68 +190,8 @@ def _by_motion(free: Linearisation, held: Scene, time: float) -> Linearisation:
     return replace(free, A=A, B=B, C=C, D=D, eigenvalues=own, leading=words, outputs=free.outputs[:-1])
 
 
-def _fed(scene: Scene, given: str | Effort, time: float) -> tuple[Scene, str | Effort]:
-    """The scene with the input free to act, and the input."""
-    if not isinstance(given, str) or given in BASE or given in [load.name for load in scene.loads]:
-        return scene, given
-    head, _, what = given.partition(".")
-    drivers = {d.name: d for d in scene.drivers if isinstance(d, Driver)}
-    joints = {joint.name for joint in scene.joints}
-    kinds = {effort: coordinate for coordinate, effort in EFFORTS.items()}
-    if head in drivers and kinds.get(what) == drivers[head].coordinate:
-        return _released(scene, drivers[head], time), JointEffort(
-            "input", drivers[head].joint, drivers[head].coordinate
-        )
-    if head in joints and what in kinds:
-        return scene, JointEffort("input", head, kinds[what])
-    marker, _, rest = given.rpartition(".force.") if ".force." in given else given.rpartition(".moment.")
-    if marker in marker_names(scene) and rest in COMPONENTS and len(rest) == 1:
-        direction = tuple(float(c == rest) for c in COMPONENTS)
-        return scene, MarkerEffort("input", marker, direction, moment=".moment." in given)
-    raise InputError(
-        f"input {given!r} is not understood: write joint.moment, joint.force, driver.moment, driver.angle, driver.stroke, "
-        "body.point.force.x, body.point.moment.x, base.x, or the name of a load; "
-        f"joints are {', '.join(sorted(joints)) or 'none'}, drivers {', '.join(drivers) or 'none'}"
-    )
-
-
-def _released(scene: Scene, driver: Driver, time: float) -> Scene:
-    """The scene without a driver, which goes on with the effort that it has."""
-    from ffr_dyn.analyses.assemble import assembly
-    from ffr_dyn.scene.forces import Actuator
-
-    held = assembly(scene, time=time)
-    effort = float(held[f"{driver.name}.effort"][0])
-    left = replace(scene_at(scene, held), drivers=tuple(d for d in scene.drivers if d is not driver))
-    if not effort:
-        return left
-    added = Actuator(f"{driver.name}_held", driver.joint, force=effort, coordinate=driver.coordinate)
-    return replace(left, forces=(*left.forces, added))
-
-
-def _components(scene: Scene, outputs: Sequence[str], time: float) -> tuple[str, ...]:
-    """Every component of the outputs. InputError where there are none."""
-    from ffr_dyn.analyses.assemble import assembly
-
-    if not outputs or isinstance(outputs, str):
-        raise InputError("response needs outputs: names of quantities in a list, such as rod.tip.acceleration")
-    known = assembly(scene, time=time, outputs=("default", "*.acceleration", "*.angular_velocity", "*.a"))
-    found: list[str] = []
-    for name in outputs:
-        try:
-            found += known.components([name])
-        except InputError:
-            found.append(name)  # another quantity, which linearise knows or names what is near
-    return tuple(found)
-
-
-def _is_absolute(effort: str | Effort, name: str) -> bool:
-    """Whether the base adds its own acceleration to an output."""
-    return isinstance(effort, str) and effort in BASE and name.endswith(f".acceleration.{effort[-1]}")
-
-
 def _as_result(
-    scene: Scene, linear: Linearisation, found: Transfer, told: str, psd: tuple[Any, ...], time: float
+    scene: Scene, linear: Linearisation, found: Transfer, words: str, psd: tuple[Any, ...], time: float
 ) -> Result:
     outputs = Axis("of", tuple(name.replace(".", " ") for name in linear.outputs))
     names = _mode_names(linear, found)
@@ -274,7 +218,7 @@ def _as_result(
         **described(scene),
         "analysis": "frequency response",
         "method": "linearised",
-        "input": told,
+        "input": words,
         "outputs": list(linear.outputs),
         "modes": names,
         "notes": [*linear.notes, *_undamped(found, psd)],
@@ -282,13 +226,6 @@ def _as_result(
         **more,
     }
     return Result(np.full(found.frequencies.size, time), quantities, {}, attributes)
-
-
-def _told(effort: Effort) -> str:
-    if isinstance(effort, JointEffort):
-        return f"{effort.joint}.{'moment' if effort.coordinate == 'angle' else 'force'}"
-    along = ",".join(f"{c:g}" for c in effort.direction)
-    return f"{effort.marker}.{'moment' if effort.moment else 'force'}:{along}"
 
 
 def _mode_names(linear: Linearisation, found: Transfer) -> list[str]:

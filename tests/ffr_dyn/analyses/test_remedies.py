@@ -71,6 +71,7 @@ from ffr_dyn.integrators import (
     tolerances,
 )
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection
+from ffr_dyn.linear.continuation import Problem, branch
 from ffr_dyn.pictures.scene_view import open_window, scene_view
 from ffr_dyn.realtime.stepper import Stepper
 from ffr_dyn.results.file import load_result
@@ -125,6 +126,65 @@ def swung(damping: float) -> Scene:
     spring = fd.JointSpring("s", "hinge", stiffness=(2 * np.pi * 1.3) ** 2 / 3, damping=damping)
     moment = Load("l", "bar.b", moment=(0, 0, harmonic(amplitude=1.0, frequency=1.3)))
     return replace(HINGED, forces=(spring,), loads=(moment,))
+
+
+SPRUNG = replace(HINGED, forces=(fd.JointSpring("s", "hinge", stiffness=100.0, damping=5.0),))
+IDLE = replace(
+    SPRUNG,
+    loads=(
+        Load("none", "bar.b"),
+        Load("looking", "bar.b", function=lambda t, state: (0.0, 0.0, 0.0)),
+    ),
+)
+SHAKEN = replace(
+    DOUBLE,
+    gravity=(0, 0, 0),
+    drivers=(Driver("d", DOUBLE.joints[0].name, 0.0),),
+    forces=(fd.JointSpring("s", DOUBLE.joints[1].name, stiffness=100.0, damping=5.0),),
+)
+
+
+def swayed(scene: Scene = SPRUNG, **how: object) -> object:
+    """Forced vibrations about the resonance."""
+    usual = {
+        "input": "hinge.moment",
+        "amplitude": 0.1,
+        "outputs": ["bar.b.position.y"],
+        "band_of": (1.0, 1.01),
+        "steps": 80,
+    }
+    if scene is SHAKEN:
+        usual["outputs"] = ["lower.b.position.y"]
+    return fd.forced(scene, **{**usual, **how})
+
+
+_HALF = np.random.default_rng(0).normal(size=(8, 8))
+_HEAVY = replace(cloud(8, stiffness=100.0), damping=2e4 * _HALF @ _HALF.T)
+LOSSY = replace(CLOUD, bodies=(Body("cloud", _HEAVY, q=np.full(8, 1e-3)),))
+
+
+def followed(slope: float, end: float = 1.0) -> object:
+    """The branch u = 1 + sin(slope p)."""
+
+    def left(u: np.ndarray, p: float) -> np.ndarray:
+        return u - 1 - np.sin(slope * p)
+
+    def derivative(u: np.ndarray, p: float, G: np.ndarray) -> np.ndarray:
+        return np.array([[1.0, -slope * np.cos(slope * p)]])
+
+    return list(branch(Problem(left, derivative, (0.0, end), 0.05, str), np.ones(1)))
+
+
+def torn(end: float) -> object:
+    """The branch u = 1 + p, which ends at p = 1/2, to where it is asked for."""
+
+    def left(u: np.ndarray, p: float) -> np.ndarray:
+        return u - 1 - p + (10.0 if p > 0.5 else 0.0) * (1.0 + u**2)
+
+    def derivative(u: np.ndarray, p: float, G: np.ndarray) -> np.ndarray:
+        return np.array([[1.0, -1.0]])
+
+    return list(branch(Problem(left, derivative, (0.0, end), 0.05, str), np.ones(1)))
 
 
 def struck(damping: float) -> Scene:
@@ -724,6 +784,38 @@ INPUT = [
         lambda: fd.response(HINGED, input="hinge.moment", outputs=["bar.b.position.x"], about="rest"),
         lambda: fd.response(HINGED, input="hinge.moment", outputs=["bar.b.position.x"], frequencies=[1.0]),
     ),
+    Case(
+        lambda: fd.response(SPRUNG, input="base.y.velocity", outputs=["bar.b.position.y"], frequencies=[0.0, 1.0]),
+        lambda: fd.response(SPRUNG, input="base.y.velocity", outputs=["bar.b.position.y"], frequencies=[0.5, 1.0]),
+    ),
+    *(
+        Case(partial(swayed, **wrong), partial(swayed, **right))
+        for wrong, right in (
+            ({"amplitude": 0.0}, {"amplitude": 0.1}),
+            ({"band_of": (0.0, 1.0)}, {"band_of": (1.0, 1.01)}),
+            ({"steps": 10}, {"steps": 80}),
+            ({"about": "steady"}, {"about": "start"}),
+            ({"outputs": []}, {"outputs": ["hinge.angle"]}),
+            ({"input": "none", "scene": IDLE}, {"input": "hinge.moment", "scene": IDLE}),
+            ({"input": "looking", "scene": IDLE}, {"input": "hinge.moment", "scene": IDLE}),
+            ({"input": "d.angle_rate", "scene": SHAKEN}, {"input": "d.angle", "scene": SHAKEN}),
+        )
+    ),
+    Case(
+        lambda: fd.Forced(input="hinge.moment", amplitude=1.0, quantities=("hinge.angle",)).perform(
+            SPRUNG, MOMENT, path=None
+        ),
+        lambda: fd.Forced(
+            input="hinge.moment", amplitude=1.0, quantities=("hinge.angle",), band="1..1.01", steps=80
+        ).perform(SPRUNG, MOMENT, path=None),
+    ),
+    Case(partial(run, LOSSY, GeneralisedAlpha(1e-3)), partial(run, LOSSY, ROS2(1e-3))),
+    Case(
+        lambda: fd.Linearise(film="m.html", mode=9).perform(TURNING, MOMENT, path=None),
+        lambda: fd.mode_motion(fd.linearise(TURNING), 0),
+    ),
+    Case(lambda: followed(200.0), lambda: followed(200.0, 0.01)),
+    Case(lambda: torn(1.0), lambda: torn(0.4)),
     Case(lambda: fd.periodic(HINGED), lambda: fd.periodic(EVENLY)),
     Case(lambda: fd.periodic(EVENLY, period=-1.0), lambda: fd.periodic(EVENLY)),
     Case(lambda: fd.periodic(EVENLY, period=0.3), lambda: fd.periodic(EVENLY)),

@@ -151,6 +151,64 @@ def test_what_stands_on_a_shaking_base_is_moved_with_it():
     np.testing.assert_allclose(found["gain"][:, 0], [1.0, np.sqrt(1 + 4 * zeta**2) / (2 * zeta)], rtol=1e-6)
 
 
+def sprung(damping: float = 2.0) -> fd.Scene:
+    """A mass of 2 kg on a rail, held by 50 N/m."""
+    mass = fd.rigid_body("m", mass=2.0, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
+    return fd.Scene(
+        (fd.Body("m", mass),),
+        (fd.Joint("rail", "translational", "ground.O", "m.c", axis=(1, 0, 0)),),
+        forces=(fd.JointSpring("spring", "rail", stiffness=50.0, damping=damping, coordinate="stroke"),),
+        ground={"O": (0, 0, 0)},
+    )
+
+
+def test_displacement_velocity_and_acceleration_of_the_base_are_transmitted_alike():
+    """T = (k + i w c) / (k + i w c - m w^2), of each to the same of the mass, and with i w to the next."""
+    f = np.array([0.1, 0.7, 0.9, 5.0])
+    s = 2j * np.pi * f
+    T = (50 + 2 * s) / (50 + 2 * s + 2 * s**2)
+    names = [f"m.c.{what}.x" for what in ("position", "velocity", "acceleration")]
+    for order, given in enumerate(("base.x.displacement", "base.x.velocity")):
+        found = fd.response(sprung(), input=given, outputs=names, frequencies=f)
+        expected = np.stack([T * s ** (k - order) for k in range(3)], axis=1)
+        np.testing.assert_allclose(found["transfer"] @ [1, 1j], expected, rtol=1e-7)
+        assert found.attributes["input"] == given
+    found = fd.response(sprung(), input="base.x", outputs=names[2:], frequencies=f)
+    np.testing.assert_allclose(found["transfer"][:, 0] @ [1, 1j], T, rtol=1e-7)
+    with pytest.raises(fd.InputError, match=r"at 0 Hz a velocity has no displacement"):
+        fd.response(sprung(), input="base.x.velocity", outputs=names, frequencies=[0.0, 1.0])
+
+
+def test_white_acceleration_of_the_base_by_miles():
+    """Mean square of the absolute acceleration: pi f_n S (1 + 4 z^2) / 4 z over all frequencies."""
+    zeta, natural, S = 2.0 / (2 * 2.0 * 5.0), 5.0 / (2 * np.pi), 0.3
+    found = fd.response(sprung(), input="base.x", outputs=["m.c.acceleration.x"], psd=((1e-3, S), (4e3, S)))
+    missing = S * (2 * zeta * natural) ** 2 / 4e3  # beyond, where |T| = 2 z f_n / f
+    whole = np.pi * natural * S * (1 + 4 * zeta**2) / (4 * zeta)
+    assert found.attributes["rms"]["m.c.acceleration.x"] == pytest.approx(np.sqrt(whole - missing), rel=2e-3)
+
+
+def test_rates_of_a_driver_are_inputs():
+    """Of its motion, its rate and its second derivative: each i w of the next."""
+    mass = fd.rigid_body("m", mass=2.0, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
+    scene = fd.Scene(
+        (fd.Body("table", mass), fd.Body("m", mass)),
+        (
+            fd.Joint("rail", "translational", "ground.O", "table.c", axis=(1, 0, 0)),
+            fd.Joint("slide", "translational", "table.c", "m.c", axis=(1, 0, 0)),
+        ),
+        (fd.Driver("shaker", "rail", 0.0, coordinate="stroke"),),
+        forces=(fd.JointSpring("spring", "slide", stiffness=50.0, damping=2.0, coordinate="stroke"),),
+        ground={"O": (0, 0, 0)},
+    )
+    f = np.array([0.1, 0.9, 5.0])
+    s = 2j * np.pi * f
+    T = (50 + 2 * s) / (50 + 2 * s + 2 * s**2)
+    for order, given in enumerate(("shaker.stroke", "shaker.stroke_rate", "shaker.stroke_acceleration")):
+        found = fd.response(scene, input=given, outputs=["m.c.acceleration.x"], frequencies=f)
+        np.testing.assert_allclose(found["transfer"][:, 0] @ [1, 1j], T * s ** (2 - order), rtol=1e-7)
+
+
 def test_what_a_driver_moves_follows_it():
     """A disc on a spring and a damper on a shaft that a motor turns: (k + i w c) / (k + i w c - J w^2), at the shaft one."""
     disc = fd.rigid_body("disc", mass=1.0, inertia=(0.1, 0.1, 0.2), points={"c": (0, 0, 0)})
@@ -249,6 +307,20 @@ def test_commands(tmp_path, words, said):
     assert done.exit_code == 0
     assert (tmp_path / "rod.nc").exists()
     assert picture.exists() == ("PICTURE" in words)
+
+
+def test_a_mode_is_drawn_and_all_are_in_the_file(tmp_path):
+    file, film = tmp_path / "rod.toml", tmp_path / "mode.html"
+    file.write_text(SCENE)
+    words = ["linearise", str(file), "--at-equilibrium", "--film", str(film), "--mode"]
+    done = CliRunner().invoke(cli, [*words, "1"], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    assert film.stat().st_size > 1000
+    kept = fd.load_result(tmp_path / "rod.nc")
+    assert kept.quantities["modes"].axes[0].labels[:4] == ("rod x", "rod y", "rod z", "rod turn x")
+    np.testing.assert_allclose(np.abs(kept["modes"][0] @ [1, 1j]).max(axis=0), 1.0)
+    with pytest.raises(fd.InputError, match=r"mode 9: the modes that are told are 1 to 1"):
+        CliRunner().invoke(cli, [*words, "9"], catch_exceptions=False, standalone_mode=False)
 
 
 KINDS = {

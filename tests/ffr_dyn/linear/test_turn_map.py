@@ -64,6 +64,26 @@ def test_multipliers_of_mathieus_equation():
     assert np.prod(values) == pytest.approx(1.0, abs=1e-7)
 
 
+def test_modes_about_a_periodic_motion_of_constant_coefficients():
+    """Exponents are the eigenvalues, also where the vibration is faster than the period; motions have their names."""
+    period = 2 * np.pi / FORCED
+    found = fd.periodic(oscillator(), period=period, method=fd.RK4(period / 1000), floquet=True)
+    expected = np.roots([2.0, 0.4, 50.0])
+    values = np.array([complex(*pair) for pair in found.attributes["exponents"]])
+    np.testing.assert_allclose(values[np.argsort(values.imag)], expected[np.argsort(expected.imag)], rtol=1e-8)
+    assert found.attributes["leading"] == ["rail.stroke"] * 2
+
+
+def test_modes_about_the_turn_of_an_engine_are_those_of_its_rod():
+    """A crank that turns slowly: the vibration of the rod, damped as it is."""
+    scene = flexible_crank(loads=())
+    found = fd.periodic(scene, floquet=True)
+    a = found.attributes
+    np.testing.assert_allclose(np.exp([complex(*pair) * a["period"] for pair in a["exponents"]]),
+                               [complex(*pair) for pair in a["multipliers"]], rtol=1e-6)  # fmt: skip
+    assert all(name.startswith("rod: ") for name in a["leading"])
+
+
 def test_a_driven_machine_ends_where_a_long_run_does():
     scene = flexible_crank(loads=())
     found = fd.periodic(scene)

@@ -14,7 +14,7 @@ from PIL import Image
 from places import MESHES
 
 from ffr_prep import cli
-from ffr_prep.body import load_body, rigid_body, save_body
+from ffr_prep.body import damped, load_body, rigid_body, save_body
 from ffr_prep.cli.options import interface_of, reference_of
 from ffr_prep.cli.terminal import Steps
 from ffr_prep.common.errors import ComputationError, InputError
@@ -85,6 +85,23 @@ def test_the_same_command_writes_the_same_bytes(body_file, tmp_path):
     for name in ("omega2", "P_dm", "rP_dm", "PP_dm"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
     assert one.provenance == two.provenance
+
+
+def test_damping_by_options(body_file, tmp_path, capsys):
+    """Rayleigh's damping, a loss factor, ratios by mode and by frequency: of body and parts, each as `damped` has it."""
+    plain = load_body(body_file)
+    base = ["reduce", *BAR, "--material", "steel", *INTERFACES, "--reference", "fixed:left", "--modes", 4]
+    cases = [
+        (["--rayleigh", "2,1e-6", "--loss-factor", "0.01"], {"alpha": 2.0, "beta": 1e-6, "loss_factor": 0.01}),
+        (["--damping", "0.01,0.02"], {"ratios": [0.01, 0.02]}),
+        (["--damping-band", "300:0.005", "--damping-band", "1e3:0.02"], {"bands": [(300, 0.005), (1000, 0.02)]}),
+    ]
+    for words, given in cases:
+        run(*base, *words, "-o", tmp_path / "d.ffr")
+        np.testing.assert_allclose(load_body(tmp_path / "d.ffr").damping, damped(plain, **given).damping, rtol=1e-12)
+    capsys.readouterr()
+    run("info", tmp_path / "d.ffr")
+    assert "damping     ratios 0.005 to 0.02 of the modes\n" in capsys.readouterr().out
 
 
 def test_report_of_a_reduction(tmp_path, capsys):
@@ -172,6 +189,14 @@ def test_pictures_of_modes(body_file, tmp_path, capsys):
 
 
 def test_modes_that_a_body_does_not_have(body_file, tmp_path, capsys):
+    reduce = ["reduce", *BAR, "--material", "steel", "-o", tmp_path / "d.ffr"]
+    assert_fails(capsys, "alpha is -1.0; damping is a number from zero", *reduce, "--rayleigh", "-1,0")
+    assert_fails(capsys, "--rayleigh 2: 2 numbers with commas", *reduce, "--rayleigh", "2")
+    assert_fails(capsys, "loss_factor is nan; damping is", *reduce, "--loss-factor", "nan")
+    assert_fails(capsys, "damping ratios are [-0.01]; give numbers from zero", *reduce, "--damping", "-0.01")
+    assert_fails(capsys, "write a frequency in Hz and a ratio, such as 100:0.005", *reduce, "--damping-band", "100")
+    bands = ["--damping-band", "9:0.1", "--damping-band", "3:0.1"]
+    assert_fails(capsys, "give frequencies in Hz that ascend", *reduce, *bands)
     assert_fails(capsys, "the body has 10 modes", "modes", body_file, "-o", tmp_path, "--modes", "11")
     assert_fails(capsys, "write numbers and ranges", "modes", body_file, "-o", tmp_path, "--modes", "first")
     assert_fails(capsys, "'big' is not a number", "modes", body_file, "-o", tmp_path, "--scale", "big")

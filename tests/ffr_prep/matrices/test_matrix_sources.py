@@ -611,6 +611,45 @@ def test_nastran_without_pynastran(tmp_path, monkeypatch, names):
         read_matrices([tmp_path / name for name in names])
 
 
+# ---- viscous damping, in every format ------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def damped_model(model) -> MatrixModel:
+    """With a dashpot between two nodes beside Rayleigh's damping."""
+    C = (2e-6 * model.K + 3.0 * model.M).tolil()
+    for i, j, sign in ((0, 0, 1), (12, 12, 1), (0, 12, -1), (12, 0, -1)):
+        C[i, j] += 40.0 * sign
+    return replace(model, C=sp.csr_array(C.tocsr()))
+
+
+def assert_damped(back: MatrixModel, model: MatrixModel) -> None:
+    orders = [np.lexsort((m.components, m.labels[m.nodes])) for m in (back, model)]
+    C, wanted = (m.C.toarray()[np.ix_(o, o)] for m, o in zip((back, model), orders, strict=True))
+    np.testing.assert_allclose(C, wanted, rtol=0, atol=1e-14 * np.abs(wanted).max())
+
+
+def test_viscous_damping_of_matrix_market_and_abaqus(damped_model, tmp_path):
+    for name in ("K", "M", "C"):
+        scipy.io.mmwrite(tmp_path / f"{name}.mtx", getattr(damped_model, name), symmetry="symmetric")
+    (tmp_path / "rows.csv").write_text(rows_csv(damped_model))
+    assert_damped(read_matrices([tmp_path / name for name in ("K.mtx", "M.mtx", "C.mtx", "rows.csv")]), damped_model)
+    stiffness, mass, deck = write_abaqus(damped_model, tmp_path)
+    (tmp_path / "DMPV.mtx").write_text(abaqus_entries(damped_model, "C"))
+    assert_damped(read_matrices([stiffness, mass, tmp_path / "DMPV.mtx", deck]), damped_model)
+
+
+def test_viscous_damping_of_nastran(damped_model):
+    found = {"KGG": damped_model.K, "MGG": damped_model.M, "BGG": damped_model.C.toarray()}
+    back = of_nastran(found, grids(damped_model))
+    assert_damped(back, damped_model)
+    assert back.source["matrices"] == "KGG, MGG, BGG"
+    notes = of_nastran({**found, "K4GG": damped_model.K}, grids(damped_model)).notes
+    assert any("structural damping, is left out: give a loss factor" in note for note in notes)
+    with pytest.raises(InputError, match="BGG has 3 rows"):
+        of_nastran({**found, "BGG": np.eye(3)}, grids(damped_model))
+
+
 # ---- the command --------------------------------------------------------------------------------------------------
 
 

@@ -167,6 +167,17 @@ def test_the_quality_of_a_structure_is_reported(tmp_path):
     assert body.provenance["quality"]["band"] == [5, 200]
 
 
+def test_damping_of_a_structure(tmp_path):
+    text = "reduction = {modes = 2}\n" + LINE.replace("elements = 2", "elements = 8")
+    plain = body_of(written(tmp_path, text))
+    entry = "damping = {rayleigh = [2.0, 1e-6], loss_factor = 0.01, ratios = [0.01], bands = [[100, 0.005]]}\n"
+    found = body_of(written(tmp_path, entry + text)).damping
+    wanted = fp.damped(plain, alpha=2.0, beta=1e-6, loss_factor=0.01, ratios=[0.01], bands=[(100, 0.005)]).damping
+    np.testing.assert_allclose(found, wanted, rtol=1e-6)
+    with pytest.raises(InputError, match=r"loss_factor is -1.0; damping is a number from zero"):
+        body_of(written(tmp_path, "damping = {loss_factor = -1}\n" + text))
+
+
 SOLID = """
 reference = {kind = "fixed", interface = "root"}
 reduction = {modes = 4}

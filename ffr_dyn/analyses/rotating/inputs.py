@@ -1,0 +1,170 @@
+"""Inputs of a frequency response in words: what acts, in which scene, and how often it is integrated to a displacement.
+
+A motion that is prescribed, of a driver or of the base, is given by its displacement (order 0), its rate (1) or its second
+derivative (2); all three act at once, so that a linear system answers it by B and D that are polynomials in i w, of degree
+two, divided by (i w)^order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ffr_dyn.analyses.efforts import Effort, JointEffort, MarkerEffort, with_function
+from ffr_dyn.analyses.linearise import BASE
+from ffr_dyn.analyses.states import scene_at
+from ffr_dyn.functions.operations import ADD, MULTIPLY
+from ffr_dyn.functions.time_functions import TimeFunction, as_time_function, is_zero, operation
+from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.scene import Scene, marker_names
+from ffr_prep.common.errors import InputError
+
+COMPONENTS = "xyz"
+EFFORTS = {"angle": "moment", "stroke": "force"}
+ORDERS = {"": 0, "_rate": 1, "_acceleration": 2}  # of a driver's motion
+OF_BASE = {"displacement": 0, "velocity": 1}  # of the base's motion, beside its acceleration
+ABSOLUTE = {"position": 0, "velocity": 1, "acceleration": 2}  # quantities of markers to which the base adds its own
+
+
+@dataclass(frozen=True)
+class Acting:
+    """An input that is understood.
+
+    effort : what acts, an effort or, by name, a load or the acceleration of the base
+    driver : whose motion it is; None where it is none's
+    order  : of a motion, and of the base's displacement or velocity
+    scene  : in which the effort is free to act: without the driver
+    """
+
+    scene: Scene
+    effort: str | Effort
+    driver: Driver | None = None
+    order: int | None = None
+
+    @property
+    def moved(self) -> tuple[str, ...]:
+        """The coordinate that the driver prescribes."""
+        return (f"{self.driver.joint}.{self.driver.coordinate}",) if self.driver else ()
+
+
+def acting(scene: Scene, given: str | Effort, time: float) -> Acting:
+    """The input. Raises InputError for words that name none."""
+    if not isinstance(given, str) or given in BASE or given in [load.name for load in scene.loads]:
+        return Acting(scene, given)
+    head, _, what = given.partition(".")
+    base, _, kind = given.rpartition(".")
+    if base in BASE and kind in OF_BASE:
+        return Acting(scene, base, order=OF_BASE[kind])
+    drivers = {d.name: d for d in scene.drivers if isinstance(d, Driver)}
+    if head in drivers and (found := _of_driver(scene, drivers[head], what, time)):
+        return found
+    joints = {joint.name for joint in scene.joints}
+    kinds = {effort: coordinate for coordinate, effort in EFFORTS.items()}
+    if head in joints and what in kinds:
+        return Acting(scene, JointEffort("input", head, kinds[what]))
+    marker, _, rest = given.rpartition(".force.") if ".force." in given else given.rpartition(".moment.")
+    if marker in marker_names(scene) and rest in COMPONENTS and len(rest) == 1:
+        direction = tuple(float(c == rest) for c in COMPONENTS)
+        return Acting(scene, MarkerEffort("input", marker, direction, moment=".moment." in given))
+    raise InputError(
+        f"input {given!r} is not understood: write joint.moment, joint.force, driver.moment, driver.angle, driver.stroke, "
+        "driver.angle_rate, body.point.force.x, body.point.moment.x, base.x, base.x.displacement, base.x.velocity, or the "
+        f"name of a load; joints are {', '.join(sorted(joints)) or 'none'}, drivers {', '.join(drivers) or 'none'}"
+    )
+
+
+def _of_driver(scene: Scene, driver: Driver, what: str, time: float) -> Acting | None:
+    """A moment or force in the place of a driver, or a change of what it prescribes; None for other words."""
+    orders = {driver.coordinate + rate: order for rate, order in ORDERS.items()}
+    if what not in orders and what != EFFORTS[driver.coordinate]:
+        return None
+    effort = JointEffort("input", driver.joint, driver.coordinate)
+    left = _released(scene, driver, time)
+    return Acting(left, effort, driver, orders[what]) if what in orders else Acting(left, effort)
+
+
+def _released(scene: Scene, driver: Driver, time: float) -> Scene:
+    """The scene without a driver, which goes on with the effort that it has."""
+    from ffr_dyn.analyses.assemble import assembly
+    from ffr_dyn.scene.forces import Actuator
+
+    held = assembly(scene, time=time)
+    effort = float(held[f"{driver.name}.effort"][0])
+    left = replace(scene_at(scene, held), drivers=tuple(d for d in scene.drivers if d is not driver))
+    if not effort:
+        return left
+    added = Actuator(f"{driver.name}_held", driver.joint, force=effort, coordinate=driver.coordinate)
+    return replace(left, forces=(*left.forces, added))
+
+
+def components(scene: Scene, outputs: Sequence[str], time: float, who: str) -> tuple[str, ...]:
+    """Every component of the outputs. InputError where there are none."""
+    from ffr_dyn.analyses.assemble import assembly
+
+    if not outputs or isinstance(outputs, str):
+        raise InputError(f"{who} needs outputs: names of quantities in a list, such as rod.tip.acceleration")
+    known = assembly(scene, time=time, outputs=("default", "*.acceleration", "*.angular_velocity", "*.a"))
+    found: list[str] = []
+    for name in outputs:
+        try:
+            found += known.components([name])
+        except InputError:
+            found.append(name)  # another quantity, which who asks for it knows, or names what is near
+    return tuple(found)
+
+
+def absolute_order(effort: str | Effort, name: str) -> int | None:
+    """Which derivative of the base's motion an output of a marker along it has as well; None of any other."""
+    if not isinstance(effort, str) or effort not in BASE:
+        return None
+    head, _, axis = name.rpartition(".")
+    return ABSOLUTE.get(head.rpartition(".")[2]) if axis == effort[-1] else None
+
+
+def told(of: Acting, given: str | Effort) -> str:
+    """The input in words, those that were given where they say it best."""
+    effort = of.effort
+    if of.driver or isinstance(effort, str):
+        return str(given)
+    if isinstance(effort, JointEffort):
+        return f"{effort.joint}.{EFFORTS[effort.coordinate]}"
+    along = ",".join(f"{c:g}" for c in effort.direction)
+    return f"{effort.marker}.{'moment' if effort.moment else 'force'}:{along}"
+
+
+# ---- as a function of time ------------------------------------------------------------------------------------------
+
+
+def excited(scene: Scene, given: Acting, wave: TimeFunction) -> Scene:
+    """The scene with the input as a function of time: an effort, the motion of a driver beside its own, the acceleration of
+    the base, or the share by which a load is changed."""
+    if (driver := given.driver) is not None:
+        added = operation(ADD, as_time_function(driver.function, "function of time"), wave)
+        drivers = tuple(replace(driver, function=added) if d is driver else d for d in scene.drivers)
+        return replace(scene, drivers=drivers)
+    if not isinstance(given.effort, str):
+        return with_function(given.scene, given.effort, wave)
+    if given.effort in BASE:
+        base = [as_time_function(f, "base_acceleration") for f in scene.base_acceleration]
+        k = BASE[given.effort]
+        base[k] = wave if is_zero(base[k]) else operation(ADD, base[k], wave)
+        return replace(scene, base_acceleration=tuple(base))
+    changed = tuple(_with_share(load, wave) if load.name == given.effort else load for load in scene.loads)
+    return replace(scene, loads=changed)
+
+
+def _with_share(load: object, wave: TimeFunction) -> object:
+    from ffr_dyn.scene.forces import Load
+
+    if not isinstance(load, Load) or load.function is not None:
+        raise InputError(f"input {getattr(load, 'name', load)!r}: only a force and a moment on a marker can be varied")
+    if all(is_zero(as_time_function(f, load.name)) for f in (*load.force, *load.moment)):
+        raise InputError(
+            f"input {load.name!r}: the load is zero, and so is every share of it; give it a force or a moment"
+        )
+    share = operation(ADD, as_time_function(1.0, "share"), wave)
+    varied = [
+        tuple(operation(MULTIPLY, as_time_function(f, load.name), share) for f in of)
+        for of in (load.force, load.moment)
+    ]
+    return replace(load, force=varied[0], moment=varied[1])
