@@ -1,4 +1,4 @@
-"""The memory of this process."""
+"""The memory of this process, and what the machine has left."""
 
 from __future__ import annotations
 
@@ -6,6 +6,11 @@ import contextlib
 import sys
 from pathlib import Path
 
+_MACHINE = Path("/proc/meminfo")
+_LIMITS = (  # of a container: most and used [bytes]
+    (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory.current")),
+    (Path("/sys/fs/cgroup/memory/memory.limit_in_bytes"), Path("/sys/fs/cgroup/memory/memory.usage_in_bytes")),
+)
 _STATUS = Path("/proc/self/status")
 _CLEAR = Path("/proc/self/clear_refs")
 _PEAK = "5"  # proc(5): writing it sets the high-water mark to the present size
@@ -33,6 +38,18 @@ def _since_the_start() -> int | None:
 
     unit = 1 if sys.platform == "darwin" else 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
+
+
+def left() -> int | None:
+    """What this process can still take without swapping [bytes]; None where that is not known (not Linux)."""
+    sizes = []
+    with contextlib.suppress(OSError, KeyError, ValueError):
+        lines = dict(line.split(":", 1) for line in _MACHINE.read_text().splitlines())
+        sizes.append(1024 * int(lines["MemAvailable"].split()[0]))
+        for most, used in _LIMITS:
+            with contextlib.suppress(OSError, ValueError):  # "max": no limit
+                sizes.append(int(most.read_text()) - int(used.read_text()))
+    return min(sizes, default=None)
 
 
 def in_words(size: int | None) -> str:

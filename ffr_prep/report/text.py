@@ -50,6 +50,7 @@ def body_lines(body: FlexibleBody) -> Iterator[str]:
     yield from _region_lines(body.provenance)
     yield from _choice_lines(body.provenance)
     yield from mode_lines(body)
+    yield from verification_lines(body.provenance)
     yield from integral_lines(body)
     yield from ability_lines(body)
     yield from part_lines(body)
@@ -143,6 +144,16 @@ def mode_lines(body: FlexibleBody) -> Iterator[str]:
     if body.n > _MOST_MODES:
         yield f"{'':9}{body.n - _MOST_MODES} more up to {body.frequencies[-1]:.6g} Hz"
     yield f"{'sum':>7}  {'':15}  " + " ".join(f"{total:7.2f}" for total in shares.sum(axis=0))
+
+
+def verification_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
+    """What was found of the normal modes, where somebody asked (`Solver.verify`)."""
+    if found := provenance.get("normal_modes"):
+        below = np.sqrt(found["below"]) / (2 * np.pi)
+        yield (
+            f"verified    {len(found['residuals'])} normal modes, residuals up to {max(found['residuals']):.1e}; by a Sturm "
+            f"count {found['counted']:.0f} lie below {below:.6g} Hz: none is missing"
+        )
 
 
 def ability_lines(body: FlexibleBody) -> Iterator[str]:
@@ -259,6 +270,7 @@ def _origin_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
             "interfaces",
             "warnings",
             "quality",
+            "normal_modes",
             "held_body",
             "regions",
             "command",

@@ -27,8 +27,10 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.progress import Advance, no_advance
 from ffr_prep.solvers.cholesky import cholesky, solve_cholesky
+from ffr_prep.solvers.inertia import modes_below
 from ffr_prep.solvers.lanczos import lowest_modes
 from ffr_prep.solvers.slepc import SlepcProcess, mpi_modes, mpi_solve, started
+from ffr_prep.solvers.verification import Verification, verified
 
 Solve = Callable[[Array], Array]
 
@@ -48,12 +50,15 @@ class Solver:
     name  : "cholesky" (this package's own), "superlu" (SciPy's, slow but with no compiled code of ours), "pardiso" (Intel
             MKL, if pypardiso is installed) or "slepc" (SLEPc and MUMPS in processes of their own, under MPI)
     ranks : processes of "slepc"
+    verify: also find the residual of every normal mode, and count by another factorisation that none is missing; both are
+            kept with the body
 
     Raises InputError for another name or number of processes.
     """
 
     name: str = "cholesky"
     ranks: int = 1
+    verify: bool = False
 
     def __post_init__(self) -> None:
         if self.name not in (*_FACTORISATIONS, "slepc"):
@@ -138,12 +143,14 @@ class FreeBody:
 
     K : (Z, Z) stiffness; T : (Z, 6) orthonormal rigid motions; solve : clamped inverse S, (Z, r) -> (Z, r)
     lowest : (supports, mass, count) -> omega2 (count,) and mass-orthonormal modes (Z, count)
+    verify : (supports, mass, omega2, modes) -> what was found of them; None where nobody asked
     """
 
     K: sp.csr_array
     T: Array
     solve: Solve
     lowest: Callable[[SupportedBody, sp.csr_array, int], tuple[Array, Array]]
+    verify: Callable[[SupportedBody, sp.csr_array, Array, Array], Verification | None]
 
 
 def free_body(
@@ -160,13 +167,14 @@ def free_body(
     _, order = scipy.linalg.qr(rigid.T, mode="r", pivoting=True)
     free = np.delete(np.arange(K.shape[0]), order[:6])
     clamped = K[free][:, free]
+    verify = partial(_looked_at, positions, advance) if solver.verify else _not_looked_at
     if solver.name != "slepc":
         solve = factorise(clamped, positions[free], solver, advance)
-        return FreeBody(K, rigid, partial(_extended, solve, free), partial(_by_lanczos, advance))
+        return FreeBody(K, rigid, partial(_extended, solve, free), partial(_by_lanczos, advance), verify)
     process = started(clamped, solver.ranks)
     solve = partial(mpi_solve, process)
     _check_regular(clamped, solve)
-    return FreeBody(K, rigid, partial(_extended, solve, free), partial(_by_slepc, process))
+    return FreeBody(K, rigid, partial(_extended, solve, free), partial(_by_slepc, process), verify)
 
 
 def _extended(solve_free: Solve, free: Array, load: Array) -> Array:
@@ -176,16 +184,31 @@ def _extended(solve_free: Solve, free: Array, load: Array) -> Array:
     return displacement
 
 
-def _by_lanczos(advance: Advance, held: SupportedBody, M: sp.csr_array, count: int) -> tuple[Array, Array]:
-    def flexibility(loads: Array) -> Array:
-        return solve_supported(held, loads, np.zeros((len(held.C), loads.shape[1])))[0]
+def _flexibility(held: SupportedBody) -> Solve:
+    return lambda loads: solve_supported(held, loads, np.zeros((len(held.C), loads.shape[1])))[0]
 
+
+def _by_lanczos(advance: Advance, held: SupportedBody, M: sp.csr_array, count: int) -> tuple[Array, Array]:
     start = np.random.default_rng(0).standard_normal((M.shape[0], _BLOCK))
-    return lowest_modes(flexibility, M, start, count, most=20 * count + 300, advance=advance)
+    return lowest_modes(_flexibility(held), M, start, count, most=20 * count + 300, advance=advance)
 
 
 def _by_slepc(process: SlepcProcess, held: SupportedBody, M: sp.csr_array, count: int) -> tuple[Array, Array]:
     return mpi_modes(process, held.body.K, M, held.C, count)
+
+
+def _looked_at(
+    positions: Array, advance: Advance, held: SupportedBody, M: sp.csr_array, omega2: Array, vectors: Array
+) -> Verification:
+    def count(sigma: float) -> int:
+        told: Advance = lambda share, words: advance(share, f"{words} for the count of modes")  # noqa: E731
+        return modes_below(held.body.K, M, held.C, positions, sigma, told)
+
+    return verified(_flexibility(held), M, count, omega2, vectors)
+
+
+def _not_looked_at(held: SupportedBody, M: sp.csr_array, omega2: Array, vectors: Array) -> None:
+    """Nobody asked."""
 
 
 # ---- supports -----------------------------------------------------------------------------------------------------
