@@ -17,6 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.process_memory import check_memory, in_words
 from ffr_prep.common.progress import Advance, no_advance
 from ffr_prep.solvers.multifrontal import (
     DONE,
@@ -29,6 +30,7 @@ from ffr_prep.solvers.multifrontal import (
     diagonal_tile,
     eliminate_branch,
     forward,
+    most_waiting,
     panel_of,
     row_tile,
     shape,
@@ -39,6 +41,10 @@ from ffr_prep.solvers.threads import Map, threads
 
 _BRANCHES = 24  # a branch has at most this part of the work
 _TILE = 384
+LESS = (
+    "take a coarser mesh, cut the body into parts, or reduce it where there is more memory, on several machines with the "
+    "solver slepc"
+)
 
 
 @dataclass(frozen=True)
@@ -79,10 +85,13 @@ def cholesky(A: sp.csr_array, positions: Array, advance: Advance = no_advance) -
                 coordinates of a rigid interface, which are eliminated last
     advance   : called as the elimination proceeds, with the share of its operations
 
-    Raises numpy.linalg.LinAlgError when A is not positive definite.
+    Raises numpy.linalg.LinAlgError when A is not positive definite, InputError when the machine has too little memory.
     """
     analysis = analysed(A, positions)
     matrix, division = analysis.matrix, analysis.division
+    factor = 8 * int(analysis.fronts.offsets[-1])
+    check_memory(factor + waiting(analysis), f"factorising the stiffness of {len(matrix.order)} unknowns", LESS)
+    advance(0.0, f"the factor takes {in_words(factor)}")
     fronts = analysis.fronts._replace(panels=np.zeros(analysis.fronts.offsets[-1]))
     with threads() as each:
         _eliminate_all(fronts, division, matrix, each, progress_of(analysis, advance))
@@ -174,6 +183,19 @@ def _private_rows(fronts: Fronts, branches: Array) -> tuple[Array, Array]:
 
 
 # ---- elimination --------------------------------------------------------------------------------------------------
+
+
+def waiting(analysis: Analysis) -> int:
+    """Bytes of the updates that wait for their fronts, at most: of two branches at work, and of all at their ends."""
+    fronts, division = analysis.fronts, analysis.division
+    squares = np.diff(fronts.ends) ** 2
+    pending, places = np.empty(len(squares) + 1, np.int64), np.zeros(len(squares) + 2, np.int64)
+    inside = sorted(most_waiting(fronts, first, last, pending, places) for first, last in division.branches)[-2:]
+    height = most = int(sum(squares[last] for _, last in division.branches))
+    for k in division.trunk:
+        most = max(most, height + int(squares[k]))
+        height += int(squares[k] - squares[division.below[k]].sum())
+    return 8 * (most + int(sum(inside)))
 
 
 @dataclass

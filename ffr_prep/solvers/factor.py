@@ -25,8 +25,9 @@ from scipy.sparse.linalg import splu
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.process_memory import check_memory
 from ffr_prep.common.progress import Advance, no_advance
-from ffr_prep.solvers.cholesky import cholesky, solve_cholesky
+from ffr_prep.solvers.cholesky import LESS, cholesky, solve_cholesky
 from ffr_prep.solvers.inertia import modes_below
 from ffr_prep.solvers.lanczos import lowest_modes
 from ffr_prep.solvers.slepc import SlepcProcess, mpi_modes, mpi_solve, started
@@ -37,6 +38,7 @@ Solve = Callable[[Array], Array]
 _SINGULAR = 1e13
 _SCALING_SWEEPS = 10
 _BLOCK = 8
+_VECTORS = 3  # that a search has for each mode, about
 _REMEDY = "look for parts joined by a single node or edge, or materials of extremely different stiffness"
 
 
@@ -189,6 +191,8 @@ def _flexibility(held: SupportedBody) -> Solve:
 
 
 def _by_lanczos(advance: Advance, held: SupportedBody, M: sp.csr_array, count: int) -> tuple[Array, Array]:
+    space = 8 * M.shape[0] * _VECTORS * (count + 2 * _BLOCK)
+    check_memory(space, f"the search for {count} normal modes of {M.shape[0]} unknowns", f"ask for fewer modes; or {LESS}")
     start = np.random.default_rng(0).standard_normal((M.shape[0], _BLOCK))
     return lowest_modes(_flexibility(held), M, start, count, most=20 * count + 300, advance=advance)
 

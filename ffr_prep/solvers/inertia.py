@@ -23,8 +23,9 @@ import scipy.sparse as sp
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.compile_cache import check_compiled_code
+from ffr_prep.common.process_memory import check_memory
 from ffr_prep.common.progress import Advance, no_advance
-from ffr_prep.solvers.cholesky import Analysis, add_tiled, analysed, finish, progress_of, tiles
+from ffr_prep.solvers.cholesky import LESS, Analysis, add_tiled, analysed, finish, progress_of, tiles, waiting
 from ffr_prep.solvers.multifrontal import (
     INTEGERS,
     LETTERS,
@@ -75,6 +76,7 @@ def negative_eigenvalues(A: sp.csr_array, positions: Array, advance: Advance = n
     """Number of negative eigenvalues of the regular symmetric A (n, n); the others as of `modes_below`."""
     analysis = analysed(A, positions)
     matrix, fronts, division = analysis.matrix, analysis.fronts, analysis.division
+    check_memory(waiting(analysis), f"the count of modes of {len(matrix.order)} unknowns", LESS)
     elimination, updates, total = progress_of(analysis, advance), {}, 0
     with threads() as each:
         found = each(lambda branch: _count_branch(fronts, branch[0], branch[1], matrix), division.branches)
