@@ -30,7 +30,7 @@ from ffr_prep.common.progress import Advance, no_advance
 from ffr_prep.solvers.cholesky import LESS, cholesky, solve_cholesky
 from ffr_prep.solvers.inertia import modes_below
 from ffr_prep.solvers.lanczos import lowest_modes
-from ffr_prep.solvers.slepc import SlepcProcess, mpi_modes, mpi_solve, started
+from ffr_prep.solvers.slepc import SlepcProcess, mpi_count, mpi_modes, mpi_solve, pencil, started
 from ffr_prep.solvers.verification import Verification, verified
 
 Solve = Callable[[Array], Array]
@@ -139,6 +139,9 @@ def _check_regular(A: sp.csr_array, solve: Solve) -> None:
         raise ComputationError(f"the stiffness matrix is singular (condition above {growth:.1e}); {_REMEDY}")
 
 
+Verify = Callable[["SupportedBody", sp.csr_array, Array, Array], Verification | None]
+
+
 @dataclass(frozen=True)
 class FreeBody:
     """A free body, ready to be solved under any support.
@@ -152,7 +155,7 @@ class FreeBody:
     T: Array
     solve: Solve
     lowest: Callable[[SupportedBody, sp.csr_array, int], tuple[Array, Array]]
-    verify: Callable[[SupportedBody, sp.csr_array, Array, Array], Verification | None]
+    verify: Verify
 
 
 def free_body(
@@ -169,14 +172,14 @@ def free_body(
     _, order = scipy.linalg.qr(rigid.T, mode="r", pivoting=True)
     free = np.delete(np.arange(K.shape[0]), order[:6])
     clamped = K[free][:, free]
-    verify = partial(_looked_at, positions, advance) if solver.verify else _not_looked_at
     if solver.name != "slepc":
         solve = factorise(clamped, positions[free], solver, advance)
-        return FreeBody(K, rigid, partial(_extended, solve, free), partial(_by_lanczos, advance), verify)
+        count = partial(_counted, positions, advance)
+        return FreeBody(K, rigid, partial(_extended, solve, free), partial(_by_lanczos, advance), _look(solver, count))
     process = started(clamped, solver.ranks)
     solve = partial(mpi_solve, process)
     _check_regular(clamped, solve)
-    return FreeBody(K, rigid, partial(_extended, solve, free), partial(_by_slepc, process), verify)
+    return FreeBody(K, rigid, partial(_extended, solve, free), partial(_by_slepc, process), _look(solver, partial(_mpi_counted, process)))
 
 
 def _extended(solve_free: Solve, free: Array, load: Array) -> Array:
@@ -198,21 +201,37 @@ def _by_lanczos(advance: Advance, held: SupportedBody, M: sp.csr_array, count: i
 
 
 def _by_slepc(process: SlepcProcess, held: SupportedBody, M: sp.csr_array, count: int) -> tuple[Array, Array]:
-    return mpi_modes(process, held.body.K, M, held.C, count)
+    made = pencil(process, held.body.K, M, held.C, held.body.T)
+    return mpi_modes(process, made, M, count, _about_the_lowest(held, M))
 
 
-def _looked_at(
-    positions: Array, advance: Advance, held: SupportedBody, M: sp.csr_array, omega2: Array, vectors: Array
-) -> Verification:
-    def count(sigma: float) -> int:
-        told: Advance = lambda share, words: advance(share, f"{words} for the count of modes")  # noqa: E731
-        return modes_below(held.body.K, M, held.C, positions, sigma, told)
+def _about_the_lowest(held: SupportedBody, M: sp.csr_array) -> float:
+    """omega2 of about the lowest mode, by inverse iteration."""
+    x = np.random.default_rng(0).standard_normal((M.shape[0], 1))
+    for _ in range(2):
+        momenta = M @ x
+        x = _flexibility(held)(momenta)
+    return float(np.vdot(x, momenta) / np.vdot(x, M @ x))
 
-    return verified(_flexibility(held), M, count, omega2, vectors)
+
+def _look(solver: Solver, count: Callable[[SupportedBody, sp.csr_array, float], int]) -> Verify:
+    """Verifies modes, with this count of those below a squared frequency, where the solver says so."""
+
+    def look(held: SupportedBody, M: sp.csr_array, omega2: Array, vectors: Array) -> Verification:
+        return verified(_flexibility(held), M, partial(count, held, M), omega2, vectors)
+
+    return look if solver.verify else lambda *_: None
 
 
-def _not_looked_at(held: SupportedBody, M: sp.csr_array, omega2: Array, vectors: Array) -> None:
-    """Nobody asked."""
+def _counted(positions: Array, advance: Advance, held: SupportedBody, M: sp.csr_array, sigma: float) -> int:
+    def told(share: float, words: str) -> None:
+        advance(share, f"{words} for the count of modes")
+
+    return modes_below(held.body.K, M, held.C, positions, sigma, told)
+
+
+def _mpi_counted(process: SlepcProcess, held: SupportedBody, M: sp.csr_array, sigma: float) -> int:
+    return mpi_count(process, pencil(process, held.body.K, M, held.C, held.body.T), sigma)
 
 
 # ---- supports -----------------------------------------------------------------------------------------------------
