@@ -179,7 +179,13 @@ def free_body(
     process = started(clamped, solver.ranks)
     solve = partial(mpi_solve, process)
     _check_regular(clamped, solve)
-    return FreeBody(K, rigid, partial(_extended, solve, free), partial(_by_slepc, process), _look(solver, partial(_mpi_counted, process)))
+    return FreeBody(
+        K,
+        rigid,
+        partial(_extended, solve, free),
+        partial(_by_slepc, process),
+        _look(solver, partial(_mpi_counted, process)),
+    )
 
 
 def _extended(solve_free: Solve, free: Array, load: Array) -> Array:
@@ -195,7 +201,9 @@ def _flexibility(held: SupportedBody) -> Solve:
 
 def _by_lanczos(advance: Advance, held: SupportedBody, M: sp.csr_array, count: int) -> tuple[Array, Array]:
     space = 8 * M.shape[0] * _VECTORS * (count + 2 * _BLOCK)
-    check_memory(space, f"the search for {count} normal modes of {M.shape[0]} unknowns", f"ask for fewer modes; or {LESS}")
+    check_memory(
+        space, f"the search for {count} normal modes of {M.shape[0]} unknowns", f"ask for fewer modes; or {LESS}"
+    )
     start = np.random.default_rng(0).standard_normal((M.shape[0], _BLOCK))
     return lowest_modes(_flexibility(held), M, start, count, most=20 * count + 300, advance=advance)
 

@@ -69,9 +69,7 @@ def external(library: str, name: str, *arguments: types.Type) -> Any:
 _dgemm = external(
     "blas", "dgemm", *[LETTERS] * 2, *[INTEGERS] * 3, *[REALS] * 2, INTEGERS, REALS, INTEGERS, *[REALS] * 2, INTEGERS
 )  # fmt: skip
-_dsyrk = external(
-    "blas", "dsyrk", *[LETTERS] * 2, *[INTEGERS] * 2, *[REALS] * 2, INTEGERS, *[REALS] * 2, INTEGERS
-)
+_dsyrk = external("blas", "dsyrk", *[LETTERS] * 2, *[INTEGERS] * 2, *[REALS] * 2, INTEGERS, *[REALS] * 2, INTEGERS)
 _dtrsm = external("blas", "dtrsm", *[LETTERS] * 4, *[INTEGERS] * 2, *[REALS] * 2, INTEGERS, REALS, INTEGERS)
 _dpotrf = external("lapack", "dpotrf", LETTERS, INTEGERS, REALS, INTEGERS, INTEGERS)
 

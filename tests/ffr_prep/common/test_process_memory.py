@@ -30,5 +30,7 @@ def test_what_is_left_is_the_least_of_machine_and_container(monkeypatch, tmp_pat
 
 def test_a_factor_that_the_machine_cannot_hold_is_refused(monkeypatch, tmp_path):
     machine(monkeypatch, tmp_path, meminfo="MemAvailable: 1 kB\n")
-    with pytest.raises(InputError, match=r"factorising the stiffness of 30 unknowns takes .* GiB of memory and the machine"):
+    with pytest.raises(
+        InputError, match=r"factorising the stiffness of 30 unknowns takes .* GiB of memory and the machine"
+    ):
         cholesky(sp.csr_array(np.eye(30) + 0.01), np.arange(90.0).reshape(30, 3))

@@ -56,7 +56,9 @@ def test_square_beams_may_be_cut_between_two_modes_of_equal_frequency(model):
 def test_a_missing_mode_is_noticed(model):
     held, M, omega2, modes = searched(model, 30)
     kept = np.delete(np.arange(30), 7)
-    with pytest.raises(ComputationError, match=r"normal modes lie below .* Hz and the search has found .* of them: ask for"):
+    with pytest.raises(
+        ComputationError, match=r"normal modes lie below .* Hz and the search has found .* of them: ask for"
+    ):
         held.body.verify(held, M, omega2[kept], modes[:, kept])
 
 
@@ -69,7 +71,9 @@ def test_a_wrong_mode_is_noticed(model):
 
 @pytest.mark.parametrize("reduction", [CraigBampton(20), Eigenmodes(20)])
 def test_the_body_keeps_what_was_found(model, reduction):
-    body = fp.reduce(model, fp.Request(name="b", reference=MeanAxis(), reduction=reduction, linear=True, solver=VERIFIED))
+    body = fp.reduce(
+        model, fp.Request(name="b", reference=MeanAxis(), reduction=reduction, linear=True, solver=VERIFIED)
+    )
     kept = body.provenance["normal_modes"]
     assert len(kept["residuals"]) == 20
     assert 18 <= kept["counted"] <= 20
