@@ -31,6 +31,7 @@ from ffr_prep.solvers import slepc_process
 
 _PYTHON = "/usr/bin/python3"
 _HOMES = {"SLEPC_DIR": "/usr/lib/slepcdir", "PETSC_DIR": "/usr/lib/petscdir"}
+_EXPORTED = (*_HOMES, "PYTHONPATH", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
 _INSTALL = "apt-get install python3-slepc4py-real libopenblas0-pthread openmpi-bin"
 _PATIENCE = 60.0
 _GRACE = 3.0
@@ -173,7 +174,8 @@ def _command(ranks: int) -> list[str]:
     if mpirun is None or not Path(_PYTHON).is_file() or not all(_home(name) for name in _HOMES):
         raise InputError(f"solver 'slepc' needs SLEPc, PETSc and MPI of the system; on Debian: {_INSTALL}")
     # By its path, so that it also runs where the package is not installed; -P keeps its folder off sys.path.
-    return [mpirun, "-n", str(ranks), _PYTHON, "-P", slepc_process.__file__]
+    exported = [word for name in _EXPORTED for word in ("-x", name)]  # to ranks on other machines
+    return [mpirun, "-n", str(ranks), *exported, _PYTHON, "-P", slepc_process.__file__]
 
 
 def _environment() -> dict[str, str]:
