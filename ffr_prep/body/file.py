@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
-from zipfile import is_zipfile
+from zipfile import ZIP_DEFLATED, ZipFile, is_zipfile
 
 import numpy as np
 
@@ -30,6 +30,7 @@ MAGIC = "ffr-body"
 # 2 adds stress modes and section forces, 3 the parts of a body that is cut, 4 a damping matrix. Files of before are read as
 # bodies without them, and a body without parts and damping is written as before.
 WHOLE, IN_PARTS, DAMPED = 2, 3, 4
+_LEVEL = 3  # of compression: a third of the time of zlib's own level, for files a twentieth larger
 
 
 def content_hash(*arrays: Array) -> str:
@@ -88,8 +89,10 @@ def _described(body: FlexibleBody) -> dict[str, Any]:
 
 def save_arrays(arrays: Mapping[str, Any], path: Path) -> Path:
     """Write a compressed .npz file that appears only when it is complete; errors as in `replacing`."""
-    with replacing(path) as part, open(part, "wb") as stream:
-        np.savez_compressed(stream, **arrays)
+    with replacing(path) as part, ZipFile(part, "w", ZIP_DEFLATED, compresslevel=_LEVEL) as archive:
+        for name, array in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as stream:
+                np.lib.format.write_array(stream, np.asanyarray(array), allow_pickle=False)
     return path
 
 

@@ -35,6 +35,11 @@ SOLVER = bundle(
         help="What factorises and finds modes: docs/size.md tells when another than our own serves.",
     ),
     click.option("--ranks", type=int, default=1, show_default=True, help="MPI processes of the solver slepc."),
+    click.option(
+        "--verify-modes",
+        is_flag=True,
+        help="Also find the residual of every normal mode and count, by a second factorisation, that none is missing.",
+    ),
 )
 WORDS = "ffr_prep.words"  # of the command that runs, in its context
 PARTS = (
@@ -79,7 +84,7 @@ def solver_of(options: Mapping[str, Any]) -> Solver:
     """The solver of the options SOLVER; InputError for ranks that cannot be."""
     from ffr_prep.solvers.factor import Solver
 
-    return Solver(options["solver"], options["ranks"])
+    return Solver(options["solver"], options["ranks"], options["verify_modes"])
 
 
 def request_of(options: Mapping[str, Any]) -> tuple[Sequence[InterfaceRegion], Request]:

@@ -1,4 +1,4 @@
-"""The memory of this process."""
+"""The memory of this process, and what the machine has left."""
 
 from __future__ import annotations
 
@@ -6,6 +6,10 @@ import contextlib
 import sys
 from pathlib import Path
 
+from ffr_prep.common.errors import InputError
+
+_MACHINE = Path("/proc/meminfo")
+_CONTAINER = Path("/sys/fs/cgroup")
 _STATUS = Path("/proc/self/status")
 _CLEAR = Path("/proc/self/clear_refs")
 _PEAK = "5"  # proc(5): writing it sets the high-water mark to the present size
@@ -33,6 +37,28 @@ def _since_the_start() -> int | None:
 
     unit = 1 if sys.platform == "darwin" else 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
+
+
+def left() -> int | None:
+    """What this process can still take without swapping [bytes]; None where that is not known (not Linux)."""
+    sizes = []
+    with contextlib.suppress(OSError, KeyError, ValueError):
+        lines = dict(line.split(":", 1) for line in _MACHINE.read_text().splitlines())
+        sizes.append(1024 * int(lines["MemAvailable"].split()[0]))
+    with contextlib.suppress(OSError, KeyError, ValueError):  # of a container; "max" is no limit
+        most, used = (int((_CONTAINER / f"memory.{name}").read_text()) for name in ("max", "current"))
+        of_use = dict(line.split() for line in (_CONTAINER / "memory.stat").read_text().splitlines())
+        sizes.append(most - used + int(of_use["inactive_file"]))
+    return min(sizes, default=None)
+
+
+def check_memory(size: float, what: str, remedy: str) -> None:
+    """InputError where the machine has not the size [bytes] left that a computation is going to take."""
+    there = left()
+    if there is not None and size > there:
+        raise InputError(
+            f"{what} takes {in_words(int(size))} of memory and the machine has {in_words(there)} left: {remedy}"
+        )
 
 
 def in_words(size: int | None) -> str:

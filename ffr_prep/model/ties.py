@@ -25,7 +25,11 @@ def tied_rows(count: int, free: Array, following: Sequence[tuple[Array, Array]])
         rows.append(np.repeat(own, 6))
         columns.append(np.tile(free.size + 6 * k + np.arange(6), own.size))
         values.append(motion.ravel())
-    triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    places = (
+        np.concatenate(rows).astype(np.int32),
+        np.concatenate(columns).astype(np.int32),
+    )  # K takes over their type
+    triplets = (np.concatenate(values), places)
     return sp.csr_array(sp.coo_array(triplets, shape=(count, free.size + 6 * len(following))))
 
 

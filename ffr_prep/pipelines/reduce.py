@@ -244,7 +244,7 @@ def record(model: Model, request: Request, doubts: Sequence[str]) -> dict[str, A
         "reduction": described(request.reduction),
         "versions": {package: version(package) for package in model.packages},
         "warnings": [*model.record.get("warnings", []), *doubts],
-        "solver": described(request.solver),
+        "solver": {key: value for key, value in described(request.solver).items() if key != "verify"},
     }
     recovered = {"stress": model.recovery} if request.stress else {}
     return of_model | recovered | dict(request.provenance)

@@ -25,6 +25,7 @@ from ffr_prep.common.progress import Advance, no_advance
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.reference import body_length, free_rigid_motions, motion_in_words
 from ffr_prep.solvers.factor import CHOLESKY, FreeBody, Solver, free_body
+from ffr_prep.solvers.verification import Verification
 
 _TIE = 1e-6
 _EQUAL = 1e-8  # relative difference of squared frequencies that are meant to be equal: rounding, not the mesh
@@ -41,6 +42,7 @@ class Basis:
 
     dropped  : number of proposed vectors that depended on the others
     warnings : what makes the basis doubtful, in words
+    verification : of the normal modes among the vectors, where it was asked for
 
     >>> basis.omega2  # of what a reduction's `basis` returned
     """
@@ -49,6 +51,7 @@ class Basis:
     omega2: Array
     dropped: int = 0
     warnings: tuple[str, ...] = ()
+    verification: Verification | None = None
 
 
 class Reduction(Protocol):

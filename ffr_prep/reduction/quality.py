@@ -216,12 +216,14 @@ def _steady_warnings(displacement: Array) -> tuple[str, ...]:
 
 
 def completed(provenance: Mapping[str, Any], basis: Basis, quality: Quality | None) -> dict[str, Any]:
-    """The provenance with what the reduction found: dropped vectors, warnings, and the quality, as JSON values."""
+    """The provenance with what the reduction found: dropped vectors, warnings, verification, quality; JSON values."""
     found = dict(provenance)
     warnings = [*found.get("warnings", []), *basis.warnings, *(quality.warnings if quality else ())]
     found["warnings"] = list(dict.fromkeys(warnings))
     if basis.dropped:
         found["dropped_vectors"] = basis.dropped
+    if basis.verification is not None:
+        found["normal_modes"] = {key: _plain(value) for key, value in vars(basis.verification).items()}
     if quality is not None:
         found["quality"] = {key: _plain(value) for key, value in vars(quality).items() if key != "warnings"}
     return found

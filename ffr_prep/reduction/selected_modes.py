@@ -32,10 +32,16 @@ def selected(
     if isinstance(selection, UpTo):
         omega2, modes = modes_up_to(model, held, selection.frequency)
         warnings = resolution_warnings(model, omega2, modes, selection.frequency)
-        return replace(with_modes(omega2, modes), warnings=warnings)
+        return _verified(model, held, replace(with_modes(omega2, modes), warnings=warnings), omega2, modes)
     if isinstance(selection, Accuracy):
         return _accurate(model, body, held, selection, with_modes)
-    return with_modes(*normal_modes(model, held, selection))
+    omega2, modes = normal_modes(model, held, selection)
+    return _verified(model, held, with_modes(omega2, modes), omega2, modes)
+
+
+def _verified(model: CoupledModel, held: SupportedBody, basis: Basis, omega2: Array, modes: Array) -> Basis:
+    """The basis with what was found of its normal modes, where there are any and somebody asked."""
+    return replace(basis, verification=held.body.verify(held, model.M, omega2, modes)) if omega2.size else basis
 
 
 def _accurate(
@@ -72,4 +78,5 @@ def _accurate(
             enough, best = count, basis
         else:
             few = count
-    return replace(best, warnings=resolution_warnings(model, omega2, modes, wanted.band.high))
+    best = replace(best, warnings=resolution_warnings(model, omega2, modes, wanted.band.high))
+    return _verified(model, held, best, omega2[:enough], modes[:, :enough])

@@ -51,6 +51,7 @@ def body_lines(body: FlexibleBody) -> Iterator[str]:
     yield from _choice_lines(body.provenance)
     yield from mode_lines(body)
     yield from damping_lines(body)
+    yield from verification_lines(body.provenance)
     yield from integral_lines(body)
     yield from ability_lines(body)
     yield from part_lines(body)
@@ -156,6 +157,16 @@ def damping_lines(body: FlexibleBody) -> Iterator[str]:
     beside = np.abs(body.damping - np.diag(rates)).max(initial=0.0)
     coupled = ", coupled with each other" if beside > _NOISE * rates.max() else ""
     yield f"damping     ratios {ratios.min():.3g} to {ratios.max():.3g} of the modes{coupled}"
+
+
+def verification_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
+    """What was found of the normal modes, where somebody asked (`Solver.verify`)."""
+    if found := provenance.get("normal_modes"):
+        below = np.sqrt(found["below"]) / (2 * np.pi)
+        yield (
+            f"verified    {len(found['residuals'])} normal modes, residuals up to {max(found['residuals']):.1e}; by a Sturm "
+            f"count {found['counted']:.0f} lie below {below:.6g} Hz: none is missing"
+        )
 
 
 def ability_lines(body: FlexibleBody) -> Iterator[str]:
@@ -272,6 +283,7 @@ def _origin_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
             "interfaces",
             "warnings",
             "quality",
+            "normal_modes",
             "held_body",
             "regions",
             "command",

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -22,6 +23,7 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.mesh import Mesh
 from ffr_prep.mesh.shapes import determinants, local_order, mapping, scalar_basis
 from ffr_prep.model.material import AnisotropicMaterial, Material, Solid
+from ffr_prep.solvers.threads import ahead
 
 Materials = Solid | Mapping[str, Solid]
 
@@ -48,19 +50,25 @@ def assemble(mesh: Mesh, material: Materials) -> SolidMatrices:
     """
     pattern = _pattern(mesh)
     K, m = np.zeros((3, 3, pattern.nnz)), np.zeros(pattern.nnz)
-    for chunk in chunks(mesh, material):
-        elements = mass_form(chunk.material.rho).elemental(_basis(mesh.points, chunk, MASS_ORDER))
-        places = np.asarray(pattern[tuple(elements.indices)]).ravel()
-        np.add.at(m, places, elements.data)
-        basis, C = _basis(mesh.points, chunk, STIFFNESS_ORDER), chunk.material.elasticity_tensor()
-        for i, j in zip(*np.tril_indices(3), strict=True):
-            np.add.at(K[i, j], places, stiffness_form(C[i, :, j]).elemental(basis).data)
+    for nodes, mass, stiffness in ahead(partial(_of_chunk, mesh.points), chunks(mesh, material)):
+        places = np.asarray(pattern[tuple(nodes)]).ravel()
+        np.add.at(m, places, mass)
+        for i, j, of_block in zip(*np.tril_indices(3), stiffness, strict=True):
+            np.add.at(K[i, j], places, of_block)
     mirrored = pattern.T.tocsr().data
     for i, j in zip(*np.tril_indices(3, -1), strict=True):
         K[j, i] = K[i, j, mirrored]
     return SolidMatrices(
         _from_blocks(pattern, K), sp.csr_array((m, pattern.indices, pattern.indptr), shape=pattern.shape)
     )
+
+
+def _of_chunk(points: Array, chunk: Chunk) -> tuple[Array, Array, list[Array]]:
+    """Pairs of nodes (2, e k k), and for each its mass and the six blocks K_ij, i >= j, of its stiffness."""
+    mass = mass_form(chunk.material.rho).elemental(_basis(points, chunk, MASS_ORDER))
+    basis, C = _basis(points, chunk, STIFFNESS_ORDER), chunk.material.elasticity_tensor()
+    blocks = zip(*np.tril_indices(3), strict=True)
+    return mass.indices, mass.data, [stiffness_form(C[i, :, j]).elemental(basis).data for i, j in blocks]
 
 
 def stiffness_form(C: Array) -> skfem.BilinearForm:
@@ -76,14 +84,20 @@ def mass_form(rho: float) -> skfem.BilinearForm:
 
 def vector_mass(m: sp.sparray) -> sp.csr_array:
     """M = m (x) I_3, (3N, 3N) [kg]: the mass of the three displacement components."""
-    return sp.csr_array(sp.kron(m, sp.eye_array(3), format="csr"))
+    m = sp.csr_array(m)
+    counts = np.repeat(np.diff(m.indptr), 3)
+    ends = np.concatenate([[0], np.cumsum(counts)])
+    entry = np.arange(ends[-1]) - np.repeat(ends[:-1] - np.repeat(m.indptr[:-1], 3), counts)
+    component = np.repeat(np.tile(np.arange(3, dtype=m.indices.dtype), m.shape[0]), counts)
+    arrays = (m.data[entry], 3 * m.indices[entry] + component, ends.astype(m.indptr.dtype))
+    return sp.csr_array(arrays, shape=(3 * m.shape[0], 3 * m.shape[1]))
 
 
 def _pattern(mesh: Mesh) -> sp.csr_array:
     """(N, N) nodes that share an element: the number of each pair, row by row."""
     sizes = np.concatenate([np.full(len(block.nodes), block.nodes.shape[1]) for block in mesh.blocks])
-    nodes = np.concatenate([block.nodes.ravel() for block in mesh.blocks])
-    ends = np.concatenate([[0], np.cumsum(sizes)])
+    nodes = np.concatenate([block.nodes.ravel() for block in mesh.blocks]).astype(np.int32)  # half of what numpy takes
+    ends = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int32)
     incidence = sp.csr_array((np.ones(nodes.size), nodes, ends), shape=(sizes.size, len(mesh.points)))
     pattern = sp.csr_array(incidence.T @ incidence)
     pattern.sort_indices()

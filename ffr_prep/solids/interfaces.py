@@ -34,14 +34,15 @@ def couple(mesh: Mesh, matrices: SolidMatrices, interfaces: Sequence[InterfaceRe
     B = _transformation(mesh.points, regions)
     C = interface_coordinates(list(map(_follows, regions)), B, lambda k: _on_nodes(len(mesh.points), regions[k]))
     check_independent(interfaces, C)
-    K = sp.csr_array(B.T @ matrices.K @ B)
+    free = np.flatnonzero(np.repeat(_free_nodes(mesh.points, regions), 3))
+    K = _tied(matrices.K, B, free)
     _check_connected(K)
     centre = mesh.points.mean(axis=0)
     return CoupledModel(
         points=mesh.points,
         B=B,
         K=K,
-        M=sp.csr_array(B.T @ vector_mass(matrices.m) @ B),
+        M=_tied(vector_mass(matrices.m), B, free),
         T=_rigid_motions(mesh.points, centre, regions),
         centre=centre,
         places=_places(mesh.points, regions),
@@ -50,6 +51,16 @@ def couple(mesh: Mesh, matrices: SolidMatrices, interfaces: Sequence[InterfaceRe
         positions=np.array([region.point for region in regions]).reshape(-1, 3),
         C=C,
     )
+
+
+def _tied(A: sp.csr_array, B: sp.csr_array, free: Array) -> sp.csr_array:
+    """B^T A B for a symmetric A; the free rows of B are the first columns as they are."""
+    following = sp.csr_array(B[:, free.size :])
+    along = sp.csr_array(A @ following)
+    across = along[free]
+    own, corner = A[free][:, free], sp.csr_array(following.T @ along)
+    rows = [sp.hstack([own, across], format="csr"), sp.hstack([sp.csr_array(across.T), corner], format="csr")]
+    return sp.csr_array(sp.vstack(rows, format="csr"))
 
 
 def turning_regions(
@@ -219,7 +230,7 @@ def _check_overlaps(regions: Sequence[_Region]) -> None:
 
 
 def _check_connected(K: sp.csr_array) -> None:
-    parts, labels = connected_components(K, directed=False)
+    parts, labels = connected_components(K, connection="strong")  # without a transpose, which K is itself
     if parts > 1:
         sizes = np.sort(np.bincount(labels))[::-1]
         listed = ", ".join(str(size) for size in sizes[:5])

@@ -13,8 +13,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ffr_prep.body import Surface
 from ffr_prep.common.arrays import Array
-from ffr_prep.mesh.mesh import Mesh
+from ffr_prep.mesh.mesh import Mesh, surface_triangles
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.region_rotations import (
     MeanRegion,
@@ -26,7 +27,7 @@ from ffr_prep.model.region_rotations import (
 from ffr_prep.model.second_order import SecondOrder
 from ffr_prep.solids.assembly import Materials
 from ffr_prep.solids.stiffening import forces_of_products
-from ffr_prep.solids.stress_modes import boundary, stressed_boundary
+from ffr_prep.solids.stress_modes import stressed_boundary
 
 
 def second_order(
@@ -38,6 +39,7 @@ def second_order(
         return np.asarray((model.B @ z).reshape(*mesh.points.shape, z.shape[1]))
 
     Phi = field(basis)
+    points, triangles = surface_triangles(mesh)
 
     def forces(some: range) -> Array:
         turning = [second_order_forces(regions, basis[:, i], basis[:, i:]) for i in some]
@@ -49,6 +51,6 @@ def second_order(
     return SecondOrder(
         known=known_second_order(regions, model, basis),
         forces=forces,
-        surface=lambda i, z: boundary(mesh, whole(i, z)),
+        surface=lambda i, z: Surface(mesh.points[points], triangles, whole(i, z)[points]),
         stressed=lambda i, z: stressed_boundary(mesh, material, whole(i, z), (Phi, i)),
     )

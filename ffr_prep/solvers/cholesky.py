@@ -17,6 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.process_memory import check_memory, in_words
 from ffr_prep.common.progress import Advance, no_advance
 from ffr_prep.solvers.multifrontal import (
     DONE,
@@ -29,6 +30,8 @@ from ffr_prep.solvers.multifrontal import (
     diagonal_tile,
     eliminate_branch,
     forward,
+    most_waiting,
+    panel_of,
     row_tile,
     shape,
     update_tile,
@@ -38,6 +41,10 @@ from ffr_prep.solvers.threads import Map, threads
 
 _BRANCHES = 24  # a branch has at most this part of the work
 _TILE = 384
+LESS = (
+    "take a coarser mesh, cut the body into parts, or reduce it where there is more memory, on several machines with the "
+    "solver slepc"
+)
 
 
 @dataclass(frozen=True)
@@ -78,18 +85,17 @@ def cholesky(A: sp.csr_array, positions: Array, advance: Advance = no_advance) -
                 coordinates of a rigid interface, which are eliminated last
     advance   : called as the elimination proceeds, with the share of its operations
 
-    Raises numpy.linalg.LinAlgError when A is not positive definite.
+    Raises numpy.linalg.LinAlgError when A is not positive definite, InputError when the machine has too little memory.
     """
-    pieces, below = elimination_tree(A, positions)
-    order = np.concatenate(pieces)
-    place = np.empty(len(order), np.int32)
-    place[order] = np.arange(len(order))
-    matrix = Sorted(A.indptr, A.indices, A.data, order, place)
-    fronts = _empty_fronts(matrix, np.cumsum([0, *map(len, pieces)]), np.array([len(of) for of in below]))
-    division = _division(fronts, below)
+    analysis = analysed(A, positions)
+    matrix, division = analysis.matrix, analysis.division
+    factor = 8 * int(analysis.fronts.offsets[-1])
+    check_memory(factor + waiting(analysis), f"factorising the stiffness of {len(matrix.order)} unknowns", LESS)
+    advance(0.0, f"the factor takes {in_words(factor)}")
+    fronts = analysis.fronts._replace(panels=np.zeros(analysis.fronts.offsets[-1]))
     with threads() as each:
-        _eliminate_all(fronts, division, matrix, each, _Elimination(_work(fronts), advance))
-    return Factor(order, fronts, division, *_private_rows(fronts, division.branches))
+        _eliminate_all(fronts, division, matrix, each, progress_of(analysis, advance))
+    return Factor(matrix.order, fronts, division, *_private_rows(fronts, division.branches))
 
 
 def solve_cholesky(factor: Factor, b: Array) -> Array:
@@ -99,14 +105,14 @@ def solve_cholesky(factor: Factor, b: Array) -> Array:
     y = np.zeros((n + len(factor.copied), b.shape[1]))
     y[:n] = b[factor.order]
     with threads() as each:
-        _finish(each(lambda branch: forward(fronts, targets, branch[0], branch[1], y), branches))
+        finish(each(lambda branch: forward(fronts, targets, branch[0], branch[1], y), branches))
         np.add.at(y, factor.copied, y[n:])
         for k in trunk:
             forward(fronts, targets, k, k, y)
         for k in reversed(trunk):
             backward(fronts, targets, k, k, y)
         y[n:] = y[factor.copied]
-        _finish(each(lambda branch: backward(fronts, targets, branch[0], branch[1], y), branches))
+        finish(each(lambda branch: backward(fronts, targets, branch[0], branch[1], y), branches))
     x = np.empty((n, b.shape[1]))
     x[factor.order] = y[:n]
     return x
@@ -115,11 +121,28 @@ def solve_cholesky(factor: Factor, b: Array) -> Array:
 # ---- division of the work -----------------------------------------------------------------------------------------
 
 
-def _empty_fronts(matrix: Sorted, starts: Array, children: Array) -> Fronts:
+@dataclass(frozen=True)
+class Analysis:
+    """A matrix in the order of its elimination, its fronts, which have no panels yet, and their division."""
+
+    matrix: Sorted
+    fronts: Fronts
+    division: Division
+
+
+def analysed(A: sp.csr_array, positions: Array) -> Analysis:
+    """What is known of the elimination of A (n, n) before any number is; positions as of `cholesky`."""
+    pieces, below = elimination_tree(A, positions)
+    order = np.concatenate(pieces)
+    place = np.empty(len(order), np.int32)
+    place[order] = np.arange(len(order))
+    matrix = Sorted(A.indptr, A.indices, A.data, order, place)
+    starts, children = np.cumsum([0, *map(len, pieces)]), np.array([len(of) for of in below])
     ends, boundary = boundaries(starts, children, matrix)
     own, rest = np.diff(starts), np.diff(ends)
     offsets = np.concatenate([[0], np.cumsum(own * (own + rest))])
-    return Fronts(starts, ends, boundary, offsets, np.zeros(offsets[-1]), children)
+    fronts = Fronts(starts, ends, boundary, offsets, np.zeros(0), children)
+    return Analysis(matrix, fronts, _division(fronts, below))
 
 
 def _division(fronts: Fronts, below: list[list[int]]) -> Division:
@@ -162,8 +185,21 @@ def _private_rows(fronts: Fronts, branches: Array) -> tuple[Array, Array]:
 # ---- elimination --------------------------------------------------------------------------------------------------
 
 
+def waiting(analysis: Analysis) -> int:
+    """Bytes of the updates that wait for their fronts, at most: of two branches at work, and of all at their ends."""
+    fronts, division = analysis.fronts, analysis.division
+    squares = np.diff(fronts.ends) ** 2
+    pending, places = np.empty(len(squares) + 1, np.int64), np.zeros(len(squares) + 2, np.int64)
+    inside = sorted(most_waiting(fronts, first, last, pending, places) for first, last in division.branches)[-2:]
+    height = most = int(sum(squares[last] for _, last in division.branches))
+    for k in division.trunk:
+        most = max(most, height + int(squares[k]))
+        height += int(squares[k] - squares[division.below[k]].sum())
+    return 8 * (most + int(sum(inside)))
+
+
 @dataclass
-class _Elimination:
+class Elimination:
     """How much of the work (F,) of the fronts is done."""
 
     work: Array
@@ -178,7 +214,12 @@ class _Elimination:
         self.advance(self.done / self.work.sum(), f"{self.fronts} of {self.work.size} fronts")
 
 
-def _eliminate_all(fronts: Fronts, division: Division, matrix: Sorted, each: Map, elimination: _Elimination) -> None:
+def progress_of(analysis: Analysis, advance: Advance) -> Elimination:
+    """Tells the listener how far an elimination is."""
+    return Elimination(_work(analysis.fronts), advance)
+
+
+def _eliminate_all(fronts: Fronts, division: Division, matrix: Sorted, each: Map, elimination: Elimination) -> None:
     results = each(lambda branch: eliminate_branch(fronts, branch[0], branch[1], matrix), division.branches)
     updates: dict[int, Array] = {}
     for (first, last), (update, bad) in zip(division.branches, results, strict=True):
@@ -190,19 +231,23 @@ def _eliminate_all(fronts: Fronts, division: Division, matrix: Sorted, each: Map
     for k in division.trunk:
         rest = shape(fronts, k)[1]
         update = np.zeros((rest, rest))
-        begin(fronts, k, matrix, update, local)
+        panel = panel_of(fronts, k)
+        begin(fronts, k, panel, matrix, update, local)
         for child in division.below[k]:
-            _add_tiled(fronts, k, child, updates.pop(child), update, local, each)
+            add_tiled(fronts, child, updates.pop(child), panel, update, local, each)
         _eliminate_tiled(fronts, k, update, each)
         updates[k] = update
         elimination.add(k, k)
 
 
-def _add_tiled(fronts: Fronts, k: int, child: int, of_child: Array, update: Array, local: Array, each: Map) -> None:
-    _finish(
+def add_tiled(
+    fronts: Fronts, child: int, of_child: Array, panel: Array, update: Array, local: Array, each: Map
+) -> None:
+    """As `add`, all columns, on all threads."""
+    finish(
         each(
-            lambda columns: add(fronts, k, child, of_child, update, local, columns[0], columns[1]),
-            _tiles(0, len(of_child)),
+            lambda columns: add(fronts, child, of_child, panel, update, local, columns[0], columns[1]),
+            tiles(0, len(of_child)),
         )
     )
 
@@ -211,19 +256,20 @@ def _eliminate_tiled(fronts: Fronts, k: int, update: Array, each: Map) -> None:
     """As `eliminate`, by tiles that do not depend on the number of threads."""
     own, rest = shape(fronts, k)
     size, panel = own + rest, fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]]
-    for first, last in _tiles(0, own):
+    for first, last in tiles(0, own):
         bad = diagonal_tile(panel, size, first, last)
         _check_pivot(fronts.starts[k] + first + bad - 1 if bad else DONE)
-        _finish(each(lambda rows, of=(first, last): row_tile(panel, size, *of, *rows), _tiles(last, size)))
-    pairs = [(columns, rows) for columns in _tiles(0, rest) for rows in _tiles(0, rest) if rows >= columns]
-    _finish(each(lambda pair: update_tile(panel, own, update, *pair[0], *pair[1]), pairs))
+        finish(each(lambda rows, of=(first, last): row_tile(panel, size, *of, *rows), tiles(last, size)))
+    pairs = [(columns, rows) for columns in tiles(0, rest) for rows in tiles(0, rest) if rows >= columns]
+    finish(each(lambda pair: update_tile(panel, own, update, *pair[0], *pair[1]), pairs))
 
 
-def _tiles(start: int, stop: int) -> list[tuple[int, int]]:
+def tiles(start: int, stop: int) -> list[tuple[int, int]]:
+    """start...stop in pieces that do not depend on the number of threads."""
     return [(first, min(first + _TILE, stop)) for first in range(start, stop, _TILE)]
 
 
-def _finish(results: Iterable[None]) -> None:
+def finish(results: Iterable[None]) -> None:
     """Wait for all, and raise what one of them raised."""
     for _ in results:
         pass

@@ -25,16 +25,20 @@ from scipy.sparse.linalg import splu
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.process_memory import check_memory
 from ffr_prep.common.progress import Advance, no_advance
-from ffr_prep.solvers.cholesky import cholesky, solve_cholesky
+from ffr_prep.solvers.cholesky import LESS, cholesky, solve_cholesky
+from ffr_prep.solvers.inertia import modes_below
 from ffr_prep.solvers.lanczos import lowest_modes
-from ffr_prep.solvers.slepc import SlepcProcess, mpi_modes, mpi_solve, started
+from ffr_prep.solvers.slepc import SlepcProcess, mpi_count, mpi_modes, mpi_solve, pencil, started
+from ffr_prep.solvers.verification import Verification, verified
 
 Solve = Callable[[Array], Array]
 
 _SINGULAR = 1e13
 _SCALING_SWEEPS = 10
 _BLOCK = 8
+_VECTORS = 3  # that a search has for each mode, about
 _REMEDY = "look for parts joined by a single node or edge, or materials of extremely different stiffness"
 
 
@@ -48,6 +52,8 @@ class Solver:
     name  : "cholesky" (this package's own), "superlu" (SciPy's, slow but with no compiled code of ours), "pardiso" (Intel
             MKL, if pypardiso is installed) or "slepc" (SLEPc and MUMPS in processes of their own, under MPI)
     ranks : processes of "slepc"
+    verify: also find the residual of every normal mode, and count by another factorisation that none is missing; both are
+            kept with the body
 
     Raises InputError for another name or number of processes.
 
@@ -56,6 +62,7 @@ class Solver:
 
     name: str = "cholesky"
     ranks: int = 1
+    verify: bool = False
 
     def __post_init__(self) -> None:
         if self.name not in (*_FACTORISATIONS, "slepc"):
@@ -134,18 +141,23 @@ def _check_regular(A: sp.csr_array, solve: Solve) -> None:
         raise ComputationError(f"the stiffness matrix is singular (condition above {growth:.1e}); {_REMEDY}")
 
 
+Verify = Callable[["SupportedBody", sp.csr_array, Array, Array], Verification | None]
+
+
 @dataclass(frozen=True)
 class FreeBody:
     """A free body, ready to be solved under any support.
 
     K : (Z, Z) stiffness; T : (Z, 6) orthonormal rigid motions; solve : clamped inverse S, (Z, r) -> (Z, r)
     lowest : (supports, mass, count) -> omega2 (count,) and mass-orthonormal modes (Z, count)
+    verify : (supports, mass, omega2, modes) -> what was found of them; None where nobody asked
     """
 
     K: sp.csr_array
     T: Array
     solve: Solve
     lowest: Callable[[SupportedBody, sp.csr_array, int], tuple[Array, Array]]
+    verify: Verify
 
 
 def free_body(
@@ -164,11 +176,18 @@ def free_body(
     clamped = K[free][:, free]
     if solver.name != "slepc":
         solve = factorise(clamped, positions[free], solver, advance)
-        return FreeBody(K, rigid, partial(_extended, solve, free), partial(_by_lanczos, advance))
+        count = partial(_counted, positions, advance)
+        return FreeBody(K, rigid, partial(_extended, solve, free), partial(_by_lanczos, advance), _look(solver, count))
     process = started(clamped, solver.ranks)
     solve = partial(mpi_solve, process)
     _check_regular(clamped, solve)
-    return FreeBody(K, rigid, partial(_extended, solve, free), partial(_by_slepc, process))
+    return FreeBody(
+        K,
+        rigid,
+        partial(_extended, solve, free),
+        partial(_by_slepc, process),
+        _look(solver, partial(_mpi_counted, process)),
+    )
 
 
 def _extended(solve_free: Solve, free: Array, load: Array) -> Array:
@@ -178,16 +197,51 @@ def _extended(solve_free: Solve, free: Array, load: Array) -> Array:
     return displacement
 
 
-def _by_lanczos(advance: Advance, held: SupportedBody, M: sp.csr_array, count: int) -> tuple[Array, Array]:
-    def flexibility(loads: Array) -> Array:
-        return solve_supported(held, loads, np.zeros((len(held.C), loads.shape[1])))[0]
+def _flexibility(held: SupportedBody) -> Solve:
+    return lambda loads: solve_supported(held, loads, np.zeros((len(held.C), loads.shape[1])))[0]
 
+
+def _by_lanczos(advance: Advance, held: SupportedBody, M: sp.csr_array, count: int) -> tuple[Array, Array]:
+    space = 8 * M.shape[0] * _VECTORS * (count + 2 * _BLOCK)
+    check_memory(
+        space, f"the search for {count} normal modes of {M.shape[0]} unknowns", f"ask for fewer modes; or {LESS}"
+    )
     start = np.random.default_rng(0).standard_normal((M.shape[0], _BLOCK))
-    return lowest_modes(flexibility, M, start, count, most=20 * count + 300, advance=advance)
+    return lowest_modes(_flexibility(held), M, start, count, most=20 * count + 300, advance=advance)
 
 
 def _by_slepc(process: SlepcProcess, held: SupportedBody, M: sp.csr_array, count: int) -> tuple[Array, Array]:
-    return mpi_modes(process, held.body.K, M, held.C, count)
+    made = pencil(process, held.body.K, M, held.C, held.body.T)
+    return mpi_modes(process, made, M, count, _about_the_lowest(held, M))
+
+
+def _about_the_lowest(held: SupportedBody, M: sp.csr_array) -> float:
+    """omega2 of about the lowest mode, by inverse iteration."""
+    x = np.random.default_rng(0).standard_normal((M.shape[0], 1))
+    for _ in range(2):
+        momenta = M @ x
+        x = _flexibility(held)(momenta)
+    return float(np.vdot(x, momenta) / np.vdot(x, M @ x))
+
+
+def _look(solver: Solver, count: Callable[[SupportedBody, sp.csr_array, float], int]) -> Verify:
+    """Verifies modes, with this count of those below a squared frequency, where the solver says so."""
+
+    def look(held: SupportedBody, M: sp.csr_array, omega2: Array, vectors: Array) -> Verification:
+        return verified(_flexibility(held), M, partial(count, held, M), omega2, vectors)
+
+    return look if solver.verify else lambda *_: None
+
+
+def _counted(positions: Array, advance: Advance, held: SupportedBody, M: sp.csr_array, sigma: float) -> int:
+    def told(share: float, words: str) -> None:
+        advance(share, f"{words} for the count of modes")
+
+    return modes_below(held.body.K, M, held.C, positions, sigma, told)
+
+
+def _mpi_counted(process: SlepcProcess, held: SupportedBody, M: sp.csr_array, sigma: float) -> int:
+    return mpi_count(process, pencil(process, held.body.K, M, held.C, held.body.T), sigma)
 
 
 # ---- supports -----------------------------------------------------------------------------------------------------

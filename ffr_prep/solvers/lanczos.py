@@ -26,6 +26,8 @@ from ffr_prep.solvers.threads import Map, pieces, sparse_product, threads
 _RESIDUAL = 1e-9
 _DEPENDENT = 1e-10
 _PANEL = 64
+_MANY = 100  # modes whose convergence is looked at after some passes only, as that takes the cube of the vectors
+_OFTEN = 1.03
 
 
 def lowest_modes(
@@ -48,12 +50,18 @@ def lowest_modes(
     """
     Q = SearchSpace([])
     T = np.zeros((0, 0))
+    due = count if count > _MANY else 0
     block, momenta, _ = _orthonormal(flexibility(M @ start), Q, M)
     while True:
         _append(Q, block)
         following = flexibility(momenta)
         block, momenta, columns = _orthonormal(following, Q, M)
         T = _bordered(T, columns)
+        full = len(T) + block.shape[1] > most or not block.size
+        if len(T) < due and not full:
+            advance(0.0, f"0 of {count} modes, {len(T)} vectors")
+            continue
+        due = min(max(len(T) + 1, int(_OFTEN * len(T))), most)
         values, vectors = scipy.linalg.eigh(T)
         values, vectors = values[::-1][:count], vectors[:, ::-1][:, :count]
         coupling = momenta.T @ following
@@ -62,7 +70,7 @@ def lowest_modes(
         advance(converged / count, f"{converged} of {count} modes")
         if converged == count:
             return 1 / values, _combined(Q, vectors)
-        if len(T) + block.shape[1] > most or not block.size:
+        if full:
             raise ComputationError(
                 f"only {converged} of {count} normal modes converged with {len(T)} vectors: ask for fewer modes"
             )

@@ -25,9 +25,9 @@ check_compiled_code()
 
 DONE = -1
 
-_REALS = types.CPointer(types.float64)
-_INTEGERS = types.CPointer(types.int32)
-_LETTERS = types.CPointer(types.uint8)
+REALS = types.CPointer(types.float64)
+INTEGERS = types.CPointer(types.int32)
+LETTERS = types.CPointer(types.uint8)
 
 
 class Fronts(NamedTuple):
@@ -60,29 +60,27 @@ class Sorted(NamedTuple):
 # ---- BLAS and LAPACK ----------------------------------------------------------------------------------------------
 
 
-def _external(library: str, name: str, *arguments: types.Type) -> Any:
+def external(library: str, name: str, *arguments: types.Type) -> Any:
     """SciPy's copy of a BLAS or LAPACK function under a name that compiled and cached code finds again."""
     llvmlite.binding.add_symbol(f"ffr_{name}", get_cython_function_address(f"scipy.linalg.cython_{library}", name))
     return types.ExternalFunction(f"ffr_{name}", types.void(*arguments))
 
 
-_dgemm = _external(
-    "blas", "dgemm", *[_LETTERS] * 2, *[_INTEGERS] * 3, *[_REALS] * 2, _INTEGERS, _REALS, _INTEGERS, *[_REALS] * 2, _INTEGERS
+_dgemm = external(
+    "blas", "dgemm", *[LETTERS] * 2, *[INTEGERS] * 3, *[REALS] * 2, INTEGERS, REALS, INTEGERS, *[REALS] * 2, INTEGERS
 )  # fmt: skip
-_dsyrk = _external(
-    "blas", "dsyrk", *[_LETTERS] * 2, *[_INTEGERS] * 2, *[_REALS] * 2, _INTEGERS, *[_REALS] * 2, _INTEGERS
-)
-_dtrsm = _external("blas", "dtrsm", *[_LETTERS] * 4, *[_INTEGERS] * 2, *[_REALS] * 2, _INTEGERS, _REALS, _INTEGERS)
-_dpotrf = _external("lapack", "dpotrf", _LETTERS, _INTEGERS, _REALS, _INTEGERS, _INTEGERS)
+_dsyrk = external("blas", "dsyrk", *[LETTERS] * 2, *[INTEGERS] * 2, *[REALS] * 2, INTEGERS, *[REALS] * 2, INTEGERS)
+_dtrsm = external("blas", "dtrsm", *[LETTERS] * 4, *[INTEGERS] * 2, *[REALS] * 2, INTEGERS, REALS, INTEGERS)
+_dpotrf = external("lapack", "dpotrf", LETTERS, INTEGERS, REALS, INTEGERS, INTEGERS)
 
-_LOWER, _PLAIN, _TRANSPOSED, _LEFT, _RIGHT = (ord(letter) for letter in "LNTLR")
+LOWER, PLAIN, TRANSPOSED, LEFT, RIGHT = (ord(letter) for letter in "LNTLR")
 
 
 @numba.njit(cache=True, nogil=True)
 def product(of_A, of_B, A, B, C, rows, columns, inner, ld, factor):  # type: ignore[no-untyped-def]
     """C (rows, columns) = factor A B, added to C if the factor is negative.
 
-    of_A, of_B : _PLAIN or _TRANSPOSED, how A (rows, inner) and B (inner, columns) are stored; ld : leading dimensions
+    of_A, of_B : PLAIN or TRANSPOSED, how A (rows, inner) and B (inner, columns) are stored; ld : leading dimensions
     """
     letters = np.array([of_A, of_B], np.uint8)
     sizes = np.array([rows, columns, inner, ld[0], ld[1], ld[2]], np.int32)
@@ -96,7 +94,7 @@ def product(of_A, of_B, A, B, C, rows, columns, inner, ld, factor):  # type: ign
 @numba.njit(cache=True, nogil=True)
 def minus_square(A, C, size, inner, ld_A, ld_C):  # type: ignore[no-untyped-def]
     """C - A A^T, lower triangle; A (size, inner)."""
-    letters = np.array([_LOWER, _PLAIN], np.uint8)
+    letters = np.array([LOWER, PLAIN], np.uint8)
     sizes = np.array([size, inner, ld_A, ld_C], np.int32)
     factors = np.array([-1.0, 1.0])
     _dsyrk(
@@ -107,8 +105,8 @@ def minus_square(A, C, size, inner, ld_A, ld_C):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def divide(side, transposed, L, B, rows, columns, ld_L, ld_B):  # type: ignore[no-untyped-def]
-    """B (rows, columns) becomes L^-1 B or L^-T B with side _LEFT, B L^-1 or B L^-T with side _RIGHT."""
-    letters = np.array([side, _LOWER, _TRANSPOSED if transposed else _PLAIN, _PLAIN], np.uint8)
+    """B (rows, columns) becomes L^-1 B or L^-T B with side LEFT, B L^-1 or B L^-T with side RIGHT."""
+    letters = np.array([side, LOWER, TRANSPOSED if transposed else PLAIN, PLAIN], np.uint8)
     sizes = np.array([rows, columns, ld_L, ld_B], np.int32)
     one = np.ones(1)
     _dtrsm(
@@ -120,7 +118,7 @@ def divide(side, transposed, L, B, rows, columns, ld_L, ld_B):  # type: ignore[n
 @numba.njit(cache=True, nogil=True)
 def triangular(A, size, ld):  # type: ignore[no-untyped-def]
     """A becomes its Cholesky factor; the number (from 1) of the pivot that is not positive, or 0."""
-    letters = np.array([_LOWER], np.uint8)
+    letters = np.array([LOWER], np.uint8)
     sizes = np.array([size, ld, 0], np.int32)
     _dpotrf(letters.ctypes, sizes.ctypes, A.ctypes, sizes[1:].ctypes, sizes[2:].ctypes)
     return sizes[2]
@@ -185,13 +183,13 @@ def panel_of(fronts, k):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def begin(fronts, k, A, update, local):  # type: ignore[no-untyped-def]
-    """The matrix into the panel of a front, zeros into its update (rest, rest); local (n,) is where its unknowns are."""
+def begin(fronts, k, panel, A, update, local):  # type: ignore[no-untyped-def]
+    """The matrix into the panel of a front (own, own + rest), zeros into its update (rest, rest); local (n,) is where its
+    unknowns are."""
     own, rest = shape(fronts, k)
     start, stop = fronts.starts[k], fronts.starts[k + 1]
     local[start:stop] = np.arange(own)
     local[fronts.boundary[fronts.ends[k] : fronts.ends[k + 1]]] = np.arange(own, own + rest)
-    panel = panel_of(fronts, k)
     for p in range(start, stop):
         row = A.order[p]
         for e in range(A.indptr[row], A.indptr[row + 1]):
@@ -203,10 +201,9 @@ def begin(fronts, k, A, update, local):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def add(fronts, k, child, of_child, update, local, first, last):  # type: ignore[no-untyped-def]
+def add(fronts, child, of_child, panel, update, local, first, last):  # type: ignore[no-untyped-def]
     """Add columns first...last of the update of a front below to a front that has begun."""
     places = local[fronts.boundary[fronts.ends[child] : fronts.ends[child + 1]]]
-    panel = panel_of(fronts, k)
     own = panel.shape[0]
     for j in range(first, min(last, places.size)):
         if places[j] < own:
@@ -227,7 +224,7 @@ def eliminate(fronts, k, update):  # type: ignore[no-untyped-def]
     if bad:
         return fronts.starts[k] + bad - 1
     if rest:
-        divide(_RIGHT, True, panel, panel[own:], rest, own, size, size)
+        divide(RIGHT, True, panel, panel[own:], rest, own, size, size)
         minus_square(panel[own:], update, rest, own, size, rest)
     return DONE
 
@@ -241,33 +238,34 @@ def eliminate_branch(fronts, first, last, A):  # type: ignore[no-untyped-def]
     local = np.empty(A.place.size, np.int32)
     pending = np.empty(last - first + 1, np.int64)
     places = np.zeros(last - first + 2, np.int64)
-    waiting = np.empty(_most_waiting(fronts, first, last, pending, places))
+    waiting = np.empty(most_waiting(fronts, first, last, pending, places))
     height = 0
     for k in range(first, last + 1):
         rest = shape(fronts, k)[1]
         update = waiting[places[height] : places[height] + rest**2]
-        begin(fronts, k, A, update.reshape((rest, rest)), local)
+        panel = panel_of(fronts, k)
+        begin(fronts, k, panel, A, update.reshape((rest, rest)), local)
         for h in range(height - fronts.children[k], height):
             size = shape(fronts, pending[h])[1]
             of_child = waiting[places[h] : places[h + 1]].reshape((size, size))
-            add(fronts, k, pending[h], of_child, update.reshape((rest, rest)), local, 0, size)
+            add(fronts, pending[h], of_child, panel, update.reshape((rest, rest)), local, 0, size)
         bad = eliminate(fronts, k, update)
         if bad != DONE:
             break
-        height = _pushed(fronts, k, pending, places, height)
-        _move(update, waiting[places[height - 1] : places[height]])
+        height = pushed(fronts, k, pending, places, height)
+        move(update, waiting[places[height - 1] : places[height]])
     return waiting[: places[height]].copy(), bad
 
 
 @numba.njit(cache=True, nogil=True)
-def _move(source, target):  # type: ignore[no-untyped-def]
+def move(source, target):  # type: ignore[no-untyped-def]
     """Copy to an array that begins at or before the source in the same memory."""
     for i in range(source.size):
         target[i] = source[i]
 
 
 @numba.njit(cache=True, nogil=True)
-def _pushed(fronts, k, pending, places, height):  # type: ignore[no-untyped-def]
+def pushed(fronts, k, pending, places, height):  # type: ignore[no-untyped-def]
     """The update of a front takes the place of those below it: how many wait then."""
     height -= fronts.children[k]
     pending[height] = k
@@ -276,12 +274,12 @@ def _pushed(fronts, k, pending, places, height):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _most_waiting(fronts, first, last, pending, places):  # type: ignore[no-untyped-def]
+def most_waiting(fronts, first, last, pending, places):  # type: ignore[no-untyped-def]
     """How large the updates of the fronts first...last become together; the arrays are for work."""
     height, most = 0, 0
     for k in range(first, last + 1):
         most = max(most, places[height] + shape(fronts, k)[1] ** 2)
-        height = _pushed(fronts, k, pending, places, height)
+        height = pushed(fronts, k, pending, places, height)
     return most
 
 
@@ -293,8 +291,8 @@ def diagonal_tile(panel, size, first, last):  # type: ignore[no-untyped-def]
     """Factorise the diagonal tile of the columns first...last of a panel, the columns before being done: as LAPACK."""
     corner = panel[first * size + first :]
     product(
-        _PLAIN,
-        _TRANSPOSED,
+        PLAIN,
+        TRANSPOSED,
         panel[first:],
         panel[first:],
         corner,
@@ -311,8 +309,8 @@ def diagonal_tile(panel, size, first, last):  # type: ignore[no-untyped-def]
 def row_tile(panel, size, first, last, top, bottom):  # type: ignore[no-untyped-def]
     """Rows top...bottom of the same columns, the diagonal tile being done."""
     tile, tall = panel[first * size + top :], bottom - top
-    product(_PLAIN, _TRANSPOSED, panel[top:], panel[first:], tile, tall, last - first, first, (size, size, size), -1.0)
-    divide(_RIGHT, True, panel[first * size + first :], tile, tall, last - first, size, size)
+    product(PLAIN, TRANSPOSED, panel[top:], panel[first:], tile, tall, last - first, first, (size, size, size), -1.0)
+    divide(RIGHT, True, panel[first * size + first :], tile, tall, last - first, size, size)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -322,7 +320,7 @@ def update_tile(panel, own, update, first, last, top, bottom):  # type: ignore[n
     size = own + rest
     target = update.reshape(update.size)[first * rest + top :]
     left, right = panel[own + top :], panel[own + first :]
-    product(_PLAIN, _TRANSPOSED, left, right, target, bottom - top, last - first, own, (size, size, rest), -1.0)
+    product(PLAIN, TRANSPOSED, left, right, target, bottom - top, last - first, own, (size, size, rest), -1.0)
 
 
 # ---- solution -----------------------------------------------------------------------------------------------------
@@ -337,11 +335,11 @@ def forward(fronts, targets, first, last, y):  # type: ignore[no-untyped-def]
         start, size = fronts.starts[k], own + rest
         panel = fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]]
         x = y[start : start + own].T.copy()
-        divide(_LEFT, False, panel, x, own, r, size, own)
+        divide(LEFT, False, panel, x, own, r, size, own)
         y[start : start + own] = x.T
         if rest:
             change = np.empty((r, rest))
-            product(_PLAIN, _PLAIN, panel[own:], x, change, rest, r, own, (size, own, rest), 1.0)
+            product(PLAIN, PLAIN, panel[own:], x, change, rest, r, own, (size, own, rest), 1.0)
             _scatter(change, targets[fronts.ends[k] : fronts.ends[k + 1]], y)
 
 
@@ -364,8 +362,8 @@ def backward(fronts, targets, first, last, y):  # type: ignore[no-untyped-def]
         if rest:
             known = np.empty((r, rest))
             _gather(y, targets[fronts.ends[k] : fronts.ends[k + 1]], known)
-            product(_TRANSPOSED, _PLAIN, panel[own:], known, x, own, r, rest, (size, rest, own), -1.0)
-        divide(_LEFT, True, panel, x, own, r, size, own)
+            product(TRANSPOSED, PLAIN, panel[own:], known, x, own, r, rest, (size, rest, own), -1.0)
+        divide(LEFT, True, panel, x, own, r, size, own)
         y[start : start + own] = x.T
 
 

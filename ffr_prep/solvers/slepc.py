@@ -31,9 +31,11 @@ from ffr_prep.solvers import slepc_process
 
 _PYTHON = "/usr/bin/python3"
 _HOMES = {"SLEPC_DIR": "/usr/lib/slepcdir", "PETSC_DIR": "/usr/lib/petscdir"}
+_EXPORTED = (*_HOMES, "PYTHONPATH", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
 _INSTALL = "apt-get install python3-slepc4py-real libopenblas0-pthread openmpi-bin"
 _PATIENCE = 60.0
 _GRACE = 3.0
+_ROUNDING = 1e-9
 _LOCAL = 20_000  # unknowns that supports may touch: eliminating one of them couples all others
 
 
@@ -77,31 +79,78 @@ def mpi_solve(process: SlepcProcess, b: Array) -> Array:
     return np.load(process.folder / "x.npy").T.copy()
 
 
-def mpi_modes(process: SlepcProcess, K: sp.csr_array, M: sp.csr_array, C: Array, count: int) -> tuple[Array, Array]:
-    """omega2 (count,), ascending, and M-orthonormal vectors (Z, count) of the modes under the supports C u = 0.
+@dataclass(frozen=True)
+class Pencil:
+    """Stiffness and mass as the processes find them in their folder.
 
-    Raises InputError for supports that touch most of the body, such as the mean axis, ComputationError without convergence.
+    vectors : (Z, z) displacements of their coordinates
+    hidden  : (Z, h) motions without stiffness, of which no mode has a part
     """
-    N = _admissible(C)
-    folder = process.folder
-    _write_matrix(folder / "K", sp.csr_array(N.T @ K @ N))
-    _write_matrix(folder / "M", sp.csr_array(N.T @ M @ N))
-    files = {"K": str(folder / "K"), "M": str(folder / "M"), "answer": str(folder / "modes.npz")}
-    _ask(process, do="modes", count=count, **files)
-    with np.load(folder / "modes.npz") as found:
-        vectors = N @ found["vectors"].T
+
+    vectors: sp.csr_array
+    hidden: Array
+
+
+def pencil(process: SlepcProcess, K: sp.csr_array, M: sp.csr_array, C: Array, T: Array) -> Pencil:
+    """K and M under the supports C u = 0 (r, Z) for the processes; T (Z, 6) rigid motions.
+
+    Few unknowns that are supported follow the others. The mean axis, T^T M u = 0, supports all: there K and M are those of
+    the free body, whose modes have no part of T. Raises InputError for others that touch most of the body.
+    """
+    size = C.shape[1]
+    touched = np.flatnonzero((C != 0).any(axis=0))
+    if touched.size <= _LOCAL:
+        made = Pencil(_admissible(C), np.zeros((size, 0)))
+    elif _is_mean_motion(C, M @ T):
+        made = Pencil(sp.csr_array(sp.eye_array(size)), T)
+    else:
+        raise InputError(
+            f"solver 'slepc' cannot find modes under supports that touch {touched.size} unknowns (at most {_LOCAL}) and are "
+            "not the mean axis: choose other reference conditions, or another solver"
+        )
+    N = made.vectors
+    _write_matrix(process.folder / "K", sp.csr_array(N.T @ K @ N))
+    _write_matrix(process.folder / "M", sp.csr_array(N.T @ M @ N))
+    np.save(process.folder / "hidden.npy", np.ascontiguousarray(made.hidden.T))
+    return made
+
+
+def _is_mean_motion(C: Array, momenta: Array) -> bool:
+    """Whether the supports C (r, Z) are combinations of the momenta (Z, 6) of rigid motions."""
+    combined = np.linalg.lstsq(momenta, C.T, rcond=None)[0]
+    return bool(np.abs(momenta @ combined - C.T).max() <= _ROUNDING * np.abs(C).max())
+
+
+def mpi_modes(process: SlepcProcess, made: Pencil, M: sp.csr_array, count: int, near: float) -> tuple[Array, Array]:
+    """omega2 (count,), ascending, and M-orthonormal vectors (Z, count) of the modes of the pencil.
+
+    near : about the lowest omega2, which a shift below zero is where motions have no stiffness
+
+    Raises ComputationError without convergence.
+    """
+    answer = process.folder / "modes.npz"
+    target = -near if made.hidden.size else 0.0
+    _ask(process, do="modes", count=count, target=target, answer=str(answer), **_files(process))
+    with np.load(answer) as found:
+        vectors = made.vectors @ found["vectors"].T
         omega2 = found["omega2"]
     return omega2, vectors / np.sqrt(np.einsum("zi,zi->i", vectors, M @ vectors))
+
+
+def mpi_count(process: SlepcProcess, made: Pencil, sigma: float) -> int:
+    """How many modes of the pencil have omega2 below sigma; ComputationError where that is one of theirs."""
+    answer = process.folder / "count.npy"
+    _ask(process, do="count", sigma=sigma, answer=str(answer), **_files(process))
+    return int(np.load(answer)) - made.hidden.shape[1]
+
+
+def _files(process: SlepcProcess) -> dict[str, str]:
+    return {name: str(process.folder / file) for name, file in (("K", "K"), ("M", "M"), ("hidden", "hidden.npy"))}
 
 
 def _admissible(C: Array) -> sp.csr_array:
     """N (Z, Z - r), sparse: the displacements that satisfy C u = 0 for the independent supports C (r, Z)."""
     touched = np.flatnonzero((C != 0).any(axis=0))
-    if touched.size > _LOCAL:
-        raise InputError(
-            f"solver 'slepc' cannot find modes under supports that touch {touched.size} unknowns (at most {_LOCAL}): "
-            "choose fixed or simply supported reference conditions, or another solver"
-        )
     _, order = scipy.linalg.qr(C[:, touched], mode="r", pivoting=True)
     pivots, others = touched[order[: len(C)]], touched[order[len(C) :]]
     following = -scipy.linalg.solve(C[:, pivots], C[:, others])
@@ -125,7 +174,8 @@ def _command(ranks: int) -> list[str]:
     if mpirun is None or not Path(_PYTHON).is_file() or not all(_home(name) for name in _HOMES):
         raise InputError(f"solver 'slepc' needs SLEPc, PETSc and MPI of the system; on Debian: {_INSTALL}")
     # By its path, so that it also runs where the package is not installed; -P keeps its folder off sys.path.
-    return [mpirun, "-n", str(ranks), _PYTHON, "-P", slepc_process.__file__]
+    exported = [word for name in _EXPORTED for word in ("-x", name)]  # to ranks on other machines
+    return [mpirun, "-n", str(ranks), *exported, _PYTHON, "-P", slepc_process.__file__]
 
 
 def _environment() -> dict[str, str]:

@@ -41,6 +41,8 @@ def main() -> int:
                 solver = _factorised(PETSc, _matrix(PETSc, command["matrix"]))
             elif command["do"] == "solve":
                 _solve(PETSc, solver, command)
+            elif command["do"] == "count":
+                _count(PETSc, command)
             else:
                 _modes(PETSc, SLEPc, command)
         except (PETSc.Error, ArithmeticError) as error:
@@ -131,13 +133,15 @@ def _gathered(PETSc: Any, x: Any) -> Any:
 
 def _modes(PETSc: Any, SLEPc: Any, command: dict[str, Any]) -> None:
     K, M = _matrix(PETSc, command["K"]), _matrix(PETSc, command["M"])
+    x = K.createVecRight()
     problem = SLEPc.EPS().create()
     problem.setOperators(K, M)
     problem.setProblemType(SLEPc.EPS.ProblemType.GHEP)
     problem.setDimensions(command["count"])
     problem.setTolerances(1e-12, 1000)
     problem.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-    problem.setTarget(0.0)
+    problem.setTarget(command["target"])
+    problem.setDeflationSpace(_vectors(x, command["hidden"]))
     transformation = problem.getST()
     transformation.setType("sinvert")
     _directly(transformation.getKSP())
@@ -145,7 +149,6 @@ def _modes(PETSc: Any, SLEPc: Any, command: dict[str, Any]) -> None:
     count = command["count"]
     if problem.getConverged() < count:
         raise ArithmeticError(f"only {problem.getConverged()} of {count} normal modes converged: ask for fewer modes")
-    x = K.createVecRight()
     omega2, vectors = [], []
     for i in range(count):
         omega2.append(problem.getEigenpair(i, x).real)
@@ -153,6 +156,32 @@ def _modes(PETSc: Any, SLEPc: Any, command: dict[str, Any]) -> None:
     if PETSc.COMM_WORLD.rank == 0:
         order = np.argsort(omega2)
         np.savez(command["answer"], omega2=np.array(omega2)[order], vectors=np.array(vectors)[order])
+
+
+def _vectors(like: Any, file: str) -> list[Any]:
+    """The rows of a file as vectors that are divided like this one."""
+    first, last = like.getOwnershipRange()
+    made = []
+    for row in np.load(file, mmap_mode="r"):
+        vector = like.duplicate()
+        vector.setArray(np.array(row[first:last]))
+        made.append(vector)
+    return made
+
+
+def _count(PETSc: Any, command: dict[str, Any]) -> None:
+    """The negative pivots of K - sigma M, which MUMPS takes symmetrically."""
+    K = _matrix(PETSc, command["K"])
+    K.setOption(PETSc.Mat.Option.SPD, False)
+    K.axpy(-command["sigma"], _matrix(PETSc, command["M"]), structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+    K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    solver = PETSc.KSP().create()
+    solver.setOperators(K)
+    _directly(solver)
+    solver.setUp()
+    negative = solver.getPC().getFactorMatrix().getMumpsInfog(_NEGATIVE_PIVOTS)
+    if PETSc.COMM_WORLD.rank == 0:
+        np.save(command["answer"], negative)
 
 
 if __name__ == "__main__":

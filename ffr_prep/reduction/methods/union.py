@@ -32,4 +32,6 @@ class Union:
         bases = [part.basis(model, body, L) for part in self.parts]
         whole = basis_of(model, L, *(basis.Z for basis in bases))
         warnings = tuple(dict.fromkeys(warning for basis in bases for warning in basis.warnings))
-        return Basis(whole.Z, whole.omega2, whole.dropped + sum(basis.dropped for basis in bases), warnings)
+        dropped = whole.dropped + sum(basis.dropped for basis in bases)
+        verification = next((basis.verification for basis in bases if basis.verification), None)
+        return Basis(whole.Z, whole.omega2, dropped, warnings, verification)

@@ -191,11 +191,11 @@ def test_a_failed_write_leaves_the_existing_file(tmp_path, monkeypatch):
     path = save_body(some_body(), tmp_path / "b.ffr")
     before = path.read_bytes()
 
-    def full_disk(stream, **arrays):
+    def full_disk(stream, array, **options):
         stream.write(b"half a file")
         raise OSError("no space left on device")
 
-    monkeypatch.setattr(body_file.np, "savez_compressed", full_disk)
+    monkeypatch.setattr(body_file.np.lib.format, "write_array", full_disk)
     with pytest.raises(ComputationError, match="no space left"):
         save_body(some_body(2), path)
     assert path.read_bytes() == before

@@ -120,9 +120,23 @@ def test_the_processes_end_with_what_holds_them():
 
 @with_slepc
 def test_slepc_refuses_supports_that_touch_most_of_a_body(monkeypatch):
+    monkeypatch.setattr(slepc, "_LOCAL", 5)
+    with pytest.raises(InputError, match=r"supports that touch \d+ unknowns \(at most 5\) and are not the mean axis"):
+        reduced(Solver("slepc"), Eigenmodes(30), CLAMPED)
+
+
+@with_slepc
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("reference", [MeanAxis(), CLAMPED])
+def test_slepc_finds_and_counts_modes_about_the_mean_axis(monkeypatch, ranks, reference):
     monkeypatch.setattr(slepc, "_LOCAL", 100)
-    with pytest.raises(InputError, match=r"supports that touch \d+ unknowns \(at most 100\): choose fixed"):
-        reduced(Solver("slepc"), Eigenmodes(30), MeanAxis())
+    ours = reduced(Solver(verify=True), Eigenmodes(30), reference)
+    theirs = reduced(Solver("slepc", ranks, verify=True), Eigenmodes(30), reference)
+    np.testing.assert_allclose(theirs.omega2, ours.omega2, rtol=1e-9)
+    np.testing.assert_allclose(theirs.PP_dm, ours.PP_dm, rtol=0, atol=1e-7 * np.abs(ours.PP_dm).max())
+    found = [body.provenance["normal_modes"] for body in (ours, theirs)]
+    assert found[0]["counted"] == found[1]["counted"] >= 27
+    assert max(found[1]["residuals"]) < 1e-8
 
 
 @with_slepc
