@@ -113,6 +113,23 @@ def pattern_of(
     )
 
 
+def no_pattern(blocks: int) -> Pattern:
+    """Of a system that is not factorised."""
+    none, starts_of_none = np.zeros(0, dtype=np.int64), np.zeros(blocks + 1, dtype=np.int64)
+    return Pattern(
+        pair_body=none,
+        pair=np.zeros((0, 6), dtype=np.int64),
+        sample=none,
+        pair_start=starts_of_none,
+        reach=none,
+        diagonal=none,
+        column_start=starts_of_none,
+        column=np.zeros((0, 2), dtype=np.int64),
+        update_start=starts_of_none,
+        update=none,
+    )
+
+
 def _shared(pairs: Array, of: list[tuple[int, ...]], marked: Markers, equal: Sequence[Hashable]) -> Array:
     """(P,) numbers of pairs, the same for those of equal markers on equal bodies; `of`: the markers of each block."""
     numbers: dict[Hashable, int] = {}
