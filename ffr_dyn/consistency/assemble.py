@@ -25,7 +25,7 @@ from ffr_dyn.consistency.validity import deflections
 from ffr_dyn.equations.constraint_rows import Block, blocks_of
 from ffr_dyn.equations.layout import Layout, initial_state, moved, to_global_axes
 from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction
-from ffr_dyn.scene.scene import Scene, require_scene
+from ffr_dyn.scene.scene import Scene, altered, require_scene
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
 from ffr_dyn.variants.plane import obstacles, planar_forms
 from ffr_prep.common.arrays import Array
@@ -168,7 +168,7 @@ def _in_plane_or_space(scene: Scene, time: float) -> Flat:
         if not found[flat.plane] or scene.plane == flat.plane:
             said = ", as the scene says" * (scene.plane == flat.plane)
             return Flat(flat, without(rows, across), f"in the plane, normal {flat.plane}{said}")
-    whole = replace(scene, plane="none")
+    whole = altered(scene, plane="none")
     return Flat(whole, constraints_of(whole, blocks_of(whole), time), _in_space(scene, found))
 
 

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
-from typing import Any, get_args
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction, as_time_f
 from ffr_dyn.scene.checks import check_name, check_own_name, several
 from ffr_dyn.scene.couplings import Coupling, coupled, coupling_word
 from ffr_dyn.scene.drivers import Driver, PointDriver, driver_word
-from ffr_dyn.scene.force_kinds import forces_of, kinds_in
+from ffr_dyn.scene.force_kinds import forces_of, kinds_in, loaded_markers
 from ffr_dyn.scene.joints import COORDINATES, Joint
 from ffr_dyn.scene.own_frame import OwnFrame
 from ffr_dyn.scene.parts import owner, taken_apart, wholes
@@ -111,6 +111,17 @@ class Body(Brief):
         return rows + ([("left out", listed(left_out))] if left_out else [])
 
 
+Checked = TypeVar("Checked", bound="Body | Scene")
+
+
+def altered(thing: Checked, **changes: Any) -> Checked:
+    """A copy of a body or a scene with other values of some fields, which are neither checked nor converted as by `replace`:
+    for forms of a scene that was checked, in which all names stay what they are."""
+    out = object.__new__(type(thing))
+    vars(out).update(vars(thing), **changes)
+    return out
+
+
 _PARALLEL = 1e-9  # of entries of a rotation, what is no turn
 _UNITS = ("m", "e0..e3", "m/s", "rad/s")
 
@@ -158,6 +169,12 @@ class Scene(Brief):
     def _numbers(self) -> dict[str, int]:
         """Of markers, by name."""
         return {f"{body}.{point}": k for k, (_, body, point) in enumerate(self._markers)}
+
+    @cached_property
+    def _used(self) -> frozenset[str]:
+        """Names of the markers at which joints, driven points, loads, springs or bushings act."""
+        pairs: tuple[Any, ...] = (*self.joints, *(driver for driver in self.drivers if isinstance(driver, PointDriver)))
+        return frozenset((*loaded_markers(self), *(end for pair in pairs for end in (pair.i, pair.j))))
 
     def __post_init__(self) -> None:
         for key, kinds in _DECLARATIONS.items():
@@ -232,6 +249,12 @@ def markers(scene: Scene) -> tuple[MarkerName, ...]:
 def marker_names(scene: Scene) -> tuple[str, ...]:
     """Names "body.interface" in the order of `markers`."""
     return tuple(scene._numbers)
+
+
+def used_interfaces(scene: Scene, body: Body) -> tuple[str, ...]:
+    """The interfaces of a body at which joints, driven points, loads, springs or bushings act."""
+    names = ((i.name, f"{owner(body)}.{i.name}") for i in body.model.interfaces)
+    return tuple(own for own, name in names if name in scene._used)
 
 
 def marker_number(scene: Scene, name: str) -> int:
