@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Literal, get_args
 import numpy as np
 
 from ffr_dyn.analyses.events import Event
-from ffr_dyn.analyses.integration import check_output_step, integrate
+from ffr_dyn.analyses.integration import check_output_step, evaluation_cost, integrate
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.rotating.periodic import periodically
 from ffr_dyn.analyses.settings import Settings
@@ -260,8 +260,7 @@ def _twins(runs: _Runs, method: Integrator) -> Iterator[Twin]:
 
 def _cost(assembled: Assembled, result: Result) -> float:
     """[us], about, of the runs that tell the error of a run; the same on every machine."""
-    sizes = [body.model.n for body in assembled.system.scene.bodies]
-    return 2.0 * result.attributes["evaluations"] * sum(1.0 + 0.02 * n + 7e-4 * n * n for n in sizes)
+    return 2.0 * result.attributes["evaluations"] * evaluation_cost(assembled.system.scene)
 
 
 def _finished(runs: _Runs, trial: _Trial, path: str | Path | None, ringing: Set[str] = frozenset()) -> Result:

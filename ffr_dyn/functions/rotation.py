@@ -52,8 +52,10 @@ def G_bar(p: Array) -> Array:
 
 def from_vector(vector: Array) -> Array:
     """(3,) rotation vector [rad] -> (4,) Euler parameters."""
-    angle = float(np.linalg.norm(vector))
-    return np.concatenate([[np.cos(angle / 2)], np.sinc(angle / (2 * np.pi)) / 2 * np.asarray(vector, float)])
+    x, y, z = np.asarray(vector, float).tolist()
+    half = math.sqrt(x * x + y * y + z * z) / 2
+    factor = math.sin(half) / half / 2 if half > 0 else 0.5
+    return np.array([math.cos(half), factor * x, factor * y, factor * z])
 
 
 def product(p: Array, r: Array) -> Array:
@@ -173,7 +175,8 @@ def triad(axis: Array, what: str = "axis") -> Array:
             f"{what} must be a vector of three numbers that is not zero, or a (3, 3) frame; it is {axis!r}"
         )
     h = value / np.linalg.norm(value)
-    helper = np.eye(3)[int(np.argmin(np.abs(h)))]
-    f = helper - (helper @ h) * h
+    k = int(np.argmin(np.abs(h)))
+    f = -h[k] * h
+    f[k] += 1.0
     f /= np.linalg.norm(f)
-    return np.column_stack([f, np.cross(h, f), h])
+    return np.array([f, cross(h, f), h]).T.copy()

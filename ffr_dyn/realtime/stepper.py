@@ -155,7 +155,7 @@ class Stepper(Brief):
         """What is doubtful of the states at which this was asked, beside the notes of assembly: as the notes of `forward`
         (the table in docs/analyses.md), but for the energy, and nothing is an error."""
         loop = self._loops[0]
-        look(self._seen, loop.record)
+        look(self._seen, View(loop.system, loop.record))
         steps = between_rows(self._seen, loop.engine.system, loop.work, loop.record)
         return [*self._seen.assembled.notes, *ended("stepper", self._seen, steps)]
 

@@ -7,15 +7,17 @@ computed and kept. `docs/scene_file.md` lists them.
 from __future__ import annotations
 
 import fnmatch
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from difflib import get_close_matches
+from functools import cache
+from typing import Any
 
 import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.functions.time_functions import TimeFunction, evaluate
-from ffr_dyn.kernels.tables import Record
 from ffr_dyn.results.power import (
     Worked,
     damping_power,
@@ -83,16 +85,14 @@ class Entry:
     compute: Callable[[View, Unwound | Worked | None], tuple[Array, Unwound | Worked | None]]
 
 
-def measure(
-    system: System, record: Record, last: Memory, wanted: Mapping[str, Entry] | None = None
-) -> tuple[dict[str, Quantity], Memory]:
-    """The wanted quantities of the recorded rows; by default those of `DEFAULT_OUTPUTS`.
+def measure(view: View, last: Memory, wanted: Mapping[str, Entry] | None = None) -> tuple[dict[str, Quantity], Memory]:
+    """The wanted quantities of recorded rows; by default those of `DEFAULT_OUTPUTS`.
 
     wanted : entries of the catalogue by name; see `selected`
     last   : what `measure` returned for the rows before these, {} at the start: angles and work go on from it
     """
-    view, found, left = View(system, record), {}, dict(last)
-    for name, entry in (selected(system) if wanted is None else wanted).items():
+    found, left = {}, dict(last)
+    for name, entry in (selected(view.system) if wanted is None else wanted).items():
         values, memory = entry.compute(view, last.get(name))
         found[name] = Quantity(values, entry.unit, entry.axes, entry.text)
         if memory is not None:
@@ -111,13 +111,20 @@ def selected(system: System, outputs: Sequence[str] = ("default",)) -> dict[str,
     wanted: set[str] = set()
     for pattern in outputs:
         patterns = DEFAULT_OUTPUTS if pattern == "default" else (pattern,)
-        fitting = {name for name in everything for one in patterns if fnmatch.fnmatchcase(name, one)}
+        fits = _one_of(patterns)
+        fitting = {name for name in everything if fits(name)}
         if not fitting:
             close = get_close_matches(pattern, everything, 3)
             known = f"did you mean {', '.join(close)}?" if close else f"there are: {', '.join(everything)}"
             raise InputError(f"outputs: {pattern!r} is none of the scene's quantities; {known}")
         wanted |= fitting
     return {name: entry for name, entry in everything.items() if name in wanted}
+
+
+@cache
+def _one_of(patterns: tuple[str, ...]) -> Callable[[str], Any]:
+    """Whether a name fits one of them."""
+    return re.compile("|".join(map(fnmatch.translate, patterns))).match
 
 
 def needs_every_step(wanted: Iterable[str]) -> bool:

@@ -7,8 +7,10 @@ of that and reads a field where it uses it. What a table holds, and in which ord
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from itertools import accumulate
+from types import MappingProxyType
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -38,26 +40,39 @@ def _array(kind: Any) -> tuple[str, int]:
     return dtype, axes
 
 
-def pack(tables: Any) -> Array:
-    """Addresses and shapes of the arrays of nested named tuples, and their numbers (int64). The arrays must outlive it."""
-    return np.array(_packed(tables), dtype=np.int64)
+def pack(tables: Any, known: Mapping[int, int] = MappingProxyType({})) -> Array:
+    """Addresses and shapes of the arrays of nested named tuples, and their numbers (int64). The arrays must outlive it.
 
-
-def _packed(tables: Any) -> list[int]:
+    known : addresses by the identity of arrays; numpy takes longer to tell them
+    """
     found: list[int] = []
-    for value, (name, kind) in zip(tables, _fields(type(tables)).items(), strict=True):  # type: ignore[arg-type]
-        if kind is float:
-            found.append(int(np.float64(value).view(np.int64)))
-        elif kind is int:
+    _pack(tables, known, found)
+    return np.array(found, dtype=np.int64)
+
+
+@cache
+def _plan(kind: Any) -> tuple[tuple[str, str, int], ...]:
+    """Of each field its name, what it holds ("float", "int", "table", or the dtype of an array), and its axes."""
+    simple = {float: "float", int: "int"}
+    return tuple(
+        (name, simple[of], 0) if of in simple else (name, "table", 0) if _is_table(of) else (name, *_array(of))
+        for name, of in _fields(kind).items()
+    )
+
+
+def _pack(tables: Any, known: Mapping[int, int], found: list[int]) -> None:
+    for value, (name, holds, axes) in zip(tables, _plan(type(tables)), strict=True):  # type: ignore[arg-type]
+        if holds == "table":
+            _pack(value, known, found)
+        elif holds == "int":
             found.append(value)
-        elif _is_table(kind):
-            found.extend(_packed(value))
+        elif holds == "float":
+            found.append(int(np.float64(value).view(np.int64)))
         else:
-            dtype, axes = _array(kind)
-            if value.dtype != dtype or value.ndim != axes or not value.flags.c_contiguous:
-                raise TypeError(f"table {name} is a {value.dtype} array of {value.ndim} axes, not {dtype} of {axes}")
-            found += [value.ctypes.data, *value.shape]
-    return found
+            if value.dtype != holds or value.ndim != axes or not value.flags.c_contiguous:
+                raise TypeError(f"table {name} is a {value.dtype} array of {value.ndim} axes, not {holds} of {axes}")
+            found.append(known.get(id(value)) or value.ctypes.data)
+            found.extend(value.shape)
 
 
 def _words(kind: Any) -> int:
