@@ -9,22 +9,20 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import csr_array
 
-from ffr_dyn.closing.constraints import Constraints, constraints_of, rows_at, without
+from ffr_dyn.closing.constraints import Constraints, constraints_of, without
 from ffr_dyn.closing.driven_angles import led_to_drivers
 from ffr_dyn.closing.independence import independent_blocks
 from ffr_dyn.closing.inertia_left import require_inertia
 from ffr_dyn.closing.positions import close_positions, close_velocities
-from ffr_dyn.closing.row_space import Matrix, independent
 from ffr_dyn.compile.scene_tables import System, compile_scene
+from ffr_dyn.consistency.across import rows_across
 from ffr_dyn.consistency.dropped_terms import check_dropped
 from ffr_dyn.consistency.held_frequencies import held_frequencies
 from ffr_dyn.consistency.sliding import sliding_notes
 from ffr_dyn.consistency.validity import deflections
 from ffr_dyn.equations.constraint_rows import Block, blocks_of
-from ffr_dyn.equations.layout import Layout, initial_state, moved, to_global_axes
-from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction
+from ffr_dyn.equations.layout import Layout, initial_state
 from ffr_dyn.scene.scene import Scene, altered, require_scene
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
 from ffr_dyn.variants.plane import obstacles, planar_forms
@@ -32,8 +30,6 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
-ASKED = 1e-6  # of a row across the plane at random speeds of about one; modes carry rounding of 1e-9
-ACROSS = 1e-8  # of the largest entry of a row, what counts as zero
 SHIFTED = 1e-6  # m, rad, from where it is told that assembly moved a body
 RELAXATION = 1e-8  # of dependent rows, relative
 TORN = 0.5  # elastic displacement of an interface over the size of its body that no joint may ask for
@@ -163,11 +159,12 @@ def flat_form(scene: Scene, time: float) -> Flat:
 def _in_plane_or_space(scene: Scene, time: float) -> Flat:
     scene, found = in_mean_axis_frames(scene), dict[str, str]()
     for flat in planar_forms(scene):
-        rows = constraints_of(flat, blocks_of(flat), time)
-        across, found[flat.plane] = _across(rows)
+        blocks = blocks_of(flat)
+        across, found[flat.plane] = rows_across(flat, blocks, time)
         if not found[flat.plane] or scene.plane == flat.plane:
             said = ", as the scene says" * (scene.plane == flat.plane)
-            return Flat(flat, without(rows, across), f"in the plane, normal {flat.plane}{said}")
+            rows = without(constraints_of(flat, blocks, time), across)
+            return Flat(flat, rows, f"in the plane, normal {flat.plane}{said}")
     whole = altered(scene, plane="none")
     return Flat(whole, constraints_of(whole, blocks_of(whole), time), _in_space(scene, found))
 
@@ -179,71 +176,6 @@ def _in_space(scene: Scene, found: dict[str, str]) -> str:
     normal, said = next(((key, (what,)) for key, what in found.items()), None) or obstacles(scene)
     more = f" (and {len(said) - 1} more)" if len(said) > 1 else ""
     return f"in space: not in the plane with the normal {normal}, as {said[0]}{more}"
-
-
-def _across(constraints: Constraints) -> tuple[Array, str]:
-    """(C,) which rows of a planar scene act across the plane only; and, in words, what of them does not hold every body in it
-    or asks for motion, now or later, or which others do not act in the plane only; "" where there is nothing.
-
-    Looked at in the position and with the motion that the scene declares, and at random in the plane around it.
-    """
-    scene, place, rng = constraints.scene, constraints.place, np.random.default_rng(0)
-    start, v = initial_state(scene, place)
-    active = np.zeros(place.v_size, bool)
-    for b, n in enumerate(place.n):
-        active[[place.iv[b] + c for c in (*place.active(b), *range(6, 6 + n))]] = True
-    inside, outside, left, jacobians = [], [], [], []
-    for scale in (0.0, 1e-2, 1e-2):
-        step = np.where(active, scale * rng.normal(size=place.v_size), 0.0)
-        x, speeds = moved(place, start, step), v + to_global_axes(place, start, 100 * step)
-        rows = rows_at(constraints, x, speeds)
-        jacobians.append(rows.J[:, ~active])
-        inside.append(_largest(rows.J[:, active]))
-        outside.append(_largest(jacobians[-1]))
-        left.append(np.abs([rows.Phi, rows.nu, rows.gamma]).max(axis=0))
-    most_inside, most_outside, most_left = (np.array(part).max(axis=0) for part in (inside, outside, left))
-    across = most_inside <= ACROSS * most_outside
-    mixed = ~across & (most_outside > ACROSS * most_inside)
-    blocks = constraints.blocks
-    moving = np.array([_changes(word.function) for block in blocks for word in block.words], bool)
-    asked = across & ((most_left >= ASKED) | moving)
-    names = [block.name for block in blocks for _ in block.words]
-    for wrong, what in ((mixed, "acts both in the plane and across it"), (asked, "asks for motion across it")):
-        if wrong.any():
-            return across, f"{names[int(np.argmax(wrong))]!r} {what}"
-    if lost := _driver_lost(blocks, across):
-        return across, f"driver {lost!r} acts across it alone"
-    if not all(_columns_independent(J[across]) for J in jacobians):
-        return across, "its joints leave a body free to move across it"
-    return across, ""
-
-
-def _driver_lost(blocks: tuple[Block, ...], across: Array) -> str:
-    """A driver all rows of which act across the plane: in the plane it would have no effort; empty where there is none."""
-    numbers = iter(across.tolist())
-    acts = [[next(numbers) for _ in block.words] for block in blocks]
-    return next((block.name for block, rows in zip(blocks, acts, strict=True) if block.driver and all(rows)), "")
-
-
-def _largest(J: Matrix) -> Array:
-    """(C,) the largest entry of each row."""
-    if isinstance(J, np.ndarray):
-        return np.abs(J).max(axis=1, initial=0.0)
-    return abs(J).max(axis=1).toarray().ravel() if J.shape[1] else np.zeros(J.shape[0])
-
-
-def _columns_independent(A: Matrix) -> bool:
-    """Whether no combination of the columns vanishes. Rows have more of their own than columns, which a chain adds up."""
-    if independent(A):
-        return A.shape[0] == A.shape[1]
-    if isinstance(A, np.ndarray):
-        return int(np.linalg.matrix_rank(A)) == A.shape[1]
-    return independent(csr_array(A.T)) or int(np.linalg.matrix_rank(A.toarray())) == A.shape[1]
-
-
-def _changes(function: TimeFunction | None) -> bool:
-    """Whether a function of time is more than a constant."""
-    return function is not None and (function.kind != POLYNOMIAL or any(function.data[1:]))
 
 
 def in_space(scene: Scene) -> Scene:

@@ -93,6 +93,13 @@ class Body(Brief):
                 raise InputError(f"{who}: there is no inertia term {term!r} to drop; {_offer(term, INERTIA_TERMS)}")
         object.__setattr__(self, "dropped", tuple(t for t in INERTIA_TERMS if t in self.dropped))
 
+    @cached_property
+    def _along(self) -> tuple[int, int, int]:
+        """The body axes along the global ones, or -1."""
+        size = np.abs(rotation_matrix(self.rotation))
+        x, y, z = (int(np.argmax(row)) if row.max() > 1 - 1e-12 else -1 for row in size)
+        return x, y, z
+
     def _title(self) -> str:
         n = self.model.n
         return f"Body {self.name!r}: {f'flexible, {n} elastic coordinates' if n else 'rigid'}, {self.model.mass:.4g} kg"
@@ -119,6 +126,8 @@ def altered(thing: Checked, **changes: Any) -> Checked:
     for forms of a scene that was checked, in which all names stay what they are."""
     out = object.__new__(type(thing))
     vars(out).update(vars(thing), **changes)
+    if "rotation" in changes:
+        vars(out).pop("_along", None)
     return out
 
 
@@ -306,9 +315,7 @@ def body_number(scene: Scene, name: str, who: str) -> int:
 
 def body_normal(body: Body, normal: int) -> int:
     """The body axis along the global axis `normal`, or -1."""
-    along = rotation_matrix(body.rotation)[normal]
-    k = int(np.argmax(np.abs(along)))
-    return k if abs(along[k]) > 1 - 1e-12 else -1
+    return body._along[normal]
 
 
 def undeformed(scene: Scene, number: int) -> Array:
