@@ -83,7 +83,7 @@ def basis_in_plane(body: Body, k: int) -> Array | None:
     """(n, n) double modes of a body combined into those in the plane across body axis k and those across it, each in the
     place of the one it is most of; None where nothing is to be turned."""
     V = np.eye(body.model.n)
-    for group in _groups(body):
+    for group in _groups(body) if body.model.n else ():
         vectors = np.linalg.eigh(body.model.PP_dm[k, k][np.ix_(group, group)])[1]
         if np.abs(vectors).max(axis=0).min() < 1.0 - TURNED:
             V[np.ix_(group, group)] = vectors * np.sign(vectors[np.abs(vectors).argmax(axis=0), range(len(group))])

@@ -163,9 +163,11 @@ def _found_asymmetry(part: Body, k: int, used: tuple[str, ...]) -> str:
     off = max(places, key=lambda name: abs(places[name]))
     if abs(places[off]) > BESIDE * length:
         return f"{off} is {places[off]:.3g} m beside its middle plane"
-    products = np.abs(np.delete(body.rr_dm[k], k)).max() / (body.mass * length**2)
+    products = max(abs(body.rr_dm[k, c]) for c in range(3) if c != k) / (body.mass * length**2)
     if products > BESIDE:
         return f"a product of inertia is {products:.2g} of its moments"
+    if not body.n:
+        return ""
     mixed = _mixed_modes(body, k, used, second_order=part.stiffening and body.stiffening is not None)
     return mixed or _mixed_damping(body, _mostly(body, k, used))
 
@@ -178,8 +180,6 @@ def _mixed_damping(body: FlexibleBody, stays: Array) -> str:
 
 
 def _mixed_modes(body: FlexibleBody, k: int, used: Sequence[str], *, second_order: bool) -> str:
-    if not body.n:
-        return ""
     size = _sizes(body, used)
     along, across = _motion_along(body, k, used) / size, _motion_across(body, k, used) / size
     mixed = np.minimum(along, across)
