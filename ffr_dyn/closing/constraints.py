@@ -6,6 +6,7 @@ time. What drivers prescribe then is evaluated once, in readable form, which say
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from scipy.sparse import csr_array
 
 from ffr_dyn.closing.row_space import FEW, Matrix
 from ffr_dyn.compile.engine import Engine, new_engine
-from ffr_dyn.compile.scene_tables import rows_alone
+from ffr_dyn.compile.scene_tables import System, compile_scene
 from ffr_dyn.equations.constraint_rows import Block, drive_at
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.kernels.entry_points import evaluate_markers, evaluate_rows
@@ -74,24 +75,30 @@ class RowsAt(Brief):
 
 def constraints_of(scene: Scene, blocks: list[Block], time: float) -> Constraints:
     """All rows of the blocks. Raises InputError where a function of time has no value then, or a length is not positive."""
-    system = rows_alone(scene, blocks)
+    system = compile_scene(scene, blocks)
     place, rows = system.layout, system.model.rows
     engine = new_engine(system, np.zeros(place.x_size), np.zeros(place.v_size))
     evaluate_markers(engine.tables, ALL, engine.x, engine.v)  # those of the ground, once
     drives = np.zeros((system.model.functions.kind.size, 3))
-    said = [(block, word) for block in blocks for word in block.words]
-    for function, (block, word) in zip(rows.function, said, strict=True):
+    said = [(block, word) for block in system.blocks for word in block.words]
+    for function, (block, word) in zip(rows.function.tolist(), said, strict=True):
         if function >= 0:
             drives[function] = drive_at(block, word, time)
-    numbers = np.arange(len(said))
-    return Constraints(scene, place, tuple(blocks), numbers, drives, engine, _entries(system.model, place))
+    return Constraints(scene, place, tuple(blocks), _numbers(system), drives, engine, _entries(system.model, place))
 
 
-def without(constraints: Constraints, left_out: Array) -> Constraints:
-    """The rows but those that are left out (C,)."""
+def _numbers(system: System) -> Array:
+    """(C,) of the rows in the order of the blocks that were compiled, those in the tables, where these have another."""
+    order, start = system.elimination.order, system.model.rows.start
+    first = dict(zip(order, start[:-1].tolist(), strict=True))
+    sizes = dict(zip(order, np.diff(start).tolist(), strict=True))
+    return np.array([first[k] + row for k in range(len(order)) for row in range(sizes[k])], dtype=np.int64)
+
+
+def without(blocks: Iterable[Block], left_out: Array) -> list[Block]:
+    """The blocks without the words that are left out (C,)."""
     numbers = iter(left_out.tolist())
-    blocks = [replace(b, words=tuple(w for w in b.words if not next(numbers))) for b in constraints.blocks]
-    return replace(constraints, blocks=tuple(blocks), numbers=constraints.numbers[~left_out])
+    return [replace(block, words=tuple(word for word in block.words if not next(numbers))) for block in blocks]
 
 
 def of_blocks(constraints: Constraints, chosen: list[int]) -> Constraints:
@@ -121,8 +128,7 @@ def _jacobian(constraints: Constraints) -> Matrix:
         values.append((kept[of, :3] @ phi[:3] + kept[of, 6:] @ phi[3:]).ravel())
     entries = np.concatenate(values)
     if size[0] <= FEW:
-        whole = np.bincount(found.at, entries, size[0] * size[1]).reshape(size)
-        return whole if numbers.size == size[0] else whole[numbers]
+        return np.bincount(found.at, entries, size[0] * size[1]).reshape(size)[numbers]
     return csr_array((entries, np.divmod(found.at, size[1])), shape=size)[numbers]
 
 

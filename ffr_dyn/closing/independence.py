@@ -42,8 +42,7 @@ def independent_blocks(constraints: Constraints, x: Array, v: Array) -> tuple[li
     said = [(block, word) for block in blocks for word in block.words]
     # what is left of the combinations in these rows is as regular as can be, and so are the rows that are kept
     out = np.sort(qr(N.T, mode="r", pivoting=True)[1][: N.shape[1]])
-    left = without(constraints, np.isin(np.arange(len(said)), out))
-    return list(left.blocks), [(said[k][0].name, said[k][1].text) for k in out]
+    return without(blocks, np.isin(np.arange(len(said)), out)), [(said[k][0].name, said[k][1].text) for k in out]
 
 
 def redundant_drivers(constraints: Constraints, x: Array, v: Array) -> tuple[str, ...]:

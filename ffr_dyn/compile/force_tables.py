@@ -139,11 +139,6 @@ def load_tables(scene: Scene, functions: FunctionTable) -> Loads:
     )
 
 
-def no_loads() -> Loads:
-    """The tables of a scene without any."""
-    return Loads(np.zeros((0, 11), dtype=np.int64), np.zeros(0), np.zeros(0))
-
-
 def _row(scene: Scene, force: Force, numbers: LoadNumbers, measured: int) -> tuple[int, ...]:
     """`Loads.row` from its second column on."""
     place = force.place

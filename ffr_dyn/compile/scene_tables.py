@@ -11,9 +11,9 @@ import numpy as np
 from ffr_dyn.compile.alignment import aligned
 from ffr_dyn.compile.body_tables import body_tables
 from ffr_dyn.compile.elimination import Elimination, eliminate
-from ffr_dyn.compile.force_tables import Callback, FunctionTable, base_functions, load_tables, no_loads
+from ffr_dyn.compile.force_tables import Callback, FunctionTable, base_functions, load_tables
 from ffr_dyn.compile.marker_tables import marker_tables
-from ffr_dyn.compile.row_tables import alike, moving_bodies, no_pattern, pattern_of, row_tables
+from ffr_dyn.compile.row_tables import alike, moving_bodies, pattern_of, row_tables
 from ffr_dyn.equations.constraint_rows import Block, blocks_of
 from ffr_dyn.equations.layout import Layout, layout
 from ffr_dyn.equations.state_view import StateView
@@ -75,27 +75,6 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: f
     compiled = Model(**model, user_address=user.address, user_count=user.count, stiff_count=0)  # type: ignore[arg-type]
     tables, addresses = aligned(compiled)
     return System(scene, place, ordered, elimination, tables, user, functions.inputs(), addresses)
-
-
-def rows_alone(scene: Scene, blocks: list[Block]) -> System:
-    """Tables of a scene for what asks for the values of constraint rows alone, in the order of `blocks`: without loads, and
-    without the multiplier matrix."""
-    place, functions, ordered = layout(scene), FunctionTable(), tuple(blocks)
-    model = {
-        "gravity": np.array(scene.gravity),
-        "base": np.full(3, -1),
-        "relaxation": 0.0,
-        "bodies": body_tables(scene, place),
-        "markers": marker_tables(scene, place, ordered),
-        "rows": row_tables(ordered, functions),
-        "pattern": no_pattern(len(ordered)),
-        "loads": no_loads(),
-        "functions": functions.tables(),
-    }
-    user = UserFunctions(functions.callbacks, place, scene)
-    compiled = Model(**model, user_address=user.address, user_count=user.count, stiff_count=0)  # type: ignore[arg-type]
-    tables, addresses = aligned(compiled)
-    return System(scene, place, ordered, Elimination((), ()), tables, user, {}, addresses)
 
 
 # ---- the user's Python functions ----------------------------------------------------------------------------------

@@ -90,7 +90,8 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     )
     all_rows = compile_scene(scene, list(rows.blocks), RELAXATION) if redundant else None
     free = _movable(place) - count
-    return Assembled(compile_scene(scene, kept), all_rows, x, v, free, tuple(notes), tuple(redundant), flat.computed)
+    system = compile_scene(scene, kept) if redundant else rows.engine.system
+    return Assembled(system, all_rows, x, v, free, tuple(notes), tuple(redundant), flat.computed)
 
 
 def shifted(scene: Scene, place: Layout, guess: Array, x: Array) -> list[str]:
@@ -163,7 +164,7 @@ def _in_plane_or_space(scene: Scene, time: float) -> Flat:
         across, found[flat.plane] = rows_across(flat, blocks, time)
         if not found[flat.plane] or scene.plane == flat.plane:
             said = ", as the scene says" * (scene.plane == flat.plane)
-            rows = without(constraints_of(flat, blocks, time), across)
+            rows = constraints_of(flat, without(blocks, across), time)
             return Flat(flat, rows, f"in the plane, normal {flat.plane}{said}")
     whole = altered(scene, plane="none")
     return Flat(whole, constraints_of(whole, blocks_of(whole), time), _in_space(scene, found))
