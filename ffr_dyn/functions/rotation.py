@@ -32,7 +32,8 @@ def rotation_matrix(p: Array) -> Array:
     p = np.asarray(p, float)
     if p.ndim == 1:
         return np.array(_rotation_rows(*p.tolist()))
-    return np.moveaxis(np.array(_rotation_rows(*np.moveaxis(p, -1, 0))), (0, 1), (-2, -1))
+    axes = (*range(2, p.ndim + 1), 0, 1)
+    return np.array(_rotation_rows(p[..., 0], p[..., 1], p[..., 2], p[..., 3])).transpose(axes)
 
 
 def _rotation_rows(p0: Any, p1: Any, p2: Any, p3: Any) -> list[list[Any]]:

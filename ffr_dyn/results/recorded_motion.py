@@ -31,9 +31,14 @@ def dot(a: Array, b: Array) -> Array:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """(T, 3), (T, 3) -> (T, 3)."""
-    (a0, a1, a2), (b0, b1, b2) = a.T, b.T
-    return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=1)
+    """(T, 3), (T, 3) -> (T, 3), or (T, 3, k) of k vectors."""
+    out = np.empty(b.shape)
+    a0, a1, a2 = a[:, 0], a[:, 1], a[:, 2]
+    b0, b1, b2 = b[:, 0], b[:, 1], b[:, 2]
+    out[:, 0] = a1 * b2 - a2 * b1
+    out[:, 1] = a2 * b0 - a0 * b2
+    out[:, 2] = a0 * b1 - a1 * b0
+    return out
 
 
 def to_global(A: Array, s: Array) -> Array:
@@ -284,16 +289,14 @@ class View(Brief):
 
     def _frame(self, marker: int, frame: Array) -> Array:
         A = self._once(("marker axes", marker), lambda: rotation_matrix(self.orientation(marker)))
-        columns = [np.broadcast_to(frame[:, k], (self.rows, 3)) for k in range(3)]
-        return np.stack([to_global(A, column) for column in columns], axis=2)
+        return A[:, :, 0, None] * frame[0] + A[:, :, 1, None] * frame[1] + A[:, :, 2, None] * frame[2]
 
     def frame_rate(self, marker: int, frame: Array) -> Array:
         """(T, 3, 3) time derivative of `frame`."""
         return self._once(("frame rate", marker, frame.tobytes()), lambda: self._frame_rate(marker, frame))
 
     def _frame_rate(self, marker: int, frame: Array) -> Array:
-        omega, columns = self.spin(marker), self.frame(marker, frame)
-        return np.stack([cross(omega, columns[:, :, k]) for k in range(3)], axis=2)
+        return cross(self.spin(marker)[:, :, None], self.frame(marker, frame))
 
     def joint_frames(self, joint: Joint) -> tuple[Array, Array]:
         """Frames (T, 3, 3) of a joint on its markers i and j, global axes."""
