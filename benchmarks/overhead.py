@@ -3,10 +3,10 @@
     python -m benchmarks.overhead [--runs 40]
 
 Goal: at most 2 ms in all around the compiled loop, after the first scene of its structure in this process. Every run has
-numbers of its own: the speed of the motor, a force on the slider, the masses of crank and slider; the rod, a body of second
-order, is the same. Printed are the best and the median of the processor time of this thread; the load of the machine, which is printed too,
-makes caches cold and counts all the same. Last comes what
-it costs to make the scene, and the whole of `forward` with the further runs that tell its errors, without its compiled loops.
+numbers of its own: the speed of the motor, a force on the slider, the mass of the slider; the rod, a body of second order, is
+the same. Printed are the best and the median processor time of this thread, and the load of the machine, which makes caches
+cold and so counts all the same. Last come the making of a scene, and the whole of `forward` without its compiled loops, with
+the further runs that tell its errors.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def main() -> int:
     found = measured(rod, runs)
     found["around the loop"] = [a + b for a, b in zip(found["assembling, tables"], found["result"], strict=True)]
     print(f"slider-crank, {rod.n} modes, {round(END / METHOD.step)} steps; load {os.getloadavg()[0]:.1f}")
-    print(f"{'ms':22s} {'best':>8s} {'median':>8s}")
+    print(f"{"ms":22s} {'best':>8s} {'median':>8s}")
     for what in ("scene", "assembling, tables", "result", "around the loop", "with its errors"):
         print(f"{what:22s} {min(found[what]):8.2f} {statistics.median(found[what]):8.2f}")
     met = min(found["around the loop"]) <= GOAL

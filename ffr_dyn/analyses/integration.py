@@ -118,9 +118,8 @@ def integrate(
     path = resume if path is None else path
     mark = "" if path is None else _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
     header = _header(scene, assembled, method, stabilisation, span)
-    kept: Kept = Recorded(assembled.system, wanted)
-    if path is not None or events or needs_every_step(wanted) or rows * row_size(assembled.system) > SMALL:
-        kept = Measured(assembled.system, wanted)
+    shown_alone = path is None and not events
+    kept = _kept(assembled.system, wanted, rows) if shown_alone else Measured(assembled.system, wanted)
     run = _begun(assembled, method, stabilisation, start, spacing, kept, resume, mark)
     _check_resumed(run, substeps * rows, output_step / substeps)
     watcher = _watcher(assembled, run, method, stabilisation, spacing, events, resume) if events else None
@@ -135,6 +134,13 @@ def integrate(
         if writer is not None:
             writer.close("complete", header | account)
     return _result(scene, run, header | account | {"status": "complete"})
+
+
+def _kept(system: System, wanted: Mapping[str, Entry], rows: int) -> Kept:
+    """What a run of so many output rows keeps where no file is written and no event is looked for."""
+    if needs_every_step(wanted) or rows * row_size(system) > SMALL:
+        return Measured(system, wanted)
+    return Recorded(system, wanted)
 
 
 def _writer(path: str | Path, scene: Scene, run: _Run, header: dict[str, Any], mark: str) -> ResultWriter:
