@@ -93,7 +93,7 @@ def main() -> int:
     found = measured(rod, runs)
     found["around the loop"] = [a + b for a, b in zip(found["assembling, tables"], found["result"], strict=True)]
     print(f"slider-crank, {rod.n} modes, {round(END / METHOD.step)} steps; load {os.getloadavg()[0]:.1f}")
-    print(f"{"ms":22s} {'best':>8s} {'median':>8s}")
+    print(f"{'ms':22s} {'best':>8s} {'median':>8s}")
     for what in ("scene", "assembling, tables", "result", "around the loop", "with its errors"):
         print(f"{what:22s} {min(found[what]):8.2f} {statistics.median(found[what]):8.2f}")
     met = min(found["around the loop"]) <= GOAL
