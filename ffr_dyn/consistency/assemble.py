@@ -159,15 +159,15 @@ def flat_form(scene: Scene, time: float) -> Flat:
 
 def _in_plane_or_space(scene: Scene, time: float) -> Flat:
     scene, found = in_mean_axis_frames(scene), dict[str, str]()
+    blocks = blocks_of(scene)  # which know joints and markers by number, and these are the same in a plane
     for flat in planar_forms(scene):
-        blocks = blocks_of(flat)
         across, found[flat.plane] = rows_across(flat, blocks, time)
         if not found[flat.plane] or scene.plane == flat.plane:
             said = ", as the scene says" * (scene.plane == flat.plane)
             rows = constraints_of(flat, without(blocks, across), time)
             return Flat(flat, rows, f"in the plane, normal {flat.plane}{said}")
     whole = altered(scene, plane="none")
-    return Flat(whole, constraints_of(whole, blocks_of(whole), time), _in_space(scene, found))
+    return Flat(whole, constraints_of(whole, blocks, time), _in_space(scene, found))
 
 
 def _in_space(scene: Scene, found: dict[str, str]) -> str:

@@ -94,9 +94,14 @@ class Body(Brief):
         object.__setattr__(self, "dropped", tuple(t for t in INERTIA_TERMS if t in self.dropped))
 
     @cached_property
+    def _axes(self) -> Array:
+        """(3, 3) body to global, at the start."""
+        return rotation_matrix(self.rotation)
+
+    @cached_property
     def _along(self) -> tuple[int, int, int]:
         """The body axes along the global ones, or -1."""
-        size = np.abs(rotation_matrix(self.rotation))
+        size = np.abs(self._axes)
         x, y, z = (int(np.argmax(row)) if row.max() > 1 - 1e-12 else -1 for row in size)
         return x, y, z
 
@@ -127,7 +132,8 @@ def altered(thing: Checked, **changes: Any) -> Checked:
     out = object.__new__(type(thing))
     vars(out).update(vars(thing), **changes)
     if "rotation" in changes:
-        vars(out).pop("_along", None)
+        for key in ("_axes", "_along"):
+            vars(out).pop(key, None)
     return out
 
 
@@ -324,7 +330,7 @@ def undeformed(scene: Scene, number: int) -> Array:
     if b == len(scene.bodies):
         return np.asarray(scene.ground[point])
     body = scene.bodies[b]
-    place: Array = body.position + rotation_matrix(body.rotation) @ body.model.interface(point).position
+    place: Array = body.position + body._axes @ body.model.interface(point).position
     return place
 
 
