@@ -19,6 +19,7 @@ from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency import failure as failing
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.doubts import BALANCE, SINGULAR, Seen, between_rows, ended, held, look, nothing_seen
+from ffr_dyn.consistency.evaluation import joined
 from ffr_dyn.consistency.following import STALLED, Lost, jumped, lost_driver, unfollowed
 from ffr_dyn.consistency.validity import meaningless
 from ffr_dyn.functions.stopwatch import Stopwatch
@@ -65,13 +66,15 @@ SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, 
 
 @dataclass
 class _Run:
-    """What changes while a run goes on; `done` counts the steps."""
+    """What changes while a run goes on; `done` counts the steps. The first row is `unseen` until others can be looked at with
+    it."""
 
     engine: Engine
     energy: EnergyWatch
     kept: Kept
     seen: Seen
     done: int
+    unseen: Record | None = None
 
 
 def integrate(
@@ -220,11 +223,22 @@ def _started(assembled: Assembled, engine: Engine, energy: EnergyWatch, seen: Se
     status = record_row(engine, start, first, 0)
     if status != OK:
         raise failing.failure(engine.system, engine.work, status, start)
-    view = View(assembled.system, with_all_reactions(assembled, first))
-    energy.look(view)
-    look(seen, view)
-    kept.add(view, np.zeros(1, dtype=np.int64))
-    return _Run(engine, energy, kept, seen, 0)
+    first = with_all_reactions(assembled, first)
+    kept.add(View(assembled.system, first), np.zeros(1, dtype=np.int64))
+    run = _Run(engine, energy, kept, seen, 0)
+    if isinstance(kept, Measured):
+        _look(run, first)  # a file holds what has been seen of its rows
+    else:
+        run.unseen = first
+    return run
+
+
+def _look(run: _Run, rows: Record) -> None:
+    """Take note of the rows that follow, and of the first where it is unseen."""
+    view = View(run.seen.assembled.system, rows if run.unseen is None else joined([run.unseen, rows]))
+    run.unseen = None
+    run.energy.look(view)
+    look(run.seen, view)
 
 
 def _advance(
@@ -260,11 +274,9 @@ def _advance(
             kept = with_all_reactions(assembled, Record(*(column[:filled] for column in chunk)))
             if watcher is not None:
                 kept, ends = watcher.look(kept)
-            view = View(system, kept)
-            run.energy.look(view)
-            part = run.kept.add(view, _shown(kept.time.size, looks, ends))
+            _look(run, kept)
+            part = run.kept.add(View(system, kept), _shown(kept.time.size, looks, ends))
             times = run.kept.times[-1]
-            look(run.seen, view)
             if nonsense := meaningless(system.scene, run.seen.arrays["bodies"]):
                 raise ComputationError(f"by t = {times[-1]:.6g} s {nonsense}")
             if lost is not None and status == OK and run.energy.gains[2] > 0:

@@ -270,7 +270,7 @@ class View(Brief):
         if owner is None:
             return np.broadcast_to([1.0, 0.0, 0.0, 0.0], (self.rows, 4))
         p = self.record.x[:, self.system.layout.p(owner[0])]
-        return times(p, from_vectors(self._turned(*owner).value))
+        return times(p, from_vectors(self._turned(*owner).value)) if self.system.layout.n[owner[0]] else p
 
     def spin(self, marker: int) -> Array:
         """(T, 3) angular velocity of the marker, global axes."""
@@ -281,7 +281,9 @@ class View(Brief):
         if owner is None:
             return np.zeros((self.rows, 3))
         omega = self.record.v[:, self.system.layout.omega(owner[0])]
-        return to_global(self._computed_axes(owner[0]), omega + turn_rates(self._turned(*owner))[0])
+        if self.system.layout.n[owner[0]]:
+            omega = omega + turn_rates(self._turned(*owner))[0]
+        return to_global(self._computed_axes(owner[0]), omega)
 
     def frame(self, marker: int, frame: Array) -> Array:
         """(T, 3, 3) joint frame (columns f, g, h) of a marker in global axes."""
