@@ -90,7 +90,7 @@ def inertia_tensor(moment: Moments) -> Array:
 def mass_matrix(body: FlexibleBody | Integrals, q: Array) -> Array:
     """(6 + n, 6 + n) mass matrix at q (n,), body axes. Equation (12) of docs/notation.md."""
     moment = moments(body, q)
-    M, s = np.zeros((6 + q.size, 6 + q.size)), skew(moment.s)
+    M, s = np.zeros((6 + q.size, 6 + q.size), moment.W.dtype), skew(moment.s)
     M[:3, :3].flat[::4] = body.mass
     M[:3, 3:6], M[3:6, :3], M[3:6, 3:6] = -s, s, inertia_tensor(moment)
     M[:3, 6:], M[3:6, 6:] = body.P_dm, axial(moment.G)
