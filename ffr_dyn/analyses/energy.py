@@ -88,10 +88,11 @@ class EnergyWatch:
             return amiss(self.account, kind, "use smaller tolerances")
         return amiss(self.account, f"{kind}, {self.method.step:.3g} s", "use a smaller step")
 
-    def look(self, rows: Record) -> None:
+    def look(self, view: View) -> None:
         """Take note of the rows that follow. Raises ComputationError when their energy comes from nowhere."""
+        rows = view.record
         with np.errstate(all="ignore"):
-            energy, powers = rows.energy[:, 0] + rows.energy[:, 1], _powers(self.system, rows)
+            energy, powers = rows.energy[:, 0] + rows.energy[:, 1], _powers(view)
             add_rows(self.account, rows, powers)
             if self.anchor is None:
                 self._begin(rows, energy, powers)
@@ -134,7 +135,7 @@ class EnergyWatch:
             raise ComputationError(self._told(anchor, row, found))
         if status == OK and not abs(found - row.energy) <= AGREED * row.energy and self._accountable():
             with np.errstate(all="ignore"):
-                powers = _powers(self.system, self.complete(fine)).sum(axis=1)
+                powers = _powers(View(self.system, self.complete(fine))).sum(axis=1)
                 work = float(np.diff(fine.time, prepend=anchor.time) @ powers)
                 grown = float(fine.energy[-1].sum()) - anchor.total
             if not grown - work <= 0.5 * found and self._grows_on(row):
@@ -214,11 +215,11 @@ def _row(rows: Record, k: int, energy: Array) -> _Row:
     return _Row(float(rows.time[k]), *state, float(energy[k]), float(rows.energy[k].sum()))
 
 
-def _powers(system: System, rows: Record) -> Array:
+def _powers(view: View) -> Array:
     """(T, sources) of all forces and drivers."""
-    scene, view = system.scene, View(system, rows)
+    scene = view.system.scene
     drives = [*scene.drivers, *(joint for joint in scene.joints if joint.kind == "distance")]
-    return np.column_stack([rows.power, *(power(view, drive) for drive in drives)])
+    return np.column_stack([view.record.power, *(power(view, drive) for drive in drives)])
 
 
 def _finer(method: Integrator, step: float) -> Any:

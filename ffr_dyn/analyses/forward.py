@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Literal, get_args
 import numpy as np
 
 from ffr_dyn.analyses.events import Event
-from ffr_dyn.analyses.integration import check_output_step, integrate
+from ffr_dyn.analyses.integration import check_output_step, evaluation_cost, integrate
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.rotating.periodic import periodically
 from ffr_dyn.analyses.settings import Settings
@@ -266,8 +266,7 @@ def _twins(runs: _Runs, method: Integrator) -> Iterator[Twin]:
 
 def _cost(assembled: Assembled, result: Result) -> float:
     """[us], about, of the runs that tell the error of a run; the same on every machine."""
-    sizes = [body.model.n for body in assembled.system.scene.bodies]
-    return 2.0 * result.attributes["evaluations"] * sum(1.0 + 0.02 * n + 7e-4 * n * n for n in sizes)
+    return 2.0 * result.attributes["evaluations"] * evaluation_cost(assembled.system.scene)
 
 
 def _finished(runs: _Runs, trial: _Trial, path: str | Path | None, ringing: Set[str] = frozenset()) -> Result:
@@ -303,9 +302,9 @@ def _unresolved(runs: _Runs, trial: _Trial, ringing: Set[str]) -> list[str]:
     """A note on the vibration that the step does not resolve: its share, its frequency, and the price of resolving it."""
     large = {name: e for name, e in trial.errors.items() if e.of_range > Within().accuracy}
     told = {name: e for name, e in large.items() if e.vibrates or name in ringing}
-    of, method = runs.vibrations, trial.method
-    if not told or not of.omega.size:
+    if not told or not runs.vibrations.omega.size:
         return []
+    of, method = runs.vibrations, trial.method
     name = max(told, key=lambda one: told[one].of_range)
     found = leading(of, trial.result, trial.twins[-1])
     words = f" of {found / 2 / np.pi:.4g} Hz" if found else ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
@@ -14,10 +14,12 @@ from ffr_dyn.analyses.checkpoint import Checkpoint, decode, encode, fingerprint,
 from ffr_dyn.analyses.energy import EnergyWatch
 from ffr_dyn.analyses.events import Event, Watcher
 from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
+from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency import failure as failing
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.doubts import BALANCE, SINGULAR, Seen, between_rows, ended, held, look, nothing_seen
+from ffr_dyn.consistency.evaluation import joined
 from ffr_dyn.consistency.following import STALLED, Lost, jumped, lost_driver, unfollowed
 from ffr_dyn.consistency.validity import meaningless
 from ffr_dyn.functions.stopwatch import Stopwatch
@@ -43,7 +45,9 @@ from ffr_dyn.kernels.tables import (
     Work,
 )
 from ffr_dyn.results.file import ResultWriter, load_checkpoint, load_result
-from ffr_dyn.results.quantities import Entry, Memory, measure, needs_every_step, selected
+from ffr_dyn.results.kept_rows import SMALL, Kept, Measured, Recorded, row_size
+from ffr_dyn.results.quantities import Entry, needs_every_step, selected
+from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.described import described
@@ -55,20 +59,22 @@ from ffr_prep.common.errors import ComputationError, InputError
 
 FEW = 4.0  # steps
 LOOKS = 10  # of a quantity that adds up, from row to row, where the method chooses its steps
+SURE = 10.0  # times, by which an evaluation may take longer than is guessed before the first one
+MOST_ROWS = 1000  # of the first call
 SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, file and keyboard
 
 
 @dataclass
 class _Run:
-    """What changes while a run goes on; `done` counts the steps."""
+    """What changes while a run goes on; `done` counts the steps. The first row is `unseen` until others can be looked at with
+    it."""
 
     engine: Engine
     energy: EnergyWatch
-    memory: Memory
-    parts: list[dict[str, Quantity]]
-    times: list[Array]
+    kept: Kept
     seen: Seen
     done: int
+    unseen: Record | None = None
 
 
 def integrate(
@@ -112,15 +118,16 @@ def integrate(
     assembled = assemble(scene, time=start) if assembled is None else assembled
     wanted = selected(assembled.system, outputs)
     span = (start, end, output_step)
-    mark = _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
+    path = resume if path is None else path
+    mark = "" if path is None else _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
     header = _header(scene, assembled, method, stabilisation, span)
-    run = _begun(assembled, method, stabilisation, start, spacing, wanted, resume, mark)
+    shown_alone = path is None and not events
+    kept = _kept(assembled.system, wanted, rows) if shown_alone else Measured(assembled.system, wanted)
+    run = _begun(assembled, method, stabilisation, start, spacing, kept, resume, mark)
     _check_resumed(run, substeps * rows, output_step / substeps)
     watcher = _watcher(assembled, run, method, stabilisation, spacing, events, resume) if events else None
-    path = resume if path is None else path
     watch = Stopwatch() if stopwatch is None else stopwatch
-    first = Result(run.times[0], run.parts[0], geometry(scene), header | {"status": "running"})
-    with nullcontext() if path is None else ResultWriter(path, first, checkpoint=_checkpoint(run, mark)) as writer:
+    with nullcontext() if path is None else _writer(path, scene, run, header, mark) as writer:
         for times, part in _advance(assembled, run, method, start, substeps, rows, wanted, watch, watcher):
             if writer is not None:
                 writer.append(times, {name: quantity.values for name, quantity in part.items()}, _checkpoint(run, mark))
@@ -130,6 +137,19 @@ def integrate(
         if writer is not None:
             writer.close("complete", header | account)
     return _result(scene, run, header | account | {"status": "complete"})
+
+
+def _kept(system: System, wanted: Mapping[str, Entry], rows: int) -> Kept:
+    """What a run of so many output rows keeps where no file is written and no event is looked for."""
+    if needs_every_step(wanted) or rows * row_size(system) > SMALL:
+        return Measured(system, wanted)
+    return Recorded(system, wanted)
+
+
+def _writer(path: str | Path, scene: Scene, run: _Run, header: dict[str, Any], mark: str) -> ResultWriter:
+    """Of a file that has the first row."""
+    first = Result(run.kept.times[0], run.kept.quantities(), geometry(scene), header | {"status": "running"})
+    return ResultWriter(path, first, checkpoint=_checkpoint(run, mark))
 
 
 def check_output_step(output_step: float) -> None:
@@ -183,7 +203,7 @@ def _begun(
     stabilisation: Stabilisation,
     start: float,
     spacing: float,
-    wanted: Mapping[str, Entry],
+    kept: Kept,
     resume: str | Path | None,
     mark: str,
 ) -> _Run:
@@ -193,23 +213,32 @@ def _begun(
     engine = new_engine(system, assembled.x, assembled.v, method, gained, start=start, spacing=spacing)
     energy = EnergyWatch(system, method, gained, spacing, lambda rows: with_all_reactions(assembled, rows))
     if resume is not None and Path(resume).exists():
-        return _resumed(Path(resume), mark, engine, energy, seen)
-    return _started(assembled, engine, energy, seen, start, wanted)
+        return _resumed(Path(resume), mark, engine, energy, seen, kept)
+    return _started(assembled, engine, energy, seen, start, kept)
 
 
-def _started(
-    assembled: Assembled, engine: Engine, energy: EnergyWatch, seen: Seen, start: float, wanted: Mapping[str, Entry]
-) -> _Run:
+def _started(assembled: Assembled, engine: Engine, energy: EnergyWatch, seen: Seen, start: float, kept: Kept) -> _Run:
     """The run with its first row."""
     first = new_record(assembled.system, 1)
     status = record_row(engine, start, first, 0)
     if status != OK:
         raise failing.failure(engine.system, engine.work, status, start)
     first = with_all_reactions(assembled, first)
-    energy.look(first)
-    look(seen, first)
-    parts, memory = measure(assembled.system, first, {}, wanted)
-    return _Run(engine, energy, memory, [parts], [first.time], seen, 0)
+    kept.add(View(assembled.system, first), np.zeros(1, dtype=np.int64))
+    run = _Run(engine, energy, kept, seen, 0)
+    if isinstance(kept, Measured):
+        _look(run, first)  # a file holds what has been seen of its rows
+    else:
+        run.unseen = first
+    return run
+
+
+def _look(run: _Run, rows: Record) -> None:
+    """Take note of the rows that follow, and of the first where it is unseen."""
+    view = View(run.seen.assembled.system, rows if run.unseen is None else joined([run.unseen, rows]))
+    run.unseen = None
+    run.energy.look(view)
+    look(run.seen, view)
 
 
 def _advance(
@@ -231,7 +260,7 @@ def _advance(
     system, steps = assembled.system, run.engine.tables.clock.steps
     looks = substeps if needs_every_step(wanted) or watcher is not None else 1
     ends = False
-    count = 1
+    count = _first_rows(system, method, substeps)
     while run.done < rows * substeps:
         chunk = new_record(system, looks * min(count, rows - run.done // substeps))
         with watch:
@@ -245,14 +274,9 @@ def _advance(
             kept = with_all_reactions(assembled, Record(*(column[:filled] for column in chunk)))
             if watcher is not None:
                 kept, ends = watcher.look(kept)
-            run.energy.look(kept)
-            shown = _shown(kept.time.size, looks, ends)
-            every, run.memory = measure(system, kept, run.memory, wanted)
-            part = {name: replace(quantity, values=quantity.values[shown]) for name, quantity in every.items()}
-            times = kept.time[shown]
-            run.parts.append(part)
-            run.times.append(times)
-            look(run.seen, kept)
+            _look(run, kept)
+            part = run.kept.add(View(system, kept), _shown(kept.time.size, looks, ends))
+            times = run.kept.times[-1]
             if nonsense := meaningless(system.scene, run.seen.arrays["bodies"]):
                 raise ComputationError(f"by t = {times[-1]:.6g} s {nonsense}")
             if lost is not None and status == OK and run.energy.gains[2] > 0:
@@ -268,19 +292,32 @@ def _advance(
         count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
 
 
+def _first_rows(system: System, method: Integrator, substeps: int) -> int:
+    """How many rows the loop is asked for before it is known how long they take; one where Python functions are called."""
+    if system.model.user_count:
+        return 1
+    evaluations = substeps * max(method.stage_count, 1)
+    return int(np.clip(SECONDS_PER_CALL / SURE / (1e-6 * evaluations * evaluation_cost(system.scene)), 1, MOST_ROWS))
+
+
+def evaluation_cost(scene: Scene) -> float:
+    """[us], about, of one evaluation; the same on every machine."""
+    return sum(1.0 + 0.02 * body.model.n + 7e-4 * body.model.n**2 for body in scene.bodies)
+
+
 def _driver_lost(run: _Run, method: Integrator, start: float, rows: Record, status: int, lost: Lost | None) -> str:
     """Which driver is why the steps up to these rows do not follow the motion, or have failed; empty where none is."""
     system, now = run.engine.system, reached(run.engine, start)
     if method.controlled:  # its errors tell what it does not follow, but it may pass a jump over
         ahead = now if status == OK else now + run.energy.spacing
-        return jumped(system, np.array([run.times[-1][-1], *rows.time, ahead]))
+        return jumped(system, np.array([run.kept.times[-1][-1], *rows.time, ahead]))
     if status != OK:
         early, late = now - method.step, now + method.step
         return jumped(system, np.array([early, now, late])) or lost_driver(system, early, late, STALLED)
     if lost is None:
         return ""
     found = lost_driver(system, lost.time - method.step, lost.time)
-    return found or jumped(system, np.concatenate([*run.times, rows.time]))
+    return found or jumped(system, np.concatenate([*run.kept.times, rows.time]))
 
 
 def _shown(rows: int, looks: int, ends: bool) -> Array:
@@ -304,7 +341,7 @@ def _watcher(
             "a run with events cannot be resumed: those of its first part are not in the file; run the whole"
         )
     watcher = Watcher(assembled, method, gains(stabilisation), spacing, events)
-    watcher.begin(run.engine, float(run.times[0][0]))
+    watcher.begin(run.engine, float(run.kept.times[0][0]))
     return watcher
 
 
@@ -353,7 +390,8 @@ KEY = "machine."  # before the names of an engine's tables in result files
 
 
 def _checkpoint(run: _Run, mark: str) -> Array:
-    return encode(Checkpoint(mark, run.done, _arrays(run.engine, run.energy, run.seen), run.memory))
+    assert isinstance(run.kept, Measured)
+    return encode(Checkpoint(mark, run.done, _arrays(run.engine, run.energy, run.seen), run.kept.memory))
 
 
 def _arrays(engine: Engine, energy: EnergyWatch, seen: Seen) -> dict[str, Array]:
@@ -368,7 +406,7 @@ def _changing(engine: Engine) -> Iterator[tuple[str, Array]]:
         yield from leaves(getattr(engine.tables, name), name)
 
 
-def _resumed(path: Path, mark: str, engine: Engine, energy: EnergyWatch, seen: Seen) -> _Run:
+def _resumed(path: Path, mark: str, engine: Engine, energy: EnergyWatch, seen: Seen, kept: Kept) -> _Run:
     """The run that a result file holds, ready to go on in the engine."""
     content = load_checkpoint(path)
     if content is None:
@@ -387,7 +425,11 @@ def _resumed(path: Path, mark: str, engine: Engine, energy: EnergyWatch, seen: S
         )
     for name, array in changing.items():
         array[...] = saved.arrays[name]
-    return _Run(engine, energy, saved.memory, [dict(earlier.quantities)], [earlier.time], seen, saved.steps)
+    assert isinstance(kept, Measured)
+    kept.memory = saved.memory
+    kept.parts.append(dict(earlier.quantities))
+    kept.times.append(earlier.time)
+    return _Run(engine, energy, kept, seen, saved.steps)
 
 
 def _check_resumed(run: _Run, steps: int, step: float) -> None:
@@ -428,12 +470,7 @@ def geometry(scene: Scene) -> dict[str, Surface]:
 
 
 def _result(scene: Scene, run: _Run, attributes: dict[str, Any]) -> Result:
-    names = run.parts[0]
-    quantities = {
-        name: Quantity(np.concatenate([part[name].values for part in run.parts]), q.unit, q.axes, q.description)
-        for name, q in names.items()
-    }
-    return Result(np.concatenate(run.times), quantities, geometry(scene), attributes)
+    return Result(np.concatenate(run.kept.times), run.kept.quantities(), geometry(scene), attributes)
 
 
 def _account(run: _Run, notes: list[str]) -> dict[str, Any]:

@@ -34,6 +34,7 @@ from ffr_dyn.integrators import Integrator, Within
 from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.quantities import measure, selected
+from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.described import described
@@ -333,7 +334,7 @@ def _recorded(of: Plant, times: Array, us: Array, states: list[tuple[Array, Arra
 
 def _efforts_found(system: System, record: Record, efforts: tuple[Effort, ...], u: Array) -> dict[str, Quantity]:
     """Efforts (T, U) and their powers."""
-    powers, _ = measure(system, record, {}, selected(system, [f"{effort.name}.power" for effort in efforts]))
+    powers, _ = measure(View(system, record), {}, selected(system, [f"{effort.name}.power" for effort in efforts]))
     found = {}
     for effort, values in zip(efforts, u.T, strict=True):
         text = "effort that realises the known motions"

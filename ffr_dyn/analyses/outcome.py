@@ -15,6 +15,7 @@ from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.quantities import DEFAULT_OUTPUTS, measure, selected
+from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.joints import COORDINATES, frames
@@ -42,7 +43,7 @@ def result_of(
 
     outputs : names or patterns; beside them every result has the quantities of `accompanying` and the efforts
     """
-    quantities, _ = measure(system, record, {}, selected(system, needed(system.scene, outputs)))
+    quantities, _ = measure(View(system, record), {}, selected(system, needed(system.scene, outputs)))
     plain = Result(record.time, quantities, geometry(system.scene), attributes)
     return with_quantities(only(plain, system.scene, outputs), efforts(system.scene, plain), path)
 

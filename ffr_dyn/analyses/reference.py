@@ -25,6 +25,7 @@ from ffr_dyn.equations.motion import position_rates
 from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.quantities import measure, needs_every_step, selected
+from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene
@@ -116,7 +117,7 @@ def reference(
         if progress is not None:
             progress(time)
     record = with_all_reactions(assembled, joined(rows))
-    quantities, _ = measure(assembled.system, record, {}, wanted)
+    quantities, _ = measure(View(assembled.system, record), {}, wanted)
     attributes = {
         **described(scene),
         "analysis": "forward dynamics",

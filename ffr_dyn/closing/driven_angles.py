@@ -12,12 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffr_dyn.equations.constraint_rows import Block, drive_of
+from ffr_dyn.closing.constraints import Constraints
 from ffr_dyn.equations.constraints import Markers
-from ffr_dyn.equations.layout import Layout
-from ffr_dyn.functions.time_functions import constant
 from ffr_dyn.scene.joints import DRIVEN_ANGLE
-from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -28,48 +25,43 @@ TURN = 2 * np.pi
 
 @dataclass(frozen=True)
 class DrivenAngle:
-    """Of a driver's word: its block and number there, its value and how far on the joint has to turn [rad]."""
+    """Of a driver's word: its function among the drives of the rows, its value and how far on the joint has to turn [rad]."""
 
-    block: int
-    word: int
+    function: int
     value: float
     left: float
 
 
-def driven_angles(scene: Scene, place: Layout, blocks: list[Block], x: Array, time: float) -> list[DrivenAngle]:
+def driven_angles(constraints: Constraints, x: Array) -> list[DrivenAngle]:
     """All driven angles at x; what is left is within half a turn, and nothing where the joint has no angle."""
-    now, found = Markers(scene, place, x, np.zeros(place.v_size)), []
-    for at, block in enumerate(blocks):
-        for number, word in enumerate(block.words):
+    now = Markers(constraints.scene, constraints.place, x, np.zeros(constraints.place.v_size))
+    functions, found = iter(constraints.functions.tolist()), []
+    for block in constraints.blocks:
+        for word in block.words:
+            function = next(functions)
             if word.kind == DRIVEN_ANGLE:
                 f, g = (now.axis(block.markers[0], word.axes[k]).r for k in (0, 1))
-                f_j, value = now.axis(block.markers[1], word.axes[2]).r, drive_of(word, time)[0]
+                f_j, value = now.axis(block.markers[1], word.axes[2]).r, float(constraints.drives[function, 0])
                 left = value - float(np.arctan2(g @ f_j, f @ f_j))
-                found.append(DrivenAngle(at, number, value, left - TURN * round(left / TURN)))
+                found.append(DrivenAngle(function, value, left - TURN * round(left / TURN)))
     return found
 
 
-def led_to_drivers(
-    scene: Scene,
-    place: Layout,
-    blocks: list[Block],
-    x: Array,
-    time: float,
-    close: Callable[[list[Block], Array], Array],
-) -> Array:
-    """`close(blocks, x)`, positions that meet all rows, in steps where driven angles at x are far from their drivers' values.
+def led_to_drivers(constraints: Constraints, x: Array, close: Callable[[Constraints, Array], Array]) -> Array:
+    """`close(constraints, x)`, positions that meet all rows, in steps where driven angles at x are far from their drivers'
+    values.
 
     Raises what `close` does.
     """
-    angles = driven_angles(scene, place, blocks, x, time)
+    angles = driven_angles(constraints, x)
     if all(abs(angle.left) <= FAR for angle in angles):
-        return close(blocks, x)
+        return close(constraints, x)
     errors = []
     for way in _ways(angles):
         found, count = x, int(np.ceil(max(abs(left) for left in way) / STEP))
         try:
             for k in range(count + 1):
-                found = close(_driven_to(blocks, angles, [(k / count - 1.0) * left for left in way]), found)
+                found = close(_driven_to(constraints, angles, [(k / count - 1.0) * left for left in way]), found)
         except InputError as error:
             errors.append(error)
         else:
@@ -85,11 +77,9 @@ def _ways(angles: list[DrivenAngle]) -> Iterator[list[float]]:
     yield [turn - np.copysign(TURN, turn) if k == far else turn for k, turn in enumerate(left)]
 
 
-def _driven_to(blocks: list[Block], angles: list[DrivenAngle], off: list[float]) -> list[Block]:
-    """The blocks with driven angles that are off their values."""
-    out = list(blocks)
+def _driven_to(constraints: Constraints, angles: list[DrivenAngle], off: list[float]) -> Constraints:
+    """The rows with driven angles that are off their values."""
+    drives = constraints.drives.copy()
     for angle, less in zip(angles, off, strict=True):
-        words = list(out[angle.block].words)
-        words[angle.word] = replace(words[angle.word], function=constant(angle.value + less))
-        out[angle.block] = replace(out[angle.block], words=tuple(words))
-    return out
+        drives[angle.function] = angle.value + less, 0.0, 0.0
+    return replace(constraints, drives=drives)

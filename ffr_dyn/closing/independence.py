@@ -7,16 +7,15 @@ may be anywhere there: their rows count, their values do not. (Nikravesh 1988, c
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.linalg import qr
 from scipy.sparse import csr_array, vstack
 
-from ffr_dyn.closing.positions import TOLERANCE, close_positions, largest_turn, stacked, weights
-from ffr_dyn.closing.row_space import Dependence, dependence, smallest_solution
+from ffr_dyn.closing.constraints import Constraints, of_blocks, rows_at, without
+from ffr_dyn.closing.positions import TOLERANCE, close_positions, largest_turn, weights
+from ffr_dyn.closing.row_space import Dependence, Matrix, dependence, smallest_solution
 from ffr_dyn.compile.row_tables import moving_bodies
-from ffr_dyn.equations.constraint_rows import Block, rows_at
+from ffr_dyn.equations.constraint_rows import Block
 from ffr_dyn.equations.layout import Layout, moved, to_body_axes
 from ffr_dyn.scene.scene import Scene, markers
 from ffr_prep.common.arrays import Array
@@ -30,29 +29,25 @@ CLEAR = 1e-5  # length of the shortest combination of rows that does not vanish,
 TAKES_PART = 1e-6  # of a row in a combination that vanishes
 
 
-def independent_blocks(
-    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float
-) -> tuple[list[Block], list[tuple[str, str]]]:
+def independent_blocks(constraints: Constraints, x: Array, v: Array) -> tuple[list[Block], list[tuple[str, str]]]:
     """Blocks without their redundant words, and the (block, word) pairs that were dropped.
 
     Raises InputError when a driver's row is redundant.
     """
-    N = dependence_in_motion(scene, place, blocks, x, v, time).combinations
+    blocks, N = list(constraints.blocks), dependence_in_motion(constraints, x, v).combinations
     for name in _drivers_in(N, blocks):
         raise InputError(f"driver {name!r} prescribes a motion that the joints and other drivers already fix")
+    if not N.size:
+        return blocks, []
     said = [(block, word) for block in blocks for word in block.words]
     # what is left of the combinations in these rows is as regular as can be, and so are the rows that are kept
-    out = set(qr(N.T, mode="r", pivoting=True)[1][: N.shape[1]].tolist()) if N.size else set[int]()
-    numbers = iter(range(len(said)))
-    left = [replace(block, words=tuple(word for word in block.words if next(numbers) not in out)) for block in blocks]
-    return left, [(said[k][0].name, said[k][1].text) for k in sorted(out)]
+    out = np.sort(qr(N.T, mode="r", pivoting=True)[1][: N.shape[1]])
+    return without(blocks, np.isin(np.arange(len(said)), out)), [(said[k][0].name, said[k][1].text) for k in out]
 
 
-def redundant_drivers(
-    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float
-) -> tuple[str, ...]:
+def redundant_drivers(constraints: Constraints, x: Array, v: Array) -> tuple[str, ...]:
     """Drivers with a row that follows from the joints and the other drivers."""
-    return _drivers_in(dependence_in_motion(scene, place, blocks, x, v, time).combinations, blocks)
+    return _drivers_in(dependence_in_motion(constraints, x, v).combinations, list(constraints.blocks))
 
 
 def _drivers_in(N: Array, blocks: list[Block]) -> tuple[str, ...]:
@@ -62,16 +57,16 @@ def _drivers_in(N: Array, blocks: list[Block]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def dependence_in_motion(
-    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float
-) -> Dependence:
+def dependence_in_motion(constraints: Constraints, x: Array, v: Array) -> Dependence:
     """How the rows depend on one another at x or, if they do so less, at its neighbours."""
-    here = _dependence(scene, place, blocks, x, v, time)
+    here = _dependence(constraints, x, v)
     if not here.count:
         return here
+    blocks = list(constraints.blocks)
     owners = np.repeat(np.arange(len(blocks)), [len(block.words) for block in blocks])
-    chosen = _involved(scene, blocks, set(owners[np.abs(here.combinations).max(axis=1) > TAKES_PART].tolist()))
-    best = _at_neighbours(scene, place, [blocks[k] for k in chosen], x, v, time)
+    dependent = set(owners[np.abs(here.combinations).max(axis=1) > TAKES_PART].tolist())
+    chosen = _involved(constraints.scene, blocks, dependent)
+    best = _at_neighbours(of_blocks(constraints, chosen), x, v)
     if best is None or best.count > here.count:
         return here
     whole = np.zeros((owners.size, best.count))
@@ -105,66 +100,67 @@ def _involved(scene: Scene, blocks: list[Block], dependent: set[int]) -> list[in
     return sorted(found)
 
 
-def _at_neighbours(
-    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float
-) -> Dependence | None:
+def _at_neighbours(constraints: Constraints, x: Array, v: Array) -> Dependence | None:
     """How the rows depend on one another at the neighbour of x where they plainly do so least; None where nothing moves."""
-    found, joints = list[Dependence](), [block for block in blocks if not block.driver]
+    found = list[Dependence]()
+    joints = of_blocks(constraints, [k for k, block in enumerate(constraints.blocks) if not block.driver])
     for number, away in enumerate(AWAY):
-        near = _neighbour(scene, place, joints, x, v, time, number, away)
+        near = _neighbour(joints, x, v, number, away)
         if near is not None:
-            found.append(_dependence(scene, place, blocks, near, v, time))
+            found.append(_dependence(constraints, near, v))
         counts = [one.count for one in found if one.least > CLEAR]
         if counts.count(min(counts, default=0)) >= AGREED:
             break
     return max(found, key=lambda one: (one.least > CLEAR, -one.count, one.least), default=None)
 
 
-def _dependence(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> Dependence:
-    rows = rows_at(scene, place, blocks, x, v, time)
-    return dependence(csr_array(stacked(rows, place) @ weights(scene, place, x, elastic=True)))
+def _dependence(constraints: Constraints, x: Array, v: Array) -> Dependence:
+    J = rows_at(constraints, x, v).J
+    return dependence(J @ weights(constraints.scene, constraints.place, x, True, isinstance(J, np.ndarray)))
 
 
-def _neighbour(
-    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float, number: int, away: float
-) -> Array | None:
+def _neighbour(constraints: Constraints, x: Array, v: Array, number: int, away: float) -> Array | None:
     """A position that meets the rows, a free motion away from x: the one that is under way, or one at random; None where
     there is none.
 
     Where first-order motions do not go on, as most do not in a singular position, Newton's method would lead back to x, so
     its steps are at right angles to the way from there: it turns the way into one that does go on.
     """
-    W, J = _rigid(scene, place, blocks, x, v, time)[1:]
+    scene, place = constraints.scene, constraints.place
+    W, J = _rigid(constraints, x, v)[1:]
     tied = _tied(place, J)
     wanted = W @ (tied * np.random.default_rng(number).normal(size=place.v_size))
     if number == 0 and (own := tied * _rigid_part(place, to_body_axes(place, x, v))).any():
         wanted = own
-    way = wanted - W @ smallest_solution(csr_array(J @ W), J @ wanted)
+    way = wanted - W @ smallest_solution(J @ W, J @ wanted)
     extent = _extent(scene, place, way)
     if not extent > NOTHING * _extent(scene, place, wanted):
         return None
     way *= away / extent
     found = moved(place, x, way)
     for _ in range(ITERATIONS):
-        Phi, W, J = _rigid(scene, place, blocks, found, v, time)
+        Phi, W, J = _rigid(constraints, found, v)
         if np.abs(Phi).max(initial=0.0) < TOLERANCE:
-            return close_positions(scene, place, blocks, found, v, time)
-        A = csr_array(vstack([J, csr_array(way[None] / np.linalg.norm(way))]) @ W)
+            return close_positions(constraints, found, v)
+        A = _with_row(J, way / np.linalg.norm(way)) @ W
         step = W @ smallest_solution(A, np.append(-Phi, 0.0))
         step *= min(1.0, away / max(_extent(scene, place, step), 1e-300))
         way, found = way + step, moved(place, found, step)
     return None
 
 
-def _rigid(
-    scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float
-) -> tuple[Array, csr_array, csr_array]:
+def _with_row(J: Matrix, row: Array) -> Matrix:
+    return np.vstack([J, row]) if isinstance(J, np.ndarray) else csr_array(vstack([J, csr_array(row[None])]))
+
+
+def _rigid(constraints: Constraints, x: Array, v: Array) -> tuple[Array, Matrix, Matrix]:
     """Phi (C,), W^(1/2) of rigid motions, Jacobian."""
-    rows = rows_at(scene, place, blocks, x, v, time)
-    return np.array([row.Phi for row in rows]), weights(scene, place, x, elastic=False), stacked(rows, place)
+    rows = rows_at(constraints, x, v)
+    dense = isinstance(rows.J, np.ndarray)
+    return rows.Phi, weights(constraints.scene, constraints.place, x, False, dense), rows.J
 
 
-def _tied(place: Layout, J: csr_array) -> Array:
+def _tied(place: Layout, J: Matrix) -> Array:
     """(V,) ones for the velocities of bodies that rows act on."""
     acts, out = np.asarray(abs(J).sum(axis=0)).ravel() > 0, np.zeros(place.v_size)
     for b, n in enumerate(place.n):

@@ -5,26 +5,29 @@ Bodies from files of other programs may lack it (`ffr_prep.body.immovable`), or 
 
 from __future__ import annotations
 
-from ffr_dyn.equations.layout import layout
+from ffr_dyn.equations.layout import Layout
 from ffr_dyn.scene.scene import Body, Scene, body_normal
-from ffr_prep.body import immovable
+from ffr_prep.body import FlexibleBody, immovable, remembered
 from ffr_prep.common.errors import InputError
 
 _AXES = "xyz"
 
 
-def require_inertia(scene: Scene) -> None:
+def require_inertia(scene: Scene, place: Layout) -> None:
     """InputError for a body without inertia against a motion that it has in a scene whose plane is decided."""
-    place = layout(scene)
     for b, body in enumerate(scene.bodies):
         _require_plane(scene, body)
         if body.dropped:  # `ffr_dyn.consistency.dropped_terms` looks at these
             continue
-        if motion := immovable(body.model, place.active(b)):
+        if motion := _immovable(body.model, tuple(place.active(b))):
             raise InputError(
                 f"body {body.name!r} cannot move: it has no inertia left for {motion}; give it mass and inertia about all "
                 "axes, keep fewer modes, or, where it is held fixed, import it with --held"
             )
+
+
+def _immovable(model: FlexibleBody, active: tuple[int, ...]) -> str:
+    return remembered(model, ("immovable", active), lambda: immovable(model, active))
 
 
 def _require_plane(scene: Scene, body: Body) -> None:

@@ -1,14 +1,16 @@
-"""What the rows of sparse matrices span: which of them depend on one another, and smallest solutions.
+"""What the rows of matrices span: which of them depend on one another, and smallest solutions.
 
-Constraint rows touch two bodies each, and a sparse factor of their Gram matrix costs in proportion to their number for chains
-and trees. It squares what rows have of their own, so the matrix is shifted by a little, and what the shift does is taken out
-again by iteration: solutions by refinement, combinations of rows that vanish by inverse iteration on several vectors at once,
-whose lengths are then found from the rows themselves (Parlett, The Symmetric Eigenvalue Problem, 1998, ch. 4 and 14).
+A few rows are dense matrices, decomposed by singular values. Many are sparse ones: constraint rows touch two bodies each, and
+a sparse factor of their Gram matrix costs in proportion to their number for chains and trees. It squares what rows have of
+their own, so the matrix is shifted by a little, and what the shift does is taken out again by iteration: solutions by
+refinement, combinations of rows that vanish by inverse iteration on several vectors at once, whose lengths are then found
+from the rows themselves (Parlett, The Symmetric Eigenvalue Problem, 1998, ch. 4 and 14).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from scipy.linalg import qr, svd
@@ -18,6 +20,9 @@ from scipy.sparse.linalg import SuperLU, splu
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 
+Matrix: TypeAlias = Array | csr_array
+
+FEW = 60  # rows, up to which matrices are dense
 DEPENDENT = 1e-8  # of a row of length one, what others do not contain, below which it depends on them
 SHIFT = 1e-13  # of the Gram matrix of rows of length one; its rounding is below
 VANISHES = 1e-14  # of a combination of unit rows, what is rounding
@@ -44,12 +49,14 @@ class Dependence(Brief):
         return int(self.combinations.shape[1])
 
 
-def dependence(A: csr_array) -> Dependence:
+def dependence(A: Matrix) -> Dependence:
     """How the rows of A (C, V) depend on one another."""
-    rows, _ = _unit_rows(A)
-    count = rows.shape[0]
+    count = A.shape[0]
     if not count:
         return Dependence(np.zeros((0, 0)), np.inf)
+    if isinstance(A, np.ndarray):
+        return _dense_dependence(A)
+    rows, _ = _unit_rows(A)
     factor, size = _factor(rows), min(FIRST, count)
     while True:
         vectors, lengths = _shortest(rows, factor, size)
@@ -59,15 +66,33 @@ def dependence(A: csr_array) -> Dependence:
         size = min(4 * size, count)
 
 
-def independent(A: csr_array) -> bool:
+def _dense_dependence(A: Array) -> Dependence:
+    """Vectors on the left whose singular values vanish, those that rows beyond the columns add among them."""
+    vectors, lengths, _ = np.linalg.svd(_dense_unit_rows(A)[0])
+    lengths = np.append(lengths, np.zeros(len(A) - lengths.size))
+    vanish = lengths < DEPENDENT * np.abs(vectors).max(axis=0)
+    return Dependence(vectors[:, vanish], float(lengths[~vanish].min(initial=np.inf)))
+
+
+def _dense_unit_rows(A: Array) -> tuple[Array, Array]:
+    length = np.sqrt(np.einsum("ij,ij->i", A, A))
+    length = np.where(length > 0, length, 1.0)
+    return A / length[:, None], length
+
+
+def independent(A: Matrix) -> bool:
     """Whether the rows of A (C, V) are independent."""
     return dependence(A).count == 0
 
 
-def smallest_solution(A: csr_array, target: Array) -> Array:
+def smallest_solution(A: Matrix, target: Array) -> Array:
     """(V,) the smallest z with A z = target (C,), by least squares where there is none."""
     if not A.shape[0]:
         return np.zeros(A.shape[1])
+    if isinstance(A, np.ndarray):
+        unit, length = _dense_unit_rows(A)
+        found: Array = np.linalg.lstsq(unit, target / length, rcond=DEPENDENT)[0]
+        return found
     rows, length = _unit_rows(A)
     factor, wanted = _factor(rows), target / length
     y, left, before = np.zeros_like(wanted), wanted, np.inf

@@ -17,28 +17,39 @@ T = TypeVar("T", bound=tuple[Any, ...])
 LINE = 8  # numbers of eight bytes in a cache line
 
 
-def aligned(tables: T) -> T:
-    """Nested named tuples with copies of their arrays in one piece of memory; an array that is there twice stays one."""
-    arrays = {id(array): array for array in _arrays(tables)}
+def aligned(tables: T) -> tuple[T, dict[int, int]]:
+    """Nested named tuples with copies of their arrays in one piece of memory; an array that is there twice stays one. And the
+    addresses of the copies, by their identity."""
+    arrays: dict[int, Array] = {}
+    _gather(tables, arrays)
     sizes = [-(-array.size // LINE) * LINE for array in arrays.values()]
     memory = np.zeros(sum(sizes) + LINE)
-    at = -memory.ctypes.data // 8 % LINE
-    copies = {}
+    begin = memory.ctypes.data
+    at = -begin // 8 % LINE
+    copies, addresses = dict[int, Array](), dict[int, int]()
     for (key, array), size in zip(arrays.items(), sizes, strict=True):
-        copies[key] = memory[at : at + array.size].view(array.dtype).reshape(array.shape)
-        copies[key][...] = array
+        copy = np.ndarray(array.shape, array.dtype, memory, 8 * at)
+        copy[...] = array
+        copies[key], addresses[id(copy)] = copy, begin + 8 * at
         at += size
-    return cast("T", _replaced(tables, copies))
+    return cast("T", _replaced(tables, copies)), addresses
 
 
-def _arrays(tables: Any) -> list[Array]:
-    if isinstance(tables, tuple):
-        return [array for field in tables for array in _arrays(field)]
-    return [tables] if isinstance(tables, np.ndarray) else []
+def _gather(tables: Any, found: dict[int, Array]) -> None:
+    for field in tables:
+        if isinstance(field, np.ndarray):
+            found[id(field)] = field
+        elif isinstance(field, tuple):
+            _gather(field, found)
 
 
 def _replaced(tables: Any, copies: dict[int, Array]) -> Any:
-    if isinstance(tables, tuple):
-        fields = [_replaced(field, copies) for field in tables]
-        return type(tables)(*fields) if hasattr(tables, "_fields") else tuple(fields)
-    return copies[id(tables)] if isinstance(tables, np.ndarray) else tables
+    fields = [
+        copies[id(field)]
+        if isinstance(field, np.ndarray)
+        else _replaced(field, copies)
+        if isinstance(field, tuple)
+        else field
+        for field in tables
+    ]
+    return type(tables)._make(fields) if hasattr(tables, "_fields") else tuple(fields)

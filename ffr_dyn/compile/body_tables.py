@@ -26,7 +26,7 @@ from ffr_dyn.kernels.tables import (
 )
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.variants.families import ROUNDING, SECOND_ORDER_ROUNDING
-from ffr_prep.body import axial
+from ffr_prep.body import axial, remembered
 from ffr_prep.common.arrays import Array
 
 SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -99,29 +99,64 @@ def tables_in_blocks(owners: Sequence[Hashable], make: Callable[[int], tuple[Arr
 NO_BLOCKS = np.zeros(0), np.zeros(0, dtype=np.int64)
 
 
+@dataclass(frozen=True)
+class _Tables:
+    """Of one body: parts of the tables; PP_dm in blocks, a pool and a plan."""
+
+    mass: float
+    moments: Array
+    omega2: Array
+    P_dm: Array
+    rP_dm: Array
+    PP_dm: tuple[Array, Array]
+
+
+def _tables(body: Body, normal: int) -> _Tables:
+    """Kept with the model: they are the same in every scene."""
+    return remembered(
+        body.model, ("tables", body.dropped, body.stiffening, normal), lambda: _made(body, kept_integrals(body), normal)
+    )
+
+
+def _made(body: Body, kept: Integrals, normal: int) -> _Tables:
+    moments, P_dm = np.concatenate([kept.r_dm, _six(kept.rr_dm)]), kept.P_dm.ravel()
+    if not body.model.n:
+        return _Tables(kept.mass, moments, kept.omega2, P_dm, P_dm, NO_BLOCKS)
+    return _Tables(
+        kept.mass, moments, kept.omega2, P_dm, _nine(kept.rP_dm).ravel(), _second_moments(body, kept, normal)
+    )
+
+
+def _second_moments(body: Body, kept: Integrals, normal: int) -> tuple[Array, Array]:
+    """I5, I9 and X: a unit mode has a second moment of one, so the size of their rounding is known."""
+    table = _PP_parts(kept, normal)
+    noise = ROUNDING + SECOND_ORDER_ROUNDING * np.abs(second_moments(body)).max(initial=0.0)
+    return in_blocks(table, table.shape[1] // 3, np.full(table.shape[1], noise)) if table.any() else NO_BLOCKS
+
+
 def body_tables(scene: Scene, place: Layout) -> Bodies:
     """Tables of all bodies."""
-    kept = [kept_integrals(body) for body in scene.bodies]
-    n = [i.omega2.size for i in kept]
+    of = [_tables(body, normal) for body, normal in zip(scene.bodies, place.normals, strict=True)]
     owners = [_owner(body) for body in scene.bodies]
-    PP = _second_moments(scene, place, kept)
-    omega2, column = once([i.omega2 for i in kept], owners)
+    in_plane = [(*owner, k) for owner, k in zip(owners, place.normals, strict=True)]
+    PP = tables_in_blocks(in_plane, lambda b: of[b].PP_dm)
+    omega2, column = once([i.omega2 for i in of], owners)
     bounds, beside = zip(*(_damping(body) for body in scene.bodies), strict=True)
     damping, _ = once(bounds, owners)
     coupled, first = once(beside, owners)
-    P, _ = once([i.P_dm for i in kept], owners)
-    rP, _ = once([_nine(i.rP_dm) for i in kept], owners)
-    where = np.zeros((len(n) + 1, 9), dtype=np.int64)
+    P, _ = once([i.P_dm for i in of], owners)
+    rP, _ = once([i.rP_dm for i in of], owners)
+    where = np.zeros((len(of) + 1, 9), dtype=np.int64)
     where[:, IN_DAMPING] = where[-1, NORMAL] = -1
     where[:-1, IN_DAMPING] = [start if part.size else -1 for start, part in zip(first, beside, strict=True)]
-    where[:-1, [N, IN_X, IN_V, IN_Q]] = np.column_stack([n, place.ix, place.iv, starts(n)[:-1]])
-    where[:-1, [IN_PP_DM, PP_PLAN]] = np.column_stack([PP.start, PP.first])
-    where[:-1, [NORMAL, IN_SHARED]] = np.column_stack([place.normals, column])
-    where[-1, IN_Q] = sum(n)
+    where[:-1, N], where[:-1, IN_X], where[:-1, IN_V] = place.n, place.ix, place.iv
+    where[:-1, IN_PP_DM], where[:-1, PP_PLAN] = PP.start, PP.first
+    where[:-1, NORMAL], where[:-1, IN_SHARED] = place.normals, column
+    where[:, IN_Q] = starts(place.n)
     return Bodies(
         where=where,
-        mass=np.array([i.mass for i in kept]),
-        moments=np.array([np.concatenate([i.r_dm, _six(i.rr_dm)]) for i in kept]),
+        mass=np.array([i.mass for i in of]),
+        moments=np.array([i.moments for i in of]),
         P_dm=P,
         rP_dm=rP,
         PP_dm=PP.pool,
@@ -135,6 +170,8 @@ def body_tables(scene: Scene, place: Layout) -> Bodies:
 def _damping(body: Body) -> tuple[Array, Array]:
     """(n,) a diagonal that is no less than the damping matrix, which implicit methods take for it, and (n n,) what it has too
     much; empty where the matrix is diagonal."""
+    if not body.model.n:
+        return body.damping, body.damping
     D = damping_matrix(body.model, body.damping)
     diagonal = np.diag(D)
     rest = D - np.diag(diagonal)
@@ -152,15 +189,3 @@ def _owner(body: Body) -> tuple[Hashable, ...]:
 def of_coordinates(bodies: Bodies, table: Array) -> Array:
     """(E,) of all elastic coordinates, one body after another, from a table of which equal bodies share their part."""
     return _pool([table[first : first + n] for first, n in bodies.where[:-1, [IN_SHARED, N]]])
-
-
-def _second_moments(scene: Scene, place: Layout, kept: Sequence[Integrals]) -> Blocks:
-    """I5, I9 and X of all bodies: a unit mode has a second moment of one, so the size of their rounding is known."""
-
-    def make(b: int) -> tuple[Array, Array]:
-        table = _PP_parts(kept[b], place.normals[b])
-        noise = ROUNDING + SECOND_ORDER_ROUNDING * np.abs(second_moments(scene.bodies[b])).max(initial=0.0)
-        return in_blocks(table, table.shape[1] // 3, np.full(table.shape[1], noise)) if table.any() else NO_BLOCKS
-
-    owners = [(*_owner(body), k) for body, k in zip(scene.bodies, place.normals, strict=True)]
-    return tables_in_blocks(owners, make)

@@ -6,7 +6,9 @@ chains and trees and little for a few loops (George & Liu 1981, ch. 5).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from heapq import heapify, heappop, heappush
 
 from ffr_prep.common.brief import Brief
@@ -20,8 +22,16 @@ class Elimination(Brief):
     columns: tuple[tuple[int, ...], ...]
 
 
-def eliminate(sizes: list[int], bodies: list[tuple[int, ...]]) -> Elimination:
-    """Order the blocks; sizes[k] rows, bodies[k] the moving bodies that block k touches."""
+def eliminate(sizes: Sequence[int], bodies: Sequence[tuple[int, ...]]) -> Elimination:
+    """Order the blocks; sizes[k] rows, bodies[k] the moving bodies that block k touches.
+
+    The last graphs are known by these numbers, which are all there is to it: scenes of one structure are ordered once.
+    """
+    return _eliminated(tuple(sizes), tuple(bodies))
+
+
+@lru_cache(64)
+def _eliminated(sizes: tuple[int, ...], bodies: tuple[tuple[int, ...], ...]) -> Elimination:
     count = len(sizes)
     at_body: dict[int, list[int]] = {}
     for k, touched in enumerate(bodies):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, cast
 
@@ -85,8 +85,10 @@ def new_engine(
     places = _addresses(system.model, method)
     forces = np.array([kernel_of(kernel).address for kernel in kernels_of(system.scene)], dtype=np.int64)
     own = np.array(x, dtype=float), np.array(v, dtype=float)
-    places, forces, work, stages, clock, control, own = aligned((places, forces, work, stages, clock, control, own))
-    return _packed(system, Tables(0, places, forces, system.model, work, stages, clock, control, *own))
+    memory, addresses = aligned((places, forces, work, stages, clock, control, *own))
+    places, forces, work, stages, clock, control, x, v = memory
+    tables = Tables(0, places, forces, system.model, work, stages, clock, control, x, v)
+    return _packed(system, tables, {**system.addresses, **addresses})
 
 
 def _addresses(model: Model, method: Integrator | None) -> Array:
@@ -113,15 +115,15 @@ def _control(system: System, method: Integrator | None, start: float, spacing: f
     return Control(np.array(numbers), np.zeros(2, dtype=np.int64), x, v, *(np.zeros(size) for size in sizes))
 
 
-def _packed(system: System, tables: Tables) -> Engine:
-    words = pack(tables)
+def _packed(system: System, tables: Tables, addresses: Mapping[int, int]) -> Engine:
+    words = pack(tables, addresses)
     words[0] = words.ctypes.data
     return Engine(system, tables._replace(address=words.ctypes.data), words)
 
 
 def with_model(engine: Engine, model: Model) -> Engine:
     """The same memory for other constant tables of the same shapes."""
-    return _packed(replace(engine.system, model=model), engine.tables._replace(model=model))
+    return _packed(replace(engine.system, model=model, addresses={}), engine.tables._replace(model=model), {})
 
 
 def evaluate_at(engine: Engine, t: float, x: Array, v: Array) -> int:

@@ -14,8 +14,9 @@ from ffr_dyn.equations.second_order import is_second_order, marker_matrices
 from ffr_dyn.kernels.tables import Markers
 from ffr_dyn.scene.force_kinds import forces_of, loaded_markers
 from ffr_dyn.scene.joints import COINCIDENCE, DISTANCE
-from ffr_dyn.scene.scene import Scene, marker_number, markers
+from ffr_dyn.scene.scene import Body, Scene, marker_number, markers
 from ffr_dyn.variants.families import rounding_of
+from ffr_prep.body import remembered
 from ffr_prep.common.arrays import Array
 
 
@@ -34,11 +35,7 @@ def marker_tables(scene: Scene, place: Layout, blocks: tuple[Block, ...]) -> Mar
 
     def make(k: int) -> tuple[Array, Array]:
         b, _, point = table[k]
-        if not bends[k]:
-            return NO_BLOCKS
-        K, kept = marker_matrices(scene.bodies[b], point), list(rows[k])
-        pool, plan = in_blocks(-np.moveaxis(K[kept], 1, 0), len(kept), rounding_of(K)[kept])
-        return np.concatenate([shapes[k][kept].ravel(), pool]), plan
+        return _bending(scene.bodies[b], point, rows[k]) if bends[k] else NO_BLOCKS
 
     body = [scene.bodies[b].model if b < ground else None for b, _, _ in table]
     bending = tables_in_blocks([(id(body[k]), table[k][2], rows[k], bends[k]) for k in range(len(table))], make)
@@ -55,6 +52,17 @@ def marker_tables(scene: Scene, place: Layout, blocks: tuple[Block, ...]) -> Mar
         active=np.array(sorted({*joint, *loaded}), dtype=np.int64),
         joint=np.array([k for k in joint if table[k][0] != ground], dtype=np.int64),
     )
+
+
+def _bending(body: Body, point: str, rows: tuple[int, ...]) -> tuple[Array, Array]:
+    """Pool and plan of some rows of a marker of a second-order body; kept with the model."""
+
+    def make() -> tuple[Array, Array]:
+        K, kept, at = marker_matrices(body, point), list(rows), body.model.interface(point)
+        pool, plan = in_blocks(-np.moveaxis(K[kept], 1, 0), len(kept), rounding_of(K)[kept])
+        return np.concatenate([np.concatenate([at.phi_t, at.phi_r])[kept].ravel(), pool]), plan
+
+    return remembered(body.model, ("bending", point, rows), make)
 
 
 def _rows(normal: int, turns: bool) -> tuple[int, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -76,51 +77,74 @@ def pattern_of(
     equal: Sequence[Hashable],
 ) -> Pattern:
     """equal : of the bodies, as `alike` tells"""
-    size = [len(b.words) for b in blocks]
+    number: dict[Hashable, int] = {}
+    return _pattern(
+        tuple((len(block.words), block.markers) for block in blocks),
+        tuple(moving),
+        elimination.columns,
+        tuple(zip(marked.body.tolist(), marked.start.tolist(), strict=True)),
+        tuple(number.setdefault(one, len(number)) for one in equal),
+    )
+
+
+@lru_cache(64)
+def _pattern(
+    blocks: tuple[tuple[int, tuple[int, ...]], ...],
+    moving: tuple[tuple[int, ...], ...],
+    columns: tuple[tuple[int, ...], ...],
+    marked: tuple[tuple[int, int], ...],
+    equal: tuple[int, ...],
+) -> Pattern:
+    """The last ones are known by these numbers, which are all there is to them: scenes of one structure share theirs.
+
+    blocks : rows and markers of each;  moving : the bodies it ties;  columns : of the elimination
+    marked : of each marker its body and where its shapes begin;  equal : bodies with the same number couple markers equally
+    """
     offsets: dict[tuple[int, int], int] = {}
     total = 0
-    for k, column in enumerate(elimination.columns):
+    for k, column in enumerate(columns):
         for later in (k, *column):
             offsets[later, k] = total
-            total += LANES * size[k]
-    sides = [[int(marked.body[marker]) for marker in block.markers] for block in blocks]
+            total += LANES * blocks[k][0]
+    sides = [[marked[marker][0] for marker in markers] for _, markers in blocks]
     pairs = [
         (b, later, side, earlier, other, offsets[later, earlier])
         for earlier in range(len(blocks))
-        for later in (earlier, *elimination.columns[earlier])
+        for later in (earlier, *columns[earlier])
         for b in moving[earlier]
         for side in _where(sides[later], b)
         for other in _where(sides[earlier], b)
     ]
     listed = np.array(sorted(pairs, key=lambda pair: pair[1]), dtype=np.int64).reshape(-1, 6)
-    shared = _shared(listed, [block.markers for block in blocks], marked, equal)
-    reach = [max(column, default=k) for k, column in enumerate(elimination.columns)]
-    updates = [
-        [offsets[a, b] for at, a in enumerate(column) for b in column[: at + 1]] for column in elimination.columns
-    ]
-    stored = [(later, offsets[later, k]) for k, column in enumerate(elimination.columns) for later in column]
-    return Pattern(
+    shared = _shared(listed, [markers for _, markers in blocks], marked, equal)
+    reach = [max(column, default=k) for k, column in enumerate(columns)]
+    updates = [[offsets[a, b] for at, a in enumerate(column) for b in column[: at + 1]] for column in columns]
+    stored = [(later, offsets[later, k]) for k, column in enumerate(columns) for later in column]
+    pattern = Pattern(
         pair_body=listed[:, 0].copy(),
         pair=np.column_stack([listed[:, 1:], shared]),
         sample=np.unique(shared, return_index=True)[1],
         pair_start=starts(np.bincount(listed[:, 1], minlength=len(blocks)).tolist()),
         reach=np.array(np.maximum.accumulate(reach), dtype=np.int64) if reach else np.zeros(0, dtype=np.int64),
         diagonal=np.array([offsets[k, k] for k in range(len(blocks))], dtype=np.int64),
-        column_start=starts([len(column) for column in elimination.columns]),
+        column_start=starts([len(column) for column in columns]),
         column=np.array(stored, dtype=np.int64).reshape(-1, 2),
         update_start=starts([len(column) for column in updates]),
         update=np.array([offset for column in updates for offset in column], dtype=np.int64),
     )
+    for table in pattern:
+        table.setflags(write=False)
+    return pattern
 
 
-def _shared(pairs: Array, of: list[tuple[int, ...]], marked: Markers, equal: Sequence[Hashable]) -> Array:
+def _shared(
+    pairs: Array, of: list[tuple[int, ...]], marked: tuple[tuple[int, int], ...], equal: tuple[int, ...]
+) -> Array:
     """(P,) numbers of pairs, the same for those of equal markers on equal bodies; `of`: the markers of each block."""
     numbers: dict[Hashable, int] = {}
     return np.array(
         [
-            numbers.setdefault(
-                (equal[b], *(int(marked.start[of[k][side]]) for k, side in ((later, i), (earlier, j)))), len(numbers)
-            )
+            numbers.setdefault((equal[b], marked[of[later][i]][1], marked[of[earlier][j]][1]), len(numbers))
             for b, later, i, earlier, j, _ in pairs.tolist()
         ],
         dtype=np.int64,

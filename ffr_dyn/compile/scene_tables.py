@@ -30,6 +30,7 @@ class System(Brief):
 
     blocks : in elimination order, as the rows in the tables;  user : keeps the callback of the user's functions alive
     inputs : where the numbers of a signal begin among those of the time functions, by its name
+    addresses : of the arrays of the tables, by identity
     """
 
     scene: Scene
@@ -39,6 +40,7 @@ class System(Brief):
     model: Model
     user: UserFunctions
     inputs: Mapping[str, tuple[int, ...]]
+    addresses: Mapping[int, int]
 
 
 def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: float = 0.0) -> System:
@@ -71,7 +73,8 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: f
     }
     user = UserFunctions(functions.callbacks, place, scene)
     compiled = Model(**model, user_address=user.address, user_count=user.count, stiff_count=0)  # type: ignore[arg-type]
-    return System(scene, place, ordered, elimination, aligned(compiled), user, functions.inputs())
+    tables, addresses = aligned(compiled)
+    return System(scene, place, ordered, elimination, tables, user, functions.inputs(), addresses)
 
 
 # ---- the user's Python functions ----------------------------------------------------------------------------------

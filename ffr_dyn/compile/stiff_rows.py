@@ -46,7 +46,7 @@ def with_stiff_rows(system: System) -> System:
     pattern = pattern_of(
         ordered, [moving[k] for k in order], elimination, m.markers, alike(system.scene, system.layout)
     )
-    rows, pattern, joint, row = aligned((rows, pattern, joint, row))
+    (rows, pattern, joint, row), addresses = aligned((rows, pattern, joint, row))
     changed = m._replace(
         rows=rows,
         pattern=pattern,
@@ -54,7 +54,8 @@ def with_stiff_rows(system: System) -> System:
         loads=m.loads._replace(row=row),
         stiff_count=int((rows.start[1:] - rows.forced).sum()),
     )
-    return replace(system, blocks=ordered, elimination=elimination, model=changed)
+    addresses = {**system.addresses, **addresses}
+    return replace(system, blocks=ordered, elimination=elimination, model=changed, addresses=addresses)
 
 
 def _extended(system: System) -> tuple[list[Block], list[Place]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,6 @@ from ffr_dyn.kernels.tables import (
     LANES,
     MOST_PASSED,
     NORMAL,
-    Bodies,
     BodyWork,
     LoadWork,
     MarkerWork,
@@ -89,7 +89,8 @@ def _body_work(m: Model, keeps_terms: bool) -> BodyWork:
     )
     work.inverse[:, 0] = [_inverse(mass) for mass in m.bodies.mass]
     for b in np.flatnonzero(n[:-1] == 0):
-        work.s[b], work.J[b], work.L[b] = _rigid_inertia(m.bodies, int(b))
+        numbers = m.bodies.moments[b].tobytes(), float(m.bodies.mass[b])
+        work.s[b], work.J[b], work.L[b] = _rigid_inertia(*numbers, int(m.bodies.where[b, NORMAL]))
         work.inverse[b, 1] = _inverse(np.trace(work.J[b]))
     return work
 
@@ -115,13 +116,18 @@ def _inverse(number: float) -> float:
     return 1.0 / number if number > 0.0 else 0.0
 
 
-def _rigid_inertia(bodies: Bodies, b: int) -> tuple[Array, Array, Array]:
-    """(first moment, inertia tensor, factor as the kernels want it) of a rigid body; -1 for a factor that does not exist."""
-    first, normal = bodies.moments[b, :3], bodies.where[b, NORMAL]
-    xx, yy, zz, xy, xz, yz = bodies.moments[b, 3:]
+@lru_cache(1024)
+def _rigid_inertia(moments: bytes, mass: float, normal: int) -> tuple[Array, Array, Array]:
+    """(first moment, inertia tensor, factor as the kernels want it) of a rigid body; -1 for a factor that does not exist.
+
+    Of its numbers in `Bodies`, by which the last bodies are known: every run of a scene asks for them again.
+    """
+    first, (xx, yy, zz, xy, xz, yz) = np.split(np.frombuffer(moments), [3])
     J = np.array([[yy + zz, -xy, -xz], [-xy, xx + zz, -yz], [-xz, -yz, xx + yy]])
-    M = np.block([[bodies.mass[b] * np.eye(3), -skew(first)], [skew(first), J]])
-    moving = np.arange(6) if normal < 0 else np.array([*np.delete(np.arange(3), normal), 3 + normal])
+    M, s = np.zeros((6, 6)), skew(first)
+    M[:3, :3].flat[::4] = mass
+    M[:3, 3:], M[3:, :3], M[3:, 3:] = -s, s, J
+    moving = list(range(6)) if normal < 0 else [*(c for c in range(3) if c != normal), 3 + normal]
     try:
         factor = np.linalg.cholesky(M[np.ix_(moving, moving)])
     except np.linalg.LinAlgError:

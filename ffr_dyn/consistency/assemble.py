@@ -9,31 +9,27 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import csr_array
 
+from ffr_dyn.closing.constraints import Constraints, constraints_of, without
 from ffr_dyn.closing.driven_angles import led_to_drivers
 from ffr_dyn.closing.independence import independent_blocks
 from ffr_dyn.closing.inertia_left import require_inertia
-from ffr_dyn.closing.positions import close_positions, close_velocities, stacked
-from ffr_dyn.closing.row_space import independent
+from ffr_dyn.closing.positions import close_positions, close_velocities
 from ffr_dyn.compile.scene_tables import System, compile_scene
+from ffr_dyn.consistency.across import rows_across
 from ffr_dyn.consistency.dropped_terms import check_dropped
 from ffr_dyn.consistency.held_frequencies import held_frequencies
 from ffr_dyn.consistency.sliding import sliding_notes
 from ffr_dyn.consistency.validity import deflections
-from ffr_dyn.equations.constraint_rows import Block, blocks_of, rows_at
-from ffr_dyn.equations.constraints import Row
-from ffr_dyn.equations.layout import Layout, initial_state, layout, moved, to_global_axes
-from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction
-from ffr_dyn.scene.scene import Scene, require_scene
+from ffr_dyn.equations.constraint_rows import Block, blocks_of
+from ffr_dyn.equations.layout import Layout, initial_state
+from ffr_dyn.scene.scene import Scene, altered, require_scene
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
 from ffr_dyn.variants.plane import obstacles, planar_forms
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
-ASKED = 1e-6  # of a row across the plane at random speeds of about one; modes carry rounding of 1e-9
-ACROSS = 1e-8  # of the largest entry of a row, what counts as zero
 SHIFTED = 1e-6  # m, rad, from where it is told that assembly moved a body
 RELAXATION = 1e-8  # of dependent rows, relative
 TORN = 0.5  # elastic displacement of an interface over the size of its body that no joint may ask for
@@ -73,18 +69,15 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     >>> x = fd.assemble(scene).x
     """
     require_scene(scene)
-    declared = scene
-    scene, blocks, computed = _flattened(scene, time)
-    place = layout(scene)
+    declared, flat = scene, flat_form(scene, time)
+    scene, rows, place = flat.scene, flat.rows, flat.rows.place
     left_out = [note for b, body in enumerate(scene.bodies) for note in check_dropped(body, place.active(b))]
     guess, v = initial_state(scene, place)
-    x = led_to_drivers(
-        scene, place, blocks, guess, time, lambda rows, at: close_positions(scene, place, rows, at, v, time)
-    )
+    x = led_to_drivers(rows, guess, lambda driven, at: close_positions(driven, at, v))
     _require_shape(scene, place, guess, x)
-    kept, redundant = independent_blocks(scene, place, blocks, x, v, time)
-    v = close_velocities(scene, place, blocks, x, v, time)
-    rows = sum(len(block.words) for block in kept)
+    kept, redundant = independent_blocks(rows, x, v)
+    v = close_velocities(rows, x, v)
+    count = sum(len(block.words) for block in kept)
     notes = [
         f"{block}: the row '{text}' is redundant; of the reactions that are possible the smallest are given"
         for block, text in redundant
@@ -99,9 +92,10 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     notes += held_frequencies(
         declared, [(x[place.R(b)], x[place.p(b)]) for b in range(len(place.n))], scene.plane, time
     )
-    all_rows = compile_scene(scene, blocks, RELAXATION) if redundant else None
-    free = _movable(place) - rows
-    return Assembled(compile_scene(scene, kept), all_rows, x, v, free, tuple(notes), tuple(redundant), computed)
+    all_rows = compile_scene(scene, list(rows.blocks), RELAXATION) if redundant else None
+    free = _movable(place) - count
+    system = compile_scene(scene, kept) if redundant else rows.engine.system
+    return Assembled(system, all_rows, x, v, free, tuple(notes), tuple(redundant), flat.computed)
 
 
 def shifted(scene: Scene, place: Layout, guess: Array, x: Array) -> list[str]:
@@ -139,34 +133,45 @@ def _movable(place: Layout) -> int:
     return sum(len(place.active(b)) + n for b, n in enumerate(place.n))
 
 
+@dataclass(frozen=True)
+class Flat:
+    """A scene as it is computed, its rows, and whether it is computed in the plane or in space, in words."""
+
+    scene: Scene
+    rows: Constraints
+    computed: str
+
+
 def flattened(scene: Scene, time: float) -> tuple[Scene, list[Block]]:
     """The scene as it is computed: second-order bodies in their mean-axis form, its plane decided, `plane` "x", "y", "z" or
     "none"; and its rows, those of a planar scene without the ones that no motion in the plane can change."""
-    return _flattened(scene, time)[:2]
+    flat = flat_form(scene, time)
+    return flat.scene, list(flat.rows.blocks)
 
 
 def plane_in_words(scene: Scene, time: float) -> str:
     """Whether a scene is computed in the plane or in space, and why."""
-    return _flattened(scene, time)[2]
+    return flat_form(scene, time).computed
 
 
-def _flattened(scene: Scene, time: float) -> tuple[Scene, list[Block], str]:
-    """As `flattened` and `plane_in_words`. Raises InputError for a body without the inertia to move."""
+def flat_form(scene: Scene, time: float) -> Flat:
+    """A scene as it is computed (`flattened`). Raises InputError for a body without the inertia to move."""
     found = _in_plane_or_space(scene, time)
-    require_inertia(found[0])
+    require_inertia(found.scene, found.rows.place)
     return found
 
 
-def _in_plane_or_space(scene: Scene, time: float) -> tuple[Scene, list[Block], str]:
+def _in_plane_or_space(scene: Scene, time: float) -> Flat:
     scene, found = in_mean_axis_frames(scene), dict[str, str]()
+    blocks = blocks_of(scene)  # which know joints and markers by number, and these are the same in a plane
     for flat in planar_forms(scene):
-        blocks = blocks_of(flat)
-        across, found[flat.plane] = _across(flat, blocks, time)
+        across, found[flat.plane] = rows_across(flat, blocks, time)
         if not found[flat.plane] or scene.plane == flat.plane:
-            numbers, said = iter(across), ", as the scene says" * (scene.plane == flat.plane)
-            left = [replace(b, words=tuple(word for word in b.words if not next(numbers))) for b in blocks]
-            return flat, left, f"in the plane, normal {flat.plane}{said}"
-    return replace(scene, plane="none"), blocks_of(scene), _in_space(scene, found)
+            said = ", as the scene says" * (scene.plane == flat.plane)
+            rows = constraints_of(flat, without(blocks, across), time)
+            return Flat(flat, rows, f"in the plane, normal {flat.plane}{said}")
+    whole = altered(scene, plane="none")
+    return Flat(whole, constraints_of(whole, blocks, time), _in_space(scene, found))
 
 
 def _in_space(scene: Scene, found: dict[str, str]) -> str:
@@ -176,68 +181,6 @@ def _in_space(scene: Scene, found: dict[str, str]) -> str:
     normal, said = next(((key, (what,)) for key, what in found.items()), None) or obstacles(scene)
     more = f" (and {len(said) - 1} more)" if len(said) > 1 else ""
     return f"in space: not in the plane with the normal {normal}, as {said[0]}{more}"
-
-
-def _across(scene: Scene, blocks: list[Block], time: float) -> tuple[list[bool], str]:
-    """Which rows of a planar scene act across the plane only; and, in words, what of them does not hold every body in it or
-    asks for motion, now or later, or which others do not act in the plane only; "" where there is nothing.
-
-    Looked at in the position and with the motion that the scene declares, and at random in the plane around it.
-    """
-    place, rng = layout(scene), np.random.default_rng(0)
-    start, v = initial_state(scene, place)
-    active = np.zeros(place.v_size, bool)
-    for b, n in enumerate(place.n):
-        active[[place.iv[b] + c for c in (*place.active(b), *range(6, 6 + n))]] = True
-    inside, outside, left, jacobians = [], [], [], []
-    for scale in (0.0, 1e-2, 1e-2):
-        step = np.where(active, scale * rng.normal(size=place.v_size), 0.0)
-        x, speeds = moved(place, start, step), v + to_global_axes(place, start, 100 * step)
-        rows = rows_at(scene, place, blocks, x, speeds, time)
-        jacobians.append(stacked(rows, place)[:, ~active])
-        inside.append([_largest(row, active) for row in rows])
-        outside.append([_largest(row, ~active) for row in rows])
-        left.append([max(abs(row.Phi), abs(row.nu), abs(row.gamma)) for row in rows])
-    most_inside, most_outside, most_left = (np.array(part).max(axis=0) for part in (inside, outside, left))
-    across = most_inside <= ACROSS * most_outside
-    mixed = ~across & (most_outside > ACROSS * most_inside)
-    moving = np.array([_changes(word.function) for block in blocks for word in block.words], bool)
-    asked = across & ((most_left >= ASKED) | moving)
-    names = [block.name for block in blocks for _ in block.words]
-    for wrong, what in ((mixed, "acts both in the plane and across it"), (asked, "asks for motion across it")):
-        if wrong.any():
-            return across.tolist(), f"{names[int(np.argmax(wrong))]!r} {what}"
-    if lost := _driver_lost(blocks, across):
-        return across.tolist(), f"driver {lost!r} acts across it alone"
-    if not all(_columns_independent(J[across]) for J in jacobians):
-        return across.tolist(), "its joints leave a body free to move across it"
-    return across.tolist(), ""
-
-
-def _driver_lost(blocks: list[Block], across: Array) -> str:
-    """A driver all rows of which act across the plane: in the plane it would have no effort; empty where there is none."""
-    numbers = iter(across.tolist())
-    acts = [[next(numbers) for _ in block.words] for block in blocks]
-    return next((block.name for block, rows in zip(blocks, acts, strict=True) if block.driver and all(rows)), "")
-
-
-def _largest(row: Row, chosen: Array) -> float:
-    """The largest entry of the Jacobian row at chosen (V,) velocities."""
-    return max(
-        (float(np.abs(part[chosen[k : k + part.size]]).max(initial=0.0)) for k, part in row.parts.items()), default=0.0
-    )
-
-
-def _columns_independent(A: csr_array) -> bool:
-    """Whether no combination of the columns vanishes. Rows have more of their own than columns, which a chain adds up."""
-    if independent(A):
-        return A.shape[0] == A.shape[1]
-    return independent(csr_array(A.T)) or int(np.linalg.matrix_rank(A.toarray())) == A.shape[1]
-
-
-def _changes(function: TimeFunction | None) -> bool:
-    """Whether a function of time is more than a constant."""
-    return function is not None and (function.kind != POLYNOMIAL or any(function.data[1:]))
 
 
 def in_space(scene: Scene) -> Scene:

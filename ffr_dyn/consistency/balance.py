@@ -103,7 +103,7 @@ def _power(system: System, rows: Record, powers: Array) -> Array:
     counted = np.ones(powers.shape[1], bool)
     counted[: len(forces_of(system.scene))] = [not _conserves(force) for force in forces_of(system.scene)]
     total: Array = powers[:, counted].sum(axis=1)
-    for b, body in enumerate(system.scene.bodies):
+    for b, body in ((b, body) for b, body in enumerate(system.scene.bodies) if body.model.n):
         rates = rows.v[:, system.layout.q_dot(b)]
         total = total - np.einsum("ti,ij,tj->t", rates, damping_matrix(body.model, body.damping), rates)
     return total

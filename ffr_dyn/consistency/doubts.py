@@ -116,16 +116,15 @@ def _size(scene: Scene) -> float:
     return max(body.model.size for body in scene.bodies) or 1.0
 
 
-def look(seen: Seen, rows: Record) -> None:
+def look(seen: Seen, view: View) -> None:
     """Take note of the rows that follow, whose violations are those of all rows, redundant ones included."""
-    system, arrays = seen.assembled.system, seen.arrays
+    system, rows, arrays = seen.assembled.system, view.record, seen.arrays
     arrays["bodies"][:] = np.maximum(arrays["bodies"], extremes(system, rows))
     arrays["x"][:] = rows.x[-1]
     worst = int(np.argmax(rows.violation[:, 0]))
     if rows.violation[worst, 0] > max(seen.tolerance, arrays["open"][0]):
         arrays["open"][:] = _opened(seen.assembled, rows, worst)
     if seen.scene.drivers:
-        view = View(system, rows)
         arrays["driven"][:] = np.maximum(arrays["driven"], np.array([_driven(view, d) for d in seen.scene.drivers]).T)
     if seen.method is not None and (explicit := candidates(system, seen.method)):
         arrays["rates"][:] = np.maximum(arrays["rates"], fastest(evaluator(system), rows, explicit))
@@ -179,7 +178,7 @@ def checked(
 ) -> list[str]:
     """The notes of an analysis that has all its rows at once and no steps. Raises ComputationError as `ended`."""
     seen = nothing_seen(assembled)
-    look(seen, rows)
+    look(seen, View(assembled.system, rows))
     return ended(analysis, seen, more)
 
 

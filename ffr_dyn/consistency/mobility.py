@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffr_dyn.closing.independence import redundant_drivers
-from ffr_dyn.consistency.assemble import assemble, flattened, in_space, plane_in_words
+from ffr_dyn.consistency.assemble import assemble, flat_form, flattened, in_space
 from ffr_dyn.consistency.evaluation import free_motions, locked, total_mass_matrix, unit_rows
 from ffr_dyn.equations.constraint_rows import Block, rows_at
 from ffr_dyn.equations.constraints import evaluate_word
-from ffr_dyn.equations.layout import Layout, layout
+from ffr_dyn.equations.layout import Layout
 from ffr_dyn.scene.joints import COORDINATES, RELATION, Joint, Word, coordinate_axes, frames
 from ffr_dyn.scene.scene import Scene, marker_number
 from ffr_prep.common.arrays import Array
@@ -88,7 +88,7 @@ def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobili
 
     >>> print(fd.mobility(scene))
     """
-    plane, computed, scene = flattened(scene, time)[0].plane, plane_in_words(scene, time), in_space(scene)
+    whole, scene = flat_form(scene, time), in_space(scene)
     over = overdriven(scene, time) if drivers and scene.drivers else ()
     bare = scene if drivers and not over else replace(scene, drivers=())
     assembled = assemble(bare, time=time)
@@ -101,15 +101,15 @@ def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobili
     motions = tuple(_motions(flat, place, assembled.x, assembled.v, rigid, Z))
     doubts = tuple(note for note in assembled.notes if note.startswith("body "))
     elastic = sum(place.n)
-    return Mobility(assembled.degrees_of_freedom, elastic, plane, computed, motions, assembled.redundant, over, doubts)
+    free, plane = assembled.degrees_of_freedom, whole.scene.plane
+    return Mobility(free, elastic, plane, whole.computed, motions, assembled.redundant, over, doubts)
 
 
 def overdriven(scene: Scene, time: float = 0.0) -> tuple[str, ...]:
     """Drivers that prescribe what the joints and the other drivers fix already, seen from the start without them."""
-    flat, blocks = flattened(in_space(scene), time)
-    place = layout(flat)
-    assembled = assemble(replace(flat, drivers=()), time=time)
-    return redundant_drivers(flat, place, blocks, assembled.x, assembled.v, time)
+    flat = flat_form(in_space(scene), time)
+    assembled = assemble(replace(flat.scene, drivers=()), time=time)
+    return redundant_drivers(flat.rows, assembled.x, assembled.v)
 
 
 def require_driven(scene: Scene, time: float, analysis: str) -> None:

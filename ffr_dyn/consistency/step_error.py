@@ -16,7 +16,7 @@ resolved looks like noise there. The factor was measured on the benchmark set (`
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +30,7 @@ ARM = 1e-6  # of the largest range of forces times that of positions, the same f
 MIDDLE, WINDOW = 2.2 * 1.5**0.5, 16  # of amplitudes of methods of order three
 NOISE = (70 / 36) ** 0.5  # by which rows without relation are farther off the curve than they are large
 RATES = {"position": "velocity", "R": "v", "q": "q_dot"}
+AT_ONCE = 2e7  # bytes of numbers that are compared side by side
 COARSE = 0.01  # of the range, by which a row may be off the curve through its neighbours
 
 
@@ -42,6 +43,26 @@ class StepError:
     vibrates: bool
 
 
+@dataclass(frozen=True)
+class _Columns:
+    """All components of some outputs side by side: table (T, K), and the first column of each output."""
+
+    names: tuple[str, ...]
+    first: Array
+    table: Array
+
+    def largest(self, values: Array) -> Array:
+        """(O,) the largest of values (K,) of each output."""
+        return np.maximum.reduceat(values, self.first)
+
+
+def _columns(run: Result, names: Iterable[str]) -> _Columns:
+    known = tuple(names)
+    parts = [run[name].reshape(run.time.size, -1) for name in known]
+    first = np.cumsum([0, *(part.shape[1] for part in parts)])[:-1]
+    return _Columns(known, first, np.concatenate([np.zeros((run.time.size, 0)), *parts], axis=1))
+
+
 def step_errors(
     run: Result, other: Result | None, ratio: float, order: int, twins: Sequence[Result] = ()
 ) -> dict[str, StepError]:
@@ -51,25 +72,52 @@ def step_errors(
     twins : of the step h, and of h/2 for a method of higher order; () where vibration is not damped
     """
     scales, found = ranges(run), {}
-    for name, scale in scales.items():
-        y = run[name]
-        step = 0.0 if other is None else largest_difference(y, other[name]) * abs(1.0 / (ratio**order - 1.0))
-        vibration = _beside_twins(y, [twin[name] for twin in twins])
-        error = max(step, vibration)
-        found[name] = StepError(error, error / scale if scale > 0 else 0.0, vibration > VIBRATION * step)
+    for names in _batches(run, scales):
+        y, steps = _columns(run, names), np.zeros(len(names))
+        if other is not None:
+            steps = _apart(y, y.table, _columns(other, names).table) * abs(1.0 / (ratio**order - 1.0))
+        vibrations = _beside_twins(y, [_columns(twin, names).table for twin in twins])
+        for name, step, vibration in zip(names, steps.tolist(), vibrations.tolist(), strict=True):
+            error, scale = max(step, vibration), scales[name]
+            found[name] = StepError(error, error / scale if scale > 0 else 0.0, vibration > VIBRATION * step)
     return found
 
 
-def _beside_twins(y: Array, twins: Sequence[Array]) -> float:
+def _batches(run: Result, names: Iterable[str]) -> Iterator[list[str]]:
+    """The outputs, so many at a time that their numbers take no more than AT_ONCE bytes."""
+    batch, size = list[str](), 0
+    for name in names:
+        more = run[name].nbytes
+        if batch and size + more > AT_ONCE:
+            yield batch
+            batch, size = [], 0
+        batch.append(name)
+        size += more
+    if batch:
+        yield batch
+
+
+def _beside_twins(y: _Columns, twins: Sequence[Array]) -> Array:
+    """(O,) v of each output."""
     if len(twins) < 2:
-        return largest_difference(y, twins[0]) if twins else 0.0
+        return _apart(y, y.table, twins[0]) if twins else np.zeros(len(y.names))
     coarse, fine = twins
-    near = nearest(y, coarse, fine)
-    rows = min(len(y), len(fine))
+    rows = min(len(coarse), len(fine))
+    extrapolated = (4.0 * fine[:rows] - coarse[:rows]) / 3.0
+    near = np.minimum(_apart(y, y.table, fine), _apart(y, y.table, extrapolated))
+    rows = min(len(y.table), len(fine))
     if rows <= 4:
         return near
-    amplitude = largest_difference(_amplitudes(y[:rows]), _amplitudes(fine[:rows]))
-    return min(near, MIDDLE * (near * amplitude) ** 0.5)
+    amplitude = _apart(y, _amplitudes(y.table[:rows]), _amplitudes(fine[:rows]))
+    return np.minimum(near, MIDDLE * np.sqrt(near * amplitude))
+
+
+def _apart(of: _Columns, one: Array, other: Array) -> Array:
+    """(O,) `largest_difference` of each output."""
+    rows = min(len(one), len(other))
+    with np.errstate(all="ignore"):
+        found = of.largest(np.abs(one[:rows] - other[:rows]).max(axis=0, initial=0.0))
+    return np.where(np.isfinite(found), found, np.inf)
 
 
 def nearest(y: Array, coarse: Array, fine: Array) -> float:
@@ -104,7 +152,11 @@ def largest_difference(one: Array, other: Array) -> float:
 def ranges(run: Result) -> dict[str, float]:
     """Of every output but the violations of constraints: the largest range of a component, floored by those of its kind (the
     last part of its name), where next to nothing moves."""
-    spans = {name: _range(q.values) for name, q in run.quantities.items() if not name.startswith("constraint.")}
+    spans: dict[str, float] = {}
+    for names in _batches(run, (name for name in run.quantities if not name.startswith("constraint."))):
+        of = _columns(run, names)
+        moved = np.ptp(of.table, axis=0) if len(of.table) else np.zeros(of.table.shape[1])
+        spans |= zip(names, of.largest(moved).tolist(), strict=True)
     largest: dict[str, float] = {}
     for name, span in spans.items():
         largest[_kind(name)] = max(span, largest.get(_kind(name), 0.0))
@@ -120,10 +172,6 @@ def _kind(name: str) -> str:
     return {"R": "position", "v": "velocity", "p": "orientation"}.get(last, last)
 
 
-def _range(values: Array) -> float:
-    return float(np.ptp(values, axis=0).max(initial=0.0)) if len(values) else 0.0
-
-
 def too_coarse(run: Result) -> dict[str, float]:
     """Outputs whose rows are too far apart to show what they do, and by how much of their range.
 
@@ -131,22 +179,21 @@ def too_coarse(run: Result) -> dict[str, float]:
     (half of what they differ by counts), which finds even a vibration that rows catch in the same phase again and again;
     every row of other outputs against the curve through the two before and the two after.
     """
-    found = {}
-    for name, scale in ranges(run).items():
-        y = run[name]
-        if scale > 0 and len(y) > 4:
-            share = float(np.abs(_off_neighbours(run, name)).max()) / scale
-            if share > COARSE:
-                found[name] = share
-    return found
+    scales = {name: scale for name, scale in ranges(run).items() if scale > 0}
+    if run.time.size <= 4:
+        return {}
+    rates = {name: rate for name in scales if (rate := _rate_of(name)) in run.quantities}
+    off: dict[str, float] = {}
+    for names in _batches(run, (name for name in scales if name not in rates)):
+        y = _columns(run, names)
+        off |= zip(names, y.largest(np.abs(_off_curve(y.table)).max(axis=0)).tolist(), strict=True)
+    for names in _batches(run, rates):
+        y, w = _columns(run, names), _columns(run, (rates[name] for name in names)).table
+        beside = 0.5 * (np.diff(y.table, axis=0) - 0.5 * np.diff(run.time)[:, None] * (w[:-1] + w[1:]))
+        off |= zip(names, y.largest(np.abs(beside).max(axis=0)).tolist(), strict=True)
+    return {name: share for name, scale in scales.items() if (share := off[name] / scale) > COARSE}
 
 
-def _off_neighbours(run: Result, name: str) -> Array:
-    """What rows are off what those beside them say."""
+def _rate_of(name: str) -> str:
     of, _, last = name.rpartition(".")
-    y, rate = run[name], f"{of}.{RATES.get(last, '')}"
-    if rate not in run.quantities:
-        return _off_curve(y)
-    w, spacing = run[rate], np.diff(run.time).reshape(-1, *(1,) * (y.ndim - 1))
-    found: Array = 0.5 * (np.diff(y, axis=0) - 0.5 * spacing * (w[:-1] + w[1:]))
-    return found
+    return f"{of}.{RATES.get(last, '')}"

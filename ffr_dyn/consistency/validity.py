@@ -14,7 +14,7 @@ from ffr_dyn.kernels.tables import Record
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.parts import owner
 from ffr_dyn.scene.scene import Body, Scene
-from ffr_prep.body import FlexibleBody, Interface
+from ffr_prep.body import FlexibleBody, Interface, remembered
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
@@ -48,19 +48,24 @@ def deflections(model: FlexibleBody, q: Array) -> tuple[float, float]:
     """The largest rotation [rad] of an interface, q (T, n), and its largest deflection over the size of the body, seen from
     the first interface or the one farthest from it: the same in every body frame. A lone interface is seen from the frame.
     """
-    points = model.interfaces
-    if not points or not model.n:
+    if not model.interfaces or not model.n:
         return 0.0, 0.0
+    moved = remembered(model, "deflections", lambda: _between_points(model))
+    turn, shift = (np.linalg.norm(moved[:, :, k] @ q.T, axis=2).max(initial=0.0) for k in (0, 1))
+    return float(turn), float(shift / model.size) if model.size > 0 else 0.0
+
+
+def _between_points(model: FlexibleBody) -> Array:
+    """(1 or 2, I, 2, 3, n) rotation and translation of all interfaces, seen from those that they are seen from."""
+    points = model.interfaces
     far = max(points, key=lambda i: float(np.linalg.norm(i.position - points[0].position)))
     bases = (
         (points[0], far) if len(points) > 1 else (Interface("frame", points[0].position, *np.zeros((2, 3, model.n))),)
     )
-    moved = np.array([
+    return np.array([
         [(i.phi_r - at.phi_r, i.phi_t - at.phi_t + np.cross(i.position - at.position, at.phi_r, axisb=0).T) for i in points]
         for at in bases
     ])  # fmt: skip
-    turn, shift = (np.linalg.norm(moved[:, :, k] @ q.T, axis=2).max(initial=0.0) for k in (0, 1))
-    return float(turn), float(shift / model.size) if model.size > 0 else 0.0
 
 
 def meaningless(scene: Scene, found: Array) -> str:

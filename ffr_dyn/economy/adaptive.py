@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ffr_dyn.analyses.integration import geometry
+from ffr_dyn.closing.constraints import constraints_of
 from ffr_dyn.closing.positions import close_positions, close_velocities
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.economy.contributions import effects_of
@@ -144,10 +145,10 @@ class _Models:
             _in_state(body, flat, choice.parts[b].modes)
             for b, (body, flat) in enumerate(zip(here.bodies, system.scene.bodies, strict=True))
         ]
-        flat, blocks = replace(system.scene, bodies=tuple(bodies)), list(system.blocks)
-        x, v = initial_state(flat, system.layout)
-        x = close_positions(flat, system.layout, blocks, x, v, time)
-        v = close_velocities(flat, system.layout, blocks, x, v, time)
+        flat = replace(system.scene, bodies=tuple(bodies))
+        rows, (x, v) = constraints_of(flat, list(system.blocks), time), initial_state(flat, system.layout)
+        x = close_positions(rows, x, v)
+        v = close_velocities(rows, x, v)
         return replace(made, assembled=replace(made.assembled, x=x, v=v))
 
 

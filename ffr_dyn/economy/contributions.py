@@ -17,6 +17,7 @@ from ffr_dyn.economy.run import Made, Trial, states
 from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.results.quantities import measure, selected
+from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
@@ -201,7 +202,7 @@ def _changed(seen: Samples, rows: Array, shift: Array, rates: Array) -> Record:
 
 def _outputs(seen: Samples, record: Record, scene: Scene, of: Probe) -> tuple[Array, ...]:
     """Per output (K, k) at recorded states, which follow one another in no order."""
-    quantities, _ = measure(seen.system, record, {}, selected(seen.system, needed(of, scene)))
+    quantities, _ = measure(View(seen.system, record), {}, selected(seen.system, needed(of, scene)))
     return histories(of, scene, Result(np.arange(float(len(record.time))), quantities))
 
 

@@ -75,7 +75,7 @@ def _driver_block(scene: Scene, driver: Driver | PointDriver) -> Block:
 def rows_at(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> list[Row]:
     """All rows of the blocks, readable form. InputError for a distance that is not positive at the time."""
     return [
-        evaluate_word(scene, place, x, v, word, block.markers, _drive(block, word, time))
+        evaluate_word(scene, place, x, v, word, block.markers, drive_at(block, word, time))
         for block in blocks
         for word in block.words
     ]
@@ -94,7 +94,8 @@ def drive_of(word: Word, time: float) -> tuple[float, float, float]:
         ) from None
 
 
-def _drive(block: Block, word: Word, time: float) -> tuple[float, float, float]:
+def drive_at(block: Block, word: Word, time: float) -> tuple[float, float, float]:
+    """As `drive_of`, of a word of a block. Raises InputError also for a distance that is not positive."""
     drive = drive_of(word, time)
     if word.kind == DISTANCE and not drive[0] > 0:
         raise InputError(f"joint {block.name!r}: length is {drive[0]:.4g} m at t = {time:.6g} s; it must be positive")

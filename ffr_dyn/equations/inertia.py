@@ -24,7 +24,7 @@ import numpy as np
 from ffr_dyn.equations.second_order import second_moments
 from ffr_dyn.functions.rotation import skew
 from ffr_dyn.scene.scene import INERTIA_TERMS, Body
-from ffr_prep.body import FlexibleBody, axial
+from ffr_prep.body import FlexibleBody, axial, remembered
 from ffr_prep.common.arrays import Array
 
 
@@ -49,6 +49,10 @@ def kept_integrals(body: Body) -> Integrals:
 
     I4 and I5 are the skew parts of rP_dm and PP_dm, I8 and I9 the symmetric ones; X stays without I9.
     """
+    return remembered(body.model, ("integrals", body.dropped, body.stiffening), lambda: _kept_integrals(body))
+
+
+def _kept_integrals(body: Body) -> Integrals:
     model, kept = body.model, {term: float(term not in body.dropped) for term in INERTIA_TERMS}
     rP, PP = (
         symmetric * 0.5 * (part + np.swapaxes(part, 0, 1)) + skewed * 0.5 * (part - np.swapaxes(part, 0, 1))
@@ -56,6 +60,8 @@ def kept_integrals(body: Body) -> Integrals:
     )
     P, I5 = kept["I3"] * model.P_dm, kept["I5"] * model.I5
     PP = PP + second_moments(body)
+    for part in (rP, PP, P, I5):
+        part.setflags(write=False)
     return Integrals(model.mass, model.r_dm, model.rr_dm, P, rP, PP, model.omega2, I5, model.I6, model.damping)
 
 
@@ -84,12 +90,12 @@ def inertia_tensor(moment: Moments) -> Array:
 def mass_matrix(body: FlexibleBody | Integrals, q: Array) -> Array:
     """(6 + n, 6 + n) mass matrix at q (n,), body axes. Equation (12) of docs/notation.md."""
     moment = moments(body, q)
-    J, H = inertia_tensor(moment), axial(moment.G)
-    return np.block([
-        [body.mass * np.eye(3), -skew(moment.s), body.P_dm],
-        [skew(moment.s), J, H],
-        [body.P_dm.T, H.T, body.I6],
-    ])  # fmt: skip
+    M, s = np.zeros((6 + q.size, 6 + q.size), moment.W.dtype), skew(moment.s)
+    M[:3, :3].flat[::4] = body.mass
+    M[:3, 3:6], M[3:6, :3], M[3:6, 3:6] = -s, s, inertia_tensor(moment)
+    M[:3, 6:], M[3:6, 6:] = body.P_dm, axial(moment.G)
+    M[6:, :6], M[6:, 6:] = M[:6, 6:].T, body.I6
+    return M
 
 
 def quadratic_velocity(body: FlexibleBody | Integrals, q: Array, omega: Array, q_dot: Array) -> Array:

@@ -32,7 +32,8 @@ def rotation_matrix(p: Array) -> Array:
     p = np.asarray(p, float)
     if p.ndim == 1:
         return np.array(_rotation_rows(*p.tolist()))
-    return np.moveaxis(np.array(_rotation_rows(*np.moveaxis(p, -1, 0))), (0, 1), (-2, -1))
+    axes = (*range(2, p.ndim + 1), 0, 1)
+    return np.array(_rotation_rows(p[..., 0], p[..., 1], p[..., 2], p[..., 3])).transpose(axes)
 
 
 def _rotation_rows(p0: Any, p1: Any, p2: Any, p3: Any) -> list[list[Any]]:
@@ -52,8 +53,10 @@ def G_bar(p: Array) -> Array:
 
 def from_vector(vector: Array) -> Array:
     """(3,) rotation vector [rad] -> (4,) Euler parameters."""
-    angle = float(np.linalg.norm(vector))
-    return np.concatenate([[np.cos(angle / 2)], np.sinc(angle / (2 * np.pi)) / 2 * np.asarray(vector, float)])
+    x, y, z = np.asarray(vector, float).tolist()
+    half = math.sqrt(x * x + y * y + z * z) / 2
+    factor = math.sin(half) / half / 2 if half > 0 else 0.5
+    return np.array([math.cos(half), factor * x, factor * y, factor * z])
 
 
 def product(p: Array, r: Array) -> Array:
@@ -173,7 +176,8 @@ def triad(axis: Array, what: str = "axis") -> Array:
             f"{what} must be a vector of three numbers that is not zero, or a (3, 3) frame; it is {axis!r}"
         )
     h = value / np.linalg.norm(value)
-    helper = np.eye(3)[int(np.argmin(np.abs(h)))]
-    f = helper - (helper @ h) * h
+    k = int(np.argmin(np.abs(h)))
+    f = -h[k] * h
+    f[k] += 1.0
     f /= np.linalg.norm(f)
-    return np.column_stack([f, np.cross(h, f), h])
+    return np.array([f, cross(h, f), h]).T.copy()

@@ -19,6 +19,7 @@ from ffr_dyn.pictures.film import Camera, Film, camera_for, film_at
 from ffr_dyn.pictures.shades import shades
 from ffr_dyn.pictures.viewer import Viewer
 from ffr_dyn.results.quantities import measure
+from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.results.result import EULER_PARAMETERS, XYZ, Quantity, Result, mode_axis
 from ffr_dyn.scene.described import described
 from ffr_dyn.scene.joints import COINCIDENCE, Joint, words
@@ -129,7 +130,7 @@ def scene_view(scene: Scene, time: float = 0.0) -> SceneView:
         record = record_states(at, np.array([time]), assembled.x[None], assembled.v[None])
     except (InputError, ComputationError) as error:
         return SceneView(declared, _all_connections(scene, declared), _apart(scene, declared), str(error))
-    quantities, _ = measure(assembled.system, record, {})
+    quantities, _ = measure(View(assembled.system, record), {})
     surfaces = {body.name: surface_of(body) for body in assembled.system.scene.bodies}
     geometry = {name: surface for name, surface in surfaces.items() if surface is not None}
     shown = Result(np.array([time]), quantities, geometry, described(scene))

@@ -157,7 +157,7 @@ class Stepper(Brief):
         """What is doubtful of the states at which this was asked, beside the notes of assembly: as the notes of `forward`
         (the table in docs/analyses.md), but for the energy, and nothing is an error."""
         loop = self._loops[0]
-        look(self._seen, loop.record)
+        look(self._seen, View(loop.system, loop.record))
         steps = between_rows(self._seen, loop.engine.system, loop.work, loop.record)
         return [*self._seen.assembled.notes, *ended("stepper", self._seen, steps)]
 
@@ -293,7 +293,7 @@ def _outputs(
         if any(np.shares_memory(values, column) for column in loop.record):
             shared[name] = _read_only(values[0:1].reshape(()) if at is None and values.ndim == 1 else _at(values, at))
         else:
-            shared[name], compute = _computed(entry, view, at)
+            shared[name], compute = _computed(loop, entry, at)
             computed.append(compute)
     return shared, computed
 
@@ -340,14 +340,17 @@ def _measured(loop: _Loop, readers: Sequence[Actuator]) -> dict[str, Array]:
     }
 
 
-def _computed(entry: Entry, view: View, at: int | None) -> tuple[Array, Callable[[], None]]:
-    """An array, and what fills it."""
-    target = np.array(entry.compute(view, None)[0][0] if at is None else 0.0)
+def _computed(loop: _Loop, entry: Entry, at: int | None) -> tuple[Array, Callable[[], None]]:
+    """An array, and what fills it: from a view of its own each time, as the row is another one in the same place."""
+
+    def values() -> Array:
+        row: Array = entry.compute(View(loop.system, loop.record), None)[0][0]
+        return row
 
     def compute() -> None:
-        values = entry.compute(view, None)[0][0]
-        target[...] = values if at is None else values[at]
+        target[...] = values() if at is None else values()[at]
 
+    target = np.array(values() if at is None else 0.0)
     return _read_only(target), compute
 
 

@@ -7,18 +7,21 @@ computed and kept. `docs/scene_file.md` lists them.
 from __future__ import annotations
 
 import fnmatch
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from difflib import get_close_matches
+from functools import cache
+from typing import Any
 
 import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
-from ffr_dyn.functions.time_functions import TimeFunction, evaluate
-from ffr_dyn.kernels.tables import Record
+from ffr_dyn.functions.time_functions import evaluate
 from ffr_dyn.results.power import (
     Worked,
     damping_power,
+    driven,
     measured_values,
     power,
     reaction,
@@ -83,16 +86,14 @@ class Entry:
     compute: Callable[[View, Unwound | Worked | None], tuple[Array, Unwound | Worked | None]]
 
 
-def measure(
-    system: System, record: Record, last: Memory, wanted: Mapping[str, Entry] | None = None
-) -> tuple[dict[str, Quantity], Memory]:
-    """The wanted quantities of the recorded rows; by default those of `DEFAULT_OUTPUTS`.
+def measure(view: View, last: Memory, wanted: Mapping[str, Entry] | None = None) -> tuple[dict[str, Quantity], Memory]:
+    """The wanted quantities of recorded rows; by default those of `DEFAULT_OUTPUTS`.
 
     wanted : entries of the catalogue by name; see `selected`
     last   : what `measure` returned for the rows before these, {} at the start: angles and work go on from it
     """
-    view, found, left = View(system, record), {}, dict(last)
-    for name, entry in (selected(system) if wanted is None else wanted).items():
+    found, left = {}, dict(last)
+    for name, entry in (selected(view.system) if wanted is None else wanted).items():
         values, memory = entry.compute(view, last.get(name))
         found[name] = Quantity(values, entry.unit, entry.axes, entry.text)
         if memory is not None:
@@ -111,13 +112,20 @@ def selected(system: System, outputs: Sequence[str] = ("default",)) -> dict[str,
     wanted: set[str] = set()
     for pattern in outputs:
         patterns = DEFAULT_OUTPUTS if pattern == "default" else (pattern,)
-        fitting = {name for name in everything for one in patterns if fnmatch.fnmatchcase(name, one)}
+        fits = _one_of(patterns)
+        fitting = {name for name in everything if fits(name)}
         if not fitting:
             close = get_close_matches(pattern, everything, 3)
             known = f"did you mean {', '.join(close)}?" if close else f"there are: {', '.join(everything)}"
             raise InputError(f"outputs: {pattern!r} is none of the scene's quantities; {known}")
         wanted |= fitting
     return {name: entry for name, entry in everything.items() if name in wanted}
+
+
+@cache
+def _one_of(patterns: tuple[str, ...]) -> Callable[[str], Any]:
+    """Whether a name fits one of them."""
+    return re.compile("|".join(map(fnmatch.translate, patterns))).match
 
 
 def needs_every_step(wanted: Iterable[str]) -> bool:
@@ -350,7 +358,7 @@ def _measured(view: View, m: Measurement) -> Array:
 def _joint_coordinates(system: System) -> Named:
     for joint in system.scene.joints:
         if "angle" in COORDINATES[joint.kind]:
-            yield f"{joint.name}.angle", _unwound(joint, _angle_function(system.scene, joint))
+            yield f"{joint.name}.angle", _unwound(joint, _angle_driver(system.scene, joint))
             rate = _entry("rad/s", (), "rate of the joint angle", lambda view, j=joint: angles(view, j)[1])  # type: ignore[misc]
             yield f"{joint.name}.angle_rate", rate
         if "stroke" in COORDINATES[joint.kind]:
@@ -362,24 +370,30 @@ def _joint_coordinates(system: System) -> Named:
                 )
 
 
-def _angle_function(scene: Scene, joint: Joint) -> TimeFunction | None:
-    """The function of time that drives the angle of a joint."""
+def _angle_driver(scene: Scene, joint: Joint) -> Driver | None:
+    """What drives the angle of a joint."""
     drivers = (driver for driver in scene.drivers if isinstance(driver, Driver) and driver.coordinate == "angle")
-    return next((driver.function for driver in drivers if driver.joint == joint.name), None)
+    return next((driver for driver in drivers if driver.joint == joint.name), None)
 
 
-def _unwound(joint: Joint, driven: TimeFunction | None) -> Entry:
+def _unwound(joint: Joint, driver: Driver | None) -> Entry:
     """The angle of a joint, which begins within half a turn; with the whole turns of its driver, if it has one."""
 
     def compute(view: View, last: Unwound | Worked | None) -> tuple[Array, Unwound]:
         moments, (angle, rate) = view.record.time, angles(view, joint)
-        if driven is None:
+        if driver is None:
             return unwind(moments, angle, rate, last if isinstance(last, Unwound) else None)
-        asked = np.array([evaluate(driven, float(t))[0] for t in moments])
-        angle += 2 * np.pi * np.round((asked - angle) / (2 * np.pi))
+        angle = angle + 2 * np.pi * np.round((_asked(view, driver) - angle) / (2 * np.pi))
         return angle, Unwound(float(angle[-1]), float(rate[-1]), float(moments[-1]))
 
     return Entry("rad", (), "joint angle, unwound", compute)
+
+
+def _asked(view: View, driver: Driver) -> Array:
+    """(T,) what a driver prescribes, which is recorded where it has rows."""
+    if any(block.name == driver.name for block in view.system.blocks):
+        return driven(view, driver)[:, 0]
+    return np.array([evaluate(driver.function, float(t))[0] for t in view.record.time])
 
 
 def unwind(time: Array, angle: Array, rate: Array, last: Unwound | None) -> tuple[Array, Unwound]:

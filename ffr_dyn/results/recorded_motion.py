@@ -6,7 +6,9 @@ anywhere and continued gives the same bits. Hence the sums written out here, whe
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,6 +22,8 @@ from ffr_prep.body import Interface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 
+T = TypeVar("T")
+
 
 def dot(a: Array, b: Array) -> Array:
     """(T, 3), (T, 3) -> (T,)."""
@@ -27,9 +31,14 @@ def dot(a: Array, b: Array) -> Array:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """(T, 3), (T, 3) -> (T, 3)."""
-    (a0, a1, a2), (b0, b1, b2) = a.T, b.T
-    return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=1)
+    """(T, 3), (T, 3) -> (T, 3), or (T, 3, k) of k vectors."""
+    out = np.empty(b.shape)
+    a0, a1, a2 = a[:, 0], a[:, 1], a[:, 2]
+    b0, b1, b2 = b[:, 0], b[:, 1], b[:, 2]
+    out[:, 0] = a1 * b2 - a2 * b1
+    out[:, 1] = a2 * b0 - a0 * b2
+    out[:, 2] = a0 * b1 - a1 * b0
+    return out
 
 
 def to_global(A: Array, s: Array) -> Array:
@@ -112,12 +121,15 @@ class Pose:
 
 @dataclass(frozen=True, repr=False)
 class View(Brief):
-    """Recorded rows of a compiled scene. Bodies of second order are recorded in their mean-axis form; what is asked for by a
-    public name is in the frames that bodies have of their own (`ffr_dyn.variants.mean_axis`)."""
+    """Recorded rows of a compiled scene that do not change any more: what is made of them for one quantity is kept for others.
+
+    Bodies of second order are recorded in their mean-axis form; what is asked for by a public name is in the frames that
+    bodies have of their own (`ffr_dyn.variants.mean_axis`).
+    """
 
     system: System
     record: Record
-    _poses: dict[int, Pose] = field(default_factory=dict)
+    _known: dict[Hashable, Any] = field(default_factory=dict)
 
     @property
     def rows(self) -> int:
@@ -132,9 +144,14 @@ class View(Brief):
 
     def pose(self, b: int) -> Pose:
         """Of the own frame of body b."""
-        if b not in self._poses:
-            self._poses[b] = self._pose(b)
-        return self._poses[b]
+        return self._once(("pose", b), lambda: self._pose(b))
+
+    def _once(self, what: Hashable, make: Callable[[], T]) -> T:
+        """What several quantities need is computed for the first of them."""
+        if what not in self._known:
+            self._known[what] = make()
+        found: T = self._known[what]
+        return found
 
     def _pose(self, b: int) -> Pose:
         place, record, frame = self.system.layout, self.record, self.system.scene.bodies[b].frame
@@ -165,7 +182,7 @@ class View(Brief):
         """(T, 3, 3) of body b; the ground has the number after the last."""
         if b == len(self.system.scene.bodies):
             return np.broadcast_to(np.eye(3), (self.rows, 3, 3))
-        return rotation_matrix(self.pose(b).p)
+        return self._once(("axes", b), lambda: rotation_matrix(self.pose(b).p))
 
     def own_elastic(self, b: int, values: Array) -> Array:
         """(T, n) coordinates of body b, their rates or accelerations (T, m), as those that it has of its own."""
@@ -181,7 +198,8 @@ class View(Brief):
         return self.record.v[:, self.system.layout.q_dot(b)]
 
     def _computed_axes(self, b: int) -> Array:
-        return rotation_matrix(self.record.x[:, self.system.layout.p(b)])
+        p = self.record.x[:, self.system.layout.p(b)]
+        return self._once(("computed axes", b), lambda: rotation_matrix(p))
 
     def _elastic(self, b: int, phi: Array, K: Array) -> Course:
         """phi q - q K q / 2 of body b, phi (k, n), K (k, n, n)."""
@@ -218,7 +236,10 @@ class View(Brief):
 
     def _turned(self, b: int, interface: Interface) -> Course:
         """Rotation vector of a marker."""
-        return self._elastic(b, interface.phi_r, self._matrices(b, interface)[3:])
+        return self._once(
+            ("turned", b, interface.name),
+            lambda: self._elastic(b, interface.phi_r, self._matrices(b, interface)[3:]),
+        )
 
     def displacement(self, marker: int) -> Array:
         """(T, 3) elastic displacement: the place of the marker less the undeformed one, body axes."""
@@ -245,30 +266,42 @@ class View(Brief):
 
     def orientation(self, marker: int) -> Array:
         """(T, 4) Euler parameters of the marker's axes: those of its body, turned by the elastic rotation."""
+        return self._once(("orientation", marker), lambda: self._orientation(marker))
+
+    def _orientation(self, marker: int) -> Array:
         owner = self._owner(marker)
         if owner is None:
             return np.broadcast_to([1.0, 0.0, 0.0, 0.0], (self.rows, 4))
         p = self.record.x[:, self.system.layout.p(owner[0])]
-        return times(p, from_vectors(self._turned(*owner).value))
+        return times(p, from_vectors(self._turned(*owner).value)) if self.system.layout.n[owner[0]] else p
 
     def spin(self, marker: int) -> Array:
         """(T, 3) angular velocity of the marker, global axes."""
+        return self._once(("spin", marker), lambda: self._spin(marker))
+
+    def _spin(self, marker: int) -> Array:
         owner = self._owner(marker)
         if owner is None:
             return np.zeros((self.rows, 3))
         omega = self.record.v[:, self.system.layout.omega(owner[0])]
-        return to_global(self._computed_axes(owner[0]), omega + turn_rates(self._turned(*owner))[0])
+        if self.system.layout.n[owner[0]]:
+            omega = omega + turn_rates(self._turned(*owner))[0]
+        return to_global(self._computed_axes(owner[0]), omega)
 
     def frame(self, marker: int, frame: Array) -> Array:
         """(T, 3, 3) joint frame (columns f, g, h) of a marker in global axes."""
-        A = rotation_matrix(self.orientation(marker))
-        columns = [np.broadcast_to(frame[:, k], (self.rows, 3)) for k in range(3)]
-        return np.stack([to_global(A, column) for column in columns], axis=2)
+        return self._once(("frame", marker, frame.tobytes()), lambda: self._frame(marker, frame))
+
+    def _frame(self, marker: int, frame: Array) -> Array:
+        A = self._once(("marker axes", marker), lambda: rotation_matrix(self.orientation(marker)))
+        return A[:, :, 0, None] * frame[0] + A[:, :, 1, None] * frame[1] + A[:, :, 2, None] * frame[2]
 
     def frame_rate(self, marker: int, frame: Array) -> Array:
         """(T, 3, 3) time derivative of `frame`."""
-        omega, columns = self.spin(marker), self.frame(marker, frame)
-        return np.stack([cross(omega, columns[:, :, k]) for k in range(3)], axis=2)
+        return self._once(("frame rate", marker, frame.tobytes()), lambda: self._frame_rate(marker, frame))
+
+    def _frame_rate(self, marker: int, frame: Array) -> Array:
+        return cross(self.spin(marker)[:, :, None], self.frame(marker, frame))
 
     def joint_frames(self, joint: Joint) -> tuple[Array, Array]:
         """Frames (T, 3, 3) of a joint on its markers i and j, global axes."""

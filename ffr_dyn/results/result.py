@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -92,6 +92,33 @@ class Quantity(Brief):
             raise InputError(f"a quantity has values of shape {self.values.shape}; its axes ask for (T, *{expected})")
 
 
+class Histories(Mapping[str, Quantity]):
+    """Quantities by name, each made by `make` when it is first asked for and then kept; alike in rows and axes."""
+
+    def __init__(self, names: Iterable[str], make: Callable[[str], Quantity]) -> None:
+        self._made: dict[str, Quantity | None] = dict.fromkeys(names)
+        self._make = make
+
+    def __getitem__(self, name: str) -> Quantity:
+        found = self._made[name]
+        if found is None:
+            self._made[name] = found = self._make(name)
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._made)
+
+    def __len__(self) -> int:
+        return len(self._made)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._made
+
+    def __reduce__(self) -> Any:
+        """Copies, and what other processes are sent, have all of them."""
+        return dict, (dict(self),)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Result(Brief):
     """Histories of one analysis.
@@ -115,10 +142,12 @@ class Result(Brief):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "time", read_only(self.time))
-        for key in ("quantities", "geometry", "attributes"):
+        for key in ("geometry", "attributes"):
             object.__setattr__(self, key, dict(getattr(self, key)))
         check_times(self.time)
-        _check_quantities(self)
+        if not isinstance(self.quantities, Histories):
+            object.__setattr__(self, "quantities", dict(self.quantities))
+            _check_quantities(self)
         _check_attributes(self.attributes)
 
     def _title(self) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from typing import Any, TypeVar, get_type_hints
 
 from ffr_dyn.scene.fields import PerMode
@@ -60,8 +61,14 @@ def loaded_markers(scene: AnyScene) -> list[str]:
 
 def modal_fields(force: Any) -> list[str]:
     """Fields with a number for each elastic coordinate of the body."""
-    hints = get_type_hints(type(force), include_extras=True)
-    return [name for name, hint in hints.items() if any(isinstance(m, PerMode) for m in _said(hint))]
+    kind: Any = type(force)
+    return list(_modal_fields(kind))
+
+
+@cache
+def _modal_fields(kind: Any) -> tuple[str, ...]:
+    hints = get_type_hints(kind, include_extras=True)
+    return tuple(name for name, hint in hints.items() if any(isinstance(m, PerMode) for m in _said(hint)))
 
 
 def in_bases(forces: tuple[Any, ...], bases: Mapping[str, Array]) -> tuple[Any, ...]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
@@ -266,6 +267,17 @@ class Joint:
             )
         frames(self)
 
+    @cached_property
+    def _frames(self) -> tuple[Array, Array]:
+        on_i = _frame(np.eye(3)[2] if self.axis is None else self.axis, f"joint {self.name!r}: axis")
+        return on_i, on_i if self.axis_j is None else _frame(self.axis_j, f"joint {self.name!r}: axis_j")
+
+
+def _frame(axis: Any, what: str) -> Array:
+    found = triad(axis, what)
+    found.setflags(write=False)
+    return found
+
 
 def _needing(key: str) -> str:
     return " or ".join(kind for kind, needs in NEEDS.items() if key in needs)
@@ -273,10 +285,7 @@ def _needing(key: str) -> str:
 
 def frames(joint: Joint) -> tuple[Array, Array]:
     """Joint frames (3, 3) on markers i and j, columns f, g, h, in body axes."""
-    on_i = triad(np.eye(3)[2] if joint.axis is None else joint.axis, f"joint {joint.name!r}: axis")
-    if joint.axis_j is None:
-        return on_i, on_i
-    return on_i, triad(joint.axis_j, f"joint {joint.name!r}: axis_j")
+    return joint._frames
 
 
 def words(joint: Joint) -> list[Word]:

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
-from typing import Any, get_args
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction, as_time_f
 from ffr_dyn.scene.checks import check_name, check_own_name, several
 from ffr_dyn.scene.couplings import Coupling, coupled, coupling_word
 from ffr_dyn.scene.drivers import Driver, PointDriver, driver_word
-from ffr_dyn.scene.force_kinds import forces_of, kinds_in
+from ffr_dyn.scene.force_kinds import forces_of, kinds_in, loaded_markers
 from ffr_dyn.scene.joints import COORDINATES, Joint
 from ffr_dyn.scene.own_frame import OwnFrame
 from ffr_dyn.scene.parts import owner, taken_apart, wholes
@@ -97,6 +97,18 @@ class Body(Brief):
                 raise InputError(f"{who}: there is no inertia term {term!r} to drop; {_offer(term, INERTIA_TERMS)}")
         object.__setattr__(self, "dropped", tuple(t for t in INERTIA_TERMS if t in self.dropped))
 
+    @cached_property
+    def _axes(self) -> Array:
+        """(3, 3) body to global, at the start."""
+        return rotation_matrix(self.rotation)
+
+    @cached_property
+    def _along(self) -> tuple[int, int, int]:
+        """The body axes along the global ones, or -1."""
+        size = np.abs(self._axes)
+        x, y, z = (int(np.argmax(row)) if row.max() > 1 - 1e-12 else -1 for row in size)
+        return x, y, z
+
     def _title(self) -> str:
         n = self.model.n
         return f"Body {self.name!r}: {f'flexible, {n} elastic coordinates' if n else 'rigid'}, {self.model.mass:.4g} kg"
@@ -113,6 +125,20 @@ class Body(Brief):
             rows += [("deformed", f"|q| up to {deformed[0]:.4g}, rates {deformed[1]:.4g}")] if any(deformed) else []
         left_out = [*self.dropped, *(["second order"] if not self.stiffening else [])]
         return rows + ([("left out", listed(left_out))] if left_out else [])
+
+
+Checked = TypeVar("Checked", bound="Body | Scene")
+
+
+def altered(thing: Checked, **changes: Any) -> Checked:
+    """A copy of a body or a scene with other values of some fields, which are neither checked nor converted as by `replace`:
+    for forms of a scene that was checked, in which all names stay what they are."""
+    out = object.__new__(type(thing))
+    vars(out).update(vars(thing), **changes)
+    if "rotation" in changes:
+        for key in ("_axes", "_along"):
+            vars(out).pop(key, None)
+    return out
 
 
 _PARALLEL = 1e-9  # of entries of a rotation, what is no turn
@@ -164,6 +190,12 @@ class Scene(Brief):
     def _numbers(self) -> dict[str, int]:
         """Of markers, by name."""
         return {f"{body}.{point}": k for k, (_, body, point) in enumerate(self._markers)}
+
+    @cached_property
+    def _used(self) -> frozenset[str]:
+        """Names of the markers at which joints, driven points, loads, springs or bushings act."""
+        pairs: tuple[Any, ...] = (*self.joints, *(driver for driver in self.drivers if isinstance(driver, PointDriver)))
+        return frozenset((*loaded_markers(self), *(end for pair in pairs for end in (pair.i, pair.j))))
 
     def __post_init__(self) -> None:
         for key, kinds in _DECLARATIONS.items():
@@ -240,6 +272,12 @@ def marker_names(scene: Scene) -> tuple[str, ...]:
     return tuple(scene._numbers)
 
 
+def used_interfaces(scene: Scene, body: Body) -> tuple[str, ...]:
+    """The interfaces of a body at which joints, driven points, loads, springs or bushings act."""
+    names = ((i.name, f"{owner(body)}.{i.name}") for i in body.model.interfaces)
+    return tuple(own for own, name in names if name in scene._used)
+
+
 def marker_number(scene: Scene, name: str) -> int:
     """Index of a marker; InputError says which body or interface does not exist and what there is."""
     names = scene._numbers
@@ -289,9 +327,7 @@ def body_number(scene: Scene, name: str, who: str) -> int:
 
 def body_normal(body: Body, normal: int) -> int:
     """The body axis along the global axis `normal`, or -1."""
-    along = rotation_matrix(body.rotation)[normal]
-    k = int(np.argmax(np.abs(along)))
-    return k if abs(along[k]) > 1 - 1e-12 else -1
+    return body._along[normal]
 
 
 def undeformed(scene: Scene, number: int) -> Array:
@@ -300,7 +336,7 @@ def undeformed(scene: Scene, number: int) -> Array:
     if b == len(scene.bodies):
         return np.asarray(scene.ground[point])
     body = scene.bodies[b]
-    place: Array = body.position + rotation_matrix(body.rotation) @ body.model.interface(point).position
+    place: Array = body.position + body._axes @ body.model.interface(point).position
     return place
 
 

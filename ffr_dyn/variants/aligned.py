@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from ffr_dyn.scene.own_frame import OwnFrame
-from ffr_dyn.scene.scene import Body, Scene, body_normal
-from ffr_dyn.variants.variant import used_interfaces, with_basis
-from ffr_prep.body import FlexibleBody, FrameMarker
+from ffr_dyn.scene.scene import Body, Scene, altered, body_normal, used_interfaces
+from ffr_dyn.variants.variant import with_basis
+from ffr_prep.body import FlexibleBody, FrameMarker, remembered
 from ffr_prep.common.arrays import Array
 
 BESIDE = 1e-6  # of the size of a body: what a mesh leaves of a place in its plane
@@ -25,19 +25,21 @@ TURNED = 1e-12  # of a mode of norm one
 
 def size_of(body: FlexibleBody) -> float:
     """[m] the radius of gyration of a body about its origin."""
-    return float(np.sqrt(np.trace(body.rr_dm) / body.mass))
+    xx, yy, zz = body.rr_dm.diagonal().tolist()
+    return float(np.sqrt((xx + yy + zz) / body.mass))
 
 
 def levelled(scene: Scene, normal: int) -> Scene:
     """The scene with places that are used in the middle plane of their body, and bodies at one height, where only a hair is
-    missing."""
+    missing; itself where nothing is."""
     near = BESIDE * max(size_of(body.model) for body in scene.bodies)
-    heights = _merged(
-        [*(body.position[normal] for body in scene.bodies), *(p[normal] for p in scene.ground.values())], near
-    )
+    declared = [*(body.position[normal] for body in scene.bodies), *(p[normal] for p in scene.ground.values())]
+    heights = _merged(declared, near)
     bodies = tuple(_flat(scene, body, body_normal(body, normal), normal, next(heights)) for body in scene.bodies)
     ground = {name: _with(point, normal, next(heights)) for name, point in scene.ground.items()}
-    return replace(scene, bodies=bodies, ground=ground)
+    changed = [new is not old for new, old in zip(bodies, scene.bodies, strict=True)]
+    changed += [ground[name] is not point for name, point in scene.ground.items()]
+    return altered(scene, bodies=bodies, ground=ground) if any(changed) else scene
 
 
 def _merged(heights: list[float], near: float) -> Iterator[float]:
@@ -50,28 +52,38 @@ def _merged(heights: list[float], near: float) -> Iterator[float]:
 
 
 def _with(point: Array, axis: int, value: float) -> Array:
+    if point[axis] == value:
+        return point
     out = np.array(point, float)
     out[axis] = value
+    out.setflags(write=False)
     return out
 
 
 def _flat(scene: Scene, body: Body, k: int, normal: int, height: float) -> Body:
-    position, near = _with(body.position, normal, height), BESIDE * size_of(body.model)
-    used = used_interfaces(scene, body) if k >= 0 else ()
-    hair = {i.name for i in body.model.interfaces if i.name in used and 0 < abs(i.position[k]) <= near}
-    if not hair:
-        return body if np.array_equal(position, body.position) else replace(body, position=position)
-    interfaces = tuple(
-        replace(i, position=_with(i.position, k, 0.0)) if i.name in hair else i for i in body.model.interfaces
-    )
-    return replace(body, position=position, model=replace(body.model, interfaces=interfaces))
+    position = _with(body.position, normal, height)
+    model = _without_hairs(body.model, k, used_interfaces(scene, body)) if k >= 0 else body.model
+    same = position is body.position and model is body.model
+    return body if same else altered(body, position=position, model=model)
+
+
+def _without_hairs(model: FlexibleBody, k: int, used: tuple[str, ...]) -> FlexibleBody:
+    """The body with used places that are next to its middle plane in it."""
+    near = BESIDE * size_of(model)
+    hair = tuple(i.name for i in model.interfaces if i.name in used and 0 < abs(i.position[k]) <= near)
+
+    def make() -> FlexibleBody:
+        moved = (replace(i, position=_with(i.position, k, 0.0)) if i.name in hair else i for i in model.interfaces)
+        return replace(model, interfaces=tuple(moved))
+
+    return remembered(model, ("without hairs", k, hair), make) if hair else model
 
 
 def basis_in_plane(body: Body, k: int) -> Array | None:
     """(n, n) double modes of a body combined into those in the plane across body axis k and those across it, each in the
     place of the one it is most of; None where nothing is to be turned."""
     V = np.eye(body.model.n)
-    for group in _groups(body):
+    for group in _groups(body) if body.model.n else ():
         vectors = np.linalg.eigh(body.model.PP_dm[k, k][np.ix_(group, group)])[1]
         if np.abs(vectors).max(axis=0).min() < 1.0 - TURNED:
             V[np.ix_(group, group)] = vectors * np.sign(vectors[np.abs(vectors).argmax(axis=0), range(len(group))])

@@ -18,10 +18,10 @@ import numpy as np
 from ffr_dyn.functions.rotation import cross, from_vector, product, rotation_matrix, tangent
 from ffr_dyn.scene.force_kinds import in_bases
 from ffr_dyn.scene.own_frame import OwnFrame
-from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.scene.scene import Body, Scene, altered, used_interfaces
 from ffr_dyn.variants.families import by_family
-from ffr_dyn.variants.variant import used_interfaces, with_basis
-from ffr_prep.body import FlexibleBody, idle_loads, mean_axis_form
+from ffr_dyn.variants.variant import with_basis
+from ffr_prep.body import FlexibleBody, idle_loads, mean_axis_form, remembered
 from ffr_prep.common.errors import InputError
 
 HELD = 1e-9  # of a unit mode: what rounding moves a held place by
@@ -33,26 +33,22 @@ def in_mean_axis_frames(scene: Scene) -> Scene:
 
     Raises InputError for joints and forces at a point whose loads have no matrices.
     """
-    forms: dict[int, tuple[FlexibleBody, OwnFrame]] = {}
-    bodies = tuple(_converted(scene, body, forms) for body in scene.bodies)
+    bodies = tuple(_converted(scene, body) for body in scene.bodies)
     bases = {
         new.name: new.frame.C for old, new in zip(scene.bodies, bodies, strict=True) if new is not old and new.frame
     }
-    return replace(scene, bodies=bodies, forces=in_bases(scene.forces, bases)) if bases else scene
+    return altered(scene, bodies=bodies, forces=in_bases(scene.forces, bases)) if bases else scene
 
 
-def _converted(scene: Scene, body: Body, forms: dict[int, tuple[FlexibleBody, OwnFrame]]) -> Body:
-    """forms : by identity of the model, what equal bodies share"""
+def _converted(scene: Scene, body: Body) -> Body:
     if body.frame or not (body.model.n and body.stiffening and body.model.stiffening is not None):
         return body
     _check_known(scene, body)
     if _is_mean_axis(body.model):
         return body
-    if id(body.model) not in forms:
-        forms[id(body.model)] = _form(body.model)
-    model, frame = forms[id(body.model)]
+    model, frame = remembered(body.model, "mean-axis form by family", lambda: _form(body.model))
     by_frequency = np.argsort(np.argsort(model.omega2, kind="stable"))
-    return _moved(replace(body, model=model, frame=frame, damping=body.damping[by_frequency]))
+    return _moved(altered(body, model=model, frame=frame, damping=body.damping[by_frequency]))
 
 
 def _form(model: FlexibleBody) -> tuple[FlexibleBody, OwnFrame]:
@@ -91,10 +87,7 @@ def _moved(body: Body) -> Body:
 
 def _check_known(scene: Scene, body: Body) -> None:
     """InputError where something acts at a point that has no second-order displacement."""
-    idle = idle_loads(body.model).tolist()[::6]
-    # A held place may turn, and moments on slender bodies have no matrix.
-    moved = [np.sqrt(body.model.mass) * np.abs(i.phi_t).max() > HELD for i in body.model.interfaces]
-    unknown = {i.name for i, none, moves in zip(body.model.interfaces, idle, moved, strict=True) if none and moves}
+    unknown = remembered(body.model, "points without second order", lambda: _unknown(body.model))
     for name in used_interfaces(scene, body):
         if name in unknown:
             raise InputError(
@@ -102,6 +95,14 @@ def _check_known(scene: Scene, body: Body) -> None:
                 "acts (a point that was added to an older file?): make it an interface of the reduction, or compute the "
                 "body without load matrices (stiffening = false)"
             )
+
+
+def _unknown(model: FlexibleBody) -> frozenset[str]:
+    """The points that have no second-order displacement, and are not held."""
+    idle = idle_loads(model).tolist()[::6]
+    # A held place may turn, and moments on slender bodies have no matrix.
+    moved = [np.sqrt(model.mass) * np.abs(i.phi_t).max() > HELD for i in model.interfaces]
+    return frozenset(i.name for i, none, moves in zip(model.interfaces, idle, moved, strict=True) if none and moves)
 
 
 def with_mean_axis_bodies(scene: Scene) -> Scene:

@@ -19,10 +19,10 @@ from ffr_dyn.functions.time_functions import is_zero
 from ffr_dyn.scene.drivers import PointDriver
 from ffr_dyn.scene.force_kinds import forces_of, in_bases
 from ffr_dyn.scene.own_frame import OwnFrame
-from ffr_dyn.scene.scene import Body, Scene, body_normal, marker_number, undeformed
+from ffr_dyn.scene.scene import Body, Scene, altered, body_normal, marker_number, undeformed, used_interfaces
 from ffr_dyn.variants.aligned import BESIDE, basis_in_plane, combined, levelled, size_of
-from ffr_dyn.variants.variant import used_interfaces, with_basis, with_modes
-from ffr_prep.body import FlexibleBody, FrameMarker, Interface, axial
+from ffr_dyn.variants.variant import with_basis, with_modes
+from ffr_prep.body import FlexibleBody, FrameMarker, Interface, axial, remembered
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -72,17 +72,39 @@ def obstacles(scene: Scene) -> tuple[str, tuple[str, ...]]:
 def _in_plane(scene: Scene, normal: int) -> Scene:
     bodies, kept = [], {}
     for body in scene.bodies:
-        k = body_normal(body, normal)
-        used = used_interfaces(scene, body)
-        V = basis_in_plane(body, k)
-        body = body if V is None else combined(body, V)
-        keep = np.flatnonzero(_mostly(body.model, k, used))
-        reduced = with_modes(body, keep.tolist())
-        model = _flat(reduced.model, k, used)
-        frame = reduced.frame and _flat_frame(reduced.frame, k)
-        bodies.append(replace(reduced, model=model, frame=frame, kept=(tuple(keep.tolist()), body.model.n)))
-        kept[body.name] = (np.eye(body.model.n) if V is None else V)[:, keep]
-    return replace(scene, bodies=tuple(bodies), forces=in_bases(scene.forces, kept), plane=AXES[normal])
+        made = altered(body, kept=((), 0))
+        if body.model.n:
+            made, kept[body.name] = _body_in_plane(body, body_normal(body, normal), used_interfaces(scene, body))
+        bodies.append(made)
+    return altered(scene, bodies=tuple(bodies), forces=in_bases(scene.forces, kept), plane=AXES[normal])
+
+
+def _body_in_plane(body: Body, k: int, used: tuple[str, ...]) -> tuple[Body, Array]:
+    """A flexible body with the modes that move it in the plane across its axis k, and these in its coordinates (n, m)."""
+    (_, model, frame), V, keep = remembered(
+        body.model, ("in plane", k, used, _ratios(body), id(body.frame)), lambda: _form_in_plane(body, k, used)
+    )
+    q, q_dot = ((values if V is None else V.T @ values)[keep] for values in (body.q, body.q_dot))
+    numbers = tuple(keep.tolist()), body.model.n
+    made = altered(body, model=model, frame=frame, q=q, q_dot=q_dot, damping=body.damping[keep], kept=numbers)
+    return made, (np.eye(body.model.n) if V is None else V)[:, keep]
+
+
+def _form_in_plane(
+    body: Body, k: int, used: tuple[str, ...]
+) -> tuple[tuple[OwnFrame | None, FlexibleBody, OwnFrame | None], Array | None, Array]:
+    """The frame that it is the form of, the model and its frame; the basis of double modes; the modes that stay."""
+    V = basis_in_plane(body, k)
+    turned = body if V is None else combined(body, V)
+    keep = np.flatnonzero(_mostly(turned.model, k, used))
+    reduced = with_modes(turned, keep.tolist())
+    frame = reduced.frame and _flat_frame(reduced.frame, k)
+    return (body.frame, _flat(reduced.model, k, used), frame), V, keep
+
+
+def _ratios(body: Body) -> bytes:
+    """What of the damping of a body tells double modes apart: nothing where all ratios are one."""
+    return body.damping.tobytes() if np.ptp(body.damping) else b""
 
 
 # ---- what stands in the way ---------------------------------------------------------------------------------------
@@ -128,17 +150,24 @@ def _obstacles(scene: Scene, normal: int) -> Iterator[str]:
 # ---- symmetry of a body -------------------------------------------------------------------------------------------
 
 
-def _asymmetry(part: Body, k: int, used: Sequence[str]) -> str:
+def _asymmetry(part: Body, k: int, used: tuple[str, ...]) -> str:
     """What of in-plane motion excites something across body axis k, rigid or elastic, in words; "" of a symmetric body."""
+    key = "asymmetry", k, used, part.stiffening, _ratios(part) if part.model.n else b""
+    return remembered(part.model, key, lambda: _found_asymmetry(part, k, used))
+
+
+def _found_asymmetry(part: Body, k: int, used: tuple[str, ...]) -> str:
     V = basis_in_plane(part, k)
     body, length = part.model if V is None else with_basis(part.model, V), size_of(part.model)
     places = {"its centre of mass": body.centre_of_mass[k]} | {name: body.interface(name).position[k] for name in used}
     off = max(places, key=lambda name: abs(places[name]))
     if abs(places[off]) > BESIDE * length:
         return f"{off} is {places[off]:.3g} m beside its middle plane"
-    products = np.abs(np.delete(body.rr_dm[k], k)).max() / (body.mass * length**2)
+    products = max(abs(body.rr_dm[k, c]) for c in range(3) if c != k) / (body.mass * length**2)
     if products > BESIDE:
         return f"a product of inertia is {products:.2g} of its moments"
+    if not body.n:
+        return ""
     mixed = _mixed_modes(body, k, used, second_order=part.stiffening and body.stiffening is not None)
     return mixed or _mixed_damping(body, _mostly(body, k, used))
 
@@ -151,8 +180,6 @@ def _mixed_damping(body: FlexibleBody, stays: Array) -> str:
 
 
 def _mixed_modes(body: FlexibleBody, k: int, used: Sequence[str], *, second_order: bool) -> str:
-    if not body.n:
-        return ""
     size = _sizes(body, used)
     along, across = _motion_along(body, k, used) / size, _motion_across(body, k, used) / size
     mixed = np.minimum(along, across)

@@ -24,10 +24,8 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.scene.drivers import PointDriver
-from ffr_dyn.scene.force_kinds import in_bases, loaded_markers, modal_fields
-from ffr_dyn.scene.parts import owner
-from ffr_dyn.scene.scene import INERTIA_TERMS, Body, Scene
+from ffr_dyn.scene.force_kinds import in_bases, modal_fields
+from ffr_dyn.scene.scene import INERTIA_TERMS, Body, Scene, used_interfaces
 from ffr_dyn.variants.condensation import statically_complete
 from ffr_prep.body import FlexibleBody, recombined, truncated
 from ffr_prep.common.arrays import Array
@@ -200,13 +198,6 @@ def vary(
         if body.name in modal
     }
     return replace(scene, bodies=tuple(bodies), forces=in_bases(scene.forces, bases))
-
-
-def used_interfaces(scene: Scene, body: Body) -> tuple[str, ...]:
-    """The interfaces of a body at which joints, drivers, loads, springs or bushings act."""
-    pairs: list[Any] = [*scene.joints, *(d for d in scene.drivers if isinstance(d, PointDriver))]
-    ends = {*loaded_markers(scene), *(end for pair in pairs for end in (pair.i, pair.j))}
-    return tuple(i.name for i in body.model.interfaces if f"{owner(body)}.{i.name}" in ends)
 
 
 def _by_name(given: Any, everywhere: Iterable[str], names: list[str]) -> dict[str, Any]:

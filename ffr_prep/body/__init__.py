@@ -27,6 +27,7 @@ from ffr_prep.body.reduced import (
     Surface,
     axial,
     cut_names,
+    remembered,
 )
 from ffr_prep.body.second_order import (
     at_places,
@@ -72,6 +73,7 @@ __all__ = [
     "reach_of",
     "recombined",
     "recoordinated",
+    "remembered",
     "rigid_body",
     "save_arrays",
     "save_body",

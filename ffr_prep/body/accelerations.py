@@ -9,6 +9,8 @@ Source: A. A. Shabana, Dynamics of Multibody Systems (2013), section 3.1.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from ffr_prep.common.arrays import Array
@@ -17,9 +19,12 @@ INERTIAL = 12  # loads of unit accelerations
 PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
+@cache
 def turns() -> Array:
     """(3, 3, 3): e_a x u = turns()[a] @ u."""
-    return np.cross(np.eye(3)[:, None], np.eye(3)[None]).transpose(0, 2, 1)
+    found = np.cross(np.eye(3)[:, None], np.eye(3)[None]).transpose(0, 2, 1)
+    found.setflags(write=False)
+    return found
 
 
 def gradients() -> Array:

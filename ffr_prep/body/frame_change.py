@@ -51,14 +51,12 @@ def in_motions(body: FlexibleBody, Z: Array, omega2: Array, stiffening: Array | 
 
 def mass_of_motions(body: FlexibleBody) -> Array:
     """(6 + n, 6 + n)."""
-    turned = (turns() @ body.r_dm).T
-    return np.block(
-        [
-            [body.mass * np.eye(3), turned, body.P_dm],
-            [turned.T, body.inertia, body.I4],
-            [body.P_dm.T, body.I4.T, np.eye(body.n)],
-        ]
-    )
+    M, turned = np.eye(6 + body.n), (turns() @ body.r_dm).T
+    M[:3, :3].flat[::4] = body.mass
+    M[:3, 3:6], M[3:6, :3], M[3:6, 3:6] = turned, turned.T, body.inertia
+    M[:3, 6:], M[3:6, 6:] = body.P_dm, body.I4
+    M[6:, :6] = M[:6, 6:].T
+    return M
 
 
 def second_moments(body: FlexibleBody) -> Array:

@@ -41,6 +41,8 @@ def immovable(body: FlexibleBody, active: Sequence[int] = range(6)) -> str:
     values, vectors = np.linalg.eigh(scaled)
     if values[0] <= _NOTHING:
         return f"{_MOTIONS[rigid[int(np.abs(vectors[:, 0]).argmax())]]}: it has none"
+    if not body.n:
+        return ""
     root = np.linalg.cholesky(scaled)
     taken, ways = np.linalg.eigh(_squared(np.linalg.solve(root, coupled / scale[:, None])))
     if taken[-1] < 1 - _NOTHING:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -351,6 +351,36 @@ class FlexibleBody(Brief):
     def S_bar_ff(self) -> Array:
         """(n, n) S_bar_xx + S_bar_yy + S_bar_zz (= I6) [-]."""
         return self.I6
+
+
+# ---- what follows from a body alone -------------------------------------------------------------------------------
+
+_MEMORY = "what follows"  # no name of a field
+_MOST = 64  # things of one body; then all are forgotten
+T = TypeVar("T")
+
+
+class _Memory(dict[Hashable, Any]):
+    """Of one body, which is immutable; not kept in files, copies and messages to other processes."""
+
+    def __reduce__(self) -> Any:
+        return _Memory, ()
+
+
+def remembered(body: FlexibleBody, key: Hashable, make: Callable[[], T]) -> T:
+    """What `make` makes of a body and of nothing but it and `key`; of the same body and key the same thing.
+
+    For what many scenes ask of one body: its forms in a plane, its tables. It lives as long as the body.
+    """
+    memory: _Memory = vars(body).setdefault(_MEMORY, _Memory())
+    try:
+        found: T = memory[key]
+    except KeyError:
+        made = make()
+        if len(memory) >= _MOST:
+            memory.clear()
+        found = memory.setdefault(key, made)  # of two threads the first
+    return found
 
 
 def axial(tensor: Array) -> Array:

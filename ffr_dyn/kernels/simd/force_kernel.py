@@ -6,6 +6,7 @@ which is of a force. Arguments and calls are those of entry points (`ffr_dyn.ker
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, get_type_hints
 
 from ffr_dyn.kernels.simd.entry_point import CompiledFunction, call_like
@@ -37,6 +38,7 @@ def kernel_of(kernel: str | CompiledFunction) -> CompiledFunction:
     return found
 
 
+@cache
 def _types(function: Any) -> list[Any]:
     """Of all arguments, in order, and of what it returns."""
     return list(get_type_hints(function).values())

@@ -7,8 +7,11 @@ of that and reads a field where it uses it. What a table holds, and in which ord
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from itertools import accumulate
+from types import MappingProxyType
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -38,26 +41,76 @@ def _array(kind: Any) -> tuple[str, int]:
     return dtype, axes
 
 
-def pack(tables: Any) -> Array:
-    """Addresses and shapes of the arrays of nested named tuples, and their numbers (int64). The arrays must outlive it."""
-    return np.array(_packed(tables), dtype=np.int64)
+@dataclass(frozen=True)
+class _Plan:
+    """The words of a packed table: how many there are, and where addresses, shapes and numbers are among them.
+
+    dtypes, axes : of the arrays, in order
+    """
+
+    words: int
+    addresses: Array
+    shapes: Array
+    integers: Array
+    numbers: Array
+    dtypes: list[Any]
+    axes: list[int]
 
 
-def _packed(tables: Any) -> list[int]:
-    found: list[int] = []
-    for value, (name, kind) in zip(tables, _fields(type(tables)).items(), strict=True):  # type: ignore[arg-type]
-        if kind is float:
-            found.append(int(np.float64(value).view(np.int64)))
-        elif kind is int:
-            found.append(value)
-        elif _is_table(kind):
-            found.extend(_packed(value))
+@cache
+def _plan(kind: Any) -> _Plan:
+    places: dict[str, list[int]] = {"array": [], "shape": [], "int": [], "float": []}
+    arrays = _planned(kind, 0, places)
+    array, shape, integer, number = (np.array(found, dtype=np.int64) for found in places.values())
+    dtypes, axes = [np.dtype(dtype) for dtype, _ in arrays], [axes for _, axes in arrays]
+    return _Plan(_words(kind), array, shape, integer, number, dtypes, axes)
+
+
+def _planned(kind: Any, at: int, places: dict[str, list[int]]) -> list[tuple[str, int]]:
+    """The arrays of a table whose first word is number `at`."""
+    found: list[tuple[str, int]] = []
+    for of in _fields(kind).values():
+        if of is float or of is int:
+            places[of.__name__].append(at)
+        elif _is_table(of):
+            found += _planned(of, at, places)
         else:
-            dtype, axes = _array(kind)
-            if value.dtype != dtype or value.ndim != axes or not value.flags.c_contiguous:
-                raise TypeError(f"table {name} is a {value.dtype} array of {value.ndim} axes, not {dtype} of {axes}")
-            found += [value.ctypes.data, *value.shape]
+            found.append(_array(of))
+            places["array"].append(at)
+            places["shape"] += range(at + 1, at + _words(of))
+        at += _words(of)
     return found
+
+
+def _gather(tables: Any, arrays: list[Array], integers: list[int], numbers: list[float]) -> None:
+    for value in tables:
+        if isinstance(value, np.ndarray):
+            arrays.append(value)
+        elif isinstance(value, tuple):
+            _gather(value, arrays, integers, numbers)
+        elif isinstance(value, float):
+            numbers.append(value)
+        else:
+            integers.append(value)
+
+
+def pack(tables: Any, known: Mapping[int, int] = MappingProxyType({})) -> Array:
+    """Addresses and shapes of the arrays of nested named tuples, and their numbers (int64). The arrays must outlive it.
+
+    known : addresses by the identity of arrays; numpy takes longer to tell them
+    """
+    kind: Any = type(tables)
+    plan, arrays, integers, numbers = _plan(kind), list[Array](), list[int](), list[float]()
+    _gather(tables, arrays, integers, numbers)
+    if [of.dtype for of in arrays] != plan.dtypes or [of.ndim for of in arrays] != plan.axes:
+        raise TypeError(f"{type(tables).__name__} holds an array of another type, or of other axes, than it declares")
+    if not all(of.flags.c_contiguous for of in arrays):
+        raise TypeError(f"{type(tables).__name__} holds an array that is not contiguous")
+    words = np.empty(plan.words, dtype=np.int64)
+    words[plan.addresses] = [known.get(id(of)) or of.ctypes.data for of in arrays]
+    words[plan.shapes] = [size for of in arrays for size in of.shape]
+    words[plan.integers], words[plan.numbers] = integers, np.array(numbers, dtype=float).view(np.int64)
+    return words
 
 
 def _words(kind: Any) -> int:

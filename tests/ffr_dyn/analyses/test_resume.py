@@ -25,6 +25,7 @@ from ffr_dyn.integrators.stabilisation import Baumgarte
 from ffr_dyn.results.file import load_checkpoint, load_result, save_result
 from ffr_dyn.results.power import Worked
 from ffr_dyn.results.quantities import Unwound, measure, selected
+from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.scene.forces import Load, SpringDamper
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
@@ -173,12 +174,12 @@ def test_measuring_in_parts_gives_the_same_bits():
     system, record = state.system, new_record(state.system, 40)
     fill_rows(new_engine(system, state.x, state.v, method, (0.0, 0.0, 1e-9)), record, 0.0, 1)
     wanted = selected(system, ("*",))
-    once, _ = measure(system, record, {}, wanted)
+    once, _ = measure(View(system, record), {}, wanted)
     for sizes in ([1] * 40, [3, 1, 13, 7, 16], [39, 1]):
         memory, parts, at = {}, [], 0
         for size in sizes:
             part = Record(*(column[at : at + size] for column in record))
-            quantities, memory = measure(system, part, memory, wanted)
+            quantities, memory = measure(View(system, part), memory, wanted)
             parts.append(quantities)
             at += size
         for name, quantity in once.items():

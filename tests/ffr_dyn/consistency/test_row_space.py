@@ -1,4 +1,4 @@
-"""Independence of sparse rows and smallest solutions, against dense decompositions; chains of many bodies."""
+"""Independence of rows and smallest solutions, of sparse and dense matrices; chains of many bodies."""
 
 from __future__ import annotations
 
@@ -25,51 +25,59 @@ def banded(rows: int, width: int = 9, shift: int = 4) -> np.ndarray:
     return A
 
 
-def test_independent_rows_and_their_smallest_solution():
+FORMS = pytest.mark.parametrize("form", [sp.csr_array, np.array])  # many rows, and few
+
+
+@FORMS
+def test_independent_rows_and_their_smallest_solution(form):
     A = banded(30)
-    assert independent(sp.csr_array(A))
+    assert independent(form(A))
     target = A @ np.random.default_rng(4).normal(size=A.shape[1])
-    found = smallest_solution(sp.csr_array(A), target)
+    found = smallest_solution(form(A), target)
     np.testing.assert_allclose(found, np.linalg.lstsq(A, target, rcond=1e-14)[0], rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("own", [0.0, 1e-12, 1e-9])
-def test_rows_that_depend_on_others_are_found_and_met_where_they_can_be(own):
+@FORMS
+def test_rows_that_depend_on_others_are_found_and_met_where_they_can_be(form, own):
     A = banded(12)
     extra = A[2] / np.linalg.norm(A[2]) + A[7] / np.linalg.norm(A[7])
     A = np.vstack([A, extra + own * np.random.default_rng(5).normal(size=A.shape[1])])
-    found = dependence(sp.csr_array(A))
+    found = dependence(form(A))
     assert found.count == 1
     size = np.linalg.norm(extra)
     np.testing.assert_allclose(found.combinations[[2, 7], 0] / found.combinations[12, 0], -1 / size, rtol=1e-6)
     unit = A[:12] / np.linalg.norm(A[:12], axis=1)[:, None]
     np.testing.assert_allclose(found.least, np.linalg.svd(unit)[1].min(), rtol=0.5)
     z = np.linalg.lstsq(A[:12], A[:12] @ np.random.default_rng(4).normal(size=A.shape[1]), rcond=1e-14)[0]
-    np.testing.assert_allclose(smallest_solution(sp.csr_array(A), A @ z), z, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(smallest_solution(form(A), A @ z), z, rtol=0, atol=1e-6)
 
 
-def test_many_dependent_rows_are_all_found():
+@FORMS
+def test_many_dependent_rows_are_all_found(form):
     A = np.random.default_rng(8).normal(size=(40, 12))
-    assert dependence(sp.csr_array(A)).count == 28
-    assert dependence(sp.csr_array(np.vstack([A, A])[:, :5])).count == 75
+    assert dependence(form(A)).count == 28
+    assert dependence(form(np.vstack([A, A])[:, :5])).count == 75
 
 
-def test_rounding_that_couples_a_dependent_row_with_others_makes_nothing_independent():
+@FORMS
+def test_rounding_that_couples_a_dependent_row_with_others_makes_nothing_independent(form):
     """The pivot of the second row is zero to the last bit, and the third row offers 1e-11 in its place."""
     A = np.zeros((6, 7))
     A[0, 0] = A[1, 0] = 1.0
     A[1, 1] = 1e-11
     A[2:, 1:6] = np.random.default_rng(6).normal(size=(4, 5))
     assert np.linalg.svd(A)[1].min() < 1e-10
-    assert not independent(sp.csr_array(A))
+    assert not independent(form(A))
 
 
-def test_rows_that_vanish_or_are_too_many_are_dependent():
+@FORMS
+def test_rows_that_vanish_or_are_too_many_are_dependent(form):
     A = banded(5)
     A[3] = 0.0
-    assert not independent(sp.csr_array(A))
-    assert not independent(sp.csr_array(np.eye(4)[:, :3]))
-    assert independent(sp.csr_array((0, 3)))
+    assert not independent(form(A))
+    assert not independent(form(np.eye(4)[:, :3]))
+    assert independent(form(np.zeros((0, 3))))
 
 
 def hanging(links: int, off: float = 0.0) -> Scene:
