@@ -102,8 +102,7 @@ def integrate(
     the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
     check_output_step(output_step)
-    if isinstance(method, (str, type)):
-        raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
+    check_method(method)
     spacing = output_step / LOOKS if method.controlled else method.step
     substeps, rows = _counts(end - start, output_step, spacing)
     _check_step(scene, method)
@@ -130,6 +129,12 @@ def integrate(
         if writer is not None:
             writer.close("complete", header | account)
     return _result(scene, run, header | account | {"status": "complete"})
+
+
+def check_method(method: object) -> None:
+    """Raises InputError for a name or a class in place of a method with its settings."""
+    if isinstance(method, (str, type)):
+        raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
 
 
 def check_output_step(output_step: float) -> None:

@@ -1,0 +1,73 @@
+"""Calls beside one another: all end, each with its own outcome, and none goes on that nobody waits for."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from ffr_dyn.functions.together import alone, together
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_every_call_has_its_outcome(threads):
+    def call(k):
+        if k % 3 == 0:
+            raise ValueError(k)
+        return k * k
+
+    calls = [lambda say, k=k: call(k) for k in range(20)]
+    found = dict(together(calls, threads))
+    assert len(found) == 20
+    for k, outcome in found.items():
+        assert str(outcome) == str(k) if k % 3 == 0 else outcome == k * k
+
+
+def test_calls_go_on_at_the_same_time():
+    """Each waits for the other, which one after another would never do."""
+    both = threading.Barrier(2, timeout=20)
+    assert sorted(k for k, arrived in together([lambda say: both.wait() >= 0] * 2, 2) if arrived is True) == [0, 1]
+
+
+def test_news_come_to_the_thread_that_waits():
+    here, heard = threading.get_ident(), list[tuple[int, float, bool]]()
+    calls = [lambda say, k=k: say(k / 10) for k in range(4)]
+    list(together(calls, 2, lambda k, t: heard.append((k, t, threading.get_ident() == here))))
+    assert sorted(heard) == [(k, k / 10, True) for k in range(4)]
+
+
+def test_who_waits_no_longer_ends_the_calls():
+    ended, told = list[int](), list[str]()
+
+    def endless(say, k):
+        try:
+            while True:
+                say(0.0)
+        finally:
+            ended.append(k)
+
+    def impatient(number, reached):
+        raise KeyboardInterrupt
+
+    calls = [lambda say, k=k: endless(say, k) for k in range(5)]
+    with pytest.raises(KeyboardInterrupt):
+        list(together(calls, 2, impatient, lambda: told.append("over")))
+    assert sorted(ended) == [0, 1]
+    assert told == ["over"]
+
+
+def test_calls_within_a_call_are_made_one_after_another():
+    def threads_of(say):
+        return {one for _, one in together([lambda say: threading.get_ident()] * 3)} == {threading.get_ident()}
+
+    assert [found for _, found in together([threads_of] * 4, 2)] == [True] * 4
+    with alone():
+        assert threads_of(None)
+
+
+def test_what_ends_a_thread_is_heard_of():
+    def leaves(say):
+        raise SystemExit(3)
+
+    found = dict(together([leaves] * 2, 2))
+    assert [type(found[k]) for k in (0, 1)] == [SystemExit] * 2
