@@ -14,9 +14,7 @@ others.
 from __future__ import annotations
 
 import fnmatch
-import os
 import statistics
-import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -32,6 +30,7 @@ from ffr_dyn.chart.variants import Variant
 from ffr_dyn.compile.first_use import ensure_compiled
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.functions.stopwatch import Stopwatch
+from ffr_dyn.functions.together import processors
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.result import Result
@@ -189,10 +188,11 @@ class Here:
     def results(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Iterator[tuple[int, Any]]:
         """See `Pool`."""
         for k, item in enumerate(items):
-            yield k, _tried(function, item)
+            yield k, tried(function, item)
 
 
-def _tried(function: Callable[[Item], Any], item: Item) -> Any:
+def tried(function: Callable[[Item], Any], item: Item) -> Any:
+    """What a function makes of an item, at the third attempt if need be, or a `Failure`."""
     for _ in range(RETRIES + 1):
         try:
             return function(item)
@@ -245,8 +245,7 @@ def pool(workers: int | None = None, cluster: str | None = None) -> Iterator[Poo
 
 def default_workers() -> int:
     """Half the processors that this process may use, at least one."""
-    processors = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
-    return max(1, processors // 2)
+    return max(1, processors() // 2)
 
 
 def _started(cluster: Callable[..., Any]) -> Any:

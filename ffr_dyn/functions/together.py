@@ -12,6 +12,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import copy_context
 from typing import Any
 
 Say = Callable[[float], None]  # how far a call is; to be called from time to time, since it also ends a call given up
@@ -69,7 +70,8 @@ def together(
             yield number, _outcome(call, lambda reached, k=number: heard(k, reached))  # type: ignore[misc]
         return
     shared = _Shared(calls)
-    crew = [threading.Thread(target=shared.work, daemon=True) for _ in range(min(wanted, len(calls)))]
+    contexts = [copy_context() for _ in range(min(wanted, len(calls)))]  # in which a command keeps what its inputs are
+    crew = [threading.Thread(target=context.run, args=(shared.work,), daemon=True) for context in contexts]
     try:
         for thread in crew:
             thread.start()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from contextvars import ContextVar
 
 import pytest
 
@@ -63,6 +64,12 @@ def test_calls_within_a_call_are_made_one_after_another():
     assert [found for _, found in together([threads_of] * 4, 2)] == [True] * 4
     with alone():
         assert threads_of(None)
+
+
+def test_what_a_command_keeps_is_known_in_its_threads():
+    kept = ContextVar("kept", default=0)
+    kept.set(7)
+    assert [found for _, found in together([lambda say: kept.get()] * 3, 2)] == [7] * 3
 
 
 def test_what_ends_a_thread_is_heard_of():
