@@ -20,7 +20,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -59,15 +59,20 @@ class Case:
     steps: tuple[float, ...]
 
 
+def of_linear_theory(scene: Scene) -> Scene:
+    """The scene in space, its bodies without terms of second order, which Exudyn does not have."""
+    return in_space(replace(scene, bodies=tuple(replace(body, stiffening=False) for body in scene.bodies)))
+
+
 def pendulum_case(kind: str, steps: tuple[float, ...]) -> Case:
     rod = pendulum_rod(kind, 8)
-    scene = in_space(pendulum(rod.body))
+    scene = of_linear_theory(pendulum(rod.body))
     return Case(f"pendulum, {kind}", rod, scene, "rod.tip", (0.6, 0.0, 0.0), 0.5, 50, 1e-5, steps)
 
 
 def slider_crank_case(kind: str, end: float, steps: tuple[float, ...]) -> Case:
     rod = connecting_rod(kind, 8)
-    scene, rows = in_space(slider_crank(rod.body)), round(end / 1e-3)
+    scene, rows = of_linear_theory(slider_crank(rod.body)), round(end / 1e-3)
     return Case(f"slider-crank, {kind}", rod, scene, "slider.pin", (0.15, 0.0, 0.0), end, rows, 2.5e-6, steps)
 
 

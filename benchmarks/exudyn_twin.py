@@ -28,6 +28,7 @@ from benchmarks.scenes import MeshedBody
 from ffr_dyn.equations.layout import layout
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.functions.time_functions import evaluate
+from ffr_dyn.scene.joints import frames
 from ffr_dyn.scene.scene import GROUND, Scene, joint_of
 from ffr_prep.body import FlexibleBody, Interface
 
@@ -38,7 +39,7 @@ ROTATION_VECTOR = "NodeType.RotationRotationVector"
 TAIT_BRYAN = "NodeType.RotationRxyz"
 
 CENTRE_OF_MASS, UNDEFORMED_BODY = "centre of mass", "undeformed body"  # where gravity acts
-LINEAR_ROTATION = 0  # of a marker on flexible nodes, as here
+EXPONENTIAL_MAP = 2  # rotation of a marker on flexible nodes, as here, with its tangent map
 
 _ANGLES = 2 * np.pi / 3 * np.arange(3)
 ARMS = 0.01 * np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES), 0 * _ANGLES])  # m; their length does not matter
@@ -176,7 +177,7 @@ def _interface_markers(mbs: Any, scene: Scene, b: int, number: int, first: int) 
             bodyNumber=number,
             meshNodeNumbers=nodes,
             weightingFactors=[1 / count] * count,
-            rotationsExponentialMap=LINEAR_ROTATION,
+            rotationsExponentialMap=EXPONENTIAL_MAP,
         )
         found[f"{body.name}.{interface.name}"] = mbs.AddMarker(marker)
     return found
@@ -232,7 +233,7 @@ def _add_joints(mbs: Any, scene: Scene, markers: Mapping[str, int]) -> None:
         ("translational", 0): items.ObjectJointPrismaticX,
     }
     for joint in scene.joints:
-        axis = int(np.argmax(np.abs(joint.axis)))
+        axis = int(np.argmax(np.abs(frames(joint)[0][:, 2])))
         mbs.AddObject(makers[joint.kind, axis](markerNumbers=[markers[joint.i], markers[joint.j]]))
 
 

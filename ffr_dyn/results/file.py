@@ -38,6 +38,7 @@ from ffr_dyn.results.result import XYZ, Axis, Quantity, Result, check_times
 from ffr_prep.body import QuadraticField, Surface, surface_arrays, surface_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.hdf5 import check_heaps
 from ffr_prep.common.interrupts import undisturbed
 from ffr_prep.common.outputs import check_output, replacing, writing
 from ffr_prep.common.reading import not_of_its_ending
@@ -85,6 +86,7 @@ def _reading(path: Path) -> Iterator[h5py.File]:
     if not path.is_file():
         raise InputError(f"result file {path} does not exist")
     try:
+        check_heaps(path)
         with h5py.File(path, "r") as file:
             _check_format(path, file)
             yield file

@@ -22,6 +22,7 @@ from ffr_dyn.studies.runs import Row
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.hdf5 import check_heaps
 from ffr_prep.common.outputs import replacing
 from ffr_prep.common.reading import reading
 
@@ -175,7 +176,13 @@ def _variable(file: h5py.File, name: str, values: Any) -> h5py.Dataset:
 
 def load_table(path: str | Path) -> Table:
     """Read a table. Raises InputError for a file that is none."""
-    with reading(path, "the table of a study", OSError, KeyError), h5py.File(path, "r", locking=False) as file:
+    with reading(path, "the table of a study", OSError, KeyError):
+        check_heaps(path)
+        return _read(Path(path))
+
+
+def _read(path: Path) -> Table:
+    with h5py.File(path, "r", locking=False) as file:
         if SECTION not in file.attrs:
             raise InputError(f"{path} is not the table of a study; ffr-dyn sweep writes one")
         found = {name: _values(data) for name, data in file.items() if name not in (RUN, MESSAGE)}

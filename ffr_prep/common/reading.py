@@ -41,16 +41,22 @@ def reading(path: str | Path, what: str, *damage: type[Exception]) -> Iterator[N
     except RecursionError:
         raise InputError(f"{path} is nested too deeply for {what}") from None
     except OverflowError:
-        raise InputError(f"{path} holds a number that is too large for {what}") from None
+        raise _too_large(path, what) from None
     except MemoryError:
         raise InputError(f"{path} announces more than fits in memory: is it {what}, and complete?") from None
     except Exception as error:
+        if "int_max_str_digits" in str(error):  # a ValueError of Python for thousands of digits
+            raise _too_large(path, what) from None
         why = " ".join(f"{type(error).__name__}: {error}".split())[:_SHOWN]
         if isinstance(error, damage):
             raise InputError(f"{path} is not {what} ({why}); is it complete?") from None
         raise InputError(
             f"{path} cannot be read as {what} ({why}); is it complete? If it is sound, please report it with the file"
         ) from error
+
+
+def _too_large(path: str | Path, what: str) -> InputError:
+    return InputError(f"{path} holds a number that is too large for {what}")
 
 
 def not_of_its_ending(path: str | Path, what: str, fault: str) -> str:

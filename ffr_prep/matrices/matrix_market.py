@@ -90,7 +90,9 @@ def _read(stream: TextIO) -> sp.csr_array:
         raise ValueError("its first line is not '%%MatrixMarket matrix coordinate real ...'")
     if words[4] not in ("general", "symmetric"):
         raise ValueError(f"it is {words[4]}; general and symmetric matrices are read")
-    size = next(line for line in stream if line.strip() and not line.startswith("%"))
+    size = next((line for line in stream if line.strip() and not line.startswith("%")), "")
+    if not size:
+        raise ValueError("it ends before the size of the matrix")
     rows, columns, *entries = (int(word) for word in size.split())
     if min(rows, columns) < 1 or rows != columns:
         raise ValueError(f"it is {rows} x {columns}; the matrices of a body are square")

@@ -213,6 +213,21 @@ def test_tables_that_cannot_be_used(tmp_path, line, message):
         read_matrices([tmp_path / "K.mtx", tmp_path / "K.mtx", tmp_path / "rows.csv"])
 
 
+def test_a_matrix_file_that_ends_with_its_comments(tmp_path):
+    (tmp_path / "K.mtx").write_text("%%MatrixMarket matrix coordinate real symmetric\n% nothing else\n")
+    (tmp_path / "rows.csv").write_text("1,1,0,0,0\n")
+    with pytest.raises(InputError, match="ends before the size of the matrix"):
+        read_matrices([tmp_path / "K.mtx", tmp_path / "K.mtx", tmp_path / "rows.csv"])
+
+
+def test_a_number_of_thousands_of_digits(tmp_path):
+    (tmp_path / "K.mtx").write_text("%%MatrixMarket matrix coordinate real general\n1 1 1\n1 1 2.0\n")
+    (tmp_path / "rows.csv").write_text(f"{'1' * 5000},1,0,0,0\n")
+    with pytest.raises(InputError) as found:
+        read_matrices([tmp_path / "K.mtx", tmp_path / "K.mtx", tmp_path / "rows.csv"])
+    assert "please report" not in str(found.value)
+
+
 def test_files_that_are_not_matrices(tmp_path):
     (tmp_path / "K.mtx").write_text("1,1,1,1,5.0\n")
     (tmp_path / "rows.csv").write_text("1,1,0,0,0\n")
