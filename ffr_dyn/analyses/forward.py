@@ -347,9 +347,9 @@ def _unresolved(runs: _Runs, trial: _Trial, ringing: Set[str]) -> list[str]:
     """A note on the vibration that the step does not resolve: its share, its frequency, and the price of resolving it."""
     large = {name: e for name, e in trial.errors.items() if e.of_range > Within().accuracy}
     told = {name: e for name, e in large.items() if e.vibrates or name in ringing}
-    of, method = runs.vibrations, trial.method
-    if not told or not of.omega.size:
+    if not told or not runs.vibrations.omega.size:
         return []
+    of, method = runs.vibrations, trial.method
     name = max(told, key=lambda one: told[one].of_range)
     found = leading(of, trial.result, trial.twins[-1])
     words = f" of {found / 2 / np.pi:.4g} Hz" if found else ""

@@ -38,6 +38,11 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
+def at_hand() -> int:
+    """How many a call may use: one within a call that is one of several itself."""
+    return 1 if getattr(_HERE, "alone", False) else processors()
+
+
 @contextmanager
 def alone() -> Iterator[None]:
     """Within it, calls are made one after another: others take the other processors."""
@@ -58,14 +63,14 @@ def together(
     """(number of a call, what it returned or the exception that it raised), in the order in which they end.
 
     calls   : each is given a function to tell how far it is
-    threads : at most; by default as many as processors, and one within a call that is one of several itself
+    threads : at most; by default as many as are `at_hand`
     heard   : (number of a call, how far it is), called in the thread that waits here
     give_up : called where nobody waits any more, as after Ctrl-C, for calls that wait for something else
 
     Who waits no longer, for an exception or because it breaks off, ends the calls that have begun.
     """
-    wanted = processors() if threads is None else threads
-    if min(wanted, len(calls)) <= 1 or (threads is None and getattr(_HERE, "alone", False)):
+    wanted = at_hand() if threads is None else threads
+    if min(wanted, len(calls)) <= 1:
         for number, call in enumerate(calls):
             yield number, _outcome(call, lambda reached, k=number: heard(k, reached))  # type: ignore[misc]
         return

@@ -39,6 +39,8 @@ def damped(
     >>> body = fp.damped(body, bands=[(100.0, 0.005), (1000.0, 0.02)])
     """
     _check(body, alpha=alpha, beta=beta, loss_factor=loss_factor)
+    if not (alpha or beta or loss_factor or len(bands)):
+        return body
     omega = np.sqrt(body.omega2)
     rates = alpha + beta * body.omega2 + loss_factor * omega + 2 * _ratios(body, bands) * omega
     D = np.diag(rates) if body.damping is None else body.damping + np.diag(rates)
