@@ -3,8 +3,8 @@
     python -m benchmarks.across_scenes
 
 The engine's own kernels, on matrices one after another, and on matrices of eight scenes whose equal entries lie side by side,
-which leaves it to the compiler to serve eight scenes by one instruction. Printed are nanoseconds of processor time a scene and
-the share of solutions that are equal to the bit.
+which leaves it to the compiler to serve eight scenes by one instruction. Printed are nanoseconds of processor time a scene
+and the share of solutions that are equal to the bit.
 """
 
 from __future__ import annotations
