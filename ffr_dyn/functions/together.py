@@ -15,6 +15,8 @@ from contextlib import contextmanager
 from contextvars import copy_context
 from typing import Any
 
+from ffr_prep.common.interrupts import undisturbed
+
 Say = Callable[[float], None]  # how far a call is; to be called from time to time, since it also ends a call given up
 Heard = Callable[[int, float], None]
 
@@ -67,7 +69,8 @@ def together(
     heard   : (number of a call, how far it is), called in the thread that waits here
     give_up : called where nobody waits any more, as after Ctrl-C, for calls that wait for something else
 
-    Who waits no longer, for an exception or because it breaks off, ends the calls that have begun.
+    Who waits no longer, for an exception or because it breaks off, ends the calls that have begun, by `GivenUp` with its
+    text; what these note, as of files that are kept, is noted of the exception.
     """
     wanted = at_hand() if threads is None else threads
     if min(wanted, len(calls)) <= 1:
@@ -88,12 +91,18 @@ def together(
                 yield number, value
             else:
                 heard(number, value)
-    finally:
-        if not shared.left.empty() or any(thread.is_alive() for thread in crew):
-            shared.over.set()
-            give_up()
         for thread in crew:
             thread.join()
+    except BaseException as error:
+        with undisturbed():  # a thread that ends with the process would keep the locks that it has
+            shared.why = "given up" if isinstance(error, GeneratorExit) else str(error) or type(error).__name__
+            give_up()
+            for thread in crew:
+                if thread.ident is not None:
+                    thread.join()
+            for note in shared.notes:
+                error.add_note(note)
+        raise
 
 
 class _Shared:
@@ -103,21 +112,23 @@ class _Shared:
         self.calls = calls
         self.left: queue.SimpleQueue[int] = queue.SimpleQueue()
         self.news: queue.SimpleQueue[tuple[int, bool, Any]] = queue.SimpleQueue()
-        self.over = threading.Event()
+        self.why = ""  # it is given up
+        self.notes: list[str] = []
         for number in range(len(calls)):
             self.left.put(number)
 
     def work(self) -> None:
         """Do what is left, call by call."""
         with alone():
-            while not self.over.is_set():
+            while not self.why:
                 try:
                     number = self.left.get_nowait()
                 except queue.Empty:
                     return
                 try:
                     found = _outcome(self.calls[number], self._say(number))
-                except GivenUp:
+                except GivenUp as end:
+                    self.notes += getattr(end, "__notes__", [])
                     return
                 except BaseException as error:  # nobody else would hear of it
                     found = error
@@ -125,8 +136,8 @@ class _Shared:
 
     def _say(self, number: int) -> Say:
         def say(reached: float) -> None:
-            if self.over.is_set():
-                raise GivenUp
+            if self.why:
+                raise GivenUp(self.why)
             self.news.put((number, False, reached))
 
         return say

@@ -6,6 +6,7 @@ Handlers belong to the main thread; elsewhere nothing changes.
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -32,13 +33,17 @@ def ending_in_order() -> Iterator[None]:
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """Signals that ask the process to end wait until the block has ended: for steps that must be done whole."""
+    """Signals that ask the process to end wait until the block has ended: for steps that must be done whole.
+
+    Where it stands on the way of one that ends the process already, that is enough.
+    """
     waiting: list[int] = []
+    ends = isinstance(sys.exc_info()[1], KeyboardInterrupt)
     try:
         with _handled(lambda number, frame: waiting.append(number)):
             yield
     finally:
-        for number in waiting[:1]:
+        for number in waiting[: not ends]:
             signal.raise_signal(number)
 
 

@@ -85,6 +85,19 @@ def test_a_batch_that_is_interrupted_ends_its_runs(tmp_path):
     assert not all(path.exists() for path in paths)
 
 
+def test_a_checked_run_that_is_interrupted_says_what_it_holds(tmp_path):
+    def stop(time):
+        if time > 0.02:
+            raise KeyboardInterrupt("SIGINT")
+
+    path = tmp_path / "run.nc"
+    how = {**HOW, "method": fd.ROS2(1e-5), "end": 10.0}
+    with pytest.raises(KeyboardInterrupt) as caught:
+        fd.forward(swinging(), check=True, path=path, progress=stop, **how)
+    assert caught.value.__notes__ == [f"{path} holds what was computed until then"]
+    assert fd.load_result(path).attributes["status"] == "stopped: SIGINT"
+
+
 @pytest.mark.parametrize("method", [fd.ROS3(1e-3), fd.RK4(1e-4), None])
 def test_the_error_of_a_run_is_the_same_by_runs_beside_one_another(method):
     how = {**HOW, "method": method, "check": True}

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import threading
+import time
 from contextvars import ContextVar
 
 import pytest
@@ -44,17 +47,48 @@ def test_who_waits_no_longer_ends_the_calls():
         try:
             while True:
                 say(0.0)
-        finally:
+        except BaseException as end:
             ended.append(k)
+            end.add_note(f"{k} ended: {end}")
+            raise
 
     def impatient(number, reached):
-        raise KeyboardInterrupt
+        raise KeyboardInterrupt("asked to")
 
     calls = [lambda say, k=k: endless(say, k) for k in range(5)]
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt) as caught:
         list(together(calls, 2, impatient, lambda: told.append("over")))
     assert sorted(ended) == [0, 1]
+    assert sorted(caught.value.__notes__) == ["0 ended: asked to", "1 ended: asked to"]
     assert told == ["over"]
+
+
+def test_who_is_interrupted_again_leaves_no_thread_behind():
+    """A second signal comes while the call that was given up still does what it cannot leave."""
+    ended = list[int]()
+
+    def slow(say, k):
+        for _ in range(10):
+            time.sleep(0.02)
+        ended.append(k)
+        say(0.0)
+
+    def twice(number, reached):
+        raise KeyboardInterrupt
+
+    def again(number, frame):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, again)
+    timer = threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGINT))
+    try:
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            list(together([lambda say: say(0.0), lambda say: slow(say, 1)], 2, twice))
+        assert ended == [1]
+    finally:
+        timer.join()
+        signal.signal(signal.SIGINT, before)
 
 
 def test_calls_within_a_call_are_made_one_after_another():
