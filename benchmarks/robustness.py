@@ -36,8 +36,8 @@ from ffr_prep.common.errors import InputError  # noqa: E402
 SCENE = """
 gravity = [0, -9.81, 0]
 [analysis]
-end = 10000.0
-output_step = 0.01
+end = 1e6
+output_step = 0.1
 step = 1e-3
 [ground]
 O = [0, 0, 0]
@@ -72,6 +72,7 @@ def inputs(total: int, folder: Path) -> bool:
 
 def start(scene: Path, output: Path, *options: str, limit: int | None = None) -> subprocess.Popen[str]:
     def limited() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # which a shell in the background has its children ignore
         if limit is not None:
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
@@ -95,10 +96,12 @@ def losses(kills: int, disks: int, folder: Path) -> bool:
     scene, output, whole, random = folder / "scene.toml", folder / "x.nc", folder / "whole.nc", np.random.default_rng(1)
     scene.write_text(SCENE)
     said: Counter[str] = Counter()
-    rows = 0
+    rows, began = 0, time.monotonic()
+    start(scene, folder / "first.nc", "--end", "1.0").communicate()
+    longest = 2.0 + time.monotonic() - began  # s, so that most are hit while they write rows
     for k in range(kills):
         run = start(scene, output, "--resume")
-        time.sleep(float(random.uniform(0.0, 3.0)))
+        time.sleep(float(random.uniform(0.0, longest)))
         run.send_signal(SIGNALS[k % len(SIGNALS)])
         run.communicate()
         said[f"{SIGNALS[k % len(SIGNALS)].name} -> {run.returncode}"] += 1
@@ -115,7 +118,7 @@ def losses(kills: int, disks: int, folder: Path) -> bool:
         now = kept(output)
         lost += now < rows
         rows = now
-    end = f"{0.01 * (rows + 9):.6g}"
+    end = f"{0.1 * (rows + 9):.9g}"
     for path in (output, whole):
         start(scene, path, "--end", end, "--resume").communicate()
     one, other = load_result(output), load_result(whole)

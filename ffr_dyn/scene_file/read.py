@@ -60,6 +60,13 @@ from ffr_prep.body import BodyError, FlexibleBody, damped, load_body, rigid_body
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import reading
 
+# Files of other kinds, by an entry that a scene never has.
+_OTHERS = {
+    "members": "a structure, of which `ffr-prep reduce-structure` makes a body",
+    "shells": "a structure, of which `ffr-prep reduce-structure` makes a body",
+    "scene": "a study of a scene, which `ffr-dyn sweep` runs",
+    "rho": "a material, which `ffr-prep reduce --material` takes",
+}
 WHOLE = ("name", "gravity", "ground", "base_acceleration", "plane")  # fields of a scene that are no tables of entries
 
 
@@ -93,6 +100,8 @@ def body_files(path: str | Path, parameters: Mapping[str, str] = {}) -> dict[str
 def _read(path: Path, parameters: Mapping[str, str]) -> tuple[Any, Source]:
     """The entries of a scene file, checked."""
     source = read_source(path)
+    if other := next((of for key, of in _OTHERS.items() if key in source.tree), None):
+        raise InputError(f"{path} is not a scene but {other}")
     try:
         values = Parameters(overridden(flattened(source.tree.pop("parameters", {})), parameters))
         tree = substituted(source.tree, values, "")

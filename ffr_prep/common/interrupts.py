@@ -16,6 +16,9 @@ from typing import Any
 _ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
+_asked: list[int] = []  # signals that have raised within `ending_in_order`
+
+
 class Interrupted(KeyboardInterrupt):
     """A signal has asked this process to end; the text is its name."""
 
@@ -25,10 +28,14 @@ def ending_in_order() -> Iterator[None]:
     """Every signal that asks the process to end raises `Interrupted` within the block."""
 
     def end(number: int, frame: FrameType | None) -> None:
+        _asked.append(number)
         raise Interrupted(signal.Signals(number).name)
 
-    with _handled(end):
-        yield
+    try:
+        with _handled(end):
+            yield
+    finally:
+        _asked.clear()
 
 
 @contextmanager
@@ -43,8 +50,18 @@ def undisturbed() -> Iterator[None]:
         with _handled(lambda number, frame: waiting.append(number)):
             yield
     finally:
-        for number in waiting[: not ends]:
+        for number in [*([] if ends else waiting), *_lost()][:1]:
             signal.raise_signal(number)
+
+
+def _lost() -> list[int]:
+    """Signals whose `Interrupted` is not on its way: Python drops what is raised in destructors and weak references."""
+    if threading.current_thread() is not threading.main_thread():
+        return []
+    error = sys.exception()
+    while error is not None and not isinstance(error, Interrupted):
+        error = error.__context__
+    return _asked if error is None else []
 
 
 def ignore_further() -> None:
@@ -62,9 +79,9 @@ def _handled(handler: Callable[[int, FrameType | None], Any]) -> Iterator[None]:
         return
     before = {number: signal.getsignal(number) for number in _ENDING}
     before = {number: known for number, known in before.items() if known not in (signal.SIG_IGN, None)}
-    for number in before:
-        signal.signal(number, handler)
     try:
+        for number in before:
+            signal.signal(number, handler)
         yield
     finally:
         for number, known in before.items():

@@ -46,6 +46,12 @@ MATRIX_FORMATS: Registry[MatrixFormat] = Registry(
             "Abaqus, *MATRIX OUTPUT, STIFFNESS, MASS; the nodes and node sets of the input file",
         ),
         MatrixFormat(
+            "JOB.sti JOB.mas JOB.dof JOB.inp",
+            ((".sti",), (".mas",), (".dof",), (".inp",)),
+            f"{_ROOM}.calculix:from_calculix",
+            "CalculiX, *FREQUENCY, SOLVER=MATRIXSTORAGE without *BOUNDARY; the nodes and node sets of the input file",
+        ),
+        MatrixFormat(
             "MATRICES.op4 MODEL.bdf",
             ((".op4",), (".bdf", ".dat", ".nas")),
             f"{_ROOM}.nastran:from_op4",

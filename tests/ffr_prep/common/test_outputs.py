@@ -202,6 +202,36 @@ def test_signals_raise_and_wait_for_what_must_be_done_whole(name):
     assert signal.getsignal(getattr(signal, name)) is handler
 
 
+class Ending:
+    """Whose destructor is where a signal happens to arrive."""
+
+    def __del__(self):
+        signal.raise_signal(signal.SIGTERM)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_a_signal_in_a_destructor_is_not_lost():
+    """Python drops the exception that is raised there; the next step that is done whole raises it again, once."""
+    done = []
+
+    def work():
+        Ending()
+        done.append("goes on")
+        try:
+            with undisturbed():
+                done.append("whole")
+        finally:
+            with undisturbed():  # on the way out nothing is raised anew
+                done.append("closed")
+            done.append("out")
+
+    with pytest.raises(Interrupted, match="SIGTERM"), ending_in_order():
+        work()
+    assert done == ["goes on", "whole", "closed", "out"]
+    with ending_in_order(), undisturbed():
+        done.append("forgotten with its block")
+
+
 def test_what_the_process_ignores_stays_ignored():
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as under nohup
     try:

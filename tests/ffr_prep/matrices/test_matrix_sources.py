@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.sparse as sp
-from matrix_models import bar, of_frame, rod, space_frame
+from boxes import box_mesh
+from matrix_models import bar, of_frame, of_solid, rod, space_frame
 from nastran_files import write_op2
 from places import ROOT
 
@@ -332,6 +333,62 @@ def test_nodes_of_an_input_file(tmp_path):
     assert labels.tolist() == [7, 3]
     assert points.tolist() == [[1.0, 2.0, 3.0], [4.0, 5.0, 0.0]]
     assert {name: of.tolist() for name, of in groups.items()} == {"All": [3, 7], "one": [3]}
+
+
+# ---- CalculiX -----------------------------------------------------------------------------------------------------
+
+# Row, column and value of the first entries that CalculiX 2.20 wrote (*FREQUENCY, SOLVER=MATRIXSTORAGE) for one C3D8 element
+# of 1 m x 0.5 m x 0.2 m, E = 2.1e11 Pa, nu = 0.3, 7850 kg/m^3; its rows are 10.1, 10.2, 10.3, 20.1 ...
+OF_CALCULIX = {
+    "K": ((1, 1, 2.9166666666667e10), (1, 2, 3.3653846153846e9), (2, 2, 3.5897435897436e10)),
+    "M": ((1, 1, 2.9074074074074e1), (1, 2, 0.0), (2, 2, 2.9074074074074e1)),
+}
+
+
+def write_calculix(model: MatrixModel, folder: Path, **parts: str) -> list[Path]:
+    """Entries of the upper triangles by columns, a line node.direction for each row, and the input file."""
+    texts = {}
+    for ending, name in (("sti", "K"), ("mas", "M")):
+        A = sp.coo_array(sp.triu(sp.csc_array(getattr(model, name))))
+        entries = zip(A.row + 1, A.col + 1, A.data, strict=True)
+        texts[ending] = "".join(f"{i} {j}  {value:.13e}\n" for i, j, value in entries)
+    rows = zip(model.labels[model.nodes], model.components + 1, strict=True)
+    texts |= {"dof": "".join(f"{node}.{component}\n" for node, component in rows), "inp": abaqus_deck(model)}
+    for ending, text in (texts | parts).items():
+        (folder / f"job.{ending}").write_text(text)
+    return [folder / f"job.{ending}" for ending in texts]
+
+
+def test_calculix_matrices(tmp_path):
+    solid = bar("hex8", (2, 1, 1))
+    back = read_matrices(write_calculix(solid, tmp_path))
+    assert_same(back, solid, 1e-13)
+    assert back.source["format"] == "CalculiX"
+
+
+def test_an_element_that_calculix_wrote(tmp_path):
+    """Its matrices are those that are assembled here, rounded to 14 digits."""
+    element = of_solid(box_mesh("hex8", (1.0, 0.5, 0.2), (1, 1, 1)))
+    first = int(np.flatnonzero((element.points == 0.0).all(axis=1))[0])
+    rows = [int(np.flatnonzero((element.nodes == first) & (element.components == c))[0]) for c in (0, 1)]
+    for name, entries in OF_CALCULIX.items():
+        for i, j, value in entries:
+            assert getattr(element, name)[rows[i - 1], rows[j - 1]] == pytest.approx(value, rel=1e-12, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        ({"dof": "1.1\n1.2\nten\n"}, r"job\.dof, line 3: 'ten' is not node\.direction"),
+        ({"dof": "1.1\n1.4\n"}, r"line 2: '1\.4' is not"),
+        ({"dof": "1.1\n1.2\n1.3\n"}, "outside the 3 rows that the .dof file lists"),
+        ({"sti": "1 1\n2 2\n"}, "has 2 numbers to a line"),
+        ({"mas": "1 1 x\n"}, r"job\.mas is not a matrix that CalculiX writes"),
+    ],
+)
+def test_calculix_files_that_cannot_be_used(tmp_path, parts, message):
+    with pytest.raises(InputError, match=message):
+        read_matrices(write_calculix(bar("hex8", (2, 1, 1)), tmp_path, **parts))
 
 
 # ---- Nastran: the conversion, on objects as pyNastran holds them --------------------------------------------------
