@@ -131,16 +131,16 @@ def integrate(
     return _result(scene, run, header | account | {"status": "complete"})
 
 
-def check_method(method: object) -> None:
-    """Raises InputError for a name or a class in place of a method with its settings."""
-    if isinstance(method, (str, type)):
-        raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
-
-
 def check_output_step(output_step: float) -> None:
     """Raises InputError for one that is none."""
     if not 0 < output_step < np.inf:
         raise InputError(f"the output step is {output_step} s; it must be positive and finite")
+
+
+def check_method(method: object) -> None:
+    """Raises InputError for a name or a class in place of a method with its settings."""
+    if isinstance(method, (str, type)):
+        raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
 
 
 def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
