@@ -4,7 +4,7 @@
 
 A crank at a speed of its own turns a rod with eight elastic coordinates, with steps of 0.1 ms; two forces are kept. Single
 runs are `fd.forward`, the batch is `fd.forward_many` with a thread for every processor; whole calls are timed, with what
-Python does around the compiled loop. Both take turns in shares of the scenes, so that whatever else the machine does weighs on
+Python does around the compiled loop. Both take turns in shares of the scenes, so that what else the machine does weighs on
 both. Every result of the batch is compared with that of its single run, bit by bit. The goal speaks of two processors with
 nothing else to do.
 """
