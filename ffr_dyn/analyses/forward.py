@@ -154,8 +154,8 @@ def forward(
                   `periodic`; "as-given" with the scene's q and q_dot
     path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
     resume      : a result file whose run goes on to the same bits; `end` may be later. A new file: a run from the start
-    progress    : called with the time reached, a few times a second
-    stopwatch   : takes the time of the integrator's compiled loop, in all runs
+    progress    : called with the time reached, a few times a second; with the mean of runs that go on at the same time
+    stopwatch   : takes the time of the integrator's compiled loop, in all runs, which go on one after another then
     assembled   : what `assemble` made of the scene at `start`, for programs that run it more than once
 
     The result's attribute "errors" has [error in its unit, error over range] of every output but the violations of

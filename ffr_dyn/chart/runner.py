@@ -30,7 +30,7 @@ from ffr_dyn.chart.variants import Variant
 from ffr_dyn.compile.first_use import ensure_compiled
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.functions.stopwatch import Stopwatch
-from ffr_dyn.functions.together import processors
+from ffr_dyn.functions.together import alone, processors
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.result import Result
@@ -211,12 +211,21 @@ class Distributed:
         """See `Pool`."""
         from dask.distributed import as_completed
 
-        futures = {self._client.submit(function, item, retries=RETRIES, pure=False): k for k, item in enumerate(items)}
+        futures = {
+            self._client.submit(_by_itself, function, item, retries=RETRIES, pure=False): k
+            for k, item in enumerate(items)
+        }
         for future in as_completed(list(futures), loop=self._client.loop):  # type: ignore[no-untyped-call]
             if future.status == "finished":
                 yield futures[future], future.result()
             else:
                 yield futures[future], Failure(_why(future))
+
+
+def _by_itself(function: Callable[[Item], Any], item: Item) -> Any:
+    """What a function makes of an item, with no threads: other workers take the other processors."""
+    with alone():
+        return function(item)
 
 
 def _why(future: Any) -> str:
