@@ -56,9 +56,14 @@ def sweep(
     with Journal(path, made) as journal:
         left = [number for number in range(len(made.points)) if number not in journal.rows]
         if left:
-            with _where(workers, cluster) as where:
-                points = _points(made, left, _bodies(made, left, folder, where, making or _silent))
-                _run(made, path, points, where, journal, progress or _silent)
+            try:
+                with _where(workers, cluster) as where:
+                    points = _points(made, left, _bodies(made, left, folder, where, making or _silent))
+                    _run(made, path, points, where, journal, progress or _silent)
+            except KeyboardInterrupt as end:
+                kept = f"{journal_of(path)} holds {len(journal.rows)} of {len(made.points)} runs"
+                end.add_note(f"{kept}, and the same command goes on with them")
+                raise
         found = table(made, journal.rows)
         if found.failed.size == len(found):
             journal_of(path).unlink()

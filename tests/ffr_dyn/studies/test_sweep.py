@@ -93,9 +93,10 @@ def test_a_study_that_was_stopped_goes_on_to_the_same_bits(folder):
         if done >= 5:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt) as caught:
         fd.sweep(folder / "study.toml", folder / "t.nc", workers=0, progress=stop)
     journal = journal_of(folder / "t.nc")
+    assert caught.value.__notes__ == [f"{journal} holds 5 of 12 runs, and the same command goes on with them"]
     journal.write_bytes(journal.read_bytes()[:-7])
     with Journal(folder / "t.nc", fd.load_study(folder / "study.toml")) as opened:
         assert len(opened.rows) == 4
