@@ -59,6 +59,7 @@ _BY_MODULE = {
     "ffr_dyn.pictures.scene_view": "show",
     "ffr_dyn.pictures.viewer": "Viewer",
     "ffr_dyn.pictures.stress_report": "report_lines stress_report",
+    "ffr_dyn.analyses.batch": "forward_many",
     "ffr_dyn.analyses.inversion.bounded": "Bounded",
     "ffr_dyn.analyses.efforts": "JointEffort MarkerEffort recorded with_effort",
     "ffr_dyn.analyses.events": "Event",
@@ -166,6 +167,7 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_dyn.pictures.scene_view import show as show
     from ffr_dyn.pictures.viewer import Viewer as Viewer
     from ffr_dyn.pictures.stress_report import report_lines as report_lines, stress_report as stress_report
+    from ffr_dyn.analyses.batch import forward_many as forward_many
     from ffr_dyn.analyses.inversion.bounded import Bounded as Bounded
     from ffr_dyn.analyses.efforts import (
         JointEffort as JointEffort, MarkerEffort as MarkerEffort, recorded as recorded, with_effort as with_effort

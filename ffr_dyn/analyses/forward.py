@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Literal, get_args
 import numpy as np
 
 from ffr_dyn.analyses.events import Event
-from ffr_dyn.analyses.integration import check_output_step, evaluation_cost, integrate
+from ffr_dyn.analyses.integration import check_method, check_output_step, evaluation_cost, integrate
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.rotating.periodic import periodically
 from ffr_dyn.analyses.settings import Settings
@@ -25,6 +25,7 @@ from ffr_dyn.consistency.quasi_static import quasi_static
 from ffr_dyn.consistency.step_error import StepError, step_errors, too_coarse
 from ffr_dyn.consistency.unresolved import Vibrations, lasting, leading, vibrations
 from ffr_dyn.functions.stopwatch import Stopwatch
+from ffr_dyn.functions.together import Say, together
 from ffr_dyn.integrators import Integrator, Within, stepped
 from ffr_dyn.integrators.ros2 import Twin
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
@@ -106,7 +107,25 @@ class _Runs:
 
     def run(self, method: Integrator, **more: Any) -> Result:
         """One run."""
-        return integrate(self.scene, method=method, assembled=self.assembled, **self.how, **more)
+        return integrate(self.scene, method=method, assembled=self.assembled, **{**self.how, **more})
+
+    def together(self, calls: Sequence[Callable[[Say], Any]], leader: bool) -> list[Any]:
+        """What runs return, or the exceptions that they raise; that of a leader, the first, ends the others and is raised.
+
+        They go on at the same time, and progress is their mean; one after another beside a stopwatch, and with the user's
+        Python functions, which would be called out of order.
+        """
+        lonely = self.how["stopwatch"] is not None or self.assembled.system.user.count
+        progress, found, times = self.how["progress"], dict[int, Any](), [self.start] * len(calls)
+
+        def heard(number: int, time: float) -> None:
+            times[number] = time
+            if progress is not None:
+                progress(sum(times) / len(times))
+
+        for number, outcome in together(calls, 1 if lonely else None, heard):
+            found[number] = _granted(outcome) if leader and number == 0 else outcome
+        return [found[number] for number in range(len(calls))]
 
 
 def forward(
@@ -139,8 +158,8 @@ def forward(
                   the motion of these analyses, of machines driven evenly; "as-given": with the scene's q and q_dot
     path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
     resume      : a result file whose run goes on to the same bits; `end` may be later. A new file: a run from the start
-    progress    : called with the time reached, a few times a second
-    stopwatch   : takes the time of the integrator's compiled loop, in all runs
+    progress    : called with the time reached, a few times a second; with the mean of runs that go on at the same time
+    stopwatch   : takes the time of the integrator's compiled loop, in all runs, which go on one after another then
     assembled   : what `assemble` made of the scene at `start`, for programs that run it more than once
 
     The result's attribute "errors" has [error in its unit, error over range] of every output, "accuracy" says the worst in a
@@ -152,6 +171,7 @@ def forward(
     >>> result = fd.forward(scene, end=2.0, output_step=0.01)
     """
     check_output_step(output_step)
+    check_method(method)
     assembled = _begun(assemble(scene, time=start) if assembled is None else assembled, start, begin, method)
     common: dict[str, Any] = {"start": start, "end": end, "output_step": output_step, "stabilisation": stabilisation}
     common |= {"outputs": outputs, "progress": progress, "stopwatch": stopwatch}
@@ -163,11 +183,10 @@ def forward(
     method, count = _resumed(resume, wanted, output_step)
     if isinstance(method, Within):
         return _searched(runs, method, kept, count)
-    result = runs.run(method, **kept)
-    if check is None:
-        check = _cost(assembled, result) < QUICK
-    trial = _Trial(method, 0 if method.controlled else round(output_step / method.step), result)
-    told = _told(runs, _beside_twins(runs, trial)) if check else trial
+    count = 0 if method.controlled else round(output_step / method.step)
+    told = _checked(runs, method, count, kept) if check else _Trial(method, count, runs.run(method, **kept))
+    if check is None and _cost(assembled, told.result) < QUICK:
+        told = _checked(runs, method, count, kept, told.result)
     return _finished(runs, told, resume if path is None else path)
 
 
@@ -215,44 +234,75 @@ class _Trial:
     errors: Mapping[str, StepError] = field(default_factory=dict)
 
 
-def _beside_twins(runs: _Runs, trial: _Trial) -> _Trial:
-    """The run with its twins, and with what they tell of its errors."""
-    try:
-        twins = tuple(runs.run(twin) for twin in _twins(runs, trial.method))
-    except ComputationError:
-        return trial
-    errors = step_errors(trial.result, None, 1.0, trial.method.order, twins) if twins else {}
-    return replace(trial, twins=twins, errors=errors)
+def _checked(
+    runs: _Runs, method: Integrator, count: int, kept: Mapping[str, Any], result: Result | None = None
+) -> _Trial:
+    """A run, unless it is there already, with its twins and a run of another step, and what they tell of its errors."""
+    trial, more = _with_twins(runs, method, count, kept, result, [lambda say: _other(runs, method, count, {}, say)])
+    return _told(trial, more[0])
 
 
-def _told(runs: _Runs, trial: _Trial, earlier: Sequence[_Trial] = ()) -> _Trial:
-    """The run with its errors, also by a run of another step, which is one of the earlier where it can."""
+def _with_twins(
+    runs: _Runs,
+    method: Integrator,
+    count: int,
+    kept: Mapping[str, Any],
+    result: Result | None = None,
+    more: Sequence[Callable[[Say], Any]] = (),
+) -> tuple[_Trial, list[Any]]:
+    """A run, unless it is there already, beside its twins, with what they tell of its errors; and what `more` returned.
+
+    Raises what the run itself raises; where twins fail there are none.
+    """
     try:
-        other, ratio = _other(runs, trial, {one.count: one.result for one in earlier})
+        twins = [lambda say, twin=twin: runs.run(twin, progress=say) for twin in _twins(runs, method)]  # type: ignore[misc]
     except ComputationError:
+        twins = []
+    own = [] if result is not None else [lambda say: runs.run(method, **kept, progress=say)]
+    outcomes = runs.together([*own, *twins, *more], leader=result is None)
+    result = outcomes.pop(0) if result is None else result
+    found, others = outcomes[: len(twins)], outcomes[len(twins) :]
+    trial = _Trial(method, count, result)
+    if not twins or any(_failed(one) for one in found):
+        return trial, others
+    return replace(trial, twins=tuple(found), errors=step_errors(result, None, 1.0, method.order, found)), others
+
+
+def _granted(outcome: Any) -> Any:
+    """What a call returned. Raises what it raised."""
+    if isinstance(outcome, BaseException):
+        raise outcome
+    return outcome
+
+
+def _failed(outcome: Any) -> bool:
+    """Whether a run came to no end; another exception is raised."""
+    return isinstance(outcome, ComputationError) or _granted(outcome) is None
+
+
+def _told(trial: _Trial, other: Any) -> _Trial:
+    """The run with its errors, also by what `_other` returned."""
+    if _failed(other):
         return replace(trial, errors={})
-    return replace(trial, errors=step_errors(trial.result, other, ratio, trial.method.order, trial.twins))
+    result, ratio = other
+    return replace(trial, errors=step_errors(trial.result, result, ratio, trial.method.order, trial.twins))
 
 
-def _other(runs: _Runs, trial: _Trial, known: Mapping[int, Result]) -> tuple[Result, float]:
+def _other(runs: _Runs, method: Any, count: int, known: Mapping[int, Result], say: Say) -> tuple[Result, float]:
     """The run with another step, and the ratio of the steps: a longer step that was tried, or about twice the step, where
     elastic forces are implicit and that is a part of a row, half of it otherwise; a tenth of the tolerance of a method that
     chooses its steps."""
-    method: Any = trial.method
     if method.controlled:
         tolerances = replace(method.tolerances, relative=method.tolerances.relative / 10)
-        return runs.run(replace(method, tolerances=tolerances)), 10.0 ** (-1.0 / method.order)
-    if method.implicit and trial.count > 1:
-        fewer = max(
-            (count for count in known if trial.count <= NEAR.get(method.order, 2) * count),
-            default=(trial.count + 1) // 2,
-        )
+        return runs.run(replace(method, tolerances=tolerances), progress=say), 10.0 ** (-1.0 / method.order)
+    if method.implicit and count > 1:
+        fewer = max((one for one in known if count <= NEAR.get(method.order, 2) * one), default=(count + 1) // 2)
         try:
-            coarse = known.get(fewer) or runs.run(replace(method, step=runs.output_step / fewer))
-            return coarse, trial.count / fewer
+            coarse = known.get(fewer) or runs.run(replace(method, step=runs.output_step / fewer), progress=say)
+            return coarse, count / fewer
         except ComputationError:
             pass  # half the step is sure to run
-    return runs.run(replace(method, step=runs.output_step / (2 * trial.count))), 0.5
+    return runs.run(replace(method, step=runs.output_step / (2 * count)), progress=say), 0.5
 
 
 def _twins(runs: _Runs, method: Integrator) -> Iterator[Twin]:
@@ -346,15 +396,15 @@ def _searched(runs: _Runs, within: Within, kept: dict[str, Any], count: int) -> 
     while True:
         method = stepped(within, runs.output_step / count)
         try:
-            result = runs.run(method, **kept)
+            trial, _ = _with_twins(runs, method, count, kept)
         except (ComputationError, InputError):
             if count >= FINEST:
                 raise
             count *= LEAP // 2
             continue
-        trial = _beside_twins(runs, _Trial(method, count, result))
         if not trial.errors or _excess(trial, ringing, trials) <= within.accuracy:
-            trial = _told(runs, trial, trials)
+            known = {one.count: one.result for one in trials}
+            trial = _told(trial, *runs.together([lambda say: _other(runs, method, count, known, say)], leader=False))  # noqa: B023
         excess = _excess(trial, ringing, trials) / within.accuracy
         trials.append(trial)
         if excess <= 1.0 or count >= FINEST:

@@ -108,8 +108,7 @@ def integrate(
     the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
     check_output_step(output_step)
-    if isinstance(method, (str, type)):
-        raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
+    check_method(method)
     spacing = output_step / LOOKS if method.controlled else method.step
     substeps, rows = _counts(end - start, output_step, spacing)
     _check_step(scene, method)
@@ -156,6 +155,12 @@ def check_output_step(output_step: float) -> None:
     """Raises InputError for one that is none."""
     if not 0 < output_step < np.inf:
         raise InputError(f"the output step is {output_step} s; it must be positive and finite")
+
+
+def check_method(method: object) -> None:
+    """Raises InputError for a name or a class in place of a method with its settings."""
+    if isinstance(method, (str, type)):
+        raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
 
 
 def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:

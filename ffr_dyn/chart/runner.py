@@ -14,9 +14,7 @@ others.
 from __future__ import annotations
 
 import fnmatch
-import os
 import statistics
-import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -32,6 +30,7 @@ from ffr_dyn.chart.variants import Variant
 from ffr_dyn.compile.first_use import ensure_compiled
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.functions.stopwatch import Stopwatch
+from ffr_dyn.functions.together import alone, processors
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.result import Result
@@ -192,10 +191,11 @@ class Here:
     def results(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Iterator[tuple[int, Any]]:
         """See `Pool`."""
         for k, item in enumerate(items):
-            yield k, _tried(function, item)
+            yield k, tried(function, item)
 
 
-def _tried(function: Callable[[Item], Any], item: Item) -> Any:
+def tried(function: Callable[[Item], Any], item: Item) -> Any:
+    """What a function makes of an item, at the third attempt if need be, or a `Failure`."""
     for _ in range(RETRIES + 1):
         try:
             return function(item)
@@ -214,12 +214,21 @@ class Distributed:
         """See `Pool`."""
         from dask.distributed import as_completed
 
-        futures = {self._client.submit(function, item, retries=RETRIES, pure=False): k for k, item in enumerate(items)}
+        futures = {
+            self._client.submit(_by_itself, function, item, retries=RETRIES, pure=False): k
+            for k, item in enumerate(items)
+        }
         for future in as_completed(list(futures), loop=self._client.loop):  # type: ignore[no-untyped-call]
             if future.status == "finished":
                 yield futures[future], future.result()
             else:
                 yield futures[future], Failure(_why(future))
+
+
+def _by_itself(function: Callable[[Item], Any], item: Item) -> Any:
+    """What a function makes of an item, with no threads: other workers take the other processors."""
+    with alone():
+        return function(item)
 
 
 def _why(future: Any) -> str:
@@ -250,8 +259,7 @@ def pool(workers: int | None = None, cluster: str | None = None) -> Iterator[Poo
 
 def default_workers() -> int:
     """Half the processors that this process may use, at least one."""
-    processors = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
-    return max(1, processors // 2)
+    return max(1, processors() // 2)
 
 
 def _started(cluster: Callable[..., Any]) -> Any:

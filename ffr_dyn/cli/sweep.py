@@ -35,7 +35,9 @@ Examples:
 @click.option("--plots", type=click.Path(path_type=Path, file_okay=False), help="Folder for pictures of the outputs.")
 @click.option("--cache", type=click.Path(path_type=Path, file_okay=False),
               help="Folder of the bodies that are made; default: <output>.bodies. Studies may share one.")  # fmt: skip
-@click.option("--workers", type=click.IntRange(0), help="Local processes; default half the processors, 0: none, here.")
+@click.option(
+    "--workers", type=click.IntRange(0), help="Local processes; default one for every processor, 0: none, here."
+)
 @click.option("--cluster", metavar="ADDRESS", help="Scheduler of a Dask cluster that does the runs instead.")
 def sweep(
     study: Path, output: Path | None, plots: Path | None, cache: Path | None, workers: int | None, cluster: str | None

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Sequence
 
 from ffr_dyn.integrators import Integrator, methods
@@ -23,6 +24,7 @@ Kernel = str | CompiledFunction  # of a force: "package.module:name", or itself 
 
 FORCES = ("ffr_dyn.kernels.forces.load:load", "ffr_dyn.kernels.forces.spring:spring")  # of a scene not known yet
 _AT_WORK: dict[str, subprocess.Popen[bytes]] = {}
+_LOOKING = threading.Lock()  # several runs may begin at the same time
 _ON_DISK: set[str] = set()  # functions that were found there before: a program with many runs looks once
 
 
@@ -63,10 +65,11 @@ def _of_scene(model: Model | None) -> list[CompiledFunction]:
 
 def ensure_compiled(*kinds: type[Integrator], model: Model | None = None, forces: Sequence[Kernel] = ()) -> None:
     """Have what some methods need on disk; where that fails, the run compiles them itself."""
-    begin_compiling(*kinds, model=model, forces=forces)
-    for process in set(_AT_WORK.values()):
-        process.wait()
-    _AT_WORK.clear()
+    with _LOOKING:
+        begin_compiling(*kinds, model=model, forces=forces)
+        for process in set(_AT_WORK.values()):
+            process.wait()
+        _AT_WORK.clear()
 
 
 def _shares(names: Sequence[str]) -> list[list[str]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from ffr_dyn.consistency.unresolved import Vibrations, lasting, vibrations
@@ -11,6 +11,7 @@ from ffr_dyn.economy.model_choice import Choice, Part
 from ffr_dyn.economy.outputs import Probe
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.run import Made, Span, Trial, cost, make, run
+from ffr_dyn.functions.together import Say, at_hand, together
 from ffr_dyn.integrators.ros2 import Twin
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
@@ -33,7 +34,10 @@ class Tried:
 
 @dataclass
 class Ledger:
-    """Runs by their choice; `spent` [us] by the cost model."""
+    """Runs by their choice; `spent` [us] by the cost model.
+
+    ahead : what came of runs that were made before they are asked for, and until then count as not made
+    """
 
     scene: Scene
     span: Span
@@ -44,6 +48,7 @@ class Ledger:
     wide: dict[Choice, Trial] = field(default_factory=dict)
     twins: dict[Choice, Trial] = field(default_factory=dict)
     models: dict[tuple[tuple[Part, ...], str], Made] = field(default_factory=dict)
+    ahead: dict[tuple[Choice, bool], Trial | Exception] = field(default_factory=dict)
     spent: float = 0.0
     tried: list[Tried] = field(default_factory=list)
 
@@ -65,7 +70,7 @@ class Ledger:
     def run(self, choice: Choice) -> Trial:
         """A run of the model."""
         if choice not in self.runs:
-            self.runs[choice] = run(self.made(choice), choice, self.span, self.of)
+            self.runs[choice] = self._had(choice, is_twin=False)
             self.spent += self.cost(self.runs[choice])
         return self.runs[choice]
 
@@ -77,11 +82,40 @@ class Ledger:
         """A run of the model that keeps vibration which its steps do not resolve (`ffr_dyn.integrators.ros2.Twin`)."""
         like = replace(choice, method="ros2")
         if like not in self.twins:
-            step = self.span.output_step / like.divisions
-            method = Twin(step, lasting(self.vibrations(like), step))
-            self.twins[like] = run(self.made(like), like, self.span, self.of, method=method)
+            self.twins[like] = self._had(like, is_twin=True)
             self.spent += self.cost(self.twins[like])
         return self.twins[like]
+
+    def begin(self, runs: Sequence[Choice], twins: Sequence[Choice] = ()) -> None:
+        """Make runs at the same time that are going to be asked for, where there are processors for it.
+
+        What is decided by them, and in which order they are kept, is as if each were made when it is asked for.
+        """
+        twins = [replace(choice, method="ros2") for choice in twins]
+        keys = [(choice, False) for choice in runs if choice not in self.runs]
+        keys += [(choice, True) for choice in twins if choice not in self.twins]
+        try:
+            calls = {key: self._call(*key) for key in keys if key not in self.ahead}
+        except (ComputationError, InputError):  # which is told when it is asked for
+            return
+        if at_hand() > 1 and not any(self.made(choice).assembled.system.user.count for choice, _ in calls):
+            outcomes = dict(together(list(calls.values())))
+            self.ahead |= {key: outcomes[k] for k, key in enumerate(calls)}
+
+    def _had(self, choice: Choice, is_twin: bool) -> Trial:
+        """A run, or its twin, that may have been made ahead. Raises what it raised."""
+        outcome = self.ahead.pop((choice, is_twin), None)
+        if isinstance(outcome, Exception):
+            raise outcome
+        return self._call(choice, is_twin)(None) if outcome is None else outcome
+
+    def _call(self, choice: Choice, is_twin: bool) -> Callable[[Say | None], Trial]:
+        """What makes a run, or its twin."""
+        made, method = self.made(choice), None
+        if is_twin:
+            step = self.span.output_step / choice.divisions
+            method = Twin(step, lasting(self.vibrations(choice), step))
+        return lambda say: run(made, choice, self.span, self.of, method=method, say=say)
 
     def over_two_rows(self, choice: Choice) -> Trial | None:
         """A run with every other output row, and steps twice as long; None where these rows are too few."""

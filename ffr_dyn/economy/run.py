@@ -13,6 +13,7 @@ from ffr_dyn.economy.model_choice import Choice, applied
 from ffr_dyn.economy.outputs import Probe, histories, needed
 from ffr_dyn.economy.policy import DEFAULT, CostModel
 from ffr_dyn.functions.stopwatch import Stopwatch
+from ffr_dyn.functions.together import Say
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.result import Result
@@ -87,8 +88,12 @@ def simulated(
     outputs: tuple[str, ...],
     stopwatch: Stopwatch | None = None,
     method: Integrator | None = None,
+    say: Say | None = None,
 ) -> Result:
-    """A forward run of a model, by its own method unless another is given. Raises ComputationError as `forward` does."""
+    """A forward run of a model, by its own method unless another is given. Raises ComputationError as `forward` does.
+
+    say : called with the time reached, a few times a second
+    """
     return integrate(
         made.scene,
         start=span.start,
@@ -98,6 +103,7 @@ def simulated(
         stabilisation=span.stabilisation,
         outputs=outputs,
         stopwatch=stopwatch,
+        progress=say,
         assembled=made.assembled,
     )
 
@@ -109,13 +115,14 @@ def run(
     of: Probe,
     outputs: tuple[str, ...] = (),
     method: Integrator | None = None,
+    say: Say | None = None,
 ) -> Trial:
     """Run a model, by its own method unless another is given, keeping its states and what `outputs` name.
 
     Raises ComputationError as `forward` does, and where the outputs are no longer finite.
     """
     kept = (*needed(of, made.scene), *_states(made.scene), *outputs)
-    result = simulated(made, choice, span, kept, method=method)
+    result = simulated(made, choice, span, kept, method=method, say=say)
     with np.errstate(over="ignore", invalid="ignore"):  # told below
         values = histories(of, made.scene, result)
     for output, one in zip(of.outputs, values, strict=True):

@@ -255,6 +255,7 @@ def _finer_ground(ledger: Ledger, ground: Ground, final: Trial, verify: bool | N
         return None
     ledger.tell("full model, finer step")
     everything = replace(ground.everything, divisions=divisions)
+    ledger.begin([everything, final.choice.stepped_as(everything)])
     return replace(ground, everything=everything, pilot=ledger.run(everything))
 
 

@@ -281,7 +281,12 @@ def _attempt(ledger: Ledger, choice: Choice) -> Trial | None:
 
 def order(trial: Trial) -> int:
     """Order of the method of a run."""
-    method: Any = METHODS[trial.choice.method]
+    return order_of(trial.choice)
+
+
+def order_of(choice: Choice) -> int:
+    """Order of the method of a model."""
+    method: Any = METHODS[choice.method]
     return int(method.order)
 
 

@@ -25,7 +25,7 @@ from ffr_dyn.economy.result import Verification
 from ffr_dyn.economy.rigid_start import PILOT, Ground
 from ffr_dyn.economy.run import Trial
 from ffr_dyn.economy.selection import Insufficient, selected_model
-from ffr_dyn.economy.steps import EXPLICIT, order
+from ffr_dyn.economy.steps import EXPLICIT, order, order_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
@@ -174,8 +174,10 @@ def _resolving(ledger: Ledger, model: Choice) -> int:
 
 def _known(ledger: Ledger, choice: Choice) -> Known | None:
     """A run and its error; None where one of the runs that tell it fails."""
+    three = [replace(choice, divisions=choice.divisions // k) for k in (1, 2, 4)]
+    ledger.begin(three, _twins(choice))
     try:
-        sharp, coarse, coarsest = (ledger.run(replace(choice, divisions=choice.divisions // k)) for k in (1, 2, 4))
+        sharp, coarse, coarsest = map(ledger.run, three)
         vibration = _vibration(ledger, sharp)
     except (ComputationError, InputError):
         return None
@@ -184,16 +186,24 @@ def _known(ledger: Ledger, choice: Choice) -> Known | None:
     return Known(sharp, np.maximum(last * fall / (1.0 - fall), vibration), 0.0)
 
 
+def _twins(choice: Choice) -> list[Choice]:
+    """Those whose twins tell the vibration that a run damps away."""
+    if choice.method == EXPLICIT or choice.controlled or not choice.count:
+        return []
+    finer = [replace(choice, divisions=2 * choice.divisions)]
+    return [choice, *(finer if order_of(choice) > 2 else [])]
+
+
 def _vibration(ledger: Ledger, trial: Trial) -> Array:
     """(outputs,) v of a run."""
-    choice = trial.choice
-    if choice.method == EXPLICIT or choice.controlled or not choice.count:
+    beside = _twins(trial.choice)
+    if not beside:
         return np.zeros(len(trial.values))
-    twin = ledger.twin(choice).values
-    if order(trial) == 2:
-        return np.array([largest_difference(y, t) for y, t in zip(trial.values, twin, strict=True)])
-    fine = ledger.twin(replace(choice, divisions=2 * choice.divisions)).values
-    return np.array([nearest(*histories) for histories in zip(trial.values, twin, fine, strict=True)])
+    ledger.begin([], beside)
+    twins = [ledger.twin(choice).values for choice in beside]
+    if len(twins) == 1:
+        return np.array([largest_difference(y, t) for y, t in zip(trial.values, twins[0], strict=True)])
+    return np.array([nearest(*histories) for histories in zip(trial.values, *twins, strict=True)])
 
 
 # ---- without a reference ------------------------------------------------------------------------------------------------

@@ -42,7 +42,7 @@ from ffr_dyn.integrators import Integrator, Tolerances, Within, method_named, st
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import GROUND, Body, Scene
-from ffr_dyn.scene_file.parameters import Parameters, as_number, flattened, overridden, substituted
+from ffr_dyn.scene_file.parameters import Parameters, as_number, flattened, nearest, overridden, substituted
 from ffr_dyn.scene_file.schema import (
     BodyEntry,
     Kind,
@@ -71,12 +71,12 @@ WHOLE = ("name", "gravity", "ground", "base_acceleration", "plane")  # fields of
 
 
 def load_scene(
-    path: str | Path, parameters: Mapping[str, str] = {}, bodies: Mapping[str, str | Path] = {}
+    path: str | Path, parameters: Mapping[str, str] = {}, bodies: Mapping[str, str | Path | FlexibleBody] = {}
 ) -> tuple[Scene, Settings | MomentSettings]:
     """Read a scene file.
 
     parameters : values, as text, in place of those in the file, such as {"crank.length": "0.15"}
-    bodies     : body files in place of those in the file, by the names of the bodies
+    bodies     : body files, or bodies, in place of the files that it names, by the names of the bodies there
 
     Raises InputError that names the file, the entry, its value and what is expected, with the nearest known name.
 
@@ -84,10 +84,11 @@ def load_scene(
     """
     with reading(path, "a scene file"):
         entry, source = _read(Path(path), parameters)
-        for name, file in bodies.items():
-            entry.bodies[name].file = Path(file)
+        for name in bodies:
+            if name not in entry.bodies:
+                raise InputError(f"{path}: bodies: there is no body {name!r}; {nearest(name, entry.bodies)}")
         settings = _settings(entry.analysis, entry.outputs, source)
-        return _scene(entry, source), _with_chart(settings, entry.chart, source)
+        return _scene(entry, source, bodies), _with_chart(settings, entry.chart, source)
 
 
 def body_files(path: str | Path, parameters: Mapping[str, str] = {}) -> dict[str, Path]:
@@ -172,13 +173,13 @@ def _with_nearest(item: Any, text: str) -> str:
 # ---- from entries to a scene --------------------------------------------------------------------------------------
 
 
-def _scene(entry: Any, source: Source) -> Scene:
+def _scene(entry: Any, source: Source, given: Mapping[str, str | Path | FlexibleBody]) -> Scene:
     declared: dict[str, Any] = {
         table: tuple(_declared(kinds, (table, name), item, source) for name, item in getattr(entry, table).items())
         for table, kinds in tables().items()
     }
     _put_markers(entry, source)
-    bodies = tuple(_body(name, body, source) for name, body in entry.bodies.items())
+    bodies = tuple(_body(name, body, given.get(name, body.file), source) for name, body in entry.bodies.items())
     try:
         scene = Scene(bodies=bodies, **{key: getattr(entry, key) for key in WHOLE}, **declared)
         for force in forces_of(scene):
@@ -258,11 +259,11 @@ def _plain(function: TimeFunction) -> float | TimeFunction:
     return function.data[0] if is_constant(function) else function
 
 
-def _body(name: str, entry: BodyEntry, source: Source) -> Body:
+def _body(name: str, entry: BodyEntry, file: str | Path | FlexibleBody | None, source: Source) -> Body:
     try:
         return Body(
             name,
-            _model(name, entry),
+            _model(name, entry, file),
             position=entry.position,
             rotation=entry.rotation,
             velocity=entry.velocity,
@@ -277,15 +278,15 @@ def _body(name: str, entry: BodyEntry, source: Source) -> Body:
         raise InputError(f"{origin(source, ('bodies', name))}: bodies.{name}: {error}") from None
 
 
-def _model(name: str, entry: BodyEntry) -> FlexibleBody:
+def _model(name: str, entry: BodyEntry, file: str | Path | FlexibleBody | None) -> FlexibleBody:
     points = {key: np.array(at) for key, at in entry.points.items()}
-    if entry.file is not None:
-        model = load_body(entry.file)
+    if file is not None:
+        model = file if isinstance(file, FlexibleBody) else load_body(file)
         model = model if entry.modes is None else truncated(model, entry.modes)
         alpha, beta = entry.rayleigh or (0.0, 0.0)
         bands = [(frequency, ratio) for frequency, ratio in entry.damping_bands]
         model = damped(model, alpha=alpha, beta=beta, loss_factor=entry.loss_factor, bands=bands)
-        model = model if entry.stiffening else replace(model, stiffening=None)
+        model = model if entry.stiffening or model.stiffening is None else replace(model, stiffening=None)
         for point, at in points.items():
             model = with_point(model, point, at)
         return model

@@ -12,6 +12,7 @@ import io
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 
@@ -20,12 +21,13 @@ from ffr_dyn.analyses.run import run
 from ffr_dyn.analyses.settings import MomentSettings, Settings
 from ffr_dyn.scene_file.read import load_scene
 from ffr_dyn.studies.measures import ERROR, Measured, values, wanted
-from ffr_prep.body import BodyError
+from ffr_prep.body import BodyError, FlexibleBody, load_body
 from ffr_prep.common.errors import ComputationError, InputError
 
 COMMAND = (
     "ffr_prep.cli"  # a command line is all that is known of it here; a process for each would load the mesher anew
 )
+LOADED = 8  # bodies that a worker keeps
 KEY = 24  # hexadecimal digits of a body's name
 
 
@@ -68,12 +70,19 @@ def _row(task: Task, point: Point) -> Row:
     if missing:
         return Row(point.number, {}, missing[0])
     try:
-        scene, settings = load_scene(task.scene, point.of_scene, point.bodies)
+        bodies = {name: _body(path) for name, path in point.bodies.items()}
+        scene, settings = load_scene(task.scene, point.of_scene, bodies)
         path = f"{task.histories}/run-{point.number:06d}.nc" if task.histories else None
         result = run(scene, _kept(settings, task.outputs, bool(path)), path=path)
         return Row(point.number, values(task.outputs, result, point.parameters))
     except (InputError, BodyError, ComputationError) as error:
         return Row(point.number, {}, " ".join(str(error).split()))
+
+
+@lru_cache(maxsize=LOADED)
+def _body(path: str) -> FlexibleBody:
+    """The body of a file that is named by what is in it; what was prepared of it for other runs is kept with it."""
+    return load_body(path)
 
 
 def _kept(settings: Settings | MomentSettings, outputs: tuple[Measured, ...], whole: bool) -> Settings | MomentSettings:

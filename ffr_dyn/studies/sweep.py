@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 
 from ffr_dyn.chart.runner import Failure, Pool, pool
+from ffr_dyn.functions.together import processors
 from ffr_dyn.scene_file.parameters import flattened
 from ffr_dyn.scene_file.source import read_source
 from ffr_dyn.studies.plan import Study, load_study, recipe
 from ffr_dyn.studies.runs import Point, Recipe, Row, Task, body_file, make, perform
 from ffr_dyn.studies.table import Journal, Table, journal_of, save_table, table
+from ffr_dyn.studies.workers import crew
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.outputs import check_output
 
@@ -35,7 +38,7 @@ def sweep(
 
     study    : `fd.study(...)`, or a study file
     cache    : folder of the bodies that are made; default: <path>.bodies. Workers elsewhere must see it
-    workers  : local processes (default half the processors; 0: here);  cluster: address of a Dask scheduler instead
+    workers  : local processes (default one for every processor; 0: here);  cluster: address of a Dask scheduler instead
     progress : called with (runs done, runs);  making: the same of bodies
 
     A study that was stopped or killed goes on with the same path; what is done is not done again, and the table is the same
@@ -55,9 +58,14 @@ def sweep(
     with Journal(path, made) as journal:
         left = [number for number in range(len(made.points)) if number not in journal.rows]
         if left:
-            with pool(workers, cluster) as where:
-                points = _points(made, left, _bodies(made, left, folder, where, making or _silent))
-                _run(made, path, points, where, journal, progress or _silent)
+            try:
+                with _where(workers, cluster) as where:
+                    points = _points(made, left, _bodies(made, left, folder, where, making or _silent))
+                    _run(made, path, points, where, journal, progress or _silent)
+            except KeyboardInterrupt as end:
+                kept = f"{journal_of(path)} holds {len(journal.rows)} of {len(made.points)} runs"
+                end.add_note(f"{kept}, and the same command goes on with them")
+                raise
         found = table(made, journal.rows)
         if found.failed.size == len(found):
             journal_of(path).unlink()
@@ -65,6 +73,12 @@ def sweep(
         save_table(found, path)
     journal_of(path).unlink()
     return found
+
+
+def _where(workers: int | None, cluster: str | None) -> AbstractContextManager[Pool]:
+    if cluster is not None or workers == 0:
+        return pool(workers, cluster)
+    return crew(processors() if workers is None else workers)
 
 
 def _silent(done: int, total: int) -> None:

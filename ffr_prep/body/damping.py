@@ -72,6 +72,8 @@ def damped(
 
 def with_damping(body: FlexibleBody, given: Damping) -> FlexibleBody:
     """The body and its parts with more damping."""
+    if not (given.alpha or given.beta or given.loss_factor or len(given.bands) or len(given.ratios)):
+        return body
     omega = np.sqrt(body.omega2)
     ratios = _by_band(given.bands, body.frequencies) + _by_number(given.ratios, body.frequencies)
     rates = given.alpha + given.beta * body.omega2 + given.loss_factor * omega + 2 * ratios * omega

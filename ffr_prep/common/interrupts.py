@@ -40,13 +40,17 @@ def ending_in_order() -> Iterator[None]:
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """Signals that ask the process to end wait until the block has ended: for steps that must be done whole."""
+    """Signals that ask the process to end wait until the block has ended: for steps that must be done whole.
+
+    Where it stands on the way of one that ends the process already, that is enough.
+    """
     waiting: list[int] = []
+    ends = isinstance(sys.exc_info()[1], KeyboardInterrupt)
     try:
         with _handled(lambda number, frame: waiting.append(number)):
             yield
     finally:
-        for number in [*waiting, *_lost()][:1]:
+        for number in [*([] if ends else waiting), *_lost()][:1]:
             signal.raise_signal(number)
 
 

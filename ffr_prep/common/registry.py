@@ -110,13 +110,21 @@ def loaded(target: Target) -> Any:
     return getattr(import_module(module), name)
 
 
+_PLUGIN = "ffr_plugin:"  # before the path, in the name of the module
+
+
+def plugins() -> list[str]:
+    """Files of Python that were loaded, for other processes to do the same."""
+    return [name.removeprefix(_PLUGIN) for name in sys.modules if name.startswith(_PLUGIN)]
+
+
 def load_plugin(path: str | Path) -> None:
     """Run a file of Python, once, which registers entries. Raises InputError for a file that fails.
 
     >>> fd.load_plugin("own.py")
     """
     path = Path(path)
-    name = f"ffr_plugin:{path.resolve()}"
+    name = f"{_PLUGIN}{path.resolve()}"
     if name in sys.modules:
         return
     spec = importlib.util.spec_from_file_location(name, path)

@@ -67,7 +67,19 @@ def test_a_name_loads_its_room_alone():
 
 # ---- the pages use the door alone -----------------------------------------------------------------------------------
 
-PAGES = ("analyses", "chart", "economy", "forces", "integrators", "realtime", "rotating", "scene_file", "stress")
+ALLOWED = {"import ffr_dyn as fd", "import ffr_prep as fp", "from dask_jobqueue import SLURMCluster"}
+PAGES = (
+    "analyses",
+    "chart",
+    "economy",
+    "forces",
+    "integrators",
+    "realtime",
+    "rotating",
+    "scene_file",
+    "stress",
+    "studies",
+)
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -75,7 +87,7 @@ def test_pages_use_the_door_alone(page):
     text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
     for block in re.findall(r"```python\n(.*?)```", text, re.S):
         imported = [node for node in ast.walk(ast.parse(block)) if isinstance(node, ast.Import | ast.ImportFrom)]
-        assert {ast.unparse(node) for node in imported} <= {"import ffr_dyn as fd", "import ffr_prep as fp"}
+        assert {ast.unparse(node) for node in imported} <= ALLOWED
     assert {name for name in re.findall(r"\bfd\.(\w+)", text) if name not in fd.__all__} == set()
 
 

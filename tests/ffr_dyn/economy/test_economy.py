@@ -48,6 +48,7 @@ from ffr_dyn.economy.steps import _from_two_rows, _of_both, chosen_step, error_o
 from ffr_dyn.economy.verification import _better, _known
 from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.time_functions import TimeFunction
+from ffr_dyn.functions.together import alone
 from ffr_dyn.integrators import ROS2, ROS3
 from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.results.result import Result
@@ -417,6 +418,18 @@ def test_stiffening_is_kept_above_the_critical_spin():
     assert blade.stiffened
     assert (found.verification.error <= found.limits).all()
     assert {one.body for one in found.stiffening} == {"blade"}
+
+
+@pytest.mark.parametrize("verify", [True, False], ids=["verified", "estimated"])
+def test_runs_at_the_same_time_find_the_same_model(verify):
+    how = {"end": 0.4, "output_step": 0.02, "tolerance": 1e-3, "verify": verify}
+    beside = economise(pendulum(7e9), TIP, **how)
+    with alone():
+        after = economise(pendulum(7e9), TIP, **how)
+    assert as_text(beside) == as_text(after)
+    assert beside.search_cost == after.search_cost
+    assert [one.choice for one in beside.runs] == [one.choice for one in after.runs]
+    np.testing.assert_array_equal(beside.error, after.error)
 
 
 def test_a_model_is_refined_where_verification_finds_it_wrong():

@@ -10,6 +10,7 @@ from test_dyn_plane import slider_crank as flexible_crank
 
 import ffr_dyn as fd
 from ffr_dyn.functions.time_functions import evaluate
+from ffr_dyn.functions.together import alone
 
 FORCED = 3.0  # rad/s
 
@@ -57,6 +58,9 @@ def test_multipliers_of_mathieus_equation():
     def rates(t, y):
         return [y[1], -(9.81 + evaluate(shaking, t)[0]) / (4 / 3) * y[0]]
 
+    with alone():
+        after = fd.periodic(scene, period=period, method=fd.RK4(period / 2000), floquet=True)
+    assert after.attributes["multipliers"] == found.attributes["multipliers"]
     ends = [solve_ivp(rates, (0, period), y, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1] for y in np.eye(2)]
     expected = np.linalg.eigvals(np.array(ends).T)
     values = [complex(*pair) for pair in found.attributes["multipliers"]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from contextlib import chdir
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -293,4 +294,16 @@ OTHER = [
     Case(p(run, HUGE), p(run, HINGED)),
     Case(lambda: run(locking(), RK4(1e-3), 0.5, stabilisation=Drifting()), lambda: run(locking(), RK4(1e-3))),
 ]
-CASES = RESUMED + KNOWN + OTHER
+
+
+def beside(**how: object) -> object:
+    """Two runs at once."""
+    with TemporaryDirectory() as folder, chdir(folder):
+        return fd.forward_many([HINGED] * 2, end=0.1, output_step=0.05, method=ROS2(1e-2), **how)
+
+
+MANY = [
+    Case(p(beside, paths=["a.nc"]), p(beside, paths=["a.nc", "b.nc"])),
+    Case(p(beside, threads=0), p(beside, threads=1)),
+]
+CASES = RESUMED + KNOWN + OTHER + MANY

@@ -20,6 +20,7 @@ from ffr_dyn.studies.draw import plot_study
 from ffr_dyn.studies.plan import study
 from ffr_dyn.studies.sampling import Axis, Spread, points, spaced
 from ffr_dyn.studies.table import Journal, Table, load_table
+from ffr_dyn.studies.workers import crew
 
 p = partial
 ANGLE = {"angle": "hinge.angle: last"}
@@ -75,6 +76,15 @@ def sampled(spread: Spread, **more: object) -> object:
     return points({"x": spread}, **{"samples": 4, **more})
 
 
+def loaded(**bodies: str) -> object:
+    return inside(fd.load_scene, "bar.toml", bodies=bodies)
+
+
+def opened(count: int) -> object:
+    with crew(count) as found:
+        return found
+
+
 TABLE = Table({"g": [1.0]}, {"angle": np.ones(1)}, ("",))
 NORMAL = Spread("normal", (0.0, 1.0))
 NUMBERS = np.array([1.0, 2.0, 3.0])
@@ -105,6 +115,8 @@ CASES = [
     Case(p(swept, {"x": "hinge.torque: last"}), swept),
     Case(p(swept, space=False), swept),
     Case(p(swept, another=True), swept),
+    Case(p(loaded, baar="strip.ffr"), p(loaded)),
+    Case(p(opened, -1), p(opened, 1)),
     Case(p(TABLE.__getitem__, "angel"), p(TABLE.__getitem__, "angle")),
     Case(p(read, study=False), p(read, study=True)),
     Case(p(drawn, NUMBERS, "angel"), p(drawn, NUMBERS, "angle")),

@@ -93,9 +93,10 @@ def test_a_study_that_was_stopped_goes_on_to_the_same_bits(folder):
         if done >= 5:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt) as caught:
         fd.sweep(folder / "study.toml", folder / "t.nc", workers=0, progress=stop)
     journal = journal_of(folder / "t.nc")
+    assert caught.value.__notes__ == [f"{journal} holds 5 of 12 runs, and the same command goes on with them"]
     journal.write_bytes(journal.read_bytes()[:-7])
     with Journal(folder / "t.nc", fd.load_study(folder / "study.toml")) as opened:
         assert len(opened.rows) == 4
@@ -107,9 +108,16 @@ def test_a_study_that_was_stopped_goes_on_to_the_same_bits(folder):
 
 
 def test_workers_make_the_same_file(folder):
-    pytest.importorskip("dask.distributed")
     fd.sweep(folder / "study.toml", folder / "whole.nc", workers=0)
     fd.sweep(folder / "study.toml", folder / "t.nc", workers=2)
+    assert (folder / "t.nc").read_bytes() == (folder / "whole.nc").read_bytes()
+
+
+def test_a_dask_cluster_makes_the_same_file(folder):
+    distributed = pytest.importorskip("dask.distributed")
+    fd.sweep(folder / "study.toml", folder / "whole.nc", workers=0)
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster:
+        fd.sweep(folder / "study.toml", folder / "t.nc", cluster=cluster.scheduler_address)
     assert (folder / "t.nc").read_bytes() == (folder / "whole.nc").read_bytes()
 
 
