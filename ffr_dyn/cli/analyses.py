@@ -27,6 +27,7 @@ from ffr_dyn.cli.run import (
     time_option,
     with_options,
 )
+from ffr_prep.common.docstrings import prose
 from ffr_prep.common.errors import InputError
 
 if TYPE_CHECKING:
@@ -104,7 +105,7 @@ def analysis_command(word: str) -> click.Command:
     forces = _FORCES if any(_is_force(made, f) for f in fields(made)) else ""
     example = f"\b\nExample:\n  {made.example}\n" if made.example else ""
 
-    @click.command(word, help=f"{analyses()[word]}\n\n{made.__doc__}", epilog=forces + example)
+    @click.command(word, help=f"{analyses()[word]}\n\n{prose(made.__doc__)}", epilog=forces + example)
     @with_options(*options, *_own_options(made))
     def command(scene: Path, **given: Any) -> None:
         _analyse(made, scene, given)
