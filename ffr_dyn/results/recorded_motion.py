@@ -121,7 +121,7 @@ class Pose:
 
 @dataclass(frozen=True, repr=False)
 class View(Brief):
-    """Recorded rows of a compiled scene that do not change any more: what is made of them for one quantity is kept for others.
+    """Recorded rows of a compiled scene that do not change any more: what is made for one quantity is kept for others.
 
     Bodies of second order are recorded in their mean-axis form; what is asked for by a public name is in the frames that
     bodies have of their own (`ffr_dyn.variants.mean_axis`).
