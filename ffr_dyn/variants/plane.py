@@ -31,6 +31,7 @@ Marker = TypeVar("Marker", Interface, FrameMarker)
 AXES = "xyz"
 _NOTHING = 1e-9  # of gravity and velocities
 _ZERO = 5e-8  # of the motion of a mode: what a symmetric mesh leaves; what it does to the motion goes with the square
+_LEFT_OUT = 0.05  # of the motion of a mode: what a declaration may leave out of it
 _MIXED = 1e-12  # of a mode of norm one
 # What the search for a plane understands; a scene with anything else is planar only when it is declared so.
 _KNOWN = {"bodies", "joints", "drivers", "couplings", "loads", "springs", "forces", "ground"}
@@ -51,12 +52,29 @@ def planar_forms(scene: Scene) -> Iterator[Scene]:
                 f"the scene is declared planar with the normal {scene.plane}, but {obstacle}; take that away, or "
                 'declare plane = "none"'
             )
+        _check_declared(scene, normal)
         yield _in_plane(scene, normal)
     if scene.plane == "auto":
         for normal in range(3):
             level = levelled(scene, normal)
             if not any(True for _ in _obstacles(level, normal)):
                 yield _in_plane(level, normal)
+
+
+def _check_declared(scene: Scene, normal: int) -> None:
+    """InputError where a declared plane would leave out much of what a mode does."""
+    for body in scene.bodies:
+        k, used = body_normal(body, normal), used_interfaces(scene, body)
+        if not body.model.n:
+            continue
+        V = basis_in_plane(body, k)
+        share, text = _most_mixed(body.model if V is None else with_basis(body.model, V), k, used)
+        if share > _LEFT_OUT:
+            raise InputError(
+                f"the scene is declared planar with the normal {scene.plane}, but {text}, of body {body.name!r}: reduce it "
+                "with all modes of one frequency, which is one mode more or fewer, or symmetric about the plane; or declare "
+                'plane = "none"'
+            )
 
 
 def obstacles(scene: Scene) -> tuple[str, tuple[str, ...]]:
@@ -180,19 +198,25 @@ def _mixed_damping(body: FlexibleBody, stays: Array) -> str:
 
 
 def _mixed_modes(body: FlexibleBody, k: int, used: Sequence[str], *, second_order: bool) -> str:
-    size = _sizes(body, used)
-    along, across = _motion_along(body, k, used) / size, _motion_across(body, k, used) / size
-    mixed = np.minimum(along, across)
-    if mixed.max() >= _ZERO:
-        j = int(np.argmax(mixed))
-        way, hertz = "across" if along[j] > across[j] else "in", np.sqrt(body.omega2[j]) / (2 * np.pi)
-        return f"mode {j + 1} ({hertz:.4g} Hz) makes {mixed[j]:.2g} of its motion {way} the plane"
+    share, text = _most_mixed(body, k, used)
+    if share >= _ZERO:
+        return text
     stays = _mostly(body, k, used)
     if (coupling := _coupling(body, stays, k)) >= _ZERO:
         return f"its mass couples modes in the plane and across it by {coupling:.2g}"
     if second_order and not _splits(body, stays, k, used):
         return "its second-order displacement couples modes in the plane and across it"
     return ""
+
+
+def _most_mixed(body: FlexibleBody, k: int, used: Sequence[str]) -> tuple[float, str]:
+    """Of the mode that is least in the plane or across it alone, how much of its motion goes the other way; in words."""
+    size = _sizes(body, used)
+    along, across = _motion_along(body, k, used) / size, _motion_across(body, k, used) / size
+    mixed = np.minimum(along, across)
+    j = int(np.argmax(mixed))
+    way, hertz = "across" if along[j] > across[j] else "in", np.sqrt(body.omega2[j]) / (2 * np.pi)
+    return float(mixed[j]), f"mode {j + 1} ({hertz:.4g} Hz) makes {mixed[j]:.2g} of its motion {way} the plane"
 
 
 def _coupling(body: FlexibleBody, stays: Array, k: int) -> float:

@@ -77,6 +77,7 @@ def older(*, stiffening: bool) -> object:
 
 SIZE = len(cloud(2).surface.points)
 SCENES = [
+    Case(p(run, replace(CLOUD, plane="z"), end=0.01), p(run, replace(CLOUD, plane="none"), end=0.01)),
     Case(p(exchanged, cloud(2), (1.0, 1.0), cloud(3)), p(exchanged, cloud(3), (1.0, 1.0, 1.0), cloud(3))),
     Case(p(forced, Pressure("p", "bar", 1.0), scene=HINGED),
          lambda: run(replace(HINGED, loads=(Load("p", "bar.b", force=(0, 1.0, 0)),)))),

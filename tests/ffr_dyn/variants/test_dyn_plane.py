@@ -365,3 +365,10 @@ def test_a_declared_plane_leaves_out_what_a_rough_mesh_does_across_it(link):
         for plane in ("z", "none")
     ]
     np.testing.assert_allclose(runs[0][:, :2], runs[1][:, :2], atol=1e-6 * np.abs(runs[1]).max())
+
+
+def test_a_declared_plane_does_not_halve_a_mode(link):
+    """One of two modes of one frequency in any plane: half of its motion would be lost, and the rod be as good as stiff."""
+    with pytest.raises(InputError, match=r"mode \d+ \(.*\) makes 0\.\d+ of its motion .*, of body 'one': reduce it"):
+        flattened(double_pendulum(turned_modes(link, 0.6), plane="z"), 0.0)
+    assert flattened(double_pendulum(turned_modes(link, 0.6)), 0.0)[0].plane == "none"
