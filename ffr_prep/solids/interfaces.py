@@ -60,7 +60,10 @@ def _tied(A: sp.csr_array, B: sp.csr_array, free: Array) -> sp.csr_array:
     across = along[free]
     own, corner = A[free][:, free], sp.csr_array(following.T @ along)
     rows = [sp.hstack([own, across], format="csr"), sp.hstack([sp.csr_array(across.T), corner], format="csr")]
-    return sp.csr_array(sp.vstack(rows, format="csr"))
+    whole = sp.csr_array(sp.vstack(rows, format="csr"))
+    whole.eliminate_zeros()
+    whole.sort_indices()  # products of matrices leave neither, and bits depend on the order of sums
+    return whole
 
 
 def turning_regions(
