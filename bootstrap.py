@@ -132,21 +132,27 @@ def demo() -> int:
 
 def site(*, links: bool) -> int:
     """The pages, and where to open them."""
-    kinds = ("html", "linkcheck") if links else ("html",)
-    passed = [check("site" if kind == "html" else "links", _pages(kind)) for kind in kinds]
-    print(f"{HOME / SITE / 'html' / 'index.html'}")
-    return 0 if all(passed) else 1
+    passed = build_pages() and (not links or check("links", [*_pages("linkcheck"), "--define", "plot_gallery=0"]))
+    print(HOME / SITE / "html" / "index.html")
+    return 0 if passed else 1
 
 
-def _pages(kind: str) -> list[str]:
+def build_pages() -> bool:
+    """Make all pages anew, every example executed."""
+    for folder in (HOME / SITE / "html", HOME / "docs" / "gallery"):
+        shutil.rmtree(folder, ignore_errors=True)
+    return check("site", _pages("html"))
+
+
+def _pages(builder: str) -> list[str]:
     """The command that makes the pages: all warnings are collected, and any of them fails."""
     strict = ["--quiet", "--nitpicky", "--fail-on-warning", "--keep-going", "--jobs", "auto"]
-    return ["python", "-m", "sphinx", *strict, "--builder", kind, "docs", str(SITE / kind)]
+    return ["python", "-m", "sphinx", *strict, "--builder", builder, "docs", str(SITE / builder)]
 
 
 def test(*, slow: bool) -> int:
     """Every check, and the tests last: their closing line ends the output."""
-    passed = [check(title, command) for title, command in {**CHECKS, "site": _pages("html")}.items()]
+    passed = [*(check(title, command) for title, command in CHECKS.items()), build_pages()]
     selection = ["-m", ""] if slow else []
     print("pytest", flush=True)
     # A process on every core, each of which does whole files, with one thread: together they would wait for each other.

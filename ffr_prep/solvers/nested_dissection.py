@@ -122,7 +122,7 @@ def _edges(graph: sp.csr_array, one: Array, place: Array, count: int) -> sp.csr_
     """(one, two) edges between the halves; place (N,) is the number of a point in the second half, -1 elsewhere."""
     rows = graph[one]
     found = place[rows.indices]
-    inside = np.concatenate([[0], np.cumsum(found >= 0)])
+    inside = np.concatenate([[0], np.cumsum(found >= 0)]).astype(np.int32)
     indices = found[found >= 0].astype(np.int32)
     return sp.csr_array((np.ones(indices.size, np.int8), indices, inside[rows.indptr]), shape=(one.size, count))
 
