@@ -298,9 +298,11 @@ def _finished(ledger: Ledger, found: Chosen, verify: bool | None) -> Economy:
     found = found if is_verified else _heard(ledger, found)
     final = found.final
     ledger.note(final, "chosen", found.error)
+    searched = ledger.spent
     if is_verified:
         allowed = ledger.policy.asked_verification if verify else ledger.policy.unasked_verification
         final, verification = verified(ledger, found.everything, found.limits, final, found.omitted, allowed)
+    verifying = ledger.spent - searched  # less than the verification's price where the search had made some of its runs
     kept, omitted = _explained(ledger, found, final)
     names = [output.name for output in ledger.of.outputs]
     return Economy(
@@ -320,7 +322,7 @@ def _finished(ledger: Ledger, found: Chosen, verify: bool | None) -> Economy:
         terms=found.terms,
         before=ledger.cost_of(_everything_in_space(found, final)),
         cost=ledger.cost(final),
-        search_cost=ledger.spent - (0.0 if verification is None else verification.cost),
+        search_cost=ledger.spent - verifying,
         tried=tuple(ledger.tried),
         runs=_all_runs(ledger, found, verification),
         unmoved=unmoved(found.omitted, found.scales, names, ledger.policy),
