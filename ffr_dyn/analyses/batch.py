@@ -51,8 +51,8 @@ def forward_many(
     that fails leaves the others alone. Raises InputError for settings that no scene could use. After Ctrl-C the runs that
     have begun end within a second, and their files are readable.
 
-        results = fd.forward_many([crank(speed) for speed in speeds], end=0.1, output_step=1e-3, method=fd.ROS2(1e-4))
-        forces = [r["pin.force"] for r in results if isinstance(r, fd.Result)]
+    >>> results = fd.forward_many([crank(speed) for speed in speeds], end=0.1, output_step=1e-3, method=fd.ROS2(1e-4))
+    >>> forces = [r["pin.force"] for r in results if isinstance(r, fd.Result)]
     """
     scenes = several("scenes", scenes, (Scene,))
     check_output_step(output_step)

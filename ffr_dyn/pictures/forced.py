@@ -13,10 +13,9 @@ from ffr_dyn.results.result import Result
 def draw_forced(result: Result, path: str | Path) -> Path:
     """Draw the amplitudes over the frequency of what `forced` returns, unstable motions dotted: .png, .svg or .pdf.
 
-        found = fd.forced(scene, input="hinge.moment", amplitude=3.0, outputs=["arm.tip.position.y"], band_of=(1, 50))
-        fd.draw_forced(found, "forced.png")
-
     Raises InputError for another kind of file.
+
+    >>> fd.draw_forced(found, "forced.png")  # of what fd.forced returned
     """
     f, stable = result["frequency"], result["stable"] > 0
     beside = ~stable  # with the neighbours, so that no gap is left

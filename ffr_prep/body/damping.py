@@ -29,6 +29,8 @@ class Damping:
     ratios      : damping ratios of the modes by rising frequency, the last one also of all others
 
     Raises BodyError for negative or infinite values and for bands that do not ascend.
+
+    >>> damping = fp.Damping(alpha=2.0, beta=1e-6, ratios=[0.01])  # a Request takes it
     """
 
     alpha: float = 0.0

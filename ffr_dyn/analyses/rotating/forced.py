@@ -38,7 +38,10 @@ GROWS = 1e-4  # of a multiplier beyond one: what differences leave
 
 @dataclass(frozen=True)
 class Forced(OfMoment):
-    """Amplitudes under a harmonic input of a given size, stable and unstable, where they jump, and their harmonics."""
+    """Amplitudes under a harmonic input of a given size, stable and unstable, where they jump, and their harmonics.
+
+    >>> analysis = fd.Forced(input="hinge.moment", amplitude=3.0, quantities=("arm.tip.position.y",), band="1..50")
+    """
 
     keeps: ClassVar[bool] = False
     example: ClassVar[str] = (
@@ -116,10 +119,9 @@ def forced(
     `jumps`, frequencies [Hz] where the branch turns back and a machine jumps to another, and `losses`, where it becomes
     unstable or stable otherwise.
 
-        found = fd.forced(scene, input="hinge.moment", amplitude=3.0, outputs=["arm.tip.position.y"], band_of=(1, 50))
-        fd.draw_forced(found, "forced.png")
-
     Raises InputError for inputs, outputs and bands that cannot be; ComputationError where no such motion is found.
+
+    >>> found = fd.forced(scene, input="hinge.moment", amplitude=3.0, outputs=["arm.tip.position.y"], band_of=(1, 50))
     """
     require_scene(scene)
     _check(amplitude, band_of, steps, harmonics, about)
