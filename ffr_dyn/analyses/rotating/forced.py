@@ -67,7 +67,8 @@ class Forced(OfMoment):
     )
     steps: int = field(default=STEPS, metadata=option("--steps", "Time steps of a period."))
     about: About = field(
-        default="start", metadata=option("--start/--equilibrium", "Vibrates about the start, or the equilibrium.")
+        default="start",
+        metadata=option("--start/--equilibrium", "Vibrates about the start. | Vibrates about the equilibrium."),
     )
     picture: str = field(default="", metadata=option("--picture", "Draw amplitudes.", metavar="FILE"))
 
