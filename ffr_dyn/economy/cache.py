@@ -36,6 +36,7 @@ class Tried:
 class Ledger:
     """Runs by their choice; `spent` [us] by the cost model.
 
+    asked : [us] of the runs and twins that were asked for since it was emptied, made then or before
     ahead : what came of runs that were made before they are asked for, and until then count as not made
     """
 
@@ -50,6 +51,7 @@ class Ledger:
     models: dict[tuple[tuple[Part, ...], str], Made] = field(default_factory=dict)
     ahead: dict[tuple[Choice, bool], Trial | Exception] = field(default_factory=dict)
     spent: float = 0.0
+    asked: dict[tuple[Choice, bool], float] = field(default_factory=dict)
     tried: list[Tried] = field(default_factory=list)
 
     def made(self, choice: Choice) -> Made:
@@ -72,6 +74,7 @@ class Ledger:
         if choice not in self.runs:
             self.runs[choice] = self._had(choice, is_twin=False)
             self.spent += self.cost(self.runs[choice])
+        self.asked[choice, False] = self.cost(self.runs[choice])
         return self.runs[choice]
 
     def vibrations(self, choice: Choice) -> Vibrations:
@@ -84,6 +87,7 @@ class Ledger:
         if like not in self.twins:
             self.twins[like] = self._had(like, is_twin=True)
             self.spent += self.cost(self.twins[like])
+        self.asked[like, True] = self.cost(self.twins[like])
         return self.twins[like]
 
     def begin(self, runs: Sequence[Choice], twins: Sequence[Choice] = ()) -> None:

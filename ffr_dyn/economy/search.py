@@ -298,11 +298,11 @@ def _finished(ledger: Ledger, found: Chosen, verify: bool | None) -> Economy:
     found = found if is_verified else _heard(ledger, found)
     final = found.final
     ledger.note(final, "chosen", found.error)
-    searched = ledger.spent
+    ledger.asked.clear()
     if is_verified:
         allowed = ledger.policy.asked_verification if verify else ledger.policy.unasked_verification
         final, verification = verified(ledger, found.everything, found.limits, final, found.omitted, allowed)
-    verifying = ledger.spent - searched  # less than the verification's price where the search had made some of its runs
+    verifying = sum(ledger.asked.values())  # of the runs that it took, which the search may have made
     kept, omitted = _explained(ledger, found, final)
     names = [output.name for output in ledger.of.outputs]
     return Economy(
