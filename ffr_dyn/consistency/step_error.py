@@ -30,6 +30,7 @@ ARM = 1e-6  # of the largest range of forces times that of positions, the same f
 MIDDLE, WINDOW = 2.2 * 1.5**0.5, 16  # of amplitudes of methods of order three
 NOISE = (70 / 36) ** 0.5  # by which rows without relation are farther off the curve than they are large
 RATES = {"position": "velocity", "R": "v", "q": "q_dot"}
+CONSTANT = 1e-8  # of the size of a kind: a range below it is rounding, as of the rate of an even turn
 AT_ONCE = 2e7  # bytes of numbers that are compared side by side
 COARSE = 0.01  # of the range, by which a row may be off the curve through its neighbours
 
@@ -151,17 +152,23 @@ def largest_difference(one: Array, other: Array) -> float:
 
 def ranges(run: Result) -> dict[str, float]:
     """Of every output but the violations of constraints: the largest range of a component, floored by those of its kind (the
-    last part of its name), where next to nothing moves."""
+    last part of its name), where next to nothing moves, and by the rounding of what is constant."""
     spans: dict[str, float] = {}
+    sizes: dict[str, float] = {}
     for names in _batches(run, (name for name in run.quantities if not name.startswith("constraint."))):
         of = _columns(run, names)
         moved = np.ptp(of.table, axis=0) if len(of.table) else np.zeros(of.table.shape[1])
         spans |= zip(names, of.largest(moved).tolist(), strict=True)
+        for name, size in zip(names, of.largest(np.abs(of.table).max(axis=0, initial=0.0)).tolist(), strict=True):
+            sizes[_kind(name)] = max(size, sizes.get(_kind(name), 0.0))
     largest: dict[str, float] = {}
     for name, span in spans.items():
         largest[_kind(name)] = max(span, largest.get(_kind(name), 0.0))
     arm = ARM * largest.get("force", 0.0) * largest.get("position", 0.0)
-    floors = {kind: max(LITTLE * most, arm if kind == "moment" else 0.0) for kind, most in largest.items()}
+    floors = {
+        kind: max(LITTLE * most, CONSTANT * sizes[kind], arm if kind == "moment" else 0.0)
+        for kind, most in largest.items()
+    }
     return {name: max(span, floors[_kind(name)]) for name, span in spans.items()}
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -67,14 +68,18 @@ def _check_declared(scene: Scene, normal: int) -> None:
         k, used = body_normal(body, normal), used_interfaces(scene, body)
         if not body.model.n:
             continue
-        V = basis_in_plane(body, k)
-        share, text = _most_mixed(body.model if V is None else with_basis(body.model, V), k, used)
+        share, text = remembered(body.model, ("declared", k, used, _ratios(body)), partial(_left_out, body, k, used))
         if share > _LEFT_OUT:
             raise InputError(
                 f"the scene is declared planar with the normal {scene.plane}, but {text}, of body {body.name!r}: reduce it "
                 "with all modes of one frequency, which is one mode more or fewer, or symmetric about the plane; or declare "
                 'plane = "none"'
             )
+
+
+def _left_out(body: Body, k: int, used: Sequence[str]) -> tuple[float, str]:
+    V = basis_in_plane(body, k)
+    return _most_mixed(body.model if V is None else with_basis(body.model, V), k, used)
 
 
 def obstacles(scene: Scene) -> tuple[str, tuple[str, ...]]:
