@@ -73,7 +73,9 @@ def new_engine(
     if method is not None and method.takes_forces:
         system = with_stiff_rows(system)
     kinds = () if method is None else (type(method),)
-    ensure_compiled(*kinds, model=system.model, forces=kernels_of(system.scene))
+    chosen = [entry.chosen(system.model) if entry.needed(system.model) else None for entry in ENTRY_POINTS.values()]
+    kernels = kernels_of(system.scene)
+    ensure_compiled(*kinds, chosen=chosen, forces=kernels)
     if method is None:
         stages, h = new_stages(system, 0), 0.0
     else:
@@ -82,21 +84,15 @@ def new_engine(
     clock = Clock(np.array([h, h or spacing]), np.zeros(3, dtype=np.int64), np.array(gains))
     control = _control(system, method, start, spacing)
     work = new_work(system.model, keeps_terms=method is not None and method.keeps_terms)
-    places = _addresses(system.model, method)
-    forces = np.array([kernel_of(kernel).address for kernel in kernels_of(system.scene)], dtype=np.int64)
+    places = np.array([0 if each is None else each.address for each in chosen], dtype=np.int64)
+    if method is not None:
+        places[step.number] = method.do_step.address
+    forces = np.array([kernel_of(kernel).address for kernel in kernels], dtype=np.int64)
     own = np.array(x, dtype=float), np.array(v, dtype=float)
     memory, addresses = aligned((places, forces, work, stages, clock, control, *own))
     places, forces, work, stages, clock, control, x, v = memory
     tables = Tables(0, places, forces, system.model, work, stages, clock, control, x, v)
     return _packed(system, tables, {**system.addresses, **addresses})
-
-
-def _addresses(model: Model, method: Integrator | None) -> Array:
-    """Of the entry points, by number; zero for those that are not called."""
-    places = [entry.chosen(model).address if entry.needed(model) else 0 for entry in ENTRY_POINTS.values()]
-    if method is not None:
-        places[step.number] = method.do_step.address
-    return np.array(places, dtype=np.int64)
 
 
 def _control(system: System, method: Integrator | None, start: float, spacing: float) -> Control:

@@ -17,7 +17,6 @@ from ffr_dyn.kernels.entry_points import add_loads, load_powers, run_controlled
 from ffr_dyn.kernels.simd.entry_point import ENTRY_POINTS, CompiledFunction, always
 from ffr_dyn.kernels.simd.force_kernel import kernel_of
 from ffr_dyn.kernels.simd.intrinsics import compiled_forms
-from ffr_dyn.kernels.tables import Model
 from ffr_prep.common.children import ending_with_us
 
 Kernel = str | CompiledFunction  # of a force: "package.module:name", or itself where that is not known
@@ -26,19 +25,23 @@ FORCES = ("ffr_dyn.kernels.forces.load:load", "ffr_dyn.kernels.forces.spring:spr
 _AT_WORK: dict[str, subprocess.Popen[bytes]] = {}
 _LOOKING = threading.Lock()  # several runs may begin at the same time
 _ON_DISK: set[str] = set()  # functions that were found there before: a program with many runs looks once
+_READY: set[tuple[object, ...]] = set()  # what was asked for before
 
 
-def begin_compiling(*kinds: type[Integrator], model: Model | None = None, forces: Sequence[Kernel] = FORCES) -> None:
+def begin_compiling(*kinds: type[Integrator], forces: Sequence[Kernel] = FORCES) -> None:
     """Start to compile what some methods need where it is not on disk, and go on with something else meanwhile.
 
     For programs that mesh and reduce bodies first: a run that needs it waits.
 
-    model  : tables of the scene; without them, of one with applied loads
     forces : kernels of the scene's forces
 
     >>> fd.begin_compiling(fd.ROS2)
     """
-    functions = _of_scene(model) + [step for step in _steps() if any(kind.do_step is step for kind in kinds)]
+    _begin(kinds, _of_any_scene(), forces)
+
+
+def _begin(kinds: Sequence[type[Integrator]], of_scene: Sequence[CompiledFunction], forces: Sequence[Kernel]) -> None:
+    functions = [*of_scene, *(step for step in _steps() if any(kind.do_step is step for kind in kinds))]
     if any(kind.controlled for kind in kinds):
         functions.append(run_controlled.general)
     wanted = {each.name: each for each in functions} | {one: kernel_of(one) for one in forces if isinstance(one, str)}
@@ -55,21 +58,28 @@ def begin_compiling(*kinds: type[Integrator], model: Model | None = None, forces
         _AT_WORK.update(dict.fromkeys(share, process))
 
 
-def _of_scene(model: Model | None) -> list[CompiledFunction]:
-    """What a scene needs whatever the method."""
-    if model is None:
-        usual = [entry.general for entry in ENTRY_POINTS.values() if entry.needed is always]
-        return [*usual, add_loads.general, load_powers.general]
-    return [entry.chosen(model) for entry in ENTRY_POINTS.values() if entry.needed(model)]
+def _of_any_scene() -> list[CompiledFunction]:
+    """What a scene with applied loads needs whatever the method."""
+    usual = [entry.general for entry in ENTRY_POINTS.values() if entry.needed is always]
+    return [*usual, add_loads.general, load_powers.general]
 
 
-def ensure_compiled(*kinds: type[Integrator], model: Model | None = None, forces: Sequence[Kernel] = ()) -> None:
-    """Have what some methods need on disk; where that fails, the run compiles them itself."""
+def ensure_compiled(
+    *kinds: type[Integrator], chosen: Sequence[CompiledFunction | None] = (), forces: Sequence[Kernel] = ()
+) -> None:
+    """Have what some methods need on disk; where that fails, the run compiles them itself.
+
+    chosen : of the entry points, by number; None for those that the scene does not call
+    """
+    wanted = (kinds, *chosen, *forces)
+    if wanted in _READY:
+        return
     with _LOOKING:
-        begin_compiling(*kinds, model=model, forces=forces)
+        _begin(kinds, [each for each in chosen if each is not None] or _of_any_scene(), forces)
         for process in set(_AT_WORK.values()):
             process.wait()
         _AT_WORK.clear()
+    _READY.add(wanted)
 
 
 def _shares(names: Sequence[str]) -> list[list[str]]:

@@ -26,7 +26,8 @@ from ffr_dyn.results.power import driven
 from ffr_dyn.results.recorded_motion import View, dot
 from ffr_dyn.scene.drivers import Driver, PointDriver
 from ffr_dyn.scene.force_kinds import forces_of
-from ffr_dyn.scene.scene import Scene, joint_of
+from ffr_dyn.scene.scene import Body, Scene, joint_of
+from ffr_prep.body import remembered
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 
@@ -250,12 +251,20 @@ def _quick(seen: Seen) -> Iterator[str]:
 def _dependent(system: System, x: Array) -> Iterator[str]:
     place = system.layout
     for b, body in enumerate(system.scene.bodies):
-        moving = [*place.active(b), *range(6, 6 + place.n[b])]
-        M = mass_matrix(kept_integrals(body), x[place.q(b)])[np.ix_(moving, moving)]
-        scale = 1.0 / np.sqrt(np.diag(M))
-        least = float(np.linalg.eigvalsh(scale[:, None] * M * scale)[0])
+        least = _least(body, (*place.active(b), *range(6, 6 + place.n[b])), x[place.q(b)])
         if not least > DEPENDENT:
             yield (
                 f"the mass matrix of body {body.name!r} is nearly singular (smallest eigenvalue {least:.1g} of a diagonal of "
                 "ones): its accelerations have few digits; keep fewer modes"
             )
+
+
+def _least(body: Body, moving: tuple[int, ...], q: Array) -> float:
+    """The smallest eigenvalue of a mass matrix with ones on its diagonal; that of a rigid body is always the same."""
+
+    def made() -> float:
+        M = mass_matrix(kept_integrals(body), q)[np.ix_(moving, moving)]
+        scale = 1.0 / np.sqrt(np.diag(M))
+        return float(np.linalg.eigvalsh(scale[:, None] * M * scale)[0])
+
+    return made() if q.size else remembered(body.model, ("least of mass", body.dropped, moving), made)

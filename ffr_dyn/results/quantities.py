@@ -11,8 +11,8 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from difflib import get_close_matches
-from functools import cache
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -73,9 +73,8 @@ class Unwound:
 Memory = Mapping[str, Unwound | Worked]
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A quantity that can be had: unit, axes, description, and how to compute its values.
+class Entry(NamedTuple):
+    """A quantity that can be had: unit, axes, description, and how to compute its values; a scene has a hundred and more.
 
     compute : (view, what the earlier rows left) -> (values (T, ...), what these rows leave)
     """
@@ -112,8 +111,7 @@ def selected(system: System, outputs: Sequence[str] = ("default",)) -> dict[str,
     wanted: set[str] = set()
     for pattern in outputs:
         patterns = DEFAULT_OUTPUTS if pattern == "default" else (pattern,)
-        fits = _one_of(patterns)
-        fitting = {name for name in everything if fits(name)}
+        fitting = {pattern} if pattern in everything else _fitting(patterns, tuple(everything))
         if not fitting:
             close = get_close_matches(pattern, everything, 3)
             known = f"did you mean {', '.join(close)}?" if close else f"there are: {', '.join(everything)}"
@@ -122,10 +120,10 @@ def selected(system: System, outputs: Sequence[str] = ("default",)) -> dict[str,
     return {name: entry for name, entry in everything.items() if name in wanted}
 
 
-@cache
-def _one_of(patterns: tuple[str, ...]) -> Callable[[str], Any]:
-    """Whether a name fits one of them."""
-    return re.compile("|".join(map(fnmatch.translate, patterns))).match
+@lru_cache(64)
+def _fitting(patterns: tuple[str, ...], names: tuple[str, ...]) -> frozenset[str]:
+    """The names that fit one of the patterns."""
+    return frozenset(filter(re.compile("|".join(map(fnmatch.translate, patterns))).match, names))
 
 
 def needs_every_step(wanted: Iterable[str]) -> bool:

@@ -11,7 +11,7 @@ import csv
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from itertools import product
@@ -321,8 +321,12 @@ def _check_quantities(result: Result) -> None:
 
 
 def _check_attributes(attributes: Mapping[str, Any]) -> None:
-    for name, value in attributes.items():
+    for name in attributes:
         _check_name("attribute", name)
+    with suppress(TypeError, ValueError):  # all at once, and one by one where that tells which
+        json.dumps(list(attributes.values()))
+        return
+    for name, value in attributes.items():
         try:
             json.dumps(value)
         except (TypeError, ValueError):

@@ -65,14 +65,19 @@ class CompiledFunction:
     def compiled(self) -> Any:
         return cfunc(types.int64(*(kind for kind, _ in self.kinds)), cache=self.own, **OPTIONS)(self.function)
 
-    @property
+    @cached_property
     def address(self) -> int:
-        return self.compiled.address
+        return int(self.compiled.address)
 
     @cached_property
     def c_function(self) -> Callable[..., int]:
-        """For calls from Python, with addresses in place of tables, records and vectors."""
+        """For calls from Python, with addresses in place of tables, records and vectors. Other threads go on meanwhile."""
         return ctypes.CFUNCTYPE(ctypes.c_int64, *(kind for _, kind in self.kinds))(self.address)
+
+    @cached_property
+    def short_call(self) -> Callable[..., int]:
+        """The same for calls of microseconds: to let go of Python's lock, and to ask for it again, takes longer."""
+        return ctypes.PYFUNCTYPE(ctypes.c_int64, *(kind for _, kind in self.kinds))(self.address)
 
 
 class EntryPoint:
@@ -98,10 +103,10 @@ class EntryPoint:
         return next((form for suits, form in self.forms if suits(model)), self.general)
 
     def __call__(self, tables: Tables, *arguments: Any) -> int:
-        """From Python: the form of the scene. Vectors are contiguous arrays of float64."""
+        """One evaluation from Python: the form of the scene. Vectors are contiguous arrays of float64."""
         packed = [pack(each) if isinstance(each, tuple) else each for each in arguments]  # which live until it returns
         given = [each.ctypes.data if isinstance(each, np.ndarray) else each for each in packed]
-        return self.chosen(tables.model).c_function(tables.address, *given)
+        return self.chosen(tables.model).short_call(tables.address, *given)
 
 
 ENTRY_POINTS: dict[str, EntryPoint] = {}
