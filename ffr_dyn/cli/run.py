@@ -27,7 +27,8 @@ file_option = click.option(
     "-o", "--file", "output", type=OUTPUT_FILE, help="Result file (netCDF); default: <scene>.nc."
 )
 parameter_option = click.option(
-    "-p", "--parameter", "parameters", multiple=True, metavar="NAME=VALUE", help="A parameter of the scene file."
+    "-p", "--parameter", "parameters", multiple=True, metavar="NAME=VALUE",
+    help="A parameter of the scene file, or another entry by its path, such as bodies.rod.damping=0.02 or gravity.2=-1.62.",
 )
 keep_option = click.option(
     "--keep", multiple=True, metavar="NAME", help="Quantities to keep, instead of the scene's; * and ? match."

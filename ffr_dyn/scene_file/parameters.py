@@ -33,14 +33,6 @@ def flattened(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return found
 
 
-def overridden(parameters: Mapping[str, Any], assignments: Mapping[str, str]) -> dict[str, Any]:
-    """The parameters with those of a command line (by name, as text). Raises InputError for names that do not exist."""
-    for name in assignments:
-        if name not in parameters:
-            raise InputError(f"there is no parameter {name!r}; {nearest(name, parameters)}")
-    return {**parameters, **assignments}
-
-
 class Parameters(Mapping[str, Any]):
     """Values by name, each worked out when it is first asked for, whatever the order in which they stand."""
 

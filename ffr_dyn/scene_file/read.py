@@ -42,7 +42,8 @@ from ffr_dyn.integrators import Integrator, Tolerances, Within, method_named, st
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import GROUND, Body, Scene
-from ffr_dyn.scene_file.parameters import Parameters, as_number, flattened, nearest, overridden, substituted
+from ffr_dyn.scene_file.assignments import assigned
+from ffr_dyn.scene_file.parameters import Parameters, as_number, nearest, substituted
 from ffr_dyn.scene_file.schema import (
     BodyEntry,
     Kind,
@@ -75,7 +76,8 @@ def load_scene(
 ) -> tuple[Scene, Settings | MomentSettings]:
     """Read a scene file.
 
-    parameters : values, as text, in place of those in the file, such as {"crank.length": "0.15"}
+    parameters : values, as text, in place of those in the file, such as {"crank.length": "0.15"}; of other entries by the
+                 path of their keys, such as {"bodies.rod.damping": "0.02", "gravity.2": "-1.62"}
     bodies     : body files, or bodies, in place of the files that it names, by the names of the bodies there
 
     Raises InputError that names the file, the entry, its value and what is expected, with the nearest known name.
@@ -105,8 +107,9 @@ def _read(path: Path, parameters: Mapping[str, str]) -> tuple[Any, Source]:
     if other := next((of for key, of in _OTHERS.items() if key in source.tree), None):
         raise InputError(f"{path} is not a scene but {other}")
     try:
-        values = Parameters(overridden(flattened(source.tree.pop("parameters", {})), parameters))
-        tree = substituted(source.tree, values, "")
+        tree, own = assigned(source, parameters)
+        values = Parameters(own)
+        tree = substituted(tree, values, "")
         known = {name: values[name] for name in values} | _signals(tree.get("inputs", {}), values)
     except InputError as error:
         keys = tuple(str(error).partition(":")[0].split("."))

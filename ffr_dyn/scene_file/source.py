@@ -49,7 +49,7 @@ def origin_of_name(source: Source, message: str) -> str:
     """File and line of the entry that a complaint names first, in quotes; of the file where it names none."""
     for name in re.findall(r"'([^']+)'", message):
         for table, entries in source.tree.items():
-            if isinstance(entries, dict) and name in entries:
+            if table != "parameters" and isinstance(entries, dict) and name in entries:
                 return origin(source, (table, name))
     return origin(source, ())
 

@@ -28,7 +28,7 @@ from ffr_dyn.integrators import CONTROLLED, Controlled, Integrator, Within, meth
 from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation
 from ffr_dyn.scene.parts import as_declared, cut_joints
 from ffr_dyn.scene.scene import Body, Scene
-from ffr_dyn.scene_file.parameters import flattened, overridden
+from ffr_dyn.scene_file.assignments import assigned
 from ffr_dyn.scene_file.read import load_scene
 from ffr_dyn.scene_file.schema import Kind, fields_of_motion, formula_of, keys_of, nested_kinds, tables
 from ffr_dyn.scene_file.source import PATHS, read_source
@@ -71,14 +71,14 @@ def save_changed(
     given : values, as text, of parameters in place of those in the original file
     """
     source, (first, how) = read_source(Path(original)), load_scene(original, given)
-    parameters = overridden(flattened(source.tree.pop("parameters", {})), given)
+    declared, parameters = assigned(source, given)
     path = save_scene(scene, settings, path)
     if not parameters:
         return path
     text = path.read_text(encoding="utf-8")
     plain = tomllib.loads(text)
     before = tomllib.loads(to_toml(first, how, {body.name: "" for body in first.bodies if not _is_plain(body.model)}))
-    tree = _as_given(plain, before, _moved(_without_marked(source.tree), path.parent))
+    tree = _as_given(plain, before, _moved(_without_marked(declared), path.parent))
     _replace(path, "\n".join(_lines({"parameters": parameters, **tree}, ())) + "\n")
     files = {name: entry["file"] for name, entry in plain["bodies"].items() if "file" in entry}
     if tomllib.loads(to_toml(*load_scene(path), files)) != plain:

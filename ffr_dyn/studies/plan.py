@@ -26,13 +26,14 @@ import hashlib
 import json
 import re
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from ffr_dyn.scene_file.assignments import places_of, unknown
 from ffr_dyn.scene_file.parameters import flattened, nearest, substituted
 from ffr_dyn.scene_file.read import body_files
 from ffr_dyn.scene_file.source import read_source
@@ -210,20 +211,25 @@ def _range(name: str, given: Mapping[str, Any]) -> Axis:
 
 
 def _check(made: Study) -> None:
-    source = read_source(made.scene)
-    own = flattened(source.tree.get("parameters", {}))
-    texts = list(_texts(source.tree))
+    tree = read_source(made.scene).tree
+    own, places, texts = flattened(tree.get("parameters", {})), places_of(tree), list(_texts(tree))
     for name in made.parameters:
-        if re.fullmatch(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", name) is None:
+        if re.fullmatch(r"[A-Za-z_]\w*(\.\w+)*", name) is None:
             raise InputError(f"parameters.{name}: use letters, digits, '_' and dots in its name")
         in_bodies = any(_mentions(line, name) for line in made.recipes.values())
-        if name not in own and not in_bodies:
-            raise InputError(
-                f"there is no parameter {name!r} in {made.scene} or in a line that makes a body; {nearest(name, own)}"
-            )
-        if not in_bodies and not any(_mentions(text, name) for text in texts):
+        if not in_bodies and name not in own and name not in places:
+            raise InputError(f"in {made.scene} and in lines that make bodies {unknown(name, own, places)}")
+        if not in_bodies and name in own and not any(_mentions(text, name) for text in texts):
             raise InputError(f"the parameter {name!r} changes nothing: nothing in {made.scene} uses it; leave it out")
+    _check_overlap(made.parameters)
     _check_bodies(made)
+
+
+def _check_overlap(names: Sequence[str]) -> None:
+    """InputError where one parameter is a part of another, as gravity and gravity.2."""
+    for name in names:
+        if part := next((other for other in names if other.startswith(f"{name}.")), None):
+            raise InputError(f"parameters: {part!r} is a part of {name!r}: give values to one of them")
 
 
 def _check_bodies(made: Study) -> None:
@@ -263,10 +269,16 @@ def _texts(tree: Any, where: tuple[str, ...] = ()) -> Iterator[str]:
 
 def of_scene(made: Study, point: Mapping[str, Value]) -> dict[str, str]:
     """The parameters of a point that are the scene's, as text."""
-    own = flattened(read_source(made.scene).tree.get("parameters", {}))
+    own = names_of_scene(made)
     return {
         name: repr(value) if isinstance(value, float) else str(value) for name, value in point.items() if name in own
     }
+
+
+def names_of_scene(made: Study) -> frozenset[str]:
+    """The parameters that are the scene's, or entries of it."""
+    tree = read_source(made.scene).tree
+    return frozenset(made.parameters) & {*flattened(tree.get("parameters", {})), *places_of(tree)}
 
 
 def recipe(made: Study, body: str, point: Mapping[str, Value]) -> str:

@@ -9,9 +9,7 @@ from pathlib import Path
 
 from ffr_dyn.chart.runner import Failure, Pool, pool
 from ffr_dyn.functions.together import processors
-from ffr_dyn.scene_file.parameters import flattened
-from ffr_dyn.scene_file.source import read_source
-from ffr_dyn.studies.plan import Study, load_study, recipe
+from ffr_dyn.studies.plan import Study, load_study, names_of_scene, recipe
 from ffr_dyn.studies.runs import Point, Recipe, Row, Task, body_file, make, perform
 from ffr_dyn.studies.table import Journal, Table, journal_of, save_table, table
 from ffr_dyn.studies.workers import crew
@@ -112,8 +110,7 @@ def _bodies(
 
 def _points(study: Study, left: Sequence[int], bodies: Mapping[tuple[str, str], str]) -> list[Point]:
     """Those of equal bodies beside each other, whose files a worker then reads once."""
-    own = flattened(read_source(study.scene).tree.get("parameters", {}))
-    found = []
+    own, found = names_of_scene(study), []
     for k in left:
         point = study.points[k]
         texts = {name: repr(v) if isinstance(v, float) else str(v) for name, v in point.items() if name in own}

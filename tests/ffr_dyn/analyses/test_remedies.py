@@ -107,6 +107,7 @@ PARTS = {
     "consistency/failure.py": ("_locks", "_overflow", "_unconverged"),
     "consistency/validity.py": ("meaningless",),
     "integrators/stabilisation.py": ("excess_of_gains",),
+    "scene_file/assignments.py": ("unknown",),
 }
 
 # ---- scenes -------------------------------------------------------------------------------------------------------------

@@ -100,6 +100,8 @@ CASES = [
     Case(asked({"g h": [1]}), asked(G)),
     Case(asked({"gg": [1]}), asked(G)),
     Case(asked({**G, "idle": [1]}), asked(G)),
+    Case(asked({"bodies.bar.mas": [1]}), asked({"bodies.bar.mass": [1]})),
+    Case(asked({"gravity": [1], "gravity.2": [1]}), asked({"gravity.2": [1]})),
     Case(made({"stripe": LINE}), made({"strip": LINE})),
     Case(made({"strip": f"modes {LINE}"}), made({"strip": LINE})),
     Case(asked(G, {"angle": "hinge.angle"}), asked(G)),

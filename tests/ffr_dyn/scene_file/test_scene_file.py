@@ -138,6 +138,23 @@ def test_parameters_can_be_given_from_outside(tmp_path):
         load_scene(path, {"bar.lenght": "0.5"})
 
 
+def test_any_entry_can_be_given_from_outside(tmp_path):
+    path = written(tmp_path)
+    scene, settings = load_scene(
+        path, {"gravity.2": "-1.62", "bodies.bar.mass": "250 g", "analysis.end": "3", "bodies.bar.inertia": "[1, 2, 3]"}
+    )
+    assert scene.gravity.tolist() == [0.0, -1.62, 0.0]
+    assert scene.bodies[0].model.mass == 0.25
+    assert np.allclose(np.diag(scene.bodies[0].model.central_inertia), [1, 2, 3])
+    assert settings.end == 3.0
+    with pytest.raises(InputError, match=r"no parameter 'gravity\.4'; did you mean 'gravity\.\d'"):
+        load_scene(path, {"gravity.4": "1"})
+    with pytest.raises(InputError, match=r"no parameter 'xyz'; there are: .*, and the entries of the file"):
+        load_scene(path, {"xyz": "1"})
+    with pytest.raises(InputError, match="'s' does not fit"):
+        load_scene(path, {"bodies.bar.mass": "250 s"})
+
+
 def test_a_parameter_may_be_a_text_anywhere(tmp_path):
     text = changed('name = "pendulum"', 'name = "${what} of ${bar.length} m"').replace(
         "[parameters]", '[parameters]\nwhat = "a bar"'

@@ -149,7 +149,7 @@ def test_a_run_that_fails_is_a_row_with_its_message(folder):
 
 
 @pytest.mark.parametrize(("changed", "says"), [
-    (("g = [1", "gg = [1"), "no parameter 'gg' .*did you mean 'g'"),
+    (("g = [1", "gg = [1"), "no parameter 'gg'.*did you mean 'g'"),
     (("g = [1", "idle = [1"), "'idle' changes nothing"),
     (("g = [1, 5, 9.81]", "g = []"), r"parameters.g = \[\]: give"),
     (("count = 4", "count = 1000000000000"), "there cannot be 1000000000000 values"),
