@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from ffr_dyn.studies.measures import TIME
 from ffr_dyn.studies.table import Table
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 LEVELS = 20
 LIKELY = 1.96  # standard errors of a mean that hold it with 95 % probability
+MANY = 10.0  # histories, beyond which they are drawn fainter
 FEW = 12  # values of a parameter, up to which they are thought to be chosen, and drawn as lines
 
 
@@ -25,6 +27,8 @@ def plot_study(table: Table, folder: str | Path, outputs: Sequence[str] = ()) ->
         <output>-tornado.png   by how much every parameter changes it, from its least to its greatest value
         <output>-mean.png      its mean over the first runs with 95 % confidence, and its distribution
         pairs.png              all parameters and outputs against each other
+
+    Of a history <output>.png has the rows of all runs.
 
     The tornado is that of a linear fit; R^2 in its title says how linear the output is. Raises InputError for unknown names.
 
@@ -43,7 +47,11 @@ def plot_study(table: Table, folder: str | Path, outputs: Sequence[str] = ()) ->
 
 
 def _drawn(table: Table, names: list[str], varied: dict[str, Array], folder: Path) -> Iterator[Path]:
+    numbers = [name for name in names if table.outputs[name].ndim == 1]
     for name in names:
+        if name not in numbers and name != TIME:
+            yield _histories(folder / f"{name}.png", name, table.outputs[TIME], table.outputs[name])
+    for name in numbers:
         done = np.isfinite(table.outputs[name])
         y, x = table.outputs[name][done], {key: values[done] for key, values in varied.items()}
         if y.size < 2:
@@ -56,7 +64,7 @@ def _drawn(table: Table, names: list[str], varied: dict[str, Array], folder: Pat
             first, second = sorted(changes, key=lambda key: -abs(changes[key]))[:2]
             if _spans(x[first], x[second]):
                 yield _surface(folder / f"{name}-surface.png", name, (first, x[first]), (second, x[second]), y)
-    yield _pairs(folder / "pairs.png", {**varied, **{name: table.outputs[name] for name in names}})
+    yield _pairs(folder / "pairs.png", {**varied, **{name: table.outputs[name] for name in numbers}})
 
 
 def _numbers(table: Table) -> dict[str, Array]:
@@ -85,6 +93,16 @@ def _spans(x: Array, y: Array) -> bool:
 
 
 # ---- one picture ----------------------------------------------------------------------------------------------------
+
+
+def _histories(path: Path, name: str, time: Array, y: Array) -> Path:
+    from ffr_dyn.pictures.histories import PALETTE, drawing
+
+    with drawing(path, (8.0, 4.0)) as figure:
+        axes = figure.subplots()
+        axes.plot(time.T, y.T, color=PALETTE[0], lw=0.8, alpha=min(1.0, MANY / len(y)))
+        axes.set(xlabel="time [s]", ylabel=name)
+    return path
 
 
 def _over_parameters(path: Path, name: str, x: dict[str, Array], y: Array) -> Path:

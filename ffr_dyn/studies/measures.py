@@ -1,8 +1,10 @@
-"""What a run is reduced to: numbers of its outputs.
+"""What a run is reduced to: numbers of its outputs, or whole histories.
 
 "rod.tip.position.x: range"    last, first, least, greatest, largest (of absolute values), mean, rms, range of a quantity;
                                of one with several components the largest of them, its length for largest and rms
 "hinge.force: error"           what the step costs it, of the run's own estimate [in its unit]
+"hinge.angle: history"         all rows of it, of one component
+"critical.1.speed: attribute"  what else the analysis has found: entries by name, items of lists from 1, a list by its length
 "evaluations"                  of the equations of motion, as the run has counted them
 "= force / load"               a formula of other outputs, by their names, and of the parameters
 """
@@ -12,10 +14,11 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from ffr_dyn.results.result import Result
+from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene_file.parameters import Parameters, as_number, nearest
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
@@ -40,7 +43,9 @@ MEASURES: dict[str, Callable[[Array], float]] = {
     "rms": lambda y: float(np.sqrt((_size(y) ** 2).mean())),
     "range": lambda y: float(np.ptp(y, axis=0).max()),
 }
-ERROR = "error"
+ERROR, HISTORY, ATTRIBUTE = "error", "history", "attribute"
+TIME = "time"  # beside histories
+Number = float | list[float]  # or a history
 
 
 @dataclass(frozen=True)
@@ -48,7 +53,7 @@ class Measured:
     """An output of a study.
 
     quantity : of a result, with a component perhaps; a count; or a formula where `how` is "="
-    how      : a name of `MEASURES`, "error", "count" or "="
+    how      : a name of `MEASURES`, "error", "history", "attribute" or "="
     """
 
     name: str
@@ -61,9 +66,9 @@ def measured(name: str, text: str) -> Measured:
     if text.lstrip().startswith("="):
         return Measured(name, text.lstrip()[1:].strip(), "=")
     if text.strip() in COUNTS:
-        return Measured(name, text.strip(), "count")
+        return Measured(name, text.strip(), ATTRIBUTE)
     quantity, colon, how = (part.strip() for part in text.rpartition(":"))
-    known = [*MEASURES, ERROR]
+    known = [*MEASURES, ERROR, HISTORY, ATTRIBUTE]
     if not colon or how not in known:
         hint = nearest(how, dict.fromkeys(known)) if colon else f"write it as QUANTITY: {' | '.join(known)}"
         raise InputError(f"outputs.{name} = {text!r}: {hint}; a formula of other outputs begins with '='")
@@ -72,25 +77,78 @@ def measured(name: str, text: str) -> Measured:
 
 def wanted(outputs: tuple[Measured, ...]) -> tuple[str, ...]:
     """Names of the quantities that a run must keep for them."""
-    names = [COMPONENT.sub("", one.quantity) for one in outputs if one.how not in ("=", "count")]
+    names = [COMPONENT.sub("", one.quantity) for one in outputs if one.how not in ("=", ATTRIBUTE)]
     return tuple(dict.fromkeys(names))
 
 
-def values(outputs: tuple[Measured, ...], result: Result, parameters: Mapping[str, float | str]) -> dict[str, float]:
-    """The numbers of a run, by name. Raises InputError for quantities that the result has not."""
-    found: dict[str, float] = {one.name: _value(one, result) for one in outputs if one.how != "="}
+def values(outputs: tuple[Measured, ...], result: Result, parameters: Mapping[str, float | str]) -> dict[str, Number]:
+    """The numbers of a run, by name; of histories all rows, and their times [s]. Raises InputError for quantities that the
+    result has not."""
+    found: dict[str, Number] = {one.name: _value(one, result) for one in outputs if one.how != "="}
     formulas = {one.name: one.quantity for one in outputs if one.how == "="}
-    known = Parameters({**parameters, **found, **formulas})
+    numbers = {name: value for name, value in found.items() if not isinstance(value, list)}
+    known = Parameters({**parameters, **numbers, **formulas})
     for name, text in formulas.items():
         found[name] = as_number(text, known, f"outputs.{name}")
-    return {one.name: found[one.name] for one in outputs}
+    times = {TIME: result.time.tolist()} if len(numbers) + len(formulas) < len(outputs) else {}
+    return {one.name: found[one.name] for one in outputs} | times
 
 
-def _value(one: Measured, result: Result) -> float:
-    if one.how == "count":
-        return float(result.attributes.get(one.quantity, np.nan))
+def _value(one: Measured, result: Result) -> Number:
+    if one.how == ATTRIBUTE:
+        return attribute(result.attributes, one.quantity)
     if one.how == ERROR:
         errors = result.attributes.get("errors", {})
         name = COMPONENT.sub("", one.quantity)
         return float(errors[name][0]) if name in errors else float("nan")
+    if one.how == HISTORY:
+        return _rows(one, result.quantity(one.quantity))
     return MEASURES[one.how](np.asarray(result[one.quantity]))
+
+
+def _rows(one: Measured, found: Quantity) -> list[float]:
+    if found.axes:
+        such = ".".join([one.quantity, *(axis.labels[0] for axis in found.axes)])
+        raise InputError(f"outputs.{one.name}: {one.quantity} has several components: name one, such as {such}: history")
+    rows: list[float] = found.values.tolist()
+    return rows
+
+
+def attribute(attributes: Mapping[str, Any], name: str) -> float:
+    """A number among the attributes of a result; NaN of an item that a list has not, the length of a list.
+
+    Raises InputError for a name that is none, or of a text.
+    """
+    found: Any = attributes
+    left = name
+    while left:
+        key, found, left = _entered(found, left)
+        if found is None:
+            return float("nan")
+        if not key:
+            raise InputError(f"the result has no attribute {name!r}; {nearest(left, _names(found))}")
+    if isinstance(found, (list, dict)):
+        return float(len(found))
+    if not isinstance(found, (int, float)):
+        raise InputError(f"the attribute {name!r} is no number but {found!r}")
+    return float(found)
+
+
+def _entered(found: Any, path: str) -> tuple[str, Any, str]:
+    """(key, entry, rest of the path) of the longest key that a path begins with; ("", ...) where there is none, and no entry
+    for an item beyond the end of a list."""
+    head, _, rest = path.partition(".")
+    if isinstance(found, list) and head.isdigit():
+        return head, (found[int(head) - 1] if 0 < int(head) <= len(found) else None), rest
+    keys = [key for key in found if path == key or path.startswith(f"{key}.")] if isinstance(found, dict) else []
+    if not keys:
+        return "", found, path
+    key = max(keys, key=len)
+    return key, found[key], path[len(key) + 1 :]
+
+
+def _names(found: Any) -> dict[str, Any]:
+    """What could have been named in an entry."""
+    if isinstance(found, list):
+        return dict.fromkeys(str(k + 1) for k in range(len(found)))
+    return found if isinstance(found, dict) else {}

@@ -44,6 +44,9 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import read_toml
 
 
+TAKEN = ("run", "row", "time", "message")  # columns that every table may have
+
+
 class BodyRecipe(BaseModel):
     """How a body is made: a line of ffr-prep, without the name of the command and the output."""
 
@@ -222,7 +225,19 @@ def _check(made: Study) -> None:
         if not in_bodies and name in own and not any(_mentions(text, name) for text in texts):
             raise InputError(f"the parameter {name!r} changes nothing: nothing in {made.scene} uses it; leave it out")
     _check_overlap(made.parameters)
+    _check_names(made)
     _check_bodies(made)
+
+
+def _check_names(made: Study) -> None:
+    """InputError for names of columns that are there twice, or that every table has."""
+    names = [*made.parameters, *(one.name for one in made.outputs)]
+    for name in names:
+        if name in TAKEN or "/" in name or names.count(name) > 1:
+            raise InputError(
+                f"{name!r} cannot be a column of the table: a parameter or an output has that name already, or it has '/' or "
+                f"is one of {', '.join(TAKEN)}; give it another"
+            )
 
 
 def _check_overlap(names: Sequence[str]) -> None:

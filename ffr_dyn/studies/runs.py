@@ -20,7 +20,7 @@ from ffr_dyn.analyses.forward import Forward
 from ffr_dyn.analyses.run import run
 from ffr_dyn.analyses.settings import MomentSettings, Settings
 from ffr_dyn.scene_file.read import load_scene
-from ffr_dyn.studies.measures import ERROR, Measured, values, wanted
+from ffr_dyn.studies.measures import ERROR, Measured, Number, values, wanted
 from ffr_prep.body import BodyError, FlexibleBody, load_body
 from ffr_prep.common.errors import ComputationError, InputError
 
@@ -53,10 +53,10 @@ class Task:
 
 @dataclass(frozen=True)
 class Row:
-    """What came of a run: its numbers, or why there are none."""
+    """What came of a run: its numbers and histories, or why there are none."""
 
     number: int
-    values: Mapping[str, float]
+    values: Mapping[str, Number]
     message: str = ""
 
 

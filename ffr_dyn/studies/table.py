@@ -2,7 +2,8 @@
 
 Rows go to a journal beside the table, a line of JSON each, on the disk as they come: whatever ends a study, what was computed
 is there, and a line that was cut off is computed again. The file itself is made from all rows in the order of the
-runs, so that it does not depend on who computed what when. xarray opens it: dimension "run", parameters as coordinates.
+runs, so that it does not depend on who computed what when. xarray opens it: dimension "run", parameters as coordinates; of
+histories also "row", with the times of every run.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any, Self
 import h5py
 import numpy as np
 
+from ffr_dyn.studies.measures import HISTORY, TIME
 from ffr_dyn.studies.plan import Study, mark
 from ffr_dyn.studies.runs import Row
 from ffr_prep.common.arrays import Array
@@ -24,10 +26,11 @@ from ffr_prep.common.brief import Brief, Rows
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.hdf5 import check_heaps
 from ffr_prep.common.outputs import replacing
+from ffr_prep.common.process_memory import check_memory
 from ffr_prep.common.reading import reading
 
 _HOW: dict[str, Any] = {"libver": ("v108", "v108"), "locking": False}
-RUN = "run"
+RUN, ROW = "run", "row"
 MESSAGE = "message"
 SECTION = "ffr_study"
 
@@ -37,7 +40,8 @@ class Table(Brief):
     """The rows of a study.
 
     parameters : by name, a value of every run, numbers (N,) or texts
-    outputs    : by name (N,), NaN for runs that failed or were not done
+    outputs    : by name (N,), NaN for runs that failed or were not done; of histories (N, T), NaN beyond the last row of a
+                 run, with "time" [s] (N, T)
     messages   : why a run has failed; empty for the others
 
     >>> table = fd.load_table("study.nc")
@@ -68,21 +72,31 @@ class Table(Brief):
 
     def _rows(self) -> Rows:
         varied = [(name, f"{len(set(values))} values") for name, values in self.parameters.items()]
-        found = {name: y[np.isfinite(y)] for name, y in self.outputs.items()}
+        found = {name: y[np.isfinite(y)] for name, y in self.outputs.items() if name != TIME}
         return varied + [(name, f"{y.min():.6g} to {y.max():.6g}") for name, y in found.items() if y.size]
 
 
 def table(study: Study, rows: Mapping[int, Row]) -> Table:
     """Of the rows that there are."""
     count = len(study.points)
-    outputs = {one.name: np.full(count, np.nan) for one in study.outputs}
+    longest = max((len(row.values.get(TIME, ())) for row in rows.values()), default=0)  # type: ignore[arg-type]
+    whole = [one.name for one in study.outputs if one.how == HISTORY]
+    if whole:
+        remedy = "take fewer histories or runs, a longer output step, or histories = true, which keeps a file for each run"
+        check_memory(3 * 8.0 * count * longest * (len(whole) + 1), f"histories of {count} runs", remedy)
+    outputs = {one.name: np.full((count, longest) if one.name in whole else count, np.nan) for one in study.outputs}
+    outputs |= {TIME: np.full((count, longest), np.nan)} if whole else {}
     messages = [""] * count
     for number, row in rows.items():
         messages[number] = row.message
         for name, value in row.values.items():
-            outputs[name][number] = value
+            outputs[name][number, ...] = _padded(value, longest) if isinstance(value, list) else value
     columns = {name: [point[name] for point in study.points] for name in study.parameters}
     return Table({name: _column(values) for name, values in columns.items()}, outputs, tuple(messages))
+
+
+def _padded(values: list[float], count: int) -> list[float]:
+    return values + [np.nan] * (count - len(values))
 
 
 def _column(values: list[Any]) -> Any:
@@ -163,9 +177,12 @@ def save_table(made: Table, path: str | Path) -> None:
     with replacing(path) as part, h5py.File(part, "w", **_HOW) as file:
         file.attrs[SECTION] = 1
         _variable(file, RUN, np.arange(len(made), dtype=np.int64)).make_scale(RUN)
+        if TIME in made.outputs:
+            _variable(file, ROW, np.arange(made.outputs[TIME].shape[1], dtype=np.int64)).make_scale(ROW)
         for name, values in {**made.parameters, **made.outputs, MESSAGE: list(made.messages)}.items():
             data = _variable(file, name, values)
-            data.dims[0].attach_scale(file[RUN])
+            for dimension, scale in zip(data.dims, (RUN, ROW), strict=False):
+                dimension.attach_scale(file[scale])
             if name not in made.parameters:
                 data.attrs["coordinates"] = " ".join(made.parameters)
             else:
@@ -192,7 +209,7 @@ def _read(path: Path) -> Table:
     with h5py.File(path, "r", locking=False) as file:
         if SECTION not in file.attrs:
             raise InputError(f"{path} is not the table of a study; ffr-dyn sweep writes one")
-        found = {name: _values(data) for name, data in file.items() if name not in (RUN, MESSAGE)}
+        found = {name: _values(data) for name, data in file.items() if name not in (RUN, ROW, MESSAGE)}
         parameters = {name: values for name, values in found.items() if "parameter" in file[name].attrs}
         outputs = {name: values for name, values in found.items() if name not in parameters}
         return Table(parameters, outputs, tuple(_values(file[MESSAGE])))

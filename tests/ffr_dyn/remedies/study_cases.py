@@ -17,6 +17,7 @@ from test_sweep import SCENE
 
 import ffr_dyn as fd
 from ffr_dyn.studies.draw import plot_study
+from ffr_dyn.studies.measures import attribute
 from ffr_dyn.studies.plan import study
 from ffr_dyn.studies.sampling import Axis, Spread, points, spaced
 from ffr_dyn.studies.table import Journal, Table, load_table
@@ -105,6 +106,11 @@ CASES = [
     Case(made({"stripe": LINE}), made({"strip": LINE})),
     Case(made({"strip": f"modes {LINE}"}), made({"strip": LINE})),
     Case(asked(G, {"angle": "hinge.angle"}), asked(G)),
+    Case(asked(G, {"time": "hinge.angle: last"}), asked(G)),
+    Case(p(swept, {"x": "hinge.force: history"}), p(swept, {"x": "hinge.force.x: history"})),
+    Case(p(swept, {"x": "degree: attribute"}), p(swept, {"x": "degrees_of_freedom: attribute"})),
+    Case(p(attribute, {"jumps": ["x"]}, "jumps.1"), p(attribute, {"jumps": ["x"]}, "jumps")),
+    Case(p(attribute, {"jumps": ["x"]}, "jump"), p(attribute, {"jumps": ["x"]}, "jumps")),
     Case(p(spaced, 0, 1, 0), p(spaced, 0, 1, 2)),
     Case(p(spaced, 0, 1, 2, logarithmic=True), p(spaced, 0.1, 1, 2, logarithmic=True)),
     Case(p(points, {"a": SHORT, "b": LONG}, paired=True), p(points, {"a": SHORT, "b": SHORT}, paired=True)),

@@ -15,7 +15,7 @@ from places import ROOT
 
 import ffr_dyn as fd
 from ffr_dyn.studies.draw import running_mean, tornado
-from ffr_dyn.studies.measures import measured
+from ffr_dyn.studies.measures import attribute, measured
 from ffr_dyn.studies.table import Journal, journal_of
 from ffr_prep.common.errors import ComputationError, InputError
 
@@ -83,6 +83,43 @@ def test_the_file_has_dimensions_and_coordinates(folder):
     with h5py.File(folder / "t.nc") as file:
         assert file["force"].dims[0][0] == file["run"]
         assert file["force"].attrs["coordinates"] == "g length"
+
+
+def test_whole_histories_are_rows_of_a_dimension_of_their_own(folder):
+    """Of runs of unequal length, too; the table is the same when it is made by workers."""
+    parameters = {"g": [1.0, 9.81], "analysis.end": [0.1, 0.2], "bodies.bar.mass": [1.0]}
+    outputs = {"h": "hinge.angle: history", "last": "hinge.angle: last", "free": "degrees_of_freedom: attribute"}
+    study = fd.study(folder / "bar.toml", parameters, outputs)
+    table = fd.sweep(study, folder / "t.nc", workers=0)
+    assert table["h"].shape == table["time"].shape == (4, 21)
+    assert np.isnan(table["h"][0, 11:]).all()
+    assert np.isnan(table["time"][0, 11:]).all()
+    for k, rows in enumerate((11, 21, 11, 21)):
+        settings = {"g": str(table["g"][k]), "analysis.end": str(table["analysis.end"][k])}
+        scene, given = fd.load_scene(folder / "bar.toml", settings)
+        alone = fd.forward(scene, **given.span, method=given.method, check=False)
+        assert table["h"][k, :rows].tobytes() == alone["hinge.angle"].tobytes()
+        assert table["time"][k, :rows].tobytes() == alone.time.tobytes()
+        assert table["last"][k] == alone["hinge.angle"][-1]
+    assert table["free"].tolist() == [1.0] * 4
+    fd.sweep(study, folder / "w.nc", workers=2)
+    assert (folder / "w.nc").read_bytes() == (folder / "t.nc").read_bytes()
+    with h5py.File(folder / "t.nc") as file:
+        assert [scale[0] for scale in file["h"].dims] == [file["run"], file["row"]]
+    assert fd.load_table(folder / "t.nc")["h"].shape == (4, 21)
+    assert {path.name for path in fd.plot_study(table, folder / "p", ["h"])} == {"h.png", "pairs.png"}
+
+
+def test_attributes_are_found_by_the_path_of_their_keys():
+    found = {"jumps": [3.0, 5.0], "critical": [{"speed": 7.0, "mode": "x"}], "rms": {"a.b.x": 2.0}, "stable": 1}
+    names = ("jumps.2", "jumps", "jumps.3", "critical.1.speed", "rms.a.b.x", "stable")
+    assert [attribute(found, name) for name in names[:2]] == [5.0, 2.0]
+    assert np.isnan(attribute(found, "jumps.3"))
+    assert [attribute(found, name) for name in names[3:]] == [7.0, 2.0, 1.0]
+    with pytest.raises(InputError, match="no attribute 'stabel'; did you mean 'stable'"):
+        attribute(found, "stabel")
+    with pytest.raises(InputError, match="is no number but 'x'"):
+        attribute(found, "critical.1.mode")
 
 
 def test_a_study_that_was_stopped_goes_on_to_the_same_bits(folder):
@@ -155,6 +192,8 @@ def test_a_run_that_fails_is_a_row_with_its_message(folder):
     (("count = 4", "count = 1000000000000"), "there cannot be 1000000000000 values"),
     (("hinge.angle: last", "hinge.angle: lats"), "did you mean 'last'"),
     (("hinge.angle: last", "hinge.angle"), "write it as QUANTITY"),
+    (("angle =", "time ="), "'time' cannot be a column"),
+    (("angle =", "g ="), "'g' cannot be a column"),
     (("scene =", "scenes ="), "did you mean 'scene'"),
     (('"bar.toml"', '"rab.toml"'), "rab.toml.* does not exist"),
 ])  # fmt: skip
