@@ -11,7 +11,6 @@ import click
 
 from ffr_dyn.cli.run import (
     INTEGRATION,
-    assignments,
     at_moment,
     changed,
     file_option,
@@ -28,6 +27,7 @@ from ffr_dyn.cli.run import (
     with_options,
 )
 from ffr_prep.common.docstrings import prose
+from ffr_prep.common.entries import assignments
 from ffr_prep.common.errors import InputError
 
 if TYPE_CHECKING:

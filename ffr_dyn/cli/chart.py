@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffr_dyn.cli.run import assignments, begins_as_given, parameter_option, require_after, scene_argument
+from ffr_dyn.cli.run import begins_as_given, parameter_option, require_after, scene_argument
 from ffr_prep.common.command import OUTPUT_FILE, reserve
+from ffr_prep.common.entries import assignments
 from ffr_prep.common.errors import InputError
 
 if TYPE_CHECKING:

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import click
 
-from ffr_dyn.cli.run import assignments, begins_as_given, over_time, parameter_option, require_after, scene_argument
+from ffr_dyn.cli.run import begins_as_given, over_time, parameter_option, require_after, scene_argument
 from ffr_prep.common.command import OUTPUT_FILE, reserve
+from ffr_prep.common.entries import assignments
 
 EXAMPLE = """\b
 Example:

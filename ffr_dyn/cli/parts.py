@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ffr_dyn.cli.run import analysed, assignments, at_moment, parameter_option, scene_argument
+from ffr_dyn.cli.run import analysed, at_moment, parameter_option, scene_argument
+from ffr_prep.common.entries import assignments
 from ffr_prep.common.errors import InputError
 
 if TYPE_CHECKING:

@@ -8,8 +8,9 @@ from typing import Any
 
 import click
 
-from ffr_dyn.cli.run import assignments, parameter_option, scene_argument
+from ffr_dyn.cli.run import parameter_option, scene_argument
 from ffr_prep.common.command import OUTPUT_FILE, reserve
+from ffr_prep.common.entries import assignments
 from ffr_prep.common.errors import InputError
 
 EXAMPLE = """\b

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, reserve
+from ffr_prep.common.entries import assignments
 from ffr_prep.common.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,7 +28,11 @@ file_option = click.option(
     "-o", "--file", "output", type=OUTPUT_FILE, help="Result file (netCDF); default: <scene>.nc."
 )
 parameter_option = click.option(
-    "-p", "--parameter", "parameters", multiple=True, metavar="NAME=VALUE",
+    "-p",
+    "--parameter",
+    "parameters",
+    multiple=True,
+    metavar="NAME=VALUE",
     help="A parameter of the scene file, or another entry by its path, such as bodies.rod.damping=0.02 or gravity.2=-1.62.",
 )
 keep_option = click.option(
@@ -91,15 +96,6 @@ def run(
     loaded, settings = load_scene(scene, assignments(parameters))
     settings = replace(settings, outputs=keep or settings.outputs)
     perform(loaded, changed(settings, changes), output or scene.with_suffix(".nc"), resume)
-
-
-def assignments(parameters: tuple[str, ...]) -> dict[str, str]:
-    """{"crank.length": "0.15"} of ("crank.length=0.15",)."""
-    for text in parameters:
-        if "=" not in text:
-            raise InputError(f"-p {text}: write it as NAME=VALUE")
-    pairs = (text.partition("=") for text in parameters)
-    return {name.strip(): value.strip() for name, _, value in pairs}
 
 
 def require_after(option: str, end: float | None, start: float) -> None:

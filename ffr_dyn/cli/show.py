@@ -6,8 +6,9 @@ from pathlib import Path
 
 import click
 
-from ffr_dyn.cli.run import assignments, at_moment, parameter_option, scene_argument, time_option
+from ffr_dyn.cli.run import at_moment, parameter_option, scene_argument, time_option
 from ffr_prep.common.command import OUTPUT_FILE, reserve
+from ffr_prep.common.entries import assignments
 
 EXAMPLE = """\b
 Example:

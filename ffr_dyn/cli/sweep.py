@@ -12,14 +12,16 @@ NOTES = """\b
 A study file:
   scene = "crank.toml"
   samples = 200                               # of the distributions; sampling = "latin-hypercube" or "sobol"
-  [parameters]                                # of the scene's [parameters], or of the lines below
+  [parameters]                                # of the scene's [parameters], of its entries, or of the lines below
   load = [10, 50, 100]                        # several lists make a grid; points = "list" takes them side by side
   speed = {from = 50, to = 150, count = 11}
   diameter = {normal = [6e-3, 1e-4]}          # uniform, triangular, lognormal, any distribution of scipy.stats
+  "bodies.slider.mass" = [0.3, 0.4]           # an entry by its path; "gravity.2" is the second number of a list
   [bodies.rod]                                # made anew by ffr-prep, once for every distinct line
   make = "reduce rod.geo --set diameter=${diameter} --material steel --interface a --interface b --modes 8"
   [outputs]
-  force = "pin.force: largest"                # last first least greatest largest mean rms range error
+  force = "pin.force: largest"                # last first least greatest largest mean rms range error history
+  first = "critical.1.speed: attribute"       # what else an analysis tells, here campbell
   share = "= force / load"                    # a formula of outputs and parameters
 
 \b

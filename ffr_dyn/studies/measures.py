@@ -109,7 +109,9 @@ def _value(one: Measured, result: Result) -> Number:
 def _rows(one: Measured, found: Quantity) -> list[float]:
     if found.axes:
         such = ".".join([one.quantity, *(axis.labels[0] for axis in found.axes)])
-        raise InputError(f"outputs.{one.name}: {one.quantity} has several components: name one, such as {such}: history")
+        raise InputError(
+            f"outputs.{one.name}: {one.quantity} has several components: name one, such as {such}: history"
+        )
     rows: list[float] = found.values.tolist()
     return rows
 

@@ -9,6 +9,7 @@
     load = [10, 50, 100]                         # one after another; several such make a grid
     speed = {from = 50, to = 150, count = 11}    # spacing = "log" if wanted
     diameter = {uniform = [5e-3, 7e-3]}          # normal, triangular, lognormal, or any distribution of scipy.stats
+    "bodies.slider.mass" = [0.3, 0.4]            # any entry of the scene, by the path of its keys
 
     [bodies.rod]                                 # made anew, once for every distinct text, by the command ffr-prep
     make = "reduce rod.geo --set diameter=${diameter} --material steel --interface a --interface b --modes 8"
@@ -33,16 +34,16 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from ffr_dyn.scene_file.assignments import places_of, unknown
+from ffr_dyn.scene_file.assignments import unknown
 from ffr_dyn.scene_file.parameters import flattened, nearest, substituted
 from ffr_dyn.scene_file.read import body_files
 from ffr_dyn.scene_file.source import read_source
 from ffr_dyn.studies.measures import Measured, measured
 from ffr_dyn.studies.sampling import Axis, Sampling, Spread, Value, points, spaced
 from ffr_prep.common.brief import Brief
+from ffr_prep.common.entries import places_of
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import read_toml
-
 
 TAKEN = ("run", "row", "time", "message")  # columns that every table may have
 
@@ -137,7 +138,7 @@ def study(
 
     fd.study("crank.toml", {"load": [10, 50, 100]}, {"force": "pin.force: largest"})
 
-    >>> study = fd.study("scene.toml", {"speed": [100, 150, 200]}, {"tip": "last(rod.tip.position.y)"})
+    >>> study = fd.study("scene.toml", {"speed": [100, 150, 200]}, {"tip": "rod.tip.position.y: last"})
     """
     if not parameters:
         raise InputError("parameters: there are none; name at least one with its values, such as load = [10, 50]")

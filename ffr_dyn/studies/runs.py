@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import io
+import re
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -28,6 +29,7 @@ COMMAND = (
     "ffr_prep.cli"  # a command line is all that is known of it here; a process for each would load the mesher anew
 )
 LOADED = 8  # bodies that a worker keeps
+NAMING, QUOTED = (".toml", ".geo"), re.compile(r"""["']([^"'\n]{1,200})["']""")
 KEY = 24  # hexadecimal digits of a body's name
 
 
@@ -107,14 +109,22 @@ class Recipe:
 
 
 def body_file(line: str, folder: Path, cache: Path) -> Path:
-    """Where a body is kept: named by its line and by what is in the files that the line names."""
+    """Where a body is kept: named by its line and by what is in the files that it names, and that these name."""
     words = shlex.split(line)
     digest = hashlib.sha256(repr(words).encode())
     for word in words[1:]:
         named = folder / word.rpartition("=")[2]
-        if named.is_file():
-            digest.update(named.read_bytes())
+        for file in (named, *_files_in(named)) if named.is_file() else ():
+            digest.update(file.read_bytes())
     return cache / f"{digest.hexdigest()[:KEY]}.ffr"
+
+
+def _files_in(path: Path) -> list[Path]:
+    """The files that a structure file or a geometry script names, between quotes."""
+    if path.suffix not in NAMING:
+        return []
+    said = {found[1] for found in QUOTED.finditer(path.read_text(encoding="utf-8", errors="replace"))}
+    return [file for file in (path.parent / name for name in sorted(said)) if file.is_file()]
 
 
 def make(recipe: Recipe) -> str:

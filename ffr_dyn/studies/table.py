@@ -82,7 +82,9 @@ def table(study: Study, rows: Mapping[int, Row]) -> Table:
     longest = max((len(row.values.get(TIME, ())) for row in rows.values()), default=0)  # type: ignore[arg-type]
     whole = [one.name for one in study.outputs if one.how == HISTORY]
     if whole:
-        remedy = "take fewer histories or runs, a longer output step, or histories = true, which keeps a file for each run"
+        remedy = (
+            "take fewer histories or runs, a longer output step, or histories = true, which keeps a file for each run"
+        )
         check_memory(3 * 8.0 * count * longest * (len(whole) + 1), f"histories of {count} runs", remedy)
     outputs = {one.name: np.full((count, longest) if one.name in whole else count, np.nan) for one in study.outputs}
     outputs |= {TIME: np.full((count, longest), np.nan)} if whole else {}

@@ -13,6 +13,7 @@ from ffr_prep.cli.options import TIME_LIMIT, tell_of_programs
 from ffr_prep.cli.request import CUTS, OUTPUT, SOLVER, reduce_to_file, solver_of
 from ffr_prep.cli.terminal import show, terminal_steps
 from ffr_prep.common.command import INPUT_FILE, reserve
+from ffr_prep.common.entries import assignments
 
 if TYPE_CHECKING:
     from ffr_prep.structures.frame import Frame
@@ -49,24 +50,37 @@ Solids tied to the frame, and other reductions:
   file = "eye.step"
   material = "steel"
   interfaces = {bore = {}, pin = {kind = "mean"}}
+
+\b
+Examples:
+  ffr-prep reduce-structure tower.toml -o tower.ffr
+  ffr-prep reduce-structure tower.toml -p members.columns.section.h=0.25 -p reduction.modes=12 -o tower.ffr
 """
 
 
 @click.command("reduce-structure", epilog=NOTES)
 @click.argument("structure", type=INPUT_FILE)
 @OUTPUT
+@click.option(
+    "-p",
+    "--parameter",
+    "entries",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Another value of an entry by its path, such as members.columns.section.h=0.25 or reduction.modes=12; repeat.",
+)
 @CUTS
 @SOLVER
 @TIME_LIMIT
-def reduce_structure_command(structure: Path, output: Path, **options: Any) -> None:
+def reduce_structure_command(structure: Path, output: Path, entries: tuple[str, ...], **options: Any) -> None:
     """Reduce the beams and plates that STRUCTURE describes, a TOML file, to a flexible body and write it to a file."""
     from ffr_prep.pipelines.structure_file import geometry_files, read_structure
 
-    solver = solver_of(options)
+    solver, given = solver_of(options), assignments(entries)
     reserve("-o", output)
-    tell_of_programs(geometry_files(structure))
+    tell_of_programs(geometry_files(structure, given))
     steps = terminal_steps()
-    loaded = read_structure(structure, steps)
+    loaded = read_structure(structure, steps, entries=given)
     steps.end()
     show(frame_lines(loaded.frame))
     cuts = loaded.request.parts if options["parts"] is None else options["parts"]

@@ -31,6 +31,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from ffr_prep.body import Damping
+from ffr_prep.common.entries import with_entries
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.common.reading import read_toml, reading
@@ -89,8 +90,10 @@ class Structure:
         return tied({"frame": frame, **solids}, self.ties)
 
 
-def read_structure(path: str | Path, progress: Stages = no_stages) -> Structure:
+def read_structure(path: str | Path, progress: Stages = no_stages, *, entries: Mapping[str, str] = {}) -> Structure:
     """Read a structure file, and the geometry it names.
+
+    entries : values, as text, in place of those in the file, by the path of their keys: {"members.bar.section.d": "0.02"}
 
     Raises InputError for a file that cannot be read, unknown or missing entries, and whatever the frame's parts refuse;
     ComputationError when meshing fails.
@@ -98,7 +101,7 @@ def read_structure(path: str | Path, progress: Stages = no_stages) -> Structure:
     >>> structure = fp.read_structure("tower.toml")
     """
     path = Path(path)
-    entry = _read(path)
+    entry = _read(path, entries)
     try:
         with reading(path, "a structure file"):
             return _structure(path, entry, progress)
@@ -133,18 +136,21 @@ def _damping(entry: DampingEntry) -> Damping:
     return Damping(alpha, beta, entry.loss_factor, entry.bands, entry.ratios)
 
 
-def geometry_files(path: Path) -> list[Path]:
+def geometry_files(path: Path, entries: Mapping[str, str] = {}) -> list[Path]:
     """The meshes and geometries that a structure file names. Raises InputError for a file that cannot be read."""
-    entry = _read(path)
+    entry = _read(path, entries)
     named = [entry.geometry, *entry.solids.values()]
     return [path.parent / of.file for of in named if of is not None]
 
 
-def _read(path: Path) -> StructureEntry:
+def _read(path: Path, entries: Mapping[str, str]) -> StructureEntry:
+    tree = read_toml(path, "a structure file")
     try:
-        return structure_schema().model_validate(read_toml(path, "a structure file"))
+        return structure_schema().model_validate(with_entries(tree, entries))
     except ValidationError as error:
         raise InputError(f"{path}: {'; '.join(map(_explained, error.errors()))}") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def _explained(wrong: Mapping[str, Any]) -> str:

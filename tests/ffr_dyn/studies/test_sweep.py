@@ -14,8 +14,10 @@ import pytest
 from places import ROOT
 
 import ffr_dyn as fd
+import ffr_prep.cli
 from ffr_dyn.studies.draw import running_mean, tornado
 from ffr_dyn.studies.measures import attribute, measured
+from ffr_dyn.studies.runs import body_file
 from ffr_dyn.studies.table import Journal, journal_of
 from ffr_prep.common.errors import ComputationError, InputError
 
@@ -260,3 +262,64 @@ def test_measures_are_what_they_are_called(folder):
     outputs = tuple(measured(f"o{k}", text) for k, text in enumerate(expected))
     found = values(outputs, result, {})
     np.testing.assert_allclose(list(found.values()), list(expected.values()), rtol=1e-14)
+
+
+STRIP = """
+reduction = {method = "eigenmodes", modes = 2}
+reference = {kind = "fixed", interface = "a"}
+linear = true
+[[polylines]]
+member = "bar"
+corners = [[0, 0, 0], [1, 0, 0]]
+elements = 2
+[members.bar]
+section = {shape = "circle", d = 0.01}
+material = "steel"
+[nodes]
+a = [0, 0, 0]
+b = [1, 0, 0]
+[interfaces.a]
+[interfaces.b]
+"""
+HANGING = """
+gravity = [0, -9.81, 0]
+[analysis]
+kind = "static"
+[ground]
+O = [0, 0, 0]
+[bodies.strip]
+file = "strip.ffr"
+[joints.clamp]
+kind = "fixed"
+i = "ground.O"
+j = "strip.a"
+"""
+
+
+def test_entries_of_structure_files_and_of_scenes_are_varied(tmp_path):
+    """A strip under its own weight, w = q l^4 / (8 E I), at rest: any analysis does."""
+    (tmp_path / "strip.toml").write_text(STRIP)
+    (tmp_path / "hanging.toml").write_text(HANGING)
+    ffr_prep.cli.main(["reduce-structure", str(tmp_path / "strip.toml"), "-o", str(tmp_path / "strip.ffr")])
+    study = fd.study(
+        tmp_path / "hanging.toml",
+        {"d": [0.01, 0.02], "gravity.2": [-9.81, -1.62]},
+        {"sag": "strip.b.displacement.y: last", "stable": "stable: attribute"},
+        bodies={"strip": "reduce-structure strip.toml -p members.bar.section.d=${d}"},
+        folder=tmp_path,
+    )
+    table = fd.sweep(study, tmp_path / "t.nc", workers=0)
+    sag, d = np.abs(table["sag"]), table["d"]
+    assert (table["stable"] == 1).all()
+    assert np.allclose(sag[d == 0.01] / sag[d == 0.02], 4.0, rtol=1e-3)
+    assert np.allclose(sag / np.abs(table["gravity.2"]) * d**2, sag[0] / 9.81 * 1e-4, rtol=1e-3)
+
+
+def test_a_body_is_known_by_the_files_that_its_files_name(tmp_path):
+    (tmp_path / "frame.toml").write_text('[geometry]\nfile = "frame.geo"\n')
+    (tmp_path / "frame.geo").write_text("Point(1) = {0, 0, 0};")
+    line = "reduce-structure frame.toml"
+    before = body_file(line, tmp_path, tmp_path)
+    assert body_file(line, tmp_path, tmp_path) == before
+    (tmp_path / "frame.geo").write_text("Point(1) = {1, 0, 0};")
+    assert body_file(line, tmp_path, tmp_path) != before

@@ -277,3 +277,26 @@ def test_the_same_file_gives_the_same_body(tmp_path):
     path = written(tmp_path, "reduction = {modes = 4}" + LINE)
     one, two = (body_of(path) for _ in range(2))
     np.testing.assert_array_equal(one.PP_dm, two.PP_dm)
+
+
+def test_entries_can_be_given_from_outside(tmp_path):
+    path = written(tmp_path, 'reduction = {method = "craig-bampton", modes = 3}' + LINE)
+    given = {"members.bar.section.d": "0.02", "members.bar.material": "aluminium", "polylines.1.elements": "4"}
+    loaded = read_structure(path, entries=given | {"reduction.modes": "5"})
+    thick = LINE.replace("d = 0.01", "d = 0.02").replace('"steel"', '"aluminium"').replace("elements = 2", "elements = 4")
+    other = read_structure(written(tmp_path, 'reduction = {method = "craig-bampton", modes = 5}' + thick))
+    assert loaded.request == other.request
+    assert loaded.frame.members == other.frame.members
+    assert len(loaded.frame.points) == 5
+    with pytest.raises(InputError, match=r"no entry 'members\.bar\.section\.b'; did you mean 'members\.bar\.section\.d'"):
+        read_structure(path, entries={"members.bar.section.b": "1"})
+    with pytest.raises(InputError, match=r"elements: .*\(it is 'many'\)"):
+        read_structure(path, entries={"polylines.1.elements": "many"})
+
+
+def test_the_command_takes_entries(tmp_path, capsys):
+    path = written(tmp_path, 'reduction = {method = "craig-bampton", modes = 3}' + LINE)
+    out = tmp_path / "bar.ffr"
+    command = ["reduce-structure", str(path), "-o", str(out), "-p", "reduction.modes=2"]
+    assert CliRunner().invoke(cli, command).exit_code == 0
+    assert load_body(out).provenance["reduction"]["modes"] == 2
