@@ -14,6 +14,7 @@ others.
 from __future__ import annotations
 
 import fnmatch
+import re
 import statistics
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -44,6 +45,7 @@ Item = TypeVar("Item")
 RETRIES = 2
 REPEATS, LEAST_SECONDS, MOST_REPEATS = 5, 0.2, 25  # a run is repeated until both is reached, or the most
 LONG = 2.0  # s of CPU time, above which one repeat is enough
+_ADDRESS = re.compile(r"inproc://\S+|([a-z]+://)?[^\s/]+:\d+")  # of a scheduler
 _CONNECT = 10.0  # s to wait for the scheduler of a cluster
 
 
@@ -288,6 +290,10 @@ def _client(workers: int | None, cluster: str | None) -> Iterator[Any]:
             with _started(partial(LocalCluster, n_workers=count)) as local, Client(local) as client:  # type: ignore[no-untyped-call]
                 yield client
             return
+        if _ADDRESS.fullmatch(cluster) is None:
+            raise InputError(
+                f"{cluster!r} is no address of a scheduler; give the one that `dask scheduler` prints, such as tcp://host:8786"
+            )
         try:
             client = Client(cluster, timeout=_CONNECT, set_as_default=False)  # type: ignore[no-untyped-call]
         except (OSError, ValueError) as error:

@@ -39,12 +39,13 @@ from ffr_dyn.scene_file.parameters import flattened, nearest, substituted
 from ffr_dyn.scene_file.read import body_files
 from ffr_dyn.scene_file.source import read_source
 from ffr_dyn.studies.measures import Measured, measured
-from ffr_dyn.studies.sampling import Axis, Sampling, Spread, Value, points, spaced
+from ffr_dyn.studies.sampling import USUAL, Axis, Sampling, Spread, Value, points, spaced
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.entries import places_of
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import read_toml
 
+MAKING = ("reduce", "reduce-structure", "reduce-matrices")
 TAKEN = ("run", "row", "time", "message")  # columns that every table may have
 
 
@@ -108,9 +109,12 @@ def load_study(path: str | Path) -> Study:
     try:
         entry = StudyFile.model_validate(tree)
     except ValidationError as error:
-        first = error.errors()[0]
+        first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
         where = ".".join(map(str, first["loc"]))
-        raise InputError(f"{path}: {where}: {first['msg'].lower()}; {_hint(where)}") from None
+        hint = f"; {_hint(where)}" if first["type"] == "extra_forbidden" else f" (it is {first['input']!r})"
+        raise InputError(
+            f"{path}: {where}: {first['msg'].lower()}{hint if first['type'] != 'missing' else ''}"
+        ) from None
     try:
         return study(
             path.parent / entry.scene, entry.parameters, entry.outputs, bodies={k: b.make for k, b in entry.bodies.items()},
@@ -160,8 +164,8 @@ def study(
 
 
 def _hint(where: str) -> str:
-    known = dict.fromkeys(StudyFile.model_fields)
-    return nearest(where.partition(".")[0], known)
+    table, _, name = where.rpartition(".")
+    return nearest(name, dict.fromkeys(BodyRecipe.model_fields if table else StudyFile.model_fields))
 
 
 def _leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -174,12 +178,14 @@ def _leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, A
 
 
 def _says_values(table: Mapping[str, Any]) -> bool:
-    return "from" in table or (len(table) == 1 and isinstance(next(iter(table.values())), list) and _is_numbers(table))
+    """Whether a table is a range or a distribution, and no table of parameters."""
+    if "from" in table or (len(table) == 1 and table.keys() <= USUAL.keys()):
+        return True
+    return len(table) == 1 and all(isinstance(given, list) and _are_numbers(given) for given in table.values())
 
 
-def _is_numbers(table: Mapping[str, Any]) -> bool:
-    (numbers,) = table.values()
-    return all(isinstance(one, (int, float)) for one in numbers)
+def _are_numbers(given: Sequence[Any]) -> bool:
+    return all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in given)
 
 
 def _values(name: str, given: Any) -> Axis | Spread:
@@ -194,7 +200,8 @@ def _values(name: str, given: Any) -> Axis | Spread:
         return _range(name, given)
     if isinstance(given, Mapping) and len(given) == 1 and "from" not in given:
         ((kind, numbers),) = given.items()
-        return Spread(kind, tuple(map(float, numbers)))
+        if isinstance(numbers, list) and _are_numbers(numbers):
+            return Spread(kind, tuple(map(float, numbers)))
     raise InputError(
         f"parameters.{name} = {given!r}: give [1, 2, 3], {{from = 1, to = 3, count = 5}}, or a distribution such as "
         "{normal = [mean, deviation]}"
@@ -205,9 +212,14 @@ def _range(name: str, given: Mapping[str, Any]) -> Axis:
     spacing = given.get("spacing", "linear")
     if spacing not in ("linear", "log"):
         raise InputError(f"parameters.{name}: spacing is {spacing!r}; give linear or log")
+    start, end, count = given["from"], given["to"], given["count"]
+    if not (_are_numbers((start, end)) and type(count) is int):
+        raise InputError(
+            f"parameters.{name}: from and to are numbers in SI units, count a whole one, not {dict(given)}"
+        )
     try:
-        return spaced(float(given["from"]), float(given["to"]), int(given["count"]), logarithmic=spacing == "log")
-    except (TypeError, ValueError) as error:
+        return spaced(float(start), float(end), count, logarithmic=spacing == "log")
+    except InputError as error:
         raise InputError(f"parameters.{name}: {error}") from None
 
 
@@ -259,10 +271,9 @@ def _check_bodies(made: Study) -> None:
             words = shlex.split(line)
         except ValueError as error:
             raise InputError(f"bodies.{name}: {line!r}: {error}") from None
-        if not words or not words[0].startswith("reduce"):
+        if not words or words[0] not in MAKING:
             raise InputError(
-                f"bodies.{name}: {line!r}: begin with a command of ffr-prep that makes a body: reduce, reduce-structure or "
-                "reduce-matrices"
+                f"bodies.{name}: {line!r}: begin with a command of ffr-prep that makes a body: {', '.join(MAKING)}"
             )
         substituted(line, made.points[0], f"bodies.{name}.make")
 

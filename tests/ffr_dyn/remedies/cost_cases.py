@@ -103,6 +103,7 @@ CHARTS = [
     Case(p(opened, workers=-1), p(opened, workers=0)),
     Case(p(without_dask, 1), p(without_dask, 0)),
     Case(p(opened, cluster="tcp://localhost"), p(opened, workers=0)),
+    Case(p(opened, cluster="tcp://localhost:9"), p(opened, workers=0)),
     Case(p(models_of, DOUBLE, modes=(2, 4)), p(models_of, DOUBLE)),
     Case(lambda: diagram().measure("energy"), lambda: diagram().measure("position:cloud.b")),
     Case(lambda: drawn(diagram(), "chart.bmp"), lambda: drawn(diagram())),

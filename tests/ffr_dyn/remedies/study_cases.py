@@ -98,6 +98,7 @@ CASES = [
     Case(asked({"g": []}), asked(G)),
     Case(asked({"g": {"from": 1, "to": 2, "count": 3, "spacing": "even"}}),
          asked({"g": {"from": 1, "to": 2, "count": 3, "spacing": "log"}})),
+    Case(asked({"g": {"from": "a", "to": 2, "count": 3}}), asked({"g": {"from": 1, "to": 2, "count": 3}})),
     Case(asked({"g h": [1]}), asked(G)),
     Case(asked({"gg": [1]}), asked(G)),
     Case(asked({**G, "idle": [1]}), asked(G)),

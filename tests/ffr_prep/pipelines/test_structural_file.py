@@ -283,12 +283,16 @@ def test_entries_can_be_given_from_outside(tmp_path):
     path = written(tmp_path, 'reduction = {method = "craig-bampton", modes = 3}' + LINE)
     given = {"members.bar.section.d": "0.02", "members.bar.material": "aluminium", "polylines.1.elements": "4"}
     loaded = read_structure(path, entries=given | {"reduction.modes": "5"})
-    thick = LINE.replace("d = 0.01", "d = 0.02").replace('"steel"', '"aluminium"').replace("elements = 2", "elements = 4")
+    thick = (
+        LINE.replace("d = 0.01", "d = 0.02").replace('"steel"', '"aluminium"').replace("elements = 2", "elements = 4")
+    )
     other = read_structure(written(tmp_path, 'reduction = {method = "craig-bampton", modes = 5}' + thick))
     assert loaded.request == other.request
     assert loaded.frame.members == other.frame.members
     assert len(loaded.frame.points) == 5
-    with pytest.raises(InputError, match=r"no entry 'members\.bar\.section\.b'; did you mean 'members\.bar\.section\.d'"):
+    with pytest.raises(
+        InputError, match=r"no entry 'members\.bar\.section\.b'; did you mean 'members\.bar\.section\.d'"
+    ):
         read_structure(path, entries={"members.bar.section.b": "1"})
     with pytest.raises(InputError, match=r"elements: .*\(it is 'many'\)"):
         read_structure(path, entries={"polylines.1.elements": "many"})
