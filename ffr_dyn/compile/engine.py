@@ -83,16 +83,16 @@ def new_engine(
         stages = new_stages(system, method.stage_count, method.row_stages, method.numbers, kept)
     clock = Clock(np.array([h, h or spacing]), np.zeros(3, dtype=np.int64), np.array(gains))
     control = _control(system, method, start, spacing)
-    work = new_work(system.model, keeps_terms=method is not None and method.keeps_terms)
+    work, of_work = new_work(system.model, keeps_terms=method is not None and method.keeps_terms)
     places = np.array([0 if each is None else each.address for each in chosen], dtype=np.int64)
     if method is not None:
         places[step.number] = method.do_step.address
     forces = np.array([kernel_of(kernel).address for kernel in kernels], dtype=np.int64)
     own = np.array(x, dtype=float), np.array(v, dtype=float)
-    memory, addresses = aligned((places, forces, work, stages, clock, control, *own))
-    places, forces, work, stages, clock, control, x, v = memory
+    memory, addresses = aligned((places, forces, stages, clock, control, *own))
+    places, forces, stages, clock, control, x, v = memory
     tables = Tables(0, places, forces, system.model, work, stages, clock, control, x, v)
-    return _packed(system, tables, {**system.addresses, **addresses})
+    return _packed(system, tables, {**system.addresses, **of_work, **addresses})
 
 
 def _control(system: System, method: Integrator | None, start: float, spacing: float) -> Control:

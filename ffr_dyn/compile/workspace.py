@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from ffr_dyn.compile.alignment import Piece, copied, in_one_piece
 from ffr_dyn.compile.body_tables import starts
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.functions.rotation import skew
@@ -29,12 +30,58 @@ from ffr_dyn.kernels.tables import (
 from ffr_dyn.kernels.vectors import LEAST_PIVOT
 from ffr_prep.common.arrays import Array
 
+MOST, LARGE = 32, 1_000_000  # pieces of memory that are known, and numbers of one that is not
 
-def new_work(m: Model, *, keeps_terms: bool = False) -> Work:
-    """Scratch of evaluations; what depends on the elastic diagonal is made when that is set.
+_BLANK: dict[Hashable, Piece[Work]] = {}
+
+
+def new_work(m: Model, *, keeps_terms: bool = False) -> tuple[Work, dict[int, int]]:
+    """Scratch of evaluations, and where its arrays are; what depends on the elastic diagonal is made when that is set.
 
     keeps_terms : whether the quadratic terms of all bodies are needed after an evaluation
+
+    Scenes of one structure have the same scratch but for the numbers that `_fill` puts there.
     """
+    key = _structure(m), keeps_terms
+    blank = _BLANK.get(key)
+    if blank is None:
+        blank = in_one_piece(_blank_work(m, keeps_terms))
+        if len(_BLANK) >= MOST:
+            _BLANK.clear()
+        if blank.numbers.size < LARGE:
+            _BLANK[key] = blank
+    work, addresses = copied(blank)
+    _fill(work, m)
+    return work, addresses
+
+
+def _structure(m: Model) -> Hashable:
+    """All that the scratch of a scene is made by, but for the numbers in it."""
+    tables = (m.bodies.where, m.rows.start, m.rows.marker, m.pattern.column_start, m.markers.body)
+    sizes = (
+        m.bodies.omega2,
+        m.bodies.coupled_damping,
+        m.markers.phi,
+        m.functions.kind,
+        m.loads.initial,
+        m.pattern.sample,
+    )
+    return b"".join(table.tobytes() for table in tables), m.rows.marker.shape, tuple(map(len, sizes)), m.user_count
+
+
+def _fill(work: Work, m: Model) -> None:
+    """Put in what is constant: shapes of linear bodies, factors of rigid ones, what forces measure at the start."""
+    bodies = work.bodies
+    work.markers.phi[:] = work.markers.kept[:] = m.markers.phi
+    work.loads.reference[:] = m.loads.initial
+    bodies.inverse[:, 0] = [_inverse(mass) for mass in m.bodies.mass.tolist()]
+    for b in np.flatnonzero(m.bodies.where[:-1, N] == 0).tolist():
+        numbers = m.bodies.moments[b].tobytes(), float(m.bodies.mass[b])
+        bodies.s[b], bodies.J[b], bodies.L[b] = _rigid_inertia(*numbers, int(m.bodies.where[b, NORMAL]))
+        bodies.inverse[b, 1] = _inverse(np.trace(bodies.J[b]))
+
+
+def _blank_work(m: Model, keeps_terms: bool) -> Work:
     V, n = 6 * m.bodies.mass.size + int(m.bodies.where[-1, IN_Q]), m.bodies.where[:, N]
     bodies = _body_work(m, keeps_terms)
     return Work(
@@ -52,14 +99,13 @@ def new_work(m: Model, *, keeps_terms: bool = False) -> Work:
 
 
 def _marker_work(m: Model, bodies: BodyWork) -> MarkerWork:
-    """Scratch of the markers; the shapes of linear bodies and the axes of rigid ones, which are constant, are in it."""
+    """Scratch of the markers; the axes of rigid bodies, which are constant, are in it."""
     M = m.markers.body.size
     return MarkerWork(
         body=m.markers.body,
         A=bodies.A,
         omega=bodies.omega,
-        phi=m.markers.phi.copy(),
-        kept=m.markers.phi.copy(),
+        **_zeros(phi=m.markers.phi.size, kept=m.markers.phi.size),
         R=_identities(M),
         T=_identities(M),
         bent=np.zeros(2 * (6 * int(m.bodies.where[:, N].max()) + LANES)),
@@ -73,12 +119,12 @@ def _zeros(**shapes: Any) -> dict[str, Array]:
 
 
 def _body_work(m: Model, keeps_terms: bool) -> BodyWork:
-    """Scratch of the bodies; the factors of rigid ones, which are constant, are in it."""
+    """Scratch of the bodies."""
     B, E, n = m.bodies.mass.size, int(m.bodies.where[-1, IN_Q]), m.bodies.where[:, N]
     V, longest = 6 * B + E, int(n.max())
     spaced = n[:-1] + LANES  # sums in whole rows of lanes end beyond the terms
     terms = int(spaced.sum() if keeps_terms else spaced.max(initial=0))
-    work = BodyWork(
+    return BodyWork(
         A=_identities(B + 1),
         dinv=np.ones(m.bodies.omega2.size),
         terms=starts(spaced)[:-1] * keeps_terms,
@@ -87,12 +133,6 @@ def _body_work(m: Model, keeps_terms: bool) -> BodyWork:
         **_zeros(H=3 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6)),
         **_zeros(more=V, settled=V if m.bodies.coupled_damping.size else 0),
     )
-    work.inverse[:, 0] = [_inverse(mass) for mass in m.bodies.mass]
-    for b in np.flatnonzero(n[:-1] == 0):
-        numbers = m.bodies.moments[b].tobytes(), float(m.bodies.mass[b])
-        work.s[b], work.J[b], work.L[b] = _rigid_inertia(*numbers, int(m.bodies.where[b, NORMAL]))
-        work.inverse[b, 1] = _inverse(np.trace(work.J[b]))
-    return work
 
 
 def _row_work(m: Model) -> RowWork:
@@ -142,7 +182,7 @@ def _rigid_inertia(moments: bytes, mass: float, normal: int) -> tuple[Array, Arr
 
 def _load_work(m: Model, V: int) -> LoadWork:
     return LoadWork(
-        reference=m.loads.initial.copy(),
+        reference=np.zeros(m.loads.initial.size),
         measured=np.zeros(m.loads.initial.size),
         axes=np.zeros((2, 4, 3, 3)),
         turn=np.zeros((3, 3, 3)),

@@ -26,6 +26,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from difflib import get_close_matches
+from functools import cache
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -303,9 +304,12 @@ def _model(name: str, entry: BodyEntry, file: str | Path | FlexibleBody | None) 
 # ---- the analysis -------------------------------------------------------------------------------------------------
 
 
+_hints = cache(get_type_hints)
+
+
 def _settings(entry: Any, outputs: list[str], source: Source) -> Settings | MomentSettings:
     made = analysis(entry.kind)
-    hints, given = get_type_hints(made), {}
+    hints, given = _hints(made), {}
     for f in fields(made):
         value = getattr(entry, f.name)
         if kinds := nested_kinds(hints[f.name]):

@@ -57,8 +57,10 @@ def planar_forms(scene: Scene) -> Iterator[Scene]:
         yield _in_plane(scene, normal)
     if scene.plane == "auto":
         for normal in range(3):
+            if any(True for _ in _across(scene, normal)):
+                continue  # whatever its height is
             level = levelled(scene, normal)
-            if not any(True for _ in _obstacles(level, normal)):
+            if not any(True for _ in _leaving(level, normal)):
                 yield _in_plane(level, normal)
 
 
@@ -153,8 +155,13 @@ def _across(scene: Scene, normal: int) -> Iterator[str]:
 
 
 def _obstacles(scene: Scene, normal: int) -> Iterator[str]:
-    """What may take the motion out of the plane, or makes reactions that a planar scene does not have."""
+    """What makes a planar motion impossible, may take it out of the plane, or makes reactions that it does not have."""
     yield from _across(scene, normal)
+    yield from _leaving(scene, normal)
+
+
+def _leaving(scene: Scene, normal: int) -> Iterator[str]:
+    """What may take the motion out of the plane, or makes reactions that a planar scene does not have."""
     if any(f.name not in _KNOWN and getattr(scene, f.name) for f in fields(scene)):
         yield "there are forces of other kinds"
     for body in scene.bodies:
