@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import fnmatch
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from difflib import get_close_matches
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -131,10 +131,40 @@ def needs_every_step(wanted: Iterable[str]) -> bool:
     return any(name.endswith(".work") for name in wanted)
 
 
+_KNOWN: dict[Hashable, dict[str, Entry]] = {}  # catalogues without the measurements, of the last structures
+_MOST = 64
+
+
 def catalogue(system: System) -> dict[str, Entry]:
-    """Every quantity that can be had of a scene, by name."""
-    parts = (_bodies, _markers, _reactions, _joint_coordinates, _forces, _powers, _totals, _measurements)
-    return {name: entry for part in parts for name, entry in part(system)}
+    """Every quantity that can be had of a scene, by name.
+
+    Scenes of one structure share their entries, which know bodies, joints and forces by number.
+    """
+    key = _structure(system)
+    known = _KNOWN.get(key)
+    if known is None:
+        if len(_KNOWN) >= _MOST:
+            _KNOWN.clear()
+        parts = (_bodies, _markers, _reactions, _joint_coordinates, _forces, _powers, _totals)
+        known = _KNOWN[key] = {name: entry for part in parts for name, entry in part(system)}
+    return {**known, **dict(_measurements(system))}
+
+
+def _structure(system: System) -> Hashable:
+    """All that the entries of a scene are made of, but for its measurements."""
+    scene = system.scene
+    return (
+        marker_names(scene),
+        tuple(
+            (body.name, n, body.kept, body.frame and body.frame.model.n)
+            for body, n in zip(scene.bodies, system.layout.n, strict=True)
+        ),
+        tuple((block.name, block.markers) for block in system.blocks),
+        tuple((joint.name, joint.kind) for joint in scene.joints),
+        tuple((coupling.name, coupling.first, coupling.second) for coupling in scene.couplings),
+        tuple((force.name, force.place.measured, force.stores_energy) for force in forces_of(scene)),
+        tuple((one.name, isinstance(one, Driver) and (one.joint, one.coordinate)) for one in scene.drivers),
+    )
 
 
 Named = Iterator[tuple[str, Entry]]
@@ -216,7 +246,7 @@ def _marker(k: int) -> dict[str, Entry]:
 
 
 def _reactions(system: System) -> Named:
-    joints = {joint.name: joint for joint in system.scene.joints}
+    joints = {joint.name: k for k, joint in enumerate(system.scene.joints)}
     couplings = {coupling.name: coupling for coupling in system.scene.couplings}
     for number, block in enumerate(system.blocks):
         if block.name in couplings:
@@ -241,13 +271,13 @@ def _coupling_effort(coupling: Coupling, number: int) -> Entry:
     return _entry(unit, (), text, lambda view: view.record.reaction[:, number, 0])
 
 
-def _reaction(name: str, marker: int, joint: Joint | None, k: int, suffix: str) -> Callable[[View], Array]:
+def _reaction(name: str, marker: int, joint: int | None, k: int, suffix: str) -> Callable[[View], Array]:
     def values(view: View) -> Array:
         vector = reaction(view, name)[k]
         if suffix == "_i":
             return to_axes(view.axes(markers(view.system.scene)[marker][0]), vector)
         if suffix == "_joint" and joint is not None:
-            return to_axes(view.joint_frames(joint)[0], vector)
+            return to_axes(view.joint_frames(view.system.scene.joints[joint])[0], vector)
         return vector
 
     return values
@@ -270,17 +300,23 @@ def _of_force(k: int, one: Measured) -> Entry:
     return _entry(one.unit, axes, one.text, values)
 
 
+def _sources(scene: Scene) -> list[Any]:
+    """What does work."""
+    return [*forces_of(scene), *scene.drivers, *(joint for joint in scene.joints if joint.kind == "distance")]
+
+
 def _powers(system: System) -> Named:
     scene = system.scene
-    distances = [joint for joint in scene.joints if joint.kind == "distance"]
-    for thing in (*forces_of(scene), *scene.drivers, *distances):
-        yield from _worked(thing.name, "put into the scene", lambda view, thing=thing: power(view, thing))  # type: ignore[misc]
+    for k, thing in enumerate(_sources(scene)):
+        values = lambda view, k=k: power(view, _sources(view.system.scene)[k])  # type: ignore[misc]  # noqa: E731
+        yield from _worked(thing.name, "put into the scene", values)
     for b, body in enumerate(scene.bodies):
         if system.layout.n[b]:
             yield from _worked(f"{body.name}.damping", "of modal damping", lambda view, b=b: damping_power(view, b))  # type: ignore[misc]
-    for joint in scene.joints:
+    for k, joint in enumerate(scene.joints):
         text = "power that the first body gives to the second through the joint"
-        yield f"{joint.name}.transmitted", _entry("W", (), text, lambda view, joint=joint: transmitted(view, joint))  # type: ignore[misc]
+        of = lambda view, k=k: transmitted(view, view.system.scene.joints[k])  # type: ignore[misc]  # noqa: E731
+        yield f"{joint.name}.transmitted", _entry("W", (), text, of)
 
 
 def _worked(name: str, text: str, values: Callable[[View], Array]) -> Named:
@@ -354,34 +390,38 @@ def _measured(view: View, m: Measurement) -> Array:
 
 
 def _joint_coordinates(system: System) -> Named:
-    for joint in system.scene.joints:
+    for number, joint in enumerate(system.scene.joints):
         if "angle" in COORDINATES[joint.kind]:
-            yield f"{joint.name}.angle", _unwound(joint, _angle_driver(system.scene, joint))
-            rate = _entry("rad/s", (), "rate of the joint angle", lambda view, j=joint: angles(view, j)[1])  # type: ignore[misc]
-            yield f"{joint.name}.angle_rate", rate
+            yield f"{joint.name}.angle", _unwound(number, _angle_driver(system.scene, joint))
+            rate = lambda view, j=number: angles(view, view.system.scene.joints[j])[1]  # type: ignore[misc]  # noqa: E731
+            yield f"{joint.name}.angle_rate", _entry("rad/s", (), "rate of the joint angle", rate)
         if "stroke" in COORDINATES[joint.kind]:
             for k, (name, unit) in enumerate((("stroke", "m"), ("stroke_rate", "m/s"))):
                 text = ("joint stroke along its axis", "rate of the joint stroke")[k]
-                yield (
-                    f"{joint.name}.{name}",
-                    _entry(unit, (), text, lambda view, j=joint, k=k: strokes(view, j)[k]),  # type: ignore[misc]
-                )
+                of = lambda view, j=number, k=k: strokes(view, view.system.scene.joints[j])[k]  # type: ignore[misc]  # noqa: E731
+                yield f"{joint.name}.{name}", _entry(unit, (), text, of)
 
 
-def _angle_driver(scene: Scene, joint: Joint) -> Driver | None:
-    """What drives the angle of a joint."""
-    drivers = (driver for driver in scene.drivers if isinstance(driver, Driver) and driver.coordinate == "angle")
-    return next((driver for driver in drivers if driver.joint == joint.name), None)
+def _angle_driver(scene: Scene, joint: Joint) -> int | None:
+    """The number of what drives the angle of a joint."""
+    angular = (
+        k
+        for k, d in enumerate(scene.drivers)
+        if isinstance(d, Driver) and (d.joint, d.coordinate) == (joint.name, "angle")
+    )
+    return next(angular, None)
 
 
-def _unwound(joint: Joint, driver: Driver | None) -> Entry:
+def _unwound(number: int, driver: int | None) -> Entry:
     """The angle of a joint, which begins within half a turn; with the whole turns of its driver, if it has one."""
 
     def compute(view: View, last: Unwound | Worked | None) -> tuple[Array, Unwound]:
-        moments, (angle, rate) = view.record.time, angles(view, joint)
+        scene = view.system.scene
+        moments, (angle, rate) = view.record.time, angles(view, scene.joints[number])
         if driver is None:
             return unwind(moments, angle, rate, last if isinstance(last, Unwound) else None)
-        angle = angle + 2 * np.pi * np.round((_asked(view, driver) - angle) / (2 * np.pi))
+        asked: Any = scene.drivers[driver]
+        angle = angle + 2 * np.pi * np.round((_asked(view, asked) - angle) / (2 * np.pi))
         return angle, Unwound(float(angle[-1]), float(rate[-1]), float(moments[-1]))
 
     return Entry("rad", (), "joint angle, unwound", compute)

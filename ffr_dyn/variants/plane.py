@@ -145,8 +145,10 @@ def _across(scene: Scene, normal: int) -> Iterator[str]:
         k = body_normal(body, normal)
         if k < 0:
             yield f"no axis of body {body.name!r} is along it"
-        elif abs(body.velocity[normal]) > _NOTHING * np.linalg.norm(body.velocity):
+        elif body.velocity.any() and abs(body.velocity[normal]) > _NOTHING * np.linalg.norm(body.velocity):
             yield f"body {body.name!r} starts with a velocity along it"
+        elif not body.omega_bar.any():
+            continue
         elif np.abs(np.delete(body.omega_bar, k)).max() > _NOTHING * np.linalg.norm(body.omega_bar):
             yield f"body {body.name!r} starts with an angular velocity across it"
     for driver in scene.drivers:
