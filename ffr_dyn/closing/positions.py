@@ -29,7 +29,6 @@ def close_positions(constraints: Constraints, x: Array, v: Array) -> Array:
     Raises InputError for rows that stay open.
     """
     place = constraints.place
-    rows = rows_at(constraints, x, v)
     for elastic in (False, True):
         found = x
         for iteration in range(ITERATIONS):

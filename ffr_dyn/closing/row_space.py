@@ -68,7 +68,10 @@ def dependence(A: Matrix) -> Dependence:
 
 def _dense_dependence(A: Array) -> Dependence:
     """Vectors on the left whose singular values vanish, those that rows beyond the columns add among them."""
-    vectors, lengths, _ = np.linalg.svd(_dense_unit_rows(A)[0])
+    unit = _dense_unit_rows(A)[0]
+    if len(A) <= A.shape[1] and (least := float(np.linalg.svd(unit, compute_uv=False)[-1])) >= DEPENDENT:
+        return Dependence(np.zeros((len(A), 0)), least)
+    vectors, lengths, _ = np.linalg.svd(unit)
     lengths = np.append(lengths, np.zeros(len(A) - lengths.size))
     vanish = lengths < DEPENDENT * np.abs(vectors).max(axis=0)
     return Dependence(vectors[:, vanish], float(lengths[~vanish].min(initial=np.inf)))

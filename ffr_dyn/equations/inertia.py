@@ -53,7 +53,11 @@ def kept_integrals(body: Body) -> Integrals:
 
 
 def _kept_integrals(body: Body) -> Integrals:
-    model, kept = body.model, {term: float(term not in body.dropped) for term in INERTIA_TERMS}
+    model = body.model
+    if not model.n:
+        none = model.P_dm, model.rP_dm, model.PP_dm, model.omega2, model.I5, model.I6
+        return Integrals(model.mass, model.r_dm, model.rr_dm, *none, model.damping)
+    kept = {term: float(term not in body.dropped) for term in INERTIA_TERMS}
     rP, PP = (
         symmetric * 0.5 * (part + np.swapaxes(part, 0, 1)) + skewed * 0.5 * (part - np.swapaxes(part, 0, 1))
         for part, symmetric, skewed in ((model.rP_dm, kept["I8"], kept["I4"]), (model.PP_dm, kept["I9"], kept["I5"]))
@@ -76,6 +80,8 @@ class Moments:
 
 def moments(body: FlexibleBody | Integrals, q: Array) -> Moments:
     """Moments of the mass of the body deformed by q (n,). Equation (10) of docs/notation.md."""
+    if not q.size:
+        return Moments(body.r_dm, body.rP_dm, body.rr_dm)
     G = body.rP_dm + np.einsum("klij,i->klj", body.PP_dm, q)
     rest = np.einsum("klj,j->kl", body.rP_dm, q)
     W = body.rr_dm + rest.T + np.einsum("klj,j->kl", G, q)  # int u u0^T + int u (Phi q)^T
