@@ -30,7 +30,7 @@ from ffr_dyn.kernels.tables import (
 from ffr_dyn.kernels.vectors import LEAST_PIVOT
 from ffr_prep.common.arrays import Array
 
-MOST, LARGE = 32, 1_000_000  # pieces of memory that are known, and numbers of one that is not
+MOST, LARGE = 32, 100_000  # pieces of memory that are known, and numbers of one that is not
 
 _BLANK: dict[Hashable, Piece[Work]] = {}
 

@@ -132,7 +132,7 @@ def needs_every_step(wanted: Iterable[str]) -> bool:
 
 
 _KNOWN: dict[Hashable, dict[str, Entry]] = {}  # catalogues without the measurements, of the last structures
-_MOST = 64
+_MOST, _MANY = 64, 2000  # catalogues, and entries of one that is not kept
 
 
 def catalogue(system: System) -> dict[str, Entry]:
@@ -146,7 +146,9 @@ def catalogue(system: System) -> dict[str, Entry]:
         if len(_KNOWN) >= _MOST:
             _KNOWN.clear()
         parts = (_bodies, _markers, _reactions, _joint_coordinates, _forces, _powers, _totals)
-        known = _KNOWN[key] = {name: entry for part in parts for name, entry in part(system)}
+        known = {name: entry for part in parts for name, entry in part(system)}
+        if len(known) < _MANY:
+            _KNOWN[key] = known
     return {**known, **dict(_measurements(system))}
 
 

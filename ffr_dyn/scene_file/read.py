@@ -304,7 +304,9 @@ def _model(name: str, entry: BodyEntry, file: str | Path | FlexibleBody | None) 
 # ---- the analysis -------------------------------------------------------------------------------------------------
 
 
-_hints = cache(get_type_hints)
+@cache
+def _hints(made: Any) -> dict[str, Any]:
+    return get_type_hints(made)
 
 
 def _settings(entry: Any, outputs: list[str], source: Source) -> Settings | MomentSettings:
