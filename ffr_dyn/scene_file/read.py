@@ -310,7 +310,7 @@ def _hints(made: Any) -> dict[str, Any]:
 
 
 def _settings(entry: Any, outputs: list[str], source: Source) -> Settings | MomentSettings:
-    made = analysis(entry.kind)
+    made: Any = analysis(entry.kind)
     hints, given = _hints(made), {}
     for f in fields(made):
         value = getattr(entry, f.name)

@@ -89,7 +89,6 @@ def here(words: list[str], *, check: bool) -> CompletedProcess[str]:
 
 COMMANDS = [
     words("check strip.toml", "check rod.toml", strip=STRIP),
-    words("run rod.toml -p mass", "run rod.toml -p mass=2", "parameters.mass = 1.0\n" + SCENE),
     words("run rod.toml -p mas=2", "run rod.toml -p mass=2", "parameters.mass = 1.0\n" + SCENE),
     words("run rod.toml --tolerance 1e-6", "run rod.toml --step 1e-3"),
     words("run rod.toml --step 1e-3 --accuracy 1e-3", "run rod.toml --step 1e-3"),

@@ -304,3 +304,6 @@ def test_the_command_takes_entries(tmp_path, capsys):
     command = ["reduce-structure", str(path), "-o", str(out), "-p", "reduction.modes=2"]
     assert CliRunner().invoke(cli, command).exit_code == 0
     assert load_body(out).provenance["reduction"]["modes"] == 2
+    with pytest.raises(SystemExit, match="2"):
+        main([*command[:-1], "reduction.modes"])
+    assert "-p reduction.modes: write it as NAME=VALUE" in capsys.readouterr().err
