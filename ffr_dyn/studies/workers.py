@@ -121,7 +121,7 @@ def _pipe(stream: Any) -> BinaryIO:
 def _serve(tasks: BinaryIO, answers: BinaryIO) -> None:
     waiting: queue.SimpleQueue[Any] = queue.SimpleQueue()
     threading.Thread(target=_read, args=(tasks, waiting), daemon=True).start()
-    with suppress(KeyboardInterrupt), alone():
+    with suppress(KeyboardInterrupt, BrokenPipeError), alone():  # who asked may be gone
         while (task := waiting.get()) is not None:
             function, item = task
             pickle.dump(tried(function, item), answers)
