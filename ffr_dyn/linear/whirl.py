@@ -14,6 +14,7 @@ from ffr_dyn.equations.layout import Layout
 from ffr_dyn.functions.rotation import rotation_matrix, triad
 from ffr_dyn.linear.steady_state import Screws
 from ffr_dyn.scene.scene import Body, Scene
+from ffr_prep.body import FlexibleBody
 from ffr_prep.common.arrays import Array
 
 ONE_WAY = 0.7  # of a whirl's amplitude is its larger part, from where the smaller is called a deviation
@@ -28,13 +29,11 @@ def whirls(scene: Scene, place: Layout, screws: Screws, x: Array, values: Array,
     Modes of what does not turn, and of real eigenvalues, have the frequency that they have, and no share (nan).
     """
     seen, share = np.abs(values.imag), np.full(values.size, np.nan)
-    for m, (value, mode) in enumerate(zip(values, modes.T, strict=True)):
-        if not value.imag:
-            continue
-        mode = mode if value.imag > 0 else mode.conj()
-        parts = np.array([_parts(body, place, screws, x, b, mode) for b, body in enumerate(scene.bodies)])
-        b = int(np.argmax(parts.sum(axis=1)))
-        forth, back = np.sqrt(parts[b])
+    modes = np.where(values.imag > 0, modes, modes.conj())
+    parts = np.array([_parts(body, place, screws, x, b, modes) for b, body in enumerate(scene.bodies)])
+    for m in np.flatnonzero(values.imag):
+        b = int(np.argmax(parts[:, :, m].sum(axis=1)))
+        forth, back = np.sqrt(parts[b, :, m])
         speed = float(np.linalg.norm(screws.w[b]))
         if forth + back <= 0 or speed <= LEAST * screws.fastest or not speed:
             continue
@@ -50,22 +49,22 @@ def ways_of(seen: Array, share: Array) -> list[str]:
     ]
 
 
-def _parts(body: Body, place: Layout, screws: Screws, x: Array, b: int, mode: Array) -> tuple[float, float]:
-    """|z_+|^2 and |z_-|^2 of a body, summed over its points and its turning, with its mass."""
+def _parts(body: Body, place: Layout, screws: Screws, x: Array, b: int, modes: Array) -> Array:
+    """Integrals (2, m) of |z_+|^2 dm and |z_-|^2 dm of a body in modes (V, m), and the same of its turning."""
     A, speed = rotation_matrix(x[place.p(b)]), float(np.linalg.norm(screws.w[b]))
     f, g = triad(A.T @ (screws.w[b] / speed))[:, :2].T if speed else np.eye(3)[:2]
-    shift, turn, q = mode[place.R_dot(b)], mode[place.omega(b)], mode[place.q_dot(b)]
-    model, surface = body.model, body.model.surface
-    known = surface is not None and surface.Phi.shape[2] == q.size
-    points = surface.points if known and surface is not None else np.array([model.r_dm / model.mass])
-    u = shift + np.cross(turn, points)
-    if known and surface is not None and q.size:
-        u = u + surface.Phi @ q
-    radius = np.sqrt(np.trace(model.rr_dm) / model.mass)
-    c = np.concatenate(
-        [np.stack([u @ f, u @ g]) / np.sqrt(len(points)), radius * np.array([[turn @ f], [turn @ g]])], 1
-    )
-    return (
-        float(model.mass * (np.abs(c[0] + 1j * c[1]) ** 2).sum()),
-        float(model.mass * (np.abs(c[0] - 1j * c[1]) ** 2).sum()),
-    )
+    motion = modes[place.R_dot(b)], modes[place.omega(b)], modes[place.q_dot(b)]
+    found: Array = np.array([_integral(body.model, along, *motion) for along in (f + 1j * g, f - 1j * g)])
+    return np.maximum(found, 0.0)
+
+
+def _integral(model: FlexibleBody, along: Array, shift: Array, turn: Array, q: Array) -> Array:
+    """(m,) of |along . u|^2 dm, u = shift + turn x x + Phi q, and of |along . turn|^2 at the radius of gyration."""
+    a, t = along @ shift, np.cross(along, turn, axisb=0).T  # along . u = a + t . x + (along . Phi) q
+    mean = np.conj(a) * (model.r_dm @ t) + np.conj(a) * (along @ model.P_dm @ q)
+    mixed = t.conj() * (np.tensordot(model.rP_dm, along, (1, 0)) @ q)
+    elastic = np.einsum("k,klij,l->ij", along, model.PP_dm, along.conj(), optimize=True)
+    own = model.mass * np.abs(a) ** 2 + (t * (model.rr_dm @ t.conj())).sum(axis=0).real
+    turned = np.trace(model.rr_dm) * np.abs(along @ turn) ** 2
+    found: Array = own + turned + 2 * (mean + mixed.sum(axis=0)).real + (q * (elastic @ q.conj())).sum(axis=0).real
+    return found
