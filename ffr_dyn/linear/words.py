@@ -11,7 +11,7 @@ import numpy as np
 from ffr_dyn.consistency.mobility import named_motion
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.scene.parts import owner
-from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import FlexibleBody, remembered
 from ffr_prep.common.arrays import Array
 
