@@ -29,9 +29,10 @@ from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
 from ffr_dyn.consistency.tangent import Chart, at_rest, chart, derivative, rates, sizes, state, state_matrix
 from ffr_dyn.equations.layout import to_global_axes
 from ffr_dyn.kernels.tables import LAW
-from ffr_dyn.linear.eigen import Eigen, eigen
-from ffr_dyn.linear.matrices import reduced
+from ffr_dyn.linear.eigen import eigen
+from ffr_dyn.linear.matrices import Modes, modes_of, reduced
 from ffr_dyn.linear.matrices import state_matrix as steady_matrix
+from ffr_dyn.linear.spectrum import main_parts, rates_of
 from ffr_dyn.linear.steady_state import Steady, screws_of, steady_here
 from ffr_dyn.linear.whirl import ways_of, whirls
 from ffr_dyn.linear.words import in_words
@@ -208,11 +209,12 @@ def linearise(
     A, error, solved = _solved(near, steady)
     B = _columns(lambda u: rates(_fed(near, scene, inputs, u), assembled.x, assembled.v), len(inputs))
     C, D = _output_matrices(near, scene, inputs, outputs)
-    modes = near.Z @ solved.vectors
+    parts = near.Z @ solved.parts
+    modes = main_parts(parts)
     modes = modes / np.where((size := np.abs(modes).max(axis=0)) > 0, size, 1.0)
     where = assembled.system.scene, assembled.system.layout
     screws = screws_of(where[1], assembled.x, assembled.v)
-    seen, whirl = whirls(*where, screws, assembled.x, solved.values, modes)
+    seen, whirl = whirls(*where, screws, assembled.x, rates_of(solved.values, len(parts), solved.shift), parts)
     ways = ways_of(seen, whirl)
     rates_seen = np.where([bool(way) for way in ways], np.abs(seen), np.abs(solved.values))
     leading = in_words(*where, assembled.x, near.M, modes, rates_seen, ways)
@@ -226,12 +228,11 @@ def linearise(
     )  # fmt: skip
 
 
-def _solved(near: Chart, steady: Steady | None) -> tuple[Array, float, Eigen]:
-    """A, its error, and its eigenvalues; about a steady motion and at rest from exact matrices."""
+def _solved(near: Chart, steady: Steady | None) -> tuple[Array, float, Modes]:
+    """A, its error, and the modes; about a steady motion and at rest from exact matrices."""
     if steady is not None:
         steady = replace(steady, Z=near.Z)
-        of = reduced(steady)
-        return steady_matrix(steady, of), 0.0, eigen(of.K, of.C)
+        return steady_matrix(steady, reduced(steady)), 0.0, modes_of(steady)
     d = near.steps.size
     A, error = state_matrix(near)
     if not np.isfinite(A).all():
@@ -239,10 +240,11 @@ def _solved(near: Chart, steady: Steady | None) -> tuple[Array, float, Eigen]:
             f"at t = {near.time:.6g} s a force has no finite value beside the state that is linearised; look at its function"
         )
     if at_rest(near):
-        return A, error, eigen(-A[d:, :d], -A[d:, d:])
+        rest = eigen(-A[d:, :d], -A[d:, d:])
+        return A, error, Modes(rest.values, rest.vectors[None], rest.free, 0.0)
     values, vectors = np.linalg.eig(A)
     order = np.lexsort((np.sign(values.imag), np.round(np.abs(values), 9)))
-    return A, error, Eigen(values[order], vectors[:d, order], 0)
+    return A, error, Modes(values[order], vectors[None, :d, order], 0, 0.0)
 
 
 def _notes(near: Chart, steady: Steady | None) -> list[str]:
