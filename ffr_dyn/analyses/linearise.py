@@ -15,7 +15,7 @@ from typing import Any, ClassVar, get_args
 
 import numpy as np
 
-from ffr_dyn.analyses.efforts import Effort, sized, with_units
+from ffr_dyn.analyses.efforts import Effort, sized, with_units, without
 from ffr_dyn.analyses.outcome import result_of
 from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.rotating.steady import steady
@@ -63,7 +63,7 @@ class Linearisation(Brief):
     driven      : drivers, whose motions are none of the degrees of freedom
     seen        : (2d,) [Hz] frequencies seen from the ground, of scenes that turn: positive where the whirl is forward
     whirl       : (2d,) share of the amplitude that whirls so, 1 for a circle and 1/2 for a line in the turning axes; nan of
-                  what does not turn
+                  what does not turn, or vibrates along the axis
     error       : relative difference of A from step halving; zero at rest and in steady motion, where A is exact
 
     >>> found = fd.linearise(scene)
@@ -205,10 +205,9 @@ def linearise(
     near = chart(at, time, assembled.x, assembled.v)
     if near.steps.size == 0:
         raise InputError("nothing is free to move: joints and drivers fix every motion; linearise with fewer drivers")
-    steady = None if at_rest(near) else steady_here(assembled.system, time, assembled.x, assembled.v)
+    steady = steady_about(near, inputs)
     A, error, solved = _solved(near, steady)
-    B = _columns(lambda u: rates(_fed(near, scene, inputs, u), assembled.x, assembled.v), len(inputs))
-    C, D = _output_matrices(near, scene, inputs, outputs)
+    B, C, D = inputs_and_outputs(near, scene, inputs, outputs)
     parts = near.Z @ solved.parts
     modes = main_parts(parts)
     modes = modes / np.where((size := np.abs(modes).max(axis=0)) > 0, size, 1.0)
@@ -226,6 +225,15 @@ def linearise(
         A, B, C, D, near.Z, solved.values, modes, leading, solved.free, driven, seen / (2 * np.pi), whirl, names,
         tuple(outputs), error, notes, near,
     )  # fmt: skip
+
+
+def steady_about(near: Chart, inputs: tuple[Effort | str, ...]) -> Steady | None:
+    """The steady motion that a chart's state is in without the inputs; None of one that is in none, or at rest."""
+    if at_rest(near):
+        return None
+    system = near.at.system
+    plain = replace(system, scene=without(system.scene, _efforts(inputs)))
+    return steady_here(plain, near.time, near.x, to_global_axes(system.layout, near.x, near.V))
 
 
 def _solved(near: Chart, steady: Steady | None) -> tuple[Array, float, Modes]:
@@ -260,6 +268,15 @@ def _notes(near: Chart, steady: Steady | None) -> list[str]:
 
 
 # ---- inputs and outputs ----------------------------------------------------------------------------------------------
+
+
+def inputs_and_outputs(
+    near: Chart, scene: Scene, inputs: tuple[Effort | str, ...], outputs: tuple[str, ...]
+) -> tuple[Array, Array, Array]:
+    """B, C, D about a chart's state."""
+    v = to_global_axes(near.at.system.layout, near.x, near.V)
+    B = _columns(lambda u: rates(_fed(near, scene, inputs, u), near.x, v), len(inputs))
+    return B, *_output_matrices(near, scene, inputs, outputs)
 
 
 def _columns(function: Callable[[Array], Array], count: int) -> Array:

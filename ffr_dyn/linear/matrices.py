@@ -64,6 +64,18 @@ def modes_of(found: Steady) -> Modes:
     return Modes(values, parts, mean.free, step * varying.rate)
 
 
+def over_turn(found: Steady, H: int) -> Array:
+    """(H + 1, 2 d, 2 d) harmonics of the state matrix over a turn; zero beyond the first where nothing varies."""
+    of = reduced(found)
+    varying = _varying(found, of)
+    A = np.zeros((H + 1, 2 * len(of.K), 2 * len(of.K)), complex)
+    A[0] = state_matrix(found, of)
+    none = state_matrix(found, Reduced(np.zeros_like(of.K), np.zeros_like(of.C)))
+    for k in range(1, min(H + 1, len(varying.K)) if varying.step else 1):
+        A[k] = state_matrix(found, Reduced(varying.K[k], varying.C[k])) - none
+    return A
+
+
 def _varying(found: Steady, mean: Reduced) -> Varying:
     """K and C by their harmonics over a turn, where all that turns does so at one speed."""
     Z = found.Z

@@ -11,7 +11,8 @@ free to go on turning has no stiffness and stays where it is. Above critical spe
 minimum, so the state is followed from rest where Newton's method does not reach it at once, and not sought downhill.
 
 A scene that turns meets its ground, gravity and bearings anew at every angle. Rows that then do not hold are no
-steady motion; forces and stiffness that vary are taken as their means of a turn, and a note says so.
+steady motion; forces and stiffness that vary are taken as their means of a turn, and a note says so. How stiffness and
+damping vary is kept by its harmonics, for the modes (`ffr_dyn.linear.hill`).
 """
 
 from __future__ import annotations
