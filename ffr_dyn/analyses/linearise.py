@@ -206,7 +206,7 @@ def linearise(
     if near.steps.size == 0:
         raise InputError("nothing is free to move: joints and drivers fix every motion; linearise with fewer drivers")
     steady = steady_about(near, inputs)
-    A, error, solved = _solved(near, steady)
+    A, error, solved = _solved(_without_inputs(near, inputs), steady)
     B, C, D = inputs_and_outputs(near, scene, inputs, outputs)
     parts = near.Z @ solved.parts
     modes = main_parts(parts)
@@ -231,9 +231,15 @@ def steady_about(near: Chart, inputs: tuple[Effort | str, ...]) -> Steady | None
     """The steady motion that a chart's state is in without the inputs; None of one that is in none, or at rest."""
     if at_rest(near):
         return None
+    plain = _without_inputs(near, inputs)
+    return steady_here(plain.at.system, near.time, near.x, to_global_axes(plain.at.system.layout, near.x, near.V))
+
+
+def _without_inputs(near: Chart, inputs: tuple[Effort | str, ...]) -> Chart:
+    """With the efforts, which are of one in the scene, left out of what is computed from its declarations."""
     system = near.at.system
     plain = replace(system, scene=without(system.scene, _efforts(inputs)))
-    return steady_here(plain, near.time, near.x, to_global_axes(system.layout, near.x, near.V))
+    return replace(near, at=replace(near.at, engine=replace(near.at.engine, system=plain)))
 
 
 def _solved(near: Chart, steady: Steady | None) -> tuple[Array, float, Modes]:
