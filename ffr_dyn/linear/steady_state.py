@@ -287,7 +287,7 @@ def steady_state(assembled: Assembled, time: float, start: Array | None = None) 
     found = _followed(machine, begin)
     together, refused = _together(found), _not_lasting(found)
     if refused and (together is None or _not_lasting(_followed(together, begin))):
-        raise InputError(refused)
+        raise refused
     varying, notes = np.inf if refused else _varying(found), tuple[str, ...]()
     if varying > VARIES and together is not None:
         one = _followed(together, begin)
@@ -471,8 +471,8 @@ def _later(found: Steady) -> tuple[Machine, Array]:
     return replace(machine, time=machine.time + later), carried(machine.place, machine.screws, found.x, later)
 
 
-def _not_lasting(found: Steady) -> str:
-    """Why it is none: rows that do not hold as the bodies move on in their screws; "" where all do."""
+def _not_lasting(found: Steady) -> InputError | None:
+    """Why it is none: rows that do not hold as the bodies move on in their screws; None where all do."""
     machine, x = _later(found)
     about = matrices(machine, x, found.about.lam)
     size = sizes_of(machine.system)
@@ -482,10 +482,10 @@ def _not_lasting(found: Steady) -> str:
     )
     bad = np.maximum(opened, turned)
     if bad.max(initial=0.0) <= OPENS * max(1.0, float(size.max())):
-        return ""
+        return None
     names = [block.name for block in machine.system.blocks for _ in block.words]
     worst = int(np.argmax(bad[: len(names)])) if names else 0
-    return (
+    return InputError(
         f"no steady motion: with every body turning on at a constant speed, {names[worst]!r} does not hold; a machine whose "
         "bodies do not all turn evenly, about axes that stay, has a periodic motion: `periodic`"
     )

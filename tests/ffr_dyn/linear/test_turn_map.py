@@ -11,6 +11,7 @@ from test_dyn_plane import slider_crank as flexible_crank
 import ffr_dyn as fd
 from ffr_dyn.functions.time_functions import evaluate
 from ffr_dyn.functions.together import alone
+from ffr_prep.common.errors import InputError
 
 FORCED = 3.0  # rad/s
 
@@ -118,3 +119,23 @@ def test_a_period_that_is_none_is_an_error():
         fd.periodic(flexible_crank(), period=0.013)
     with pytest.raises(fd.ComputationError, match="does not repeat itself"):
         fd.periodic(flexible_crank())
+
+
+def test_a_floquet_mode_moves_about_the_periodic_motion_without_its_decay():
+    """Of a linear oscillator: its own vibration, of constant amplitude, on top of the forced one."""
+    scene, period = oscillator(), 2 * np.pi / FORCED
+    method = fd.RK4(period / 1000)
+    turn = fd.periodic(scene, period=period, method=method, floquet=True)
+    motion = fd.floquet_motion(scene, 0, period=period, method=method)
+    growth, rate = turn.attributes["exponents"][0]
+    assert (growth, abs(rate)) == pytest.approx((-0.1, np.sqrt(25 - 0.01)), rel=1e-6)
+    assert motion.attributes["title"] == "0.79562 Hz, growth -0.1 1/s"
+    forced = np.interp(
+        motion.time, np.append(turn.time, turn.time[1:] + period), np.append(turn["m.R.x"], turn["m.R.x"][1:])
+    )
+    waves = np.stack([np.cos(abs(rate) * motion.time), np.sin(abs(rate) * motion.time)], 1)
+    added = motion["m.R.x"] - forced
+    fit = np.linalg.lstsq(waves, added, rcond=None)[0]
+    np.testing.assert_allclose(waves @ fit, added, atol=1e-6 * np.hypot(*fit))
+    with pytest.raises(InputError, match="are 1 to 1"):
+        fd.floquet_motion(scene, 1, period=period, method=method)
