@@ -32,6 +32,7 @@ from ffr_dyn.kernels.tables import LAW
 from ffr_dyn.linear.eigen import eigen
 from ffr_dyn.linear.matrices import Modes, modes_of, reduced
 from ffr_dyn.linear.matrices import state_matrix as steady_matrix
+from ffr_dyn.linear.prestrained import prestrained, told
 from ffr_dyn.linear.spectrum import main_parts, rates_of
 from ffr_dyn.linear.steady_state import Steady, screws_of, steady_here
 from ffr_dyn.linear.whirl import ways_of, whirls
@@ -219,7 +220,10 @@ def linearise(
     leading = in_words(*where, assembled.x, near.M, modes, rates_seen, ways)
     names = tuple(item if isinstance(item, str) else item.name for item in inputs)
     evaluate(at, time, assembled.x, assembled.v)
+    unit = main_parts(parts) / np.sqrt(np.maximum((np.abs(solved.parts) ** 2).sum(axis=(0, 1)), 1e-300))
+    strained = prestrained(*where, assembled.x, solved.values, unit)
     notes = (*assembled.notes, *_notes(near, steady), *checked("linearise", assembled, at.record))
+    notes = (*notes, *told(strained, leading[strained.mode]))
     driven = tuple(driver.name for driver in scene.drivers)
     return Linearisation(
         A, B, C, D, near.Z, solved.values, modes, leading, solved.free, driven, seen / (2 * np.pi), whirl, names,

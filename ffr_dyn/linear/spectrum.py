@@ -19,6 +19,7 @@ from scipy.optimize import linear_sum_assignment
 
 from ffr_dyn.linear.hill import moved_on, one_of_each
 from ffr_dyn.linear.matrices import modes_of
+from ffr_dyn.linear.prestrained import Prestrained, prestrained
 from ffr_dyn.linear.steady_state import Steady
 from ffr_dyn.linear.whirl import ways_of, whirls
 from ffr_dyn.linear.words import in_words
@@ -50,6 +51,11 @@ class Spectrum:
         rates = np.where([bool(way) for way in ways], np.abs(self.seen), np.abs(self.values))
         system, shapes = self.found.machine.system, main_parts(self.parts)
         return in_words(system.scene, system.layout, self.found.x, self.found.about.M, shapes, rates, ways)
+
+    @property
+    def prestrained(self) -> Prestrained:
+        machine = self.found.machine
+        return prestrained(machine.system.scene, machine.place, self.found.x, self.values, main_parts(self.parts))
 
     def only(self, numbers: Array) -> Spectrum:
         return replace(

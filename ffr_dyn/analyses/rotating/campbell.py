@@ -19,6 +19,7 @@ from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.rotating.steady import GROWS, SPEEDS, TURN
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import assemble, in_space
+from ffr_dyn.linear.prestrained import told
 from ffr_dyn.linear.spectrum import Spectrum, followed, spectrum
 from ffr_dyn.linear.speeds import at_speed, speed_list
 from ffr_dyn.linear.steady_state import steady_state
@@ -223,7 +224,8 @@ def _as_result(
     modes = Axis("vibration", tuple(str(k + 1) for k in range(len(names))))
     modulus = np.abs(values)
     ratios = np.where(modulus > 0, -values.real / np.where(modulus > 0, modulus, 1.0), 0.0)
-    notes = dict.fromkeys(note for one in spectra for note in one.found.notes)
+    worst = max((one.prestrained for one in spectra), key=lambda one: one.share)
+    notes = dict.fromkeys([*(note for one in spectra for note in one.found.notes), *told(worst, names[worst.mode])])
     quantities = {
         "speed": Quantity(np.array(speeds), "rad/s", (), "of what turns"),
         "frequencies": Quantity(np.abs(values.imag) / (2 * np.pi), "Hz", (modes,), "in the turning axes"),
