@@ -35,7 +35,7 @@ from ffr_dyn.linear.matrices import state_matrix as steady_matrix
 from ffr_dyn.linear.prestrained import prestrained, told
 from ffr_dyn.linear.spectrum import main_parts, rates_of
 from ffr_dyn.linear.steady_state import Steady, screws_of, steady_here
-from ffr_dyn.linear.whirl import ways_of, whirls
+from ffr_dyn.linear.whirl import damping_ratios, ways_of, whirls
 from ffr_dyn.linear.words import in_words
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.quantities import catalogue
@@ -97,9 +97,9 @@ class Linearisation(Brief):
 
     @property
     def damping_ratios(self) -> Array:
-        """(2d,) -Re / modulus; 1 for a decay without vibration, negative where the motion grows."""
-        modulus = np.abs(self.eigenvalues)
-        return np.where(modulus > 0, -self.eigenvalues.real / np.where(modulus > 0, modulus, 1.0), 0.0)
+        """(2d,) -Re / modulus, of whirls at the frequency seen from the ground; 1 for a decay without vibration, negative
+        where the motion grows."""
+        return damping_ratios(self.eigenvalues, 2 * np.pi * self.seen, self.whirl)
 
     @property
     def stability_margin(self) -> float:

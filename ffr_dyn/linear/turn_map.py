@@ -333,6 +333,9 @@ def floquet_modes(of: Turns) -> FloquetModes:
     base = 2 * np.pi / of.period
     logarithm = np.log(np.where(values, values, 1e-300).astype(complex)) / of.period
     exponents = logarithm + 1j * base * np.round((spin - logarithm.imag) / base)
+    exponents = np.where(
+        values.imag == 0, exponents.real + 1j * np.abs(exponents.imag), exponents
+    )  # half a turn: either
     rates = np.sqrt((np.abs(z) ** 2).sum(axis=0) / size)
     return FloquetModes(values, exponents, of.near.Z @ y, rates, begun)
 

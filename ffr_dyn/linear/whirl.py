@@ -66,6 +66,14 @@ def ways_of(seen: Array, share: Array) -> list[str]:
     ]
 
 
+def damping_ratios(values: Array, seen: Array, share: Array) -> Array:
+    """(m,) -Re / modulus of eigenvalues (m,) [1/s], of a whirl with the frequency (m,) [rad/s] that is seen from the ground;
+    1 of a decay without vibration, negative where a motion grows."""
+    whirling = [bool(way) for way in ways_of(seen, share)]
+    modulus = np.hypot(values.real, np.where(whirling, seen, values.imag))
+    return np.where(modulus > 0, -values.real / np.where(modulus > 0, modulus, 1.0), 0.0)
+
+
 def _integrals(body: Body, place: Layout, screws: Screws, x: Array, b: int, parts: Array) -> Array:
     """Integrals (3, h, m) of |z_+|^2 dm, |z_-|^2 dm and |u_3|^2 dm of a body in motions (h, V, m), turning included."""
     A, speed = rotation_matrix(x[place.p(b)]), float(np.linalg.norm(screws.w[b]))

@@ -86,3 +86,12 @@ def test_where_hills_determinant_is_unstable_mathieus_equation_is():
     assert found.values.size == 2
     assert found.values.real.max() == pytest.approx(b, rel=1e-4)
     assert np.abs(found.values.imag) == pytest.approx([0.5, 0.5])
+
+
+def test_the_damping_of_a_whirl_is_that_at_the_frequency_seen_from_the_ground():
+    """As in axes at rest; what varies is told once for all speeds."""
+    found = fd.campbell(rotor(1.0, damping=300.0), speeds=(200.0, 250.0))
+    ratios = [-value.real / abs(value) for value in at_rest(200.0, 300.0)]
+    whirling = np.array(found.attributes["whirling"], bool)
+    np.testing.assert_allclose(np.sort(found["damping_ratios"][0, whirling]), np.sort(ratios), rtol=1e-6)
+    assert sum("changes with their angle" in note for note in found.attributes["notes"]) == 1

@@ -9,6 +9,7 @@ from test_analyses_kinematic import bar
 from test_dyn_plane import slider_crank as flexible_crank
 
 import ffr_dyn as fd
+from ffr_dyn.analyses.rotating.periodic import floquet_lines
 from ffr_dyn.functions.time_functions import evaluate
 from ffr_dyn.functions.together import alone
 from ffr_prep.common.errors import InputError
@@ -139,3 +140,18 @@ def test_a_floquet_mode_moves_about_the_periodic_motion_without_its_decay():
     np.testing.assert_allclose(waves @ fit, added, atol=1e-6 * np.hypot(*fit))
     with pytest.raises(InputError, match="are 1 to 1"):
         fd.floquet_motion(scene, 1, period=period, method=method)
+
+
+def test_the_mode_that_grows_by_a_parametric_resonance_is_told():
+    """Multipliers that are real and negative: half the frequency of the shaking, in the list of what is told."""
+    w = 2 * np.sqrt(9.81 / (4 / 3))
+    shaking = fd.harmonic(amplitude=0.2 * 9.81, frequency=w / (2 * np.pi))
+    scene = fd.Scene(
+        (fd.Body("rod", bar("rod", 2.0), rotation=(0, 0, -np.pi / 2)),), (fd.Joint("A", "revolute", "ground.O", "rod.a"),),
+        ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0), base_acceleration=(0, shaking, 0),
+    )  # fmt: skip
+    found = fd.periodic(scene, period=2 * np.pi / w, floquet=True)
+    exponents, lines = found.attributes["exponents"], floquet_lines(found.attributes)
+    assert [rate for _, rate in exponents] == pytest.approx([w / 2, w / 2])
+    assert exponents[0][0] > 0.1
+    assert len(lines) == 2
