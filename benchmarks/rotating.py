@@ -488,9 +488,42 @@ def _apart(found: fd.Result, exact: Array) -> float:
     return float(max(np.abs(values - one).min() for one in exact))
 
 
+# ---- bearings that are not the same all around --------------------------------------------------------------------------
+
+ENDS, ACROSS, ALONG, AIR = (-0.2, 0.3), 0.5, 0.9, 300.0  # m, kg m^2, N s/m
+
+
+def unlike() -> Iterator[Figure]:
+    """A rigid rotor of 10 kg in bearings of 1 and 1.5 MN/m, against its equations in axes at rest."""
+    speed, stiff, points = 200.0, (1e6, 1.5e6), {side: (0.0, 0.0, z) for side, z in zip("lr", ENDS, strict=True)}
+    disc = fd.rigid_body("disc", mass=10.0, inertia=(ACROSS, ACROSS, ALONG), points=points)
+    K, C = np.diag([*stiff, 1e6, 0, 0, 0]), np.diag([AIR, AIR, 0, 0, 0, 0])
+    bearings = tuple(fd.Bushing(f"bearing_{side}", f"ground.{side}", f"disc.{side}", K, C) for side in "lr")
+    scene = fd.Scene((fd.Body("disc", disc, omega_bar=(0, 0, speed)),), forces=bearings, ground=points)
+    M, still, loss = np.diag([10.0, 10.0, ACROSS, ACROSS]), np.zeros((4, 4)), np.zeros((4, 4))
+    loss[2, 3], loss[3, 2] = ALONG * speed, -ALONG * speed
+    for z in ENDS:
+        B = np.array([[1, 0, 0, z], [0, 1, -z, 0]])
+        still, loss = still + B.T @ np.diag(stiff) @ B, loss + AIR * B.T @ B
+    A = np.block([[np.zeros((4, 4)), np.eye(4)], [-np.linalg.solve(M, still), -np.linalg.solve(M, loss)]])
+    exact = np.linalg.eigvals(A)
+    found = fd.linearise(scene)
+    moving = (found.eigenvalues.imag > 0) & ~np.isnan(found.whirl)
+    values = found.eigenvalues.real[moving] + 2j * np.pi * np.abs(found.seen[moving])
+    off = max(np.abs(exact - value).min() / abs(value) for value in values)
+    yield Figure("rotor in unlike bearings: eigenvalues against axes at rest", off, 1e-8)
+    f = np.geomspace(5.0, 150.0, 12)
+    how = {"input": "disc.r.force.x", "outputs": ["disc.r.position.x"], "about": "steady", "frequencies": f}
+    H = fd.response(scene, **how)["transfer"][:, 0] @ np.array([1, 1j])
+    at = np.array([1.0, 0, 0, ENDS[1]])
+    truth = [at @ np.linalg.solve(still + s * loss + s**2 * M, at) for s in 2j * np.pi * f]
+    yield Figure("    response to a force that does not turn", float(np.abs(H / np.array(truth) - 1).max()), 1e-8)
+
+
 CASES: dict[str, Callable[[], Iterator[Figure]]] = {
     "overhung": overhung,
     "nelson-mcvaugh": nelson_mcvaugh,
+    "unlike": unlike,
     "blades": blades,
     "swept": swept,
     "responses": responses,

@@ -74,7 +74,7 @@ _BY_MODULE = {
     "ffr_dyn.pictures.bode": "draw_bode draw_nyquist",
     "ffr_dyn.pictures.campbell": "draw_campbell",
     "ffr_dyn.analyses.rotating.campbell": "Campbell campbell",
-    "ffr_dyn.analyses.rotating.periodic": "Periodic periodic",
+    "ffr_dyn.analyses.rotating.periodic": "Periodic floquet_motion periodic",
     "ffr_dyn.analyses.rotating.response": "Response response",
     "ffr_dyn.analyses.rotating.forced": "Forced forced",
     "ffr_dyn.pictures.forced": "draw_forced",
@@ -190,7 +190,9 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_dyn.pictures.campbell import draw_campbell as draw_campbell
     from ffr_dyn.analyses.rotating.campbell import Campbell as Campbell, campbell as campbell
     from ffr_dyn.analyses.rotating.mode_motion import mode_motion as mode_motion
-    from ffr_dyn.analyses.rotating.periodic import Periodic as Periodic, periodic as periodic
+    from ffr_dyn.analyses.rotating.periodic import (
+        Periodic as Periodic, floquet_motion as floquet_motion, periodic as periodic
+    )
     from ffr_dyn.analyses.rotating.response import Response as Response, response as response
     from ffr_dyn.analyses.rotating.forced import Forced as Forced, forced as forced
     from ffr_dyn.pictures.forced import draw_forced as draw_forced

@@ -118,6 +118,13 @@ def with_units(scene: Scene, efforts: tuple[Effort, ...]) -> Scene:
     return scene
 
 
+def without(scene: Scene, efforts: tuple[Effort, ...]) -> Scene:
+    """The scene without the efforts that `with_units` has added."""
+    names = {effort.name for effort in efforts}
+    loads, forces = (tuple(one for one in of if one.name not in names) for of in (scene.loads, scene.forces))
+    return replace(scene, loads=loads, forces=forces)
+
+
 def _with_actuator(scene: Scene, effort: JointEffort, force: TimeFunction) -> Scene:
     added = Actuator(effort.name, effort.joint, force=force, coordinate=effort.coordinate)
     return replace(scene, forces=(*scene.forces, added))

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, get_args
 
 import numpy as np
 
-from ffr_dyn.analyses.efforts import Effort, sized, with_units
+from ffr_dyn.analyses.efforts import Effort, sized, with_units, without
 from ffr_dyn.analyses.outcome import result_of
 from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.rotating.steady import steady
@@ -29,11 +29,13 @@ from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
 from ffr_dyn.consistency.tangent import Chart, at_rest, chart, derivative, rates, sizes, state, state_matrix
 from ffr_dyn.equations.layout import to_global_axes
 from ffr_dyn.kernels.tables import LAW
-from ffr_dyn.linear.eigen import Eigen, eigen
-from ffr_dyn.linear.matrices import reduced
+from ffr_dyn.linear.eigen import eigen
+from ffr_dyn.linear.matrices import Modes, modes_of, reduced
 from ffr_dyn.linear.matrices import state_matrix as steady_matrix
+from ffr_dyn.linear.prestrained import prestrained, told
+from ffr_dyn.linear.spectrum import main_parts, rates_of
 from ffr_dyn.linear.steady_state import Steady, screws_of, steady_here
-from ffr_dyn.linear.whirl import ways_of, whirls
+from ffr_dyn.linear.whirl import damping_ratios, ways_of, whirls
 from ffr_dyn.linear.words import in_words
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.quantities import catalogue
@@ -62,7 +64,7 @@ class Linearisation(Brief):
     driven      : drivers, whose motions are none of the degrees of freedom
     seen        : (2d,) [Hz] frequencies seen from the ground, of scenes that turn: positive where the whirl is forward
     whirl       : (2d,) share of the amplitude that whirls so, 1 for a circle and 1/2 for a line in the turning axes; nan of
-                  what does not turn
+                  what does not turn, or vibrates along the axis
     error       : relative difference of A from step halving; zero at rest and in steady motion, where A is exact
 
     >>> found = fd.linearise(scene)
@@ -95,9 +97,9 @@ class Linearisation(Brief):
 
     @property
     def damping_ratios(self) -> Array:
-        """(2d,) -Re / modulus; 1 for a decay without vibration, negative where the motion grows."""
-        modulus = np.abs(self.eigenvalues)
-        return np.where(modulus > 0, -self.eigenvalues.real / np.where(modulus > 0, modulus, 1.0), 0.0)
+        """(2d,) -Re / modulus, of whirls at the frequency seen from the ground; 1 for a decay without vibration, negative
+        where the motion grows."""
+        return damping_ratios(self.eigenvalues, 2 * np.pi * self.seen, self.whirl)
 
     @property
     def stability_margin(self) -> float:
@@ -204,21 +206,24 @@ def linearise(
     near = chart(at, time, assembled.x, assembled.v)
     if near.steps.size == 0:
         raise InputError("nothing is free to move: joints and drivers fix every motion; linearise with fewer drivers")
-    steady = None if at_rest(near) else steady_here(assembled.system, time, assembled.x, assembled.v)
-    A, error, solved = _solved(near, steady)
-    B = _columns(lambda u: rates(_fed(near, scene, inputs, u), assembled.x, assembled.v), len(inputs))
-    C, D = _output_matrices(near, scene, inputs, outputs)
-    modes = near.Z @ solved.vectors
+    steady = steady_about(near, inputs)
+    A, error, solved = _solved(_without_inputs(near, inputs), steady)
+    B, C, D = inputs_and_outputs(near, scene, inputs, outputs)
+    parts = near.Z @ solved.parts
+    modes = main_parts(parts)
     modes = modes / np.where((size := np.abs(modes).max(axis=0)) > 0, size, 1.0)
     where = assembled.system.scene, assembled.system.layout
     screws = screws_of(where[1], assembled.x, assembled.v)
-    seen, whirl = whirls(*where, screws, assembled.x, solved.values, modes)
+    seen, whirl = whirls(*where, screws, assembled.x, rates_of(solved.values, len(parts), solved.shift), parts)
     ways = ways_of(seen, whirl)
     rates_seen = np.where([bool(way) for way in ways], np.abs(seen), np.abs(solved.values))
     leading = in_words(*where, assembled.x, near.M, modes, rates_seen, ways)
     names = tuple(item if isinstance(item, str) else item.name for item in inputs)
     evaluate(at, time, assembled.x, assembled.v)
+    unit = main_parts(parts) / np.sqrt(np.maximum((np.abs(solved.parts) ** 2).sum(axis=(0, 1)), 1e-300))
+    strained = prestrained(*where, assembled.x, solved.values, unit)
     notes = (*assembled.notes, *_notes(near, steady), *checked("linearise", assembled, at.record))
+    notes = (*notes, *told(strained, leading[strained.mode]))
     driven = tuple(driver.name for driver in scene.drivers)
     return Linearisation(
         A, B, C, D, near.Z, solved.values, modes, leading, solved.free, driven, seen / (2 * np.pi), whirl, names,
@@ -226,12 +231,26 @@ def linearise(
     )  # fmt: skip
 
 
-def _solved(near: Chart, steady: Steady | None) -> tuple[Array, float, Eigen]:
-    """A, its error, and its eigenvalues; about a steady motion and at rest from exact matrices."""
+def steady_about(near: Chart, inputs: tuple[Effort | str, ...]) -> Steady | None:
+    """The steady motion that a chart's state is in without the inputs; None of one that is in none, or at rest."""
+    if at_rest(near):
+        return None
+    plain = _without_inputs(near, inputs)
+    return steady_here(plain.at.system, near.time, near.x, to_global_axes(plain.at.system.layout, near.x, near.V))
+
+
+def _without_inputs(near: Chart, inputs: tuple[Effort | str, ...]) -> Chart:
+    """With the efforts, which are of one in the scene, left out of what is computed from its declarations."""
+    system = near.at.system
+    plain = replace(system, scene=without(system.scene, _efforts(inputs)))
+    return replace(near, at=replace(near.at, engine=replace(near.at.engine, system=plain)))
+
+
+def _solved(near: Chart, steady: Steady | None) -> tuple[Array, float, Modes]:
+    """A, its error, and the modes; about a steady motion and at rest from exact matrices."""
     if steady is not None:
         steady = replace(steady, Z=near.Z)
-        of = reduced(steady)
-        return steady_matrix(steady, of), 0.0, eigen(of.K, of.C)
+        return steady_matrix(steady, reduced(steady)), 0.0, modes_of(steady)
     d = near.steps.size
     A, error = state_matrix(near)
     if not np.isfinite(A).all():
@@ -239,10 +258,11 @@ def _solved(near: Chart, steady: Steady | None) -> tuple[Array, float, Eigen]:
             f"at t = {near.time:.6g} s a force has no finite value beside the state that is linearised; look at its function"
         )
     if at_rest(near):
-        return A, error, eigen(-A[d:, :d], -A[d:, d:])
+        rest = eigen(-A[d:, :d], -A[d:, d:])
+        return A, error, Modes(rest.values, rest.vectors[None], rest.free, 0.0)
     values, vectors = np.linalg.eig(A)
     order = np.lexsort((np.sign(values.imag), np.round(np.abs(values), 9)))
-    return A, error, Eigen(values[order], vectors[:d, order], 0)
+    return A, error, Modes(values[order], vectors[None, :d, order], 0, 0.0)
 
 
 def _notes(near: Chart, steady: Steady | None) -> list[str]:
@@ -258,6 +278,15 @@ def _notes(near: Chart, steady: Steady | None) -> list[str]:
 
 
 # ---- inputs and outputs ----------------------------------------------------------------------------------------------
+
+
+def inputs_and_outputs(
+    near: Chart, scene: Scene, inputs: tuple[Effort | str, ...], outputs: tuple[str, ...]
+) -> tuple[Array, Array, Array]:
+    """B, C, D about a chart's state."""
+    v = to_global_axes(near.at.system.layout, near.x, near.V)
+    B = _columns(lambda u: rates(_fed(near, scene, inputs, u), near.x, v), len(inputs))
+    return B, *_output_matrices(near, scene, inputs, outputs)
 
 
 def _columns(function: Callable[[Array], Array], count: int) -> Array:

@@ -86,7 +86,7 @@ def strained(scene: Scene, turned: Array, stretched: Array) -> list[str]:
     """
     worst: dict[str, tuple[float, str]] = {}
     for body, turn, share in zip(scene.bodies, turned, stretched, strict=True):
-        limit = BENT if _stiffened(body) else STRAINED
+        limit = BENT if stiffened(body) else STRAINED
         beyond = max(share / STRETCHED, turn / limit)
         if beyond > max(1.0, worst.get(owner(body), (0.0, ""))[0]):
             note = (
@@ -162,7 +162,7 @@ def unstiffened(scene: Scene, spun: Array) -> list[str]:
     """Bodies without geometric stiffening that spin near their first frequency; spun (B,) [rad/s]."""
     notes = []
     for body, spin in zip(scene.bodies, spun, strict=True):
-        share = spin / _first(body) if body.model.n and not _stiffened(body) else 0.0
+        share = spin / _first(body) if body.model.n and not stiffened(body) else 0.0
         if share > SPINNING:
             notes.append(
                 f"body {body.name!r} spins at up to {spin:.4g} rad/s, {share:.2g} of its first frequency, without geometric "
@@ -176,5 +176,5 @@ def _first(body: Body) -> float:
     return float(np.sqrt(body.model.omega2.min())) or np.inf
 
 
-def _stiffened(body: Body) -> bool:
+def stiffened(body: Body) -> bool:
     return body.model.stiffening is not None and body.stiffening

@@ -3,7 +3,8 @@ the bodies.
 
     y_ddot + C y_dot + K y = forces,    C = Z^T (G + D) Z,  K = Z^T K Z,  Z^T M Z = 1
 
-with the matrices of `ffr_dyn.linear.steady_state`, all of them exact but for forces that see velocities.
+with the matrices of `ffr_dyn.linear.steady_state`, all of them exact but for forces that see velocities. Where they change
+with the angle of the turning bodies they are the means of a turn, and the modes Hill's (`ffr_dyn.linear.hill`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import numpy as np
 
 from ffr_dyn.equations.layout import to_body_axes
 from ffr_dyn.functions.rotation import skew
+from ffr_dyn.linear.eigen import eigen
+from ffr_dyn.linear.hill import Varying, hill
 from ffr_dyn.linear.steady_state import Steady
 from ffr_prep.common.arrays import Array
 
@@ -26,10 +29,60 @@ class Reduced:
     C: Array
 
 
+@dataclass(frozen=True)
+class Modes:
+    """values (2 d,) [1/s] of the modes of a steady motion, `free` zeros first, the others by rising modulus.
+
+    parts : (2 h + 1, d, 2 d) of y = exp(value t) sum_k parts[h + k] exp(i k shift t)
+    shift : [rad/s], 0 where nothing varies
+    """
+
+    values: Array
+    parts: Array
+    free: int
+    shift: float
+
+
 def reduced(found: Steady) -> Reduced:
     """The matrices of the free motions."""
     Z, about = found.Z, found.about
     return Reduced(Z.T @ about.K @ Z, Z.T @ (about.G + about.D) @ Z)
+
+
+def modes_of(found: Steady) -> Modes:
+    """The modes of a steady motion in its free motions."""
+    of = reduced(found)
+    mean, varying = eigen(of.K, of.C), _varying(found, of)
+    step = varying.step if varying.rate else 0
+    if not step:
+        return Modes(mean.values, mean.vectors[None], mean.free, 0.0)
+    all_of = hill(varying)
+    order = np.lexsort((np.sign(all_of.values.imag), np.round(np.abs(all_of.values), 9)))
+    values, parts, h = all_of.values[order], all_of.parts[..., order], len(all_of.parts) // 2
+    values[: mean.free], parts[..., : mean.free] = 0.0, 0.0
+    parts[h, :, : mean.free] = mean.vectors[:, : mean.free]
+    return Modes(values, parts, mean.free, step * varying.rate)
+
+
+def over_turn(found: Steady, H: int) -> Array:
+    """(H + 1, 2 d, 2 d) harmonics of the state matrix over a turn; zero beyond the first where nothing varies."""
+    of = reduced(found)
+    varying = _varying(found, of)
+    A = np.zeros((H + 1, 2 * len(of.K), 2 * len(of.K)), complex)
+    A[0] = state_matrix(found, of)
+    none = state_matrix(found, Reduced(np.zeros_like(of.K), np.zeros_like(of.C)))
+    for k in range(1, min(H + 1, len(varying.K)) if varying.step else 1):
+        A[k] = state_matrix(found, Reduced(varying.K[k], varying.C[k])) - none
+    return A
+
+
+def _varying(found: Steady, mean: Reduced) -> Varying:
+    """K and C by their harmonics over a turn, where all that turns does so at one speed."""
+    Z = found.Z
+    K, C = (Z.T @ one @ Z for one in (found.about.over_turn))
+    return Varying(
+        np.concatenate([mean.K[None], K[1:]]), np.concatenate([mean.C[None], C[1:]]), found.machine.screws.rate
+    )
 
 
 def state_matrix(found: Steady, of: Reduced) -> Array:

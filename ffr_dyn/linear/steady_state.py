@@ -11,12 +11,13 @@ free to go on turning has no stiffness and stays where it is. Above critical spe
 minimum, so the state is followed from rest where Newton's method does not reach it at once, and not sought downhill.
 
 A scene that turns meets its ground, gravity and bearings anew at every angle. Rows that then do not hold are no
-steady motion; forces and stiffness that vary are taken as their means of a turn, and a note says so.
+steady motion; forces and stiffness that vary are taken as their means of a turn, and a note says so. How stiffness and
+damping vary is kept by its harmonics, for the modes (`ffr_dyn.linear.hill`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,6 +36,7 @@ from ffr_dyn.equations.placed import Sums, all_placed, nothing_on
 from ffr_dyn.equations.spinning import spinning
 from ffr_dyn.equations.statics import balance, damping
 from ffr_dyn.functions.rotation import from_vector, product, rotation_matrix
+from ffr_dyn.linear.hill import harmonics
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import AtMarker, OnBody
@@ -74,6 +76,13 @@ class Screws:
     def fastest(self) -> float:
         """[rad/s]"""
         return float(np.linalg.norm(self.w, axis=1).max())
+
+    @property
+    def rate(self) -> float:
+        """[rad/s] of all that turns, where that is one; else 0."""
+        speeds = np.linalg.norm(self.w, axis=1)
+        same = np.isclose(speeds, self.fastest, rtol=SAME, atol=0.0) | (speeds <= SAME * self.fastest)
+        return self.fastest if same.all() else 0.0
 
 
 def screws_of(place: Layout, x: Array, v: Array) -> Screws:
@@ -124,6 +133,7 @@ class Matrices:
     """About a motion, in body axes: forces (V,) but those of the constraints; Phi (C,), jacobian (C, V) of the rows.
 
     M, G, D, K : (V, V) mass, gyroscopic, damping and stiffness matrix, centrifugal part and multipliers (C,) included
+    over_turn  : (2, H + 1, V, V) complex, K and D of what varies over a turn by their harmonics exp(i k w t), k = 0 ... H
     """
 
     forces: Array
@@ -134,23 +144,24 @@ class Matrices:
     D: Array
     K: Array
     lam: Array
+    over_turn: Array
 
 
-def matrices(machine: Machine, x: Array, lam: Array) -> Matrices:
-    """At the positions x (X,), with the multipliers lam (C,)."""
+def matrices(machine: Machine, x: Array, lam: Array, own: Sequence[_Loads] = ()) -> Matrices:
+    """At the positions x (X,), with the multipliers lam (C,); `own` is what `_over_turn` has found there."""
     system, place = machine.system, machine.place
     across, rows = locked(place), sum(len(block.words) for block in system.blocks)
     at = balance(system.scene, place, system.blocks, machine.time, x, lam[:rows], {})
     Phi = np.concatenate([at.Phi, np.zeros(across.size)])
     jacobian = np.concatenate([at.jacobian, unit_rows(across, place.v_size)])
-    forces, K, D = at.forces, at.stiffness, np.zeros_like(at.stiffness)
-    own = [_loads(machine, time, carried(place, machine.screws, x, time)) for time in machine.phases]
+    forces, K = at.forces, at.stiffness
+    own = own or _over_turn(machine, x)
     if len(own) > 1:
         only = balance(system.scene, place, system.blocks, machine.time, x, np.zeros(rows), {})
         forces, K = 0 * forces, K - only.stiffness
-    for more_forces, more_K, more_D in own:
-        forces, K, D = forces + more_forces / len(own), K + more_K / len(own), D + more_D / len(own)
-    G = np.zeros_like(K)
+    over_turn = harmonics(np.array([one[1:] for one in own])).swapaxes(0, 1)
+    forces, K = forces + sum(one[0] for one in own) / len(own), K + over_turn[0, 0].real
+    D, G = over_turn[1, 0].real, np.zeros_like(K)
     inside = to_body_axes(place, x, velocities(place, machine.screws, x))
     for b, body in enumerate(system.scene.bodies):
         one = slice(place.iv[b], place.iv[b] + 6 + place.n[b])
@@ -158,11 +169,22 @@ def matrices(machine: Machine, x: Array, lam: Array) -> Matrices:
         forces[one] += part.force
         K[one, one] -= part.hessian
         G[one, one] = part.gyroscopic
-    return Matrices(forces, Phi, jacobian, total_mass_matrix(system.scene, place, x), G, D, K, lam)
+    return Matrices(forces, Phi, jacobian, total_mass_matrix(system.scene, place, x), G, D, K, lam, over_turn)
 
 
-def _loads(machine: Machine, later: float, x: Array) -> tuple[Array, Array, Array]:
-    """Forces (V,), stiffness and damping (V, V) at a phase: of one phase alone, what velocities add to forces at rest."""
+_Loads = tuple[Array, Array, Array]
+
+
+def _over_turn(machine: Machine, x: Array) -> list[_Loads]:
+    """Forces (V,), stiffness and damping (V, V) at every phase: of one phase alone, what velocities add to forces at rest."""
+    system, place = machine.system, machine.place
+    now = At(system.scene, place, machine.time, x, velocities(place, machine.screws, x))
+    seeing = [force for force in forces_of(system.scene) if _sees_velocities(now, force)]
+    return [_loads(machine, time, carried(place, machine.screws, x, time), seeing) for time in machine.phases]
+
+
+def _loads(machine: Machine, later: float, x: Array, seeing: Sequence[Force]) -> _Loads:
+    """At a phase; `seeing` are the forces that change with velocities."""
     system, place, time = machine.system, machine.place, machine.time + later
     forces, K = np.zeros(place.v_size), np.zeros((place.v_size, place.v_size))
     D = damping(system.scene, place, time, x)
@@ -174,9 +196,7 @@ def _loads(machine: Machine, later: float, x: Array) -> tuple[Array, Array, Arra
         return forces, K, D
     now = At(system.scene, place, time, x, velocities(place, machine.screws, x))
     total = nothing_on(all_placed(replace(now, v=np.zeros(place.v_size))), place.v_size)
-    for force in forces_of(system.scene):
-        if not _sees_velocities(now, force):
-            continue
+    for force in seeing:
         if isinstance(force.place, (AtMarker, OnBody)) or _looks(now, force):
             _add_by_differences(total, D, machine.screws, now, force)
         else:
@@ -265,16 +285,17 @@ def steady_state(assembled: Assembled, time: float, start: Array | None = None) 
     machine = Machine(system, time, screws_of(system.layout, assembled.x, assembled.v))
     begin = assembled.x if start is None else start
     found = _followed(machine, begin)
-    _require_lasting(found)
-    varying, notes = _varying(found), tuple[str, ...]()
-    if varying > VARIES and (together := _together(found)) is not None:
+    together, refused = _together(found), _not_lasting(found)
+    if refused and (together is None or _not_lasting(_followed(together, begin))):
+        raise refused
+    varying, notes = np.inf if refused else _varying(found), tuple[str, ...]()
+    if varying > VARIES and together is not None:
         one = _followed(together, begin)
-        if (less := _varying(one)) < varying:
+        if (less := _varying(one)) < varying and not _not_lasting(one):
             found, varying, notes = one, less, (ALL_TURN,)
-            _require_lasting(found)
     if varying > VARIES:
         found = _followed(replace(found.machine, phases=_phases(found.machine)), found.x)
-        notes = (*notes, _varies(varying))
+        notes = (*notes, _varies(varying, found.machine.screws.rate))
     return replace(found, notes=notes)
 
 
@@ -297,23 +318,27 @@ def steady_here(system: System, time: float, x: Array, v: Array) -> Steady | Non
     apart = np.abs((v - velocities(machine.place, machine.screws, x)) / size).max(initial=0.0)
     if apart > SAME * max(machine.screws.fastest, float(np.abs(v / size).max(initial=0.0))):
         return None
-    for phases in ((0.0,), _phases(machine)):
-        found = _at(replace(machine, phases=phases), x)
-        if np.abs(found.Z.T @ found.about.forces).max(initial=0.0) <= SAME * _size_of_forces(found):
-            try:
-                _require_lasting(found)
-            except InputError:
-                return None
-            varying = _varying(found) if len(phases) == 1 else VARIES
-            return found if varying <= VARIES else replace(found, notes=(_varies(varying),))
-    return None
+    found = _in_balance(machine, x)
+    if found is not None and _varying(found) <= VARIES:
+        return found
+    found = _in_balance(replace(machine, phases=_phases(machine)), x)
+    return found and replace(found, notes=(_varies(_varying(_at(machine, x)), machine.screws.rate),))
+
+
+def _in_balance(machine: Machine, x: Array) -> Steady | None:
+    """The steady motion at positions (X,) that balance; None where they do not."""
+    found = _at(machine, x)
+    if np.abs(found.Z.T @ found.about.forces).max(initial=0.0) > SAME * _size_of_forces(found):
+        return None
+    return None if _not_lasting(found) else found
 
 
 def _at(machine: Machine, x: Array) -> Steady:
     """The matrices at a state, balanced or not."""
     count = sum(len(block.words) for block in machine.system.blocks) + locked(machine.place).size
-    about = matrices(machine, x, np.zeros(count))
-    about = matrices(machine, x, _multipliers(about, about.forces))
+    own = _over_turn(machine, x)
+    about = matrices(machine, x, np.zeros(count), own)
+    about = matrices(machine, x, _multipliers(about, about.forces), own)
     Z = free_motions(about.jacobian, about.M)
     return Steady(machine, x, velocities(machine.place, machine.screws, x), about, Z, 0)
 
@@ -324,11 +349,12 @@ def _phases(machine: Machine) -> tuple[float, ...]:
     return tuple(2 * np.pi / fastest * k / PHASES for k in range(PHASES)) if fastest else (0.0,)
 
 
-def _varies(varying: float) -> str:
+def _varies(varying: float, rate: float) -> str:
+    of_modes = "its modes are those of what varies" if rate else "its modes have those means, too"
     return (
         "what acts on the turning bodies changes with their angle, as weight, loads and bearings do that are not the same "
-        f"all around, by up to {varying:.1g} of the stiffness or the forces: the steady motion and its modes have the means "
-        "of a turn; `periodic` finds the motion itself"
+        f"all around, by up to {varying:.1g} of the stiffness or the forces: the steady motion has the means of a turn, "
+        f"{of_modes}; `periodic` finds the motion itself"
     )
 
 
@@ -445,8 +471,8 @@ def _later(found: Steady) -> tuple[Machine, Array]:
     return replace(machine, time=machine.time + later), carried(machine.place, machine.screws, found.x, later)
 
 
-def _require_lasting(found: Steady) -> None:
-    """InputError where the rows do not hold as the bodies move on in their screws."""
+def _not_lasting(found: Steady) -> InputError | None:
+    """Why it is none: rows that do not hold as the bodies move on in their screws; None where all do."""
     machine, x = _later(found)
     about = matrices(machine, x, found.about.lam)
     size = sizes_of(machine.system)
@@ -456,10 +482,10 @@ def _require_lasting(found: Steady) -> None:
     )
     bad = np.maximum(opened, turned)
     if bad.max(initial=0.0) <= OPENS * max(1.0, float(size.max())):
-        return
+        return None
     names = [block.name for block in machine.system.blocks for _ in block.words]
     worst = int(np.argmax(bad[: len(names)])) if names else 0
-    raise InputError(
+    return InputError(
         f"no steady motion: with every body turning on at a constant speed, {names[worst]!r} does not hold; a machine whose "
         "bodies do not all turn evenly, about axes that stay, has a periodic motion: `periodic`"
     )

@@ -40,7 +40,7 @@ def transfer(A: Array, B: Array, C: Array, D: Array, frequencies: Array, count: 
     """
     s = 2j * np.pi * frequencies
     one, powers = np.eye(len(A)), s[:, None] ** (np.arange(B.shape[1]) - float(order))
-    H = np.array([C @ np.linalg.solve(at * one - A, B @ u) + D @ u for at, u in zip(s, powers, strict=True)])
+    H = np.array([C @ _answer(at * one - A, B @ u) + D @ u for at, u in zip(s, powers, strict=True)])
     H = H.reshape(s.size, len(C))
     values, left, right = eig(A, left=True, right=True)
     scale = np.einsum("sk,sk->k", left.conj(), right)
@@ -53,6 +53,15 @@ def transfer(A: Array, B: Array, C: Array, D: Array, frequencies: Array, count: 
     most = np.sort(np.argsort(-size, kind="stable")[:count])
     most = most[np.argsort(np.abs(values[chosen][most]), kind="stable")]
     return Transfer(frequencies, H, parts[:, :, most], chosen[most], values[chosen][most])
+
+
+def _answer(matrix: Array, right: Array) -> Array:
+    """The solution; where there are several, of what is free and not excited, the smallest."""
+    try:
+        return np.linalg.solve(matrix, right)
+    except np.linalg.LinAlgError:
+        found: Array = np.linalg.lstsq(matrix, right, rcond=None)[0]
+        return found
 
 
 def band(values: Array, low: float | None = None, high: float | None = None) -> Array:

@@ -24,7 +24,7 @@ from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.evaluation import evaluate, evaluator
 from ffr_dyn.consistency.failure import failure
 from ffr_dyn.consistency.tangent import STEP, Chart, chart, sizes_of
-from ffr_dyn.equations.layout import moved, to_body_axes, to_global_axes
+from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.functions.time_functions import evaluate as value_of
 from ffr_dyn.functions.together import together
@@ -141,18 +141,24 @@ def _least(matrix: Array, right: Array) -> Array:
 def deviation(of: Turns, x: Array, v: Array) -> Array:
     """(2 d,) minimal coordinates of a state near the chart's. Raises ComputationError for one that is not near."""
     near, place = of.near, of.system.layout
-    y, V = np.zeros(place.v_size), to_body_axes(place, x, v)
-    for b in range(len(place.n)):
-        A0, A = rotation_matrix(near.x[place.p(b)]), rotation_matrix(x[place.p(b)])
-        y[place.R_dot(b)] = A0.T @ (x[place.R(b)] - near.x[place.R(b)])
-        y[place.omega(b)] = _vector(A0.T @ A)
-        y[place.q_dot(b)] = x[place.q(b)] - near.x[place.q(b)]
+    y, V = _between(place, near.x, x), to_body_axes(place, x, v)
     if np.abs(y / sizes_of(of.system)).max() > AGAIN:
         raise ComputationError(
             f"after a period of {of.period:.6g} s the scene is not where it began: the period is not that of its drivers and "
             "loads, or a body goes on turning; give another period"
         )
     return np.concatenate([near.W.T @ y, near.W.T @ (V - near.V)])
+
+
+def _between(place: Layout, x0: Array, x: Array) -> Array:
+    """(V,) that moves positions x0 (X,) to x, in the body axes there."""
+    y = np.zeros(place.v_size)
+    for b in range(len(place.n)):
+        A0, A = rotation_matrix(x0[place.p(b)]), rotation_matrix(x[place.p(b)])
+        y[place.R_dot(b)] = A0.T @ (x[place.R(b)] - x0[place.R(b)])
+        y[place.omega(b)] = _vector(A0.T @ A)
+        y[place.q_dot(b)] = x[place.q(b)] - x0[place.q(b)]
+    return y
 
 
 def _vector(A: Array) -> Array:
@@ -302,7 +308,7 @@ class FloquetModes:
     """Small motions y = exp(exponent t) p(t), p periodic, about a periodic motion: multipliers and exponents [1/s] (2 d,),
     the largest multiplier first, and shapes (V, 2 d), p at the beginning of the period.
 
-    rates : (2 d,) [rad/s] of the shapes there
+    rates : (2 d,) [rad/s] of the shapes there;  deviations : (2 d, 2 d) that begin the modes, in units of the scale
 
     A frequency is known but for multiples of that of the period; it is the one nearest to the rate at the beginning.
     """
@@ -311,6 +317,7 @@ class FloquetModes:
     exponents: Array
     shapes: Array
     rates: Array
+    deviations: Array
 
 
 def floquet_modes(of: Turns) -> FloquetModes:
@@ -318,15 +325,35 @@ def floquet_modes(of: Turns) -> FloquetModes:
     d = of.near.steps.size
     values, vectors = np.linalg.eig(monodromy(of, np.zeros(2 * d)))
     order = np.argsort(-np.abs(values), kind="stable")
-    values, vectors = values[order], (vectors[:, order].T * of.scale).T
+    values, begun = values[order], vectors[:, order]
+    vectors = (begun.T * of.scale).T
     y, z = vectors[:d], vectors[d:]
     size = np.maximum((np.abs(y) ** 2).sum(axis=0), 1e-300)
     spin = (y.conj() * z).sum(axis=0).imag / size
     base = 2 * np.pi / of.period
     logarithm = np.log(np.where(values, values, 1e-300).astype(complex)) / of.period
     exponents = logarithm + 1j * base * np.round((spin - logarithm.imag) / base)
+    exponents = np.where(
+        values.imag == 0, exponents.real + 1j * np.abs(exponents.imag), exponents
+    )  # half a turn: either
     rates = np.sqrt((np.abs(z) ** 2).sum(axis=0) / size)
-    return FloquetModes(values, exponents, of.near.Z @ y, rates)
+    return FloquetModes(values, exponents, of.near.Z @ y, rates, begun)
+
+
+def floquet_shape(of: Turns, modes: FloquetModes, number: int, rows: int) -> Array:
+    """(rows, V) p(t) of a mode at `rows` moments of the period, evenly, the last at its end: by central differences."""
+    at = placed(of, np.zeros(of.scale.size))
+    rest, begun = after(of, *at, rows=rows), modes.deviations[:, number]
+    shape = np.zeros((rows, of.system.layout.v_size), complex)
+    for part, unit in ((begun.real, 1.0), (begun.imag, 1j)):
+        if not part.any():
+            continue
+        ends = [after(of, *placed(of, sign * DIFFERENCE * part * of.scale), rows=rows) for sign in (1.0, -1.0)]
+        for k in range(rows):
+            forth, back = (_between(of.system.layout, rest.x[k], end.x[k]) for end in ends)
+            shape[k] += unit * (forth - back) / (2 * DIFFERENCE)
+    times = of.period / rows * np.arange(1, rows + 1)
+    return shape * np.exp(-modes.exponents[number] * times)[:, None]
 
 
 def _newton(of: Turns, s: Array) -> tuple[Array, int, float]:

@@ -2,7 +2,9 @@
 
 Of a body that turns at w about an axis, a point vibrates across it by z = u_1 + i u_2 = z_+ exp(i nu t) + z_- exp(-i nu t) in
 axes that turn with the body. From the ground z is exp(i w t) times as much, so the two parts have the frequencies w + nu and
-w - nu: whirls forward, with the turning, where these are positive, and backward where they are negative.
+w - nu: whirls forward, with the turning, where these are positive, and backward where they are negative. In bearings that are
+not the same all around a mode has parts at nu and nu + 2 w, and both a forward and a backward one at a frequency from the
+ground: an ellipse. What vibrates along the axis is seen as it is.
 (Genta 2005, Dynamics of Rotating Systems, ch. 4.)
 """
 
@@ -14,33 +16,47 @@ from ffr_dyn.equations.layout import Layout
 from ffr_dyn.functions.rotation import rotation_matrix, triad
 from ffr_dyn.linear.steady_state import Screws
 from ffr_dyn.scene.scene import Body, Scene
+from ffr_prep.body import FlexibleBody
 from ffr_prep.common.arrays import Array
 
 ONE_WAY = 0.7  # of a whirl's amplitude is its larger part, from where the smaller is called a deviation
+ALONG = 0.4  # of what moves across the axis, turning of sections included, from where a motion is one along the axis
+ONE = 1e-6  # of frequencies that are one, relative to the speed
 LEAST = 1e-6  # of a turning relative to the fastest body's: what counts as turning
 
 
-def whirls(scene: Scene, place: Layout, screws: Screws, x: Array, values: Array, modes: Array) -> tuple[Array, Array]:
-    """Frequencies (m,) [rad/s] seen from the ground of modes (V, m) with eigenvalues (m,), positive where the whirl
-    is forward; and the share (m,) of their amplitude that whirls that way: 1 for a circle, 1/2 for a line in the
-    turning axes.
+def whirls(scene: Scene, place: Layout, screws: Screws, x: Array, rates: Array, parts: Array) -> tuple[Array, Array]:
+    """Frequencies (m,) [rad/s] seen from the ground of modes, positive where the whirl is forward; and the share (m,) of
+    their amplitude that has this frequency: 1 for a circle, and any whirl of an ellipse, 1/2 for a line in the turning axes.
 
-    Modes of what does not turn, and of real eigenvalues, have the frequency that they have, and no share (nan).
+    rates, parts : (h, m) [rad/s] and (h, V, m) of the harmonics of each mode in the turning axes
+
+    Modes of what does not turn, or vibrates along the axis, and those without frequency have the frequency that they have,
+    and no share (nan).
     """
-    seen, share = np.abs(values.imag), np.full(values.size, np.nan)
-    for m, (value, mode) in enumerate(zip(values, modes.T, strict=True)):
-        if not value.imag:
-            continue
-        mode = mode if value.imag > 0 else mode.conj()
-        parts = np.array([_parts(body, place, screws, x, b, mode) for b, body in enumerate(scene.bodies)])
-        b = int(np.argmax(parts.sum(axis=1)))
-        forth, back = np.sqrt(parts[b])
-        speed = float(np.linalg.norm(screws.w[b]))
-        if forth + back <= 0 or speed <= LEAST * screws.fastest or not speed:
-            continue
-        seen[m] = speed + seen[m] if forth >= back else speed - seen[m]
-        share[m] = max(forth, back) / (forth + back)
+    main = np.argmax((np.abs(parts) ** 2).sum(axis=1), axis=0)
+    seen, share = np.abs(rates[main, np.arange(len(main))]), np.full(len(main), np.nan)
+    speeds = np.linalg.norm(screws.w, axis=1)
+    moving = np.array([_integrals(body, place, screws, x, b, parts) for b, body in enumerate(scene.bodies)])
+    for m in np.flatnonzero(rates[main, np.arange(len(main))]):
+        b = int(np.argmax(moving[..., m].sum(axis=(1, 2))))
+        forth, back, along = moving[b, ..., m]
+        across = (forth + back).sum()
+        if along.sum() <= ALONG * across and across > 0 and speeds[b] > LEAST * screws.fastest:
+            seen[m], share[m] = _from_the_ground(speeds[b], rates[:, m], forth, back)
     return seen, share
+
+
+def _from_the_ground(speed: float, rates: Array, forth: Array, back: Array) -> tuple[float, float]:
+    """The frequency [rad/s] that most of the motion across the axis has, and its share of the amplitude."""
+    found, sizes = np.concatenate([speed + rates, speed - rates]), np.concatenate([forth, back])
+    same = np.abs(np.abs(found)[:, None] - np.abs(found)) <= ONE * speed
+    amplitudes = np.sqrt(same @ sizes)
+    groups = [k for k in range(found.size) if not same[k, :k].any()]
+    best = groups[int(np.argmax(amplitudes[groups]))]
+    forward = sizes[same[best] & (found > 0)].sum() >= sizes[same[best] & (found <= 0)].sum()
+    frequency = float(abs(found[best]))
+    return frequency if forward else -frequency, float(amplitudes[best] / amplitudes[groups].sum())
 
 
 def ways_of(seen: Array, share: Array) -> list[str]:
@@ -50,22 +66,34 @@ def ways_of(seen: Array, share: Array) -> list[str]:
     ]
 
 
-def _parts(body: Body, place: Layout, screws: Screws, x: Array, b: int, mode: Array) -> tuple[float, float]:
-    """|z_+|^2 and |z_-|^2 of a body, summed over its points and its turning, with its mass."""
+def damping_ratios(values: Array, seen: Array, share: Array) -> Array:
+    """(m,) -Re / modulus of eigenvalues (m,) [1/s], of a whirl with the frequency (m,) [rad/s] that is seen from the ground;
+    1 of a decay without vibration, negative where a motion grows."""
+    whirling = [bool(way) for way in ways_of(seen, share)]
+    modulus = np.hypot(values.real, np.where(whirling, seen, values.imag))
+    return np.where(modulus > 0, -values.real / np.where(modulus > 0, modulus, 1.0), 0.0)
+
+
+def _integrals(body: Body, place: Layout, screws: Screws, x: Array, b: int, parts: Array) -> Array:
+    """Integrals (3, h, m) of |z_+|^2 dm, |z_-|^2 dm and |u_3|^2 dm of a body in motions (h, V, m), turning included."""
     A, speed = rotation_matrix(x[place.p(b)]), float(np.linalg.norm(screws.w[b]))
-    f, g = triad(A.T @ (screws.w[b] / speed))[:, :2].T if speed else np.eye(3)[:2]
-    shift, turn, q = mode[place.R_dot(b)], mode[place.omega(b)], mode[place.q_dot(b)]
-    model, surface = body.model, body.model.surface
-    known = surface is not None and surface.Phi.shape[2] == q.size
-    points = surface.points if known and surface is not None else np.array([model.r_dm / model.mass])
-    u = shift + np.cross(turn, points)
-    if known and surface is not None and q.size:
-        u = u + surface.Phi @ q
-    radius = np.sqrt(np.trace(model.rr_dm) / model.mass)
-    c = np.concatenate(
-        [np.stack([u @ f, u @ g]) / np.sqrt(len(points)), radius * np.array([[turn @ f], [turn @ g]])], 1
-    )
-    return (
-        float(model.mass * (np.abs(c[0] + 1j * c[1]) ** 2).sum()),
-        float(model.mass * (np.abs(c[0] - 1j * c[1]) ** 2).sum()),
-    )
+    f, g, e = triad(A.T @ (screws.w[b] / speed)).T if speed else np.eye(3)
+    modes = np.moveaxis(parts, 1, 0).reshape(parts.shape[1], -1)
+    motion = modes[place.R_dot(b)], modes[place.omega(b)], modes[place.q_dot(b)]
+    radius = np.sqrt(np.trace(body.model.rr_dm))
+    found = [
+        _integral(body.model, one, *motion) + np.abs(radius * one @ motion[1]) ** 2 for one in (f + 1j * g, f - 1j * g)
+    ]
+    found.append(_integral(body.model, e, *motion))
+    return np.maximum(np.array(found), 0.0).reshape(3, len(parts), -1)
+
+
+def _integral(model: FlexibleBody, along: Array, shift: Array, turn: Array, q: Array) -> Array:
+    """(m,) of |along . u|^2 dm, u = shift + turn x x + Phi q."""
+    a, t = along @ shift, np.cross(along, turn, axisb=0).T  # along . u = a + t . x + (along . Phi) q
+    mean = np.conj(a) * (model.r_dm @ t) + np.conj(a) * (along @ model.P_dm @ q)
+    mixed = t.conj() * (np.tensordot(model.rP_dm, along, (1, 0)) @ q)
+    elastic = np.einsum("k,klij,l->ij", along, model.PP_dm, along.conj(), optimize=True)
+    own = model.mass * np.abs(a) ** 2 + (t * (model.rr_dm @ t.conj())).sum(axis=0).real
+    found: Array = own + 2 * (mean + mixed.sum(axis=0)).real + (q * (elastic @ q.conj())).sum(axis=0).real
+    return found

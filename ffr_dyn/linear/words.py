@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ffr_dyn.consistency.mobility import named_motion
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.scene.parts import owner
-from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.scene.scene import Scene
+from ffr_prep.body import FlexibleBody, remembered
 from ffr_prep.common.arrays import Array
 
 ELASTIC = 0.2  # of a mode's energy is strain from where it is named by the shape of a body
@@ -58,41 +60,61 @@ def _elastic(scene: Scene, place: Layout, M: Array, rate: float, mode: Array) ->
     if not sum(strain) > ELASTIC * moving or moving == 0:
         return None
     k = int(np.argmax(strain))
-    q = mode[place.q_dot(k)]
-    return (owner(scene.bodies[k]), *_shape(scene.bodies[k], q * np.conj(q[int(np.argmax(np.abs(q)))])))
+    model = scene.bodies[k].model
+    along = remembered(model, "sections", lambda: _sections(model))
+    return (owner(scene.bodies[k]), *(_shape(along, mode[place.q_dot(k)]) if along else ("elastic mode", "")))
 
 
-def _shape(body: Body, q: Array) -> tuple[str, str]:
-    """What a body does in the deflections q (n,), complex."""
-    points, u = _field(body, q)
+@dataclass(frozen=True)
+class _Sections:
+    """Sections along a slender body: its direction e (3,); by elastic coordinates their displacements (s, 3, n), and
+    their turning about e (s, n), at the radius that counts as displacement."""
+
+    e: Array
+    displacements: Array
+    turnings: Array
+
+
+def _sections(model: FlexibleBody) -> _Sections | None:
+    """None of a body that is not slender."""
+    points, Phi = _field(model)
+    if len(points) < 2:
+        return None
     centred = points - points.mean(axis=0)
     sizes, axes = np.linalg.eigh(centred.T @ centred)
-    if not sizes[2] > SLENDER**2 * max(sizes[1], 0.0) or len(points) < 2:
-        return "elastic mode", ""
-    e = axes[:, 2]
+    if not sizes[2] > SLENDER**2 * max(sizes[1], 0.0):
+        return None
+    e, radius = axes[:, 2], np.sqrt(float(sizes[0] + sizes[1]) / len(points))
     s, across = centred @ e, centred - np.outer(centred @ e, e)
-    turning, lateral, axial = 0.0, np.zeros((3, 3)), 0.0
+    means, turnings = [], []
     for part in _slices(s):
-        mean, r = u[part].mean(axis=0), across[part] - across[part].mean(axis=0)
+        r = across[part] - across[part].mean(axis=0)
         inertia = float((r**2).sum())
-        twist = np.cross(r, u[part] - mean).sum(axis=0) @ e / inertia if inertia > 1e-12 * sizes[2] else 0.0
-        turning += abs(twist) ** 2 * float(sizes[0] + sizes[1]) / len(points)
-        flat = mean - e * (mean @ e)
-        lateral += np.outer(flat, flat.conj()).real
-        axial += abs(mean @ e) ** 2
-    bending = float(np.trace(lateral))
+        share = radius / inertia if inertia > 1e-12 * sizes[2] else 0.0
+        means.append(Phi[part].mean(axis=0))
+        turnings.append(share * np.tensordot(np.cross(e, r), Phi[part], 2))
+    return _Sections(e, np.array(means), np.array(turnings))
+
+
+def _shape(of: _Sections, q: Array) -> tuple[str, str]:
+    """What a slender body does in the deflections q (n,), complex."""
+    u = of.displacements @ q
+    flat = u - np.outer(u @ of.e, of.e)
+    lateral = (flat.T @ flat.conj()).real
+    bending, axial, turning = np.trace(lateral), (np.abs(u @ of.e) ** 2).sum(), (np.abs(of.turnings @ q) ** 2).sum()
     if bending < max(axial, turning):
         return ("torsion", "") if turning > axial else ("stretching", "")
     return "bending", _direction(lateral)
 
 
-def _field(body: Body, q: Array) -> tuple[Array, Array]:
-    """Points (P, 3) of a body and their displacements, complex; where nothing is drawn, its interfaces'."""
-    surface = body.model.surface
-    if surface is not None and surface.Phi.shape[2] == q.size:
-        return surface.points, surface.Phi @ q
-    interfaces = body.model.interfaces
-    return np.array([i.position for i in interfaces]), np.array([i.phi_t @ q for i in interfaces])
+def _field(model: FlexibleBody) -> tuple[Array, Array]:
+    """Points (P, 3) of a body and their displacements (P, 3, n); where nothing is drawn, its interfaces'."""
+    surface = model.surface
+    if surface is not None and surface.Phi.shape[2] == model.n:
+        return surface.points, surface.Phi
+    found = model.interfaces
+    points, shapes = [i.position for i in found], [i.phi_t for i in found]
+    return np.reshape(points, (-1, 3)), np.reshape(shapes, (-1, 3, model.n))
 
 
 def _slices(s: Array) -> Sequence[Array]:

@@ -16,13 +16,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ffr_dyn.analyses.registry import OfMoment, option
-from ffr_dyn.analyses.rotating.steady import GROWS, SPEEDS, TURN
+from ffr_dyn.analyses.rotating.steady import GROWS, SPEEDS, TURN, distinct
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import assemble, in_space
+from ffr_dyn.linear.prestrained import told
 from ffr_dyn.linear.spectrum import Spectrum, followed, spectrum
 from ffr_dyn.linear.speeds import at_speed, speed_list
 from ffr_dyn.linear.steady_state import steady_state
-from ffr_dyn.linear.whirl import ONE_WAY
+from ffr_dyn.linear.whirl import ONE_WAY, damping_ratios
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.described import described
@@ -221,14 +222,16 @@ def _as_result(
 ) -> Result:
     values, seen = np.array([one.values for one in spectra]), np.array([one.seen for one in spectra])
     modes = Axis("vibration", tuple(str(k + 1) for k in range(len(names))))
-    modulus = np.abs(values)
-    ratios = np.where(modulus > 0, -values.real / np.where(modulus > 0, modulus, 1.0), 0.0)
-    notes = dict.fromkeys(note for one in spectra for note in one.found.notes)
+    ratios = np.array([damping_ratios(one.values, one.seen, one.whirl) for one in spectra])
+    worst = max((one.prestrained for one in spectra), key=lambda one: one.share)
+    notes = [*distinct(note for one in spectra for note in one.found.notes), *told(worst, names[worst.mode])]
     quantities = {
         "speed": Quantity(np.array(speeds), "rad/s", (), "of what turns"),
         "frequencies": Quantity(np.abs(values.imag) / (2 * np.pi), "Hz", (modes,), "in the turning axes"),
         "seen": Quantity(seen / (2 * np.pi), "Hz", (modes,), "from the ground, positive of forward whirls"),
-        "damping_ratios": Quantity(ratios, "1", (modes,), "of the vibrations; negative where they grow"),
+        "damping_ratios": Quantity(
+            ratios, "1", (modes,), "of the vibrations, of whirls as seen from the ground; negative where they grow"
+        ),
         "growth": Quantity(values.real, "1/s", (modes,), "real parts of the eigenvalues"),
     }
     attributes = {
@@ -239,7 +242,7 @@ def _as_result(
         "whirling": [int(one) for one in whirling],
         "critical": critical,
         "limits": limits,
-        "notes": list(notes),
+        "notes": notes,
         "status": "complete",
     }
     return Result(np.full(len(speeds), time), quantities, {}, attributes)

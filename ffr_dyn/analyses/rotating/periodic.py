@@ -19,8 +19,10 @@ from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
+from ffr_dyn.consistency.tangent import sizes_of
+from ffr_dyn.equations.layout import moved
 from ffr_dyn.integrators import ROS3, Integrator
-from ffr_dyn.linear.turn_map import Returned, Turns, floquet_modes, period_of, returned, turns
+from ffr_dyn.linear.turn_map import Returned, Turns, floquet_modes, floquet_shape, period_of, returned, turns
 from ffr_dyn.linear.words import in_words
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
@@ -31,6 +33,7 @@ from ffr_prep.common.errors import InputError
 
 STEPS = 1000  # to a period, where no method is given
 SHOWN = 12  # modes that a command prints
+CYCLES = 10  # periods that a film of one shows, at most
 
 
 @dataclass(frozen=True)
@@ -46,10 +49,21 @@ class Periodic(OfMoment):
     floquet: bool = field(
         default=False, metadata=option("--floquet/--no-floquet", "Also Floquet's multipliers: takes many periods.")
     )
+    film: str = field(
+        default="", metadata=option("--film", "Film of a Floquet mode, .html, .gif or .mp4.", metavar="FILE")
+    )
+    mode: int = field(
+        default=1, metadata=option("--mode", "Which mode the film shows, by its line in what --floquet prints.")
+    )
 
     def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
         method = ROS3(self.step) if self.step else None
         period = self.period or None
+        if self.film:
+            from ffr_dyn.pictures.animate import animate
+
+            motion = floquet_motion(scene, self.mode - 1, period=period, method=method, time=settings.time)
+            animate(motion, self.film)
         return periodic(scene, period=period, method=method, floquet=self.floquet, **settings.span, **how)
 
     def report(self, result: Result) -> list[str]:
@@ -108,6 +122,48 @@ def periodic(
         "status": "complete",
     }
     return result_of(assembled.system, record, attributes, path, outputs)
+
+
+def floquet_motion(
+    scene: Scene,
+    number: int = 0,
+    *,
+    period: float | None = None,
+    method: Integrator | None = None,
+    time: float = 0.0,
+    size: float = 0.05,
+) -> Result:
+    """A Floquet mode about the periodic motion of a scene, as a result that can be animated: the motion with the mode on
+    top, y = exp(i w t) p(t) without its growth or decay, over as many periods as a vibration takes, ten at most.
+
+    number : of the mode, from 0, one of each conjugate pair, as `ffr-dyn periodic --floquet` prints them;  period, method,
+             time : as of `periodic`;  size : of the largest movement [rad, or of the scene's size]
+
+    Raises InputError for a number that there is not, and as `periodic` does.
+
+    >>> fd.animate(fd.floquet_motion(scene, 0), "mode.html")
+    """
+    assembled = assemble(scene, time=time)
+    of, found = _found(assembled, time, method, period)
+    of = turns(of.system, time, found.x, found.v, of.method, of.period)
+    modes = floquet_modes(of)
+    numbers = np.flatnonzero(modes.exponents.imag >= 0)
+    if not 0 <= number < numbers.size:
+        raise InputError(f"mode {number + 1}: the Floquet modes that are told are 1 to {numbers.size}")
+    m, rows = int(numbers[number]), len(found.record.x)
+    shape, rate = floquet_shape(of, modes, m, rows), float(modes.exponents[m].imag)
+    shape = shape * (size / np.abs(shape / sizes_of(of.system)).max())
+    count = int(np.clip(np.ceil(2 * np.pi / (rate * of.period)), 1, CYCLES)) if rate else 1
+    times = of.period / rows * np.arange(1, count * rows + 1)
+    place, again = of.system.layout, np.arange(count * rows) % rows
+    turning = (shape[again] * np.exp(1j * rate * times)[:, None]).real
+    x = np.array([moved(place, found.record.x[k], y) for k, y in zip(again, turning, strict=True)])
+    record = record_states(evaluator(of.system), time + times, x, found.record.v[again])
+    growth, frequency = modes.exponents[m].real, rate / (2 * np.pi)
+    attributes = {
+        "title": f"{frequency:.5g} Hz, growth {growth:.3g} 1/s", "analysis": "Floquet mode", "notes": [], "status": "complete"
+    }  # fmt: skip
+    return result_of(of.system, record, attributes)
 
 
 def periodically(assembled: Assembled, time: float, method: Integrator | None) -> Assembled:

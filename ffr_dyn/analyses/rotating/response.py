@@ -13,6 +13,7 @@ from ffr_dyn.analyses.efforts import Effort
 from ffr_dyn.analyses.linearise import Linearisation, linearise
 from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.rotating.inputs import Acting, absolute_order, acting, components, told
+from ffr_dyn.analyses.rotating.seen_from_ground import beside, seen_from_ground
 from ffr_dyn.analyses.rotating.steady import steady
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import scene_at
@@ -127,7 +128,8 @@ def response(
                displacement and velocity, positions and velocities of markers as well
     band_of  : (low, high) [Hz];  frequencies : [Hz], instead; by default the band of the first vibrations
     psd      : (frequency [Hz], one-sided density [input^2/Hz]) of a noise at the input, linear in between, zero outside
-    about    : the scene's "start", its "equilibrium" or its "steady" motion
+    about    : the scene's "start", its "equilibrium" or its "steady" motion, about which inputs and outputs in the ground's
+               axes do not turn with the bodies
 
     The result has `frequency` [Hz], and of each output `gain`, `phase` [deg], `transfer` (real and imaginary), and `parts` of
     it by the modes that do most, named in the attribute "modes"; with a psd `density` and the attribute "rms".
@@ -144,6 +146,7 @@ def response(
     acts = acting(at, input, time)
     names = (*components(acts.scene, outputs, time, "response"), *acts.moved)
     linear = linearise(acts.scene, time=time, inputs=(acts.effort,), outputs=names)
+    linear, envelopes = (linear, None) if acts.driver else seen_from_ground(linear, acts.scene, (acts.effort,), names)
     linear = _by_motion(linear, at, time) if acts.driver else _by_base(linear, acts)
     low, high = band_of if band_of else (None, None)
     if psd and not band_of:
@@ -152,6 +155,8 @@ def response(
     if acts.order and not f.min() > 0:
         raise InputError(f"frequencies {list(frequencies)}: at 0 Hz a velocity has no displacement; give positive ones")
     found = transfer(linear.A, linear.B, linear.C, linear.D, f, PARTS, acts.order or 0)
+    if envelopes is not None:
+        linear = replace(linear, notes=(*linear.notes, *beside(envelopes, f[:: max(1, f.size // 50)], names)))
     result = _as_result(scene, linear, found, told(acts, input), tuple(psd), time)
     if path is not None:
         save_result(result, path)

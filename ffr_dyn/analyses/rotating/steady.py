@@ -5,7 +5,7 @@ What a steady motion is and how it is found, `ffr_dyn.linear.steady_state` says.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -98,12 +98,26 @@ def steady(
         "method": f"Newton's method, {sum(state.steps for _, state in found)} steps",
         "degrees_of_freedom": assembled.degrees_of_freedom,
         "stable": int(stable),
-        "notes": list(dict.fromkeys(notes)),
+        "notes": distinct(notes),
         "status": "complete",
     }
     plain = result_of(assembled.system, joined(rows), attributes, None, outputs)
     values = np.array(list(speeds) or [found[0][1].machine.screws.fastest])
     return with_quantities(plain, {"speed": Quantity(values, "rad/s", (), "of what turns")}, path)
+
+
+def distinct(notes: Iterable[str]) -> list[str]:
+    """Notes that differ by more than how much, of those the one with the most."""
+    found = dict[str, str]()
+    for note in notes:
+        what, _, much = note.partition(" by up to ")
+        if what not in found or _number(much) > _number(found[what].partition(" by up to ")[2]):
+            found[what] = note
+    return list(found.values())
+
+
+def _number(text: str) -> float:
+    return float(text.split()[0]) if text else 0.0
 
 
 def growing(found: Found) -> str:

@@ -9,6 +9,7 @@ import pytest
 from scipy.linalg import eigh
 from test_analyses_kinematic import slider_crank
 from test_analyses_static import flexible, hanging
+from test_quasi_static import rotor
 
 from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort, recorded, with_effort
 from ffr_dyn.analyses.integration import integrate
@@ -202,3 +203,10 @@ def test_the_mass_matrix_that_the_kernels_keep_is_the_readable_one():
     evaluate(at, 0.0, assembled.x, assembled.v)
     readable = total_mass_matrix(flexible(), assembled.system.layout, assembled.x)
     np.testing.assert_allclose(evaluated_mass_matrix(at), readable, atol=1e-13)
+
+
+def test_an_input_has_no_stiffness_of_its_own():
+    """A force of one newton across a beam does nothing along it, and A is that without any input."""
+    scene = rotor(0.0, stiffening=True)
+    plain, fed = (linearise(scene, inputs=inputs) for inputs in ((), (MarkerEffort("push", "rod.b", (0, 1.0, 0)),)))
+    np.testing.assert_array_equal(fed.A, plain.A)

@@ -825,6 +825,10 @@ INPUT = [
     Case(lambda: fd.steady(governor(1000.0)), lambda: fd.steady(governor(1.0))),
     Case(lambda: fd.periodic(swung(0.0), period=1 / 1.3), lambda: fd.periodic(swung(1.0), period=1 / 1.3)),
     Case(lambda: fd.periodic(struck(0.05), period=1 / 1.3), lambda: fd.periodic(struck(5.0), period=1 / 1.3)),
+    Case(
+        lambda: fd.floquet_motion(swung(1.0), 9, period=1 / 1.3),
+        lambda: fd.floquet_motion(swung(1.0), 0, period=1 / 1.3),
+    ),
     Case(lambda: fd.steady(CRANKED), lambda: fd.periodic(CRANKED)),
     Case(lambda: fd.periodic(SWAYING, period=1.0), lambda: fd.periodic(SWAYING, period=1 / 1.3)),
     Case(lambda: fd.steady(TWICE_DRIVEN, speeds=(1.0,)), lambda: fd.steady(TWICE_DRIVEN, speeds=(1.0,), turn="first")),

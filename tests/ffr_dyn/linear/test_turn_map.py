@@ -9,8 +9,10 @@ from test_analyses_kinematic import bar
 from test_dyn_plane import slider_crank as flexible_crank
 
 import ffr_dyn as fd
+from ffr_dyn.analyses.rotating.periodic import floquet_lines
 from ffr_dyn.functions.time_functions import evaluate
 from ffr_dyn.functions.together import alone
+from ffr_prep.common.errors import InputError
 
 FORCED = 3.0  # rad/s
 
@@ -118,3 +120,38 @@ def test_a_period_that_is_none_is_an_error():
         fd.periodic(flexible_crank(), period=0.013)
     with pytest.raises(fd.ComputationError, match="does not repeat itself"):
         fd.periodic(flexible_crank())
+
+
+def test_a_floquet_mode_moves_about_the_periodic_motion_without_its_decay():
+    """Of a linear oscillator: its own vibration, of constant amplitude, on top of the forced one."""
+    scene, period = oscillator(), 2 * np.pi / FORCED
+    method = fd.RK4(period / 1000)
+    turn = fd.periodic(scene, period=period, method=method, floquet=True)
+    motion = fd.floquet_motion(scene, 0, period=period, method=method)
+    growth, rate = turn.attributes["exponents"][0]
+    assert (growth, abs(rate)) == pytest.approx((-0.1, np.sqrt(25 - 0.01)), rel=1e-6)
+    assert motion.attributes["title"] == "0.79562 Hz, growth -0.1 1/s"
+    forced = np.interp(
+        motion.time, np.append(turn.time, turn.time[1:] + period), np.append(turn["m.R.x"], turn["m.R.x"][1:])
+    )
+    waves = np.stack([np.cos(abs(rate) * motion.time), np.sin(abs(rate) * motion.time)], 1)
+    added = motion["m.R.x"] - forced
+    fit = np.linalg.lstsq(waves, added, rcond=None)[0]
+    np.testing.assert_allclose(waves @ fit, added, atol=1e-6 * np.hypot(*fit))
+    with pytest.raises(InputError, match="are 1 to 1"):
+        fd.floquet_motion(scene, 1, period=period, method=method)
+
+
+def test_the_mode_that_grows_by_a_parametric_resonance_is_told():
+    """Multipliers that are real and negative: half the frequency of the shaking, in the list of what is told."""
+    w = 2 * np.sqrt(9.81 / (4 / 3))
+    shaking = fd.harmonic(amplitude=0.2 * 9.81, frequency=w / (2 * np.pi))
+    scene = fd.Scene(
+        (fd.Body("rod", bar("rod", 2.0), rotation=(0, 0, -np.pi / 2)),), (fd.Joint("A", "revolute", "ground.O", "rod.a"),),
+        ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0), base_acceleration=(0, shaking, 0),
+    )  # fmt: skip
+    found = fd.periodic(scene, period=2 * np.pi / w, floquet=True)
+    exponents, lines = found.attributes["exponents"], floquet_lines(found.attributes)
+    assert [rate for _, rate in exponents] == pytest.approx([w / 2, w / 2])
+    assert exponents[0][0] > 0.1
+    assert len(lines) == 2

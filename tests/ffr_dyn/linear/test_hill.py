@@ -1,0 +1,97 @@
+"""Rotors in bearings that are not the same all around: against equations in axes at rest, and against Floquet's theory."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import ffr_dyn as fd
+from ffr_dyn.linear.hill import Varying, hill
+
+MASS, ACROSS, ALONG, ENDS = 10.0, 0.5, 0.9, (-0.2, 0.3)  # kg, kg m^2, m
+STIFF, AXIAL = (1e6, 1.5e6), 1e6  # N/m
+
+
+def rotor(speed: float, damping: float = 0.0, across: tuple[float, float] = (ACROSS, ACROSS)) -> fd.Scene:
+    """Rigid, in two bearings of different stiffness along x and y, a third spring along its axis."""
+    points = dict(zip(("left", "right"), ((0.0, 0.0, z) for z in ENDS), strict=True))
+    disc = fd.rigid_body("disc", mass=MASS, inertia=(*across, ALONG), points=points)
+    bearings = [
+        fd.Bushing(
+            side, f"ground.{side}", f"disc.{side}", np.diag([*STIFF, axial, 0, 0, 0]), np.diag([damping] * 2 + 4 * [0])
+        )
+        for side, axial in (("left", AXIAL), ("right", 0.0))
+    ]
+    return fd.Scene((fd.Body("disc", disc, omega_bar=(0, 0, speed)),), forces=tuple(bearings), ground=points)
+
+
+def at_rest(speed: float, damping: float) -> np.ndarray:
+    """Eigenvalues (4,) of x, y of the centre and small turnings about x and y, in axes that do not turn."""
+    M, C, K = np.diag([MASS, MASS, ACROSS, ACROSS]), np.zeros((4, 4)), np.zeros((4, 4))
+    C[2, 3], C[3, 2] = ALONG * speed, -ALONG * speed
+    for z in ENDS:
+        B = np.array([[1, 0, 0, z], [0, 1, -z, 0]])
+        K += B.T @ np.diag(STIFF) @ B
+        C += damping * B.T @ B
+    A = np.block([[np.zeros((4, 4)), np.eye(4)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
+    values = np.linalg.eigvals(A)
+    values = values[values.imag > 0]
+    return values[np.argsort(values.imag)]
+
+
+@pytest.mark.parametrize("speed", [200.0, 600.0])
+def test_a_rotor_in_unlike_bearings_whirls_as_in_axes_at_rest(speed):
+    found = fd.linearise(rotor(speed, damping=300.0))
+    moving = (found.eigenvalues.imag > 0) & ~np.isnan(found.whirl)
+    order = np.argsort(np.abs(found.seen[moving]))
+    exact = at_rest(speed, 300.0)
+    np.testing.assert_allclose(2 * np.pi * np.abs(found.seen[moving][order]), exact.imag, rtol=1e-9)
+    np.testing.assert_allclose(found.eigenvalues.real[moving][order], exact.real, rtol=1e-7)
+    np.testing.assert_allclose(found.whirl[moving], 1.0, atol=1e-6)  # one frequency each, from the ground
+    assert "its modes are those of what varies" in found.notes[-1]
+
+
+def test_along_the_axis_nothing_is_added_to_a_frequency():
+    found = fd.linearise(rotor(200.0))
+    (axial,) = found.seen[(found.eigenvalues.imag > 0) & np.isnan(found.whirl)]
+    assert axial == pytest.approx(np.sqrt(AXIAL / MASS) / (2 * np.pi), rel=1e-9)
+
+
+def test_critical_speeds_in_unlike_bearings():
+    """Where the speed is one of the eigenvalues in axes at rest; followed through rest, where the axes coincide."""
+    found = fd.campbell(rotor(1.0), speeds=np.linspace(0.0, 700.0, 15))
+    critical = [one["speed"] for one in found.attributes["critical"] if one["axes"] == "ground"]
+    assert len(critical) == 3  # what turns faster than its inertia lets it whirl has none
+    for speed in critical:
+        assert np.abs(at_rest(speed, 0.0).imag - speed).min() < 1e-5 * speed
+    assert (np.abs(np.diff(np.abs(found["seen"]), axis=0)) < 20).all()
+
+
+def test_a_rotor_unlike_itself_in_unlike_bearings_has_floquets_exponents():
+    """Of the compiled loop, over a turn."""
+    speed = 300.0
+    scene = rotor(speed, damping=200.0, across=(0.4, 0.6))
+    values = fd.linearise(scene).eigenvalues
+    period = 2 * np.pi / speed
+    turn = fd.periodic(scene, period=period, method=fd.RK4(period / 2000), floquet=True)
+    exponents = np.array(turn.attributes["exponents"]) @ np.array([1, 1j])
+    apart = (values[:, None] - exponents) / (1j * speed)
+    assert np.abs(speed * (apart - np.round(apart.real))).min(axis=1).max() < 1e-6
+
+
+def test_where_hills_determinant_is_unstable_mathieus_equation_is():
+    """y'' + (a + 2 b cos t) y = 0 at a = 1/4 grows by b, nearly."""
+    b = 1e-3
+    found = hill(Varying(np.array([[[0.25]], [[b]]], complex), np.zeros((2, 1, 1), complex), 1.0))
+    assert found.values.size == 2
+    assert found.values.real.max() == pytest.approx(b, rel=1e-4)
+    assert np.abs(found.values.imag) == pytest.approx([0.5, 0.5])
+
+
+def test_the_damping_of_a_whirl_is_that_at_the_frequency_seen_from_the_ground():
+    """As in axes at rest; what varies is told once for all speeds."""
+    found = fd.campbell(rotor(1.0, damping=300.0), speeds=(200.0, 250.0))
+    ratios = [-value.real / abs(value) for value in at_rest(200.0, 300.0)]
+    whirling = np.array(found.attributes["whirling"], bool)
+    np.testing.assert_allclose(np.sort(found["damping_ratios"][0, whirling]), np.sort(ratios), rtol=1e-6)
+    assert sum("changes with their angle" in note for note in found.attributes["notes"]) == 1
