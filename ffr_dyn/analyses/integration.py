@@ -13,6 +13,7 @@ import numpy as np
 from ffr_dyn.analyses.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
 from ffr_dyn.analyses.energy import EnergyWatch
 from ffr_dyn.analyses.events import Event, Watcher
+from ffr_dyn.closing.passed_positions import passed_in_words
 from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
@@ -26,23 +27,16 @@ from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import Integrator, methods
 from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation, excess_of_gains, gains
 from ffr_dyn.kernels.tables import (
-    AT,
     EVALUATIONS,
     FILLED,
-    FIRST_PASSED,
-    LOW,
-    LOW_AT,
-    MOST_PASSED,
     NEXT,
     NOW,
     OK,
-    PASSED,
     PHI,
     PHI_DOT,
     PROJECTIONS,
     SPACING,
     Record,
-    Work,
 )
 from ffr_dyn.results.file import ResultWriter, load_checkpoint, load_result
 from ffr_dyn.results.kept_rows import SMALL, Kept, Measured, Recorded, row_size
@@ -57,7 +51,6 @@ from ffr_prep.body import Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
-FEW = 4.0  # steps
 LOOKS = 10  # of a quantity that adds up, from row to row, where the method chooses its steps
 SURE = 10.0  # times, by which an evaluation may take longer than is guessed before the first one
 MOST_ROWS = 1000  # of the first call
@@ -215,7 +208,10 @@ def _begun(
     """The run at its start, or where the file to resume left it."""
     system, gained = assembled.system, gains(stabilisation)
     seen = nothing_seen(assembled, method, *held(system.scene, stabilisation))
-    engine = new_engine(system, assembled.x, assembled.v, method, gained, start=start, spacing=spacing)
+    dropped = assembled.all_rows is not None
+    engine = new_engine(
+        system, assembled.x, assembled.v, method, gained, start=start, spacing=spacing, keeps_passed=dropped
+    )
     energy = EnergyWatch(system, method, gained, spacing, lambda rows: with_all_reactions(assembled, rows))
     if resume is not None and Path(resume).exists():
         return _resumed(Path(resume), mark, engine, energy, seen, kept)
@@ -359,21 +355,21 @@ def reached(engine: Engine, start: float) -> float:
 
 
 def with_all_reactions(assembled: Assembled, record: Record) -> Record:
-    """The record with reactions and violations of the redundant rows too: at every state, the smallest reactions that
-    give its accelerations."""
+    """The record with reactions and violations of the redundant rows too, and accelerations that all rows agree on: those
+    that the motion keeps may depend on one another where the mechanism is not singular."""
     if assembled.all_rows is None:
         return record
     system = assembled.all_rows
     engine, one = new_engine(system, record.x[0], record.v[0]), new_record(system, 1)
     names = [block.name for block in system.blocks]
     numbers = [names.index(block.name) for block in assembled.system.blocks]
-    reaction, violation = np.empty_like(record.reaction), np.empty_like(record.violation)
+    reaction, violation, vd = np.empty_like(record.reaction), np.empty_like(record.violation), np.empty_like(record.vd)
     for row, moment in enumerate(record.time):
         engine.x[:], engine.v[:] = record.x[row], record.v[row]
         engine.work.loads.reference[:] = record.forces[row]
         record_row(engine, moment, one, 0)
-        reaction[row], violation[row] = one.reaction[0, numbers], one.violation[0]
-    return record._replace(reaction=reaction, violation=violation)
+        reaction[row], violation[row], vd[row] = one.reaction[0, numbers], one.violation[0], one.vd[0]
+    return record._replace(reaction=reaction, violation=violation, vd=vd)
 
 
 # ---- stopping and going on -------------------------------------------------------------------------------------------
@@ -480,6 +476,7 @@ def _result(scene: Scene, run: _Run, attributes: dict[str, Any]) -> Result:
 
 def _account(run: _Run, notes: list[str]) -> dict[str, Any]:
     """What only the end of a run can tell."""
+    assembled = run.seen.assembled
     info, drift = run.engine.work.info, run.engine.work.drift
     return {
         "evaluations": int(info[EVALUATIONS]),
@@ -492,7 +489,9 @@ def _account(run: _Run, notes: list[str]) -> dict[str, Any]:
                 "forward",
                 run.seen,
                 {
-                    SINGULAR: _singular(run.engine.work, run.energy.spacing),
+                    SINGULAR: passed_in_words(
+                        assembled.system, assembled.all_rows, run.engine.work, run.energy.spacing
+                    ),
                     BALANCE: run.energy.amiss(),
                     **between_rows(run.seen, run.engine.system, run.engine.work, new_record(run.engine.system, 0)),
                 },
@@ -505,21 +504,3 @@ def _steps(engine: Engine) -> dict[str, Any]:
     """Steps that the method chose."""
     control = engine.tables.control
     return {"steps": int(control.counts[0]), "refused_steps": int(control.counts[1])} if control.numbers.size else {}
-
-
-def _singular(work: Work, step: float) -> list[str]:
-    """A note on the singular positions that were passed, or are just being; a few steps [s] apart they are one."""
-    share = work.independence
-    count = int(share[PASSED])
-    times = share[FIRST_PASSED:][: min(count, MOST_PASSED)].tolist()
-    if share[LOW] < AT:
-        times.append(float(share[LOW_AT]))
-    apart = [time for k, time in enumerate(times) if k == 0 or time - times[k - 1] > FEW * step]
-    if not apart:
-        return []
-    more = f" and {count - MOST_PASSED} times more" if count > MOST_PASSED else ""
-    what = "a singular position" if len(apart) == 1 else "singular positions"
-    return [
-        f"the motion passes {what} near t = {', '.join(f'{time:.6g}' for time in apart)} s{more}, where constraints become "
-        "dependent; it goes on along its branch, and reactions there are large or not unique"
-    ]

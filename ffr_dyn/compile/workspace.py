@@ -30,10 +30,11 @@ from ffr_dyn.kernels.vectors import LEAST_PIVOT
 from ffr_prep.common.arrays import Array
 
 
-def new_work(m: Model, *, keeps_terms: bool = False) -> Work:
+def new_work(m: Model, *, keeps_terms: bool = False, keeps_passed: bool = False) -> Work:
     """Scratch of evaluations; what depends on the elastic diagonal is made when that is set.
 
-    keeps_terms : whether the quadratic terms of all bodies are needed after an evaluation
+    keeps_terms  : whether the quadratic terms of all bodies are needed after an evaluation
+    keeps_passed : whether positions beside singular ones are
     """
     V, n = 6 * m.bodies.mass.size + int(m.bodies.where[-1, IN_Q]), m.bodies.where[:, N]
     bodies = _body_work(m, keeps_terms)
@@ -48,6 +49,7 @@ def new_work(m: Model, *, keeps_terms: bool = False) -> Work:
         info=np.zeros(3, dtype=np.int64),
         independence=np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, *np.zeros(MOST_PASSED)]),
         **_zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=4),
+        passed=np.zeros((MOST_PASSED + 1, m.bodies.mass.size + V) if keeps_passed else (0, 0)),
     )
 
 
@@ -85,7 +87,7 @@ def _body_work(m: Model, keeps_terms: bool) -> BodyWork:
         **_zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), inverse=(B, 2), g=9 * terms, l=3 * terms),
         sorted=np.zeros(17 * longest + 4 * LANES),
         **_zeros(H=3 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6)),
-        **_zeros(more=V, settled=V if m.bodies.coupled_damping.size else 0),
+        **_zeros(more=V, settled=V if m.bodies.coupled_damping.size else 0, solved=V * (m.relaxation > 0.0)),
     )
     work.inverse[:, 0] = [_inverse(mass) for mass in m.bodies.mass]
     for b in np.flatnonzero(n[:-1] == 0):
@@ -102,7 +104,7 @@ def _row_work(m: Model) -> RowWork:
     column = np.repeat(np.arange(K), np.diff(m.pattern.column_start))
     stored = LANES * int(size.sum() + size[column].sum())
     return RowWork(
-        **_zeros(Phi=C, nu=C, gamma=C, lam=C, left=C),
+        **_zeros(Phi=C, nu=C, gamma=C, lam=C, left=C, reacted=C * (m.relaxation > 0.0)),
         **_zeros(jac=(K * D, 9, LANES), kept=(K * D, 9, LANES), X=K * D * 12 * LANES, Y=12 * LANES),
         **_zeros(scale=K * LANES, least=K * LANES, pivots=K * LANES, step=K * LANES),
         **_zeros(compliance=K * LANES, pull=K * LANES, relief=K * LANES),
