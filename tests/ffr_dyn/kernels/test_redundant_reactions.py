@@ -56,7 +56,7 @@ def test_a_locomotive_is_singular_where_its_cranks_are_aligned_and_nowhere_else(
     positions smoothly, and are the same in the plane and in space."""
     found = [ran(locomotive(3, drawn, 8.0, plane, gravity=GRAVITY), method) for plane in ("auto", "none")]
     for result in found:
-        x, y = result["s0.b.position"][:, :2].T
+        y = result["s0.b.position"][:, 1]
         aligned = result.time[:-1][(y[1:] * y[:-1] < 0)]
         note = next(text for text in result.attributes["notes"] if "the motion passes" in text)
         told = np.array([float(word) for word in note.split("near t = ")[1].split(" s,")[0].split(", ")])
