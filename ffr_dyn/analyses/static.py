@@ -20,7 +20,7 @@ from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import held
 from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
 from ffr_dyn.consistency.doubts import checked
-from ffr_dyn.consistency.equilibrium import Equilibrium, equilibrium
+from ffr_dyn.consistency.equilibrium import Equilibrium, equilibrium, jumped
 from ffr_dyn.consistency.evaluation import (
     Evaluator,
     evaluate,
@@ -73,7 +73,8 @@ def static(
     at = evaluator(assembled.system)
     found = equilibrium(assembled.system, time, assembled.x, sizes(at))
     lowest = _lowest_stiffness(at, assembled, found)
-    return _result(scene, assembled, at, found, time, lowest, outputs, path)
+    branch = jumped(assembled.system, time, assembled.x, sizes(at), found)
+    return _result(scene, assembled, at, found, time, (lowest, branch), outputs, path)
 
 
 def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium) -> float:
@@ -110,7 +111,7 @@ def _result(
     at: Evaluator,
     found: Equilibrium,
     time: float,
-    lowest: float,
+    seen: tuple[float, str],
     outputs: Sequence[str],
     path: str | Path | None,
 ) -> Result:
@@ -118,8 +119,9 @@ def _result(
     for x in found.path[:-1]:  # forces count the turns of angles on the way
         evaluate(at, time, x, still)
     record = with_all_reactions(assembled, record_states(at, np.array([time]), found.path[-1:], still[None]))
+    lowest, branch = seen
     stable = lowest > 0
-    notes = [*assembled.notes, *checked("static", assembled, record)]
+    notes = [*assembled.notes, *checked("static", assembled, record), *([branch] if branch else [])]
     if not stable:
         notes.append(f"the equilibrium is unstable: its lowest stiffness per mass is {lowest:.4g} 1/s^2")
     attributes = {

@@ -119,7 +119,7 @@ def substituted(value: Any, parameters: Mapping[str, Any], where: str) -> Any:
 
 def as_number(text: str, parameters: Mapping[str, Any], what: str, unit: str | None = None) -> float:
     """A number from a text: with a unit ("120 mm"), or a formula of parameters, in SI units."""
-    quantity, named = split_quantity(text), parameters[text.strip()] if text.strip() in parameters else None
+    quantity, named = split_quantity(text), parameters.get(text.strip())
     try:
         if quantity is not None:
             return to_si(*quantity, unit)

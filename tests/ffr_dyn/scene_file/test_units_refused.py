@@ -121,7 +121,7 @@ def test_a_parameter_keeps_its_unit_where_it_stands_alone(given, tmp_path):
         [springs]
         spring = {{i = "ground.a", j = "ground.b", stiffness = "{given}"}}
         [loads]
-        load = {{at = "ground.a", force = ["{given}", 0, 0]}}
+        load = {{marker = "ground.a", force = ["{given}", 0, 0]}}
         [analysis]
         kind = "assemble"
         """,
