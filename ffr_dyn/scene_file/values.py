@@ -25,7 +25,7 @@ from ffr_dyn.functions.curves import Curve
 from ffr_dyn.functions.formula import Expression, is_constant, parse
 from ffr_dyn.functions.time_functions import HARMONIC, TimeFunction, constant, harmonic, piecewise, polynomial, table
 from ffr_dyn.scene.fields import Six, Unit
-from ffr_dyn.scene_file.parameters import as_number, fitting
+from ffr_dyn.scene_file.parameters import WithUnit, as_number, fitting
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import reading
 from ffr_prep.common.strict import Strict
@@ -178,7 +178,7 @@ def check_units(given: Iterable[tuple[Any, str]], info: ValidationInfo) -> None:
         parameters = parameters_of(info)
         if isinstance(text, float):
             fitting(text, unit)
-        elif isinstance(text, str) and (split_quantity(text) is not None or text.strip() in parameters):
+        elif isinstance(text, str) and (split_quantity(text) or isinstance(parameters.get(text.strip()), WithUnit)):
             as_number(text, parameters, "it", unit)
 
 
