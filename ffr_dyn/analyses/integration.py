@@ -21,7 +21,8 @@ from ffr_dyn.consistency import failure as failing
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.doubts import BALANCE, SINGULAR, Seen, between_rows, ended, held, look, nothing_seen
 from ffr_dyn.consistency.evaluation import joined
-from ffr_dyn.consistency.following import STALLED, Lost, jumped, lost_driver, unfollowed
+from ffr_dyn.consistency.explicit_forces import told
+from ffr_dyn.consistency.following import LOST, STALLED, Lost, jumped, lost_driver, unfollowed
 from ffr_dyn.consistency.validity import meaningless
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import Integrator, methods
@@ -36,6 +37,8 @@ from ffr_dyn.kernels.tables import (
     PHI_DOT,
     PROJECTIONS,
     SPACING,
+    STEP_TOO_SMALL,
+    USER_FAILED,
     Record,
 )
 from ffr_dyn.results.file import ResultWriter, load_checkpoint, load_result
@@ -287,10 +290,21 @@ def _advance(
         if ends:
             return
         if status != OK:
+            _require_soft(run, method, status, reached(run.engine, start))
             gained = run.energy.gains
             settings = failing.Settings(method, gained[2] > 0, excess_of_gains(gained, run.energy.spacing))
             raise failing.failure(run.engine.system, run.engine.work, status, reached(run.engine, start), settings)
         count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
+
+
+def _require_soft(run: _Run, method: Integrator, status: int, time: float) -> None:
+    """ComputationError where steps that have failed are too long for a force that the method takes explicitly."""
+    if status in (USER_FAILED, STEP_TOO_SMALL):
+        return
+    if run.unseen is not None:
+        look(run.seen, View(run.engine.system, run.unseen))
+    for text in told(run.engine.system, method, run.seen.arrays["rates"])[:1]:
+        raise ComputationError(f"at t = {time:.6g} s the steps do not go on: {text}")
 
 
 def _first_rows(system: System, method: Integrator, substeps: int) -> int:
@@ -317,7 +331,7 @@ def _driver_lost(run: _Run, method: Integrator, start: float, rows: Record, stat
         return jumped(system, np.array([early, now, late])) or lost_driver(system, early, late, STALLED)
     if lost is None:
         return ""
-    found = lost_driver(system, lost.time - method.step, lost.time)
+    found = lost_driver(system, lost.time - method.step, lost.time, LOST)
     return found or jumped(system, np.concatenate([*run.kept.times, rows.time]))
 
 

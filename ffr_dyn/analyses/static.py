@@ -37,7 +37,7 @@ from ffr_dyn.results.result import Result
 from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import ComputationError, InputError
 
 NEUTRAL = 1e-7  # of a stiffness, relative to that of the applied forces
 ROUNDING = 1e-13  # of a stiffness, relative to the largest
@@ -86,6 +86,13 @@ def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium) -
         return float("inf")
     K = Z.T @ found.balance.stiffness @ Z
     values, vectors = np.linalg.eigh(0.5 * (K + K.T))
+    if not found.found and values[0] > 0:
+        motion = named_motion(at.system.scene, at.system.layout, x, Z @ np.linalg.solve(K, Z.T @ found.balance.forces))
+        raise ComputationError(
+            f"no equilibrium was found in {len(found.steps)} steps, though what moves is held: a force jumps, has a kink or "
+            f"a pole near there, along {motion}; look at the forces and formulas that act on it, or start nearer to an "
+            "equilibrium"
+        )
     if not found.found:
         raise _not_held(assembled, x, Z @ vectors[:, 0], f"no equilibrium was found in {len(found.steps)} steps")
     applied = np.linalg.solve(M, found.balance.forces) / sizes(at)
