@@ -30,7 +30,7 @@ ARM = 1e-6  # of the largest range of forces times that of positions, the same f
 MIDDLE, WINDOW = 2.2 * 1.5**0.5, 16  # of amplitudes of methods of order three
 NOISE = (70 / 36) ** 0.5  # by which rows without relation are farther off the curve than they are large
 RATES = {"position": "velocity", "R": "v", "q": "q_dot"}
-CONSTANT = 1e-8  # of the size of a kind: a range below it is rounding, as of the rate of an even turn
+CONSTANT = 1e-7  # of the size of a kind: a range below it is rounding, as of the rate of an even turn
 AT_ONCE = 2e7  # bytes of numbers that are compared side by side
 COARSE = 0.01  # of the range, by which a row may be off the curve through its neighbours
 

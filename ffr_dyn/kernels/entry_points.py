@@ -79,7 +79,10 @@ from ffr_dyn.kernels.tables import (
 )
 from ffr_dyn.kernels.vectors import add_scaled, copy, fill
 
-PASSES = 10  # at most, where rows depend on one another
+PASSES, SETTLES = (
+    20,
+    0.9,
+)  # at most, where rows depend on one another; of what is left, to which a pass brings it no more
 GROSS = 1.0  # m, -: of a violation that no projection puts right
 SETTLING, SETTLED = 60, 1e-11  # iterations with a damping matrix, and the relative change at which they end
 UNMET = 1e3  # tolerances, beyond which a violation that the projection does not take back is no drift
@@ -278,7 +281,7 @@ def refine(r, target):
         add_scaled(rw.left, rw.left, -1.0, target)
         subtract_yield(m.rows, rw, rw.lam, rw.left)
         left = largest(rw.left)
-        if number > 1 and not left < 0.5 * before:
+        if number > 1 and not left < SETTLES * before:
             break
         before = left
         copy(bw.more, bw.acc)

@@ -9,13 +9,16 @@ import pytest
 from test_dyn_singular import bricard
 from test_independence import locomotive
 
+from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.evaluation import evaluate, evaluated_mass_matrix, evaluator
 from ffr_dyn.functions.formula import formula
-from ffr_dyn.integrators import RK4, ROS2, ROS3, Integrator
+from ffr_dyn.integrators import RK4, ROS2, ROS3, GeneralisedAlpha, Integrator
 from ffr_dyn.scene.drivers import Driver
-from ffr_dyn.scene.scene import Scene
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Body, Scene
+from ffr_prep.body import rigid_body
 
 GRAVITY = (0.0, -9.81, 0.0)
 
@@ -87,3 +90,24 @@ def test_bricards_reactions_are_the_smallest():
     start = assemble(scene)
     lam, wanted = smallest(scene, start.x, start.v)
     np.testing.assert_allclose(lam, wanted, rtol=0, atol=1e-6 * np.abs(wanted).max())
+
+
+def door(hinges: int) -> Scene:
+    """At rest on one hinge or two, whose axis gravity is along: all that holds it is constant."""
+    points = {"a": np.array([0, 0, -0.5]), "b": np.array([0, 0, 0.5])}
+    model = rigid_body("door", mass=10.0, inertia=(1.0, 1.0, 1.0), centre_of_mass=(0.5, 0, 0), points=points)
+    joints = tuple(Joint(f"h{k}", "revolute", f"ground.{k}", f"door.{k}") for k in "ab"[:hinges])
+    return Scene((Body("door", model),), joints, ground={"a": (0, 0, -0.5), "b": (0, 0, 0.5)}, gravity=(0, 0, -9.81))
+
+
+@pytest.mark.parametrize("hinges", [1, 2])
+@pytest.mark.parametrize(
+    "method", [ROS2(1e-3), RK4(1e-3), GeneralisedAlpha(1e-3), GeneralisedAlpha(1e-3, form="stabilised")]
+)
+def test_a_door_at_rest_is_at_rest(hinges, method):
+    """Iterations end at what rounding leaves, and rounding of reactions is no motion that rows are too coarse for."""
+    result = forward(door(hinges), end=0.2, output_step=0.01, method=method)
+    held = sum(result[f"h{k}.force"] for k in "ab"[:hinges])
+    np.testing.assert_allclose(held, np.tile([0, 0, 98.1], (21, 1)), atol=1e-7)
+    np.testing.assert_allclose(result["ha.force"][:, 2], 98.1 / hinges, atol=1e-6)
+    assert not any("too coarse" in note for note in result.attributes["notes"])
