@@ -169,6 +169,8 @@ def ranges(run: Result) -> dict[str, float]:
         kind: max(LITTLE * most, CONSTANT * sizes[kind], arm if kind == "moment" else 0.0)
         for kind, most in largest.items()
     }
+    if "velocity" in floors and run.time.size and (lasts := float(np.ptp(run.time))) > 0:  # of what is at rest
+        floors["velocity"] = max(floors["velocity"], CONSTANT * sizes.get("position", 0.0) / lasts)
     return {name: max(span, floors[_kind(name)]) for name, span in spans.items()}
 
 
