@@ -169,9 +169,16 @@ def ranges(run: Result) -> dict[str, float]:
         kind: max(LITTLE * most, CONSTANT * sizes[kind], arm if kind == "moment" else 0.0)
         for kind, most in largest.items()
     }
-    if "velocity" in floors and run.time.size and (lasts := float(np.ptp(run.time))) > 0:  # of what is at rest
-        floors["velocity"] = max(floors["velocity"], CONSTANT * sizes.get("position", 0.0) / lasts)
+    for kind, floor in _floors_at_rest(run, sizes).items():
+        floors[kind] = max(floors.get(kind, 0.0), floor)
     return {name: max(span, floors[_kind(name)]) for name, span in spans.items()}
+
+
+def _floors_at_rest(run: Result, sizes: dict[str, float]) -> dict[str, float]:
+    """Of rates and energies of what does not move at all, where positions and forces have a size."""
+    lasts = float(np.ptp(run.time)) if run.time.size else 0.0
+    far, rate = sizes.get("position", 0.0), CONSTANT / lasts if lasts > 0 else 0.0
+    return {"velocity": far * rate, "omega_bar": rate, "energy": CONSTANT * far * sizes.get("force", 0.0)}
 
 
 def _kind(name: str) -> str:
